@@ -1,0 +1,3 @@
+//! The `relight` command.
+
+fn main() {}
