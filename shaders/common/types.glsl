@@ -1,0 +1,53 @@
+// The structures and constants that GLSL and Rust (shaders/src/types.rs) share, under the same names.
+// Everything is laid out `scalar`. A test compares the member offsets of both sides.
+#ifndef RELIGHT_TYPES_GLSL
+#define RELIGHT_TYPES_GLSL
+
+struct Vertex { vec3 position; vec3 normal; vec2 st; vec2 lightmap; uint color; };
+
+struct Wave { uint function; float base; float amplitude; float phase; float frequency; };
+
+struct TcMod { uint kind; float values[6]; Wave wave; };
+
+struct Stage {
+    uint image_first; uint image_count; float image_frequency; uint sampler_index;
+    uint tc_gen; vec3 vector_s; vec3 vector_t; uint tc_mod_first; uint tc_mod_count;
+    uint rgb_gen; uint alpha_gen; vec4 constant; Wave rgb_wave; Wave alpha_wave;
+    float portal_range; uint alpha_func; uint blend_src; uint blend_dst; uint flags;
+};
+
+struct Material {
+    uint stage_first; uint stage_count; uint flags; float time_offset; float clamp_time;
+    vec3 mean_emission; vec3 light_radiance;
+};
+
+struct Instance {
+    vec3 axis[3]; vec3 origin; vec3 viewer; vec4 color; vec2 texcoord; float time;
+    vec3 ambient; vec3 directed; vec3 light_direction; uint flags;
+};
+
+struct Triangle { uint indices[3]; uint material; uint instance; uint fog; uint lightmap; uint flags; };
+
+struct Fog { vec3 mins; vec3 maxs; vec4 plane; uint has_surface; vec3 color; float depth; };
+
+const uint NO_TEXTURE = 0xFFFFFFFFu;
+const uint WAVE_SIN = 0, WAVE_SQUARE = 1, WAVE_TRIANGLE = 2, WAVE_SAWTOOTH = 3, WAVE_INVERSE_SAWTOOTH = 4, WAVE_NOISE = 5;
+const uint TCMOD_TURBULENT = 0, TCMOD_SCALE = 1, TCMOD_SCROLL = 2, TCMOD_STRETCH = 3, TCMOD_TRANSFORM = 4, TCMOD_ROTATE = 5,
+    TCMOD_ENTITY_TRANSLATE = 6;
+const uint TCGEN_BASE = 0, TCGEN_LIGHTMAP = 1, TCGEN_ENVIRONMENT = 2, TCGEN_VECTOR = 3;
+const uint RGBGEN_IDENTITY = 0, RGBGEN_IDENTITY_LIGHTING = 1, RGBGEN_WAVE = 2, RGBGEN_CONST = 3, RGBGEN_ENTITY = 4,
+    RGBGEN_ONE_MINUS_ENTITY = 5, RGBGEN_VERTEX = 6, RGBGEN_EXACT_VERTEX = 7, RGBGEN_ONE_MINUS_VERTEX = 8, RGBGEN_LIGHTING_DIFFUSE = 9;
+const uint ALPHAGEN_IDENTITY = 0, ALPHAGEN_CONST = 1, ALPHAGEN_WAVE = 2, ALPHAGEN_ENTITY = 3, ALPHAGEN_ONE_MINUS_ENTITY = 4,
+    ALPHAGEN_VERTEX = 5, ALPHAGEN_ONE_MINUS_VERTEX = 6, ALPHAGEN_LIGHTING_SPECULAR = 7, ALPHAGEN_PORTAL = 8;
+const uint ALPHAFUNC_NONE = 0, ALPHAFUNC_GT0 = 1, ALPHAFUNC_LT128 = 2, ALPHAFUNC_GE128 = 3;
+const uint BLEND_ZERO = 0, BLEND_ONE = 1, BLEND_DST_COLOR = 2, BLEND_ONE_MINUS_DST_COLOR = 3, BLEND_SRC_ALPHA = 4,
+    BLEND_ONE_MINUS_SRC_ALPHA = 5, BLEND_DST_ALPHA = 6, BLEND_ONE_MINUS_DST_ALPHA = 7, BLEND_SRC_ALPHA_SATURATE = 8,
+    BLEND_SRC_COLOR = 9, BLEND_ONE_MINUS_SRC_COLOR = 10;
+const uint STAGE_WHITE = 1, STAGE_DEPTH_WRITE = 2, STAGE_DEPTH_EQUAL = 4;
+const uint MATERIAL_TWO_SIDED = 1, MATERIAL_CULL_BACK = 2, MATERIAL_CUT_OUT = 4, MATERIAL_TRANSLUCENT = 8, MATERIAL_SKY = 16,
+    MATERIAL_PORTAL = 32, MATERIAL_FOG = 64, MATERIAL_LIQUID = 128, MATERIAL_GLASS = 256, MATERIAL_VERTEX_LIGHT = 512,
+    MATERIAL_POLYGON_OFFSET = 1024, MATERIAL_EMITTER = 2048, MATERIAL_INVISIBLE = 4096;
+const uint INSTANCE_DEPTH_HACK = 1, INSTANCE_FIRST_PERSON = 2, INSTANCE_THIRD_PERSON = 4, INSTANCE_NO_SHADOW = 8, INSTANCE_WORLD = 16;
+const uint TRIANGLE_WORLD = 1;
+
+#endif

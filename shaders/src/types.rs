@@ -1,0 +1,235 @@
+//! The structures that Rust and GLSL share. `shaders/common/types.glsl` has the same ones under the same names;
+//! a test reads the member offsets out of the compiled SPIR-V and compares them with these.
+//!
+//! Everything is `layout(scalar)`: a `Vec3` takes 12 bytes and aligns to 4. Addresses are buffer device addresses.
+
+#![allow(clippy::struct_excessive_bools)]
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3, Vec4};
+
+/// A vertex, of the world (world space) or of what moves (space of its [`Instance`]).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Vertex {
+    /// Position, id Tech units.
+    pub position: Vec3,
+    /// Unit normal.
+    pub normal: Vec3,
+    /// Texture coordinates, (0, 0) is the image's first texel.
+    pub st: Vec2,
+    /// Lightmap coordinates within the page of the draw.
+    pub lightmap: Vec2,
+    /// RGBA8, red in the lowest byte; encoded as displayed, overbright shift applied.
+    pub color: u32,
+}
+
+/// A periodic function: `base + table(function, phase + time * frequency) * amplitude`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Wave {
+    /// One of the `WAVE_*` constants.
+    pub function: u32,
+    /// Added to the table's value.
+    pub base: f32,
+    /// Scale of the table's value.
+    pub amplitude: f32,
+    /// In periods.
+    pub phase: f32,
+    /// Periods per second.
+    pub frequency: f32,
+}
+
+/// One `tcMod`; the meaning of `values` depends on `kind` (see `material.glsl`).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct TcMod {
+    /// One of the `TCMOD_*` constants.
+    pub kind: u32,
+    /// Parameters: scale, scroll: (s, t); rotate: degrees per second; transform: m00 m01 m10 m11 t0 t1.
+    pub values: [f32; 6],
+    /// The wave of `stretch`; amplitude, phase and frequency of `turb`.
+    pub wave: Wave,
+}
+
+/// One stage of a material.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Stage {
+    /// First of the stage's images in the image list (an array of bindless texture indices).
+    pub image_first: u32,
+    /// How many images the animation has; 1 for a plain map; 0: the lightmap of the draw.
+    pub image_count: u32,
+    /// Images per second of an animation.
+    pub image_frequency: f32,
+    /// Index of the sampler.
+    pub sampler_index: u32,
+    /// One of the `TCGEN_*` constants.
+    pub tc_gen: u32,
+    /// `tcGen vector`: the axis of s.
+    pub vector_s: Vec3,
+    /// `tcGen vector`: the axis of t.
+    pub vector_t: Vec3,
+    /// First of the stage's `tcMod`s.
+    pub tc_mod_first: u32,
+    /// Number of `tcMod`s.
+    pub tc_mod_count: u32,
+    /// One of the `RGBGEN_*` constants.
+    pub rgb_gen: u32,
+    /// One of the `ALPHAGEN_*` constants.
+    pub alpha_gen: u32,
+    /// `rgbGen const` and `alphaGen const`, 0..1.
+    pub constant: Vec4,
+    /// `rgbGen wave`.
+    pub rgb_wave: Wave,
+    /// `alphaGen wave`.
+    pub alpha_wave: Wave,
+    /// `alphaGen portal`: distance at which alpha reaches 1.
+    pub portal_range: f32,
+    /// One of the `ALPHAFUNC_*` constants.
+    pub alpha_func: u32,
+    /// Source blend factor, `BLEND_*`; `BLEND_ONE` with a destination of `BLEND_ZERO` is no blending.
+    pub blend_src: u32,
+    /// Destination blend factor, `BLEND_*`.
+    pub blend_dst: u32,
+    /// `STAGE_*` bits.
+    pub flags: u32,
+}
+
+/// A material: a run of stages and what the tracer needs to know at once.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Material {
+    /// First stage.
+    pub stage_first: u32,
+    /// Number of stages.
+    pub stage_count: u32,
+    /// `MATERIAL_*` bits.
+    pub flags: u32,
+    /// Seconds subtracted from shader time (`RemapShader`).
+    pub time_offset: f32,
+    /// `clampTime`, or a very large number.
+    pub clamp_time: f32,
+    /// Mean linear colour emitted towards a viewer, display-white units (for bounced light).
+    pub mean_emission: Vec3,
+    /// Extra radiance of the surface as a light, display-white units, shown as its glow (0 if none).
+    pub light_radiance: Vec3,
+}
+
+/// One entity (or the world, index 0) of a view.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Instance {
+    /// The entity's axes as columns: `world = axis * local + origin`.
+    pub axis: [Vec3; 3],
+    /// Where the entity is, world space.
+    pub origin: Vec3,
+    /// Viewer in the entity's space (for environment mapping and specular alpha).
+    pub viewer: Vec3,
+    /// `shaderRGBA`, 0..1.
+    pub color: Vec4,
+    /// `shaderTexCoord`, for `tcMod entityTranslate`.
+    pub texcoord: Vec2,
+    /// Shader time in seconds: view time less the entity's.
+    pub time: f32,
+    /// Ambient light from the grid, 0..1 (of 255), engine's scales applied.
+    pub ambient: Vec3,
+    /// Directed light, 0..1 and above.
+    pub directed: Vec3,
+    /// Unit direction towards that light, in the entity's space.
+    pub light_direction: Vec3,
+    /// `INSTANCE_*` bits.
+    pub flags: u32,
+}
+
+/// What a primitive of an acceleration structure is.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Triangle {
+    /// Vertex indices into the geometry's vertex array.
+    pub indices: [u32; 3],
+    /// Index of the material.
+    pub material: u32,
+    /// Index of the instance (entity) it belongs to.
+    pub instance: u32,
+    /// Fog volume plus one; 0 none.
+    pub fog: u32,
+    /// Bindless texture index of the lightmap page, or `NO_TEXTURE`.
+    pub lightmap: u32,
+    /// `TRIANGLE_*` bits.
+    pub flags: u32,
+}
+
+/// A fog volume.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Fog {
+    /// Lower corner of the box.
+    pub mins: Vec3,
+    /// Upper corner of the box.
+    pub maxs: Vec3,
+    /// Fog surface: `normal.p - distance` is the depth below it; only if `has_surface`.
+    pub plane: Vec4,
+    /// 1 if the volume has a surface.
+    pub has_surface: u32,
+    /// Colour, as displayed (encoded).
+    pub color: Vec3,
+    /// Depth at which the fog is opaque, units.
+    pub depth: f32,
+}
+
+/// Names of constants used on both sides.
+pub mod constants {
+    macro_rules! constants { ($($(#[$doc:meta])* $name:ident = $value:expr;)*) => { $($(#[$doc])* #[allow(missing_docs)] pub const $name: u32 = $value;)* } }
+    constants! {
+        /// No texture.
+        NO_TEXTURE = 0xFFFF_FFFF;
+        WAVE_SIN = 0; WAVE_SQUARE = 1; WAVE_TRIANGLE = 2; WAVE_SAWTOOTH = 3; WAVE_INVERSE_SAWTOOTH = 4; WAVE_NOISE = 5;
+        TCMOD_TURBULENT = 0; TCMOD_SCALE = 1; TCMOD_SCROLL = 2; TCMOD_STRETCH = 3; TCMOD_TRANSFORM = 4; TCMOD_ROTATE = 5;
+        TCMOD_ENTITY_TRANSLATE = 6;
+        TCGEN_BASE = 0; TCGEN_LIGHTMAP = 1; TCGEN_ENVIRONMENT = 2; TCGEN_VECTOR = 3;
+        RGBGEN_IDENTITY = 0; RGBGEN_IDENTITY_LIGHTING = 1; RGBGEN_WAVE = 2; RGBGEN_CONST = 3; RGBGEN_ENTITY = 4;
+        RGBGEN_ONE_MINUS_ENTITY = 5; RGBGEN_VERTEX = 6; RGBGEN_EXACT_VERTEX = 7; RGBGEN_ONE_MINUS_VERTEX = 8;
+        RGBGEN_LIGHTING_DIFFUSE = 9;
+        ALPHAGEN_IDENTITY = 0; ALPHAGEN_CONST = 1; ALPHAGEN_WAVE = 2; ALPHAGEN_ENTITY = 3; ALPHAGEN_ONE_MINUS_ENTITY = 4;
+        ALPHAGEN_VERTEX = 5; ALPHAGEN_ONE_MINUS_VERTEX = 6; ALPHAGEN_LIGHTING_SPECULAR = 7; ALPHAGEN_PORTAL = 8;
+        ALPHAFUNC_NONE = 0; ALPHAFUNC_GT0 = 1; ALPHAFUNC_LT128 = 2; ALPHAFUNC_GE128 = 3;
+        BLEND_ZERO = 0; BLEND_ONE = 1; BLEND_DST_COLOR = 2; BLEND_ONE_MINUS_DST_COLOR = 3; BLEND_SRC_ALPHA = 4;
+        BLEND_ONE_MINUS_SRC_ALPHA = 5; BLEND_DST_ALPHA = 6; BLEND_ONE_MINUS_DST_ALPHA = 7; BLEND_SRC_ALPHA_SATURATE = 8;
+        BLEND_SRC_COLOR = 9; BLEND_ONE_MINUS_SRC_COLOR = 10;
+        /// The stage's image is white.
+        STAGE_WHITE = 1;
+        /// The stage writes depth.
+        STAGE_DEPTH_WRITE = 2;
+        /// The stage tests depth for equality.
+        STAGE_DEPTH_EQUAL = 4;
+        /// Seen from both sides.
+        MATERIAL_TWO_SIDED = 1;
+        /// Only the back side is seen.
+        MATERIAL_CULL_BACK = 2;
+        /// Has an alpha-tested stage that decides what is solid.
+        MATERIAL_CUT_OUT = 4;
+        /// Its first stage blends: what lies behind shows through.
+        MATERIAL_TRANSLUCENT = 8;
+        MATERIAL_SKY = 16; MATERIAL_PORTAL = 32; MATERIAL_FOG = 64; MATERIAL_LIQUID = 128; MATERIAL_GLASS = 256;
+        /// Vertex colours are baked light (world surfaces), not part of the material.
+        MATERIAL_VERTEX_LIGHT = 512;
+        /// Drawn with a depth offset (decals).
+        MATERIAL_POLYGON_OFFSET = 1024;
+        /// Gives light (is in the light list).
+        MATERIAL_EMITTER = 2048;
+        /// Nothing is drawn.
+        MATERIAL_INVISIBLE = 4096;
+        /// Drawn in front of everything near (first-person weapon).
+        INSTANCE_DEPTH_HACK = 1;
+        /// Only in the eye's own view, never in mirrors and shadows.
+        INSTANCE_FIRST_PERSON = 2;
+        /// Only in mirrors and shadows.
+        INSTANCE_THIRD_PERSON = 4;
+        INSTANCE_NO_SHADOW = 8;
+        /// The instance is the world or one of its submodels.
+        INSTANCE_WORLD = 16;
+        /// The triangle belongs to the world (its vertex colours and lightmap are baked light).
+        TRIANGLE_WORLD = 1;
+    }
+}
