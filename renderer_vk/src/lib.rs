@@ -1,1 +1,8 @@
-//! renderer_vk
+//! The renderer: a safe Rust API over Vulkan. It knows no engine and no C; `ffi` translates for engines and `cli`
+//! uses it directly.
+
+#![deny(unsafe_code)]
+
+pub mod api;
+pub mod scene;
+pub mod settings;

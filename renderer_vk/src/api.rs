@@ -1,0 +1,181 @@
+//! What a front end hands to the renderer: entities, polygons, views, in the engine's own terms but as safe types.
+//!
+//! Space: id Tech units, x forward, y left, z up. Angles: degrees. Time: milliseconds. Colours: as displayed.
+
+use glam::{Vec2, Vec3};
+
+/// What a scene entity is (`refEntityType_t`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum EntityKind {
+    /// A model, inline BSP models included.
+    #[default]
+    Model,
+    /// Accepted by the engine's interface, but an error once it is drawn.
+    Poly,
+    /// A quad that faces the camera.
+    Sprite,
+    /// A red tube.
+    Beam,
+    /// The core of a rail trail.
+    RailCore,
+    /// The rings of a rail trail.
+    RailRings,
+    /// A lightning bolt.
+    Lightning,
+    /// Nothing to see: marks the plane of a portal or mirror.
+    PortalSurface,
+}
+
+/// `renderfx` bits of an entity.
+pub mod renderfx {
+    #![allow(missing_docs)]
+    pub const MIN_LIGHT: u32 = 0x1;
+    pub const THIRD_PERSON: u32 = 0x2;
+    pub const FIRST_PERSON: u32 = 0x4;
+    pub const DEPTH_HACK: u32 = 0x8;
+    pub const CROSSHAIR: u32 = 0x10;
+    pub const NO_SHADOW: u32 = 0x40;
+    pub const LIGHTING_ORIGIN: u32 = 0x80;
+    pub const SHADOW_PLANE: u32 = 0x100;
+    pub const WRAP_FRAMES: u32 = 0x200;
+}
+
+/// `rdflags` bits of a view.
+pub mod rdflags {
+    #![allow(missing_docs)]
+    pub const NO_WORLD_MODEL: u32 = 0x1;
+    pub const HYPERSPACE: u32 = 0x4;
+}
+
+/// One thing to draw (`refEntity_t`).
+#[derive(Clone, Copy, Debug, Default)]
+#[allow(missing_docs)] // the engine's fields, under its names
+pub struct RefEntity {
+    pub kind: EntityKind,
+    pub renderfx: u32,
+    pub model: i32,
+    pub lighting_origin: Vec3,
+    pub shadow_plane: f32,
+    pub axis: [Vec3; 3],
+    pub non_normalized_axes: bool,
+    pub origin: Vec3,
+    pub frame: i32,
+    pub old_origin: Vec3,
+    pub old_frame: i32,
+    /// 0 = `frame`, 1 = `old_frame`.
+    pub backlerp: f32,
+    pub skin_num: i32,
+    pub custom_skin: i32,
+    pub custom_shader: i32,
+    pub shader_rgba: [u8; 4],
+    pub shader_texcoord: Vec2,
+    /// Seconds, subtracted from the view's time.
+    pub shader_time: f32,
+    pub radius: f32,
+    /// Sprites: degrees.
+    pub rotation: f32,
+}
+
+/// A corner of a polygon (`polyVert_t`).
+#[derive(Clone, Copy, Debug, Default)]
+#[allow(missing_docs)]
+pub struct PolyVert {
+    pub position: Vec3,
+    pub st: Vec2,
+    pub rgba: [u8; 4],
+}
+
+/// A view to draw (`refdef_t`).
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)]
+pub struct RefDef {
+    /// Pixels from the left and the top of the window.
+    pub x: i32,
+    pub y: i32,
+    pub width: i32,
+    pub height: i32,
+    /// Full angles, degrees.
+    pub fov_x: f32,
+    pub fov_y: f32,
+    pub view_origin: Vec3,
+    /// Forward, left, up.
+    pub view_axis: [Vec3; 3],
+    pub time_ms: i32,
+    pub flags: u32,
+    /// A set bit hides that area.
+    pub area_mask: [u8; 32],
+    /// Strings of `deformVertexes text0..7`, NUL-terminated.
+    pub text: [[u8; 32]; 8],
+}
+
+impl Default for RefDef {
+    fn default() -> Self {
+        Self {
+            x: 0,
+            y: 0,
+            width: 640,
+            height: 480,
+            fov_x: 90.0,
+            fov_y: 73.739_8,
+            view_origin: Vec3::ZERO,
+            view_axis: [Vec3::X, Vec3::Y, Vec3::Z],
+            time_ms: 0,
+            flags: 0,
+            area_mask: [0; 32],
+            text: [[0; 32]; 8],
+        }
+    }
+}
+
+/// A dynamic light as the game sends it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DynamicLight {
+    /// Where it is.
+    pub origin: Vec3,
+    /// Reach in units (the engine calls it intensity).
+    pub radius: f32,
+    /// Nominally 0..1.
+    pub color: Vec3,
+    /// Added instead of modulated.
+    pub additive: bool,
+}
+
+/// A piece of a decal clipped to the world (`markFragment_t`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MarkFragment {
+    /// Index of its first point.
+    pub first_point: usize,
+    /// Number of points.
+    pub num_points: usize,
+}
+
+/// A tag's place (`orientation_t`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orientation {
+    /// Origin.
+    pub origin: Vec3,
+    /// Forward, left, up.
+    pub axis: [Vec3; 3],
+}
+
+/// Answer of `light_for_point`: 0..255 scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointLighting {
+    /// Ambient light.
+    pub ambient: Vec3,
+    /// Directed light.
+    pub directed: Vec3,
+    /// Unit vector towards the directed light.
+    pub direction: Vec3,
+}
+
+/// A picture read back from the frame: RGB8, rows from the top.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// `width * height * 3` bytes.
+    pub rgb: Vec<u8>,
+}

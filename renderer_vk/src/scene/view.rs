@@ -1,0 +1,137 @@
+//! Camera and projection of a view.
+
+use glam::{Mat4, Vec3, Vec4};
+
+use crate::api::RefDef;
+
+/// A camera with its viewport. World space is id Tech's; clip space is Vulkan's (y down, depth 0..1).
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// Eye, world space.
+    pub origin: Vec3,
+    /// Forward, left, up.
+    pub axis: [Vec3; 3],
+    /// Tangent of half the horizontal angle.
+    pub tan_x: f32,
+    /// Tangent of half the vertical angle.
+    pub tan_y: f32,
+    /// World to clip space.
+    pub world_to_clip: Mat4,
+    /// Distance of the near plane.
+    pub near: f32,
+    /// Distance of the far plane.
+    pub far: f32,
+    /// Pixels from the left and the top of the window, width, height.
+    pub viewport: [i32; 4],
+    /// Left and right are swapped (seen in a mirror), so front faces wind the other way.
+    pub mirrored: bool,
+    /// Only what lies on the positive side of `xyz.p = w` shows (portal views).
+    pub clip_plane: Option<Vec4>,
+    /// This is what a portal or mirror shows.
+    pub is_portal: bool,
+}
+
+impl View {
+    /// The view that `def` asks for, with depth from `near` to `far`.
+    pub fn new(def: &RefDef, near: f32, far: f32) -> Self {
+        let half = |degrees: f32| (degrees.clamp(0.1, 179.9).to_radians() * 0.5).tan();
+        let mut view = Self {
+            origin: def.view_origin,
+            axis: def.view_axis,
+            tan_x: half(def.fov_x),
+            tan_y: half(def.fov_y),
+            world_to_clip: Mat4::IDENTITY,
+            near,
+            far: far.max(near * 2.0),
+            viewport: [def.x, def.y, def.width, def.height],
+            mirrored: false,
+            clip_plane: None,
+            is_portal: false,
+        };
+        view.update();
+        view
+    }
+
+    /// Recomputes the matrix after a change of the other fields.
+    pub fn update(&mut self) {
+        let [forward, left, up] = self.axis;
+        let rotate = Mat4::from_cols(
+            Vec4::new(-left.x, -up.x, forward.x, 0.0),
+            Vec4::new(-left.y, -up.y, forward.y, 0.0),
+            Vec4::new(-left.z, -up.z, forward.z, 0.0),
+            Vec4::W,
+        );
+        // right, down, forward; depth 0 at the near and 1 at the far plane
+        let depth = self.far / (self.far - self.near);
+        let project = Mat4::from_cols(
+            Vec4::new(1.0 / self.tan_x, 0.0, 0.0, 0.0),
+            Vec4::new(0.0, 1.0 / self.tan_y, 0.0, 0.0),
+            Vec4::new(0.0, 0.0, depth, 1.0),
+            Vec4::new(0.0, 0.0, -depth * self.near, 0.0),
+        );
+        self.world_to_clip = project * rotate * Mat4::from_translation(-self.origin);
+    }
+
+    /// The four side planes of the view's pyramid, pointing inwards: `xyz.p >= w` is inside.
+    pub fn frustum(&self) -> [Vec4; 4] {
+        let [forward, left, up] = self.axis;
+        let plane = |normal: Vec3| {
+            let normal = normal.normalize();
+            normal.extend(normal.dot(self.origin))
+        };
+        [
+            plane(forward * self.tan_x - left),
+            plane(forward * self.tan_x + left),
+            plane(forward * self.tan_y - up),
+            plane(forward * self.tan_y + up),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clip(view: &View, p: Vec3) -> Vec3 {
+        let c = view.world_to_clip * p.extend(1.0);
+        c.truncate() / c.w
+    }
+
+    #[test]
+    fn forward_is_the_middle_and_up_is_up() {
+        let view = View::new(
+            &RefDef {
+                fov_x: 90.0,
+                fov_y: 90.0,
+                ..RefDef::default()
+            },
+            4.0,
+            1000.0,
+        );
+        let middle = clip(&view, Vec3::new(4.0, 0.0, 0.0));
+        assert!(middle.abs_diff_eq(Vec3::ZERO, 1e-5), "{middle}");
+        let far = clip(&view, Vec3::new(1000.0, 0.0, 0.0));
+        assert!((far.z - 1.0).abs() < 1e-4, "{far}");
+        // left of the view is the negative x of clip space, up is the negative y (Vulkan)
+        assert!((clip(&view, Vec3::new(10.0, 10.0, 0.0)).x + 1.0).abs() < 1e-5);
+        assert!((clip(&view, Vec3::new(10.0, 0.0, 10.0)).y + 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn frustum_planes_point_inwards() {
+        let view = View::new(
+            &RefDef {
+                fov_x: 90.0,
+                fov_y: 60.0,
+                ..RefDef::default()
+            },
+            4.0,
+            1000.0,
+        );
+        let inside = |p: Vec3| view.frustum().iter().all(|f| f.truncate().dot(p) >= f.w);
+        assert!(inside(Vec3::new(10.0, 9.0, 0.0)));
+        assert!(!inside(Vec3::new(10.0, 11.0, 0.0)));
+        assert!(!inside(Vec3::new(10.0, 0.0, 6.0)));
+        assert!(inside(Vec3::new(10.0, 0.0, 5.0)));
+    }
+}

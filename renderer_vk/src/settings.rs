@@ -1,0 +1,150 @@
+//! The renderer's settings: the values of the cvars, as plain data. The front end owns the cvars (names, ranges,
+//! flags) and hands over a fresh copy each frame; what is latched there changes only at `begin_registration`.
+
+/// How traced direct light chooses among the lights of a cluster.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum LightSampling {
+    /// One light of the list, each with the same probability.
+    Uniform,
+    /// Resampled importance sampling over a few candidates.
+    #[default]
+    Resampled,
+    /// Every light of the list.
+    All,
+}
+
+/// All settings. Names follow the cvars.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs)] // each is documented with its cvar in `ffi`
+pub struct Settings {
+    // the traced look
+    pub rt: bool,
+    /// Accumulate frames while nothing moves (reference mode).
+    pub rt_reference: bool,
+    pub rt_light_sampling: LightSampling,
+    /// Light samples (shadow rays) a pixel and frame.
+    pub rt_samples: u32,
+    /// Candidates of resampled selection.
+    pub rt_candidates: u32,
+    /// Mirrors and glass on a path.
+    pub rt_max_depth: u32,
+    /// Diffuse bounces.
+    pub rt_bounces: u32,
+    /// Exposure in stops; added to automatic exposure.
+    pub rt_exposure: f32,
+    pub rt_auto_exposure: bool,
+    /// Multiplies every light that the map has.
+    pub rt_light_scale: f32,
+    /// Multiplies the game's dynamic lights.
+    pub rt_dlight_scale: f32,
+    // textures (latched)
+    pub picmip: u32,
+    pub round_images_down: bool,
+    pub simple_mip_maps: bool,
+    pub detail_textures: bool,
+    pub intensity: f32,
+    pub greyscale: f32,
+    pub anisotropy: f32,
+    pub texture_mode: String,
+    pub map_overbright_bits: u32,
+    pub overbright_bits: u32,
+    pub vertex_light: bool,
+    pub fullbright: bool,
+    pub subdivisions: f32,
+    // polled
+    pub gamma: f32,
+    pub ignore_hw_gamma: bool,
+    pub fullscreen: bool,
+    pub swap_interval: i32,
+    pub lod_bias: i32,
+    pub lod_scale: f32,
+    pub lod_curve_error: f32,
+    pub znear: f32,
+    pub fast_sky: bool,
+    pub draw_sun: bool,
+    pub dynamic_light: bool,
+    pub flares: bool,
+    pub shadows: i32,
+    pub draw_world: bool,
+    pub draw_entities: bool,
+    pub no_vis: bool,
+    pub lock_pvs: bool,
+    pub no_cull: bool,
+    pub no_curves: bool,
+    pub no_portals: bool,
+    pub clear: bool,
+    pub show_tris: bool,
+    pub lightmap: bool,
+    pub speeds: i32,
+    pub ambient_scale: f32,
+    pub directed_scale: f32,
+    pub rail_width: f32,
+    pub rail_core_width: f32,
+    pub rail_segment_length: f32,
+    pub marks_on_triangle_meshes: bool,
+    pub offset_factor: f32,
+    pub offset_units: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            rt: false,
+            rt_reference: false,
+            rt_light_sampling: LightSampling::Resampled,
+            rt_samples: 1,
+            rt_candidates: 8,
+            rt_max_depth: 4,
+            rt_bounces: 1,
+            rt_exposure: 0.0,
+            rt_auto_exposure: true,
+            rt_light_scale: 1.0,
+            rt_dlight_scale: 1.0,
+            picmip: 0,
+            round_images_down: true,
+            simple_mip_maps: true,
+            detail_textures: true,
+            intensity: 1.0,
+            greyscale: 0.0,
+            anisotropy: 0.0,
+            texture_mode: "GL_LINEAR_MIPMAP_LINEAR".into(),
+            map_overbright_bits: 2,
+            overbright_bits: 0,
+            vertex_light: false,
+            fullbright: false,
+            subdivisions: 4.0,
+            gamma: 1.0,
+            ignore_hw_gamma: false,
+            fullscreen: false,
+            swap_interval: 0,
+            lod_bias: 0,
+            lod_scale: 5.0,
+            lod_curve_error: 250.0,
+            znear: 4.0,
+            fast_sky: false,
+            draw_sun: false,
+            dynamic_light: true,
+            flares: false,
+            shadows: 1,
+            draw_world: true,
+            draw_entities: true,
+            no_vis: false,
+            lock_pvs: false,
+            no_cull: false,
+            no_curves: false,
+            no_portals: false,
+            clear: false,
+            show_tris: false,
+            lightmap: false,
+            speeds: 0,
+            ambient_scale: 0.6,
+            directed_scale: 1.0,
+            rail_width: 16.0,
+            rail_core_width: 6.0,
+            rail_segment_length: 32.0,
+            marks_on_triangle_meshes: false,
+            offset_factor: -1.0,
+            offset_units: -2.0,
+        }
+    }
+}
