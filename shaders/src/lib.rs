@@ -1,3 +1,65 @@
-//! The renderer's GLSL, compiled to SPIR-V at build time, and the structures that it shares with Rust.
+//! The renderer's GLSL as SPIR-V, and the structures that it shares with Rust.
+//!
+//! The sources lie beside this crate's manifest, one folder for each group of passes; the build script compiles
+//! them for Vulkan 1.2 and gives each module a static here, named after folder and file: `raster/draw.vert` is
+//! [`RASTER_DRAW_VERT`](crate). See `build.rs` for variants.
+
+#![forbid(unsafe_code)]
 
 pub mod types;
+
+/// Bytes that start at an address that is a multiple of four, as words of SPIR-V must.
+#[repr(C, align(4))]
+struct Aligned<T: ?Sized>(T);
+
+/// The stage of the pipeline that a module is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// Vertex shader (`.vert`).
+    Vertex,
+    /// Fragment shader (`.frag`).
+    Fragment,
+    /// Compute shader (`.comp`).
+    Compute,
+    /// Ray generation (`.rgen`).
+    RayGeneration,
+    /// Closest hit (`.rchit`).
+    ClosestHit,
+    /// Any hit (`.rahit`).
+    AnyHit,
+    /// Miss (`.rmiss`).
+    Miss,
+}
+
+/// One compiled module; its entry point is `main`.
+pub struct Spirv {
+    name: &'static str,
+    stage: Stage,
+    bytes: &'static Aligned<[u8]>,
+}
+
+impl Spirv {
+    /// The source file below the shader folder and the definitions of the variant, for labels and messages.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// The stage that the module was compiled for.
+    pub fn stage(&self) -> Stage {
+        self.stage
+    }
+
+    /// The words of the module, SPIR-V 1.5.
+    pub fn words(&self) -> &'static [u32] {
+        // The wrapper aligns the bytes and SPIR-V comes in whole words, so this cast cannot fail.
+        bytemuck::try_cast_slice(&self.bytes.0).unwrap_or_default()
+    }
+}
+
+impl std::fmt::Debug for Spirv {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Spirv({}, {:?})", self.name, self.stage)
+    }
+}
+
+include!(concat!(env!("OUT_DIR"), "/modules.rs"));

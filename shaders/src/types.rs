@@ -1,12 +1,13 @@
 //! The structures that Rust and GLSL share. `shaders/common/types.glsl` has the same ones under the same names;
 //! a test reads the member offsets out of the compiled SPIR-V and compares them with these.
 //!
-//! Everything is `layout(scalar)`: a `Vec3` takes 12 bytes and aligns to 4. Addresses are buffer device addresses.
+//! Everything is `layout(scalar)`: a `Vec3` takes 12 bytes and aligns to 4; a `vec4` is `[f32; 4]` here, because
+//! glam's `Vec4` aligns to 16. Addresses are buffer device addresses.
 
 #![allow(clippy::struct_excessive_bools)]
 
 use bytemuck::{Pod, Zeroable};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3};
 
 /// A vertex, of the world (world space) or of what moves (space of its [`Instance`]).
 #[repr(C)]
@@ -79,7 +80,7 @@ pub struct Stage {
     /// One of the `ALPHAGEN_*` constants.
     pub alpha_gen: u32,
     /// `rgbGen const` and `alphaGen const`, 0..1.
-    pub constant: Vec4,
+    pub constant: [f32; 4],
     /// `rgbGen wave`.
     pub rgb_wave: Wave,
     /// `alphaGen wave`.
@@ -127,7 +128,7 @@ pub struct Instance {
     /// Viewer in the entity's space (for environment mapping and specular alpha).
     pub viewer: Vec3,
     /// `shaderRGBA`, 0..1.
-    pub color: Vec4,
+    pub color: [f32; 4],
     /// `shaderTexCoord`, for `tcMod entityTranslate`.
     pub texcoord: Vec2,
     /// Shader time in seconds: view time less the entity's.
@@ -169,7 +170,7 @@ pub struct Fog {
     /// Upper corner of the box.
     pub maxs: Vec3,
     /// Fog surface: `normal.p - distance` is the depth below it; only if `has_surface`.
-    pub plane: Vec4,
+    pub plane: [f32; 4],
     /// 1 if the volume has a surface.
     pub has_surface: u32,
     /// Colour, as displayed (encoded).

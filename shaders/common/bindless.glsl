@@ -1,0 +1,38 @@
+// The one descriptor set, number 0, that every pipeline uses. Indices come from the renderer's gpu layer;
+// an index that differs between invocations of a draw or dispatch needs nonuniformEXT.
+// Everything else reaches a shader as a buffer device address in its push constants.
+//
+// Before including this, a stage that walks acceleration structures defines BINDLESS_SCENES and enables
+// GL_EXT_ray_tracing or GL_EXT_ray_query.
+#ifndef RELIGHT_BINDLESS_GLSL
+#define RELIGHT_BINDLESS_GLSL
+
+#extension GL_EXT_nonuniform_qualifier : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_buffer_reference2 : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+
+layout(set = 0, binding = 0) uniform sampler samplers[];
+layout(set = 0, binding = 1) uniform texture2D textures[];
+layout(set = 0, binding = 1) uniform utexture2D utextures[];
+
+// Storage images: one binding, seen as the format that the image was made with.
+layout(set = 0, binding = 2, rgba8) uniform image2D images_rgba8[];
+layout(set = 0, binding = 2, rgba16) uniform image2D images_rgba16[];
+layout(set = 0, binding = 2, rgb10_a2) uniform image2D images_rgb10_a2[];
+layout(set = 0, binding = 2, r11f_g11f_b10f) uniform image2D images_r11f_g11f_b10f[];
+layout(set = 0, binding = 2, rgba16f) uniform image2D images_rgba16f[];
+layout(set = 0, binding = 2, rg16f) uniform image2D images_rg16f[];
+layout(set = 0, binding = 2, r16f) uniform image2D images_r16f[];
+layout(set = 0, binding = 2, rgba32f) uniform image2D images_rgba32f[];
+layout(set = 0, binding = 2, rg32f) uniform image2D images_rg32f[];
+layout(set = 0, binding = 2, r32f) uniform image2D images_r32f[];
+layout(set = 0, binding = 2, rgba32ui) uniform uimage2D uimages_rgba32ui[];
+layout(set = 0, binding = 2, rg32ui) uniform uimage2D uimages_rg32ui[];
+layout(set = 0, binding = 2, r32ui) uniform uimage2D uimages_r32ui[];
+
+#ifdef BINDLESS_SCENES
+layout(set = 0, binding = 3) uniform accelerationStructureEXT scenes[];
+#endif
+
+#endif
