@@ -1,1 +1,29 @@
-//! shaderscript
+//! Quake III `.shader` scripts: text to typed materials, their evaluation, and what they are to light.
+//!
+//! * `parse_script` reads one file and never fails as a whole: every fault is a [`Diagnostic`] with file, line
+//!   and column, and reading goes on at the next definition.
+//! * `Library` joins the files of a game by the engine's rules of precedence and finds a [`Shader`] by name.
+//! * `eval` is the run-time half: waves, noise, colour and texture coordinate generators, vertex deformations.
+//! * `light` tells what a material is to a light simulation (opaque, cut-out, glass, sky, emitter ...) from its
+//!   directives alone, and separates a stack of stages into what reflects light and what glows.
+//!
+//! No files are opened here: whether an image exists is for the caller to find out.
+//!
+//! Source: behaviour of ioquake3's first OpenGL renderer (1.36, November 2022), the one Debian ships.
+
+#![forbid(unsafe_code)]
+
+pub mod surface_params;
+
+mod diagnostic;
+mod shader;
+mod stage;
+
+pub use diagnostic::{Diagnostic, Severity};
+pub use shader::{
+    Cull, Deform, Fog, LightDirectives, Location, Shader, Sky, Sun, UnknownDirective, sort,
+};
+pub use stage::{
+    AlphaFunc, AlphaGen, BlendFactor, DepthFunc, RgbGen, Stage, StageImage, TcGen, TcMod, Wave,
+    WaveFunction,
+};
