@@ -1,1 +1,15 @@
-//! relight
+//! Map conversion: a map, its materials and its images become a relit world.
+//!
+//! * [`files`]: game files behind one trait: packs, folders, an engine, memory.
+//! * [`mod@image`]: texture images as the engine reads them.
+//! * [`overbright`]: the one place that knows overbright bits, gamma and sRGB.
+
+#![forbid(unsafe_code)]
+
+pub mod files;
+pub mod image;
+pub mod overbright;
+#[cfg(test)]
+mod test_data;
+
+pub use files::{FileError, GameFiles, MemoryFiles, Pk3, SearchPath};

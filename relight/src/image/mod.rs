@@ -1,0 +1,293 @@
+//! Texture images: the engine's formats, its search for files, and the arithmetic on pixels that
+//! both looks share.
+//!
+//! TGA, BMP and PCX have readers of their own, because the engine reads them differently from their
+//! specifications (a TGA's top-down flag means nothing to it). PNG and JPEG are decoded by `image`.
+
+mod bmp;
+mod pcx;
+mod resample;
+mod tga;
+
+use crate::files::{FileError, GameFiles};
+use crate::overbright;
+use glam::Vec3;
+use image::{DynamicImage, ImageDecoder, ImageFormat};
+use std::io::Cursor;
+
+/// The most pixels that an image may have: 2²⁶, an 8192 × 8192 picture. Checked before pixels are
+/// decoded, so that a header of a few bytes cannot ask for gigabytes.
+pub const MAX_PIXELS: u64 = 1 << 26;
+
+/// Extensions that the engine tries, in its order.
+pub const EXTENSIONS: [&str; 6] = ["tga", "jpg", "jpeg", "png", "pcx", "bmp"];
+
+/// Why an image file could not be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImageError {
+    /// The file could not be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The file's content is not an image that the engine reads.
+    #[error("{file}: {reason}")]
+    Malformed {
+        /// Game path of the file.
+        file: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The picture is empty or has more than [`MAX_PIXELS`] pixels.
+    #[error("{file}: {width} x {height} pixels; an image has 1 to {MAX_PIXELS}")]
+    Size {
+        /// Game path of the file.
+        file: String,
+        /// Width that the header names.
+        width: u32,
+        /// Height that the header names.
+        height: u32,
+    },
+}
+
+/// A picture: 8-bit sRGB-encoded RGBA, straight alpha, row 0 on top (texture coordinate t = 0).
+#[derive(Clone, PartialEq, Eq)]
+pub struct Image {
+    /// Width in pixels, at least 1.
+    pub width: u32,
+    /// Height in pixels, at least 1.
+    pub height: u32,
+    /// `width * height * 4` bytes.
+    pub rgba: Vec<u8>,
+    /// Whether some pixel's alpha is not 255; the engine keeps an alpha channel only then.
+    pub has_alpha: bool,
+}
+
+impl std::fmt::Debug for Image {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "Image({} x {}, alpha: {})",
+            self.width, self.height, self.has_alpha
+        )
+    }
+}
+
+impl Image {
+    /// A picture from its pixels; `None` when the number of bytes does not fit the size, or the size
+    /// is empty or above [`MAX_PIXELS`].
+    pub fn from_rgba(width: u32, height: u32, rgba: Vec<u8>) -> Option<Image> {
+        let pixels = u64::from(width) * u64::from(height);
+        if pixels == 0 || pixels > MAX_PIXELS || rgba.len() as u64 != pixels * 4 {
+            return None;
+        }
+        let has_alpha = rgba.chunks_exact(4).any(|p| p.get(3) != Some(&255));
+        Some(Image {
+            width,
+            height,
+            rgba,
+            has_alpha,
+        })
+    }
+
+    /// A picture of one colour, 1 × 1.
+    pub fn uniform(rgba: [u8; 4]) -> Image {
+        Image {
+            width: 1,
+            height: 1,
+            rgba: rgba.to_vec(),
+            has_alpha: rgba[3] != 255,
+        }
+    }
+
+    /// The pixels, row by row from the top.
+    pub fn pixels(&self) -> impl ExactSizeIterator<Item = [u8; 4]> + '_ {
+        self.rgba.as_chunks::<4>().0.iter().copied()
+    }
+
+    /// Mean colour, linear, each channel 0..=1; alpha plays no part.
+    pub fn mean_linear(&self) -> Vec3 {
+        let table = overbright::byte_table();
+        let mut sum = [0.0f64; 3];
+        for [r, g, b, _] in self.pixels() {
+            for (sum, byte) in sum.iter_mut().zip([r, g, b]) {
+                *sum += f64::from(table[usize::from(byte)]);
+            }
+        }
+        let count = f64::from(self.width) * f64::from(self.height);
+        Vec3::from_array(sum.map(|s| (s / count) as f32))
+    }
+
+    /// Mean alpha, 0..=1.
+    pub fn mean_alpha(&self) -> f32 {
+        let sum: u64 = self.pixels().map(|[.., a]| u64::from(a)).sum();
+        (sum as f64 / (f64::from(self.width) * f64::from(self.height) * 255.0)) as f32
+    }
+}
+
+/// Loads the image that a script or a map names.
+///
+/// The engine's search: a name with a known extension is tried as written; when that file is absent
+/// (or is a PNG, JPEG or PCX that cannot be decoded) the extension is taken off and the others are
+/// tried in the order of [`EXTENSIONS`]. A name with no or an unknown extension gets each extension
+/// in turn. Returns the picture and the game path of the file it came from; `None` when there is none.
+///
+/// # Errors
+/// [`ImageError`] when a TGA or BMP is malformed, an image is too large, or a file cannot be read. The
+/// engine leaves the map for the first of these; callers here draw the default image and say so once.
+pub fn load(files: &dyn GameFiles, name: &str) -> Result<Option<(Image, String)>, ImageError> {
+    let (stem, written) = match split_extension(name) {
+        Some((stem, ext)) if known(ext) => (stem, Some(ext.to_ascii_lowercase())),
+        _ => (name, None),
+    };
+    if let Some(ext) = &written
+        && let Some(image) = load_one(files, name, ext)?
+    {
+        return Ok(Some((image, name.to_owned())));
+    }
+    for ext in EXTENSIONS {
+        if written.as_deref() == Some(ext) {
+            continue;
+        }
+        let file = format!("{stem}.{ext}");
+        if let Some(image) = load_one(files, &file, ext)? {
+            return Ok(Some((image, file)));
+        }
+    }
+    Ok(None)
+}
+
+/// The game path of the file that [`load`] would try first among those that exist, without reading it.
+pub fn find(files: &dyn GameFiles, name: &str) -> Option<String> {
+    let stem = match split_extension(name) {
+        Some((stem, ext)) if known(ext) => {
+            if files.exists(name) {
+                return Some(name.to_owned());
+            }
+            stem
+        }
+        _ => name,
+    };
+    EXTENSIONS
+        .iter()
+        .map(|ext| format!("{stem}.{ext}"))
+        .find(|file| files.exists(file))
+}
+
+fn known(extension: &str) -> bool {
+    EXTENSIONS.iter().any(|e| e.eq_ignore_ascii_case(extension))
+}
+
+/// Stem and extension of a game path; `None` when the last component has no dot.
+pub(crate) fn split_extension(name: &str) -> Option<(&str, &str)> {
+    let (stem, ext) = name.rsplit_once('.')?;
+    (!ext.contains(['/', '\\'])).then_some((stem, ext))
+}
+
+fn load_one(
+    files: &dyn GameFiles,
+    file: &str,
+    extension: &str,
+) -> Result<Option<Image>, ImageError> {
+    let Some(bytes) = files.read(file)? else {
+        return Ok(None);
+    };
+    match decode(file, extension, &bytes) {
+        Ok(image) => Ok(Some(image)),
+        // The engine treats these three formats as absent when they cannot be decoded.
+        Err(problem @ ImageError::Malformed { .. }) if !matches!(extension, "tga" | "bmp") => {
+            log::warn!("{problem}; trying other extensions");
+            Ok(None)
+        }
+        Err(problem) => Err(problem),
+    }
+}
+
+/// Decodes an image by its extension (lower case, one of [`EXTENSIONS`]); `file` is for messages.
+///
+/// # Errors
+/// [`ImageError::Malformed`] and [`ImageError::Size`].
+pub fn decode(file: &str, extension: &str, bytes: &[u8]) -> Result<Image, ImageError> {
+    let malformed = |reason: String| ImageError::Malformed {
+        file: file.to_owned(),
+        reason,
+    };
+    let decoded = match extension {
+        "tga" => tga::decode(bytes),
+        "bmp" => bmp::decode(bytes),
+        "pcx" => pcx::decode(bytes),
+        "jpg" | "jpeg" => foreign(ImageFormat::Jpeg, bytes),
+        "png" => foreign(ImageFormat::Png, bytes),
+        other => Err(Fault::Malformed(format!(
+            "no reader for extension {other:?}"
+        ))),
+    };
+    decoded.map_err(|fault| match fault {
+        Fault::Malformed(reason) => malformed(reason),
+        Fault::Size(width, height) => ImageError::Size {
+            file: file.to_owned(),
+            width,
+            height,
+        },
+    })
+}
+
+/// What a reader complains about, before the file's name is known.
+#[derive(Debug, PartialEq)]
+enum Fault {
+    Malformed(String),
+    Size(u32, u32),
+}
+
+impl From<&str> for Fault {
+    fn from(reason: &str) -> Self {
+        Fault::Malformed(reason.to_owned())
+    }
+}
+
+/// Number of pixels of a size that an image may have.
+fn check_size(width: u32, height: u32) -> Result<usize, Fault> {
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels == 0 || pixels > MAX_PIXELS {
+        return Err(Fault::Size(width, height));
+    }
+    usize::try_from(pixels).map_err(|_| Fault::Size(width, height))
+}
+
+fn finish(width: u32, height: u32, rgba: Vec<u8>) -> Result<Image, Fault> {
+    Image::from_rgba(width, height, rgba).ok_or(Fault::Size(width, height))
+}
+
+fn foreign(format: ImageFormat, bytes: &[u8]) -> Result<Image, Fault> {
+    let fault = |e: image::ImageError| Fault::Malformed(e.to_string());
+    let mut reader = image::ImageReader::with_format(Cursor::new(bytes), format);
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(MAX_PIXELS * 16);
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(fault)?;
+    let (width, height) = decoder.dimensions();
+    check_size(width, height)?;
+    let rgba = DynamicImage::from_decoder(decoder)
+        .map_err(fault)?
+        .into_rgba8()
+        .into_raw();
+    finish(width, height, rgba)
+}
+
+/// Little-endian `u16` at a byte offset.
+fn u16_at(bytes: &[u8], at: usize) -> Option<u16> {
+    bytes
+        .get(at..)?
+        .first_chunk::<2>()
+        .map(|b| u16::from_le_bytes(*b))
+}
+
+/// Little-endian `u32` at a byte offset.
+fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
+    bytes
+        .get(at..)?
+        .first_chunk::<4>()
+        .map(|b| u32::from_le_bytes(*b))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,90 @@
+//! Overbright, gamma and sRGB: the one place that knows how stored bytes become light.
+//!
+//! Map compilers store light at a quarter of its displayed strength, so that a lightmap can hold
+//! more than display white: *overbright*. The engine shifts lightmap texels, vertex colours and
+//! light-grid points left by `r_mapOverBrightBits - r_overBrightBits` when it loads a map, and keeps
+//! the hue when a channel runs over ([`shift`]); what the hardware's gamma ramp adds back makes the
+//! whole ×4 in *encoded* (gamma) space whatever the split. Everything that Relight traces is linear
+//! ([`to_linear`]).
+//!
+//! Source: behaviour of ioquake3's `renderer_opengl1`; IEC 61966-2-1 for the sRGB curve.
+
+use glam::Vec3;
+
+/// Default of `r_mapOverBrightBits`: stored light is shifted by two bits in all, that is ×4.
+pub const MAP_OVERBRIGHT_BITS: u32 = 2;
+
+/// Shifts stored light left by `bits` (encoded space); when a channel passes 255, all are scaled so
+/// that the largest is 255 and the hue stays.
+pub fn shift(rgb: [u8; 3], bits: u32) -> [u8; 3] {
+    let bits = bits.min(8);
+    let wide = rgb.map(|c| u32::from(c) << bits);
+    let max = wide.into_iter().max().unwrap_or(0);
+    let keep = |c: u32| u8::try_from(if max > 255 { c * 255 / max } else { c }).unwrap_or(u8::MAX);
+    wide.map(keep)
+}
+
+/// [`shift`] for a colour with alpha, which stays as it is.
+pub fn shift_rgba(rgba: [u8; 4], bits: u32) -> [u8; 4] {
+    let [r, g, b, a] = rgba;
+    let [r, g, b] = shift([r, g, b], bits);
+    [r, g, b, a]
+}
+
+/// Linear value of an sRGB-encoded one; both 1 at display white. Values above 1 continue the curve,
+/// negative ones give 0.
+pub fn to_linear(encoded: f32) -> f32 {
+    if encoded <= 0.040_45 {
+        (encoded / 12.92).max(0.0)
+    } else {
+        ((encoded + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+/// sRGB-encoded value of a linear one: the inverse of [`to_linear`].
+pub fn from_linear(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 {
+        (linear * 12.92).max(0.0)
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+/// Linear value (0..=1) of every sRGB-encoded byte.
+pub fn byte_table() -> [f32; 256] {
+    std::array::from_fn(|i| to_linear(i as f32 / 255.0))
+}
+
+/// Linear colour of an sRGB-encoded one, channel by channel.
+pub fn colour_to_linear(encoded: Vec3) -> Vec3 {
+    Vec3::new(
+        to_linear(encoded.x),
+        to_linear(encoded.y),
+        to_linear(encoded.z),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shift_keeps_hue() {
+        assert_eq!(shift([10, 20, 30], 2), [40, 80, 120]);
+        assert_eq!(shift([200, 100, 50], 2), [255, 127, 63]);
+        assert_eq!(shift([1, 2, 3], 0), [1, 2, 3]);
+        assert_eq!(shift([255, 255, 255], 99), [255, 255, 255]);
+        assert_eq!(shift_rgba([64, 0, 0, 7], 2), [255, 0, 0, 7]);
+    }
+
+    #[test]
+    fn srgb_round_trip() {
+        for i in 0..=255u8 {
+            let encoded = f32::from(i) / 255.0;
+            assert!((from_linear(to_linear(encoded)) - encoded).abs() < 1e-5);
+        }
+        assert!((to_linear(0.5) - 0.2140).abs() < 1e-4);
+        assert!(to_linear(4.0) > 16.0);
+        assert_eq!(to_linear(-1.0), 0.0);
+    }
+}
