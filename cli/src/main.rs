@@ -1,3 +1,27 @@
 //! The `relight` command.
 
-fn main() {}
+#![forbid(unsafe_code)]
+
+mod compare;
+
+use clap::{Parser, Subcommand};
+
+/// Maps of id Tech 3 games: what is in them, converted, relit
+#[derive(Parser, Debug)]
+#[command(name = "relight", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Tell how alike pictures of one view are
+    Compare(compare::CompareArgs),
+}
+
+fn main() -> anyhow::Result<()> {
+    match Cli::parse().command {
+        Command::Compare(args) => compare::run(&args),
+    }
+}

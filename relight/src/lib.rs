@@ -1,11 +1,13 @@
 //! Map conversion: a map, its materials and its images become a relit world.
 //!
+//! * [`compare`]: two pictures of one view compared.
 //! * [`files`]: game files behind one trait: packs, folders, an engine, memory.
 //! * [`mod@image`]: texture images as the engine reads them.
 //! * [`overbright`]: the one place that knows overbright bits, gamma and sRGB.
 
 #![forbid(unsafe_code)]
 
+pub mod compare;
 pub mod files;
 pub mod image;
 pub mod overbright;

@@ -1,0 +1,82 @@
+//! `relight compare`: how alike pictures of one view are, and the pictures beside each other.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use image::RgbImage;
+use relight::compare::{Rgb8, compare};
+
+/// Options of `relight compare`.
+#[derive(Args, Debug)]
+pub struct CompareArgs {
+    /// The picture to compare with (PNG, JPEG or TGA)
+    reference: PathBuf,
+    /// Pictures to compare with it
+    others: Vec<PathBuf>,
+    /// Write all pictures beside each other to this file (PNG)
+    #[arg(long, value_name = "FILE")]
+    side_by_side: Option<PathBuf>,
+}
+
+/// Prints one line for each picture: structural similarity (1 = the same), mean absolute and root mean square
+/// difference (0..255), share of pixels that differ visibly, mean luminance of both.
+pub fn run(args: &CompareArgs) -> Result<()> {
+    let reference = read(&args.reference)?;
+    let mut pictures = vec![reference];
+    for path in &args.others {
+        let picture = read(path)?;
+        if let Some(reference) = pictures.first() {
+            let d = compare(reference, &picture)
+                .with_context(|| format!("{} and {}", args.reference.display(), path.display()))?;
+            println!(
+                "{}: SSIM {:.4}, mean difference {:.3}, RMS {:.3}, {:.2} % of pixels differ by more than 8, luminance {:.1} and {:.1}",
+                path.display(),
+                d.ssim,
+                d.mean_absolute,
+                d.root_mean_square,
+                100.0 * d.differing,
+                reference.mean_luminance(),
+                picture.mean_luminance(),
+            );
+        }
+        pictures.push(picture);
+    }
+    if let Some(path) = &args.side_by_side
+        && let Some(all) = Rgb8::side_by_side(&pictures, 4)
+    {
+        write(path, &all)?;
+    }
+    Ok(())
+}
+
+/// Reads a picture file of any kind that the game knows, by its extension; alpha is dropped.
+fn read(path: &Path) -> Result<Rgb8> {
+    let file = path.display().to_string();
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default();
+    let bytes = std::fs::read(path).with_context(|| file.clone())?;
+    let picture = relight::image::decode(&file, &extension, &bytes)?;
+    let rgb = picture
+        .pixels()
+        .flat_map(|[r, g, b, _]| [r, g, b])
+        .collect();
+    Ok(Rgb8::new(
+        picture.width as usize,
+        picture.height as usize,
+        rgb,
+    )?)
+}
+
+fn write(path: &Path, picture: &Rgb8) -> Result<()> {
+    let (width, height) = (
+        u32::try_from(picture.width())?,
+        u32::try_from(picture.height())?,
+    );
+    RgbImage::from_raw(width, height, picture.pixels().to_vec())
+        .context("the pictures beside each other are too large for one file")?
+        .save(path)
+        .with_context(|| path.display().to_string())
+}

@@ -1,0 +1,364 @@
+//! Two pictures of one view compared: how alike are they, and how bright is each.
+//!
+//! Values are those of the picture file (display-referred, 0..255): a comparison of what is seen, so nothing
+//! is linearized here.
+
+use thiserror::Error;
+
+/// Side of the window over which structural similarity is computed, in pixels.
+const WINDOW: usize = 7;
+
+/// An RGB picture, 8 bits a channel, rows from the top.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rgb8 {
+    width: usize,
+    height: usize,
+    pixels: Vec<u8>,
+}
+
+/// Why two pictures cannot be compared.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum CompareError {
+    /// The number of bytes is not that of a picture of this size.
+    #[error("{bytes} bytes are no picture of {width}x{height}: 3 bytes a pixel make {}", width * height * 3)]
+    Length {
+        /// Pixels.
+        width: usize,
+        /// Pixels.
+        height: usize,
+        /// Bytes given.
+        bytes: usize,
+    },
+    /// The pictures differ in size.
+    #[error("a picture of {}x{} cannot be compared with one of {}x{}", .0.0, .0.1, .1.0, .1.1)]
+    Size((usize, usize), (usize, usize)),
+    /// A side is shorter than the window of the similarity measure.
+    #[error("a picture of {0}x{1} is smaller than the {WINDOW}x{WINDOW} window of the comparison")]
+    TooSmall(usize, usize),
+}
+
+/// What [`compare`] measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Difference {
+    /// Mean structural similarity: 1 = the same picture.
+    pub ssim: f64,
+    /// Mean absolute difference, 0..255.
+    pub mean_absolute: f64,
+    /// Root of the mean squared difference, 0..255.
+    pub root_mean_square: f64,
+    /// Share of pixels of which a channel differs by more than 8, 0..1.
+    pub differing: f64,
+}
+
+impl Rgb8 {
+    /// Takes over `pixels`, which have to be `width * height * 3` bytes.
+    pub fn new(width: usize, height: usize, pixels: Vec<u8>) -> Result<Self, CompareError> {
+        let wanted = width.checked_mul(height).and_then(|n| n.checked_mul(3));
+        if wanted != Some(pixels.len()) {
+            return Err(CompareError::Length {
+                width,
+                height,
+                bytes: pixels.len(),
+            });
+        }
+        Ok(Self {
+            width,
+            height,
+            pixels,
+        })
+    }
+
+    /// Pixels from left to right.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Pixels from top to bottom.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Red, green, blue of each pixel, rows from the top.
+    pub fn pixels(&self) -> &[u8] {
+        &self.pixels
+    }
+
+    /// Mean luma (the weights of BT.709, applied to the values as stored), 0..255.
+    pub fn mean_luminance(&self) -> f64 {
+        let sum: f64 = self
+            .pixels
+            .chunks_exact(3)
+            .map(|p| 0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2]))
+            .sum();
+        sum / (self.width * self.height).max(1) as f64
+    }
+
+    /// Number of different colours, of which a picture with anything in it has many.
+    pub fn distinct_colors(&self) -> usize {
+        let mut colors: Vec<[u8; 3]> = self
+            .pixels
+            .chunks_exact(3)
+            .map(|p| [p[0], p[1], p[2]])
+            .collect();
+        colors.sort_unstable();
+        colors.dedup();
+        colors.len()
+    }
+
+    /// The pictures beside each other, a gap of `gap` black pixels between them. `None` without pictures.
+    /// Lower ones are filled up with black.
+    pub fn side_by_side(pictures: &[Self], gap: usize) -> Option<Self> {
+        let height = pictures.iter().map(|p| p.height).max()?;
+        let width = pictures.iter().map(|p| p.width).sum::<usize>() + gap * (pictures.len() - 1);
+        let mut pixels = vec![0; width * height * 3];
+        let mut left = 0;
+        for picture in pictures {
+            let row = picture.width * 3;
+            for (from, to) in picture
+                .pixels
+                .chunks_exact(row.max(1))
+                .zip(pixels.chunks_exact_mut(width * 3))
+            {
+                to[left * 3..left * 3 + row].copy_from_slice(from);
+            }
+            left += picture.width + gap;
+        }
+        Some(Self {
+            width,
+            height,
+            pixels,
+        })
+    }
+}
+
+/// Compares `b` with `a`.
+///
+/// Structural similarity as of Wang, Bovik, Sheikh and Simoncelli, "Image quality assessment: from error
+/// visibility to structural similarity" (2004), equation 13, with its constants (K1 0.01, K2 0.03), over a
+/// uniform window of 7x7 pixels with sample covariances, each channel alone, averaged over channels and over
+/// the windows that lie fully in the picture: the defaults of scikit-image, so figures compare with its.
+pub fn compare(a: &Rgb8, b: &Rgb8) -> Result<Difference, CompareError> {
+    if (a.width, a.height) != (b.width, b.height) {
+        return Err(CompareError::Size((a.width, a.height), (b.width, b.height)));
+    }
+    if a.width < WINDOW || a.height < WINDOW {
+        return Err(CompareError::TooSmall(a.width, a.height));
+    }
+    let ssim = (0..3)
+        .map(|channel| channel_ssim(a, b, channel))
+        .sum::<f64>()
+        / 3.0;
+    let mut absolute = 0u64;
+    let mut squared = 0u64;
+    let mut differing = 0usize;
+    for (p, q) in a.pixels.chunks_exact(3).zip(b.pixels.chunks_exact(3)) {
+        let mut worst = 0;
+        for (&x, &y) in p.iter().zip(q) {
+            let difference = x.abs_diff(y);
+            worst = worst.max(difference);
+            absolute += u64::from(difference);
+            squared += u64::from(difference).pow(2);
+        }
+        differing += usize::from(worst > 8);
+    }
+    let values = a.pixels.len() as f64;
+    Ok(Difference {
+        ssim,
+        mean_absolute: absolute as f64 / values,
+        root_mean_square: (squared as f64 / values).sqrt(),
+        differing: differing as f64 / (values / 3.0),
+    })
+}
+
+/// Sums over a window: of the values, their squares and their products.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    a: i64,
+    b: i64,
+    aa: i64,
+    bb: i64,
+    ab: i64,
+}
+
+impl Sums {
+    fn of(x: u8, y: u8) -> Self {
+        let (x, y) = (i64::from(x), i64::from(y));
+        Self {
+            a: x,
+            b: y,
+            aa: x * x,
+            bb: y * y,
+            ab: x * y,
+        }
+    }
+
+    fn add(&mut self, o: &Self) {
+        self.a += o.a;
+        self.b += o.b;
+        self.aa += o.aa;
+        self.bb += o.bb;
+        self.ab += o.ab;
+    }
+
+    fn subtract(&mut self, o: &Self) {
+        self.a -= o.a;
+        self.b -= o.b;
+        self.aa -= o.aa;
+        self.bb -= o.bb;
+        self.ab -= o.ab;
+    }
+
+    /// Equation 13 of the paper. Sums are whole numbers, so equal pictures give exactly 1.
+    fn ssim(&self) -> f64 {
+        let n = (WINDOW * WINDOW) as f64;
+        let c1 = (0.01f64 * 255.0).powi(2);
+        let c2 = (0.03f64 * 255.0).powi(2);
+        let (a, b) = (self.a as f64, self.b as f64);
+        let (mean_a, mean_b) = (a / n, b / n);
+        let variance_a = (self.aa as f64 - a * mean_a) / (n - 1.0);
+        let variance_b = (self.bb as f64 - b * mean_b) / (n - 1.0);
+        let covariance = (self.ab as f64 - a * mean_b) / (n - 1.0);
+        ((2.0 * mean_a * mean_b + c1) * (2.0 * covariance + c2))
+            / ((mean_a * mean_a + mean_b * mean_b + c1) * (variance_a + variance_b + c2))
+    }
+}
+
+/// Mean similarity of one channel. A window slides down the columns' running sums, so the work does not grow
+/// with the window.
+fn channel_ssim(a: &Rgb8, b: &Rgb8, channel: usize) -> f64 {
+    let at = |x: usize, y: usize| {
+        let i = (y * a.width + x) * 3 + channel;
+        Sums::of(a.pixels[i], b.pixels[i])
+    };
+    let mut columns = vec![Sums::default(); a.width];
+    let mut total = 0.0;
+    for y in 0..a.height {
+        for (x, column) in columns.iter_mut().enumerate() {
+            column.add(&at(x, y));
+            if y >= WINDOW {
+                column.subtract(&at(x, y - WINDOW));
+            }
+        }
+        if y + 1 < WINDOW {
+            continue;
+        }
+        let mut window = Sums::default();
+        for x in 0..a.width {
+            window.add(&columns[x]);
+            if x >= WINDOW {
+                window.subtract(&columns[x - WINDOW]);
+            }
+            if x + 1 >= WINDOW {
+                total += window.ssim();
+            }
+        }
+    }
+    total / ((a.width - WINDOW + 1) * (a.height - WINDOW + 1)) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A repeatable picture without structure shared between seeds.
+    fn noise(width: usize, height: usize, mut seed: u32) -> Rgb8 {
+        let pixels = (0..width * height * 3)
+            .map(|_| {
+                seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (seed >> 24) as u8
+            })
+            .collect();
+        Rgb8::new(width, height, pixels).unwrap()
+    }
+
+    fn ramp(offset: u8) -> Rgb8 {
+        let pixels = (0..32 * 24)
+            .flat_map(|i| {
+                let (x, y) = ((i % 32) as u8, (i / 32) as u8);
+                [x * 5 + offset, y * 7 + offset, x * 2 + y * 3 + offset]
+            })
+            .collect();
+        Rgb8::new(32, 24, pixels).unwrap()
+    }
+
+    #[test]
+    fn a_picture_equals_itself() {
+        let d = compare(&noise(40, 30, 1), &noise(40, 30, 1)).unwrap();
+        assert_eq!(
+            (d.ssim, d.mean_absolute, d.root_mean_square, d.differing),
+            (1.0, 0.0, 0.0, 0.0)
+        );
+    }
+
+    #[test]
+    fn unrelated_pictures_are_unlike() {
+        let d = compare(&noise(40, 30, 1), &noise(40, 30, 99)).unwrap();
+        assert!(d.ssim.abs() < 0.05, "{d:?}");
+        assert!(d.differing > 0.9, "{d:?}");
+    }
+
+    /// The closed form for a constant window: variances vanish and the luminance term alone remains.
+    #[test]
+    fn flat_pictures_follow_the_formula() {
+        let flat = |v| Rgb8::new(9, 8, vec![v; 9 * 8 * 3]).unwrap();
+        let d = compare(&flat(100), &flat(150)).unwrap();
+        let c1 = 6.5025;
+        let wanted = (2.0 * 100.0 * 150.0 + c1) / (100.0f64.powi(2) + 150.0f64.powi(2) + c1);
+        assert!((d.ssim - wanted).abs() < 1e-12, "{} {wanted}", d.ssim);
+        assert_eq!(d.mean_absolute, 50.0);
+    }
+
+    /// Against sums done window by window in floating point.
+    #[test]
+    fn sliding_sums_agree_with_direct_ones() {
+        let (a, b) = (ramp(0), ramp(40));
+        let mut total = 0.0;
+        for channel in 0..3 {
+            for y in 0..=24 - WINDOW {
+                for x in 0..=32 - WINDOW {
+                    let mut sums = Sums::default();
+                    for j in 0..WINDOW {
+                        for i in 0..WINDOW {
+                            let at = ((y + j) * 32 + x + i) * 3 + channel;
+                            sums.add(&Sums::of(a.pixels[at], b.pixels[at]));
+                        }
+                    }
+                    total += sums.ssim();
+                }
+            }
+        }
+        let wanted = total / (3 * (24 - WINDOW + 1) * (32 - WINDOW + 1)) as f64;
+        assert!((compare(&a, &b).unwrap().ssim - wanted).abs() < 1e-12);
+    }
+
+    #[test]
+    fn sizes_have_to_fit() {
+        assert_eq!(
+            compare(&noise(8, 8, 1), &noise(8, 9, 1)),
+            Err(CompareError::Size((8, 8), (8, 9)))
+        );
+        assert_eq!(
+            compare(&noise(6, 8, 1), &noise(6, 8, 1)),
+            Err(CompareError::TooSmall(6, 8))
+        );
+        assert!(Rgb8::new(2, 2, vec![0; 11]).is_err());
+    }
+
+    #[test]
+    fn beside_each_other() {
+        let a = Rgb8::new(1, 2, vec![1; 6]).unwrap();
+        let b = Rgb8::new(2, 1, vec![2; 6]).unwrap();
+        let both = Rgb8::side_by_side(&[a, b], 1).unwrap();
+        assert_eq!((both.width(), both.height()), (4, 2));
+        assert_eq!(both.pixels()[..12], [1, 1, 1, 0, 0, 0, 2, 2, 2, 2, 2, 2]);
+        assert_eq!(both.pixels()[12..], [1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(Rgb8::side_by_side(&[], 1), None);
+    }
+
+    #[test]
+    fn brightness_and_colours() {
+        let picture = Rgb8::new(2, 1, vec![255, 255, 255, 0, 0, 0]).unwrap();
+        assert!((picture.mean_luminance() - 127.5).abs() < 1e-9);
+        assert_eq!(picture.distinct_colors(), 2);
+    }
+}

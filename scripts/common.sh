@@ -1,0 +1,93 @@
+# shellcheck shell=bash
+# Shared by the scripts of this repository: where things are, how to say things, how to start the engine.
+# Sourced, never run. Every failure is one sentence that says what to do.
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+
+# The engine and the game as Debian installs them; a caller may point elsewhere.
+ENGINE_DIR=${ENGINE_DIR:-/usr/lib/ioquake3}
+GAME_DIR=${GAME_DIR:-/usr/lib/openarena}
+GAME_DATA=${OPENARENA_DATA:-/usr/share/games/openarena/baseoa}
+TARGET_DIR=${CARGO_TARGET_DIR:-$root/target}
+
+say() { printf '%s\n' "$*"; }
+step() { printf '\n== %s\n' "$*"; }
+die() {
+  printf '%s\n' "$*" >&2
+  exit 1
+}
+
+# Machine name as ioquake3 spells it in the file names of its renderers.
+engine_arch() {
+  case $(uname -m) in
+    x86_64) echo x86_64 ;;
+    aarch64) echo arm64 ;;
+    armv7l) echo arm ;;
+    i?86) echo x86 ;;
+    *) uname -m ;;
+  esac
+}
+
+have_display() { [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; }
+
+# A graphics processor that some Vulkan driver could drive (a render node, or NVIDIA's own device file).
+have_gpu() { compgen -G '/dev/dri/renderD*' >/dev/null || [ -e /dev/nvidia0 ]; }
+
+# Mesa's software Vulkan, whose file name carries the machine name in newer packages.
+software_vulkan() {
+  local icd
+  for icd in /usr/share/vulkan/icd.d/lvp_icd.*json /usr/share/vulkan/icd.d/lvp_icd.json; do
+    [ -e "$icd" ] && { echo "$icd"; return; }
+  done
+  return 1
+}
+
+# Selects Mesa's software Vulkan for what is started from here on, under the loader's new and old variable.
+use_software_vulkan() {
+  local icd
+  icd=$(software_vulkan) || die "Mesa's software Vulkan is not installed; run scripts/setup test."
+  export VK_DRIVER_FILES=$icd VK_ICD_FILENAMES=$icd
+}
+
+use_cargo() {
+  command -v cargo >/dev/null 2>&1 || PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+  command -v cargo >/dev/null 2>&1 ||
+    die "Rust's cargo is not on the PATH: install it as https://rustup.rs says, then run this again."
+}
+
+# engine_folder LIBRARY: a private folder in which the engine finds its own renderers and ours.
+# ioquake3 looks for renderer_NAME_ARCH.so in the folder of argv[0] before it looks elsewhere, so links are
+# all it takes: no system folder is touched and nothing needs root. Prints the folder.
+engine_folder() {
+  local library=$1 folder=$TARGET_DIR/engine arch renderer
+  arch=$(engine_arch)
+  [ -x "$ENGINE_DIR/ioquake3" ] || die "There is no ioquake3 in $ENGINE_DIR; run scripts/setup."
+  mkdir -p "$folder"
+  ln -sfn "$ENGINE_DIR/ioquake3" "$folder/ioquake3"
+  for renderer in "$ENGINE_DIR"/renderer_*.so; do
+    [ -e "$renderer" ] && ln -sfn "$renderer" "$folder/"
+  done
+  if [ -n "$library" ]; then
+    [ -e "$library" ] || die "$library is not there; build it with: cargo build --release -p ffi"
+    ln -sfn "$(realpath "$library")" "$folder/renderer_vk_$arch.so"
+  fi
+  echo "$folder"
+}
+
+# The options with which Debian's own `openarena` starts the engine.
+game_options=(
+  +set com_basegame baseoa
+  +set fs_basepath "$GAME_DIR"
+  +set com_homepath .openarena
+  +set com_legacyprotocol 71 +set com_protocol 71
+  +set sv_master1 dpmaster.deathmask.net
+  +set cl_motd 0
+)
+
+# Names of the maps in the game's and the player's pk3s. A zip file keeps names uncompressed, so no
+# unpacker is needed.
+map_names() {
+  { grep -aoihE 'maps/[a-z0-9_+.-]+\.bsp' "$GAME_DATA"/*.pk3 "$HOME"/.openarena/baseoa/*.pk3 2>/dev/null || true; } |
+    tr '[:upper:]' '[:lower:]' | sed -e 's,^maps/,,' -e 's,\.bsp$,,' | sort -u
+}
