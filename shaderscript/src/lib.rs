@@ -1,8 +1,8 @@
 //! Quake III `.shader` scripts: text to typed materials, their evaluation, and what they are to light.
 //!
-//! * `parse_script` reads one file and never fails as a whole: every fault is a [`Diagnostic`] with file, line
+//! * [`parse_script`] reads one file and never fails as a whole: every fault is a [`Diagnostic`] with file, line
 //!   and column, and reading goes on at the next definition.
-//! * `Library` joins the files of a game by the engine's rules of precedence and finds a [`Shader`] by name.
+//! * [`Library`] joins the files of a game by the engine's rules of precedence and finds a [`Shader`] by name.
 //! * `eval` is the run-time half: waves, noise, colour and texture coordinate generators, vertex deformations.
 //! * `light` tells what a material is to a light simulation (opaque, cut-out, glass, sky, emitter ...) from its
 //!   directives alone, and separates a stack of stages into what reflects light and what glows.
@@ -14,12 +14,21 @@
 #![forbid(unsafe_code)]
 
 pub mod surface_params;
+pub mod token;
 
+mod collapse;
 mod diagnostic;
+mod implicit;
+mod library;
+mod parse;
 mod shader;
 mod stage;
 
+pub use collapse::{Combine, Pass, collapse, collapse_vertex_light};
 pub use diagnostic::{Diagnostic, Severity};
+pub use implicit::ImplicitKind;
+pub use library::{Library, strip_extension};
+pub use parse::{Script, parse_script};
 pub use shader::{
     Cull, Deform, Fog, LightDirectives, Location, Shader, Sky, Sun, UnknownDirective, sort,
 };

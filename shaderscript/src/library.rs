@@ -1,0 +1,150 @@
+//! All scripts of a game, joined by the engine's rules.
+
+use crate::{
+    diagnostic::{Diagnostic, Severity},
+    parse::parse_script,
+    shader::Shader,
+};
+use std::collections::HashMap;
+
+/// The scripts of a game.
+///
+/// Precedence: the engine joins the files in *reverse* listing order and takes the first definition of a name. The
+/// listing has the highest-priority archive first, so between files of different names the one from the
+/// lowest-priority archive wins, and inside one file the first definition. Files of the same name never meet: the
+/// file system shows only the one of highest priority. A file that fails the structural check contributes nothing.
+#[derive(Clone, Debug, Default)]
+pub struct Library {
+    shaders: Vec<Shader>,
+    /// Winning definition of each name in lower case.
+    by_name: HashMap<String, usize>,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl Library {
+    /// Joins scripts, given as (file name, contents) in the engine's listing order: highest priority first.
+    pub fn new<N: AsRef<str>, T: AsRef<[u8]>>(
+        files: impl IntoIterator<Item = (N, T), IntoIter: DoubleEndedIterator>,
+    ) -> Library {
+        let mut library = Library::default();
+        for (file, text) in files.into_iter().rev() {
+            let script = parse_script(file.as_ref(), text.as_ref());
+            library.diagnostics.extend(script.diagnostics);
+            if script.dropped.is_some() {
+                continue;
+            }
+            for shader in script.shaders {
+                let index = library.shaders.len();
+                let key = shader.name.to_ascii_lowercase();
+                match library
+                    .by_name
+                    .get(&key)
+                    .and_then(|&i| library.shaders.get(i))
+                {
+                    Some(winner) => library.diagnostics.push(Diagnostic {
+                        file: shader.location.file.clone(),
+                        line: shader.location.line,
+                        column: 1,
+                        severity: Severity::Note,
+                        shader: Some(shader.name.clone()),
+                        message: format!(
+                            "not used: {}:{} defines this name first",
+                            winner.location.file, winner.location.line
+                        ),
+                    }),
+                    None => {
+                        library.by_name.insert(key, index);
+                    }
+                }
+                library.shaders.push(shader);
+            }
+        }
+        library
+    }
+
+    /// The definition of a name as the engine looks it up: an extension of `name` is ignored, case does not count, a
+    /// backslash is not a slash. A definition whose own name has an extension is therefore never found.
+    pub fn find(&self, name: &str) -> Option<&Shader> {
+        let key = strip_extension(name).to_ascii_lowercase();
+        self.by_name.get(&key).and_then(|&i| self.shaders.get(i))
+    }
+
+    /// Every definition, in the order in which the engine would come across them; of several with one name the
+    /// first counts.
+    pub fn definitions(&self) -> &[Shader] {
+        &self.shaders
+    }
+
+    /// The definitions that count, one for each name, in the same order.
+    pub fn effective(&self) -> impl Iterator<Item = &Shader> {
+        self.shaders.iter().enumerate().filter_map(|(i, shader)| {
+            (self.by_name.get(&shader.name.to_ascii_lowercase()) == Some(&i)).then_some(shader)
+        })
+    }
+
+    /// All faults of all files, and a note for every definition that another one hides.
+    pub fn diagnostics(&self) -> &[Diagnostic] {
+        &self.diagnostics
+    }
+}
+
+/// A name without its extension: what follows the last dot of its last component.
+pub fn strip_extension(name: &str) -> &str {
+    match (name.rfind('.'), name.rfind('/')) {
+        (Some(dot), Some(slash)) if dot < slash => name,
+        (Some(dot), _) => name.get(..dot).unwrap_or(name),
+        (None, _) => name,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn images(library: &Library, name: &str) -> Vec<String> {
+        library
+            .find(name)
+            .map(|s| s.image_names().map(str::to_owned).collect())
+            .unwrap_or_default()
+    }
+
+    #[test]
+    fn the_last_file_listed_and_its_first_definition_win() {
+        let library = Library::new([
+            ("high.shader", "a\n{\n{\nmap high\n}\n}\n"),
+            (
+                "low.shader",
+                "A\n{\n{\nmap low1\n}\n}\na\n{\n{\nmap low2\n}\n}\n",
+            ),
+        ]);
+        assert_eq!(images(&library, "a"), ["low1"]);
+        assert_eq!(library.definitions().len(), 3);
+        assert_eq!(library.effective().count(), 1);
+        assert_eq!(library.diagnostics().len(), 2);
+    }
+
+    #[test]
+    fn names_are_compared_as_the_engine_compares_them() {
+        let library = Library::new([(
+            "f",
+            "Textures/Wall {\n{\nmap x\n}\n}\na\\b {\n{\nmap y\n}\n}\nc.d {\n{\nmap z\n}\n}\n",
+        )]);
+        assert!(library.find("textures/WALL.tga").is_some());
+        assert!(library.find("a/b").is_none());
+        assert!(library.find("a\\b").is_some());
+        assert!(library.find("c.d").is_none());
+        assert_eq!(strip_extension("a.b/c"), "a.b/c");
+        assert_eq!(strip_extension("a/b.c.d"), "a/b.c");
+    }
+
+    #[test]
+    fn a_broken_file_is_dropped_whole() {
+        let library = Library::new([
+            ("good", "a {\n{\nmap x\n}\n}\n"),
+            ("bad", "b {\n{\nmap x\n}\n}\na {\n{\nmap y\n}\n"),
+        ]);
+        assert_eq!(images(&library, "a"), ["x"]);
+        assert!(library.find("b").is_none());
+        assert!(!library.diagnostics().is_empty());
+    }
+}
