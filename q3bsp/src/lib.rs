@@ -1,1 +1,103 @@
-//! q3bsp
+//! id Tech 3 maps (`IBSP` version 46): bytes to typed, validated data and back.
+//!
+//! [`Bsp::parse`] checks everything that a reader would otherwise have to check again: the directory,
+//! the record sizes and every index of every lump. What the engine refuses is a typed [`Error`] that
+//! names lump, element and value; what the engine tolerates is repaired and remembered as a [`Warning`].
+//! After `Ok`, an index found in a public field may be used without another check.
+//! [`Bsp::write`] gives an unchanged file back byte for byte, repairs undone.
+//!
+//! Numbers are as in the file: id units, x forward, y left, z up, triangles clockwise seen from their
+//! front. Floating-point values are *not* checked (shipped maps carry NaN lightmap coordinates and zero
+//! normals, and they must survive writing); [`DrawVert::finite`] gives the cleaned vertex, and
+//! everything derived here (patches, fog volumes, grid samples) is finite.
+//!
+//! ```no_run
+//! let bytes = std::fs::read("maps/example.bsp")?;
+//! let bsp = q3bsp::Bsp::parse(&bytes)?;
+//! for warning in &bsp.warnings {
+//!     println!("{warning}");
+//! }
+//! let patches = bsp.patch_meshes(4.0);
+//! println!("{} surfaces, {} of them drawn patches", bsp.surfaces.len(), patches.iter().flatten().count());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)
+)]
+
+pub mod builder;
+mod bytes;
+mod container;
+pub mod entities;
+mod error;
+mod flags;
+mod fog;
+mod grid;
+mod lumps;
+mod parse;
+mod patch;
+mod tree;
+mod validate;
+mod visibility;
+mod write;
+
+pub use container::{Container, Gap, LumpRange, Repair};
+pub use entities::Entity;
+pub use error::{Error, Lump, Warning};
+pub use flags::{content_flags, surface_flags};
+pub use fog::FogVolume;
+pub use grid::{GridSample, LightGridLayout};
+pub use lumps::{
+    Brush, BrushSide, DrawVert, Fog, GridPoint, LIGHTMAP_BYTES, LIGHTMAP_SIZE, Leaf, Lightmap,
+    Model, Node, Plane, ShaderRef, Surface, SurfaceKind, lightmap_index,
+};
+pub use patch::{MAX_GRID_SIZE, PatchMesh, tessellate_patch};
+pub use visibility::Visibility;
+
+/// A whole map, owned. Indices in the fields are valid after [`Bsp::parse`]; code that changes the
+/// fields by hand takes over that duty ([`Bsp::validate`] checks it again).
+#[derive(Clone, Debug, Default)]
+pub struct Bsp {
+    /// Lump 0 as stored: entity text, meaningful up to the first NUL. See [`Bsp::entities`].
+    pub entities: Vec<u8>,
+    /// Lump 1: shader references of surfaces, brushes and brush sides. The same name may occur
+    /// several times with different flags.
+    pub shaders: Vec<ShaderRef>,
+    /// Lump 2: planes.
+    pub planes: Vec<Plane>,
+    /// Lump 3: inner nodes of the BSP tree; node 0 is the root.
+    pub nodes: Vec<Node>,
+    /// Lump 4: leafs. Not every leaf is in the tree (see [`Bsp::tree_leafs`]).
+    pub leafs: Vec<Leaf>,
+    /// Lump 5: surface indices that leafs refer to.
+    pub leaf_surfaces: Vec<i32>,
+    /// Lump 6: brush indices that leafs refer to.
+    pub leaf_brushes: Vec<i32>,
+    /// Lump 7: models; 0 is the world, `n` is what an entity calls `*n`.
+    pub models: Vec<Model>,
+    /// Lump 8: convex brushes.
+    pub brushes: Vec<Brush>,
+    /// Lump 9: sides of brushes.
+    pub brush_sides: Vec<BrushSide>,
+    /// Lump 10: vertices and patch control points.
+    pub vertices: Vec<DrawVert>,
+    /// Lump 11: triangle corners, relative to the surface's `first_vert`. Surfaces share ranges.
+    pub indices: Vec<i32>,
+    /// Lump 12: fog volumes as stored; see [`Bsp::fog_volumes`].
+    pub fogs: Vec<Fog>,
+    /// Lump 13: what is drawn.
+    pub surfaces: Vec<Surface>,
+    /// Lump 14: lightmap pages.
+    pub lightmaps: Vec<Lightmap>,
+    /// Lump 15: light grid points, x fastest; see [`Bsp::light_grid`].
+    pub light_grid: Vec<GridPoint>,
+    /// Lump 16: potentially visible sets. `None` when absent or unusable: everything sees everything.
+    pub visibility: Option<Visibility>,
+    /// What the file looked like around the data.
+    pub container: Container,
+    /// Tolerated oddities found by [`Bsp::parse`], in the order found.
+    pub warnings: Vec<Warning>,
+}

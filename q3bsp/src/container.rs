@@ -1,0 +1,67 @@
+//! The file around the lumps: kept so that an unchanged map is written back byte for byte.
+
+use crate::error::Lump;
+
+/// Bytes of the header: identification, version and seventeen directory entries.
+pub(crate) const HEADER_BYTES: usize = 144;
+
+/// Where a lump lies in the file, as the directory says. Empty lumps may have any offset.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LumpRange {
+    /// Bytes from the start of the file.
+    pub offset: i32,
+    /// Length in bytes.
+    pub length: i32,
+}
+
+/// Bytes that belong to no lump: an eighteenth directory entry, a compiler's banner, padding.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Gap {
+    /// Bytes from the start of the file.
+    pub offset: usize,
+    /// What is there.
+    pub bytes: Vec<u8>,
+}
+
+/// A value that was replaced on reading. [`crate::Bsp::write`] puts the original back as long as the
+/// replacement is still there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Repair {
+    /// The lump.
+    pub lump: Lump,
+    /// Index of the record.
+    pub element: usize,
+    /// Byte offset of the 32-bit field in the record.
+    pub field_offset: usize,
+    /// As stored in the file.
+    pub original: i32,
+    /// As found in the [`crate::Bsp`].
+    pub replacement: i32,
+}
+
+/// The layout of the file a [`crate::Bsp`] was read from. The default (no file) makes
+/// [`crate::Bsp::write`] use the compilers' usual order.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Container {
+    /// The directory, by [`Lump::index`].
+    pub lumps: [LumpRange; 17],
+    /// Bytes outside header and lumps, ascending.
+    pub gaps: Vec<Gap>,
+    /// Length of the file; 0 when the map was not read from one.
+    pub file_length: usize,
+    /// Bytes at the end of a lump that are no whole record, by [`Lump::index`]. For the visibility
+    /// lump also everything that the matrix does not cover.
+    pub trailing: [Vec<u8>; 17],
+    /// Replaced values.
+    pub repairs: Vec<Repair>,
+}
+
+impl Container {
+    /// The bytes directly behind the header that no lump claims, where compilers leave their banner.
+    pub fn banner(&self) -> &[u8] {
+        match self.gaps.first() {
+            Some(gap) if gap.offset == HEADER_BYTES => &gap.bytes,
+            _ => &[],
+        }
+    }
+}

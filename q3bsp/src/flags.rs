@@ -1,0 +1,91 @@
+//! Flag bits of the shader lump, as the map compiler wrote them (the engine's `surfaceflags.h` values).
+
+/// Surface flags ([`crate::ShaderRef::surface_flags`]).
+pub mod surface_flags {
+    /// No falling damage.
+    pub const NODAMAGE: u32 = 0x1;
+    /// Low friction.
+    pub const SLICK: u32 = 0x2;
+    /// Lets the sky show.
+    pub const SKY: u32 = 0x4;
+    /// Can be climbed.
+    pub const LADDER: u32 = 0x8;
+    /// Projectiles vanish without an explosion.
+    pub const NOIMPACT: u32 = 0x10;
+    /// No decals.
+    pub const NOMARKS: u32 = 0x20;
+    /// Flesh sounds and effects.
+    pub const FLESH: u32 = 0x40;
+    /// Not drawn. For patches the engine honours this bit of the *map*, not of the script.
+    pub const NODRAW: u32 = 0x80;
+    /// Compiler hint brush.
+    pub const HINT: u32 = 0x100;
+    /// Skipped by the compiler.
+    pub const SKIP: u32 = 0x200;
+    /// Has no lightmap.
+    pub const NOLIGHTMAP: u32 = 0x400;
+    /// Vertex lit.
+    pub const POINTLIGHT: u32 = 0x800;
+    /// Metal footsteps.
+    pub const METALSTEPS: u32 = 0x1000;
+    /// No footsteps.
+    pub const NOSTEPS: u32 = 0x2000;
+    /// No collision.
+    pub const NONSOLID: u32 = 0x4000;
+    /// Tints light that the compiler traced through it.
+    pub const LIGHTFILTER: u32 = 0x8000;
+    /// Casts shadows by its texture's alpha.
+    pub const ALPHASHADOW: u32 = 0x10000;
+    /// Not lit by dynamic lights.
+    pub const NODLIGHT: u32 = 0x20000;
+    /// Leaves dust.
+    pub const DUST: u32 = 0x40000;
+}
+
+/// Content flags ([`crate::ShaderRef::content_flags`]).
+pub mod content_flags {
+    /// Solid.
+    pub const SOLID: u32 = 0x1;
+    /// Lava.
+    pub const LAVA: u32 = 0x8;
+    /// Slime.
+    pub const SLIME: u32 = 0x10;
+    /// Water.
+    pub const WATER: u32 = 0x20;
+    /// Fog.
+    pub const FOG: u32 = 0x40;
+    /// Separates areas.
+    pub const AREAPORTAL: u32 = 0x8000;
+    /// Blocks players.
+    pub const PLAYERCLIP: u32 = 0x10000;
+    /// Blocks monsters.
+    pub const MONSTERCLIP: u32 = 0x20000;
+    /// Bot information: teleporter.
+    pub const TELEPORTER: u32 = 0x40000;
+    /// Bot information: jump pad.
+    pub const JUMPPAD: u32 = 0x80000;
+    /// Bot information: cluster portal.
+    pub const CLUSTERPORTAL: u32 = 0x100000;
+    /// Bot information: do not enter.
+    pub const DONOTENTER: u32 = 0x200000;
+    /// Blocks bots.
+    pub const BOTCLIP: u32 = 0x400000;
+    /// Moving brush.
+    pub const MOVER: u32 = 0x800000;
+    /// Marks the origin of a brush model; removed by the compiler.
+    pub const ORIGIN: u32 = 0x1000000;
+    /// Living body.
+    pub const BODY: u32 = 0x2000000;
+    /// Dead body.
+    pub const CORPSE: u32 = 0x4000000;
+    /// Detail brush: does not split the tree.
+    pub const DETAIL: u32 = 0x8000000;
+    /// Structural brush.
+    pub const STRUCTURAL: u32 = 0x10000000;
+    /// Does not hide what is behind it.
+    pub const TRANSLUCENT: u32 = 0x20000000;
+    /// Trigger volume.
+    pub const TRIGGER: u32 = 0x40000000;
+    /// Items dropped inside vanish.
+    pub const NODROP: u32 = 0x80000000;
+}

@@ -1,0 +1,583 @@
+//! The records of the lumps: one struct per kind, with its decoder and encoder.
+
+use crate::bytes::{Fields, Put, name_field, name_text};
+use glam::{Vec2, Vec3};
+
+/// A record of fixed size in a lump.
+pub(crate) trait Record: Sized {
+    /// Bytes per record.
+    const STRIDE: usize;
+    /// Decodes one record of exactly [`Self::STRIDE`] bytes.
+    fn decode(fields: Fields<'_>) -> Self;
+    /// Appends exactly [`Self::STRIDE`] bytes.
+    fn encode(&self, out: &mut Vec<u8>);
+}
+
+/// Lump 1: a shader name with the flags that the map compiler saw.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ShaderRef {
+    /// Name without extension, as written, to the first NUL; bytes that are not UTF-8 are replaced.
+    pub name: String,
+    /// The field as stored; compilers left garbage behind the NUL.
+    pub raw_name: [u8; 64],
+    /// See [`crate::surface_flags`].
+    pub surface_flags: u32,
+    /// See [`crate::content_flags`].
+    pub content_flags: u32,
+}
+
+impl ShaderRef {
+    /// A reference with a clean name field. Names longer than 63 bytes are cut when written.
+    pub fn new(name: &str, surface_flags: u32, content_flags: u32) -> ShaderRef {
+        ShaderRef {
+            name: name.to_owned(),
+            raw_name: name_field(name, &[0; 64]),
+            surface_flags,
+            content_flags,
+        }
+    }
+}
+
+impl Record for ShaderRef {
+    const STRIDE: usize = 72;
+    fn decode(mut f: Fields<'_>) -> Self {
+        let raw_name = f.bytes();
+        ShaderRef {
+            name: name_text(&raw_name),
+            raw_name,
+            surface_flags: f.u32(),
+            content_flags: f.u32(),
+        }
+    }
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(&name_field(&self.name, &self.raw_name));
+        out.extend_from_slice(&self.surface_flags.to_le_bytes());
+        out.extend_from_slice(&self.content_flags.to_le_bytes());
+    }
+}
+
+/// Lump 2: the plane of points p with `normal · p = dist`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Unit normal.
+    pub normal: Vec3,
+    /// Distance from the origin along the normal, id units.
+    pub dist: f32,
+}
+
+impl Plane {
+    /// Signed distance of a point, positive in front.
+    pub fn distance(&self, point: Vec3) -> f32 {
+        self.normal.dot(point) - self.dist
+    }
+}
+
+impl Record for Plane {
+    const STRIDE: usize = 16;
+    fn decode(mut f: Fields<'_>) -> Self {
+        Plane {
+            normal: f.vec3(),
+            dist: f.f32(),
+        }
+    }
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.put_vec3(self.normal);
+        out.put_f32(self.dist);
+    }
+}
+
+/// Lump 3: an inner node of the tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Node {
+    /// Index of the splitting plane.
+    pub plane: i32,
+    /// Front and back child: a node index, or `-1 - leaf` when negative.
+    pub children: [i32; 2],
+    /// Smallest corner of the bounds, id units.
+    pub mins: [i32; 3],
+    /// Largest corner of the bounds, id units.
+    pub maxs: [i32; 3],
+}
+
+impl Record for Node {
+    const STRIDE: usize = 36;
+    fn decode(mut f: Fields<'_>) -> Self {
+        Node {
+            plane: f.i32(),
+            children: [f.i32(), f.i32()],
+            mins: f.ivec3(),
+            maxs: f.ivec3(),
+        }
+    }
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.put_i32(self.plane);
+        out.put_i32(self.children[0]);
+        out.put_i32(self.children[1]);
+        out.put_ivec3(self.mins);
+        out.put_ivec3(self.maxs);
+    }
+}
+
+/// Lump 4: a convex cell of space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Leaf {
+    /// Visibility cluster, below [`crate::Bsp::num_clusters`]; -1 for solid space and outside.
+    pub cluster: i32,
+    /// Area that doors separate; -1 likewise. Not used as an index here, and not checked.
+    pub area: i32,
+    /// Smallest corner of the bounds, id units.
+    pub mins: [i32; 3],
+    /// Largest corner of the bounds, id units.
+    pub maxs: [i32; 3],
+    /// First of this leaf's entries in [`crate::Bsp::leaf_surfaces`].
+    pub first_leaf_surface: i32,
+    /// Number of them.
+    pub num_leaf_surfaces: i32,
+    /// First of this leaf's entries in [`crate::Bsp::leaf_brushes`].
+    pub first_leaf_brush: i32,
+    /// Number of them.
+    pub num_leaf_brushes: i32,
+}
+
+impl Record for Leaf {
+    const STRIDE: usize = 48;
+    fn decode(mut f: Fields<'_>) -> Self {
+        Leaf {
+            cluster: f.i32(),
+            area: f.i32(),
+            mins: f.ivec3(),
+            maxs: f.ivec3(),
+            first_leaf_surface: f.i32(),
+            num_leaf_surfaces: f.i32(),
+            first_leaf_brush: f.i32(),
+            num_leaf_brushes: f.i32(),
+        }
+    }
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.put_i32(self.cluster);
+        out.put_i32(self.area);
+        out.put_ivec3(self.mins);
+        out.put_ivec3(self.maxs);
+        out.put_i32(self.first_leaf_surface);
+        out.put_i32(self.num_leaf_surfaces);
+        out.put_i32(self.first_leaf_brush);
+        out.put_i32(self.num_leaf_brushes);
+    }
+}
+
+/// Lumps 5, 6 and 11 are plain integers.
+impl Record for i32 {
+    const STRIDE: usize = 4;
+    fn decode(mut f: Fields<'_>) -> Self {
+        f.i32()
+    }
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.put_i32(*self);
+    }
+}
+
+/// Lump 7: the world or a brush model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Model {
+    /// Smallest corner. For model 0 these are the compiler's bounds, which the light grid is laid out
+    /// by; geometry may lie outside.
+    pub mins: Vec3,
+    /// Largest corner.
+    pub maxs: Vec3,
+    /// First surface.
+    pub first_surface: i32,
+    /// Number of surfaces.
+    pub num_surfaces: i32,
+    /// First brush.
+    pub first_brush: i32,
+    /// Number of brushes.
+    pub num_brushes: i32,
+}
+
+impl Record for Model {
+    const STRIDE: usize = 40;
+    fn decode(mut f: Fields<'_>) -> Self {
+        Model {
+            mins: f.vec3(),
+            maxs: f.vec3(),
+            first_surface: f.i32(),
+            num_surfaces: f.i32(),
+            first_brush: f.i32(),
+            num_brushes: f.i32(),
+        }
+    }
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.put_vec3(self.mins);
+        out.put_vec3(self.maxs);
+        out.put_i32(self.first_surface);
+        out.put_i32(self.num_surfaces);
+        out.put_i32(self.first_brush);
+        out.put_i32(self.num_brushes);
+    }
+}
+
+/// Lump 8: the intersection of the half-spaces `normal · p <= dist` of its sides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Brush {
+    /// First side. Compilers write the six axial sides first: -x +x -y +y -z +z.
+    pub first_side: i32,
+    /// Number of sides.
+    pub num_sides: i32,
+    /// Shader whose content flags say what the brush is.
+    pub shader: i32,
+}
+
+impl Record for Brush {
+    const STRIDE: usize = 12;
+    fn decode(mut f: Fields<'_>) -> Self {
+        Brush {
+            first_side: f.i32(),
+            num_sides: f.i32(),
+            shader: f.i32(),
+        }
+    }
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.put_i32(self.first_side);
+        out.put_i32(self.num_sides);
+        out.put_i32(self.shader);
+    }
+}
+
+/// Lump 9: one side of a brush.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BrushSide {
+    /// Plane, normal outwards.
+    pub plane: i32,
+    /// Shader.
+    pub shader: i32,
+}
+
+impl Record for BrushSide {
+    const STRIDE: usize = 8;
+    fn decode(mut f: Fields<'_>) -> Self {
+        BrushSide {
+            plane: f.i32(),
+            shader: f.i32(),
+        }
+    }
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.put_i32(self.plane);
+        out.put_i32(self.shader);
+    }
+}
+
+/// Lump 10: a vertex, or a control point of a patch. Values are as stored and may be NaN.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DrawVert {
+    /// Position, id units.
+    pub position: Vec3,
+    /// Texture coordinates; t = 0 is the first image row.
+    pub st: Vec2,
+    /// Coordinates in the lightmap page, 0 to 1.
+    pub lightmap: Vec2,
+    /// Unit normal; zero in some files.
+    pub normal: Vec3,
+    /// Red, green, blue before the over-bright shift, and alpha.
+    pub color: [u8; 4],
+}
+
+impl DrawVert {
+    /// The vertex with every component that is NaN or infinite set to 0.
+    pub fn finite(&self) -> DrawVert {
+        let clean = |v: f32| if v.is_finite() { v } else { 0.0 };
+        DrawVert {
+            position: self.position.map(clean),
+            st: self.st.map(clean),
+            lightmap: self.lightmap.map(clean),
+            normal: self.normal.map(clean),
+            color: self.color,
+        }
+    }
+
+    /// Whether no component is NaN or infinite.
+    pub fn is_finite(&self) -> bool {
+        self.position.is_finite()
+            && self.st.is_finite()
+            && self.lightmap.is_finite()
+            && self.normal.is_finite()
+    }
+
+    /// The point half way on the segment: positions and coordinates in float, colours by integer
+    /// halving; the normal of `self` (patches compute normals afterwards).
+    pub(crate) fn halfway(&self, other: &DrawVert) -> DrawVert {
+        let mut color = self.color;
+        for (c, o) in color.iter_mut().zip(other.color) {
+            *c = ((u16::from(*c) + u16::from(o)) >> 1) as u8;
+        }
+        DrawVert {
+            position: (self.position + other.position) * 0.5,
+            st: (self.st + other.st) * 0.5,
+            lightmap: (self.lightmap + other.lightmap) * 0.5,
+            normal: self.normal,
+            color,
+        }
+    }
+}
+
+impl Record for DrawVert {
+    const STRIDE: usize = 44;
+    fn decode(mut f: Fields<'_>) -> Self {
+        DrawVert {
+            position: f.vec3(),
+            st: f.vec2(),
+            lightmap: f.vec2(),
+            normal: f.vec3(),
+            color: f.bytes(),
+        }
+    }
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.put_vec3(self.position);
+        out.put_vec2(self.st);
+        out.put_vec2(self.lightmap);
+        out.put_vec3(self.normal);
+        out.extend_from_slice(&self.color);
+    }
+}
+
+/// Lump 12: a fog volume as stored.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fog {
+    /// Shader whose `fogParms` give colour and depth.
+    pub shader: String,
+    /// The name field as stored.
+    pub raw_shader: [u8; 64],
+    /// The brush, which has at least six sides.
+    pub brush: i32,
+    /// Side of the brush (relative to its first) through which one looks into the fog; -1 for none.
+    pub visible_side: i32,
+}
+
+impl Record for Fog {
+    const STRIDE: usize = 72;
+    fn decode(mut f: Fields<'_>) -> Self {
+        let raw_shader = f.bytes();
+        Fog {
+            shader: name_text(&raw_shader),
+            raw_shader,
+            brush: f.i32(),
+            visible_side: f.i32(),
+        }
+    }
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(&name_field(&self.shader, &self.raw_shader));
+        out.put_i32(self.brush);
+        out.put_i32(self.visible_side);
+    }
+}
+
+/// What a [`Surface`] is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SurfaceKind {
+    /// A flat polygon with its triangles; stored 1.
+    Planar,
+    /// A grid of control points of bi-quadratic Bézier patches; stored 2.
+    Patch,
+    /// Any triangles, vertex lit; stored 3.
+    TriangleSoup,
+    /// A point that shows a corona, without geometry; stored 4.
+    Flare,
+    /// A number that the engine does not know. Never in a validated map.
+    Other(i32),
+}
+
+impl SurfaceKind {
+    /// From the stored number.
+    pub fn from_raw(raw: i32) -> SurfaceKind {
+        match raw {
+            1 => SurfaceKind::Planar,
+            2 => SurfaceKind::Patch,
+            3 => SurfaceKind::TriangleSoup,
+            4 => SurfaceKind::Flare,
+            other => SurfaceKind::Other(other),
+        }
+    }
+
+    /// The stored number.
+    pub fn raw(self) -> i32 {
+        match self {
+            SurfaceKind::Planar => 1,
+            SurfaceKind::Patch => 2,
+            SurfaceKind::TriangleSoup => 3,
+            SurfaceKind::Flare => 4,
+            SurfaceKind::Other(raw) => raw,
+        }
+    }
+}
+
+/// Negative values of [`Surface::lightmap`].
+pub mod lightmap_index {
+    /// No lightmap: lit like an entity.
+    pub const NONE: i32 = -1;
+    /// White: full bright.
+    pub const WHITE: i32 = -2;
+    /// Lit by vertex colours.
+    pub const BY_VERTEX: i32 = -3;
+    /// 2D drawing; never from a compiler.
+    pub const TWO_D: i32 = -4;
+}
+
+/// Lump 13: something drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// Shader index.
+    pub shader: i32,
+    /// Fog index, or -1.
+    pub fog: i32,
+    /// What the surface is made of.
+    pub kind: SurfaceKind,
+    /// First vertex or control point.
+    pub first_vert: i32,
+    /// Number of them; width × height for a patch.
+    pub num_verts: i32,
+    /// First entry in [`crate::Bsp::indices`].
+    pub first_index: i32,
+    /// Number of them: a multiple of three, 0 for patches drawn by their grid.
+    pub num_indices: i32,
+    /// Lightmap page, or one of [`lightmap_index`].
+    pub lightmap: i32,
+    /// Left column of the chart in its page, texels. Not used for drawing.
+    pub lightmap_x: i32,
+    /// Upper row of the chart.
+    pub lightmap_y: i32,
+    /// Width of the chart.
+    pub lightmap_width: i32,
+    /// Height of the chart.
+    pub lightmap_height: i32,
+    /// World position of the chart's first texel; of a flare: its position.
+    pub lightmap_origin: Vec3,
+    /// World steps per texel and the plane normal (often zero); of a patch: mins and maxs of its LOD
+    /// group; of a flare: colour, unused, normal.
+    pub lightmap_vecs: [Vec3; 3],
+    /// Control points per row: odd and at least 3 for a patch.
+    pub patch_width: i32,
+    /// Rows of control points: odd and at least 3 for a patch.
+    pub patch_height: i32,
+}
+
+impl Record for Surface {
+    const STRIDE: usize = 104;
+    fn decode(mut f: Fields<'_>) -> Self {
+        Surface {
+            shader: f.i32(),
+            fog: f.i32(),
+            kind: SurfaceKind::from_raw(f.i32()),
+            first_vert: f.i32(),
+            num_verts: f.i32(),
+            first_index: f.i32(),
+            num_indices: f.i32(),
+            lightmap: f.i32(),
+            lightmap_x: f.i32(),
+            lightmap_y: f.i32(),
+            lightmap_width: f.i32(),
+            lightmap_height: f.i32(),
+            lightmap_origin: f.vec3(),
+            lightmap_vecs: [f.vec3(), f.vec3(), f.vec3()],
+            patch_width: f.i32(),
+            patch_height: f.i32(),
+        }
+    }
+    fn encode(&self, out: &mut Vec<u8>) {
+        for v in [
+            self.shader,
+            self.fog,
+            self.kind.raw(),
+            self.first_vert,
+            self.num_verts,
+            self.first_index,
+            self.num_indices,
+            self.lightmap,
+            self.lightmap_x,
+            self.lightmap_y,
+            self.lightmap_width,
+            self.lightmap_height,
+        ] {
+            out.put_i32(v);
+        }
+        out.put_vec3(self.lightmap_origin);
+        for v in self.lightmap_vecs {
+            out.put_vec3(v);
+        }
+        out.put_i32(self.patch_width);
+        out.put_i32(self.patch_height);
+    }
+}
+
+/// Texels per side of a lightmap page.
+pub const LIGHTMAP_SIZE: usize = 128;
+
+/// Bytes of a lightmap page.
+pub const LIGHTMAP_BYTES: usize = LIGHTMAP_SIZE * LIGHTMAP_SIZE * 3;
+
+/// Lump 14: one page of 128 × 128 texels, red green blue, first row first, before the over-bright shift.
+/// Always [`LIGHTMAP_BYTES`] long.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Lightmap(
+    /// The bytes.
+    pub Box<[u8]>,
+);
+
+impl std::fmt::Debug for Lightmap {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Lightmap({} bytes)", self.0.len())
+    }
+}
+
+impl Lightmap {
+    /// The texel at column `x`, row `y`; coordinates beyond the page are clamped to its edge.
+    pub fn texel(&self, x: usize, y: usize) -> [u8; 3] {
+        let at = (y.min(LIGHTMAP_SIZE - 1) * LIGHTMAP_SIZE + x.min(LIGHTMAP_SIZE - 1)) * 3;
+        match self.0.get(at..at + 3) {
+            Some(&[r, g, b]) => [r, g, b],
+            _ => [0; 3],
+        }
+    }
+}
+
+/// Lump 15: light that arrives at one point of the grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GridPoint {
+    /// Light from everywhere; all zero when the point is inside a wall.
+    pub ambient: [u8; 3],
+    /// Light from the direction below.
+    pub directed: [u8; 3],
+    /// Angle from the z axis in 1/256 turns (byte 6).
+    pub longitude: u8,
+    /// Angle around the z axis in 1/256 turns (byte 7).
+    pub latitude: u8,
+}
+
+impl GridPoint {
+    /// Unit vector towards the light.
+    pub fn direction(&self) -> Vec3 {
+        let turn = std::f32::consts::TAU / 256.0;
+        let (sin_lat, cos_lat) = (f32::from(self.latitude) * turn).sin_cos();
+        let (sin_long, cos_long) = (f32::from(self.longitude) * turn).sin_cos();
+        Vec3::new(cos_lat * sin_long, sin_lat * sin_long, cos_long)
+    }
+}
+
+impl Record for GridPoint {
+    const STRIDE: usize = 8;
+    fn decode(mut f: Fields<'_>) -> Self {
+        let ambient = f.bytes();
+        let directed = f.bytes();
+        let [longitude, latitude] = f.bytes();
+        GridPoint {
+            ambient,
+            directed,
+            longitude,
+            latitude,
+        }
+    }
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(&self.ambient);
+        out.extend_from_slice(&self.directed);
+        out.push(self.longitude);
+        out.push(self.latitude);
+    }
+}

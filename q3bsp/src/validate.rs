@@ -1,0 +1,570 @@
+//! Every reference between lumps, checked once so that nobody needs to check it again.
+//!
+//! The line between error and repair is the engine's behaviour: values that it ignores or maps to
+//! something harmless are repaired, values that it refuses, or would follow out of its arrays, are errors.
+
+use crate::Bsp;
+use crate::container::Repair;
+use crate::error::{Error, Lump, Warning};
+use crate::lumps::{SurfaceKind, lightmap_index};
+
+/// Most vertices, and most indices, that all surfaces together may refer to. Shipped maps stay below
+/// two hundred thousand; the limit keeps a file that shares one range a million times from
+/// exhausting memory in whoever expands it.
+const MAX_REFERENCES: u64 = 1 << 26;
+
+/// A 32-bit field of a record: its name in messages and its byte offset.
+#[derive(Clone, Copy)]
+struct Field(&'static str, usize);
+
+/// Collects repairs of one lump.
+struct Repairs<'a> {
+    lump: Lump,
+    warnings: &'a mut Vec<Warning>,
+    repairs: &'a mut Vec<Repair>,
+}
+
+impl Repairs<'_> {
+    fn replace(
+        &mut self,
+        element: usize,
+        Field(field, field_offset): Field,
+        slot: &mut i32,
+        replacement: i32,
+        action: &'static str,
+    ) {
+        if *slot == replacement {
+            return;
+        }
+        self.warnings.push(Warning {
+            lump: self.lump,
+            element: Some(element),
+            field,
+            value: i64::from(*slot),
+            action,
+        });
+        self.repairs.push(Repair {
+            lump: self.lump,
+            element,
+            field_offset,
+            original: *slot,
+            replacement,
+        });
+        *slot = replacement;
+    }
+
+    /// A range that must lie inside `target`; an empty one may start anywhere and is moved to 0.
+    fn range(
+        &mut self,
+        element: usize,
+        name: Field,
+        first: &mut i32,
+        count: i32,
+        target: Lump,
+        limit: usize,
+    ) -> Result<(), Error> {
+        if in_range(*first, count, limit) {
+            return Ok(());
+        }
+        if count == 0 {
+            self.replace(element, name, first, 0, "an empty range, taken as 0");
+            return Ok(());
+        }
+        Err(Error::Range {
+            lump: self.lump,
+            element,
+            field: name.0,
+            first: *first,
+            count,
+            target,
+            limit,
+        })
+    }
+}
+
+fn in_range(first: i32, count: i32, limit: usize) -> bool {
+    first >= 0 && count >= 0 && i64::from(first) + i64::from(count) <= limit as i64
+}
+
+fn index(
+    lump: Lump,
+    element: usize,
+    field: &'static str,
+    value: i32,
+    target: Lump,
+    limit: usize,
+) -> Result<usize, Error> {
+    match usize::try_from(value) {
+        Ok(index) if index < limit => Ok(index),
+        _ => Err(Error::Value {
+            lump,
+            element,
+            field,
+            value: i64::from(value),
+            expected: format!("outside the {limit} of lump {target}"),
+        }),
+    }
+}
+
+impl Bsp {
+    /// Checks every reference between the lumps, as [`Bsp::parse`] does; for maps put together or
+    /// changed in memory. Repairs what the engine tolerates and adds to [`Bsp::warnings`].
+    ///
+    /// # Errors
+    /// The first reference that leads out of its lump, or a lump missing that every map needs.
+    pub fn validate(&mut self) -> Result<(), Error> {
+        for (lump, empty) in [
+            (Lump::Shaders, self.shaders.is_empty()),
+            (Lump::Planes, self.planes.is_empty()),
+            (Lump::Nodes, self.nodes.is_empty()),
+            (Lump::Leafs, self.leafs.is_empty()),
+            (Lump::Models, self.models.is_empty()),
+        ] {
+            if empty {
+                return Err(Error::Empty { lump });
+            }
+        }
+        self.check_nodes()?;
+        self.check_tree()?;
+        self.check_leafs()?;
+        self.check_models()?;
+        self.check_brushes()?;
+        self.check_fogs()?;
+        self.check_surfaces()?;
+        self.check_indices()?;
+        self.warn_about_floats();
+        Ok(())
+    }
+
+    fn check_nodes(&self) -> Result<(), Error> {
+        for (element, node) in self.nodes.iter().enumerate() {
+            let lump = Lump::Nodes;
+            index(
+                lump,
+                element,
+                "planeNum",
+                node.plane,
+                Lump::Planes,
+                self.planes.len(),
+            )?;
+            for child in node.children {
+                if child >= 0 {
+                    index(lump, element, "child", child, Lump::Nodes, self.nodes.len())?;
+                } else {
+                    // -1 - child cannot overflow for a negative number.
+                    let leaf = -1 - child;
+                    index(
+                        lump,
+                        element,
+                        "leaf child",
+                        leaf,
+                        Lump::Leafs,
+                        self.leafs.len(),
+                    )?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The nodes under the root must form a tree: a node met twice would make walks endless or
+    /// exponential.
+    fn check_tree(&self) -> Result<(), Error> {
+        let mut seen = vec![false; self.nodes.len()];
+        let mut pending = vec![0usize];
+        while let Some(at) = pending.pop() {
+            let Some(node) = self.nodes.get(at) else {
+                continue;
+            };
+            if std::mem::replace(&mut seen[at], true) {
+                return Err(Error::Value {
+                    lump: Lump::Nodes,
+                    element: at,
+                    field: "number of parents",
+                    value: 2,
+                    expected: "but the nodes below the root must form a tree".to_owned(),
+                });
+            }
+            pending.extend(
+                node.children
+                    .iter()
+                    .filter_map(|&c| usize::try_from(c).ok()),
+            );
+        }
+        Ok(())
+    }
+
+    fn check_leafs(&mut self) -> Result<(), Error> {
+        let clusters = self.visibility.as_ref().map(|v| v.clusters);
+        let (surfaces, brushes) = (self.surfaces.len(), self.brushes.len());
+        let (leaf_surfaces, leaf_brushes) = (self.leaf_surfaces.len(), self.leaf_brushes.len());
+        let leafs = self.leafs.len();
+        let mut log = Repairs {
+            lump: Lump::Leafs,
+            warnings: &mut self.warnings,
+            repairs: &mut self.container.repairs,
+        };
+        for (element, leaf) in self.leafs.iter_mut().enumerate() {
+            let cluster = Field("cluster", 0);
+            if leaf.cluster < -1 {
+                log.replace(element, cluster, &mut leaf.cluster, -1, "taken as outside");
+            }
+            match clusters {
+                Some(count) if i64::from(leaf.cluster) >= count as i64 => {
+                    let action = "not in the visibility lump: never drawn, sees everything";
+                    log.replace(element, cluster, &mut leaf.cluster, -1, action);
+                }
+                // Without sets all clusters are alike, so that a number nobody could count up to
+                // may as well be 0.
+                None if i64::from(leaf.cluster) >= leafs as i64 => {
+                    let action = "more than there are leafs; taken as 0, as all see each other";
+                    log.replace(element, cluster, &mut leaf.cluster, 0, action);
+                }
+                _ => {}
+            }
+            log.range(
+                element,
+                Field("firstLeafSurface", 32),
+                &mut leaf.first_leaf_surface,
+                leaf.num_leaf_surfaces,
+                Lump::LeafSurfaces,
+                leaf_surfaces,
+            )?;
+            log.range(
+                element,
+                Field("firstLeafBrush", 40),
+                &mut leaf.first_leaf_brush,
+                leaf.num_leaf_brushes,
+                Lump::LeafBrushes,
+                leaf_brushes,
+            )?;
+        }
+        for (element, &surface) in self.leaf_surfaces.iter().enumerate() {
+            index(
+                Lump::LeafSurfaces,
+                element,
+                "surface",
+                surface,
+                Lump::Surfaces,
+                surfaces,
+            )?;
+        }
+        for (element, &brush) in self.leaf_brushes.iter().enumerate() {
+            index(
+                Lump::LeafBrushes,
+                element,
+                "brush",
+                brush,
+                Lump::Brushes,
+                brushes,
+            )?;
+        }
+        Ok(())
+    }
+
+    fn check_models(&mut self) -> Result<(), Error> {
+        let (surfaces, brushes) = (self.surfaces.len(), self.brushes.len());
+        let mut log = Repairs {
+            lump: Lump::Models,
+            warnings: &mut self.warnings,
+            repairs: &mut self.container.repairs,
+        };
+        for (element, model) in self.models.iter_mut().enumerate() {
+            let name = Field("firstSurface", 24);
+            let count = model.num_surfaces;
+            log.range(
+                element,
+                name,
+                &mut model.first_surface,
+                count,
+                Lump::Surfaces,
+                surfaces,
+            )?;
+            let name = Field("firstBrush", 32);
+            let count = model.num_brushes;
+            log.range(
+                element,
+                name,
+                &mut model.first_brush,
+                count,
+                Lump::Brushes,
+                brushes,
+            )?;
+        }
+        Ok(())
+    }
+
+    fn check_brushes(&mut self) -> Result<(), Error> {
+        let (shaders, sides, planes) = (
+            self.shaders.len(),
+            self.brush_sides.len(),
+            self.planes.len(),
+        );
+        let mut log = Repairs {
+            lump: Lump::Brushes,
+            warnings: &mut self.warnings,
+            repairs: &mut self.container.repairs,
+        };
+        for (element, brush) in self.brushes.iter_mut().enumerate() {
+            index(
+                Lump::Brushes,
+                element,
+                "shaderNum",
+                brush.shader,
+                Lump::Shaders,
+                shaders,
+            )?;
+            let name = Field("firstSide", 0);
+            let count = brush.num_sides;
+            log.range(
+                element,
+                name,
+                &mut brush.first_side,
+                count,
+                Lump::BrushSides,
+                sides,
+            )?;
+        }
+        for (element, side) in self.brush_sides.iter().enumerate() {
+            let lump = Lump::BrushSides;
+            index(lump, element, "planeNum", side.plane, Lump::Planes, planes)?;
+            index(
+                lump,
+                element,
+                "shaderNum",
+                side.shader,
+                Lump::Shaders,
+                shaders,
+            )?;
+        }
+        Ok(())
+    }
+
+    fn check_fogs(&mut self) -> Result<(), Error> {
+        let mut log = Repairs {
+            lump: Lump::Fogs,
+            warnings: &mut self.warnings,
+            repairs: &mut self.container.repairs,
+        };
+        for (element, fog) in self.fogs.iter_mut().enumerate() {
+            let at = index(
+                Lump::Fogs,
+                element,
+                "brushNum",
+                fog.brush,
+                Lump::Brushes,
+                self.brushes.len(),
+            )?;
+            let sides = self.brushes.get(at).map_or(0, |brush| brush.num_sides);
+            if sides < 6 {
+                return Err(Error::Value {
+                    lump: Lump::Fogs,
+                    element,
+                    field: "number of sides of its brush",
+                    value: i64::from(sides),
+                    expected: "but the first six give the bounds of the fog".to_owned(),
+                });
+            }
+            if fog.visible_side < -1 || fog.visible_side >= sides {
+                let action = "no side of its brush; taken as none";
+                let field = Field("visibleSide", 68);
+                log.replace(element, field, &mut fog.visible_side, -1, action);
+            }
+        }
+        Ok(())
+    }
+
+    fn check_surfaces(&mut self) -> Result<(), Error> {
+        let (shaders, fogs) = (self.shaders.len(), self.fogs.len() as i64);
+        let (vertices, indices) = (self.vertices.len(), self.indices.len());
+        let pages = self.lightmaps.len() as i64;
+        let mut log = Repairs {
+            lump: Lump::Surfaces,
+            warnings: &mut self.warnings,
+            repairs: &mut self.container.repairs,
+        };
+        let (mut all_vertices, mut all_indices) = (0u64, 0u64);
+        let first_vert = Field("firstVert", 12);
+        let first_index = Field("firstIndex", 20);
+        for (element, s) in self.surfaces.iter_mut().enumerate() {
+            index(
+                Lump::Surfaces,
+                element,
+                "shaderNum",
+                s.shader,
+                Lump::Shaders,
+                shaders,
+            )?;
+            if s.fog < -1 || i64::from(s.fog) >= fogs {
+                log.replace(
+                    element,
+                    Field("fogNum", 4),
+                    &mut s.fog,
+                    -1,
+                    "taken as no fog",
+                );
+            }
+            if s.lightmap < lightmap_index::TWO_D || i64::from(s.lightmap) >= pages {
+                let action = "no such page; lit by vertex";
+                let by_vertex = lightmap_index::BY_VERTEX;
+                log.replace(
+                    element,
+                    Field("lightmapNum", 28),
+                    &mut s.lightmap,
+                    by_vertex,
+                    action,
+                );
+            }
+            let drawn_by_indices = match s.kind {
+                SurfaceKind::Planar | SurfaceKind::TriangleSoup => true,
+                SurfaceKind::Patch => {
+                    let points = patch_points(element, s.patch_width, s.patch_height)?;
+                    let action = "not width × height of the patch, which counts";
+                    log.replace(
+                        element,
+                        Field("numVerts", 16),
+                        &mut s.num_verts,
+                        points,
+                        action,
+                    );
+                    false
+                }
+                SurfaceKind::Flare => {
+                    if !in_range(s.first_vert, s.num_verts, vertices) {
+                        let action = "unused by a flare; taken as 0";
+                        log.replace(element, first_vert, &mut s.first_vert, 0, action);
+                        log.replace(element, Field("numVerts", 16), &mut s.num_verts, 0, action);
+                    }
+                    false
+                }
+                SurfaceKind::Other(raw) => {
+                    return Err(Error::Value {
+                        lump: Lump::Surfaces,
+                        element,
+                        field: "surfaceType",
+                        value: i64::from(raw),
+                        expected: "not one of 1 to 4".to_owned(),
+                    });
+                }
+            };
+            let count = s.num_verts;
+            log.range(
+                element,
+                first_vert,
+                &mut s.first_vert,
+                count,
+                Lump::DrawVerts,
+                vertices,
+            )?;
+            let num_indexes = Field("numIndexes", 24);
+            if drawn_by_indices {
+                if s.num_indices > 0 && s.num_indices % 3 != 0 {
+                    let whole = s.num_indices - s.num_indices % 3;
+                    let action = "not a multiple of three; the rest is ignored";
+                    log.replace(element, num_indexes, &mut s.num_indices, whole, action);
+                }
+                let count = s.num_indices;
+                let target = Lump::DrawIndexes;
+                log.range(
+                    element,
+                    first_index,
+                    &mut s.first_index,
+                    count,
+                    target,
+                    indices,
+                )?;
+            } else if !in_range(s.first_index, s.num_indices, indices) {
+                let action = "unused by this kind of surface; taken as 0";
+                log.replace(element, first_index, &mut s.first_index, 0, action);
+                log.replace(element, num_indexes, &mut s.num_indices, 0, action);
+            }
+            all_vertices += u64::try_from(s.num_verts).unwrap_or(0);
+            all_indices += u64::try_from(s.num_indices).unwrap_or(0);
+        }
+        for (target, found) in [
+            (Lump::DrawVerts, all_vertices),
+            (Lump::DrawIndexes, all_indices),
+        ] {
+            if found > MAX_REFERENCES {
+                return Err(Error::TooMuchSharing {
+                    target,
+                    found,
+                    limit: MAX_REFERENCES,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Triangle corners must lie among their surface's vertices.
+    fn check_indices(&self) -> Result<(), Error> {
+        for s in &self.surfaces {
+            if !matches!(s.kind, SurfaceKind::Planar | SurfaceKind::TriangleSoup) {
+                continue;
+            }
+            let corners = self.surface_indices(s);
+            let outside = |&corner: &i32| corner < 0 || corner >= s.num_verts;
+            if let Some(at) = corners.iter().position(outside) {
+                let element = usize::try_from(s.first_index).unwrap_or(0) + at;
+                return Err(Error::Value {
+                    lump: Lump::DrawIndexes,
+                    element,
+                    field: "corner",
+                    value: i64::from(corners.get(at).copied().unwrap_or(0)),
+                    expected: format!("outside the {} vertices of its surface", s.num_verts),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// One warning each for vertices and planes that are not finite; they stay as they are.
+    fn warn_about_floats(&mut self) {
+        let vertices = |v: &crate::DrawVert| !v.is_finite();
+        let planes = |p: &crate::Plane| !p.normal.is_finite() || !p.dist.is_finite();
+        for (lump, first, count) in [
+            (
+                Lump::DrawVerts,
+                self.vertices.iter().position(vertices),
+                self.vertices.iter().filter(|v| vertices(v)).count(),
+            ),
+            (
+                Lump::Planes,
+                self.planes.iter().position(planes),
+                self.planes.iter().filter(|p| planes(p)).count(),
+            ),
+        ] {
+            if let Some(first) = first {
+                self.warnings.push(Warning {
+                    lump,
+                    element: Some(first),
+                    field: "number of records with NaN or infinity, of which this is the first,",
+                    value: count as i64,
+                    action: "kept as they are",
+                });
+            }
+        }
+    }
+}
+
+/// Number of control points of a patch whose sizes are acceptable to the engine.
+fn patch_points(element: usize, width: i32, height: i32) -> Result<i32, Error> {
+    for (field, size) in [("patchWidth", width), ("patchHeight", height)] {
+        if size < 3 || size % 2 == 0 {
+            return Err(Error::Value {
+                lump: Lump::Surfaces,
+                element,
+                field,
+                value: i64::from(size),
+                expected: "but patches have an odd number of at least 3".to_owned(),
+            });
+        }
+    }
+    width.checked_mul(height).ok_or(Error::Value {
+        lump: Lump::Surfaces,
+        element,
+        field: "patchWidth",
+        value: i64::from(width),
+        expected: format!("too much for patchHeight {height}"),
+    })
+}
