@@ -1,17 +1,38 @@
 //! Map conversion: a map, its materials and its images become a relit world.
 //!
-//! * [`compare`]: two pictures of one view compared.
 //! * [`files`]: game files behind one trait: packs, folders, an engine, memory.
 //! * [`mod@image`]: texture images as the engine reads them.
+//! * [`materials`]: scripts and implicit materials by name.
 //! * [`overbright`]: the one place that knows overbright bits, gamma and sRGB.
+//! * [`world`]: a map with flat geometry, resolved materials and its light sources.
+//! * [`light`]: light sources, their units, and the lists of them per cluster.
+//!
+//! ```no_run
+//! use relight::{Materials, RelitWorld, SearchPath};
+//!
+//! let files = SearchPath::open(&["/usr/share/games/openarena/baseoa"])?;
+//! let (materials, _) = Materials::load(&files);
+//! let world = RelitWorld::load(&files, &materials, "maps/oa_dm1.bsp", Default::default())?;
+//! println!("{} lights, {} suns", world.lights.len(), world.suns.len());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)
+)]
 
-pub mod compare;
 pub mod files;
 pub mod image;
+pub mod light;
+pub mod materials;
 pub mod overbright;
 #[cfg(test)]
 mod test_data;
+pub mod world;
 
 pub use files::{FileError, GameFiles, MemoryFiles, Pk3, SearchPath};
+pub use light::{LightLists, LightReport, PointLight, SunLight, TriangleLight};
+pub use materials::{Materials, Resolved};
+pub use world::{LoadError, Options, RelitWorld, WorldMaterial, WorldSurface, WorldVertex};

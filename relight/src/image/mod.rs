@@ -134,7 +134,12 @@ impl Image {
 /// # Errors
 /// [`ImageError`] when a TGA or BMP is malformed, an image is too large, or a file cannot be read. The
 /// engine leaves the map for the first of these; callers here draw the default image and say so once.
+///
+/// The names of the engine's built-in images `*white` and `*default` give those.
 pub fn load(files: &dyn GameFiles, name: &str) -> Result<Option<(Image, String)>, ImageError> {
+    if let Some(image) = built_in(name) {
+        return Ok(Some((image, name.to_owned())));
+    }
     let (stem, written) = match split_extension(name) {
         Some((stem, ext)) if known(ext) => (stem, Some(ext.to_ascii_lowercase())),
         _ => (name, None),
@@ -158,6 +163,9 @@ pub fn load(files: &dyn GameFiles, name: &str) -> Result<Option<(Image, String)>
 
 /// The game path of the file that [`load`] would try first among those that exist, without reading it.
 pub fn find(files: &dyn GameFiles, name: &str) -> Option<String> {
+    if built_in(name).is_some() {
+        return Some(name.to_owned());
+    }
     let stem = match split_extension(name) {
         Some((stem, ext)) if known(ext) => {
             if files.exists(name) {
@@ -171,6 +179,35 @@ pub fn find(files: &dyn GameFiles, name: &str) -> Option<String> {
         .iter()
         .map(|ext| format!("{stem}.{ext}"))
         .find(|file| files.exists(file))
+}
+
+/// The engine's built-in images that scripts can name: `*white`, 8 × 8, and `*default`, 16 × 16 dark grey with a
+/// white border, which marks what is missing.
+pub fn built_in(name: &str) -> Option<Image> {
+    const WHITE: [u8; 4] = [255; 4];
+    const DARK: [u8; 4] = [32, 32, 32, 255];
+    let picture = |side: u32, texel: &dyn Fn(u32, u32) -> [u8; 4]| {
+        let rgba = (0..side * side)
+            .flat_map(|i| texel(i % side, i / side))
+            .collect();
+        Image {
+            width: side,
+            height: side,
+            rgba,
+            has_alpha: false,
+        }
+    };
+    match name {
+        "*white" => Some(picture(8, &|_, _| WHITE)),
+        "*default" => Some(picture(16, &|x, y| {
+            if matches!(x, 0 | 15) || matches!(y, 0 | 15) {
+                WHITE
+            } else {
+                DARK
+            }
+        })),
+        _ => None,
+    }
 }
 
 fn known(extension: &str) -> bool {

@@ -1,0 +1,171 @@
+//! Whether a material emits light, and how much: by its directives and its stages, never by its name.
+//!
+//! In this order:
+//!
+//! 1. `q3map_surfacelight` and, on skies, `q3map_skylight`: what the map compiler was told. The colour is the
+//!    mean of the light image, scaled so that its largest channel is 1. Which image: `q3map_lightRGB` gives the
+//!    colour itself; else the first that exists of `q3map_lightimage`, for skies the box's upper side,
+//!    `qer_editorimage`, an image of the material's name, the images of its stages; white when there is none.
+//! 2. Stages that glow: of an opaque material, what its stack of stages shows where no light falls, averaged
+//!    over the texture and over time, is at least [`GLOW_THRESHOLD`].
+//!
+//! Source: q3map2's choice of the light image; the stage algebra is [`shaderscript::light`]'s.
+
+use super::entities::normalise;
+use super::{POINT_LIGHT_INTENSITY, SKY_LIGHT_RADIANCE, SURFACE_LIGHT_RADIANCE};
+use crate::files::GameFiles;
+use crate::image::{self, Image};
+use crate::world::WorldMaterial;
+use glam::Vec3;
+use shaderscript::{Cull, Deform, Shader};
+use std::collections::HashMap;
+
+/// Why a surface emits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum EmissionSource {
+    /// `q3map_surfacelight`.
+    SurfaceLight,
+    /// `q3map_surfacelight` or `q3map_skylight` of a sky.
+    Sky,
+    /// `q3map_surfacelight` of a sprite that turns to the viewer.
+    Sprite,
+    /// Its stages show it glowing.
+    Glow,
+    /// A flare marks a lamp here.
+    Flare,
+}
+
+impl EmissionSource {
+    /// A short name for tables.
+    pub fn label(self) -> &'static str {
+        match self {
+            EmissionSource::SurfaceLight => "surfacelight",
+            EmissionSource::Sky => "sky",
+            EmissionSource::Sprite => "sprite",
+            EmissionSource::Glow => "glow",
+            EmissionSource::Flare => "flare",
+        }
+    }
+}
+
+/// Light that a material emits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Emission {
+    /// Why.
+    pub source: EmissionSource,
+    /// Radiance, linear, display units. Of [`EmissionSource::Sprite`]: radiant intensity of each surface, into
+    /// every direction.
+    pub strength: Vec3,
+    /// Whether both sides emit, because both are drawn.
+    pub two_sided: bool,
+    /// Whether it is the back that emits, because only the back is drawn.
+    pub reversed: bool,
+    /// Whether its quads turn to the viewer.
+    pub turns_to_viewer: bool,
+}
+
+/// Least mean emission (luminance, linear) that makes an opaque material without directives a light: that of
+/// a display grey of 37 %. Full-bright trim is dimmer than that; lamps, screens and lava are not.
+pub const GLOW_THRESHOLD: f32 = 0.11;
+
+/// Relative luminance of linear colours (Rec. 709).
+pub(super) fn luminance(color: Vec3) -> f32 {
+    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
+
+/// Longest side of the copies of textures that means are taken from.
+const SAMPLE_SIDE: u32 = 64;
+
+/// Finds what materials emit, keeping small copies of the images that it looked at.
+pub(crate) struct Finder<'a> {
+    files: &'a dyn GameFiles,
+    images: HashMap<String, Option<Image>>,
+}
+
+impl<'a> Finder<'a> {
+    pub fn new(files: &'a dyn GameFiles) -> Self {
+        Finder {
+            files,
+            images: HashMap::new(),
+        }
+    }
+
+    /// The light that a material emits.
+    pub fn emission(&mut self, material: &WorldMaterial) -> Option<Emission> {
+        let definition = material.resolved.definition();
+        let sky = material.is_sky();
+        let autosprite = definition.deforms.contains(&Deform::AutoSprite);
+        let emission = |source, strength: Vec3| Emission {
+            source,
+            strength,
+            two_sided: definition.cull == Cull::None && !sky,
+            reversed: definition.cull == Cull::Back && !sky,
+            turns_to_viewer: autosprite || definition.deforms.contains(&Deform::AutoSprite2),
+        };
+        let positive = |v: Option<f32>| v.filter(|v| v.is_finite() && *v > 0.0).unwrap_or(0.0);
+        let surface_light = positive(definition.light.surface_light);
+        let dome = if sky {
+            positive(definition.light.sky_light.map(|(value, _)| value))
+        } else {
+            0.0
+        };
+        if surface_light > 0.0 || dome > 0.0 {
+            let color = self.light_color(definition);
+            return Some(match (sky, autosprite) {
+                (true, _) => emission(
+                    EmissionSource::Sky,
+                    color * (surface_light * SURFACE_LIGHT_RADIANCE + dome * SKY_LIGHT_RADIANCE),
+                ),
+                (false, true) => emission(
+                    EmissionSource::Sprite,
+                    color * (surface_light * POINT_LIGHT_INTENSITY),
+                ),
+                (false, false) => emission(
+                    EmissionSource::SurfaceLight,
+                    color * (surface_light * SURFACE_LIGHT_RADIANCE),
+                ),
+            });
+        }
+        None
+    }
+
+    /// Colour of the light that directives ask for, its largest channel 1.
+    fn light_color(&mut self, definition: &Shader) -> Vec3 {
+        let light = &definition.light;
+        if let Some(rgb) = light.light_rgb {
+            return normalise(rgb.max(Vec3::ZERO));
+        }
+        let sky_side = definition
+            .sky
+            .as_ref()
+            .and_then(|sky| Some(format!("{}_up", sky.outer.as_ref()?)));
+        let mut names: Vec<&str> = Vec::new();
+        names.extend(light.light_image.as_deref());
+        names.extend(sky_side.as_deref());
+        names.extend(light.editor_image.as_deref());
+        names.push(&definition.name);
+        names.extend(definition.image_names());
+        let mean = names
+            .into_iter()
+            .find_map(|name| self.image(name).map(Image::mean_linear));
+        mean.map_or(Vec3::ONE, normalise)
+    }
+
+    /// A small copy of an image, if there is one.
+    fn image(&mut self, name: &str) -> Option<&Image> {
+        if !self.images.contains_key(name) {
+            let loaded = image::load(self.files, name).unwrap_or_else(|problem| {
+                log::warn!("{problem}");
+                None
+            });
+            let small = loaded.map(|(mut image, _)| {
+                while image.width.max(image.height) > SAMPLE_SIDE {
+                    image = image.halve();
+                }
+                image
+            });
+            self.images.insert(name.to_owned(), small);
+        }
+        self.images.get(name)?.as_ref()
+    }
+}

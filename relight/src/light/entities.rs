@@ -1,0 +1,199 @@
+//! Light that entities describe: light entities left in the map, and the world's ambient term.
+//!
+//! Compilers strip light entities unless told otherwise, so most maps have none.
+//!
+//! Source: meaning and defaults of the keys are q3map2's.
+
+use super::{
+    AMBIENT_RADIANCE, DEFAULT_POINT_LIGHT_RADIUS, DEFAULT_SUN_RADIUS, POINT_LIGHT_INTENSITY,
+    PointLight, SUN_IRRADIANCE, Spot, SunLight,
+};
+use glam::Vec3;
+use q3bsp::Entity;
+
+/// `light` of an entity that does not say.
+const DEFAULT_LIGHT: f32 = 300.0;
+/// `radius` of a spot light that does not say: of its cone where its target stands.
+const DEFAULT_CONE_RADIUS: f32 = 64.0;
+/// Added to a cone's radius by the compiler.
+const CONE_MARGIN: f32 = 16.0;
+/// `spawnflags` bit of a light that falls off linearly.
+const LINEAR_FALLOFF: i64 = 1;
+/// A linear light of value l gives 7500 l / 8000 up close.
+const LINEAR_SCALE: f32 = 1.0 / 8000.0;
+
+/// Light entities, as point lights and suns.
+pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLight>) {
+    let mut points = Vec::new();
+    let mut suns = Vec::new();
+    for entity in entities.iter().filter(|e| is_light(e.classname())) {
+        let Some(origin) = entity.vec3("origin") else {
+            continue;
+        };
+        let value = number(entity, &["_light", "light"]).unwrap_or(DEFAULT_LIGHT)
+            * number(entity, &["scale"])
+                .filter(|s| *s != 0.0)
+                .unwrap_or(1.0);
+        let color = color(entity);
+        if !(value > 0.0 && value.is_finite()) || color == Vec3::ZERO {
+            continue;
+        }
+        let target = entity.get("target").and_then(|name| {
+            let aim = entities.iter().find(|e| {
+                e.get("targetname")
+                    .is_some_and(|t| t.eq_ignore_ascii_case(name))
+            })?;
+            let offset = aim.vec3("origin")? - origin;
+            (offset.length() > 0.0).then_some(offset)
+        });
+        if number(entity, &["_sun"]) == Some(1.0) {
+            suns.push(SunLight {
+                direction: target.map_or(Vec3::Z, |offset| -offset.normalize_or(Vec3::NEG_Z)),
+                irradiance: color * (value * SUN_IRRADIANCE),
+                angular_radius: number(entity, &["_deviance", "_deviation", "_jitter"])
+                    .filter(|d| *d > 0.0)
+                    .map_or(DEFAULT_SUN_RADIUS, f32::to_radians),
+                material: None,
+            });
+            continue;
+        }
+        let flags = number(entity, &["spawnflags"]).map_or(0, |f| f as i64);
+        let intensity = if flags & LINEAR_FALLOFF != 0 {
+            linear_intensity(
+                value,
+                number(entity, &["fade"])
+                    .filter(|f| *f > 0.0)
+                    .unwrap_or(1.0),
+            )
+        } else {
+            value * POINT_LIGHT_INTENSITY
+        };
+        let spot = target.map(|offset| Spot {
+            direction: offset.normalize_or(Vec3::NEG_Z),
+            tan_half_angle: (number(entity, &["radius"])
+                .filter(|r| *r != 0.0)
+                .unwrap_or(DEFAULT_CONE_RADIUS)
+                + CONE_MARGIN)
+                / offset.length(),
+        });
+        points.push(PointLight {
+            origin,
+            intensity: color * intensity,
+            radius: DEFAULT_POINT_LIGHT_RADIUS,
+            spot,
+        });
+    }
+    (points, suns)
+}
+
+/// Intensity of an inverse-square light that is as bright as a linear one at half the linear one's reach.
+///
+/// A linear light gives v(d) = 7500 l / 8000 - fade d, so it reaches R = 7500 l / (8000 fade) and gives half its
+/// strength at R / 2; with E = π v 4 / 255 the equal inverse-square light has I = E (R / 2)².
+fn linear_intensity(value: f32, fade: f32) -> f32 {
+    let near = 7500.0 * value * LINEAR_SCALE;
+    let half_reach = near / fade * 0.5;
+    SUN_IRRADIANCE * near * 0.5 * half_reach * half_reach
+}
+
+/// Radiance from everywhere: the compiler adds `ambient` to every texel, and lifts texels to `_minlight`.
+pub(crate) fn ambient(entities: &[Entity]) -> Vec3 {
+    let Some(world) = entities.first() else {
+        return Vec3::ZERO;
+    };
+    let positive = |keys: &[&str]| {
+        number(world, keys)
+            .filter(|v| *v > 0.0 && v.is_finite())
+            .unwrap_or(0.0)
+    };
+    let value = positive(&["_ambient", "ambient"]).max(positive(&["_minlight"]));
+    color(world) * (value * AMBIENT_RADIANCE)
+}
+
+/// Whether a class of entity lights the world. (`lightJunior` lights only what moves.)
+fn is_light(classname: &str) -> bool {
+    let class = classname.to_ascii_lowercase();
+    class.starts_with("light") && class != "lightjunior"
+}
+
+/// The first key that is there, as a finite number.
+fn number(entity: &Entity, keys: &[&str]) -> Option<f32> {
+    keys.iter()
+        .find_map(|key| entity.number(key))
+        .filter(|v| v.is_finite())
+}
+
+/// `_color`, scaled so that its largest channel is 1; white when absent.
+fn color(entity: &Entity) -> Vec3 {
+    match entity.vec3("_color") {
+        Some(color) => normalise(color.max(Vec3::ZERO)),
+        None => Vec3::ONE,
+    }
+}
+
+/// A colour scaled so that its largest channel is 1; white when there is nothing to scale.
+pub(super) fn normalise(color: Vec3) -> Vec3 {
+    let largest = color.max_element();
+    if largest > 0.0 && color.is_finite() {
+        color / largest
+    } else {
+        Vec3::ONE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts::PI;
+
+    fn entities(text: &str) -> Vec<Entity> {
+        q3bsp::entities::parse(text.as_bytes()).0
+    }
+
+    #[test]
+    fn a_point_light_lights_as_the_compiler_computes() {
+        let text = r#"{ "classname" "worldspawn" } { "classname" "light" "origin" "1 2 3" "light" "200" "_color" "0.5 0.25 0" }"#;
+        let (points, suns) = light_entities(&entities(text));
+        assert!(suns.is_empty());
+        let [light] = points[..] else {
+            panic!("{points:?}")
+        };
+        assert_eq!(light.origin, Vec3::new(1.0, 2.0, 3.0));
+        // At distance d the compiler stores 7500 · 200 / d², shown ×4; white shows I / d² / π.
+        let shown = light.intensity / (100.0 * 100.0) / PI;
+        let stored = 7500.0 * 200.0 / (100.0 * 100.0) * 4.0 / 255.0;
+        assert!((shown - stored * Vec3::new(1.0, 0.5, 0.0)).length() < 1e-3);
+        assert_eq!(light.spot, None);
+    }
+
+    #[test]
+    fn targets_make_spots_and_suns() {
+        let text = r#"{ "classname" "worldspawn" "ambient" "10" "_color" "0 2 1" }
+            { "classname" "light" "origin" "0 0 100" "target" "a" "radius" "84" }
+            { "classname" "light" "origin" "0 0 100" "target" "a" "_sun" "1" "light" "50" "_deviance" "2" }
+            { "classname" "light" "origin" "0 0 100" "target" "nothing" }
+            { "classname" "light" "light" "100" }
+            { "classname" "light" "origin" "0 0 0" "light" "-3" }
+            { "classname" "target_position" "origin" "0 0 0" "targetname" "a" }"#;
+        let entities = entities(text);
+        let (points, suns) = light_entities(&entities);
+        assert_eq!(points.len(), 2);
+        let spot = points[0].spot.unwrap();
+        assert_eq!(spot.direction, Vec3::NEG_Z);
+        assert!((spot.tan_half_angle - 1.0).abs() < 1e-6);
+        assert_eq!(points[1].spot, None);
+        assert_eq!(suns[0].direction, Vec3::Z);
+        assert!((suns[0].irradiance.x - PI * 50.0 * 4.0 / 255.0).abs() < 1e-5);
+        assert!((suns[0].angular_radius - 2f32.to_radians()).abs() < 1e-7);
+        assert!((ambient(&entities) - Vec3::new(0.0, 1.0, 0.5) * 40.0 / 255.0).length() < 1e-6);
+        assert_eq!(ambient(&[]), Vec3::ZERO);
+    }
+
+    #[test]
+    fn linear_lights_agree_half_way() {
+        let intensity = linear_intensity(300.0, 2.0);
+        let reach = 7500.0 * 300.0 / 8000.0 / 2.0;
+        let linear = SUN_IRRADIANCE * (7500.0 * 300.0 / 8000.0 - 2.0 * reach / 2.0);
+        assert!((intensity / (reach / 2.0).powi(2) - linear).abs() < 1e-4 * linear);
+    }
+}

@@ -1,0 +1,176 @@
+//! From emitting materials to triangle lights, and from sky materials to suns.
+
+use super::emission::{Emission, EmissionSource};
+use super::{DEFAULT_SUN_RADIUS, EmitterSummary, SUN_IRRADIANCE, SunLight, TriangleLight};
+use crate::world::{NO_LIGHT, RelitWorld, WorldMaterial, WorldSurface};
+use glam::Vec3;
+
+/// Triangles of less area emit nothing: their light is less than rounding, and their normal is noise.
+/// Square id units.
+const LEAST_AREA: f32 = 1.0 / 64.0;
+
+/// Suns of the sky materials that drawn surfaces use. The same sun written twice counts once.
+pub(crate) fn suns(materials: &[WorldMaterial], surfaces: &[WorldSurface]) -> Vec<SunLight> {
+    let mut used = vec![false; materials.len()];
+    for surface in surfaces.iter().filter(|s| s.num_indices > 0) {
+        if let Some(used) = used.get_mut(surface.material as usize) {
+            *used = true;
+        }
+    }
+    let mut suns: Vec<SunLight> = Vec::new();
+    for (index, (material, _)) in materials
+        .iter()
+        .zip(used)
+        .enumerate()
+        .filter(|(_, (m, used))| *used && m.is_sky())
+    {
+        for sun in &material.resolved.definition().suns {
+            let irradiance = sun.compiler_color() * (sun.intensity * SUN_IRRADIANCE);
+            let direction = sun.direction.normalize_or_zero();
+            if !irradiance.is_finite() || irradiance.max_element() <= 0.0 || direction == Vec3::ZERO
+            {
+                continue;
+            }
+            if suns
+                .iter()
+                .any(|s| s.direction == direction && s.irradiance == irradiance)
+            {
+                continue;
+            }
+            suns.push(SunLight {
+                direction,
+                irradiance,
+                angular_radius: match sun.deviance_degrees {
+                    d if d > 0.0 && d.is_finite() => d.min(90.0).to_radians(),
+                    _ => DEFAULT_SUN_RADIUS,
+                },
+                material: Some(index as u32),
+            });
+        }
+    }
+    suns
+}
+
+/// Makes the triangle lights of a world whose materials know their emission, and the report of them.
+pub(crate) fn place(world: &mut RelitWorld) {
+    let mut summaries: Vec<Option<EmitterSummary>> = vec![None; world.materials.len()];
+    let mut lights = Vec::new();
+    for index in 0..world.surfaces.len() {
+        let Some(surface) = world.surfaces.get(index).copied() else {
+            continue;
+        };
+        let material = world.materials.get(surface.material as usize);
+        let Some((material, emission)) = material.and_then(|m| Some((m, m.emission?))) else {
+            continue;
+        };
+        let first = lights.len();
+        let degenerate = cut(
+            world,
+            index as u32,
+            &surface,
+            material,
+            emission,
+            &mut lights,
+        );
+        let made = lights.get(first..).unwrap_or_default();
+        world.report.degenerate_triangles += degenerate;
+        for (light, at) in made.iter().zip(first as u32..) {
+            if let Some(slot) = world.triangle_lights.get_mut(light.triangle as usize) {
+                *slot = at;
+            }
+        }
+        if let Some(surface) = world.surfaces.get_mut(index) {
+            surface.first_light = first as u32;
+            surface.num_lights = made.len() as u32;
+        }
+        let Some(brightest) = made.first() else {
+            continue;
+        };
+        if let Some(slot) = summaries.get_mut(surface.material as usize) {
+            let summary = slot.get_or_insert_with(|| EmitterSummary {
+                material: surface.material,
+                name: material.name.clone(),
+                source: emission.source,
+                radiance: brightest.radiance,
+                surfaces: 0,
+                triangles: 0,
+                area: 0.0,
+            });
+            summary.surfaces += 1;
+            summary.triangles += made.len();
+            summary.area += made.iter().map(|l| f64::from(l.area())).sum::<f64>();
+        }
+    }
+    debug_assert!(
+        world
+            .triangle_lights
+            .iter()
+            .all(|&l| l == NO_LIGHT || (l as usize) < lights.len())
+    );
+    world.lights = lights;
+    world.report.emitters = summaries.into_iter().flatten().collect();
+    world.report.triangle_lights = world.lights.len();
+    world.report.point_lights = world.point_lights.len();
+    world.report.suns = world.suns.len();
+}
+
+/// Appends the lights of one surface; returns how many of its triangles are degenerate.
+fn cut(
+    world: &RelitWorld,
+    index: u32,
+    surface: &WorldSurface,
+    material: &WorldMaterial,
+    emission: Emission,
+    lights: &mut Vec<TriangleLight>,
+) -> usize {
+    let offset = world
+        .models
+        .get(surface.model as usize)
+        .map_or(Vec3::ZERO, |m| m.origin);
+    let sprite = emission.turns_to_viewer;
+    let radiance = match emission.source {
+        // All quads of the surface share one light of the compiler's.
+        EmissionSource::Sprite => {
+            let area = world.surface_area(surface);
+            if area < LEAST_AREA {
+                Vec3::ZERO
+            } else {
+                emission.strength * (2.0 / area)
+            }
+        }
+        _ => emission.strength,
+    };
+    if !radiance.is_finite() || radiance.max_element() <= 0.0 {
+        return 0;
+    }
+    let first = surface.first_index / 3;
+    let mut degenerate = 0;
+    for triangle in first..first + surface.num_indices / 3 {
+        let Some([a, b, c]) = world.triangle(triangle as usize) else {
+            continue;
+        };
+        // Front faces of a map are clockwise; a light's are the other way round.
+        let corners = if emission.reversed {
+            [a, b, c]
+        } else {
+            [a, c, b]
+        };
+        let light = TriangleLight {
+            vertices: corners.map(|p| p + offset),
+            radiance,
+            two_sided: emission.two_sided || sprite,
+            surface: index,
+            triangle: if sprite { u32::MAX } else { triangle },
+            model: surface.model,
+            is_sky: material.is_sky(),
+            source: emission.source,
+        };
+        let area = light.area();
+        if area.is_finite() && area >= LEAST_AREA {
+            lights.push(light);
+        } else {
+            degenerate += 1;
+        }
+    }
+    degenerate
+}

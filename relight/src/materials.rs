@@ -1,0 +1,195 @@
+//! Materials by name: what the scripts of a game define, what the engine makes of bare images, and the
+//! default for everything that is missing.
+
+use crate::files::GameFiles;
+use crate::image;
+use shaderscript::{Diagnostic, ImplicitKind, Library, Shader};
+use std::collections::{HashMap, HashSet};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// The materials of a game.
+#[derive(Debug)]
+pub struct Materials {
+    library: Library,
+    /// Whether the image of a name exists, as far as was asked.
+    images: Mutex<HashMap<String, bool>>,
+    /// Materials whose fault was told.
+    told: Mutex<HashSet<String>>,
+}
+
+/// A material as it is drawn, and as the map compiler read it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resolved {
+    /// What is drawn: the script's definition, the implicit material of an image, or the default
+    /// ([`Shader::default_material`]).
+    pub shader: Shader,
+    /// The script's definition, also when something else is drawn: what it says about light was true for the
+    /// map compiler, which needs no images.
+    pub script: Option<Shader>,
+    /// Why the default is drawn; `None` for a good material.
+    pub fault: Option<String>,
+}
+
+impl Resolved {
+    /// The definition that tells about light: the script's, else what is drawn.
+    pub fn definition(&self) -> &Shader {
+        self.script.as_ref().unwrap_or(&self.shader)
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // What is behind these locks is valid at every moment.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Materials {
+    /// Reads `scripts/*.shader` in the engine's order.
+    ///
+    /// Faults of scripts, and scripts that cannot be read, are told in the diagnostics; none of them is fatal.
+    pub fn load(files: &dyn GameFiles) -> (Materials, Vec<Diagnostic>) {
+        let mut scripts = Vec::new();
+        let mut unreadable = Vec::new();
+        for name in files.list("scripts", ".shader") {
+            let path = format!("scripts/{name}");
+            match files.read(&path) {
+                Ok(Some(text)) => scripts.push((path, text)),
+                Ok(None) => {}
+                Err(problem) => unreadable.push(Diagnostic {
+                    file: path,
+                    line: 1,
+                    column: 1,
+                    severity: shaderscript::Severity::Error,
+                    shader: None,
+                    message: format!("cannot be read: {problem}"),
+                }),
+            }
+        }
+        let library = Library::new(scripts);
+        unreadable.extend_from_slice(library.diagnostics());
+        (Materials::from_library(library), unreadable)
+    }
+
+    /// Materials of scripts that were read elsewhere.
+    pub fn from_library(library: Library) -> Materials {
+        Materials {
+            library,
+            images: Mutex::default(),
+            told: Mutex::default(),
+        }
+    }
+
+    /// The scripts.
+    pub fn library(&self) -> &Library {
+        &self.library
+    }
+
+    /// The material of a name, for a kind of use.
+    ///
+    /// As in the engine: a script's definition if there is one, all images of its stages exist, and the engine
+    /// would accept it; the image of that name with implicit stages if there is no script; the default
+    /// otherwise, which is logged once per name.
+    pub fn resolve(&self, files: &dyn GameFiles, name: &str, kind: ImplicitKind) -> Resolved {
+        let script = self.library.find(name).cloned();
+        let fault = match &script {
+            Some(script) => self.script_fault(files, script),
+            None if self.image_exists(files, name) => None,
+            None => Some("neither a script nor an image has this name".to_owned()),
+        };
+        if let Some(fault) = &fault
+            && lock(&self.told).insert(name.to_ascii_lowercase())
+        {
+            log::warn!("material {name}: {fault}; the default is drawn");
+        }
+        let shader = match (&script, &fault) {
+            (_, Some(_)) => Shader::default_material(name),
+            (Some(script), None) => script.clone(),
+            (None, None) => Shader::implicit(name, kind),
+        };
+        Resolved {
+            shader,
+            script,
+            fault,
+        }
+    }
+
+    /// Why the engine would not draw a script's definition.
+    fn script_fault(&self, files: &dyn GameFiles, script: &Shader) -> Option<String> {
+        let place = &script.location;
+        let at = |what: String| format!("{}:{}: {what}", place.file, place.line);
+        if let Some(reason) = &script.rejected {
+            return Some(at(reason.clone()));
+        }
+        let missing = script
+            .image_names()
+            .find(|image| !self.image_exists(files, image))?;
+        Some(at(format!("image {missing} is missing")))
+    }
+
+    fn image_exists(&self, files: &dyn GameFiles, name: &str) -> bool {
+        if let Some(&known) = lock(&self.images).get(name) {
+            return known;
+        }
+        let exists = image::find(files, name).is_some();
+        lock(&self.images).insert(name.to_owned(), exists);
+        exists
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::MemoryFiles;
+
+    const PIXEL: &[u8] = &[
+        0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 24, 0, 10, 20, 30,
+    ];
+
+    fn files(entries: &[(&str, &[u8])]) -> MemoryFiles {
+        let mut files = MemoryFiles::new();
+        for (path, bytes) in entries {
+            files.insert(path, *bytes).unwrap();
+        }
+        files
+    }
+
+    #[test]
+    fn scripts_images_and_the_default() {
+        let script = b"t/good\n{\n{\nmap t/pixel.jpg\n}\n}\nt/gone\n{\nq3map_surfacelight 100\n{\nmap t/none\n}\n}\nt/bad\n{\nnonsense\n}\n";
+        let files = files(&[("scripts/a.shader", script), ("t/pixel.tga", PIXEL)]);
+        let (materials, _) = Materials::load(&files);
+        let resolve = |name: &str| materials.resolve(&files, name, ImplicitKind::Lightmapped);
+
+        let good = resolve("T/GOOD");
+        assert_eq!((good.fault.as_ref(), good.shader.stages.len()), (None, 1));
+        let implicit = resolve("t/pixel");
+        assert_eq!(
+            (implicit.fault.as_ref(), implicit.script.as_ref()),
+            (None, None)
+        );
+        assert_eq!(
+            implicit.shader,
+            Shader::implicit("t/pixel", ImplicitKind::Lightmapped)
+        );
+
+        let gone = resolve("t/gone");
+        assert!(
+            gone.fault.as_ref().unwrap().contains("t/none"),
+            "{:?}",
+            gone.fault
+        );
+        assert_eq!(gone.shader, Shader::default_material("t/gone"));
+        assert_eq!(gone.definition().light.surface_light, Some(100.0));
+        assert!(resolve("t/bad").fault.is_some());
+        assert!(resolve("t/nothing").fault.unwrap().contains("neither"));
+    }
+
+    #[test]
+    fn built_in_images_exist() {
+        let files = files(&[("scripts/a.shader", b"t/w\n{\n{\nmap *white\n}\n}\n")]);
+        let (materials, _) = Materials::load(&files);
+        assert_eq!(
+            materials.resolve(&files, "t/w", ImplicitKind::Vertex).fault,
+            None
+        );
+    }
+}

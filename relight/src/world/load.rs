@@ -1,0 +1,334 @@
+//! From a map's bytes to a [`RelitWorld`].
+
+use super::geometry::{Flare, Geometry, NO_LIGHT, WorldModel, WorldSurface};
+use super::material::{WorldMaterial, lighting_of, lightmap_of};
+use super::{RelitWorld, fog};
+use crate::files::{FileError, GameFiles};
+use crate::light::{self, LightReport, TriangleLight};
+use crate::materials::Materials;
+use crate::overbright::MAP_OVERBRIGHT_BITS;
+use glam::Vec3;
+use q3bsp::{Bsp, Entity, SurfaceKind};
+use std::collections::HashMap;
+
+/// Why a map could not be relit.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// The map's file could not be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// There is no such map.
+    #[error("{map}: no such file in the game folders")]
+    Absent {
+        /// Game path as asked for.
+        map: String,
+    },
+    /// The file is not a map, or a damaged one.
+    #[error("{map}: {source}")]
+    Map {
+        /// Game path of the map.
+        map: String,
+        /// Lump, element and value that are wrong.
+        source: q3bsp::Error,
+    },
+}
+
+/// What loading is busy with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Reading and checking the map.
+    Map,
+    /// Looking materials up.
+    Materials,
+    /// Building vertices and triangles, patches among them.
+    Geometry,
+    /// Finding what emits.
+    Lights,
+    /// Listing lights per cluster.
+    LightLists,
+    /// Done.
+    Done,
+}
+
+/// Told of every stage as it begins.
+pub type Progress<'a> = &'a mut dyn FnMut(Stage);
+
+/// How a map is relit.
+pub struct Options<'a> {
+    /// Largest distance of a curve from its mesh, id units (`r_subdivisions`).
+    pub subdivisions: f32,
+    /// Left shift of lightmaps and vertex colours: `r_mapOverBrightBits` less what the display adds.
+    pub overbright_shift: u32,
+    /// Told of progress.
+    pub progress: Option<Progress<'a>>,
+}
+
+impl Default for Options<'_> {
+    /// The engine's defaults in a window: subdivisions 4, shift 2.
+    fn default() -> Self {
+        Options {
+            subdivisions: 4.0,
+            overbright_shift: MAP_OVERBRIGHT_BITS,
+            progress: None,
+        }
+    }
+}
+
+impl RelitWorld {
+    /// Loads and relights a map.
+    ///
+    /// # Errors
+    /// [`LoadError`] when the map is absent, cannot be read or is damaged. Missing materials and images are
+    /// warnings.
+    pub fn load(
+        files: &dyn GameFiles,
+        materials: &Materials,
+        map: &str,
+        options: Options<'_>,
+    ) -> Result<RelitWorld, LoadError> {
+        let bytes = files.read(map)?.ok_or_else(|| LoadError::Absent {
+            map: map.to_owned(),
+        })?;
+        let bsp = Bsp::parse(&bytes).map_err(|source| LoadError::Map {
+            map: map.to_owned(),
+            source,
+        })?;
+        Ok(RelitWorld::from_bsp(files, materials, map, bsp, options))
+    }
+
+    /// Relights a map that was read elsewhere.
+    pub fn from_bsp(
+        files: &dyn GameFiles,
+        materials: &Materials,
+        map: &str,
+        bsp: Bsp,
+        mut options: Options<'_>,
+    ) -> RelitWorld {
+        let mut begin = |stage: Stage| {
+            if let Some(progress) = options.progress.as_mut() {
+                progress(stage);
+            }
+        };
+        begin(Stage::Map);
+        let entities = bsp.entities();
+        let mut warnings: Vec<String> =
+            bsp.warnings.iter().map(|w| format!("{map}: {w}")).collect();
+
+        begin(Stage::Materials);
+        let mut finder = light::Finder::new(files);
+        let (mut world_materials, material_of) = resolve_materials(files, materials, &bsp);
+        let mut faulty: Vec<_> = world_materials
+            .iter()
+            .filter_map(|m| {
+                Some(format!(
+                    "{map}: material {}: {}",
+                    m.name,
+                    m.resolved.fault.as_ref()?
+                ))
+            })
+            .collect();
+        faulty.sort();
+        faulty.dedup();
+        warnings.extend(faulty);
+        let fogs = fog::fogs(&bsp, files, materials);
+
+        begin(Stage::Geometry);
+        let models = place_models(&bsp, &entities);
+        let model_of = model_of_surfaces(&bsp);
+        let patches = bsp.patch_meshes(options.subdivisions);
+        let mut geometry = Geometry::default();
+        let mut surfaces = Vec::with_capacity(bsp.surfaces.len());
+        let mut flares = Vec::new();
+        for (index, stored) in bsp.surfaces.iter().enumerate() {
+            let patch = patches.get(index).and_then(Option::as_ref);
+            let placed = geometry.add(&bsp, index, patch, options.overbright_shift);
+            let fog = match usize::try_from(stored.fog) {
+                Ok(fog) if fog < fogs.len() => fog as u32 + 1,
+                _ => 0,
+            };
+            let material = material_of.get(index).copied().unwrap_or(0);
+            if stored.kind == SurfaceKind::Flare {
+                let finite = |v: Vec3| if v.is_finite() { v } else { Vec3::ZERO };
+                flares.push(Flare {
+                    origin: finite(stored.lightmap_origin),
+                    color: finite(stored.lightmap_vecs[0]),
+                    normal: finite(stored.lightmap_vecs[2]).normalize_or_zero(),
+                    surface: index as u32,
+                    material,
+                    fog,
+                });
+            }
+            surfaces.push(WorldSurface {
+                kind: stored.kind,
+                material,
+                fog,
+                lightmap: lightmap_of(&bsp, index),
+                model: model_of.get(index).copied().unwrap_or(0),
+                first_vertex: placed.first_vertex,
+                num_vertices: placed.num_vertices,
+                first_index: placed.first_index,
+                num_indices: placed.num_indices,
+                first_light: 0,
+                num_lights: 0,
+                mins: placed.mins,
+                maxs: placed.maxs,
+                plane: placed.plane,
+            });
+        }
+
+        begin(Stage::Lights);
+        for material in &mut world_materials {
+            material.emission = finder.emission(material);
+        }
+        let (point_lights, mut suns) = light::light_entities(&entities);
+        suns.extend(light::suns(&world_materials, &surfaces));
+        let mut world = RelitWorld {
+            name: map.to_owned(),
+            materials: world_materials,
+            surfaces,
+            models,
+            vertices: geometry.vertices,
+            triangle_lights: vec![NO_LIGHT; geometry.indices.len() / 3],
+            indices: geometry.indices,
+            flares,
+            fogs,
+            lights: Vec::new(),
+            point_lights,
+            suns,
+            light_lists: Default::default(),
+            ambient: light::ambient(&entities),
+            sky: None,
+            report: LightReport::default(),
+            warnings,
+            overbright_shift: options.overbright_shift,
+            bsp,
+        };
+        light::place(&mut world);
+        world.sky = world.largest_sky();
+
+        begin(Stage::LightLists);
+        let clusters = light::Clusters::new(&world.bsp);
+        world.light_lists = clusters.lists(
+            &world.lights,
+            &world.point_lights,
+            &world.surfaces,
+            &world.models,
+        );
+        world.report.clusters = world.light_lists.clusters();
+        world.report.mean_list_length = world.light_lists.mean_length();
+        world.report.longest_list = world.light_lists.longest();
+        begin(Stage::Done);
+        world
+    }
+
+    /// Material of the sky surfaces with the largest area together.
+    fn largest_sky(&self) -> Option<u32> {
+        let mut area: HashMap<u32, f32> = HashMap::new();
+        for surface in &self.surfaces {
+            let material = self.materials.get(surface.material as usize);
+            if surface.num_indices > 0 && material.is_some_and(WorldMaterial::is_sky) {
+                *area.entry(surface.material).or_default() += self.surface_area(surface);
+            }
+        }
+        let largest = area
+            .into_iter()
+            .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+        largest.map(|(material, _)| material)
+    }
+
+    /// Area of a surface's triangles, square id units.
+    pub fn surface_area(&self, surface: &WorldSurface) -> f32 {
+        let first = surface.first_index as usize / 3;
+        (first..first + surface.num_indices as usize / 3)
+            .filter_map(|t| self.triangle(t))
+            .map(|[a, b, c]| (b - a).cross(c - a).length() * 0.5)
+            .sum()
+    }
+
+    /// Index of the light that a triangle of the index buffer is.
+    pub fn light_of_triangle(&self, triangle: usize) -> Option<&TriangleLight> {
+        self.lights
+            .get(*self.triangle_lights.get(triangle)? as usize)
+    }
+}
+
+/// The materials that the surfaces use, and for every surface the index of its own.
+///
+/// One entry per (name, flags, lighting): compilers write one name several times with different flags, of which
+/// one may be invisible.
+fn resolve_materials(
+    files: &dyn GameFiles,
+    materials: &Materials,
+    bsp: &Bsp,
+) -> (Vec<WorldMaterial>, Vec<u32>) {
+    let mut known: HashMap<(String, u32, u32, _), u32> = HashMap::new();
+    let mut list = Vec::new();
+    let mut of_surface = Vec::with_capacity(bsp.surfaces.len());
+    for (index, surface) in bsp.surfaces.iter().enumerate() {
+        let shader = usize::try_from(surface.shader)
+            .ok()
+            .and_then(|s| bsp.shaders.get(s));
+        let (name, surface_flags, content_flags) = shader.map_or(("", 0, 0), |s| {
+            (s.name.as_str(), s.surface_flags, s.content_flags)
+        });
+        let lighting = lighting_of(lightmap_of(bsp, index));
+        let key = (
+            name.to_ascii_lowercase(),
+            surface_flags,
+            content_flags,
+            lighting,
+        );
+        let material = *known.entry(key).or_insert_with(|| {
+            let resolved = materials.resolve(files, name, lighting);
+            list.push(WorldMaterial {
+                name: name.to_owned(),
+                surface_flags,
+                content_flags,
+                lighting,
+                resolved,
+                emission: None,
+            });
+            (list.len() - 1) as u32
+        });
+        of_surface.push(material);
+    }
+    (list, of_surface)
+}
+
+/// The models, with the origins of the entities that they belong to.
+fn place_models(bsp: &Bsp, entities: &[Entity]) -> Vec<WorldModel> {
+    let mut models: Vec<_> = bsp
+        .models
+        .iter()
+        .map(|model| {
+            let range = bsp.model_surfaces(model);
+            WorldModel {
+                first_surface: range.start as u32,
+                num_surfaces: range.len() as u32,
+                origin: Vec3::ZERO,
+            }
+        })
+        .collect();
+    for entity in entities {
+        let model = entity.brush_model().and_then(|m| models.get_mut(m));
+        if let (Some(model), Some(origin)) = (model, entity.vec3("origin")) {
+            model.origin = origin;
+        }
+    }
+    models
+}
+
+/// For every surface the model that it belongs to.
+fn model_of_surfaces(bsp: &Bsp) -> Vec<u32> {
+    let mut of_surface = vec![0; bsp.surfaces.len()];
+    for (number, model) in bsp.models.iter().enumerate().skip(1) {
+        for slot in of_surface
+            .get_mut(bsp.model_surfaces(model))
+            .unwrap_or_default()
+        {
+            *slot = number as u32;
+        }
+    }
+    of_surface
+}

@@ -1,0 +1,91 @@
+//! A map, relit: geometry in flat arrays, materials resolved, light sources found.
+
+mod fog;
+mod geometry;
+mod load;
+mod material;
+
+pub use fog::WorldFog;
+pub use geometry::{Flare, NO_LIGHT, WorldModel, WorldSurface, WorldVertex};
+pub use load::{LoadError, Options, Progress, Stage};
+pub use material::WorldMaterial;
+
+use crate::light::{LightLists, LightReport, PointLight, SunLight, TriangleLight};
+use crate::overbright;
+use glam::Vec3;
+use q3bsp::Bsp;
+
+/// A map made ready for tracing and for drawing.
+///
+/// `surfaces` has one entry per surface of the map, under the same index.
+#[derive(Debug)]
+pub struct RelitWorld {
+    /// Game path of the map.
+    pub name: String,
+    /// The map itself.
+    pub bsp: Bsp,
+    /// Materials that the surfaces use, each (name, flags, lighting) once.
+    pub materials: Vec<WorldMaterial>,
+    /// The map's surfaces; those that are not drawn have no indices.
+    pub surfaces: Vec<WorldSurface>,
+    /// The map's models: 0 is the world.
+    pub models: Vec<WorldModel>,
+    /// Vertices of all surfaces, model space.
+    pub vertices: Vec<WorldVertex>,
+    /// Triangles of all surfaces: indices into `vertices`, clockwise seen from the front.
+    pub indices: Vec<u32>,
+    /// For every triangle of `indices`, the [`TriangleLight`] that it is, or [`NO_LIGHT`].
+    pub triangle_lights: Vec<u32>,
+    /// Coronas.
+    pub flares: Vec<Flare>,
+    /// Fog volumes; a surface's `fog` is an index into this plus 1.
+    pub fogs: Vec<WorldFog>,
+    /// Emitting triangles; those of one surface follow each other.
+    pub lights: Vec<TriangleLight>,
+    /// Light entities left in the map.
+    pub point_lights: Vec<PointLight>,
+    /// Suns.
+    pub suns: Vec<SunLight>,
+    /// Which lights matter where.
+    pub light_lists: LightLists,
+    /// Radiance that comes from everywhere: the compiler's ambient term.
+    pub ambient: Vec3,
+    /// Material of the sky that covers the largest area; `None` for a map without sky.
+    pub sky: Option<u32>,
+    /// What was found, and by which evidence.
+    pub report: LightReport,
+    /// What was wrong and is made up for: missing materials, repaired values. Each thing once.
+    pub warnings: Vec<String>,
+    /// Shift that was applied to vertex colours; see [`overbright`].
+    pub overbright_shift: u32,
+}
+
+impl RelitWorld {
+    /// A lightmap page as it is drawn: RGB bytes, [`overbright::shift`]ed, rows from the top; `None` when there
+    /// is no such page.
+    pub fn lightmap(&self, page: usize) -> Option<Vec<u8>> {
+        let page = self.bsp.lightmaps.get(page)?;
+        let texels = page.0.as_chunks::<3>().0.iter();
+        Some(
+            texels
+                .flat_map(|&texel| overbright::shift(texel, self.overbright_shift))
+                .collect(),
+        )
+    }
+
+    /// Corners of a triangle of [`indices`](Self::indices), model space; `None` past the end.
+    pub fn triangle(&self, triangle: usize) -> Option<[Vec3; 3]> {
+        let corners = self.indices.as_chunks::<3>().0.get(triangle)?;
+        let position = |&i: &u32| {
+            self.vertices
+                .get(i as usize)
+                .map_or(Vec3::ZERO, |v| v.position)
+        };
+        Some(std::array::from_fn(|k| position(&corners[k])))
+    }
+
+    /// Number of light sources of all kinds.
+    pub fn light_count(&self) -> usize {
+        self.lights.len() + self.point_lights.len() + self.suns.len()
+    }
+}
