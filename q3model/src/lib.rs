@@ -1,1 +1,25 @@
-//! q3model
+//! Models, skins and fonts of id Tech 3: bytes to typed, validated data.
+//!
+//! [`Md3`] is the vertex-animated model of Quake III, [`Skin`] the text file that gives its surfaces
+//! shaders, [`FontInfo`] the table of a pre-rendered font. Readers return typed errors that say where;
+//! after `Ok` every index is in range. Numbers are as in the file: id units, x forward, y left, z up,
+//! triangles clockwise seen from their front.
+
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)
+)]
+
+mod bytes;
+mod error;
+mod font;
+mod md3;
+mod md3_parse;
+mod md3_write;
+mod skin;
+
+pub use error::Error;
+pub use font::{FONT_FILE_BYTES, FontInfo, GLYPHS_PER_FONT, Glyph};
+pub use md3::{Frame, Md3, PackedVertex, Surface, Tag};
+pub use skin::{Skin, SkinSurface};

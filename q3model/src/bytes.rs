@@ -1,0 +1,88 @@
+//! Checked reading of records at offsets that the file itself names.
+
+use crate::Error;
+use glam::{Vec2, Vec3};
+
+/// A part of a file that offsets are relative to.
+#[derive(Clone, Copy)]
+pub(crate) struct Region<'a> {
+    file: &'a [u8],
+    start: usize,
+}
+
+impl<'a> Region<'a> {
+    pub(crate) fn new(file: &'a [u8], start: usize) -> Self {
+        Region { file, start }
+    }
+
+    /// `count` records of `stride` bytes at `offset` from the start of the region.
+    pub(crate) fn records(
+        &self,
+        what: impl Fn() -> String,
+        offset: i32,
+        count: usize,
+        stride: usize,
+    ) -> Result<&'a [u8], Error> {
+        let length = count as u64 * stride as u64;
+        let start = self.start as i64 + i64::from(offset);
+        if length == 0 {
+            return Ok(&[]);
+        }
+        let slice = usize::try_from(start).ok().and_then(|start| {
+            let end = start.checked_add(usize::try_from(length).ok()?)?;
+            self.file.get(start..end)
+        });
+        slice.ok_or_else(|| Error::OutsideFile {
+            what: what(),
+            offset: start,
+            length,
+            file_length: self.file.len(),
+        })
+    }
+}
+
+/// Reads fields of one record in order. A record is cut out by its size beforehand, so that running
+/// out of bytes cannot happen; it would read zeros.
+pub(crate) struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    pub(crate) fn new(record: &'a [u8]) -> Self {
+        Fields(record)
+    }
+
+    pub(crate) fn bytes<const N: usize>(&mut self) -> [u8; N] {
+        match self.0.split_first_chunk::<N>() {
+            Some((head, rest)) => {
+                self.0 = rest;
+                *head
+            }
+            None => {
+                self.0 = &[];
+                [0; N]
+            }
+        }
+    }
+
+    pub(crate) fn i32(&mut self) -> i32 {
+        i32::from_le_bytes(self.bytes())
+    }
+
+    pub(crate) fn f32(&mut self) -> f32 {
+        f32::from_le_bytes(self.bytes())
+    }
+
+    pub(crate) fn vec2(&mut self) -> Vec2 {
+        Vec2::new(self.f32(), self.f32())
+    }
+
+    pub(crate) fn vec3(&mut self) -> Vec3 {
+        Vec3::new(self.f32(), self.f32(), self.f32())
+    }
+
+    /// A name in a field of fixed size: up to the first NUL, bytes that are not UTF-8 replaced.
+    pub(crate) fn name<const N: usize>(&mut self) -> String {
+        let field: [u8; N] = self.bytes();
+        let text = field.split(|&b| b == 0).next().unwrap_or(&[]);
+        String::from_utf8_lossy(text).into_owned()
+    }
+}

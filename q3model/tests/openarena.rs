@@ -1,0 +1,86 @@
+//! All models and skins of an installed OpenArena.
+
+mod common;
+
+use q3model::{Md3, Skin};
+
+#[test]
+fn every_model_is_read_and_survives_writing() {
+    let (mut most_frames, mut most_surfaces, mut most_tags) = (0, 0, 0);
+    let mut beyond_the_engine = Vec::new();
+    let models = common::for_each_file(".md3", |pak, name, bytes| {
+        let model = match Md3::parse(bytes) {
+            Ok(model) => model,
+            Err(error) => panic!("{pak}/{name}: {error}"),
+        };
+        most_frames = most_frames.max(model.frames.len());
+        most_surfaces = most_surfaces.max(model.surfaces.len());
+        most_tags = most_tags.max(model.num_tags);
+        if model
+            .surfaces
+            .iter()
+            .any(|s| s.num_verts >= 1000 || s.triangles.len() >= 2000)
+        {
+            beyond_the_engine.push(name.to_owned());
+        }
+        for surface in &model.surfaces {
+            assert_eq!(surface.st.len(), surface.num_verts);
+            assert_eq!(
+                surface.vertices.len(),
+                surface.num_verts * model.frames.len()
+            );
+            for normal in surface.vertices.iter().map(|v| v.normal()) {
+                assert!((normal.length() - 1.0).abs() < 1e-4);
+            }
+        }
+        for tag in model.frame_tags(0) {
+            let last = model.frames.len() as i32;
+            let between = model.lerp_tag(&tag.name, 0, last, 0.5).unwrap();
+            assert!(
+                between.axis.iter().all(|a| (a.length() - 1.0).abs() < 1e-4),
+                "{pak}/{name}"
+            );
+        }
+        // Compared as text, because NaN is not equal to itself.
+        let again = Md3::parse(&model.write()).unwrap();
+        assert_eq!(format!("{again:?}"), format!("{model:?}"), "{pak}/{name}");
+    });
+    let Some(models) = models else { return };
+    assert_eq!(models, 293);
+    assert_eq!((most_frames, most_surfaces, most_tags), (325, 24, 4));
+    beyond_the_engine.sort();
+    assert_eq!(
+        beyond_the_engine,
+        [
+            "models/map/forklift.md3",
+            "models/mapobjects/gargoyle/gargoyle.md3"
+        ]
+    );
+}
+
+#[test]
+fn every_skin_is_read() {
+    let mut entries = 0;
+    let mut empty = Vec::new();
+    let skins = common::for_each_file(".skin", |_, name, bytes| {
+        let skin = Skin::parse(bytes);
+        entries += skin.surfaces.len();
+        if skin.surfaces.is_empty() {
+            empty.push(name.to_owned());
+        }
+        for entry in &skin.surfaces {
+            assert!(
+                !entry.surface.contains([',', '\n', '"']),
+                "{name}: {entry:?}"
+            );
+            assert!(
+                !entry.shader.contains([',', '\n', '"']),
+                "{name}: {entry:?}"
+            );
+            assert!(skin.shader_for(&entry.surface).is_some());
+        }
+    });
+    let Some(skins) = skins else { return };
+    assert_eq!(skins, 276);
+    println!("{entries} entries; without any: {empty:?}");
+}
