@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod compare;
+mod info;
 
 use clap::{Parser, Subcommand};
 
@@ -18,10 +19,13 @@ struct Cli {
 enum Command {
     /// Tell how alike pictures of one view are
     Compare(compare::CompareArgs),
+    /// Tell what is in maps, and where their light comes from
+    Info(info::InfoArgs),
 }
 
 fn main() -> anyhow::Result<()> {
     match Cli::parse().command {
         Command::Compare(args) => compare::run(&args),
+        Command::Info(args) => info::run(&args),
     }
 }

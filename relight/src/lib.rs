@@ -1,9 +1,11 @@
 //! Map conversion: a map, its materials and its images become a relit world.
 //!
+//! * [`compare`]: two pictures of one view compared.
 //! * [`files`]: game files behind one trait: packs, folders, an engine, memory.
 //! * [`mod@image`]: texture images as the engine reads them.
 //! * [`materials`]: scripts and implicit materials by name.
 //! * [`overbright`]: the one place that knows overbright bits, gamma and sRGB.
+//! * [`sample`]: a small made-up game, to show and test things without game data.
 //! * [`world`]: a map with flat geometry, resolved materials and its light sources.
 //! * [`light`]: light sources, their units, and the lists of them per cluster.
 //!
@@ -23,11 +25,13 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)
 )]
 
+pub mod compare;
 pub mod files;
 pub mod image;
 pub mod light;
 pub mod materials;
 pub mod overbright;
+pub mod sample;
 #[cfg(test)]
 mod test_data;
 pub mod world;

@@ -222,7 +222,7 @@ fn shaders(map: &mut MapBuilder) -> Shaders {
 
 /// A rectangle seen from the side that `normal` points to, with half sizes along two axes.
 fn rectangle(center: Vec3, right: Vec3, up: Vec3) -> [Vec3; 4] {
-    // clockwise from the front: the normal is up × right
+    // clockwise from the front: the normal is right × up
     [center - right - up, center - right + up, center + right + up, center + right - up]
 }
 
@@ -286,15 +286,15 @@ fn build_map() -> q3bsp::Bsp {
     lit.push(map.add_quad(s.tile, rectangle(Vec3::ZERO, y(-256.0), x(320.0)).map(|p| p + z(mins.z))));
     lit.push(map.add_quad(s.plaster, rectangle(Vec3::new(-80.0, 0.0, maxs.z), y(256.0), x(240.0))));
     map.add_quad(s.sky, rectangle(Vec3::new(240.0, 0.0, maxs.z), y(256.0), x(80.0)));
-    lit.push(map.add_quad(s.brick, rectangle(Vec3::new(mins.x, 0.0, 128.0), y(-256.0), z(128.0))));
-    lit.push(map.add_quad(s.brick, rectangle(Vec3::new(maxs.x, 0.0, 128.0), y(256.0), z(128.0))));
-    lit.push(map.add_quad(s.brick, rectangle(Vec3::new(0.0, mins.y, 128.0), x(320.0), z(128.0))));
-    lit.push(map.add_quad(s.brick, rectangle(Vec3::new(0.0, maxs.y, 128.0), x(-320.0), z(128.0))));
+    lit.push(map.add_quad(s.brick, rectangle(Vec3::new(mins.x, 0.0, 128.0), y(256.0), z(128.0))));
+    lit.push(map.add_quad(s.brick, rectangle(Vec3::new(maxs.x, 0.0, 128.0), y(-256.0), z(128.0))));
+    lit.push(map.add_quad(s.brick, rectangle(Vec3::new(0.0, mins.y, 128.0), x(-320.0), z(128.0))));
+    lit.push(map.add_quad(s.brick, rectangle(Vec3::new(0.0, maxs.y, 128.0), x(320.0), z(128.0))));
 
     // lamps: a panel under the ceiling, two on the wall behind the camera
     map.add_quad(s.warm, rectangle(Vec3::new(-96.0, 0.0, 254.0), y(40.0), x(40.0)));
-    map.add_quad(s.red, rectangle(Vec3::new(-318.0, -160.0, 120.0), y(-20.0), z(36.0)));
-    map.add_quad(s.blue, rectangle(Vec3::new(-318.0, 160.0, 120.0), y(-20.0), z(36.0)));
+    map.add_quad(s.red, rectangle(Vec3::new(-318.0, -160.0, 120.0), y(20.0), z(36.0)));
+    map.add_quad(s.blue, rectangle(Vec3::new(-318.0, 160.0, 120.0), y(20.0), z(36.0)));
 
     // a pillar and a block
     for (low, high) in [
@@ -307,7 +307,7 @@ fn build_map() -> q3bsp::Bsp {
     // the grate hangs under the lamp and throws its shadow on the floor
     lit.push(map.add_quad(s.grate, rectangle(Vec3::new(-96.0, 0.0, 128.0), y(-64.0), x(64.0))));
     // the mirror on the left wall
-    map.add_quad(s.mirror, rectangle(Vec3::new(130.0, 254.0, 120.0), x(-90.0), z(80.0)));
+    map.add_quad(s.mirror, rectangle(Vec3::new(130.0, 254.0, 120.0), x(90.0), z(80.0)));
     lit.push(patch(&mut map, s.metal));
 
     let quads: Vec<usize> = lit.iter().copied().take(lit.len() - 1).collect();
