@@ -249,14 +249,6 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
     }
 
     fn deform_of(&mut self, kind: &str) -> Result<Deform, String> {
-        const SIMPLE: [(&str, fn() -> Deform); 3] = [
-            ("projectionShadow", || Deform::ProjectionShadow),
-            ("autosprite", || Deform::AutoSprite),
-            ("autosprite2", || Deform::AutoSprite2),
-        ];
-        if let Some(simple) = lookup(&SIMPLE, kind) {
-            return Ok(simple());
-        }
         if has_prefix(kind, "text") {
             let digit = kind.as_bytes().get(4).map_or(0, |b| b.wrapping_sub(b'0'));
             return Ok(Deform::Text(if digit <= 7 { digit } else { 0 }));
@@ -269,6 +261,9 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
                 .ok_or_else(|| format!("deformVertexes {kind}: missing argument"))
         };
         match kind.to_ascii_lowercase().as_str() {
+            "projectionshadow" => Ok(Deform::ProjectionShadow),
+            "autosprite" => Ok(Deform::AutoSprite),
+            "autosprite2" => Ok(Deform::AutoSprite2),
             "bulge" => Ok(Deform::Bulge {
                 width: argument(self)?,
                 height: argument(self)?,
