@@ -3,6 +3,9 @@
 #ifndef RELIGHT_TYPES_GLSL
 #define RELIGHT_TYPES_GLSL
 
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_EXT_scalar_block_layout : require
+
 struct Vertex { vec3 position; vec3 normal; vec2 st; vec2 lightmap; uint color; };
 
 struct Wave { uint function; float base; float amplitude; float phase; float frequency; };
@@ -30,6 +33,20 @@ struct Triangle { uint indices[3]; uint material; uint instance; uint fog; uint 
 
 struct Fog { vec3 mins; vec3 maxs; vec4 plane; uint has_surface; vec3 color; float depth; };
 
+struct MaterialBuffers { uint64_t materials; uint64_t stages; uint64_t tc_mods; uint64_t images; uint64_t noise; };
+
+struct RasterView {
+    vec4 world_to_clip[4]; vec4 clip_plane; vec3 eye; vec3 forward; float identity_light; MaterialBuffers materials;
+    uint64_t static_vertices; uint64_t dynamic_vertices; uint64_t instances; uint64_t draws; uint64_t fogs; uint64_t lights;
+};
+
+struct Draw {
+    uint mode; uint stages[2]; uint stage_count; uint combine; uint material; uint instance; uint lightmap; uint fog;
+    uint fog_adjust; uint argument; uint dynamic_vertices;
+};
+
+struct RasterLight { vec3 origin; float radius; vec3 color; };
+
 const uint NO_TEXTURE = 0xFFFFFFFFu;
 const uint WAVE_SIN = 0, WAVE_SQUARE = 1, WAVE_TRIANGLE = 2, WAVE_SAWTOOTH = 3, WAVE_INVERSE_SAWTOOTH = 4, WAVE_NOISE = 5;
 const uint TCMOD_TURBULENT = 0, TCMOD_SCALE = 1, TCMOD_SCROLL = 2, TCMOD_STRETCH = 3, TCMOD_TRANSFORM = 4, TCMOD_ROTATE = 5,
@@ -48,6 +65,9 @@ const uint MATERIAL_TWO_SIDED = 1, MATERIAL_CULL_BACK = 2, MATERIAL_CUT_OUT = 4,
     MATERIAL_PORTAL = 32, MATERIAL_FOG = 64, MATERIAL_LIQUID = 128, MATERIAL_GLASS = 256, MATERIAL_VERTEX_LIGHT = 512,
     MATERIAL_POLYGON_OFFSET = 1024, MATERIAL_EMITTER = 2048, MATERIAL_INVISIBLE = 4096;
 const uint INSTANCE_DEPTH_HACK = 1, INSTANCE_FIRST_PERSON = 2, INSTANCE_THIRD_PERSON = 4, INSTANCE_NO_SHADOW = 8, INSTANCE_WORLD = 16;
+const uint DRAW_STAGE = 0, DRAW_LIGHT = 1, DRAW_FOG = 2, DRAW_IMAGE = 3, DRAW_PLAIN = 4;
+const uint COMBINE_MODULATE = 0, COMBINE_ADD = 1;
+const uint FOG_ADJUST_NONE = 0, FOG_ADJUST_RGB = 1, FOG_ADJUST_ALPHA = 2, FOG_ADJUST_RGBA = 3;
 const uint TRIANGLE_WORLD = 1;
 
 #endif

@@ -179,6 +179,92 @@ pub struct Fog {
     pub depth: f32,
 }
 
+/// Device addresses of the materials' arrays.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct MaterialBuffers {
+    /// [`Material`]s.
+    pub materials: u64,
+    /// [`Stage`]s.
+    pub stages: u64,
+    /// [`TcMod`]s.
+    pub tc_mods: u64,
+    /// The image list: bindless texture indices (`u32`).
+    pub images: u64,
+    /// The noise lattice of `rgbGen wave noise`: 256 values (`f32`), then the permutation (256 `u32`).
+    pub noise: u64,
+}
+
+/// What every draw of a raster view shares.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct RasterView {
+    /// World to clip space, columns.
+    pub world_to_clip: [[f32; 4]; 4],
+    /// Only the positive side of `xyz.p = w` shows; zero: everything.
+    pub clip_plane: [f32; 4],
+    /// Eye, world space.
+    pub eye: Vec3,
+    /// View direction, world space.
+    pub forward: Vec3,
+    /// `identityLight`: 1 over 2 to the power of the overbright bits.
+    pub identity_light: f32,
+    /// Materials.
+    pub materials: MaterialBuffers,
+    /// The world's [`Vertex`] array.
+    pub static_vertices: u64,
+    /// [`Vertex`] array of what moves.
+    pub dynamic_vertices: u64,
+    /// [`Instance`]s.
+    pub instances: u64,
+    /// [`Draw`]s.
+    pub draws: u64,
+    /// [`Fog`]s.
+    pub fogs: u64,
+    /// [`RasterLight`]s.
+    pub lights: u64,
+}
+
+/// One draw call of the classic look.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Draw {
+    /// `DRAW_*`: what the draw does.
+    pub mode: u32,
+    /// One or two (multitexture) stages.
+    pub stages: [u32; 2],
+    /// 1 or 2.
+    pub stage_count: u32,
+    /// `COMBINE_*`.
+    pub combine: u32,
+    /// Index of the material.
+    pub material: u32,
+    /// Index of the instance.
+    pub instance: u32,
+    /// Bindless texture of the lightmap page or `NO_TEXTURE`.
+    pub lightmap: u32,
+    /// Fog volume plus one; 0 none.
+    pub fog: u32,
+    /// `FOG_ADJUST_*`: what fog scales.
+    pub fog_adjust: u32,
+    /// Index of the dynamic light (`DRAW_LIGHT`); bindless texture (`DRAW_IMAGE`).
+    pub argument: u32,
+    /// 1: dynamic vertices.
+    pub dynamic_vertices: u32,
+}
+
+/// A dynamic light as the classic look draws it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct RasterLight {
+    /// World space.
+    pub origin: Vec3,
+    /// Units.
+    pub radius: f32,
+    /// Nominally 0..1.
+    pub color: Vec3,
+}
+
 /// Names of constants used on both sides.
 pub mod constants {
     macro_rules! constants { ($($(#[$doc:meta])* $name:ident = $value:expr;)*) => { $($(#[$doc])* #[allow(missing_docs)] pub const $name: u32 = $value;)* } }
@@ -230,6 +316,18 @@ pub mod constants {
         INSTANCE_NO_SHADOW = 8;
         /// The instance is the world or one of its submodels.
         INSTANCE_WORLD = 16;
+        /// A draw of a material's stage.
+        DRAW_STAGE = 0;
+        /// A dynamic light's blob over a surface.
+        DRAW_LIGHT = 1;
+        /// The fog over an opaque surface.
+        DRAW_FOG = 2;
+        /// One plain image (sides of the sky box).
+        DRAW_IMAGE = 3;
+        /// One colour (debugging aids).
+        DRAW_PLAIN = 4;
+        COMBINE_MODULATE = 0; COMBINE_ADD = 1;
+        FOG_ADJUST_NONE = 0; FOG_ADJUST_RGB = 1; FOG_ADJUST_ALPHA = 2; FOG_ADJUST_RGBA = 3;
         /// The triangle belongs to the world (its vertex colours and lightmap are baked light).
         TRIANGLE_WORLD = 1;
     }

@@ -1,0 +1,191 @@
+// Evaluation of a material's stages, as shaderscript::eval does it on the CPU: waves, texture coordinates, colours.
+// Shared by the classic look (per vertex) and the tracer (per hit). Colours are as displayed (encoded), 0..1.
+#ifndef RELIGHT_MATERIAL_GLSL
+#define RELIGHT_MATERIAL_GLSL
+
+#extension GL_EXT_buffer_reference2 : require
+#include "types.glsl"
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Materials { Material at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Stages { Stage at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TcMods { TcMod at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer ImageList { uint at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer NoiseLattice { float values[256]; uint permutation[256]; };
+
+// Where a stage is evaluated: a vertex or a hit, in the space of its instance.
+struct StagePoint {
+    vec3 position;
+    vec3 normal;
+    vec2 st;
+    vec2 lightmap;
+    vec4 color;          // of the vertex
+    float time;          // shader time, seconds
+    float identity_light;
+    float view_distance; // from the eye, for alphaGen portal
+};
+
+// The engine's tables have 1024 entries; turns to table value.
+float wave_table(uint function, float turns) {
+    int index = int(turns * 1024.0) & 1023;
+    switch (function) {
+    case WAVE_SQUARE: return index < 512 ? 1.0 : -1.0;
+    case WAVE_TRIANGLE: {
+        int half_index = index & 511;
+        float value = half_index < 256 ? float(half_index) / 256.0 : 1.0 - float(half_index - 256) / 256.0;
+        return index < 512 ? value : -value;
+    }
+    case WAVE_SAWTOOTH: return float(index) / 1024.0;
+    case WAVE_INVERSE_SAWTOOTH: return 1.0 - float(index) / 1024.0;
+    default: return sin(float(index) * (6.283185307 / 1023.0));
+    }
+}
+
+// The time axis of the 4D lattice noise at the origin of space.
+float noise_at_time(NoiseLattice lattice, float t) {
+    float cell = floor(t);
+    float fraction = t - cell;
+    int i = int(cell);
+    uint p0 = lattice.permutation[uint(i) & 255u];
+    uint p1 = lattice.permutation[uint(i + 1) & 255u];
+    // x = y = z = 0: permute through the three zero coordinates, as the CPU does
+    for (int axis = 0; axis < 3; axis++) { p0 = lattice.permutation[p0 & 255u]; p1 = lattice.permutation[p1 & 255u]; }
+    return mix(lattice.values[p0 & 255u], lattice.values[p1 & 255u], fraction);
+}
+
+// phase + time * frequency with whole periods taken out first, so that hours of uptime keep their precision
+float wave_turns(float phase, float frequency, float time) {
+    float turns = time * frequency;
+    return phase + (turns - trunc(turns));
+}
+
+float wave_value(Wave wave, float time) {
+    return wave.base + wave_table(wave.function, wave_turns(wave.phase, wave.frequency, time)) * wave.amplitude;
+}
+
+vec2 stage_texcoord(MaterialBuffers buffers, Stage stage, Instance instance, StagePoint p) {
+    vec2 st;
+    switch (stage.tc_gen) {
+    case TCGEN_LIGHTMAP: st = p.lightmap; break;
+    case TCGEN_ENVIRONMENT: {
+        vec3 viewer = normalize(instance.viewer - p.position);
+        vec3 reflected = p.normal * (2.0 * dot(p.normal, viewer)) - viewer;
+        st = vec2(0.5 + 0.5 * reflected.y, 0.5 - 0.5 * reflected.z);
+        break;
+    }
+    case TCGEN_VECTOR: st = vec2(dot(p.position, stage.vector_s), dot(p.position, stage.vector_t)); break;
+    default: st = p.st;
+    }
+    TcMods mods = TcMods(buffers.tc_mods);
+    for (uint i = 0; i < stage.tc_mod_count; i++) {
+        TcMod mod = mods.at[stage.tc_mod_first + i];
+        switch (mod.kind) {
+        case TCMOD_TURBULENT: {
+            float now = wave_turns(mod.wave.phase, mod.wave.frequency, p.time);
+            st += vec2(wave_table(WAVE_SIN, (p.position.x + p.position.z) * (1.0 / 1024.0) + now),
+                       wave_table(WAVE_SIN, p.position.y * (1.0 / 1024.0) + now)) * mod.wave.amplitude;
+            break;
+        }
+        case TCMOD_SCALE: st *= vec2(mod.values[0], mod.values[1]); break;
+        case TCMOD_SCROLL: st += fract(vec2(mod.values[0], mod.values[1]) * p.time); break;
+        case TCMOD_STRETCH: {
+            float scale = 1.0 / wave_value(mod.wave, p.time);
+            st = st * scale + (0.5 - 0.5 * scale);
+            break;
+        }
+        case TCMOD_TRANSFORM:
+            st = vec2(st.x * mod.values[0] + st.y * mod.values[2] + mod.values[4],
+                      st.x * mod.values[1] + st.y * mod.values[3] + mod.values[5]);
+            break;
+        case TCMOD_ROTATE: {
+            // the engine looks the angle up in its 1024-entry sine table
+            float turns = -mod.values[0] * p.time / 360.0;
+            int index = int(fract(turns) * 1024.0);
+            float s = sin(float(index & 1023) * (6.283185307 / 1023.0));
+            float c = sin(float((index + 256) & 1023) * (6.283185307 / 1023.0));
+            st = vec2(st.x * c - st.y * s + 0.5 - 0.5 * c + 0.5 * s, st.x * s + st.y * c + 0.5 - 0.5 * s - 0.5 * c);
+            break;
+        }
+        case TCMOD_ENTITY_TRANSLATE: st += fract(instance.texcoord * p.time); break;
+        }
+    }
+    return st;
+}
+
+// Colour and alpha that the stage's image is multiplied by.
+vec4 stage_color(MaterialBuffers buffers, Stage stage, Instance instance, StagePoint p) {
+    vec4 c = vec4(1.0);
+    switch (stage.rgb_gen) {
+    case RGBGEN_IDENTITY_LIGHTING: c.rgb = vec3(p.identity_light); break;
+    case RGBGEN_WAVE:
+        if (stage.rgb_wave.function == WAVE_NOISE) {
+            float n = noise_at_time(NoiseLattice(buffers.noise), (p.time + stage.rgb_wave.phase) * stage.rgb_wave.frequency);
+            c.rgb = vec3(clamp(stage.rgb_wave.base + n * stage.rgb_wave.amplitude, 0.0, 1.0));
+        } else {
+            c.rgb = vec3(clamp(wave_value(stage.rgb_wave, p.time) * p.identity_light, 0.0, 1.0));
+        }
+        break;
+    case RGBGEN_CONST: c.rgb = stage.constant.rgb; break;
+    case RGBGEN_ENTITY: c = instance.color; break;
+    case RGBGEN_ONE_MINUS_ENTITY: c = 1.0 - instance.color; break;
+    case RGBGEN_VERTEX: c.rgb = p.color.rgb * p.identity_light; break;
+    case RGBGEN_EXACT_VERTEX: c = p.color; break;
+    case RGBGEN_ONE_MINUS_VERTEX: c.rgb = (1.0 - p.color.rgb) * p.identity_light; break;
+    case RGBGEN_LIGHTING_DIFFUSE:
+        if ((instance.flags & INSTANCE_WORLD) != 0) {
+            c = vec4(0.0); // the engine has no light for the world itself
+        } else {
+            float incoming = max(dot(p.normal, instance.light_direction), 0.0);
+            c = vec4(min(instance.ambient + incoming * instance.directed, vec3(1.0)), 1.0);
+        }
+        break;
+    }
+    switch (stage.alpha_gen) {
+    case ALPHAGEN_IDENTITY:
+        // what sets all four channels keeps its alpha
+        if (stage.rgb_gen != RGBGEN_ENTITY && stage.rgb_gen != RGBGEN_ONE_MINUS_ENTITY && stage.rgb_gen != RGBGEN_EXACT_VERTEX
+            && stage.rgb_gen != RGBGEN_LIGHTING_DIFFUSE) c.a = 1.0;
+        break;
+    case ALPHAGEN_CONST: c.a = stage.constant.a; break;
+    case ALPHAGEN_WAVE: c.a = clamp(wave_value(stage.alpha_wave, p.time), 0.0, 1.0); break;
+    case ALPHAGEN_ENTITY: c.a = instance.color.a; break;
+    case ALPHAGEN_ONE_MINUS_ENTITY: c.a = 1.0 - instance.color.a; break;
+    case ALPHAGEN_VERTEX: c.a = p.color.a; break;
+    case ALPHAGEN_ONE_MINUS_VERTEX: c.a = 1.0 - p.color.a; break;
+    case ALPHAGEN_LIGHTING_SPECULAR: {
+        vec3 light = normalize(vec3(-960.0, 1980.0, 96.0) - p.position);
+        vec3 reflected = p.normal * (2.0 * dot(p.normal, light)) - light;
+        float s = max(dot(reflected, normalize(instance.viewer - p.position)), 0.0);
+        c.a = min(s * s * s * s, 1.0);
+        break;
+    }
+    case ALPHAGEN_PORTAL: c.a = clamp(p.view_distance / stage.portal_range, 0.0, 1.0); break;
+    }
+    // the engine keeps bytes
+    return floor(clamp(c, 0.0, 1.0) * 255.0 + 0.001) / 255.0;
+}
+
+// Bindless texture of the stage at this time; `lightmap` is the draw's page.
+uint stage_image(MaterialBuffers buffers, Stage stage, uint lightmap, float time) {
+    if (stage.image_count == 0) return lightmap;
+    uint frame = 0;
+    if (stage.image_count > 1) {
+        float frames = max(floor(time * stage.image_frequency), 0.0);
+        frame = uint(mod(frames, float(stage.image_count)));
+    }
+    return ImageList(buffers.images).at[stage.image_first + frame];
+}
+
+bool alpha_passes(uint alpha_func, float alpha) {
+    switch (alpha_func) {
+    case ALPHAFUNC_GT0: return alpha > 0.0;
+    case ALPHAFUNC_LT128: return alpha < 0.5;
+    case ALPHAFUNC_GE128: return alpha >= 0.5;
+    default: return true;
+    }
+}
+
+float shader_time(Material material, Instance instance) {
+    return min(instance.time - material.time_offset, material.clamp_time);
+}
+
+#endif

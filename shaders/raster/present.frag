@@ -1,0 +1,16 @@
+#version 460
+// The frame on its way to the window: overbright bits and gamma, which the engine leaves to the display's ramp.
+#include "common/bindless.glsl"
+
+layout(push_constant, scalar) uniform Push { uint image; float scale; float inverse_gamma; uint srgb_target; } push;
+layout(location = 0) in vec2 in_uv;
+layout(location = 0) out vec4 out_color;
+
+void main() {
+    ivec2 size = textureSize(textures[push.image], 0);
+    vec3 c = texelFetch(textures[push.image], min(ivec2(in_uv * vec2(size)), size - 1), 0).rgb;
+    c = min(pow(c, vec3(push.inverse_gamma)) * push.scale, vec3(1.0));
+    // a target that encodes on writing gets linear values
+    if (push.srgb_target != 0) c = mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
+    out_color = vec4(c, 1.0);
+}
