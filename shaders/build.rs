@@ -24,7 +24,7 @@ use glslang::{
 };
 
 /// Part of every content hash: raise it when the way of compiling changes.
-const SCRIPT_VERSION: &str = "2 vulkan1.2 spirv1.5 glslang 0.9.1";
+const SCRIPT_VERSION: &str = "3 vulkan1.2 spirv1.5 glslang 0.9.1";
 
 /// The file name extensions that are stages, with the `Stage` variant of the library and glslang's value.
 const STAGES: [(&str, &str, ShaderStage); 7] = [
@@ -342,6 +342,7 @@ fn compile(root: &Path, job: &Job) -> Result<Vec<u32>, String> {
         .iter()
         .map(|(k, v)| (k.as_str(), v.as_deref()))
         .collect();
+    let text = with_includes(&text);
     let source = ShaderSource::from(text.as_str());
     let mut includes = Includes {
         root,
@@ -356,14 +357,23 @@ fn compile(root: &Path, job: &Job) -> Result<Vec<u32>, String> {
         Some(&mut includes),
     )
     .map_err(explain)?;
-    let mut builder = Shader::new(compiler, input);
-    builder.preamble("#extension GL_GOOGLE_include_directive : require\n");
-    let shader = builder.parse().map_err(explain)?;
+    let shader = Shader::new(compiler, input).parse().map_err(explain)?;
     let words = shader.compile().map_err(explain)?;
     if words.is_empty() {
         return Err(format!("{}: glslang made no SPIR-V", job.file));
     }
     Ok(words)
+}
+
+/// Switches `#include` on, behind the `#version` line: nothing may stand before that. Line numbers stay what they were.
+fn with_includes(text: &str) -> String {
+    const EXTENSION: &str = "#extension GL_GOOGLE_include_directive : require\n";
+    match text.split_once('\n') {
+        Some((version, rest)) if version.trim_start().starts_with("#version") => {
+            format!("{version}\n{EXTENSION}#line 2\n{rest}")
+        }
+        _ => format!("#version 460\n{EXTENSION}#line 1\n{text}"),
+    }
 }
 
 /// glslang calls the stage file `0` in its messages; give it its name: `file:line:column`.

@@ -6,6 +6,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod trace_types;
 pub mod types;
 
 /// Bytes that start at an address that is a multiple of four, as words of SPIR-V must.

@@ -1,0 +1,217 @@
+//! The structures of the traced look that Rust and GLSL share; `shaders/trace/types.glsl` has the same ones under the
+//! same names, `layout(scalar)`. Radiance is linear, in units where a white diffuse surface of outgoing radiance 1
+//! shows as display white; space is the world's unless said otherwise. Addresses are buffer device addresses.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use crate::types::MaterialBuffers;
+
+/// One geometry of the acceleration structures: found by a hit's instance custom index plus geometry index.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct GeometryRecord {
+    /// [`crate::types::Triangle`]s, one for each primitive.
+    pub triangles: u64,
+    /// [`crate::types::Vertex`]es that the triangles index, in the space of the instance.
+    pub vertices: u64,
+    /// Instance of all its triangles, or `NO_INSTANCE`: each triangle names its own.
+    pub instance: u32,
+    /// `KIND_*`.
+    pub kind: u32,
+}
+
+/// A triangle that gives light from the side where its corners go round counter-clockwise.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct TriangleLight {
+    /// Corners.
+    pub corners: [Vec3; 3],
+    /// Radiance, the same in all directions.
+    pub radiance: Vec3,
+    /// `LIGHT_*` bits.
+    pub flags: u32,
+}
+
+/// A small sphere that gives light: a point light of the map or a dynamic light of the game.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct SphereLight {
+    /// Centre.
+    pub origin: Vec3,
+    /// Radius, above 0.
+    pub radius: f32,
+    /// Radiance of its surface.
+    pub radiance: Vec3,
+    /// What lies nearer to the centre than this casts no shadow (the model that carries the light).
+    pub clearance: f32,
+    /// Direction of a spot.
+    pub axis: Vec3,
+    /// Cosine of the angle to `axis` up to which a spot shines in full; -1 for no spot.
+    pub cos_inner: f32,
+    /// Cosine of the angle to `axis` from which on it is dark; -2 for no spot.
+    pub cos_outer: f32,
+}
+
+/// A far disc of light.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct SunLight {
+    /// Unit vector towards its middle.
+    pub direction: Vec3,
+    /// Cosine of its angular radius.
+    pub cos_angle: f32,
+    /// Irradiance of a surface that faces it, divided by pi: what a white diffuse surface shows.
+    pub irradiance: Vec3,
+}
+
+/// A node of the map's tree.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct BspNode {
+    /// Plane: a point is in front where `xyz . p >= w`.
+    pub plane: [f32; 4],
+    /// Front and back child: a node, or `-1 - leaf`.
+    pub children: [i32; 2],
+}
+
+/// A sky material.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct SkyRecord {
+    /// Bindless textures of the box in the order rt bk lf ft up dn, or `NO_TEXTURE`.
+    pub faces: [u32; 6],
+    /// Height of the clouds, units.
+    pub cloud_height: f32,
+}
+
+/// A portal or mirror; see `scene::Portal` of the renderer.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PortalRecord {
+    /// Plane of the surface: `xyz . p = w`.
+    pub plane: [f32; 4],
+    /// 1: reflects.
+    pub mirror: u32,
+    /// A point of the plane.
+    pub surface_origin: Vec3,
+    /// Frame of the plane.
+    pub surface_axis: [Vec3; 3],
+    /// Where `surface_origin` is seen from.
+    pub camera_origin: Vec3,
+    /// What the frame of the plane turns to.
+    pub camera_axis: [Vec3; 3],
+}
+
+/// All that the passes of one traced view read: camera, arrays, images, settings.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)] // counts and addresses of the arrays that the other structures describe; bindless image indices
+pub struct TraceView {
+    pub geometries: u64,
+    pub instances: u64,
+    pub fogs: u64,
+    pub portals: u64,
+    pub skies: u64,
+    pub triangle_lights: u64,
+    pub sphere_lights: u64,
+    pub dynamic_lights: u64,
+    pub suns: u64,
+    pub nodes: u64,
+    /// Cluster of each leaf (`i32`).
+    pub leaf_clusters: u64,
+    /// First entry of each cluster's list in `light_indices`; the row after the last cluster is for points in none.
+    pub light_offsets: u64,
+    /// Light lists: triangle lights first, then the map's sphere lights.
+    pub light_indices: u64,
+    /// State of automatic exposure: histogram and current exposure.
+    pub exposure: u64,
+    pub materials: MaterialBuffers,
+    pub eye: Vec3,
+    pub forward: Vec3,
+    /// Scaled by the tangent of half the horizontal angle.
+    pub left: Vec3,
+    /// Scaled by the tangent of half the vertical angle.
+    pub up: Vec3,
+    pub width: u32,
+    pub height: u32,
+    /// Place of the view in the target, pixels from the left and the top.
+    pub target_x: i32,
+    pub target_y: i32,
+    /// Index of the top-level structure.
+    pub scene: u32,
+    /// `VIEW_*` bits.
+    pub flags: u32,
+    /// Of the random numbers: differs from frame to frame.
+    pub seed: u32,
+    /// Frames in the accumulation image before this one.
+    pub accumulated: u32,
+    /// Seconds.
+    pub time: f32,
+    /// Width of a pixel's cone at distance 1.
+    pub pixel_spread: f32,
+    /// Light everywhere, as radiance of a white diffuse surface.
+    pub ambient: Vec3,
+    pub fog_count: u32,
+    pub portal_count: u32,
+    pub triangle_light_count: u32,
+    pub sun_count: u32,
+    pub dynamic_light_count: u32,
+    pub cluster_count: u32,
+    pub node_count: u32,
+    /// Mirrors and portals on a path.
+    pub max_depth: u32,
+    pub bounces: u32,
+    pub samples: u32,
+    pub candidates: u32,
+    /// `SAMPLING_*`.
+    pub sampling: u32,
+    pub image_position: u32,
+    pub image_surface: u32,
+    pub image_front: u32,
+    pub image_direct: u32,
+    pub image_indirect: u32,
+    pub image_hdr: u32,
+    pub image_accumulation: u32,
+    pub image_target: u32,
+    /// Stops.
+    pub exposure_bias: f32,
+    /// How far automatic exposure moves to its aim in this frame, 0..1.
+    pub exposure_blend: f32,
+    /// Scale of the map's lights.
+    pub light_scale: f32,
+    pub target_width: u32,
+    pub target_height: u32,
+    pub padding: u32,
+}
+
+/// Names of constants used on both sides.
+#[allow(missing_docs)] // see types.glsl
+pub mod constants {
+    pub const KIND_OPAQUE: u32 = 0;
+    pub const KIND_TESTED: u32 = 1;
+    pub const KIND_TRANSLUCENT: u32 = 2;
+    pub const KIND_SKY: u32 = 3;
+    pub const MASK_SOLID: u8 = 0x01;
+    pub const MASK_TRANSLUCENT: u8 = 0x02;
+    pub const MASK_SKY: u8 = 0x04;
+    pub const MASK_FIRST_SOLID: u8 = 0x08;
+    pub const MASK_FIRST_TRANSLUCENT: u8 = 0x10;
+    pub const MASK_THIRD_SOLID: u8 = 0x20;
+    pub const MASK_THIRD_TRANSLUCENT: u8 = 0x40;
+    pub const MASK_NO_SHADOW: u8 = 0x80;
+    pub const LIGHT_TWO_SIDED: u32 = 1;
+    pub const LIGHT_SKY: u32 = 2;
+    pub const VIEW_JITTER: u32 = 1;
+    pub const VIEW_FIRST_PERSON: u32 = 2;
+    pub const VIEW_ACCUMULATE: u32 = 4;
+    pub const VIEW_AUTO_EXPOSURE: u32 = 8;
+    pub const VIEW_FAST_SKY: u32 = 16;
+    pub const VIEW_EXPOSURE_RESET: u32 = 32;
+    pub const VIEW_FULLBRIGHT: u32 = 64;
+    pub const SAMPLING_UNIFORM: u32 = 0;
+    pub const SAMPLING_RESAMPLED: u32 = 1;
+    pub const SAMPLING_ALL: u32 = 2;
+    pub const TRIANGLE_RANK_SHIFT: u32 = 8;
+    pub const NO_INSTANCE: u32 = 0xFFFF_FFFF;
+}

@@ -1,0 +1,27 @@
+// The one place of the tracer that knows how displayed colours are encoded.
+//
+// Textures, vertex colours, entity colours and the colours of waves and constants are what the classic look would put
+// on the screen: sRGB (IEC 61966-2-1). Each factor is decoded on its own and products are taken of linear values; for
+// a pure power law that is the same as decoding the product, for sRGB it is nearly so, and a texture that is
+// multiplied by white comes out of the tone curve exactly as it went in. Alpha is linear already.
+#ifndef RELIGHT_TRACE_COLOR_GLSL
+#define RELIGHT_TRACE_COLOR_GLSL
+
+vec3 decode_display(vec3 c) {
+    vec3 low = c / 12.92;
+    vec3 high = pow((max(c, 0.0) + 0.055) / 1.055, vec3(2.4));
+    return mix(high, low, lessThanEqual(c, vec3(0.04045)));
+}
+
+vec3 encode_display(vec3 c) {
+    vec3 low = c * 12.92;
+    vec3 high = 1.055 * pow(max(c, 0.0), vec3(1.0 / 2.4)) - 0.055;
+    return mix(high, low, lessThanEqual(c, vec3(0.0031308)));
+}
+
+// Relative luminance of linear Rec. 709 primaries.
+float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
+
+float max_component(vec3 c) { return max(c.r, max(c.g, c.b)); }
+
+#endif

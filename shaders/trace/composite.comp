@@ -1,0 +1,19 @@
+#version 460
+// Puts light and surface together: what is in front + albedo * light.
+#include "trace/gbuffer.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (pixel.x >= int(VIEW.width) || pixel.y >= int(VIEW.height)) return;
+    vec3 radiance = imageLoad(images_rgba32f[VIEW.image_front], pixel).rgb;
+    GBufferPixel g = gbuffer_read(pixel);
+    if (g.path >= 0.0) {
+        vec3 light = imageLoad(images_rgba16f[VIEW.image_direct], pixel).rgb + imageLoad(images_rgba16f[VIEW.image_indirect], pixel).rgb;
+        radiance += g.albedo * light;
+    }
+    // one broken number must not spread through exposure and accumulation
+    if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
+    imageStore(images_rgba32f[VIEW.image_hdr], pixel, vec4(radiance, 1.0));
+}

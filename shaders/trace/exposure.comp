@@ -1,0 +1,37 @@
+#version 460
+// From the histogram to the exposure: the mean logarithm of luminance, without the darkest and brightest parts of the
+// picture, is brought towards a middle grey. The correction is held to two stops and taken by part only, so that dark
+// rooms stay dark: the map's author chose its light.
+#include "trace/exposure.glsl"
+
+layout(local_size_x = 1) in;
+
+// Mean of a well-lit picture, linear; its logarithm is what exposure aims at.
+const float MIDDLE = 0.10;
+// How much of the difference is corrected.
+const float ADAPTATION = 0.6;
+const float MAX_STOPS = 2.0;
+// Pixels left out at the dark and at the bright end, of all.
+const float DARK_PART = 0.2, BRIGHT_PART = 0.05;
+
+void main() {
+    ExposureState state = ExposureState(VIEW.exposure);
+    float total = float(VIEW.width) * float(VIEW.height);
+    float from = total * DARK_PART, to = total * (1.0 - BRIGHT_PART);
+    float below = 0.0, sum = 0.0, weight = 0.0;
+    for (uint i = 0; i < EXPOSURE_BINS; i++) {
+        float count = float(state.bins[i]);
+        float inside = max(min(below + count, to) - max(below, from), 0.0);
+        float middle = EXPOSURE_MIN_LOG + (float(i) + 0.5) / float(EXPOSURE_BINS) * (EXPOSURE_MAX_LOG - EXPOSURE_MIN_LOG);
+        sum += inside * middle;
+        weight += inside;
+        below += count;
+        state.bins[i] = 0;
+    }
+    float stops = 0.0;
+    if ((VIEW.flags & VIEW_AUTO_EXPOSURE) != 0 && weight > 0.0)
+        stops = clamp((log2(MIDDLE) - sum / weight) * ADAPTATION, -MAX_STOPS, MAX_STOPS);
+    float old = log2(clamp(state.exposure, exp2(-MAX_STOPS), exp2(MAX_STOPS)));
+    if ((VIEW.flags & VIEW_EXPOSURE_RESET) != 0 || isnan(old)) old = stops;
+    state.exposure = exp2(mix(old, stops, VIEW.exposure_blend));
+}

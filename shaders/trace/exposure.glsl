@@ -1,0 +1,17 @@
+// Automatic exposure: state in a buffer that outlives the frame.
+#ifndef RELIGHT_TRACE_EXPOSURE_GLSL
+#define RELIGHT_TRACE_EXPOSURE_GLSL
+
+#include "trace/view.glsl"
+#include "trace/color.glsl"
+
+const uint EXPOSURE_BINS = 128;
+// Luminance of the histogram's ends, stops.
+const float EXPOSURE_MIN_LOG = -12.0, EXPOSURE_MAX_LOG = 8.0;
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer ExposureState {
+    float exposure; // scale of radiance
+    uint bins[EXPOSURE_BINS];
+};
+
+#endif

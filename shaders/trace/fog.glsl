@@ -1,0 +1,69 @@
+// Fog volumes along a ray. Inside a volume's box and below its surface the engine's factor is sqrt(length / depth),
+// opaque at `depth`; here the length is that of the ray's own way through the volume. The factor weighs linear light.
+#ifndef RELIGHT_TRACE_FOG_GLSL
+#define RELIGHT_TRACE_FOG_GLSL
+
+#include "trace/color.glsl"
+#include "trace/geometry.glsl"
+
+// Where the ray is inside the volume: x < y, or an empty range.
+vec2 fog_range(Fog fog, vec3 origin, vec3 direction) {
+    float enter = 0.0, leave = FAR;
+    for (int i = 0; i < 3; i++) {
+        if (abs(direction[i]) < 1.0e-12) {
+            if (origin[i] < fog.mins[i] || origin[i] > fog.maxs[i]) return vec2(1.0, 0.0);
+            continue;
+        }
+        float a = (fog.mins[i] - origin[i]) / direction[i], b = (fog.maxs[i] - origin[i]) / direction[i];
+        enter = max(enter, min(a, b));
+        leave = min(leave, max(a, b));
+    }
+    if (fog.has_surface != 0) {
+        float below = dot(fog.plane.xyz, origin) - fog.plane.w;
+        float rate = dot(fog.plane.xyz, direction);
+        if (abs(rate) < 1.0e-12) {
+            if (below < 0.0) return vec2(1.0, 0.0);
+        } else if (rate > 0.0) {
+            enter = max(enter, -below / rate);
+        } else {
+            leave = min(leave, -below / rate);
+        }
+    }
+    return vec2(enter, leave);
+}
+
+float fog_transmittance(Fog fog, vec2 range, float t) {
+    float inside = clamp(min(t, range.y) - range.x, 0.0, FAR);
+    return 1.0 - sqrt(min(inside / max(fog.depth, 1.0), 1.0));
+}
+
+// Composes the fog between two distances on a ray behind what is in front (`transmittance`, `radiance`). Volumes do not
+// overlap, so each is taken whole, nearest first.
+void fog_segment(vec3 origin, vec3 direction, float from, float to, inout vec3 transmittance, inout vec3 radiance) {
+    uint count = VIEW.fog_count;
+    float last_enter = -1.0;
+    uint last_index = 0;
+    TraceFogs fogs = TraceFogs(VIEW.fogs);
+    for (uint step_index = 0; step_index < count; step_index++) {
+        // the next volume by entry, then by index
+        float best = FAR;
+        uint chosen = count;
+        for (uint i = 0; i < count; i++) {
+            vec2 range = fog_range(fogs.at[i], origin, direction);
+            if (range.x >= range.y || range.x >= to || range.y <= from) continue;
+            bool later = range.x > last_enter || (range.x == last_enter && i > last_index);
+            if (later && range.x < best) { best = range.x; chosen = i; }
+        }
+        if (chosen == count) return;
+        Fog fog = fogs.at[chosen];
+        vec2 range = fog_range(fog, origin, direction);
+        float before = fog_transmittance(fog, range, from);
+        float ratio = before > 0.0 ? clamp(fog_transmittance(fog, range, to) / before, 0.0, 1.0) : 0.0;
+        radiance += transmittance * decode_display(fog.color) * (1.0 - ratio);
+        transmittance *= ratio;
+        last_enter = best;
+        last_index = chosen;
+    }
+}
+
+#endif

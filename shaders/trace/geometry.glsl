@@ -1,0 +1,89 @@
+// From what a ray reports to the point on the surface.
+#ifndef RELIGHT_TRACE_GEOMETRY_GLSL
+#define RELIGHT_TRACE_GEOMETRY_GLSL
+
+#include "trace/view.glsl"
+
+const uint NO_HIT = 0xFFFFFFFFu;
+
+// What a ray reports. `geometry` indexes the geometry records; NO_HIT: nothing.
+struct Hit {
+    uint geometry;
+    uint primitive;
+    vec2 barycentrics;
+    float t;
+};
+
+// A point on a triangle. Positions and normals of `stage` are in the space of the instance, the others in world space.
+struct SurfacePoint {
+    Triangle triangle;
+    uint instance;
+    uint kind;
+    vec3 position;
+    vec3 face_normal;   // unit, on the side that faces front (clockwise)
+    vec3 normal;        // unit, interpolated
+    float texel_scale;  // texture coordinate per unit of length
+    StagePoint stage;
+};
+
+Instance instance_of(uint index) { return TraceInstances(VIEW.instances).at[index]; }
+Material material_of(uint index) { return Materials(VIEW.materials.materials).at[index]; }
+
+vec3 safe_normalize(vec3 v, vec3 otherwise) {
+    float squared = dot(v, v);
+    return squared > 1.0e-30 ? v * inversesqrt(squared) : otherwise;
+}
+
+SurfacePoint surface_point(Hit hit) {
+    GeometryRecord record = Geometries(VIEW.geometries).at[hit.geometry];
+    SurfacePoint p;
+    p.triangle = Triangles(record.triangles).at[hit.primitive];
+    p.instance = record.instance != NO_INSTANCE ? record.instance : p.triangle.instance;
+    p.kind = record.kind;
+    TraceVertices vertices = TraceVertices(record.vertices);
+    Vertex a = vertices.at[p.triangle.indices[0]];
+    Vertex b = vertices.at[p.triangle.indices[1]];
+    Vertex c = vertices.at[p.triangle.indices[2]];
+    vec3 w = vec3(1.0 - hit.barycentrics.x - hit.barycentrics.y, hit.barycentrics);
+    Instance instance = instance_of(p.instance);
+    mat3 axis = mat3(instance.axis[0], instance.axis[1], instance.axis[2]);
+
+    p.stage.position = a.position * w.x + b.position * w.y + c.position * w.z;
+    // the front is where the corners go round clockwise
+    vec3 local_face = cross(c.position - a.position, b.position - a.position);
+    p.stage.normal = safe_normalize(a.normal * w.x + b.normal * w.y + c.normal * w.z, safe_normalize(local_face, vec3(0, 0, 1)));
+    p.stage.st = a.st * w.x + b.st * w.y + c.st * w.z;
+    p.stage.lightmap = a.lightmap * w.x + b.lightmap * w.y + c.lightmap * w.z;
+    p.stage.color = unpackUnorm4x8(a.color) * w.x + unpackUnorm4x8(b.color) * w.y + unpackUnorm4x8(c.color) * w.z;
+    p.stage.identity_light = 1.0;
+    p.stage.time = shader_time(material_of(p.triangle.material), instance);
+
+    p.position = axis * p.stage.position + instance.origin;
+    vec3 ab = axis * (b.position - a.position);
+    vec3 ac = axis * (c.position - a.position);
+    vec3 face = cross(ac, ab);
+    float double_area = length(face);
+    p.face_normal = double_area > 0.0 ? face / double_area : vec3(0, 0, 1);
+    p.normal = safe_normalize(axis * p.stage.normal, p.face_normal);
+    vec2 sb = b.st - a.st, sc = c.st - a.st;
+    float double_st = abs(sb.x * sc.y - sb.y * sc.x);
+    p.texel_scale = double_area > 0.0 ? sqrt(double_st / double_area) : 0.0;
+    p.stage.view_distance = distance(p.position, VIEW.eye);
+    return p;
+}
+
+// The side that the material does not show.
+bool is_culled(uint material_flags, vec3 face_normal, vec3 direction) {
+    if ((material_flags & MATERIAL_TWO_SIDED) != 0) return false;
+    bool from_front = dot(face_normal, direction) < 0.0;
+    return from_front == ((material_flags & MATERIAL_CULL_BACK) != 0);
+}
+
+// Where a ray that leaves the surface on the side of `normal` starts: far enough not to meet the surface again in
+// spite of rounding (Wachter and Binder, A Fast and Robust Method for Avoiding Self-Intersection, scaled to coordinates).
+vec3 offset_ray(vec3 position, vec3 normal) {
+    vec3 m = abs(position);
+    return position + normal * (0.02 + 1.0e-5 * max(m.x, max(m.y, m.z)));
+}
+
+#endif

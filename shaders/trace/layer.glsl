@@ -1,0 +1,142 @@
+// A stack of stages as light sees it: what reaches the eye is lit * L + emission + through * background, where L is the
+// light that a white diffuse surface would show here. shaderscript::light has the same algebra on the CPU and its tests.
+#ifndef RELIGHT_TRACE_LAYER_GLSL
+#define RELIGHT_TRACE_LAYER_GLSL
+
+#include "trace/color.glsl"
+#include "trace/geometry.glsl"
+
+struct Layer {
+    vec3 lit;
+    vec3 emission;
+    vec3 through;
+};
+
+// Level of detail for a texture whose coordinates change by `scale` per unit where the ray's cone is `width` wide.
+float texture_lod(uint image, float scale, float width) {
+    vec2 size = vec2(textureSize(textures[nonuniformEXT(image)], 0));
+    float texels = width * scale * sqrt(size.x * size.y);
+    return max(log2(max(texels, 1.0e-6)), 0.0);
+}
+
+// The stage's image at the point; white where there is none. `width`: of the ray's cone at the hit, units.
+vec4 stage_texel(Stage stage, SurfacePoint p, Instance instance, float width) {
+    uint image = stage_image(VIEW.materials, stage, p.triangle.lightmap, p.stage.time);
+    if ((stage.flags & STAGE_WHITE) != 0 || image == NO_TEXTURE) return vec4(1.0);
+    vec2 uv = stage_texcoord(VIEW.materials, stage, instance, p.stage);
+    float scale = p.texel_scale;
+    if (stage.tc_gen == TCGEN_ENVIRONMENT) {
+        scale = 0.0;
+    } else if (stage.tc_gen == TCGEN_VECTOR) {
+        scale = sqrt(length(stage.vector_s) * length(stage.vector_t));
+    } else if (stage.tc_mod_count > 0) {
+        // how much the modifiers stretch the image: the Jacobian by differences
+        const float step_st = 1.0 / 64.0;
+        SurfacePoint q = p;
+        q.stage.st = p.stage.st + vec2(step_st, 0.0);
+        vec2 ds = stage_texcoord(VIEW.materials, stage, instance, q.stage) - uv;
+        q.stage.st = p.stage.st + vec2(0.0, step_st);
+        vec2 dt = stage_texcoord(VIEW.materials, stage, instance, q.stage) - uv;
+        scale *= sqrt(abs(ds.x * dt.y - ds.y * dt.x)) / step_st;
+    }
+    float lod = texture_lod(image, scale, width);
+    return textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), uv, lod);
+}
+
+// Whether the surface is there at all: the first stage with an alpha test decides.
+bool is_solid_at(SurfacePoint p, float width) {
+    Material material = material_of(p.triangle.material);
+    Instance instance = instance_of(p.instance);
+    Stages stages = Stages(VIEW.materials.stages);
+    for (uint i = 0; i < material.stage_count; i++) {
+        Stage stage = stages.at[material.stage_first + i];
+        if (stage.alpha_func == ALPHAFUNC_NONE) continue;
+        float alpha = stage_texel(stage, p, instance, width).a * stage_color(VIEW.materials, stage, instance, p.stage).a;
+        return alpha_passes(stage.alpha_func, alpha);
+    }
+    return true;
+}
+
+// a * b for polynomials in L and the background. Light seen twice counts once: L * L becomes L. What the background
+// is multiplied by, light included, scales it.
+Layer layer_product(Layer a, Layer b) {
+    Layer r;
+    r.lit = a.lit * b.lit + a.lit * b.emission + a.emission * b.lit;
+    r.emission = a.emission * b.emission;
+    r.through = a.through * (b.lit + b.emission) + b.through * (a.lit + a.emission);
+    return r;
+}
+
+Layer layer_scale(Layer a, float s) { return Layer(a.lit * s, a.emission * s, a.through * s); }
+Layer layer_add(Layer a, Layer b) { return Layer(a.lit + b.lit, a.emission + b.emission, a.through + b.through); }
+Layer layer_subtract(Layer a, Layer b) { return Layer(a.lit - b.lit, a.emission - b.emission, a.through - b.through); }
+
+// `value` times a blend factor. The frame buffer has no alpha of its own: destination alpha reads as one.
+Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, float source_alpha) {
+    switch (factor) {
+    case BLEND_ONE: return value;
+    case BLEND_DST_COLOR: return layer_product(value, destination);
+    case BLEND_ONE_MINUS_DST_COLOR: return layer_subtract(value, layer_product(value, destination));
+    case BLEND_SRC_COLOR: return layer_product(value, source);
+    case BLEND_ONE_MINUS_SRC_COLOR: return layer_subtract(value, layer_product(value, source));
+    case BLEND_SRC_ALPHA: return layer_scale(value, source_alpha);
+    case BLEND_ONE_MINUS_SRC_ALPHA: return layer_scale(value, 1.0 - source_alpha);
+    case BLEND_DST_ALPHA: return value;
+    default: return Layer(vec3(0.0), vec3(0.0), vec3(0.0)); // ZERO, ONE_MINUS_DST_ALPHA, SRC_ALPHA_SATURATE
+    }
+}
+
+// Runs the stages of the point's material over the background.
+Layer evaluate_stages(SurfacePoint p, float width) {
+    Material material = material_of(p.triangle.material);
+    Instance instance = instance_of(p.instance);
+    Stages stages = Stages(VIEW.materials.stages);
+    bool world = (p.triangle.flags & TRIANGLE_WORLD) != 0;
+    Layer layer = Layer(vec3(0.0), vec3(0.0), vec3(1.0));
+    for (uint i = 0; i < material.stage_count; i++) {
+        Stage stage = stages.at[material.stage_first + i];
+        vec4 color = stage_color(VIEW.materials, stage, instance, p.stage);
+        Layer source = Layer(vec3(0.0), vec3(0.0), vec3(0.0));
+        float alpha;
+        if (stage.image_count == 0 && (stage.flags & STAGE_WHITE) == 0) {
+            // the lightmap: the light itself, as bright as the stage lets it through
+            source.lit = decode_display(color.rgb);
+            alpha = color.a;
+        } else {
+            vec4 texel = stage_texel(stage, p, instance, width);
+            vec3 image = decode_display(texel.rgb);
+            bool baked = world && (material.flags & MATERIAL_VERTEX_LIGHT) != 0
+                && (stage.rgb_gen == RGBGEN_VERTEX || stage.rgb_gen == RGBGEN_EXACT_VERTEX);
+            if (stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE || baked) {
+                source.lit = image;
+                alpha = texel.a * (stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE && stage.alpha_gen == ALPHAGEN_IDENTITY ? 1.0 : color.a);
+            } else {
+                source.emission = image * decode_display(color.rgb);
+                alpha = texel.a * color.a;
+            }
+        }
+        if (stage.alpha_func != ALPHAFUNC_NONE && !alpha_passes(stage.alpha_func, alpha)) continue;
+        layer = layer_add(layer_blend(stage.blend_src, source, source, layer, alpha),
+            layer_blend(stage.blend_dst, layer, source, layer, alpha));
+    }
+    return layer;
+}
+
+// What a lamp shows of the light that it gives: its radiance, held where the tone curve can still tell the texture.
+vec3 shown_glow(Material material) {
+    vec3 radiance = material.light_radiance;
+    return radiance / (1.0 + max_component(radiance) * 0.25);
+}
+
+// The layer as an eye sees it: an emitter's surface glows with its own texture.
+Layer evaluate_layer(SurfacePoint p, float width) {
+    Layer layer = evaluate_stages(p, width);
+    Material material = material_of(p.triangle.material);
+    layer.emission += layer.lit * shown_glow(material);
+    layer.lit = max(layer.lit, 0.0);
+    layer.emission = max(layer.emission, 0.0);
+    layer.through = max(layer.through, 0.0);
+    return layer;
+}
+
+#endif

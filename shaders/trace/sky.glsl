@@ -1,0 +1,60 @@
+// Sky by direction: the box of six images, and the cloud stages on a sphere around the world.
+#ifndef RELIGHT_TRACE_SKY_GLSL
+#define RELIGHT_TRACE_SKY_GLSL
+
+#include "trace/layer.glsl"
+
+// The box face that a direction points at and where on it. Order of the faces: +X rt, +Y bk, -X lf, -Y ft, +Z up, -Z dn.
+void sky_face(vec3 d, out uint face, out vec2 uv) {
+    vec3 m = abs(d);
+    vec2 st;
+    if (m.x >= m.y && m.x >= m.z) {
+        face = d.x > 0.0 ? 0u : 2u;
+        st = vec2(d.x > 0.0 ? -d.y : d.y, d.z) / m.x;
+    } else if (m.y >= m.z) {
+        face = d.y > 0.0 ? 1u : 3u;
+        st = vec2(d.y > 0.0 ? d.x : -d.x, d.z) / m.y;
+    } else {
+        face = d.z > 0.0 ? 4u : 5u;
+        st = vec2(-d.y, d.z > 0.0 ? -d.x : d.x) / m.z;
+    }
+    uv = vec2(st.x * 0.5 + 0.5, 0.5 - st.y * 0.5);
+}
+
+// Texture coordinates of the clouds: the point where the direction meets a sphere of radius 4096 + height around a
+// centre 4096 below the eye, its unit vector's arc cosines.
+vec2 cloud_uv(vec3 d, float height) {
+    const float radius = 4096.0;
+    float along = -d.z * radius + sqrt(max(d.z * d.z * radius * radius + 2.0 * radius * height + height * height, 0.0));
+    vec3 v = normalize(d * along + vec3(0.0, 0.0, radius));
+    return acos(clamp(v.xy, -1.0, 1.0));
+}
+
+// Displayed radiance of the sky in direction d. `p`: the sky surface that was hit; its lightmap index is the sky's.
+vec3 sky_radiance(SurfacePoint p, vec3 d, float spread) {
+    if ((VIEW.flags & VIEW_FAST_SKY) != 0) return vec3(0.0);
+    SkyRecord sky = Skies(VIEW.skies).at[p.triangle.lightmap];
+    uint face;
+    vec2 uv;
+    sky_face(d, face, uv);
+    vec3 radiance = vec3(0.0);
+    uint image = sky.faces[face];
+    if (image != NO_TEXTURE) {
+        vec2 size = vec2(textureSize(textures[nonuniformEXT(image)], 0));
+        float lod = max(log2(max(spread * 0.5 * max(size.x, size.y), 1.0e-6)), 0.0);
+        // sampler 1: clamped
+        radiance = decode_display(textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[1]), uv, lod).rgb);
+    }
+    if (face != 5u) {
+        p.stage.st = cloud_uv(d, sky.cloud_height);
+        p.stage.lightmap = p.stage.st;
+        p.triangle.lightmap = NO_TEXTURE;
+        // one unit of direction moves the coordinates by about radius over height of the sphere's cap, at most
+        p.texel_scale = 1.0;
+        Layer clouds = evaluate_stages(p, spread);
+        radiance = max(clouds.emission + clouds.lit + clouds.through * radiance, 0.0);
+    }
+    return radiance;
+}
+
+#endif

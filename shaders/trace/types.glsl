@@ -1,0 +1,58 @@
+// The structures of the traced look that GLSL and Rust (shaders/src/trace_types.rs) share, under the same names.
+// Everything is laid out `scalar`. Addresses are buffer device addresses.
+#ifndef RELIGHT_TRACE_TYPES_GLSL
+#define RELIGHT_TRACE_TYPES_GLSL
+
+#include "common/types.glsl"
+
+struct GeometryRecord { uint64_t triangles; uint64_t vertices; uint instance; uint kind; };
+
+struct TriangleLight { vec3 corners[3]; vec3 radiance; uint flags; };
+
+struct SphereLight { vec3 origin; float radius; vec3 radiance; float clearance; vec3 axis; float cos_inner; float cos_outer; };
+
+struct SunLight { vec3 direction; float cos_angle; vec3 irradiance; };
+
+struct BspNode { vec4 plane; int children[2]; };
+
+struct SkyRecord { uint faces[6]; float cloud_height; };
+
+struct PortalRecord {
+    vec4 plane; uint mirror; vec3 surface_origin; vec3 surface_axis[3]; vec3 camera_origin; vec3 camera_axis[3];
+};
+
+struct TraceView {
+    uint64_t geometries; uint64_t instances; uint64_t fogs; uint64_t portals; uint64_t skies; uint64_t triangle_lights;
+    uint64_t sphere_lights; uint64_t dynamic_lights; uint64_t suns; uint64_t nodes; uint64_t leaf_clusters;
+    uint64_t light_offsets; uint64_t light_indices; uint64_t exposure;
+    MaterialBuffers materials;
+    vec3 eye; vec3 forward; vec3 left; vec3 up;
+    uint width; uint height; int target_x; int target_y;
+    uint scene; uint flags; uint seed; uint accumulated;
+    float time; float pixel_spread; vec3 ambient;
+    uint fog_count; uint portal_count; uint triangle_light_count; uint sun_count; uint dynamic_light_count;
+    uint cluster_count; uint node_count;
+    uint max_depth; uint bounces; uint samples; uint candidates; uint sampling;
+    uint image_position; uint image_surface; uint image_front; uint image_direct; uint image_indirect; uint image_hdr;
+    uint image_accumulation; uint image_target;
+    float exposure_bias; float exposure_blend; float light_scale;
+    uint target_width; uint target_height; uint padding;
+};
+
+// What a geometry's triangles are to a ray.
+const uint KIND_OPAQUE = 0, KIND_TESTED = 1, KIND_TRANSLUCENT = 2, KIND_SKY = 3;
+// Masks of top-level instances.
+const uint MASK_SOLID = 0x01, MASK_TRANSLUCENT = 0x02, MASK_SKY = 0x04, MASK_FIRST_SOLID = 0x08, MASK_FIRST_TRANSLUCENT = 0x10,
+    MASK_THIRD_SOLID = 0x20, MASK_THIRD_TRANSLUCENT = 0x40, MASK_NO_SHADOW = 0x80;
+// Bits of TriangleLight.flags.
+const uint LIGHT_TWO_SIDED = 1, LIGHT_SKY = 2;
+// Bits of TraceView.flags.
+const uint VIEW_JITTER = 1, VIEW_FIRST_PERSON = 2, VIEW_ACCUMULATE = 4, VIEW_AUTO_EXPOSURE = 8, VIEW_FAST_SKY = 16,
+    VIEW_EXPOSURE_RESET = 32, VIEW_FULLBRIGHT = 64;
+const uint SAMPLING_UNIFORM = 0, SAMPLING_RESAMPLED = 1, SAMPLING_ALL = 2;
+// Triangle.flags: bits from here on hold the drawing rank, sort value times 8, at most 255.
+const uint TRIANGLE_RANK_SHIFT = 8;
+// No instance of its own: the triangle names it.
+const uint NO_INSTANCE = 0xFFFFFFFFu;
+
+#endif

@@ -1,0 +1,31 @@
+// What every stage of the traced look begins with: the one push constant and the arrays behind it.
+#ifndef RELIGHT_TRACE_VIEW_GLSL
+#define RELIGHT_TRACE_VIEW_GLSL
+
+#include "common/bindless.glsl"
+#include "common/material.glsl"
+#include "trace/types.glsl"
+
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer TraceViews { TraceView view; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Geometries { GeometryRecord at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Triangles { Triangle at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TraceVertices { Vertex at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TraceInstances { Instance at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TraceFogs { Fog at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Portals { PortalRecord at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Skies { SkyRecord at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TriangleLights { TriangleLight at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer SphereLights { SphereLight at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer SunLights { SunLight at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BspNodes { BspNode at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Integers { int at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Indices { uint at[]; };
+
+layout(push_constant, scalar) uniform Push { uint64_t view; } push;
+#define VIEW (TraceViews(push.view).view)
+
+const float PI = 3.14159265358979;
+// Farther than anything in a map (the engine's world ends at 131072 units).
+const float FAR = 1.0e6;
+
+#endif
