@@ -36,7 +36,7 @@ struct Fog { vec3 mins; vec3 maxs; vec4 plane; uint has_surface; vec3 color; flo
 struct MaterialBuffers { uint64_t materials; uint64_t stages; uint64_t tc_mods; uint64_t images; uint64_t noise; };
 
 struct RasterView {
-    vec4 world_to_clip[4]; vec4 clip_plane; vec3 eye; vec3 forward; float identity_light; MaterialBuffers materials;
+    vec4 world_to_clip[4]; vec4 clip_plane; vec3 eye; vec3 forward; float identity_light; uint padding; MaterialBuffers materials;
     uint64_t static_vertices; uint64_t dynamic_vertices; uint64_t instances; uint64_t draws; uint64_t fogs; uint64_t lights;
 };
 

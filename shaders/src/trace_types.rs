@@ -182,7 +182,6 @@ pub struct TraceView {
     pub light_scale: f32,
     pub target_width: u32,
     pub target_height: u32,
-    pub padding: u32,
 }
 
 /// Names of constants used on both sides.

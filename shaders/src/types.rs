@@ -209,6 +209,8 @@ pub struct RasterView {
     pub forward: Vec3,
     /// `identityLight`: 1 over 2 to the power of the overbright bits.
     pub identity_light: f32,
+    /// Keeps the addresses at multiples of eight without hidden bytes.
+    pub padding: u32,
     /// Materials.
     pub materials: MaterialBuffers,
     /// The world's [`Vertex`] array.
