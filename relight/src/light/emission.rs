@@ -12,11 +12,13 @@
 //! Source: q3map2's choice of the light image; the stage algebra is [`shaderscript::light`]'s.
 
 use super::entities::normalise;
+use super::glow::mean_emission;
 use super::{POINT_LIGHT_INTENSITY, SKY_LIGHT_RADIANCE, SURFACE_LIGHT_RADIANCE};
 use crate::files::GameFiles;
 use crate::image::{self, Image};
 use crate::world::WorldMaterial;
 use glam::Vec3;
+use shaderscript::light::{SurfaceClass, classify};
 use shaderscript::{Cull, Deform, Shader};
 use std::collections::HashMap;
 
@@ -126,7 +128,25 @@ impl<'a> Finder<'a> {
                 ),
             });
         }
-        None
+        let glow = self.glow(material)?;
+        Some(emission(EmissionSource::Glow, glow))
+    }
+
+    /// Radiance of an opaque material whose stages glow.
+    fn glow(&mut self, material: &WorldMaterial) -> Option<Vec3> {
+        let shader = &material.resolved.shader;
+        let solid = matches!(
+            classify(shader).class,
+            SurfaceClass::Opaque | SurfaceClass::CutOut
+        );
+        if !solid || material.resolved.fault.is_some() || material.is_sky() {
+            return None;
+        }
+        for name in shader.image_names() {
+            self.image(name);
+        }
+        let mean = mean_emission(shader, |name| self.images.get(name)?.as_ref());
+        (luminance(mean) >= GLOW_THRESHOLD).then_some(mean)
     }
 
     /// Colour of the light that directives ask for, its largest channel 1.

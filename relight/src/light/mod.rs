@@ -44,6 +44,7 @@
 
 mod emission;
 mod entities;
+mod glow;
 mod lists;
 mod report;
 mod surfaces;

@@ -286,6 +286,7 @@ fn resolve_materials(
                 surface_flags,
                 content_flags,
                 lighting,
+                class: shaderscript::light::classify(&resolved.shader),
                 resolved,
                 emission: None,
             });

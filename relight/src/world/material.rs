@@ -4,6 +4,7 @@ use crate::light::Emission;
 use crate::materials::Resolved;
 use q3bsp::{Bsp, SurfaceKind, lightmap_index};
 use shaderscript::ImplicitKind;
+use shaderscript::light::LightClass;
 
 /// A material of a world.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +20,8 @@ pub struct WorldMaterial {
     pub lighting: ImplicitKind,
     /// What is drawn, what the script says, and what is wrong.
     pub resolved: Resolved,
+    /// What it is to light, as it is drawn.
+    pub class: LightClass,
     /// Light that it emits; `None` for most.
     pub emission: Option<Emission>,
 }
