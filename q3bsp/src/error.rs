@@ -164,13 +164,15 @@ pub enum Error {
         /// Number of elements there.
         limit: usize,
     },
-    /// The surfaces of a small file together refer to more data than any map has: sharing ranges is
+    /// The records of a small file together refer to more data than any map has: sharing ranges is
     /// normal, but this would exhaust memory.
-    #[error("surfaces refer to {found} elements of lump {target} in all, more than {limit}")]
+    #[error("lump {lump} refers to {found} elements of lump {target} in all, more than {limit}")]
     TooMuchSharing {
+        /// The lump that refers.
+        lump: Lump,
         /// The lump shared.
         target: Lump,
-        /// Sum over all surfaces.
+        /// Sum over all records.
         found: u64,
         /// Most accepted.
         limit: u64,

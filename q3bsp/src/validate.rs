@@ -8,10 +8,24 @@ use crate::container::Repair;
 use crate::error::{Error, Lump, Warning};
 use crate::lumps::{SurfaceKind, lightmap_index};
 
-/// Most vertices, and most indices, that all surfaces together may refer to. Shipped maps stay below
-/// two hundred thousand; the limit keeps a file that shares one range a million times from
-/// exhausting memory in whoever expands it.
+/// Most elements of one lump that the records of another may refer to in all. Sharing is normal, but
+/// shipped maps stay far below a million; the limit keeps a file that shares one range a million times
+/// from exhausting memory in whoever expands it.
 const MAX_REFERENCES: u64 = 1 << 26;
+
+/// Refuses a lump whose records refer to more than [`MAX_REFERENCES`] elements.
+fn check_sharing(lump: Lump, target: Lump, counts: impl Iterator<Item = i32>) -> Result<(), Error> {
+    let found = counts.map(|count| u64::try_from(count).unwrap_or(0)).sum();
+    if found > MAX_REFERENCES {
+        return Err(Error::TooMuchSharing {
+            lump,
+            target,
+            found,
+            limit: MAX_REFERENCES,
+        });
+    }
+    Ok(())
+}
 
 /// A 32-bit field of a record: its name in messages and its byte offset.
 #[derive(Clone, Copy)]
@@ -131,6 +145,8 @@ impl Bsp {
         self.check_brushes()?;
         self.check_fogs()?;
         self.check_surfaces()?;
+        self.check_all_sharing()?;
+        // Only now, as it expands the shared ranges.
         self.check_indices()?;
         self.warn_about_floats();
         Ok(())
@@ -383,7 +399,6 @@ impl Bsp {
             warnings: &mut self.warnings,
             repairs: &mut self.container.repairs,
         };
-        let (mut all_vertices, mut all_indices) = (0u64, 0u64);
         let first_vert = Field("firstVert", 12);
         let first_index = Field("firstIndex", 20);
         for (element, s) in self.surfaces.iter_mut().enumerate() {
@@ -478,22 +493,46 @@ impl Bsp {
                 log.replace(element, first_index, &mut s.first_index, 0, action);
                 log.replace(element, num_indexes, &mut s.num_indices, 0, action);
             }
-            all_vertices += u64::try_from(s.num_verts).unwrap_or(0);
-            all_indices += u64::try_from(s.num_indices).unwrap_or(0);
-        }
-        for (target, found) in [
-            (Lump::DrawVerts, all_vertices),
-            (Lump::DrawIndexes, all_indices),
-        ] {
-            if found > MAX_REFERENCES {
-                return Err(Error::TooMuchSharing {
-                    target,
-                    found,
-                    limit: MAX_REFERENCES,
-                });
-            }
         }
         Ok(())
+    }
+
+    fn check_all_sharing(&self) -> Result<(), Error> {
+        let leafs = self.leafs.iter();
+        let brushes = self.brushes.iter();
+        let models = self.models.iter();
+        let surfaces = self.surfaces.iter();
+        check_sharing(
+            Lump::Leafs,
+            Lump::LeafSurfaces,
+            leafs.clone().map(|leaf| leaf.num_leaf_surfaces),
+        )?;
+        check_sharing(
+            Lump::Leafs,
+            Lump::LeafBrushes,
+            leafs.map(|leaf| leaf.num_leaf_brushes),
+        )?;
+        check_sharing(
+            Lump::Models,
+            Lump::Surfaces,
+            models.clone().map(|m| m.num_surfaces),
+        )?;
+        check_sharing(Lump::Models, Lump::Brushes, models.map(|m| m.num_brushes))?;
+        check_sharing(
+            Lump::Brushes,
+            Lump::BrushSides,
+            brushes.map(|b| b.num_sides),
+        )?;
+        check_sharing(
+            Lump::Surfaces,
+            Lump::DrawVerts,
+            surfaces.clone().map(|s| s.num_verts),
+        )?;
+        check_sharing(
+            Lump::Surfaces,
+            Lump::DrawIndexes,
+            surfaces.map(|s| s.num_indices),
+        )
     }
 
     /// Triangle corners must lie among their surface's vertices.

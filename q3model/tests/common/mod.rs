@@ -37,7 +37,7 @@ pub fn for_each_file(extension: &str, mut visit: impl FnMut(&str, &str, &[u8])) 
         let mut archive = zip::ZipArchive::new(std::fs::File::open(&pak).unwrap()).unwrap();
         for at in 0..archive.len() {
             let mut file = archive.by_index(at).unwrap();
-            let name = file.name().to_owned();
+            let name = file.name().unwrap().into_owned();
             if name.to_ascii_lowercase().ends_with(extension) {
                 let mut bytes = Vec::new();
                 file.read_to_end(&mut bytes).unwrap();

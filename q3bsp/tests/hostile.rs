@@ -1,0 +1,439 @@
+//! Broken maps: the reader answers with a map or an error, and every accessor of a map works.
+
+use glam::{Vec2, Vec3};
+use proptest::prelude::*;
+use q3bsp::builder::MapBuilder;
+use q3bsp::{Bsp, DrawVert, Error, GridPoint, Lump, content_flags, tessellate_patch};
+use std::sync::LazyLock;
+
+fn vert(x: f32, y: f32, z: f32) -> DrawVert {
+    DrawVert {
+        position: Vec3::new(x, y, z),
+        st: Vec2::new(x, y),
+        lightmap: Vec2::ZERO,
+        normal: Vec3::Z,
+        color: [255; 4],
+    }
+}
+
+/// A map with something in every lump.
+fn sample() -> Bsp {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("textures/wall", 0, content_flags::SOLID);
+    let fog = map.add_shader("textures/fog", 0, content_flags::FOG);
+    let one = map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
+    let two = map.add_room(
+        wall,
+        Vec3::new(128.0, -64.0, -64.0),
+        Vec3::new(256.0, 64.0, 64.0),
+    );
+    map.set_sees(one, two, false);
+    let arch: Vec<DrawVert> = (0..9)
+        .map(|at| {
+            let (x, y) = ((at % 3) as f32, (at / 3) as f32);
+            vert(x * 40.0, y * 40.0, if x == 1.0 { 60.0 } else { 0.0 })
+        })
+        .collect();
+    map.add_patch(wall, 3, 3, &arch);
+    map.add_soup(
+        wall,
+        &[
+            vert(0.0, 0.0, 0.0),
+            vert(0.0, 9.0, 0.0),
+            vert(9.0, 0.0, 0.0),
+        ],
+        &[0, 1, 2],
+    );
+    map.add_flare(wall, Vec3::ZERO, Vec3::Z, Vec3::ONE);
+    map.add_box_brush(wall, Vec3::splat(-130.0), Vec3::splat(-128.0));
+    let volume = map.add_fog_brush(fog, Vec3::splat(-128.0), Vec3::splat(0.0), 5);
+    let page = map.add_lightmap([10, 20, 30]);
+    map.set_lightmap(0, page);
+    map.set_fog(1, volume);
+    let model = map.begin_model();
+    map.add_box_faces(wall, Vec3::splat(-8.0), Vec3::splat(8.0), false);
+    map.add_entity(&[("classname", "func_door"), ("model", &format!("*{model}"))]);
+    map.build_with_grid(Vec3::new(64.0, 64.0, 128.0), |_| GridPoint {
+        ambient: [10; 3],
+        directed: [20; 3],
+        longitude: 30,
+        latitude: 40,
+    })
+}
+
+static SAMPLE: LazyLock<Vec<u8>> = LazyLock::new(|| sample().write());
+
+/// Uses everything that a map offers.
+fn exercise(bsp: &Bsp) {
+    let clusters = bsp.num_clusters();
+    for (at, leaf) in bsp.leafs.iter().enumerate() {
+        assert!(i64::from(leaf.cluster) < clusters as i64, "leaf {at}");
+        for &surface in bsp.leaf_surface_indices(leaf) {
+            let _ = bsp.surfaces[surface as usize];
+        }
+        for &brush in bsp.leaf_brush_indices(leaf) {
+            let _ = bsp.brushes[brush as usize];
+        }
+    }
+    for surface in &bsp.surfaces {
+        let _ = &bsp.shaders[surface.shader as usize];
+        if surface.fog >= 0 {
+            let _ = &bsp.fogs[surface.fog as usize];
+        }
+        if surface.lightmap >= 0 {
+            let _ = bsp.lightmaps[surface.lightmap as usize].texel(127, 127);
+        }
+        let vertices = &bsp.vertices[surface.first_vert as usize..][..surface.num_verts as usize];
+        assert_eq!(vertices.len(), bsp.surface_vertices(surface).len());
+        let corners = &bsp.indices[surface.first_index as usize..][..surface.num_indices as usize];
+        if !matches!(
+            surface.kind,
+            q3bsp::SurfaceKind::Patch | q3bsp::SurfaceKind::Flare
+        ) {
+            assert_eq!(corners.len() % 3, 0);
+            for &corner in corners {
+                assert!((corner as usize) < vertices.len());
+            }
+        }
+    }
+    for model in &bsp.models {
+        let _ = &bsp.surfaces[bsp.model_surfaces(model)];
+    }
+    for brush in &bsp.brushes {
+        for side in bsp.sides_of(brush) {
+            assert!(bsp.plane_of(side).is_some());
+        }
+    }
+    for volume in bsp.fog_volumes() {
+        assert!(volume.mins.is_finite() && volume.maxs.is_finite());
+    }
+    for mesh in bsp.patch_meshes(4.0).into_iter().flatten() {
+        assert!(mesh.vertices.iter().all(DrawVert::is_finite));
+        let count = mesh.vertices.len() as u32;
+        assert!(mesh.indices_at(0.01).into_iter().all(|at| at < count));
+    }
+    if let Some(layout) = bsp.light_grid() {
+        for p in [Vec3::ZERO, Vec3::splat(1e30), Vec3::splat(-1e30)] {
+            if let Some(sample) = layout.sample(&bsp.light_grid, p) {
+                assert!(sample.ambient.is_finite());
+            }
+        }
+    }
+    for p in [Vec3::ZERO, Vec3::splat(1e9), Vec3::NAN] {
+        assert!(bsp.leaf_at(p) < bsp.leafs.len());
+        bsp.cluster_sees(bsp.cluster_at(p), 0);
+    }
+    assert_eq!(bsp.cluster_surfaces().len(), clusters);
+    for entity in bsp.entities() {
+        entity.vec3("origin");
+        entity.brush_model();
+    }
+}
+
+/// Reads; a map must work and be written back as it was.
+fn survive(bytes: &[u8]) -> bool {
+    match Bsp::parse(bytes) {
+        Ok(bsp) => {
+            exercise(&bsp);
+            assert!(bsp.write() == bytes, "not written back as it was");
+            true
+        }
+        Err(error) => {
+            assert!(!error.to_string().is_empty());
+            false
+        }
+    }
+}
+
+#[test]
+fn the_sample_has_something_in_every_lump() {
+    let bsp = Bsp::parse(&SAMPLE).unwrap();
+    assert_eq!(bsp.warnings, []);
+    for lump in Lump::ALL {
+        assert!(bsp.container.lumps[lump.index()].length > 0, "{lump}");
+    }
+    assert_eq!(bsp.patch_meshes(4.0).iter().flatten().count(), 1);
+    assert!(survive(&SAMPLE));
+}
+
+#[test]
+fn truncation_anywhere_is_an_error() {
+    for length in (0..SAMPLE.len()).step_by(37).chain(0..200) {
+        assert!(!survive(&SAMPLE[..length]), "{length} bytes were enough");
+    }
+}
+
+#[test]
+fn every_header_byte_may_be_anything() {
+    for at in 0..144 {
+        for value in [0, 1, 0x7f, 0x80, 0xff] {
+            let mut bytes = SAMPLE.clone();
+            bytes[at] = value;
+            survive(&bytes);
+        }
+    }
+}
+
+/// Every 32-bit word outside the lightmaps, with values that break counts, indices and floats.
+#[test]
+fn every_word_may_be_anything() {
+    let pages = Bsp::parse(&SAMPLE).unwrap().container.lumps[Lump::Lightmaps.index()];
+    let pages = pages.offset as usize..(pages.offset + pages.length) as usize;
+    let (mut accepted, mut refused) = (0, 0);
+    for at in (144..SAMPLE.len() - 3)
+        .step_by(4)
+        .filter(|at| !pages.contains(at))
+    {
+        for value in [-1i32, 0x7fff_ffff, i32::MIN, 1000, 0x7fc0_0000] {
+            let mut bytes = SAMPLE.clone();
+            bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
+            if survive(&bytes) {
+                accepted += 1;
+            } else {
+                refused += 1;
+            }
+        }
+    }
+    // Both happen, or the test tests nothing.
+    assert!(
+        accepted > 100 && refused > 100,
+        "{accepted} accepted, {refused} refused"
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn several_pokes_at_once(pokes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20)) {
+        let mut bytes = SAMPLE.clone();
+        for (at, value) in pokes {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        survive(&bytes);
+    }
+
+    #[test]
+    fn noise_behind_a_good_header(noise in prop::collection::vec(any::<u8>(), 0..600)) {
+        let mut bytes = b"IBSP\x2e\0\0\0".to_vec();
+        bytes.extend(noise);
+        survive(&bytes);
+    }
+
+    #[test]
+    fn entity_text_may_be_anything(text in prop::collection::vec(prop::sample::select(&b"{}\"ab \n/*0"[..]), 0..200)) {
+        let (entities, _) = q3bsp::entities::parse(&text);
+        // What was read, written and read again is the same, but for quotation marks inside words.
+        let entities: Vec<_> = entities
+            .into_iter()
+            .map(|mut entity| {
+                for (key, value) in &mut entity.pairs {
+                    *key = key.replace('"', "'");
+                    *value = value.replace('"', "'");
+                }
+                entity
+            })
+            .collect();
+        let (again, warnings) = q3bsp::entities::parse(&q3bsp::entities::write(&entities));
+        prop_assert_eq!(again, entities);
+        prop_assert_eq!(warnings, vec![]);
+    }
+
+    #[test]
+    fn patches_of_finite_points_are_finite_and_keep_their_corners(
+        half in (1usize..5, 1usize..5),
+        seed in prop::collection::vec(-1e6f32..1e6, 81 * 3),
+        subdivisions in prop::sample::select(&[0.0f32, 1.0, 4.0, 80.0, f32::NAN, f32::INFINITY][..]),
+    ) {
+        let (width, height) = (half.0 * 2 + 1, half.1 * 2 + 1);
+        let points: Vec<DrawVert> = seed
+            .chunks(3)
+            .take(width * height)
+            .map(|p| vert(p[0], p[1], p[2]))
+            .collect();
+        let mesh = tessellate_patch(&points, width, height, subdivisions).unwrap();
+        prop_assert!(mesh.vertices.iter().all(DrawVert::is_finite));
+        prop_assert!(mesh.width <= q3bsp::MAX_GRID_SIZE && mesh.height <= mesh.width);
+        let first = mesh.vertices.first().unwrap().position;
+        let corners = [points[0], points[width - 1], points[width * (height - 1)], points[width * height - 1]];
+        prop_assert!(corners.iter().any(|c| c.position == first));
+    }
+}
+
+#[test]
+fn extreme_patches_end() {
+    for value in [0.0, 1e30, f32::MAX, f32::NAN, f32::INFINITY] {
+        let points: Vec<DrawVert> = (0..9)
+            .map(|at| vert(value * at as f32, value, -value))
+            .collect();
+        let mesh = tessellate_patch(&points, 3, 3, 4.0).unwrap();
+        assert!(mesh.vertices.iter().all(DrawVert::is_finite));
+        assert!(
+            mesh.column_errors
+                .iter()
+                .chain(&mesh.row_errors)
+                .all(|e| e.is_finite())
+        );
+    }
+    let long: Vec<DrawVert> = (0..3 * 3001)
+        .map(|at| vert(at as f32, (at % 7) as f32, 0.0))
+        .collect();
+    assert!(tessellate_patch(&long, 3001, 3, 4.0).unwrap().width >= 65);
+}
+
+#[test]
+fn wrong_sizes_are_errors() {
+    let points = vec![vert(0.0, 0.0, 0.0); 12];
+    for (width, height) in [(4, 3), (3, 4), (1, 12), (3, 3), (usize::MAX, usize::MAX)] {
+        assert!(matches!(
+            tessellate_patch(&points, width, height, 4.0),
+            Err(Error::Patch { .. })
+        ));
+    }
+}
+
+/// Breaks the sample in memory and says what the check finds.
+fn broken(change: impl FnOnce(&mut Bsp)) -> Error {
+    let mut bsp = sample();
+    change(&mut bsp);
+    let error = bsp.validate().unwrap_err();
+    assert_eq!(Bsp::parse(&bsp.write()).unwrap_err(), error);
+    error
+}
+
+#[test]
+fn errors_name_lump_element_and_value() {
+    for (error, text) in [
+        (
+            broken(|b| b.nodes[1].plane = 999),
+            "lump nodes, element 1: planeNum is 999, outside the ",
+        ),
+        (
+            broken(|b| b.nodes[2].children[0] = -1000),
+            "lump nodes, element 2: leaf child is 999, outside the ",
+        ),
+        (
+            broken(|b| b.nodes[1].children[0] = 0),
+            "lump nodes, element 0: number of parents is 2",
+        ),
+        (
+            broken(|b| b.surfaces[3].shader = -1),
+            "lump surfaces, element 3: shaderNum is -1, outside the 2 of lump shaders",
+        ),
+        (
+            broken(|b| b.surfaces[0].first_vert = i32::MAX),
+            "lump surfaces, element 0: firstVert 2147483647+4 reach outside the ",
+        ),
+        (
+            broken(|b| b.indices[1] = 4),
+            "lump drawindexes, element 1: corner is 4, outside the 4 vertices of its surface",
+        ),
+        (
+            broken(|b| b.surfaces[12].patch_width = 4),
+            "lump surfaces, element 12: patchWidth is 4, but patches",
+        ),
+        (
+            broken(|b| b.surfaces[0].kind = q3bsp::SurfaceKind::Other(5)),
+            "lump surfaces, element 0: surfaceType is 5",
+        ),
+        (
+            broken(|b| b.brushes[1].num_sides = 5),
+            "lump fogs, element 0: number of sides of its brush is 5",
+        ),
+        (broken(|b| b.models.clear()), "lump models is empty"),
+    ] {
+        assert!(error.to_string().starts_with(text), "{error}");
+    }
+}
+
+#[test]
+fn tolerated_values_are_repaired_and_written_back() {
+    let mut bsp = sample();
+    bsp.surfaces[0].fog = 7;
+    bsp.surfaces[1].lightmap = 1;
+    bsp.surfaces[2].num_indices = 5;
+    bsp.surfaces[12].num_verts = 1;
+    bsp.fogs[0].visible_side = 6;
+    bsp.leafs[1].cluster = 99;
+    let bytes = bsp.write();
+    let mut read = Bsp::parse(&bytes).unwrap();
+    assert_eq!(read.warnings.len(), 6, "{:#?}", read.warnings);
+    assert_eq!(read.surfaces[0].fog, -1);
+    assert_eq!(read.surfaces[1].lightmap, -3);
+    assert_eq!(read.surfaces[2].num_indices, 3);
+    assert_eq!(read.surfaces[12].num_verts, 9);
+    assert_eq!(read.fog_volumes()[0].surface, None);
+    assert_eq!(read.leafs[1].cluster, -1);
+    assert_eq!(
+        read.warnings[1].to_string(),
+        "lump fogs, element 0: visibleSide is 6, no side of its brush; taken as none"
+    );
+    assert!(read.write() == bytes);
+    // A value that was changed on purpose is not overwritten by the original.
+    read.surfaces[0].fog = 0;
+    assert_eq!(Bsp::parse(&read.write()).unwrap().surfaces[0].fog, 0);
+}
+
+#[test]
+fn unusual_containers_are_kept() {
+    // Banner, gaps and an unaligned lump: everything moved by 13 bytes.
+    let mut bytes = SAMPLE[..144].to_vec();
+    bytes.extend(b"MADE BY HAND\0");
+    bytes.extend(&SAMPLE[144..]);
+    for lump in 0..17 {
+        let at = 8 + lump * 8;
+        let offset = i32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) + 13;
+        bytes[at..at + 4].copy_from_slice(&offset.to_le_bytes());
+    }
+    bytes.extend(b"trailing");
+    let mut bsp = Bsp::parse(&bytes).unwrap();
+    assert!(bsp.container.banner().starts_with(b"MADE BY HAND\0"));
+    assert!(bsp.write() == bytes);
+    // A change of length makes a new layout that reads back and keeps the banner.
+    bsp.entities = b"{ classname worldspawn }\0".to_vec();
+    let again = Bsp::parse(&bsp.write()).unwrap();
+    assert_eq!(again.entities, bsp.entities);
+    assert_eq!(again.surfaces, bsp.surfaces);
+    assert!(again.container.banner().starts_with(b"MADE BY HAND\0"));
+}
+
+#[test]
+fn odd_ends_of_lightmaps_grid_and_visibility_are_kept() {
+    let mut bsp = sample();
+    bsp.container.trailing[Lump::Lightmaps.index()] = vec![1; 1000];
+    bsp.container.trailing[Lump::LightGrid.index()] = vec![2; 3];
+    let bytes = bsp.write();
+    let read = Bsp::parse(&bytes).unwrap();
+    assert_eq!((read.lightmaps.len(), read.light_grid()), (1, None));
+    assert_eq!(read.warnings.len(), 2);
+    assert!(read.write() == bytes);
+
+    let mut bsp = sample();
+    bsp.visibility = None;
+    bsp.container.trailing[Lump::Visibility.index()] = [9i32, 1].map(i32::to_le_bytes).concat();
+    let bytes = bsp.write();
+    let read = Bsp::parse(&bytes).unwrap();
+    assert_eq!((read.visibility.as_ref(), read.warnings.len()), (None, 1));
+    assert!(read.cluster_sees(0, 1) && read.num_clusters() == 2);
+    assert!(read.write() == bytes);
+}
+
+#[test]
+fn foreign_formats_are_named() {
+    for (bytes, name) in [
+        (&b"IBSP\x2f\0\0\0"[..], "\"IBSP\" version 47 (RTCW"),
+        (b"RBSP\x01\0\0\0", "\"RBSP\" version 1 (Raven"),
+        (b"PSBI\0\0\0\x2e", "big-endian"),
+        (b"\x1d\0\0\0\0\0\0\0", "Quake"),
+        (b"PK\x03\x04....", "unknown"),
+    ] {
+        let error = Bsp::parse(bytes).unwrap_err().to_string();
+        assert!(error.contains(name), "{error}");
+    }
+    assert!(matches!(
+        Bsp::parse(b"IBSP\x2e\0\0\0"),
+        Err(Error::TooShort { .. })
+    ));
+    assert!(matches!(Bsp::parse(b""), Err(Error::TooShort { .. })));
+}
