@@ -4,5 +4,6 @@
 #![deny(unsafe_code)]
 
 pub mod api;
+pub mod gpu;
 pub mod scene;
 pub mod settings;

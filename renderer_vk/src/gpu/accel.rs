@@ -1,0 +1,661 @@
+//! Acceleration structures: bottom level from triangles, top level from instances.
+
+use ash::vk;
+
+use super::access::Access;
+use super::buffer::{Buffer, BufferDesc, BufferUsage, Memory};
+use super::device::Device;
+use super::error::{Context, Error};
+use super::graveyard::Garbage;
+use super::pass::Pass;
+
+/// Scratch memory that the builds of one call share; larger calls build in several steps.
+const SCRATCH: u64 = 64 << 20;
+
+/// How a bottom-level structure is built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct BlasFlags {
+    /// Build fast (what moves) instead of tracing fast (what stays).
+    pub fast_build: bool,
+    /// May be compacted, which [`Device::build_static_blas`] does.
+    pub compact: bool,
+}
+
+/// Triangles of a bottom-level structure.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BlasGeometry {
+    /// Address of the first vertex, whose first 12 bytes are its position.
+    pub vertex_address: u64,
+    /// Bytes from vertex to vertex.
+    pub vertex_stride: u64,
+    /// Highest index that occurs.
+    pub max_vertex: u32,
+    /// Address of the first triangle's first index (32 bits).
+    pub index_address: u64,
+    /// Triangles.
+    pub triangle_count: u32,
+    /// No any-hit shader is called.
+    pub opaque: bool,
+    /// The any-hit shader is called once for a triangle at most.
+    pub no_duplicate_any_hit: bool,
+}
+
+/// One build of a batch.
+pub struct BlasBuild<'a> {
+    /// The structure; it takes new storage when its old one is too small, and has a new address then.
+    pub blas: &'a mut Blas,
+    /// Its triangles.
+    pub geometries: &'a [BlasGeometry],
+}
+
+/// An instance of a bottom-level structure.
+#[derive(Clone, Copy, Debug)]
+pub struct Instance {
+    /// Object to world, three rows.
+    pub transform: [[f32; 4]; 3],
+    /// Read by shaders; 24 bits.
+    pub custom_index: u32,
+    /// Rays see it when their mask shares a bit.
+    pub mask: u8,
+    /// Added to the ray's offset to choose the hit group; 24 bits.
+    pub sbt_offset: u32,
+    /// Both faces are hit, whatever the ray culls.
+    pub cull_disable: bool,
+    /// Front faces are clockwise seen from the ray's origin, instead of counter-clockwise.
+    pub flip_facing: bool,
+    /// Overrides the geometry: `Some(true)` as opaque, `Some(false)` as not opaque.
+    pub force_opaque: Option<bool>,
+    /// Address of the bottom-level structure; 0 is an instance of nothing.
+    pub blas: u64,
+}
+
+impl Instance {
+    /// An instance in place, seen by every ray.
+    pub fn new(blas: u64) -> Self {
+        Self {
+            transform: [
+                [1.0, 0.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0, 0.0],
+                [0.0, 0.0, 1.0, 0.0],
+            ],
+            custom_index: 0,
+            mask: 0xff,
+            sbt_offset: 0,
+            cull_disable: false,
+            flip_facing: false,
+            force_opaque: None,
+            blas,
+        }
+    }
+
+    fn vk(&self) -> vk::AccelerationStructureInstanceKHR {
+        use vk::GeometryInstanceFlagsKHR as F;
+        let mut matrix = [0.0; 12];
+        for (target, value) in matrix.iter_mut().zip(self.transform.iter().flatten()) {
+            *target = *value;
+        }
+        let mut flags = F::empty();
+        if self.cull_disable {
+            flags |= F::TRIANGLE_FACING_CULL_DISABLE;
+        }
+        if self.flip_facing {
+            flags |= F::TRIANGLE_FLIP_FACING;
+        }
+        match self.force_opaque {
+            Some(true) => flags |= F::FORCE_OPAQUE,
+            Some(false) => flags |= F::FORCE_NO_OPAQUE,
+            None => {}
+        }
+        vk::AccelerationStructureInstanceKHR {
+            transform: vk::TransformMatrixKHR { matrix },
+            instance_custom_index_and_mask: vk::Packed24_8::new(
+                self.custom_index & 0x00ff_ffff,
+                self.mask,
+            ),
+            instance_shader_binding_table_record_offset_and_flags: vk::Packed24_8::new(
+                self.sbt_offset & 0x00ff_ffff,
+                u8::try_from(flags.as_raw()).unwrap_or(0),
+            ),
+            acceleration_structure_reference: vk::AccelerationStructureReferenceKHR {
+                device_handle: self.blas,
+            },
+        }
+    }
+}
+
+/// A structure with its memory.
+struct Storage {
+    device: Device,
+    raw: vk::AccelerationStructureKHR,
+    size: u64,
+    address: u64,
+    _buffer: Buffer,
+}
+
+impl Storage {
+    fn new(
+        device: &Device,
+        name: &str,
+        kind: vk::AccelerationStructureTypeKHR,
+        size: u64,
+    ) -> Result<Self, Error> {
+        let functions = functions(device, name)?;
+        let buffer = Buffer::new(
+            device,
+            &BufferDesc {
+                name,
+                // The structure must start at a multiple of 256 of the buffer: it starts at 0.
+                size,
+                usage: BufferUsage::ACCEL_STORAGE,
+                memory: Memory::Device,
+            },
+        )?;
+        let info = vk::AccelerationStructureCreateInfoKHR::default()
+            .buffer(buffer.0.raw)
+            .size(size)
+            .ty(kind);
+        // SAFETY: the buffer has the usage and the size.
+        let raw = unsafe { functions.create_acceleration_structure(&info, None) }
+            .context("vkCreateAccelerationStructureKHR")?;
+        device.0.name(raw, name);
+        let info =
+            vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(raw);
+        // SAFETY: just made.
+        let address = unsafe { functions.get_acceleration_structure_device_address(&info) };
+        Ok(Self {
+            device: device.clone(),
+            raw,
+            size,
+            address,
+            _buffer: buffer,
+        })
+    }
+}
+
+impl Drop for Storage {
+    fn drop(&mut self) {
+        // Before its buffer, which is dropped after this.
+        self.device.0.bury(Garbage::Acceleration(self.raw));
+    }
+}
+
+fn functions<'a>(
+    device: &'a Device,
+    name: &str,
+) -> Result<&'a ash::khr::acceleration_structure::Device, Error> {
+    device
+        .0
+        .acceleration
+        .as_ref()
+        .ok_or_else(|| Error::Unsupported {
+            name: name.to_owned(),
+            what: "an acceleration structure".to_owned(),
+            device: device.0.info.name.clone(),
+        })
+}
+
+/// A bottom-level acceleration structure.
+pub struct Blas {
+    device: Device,
+    name: String,
+    flags: BlasFlags,
+    storage: Option<Storage>,
+}
+
+impl Blas {
+    /// An empty structure; it gets its memory when it is built.
+    pub fn new(device: &Device, name: &str, flags: BlasFlags) -> Self {
+        Self {
+            device: device.clone(),
+            name: name.to_owned(),
+            flags,
+            storage: None,
+        }
+    }
+
+    /// The device address for [`Instance::blas`]; 0 before the first build. Building anew may change it.
+    pub fn address(&self) -> u64 {
+        self.storage.as_ref().map_or(0, |s| s.address)
+    }
+
+    /// Bytes of its memory.
+    pub fn size(&self) -> u64 {
+        self.storage.as_ref().map_or(0, |s| s.size)
+    }
+
+    fn build_flags(&self) -> vk::BuildAccelerationStructureFlagsKHR {
+        use vk::BuildAccelerationStructureFlagsKHR as F;
+        let mut flags = if self.flags.fast_build {
+            F::PREFER_FAST_BUILD
+        } else {
+            F::PREFER_FAST_TRACE
+        };
+        if self.flags.compact {
+            flags |= F::ALLOW_COMPACTION;
+        }
+        flags
+    }
+}
+
+/// Vulkan's form of the triangles.
+fn triangles(g: &BlasGeometry) -> vk::AccelerationStructureGeometryKHR<'static> {
+    let mut flags = vk::GeometryFlagsKHR::empty();
+    if g.opaque {
+        flags |= vk::GeometryFlagsKHR::OPAQUE;
+    }
+    if g.no_duplicate_any_hit {
+        flags |= vk::GeometryFlagsKHR::NO_DUPLICATE_ANY_HIT_INVOCATION;
+    }
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+        .flags(flags)
+        .geometry(vk::AccelerationStructureGeometryDataKHR {
+            triangles: vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+                .vertex_format(vk::Format::R32G32B32_SFLOAT)
+                .vertex_data(vk::DeviceOrHostAddressConstKHR {
+                    device_address: g.vertex_address,
+                })
+                .vertex_stride(g.vertex_stride)
+                .max_vertex(g.max_vertex)
+                .index_type(vk::IndexType::UINT32)
+                .index_data(vk::DeviceOrHostAddressConstKHR {
+                    device_address: g.index_address,
+                }),
+        })
+}
+
+/// A build that is ready to be recorded.
+struct Planned {
+    geometries: Vec<vk::AccelerationStructureGeometryKHR<'static>>,
+    ranges: Vec<vk::AccelerationStructureBuildRangeInfoKHR>,
+    flags: vk::BuildAccelerationStructureFlagsKHR,
+    target: vk::AccelerationStructureKHR,
+    scratch: u64,
+}
+
+/// Sizes the storage of every build and plans it.
+fn plan(builds: &mut [BlasBuild<'_>]) -> Result<Vec<Planned>, Error> {
+    let mut planned = Vec::with_capacity(builds.len());
+    for build in builds {
+        let device = &build.blas.device.clone();
+        let functions = functions(device, &build.blas.name)?;
+        let geometries: Vec<_> = build.geometries.iter().map(triangles).collect();
+        let counts: Vec<u32> = build.geometries.iter().map(|g| g.triangle_count).collect();
+        if let Some(limits) = device.0.info.ray_tracing {
+            let total: u64 = counts.iter().map(|c| u64::from(*c)).sum();
+            if total > limits.max_primitives {
+                return Err(Error::Unsupported {
+                    name: build.blas.name.clone(),
+                    what: format!(
+                        "{total} triangles in one structure ({} are)",
+                        limits.max_primitives
+                    ),
+                    device: device.0.info.name.clone(),
+                });
+            }
+        }
+        let flags = build.blas.build_flags();
+        let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+            .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
+            .flags(flags)
+            .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
+            .geometries(&geometries);
+        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+        // SAFETY: one count for each geometry.
+        unsafe {
+            functions.get_acceleration_structure_build_sizes(
+                vk::AccelerationStructureBuildTypeKHR::DEVICE,
+                &info,
+                &counts,
+                &mut sizes,
+            );
+        }
+        if build.blas.size() < sizes.acceleration_structure_size {
+            // A structure that is built anew each frame with varying triangles should not be made anew each time.
+            let size = if build.blas.flags.fast_build {
+                sizes.acceleration_structure_size.saturating_mul(5) / 4
+            } else {
+                sizes.acceleration_structure_size
+            };
+            build.blas.storage = None;
+            build.blas.storage = Some(Storage::new(
+                device,
+                &build.blas.name,
+                vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL,
+                size,
+            )?);
+        }
+        let target = build
+            .blas
+            .storage
+            .as_ref()
+            .map(|s| s.raw)
+            .unwrap_or_default();
+        planned.push(Planned {
+            geometries,
+            ranges: counts
+                .iter()
+                .map(|count| {
+                    vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(*count)
+                })
+                .collect(),
+            flags,
+            target,
+            scratch: sizes.build_scratch_size,
+        });
+    }
+    Ok(planned)
+}
+
+fn scratch_alignment(device: &Device) -> u64 {
+    device
+        .0
+        .info
+        .ray_tracing
+        .map_or(256, |l| u64::from(l.scratch_alignment))
+        .max(1)
+}
+
+impl Pass<'_> {
+    /// Builds bottom-level structures, all in one command unless their scratch memory would grow large. The pass
+    /// declares [`Access::ACCEL_BUILD`].
+    ///
+    /// # Errors
+    /// A device without acceleration structures; out of memory.
+    pub fn build_blas(&mut self, builds: &mut [BlasBuild<'_>]) -> Result<(), Error> {
+        let device = self.device().clone();
+        let planned = plan(builds)?;
+        if planned.is_empty() {
+            return Ok(());
+        }
+        self.end_rendering();
+        let functions = functions(&device, "build_blas")?;
+        let align = scratch_alignment(&device);
+        // Steps of builds whose scratch memory lies side by side.
+        let mut steps: Vec<(Vec<(usize, u64)>, u64)> = Vec::new();
+        for (index, build) in planned.iter().enumerate() {
+            let size = build.scratch.next_multiple_of(align);
+            match steps.last_mut() {
+                Some((members, used)) if *used + size <= SCRATCH => {
+                    members.push((index, *used));
+                    *used += size;
+                }
+                _ => steps.push((vec![(index, 0)], size)),
+            }
+        }
+        let most = steps.iter().map(|s| s.1).max().unwrap_or(0);
+        let scratch = self.recorder().scratch(most + align)?;
+        let base = scratch.address().next_multiple_of(align);
+        for (members, _) in &steps {
+            // The scratch memory is shared with the step, or the build, before.
+            self.barrier();
+            let parts = || {
+                members
+                    .iter()
+                    .filter_map(|(i, at)| Some((planned.get(*i)?, *at)))
+            };
+            let infos: Vec<_> = parts()
+                .map(|(build, at)| {
+                    vk::AccelerationStructureBuildGeometryInfoKHR::default()
+                        .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
+                        .flags(build.flags)
+                        .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
+                        .dst_acceleration_structure(build.target)
+                        .geometries(&build.geometries)
+                        .scratch_data(vk::DeviceOrHostAddressKHR {
+                            device_address: base + at,
+                        })
+                })
+                .collect();
+            let ranges: Vec<&[_]> = parts().map(|(build, _)| &build.ranges[..]).collect();
+            // SAFETY: storage and scratch have the sizes that the driver asked for; the addresses of the geometry are
+            // the caller's, within buffers of this device.
+            unsafe {
+                functions.cmd_build_acceleration_structures(self.cmd(), &infos, &ranges);
+            }
+        }
+        Ok(())
+    }
+
+    /// Builds the top-level structure from `instances`. The pass declares [`Access::ACCEL_BUILD`]; structures built in
+    /// the same pass are waited for.
+    ///
+    /// # Errors
+    /// A device without acceleration structures; out of memory; more instances than the device allows.
+    pub fn build_tlas(&mut self, tlas: &mut Tlas, instances: &[Instance]) -> Result<(), Error> {
+        let device = self.device().clone();
+        let functions = functions(&device, &tlas.name)?;
+        let count = u32::try_from(instances.len()).unwrap_or(u32::MAX);
+        if let Some(limits) = device.0.info.ray_tracing
+            && u64::from(count) > limits.max_instances
+        {
+            return Err(Error::Unsupported {
+                name: tlas.name.clone(),
+                what: format!("{count} instances ({} are)", limits.max_instances),
+                device: device.0.info.name.clone(),
+            });
+        }
+        let data: Vec<u8> = instances
+            .iter()
+            .flat_map(|i| instance_bytes(&i.vk()))
+            .collect();
+        let address = self.arena().push(&data)?;
+        let geometries = [vk::AccelerationStructureGeometryKHR::default()
+            .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+            .geometry(vk::AccelerationStructureGeometryDataKHR {
+                instances: vk::AccelerationStructureGeometryInstancesDataKHR::default().data(
+                    vk::DeviceOrHostAddressConstKHR {
+                        device_address: address,
+                    },
+                ),
+            })];
+        let mut info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+            .ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL)
+            .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)
+            .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
+            .geometries(&geometries);
+        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+        // SAFETY: one count for the one geometry.
+        unsafe {
+            functions.get_acceleration_structure_build_sizes(
+                vk::AccelerationStructureBuildTypeKHR::DEVICE,
+                &info,
+                &[count],
+                &mut sizes,
+            );
+        }
+        tlas.reserve(&device, sizes.acceleration_structure_size)?;
+        let align = scratch_alignment(&device);
+        let scratch = self.recorder().scratch(sizes.build_scratch_size + align)?;
+        self.barrier();
+        info = info
+            .dst_acceleration_structure(tlas.storage.as_ref().map(|s| s.raw).unwrap_or_default())
+            .scratch_data(vk::DeviceOrHostAddressKHR {
+                device_address: scratch.address().next_multiple_of(align),
+            });
+        let ranges = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count)];
+        // SAFETY: storage and scratch have the sizes that the driver asked for; the instances lie in the frame's arena.
+        unsafe {
+            functions.cmd_build_acceleration_structures(self.cmd(), &[info], &[&ranges]);
+        }
+        Ok(())
+    }
+}
+
+/// The 64 bytes that Vulkan reads.
+fn instance_bytes(instance: &vk::AccelerationStructureInstanceKHR) -> [u8; 64] {
+    const {
+        assert!(size_of::<vk::AccelerationStructureInstanceKHR>() == 64);
+    }
+    // SAFETY: a C structure of 64 bytes without padding: 48 of matrix, twice 4 of bit fields, 8 of address.
+    unsafe { std::ptr::read(std::ptr::from_ref(instance).cast::<[u8; 64]>()) }
+}
+
+/// A top-level acceleration structure.
+pub struct Tlas {
+    name: String,
+    device: Device,
+    storage: Option<Storage>,
+    index: Option<u32>,
+}
+
+impl Tlas {
+    /// An empty structure; build it before a shader walks it.
+    pub fn new(device: &Device, name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            device: device.clone(),
+            storage: None,
+            index: None,
+        }
+    }
+
+    /// Index in binding 3, valid after [`Pass::build_tlas`], which may change it.
+    pub fn index(&self) -> u32 {
+        self.index.unwrap_or(super::image::NO_INDEX)
+    }
+
+    /// Device address, valid after [`Pass::build_tlas`], which may change it.
+    pub fn address(&self) -> u64 {
+        self.storage.as_ref().map_or(0, |s| s.address)
+    }
+
+    /// Sees to it that the storage holds `size` bytes.
+    fn reserve(&mut self, device: &Device, size: u64) -> Result<(), Error> {
+        if self.storage.as_ref().is_some_and(|s| s.size >= size) {
+            return Ok(());
+        }
+        let old = self.storage.as_ref().map_or(0, |s| s.size);
+        self.release();
+        let storage = Storage::new(
+            device,
+            &self.name,
+            vk::AccelerationStructureTypeKHR::TOP_LEVEL,
+            size.max(old.saturating_mul(2)),
+        )?;
+        self.index = Some(device.0.bindless.add_scene(device.vk(), storage.raw)?);
+        self.storage = Some(storage);
+        Ok(())
+    }
+
+    fn release(&mut self) {
+        if let Some(index) = self.index.take() {
+            self.device.0.bury(Garbage::Scene(index));
+        }
+        self.storage = None;
+    }
+}
+
+impl Drop for Tlas {
+    fn drop(&mut self) {
+        self.release();
+    }
+}
+
+impl Device {
+    /// Builds bottom-level structures at once and compacts those that allow it. Blocks; for loading.
+    ///
+    /// # Errors
+    /// As [`Pass::build_blas`].
+    pub fn build_static_blas(&self, builds: &mut [BlasBuild<'_>]) -> Result<(), Error> {
+        if builds.is_empty() {
+            return Ok(());
+        }
+        self.immediate(|rec| {
+            rec.pass(
+                "build_static_blas",
+                Access::ACCEL_BUILD,
+                Access::ACCEL_BUILD,
+            )?
+            .build_blas(builds)
+        })?;
+        let mut compact: Vec<&mut Blas> = builds
+            .iter_mut()
+            .map(|b| &mut *b.blas)
+            .filter(|b| b.flags.compact && b.storage.is_some())
+            .collect();
+        if compact.is_empty() {
+            return Ok(());
+        }
+        let functions = functions(self, "build_static_blas")?;
+        let raw: Vec<_> = compact
+            .iter()
+            .filter_map(|b| b.storage.as_ref().map(|s| s.raw))
+            .collect();
+        let sizes = self.compacted_sizes(functions, &raw)?;
+        // Old storages live until the copies are over.
+        let mut old = Vec::new();
+        for (blas, size) in compact.iter_mut().zip(&sizes) {
+            if *size > 0 && *size < blas.size() {
+                let new = Storage::new(
+                    self,
+                    &blas.name,
+                    vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL,
+                    *size,
+                )?;
+                let source = blas.storage.replace(new);
+                old.extend(source.map(|s| (s, blas.storage.as_ref().map(|n| n.raw))));
+            }
+        }
+        self.immediate(|rec| {
+            let pass = rec.pass("compact_blas", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
+            for (source, target) in &old {
+                let info = vk::CopyAccelerationStructureInfoKHR::default()
+                    .src(source.raw)
+                    .dst(target.unwrap_or_default())
+                    .mode(vk::CopyAccelerationStructureModeKHR::COMPACT);
+                // SAFETY: the target has the compacted size of the source, which was built with the flag for it.
+                unsafe { functions.cmd_copy_acceleration_structure(pass.cmd(), &info) };
+            }
+            Ok(())
+        })
+    }
+
+    fn compacted_sizes(
+        &self,
+        functions: &ash::khr::acceleration_structure::Device,
+        structures: &[vk::AccelerationStructureKHR],
+    ) -> Result<Vec<u64>, Error> {
+        let count = u32::try_from(structures.len()).unwrap_or(u32::MAX);
+        let kind = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
+        let info = vk::QueryPoolCreateInfo::default()
+            .query_type(kind)
+            .query_count(count);
+        // SAFETY: plain creation.
+        let pool =
+            unsafe { self.vk().create_query_pool(&info, None) }.context("vkCreateQueryPool")?;
+        let asked = self.immediate(|rec| {
+            let pass = rec.pass("compacted_size", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
+            // SAFETY: the pool is new and not in use.
+            unsafe { self.vk().cmd_reset_query_pool(pass.cmd(), pool, 0, count) };
+            // SAFETY: the structures were built with ALLOW_COMPACTION in an earlier submission.
+            unsafe {
+                functions.cmd_write_acceleration_structures_properties(
+                    pass.cmd(),
+                    structures,
+                    kind,
+                    pool,
+                    0,
+                );
+            }
+            Ok(())
+        });
+        let mut sizes = vec![0u64; structures.len()];
+        let read = asked.and_then(|()| {
+            // SAFETY: the queries were written by a submission that is over.
+            unsafe {
+                self.vk().get_query_pool_results(
+                    pool,
+                    0,
+                    &mut sizes,
+                    vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT,
+                )
+            }
+            .context("vkGetQueryPoolResults")
+        });
+        // SAFETY: nothing uses the pool any more.
+        unsafe { self.vk().destroy_query_pool(pool, None) };
+        read?;
+        Ok(sizes)
+    }
+}

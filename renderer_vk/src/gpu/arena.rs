@@ -1,0 +1,124 @@
+//! Memory for the data that the CPU makes anew in every frame.
+
+use bytemuck::Pod;
+
+use super::buffer::{Buffer, BufferDesc, BufferUsage, Memory};
+use super::device::Device;
+use super::error::Error;
+
+/// Size of a chunk; larger requests get one of their own size.
+const CHUNK: u64 = 1 << 20;
+/// Alignment of everything at least.
+const ALIGN: u64 = 16;
+
+/// Mapped memory of one frame, handed out from front to back and taken back whole when the frame is over. It grows by
+/// chunks, which are kept for the next frame.
+pub struct UploadArena {
+    device: Device,
+    chunks: Vec<Buffer>,
+    /// The chunk in use and its taken bytes.
+    current: usize,
+    used: u64,
+}
+
+/// A piece of an [`UploadArena`]; write it through [`bytes`](Self::bytes) before the frame ends.
+pub struct ArenaSlice<'a> {
+    bytes: &'a mut [u8],
+    /// Device address of the first byte.
+    pub address: u64,
+    /// Offset of the first byte in [`buffer`](Self::buffer).
+    pub offset: u64,
+    buffer: Buffer,
+}
+
+impl ArenaSlice<'_> {
+    /// The bytes; what is not written is undefined.
+    pub fn bytes(&mut self) -> &mut [u8] {
+        self.bytes
+    }
+
+    /// The buffer that holds the piece (usable for indices, indirect parameters and acceleration structure input).
+    pub fn buffer(&self) -> &Buffer {
+        &self.buffer
+    }
+}
+
+impl UploadArena {
+    pub(crate) fn new(device: &Device) -> Self {
+        Self {
+            device: device.clone(),
+            chunks: Vec::new(),
+            current: 0,
+            used: 0,
+        }
+    }
+
+    /// Takes everything back; the frame that used it is over.
+    pub(crate) fn reset(&mut self) {
+        self.current = 0;
+        self.used = 0;
+    }
+
+    /// Takes `size` bytes at a multiple of `align` (a power of two; at least 16 is used).
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn alloc(&mut self, size: u64, align: u64) -> Result<ArenaSlice<'_>, Error> {
+        let align = align.max(ALIGN);
+        let length = usize::try_from(size).map_err(|_| Error::OutOfMemory {
+            what: "upload arena".to_owned(),
+            bytes: size,
+            reason: "larger than the address space".to_owned(),
+        })?;
+        loop {
+            let Some(chunk) = self.chunks.get(self.current) else {
+                // `align` more, because a chunk itself is only aligned as the driver likes.
+                let chunk = Buffer::new(
+                    &self.device,
+                    &BufferDesc {
+                        name: "upload arena",
+                        size: size.saturating_add(align).max(CHUNK),
+                        usage: BufferUsage::INDEX
+                            | BufferUsage::INDIRECT
+                            | BufferUsage::ACCEL_INPUT,
+                        memory: Memory::Upload,
+                    },
+                )?;
+                self.chunks.push(chunk);
+                self.used = 0;
+                continue;
+            };
+            let address = (chunk.address() + self.used).next_multiple_of(align);
+            let offset = address - chunk.address();
+            let end = offset.saturating_add(size);
+            if end > chunk.size() {
+                self.current += 1;
+                self.used = 0;
+                continue;
+            }
+            self.used = end;
+            let buffer = chunk.clone();
+            let start = buffer.mapped_range(offset, length)?;
+            // SAFETY: the range lies in mapped memory of the chunk, is handed out once per frame, and no GPU work
+            // reads it before the frame is submitted; the slice borrows the arena, so it cannot outlive a reset.
+            let bytes = unsafe { std::slice::from_raw_parts_mut(start, length) };
+            return Ok(ArenaSlice {
+                bytes,
+                address,
+                offset,
+                buffer,
+            });
+        }
+    }
+
+    /// Copies `data` and returns their device address, 16-aligned.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn push<T: Pod>(&mut self, data: &[T]) -> Result<u64, Error> {
+        let source: &[u8] = bytemuck::cast_slice(data);
+        let mut slice = self.alloc(source.len() as u64, ALIGN)?;
+        slice.bytes().copy_from_slice(source);
+        Ok(slice.address)
+    }
+}

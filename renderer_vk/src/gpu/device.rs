@@ -1,0 +1,489 @@
+//! The device: everything else is made from it and holds it alive.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ash::{ext, khr, vk};
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{
+    Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc,
+};
+
+use super::bindless::Bindless;
+use super::error::{Context, Error};
+use super::graveyard::{Garbage, SyncState};
+use super::instance::{Instance, SurfaceSource};
+use super::pipeline::{cache_from_bytes, cache_to_bytes};
+use super::select::{self, Abilities, DeviceInfo};
+use super::upload::Pending;
+
+/// How to make a [`Device`].
+#[derive(Clone, Debug)]
+pub struct DeviceOptions {
+    /// Told to the driver.
+    pub app_name: String,
+    /// Whether to switch on the validation layer with synchronization validation.
+    pub validation: bool,
+    /// Part of the wanted device's name, or its index; `None`: the best one.
+    pub prefer: Option<String>,
+    /// `false`: behave as on a device without ray tracing.
+    pub allow_ray_tracing: bool,
+    /// What [`Device::pipeline_cache_data`] gave in an earlier run; ignored when it does not fit.
+    pub pipeline_cache: Option<Vec<u8>>,
+}
+
+impl Default for DeviceOptions {
+    fn default() -> Self {
+        Self {
+            app_name: "Relight".to_owned(),
+            validation: false,
+            prefer: None,
+            allow_ray_tracing: true,
+            pipeline_cache: None,
+        }
+    }
+}
+
+/// GPU memory in use, for a console command.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MemoryReport {
+    /// Bytes taken by live objects.
+    pub allocated: u64,
+    /// Bytes taken from the driver.
+    pub reserved: u64,
+    /// Number of live allocations.
+    pub allocations: usize,
+}
+
+/// Owner of the raw device; its only task is to outlive everything that is made from it.
+pub(crate) struct RawDevice {
+    pub raw: ash::Device,
+    pub instance: Instance,
+}
+
+impl Drop for RawDevice {
+    fn drop(&mut self) {
+        // SAFETY: every object of the device has been destroyed by `DeviceInner::drop`.
+        unsafe { self.raw.destroy_device(None) };
+    }
+}
+
+/// Key of a render pass: formats and whether the attachments are cleared.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct RenderPassKey {
+    pub color: Option<vk::Format>,
+    pub depth: Option<vk::Format>,
+    pub clear_color: bool,
+    pub clear_depth: bool,
+}
+
+/// The shared part of a [`Device`]. Field order is destruction order.
+pub(crate) struct DeviceInner {
+    pub allocator: Mutex<Option<Allocator>>,
+    pub state: Mutex<SyncState>,
+    pub pending: Mutex<Pending>,
+    pub bindless: Bindless,
+    pub render_passes: Mutex<HashMap<RenderPassKey, vk::RenderPass>>,
+    pub pipeline_cache: vk::PipelineCache,
+    pub timeline: vk::Semaphore,
+    pub timings: Mutex<Vec<(String, f32)>>,
+    pub queue: Mutex<vk::Queue>,
+    pub queue_family: u32,
+    pub timestamp_mask: u64,
+    pub timestamp_period: f32,
+    pub abilities: Abilities,
+    pub info: DeviceInfo,
+    pub physical: vk::PhysicalDevice,
+    pub acceleration: Option<khr::acceleration_structure::Device>,
+    pub ray_tracing: Option<khr::ray_tracing_pipeline::Device>,
+    pub swapchain: Option<khr::swapchain::Device>,
+    pub debug: Option<ext::debug_utils::Device>,
+    pub core: RawDevice,
+}
+
+/// A Vulkan device with one queue. Clones share it; it is destroyed with the last object made from it.
+#[derive(Clone)]
+pub struct Device(pub(crate) Arc<DeviceInner>);
+
+/// Locks, and takes a lock that a panicking thread left behind: the data are plain lists.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Device {
+    /// Chooses a device and makes it ready.
+    ///
+    /// Needed: Vulkan 1.2 with buffer device addresses, descriptor indexing, scalar block layout, timeline
+    /// semaphores and 64-bit integers. Used when there: ray tracing pipelines, ray queries, anisotropy, wireframe,
+    /// BC textures.
+    ///
+    /// # Errors
+    /// One message that says what is missing: the loader, the surface, or on each device which feature.
+    pub fn new(options: &DeviceOptions, source: SurfaceSource<'_>) -> Result<Self, Error> {
+        let instance = Instance::new(&options.app_name, options.validation, source)?;
+        let choice = select::choose(
+            &instance,
+            options.prefer.as_deref(),
+            options.allow_ray_tracing,
+        )?;
+        let raw = select::create_device(&instance, &choice)?;
+        let core = RawDevice { raw, instance };
+        let a = choice.abilities;
+        let (vi, vd) = (&core.instance.raw, &core.raw);
+        let mut inner = DeviceInner {
+            allocator: Mutex::new(None),
+            state: Mutex::new(SyncState::default()),
+            pending: Mutex::new(Pending::default()),
+            bindless: Bindless::default(),
+            render_passes: Mutex::new(HashMap::new()),
+            pipeline_cache: vk::PipelineCache::null(),
+            timeline: vk::Semaphore::null(),
+            timings: Mutex::new(Vec::new()),
+            // SAFETY: the device was made with one queue of this family.
+            queue: Mutex::new(unsafe { vd.get_device_queue(choice.queue_family, 0) }),
+            queue_family: choice.queue_family,
+            timestamp_mask: match choice.timestamp_bits {
+                0 => 0,
+                64.. => u64::MAX,
+                bits => (1 << bits) - 1,
+            },
+            timestamp_period: choice.timestamp_period,
+            abilities: a,
+            physical: choice.physical,
+            acceleration: a
+                .acceleration
+                .then(|| khr::acceleration_structure::Device::new(vi, vd)),
+            ray_tracing: a
+                .pipeline
+                .then(|| khr::ray_tracing_pipeline::Device::new(vi, vd)),
+            swapchain: core
+                .instance
+                .surface
+                .is_some()
+                .then(|| khr::swapchain::Device::new(vi, vd)),
+            debug: select::debug_utils(&core.instance, vd),
+            info: choice.info,
+            core,
+        };
+        inner.init(options)?;
+        log::info!(
+            "Vulkan device {} ({}), ray tracing pipeline: {}, ray query: {}",
+            inner.info.name,
+            inner.info.driver.trim(),
+            inner.info.ray_tracing.is_some(),
+            inner.info.ray_query
+        );
+        Ok(Self(Arc::new(inner)))
+    }
+
+    /// What the device is and can do.
+    pub fn info(&self) -> &DeviceInfo {
+        &self.0.info
+    }
+
+    /// GPU milliseconds of each pass of the newest frame whose results have arrived, in order of recording. Empty
+    /// when the device has no timestamps.
+    pub fn timings(&self) -> Vec<(String, f32)> {
+        lock(&self.0.timings).clone()
+    }
+
+    /// Everything that the validation layer said since the device was made.
+    pub fn validation_messages(&self) -> Vec<String> {
+        lock(&self.0.core.instance.messages).clone()
+    }
+
+    /// Waits until the device has nothing to do and frees what was waiting for that. Not for use within a frame.
+    ///
+    /// # Errors
+    /// Device loss.
+    pub fn wait_idle(&self) -> Result<(), Error> {
+        {
+            let _queue = lock(&self.0.queue);
+            // SAFETY: the queue is held, so nothing is submitted meanwhile.
+            unsafe { self.0.core.raw.device_wait_idle() }.context("vkDeviceWaitIdle")?;
+        }
+        self.0.collect()
+    }
+
+    /// The driver's compiled pipelines, to be given to a later run in [`DeviceOptions::pipeline_cache`].
+    ///
+    /// # Errors
+    /// Those of `vkGetPipelineCacheData`.
+    pub fn pipeline_cache_data(&self) -> Result<Vec<u8>, Error> {
+        // SAFETY: the cache belongs to this live device.
+        let data = unsafe {
+            self.0
+                .core
+                .raw
+                .get_pipeline_cache_data(self.0.pipeline_cache)
+        }
+        .context("vkGetPipelineCacheData")?;
+        Ok(cache_to_bytes(&data))
+    }
+
+    /// Memory in use.
+    pub fn memory_report(&self) -> MemoryReport {
+        lock(&self.0.allocator)
+            .as_ref()
+            .map(|allocator| {
+                let report = allocator.generate_report();
+                MemoryReport {
+                    allocated: report.total_allocated_bytes,
+                    reserved: report.total_capacity_bytes,
+                    allocations: report.allocations.len(),
+                }
+            })
+            .unwrap_or_default()
+    }
+
+    /// How many dropped objects still wait for the frames that may use them.
+    pub fn graveyard_len(&self) -> usize {
+        lock(&self.0.state).graveyard.len()
+    }
+
+    /// The raw device functions.
+    pub(crate) fn vk(&self) -> &ash::Device {
+        &self.0.core.raw
+    }
+}
+
+impl std::fmt::Debug for Device {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Device({})", self.0.info.name)
+    }
+}
+
+impl DeviceInner {
+    /// Makes what needs the device to be there; on an error, dropping `self` destroys what was made.
+    fn init(&mut self, options: &DeviceOptions) -> Result<(), Error> {
+        let raw = &self.core.raw;
+        *lock(&self.allocator) = Some(
+            Allocator::new(&AllocatorCreateDesc {
+                instance: self.core.instance.raw.clone(),
+                device: raw.clone(),
+                physical_device: self.physical,
+                debug_settings: gpu_allocator::AllocatorDebugSettings::default(),
+                buffer_device_address: true,
+                allocation_sizes: gpu_allocator::AllocationSizes::new(64 << 20, 16 << 20),
+            })
+            .map_err(|e| Error::OutOfMemory {
+                what: "the memory allocator".to_owned(),
+                bytes: 0,
+                reason: e.to_string(),
+            })?,
+        );
+        let mut kind = vk::SemaphoreTypeCreateInfo::default()
+            .semaphore_type(vk::SemaphoreType::TIMELINE)
+            .initial_value(0);
+        let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        // SAFETY: the timelineSemaphore feature is on.
+        self.timeline =
+            unsafe { raw.create_semaphore(&info, None) }.context("vkCreateSemaphore")?;
+        let old = options
+            .pipeline_cache
+            .as_deref()
+            .and_then(cache_from_bytes)
+            .unwrap_or_default();
+        let info = vk::PipelineCacheCreateInfo::default().initial_data(old);
+        // SAFETY: the data are a cache as a driver wrote it (checked by a hash); a driver that did not write them
+        // ignores them by their header.
+        self.pipeline_cache =
+            unsafe { raw.create_pipeline_cache(&info, None) }.context("vkCreatePipelineCache")?;
+        self.bindless.init(raw, &self.info, self.abilities)?;
+        self.name(self.timeline, "frame timeline");
+        Ok(())
+    }
+
+    /// Gives an object its name in validation messages and captures.
+    pub fn name<T: vk::Handle>(&self, handle: T, name: &str) {
+        let Some(debug) = &self.debug else { return };
+        let Ok(name) = std::ffi::CString::new(name) else {
+            return;
+        };
+        let info = vk::DebugUtilsObjectNameInfoEXT::default()
+            .object_handle(handle)
+            .object_name(&name);
+        // SAFETY: the handle is a live object of this device. A failure only loses the name.
+        let _ = unsafe { debug.set_debug_utils_object_name(&info) };
+    }
+
+    /// Takes memory for an object.
+    pub fn allocate(
+        &self,
+        name: &str,
+        requirements: vk::MemoryRequirements,
+        location: MemoryLocation,
+        linear: bool,
+    ) -> Result<Allocation, Error> {
+        let mut guard = lock(&self.allocator);
+        let fail = |reason: String| Error::OutOfMemory {
+            what: name.to_owned(),
+            bytes: requirements.size,
+            reason,
+        };
+        guard
+            .as_mut()
+            .ok_or_else(|| fail("the allocator is gone".to_owned()))?
+            .allocate(&AllocationCreateDesc {
+                name,
+                requirements,
+                location,
+                linear,
+                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+            })
+            .map_err(|e| fail(e.to_string()))
+    }
+
+    /// Gives memory back.
+    pub fn free(&self, allocation: Allocation) {
+        if let Some(allocator) = lock(&self.allocator).as_mut()
+            && let Err(e) = allocator.free(allocation)
+        {
+            log::error!("GPU memory could not be freed: {e}");
+        }
+    }
+
+    /// The render pass for `key`: attachments stay in the layout GENERAL.
+    pub fn render_pass(&self, key: RenderPassKey) -> Result<vk::RenderPass, Error> {
+        let mut passes = lock(&self.render_passes);
+        if let Some(pass) = passes.get(&key) {
+            return Ok(*pass);
+        }
+        let attachment = |format, clear: bool| {
+            vk::AttachmentDescription::default()
+                .format(format)
+                .samples(vk::SampleCountFlags::TYPE_1)
+                .load_op(if clear {
+                    vk::AttachmentLoadOp::CLEAR
+                } else {
+                    vk::AttachmentLoadOp::LOAD
+                })
+                .store_op(vk::AttachmentStoreOp::STORE)
+                .stencil_load_op(vk::AttachmentLoadOp::DONT_CARE)
+                .stencil_store_op(vk::AttachmentStoreOp::DONT_CARE)
+                .initial_layout(vk::ImageLayout::GENERAL)
+                .final_layout(vk::ImageLayout::GENERAL)
+        };
+        let mut attachments = Vec::new();
+        let mut next = 0;
+        let mut reference = || {
+            next += 1;
+            vk::AttachmentReference {
+                attachment: next - 1,
+                layout: vk::ImageLayout::GENERAL,
+            }
+        };
+        let mut color = Vec::new();
+        if let Some(format) = key.color {
+            attachments.push(attachment(format, key.clear_color));
+            color.push(reference());
+        }
+        let depth = key.depth.map(|format| {
+            attachments.push(attachment(format, key.clear_depth));
+            reference()
+        });
+        let mut subpass = vk::SubpassDescription::default()
+            .pipeline_bind_point(vk::PipelineBindPoint::GRAPHICS)
+            .color_attachments(&color);
+        if let Some(depth) = &depth {
+            subpass = subpass.depth_stencil_attachment(depth);
+        }
+        let subpasses = [subpass];
+        let info = vk::RenderPassCreateInfo::default()
+            .attachments(&attachments)
+            .subpasses(&subpasses);
+        // SAFETY: references lie within the attachments; pointers live here.
+        let pass = unsafe { self.core.raw.create_render_pass(&info, None) }
+            .context("vkCreateRenderPass")?;
+        passes.insert(key, pass);
+        Ok(pass)
+    }
+
+    /// Puts an object to rest until no frame uses it.
+    pub fn bury(&self, garbage: Garbage) {
+        let pending = !lock(&self.pending).is_empty();
+        let mut state = lock(&self.state);
+        let tag = state.tag(pending);
+        state.graveyard.push((tag, garbage));
+    }
+
+    /// Frees every buried object that no frame can use any more.
+    pub fn collect(&self) -> Result<(), Error> {
+        // SAFETY: the timeline belongs to this device.
+        let done = unsafe { self.core.raw.get_semaphore_counter_value(self.timeline) }
+            .context("vkGetSemaphoreCounterValue")?;
+        let dead = lock(&self.state).take_dead(done);
+        for garbage in dead {
+            self.destroy(garbage);
+        }
+        Ok(())
+    }
+
+    /// Destroys one object. Only for objects that no submitted or open command buffer uses.
+    fn destroy(&self, garbage: Garbage) {
+        let raw = &self.core.raw;
+        // SAFETY (each call below): the handle was made from this device, its owner is gone, and the frames that
+        // could use it are over (`take_dead`, or an idle device).
+        match garbage {
+            Garbage::Buffer(buffer, memory) => {
+                // SAFETY: see above.
+                unsafe { raw.destroy_buffer(buffer, None) };
+                self.free(memory);
+            }
+            Garbage::Image(image, memory) => {
+                // SAFETY: see above.
+                unsafe { raw.destroy_image(image, None) };
+                self.free(memory);
+            }
+            // SAFETY: see above.
+            Garbage::View(view) => unsafe { raw.destroy_image_view(view, None) },
+            // SAFETY: see above.
+            Garbage::Framebuffer(f) => unsafe { raw.destroy_framebuffer(f, None) },
+            // SAFETY: see above.
+            Garbage::Pipeline(p) => unsafe { raw.destroy_pipeline(p, None) },
+            // SAFETY: see above.
+            Garbage::CommandPool(p) => unsafe { raw.destroy_command_pool(p, None) },
+            // SAFETY: see above.
+            Garbage::QueryPool(p) => unsafe { raw.destroy_query_pool(p, None) },
+            // SAFETY: see above.
+            Garbage::Semaphore(s) => unsafe { raw.destroy_semaphore(s, None) },
+            Garbage::Acceleration(a) => {
+                if let Some(functions) = &self.acceleration {
+                    // SAFETY: see above.
+                    unsafe { functions.destroy_acceleration_structure(a, None) };
+                }
+            }
+            Garbage::Texture(index) => self.bindless.free_texture(index),
+            Garbage::Storage(index) => self.bindless.free_storage(index),
+            Garbage::Scene(index) => self.bindless.free_scene(index),
+        }
+    }
+}
+
+impl Drop for DeviceInner {
+    fn drop(&mut self) {
+        // SAFETY: nothing else can use the device any more. On a lost device the call fails, and destroying is
+        // allowed then too.
+        let _ = unsafe { self.core.raw.device_wait_idle() };
+        let dead = std::mem::take(&mut lock(&self.state).graveyard);
+        for (_, garbage) in dead {
+            self.destroy(garbage);
+        }
+        let staging = lock(&self.pending).take_staging();
+        for (buffer, memory) in staging {
+            self.destroy(Garbage::Buffer(buffer, memory));
+        }
+        self.bindless.destroy(&self.core.raw);
+        let raw = &self.core.raw;
+        for (_, pass) in lock(&self.render_passes).drain() {
+            // SAFETY: made from this idle device.
+            unsafe { raw.destroy_render_pass(pass, None) };
+        }
+        // SAFETY: made from this idle device, or null, which is allowed.
+        unsafe { raw.destroy_pipeline_cache(self.pipeline_cache, None) };
+        // SAFETY: as above.
+        unsafe { raw.destroy_semaphore(self.timeline, None) };
+        // The allocator logs what leaked and frees its blocks; it needs the device.
+        drop(lock(&self.allocator).take());
+    }
+}

@@ -1,0 +1,231 @@
+//! The ring of frames: while the GPU works on one, the CPU records the next.
+
+use ash::vk;
+
+use super::device::{Device, lock};
+use super::error::{Context, Error};
+use super::graveyard::Garbage;
+use super::recorder::{Recorder, Recording, SlotResources};
+use super::swapchain::Swapchain;
+
+/// A place in the ring.
+struct Slot {
+    /// Timeline value of the frame that used it last.
+    value: u64,
+    resources: Option<SlotResources>,
+    /// Signalled when the swapchain's image of this frame may be drawn to.
+    available: vk::Semaphore,
+}
+
+/// Frames in flight of a device; there is one ring at a time.
+pub struct FrameRing {
+    device: Device,
+    slots: Vec<Slot>,
+    next: usize,
+}
+
+impl FrameRing {
+    /// A ring of `frames` frames in flight (at least 1; 2 keeps CPU and GPU busy).
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when the device has a ring already; out of memory.
+    pub fn new(device: &Device, frames: usize) -> Result<Self, Error> {
+        {
+            let mut state = lock(&device.0.state);
+            if state.ring {
+                return Err(Error::Usage {
+                    name: "FrameRing".to_owned(),
+                    what: "the device has one already, and they would share its timeline"
+                        .to_owned(),
+                });
+            }
+            state.ring = true;
+        }
+        let mut ring = Self {
+            device: device.clone(),
+            slots: Vec::new(),
+            next: 0,
+        };
+        for _ in 0..frames.max(1) {
+            // SAFETY: plain creation.
+            let available = unsafe {
+                device
+                    .vk()
+                    .create_semaphore(&vk::SemaphoreCreateInfo::default(), None)
+            }
+            .context("vkCreateSemaphore")?;
+            ring.slots.push(Slot {
+                value: 0,
+                resources: None,
+                available,
+            });
+        }
+        Ok(ring)
+    }
+
+    /// Frames in flight.
+    pub fn len(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// A ring has at least one frame.
+    pub fn is_empty(&self) -> bool {
+        self.slots.is_empty()
+    }
+
+    /// Begins the next frame: waits until its place in the ring is free (and for no other frame), publishes the times
+    /// of the frame that held it and frees what no frame uses any more.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when a frame is being recorded; out of memory; device loss.
+    pub fn begin(&mut self) -> Result<Recorder, Error> {
+        let device = self.device.clone();
+        if lock(&device.0.state).recording {
+            return Err(Error::Usage {
+                name: "FrameRing".to_owned(),
+                what: "a frame is being recorded already".to_owned(),
+            });
+        }
+        let index = self.next;
+        let Some(slot) = self.slots.get_mut(index) else {
+            return Err(Error::Usage {
+                name: "FrameRing".to_owned(),
+                what: "the ring is empty".to_owned(),
+            });
+        };
+        let semaphores = [device.0.timeline];
+        let values = [slot.value];
+        let info = vk::SemaphoreWaitInfo::default()
+            .semaphores(&semaphores)
+            .values(&values);
+        // SAFETY: the value is 0 or was submitted.
+        unsafe { device.vk().wait_semaphores(&info, u64::MAX) }.context("vkWaitSemaphores")?;
+        let mut resources = match slot.resources.take() {
+            Some(resources) => {
+                resources.timers.publish();
+                resources
+            }
+            None => SlotResources::new(&device)?,
+        };
+        device.0.collect()?;
+        resources.restart()?;
+        lock(&device.0.state).recording = true;
+        let available = slot.available;
+        self.next = (index + 1) % self.slots.len();
+        Ok(Recorder {
+            cmd: resources.main,
+            slot: resources,
+            acquired: None,
+            ring_slot: Some(index),
+            available: Some(available),
+            recording: Some(Recording(device.clone())),
+            device,
+        })
+    }
+
+    /// Submits a frame that shows nothing.
+    ///
+    /// # Errors
+    /// Out of memory, device loss.
+    pub fn end(&mut self, recorder: Recorder) -> Result<(), Error> {
+        self.submit(recorder).map(|_| ())
+    }
+
+    /// Submits a frame and shows the image that [`Swapchain::acquire`] gave it, if it did.
+    ///
+    /// # Errors
+    /// Out of memory, device loss. A swapchain that became out of date is no error: it is made anew at the next
+    /// acquisition.
+    pub fn end_present(
+        &mut self,
+        mut recorder: Recorder,
+        swapchain: &mut Swapchain,
+    ) -> Result<(), Error> {
+        swapchain.prepare_present(&mut recorder);
+        match self.submit(recorder)? {
+            Some((index, finished)) => swapchain.present(index, finished),
+            None => Ok(()),
+        }
+    }
+
+    /// Submits; returns the acquired image and the semaphore that says when it is drawn.
+    fn submit(&mut self, recorder: Recorder) -> Result<Option<(u32, vk::Semaphore)>, Error> {
+        let device = self.device.clone();
+        let Recorder {
+            slot,
+            acquired,
+            ring_slot,
+            recording,
+            ..
+        } = recorder;
+        slot.finish()?;
+        let mut pending = std::mem::take(&mut *lock(&device.0.pending));
+        let value = lock(&device.0.state).submitted + 1;
+        let before = slot.record_before(&pending);
+        let submitted = before.and_then(|()| {
+            let first = [slot.before];
+            let main = [slot.main];
+            let mut waits = Vec::new();
+            let mut stages = Vec::new();
+            let mut signals = vec![device.0.timeline];
+            let mut values = vec![value];
+            if let Some(image) = &acquired {
+                waits.push(image.available);
+                stages.push(
+                    vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT
+                        | vk::PipelineStageFlags::TRANSFER,
+                );
+                signals.push(image.finished);
+                // Ignored for a binary semaphore, but the counts must agree.
+                values.push(0);
+            }
+            let wait_values = vec![0; waits.len()];
+            let mut timeline = vk::TimelineSemaphoreSubmitInfo::default()
+                .wait_semaphore_values(&wait_values)
+                .signal_semaphore_values(&values);
+            let submits = [
+                // Apart, so that uploads do not wait for the swapchain.
+                vk::SubmitInfo::default().command_buffers(&first),
+                vk::SubmitInfo::default()
+                    .command_buffers(&main)
+                    .wait_semaphores(&waits)
+                    .wait_dst_stage_mask(&stages)
+                    .signal_semaphores(&signals)
+                    .push_next(&mut timeline),
+            ];
+            let queue = lock(&device.0.queue);
+            // SAFETY: the buffers are recorded and not pending (their slot was waited for); the value is higher than
+            // every one before; the queue is held.
+            unsafe {
+                device
+                    .vk()
+                    .queue_submit(*queue, &submits, vk::Fence::null())
+            }
+            .context("vkQueueSubmit")
+        });
+        if submitted.is_ok() {
+            lock(&device.0.state).submitted = value;
+        }
+        for (buffer, memory) in pending.take_staging() {
+            device.0.bury(Garbage::Buffer(buffer, memory));
+        }
+        if submitted.is_ok()
+            && let Some(place) = ring_slot.and_then(|i| self.slots.get_mut(i))
+        {
+            place.value = value;
+            place.resources = Some(slot);
+        }
+        drop(recording);
+        submitted?;
+        Ok(acquired.map(|a| (a.index, a.finished)))
+    }
+}
+
+impl Drop for FrameRing {
+    fn drop(&mut self) {
+        for slot in self.slots.drain(..) {
+            self.device.0.bury(Garbage::Semaphore(slot.available));
+        }
+        lock(&self.device.0.state).ring = false;
+    }
+}

@@ -1,0 +1,487 @@
+//! Images and their formats.
+//!
+//! Layout rule: an image that shaders write or that is drawn to stays in `GENERAL`; one that is only sampled stays in
+//! `SHADER_READ_ONLY_OPTIMAL`. Copies change it for their own duration. Swapchain images are `GENERAL` between
+//! acquisition and presentation.
+
+use std::ops::BitOr;
+use std::sync::{Arc, Mutex};
+
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::Allocation;
+
+use super::device::{Device, lock};
+use super::error::{Context, Error};
+use super::graveyard::Garbage;
+
+/// What [`Image::texture_index`] and [`Image::storage_index`] return for an image without that usage.
+pub const NO_INDEX: u32 = u32::MAX;
+
+macro_rules! formats {
+    ($($(#[$doc:meta])* $name:ident = $vk:ident, $block:expr, $bytes:expr;)*) => {
+        /// Texel format; the name says the channels, their bits, and `F` float, `Uint` integer, else normalized.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum Format { $($(#[$doc])* $name,)* }
+        impl Format {
+            pub(crate) fn vk(self) -> vk::Format {
+                match self { $(Self::$name => vk::Format::$vk,)* }
+            }
+            /// Width and height of a block (1 for formats that are not compressed) and its bytes.
+            pub fn block(self) -> (u32, u32) {
+                match self { $(Self::$name => ($block, $bytes),)* }
+            }
+        }
+    };
+}
+
+formats! {
+    /// One channel, 8 bits.
+    R8 = R8_UNORM, 1, 1;
+    /// Two channels, 8 bits.
+    Rg8 = R8G8_UNORM, 1, 2;
+    /// Four channels, 8 bits, as stored.
+    Rgba8 = R8G8B8A8_UNORM, 1, 4;
+    /// Four channels, 8 bits, sampled as linear values of sRGB-encoded texels.
+    Rgba8Srgb = R8G8B8A8_SRGB, 1, 4;
+    /// Four channels, 8 bits, blue first: the usual swapchain.
+    Bgra8 = B8G8R8A8_UNORM, 1, 4;
+    /// Ten bits for each colour, two for alpha.
+    Rgb10A2 = A2B10G10R10_UNORM_PACK32, 1, 4;
+    /// Small floats without sign.
+    R11G11B10F = B10G11R11_UFLOAT_PACK32, 1, 4;
+    /// Half float.
+    R16F = R16_SFLOAT, 1, 2;
+    /// Two half floats.
+    Rg16F = R16G16_SFLOAT, 1, 4;
+    /// Four half floats.
+    Rgba16F = R16G16B16A16_SFLOAT, 1, 8;
+    /// Four channels, 16 bits.
+    Rgba16 = R16G16B16A16_UNORM, 1, 8;
+    /// 16-bit integer.
+    R16Uint = R16_UINT, 1, 2;
+    /// Float.
+    R32F = R32_SFLOAT, 1, 4;
+    /// Two floats.
+    Rg32F = R32G32_SFLOAT, 1, 8;
+    /// Four floats.
+    Rgba32F = R32G32B32A32_SFLOAT, 1, 16;
+    /// 32-bit integer.
+    R32Uint = R32_UINT, 1, 4;
+    /// Two 32-bit integers.
+    Rg32Uint = R32G32_UINT, 1, 8;
+    /// Four 32-bit integers.
+    Rgba32Uint = R32G32B32A32_UINT, 1, 16;
+    /// BC1 with one bit of alpha.
+    Bc1 = BC1_RGBA_UNORM_BLOCK, 4, 8;
+    /// BC2.
+    Bc2 = BC2_UNORM_BLOCK, 4, 16;
+    /// BC3.
+    Bc3 = BC3_UNORM_BLOCK, 4, 16;
+    /// BC4, one channel.
+    Bc4 = BC4_UNORM_BLOCK, 4, 8;
+    /// BC5, two channels.
+    Bc5 = BC5_UNORM_BLOCK, 4, 16;
+    /// BC7.
+    Bc7 = BC7_UNORM_BLOCK, 4, 16;
+    /// Depth, float.
+    D32F = D32_SFLOAT, 1, 4;
+}
+
+impl Format {
+    /// Bytes of `width` × `height` texels, blocks counted whole.
+    pub fn bytes(self, width: u32, height: u32) -> u64 {
+        let (size, bytes) = self.block();
+        u64::from(width.div_ceil(size)) * u64::from(height.div_ceil(size)) * u64::from(bytes)
+    }
+
+    pub(crate) fn aspect(self) -> vk::ImageAspectFlags {
+        if self == Self::D32F {
+            vk::ImageAspectFlags::DEPTH
+        } else {
+            vk::ImageAspectFlags::COLOR
+        }
+    }
+}
+
+/// What an image is for, beyond copies, which every image allows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct ImageUsage(u32);
+
+impl ImageUsage {
+    /// Sampled as a texture.
+    pub const SAMPLED: Self = Self(1);
+    /// Read and written by shaders as a storage image.
+    pub const STORAGE: Self = Self(2);
+    /// Drawn to.
+    pub const COLOR: Self = Self(4);
+    /// Depth buffer.
+    pub const DEPTH: Self = Self(8);
+
+    pub(crate) fn has(self, other: Self) -> bool {
+        self.0 & other.0 != 0
+    }
+}
+
+impl BitOr for ImageUsage {
+    type Output = Self;
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+/// How to make an [`Image`].
+#[derive(Clone, Copy, Debug)]
+pub struct ImageDesc<'a> {
+    /// Label in captures, validation messages and leak reports.
+    pub name: &'a str,
+    /// Texels.
+    pub width: u32,
+    /// Texels.
+    pub height: u32,
+    /// Levels, at least 1.
+    pub mips: u32,
+    /// Array layers, at least 1; more than one makes a 2D array.
+    pub layers: u32,
+    /// Texel format.
+    pub format: Format,
+    /// What for.
+    pub usage: ImageUsage,
+}
+
+impl<'a> ImageDesc<'a> {
+    /// One level, one layer.
+    pub fn new(name: &'a str, width: u32, height: u32, format: Format, usage: ImageUsage) -> Self {
+        Self {
+            name,
+            width,
+            height,
+            mips: 1,
+            layers: 1,
+            format,
+            usage,
+        }
+    }
+}
+
+pub(crate) struct ImageInner {
+    device: Device,
+    pub raw: vk::Image,
+    /// `None`: the image belongs to a swapchain.
+    memory: Mutex<Option<Allocation>>,
+    /// All levels and layers.
+    view: vk::ImageView,
+    /// Level 0, for storage and drawing.
+    pub target: vk::ImageView,
+    pub layout: vk::ImageLayout,
+    pub aspect: vk::ImageAspectFlags,
+    width: u32,
+    height: u32,
+    mips: u32,
+    layers: u32,
+    format: Format,
+    usage: ImageUsage,
+    texture: u32,
+    storage: u32,
+    name: String,
+}
+
+/// An image. Clones share it.
+#[derive(Clone)]
+pub struct Image(pub(crate) Arc<ImageInner>);
+
+/// One image, all its levels and layers, for barriers.
+pub(crate) fn whole(aspect: vk::ImageAspectFlags) -> vk::ImageSubresourceRange {
+    vk::ImageSubresourceRange {
+        aspect_mask: aspect,
+        base_mip_level: 0,
+        level_count: vk::REMAINING_MIP_LEVELS,
+        base_array_layer: 0,
+        layer_count: vk::REMAINING_ARRAY_LAYERS,
+    }
+}
+
+impl Image {
+    /// Makes an image; its contents are undefined until written.
+    ///
+    /// # Errors
+    /// Out of memory, a full descriptor table, a size of zero or beyond the device's limit, a format that the device
+    /// cannot use so.
+    pub fn new(device: &Device, desc: &ImageDesc<'_>) -> Result<Self, Error> {
+        use vk::ImageUsageFlags as U;
+        let limit = device.0.info.max_image_size;
+        if desc.width == 0 || desc.height == 0 || desc.width > limit || desc.height > limit {
+            return Err(Error::Usage {
+                name: desc.name.to_owned(),
+                what: format!(
+                    "an image of {}x{} texels (1 to {limit} are possible)",
+                    desc.width, desc.height
+                ),
+            });
+        }
+        let most_mips = 32 - desc.width.max(desc.height).leading_zeros();
+        let (mips, layers) = (desc.mips.clamp(1, most_mips), desc.layers.max(1));
+        let mut usage = U::TRANSFER_SRC | U::TRANSFER_DST;
+        let mut needed = vk::FormatFeatureFlags::empty();
+        if desc.usage.has(ImageUsage::SAMPLED) {
+            usage |= U::SAMPLED;
+            needed |= vk::FormatFeatureFlags::SAMPLED_IMAGE;
+        }
+        if desc.usage.has(ImageUsage::STORAGE) {
+            usage |= U::STORAGE;
+            needed |= vk::FormatFeatureFlags::STORAGE_IMAGE;
+        }
+        if desc.usage.has(ImageUsage::COLOR) {
+            usage |= U::COLOR_ATTACHMENT;
+            needed |= vk::FormatFeatureFlags::COLOR_ATTACHMENT;
+        }
+        if desc.usage.has(ImageUsage::DEPTH) {
+            usage |= U::DEPTH_STENCIL_ATTACHMENT;
+            needed |= vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
+        }
+        // SAFETY: the physical device belongs to the live instance.
+        let properties = unsafe {
+            device
+                .0
+                .core
+                .instance
+                .raw
+                .get_physical_device_format_properties(device.0.physical, desc.format.vk())
+        };
+        if !properties.optimal_tiling_features.contains(needed) {
+            return Err(Error::Unsupported {
+                name: desc.name.to_owned(),
+                what: format!("{:?} as {needed:?}", desc.format),
+                device: device.0.info.name.clone(),
+            });
+        }
+        let info = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(desc.format.vk())
+            .extent(vk::Extent3D {
+                width: desc.width,
+                height: desc.height,
+                depth: 1,
+            })
+            .mip_levels(mips)
+            .array_layers(layers)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(usage)
+            .initial_layout(vk::ImageLayout::UNDEFINED);
+        let vk = device.vk();
+        // SAFETY: size and format were checked against the device.
+        let raw = unsafe { vk.create_image(&info, None) }.context("vkCreateImage")?;
+        // SAFETY: `raw` was just made.
+        let requirements = unsafe { vk.get_image_memory_requirements(raw) };
+        let memory =
+            match device
+                .0
+                .allocate(desc.name, requirements, MemoryLocation::GpuOnly, false)
+            {
+                Ok(memory) => memory,
+                Err(e) => {
+                    // SAFETY: nothing uses the new image.
+                    unsafe { vk.destroy_image(raw, None) };
+                    return Err(e);
+                }
+            };
+        // SAFETY: the memory was allocated for these requirements and is bound once.
+        let bound = unsafe { vk.bind_image_memory(raw, memory.memory(), memory.offset()) };
+        let only_sampled = desc.usage == ImageUsage::SAMPLED;
+        let mut inner = ImageInner {
+            device: device.clone(),
+            raw,
+            memory: Mutex::new(Some(memory)),
+            view: vk::ImageView::null(),
+            target: vk::ImageView::null(),
+            layout: if only_sampled {
+                vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL
+            } else {
+                vk::ImageLayout::GENERAL
+            },
+            aspect: desc.format.aspect(),
+            width: desc.width,
+            height: desc.height,
+            mips,
+            layers,
+            format: desc.format,
+            usage: desc.usage,
+            texture: NO_INDEX,
+            storage: NO_INDEX,
+            name: desc.name.to_owned(),
+        };
+        bound.context("vkBindImageMemory")?;
+        device.0.name(raw, desc.name);
+        inner.make_views()?;
+        let image = Self(Arc::new(inner));
+        device.queue_init(&image);
+        Ok(image)
+    }
+
+    /// Wraps an image of a swapchain, which keeps its ownership.
+    pub(crate) fn of_swapchain(
+        device: &Device,
+        raw: vk::Image,
+        name: &str,
+        width: u32,
+        height: u32,
+        format: Format,
+    ) -> Result<Self, Error> {
+        let mut inner = ImageInner {
+            device: device.clone(),
+            raw,
+            memory: Mutex::new(None),
+            view: vk::ImageView::null(),
+            target: vk::ImageView::null(),
+            layout: vk::ImageLayout::GENERAL,
+            aspect: vk::ImageAspectFlags::COLOR,
+            width,
+            height,
+            mips: 1,
+            layers: 1,
+            format,
+            usage: ImageUsage::COLOR,
+            texture: NO_INDEX,
+            storage: NO_INDEX,
+            name: name.to_owned(),
+        };
+        device.0.name(raw, name);
+        inner.make_views()?;
+        Ok(Self(Arc::new(inner)))
+    }
+
+    /// Index in the texture table (binding 1), or [`NO_INDEX`].
+    pub fn texture_index(&self) -> u32 {
+        self.0.texture
+    }
+
+    /// Index in the storage image table (binding 2) of level 0, or [`NO_INDEX`].
+    pub fn storage_index(&self) -> u32 {
+        self.0.storage
+    }
+
+    /// Texels of level 0.
+    pub fn width(&self) -> u32 {
+        self.0.width
+    }
+
+    /// Texels of level 0.
+    pub fn height(&self) -> u32 {
+        self.0.height
+    }
+
+    /// Levels.
+    pub fn mips(&self) -> u32 {
+        self.0.mips
+    }
+
+    /// Array layers.
+    pub fn layers(&self) -> u32 {
+        self.0.layers
+    }
+
+    /// Texel format.
+    pub fn format(&self) -> Format {
+        self.0.format
+    }
+
+    /// The label.
+    pub fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    /// Width and height of a level.
+    pub fn mip_size(&self, mip: u32) -> (u32, u32) {
+        (
+            self.0.width.checked_shr(mip).unwrap_or(0).max(1),
+            self.0.height.checked_shr(mip).unwrap_or(0).max(1),
+        )
+    }
+
+    /// An [`Error::Usage`] about this image.
+    pub(crate) fn misuse(&self, what: impl Into<String>) -> Error {
+        Error::Usage {
+            name: self.0.name.clone(),
+            what: what.into(),
+        }
+    }
+
+    pub(crate) fn usage(&self) -> ImageUsage {
+        self.0.usage
+    }
+}
+
+impl std::fmt::Debug for Image {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let i = &self.0;
+        write!(
+            f,
+            "Image({}, {}x{} {:?})",
+            i.name, i.width, i.height, i.format
+        )
+    }
+}
+
+impl ImageInner {
+    /// Makes the views and enters them into the tables.
+    fn make_views(&mut self) -> Result<(), Error> {
+        if self.usage.0 == 0 {
+            return Ok(());
+        }
+        let kind = if self.layers > 1 {
+            vk::ImageViewType::TYPE_2D_ARRAY
+        } else {
+            vk::ImageViewType::TYPE_2D
+        };
+        let make = |levels: u32, kind: vk::ImageViewType, layers: u32| {
+            let info = vk::ImageViewCreateInfo::default()
+                .image(self.raw)
+                .view_type(kind)
+                .format(self.format.vk())
+                .subresource_range(vk::ImageSubresourceRange {
+                    level_count: levels,
+                    layer_count: layers,
+                    ..whole(self.aspect)
+                });
+            // SAFETY: the image is alive, levels and layers are its own.
+            unsafe { self.device.vk().create_image_view(&info, None) }.context("vkCreateImageView")
+        };
+        let view = make(self.mips, kind, self.layers)?;
+        self.view = view;
+        self.target = if self.mips > 1 || self.layers > 1 {
+            make(1, vk::ImageViewType::TYPE_2D, 1)?
+        } else {
+            view
+        };
+        let bindless = &self.device.0.bindless;
+        if self.usage.has(ImageUsage::SAMPLED) {
+            self.texture = bindless.add_texture(self.device.vk(), self.view, self.layout)?;
+        }
+        if self.usage.has(ImageUsage::STORAGE) {
+            self.storage = bindless.add_storage(self.device.vk(), self.target)?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for ImageInner {
+    fn drop(&mut self) {
+        let device = &self.device.0;
+        if self.texture != NO_INDEX {
+            device.bury(Garbage::Texture(self.texture));
+        }
+        if self.storage != NO_INDEX {
+            device.bury(Garbage::Storage(self.storage));
+        }
+        if self.target != self.view && self.target != vk::ImageView::null() {
+            device.bury(Garbage::View(self.target));
+        }
+        if self.view != vk::ImageView::null() {
+            device.bury(Garbage::View(self.view));
+        }
+        if let Some(memory) = lock(&self.memory).take() {
+            device.bury(Garbage::Image(self.raw, memory));
+        }
+    }
+}

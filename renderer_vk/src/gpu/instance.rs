@@ -1,0 +1,267 @@
+//! The Vulkan instance, its validation messages and the window's surface.
+
+use std::ffi::{CStr, CString, c_void};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use ash::{ext, khr, vk};
+
+use super::error::{Context, Error};
+
+/// Where the picture goes.
+pub enum SurfaceSource<'a> {
+    /// Nowhere: no window, the loader is the system's `libvulkan`.
+    Headless,
+    /// A window of somebody else, who also knows the loader. Made by [`SurfaceSource::window`].
+    Window(WindowSource<'a>),
+}
+
+/// The Vulkan side of a window; see [`SurfaceSource::window`].
+pub struct WindowSource<'a> {
+    get_instance_proc_addr: vk::PFN_vkGetInstanceProcAddr,
+    extensions: Vec<CString>,
+    #[allow(clippy::type_complexity)]
+    create: &'a mut dyn FnMut(vk::Instance) -> Result<vk::SurfaceKHR, String>,
+}
+
+impl<'a> SurfaceSource<'a> {
+    /// A window whose owner gives the loader's entry point, the instance extensions that its surfaces need, and a
+    /// function that makes the surface. The device owns the surface from then on and must be dropped before the
+    /// window is destroyed.
+    ///
+    /// # Safety
+    /// `get_instance_proc_addr` must be the entry point of a Vulkan loader that stays in memory for as long as the
+    /// device lives, and `create` must return a surface made with the instance that it is given.
+    #[allow(clippy::type_complexity)]
+    pub unsafe fn window(
+        get_instance_proc_addr: vk::PFN_vkGetInstanceProcAddr,
+        extensions: Vec<CString>,
+        create: &'a mut dyn FnMut(vk::Instance) -> Result<vk::SurfaceKHR, String>,
+    ) -> Self {
+        Self::Window(WindowSource {
+            get_instance_proc_addr,
+            extensions,
+            create,
+        })
+    }
+}
+
+/// Messages of the validation layer, in the order of their arrival.
+pub(crate) type Messages = Mutex<Vec<String>>;
+
+/// Owner of the instance and of what is made from it alone.
+pub(crate) struct Instance {
+    pub raw: ash::Instance,
+    pub debug_utils: bool,
+    pub messages: Arc<Messages>,
+    pub surface: Option<(khr::surface::Instance, vk::SurfaceKHR)>,
+    messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    // Last: the loader must outlive everything above.
+    _entry: ash::Entry,
+}
+
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+impl Instance {
+    /// Makes the instance and, with a window, its surface.
+    pub fn new(app_name: &str, validation: bool, source: SurfaceSource<'_>) -> Result<Self, Error> {
+        let (entry, mut extensions, window) = match source {
+            SurfaceSource::Headless => {
+                // SAFETY: opening the loader runs its initializers; the library is a Vulkan loader by its name.
+                let entry = unsafe { ash::Entry::load() }.map_err(|e| {
+                    Error::Loader(format!(
+                        "{e}; is a Vulkan driver with its loader installed?"
+                    ))
+                })?;
+                (entry, Vec::new(), None)
+            }
+            SurfaceSource::Window(window) => {
+                let functions = ash::StaticFn {
+                    get_instance_proc_addr: window.get_instance_proc_addr,
+                };
+                // SAFETY: the maker of the source promised a loader's entry point that stays in memory.
+                let entry = unsafe { ash::Entry::from_static_fn(functions) };
+                (entry, window.extensions, Some(window.create))
+            }
+        };
+
+        // SAFETY: no instance is needed for this call.
+        let version = unsafe { entry.try_enumerate_instance_version() }
+            .context("vkEnumerateInstanceVersion")?
+            .unwrap_or(vk::API_VERSION_1_0);
+        if version < vk::API_VERSION_1_2 {
+            return Err(Error::Loader(format!(
+                "it offers Vulkan {}.{}, 1.2 is needed",
+                vk::api_version_major(version),
+                vk::api_version_minor(version)
+            )));
+        }
+
+        // SAFETY: no instance is needed for this call.
+        let available = unsafe { entry.enumerate_instance_extension_properties(None) }
+            .context("vkEnumerateInstanceExtensionProperties")?;
+        let has = |list: &[vk::ExtensionProperties], name: &CStr| {
+            list.iter()
+                .any(|e| e.extension_name_as_c_str().is_ok_and(|n| n == name))
+        };
+        for wanted in &extensions {
+            if !has(&available, wanted) {
+                return Err(Error::Surface(format!(
+                    "the Vulkan loader lacks {}, which the window needs",
+                    wanted.to_string_lossy()
+                )));
+            }
+        }
+        let debug_utils = has(&available, ext::debug_utils::NAME);
+        if debug_utils
+            && !extensions
+                .iter()
+                .any(|e| e.as_c_str() == ext::debug_utils::NAME)
+        {
+            extensions.push(ext::debug_utils::NAME.to_owned());
+        }
+
+        let mut layers = Vec::new();
+        let mut validation_features = false;
+        if validation {
+            // SAFETY: no instance is needed for this call.
+            let found = unsafe { entry.enumerate_instance_layer_properties() }
+                .context("vkEnumerateInstanceLayerProperties")?
+                .iter()
+                .any(|l| l.layer_name_as_c_str().is_ok_and(|n| n == VALIDATION_LAYER));
+            if found {
+                layers.push(VALIDATION_LAYER.as_ptr());
+                // SAFETY: no instance is needed; the layer was just found.
+                let of_layer = unsafe {
+                    entry.enumerate_instance_extension_properties(Some(VALIDATION_LAYER))
+                }
+                .unwrap_or_default();
+                validation_features = has(&of_layer, ext::validation_features::NAME);
+                if validation_features {
+                    extensions.push(ext::validation_features::NAME.to_owned());
+                }
+            } else {
+                log::warn!(
+                    "Vulkan validation was asked for, but {} is not installed",
+                    VALIDATION_LAYER.to_string_lossy()
+                );
+            }
+        }
+
+        let app_name = CString::new(app_name.replace('\0', "")).unwrap_or_default();
+        let app = vk::ApplicationInfo::default()
+            .application_name(&app_name)
+            .engine_name(c"Relight")
+            .api_version(vk::API_VERSION_1_2);
+        let pointers: Vec<_> = extensions.iter().map(|e| e.as_ptr()).collect();
+        let messages = Arc::new(Messages::default());
+        let mut debug_info = messenger_info(&messages);
+        let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+        let mut features =
+            vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+        let mut info = vk::InstanceCreateInfo::default()
+            .application_info(&app)
+            .enabled_extension_names(&pointers)
+            .enabled_layer_names(&layers);
+        if validation_features {
+            info = info.push_next(&mut features);
+        }
+        if debug_utils && !layers.is_empty() {
+            // Catches what the layer says while the instance itself is made and destroyed.
+            info = info.push_next(&mut debug_info);
+        }
+        // SAFETY: every pointer in `info` lives in this function, names are NUL-terminated.
+        let raw = unsafe { entry.create_instance(&info, None) }.map_err(|result| match result {
+            vk::Result::ERROR_INCOMPATIBLE_DRIVER => {
+                Error::NoDevice("the loader found no driver".to_owned())
+            }
+            result => Error::Vulkan {
+                call: "vkCreateInstance",
+                result,
+            },
+        })?;
+
+        let mut instance = Self {
+            raw,
+            debug_utils,
+            messages,
+            surface: None,
+            messenger: None,
+            _entry: entry.clone(),
+        };
+        if debug_utils && !layers.is_empty() {
+            let functions = ext::debug_utils::Instance::new(&entry, &instance.raw);
+            let info = messenger_info(&instance.messages);
+            // SAFETY: the instance is alive; the user data is the `Arc` held beside the messenger.
+            let messenger = unsafe { functions.create_debug_utils_messenger(&info, None) }
+                .context("vkCreateDebugUtilsMessengerEXT")?;
+            instance.messenger = Some((functions, messenger));
+        }
+        if let Some(create) = window {
+            let surface = create(instance.raw.handle()).map_err(Error::Surface)?;
+            let functions = khr::surface::Instance::new(&entry, &instance.raw);
+            instance.surface = Some((functions, surface));
+        }
+        Ok(instance)
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        if let Some((functions, surface)) = self.surface.take() {
+            // SAFETY: the surface came from this instance and its swapchains are gone with the device.
+            unsafe { functions.destroy_surface(surface, None) };
+        }
+        if let Some((functions, messenger)) = self.messenger.take() {
+            // SAFETY: made from this instance, destroyed once.
+            unsafe { functions.destroy_debug_utils_messenger(messenger, None) };
+        }
+        // SAFETY: every object made from the instance is gone; this is the only owner.
+        unsafe { self.raw.destroy_instance(None) };
+    }
+}
+
+fn messenger_info(messages: &Arc<Messages>) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
+    vk::DebugUtilsMessengerCreateInfoEXT::default()
+        .message_severity(
+            vk::DebugUtilsMessageSeverityFlagsEXT::ERROR
+                | vk::DebugUtilsMessageSeverityFlagsEXT::WARNING,
+        )
+        .message_type(
+            vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION
+                | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
+        )
+        .pfn_user_callback(Some(on_message))
+        .user_data(Arc::as_ptr(messages).cast_mut().cast())
+}
+
+/// Keeps and logs one message of the validation layer.
+///
+/// # Safety
+/// Called by the loader with valid data; `user_data` is the [`Messages`] of a live [`Instance`].
+unsafe extern "system" fn on_message(
+    severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    user_data: *mut c_void,
+) -> vk::Bool32 {
+    if data.is_null() || user_data.is_null() {
+        return vk::FALSE;
+    }
+    // SAFETY: the loader passes valid data for the length of the call.
+    let data = unsafe { &*data };
+    // SAFETY: a message, when present, is NUL-terminated.
+    let text = unsafe { data.message_as_c_str() }
+        .map_or_else(String::new, |t| t.to_string_lossy().into_owned());
+    if severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR) {
+        log::error!("{text}");
+    } else {
+        log::warn!("{text}");
+    }
+    // SAFETY: the instance holds the `Arc` until after the messenger is destroyed.
+    let messages = unsafe { &*user_data.cast::<Messages>() };
+    messages
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .push(text);
+    vk::FALSE
+}

@@ -1,0 +1,57 @@
+//! The GPU layer: a thin, owning layer over `ash`. This is the only place of the renderer with `unsafe`.
+//!
+//! - **Ownership.** A [`Buffer`], [`Image`], pipeline or acceleration structure owns what it is made of and holds its
+//!   [`Device`]. Dropping one at any time is fine: it is destroyed when the frames that may use it are over.
+//! - **Frames.** [`FrameRing::begin`] gives a [`Recorder`], [`Recorder::pass`] gives a [`Pass`], and only a pass records
+//!   work. Each pass begins with one barrier (`access.rs` has the rule) and is timed.
+//! - **Resources.** One descriptor set serves every pipeline: textures and storage images are 32-bit indices, buffers
+//!   are device addresses in 128 bytes of push constants. `shaders/common/bindless.glsl` is the other side.
+//! - **Uploads** asked for at any time run before the commands of the frame that is being recorded.
+//!
+//! Needed is Vulkan 1.2; dynamic rendering and the newer synchronization calls are not used. What a caller can still get
+//! wrong in safe code is what no API of addresses and indices can check: a shader that follows a wrong address reads
+//! other GPU memory of this process or loses the device, which is reported as [`Error::DeviceLost`].
+
+#![allow(unsafe_code)]
+#![warn(clippy::multiple_unsafe_ops_per_block)]
+
+mod accel;
+mod access;
+mod arena;
+mod bindless;
+mod buffer;
+mod device;
+mod error;
+mod frame;
+mod graveyard;
+mod image;
+mod instance;
+mod pass;
+mod pipeline;
+mod ray_tracing;
+mod recorder;
+mod select;
+mod swapchain;
+mod timers;
+mod upload;
+
+pub use accel::{Blas, BlasBuild, BlasFlags, BlasGeometry, Instance, Tlas};
+pub use access::Access;
+pub use arena::{ArenaSlice, UploadArena};
+pub use ash::vk;
+pub use bindless::{Filter, MipFilter, SamplerDesc, Wrap};
+pub use buffer::{Buffer, BufferDesc, BufferUsage, Memory};
+pub use device::{Device, DeviceOptions, MemoryReport};
+pub use error::Error;
+pub use frame::FrameRing;
+pub use image::{Format, Image, ImageDesc, ImageUsage, NO_INDEX};
+pub use instance::{SurfaceSource, WindowSource};
+pub use pass::{Pass, Rendering, Viewport};
+pub use pipeline::{
+    BlendFactor, ComputePipeline, Cull, DepthTest, GraphicsDesc, GraphicsPipeline, Topology,
+};
+pub use ray_tracing::{HitGroup, RayTracingDesc, RayTracingPipeline};
+pub use recorder::Recorder;
+pub use select::{DeviceInfo, DeviceKind, RayTracingLimits};
+pub use shaders::Spirv;
+pub use swapchain::{Swapchain, SwapchainDesc};

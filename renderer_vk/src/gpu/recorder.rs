@@ -1,0 +1,350 @@
+//! Recording: command buffers, and passes as the only way to put work into them.
+
+use std::ffi::CString;
+
+use ash::vk;
+
+use super::access::{Access, pass_barrier};
+use super::arena::UploadArena;
+use super::buffer::{Buffer, BufferDesc, BufferUsage, Memory};
+use super::device::{Device, lock};
+use super::error::{Context, Error};
+use super::graveyard::Garbage;
+use super::image::Image;
+use super::pass::Pass;
+use super::timers::Timers;
+use super::upload;
+
+/// What one command buffer at a time needs and keeps for its next use.
+pub(crate) struct SlotResources {
+    device: Device,
+    pool: vk::CommandPool,
+    pub main: vk::CommandBuffer,
+    pub before: vk::CommandBuffer,
+    pub arena: UploadArena,
+    pub timers: Timers,
+    pub scratch: Option<Buffer>,
+}
+
+impl SlotResources {
+    pub fn new(device: &Device) -> Result<Self, Error> {
+        let info = vk::CommandPoolCreateInfo::default()
+            .flags(vk::CommandPoolCreateFlags::TRANSIENT)
+            .queue_family_index(device.0.queue_family);
+        // SAFETY: the family is the one of the device's queue.
+        let pool = unsafe { device.vk().create_command_pool(&info, None) }
+            .context("vkCreateCommandPool")?;
+        let mut slot = Self {
+            device: device.clone(),
+            pool,
+            main: vk::CommandBuffer::null(),
+            before: vk::CommandBuffer::null(),
+            arena: UploadArena::new(device),
+            timers: Timers::new(device),
+            scratch: None,
+        };
+        let info = vk::CommandBufferAllocateInfo::default()
+            .command_pool(pool)
+            .level(vk::CommandBufferLevel::PRIMARY)
+            .command_buffer_count(2);
+        // SAFETY: the pool was just made.
+        let buffers = unsafe { device.vk().allocate_command_buffers(&info) }
+            .context("vkAllocateCommandBuffers")?;
+        if let [before, main] = buffers[..] {
+            slot.before = before;
+            slot.main = main;
+        }
+        Ok(slot)
+    }
+
+    /// Starts the main command buffer; the last use of the slot is over.
+    pub fn restart(&mut self) -> Result<(), Error> {
+        let vk = self.device.vk();
+        // SAFETY: no command buffer of the pool is pending.
+        unsafe { vk.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
+            .context("vkResetCommandPool")?;
+        self.arena.reset();
+        self.timers.clear();
+        begin(&self.device, self.main)
+    }
+
+    /// Records uploads and query resets into the command buffer that runs before the main one.
+    pub fn record_before(&self, pending: &upload::Pending) -> Result<(), Error> {
+        begin(&self.device, self.before)?;
+        self.timers.reset(self.before);
+        if !pending.is_empty() {
+            upload::record(&self.device, self.before, pending);
+        }
+        // SAFETY: the buffer is being recorded.
+        unsafe { self.device.vk().end_command_buffer(self.before) }.context("vkEndCommandBuffer")
+    }
+
+    /// Ends the main command buffer, with everything visible to the CPU once the submission is over.
+    pub fn finish(&self) -> Result<(), Error> {
+        let vk = self.device.vk();
+        let memory = [vk::MemoryBarrier::default()
+            .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
+            .dst_access_mask(vk::AccessFlags::HOST_READ)];
+        // SAFETY: recording, outside of a render pass (a `Pass` ends its own).
+        unsafe {
+            vk.cmd_pipeline_barrier(
+                self.main,
+                vk::PipelineStageFlags::ALL_COMMANDS,
+                vk::PipelineStageFlags::HOST,
+                vk::DependencyFlags::empty(),
+                &memory,
+                &[],
+                &[],
+            );
+        }
+        // SAFETY: the buffer is being recorded.
+        unsafe { vk.end_command_buffer(self.main) }.context("vkEndCommandBuffer")
+    }
+}
+
+impl Drop for SlotResources {
+    fn drop(&mut self) {
+        self.device.0.bury(Garbage::CommandPool(self.pool));
+    }
+}
+
+fn begin(device: &Device, cmd: vk::CommandBuffer) -> Result<(), Error> {
+    let info =
+        vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+    // SAFETY: the buffer is in its initial state.
+    unsafe { device.vk().begin_command_buffer(cmd, &info) }.context("vkBeginCommandBuffer")
+}
+
+/// A swapchain image that the frame draws to.
+pub(crate) struct Acquired {
+    pub image: Image,
+    pub index: u32,
+    pub available: vk::Semaphore,
+    pub finished: vk::Semaphore,
+}
+
+/// Says for as long as it lives that a frame is being recorded.
+pub(crate) struct Recording(pub Device);
+
+impl Drop for Recording {
+    fn drop(&mut self) {
+        // After a submission this changes nothing; a frame that was thrown away gives its objects to earlier frames.
+        let pending = !lock(&self.0.0.pending).is_empty();
+        let mut state = lock(&self.0.0.state);
+        state.recording = false;
+        state.retag(pending);
+    }
+}
+
+/// A frame, or an immediate piece of work, while it is recorded. Dropping a frame's recorder instead of ending it
+/// throws the frame away.
+pub struct Recorder {
+    pub(crate) device: Device,
+    pub(crate) cmd: vk::CommandBuffer,
+    pub(crate) slot: SlotResources,
+    pub(crate) acquired: Option<Acquired>,
+    /// Index in the ring; `None` for immediate work.
+    pub(crate) ring_slot: Option<usize>,
+    /// What an acquisition of a swapchain image for this frame signals.
+    pub(crate) available: Option<vk::Semaphore>,
+    // Last, so that the slot of a frame that is thrown away is buried as one of that frame.
+    pub(crate) recording: Option<Recording>,
+}
+
+impl Recorder {
+    /// The device.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// Memory for data that this frame alone uses.
+    pub fn arena(&mut self) -> &mut UploadArena {
+        &mut self.slot.arena
+    }
+
+    /// Begins a pass: waits for everything before it, makes every write so far visible to the stages that `reads` and
+    /// `writes` name, opens a debug label and takes a timestamp. The pass ends when the returned guard is dropped.
+    ///
+    /// # Errors
+    /// Out of memory for timestamps.
+    pub fn pass(&mut self, name: &str, reads: Access, writes: Access) -> Result<Pass<'_>, Error> {
+        if let Some(debug) = &self.device.0.debug
+            && let Ok(label) = CString::new(name)
+        {
+            let info = vk::DebugUtilsLabelEXT::default().label_name(&label);
+            // SAFETY: the command buffer is being recorded.
+            unsafe { debug.cmd_begin_debug_utils_label(self.cmd, &info) };
+        }
+        if let Some((stages, memory)) = pass_barrier(self.device.0.abilities, reads, writes) {
+            // SAFETY: recording outside of a render pass; the stages belong to extensions that are on.
+            unsafe {
+                self.device.vk().cmd_pipeline_barrier(
+                    self.cmd,
+                    vk::PipelineStageFlags::ALL_COMMANDS,
+                    stages,
+                    vk::DependencyFlags::empty(),
+                    &[memory],
+                    &[],
+                    &[],
+                );
+            }
+        }
+        let query = match self.ring_slot {
+            Some(_) => self.slot.timers.begin(name)?,
+            None => None,
+        };
+        if let Some((pool, query)) = query {
+            // SAFETY: the query is reset by the command buffer that runs before this one.
+            unsafe {
+                self.device.vk().cmd_write_timestamp(
+                    self.cmd,
+                    vk::PipelineStageFlags::BOTTOM_OF_PIPE,
+                    pool,
+                    query,
+                );
+            }
+        }
+        Ok(Pass::new(self, query))
+    }
+
+    /// Scratch memory of acceleration structure builds, shared by the builds of this frame.
+    pub(crate) fn scratch(&mut self, size: u64) -> Result<Buffer, Error> {
+        if let Some(buffer) = &self.slot.scratch
+            && buffer.size() >= size
+        {
+            return Ok(buffer.clone());
+        }
+        let buffer = Buffer::new(
+            &self.device,
+            &BufferDesc {
+                name: "acceleration structure scratch",
+                size: size.max(1 << 20),
+                usage: BufferUsage::STORAGE,
+                memory: Memory::Device,
+            },
+        )?;
+        self.slot.scratch = Some(buffer.clone());
+        Ok(buffer)
+    }
+}
+
+impl Device {
+    /// Records work, submits it before the frame that may be under way, and waits for it. Waiting uploads run first.
+    /// For loading and tests.
+    ///
+    /// # Errors
+    /// Those of `record`, out of memory, device loss.
+    pub fn immediate<T>(
+        &self,
+        record: impl FnOnce(&mut Recorder) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        lock(&self.0.state).immediates += 1;
+        let result = self.run_immediate(record);
+        {
+            let pending = !lock(&self.0.pending).is_empty();
+            let mut state = lock(&self.0.state);
+            state.immediates -= 1;
+            state.retag(pending);
+        }
+        self.0.collect()?;
+        result
+    }
+
+    fn run_immediate<T>(
+        &self,
+        record: impl FnOnce(&mut Recorder) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let mut slot = SlotResources::new(self)?;
+        slot.restart()?;
+        let mut recorder = Recorder {
+            device: self.clone(),
+            cmd: slot.main,
+            slot,
+            acquired: None,
+            ring_slot: None,
+            available: None,
+            recording: None,
+        };
+        let value = record(&mut recorder)?;
+        let slot = recorder.slot;
+        slot.finish()?;
+        let mut pending = std::mem::take(&mut *lock(&self.0.pending));
+        let done = slot
+            .record_before(&pending)
+            .and_then(|()| self.submit_and_wait(&[slot.before, slot.main]));
+        for (buffer, memory) in pending.take_staging() {
+            self.0.bury(Garbage::Buffer(buffer, memory));
+        }
+        done?;
+        Ok(value)
+    }
+
+    fn submit_and_wait(&self, buffers: &[vk::CommandBuffer]) -> Result<(), Error> {
+        let vk = self.vk();
+        // SAFETY: plain creation.
+        let fence = unsafe { vk.create_fence(&vk::FenceCreateInfo::default(), None) }
+            .context("vkCreateFence")?;
+        let submits = [vk::SubmitInfo::default().command_buffers(buffers)];
+        let submitted = {
+            let queue = lock(&self.0.queue);
+            // SAFETY: the buffers are recorded and pending nowhere else; the queue is held.
+            unsafe { vk.queue_submit(*queue, &submits, fence) }.context("vkQueueSubmit")
+        };
+        let done = submitted.and_then(|()| {
+            // SAFETY: the fence was submitted.
+            unsafe { vk.wait_for_fences(&[fence], true, u64::MAX) }.context("vkWaitForFences")
+        });
+        // SAFETY: the wait is over, or the submission failed, or the device is lost.
+        unsafe { vk.destroy_fence(fence, None) };
+        done
+    }
+
+    /// Reads a part of a buffer back, after all work that was submitted so far. Blocks.
+    ///
+    /// # Errors
+    /// A range outside of the buffer, out of memory, device loss.
+    pub fn read_buffer(&self, buffer: &Buffer, offset: u64, size: u64) -> Result<Vec<u8>, Error> {
+        buffer.check(offset, size)?;
+        let target = self.readback(size)?;
+        self.immediate(|rec| {
+            rec.pass("read_buffer", Access::TRANSFER, Access::TRANSFER)?
+                .copy_buffer(buffer, offset, &target, 0, size);
+            Ok(())
+        })?;
+        read_all(&target, size)
+    }
+
+    /// Reads level 0 of an image back, rows from the top without padding, after all work that was submitted so far.
+    /// Blocks.
+    ///
+    /// # Errors
+    /// Out of memory, device loss.
+    pub fn read_image(&self, image: &Image) -> Result<Vec<u8>, Error> {
+        let size = image.format().bytes(image.width(), image.height());
+        let target = self.readback(size)?;
+        self.immediate(|rec| {
+            rec.pass("read_image", Access::TRANSFER, Access::TRANSFER)?
+                .copy_image_to_buffer(image, [0, 0, image.width(), image.height()], &target, 0);
+            Ok(())
+        })?;
+        read_all(&target, size)
+    }
+
+    fn readback(&self, size: u64) -> Result<Buffer, Error> {
+        Buffer::new(
+            self,
+            &BufferDesc {
+                name: "read-back",
+                size,
+                usage: BufferUsage::TRANSFER,
+                memory: Memory::Readback,
+            },
+        )
+    }
+}
+
+fn read_all(buffer: &Buffer, size: u64) -> Result<Vec<u8>, Error> {
+    let mut bytes = vec![0; usize::try_from(size).unwrap_or(0)];
+    buffer.read(0, &mut bytes)?;
+    Ok(bytes)
+}

@@ -1,0 +1,395 @@
+//! The images of the window.
+
+use ash::vk;
+
+use super::device::{Device, lock};
+use super::error::{Context, Error};
+use super::graveyard::Garbage;
+use super::image::{Format, Image, whole};
+use super::recorder::{Acquired, Recorder};
+
+/// How to make a [`Swapchain`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SwapchainDesc {
+    /// Pixels; what the window system dictates goes before it.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Whether to wait for the display.
+    pub vsync: bool,
+}
+
+/// The images that the window shows, made anew when the window changes.
+pub struct Swapchain {
+    device: Device,
+    desc: SwapchainDesc,
+    raw: vk::SwapchainKHR,
+    format: Format,
+    images: Vec<(Image, vk::Semaphore)>,
+    stale: bool,
+    /// The image of a frame that is not presented yet.
+    acquired: Option<u32>,
+}
+
+impl Swapchain {
+    /// Makes the swapchain of the device's window. The window may be minimised; images come when it is shown.
+    ///
+    /// # Errors
+    /// A headless device, a surface without a usable format, out of memory, a lost surface.
+    pub fn new(device: &Device, desc: SwapchainDesc) -> Result<Self, Error> {
+        let mut swapchain = Self {
+            device: device.clone(),
+            desc,
+            raw: vk::SwapchainKHR::null(),
+            format: Format::Bgra8,
+            images: Vec::new(),
+            stale: true,
+            acquired: None,
+        };
+        swapchain.format = swapchain.choose_format()?.0;
+        swapchain.recreate()?;
+        Ok(swapchain)
+    }
+
+    /// Format of the images: 8 bits, as stored, red or blue first.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// Size of the images; zero while the window is minimised.
+    pub fn extent(&self) -> (u32, u32) {
+        self.images
+            .first()
+            .map_or((0, 0), |(i, _)| (i.width(), i.height()))
+    }
+
+    /// Tells of a new size or a new wish; takes effect at the next acquisition.
+    pub fn resize(&mut self, width: u32, height: u32, vsync: bool) {
+        let desc = SwapchainDesc {
+            width,
+            height,
+            vsync,
+        };
+        if desc != self.desc {
+            self.desc = desc;
+            self.stale = true;
+        }
+    }
+
+    /// Takes the next image for the frame. Call it late, just before the first pass that draws to the window: passes
+    /// after it wait for the window system. `None`: nothing can be shown now (minimised), and the frame goes on
+    /// without.
+    ///
+    /// # Errors
+    /// Out of memory, a lost surface, device loss.
+    pub fn acquire(&mut self, recorder: &mut Recorder) -> Result<Option<Image>, Error> {
+        let Some(available) = recorder.available else {
+            return Err(Error::Usage {
+                name: "swapchain".to_owned(),
+                what: "an image can only be taken for a frame".to_owned(),
+            });
+        };
+        if let Some(acquired) = &recorder.acquired {
+            return Ok(Some(acquired.image.clone()));
+        }
+        // A frame that was thrown away after acquiring leaves its image behind.
+        if self.stale || self.acquired.is_some() {
+            self.recreate()?;
+        }
+        let Some(functions) = self.device.0.swapchain.clone() else {
+            return Ok(None);
+        };
+        // A swapchain may be out of date again at once while a window is dragged; then skip the frame.
+        for _ in 0..2 {
+            if self.images.is_empty() {
+                return Ok(None);
+            }
+            // SAFETY: the semaphore is not pending: its last wait belongs to a frame that is over.
+            let got = unsafe {
+                functions.acquire_next_image(self.raw, u64::MAX, available, vk::Fence::null())
+            };
+            match got {
+                Ok((index, suboptimal)) => {
+                    self.stale = suboptimal;
+                    let Some((image, finished)) = self.images.get(index as usize) else {
+                        return Ok(None);
+                    };
+                    self.acquired = Some(index);
+                    recorder.acquired = Some(Acquired {
+                        image: image.clone(),
+                        index,
+                        available,
+                        finished: *finished,
+                    });
+                    let image = image.clone();
+                    self.change_layout(
+                        recorder,
+                        &image,
+                        vk::ImageLayout::UNDEFINED,
+                        vk::ImageLayout::GENERAL,
+                    );
+                    return Ok(Some(image));
+                }
+                Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.recreate()?,
+                Err(result) => return Err(result).context("vkAcquireNextImageKHR"),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Records the change to the layout for showing.
+    pub(crate) fn prepare_present(&self, recorder: &mut Recorder) {
+        if let Some(acquired) = &recorder.acquired {
+            let image = acquired.image.clone();
+            self.change_layout(
+                recorder,
+                &image,
+                vk::ImageLayout::GENERAL,
+                vk::ImageLayout::PRESENT_SRC_KHR,
+            );
+        }
+    }
+
+    /// Shows an image of a submitted frame.
+    pub(crate) fn present(&mut self, index: u32, finished: vk::Semaphore) -> Result<(), Error> {
+        self.acquired = None;
+        let Some(functions) = &self.device.0.swapchain else {
+            return Ok(());
+        };
+        let (waits, swapchains, indices) = ([finished], [self.raw], [index]);
+        let info = vk::PresentInfoKHR::default()
+            .wait_semaphores(&waits)
+            .swapchains(&swapchains)
+            .image_indices(&indices);
+        let queue = lock(&self.device.0.queue);
+        // SAFETY: the image was acquired, the frame that signals the semaphore was submitted, the queue is held.
+        match unsafe { functions.queue_present(*queue, &info) } {
+            Ok(suboptimal) => self.stale |= suboptimal,
+            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.stale = true,
+            Err(result) => return Err(result).context("vkQueuePresentKHR"),
+        }
+        Ok(())
+    }
+
+    fn change_layout(
+        &self,
+        recorder: &Recorder,
+        image: &Image,
+        from: vk::ImageLayout,
+        to: vk::ImageLayout,
+    ) {
+        let barrier = vk::ImageMemoryBarrier::default()
+            .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
+            .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)
+            .old_layout(from)
+            .new_layout(to)
+            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .image(image.0.raw)
+            .subresource_range(whole(vk::ImageAspectFlags::COLOR));
+        // The stages that the wait for the acquisition has too, so that this comes after it.
+        let stages =
+            vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT | vk::PipelineStageFlags::TRANSFER;
+        // SAFETY: recording outside of a render pass; the image is in the layout `from`.
+        unsafe {
+            self.device.vk().cmd_pipeline_barrier(
+                recorder.cmd,
+                stages,
+                stages,
+                vk::DependencyFlags::empty(),
+                &[],
+                &[],
+                &[barrier],
+            );
+        }
+    }
+
+    fn surface(&self) -> Result<(&ash::khr::surface::Instance, vk::SurfaceKHR), Error> {
+        self.device
+            .0
+            .core
+            .instance
+            .surface
+            .as_ref()
+            .map(|(functions, surface)| (functions, *surface))
+            .ok_or_else(|| Error::Surface("the device was made without a window".to_owned()))
+    }
+
+    /// Eight bits as stored are wanted, because the picture is already encoded.
+    fn choose_format(&self) -> Result<(Format, vk::ColorSpaceKHR), Error> {
+        let (functions, surface) = self.surface()?;
+        // SAFETY: surface and physical device belong to the same live instance.
+        let formats = unsafe {
+            functions.get_physical_device_surface_formats(self.device.0.physical, surface)
+        }
+        .context("vkGetPhysicalDeviceSurfaceFormatsKHR")?;
+        for wanted in [Format::Bgra8, Format::Rgba8] {
+            let found = formats
+                .iter()
+                .filter(|f| f.format == wanted.vk())
+                .min_by_key(|f| f.color_space != vk::ColorSpaceKHR::SRGB_NONLINEAR);
+            if let Some(found) = found {
+                return Ok((wanted, found.color_space));
+            }
+        }
+        Err(Error::Surface(format!(
+            "the window offers no 8-bit UNORM format, only {:?}",
+            formats.iter().map(|f| f.format).collect::<Vec<_>>()
+        )))
+    }
+
+    /// Makes the swapchain anew for the window as it is now; without images when the window is minimised. Waits for
+    /// the device, because nothing says when the window system has done with the old images.
+    fn recreate(&mut self) -> Result<(), Error> {
+        self.wait_device()?;
+        let device = self.device.clone();
+        let Some(swapchains) = &device.0.swapchain else {
+            return Err(Error::Surface(
+                "the device was made without a window".to_owned(),
+            ));
+        };
+        self.forget_images();
+        let (format, color_space) = self.choose_format()?;
+        let (functions, surface) = self.surface()?;
+        // SAFETY: surface and physical device belong to the same live instance.
+        let caps = unsafe {
+            functions.get_physical_device_surface_capabilities(device.0.physical, surface)
+        }
+        .context("vkGetPhysicalDeviceSurfaceCapabilitiesKHR")?;
+        // SAFETY: as above.
+        let modes = unsafe {
+            functions.get_physical_device_surface_present_modes(device.0.physical, surface)
+        }
+        .context("vkGetPhysicalDeviceSurfacePresentModesKHR")?;
+        let mode = if self.desc.vsync {
+            vk::PresentModeKHR::FIFO
+        } else {
+            [vk::PresentModeKHR::IMMEDIATE, vk::PresentModeKHR::MAILBOX]
+                .into_iter()
+                .find(|m| modes.contains(m))
+                .unwrap_or(vk::PresentModeKHR::FIFO)
+        };
+        // This value says that the swapchain decides the size.
+        let free = caps.current_extent.width == u32::MAX;
+        let axis = |current: u32, wanted: u32, min: u32, max: u32| {
+            if free {
+                wanted.max(min).min(max)
+            } else {
+                current
+            }
+        };
+        let extent = vk::Extent2D {
+            width: axis(
+                caps.current_extent.width,
+                self.desc.width,
+                caps.min_image_extent.width,
+                caps.max_image_extent.width,
+            ),
+            height: axis(
+                caps.current_extent.height,
+                self.desc.height,
+                caps.min_image_extent.height,
+                caps.max_image_extent.height,
+            ),
+        };
+        if extent.width == 0 || extent.height == 0 {
+            // Minimised. Stay stale, so that the next acquisition tries again.
+            self.stale = true;
+            return Ok(());
+        }
+        let mut count = caps.min_image_count.saturating_add(1).max(3);
+        if caps.max_image_count > 0 {
+            count = count.min(caps.max_image_count);
+        }
+        let alpha = [
+            vk::CompositeAlphaFlagsKHR::OPAQUE,
+            vk::CompositeAlphaFlagsKHR::INHERIT,
+            vk::CompositeAlphaFlagsKHR::PRE_MULTIPLIED,
+            vk::CompositeAlphaFlagsKHR::POST_MULTIPLIED,
+        ]
+        .into_iter()
+        .find(|a| caps.supported_composite_alpha.contains(*a))
+        .unwrap_or(vk::CompositeAlphaFlagsKHR::OPAQUE);
+        let usage = (vk::ImageUsageFlags::COLOR_ATTACHMENT
+            | vk::ImageUsageFlags::TRANSFER_DST
+            | vk::ImageUsageFlags::TRANSFER_SRC)
+            & caps.supported_usage_flags;
+        let old = self.raw;
+        let info = vk::SwapchainCreateInfoKHR::default()
+            .surface(surface)
+            .min_image_count(count)
+            .image_format(format.vk())
+            .image_color_space(color_space)
+            .image_extent(extent)
+            .image_array_layers(1)
+            .image_usage(usage)
+            .image_sharing_mode(vk::SharingMode::EXCLUSIVE)
+            .pre_transform(caps.current_transform)
+            .composite_alpha(alpha)
+            .present_mode(mode)
+            .clipped(true)
+            .old_swapchain(old);
+        // SAFETY: values are within the surface's capabilities; the old swapchain is retired by this.
+        let made = unsafe { swapchains.create_swapchain(&info, None) };
+        self.raw = vk::SwapchainKHR::null();
+        // SAFETY: its images are forgotten and the device is idle. Null is allowed.
+        unsafe { swapchains.destroy_swapchain(old, None) };
+        self.raw = made.context("vkCreateSwapchainKHR")?;
+        self.format = format;
+        device.0.name(self.raw, "swapchain");
+        // SAFETY: just made.
+        let raw_images = unsafe { swapchains.get_swapchain_images(self.raw) }
+            .context("vkGetSwapchainImagesKHR")?;
+        for raw in raw_images {
+            let image = Image::of_swapchain(
+                &device,
+                raw,
+                "swapchain image",
+                extent.width,
+                extent.height,
+                format,
+            )?;
+            // SAFETY: plain creation.
+            let finished = unsafe {
+                device
+                    .vk()
+                    .create_semaphore(&vk::SemaphoreCreateInfo::default(), None)
+            }
+            .context("vkCreateSemaphore")?;
+            self.images.push((image, finished));
+        }
+        self.stale = false;
+        Ok(())
+    }
+
+    fn wait_device(&self) -> Result<(), Error> {
+        let _queue = lock(&self.device.0.queue);
+        // SAFETY: the queue is held.
+        unsafe { self.device.vk().device_wait_idle() }.context("vkDeviceWaitIdle")
+    }
+
+    fn forget_images(&mut self) {
+        self.acquired = None;
+        for (image, finished) in self.images.drain(..) {
+            drop(image);
+            self.device.0.bury(Garbage::Semaphore(finished));
+        }
+    }
+}
+
+impl Drop for Swapchain {
+    fn drop(&mut self) {
+        if let Err(e) = self.wait_device() {
+            log::warn!("{e}");
+        }
+        self.forget_images();
+        // The views of the images must go before the swapchain.
+        if let Err(e) = self.device.0.collect() {
+            log::warn!("{e}");
+        }
+        if let Some(functions) = &self.device.0.swapchain {
+            // SAFETY: the device is idle. Null is allowed.
+            unsafe { functions.destroy_swapchain(self.raw, None) };
+        }
+    }
+}

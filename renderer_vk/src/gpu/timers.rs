@@ -1,0 +1,119 @@
+//! GPU time of passes.
+
+use ash::vk;
+
+use super::device::{Device, lock};
+use super::error::{Context, Error};
+use super::graveyard::Garbage;
+
+/// Passes per query pool; more passes make more pools.
+const PASSES: u32 = 64;
+
+/// Timestamps of one frame's passes.
+pub(crate) struct Timers {
+    device: Device,
+    pools: Vec<vk::QueryPool>,
+    names: Vec<String>,
+}
+
+impl Timers {
+    pub fn new(device: &Device) -> Self {
+        Self {
+            device: device.clone(),
+            pools: Vec::new(),
+            names: Vec::new(),
+        }
+    }
+
+    /// Forgets the passes of the last use.
+    pub fn clear(&mut self) {
+        self.names.clear();
+    }
+
+    /// Enters a pass: the pool and the first of its two queries. `None` without timestamps.
+    pub fn begin(&mut self, name: &str) -> Result<Option<(vk::QueryPool, u32)>, Error> {
+        if !self.device.0.info.timestamps {
+            return Ok(None);
+        }
+        let index = self.names.len();
+        let per_pool = PASSES as usize;
+        if index / per_pool >= self.pools.len() {
+            let info = vk::QueryPoolCreateInfo::default()
+                .query_type(vk::QueryType::TIMESTAMP)
+                .query_count(PASSES * 2);
+            // SAFETY: plain creation.
+            let pool = unsafe { self.device.vk().create_query_pool(&info, None) }
+                .context("vkCreateQueryPool")?;
+            self.pools.push(pool);
+        }
+        self.names.push(name.to_owned());
+        let query = u32::try_from(index % per_pool).unwrap_or(0) * 2;
+        Ok(self.pools.get(index / per_pool).map(|pool| (*pool, query)))
+    }
+
+    /// Records the reset of every pool; runs before the passes.
+    pub fn reset(&self, cmd: vk::CommandBuffer) {
+        for pool in &self.pools {
+            // SAFETY: outside of a render pass, the whole pool, and its last frame is over.
+            unsafe {
+                self.device
+                    .vk()
+                    .cmd_reset_query_pool(cmd, *pool, 0, PASSES * 2);
+            }
+        }
+    }
+
+    /// Publishes the times of a frame that is over.
+    pub fn publish(&self) {
+        if self.names.is_empty() {
+            return;
+        }
+        let inner = &self.device.0;
+        let mut ticks: Vec<u64> = Vec::new();
+        let mut left = self.names.len() * 2;
+        for pool in &self.pools {
+            let mut values = vec![0u64; left.min(PASSES as usize * 2)];
+            if values.is_empty() {
+                break;
+            }
+            // SAFETY: these queries were written by a frame that is over.
+            let read = unsafe {
+                inner.core.raw.get_query_pool_results(
+                    *pool,
+                    0,
+                    &mut values,
+                    vk::QueryResultFlags::TYPE_64,
+                )
+            };
+            if read.is_err() {
+                return;
+            }
+            left -= values.len();
+            ticks.extend(values);
+        }
+        let times = self
+            .names
+            .iter()
+            .zip(ticks.chunks_exact(2))
+            .map(|(name, t)| {
+                let mask = inner.timestamp_mask;
+                let passed = match t {
+                    [begin, end] => (end & mask).wrapping_sub(begin & mask) & mask,
+                    _ => 0,
+                };
+                #[allow(clippy::cast_precision_loss)]
+                let ms = passed as f32 * inner.timestamp_period * 1e-6;
+                (name.clone(), ms)
+            })
+            .collect();
+        *lock(&inner.timings) = times;
+    }
+}
+
+impl Drop for Timers {
+    fn drop(&mut self) {
+        for pool in self.pools.drain(..) {
+            self.device.0.bury(Garbage::QueryPool(pool));
+        }
+    }
+}
