@@ -1,0 +1,135 @@
+//! The boundary between the engine's C and our Rust: no panic crosses it, and the engine's error function, which never
+//! comes back, is called only when nothing of ours is alive on the stack.
+//!
+//! The engine's `Error` does a `longjmp` to its main loop, and before that calls `Shutdown`, `BeginRegistration` and
+//! more of our functions. So a failing call first ends completely: the closure's frame is gone with its destructors
+//! run, the state is back in its cell, the message lies in a static buffer.
+
+use crate::ioq3::abi::error_level;
+use crate::ioq3::engine::Engine;
+use crate::{logging, session};
+use std::any::Any;
+use std::cell::UnsafeCell;
+use std::ffi::{c_char, c_int};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Why a call cannot do what the engine asked, in a way that the engine has to hear about.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// One of [`error_level`].
+    pub level: c_int,
+    /// For the player: what failed, where, and if possible what to do.
+    pub message: String,
+    /// The renderer did not survive it: the next registration makes a new one.
+    pub discard: bool,
+}
+
+impl Failure {
+    /// Back to the menu.
+    pub fn drop(message: impl ToString) -> Self {
+        Self {
+            level: error_level::DROP,
+            message: message.to_string(),
+            discard: false,
+        }
+    }
+
+    /// The process has to end.
+    pub fn fatal(message: impl ToString) -> Self {
+        Self {
+            level: error_level::FATAL,
+            message: message.to_string(),
+            discard: false,
+        }
+    }
+}
+
+/// The engine copies at most this much of a message.
+const MESSAGE_BYTES: usize = 4096;
+
+struct Message(UnsafeCell<[u8; MESSAGE_BYTES]>);
+
+// SAFETY: touched on the engine's main thread alone (`entry` refuses other threads first).
+unsafe impl Sync for Message {}
+
+static MESSAGE: Message = Message(UnsafeCell::new([0; MESSAGE_BYTES]));
+
+/// Puts `text` into the static buffer, cut between characters, and answers where it is.
+fn keep_message(text: &str) -> *const c_char {
+    let mut end = text.len().min(MESSAGE_BYTES - 1);
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    // SAFETY: main thread only, and no reference into the buffer lives outside this function.
+    let buffer = unsafe { &mut *MESSAGE.0.get() };
+    buffer.fill(0);
+    for (to, from) in buffer.iter_mut().zip(text.bytes().take(end)) {
+        *to = if from == 0 { b'?' } else { from };
+    }
+    buffer.as_ptr().cast()
+}
+
+/// The text of a panic.
+fn panic_text(payload: &(dyn Any + Send)) -> &str {
+    payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("unknown reason")
+}
+
+/// Runs one call of the engine. `R` has no destructor, so that nothing is alive when the engine's error is called.
+///
+/// An error or a panic of `f` becomes the engine's error, from which this does not return. A panic costs the renderer
+/// its state: the next `BeginRegistration` starts a new one. Calls from another thread than the one that called
+/// `GetRefAPI` are refused.
+pub fn entry<R: Copy + Default>(f: impl FnOnce() -> Result<R, Failure>) -> R {
+    if !session::on_main_thread() {
+        return R::default();
+    }
+    match guarded(f) {
+        Ok(value) => value,
+        Err((level, message)) => {
+            if let Some(error) = Engine::current().and_then(Engine::error_function) {
+                // SAFETY: the engine's variadic error with a literal format and one NUL-terminated static string. It
+                // leaves by longjmp: the only frames it passes are this one and the exported function's, and
+                // neither has anything left to drop.
+                unsafe { error(level, c"%s".as_ptr(), message) };
+            }
+            // Only an engine without an error function comes here.
+            R::default()
+        }
+    }
+}
+
+/// The part of [`entry`] with destructors, in a frame of its own.
+#[inline(never)]
+fn guarded<R>(f: impl FnOnce() -> Result<R, Failure>) -> Result<R, (c_int, *const c_char)> {
+    let outcome = catch_unwind(AssertUnwindSafe(f));
+    let failed = match outcome {
+        Ok(Ok(value)) => {
+            logging::flush();
+            return Ok(value);
+        }
+        Ok(Err(failure)) => {
+            if failure.discard {
+                let _ = catch_unwind(session::discard_renderer);
+            }
+            (failure.level, keep_message(&failure.message))
+        }
+        Err(payload) => {
+            let text = format!(
+                "the renderer met a fault of its own{}: {}",
+                logging::take_panic_place(),
+                panic_text(payload.as_ref())
+            );
+            let kept = keep_message(&text);
+            // What the panic left behind cannot be trusted; giving it back may fail as well. A second panic's payload
+            // is dropped like the first one's.
+            let _ = catch_unwind(session::discard_renderer);
+            (error_level::DROP, kept)
+        }
+    };
+    logging::flush();
+    Err(failed)
+}

@@ -1,0 +1,48 @@
+//! For tests: C compiled by the machine's own compiler, because only C knows C's layouts and `longjmp`.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// A file of this crate's sources.
+pub fn source(relative: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("src")
+        .join(relative)
+}
+
+/// Compiles `input` with extra arguments. `None`, with a printed line, when there is no C compiler; where everything
+/// has to be tested (`RELIGHT_REQUIRE_DATA=1`) that is a failure.
+pub fn compile(input: &Path, output: &Path, arguments: &[&str]) -> Option<()> {
+    let result = Command::new("cc")
+        .args(arguments)
+        .arg("-o")
+        .arg(output)
+        .arg(input)
+        .output();
+    match result {
+        Ok(result) => {
+            assert!(
+                result.status.success(),
+                "{}: {}",
+                input.display(),
+                String::from_utf8_lossy(&result.stderr)
+            );
+            Some(())
+        }
+        Err(error) => {
+            assert!(
+                std::env::var_os("RELIGHT_REQUIRE_DATA").is_none_or(|value| value != "1"),
+                "no C compiler: {error}"
+            );
+            println!("skipped: no C compiler ({error})");
+            None
+        }
+    }
+}
+
+/// A folder for one test's files, removed by the test itself.
+pub fn scratch(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("relight-ffi-{}-{name}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}

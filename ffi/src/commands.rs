@@ -1,0 +1,234 @@
+//! Console commands.
+
+use crate::boundary::{Failure, entry};
+use crate::capture::{Format, Shot};
+use crate::contract::Renderer;
+use crate::cvars::Cvar;
+use crate::ioq3::engine::{Engine, valid_game_path};
+use crate::session::{self, Front, with_renderer};
+use crate::window;
+use crate::window::modes::MODES;
+use std::ffi::{CStr, CString};
+
+type Function = unsafe extern "C" fn();
+
+/// All commands. They exist between `BeginRegistration` and `Shutdown`: the engine keeps our function pointers.
+static COMMANDS: &[(&CStr, Function)] = &[
+    (c"imagelist", image_list),
+    (c"shaderlist", shader_list),
+    (c"skinlist", skin_list),
+    (c"modellist", model_list),
+    (c"modelist", mode_list),
+    (c"screenshot", screenshot_tga),
+    (c"screenshotJPEG", screenshot_jpeg),
+    (c"gfxinfo", gfx_info),
+    (c"minimize", minimize),
+    (c"rt_timings", timings),
+];
+
+/// Adds all commands.
+pub fn add(engine: Engine) {
+    for &(name, function) in COMMANDS {
+        engine.add_command(name, function);
+    }
+}
+
+/// Removes all commands.
+pub fn remove(engine: Engine) {
+    for &(name, _) in COMMANDS {
+        engine.remove_command(name);
+    }
+}
+
+/// Runs a command that prints lines. The lines are printed with the state back in its place.
+fn print_lines(make: impl FnOnce(&mut Renderer, &mut Front, &[String]) -> Vec<String>) {
+    entry(|| {
+        let Some(engine) = Engine::current() else {
+            return Ok(());
+        };
+        let arguments = engine.arguments();
+        let lines = with_renderer(|renderer, front| Ok(make(renderer, front, &arguments)))?;
+        for line in lines {
+            engine.say(&format!("{line}\n"));
+        }
+        Ok(())
+    });
+}
+
+extern "C" fn image_list() {
+    print_lines(|renderer, _, _| renderer.image_list());
+}
+
+extern "C" fn shader_list() {
+    // Any argument asks for the order in which they are drawn.
+    print_lines(|renderer, _, arguments| renderer.shader_list(arguments.len() > 1));
+}
+
+extern "C" fn skin_list() {
+    print_lines(|renderer, _, _| renderer.skin_list());
+}
+
+extern "C" fn model_list() {
+    print_lines(|renderer, _, _| renderer.model_list());
+}
+
+extern "C" fn mode_list() {
+    print_lines(|_, _, _| {
+        MODES
+            .iter()
+            .enumerate()
+            .map(|(number, (name, ..))| format!("Mode {number:2}: {name}"))
+            .collect()
+    });
+}
+
+extern "C" fn timings() {
+    print_lines(|renderer, _, _| {
+        let passes = renderer.timings();
+        if passes.is_empty() {
+            return vec!["no finished frame was timed yet".into()];
+        }
+        let total: f32 = passes.iter().map(|(_, ms)| ms).sum();
+        let mut lines: Vec<_> = passes
+            .iter()
+            .map(|(name, ms)| format!("{ms:8.3} ms  {name}"))
+            .collect();
+        lines.push(format!("{total:8.3} ms  all passes"));
+        lines
+    });
+}
+
+extern "C" fn gfx_info() {
+    print_lines(|renderer, front, _| {
+        let strings = crate::config::DeviceStrings::new(renderer.device_info());
+        let (width, height) = front.size;
+        let settings = &front.settings;
+        vec![
+            String::new(),
+            format!("VENDOR: {}", strings.vendor),
+            format!("RENDERER: {}", strings.renderer),
+            format!("VERSION: {}", strings.version),
+            format!("EXTENSIONS: {}", strings.extensions),
+            format!(
+                "MODE: {width} x {height} {}",
+                if front.fullscreen {
+                    "fullscreen"
+                } else {
+                    "windowed"
+                }
+            ),
+            format!(
+                "GAMMA: {} applied to the picture, {} overbright bits",
+                settings.gamma, settings.overbright_bits
+            ),
+            format!("texturemode: {}", settings.texture_mode),
+            format!("picmip: {}", settings.picmip),
+            format!("look: {}", if settings.rt { "traced" } else { "classic" }),
+        ]
+    });
+}
+
+extern "C" fn minimize() {
+    entry(|| {
+        if let Some(window) = window::current() {
+            window.minimize();
+        }
+        Ok(())
+    });
+}
+
+extern "C" fn screenshot_tga() {
+    entry(|| screenshot(Format::Tga));
+}
+
+extern "C" fn screenshot_jpeg() {
+    entry(|| screenshot(Format::Jpeg));
+}
+
+/// `maps/q3dm1.bsp` → `q3dm1`.
+fn map_base_name(world: &str) -> &str {
+    let file = world.rsplit(['/', '\\']).next().unwrap_or(world);
+    file.rsplit_once('.').map_or(file, |(base, _)| base)
+}
+
+/// Queues the picture; it is taken once the frame is drawn.
+fn screenshot(format: Format) -> Result<(), Failure> {
+    let Some(engine) = Engine::current() else {
+        return Ok(());
+    };
+    let arguments = engine.arguments();
+    let argument = arguments.get(1).map_or("", String::as_str);
+    if argument == "levelshot" {
+        let path = with_renderer(|renderer, _| {
+            Ok(renderer
+                .world_name()
+                .map(|world| format!("levelshots/{}.tga", map_base_name(world))))
+        })?;
+        match path {
+            Some(path) => queue(engine, Shot::Level { path }),
+            None => engine.say("levelshot: no map is loaded\n"),
+        }
+        return Ok(());
+    }
+    let silent = argument == "silent";
+    let path = if !argument.is_empty() && !silent {
+        Some(format!("screenshots/{argument}.{}", format.extension()))
+    } else {
+        let exists =
+            |path: &str| CString::new(path).is_ok_and(|path| engine.home_file_exists(&path));
+        session::with(|session| session.front.captures.next_path(format, exists)).flatten()
+    };
+    match path {
+        Some(path) => queue(
+            engine,
+            Shot::Screen {
+                format,
+                path,
+                silent,
+            },
+        ),
+        None => engine.say("screenshot: all 10000 file names are taken\n"),
+    }
+    Ok(())
+}
+
+fn queue(engine: Engine, shot: Shot) {
+    let (Shot::Screen { path, .. } | Shot::Level { path }) = &shot;
+    if valid_game_path(path).is_none() {
+        engine.say(&format!("screenshot: {path}: the name is too long\n"));
+        return;
+    }
+    session::with(|session| {
+        if session.front.registered {
+            session.front.captures.shots.push(shot);
+        }
+    });
+}
+
+/// Quality of screenshots in percent.
+pub fn screenshot_quality(front: &Front) -> i32 {
+    front
+        .cvars
+        .as_ref()
+        .map_or(90, |cvars| cvars.integer(Cvar::ScreenshotJpegQuality))
+}
+
+/// Quality of video frames in percent.
+pub fn video_quality(front: &Front) -> i32 {
+    front
+        .cvars
+        .as_ref()
+        .map_or(90, |cvars| cvars.integer(Cvar::AviMotionJpegQuality))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn level_shots_are_named_after_the_map() {
+        assert_eq!(map_base_name("maps/q3dm1.bsp"), "q3dm1");
+        assert_eq!(map_base_name("maps\\a.b.bsp"), "a.b");
+        assert_eq!(map_base_name("plain"), "plain");
+    }
+}

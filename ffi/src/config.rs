@@ -1,0 +1,148 @@
+//! What the engine, its menus and the game are told about the renderer (`glconfig_t`).
+
+use crate::contract::DeviceInfo;
+use crate::ioq3::abi::{QBool, glconfig_t};
+use std::ffi::c_char;
+
+/// The device in the words that menus show.
+pub struct DeviceStrings {
+    /// Who made it.
+    pub vendor: String,
+    /// Its name.
+    pub renderer: String,
+    /// Vulkan's version and the driver's.
+    pub version: String,
+    /// Words separated by single spaces, never empty: menus split them.
+    pub extensions: String,
+}
+
+/// Vendors by their PCI or Khronos number.
+fn vendor_name(id: u32) -> String {
+    match id {
+        0x1002 => "AMD".into(),
+        0x1010 => "Imagination Technologies".into(),
+        0x106B => "Apple".into(),
+        0x10DE => "NVIDIA Corporation".into(),
+        0x13B5 => "Arm".into(),
+        0x14E4 => "Broadcom".into(),
+        0x5143 => "Qualcomm".into(),
+        0x8086 => "Intel".into(),
+        0x10005 => "Mesa".into(),
+        other => format!("vendor {other:#06x}"),
+    }
+}
+
+impl DeviceStrings {
+    /// Describes a device.
+    pub fn new(info: &DeviceInfo) -> Self {
+        let (major, minor, patch) = info.api_version;
+        Self {
+            vendor: vendor_name(info.vendor_id),
+            renderer: info.name.clone(),
+            version: format!(
+                "Vulkan {major}.{minor}.{patch}, {}, Relight {}",
+                info.driver,
+                env!("CARGO_PKG_VERSION")
+            ),
+            extensions: extensions(info).join(" "),
+        }
+    }
+}
+
+fn extensions(info: &DeviceInfo) -> Vec<&'static str> {
+    let mut words = vec![
+        "VK_descriptor_indexing",
+        "VK_buffer_device_address",
+        "VK_timeline_semaphore",
+    ];
+    if info.rt {
+        words.extend([
+            "VK_KHR_acceleration_structure",
+            "VK_KHR_ray_tracing_pipeline",
+        ]);
+    }
+    words
+}
+
+/// Facts besides the device.
+#[derive(Clone, Copy, Debug)]
+pub struct Screen {
+    /// Pixels.
+    pub size: (u32, u32),
+    /// Width over height as seen.
+    pub aspect: f32,
+    /// Hz, 0 = unknown.
+    pub refresh_rate: i32,
+    /// Fills the screen.
+    pub fullscreen: bool,
+    /// `r_gamma` works on the finished picture, not on textures.
+    pub gamma: bool,
+}
+
+/// Copies text into a C array, cut to fit, always ended by a zero.
+fn put<const N: usize>(to: &mut [c_char; N], text: &str) {
+    let bytes = text
+        .bytes()
+        .filter(|&byte| byte != 0)
+        .take(N - 1)
+        .chain(std::iter::repeat(0));
+    for (to, byte) in to.iter_mut().zip(bytes) {
+        *to = byte as c_char;
+    }
+}
+
+/// The whole structure.
+pub fn glconfig(info: &DeviceInfo, screen: Screen) -> glconfig_t {
+    let strings = DeviceStrings::new(info);
+    let pixels = |n: u32| i32::try_from(n).unwrap_or(i32::MAX);
+    let mut config = glconfig_t {
+        renderer_string: [0; 1024],
+        vendor_string: [0; 1024],
+        version_string: [0; 1024],
+        extensions_string: [0; 8192],
+        maxTextureSize: pixels(max_texture_size(info)),
+        numTextureUnits: 32,
+        colorBits: 32,
+        depthBits: 24,
+        // Enough for the game to offer shadow volumes.
+        stencilBits: 8,
+        driverType: 0,
+        // Anything else makes game code leave effects out.
+        hardwareType: 0,
+        deviceSupportsGamma: screen.gamma.into(),
+        textureCompression: 0,
+        textureEnvAddAvailable: true.into(),
+        vidWidth: pixels(screen.size.0),
+        vidHeight: pixels(screen.size.1),
+        windowAspect: screen.aspect,
+        displayFrequency: screen.refresh_rate,
+        isFullscreen: screen.fullscreen.into(),
+        // The engine would send every frame twice.
+        stereoEnabled: QBool::from(false),
+        smpActive: QBool::from(false),
+    };
+    put(&mut config.renderer_string, &strings.renderer);
+    put(&mut config.vendor_string, &strings.vendor);
+    put(&mut config.version_string, &strings.version);
+    put(&mut config.extensions_string, &strings.extensions);
+    config
+}
+
+/// Vulkan 1.2 devices do 4096 at least; cinematics are shrunk to 256 pixels when this is not above 256.
+fn max_texture_size(_info: &DeviceInfo) -> u32 {
+    16384
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_cut_and_always_ended() {
+        let mut to = [1 as c_char; 4];
+        put(&mut to, "abcdef");
+        assert_eq!(to.map(|c| c as u8), *b"abc\0");
+        put(&mut to, "a");
+        assert_eq!(to.map(|c| c as u8), *b"a\0\0\0");
+    }
+}

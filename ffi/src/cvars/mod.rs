@@ -1,0 +1,173 @@
+//! Console variables: registration, reading, and their way into the renderer's settings.
+
+mod settings;
+pub mod table;
+
+pub use settings::{apply, write_back_clamps};
+pub use table::{Cvar, TABLE};
+
+use crate::ioq3::abi::{QBool, cvar_t};
+use crate::ioq3::engine::{Engine, string_from};
+
+/// What may be asked of a cvar's number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Smallest value.
+    pub min: f32,
+    /// Largest value.
+    pub max: f32,
+    /// Whole numbers alone.
+    pub integral: bool,
+}
+
+/// The engine's variables behind [`TABLE`], by position. They are the engine's memory and live as long as the process.
+#[derive(Debug)]
+pub struct Cvars {
+    handles: Vec<*mut cvar_t>,
+}
+
+impl Cvars {
+    /// Registers every cvar of the table. Doing it again applies the latched values.
+    pub fn register(engine: Engine) -> Cvars {
+        let handles = TABLE
+            .iter()
+            .map(|spec| {
+                let cvar = engine.cvar_get(spec.name, spec.default, spec.flags);
+                if let Some(range) = spec.range {
+                    engine.cvar_check_range(cvar, range.min, range.max, range.integral);
+                }
+                engine.cvar_describe(cvar, spec.description);
+                cvar
+            })
+            .collect();
+        Cvars { handles }
+    }
+
+    fn handle(&self, cvar: Cvar) -> Option<*mut cvar_t> {
+        self.handles
+            .get(cvar as usize)
+            .copied()
+            .filter(|handle| !handle.is_null())
+    }
+
+    /// The value as an integer, as the engine parsed it; 0 if the engine has no such cvar.
+    pub fn integer(&self, cvar: Cvar) -> i32 {
+        // SAFETY: a non-null result of the engine's Cvar_Get, valid as long as the process, changed on this thread only.
+        self.handle(cvar)
+            .map_or(0, |handle| unsafe { (*handle).integer })
+    }
+
+    /// The value as a number, with anything that is not finite taken for 0.
+    pub fn value(&self, cvar: Cvar) -> f32 {
+        // SAFETY: as in `integer`.
+        let value = self
+            .handle(cvar)
+            .map_or(0.0, |handle| unsafe { (*handle).value });
+        if value.is_finite() { value } else { 0.0 }
+    }
+
+    /// Whether the integer value is not 0.
+    pub fn flag(&self, cvar: Cvar) -> bool {
+        self.integer(cvar) != 0
+    }
+
+    /// The value as text.
+    pub fn string(&self, cvar: Cvar) -> String {
+        // SAFETY: as in `integer`; the string is the engine's and is copied before anything can change it.
+        self.handle(cvar).map_or_else(String::new, |handle| unsafe {
+            string_from((*handle).string)
+        })
+    }
+
+    /// Whether the value changed since [`Cvars::seen`] was last called.
+    pub fn modified(&self, cvar: Cvar) -> bool {
+        // SAFETY: as in `integer`.
+        self.handle(cvar)
+            .is_some_and(|handle| unsafe { (*handle).modified } != 0)
+    }
+
+    /// Marks the change as consumed.
+    pub fn seen(&self, cvar: Cvar) {
+        if let Some(handle) = self.handle(cvar) {
+            const NO: QBool = 0;
+            // SAFETY: as in `integer`; clearing this member is what the engine expects of a variable's owner.
+            unsafe { (*handle).modified = NO }
+        }
+    }
+
+    /// Sets a variable of the table.
+    pub fn set(&self, engine: Engine, cvar: Cvar, value: &str) {
+        if let Some(spec) = TABLE.get(cvar as usize) {
+            engine.cvar_set(spec.name, value);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    /// Names, defaults and flags as Debian's opengl1 registers them (its log), one per line. `-` is the empty string.
+    const KNOWN: &str = include_str!("known_cvars.txt");
+
+    fn flag_bits(letters: &str) -> i32 {
+        letters
+            .chars()
+            .map(|letter| match letter {
+                'A' => 0x1,
+                'L' => 0x20,
+                'R' => 0x40,
+                'T' => 0x100,
+                'C' => 0x200,
+                '0' => 0,
+                other => panic!("unknown flag letter {other}"),
+            })
+            .sum()
+    }
+
+    #[test]
+    fn every_known_cvar_is_there_with_its_default_and_flags() {
+        let mut rows = 0;
+        for line in KNOWN.lines().filter(|line| !line.starts_with('#')) {
+            let [name, default, flags] = line.split_whitespace().collect::<Vec<_>>()[..] else {
+                panic!("bad row {line:?}")
+            };
+            let default = if default == "-" { "" } else { default };
+            let spec = TABLE
+                .iter()
+                .find(|spec| spec.name.to_str() == Ok(name))
+                .unwrap_or_else(|| panic!("{name} is missing"));
+            assert_eq!(spec.default.to_str(), Ok(default), "default of {name}");
+            assert_eq!(spec.flags, flag_bits(flags), "flags of {name}");
+            rows += 1;
+        }
+        assert_eq!(rows, 107);
+    }
+
+    #[test]
+    fn names_are_unique_whatever_their_case() {
+        let names: HashSet<_> = TABLE
+            .iter()
+            .map(|spec| spec.name.to_bytes().to_ascii_lowercase())
+            .collect();
+        assert_eq!(names.len(), TABLE.len());
+    }
+
+    #[test]
+    fn defaults_are_within_their_ranges() {
+        for spec in TABLE {
+            let Some(range) = spec.range else { continue };
+            let value: f32 = spec.default.to_str().unwrap().parse().unwrap_or(0.0);
+            assert!(range.min <= value && value <= range.max, "{:?}", spec.name);
+            assert!(!range.integral || value.fract() == 0.0, "{:?}", spec.name);
+        }
+    }
+
+    #[test]
+    fn each_has_a_description() {
+        for spec in TABLE {
+            assert!(spec.description.to_bytes().len() > 10, "{:?}", spec.name);
+        }
+    }
+}

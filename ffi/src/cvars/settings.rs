@@ -1,0 +1,140 @@
+//! From console variables to the renderer's settings.
+
+use super::{Cvar, Cvars};
+use crate::contract::{LightSampling, Settings};
+use crate::ioq3::engine::Engine;
+
+/// A count: negative is 0.
+fn count(cvars: &Cvars, cvar: Cvar) -> u32 {
+    u32::try_from(cvars.integer(cvar)).unwrap_or(0)
+}
+
+/// `rt_lightSampling`: 0 uniform, 1 resampled, 2 all.
+fn light_sampling(value: i32) -> LightSampling {
+    match value {
+        0 => LightSampling::Uniform,
+        2 => LightSampling::All,
+        _ => LightSampling::Resampled,
+    }
+}
+
+/// Doublings of light that the classic look applies to the finished picture: the engine does so in full screen only,
+/// where it owns the display's gamma, and by at most two.
+fn overbright_bits(bits: i32, fullscreen: bool, hardware_gamma: bool) -> u32 {
+    if !fullscreen || !hardware_gamma {
+        return 0;
+    }
+    u32::try_from(bits).unwrap_or(0).min(2)
+}
+
+/// Reads every setting. Cheap: the variables are the engine's memory; text is copied when it changed.
+///
+/// `window_fullscreen` is what the window was when the renderer was registered: overbright depends on it, and is
+/// latched.
+pub fn apply(cvars: &Cvars, window_fullscreen: bool, settings: &mut Settings) {
+    let (value, flag, integer) = (|c| cvars.value(c), |c| cvars.flag(c), |c| cvars.integer(c));
+
+    settings.rt = flag(Cvar::RayTrace);
+    settings.rt_reference = flag(Cvar::RtReference);
+    settings.rt_light_sampling = light_sampling(integer(Cvar::RtLightSampling));
+    settings.rt_samples = count(cvars, Cvar::RtSamples).max(1);
+    settings.rt_candidates = count(cvars, Cvar::RtCandidates).max(1);
+    settings.rt_max_depth = count(cvars, Cvar::RtMaxDepth);
+    settings.rt_bounces = count(cvars, Cvar::RtBounces);
+    settings.rt_exposure = value(Cvar::RtExposure);
+    settings.rt_auto_exposure = flag(Cvar::RtAutoExposure);
+    settings.rt_light_scale = value(Cvar::RtLightScale).max(0.0);
+    settings.rt_dlight_scale = value(Cvar::RtDlightScale).max(0.0);
+
+    settings.picmip = count(cvars, Cvar::PicMip).min(16);
+    settings.round_images_down = flag(Cvar::RoundImagesDown);
+    settings.simple_mip_maps = flag(Cvar::SimpleMipMaps);
+    settings.detail_textures = flag(Cvar::DetailTextures);
+    settings.intensity = value(Cvar::Intensity).max(1.0);
+    settings.greyscale = value(Cvar::Greyscale).clamp(0.0, 1.0);
+    settings.anisotropy = if flag(Cvar::ExtTextureFilterAnisotropic) {
+        value(Cvar::ExtMaxAnisotropy).max(1.0)
+    } else {
+        0.0
+    };
+    if cvars.modified(Cvar::TextureMode) {
+        settings.texture_mode = cvars.string(Cvar::TextureMode);
+        cvars.seen(Cvar::TextureMode);
+    }
+    settings.map_overbright_bits = count(cvars, Cvar::MapOverBrightBits);
+    settings.ignore_hw_gamma = flag(Cvar::IgnoreHwGamma);
+    settings.fullscreen = window_fullscreen;
+    settings.overbright_bits = overbright_bits(
+        integer(Cvar::OverBrightBits),
+        window_fullscreen,
+        !settings.ignore_hw_gamma,
+    );
+    settings.vertex_light = flag(Cvar::VertexLight);
+    settings.fullbright = flag(Cvar::FullBright);
+    settings.subdivisions = value(Cvar::Subdivisions);
+
+    settings.gamma = value(Cvar::Gamma).clamp(0.5, 3.0);
+    settings.swap_interval = integer(Cvar::SwapInterval);
+    settings.lod_bias = integer(Cvar::LodBias);
+    settings.lod_scale = value(Cvar::LodScale);
+    settings.lod_curve_error = value(Cvar::LodCurveError);
+    settings.znear = value(Cvar::ZNear).max(0.001);
+    settings.fast_sky = flag(Cvar::FastSky);
+    settings.draw_sun = flag(Cvar::DrawSun);
+    settings.dynamic_light = flag(Cvar::DynamicLight);
+    settings.flares = flag(Cvar::Flares);
+    settings.shadows = integer(Cvar::Shadows);
+    settings.draw_world = flag(Cvar::DrawWorld);
+    settings.draw_entities = flag(Cvar::DrawEntities);
+    settings.no_vis = flag(Cvar::NoVis);
+    settings.lock_pvs = flag(Cvar::LockPvs);
+    settings.no_cull = flag(Cvar::NoCull);
+    settings.no_curves = flag(Cvar::NoCurves);
+    // r_fastsky 1 takes the portals away as well, any higher value keeps them.
+    settings.no_portals = flag(Cvar::NoPortals) || integer(Cvar::FastSky) == 1;
+    settings.clear = flag(Cvar::Clear);
+    settings.show_tris = flag(Cvar::ShowTris);
+    settings.lightmap = flag(Cvar::Lightmap);
+    settings.speeds = integer(Cvar::Speeds);
+    settings.ambient_scale = value(Cvar::AmbientScale);
+    settings.directed_scale = value(Cvar::DirectedScale);
+    settings.rail_width = value(Cvar::RailWidth);
+    settings.rail_core_width = value(Cvar::RailCoreWidth);
+    settings.rail_segment_length = value(Cvar::RailSegmentLength);
+    settings.marks_on_triangle_meshes = flag(Cvar::MarksOnTriangleMeshes);
+    settings.offset_factor = value(Cvar::OffsetFactor);
+    settings.offset_units = value(Cvar::OffsetUnits);
+}
+
+/// Writes limits back to variables that menus show: `r_gamma` within 0.5 and 3, `r_intensity` at least 1.
+pub fn write_back_clamps(engine: Engine, cvars: &Cvars) {
+    if cvars.value(Cvar::Gamma) < 0.5 {
+        cvars.set(engine, Cvar::Gamma, "0.5");
+    } else if cvars.value(Cvar::Gamma) > 3.0 {
+        cvars.set(engine, Cvar::Gamma, "3");
+    }
+    if cvars.value(Cvar::Intensity) < 1.0 {
+        cvars.set(engine, Cvar::Intensity, "1");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn overbright_needs_full_screen_and_gamma_of_the_display() {
+        assert_eq!(overbright_bits(1, false, true), 0);
+        assert_eq!(overbright_bits(1, true, false), 0);
+        assert_eq!(overbright_bits(1, true, true), 1);
+        assert_eq!(overbright_bits(9, true, true), 2);
+        assert_eq!(overbright_bits(-3, true, true), 0);
+    }
+
+    #[test]
+    fn light_sampling_takes_its_documented_numbers() {
+        assert_eq!(light_sampling(0), LightSampling::Uniform);
+        assert_eq!(light_sampling(1), LightSampling::Resampled);
+        assert_eq!(light_sampling(2), LightSampling::All);
+    }
+}

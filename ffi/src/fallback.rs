@@ -1,0 +1,196 @@
+//! What happens on a machine without usable Vulkan: the engine's own OpenGL renderer works in our place.
+//!
+//! The engine asks for `GetRefAPI` before any window exists, and does not try another library once ours is loaded. So
+//! that is where the other renderer is loaded and its functions are answered instead of ours.
+
+use crate::ioq3::abi::{QBool, refexport_t, refimport_t};
+use crate::ioq3::engine::Engine;
+use libloading::Library;
+use std::ffi::c_int;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+type GetRefApi = unsafe extern "C" fn(c_int, *const refimport_t) -> *const refexport_t;
+
+/// The renderer that works in our place.
+struct Substitute {
+    /// Closed when the engine has shut it down for good, as the engine would do.
+    _library: Library,
+    shutdown: unsafe extern "C" fn(QBool),
+}
+
+static SUBSTITUTE: Mutex<Option<Substitute>> = Mutex::new(None);
+
+fn substitute() -> std::sync::MutexGuard<'static, Option<Substitute>> {
+    SUBSTITUTE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The architecture as these engines spell it in file names.
+fn engine_architecture() -> &'static str {
+    match std::env::consts::ARCH {
+        "aarch64" => "arm64",
+        other => other,
+    }
+}
+
+/// File names to look for, best first: opengl1 looks and runs the same everywhere.
+fn file_names() -> Vec<String> {
+    let (arch, suffix) = (engine_architecture(), std::env::consts::DLL_SUFFIX);
+    ["opengl1", "opengl2"]
+        .iter()
+        .flat_map(|name| {
+            [
+                format!("renderer_{name}_{arch}{suffix}"),
+                format!("renderer_{name}{suffix}"),
+            ]
+        })
+        .collect()
+}
+
+/// The folder of the file that this code was loaded from.
+#[cfg(unix)]
+fn own_folder() -> Option<PathBuf> {
+    use std::ffi::{CStr, OsStr, c_char, c_void};
+    use std::os::unix::ffi::OsStrExt;
+
+    #[repr(C)]
+    struct DlInfo {
+        file_name: *const c_char,
+        base: *mut c_void,
+        symbol_name: *const c_char,
+        symbol: *mut c_void,
+    }
+    unsafe extern "C" {
+        fn dladdr(address: *const c_void, info: *mut DlInfo) -> c_int;
+    }
+    let mut info = DlInfo {
+        file_name: std::ptr::null(),
+        base: std::ptr::null_mut(),
+        symbol_name: std::ptr::null(),
+        symbol: std::ptr::null_mut(),
+    };
+    // SAFETY: the address is one of ours; the system fills the structure.
+    let known = unsafe { dladdr(crate::GetRefAPI as *const c_void, &mut info) } != 0
+        && !info.file_name.is_null();
+    // SAFETY: the loader's own string.
+    let file = known.then(|| unsafe { CStr::from_ptr(info.file_name) })?;
+    PathBuf::from(OsStr::from_bytes(file.to_bytes()))
+        .parent()
+        .map(PathBuf::from)
+}
+
+#[cfg(not(unix))]
+fn own_folder() -> Option<PathBuf> {
+    None
+}
+
+/// Folders to look in, in order, none twice.
+fn folders() -> Vec<PathBuf> {
+    let program = std::env::args_os()
+        .next()
+        .and_then(|program| PathBuf::from(program).parent().map(PathBuf::from));
+    let mut list: Vec<PathBuf> = Vec::new();
+    for folder in [
+        own_folder(),
+        program,
+        Some(PathBuf::from("/usr/lib/ioquake3")),
+    ]
+    .into_iter()
+    .flatten()
+    {
+        if !list.contains(&folder) {
+            list.push(folder);
+        }
+    }
+    list
+}
+
+/// Loads another renderer and answers its functions, with `Shutdown` going through us.
+///
+/// # Safety
+/// `table` must be the engine's import table, as `GetRefAPI` got it.
+pub unsafe fn load(
+    engine: Engine,
+    api_version: c_int,
+    table: *const refimport_t,
+) -> Option<refexport_t> {
+    // One that the engine never shut down must not be loaded twice.
+    drop(substitute().take());
+    for folder in folders() {
+        for name in file_names() {
+            let path = folder.join(name);
+            if !path.is_file() {
+                continue;
+            }
+            // SAFETY: a renderer of the engine; its initialisers are made to run at load time.
+            let library = match unsafe { Library::new(&path) } {
+                Ok(library) => library,
+                Err(error) => {
+                    engine.say(&format!("{}: {error}\n", path.display()));
+                    continue;
+                }
+            };
+            // SAFETY: the symbol has this signature in every renderer of this engine.
+            let Ok(get_ref_api) =
+                (unsafe { library.get::<GetRefApi>(b"GetRefAPI\0") }).map(|symbol| *symbol)
+            else {
+                continue;
+            };
+            if std::ptr::fn_addr_eq(get_ref_api, crate::GetRefAPI as GetRefApi) {
+                // Someone installed us under that name.
+                continue;
+            }
+            // SAFETY: by the caller's promise; it copies the table.
+            let exports = unsafe { get_ref_api(api_version, table) };
+            if exports.is_null() {
+                continue;
+            }
+            // SAFETY: the renderer's static table.
+            let mut exports = unsafe { exports.read_unaligned() };
+            engine.say(&format!("Relight: using {} instead\n", path.display()));
+            *substitute() = Some(Substitute {
+                _library: library,
+                shutdown: exports.Shutdown,
+            });
+            exports.Shutdown = shutdown;
+            return Some(exports);
+        }
+    }
+    None
+}
+
+/// `Shutdown` of the substitute, and the end of its library when the engine is done with it: the engine unloads only
+/// us, and the substitute must start afresh next time.
+extern "C" fn shutdown(destroy_window: QBool) {
+    let function = substitute().as_ref().map(|substitute| substitute.shutdown);
+    if let Some(function) = function {
+        // SAFETY: the substitute's own function, still loaded.
+        unsafe { function(destroy_window) };
+    }
+    if destroy_window != 0 {
+        let done = substitute().take();
+        drop(done);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_spellings_of_opengl1_come_before_opengl2() {
+        let names = file_names();
+        assert_eq!(names.len(), 4);
+        assert!(
+            names[0].starts_with("renderer_opengl1_") && names[1].starts_with("renderer_opengl1.")
+        );
+        assert!(names[2].starts_with("renderer_opengl2_"));
+    }
+
+    #[test]
+    fn our_own_folder_is_searched_first() {
+        let folders = folders();
+        assert_eq!(folders.first(), own_folder().as_ref());
+        assert!(folders.contains(&PathBuf::from("/usr/lib/ioquake3")));
+    }
+}

@@ -1,0 +1,64 @@
+//! The engine's file system behind the renderer's own trait.
+
+use crate::ioq3::engine::{Engine, valid_game_path};
+use crate::session;
+use relight::{FileError, GameFiles};
+use std::ffi::CString;
+
+/// Game files as the engine finds them: its packs, folders and download rules.
+///
+/// Usable on the engine's main thread alone; the trait asks for nothing more.
+#[derive(Debug)]
+pub struct EngineFiles {
+    engine: Engine,
+}
+
+impl EngineFiles {
+    /// Files of `engine`.
+    pub fn new(engine: Engine) -> Self {
+        Self { engine }
+    }
+
+    /// `path` as something that the engine can be asked for.
+    fn checked(path: &str) -> Result<CString, FileError> {
+        let usable = if session::on_main_thread() {
+            valid_game_path(path)
+        } else {
+            None
+        };
+        usable.ok_or_else(|| FileError::Refused {
+            path: path.to_string(),
+        })
+    }
+}
+
+impl GameFiles for EngineFiles {
+    fn read(&self, path: &str) -> Result<Option<Vec<u8>>, FileError> {
+        Ok(self.engine.read_file(&Self::checked(path)?))
+    }
+
+    fn list(&self, dir: &str, extension: &str) -> Vec<String> {
+        // An empty folder name is the game folder itself; the engine takes it here, unlike for reading.
+        let dir = if dir.is_empty() {
+            Some(CString::default())
+        } else {
+            Self::checked(dir).ok()
+        };
+        // The engine compares name endings: without the dot `menushader` would count as a `shader`.
+        let suffix = if extension.is_empty() || extension.starts_with('.') {
+            extension.to_string()
+        } else {
+            format!(".{extension}")
+        };
+        match (dir, CString::new(suffix)) {
+            (Some(dir), Ok(extension)) if session::on_main_thread() => {
+                self.engine.list_files(&dir, &extension)
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn exists(&self, path: &str) -> bool {
+        Self::checked(path).is_ok_and(|name| self.engine.has_file(&name))
+    }
+}

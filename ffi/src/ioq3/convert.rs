@@ -1,0 +1,194 @@
+//! Between the engine's structures and the renderer's types.
+
+use super::abi::{
+    Vec3C, fontInfo_t, glyphInfo_t, markFragment_t, orientation_t, polyVert_t, refEntity_t,
+    refdef_t,
+};
+use crate::contract::FontInfo;
+use glam::{Vec2, Vec3};
+use renderer_vk::api::{EntityKind, MarkFragment, Orientation, PolyVert, RefDef, RefEntity};
+use std::ffi::c_char;
+
+/// The kind of an entity; `None` for a number that is none.
+fn entity_kind(number: i32) -> Option<EntityKind> {
+    Some(match number {
+        0 => EntityKind::Model,
+        1 => EntityKind::Poly,
+        2 => EntityKind::Sprite,
+        3 => EntityKind::Beam,
+        4 => EntityKind::RailCore,
+        5 => EntityKind::RailRings,
+        6 => EntityKind::Lightning,
+        7 => EntityKind::PortalSurface,
+        _ => return None,
+    })
+}
+
+/// An entity; `None` when its type is no entity type.
+pub fn entity(from: &refEntity_t) -> Option<RefEntity> {
+    Some(RefEntity {
+        kind: entity_kind(from.reType)?,
+        renderfx: from.renderfx.cast_unsigned(),
+        model: from.hModel,
+        lighting_origin: from.lightingOrigin.into(),
+        shadow_plane: from.shadowPlane,
+        axis: from.axis.map(Vec3::from),
+        non_normalized_axes: from.nonNormalizedAxes != 0,
+        origin: from.origin.into(),
+        frame: from.frame,
+        old_origin: from.oldorigin.into(),
+        old_frame: from.oldframe,
+        backlerp: from.backlerp,
+        skin_num: from.skinNum,
+        custom_skin: from.customSkin,
+        custom_shader: from.customShader,
+        shader_rgba: from.shaderRGBA,
+        shader_texcoord: Vec2::from(from.shaderTexCoord),
+        shader_time: from.shaderTime,
+        radius: from.radius,
+        rotation: from.rotation,
+    })
+}
+
+/// A view.
+pub fn view(from: &refdef_t) -> RefDef {
+    RefDef {
+        x: from.x,
+        y: from.y,
+        width: from.width,
+        height: from.height,
+        fov_x: from.fov_x,
+        fov_y: from.fov_y,
+        view_origin: from.vieworg.into(),
+        view_axis: from.viewaxis.map(Vec3::from),
+        time_ms: from.time,
+        flags: from.rdflags.cast_unsigned(),
+        area_mask: from.areamask,
+        text: from.text,
+    }
+}
+
+/// A corner of a polygon.
+pub fn poly_vert(from: &polyVert_t) -> PolyVert {
+    PolyVert {
+        position: from.xyz.into(),
+        st: Vec2::from(from.st),
+        rgba: from.modulate,
+    }
+}
+
+/// A tag's place; without one the identity at the origin.
+pub fn orientation(from: Option<Orientation>) -> orientation_t {
+    let place = from.unwrap_or(Orientation {
+        origin: Vec3::ZERO,
+        axis: [Vec3::X, Vec3::Y, Vec3::Z],
+    });
+    orientation_t {
+        origin: place.origin.to_array(),
+        axis: place.axis.map(|axis| axis.to_array()),
+    }
+}
+
+/// A decal's piece.
+pub fn mark_fragment(from: &MarkFragment) -> markFragment_t {
+    let int = |n: usize| i32::try_from(n).unwrap_or(i32::MAX);
+    markFragment_t {
+        firstPoint: int(from.first_point),
+        numPoints: int(from.num_points),
+    }
+}
+
+fn text<const N: usize>(from: &str) -> [c_char; N] {
+    let mut to = [0; N];
+    // The last byte stays zero.
+    for (to, byte) in to.iter_mut().take(N - 1).zip(from.bytes()) {
+        *to = byte as c_char;
+    }
+    to
+}
+
+/// A font with its glyphs' shaders registered.
+pub fn font(from: &FontInfo) -> Box<fontInfo_t> {
+    let blank = glyphInfo_t {
+        height: 0,
+        top: 0,
+        bottom: 0,
+        pitch: 0,
+        xSkip: 0,
+        imageWidth: 0,
+        imageHeight: 0,
+        s: 0.0,
+        t: 0.0,
+        s2: 0.0,
+        t2: 0.0,
+        glyph: 0,
+        shaderName: [0; 32],
+    };
+    let mut to = Box::new(fontInfo_t {
+        glyphs: [blank; 256],
+        glyphScale: from.glyph_scale,
+        name: text(&from.name),
+    });
+    for (to, from) in to.glyphs.iter_mut().zip(&from.glyphs) {
+        *to = glyphInfo_t {
+            height: from.height,
+            glyph: from.glyph,
+            shaderName: text(&from.shader_name),
+            ..blank
+        };
+    }
+    to
+}
+
+/// A vector of the engine.
+///
+/// # Safety
+/// `from` must be null (then the answer is the origin) or point at three floats.
+pub unsafe fn vector(from: *const Vec3C) -> Vec3 {
+    if from.is_null() {
+        return Vec3::ZERO;
+    }
+    // SAFETY: by the caller's promise; game code gives no better alignment than a float's, if that.
+    unsafe { from.read_unaligned() }.into()
+}
+
+/// Writes a vector where the engine wants it; null is left alone.
+///
+/// # Safety
+/// `to` must be null or have room for three floats.
+pub unsafe fn write_vector(to: *mut Vec3C, vector: Vec3) {
+    if !to.is_null() {
+        // SAFETY: by the caller's promise.
+        unsafe { to.write_unaligned(vector.to_array()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ioq3::abi::RT_MAX_REF_ENTITY_TYPE;
+
+    #[test]
+    fn every_entity_type_of_the_engine_is_known_and_no_other() {
+        for number in 0..RT_MAX_REF_ENTITY_TYPE {
+            assert!(entity_kind(number).is_some(), "{number}");
+        }
+        assert!(entity_kind(-1).is_none() && entity_kind(RT_MAX_REF_ENTITY_TYPE).is_none());
+    }
+
+    #[test]
+    fn no_tag_is_the_identity() {
+        let none = orientation(None);
+        assert_eq!(none.origin, [0.0; 3]);
+        assert_eq!(
+            none.axis,
+            [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+        );
+    }
+
+    #[test]
+    fn long_names_end_with_a_zero() {
+        let name: [c_char; 4] = text("abcdef");
+        assert_eq!(name.map(|c| c as u8), *b"abc\0");
+    }
+}

@@ -1,0 +1,398 @@
+//! The engine's services, with the raw pointers and the C strings kept inside.
+//!
+//! Every service may leave by `longjmp` when the engine meets an error of its own. The calls here keep nothing on the
+//! stack that needs a destructor for correctness; what can leak in such a case is memory alone.
+
+use super::abi::{self, cvar_t, print, refimport_t};
+use std::cell::UnsafeCell;
+use std::ffi::{CStr, CString, c_char, c_int, c_uchar, c_void};
+use std::ptr;
+
+/// Where `GetRefAPI` puts its copy of the engine's table.
+struct Imports(UnsafeCell<Option<refimport_t>>);
+
+// SAFETY: written by `GetRefAPI` alone and read by calls of the engine, all of them on the engine's main thread
+// (`session::on_main_thread` is asked before any other thread gets here).
+unsafe impl Sync for Imports {}
+
+static IMPORTS: Imports = Imports(UnsafeCell::new(None));
+
+/// The engine that loaded us. A token: the table itself is a static, replaced by each `GetRefAPI`.
+#[derive(Clone, Copy, Debug)]
+pub struct Engine(());
+
+/// Hands the pieces of `text` to `f`, each short enough for the engine's print buffer and NUL-terminated.
+///
+/// The buffer is on the stack, so that nothing needs to be freed when `f` does not come back.
+fn in_c_pieces(text: &str, mut f: impl FnMut(*const c_char)) {
+    // The engine formats into 4096 bytes.
+    const PIECE: usize = 3500;
+    let mut rest = text;
+    while !rest.is_empty() {
+        let mut end = rest.len().min(PIECE);
+        while !rest.is_char_boundary(end) {
+            end -= 1;
+        }
+        let (piece, tail) = rest.split_at(end);
+        let mut buffer = [0u8; PIECE + 1];
+        for (to, from) in buffer.iter_mut().zip(piece.bytes()) {
+            *to = if from == 0 { b'?' } else { from };
+        }
+        f(buffer.as_ptr().cast());
+        rest = tail;
+    }
+}
+
+impl Engine {
+    /// Takes over the engine's table.
+    ///
+    /// # Safety
+    /// Every function of the table must be callable with the signature that the engine's ABI gives it for as long as
+    /// the process lives, and this must run on the engine's main thread while no other call of ours runs.
+    pub unsafe fn install(table: refimport_t) -> Engine {
+        // SAFETY: nobody else reads or writes, by the caller's promise.
+        unsafe { *IMPORTS.0.get() = Some(table) };
+        Engine(())
+    }
+
+    /// The engine of the newest `GetRefAPI`, if there was one.
+    pub fn current() -> Option<Engine> {
+        // SAFETY: main thread only; nobody holds a reference into the cell (`table` copies).
+        let known = unsafe { (*IMPORTS.0.get()).is_some() };
+        known.then_some(Engine(()))
+    }
+
+    /// One function of the table.
+    fn get<F>(self, pick: impl FnOnce(&refimport_t) -> Option<F>) -> Option<F> {
+        // SAFETY: main thread only; the reference ends with this expression.
+        unsafe { (*IMPORTS.0.get()).as_ref().and_then(pick) }
+    }
+
+    /// Prints. `level` is one of [`print`].
+    pub fn print(self, level: c_int, text: &str) {
+        if let Some(printf) = self.get(|t| t.Printf) {
+            in_c_pieces(text, |piece| {
+                // SAFETY: the engine's variadic print with a literal format and one NUL-terminated string.
+                unsafe { printf(level, c"%s".as_ptr(), piece) }
+            });
+        }
+    }
+
+    /// Prints to the console and the log.
+    pub fn say(self, text: &str) {
+        self.print(print::ALL, text);
+    }
+
+    /// The engine's error function. Calling it never returns to the caller.
+    pub fn error_function(self) -> Option<unsafe extern "C" fn(c_int, *const c_char, ...)> {
+        self.get(|t| t.Error)
+    }
+
+    /// Engine time in milliseconds (scaled by `timescale`).
+    pub fn milliseconds(self) -> c_int {
+        // SAFETY: no arguments.
+        self.get(|t| t.Milliseconds).map_or(0, |f| unsafe { f() })
+    }
+
+    /// Finds or makes a cvar; applies its latched value. Null when the engine has no such service.
+    pub fn cvar_get(self, name: &CStr, default: &CStr, flags: c_int) -> *mut cvar_t {
+        // SAFETY: both strings live through the call; the engine copies them.
+        self.get(|t| t.Cvar_Get)
+            .map_or(ptr::null_mut(), |f| unsafe {
+                f(name.as_ptr(), default.as_ptr(), flags)
+            })
+    }
+
+    /// Sets a cvar, whatever its flags.
+    pub fn cvar_set(self, name: &CStr, value: &str) {
+        let Ok(value) = CString::new(value) else {
+            return;
+        };
+        if let Some(f) = self.get(|t| t.Cvar_Set) {
+            // SAFETY: both strings live through the call; the engine copies them.
+            unsafe { f(name.as_ptr(), value.as_ptr()) }
+        }
+    }
+
+    /// Keeps a cvar within a range from now on.
+    pub fn cvar_check_range(self, cvar: *mut cvar_t, min: f32, max: f32, integral: bool) {
+        if let (Some(f), false) = (self.get(|t| t.Cvar_CheckRange), cvar.is_null()) {
+            // SAFETY: `cvar` came from `cvar_get`, whose results live as long as the process.
+            unsafe { f(cvar, min, max, integral.into()) }
+        }
+    }
+
+    /// Sets the text that the console shows for a cvar.
+    pub fn cvar_describe(self, cvar: *mut cvar_t, text: &CStr) {
+        if let (Some(f), false) = (self.get(|t| t.Cvar_SetDescription), cvar.is_null()) {
+            // SAFETY: `cvar` came from `cvar_get`; the engine copies the text.
+            unsafe { f(cvar, text.as_ptr()) }
+        }
+    }
+
+    /// Integer value of any cvar; 0 if there is none.
+    pub fn cvar_integer(self, name: &CStr) -> c_int {
+        // SAFETY: the name lives through the call.
+        self.get(|t| t.Cvar_VariableIntegerValue)
+            .map_or(0, |f| unsafe { f(name.as_ptr()) })
+    }
+
+    /// Adds a console command. If there is one of that name, the old function stays.
+    pub fn add_command(self, name: &CStr, function: unsafe extern "C" fn()) {
+        if let Some(f) = self.get(|t| t.Cmd_AddCommand) {
+            // SAFETY: the name is copied; the function is one of ours and stays mapped (-z nodelete).
+            unsafe { f(name.as_ptr(), Some(function)) }
+        }
+    }
+
+    /// Removes a console command; one that is not there is no error.
+    pub fn remove_command(self, name: &CStr) {
+        if let Some(f) = self.get(|t| t.Cmd_RemoveCommand) {
+            // SAFETY: the name lives through the call.
+            unsafe { f(name.as_ptr()) }
+        }
+    }
+
+    /// The words of the command that runs now; the first is its name.
+    pub fn arguments(self) -> Vec<String> {
+        // SAFETY: no arguments.
+        let count = self.get(|t| t.Cmd_Argc).map_or(0, |f| unsafe { f() });
+        let Some(argv) = self.get(|t| t.Cmd_Argv) else {
+            return Vec::new();
+        };
+        (0..count)
+            .map(|i| {
+                // SAFETY: the engine answers any index with a string that stays until the next command; copied at once.
+                unsafe { string_from(argv(i)) }
+            })
+            .collect()
+    }
+
+    /// Appends to the engine's command buffer.
+    pub fn append_command(self, text: &CStr) {
+        if let Some(f) = self.get(|t| t.Cmd_ExecuteText) {
+            // SAFETY: the text is copied. Appended text runs later, not from inside this call.
+            unsafe { f(abi::EXEC_APPEND, text.as_ptr()) }
+        }
+    }
+
+    /// Asks the collision model's visibility whether `from` sees `to`, both clusters of the loaded map.
+    pub fn cluster_sees(self, from: i32, to: i32) -> bool {
+        let (Some(f), Ok(bit)) = (self.get(|t| t.CM_ClusterPVS), usize::try_from(to)) else {
+            return false;
+        };
+        // SAFETY: the engine takes any cluster. The row it answers has a bit for each cluster of the map, and `to` is
+        // a cluster of the map, by the caller's contract.
+        unsafe {
+            let row = f(from);
+            !row.is_null() && *row.add(bit / 8) & (1 << (bit % 8)) != 0
+        }
+    }
+
+    /// Reads a game file whole. `None` if it is not there.
+    ///
+    /// The name must have passed [`valid_game_path`].
+    pub fn read_file(self, name: &CStr) -> Option<Vec<u8>> {
+        let read = self.get(|t| t.FS_ReadFile)?;
+        let free = self.get(|t| t.FS_FreeFile)?;
+        let mut buffer: *mut c_void = ptr::null_mut();
+        // SAFETY: the name is not empty (that would be a fatal error); the engine stores its buffer in ours.
+        let length = unsafe { read(name.as_ptr(), &mut buffer) };
+        if buffer.is_null() {
+            return None;
+        }
+        let contents = usize::try_from(length).ok().map(|length| {
+            // SAFETY: the engine's buffer holds `length` bytes and stays until it is freed.
+            unsafe { std::slice::from_raw_parts(buffer.cast::<u8>(), length) }.to_vec()
+        });
+        // SAFETY: freed once, before anything else is read: the engine's temporary memory is a stack.
+        unsafe { free(buffer) };
+        contents
+    }
+
+    /// Whether a game file is there, in packs or folders, without reading it.
+    pub fn has_file(self, name: &CStr) -> bool {
+        // SAFETY: with no buffer to fill the engine only looks.
+        self.get(|t| t.FS_ReadFile)
+            .is_some_and(|f| unsafe { f(name.as_ptr(), ptr::null_mut()) } >= 0)
+    }
+
+    /// Files of a folder, in the engine's order.
+    pub fn list_files(self, directory: &CStr, extension: &CStr) -> Vec<String> {
+        let (Some(list), Some(free)) = (
+            self.get(|t| t.FS_ListFiles),
+            self.get(|t| t.FS_FreeFileList),
+        ) else {
+            return Vec::new();
+        };
+        let mut count: c_int = 0;
+        // SAFETY: both strings live through the call; the engine stores the count.
+        let names = unsafe { list(directory.as_ptr(), extension.as_ptr(), &mut count) };
+        if names.is_null() {
+            return Vec::new();
+        }
+        let copied = (0..usize::try_from(count).unwrap_or(0))
+            .map(|i| {
+                // SAFETY: `count` strings stand in the list.
+                unsafe { string_from(*names.add(i)) }
+            })
+            .collect();
+        // SAFETY: freed once.
+        unsafe { free(names) };
+        copied
+    }
+
+    /// Writes below the user's game folder. The engine reports its own failures.
+    pub fn write_file(self, name: &CStr, contents: &[u8]) {
+        if let (Some(f), Ok(length)) = (
+            self.get(|t| t.FS_WriteFile),
+            c_int::try_from(contents.len()),
+        ) {
+            // SAFETY: name and contents live through the call.
+            unsafe { f(name.as_ptr(), contents.as_ptr().cast(), length) }
+        }
+    }
+
+    /// Whether the user's game folder has this file (packs are not searched).
+    pub fn home_file_exists(self, name: &CStr) -> bool {
+        // SAFETY: the name lives through the call.
+        self.get(|t| t.FS_FileExists)
+            .is_some_and(|f| unsafe { f(name.as_ptr()) } != 0)
+    }
+
+    /// Starts a video for a material. `None` if it cannot be played.
+    pub fn play_cinematic(self, name: &CStr) -> Option<c_int> {
+        // SAFETY: the name lives through the call. The size only matters to videos that the engine draws itself.
+        let handle = self
+            .get(|t| t.CIN_PlayCinematic)
+            .map(|f| unsafe { f(name.as_ptr(), 0, 0, 256, 256, abi::CIN_MATERIAL) })?;
+        (handle >= 0).then_some(handle)
+    }
+
+    /// Lets a video go on to the present and upload its picture. The engine calls `UploadCinematic` from inside.
+    pub fn run_cinematic(self, handle: c_int) {
+        if let (Some(run), Some(upload)) = (
+            self.get(|t| t.CIN_RunCinematic),
+            self.get(|t| t.CIN_UploadCinematic),
+        ) {
+            // SAFETY: the engine takes any handle that `play_cinematic` answered, also of a video that ended.
+            unsafe {
+                run(handle);
+                upload(handle);
+            }
+        }
+    }
+
+    /// Appends a frame to the video that the engine records.
+    ///
+    /// # Safety
+    /// `length` bytes must be readable at `data`.
+    pub unsafe fn write_avi_frame(self, data: *const c_uchar, length: c_int) {
+        if let Some(f) = self.get(|t| t.CL_WriteAVIVideoFrame) {
+            // SAFETY: by the caller's promise.
+            unsafe { f(data, length) }
+        }
+    }
+
+    /// Gives the window to the engine's input code.
+    ///
+    /// # Safety
+    /// `window` must be an `SDL_Window` of the process's SDL, valid until [`Engine::input_shutdown`].
+    pub unsafe fn input_init(self, window: *mut c_void) {
+        if let Some(f) = self.get(|t| t.IN_Init) {
+            // SAFETY: by the caller's promise.
+            unsafe { f(window) }
+        }
+    }
+
+    /// Takes the window away from the engine's input code.
+    pub fn input_shutdown(self) {
+        if let Some(f) = self.get(|t| t.IN_Shutdown) {
+            // SAFETY: no arguments.
+            unsafe { f() }
+        }
+    }
+
+    /// Lets the input code start again on the same window.
+    pub fn input_restart(self) {
+        if let Some(f) = self.get(|t| t.IN_Restart) {
+            // SAFETY: no arguments.
+            unsafe { f() }
+        }
+    }
+
+    /// Tells the engine that video is about to start. Does nothing in today's engines.
+    pub fn video_init_hook(self, safe: bool) {
+        if let Some(f) = self.get(|t| {
+            if safe {
+                t.Sys_GLimpSafeInit
+            } else {
+                t.Sys_GLimpInit
+            }
+        }) {
+            // SAFETY: no arguments.
+            unsafe { f() }
+        }
+    }
+}
+
+/// Copies a C string; null is empty. Bytes that are not UTF-8 are replaced.
+///
+/// # Safety
+/// `text` must be null or point at a NUL-terminated string.
+pub unsafe fn string_from(text: *const c_char) -> String {
+    if text.is_null() {
+        return String::new();
+    }
+    // SAFETY: by the caller's promise.
+    unsafe { CStr::from_ptr(text) }
+        .to_string_lossy()
+        .into_owned()
+}
+
+/// A name that can be handed to the engine's file functions: not empty, shorter than the engine's limit for game
+/// paths, without NUL. An empty name would end the process.
+pub fn valid_game_path(name: &str) -> Option<CString> {
+    if name.is_empty() || name.len() >= abi::MAX_QPATH {
+        return None;
+    }
+    CString::new(name).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_text_is_cut_between_characters_and_keeps_every_byte() {
+        let text = "aé".repeat(4000);
+        let mut joined = Vec::new();
+        let mut pieces = 0;
+        in_c_pieces(&text, |piece| {
+            // SAFETY: `in_c_pieces` hands over NUL-terminated text.
+            let piece = unsafe { CStr::from_ptr(piece) };
+            assert!(piece.to_bytes().len() < 4000);
+            assert!(std::str::from_utf8(piece.to_bytes()).is_ok());
+            joined.extend_from_slice(piece.to_bytes());
+            pieces += 1;
+        });
+        assert_eq!(joined, text.as_bytes());
+        assert!(pieces > 3);
+    }
+
+    #[test]
+    fn a_zero_byte_does_not_end_the_text() {
+        let mut seen = String::new();
+        // SAFETY: NUL-terminated by `in_c_pieces`.
+        in_c_pieces("a\0b", |piece| seen = unsafe { string_from(piece) });
+        assert_eq!(seen, "a?b");
+    }
+
+    #[test]
+    fn names_that_the_engine_would_die_of_are_refused() {
+        assert!(valid_game_path("").is_none());
+        assert!(valid_game_path("a\0b").is_none());
+        assert!(valid_game_path(&"x".repeat(64)).is_none());
+        assert!(valid_game_path(&"x".repeat(63)).is_some());
+    }
+}

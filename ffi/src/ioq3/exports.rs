@@ -1,0 +1,89 @@
+//! The table of functions that the engine gets.
+
+use super::abi::refexport_t;
+use super::{lifecycle, scene};
+
+/// Answered by every `GetRefAPI`; the engine copies it.
+pub static EXPORTS: refexport_t = refexport_t {
+    Shutdown: lifecycle::shutdown,
+    BeginRegistration: lifecycle::begin_registration,
+    RegisterModel: scene::register_model,
+    RegisterSkin: scene::register_skin,
+    RegisterShader: scene::register_shader,
+    RegisterShaderNoMip: scene::register_shader_no_mip,
+    LoadWorld: scene::load_world,
+    SetWorldVisData: scene::set_world_vis_data,
+    EndRegistration: lifecycle::end_registration,
+    ClearScene: scene::clear_scene,
+    AddRefEntityToScene: scene::add_ref_entity,
+    AddPolyToScene: scene::add_poly,
+    LightForPoint: scene::light_for_point,
+    AddLightToScene: scene::add_light,
+    AddAdditiveLightToScene: scene::add_additive_light,
+    RenderScene: scene::render_scene,
+    SetColor: scene::set_color,
+    DrawStretchPic: scene::stretch_pic,
+    DrawStretchRaw: scene::stretch_raw,
+    UploadCinematic: scene::upload_cinematic,
+    BeginFrame: lifecycle::begin_frame,
+    EndFrame: lifecycle::end_frame,
+    MarkFragments: scene::mark_fragments,
+    LerpTag: scene::lerp_tag,
+    ModelBounds: scene::model_bounds,
+    RegisterFont: scene::register_font,
+    RemapShader: scene::remap_shader,
+    GetEntityToken: scene::get_entity_token,
+    inPVS: scene::in_pvs,
+    TakeVideoFrame: lifecycle::take_video_frame,
+};
+
+/// Calls every function of the table with arguments as odd as an engine's mistakes.
+#[cfg(test)]
+pub fn call_everything() {
+    use std::ptr::{null, null_mut};
+    let re = &EXPORTS;
+    let pixels = [0u8; 4];
+    let mut buffer = [1; 4];
+    // SAFETY: null where a pointer is not needed, else our own memory of the right size.
+    unsafe {
+        (re.RegisterModel)(c"a".as_ptr());
+        (re.RegisterSkin)(null());
+        (re.RegisterShader)(c"".as_ptr());
+        (re.RegisterShaderNoMip)(c"a".as_ptr());
+        (re.LoadWorld)(c"maps/a.bsp".as_ptr());
+        (re.SetWorldVisData)(null());
+        (re.EndRegistration)();
+        (re.ClearScene)();
+        (re.AddRefEntityToScene)(null());
+        (re.AddPolyToScene)(1, -1, null(), 5);
+        (re.AddPolyToScene)(0, 3, null(), 1);
+        assert_eq!(
+            (re.LightForPoint)(null(), null_mut(), null_mut(), null_mut()),
+            0
+        );
+        (re.AddLightToScene)(null(), f32::NAN, 1.0, 1.0, 1.0);
+        (re.AddAdditiveLightToScene)(null(), 100.0, 1.0, 1.0, 1.0);
+        (re.RenderScene)(null());
+        (re.SetColor)(null());
+        (re.DrawStretchPic)(0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0);
+        (re.DrawStretchRaw)(0, 0, 1, 1, 1, 1, pixels.as_ptr(), 0, 1);
+        (re.UploadCinematic)(1, 1, -1, 1, pixels.as_ptr(), -3, 1);
+        (re.BeginFrame)(0);
+        (re.EndFrame)(null_mut(), null_mut());
+        assert_eq!(
+            (re.MarkFragments)(3, null(), null(), 1, null_mut(), 1, null_mut()),
+            0
+        );
+        assert_eq!((re.LerpTag)(null_mut(), 1, 0, 0, 0.0, c"tag".as_ptr()), 0);
+        (re.ModelBounds)(1, null_mut(), null_mut());
+        (re.RegisterFont)(null(), 12, null_mut());
+        (re.RemapShader)(null(), null(), null());
+        assert_eq!((re.GetEntityToken)(buffer.as_mut_ptr(), 4), 0);
+        assert_eq!((re.inPVS)(null(), null()), 0);
+        (re.TakeVideoFrame)(-1, 4, null_mut(), null_mut(), 1);
+        (re.Shutdown)(0);
+        (re.Shutdown)(1);
+        (re.Shutdown)(1);
+    }
+    assert_eq!(buffer[0], 0);
+}

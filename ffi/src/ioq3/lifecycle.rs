@@ -1,0 +1,439 @@
+//! Registration, frames and shutdown: when the window, the device and the assets come and go.
+
+use super::abi::{QBool, glconfig_t};
+use super::engine::{Engine, valid_game_path};
+use crate::boundary::{Failure, entry};
+use crate::capture::{self, Format, Shot, VideoFrame};
+use crate::contract::{self as vk, Error, Renderer, RendererOptions};
+use crate::cvars::{self, Cvar, Cvars};
+use crate::files::EngineFiles;
+use crate::session::{self, Front, with_renderer};
+use crate::window::{self, Window};
+use crate::{commands, config};
+use renderer_vk::api::Picture;
+use std::ffi::c_int;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Looks whether a usable Vulkan device is there, without a window.
+///
+/// # Errors
+/// One sentence: what is missing.
+pub fn probe(engine: Engine) -> Result<(), String> {
+    let device = wanted_device(&Cvars::register(engine));
+    vk::probe(device.as_deref())
+        .map(|_| ())
+        .map_err(|e| e.to_string())
+}
+
+fn wanted_device(cvars: &Cvars) -> Option<String> {
+    Some(cvars.string(Cvar::Device)).filter(|name| !name.is_empty())
+}
+
+/// An error of the renderer as the engine has to hear it. What the GPU did not survive takes the renderer with it.
+pub fn failure(error: Error) -> Failure {
+    let lost = !matches!(error, Error::NoWorld);
+    Failure {
+        discard: lost,
+        ..Failure::drop(error)
+    }
+}
+
+/// `re.BeginRegistration`.
+pub extern "C" fn begin_registration(out: *mut glconfig_t) {
+    entry(|| {
+        session::abandon_if_taken();
+        let Some(engine) = Engine::current() else {
+            return Ok(());
+        };
+        let cvars = Cvars::register(engine);
+        window::apply_safe_settings(engine);
+        cvars::write_back_clamps(engine, &cvars);
+        commands::add(engine);
+
+        let has_renderer = session::with(|session| session.renderer.is_some()).unwrap_or(false);
+        if !has_renderer {
+            start_renderer(engine, &cvars)?;
+        }
+        let info = session::with(|session| {
+            describe(session.renderer.as_ref()?, &mut session.front, &cvars).into()
+        })
+        .flatten();
+        if let (Some(config), false) = (info, out.is_null()) {
+            // SAFETY: the engine's own structure of this type.
+            unsafe { out.write_unaligned(config) };
+        }
+        // The input code reads nothing of ours, but it is the engine's: no state is held.
+        window::give_to_input_once(engine);
+
+        session::with(|session| {
+            let front = &mut session.front;
+            let Some(renderer) = &mut session.renderer else {
+                return Ok(());
+            };
+            cvars::apply(&cvars, front.fullscreen, &mut front.settings);
+            front.settings.texture_mode = cvars.string(Cvar::TextureMode);
+            front.cvars = Some(cvars);
+            front.skip_eye = false;
+            front.registered = true;
+            let files = Arc::new(EngineFiles::new(engine));
+            renderer
+                .begin_registration(files, &front.settings)
+                .map_err(|e| Failure::fatal(format!("Relight cannot start: {e}")))
+        })
+        .unwrap_or(Ok(()))
+    });
+}
+
+/// Opens the window, unless there is one or none is wanted, and makes a renderer for it.
+fn start_renderer(engine: Engine, cvars: &Cvars) -> Result<(), Failure> {
+    if window::current().is_some_and(|window| window.stale) {
+        window::close(engine, false);
+    }
+    let headless = cvars.flag(Cvar::Headless);
+    let made = if headless {
+        let size =
+            window::headless_mode(cvars).map_or((640, 480), |mode| (mode.width, mode.height));
+        make_renderer(cvars, size, None)
+    } else {
+        let window = match window::current() {
+            Some(window) => Ok(window),
+            None => window::open(engine, cvars),
+        };
+        window
+            .map_err(|e| e.to_string())
+            .and_then(|window| make_renderer(cvars, window.size, Some(window)))
+    };
+    match made {
+        Ok(renderer) => {
+            let info = renderer.device_info();
+            log::info!(
+                "Relight on {}: {}",
+                info.name,
+                if info.rt {
+                    "rays are traced by hardware"
+                } else {
+                    "rays are traced in compute shaders"
+                }
+            );
+            session::with(|session| session.renderer = Some(renderer));
+            Ok(())
+        }
+        Err(message) => {
+            window::close(engine, true);
+            Err(Failure::fatal(format!(
+                "Relight cannot start: {message}. Start the game with \"+set cl_renderer opengl1\" to play without it."
+            )))
+        }
+    }
+}
+
+fn make_renderer(
+    cvars: &Cvars,
+    (width, height): (u32, u32),
+    window: Option<Window>,
+) -> Result<Renderer, String> {
+    let window = window
+        .map(|window| window.source())
+        .transpose()
+        .map_err(|e| e.to_string())?;
+    let options = RendererOptions {
+        width,
+        height,
+        window,
+        validation: cvars.flag(Cvar::VkValidation),
+        device: wanted_device(cvars),
+    };
+    Renderer::new(options).map_err(|e| e.to_string())
+}
+
+/// Fills in what depends on the window, and answers what the game is told.
+fn describe(renderer: &Renderer, front: &mut Front, cvars: &Cvars) -> glconfig_t {
+    let screen = match window::current() {
+        Some(window) => config::Screen {
+            size: window.size,
+            aspect: window.aspect,
+            refresh_rate: window.refresh_rate(),
+            fullscreen: window.is_fullscreen(),
+            gamma: !cvars.flag(Cvar::IgnoreHwGamma),
+        },
+        None => {
+            let mode = window::headless_mode(cvars);
+            // The renderer keeps its size until the video system restarts.
+            let size = if front.size == (0, 0) {
+                mode.map_or((640, 480), |m| (m.width, m.height))
+            } else {
+                front.size
+            };
+            config::Screen {
+                size,
+                aspect: size.0 as f32 / size.1 as f32,
+                refresh_rate: 0,
+                fullscreen: false,
+                gamma: !cvars.flag(Cvar::IgnoreHwGamma),
+            }
+        }
+    };
+    front.size = screen.size;
+    front.fullscreen = screen.fullscreen;
+    config::glconfig(renderer.device_info(), screen)
+}
+
+/// `re.Shutdown`. Twice in a row, before any registration and from inside an error of the engine are all fine.
+pub extern "C" fn shutdown(destroy_window: QBool) {
+    entry(|| {
+        session::abandon_if_taken();
+        let Some(engine) = Engine::current() else {
+            return Ok(());
+        };
+        // The engine would keep our pointers after it has unloaded us.
+        commands::remove(engine);
+        let destroyed = session::with(|session| {
+            session.front.registered = false;
+            session.front.captures.clear();
+            session.front.cinematics.clear();
+            if let Some(renderer) = &mut session.renderer {
+                renderer.shutdown_registration();
+            }
+            if destroy_window != 0 {
+                session.front.size = (0, 0);
+                session.renderer.take()
+            } else {
+                None
+            }
+        });
+        // The surface goes before its window.
+        drop(destroyed);
+        if destroy_window != 0 {
+            window::close(engine, true);
+        }
+        Ok(())
+    });
+}
+
+/// `re.EndRegistration`.
+pub extern "C" fn end_registration() {
+    entry(|| {
+        with_renderer(|renderer, _| {
+            renderer.end_registration();
+            Ok(())
+        })
+    });
+}
+
+/// `re.BeginFrame`.
+pub extern "C" fn begin_frame(stereo: c_int) {
+    entry(|| {
+        let Some(engine) = Engine::current() else {
+            return Ok(());
+        };
+        with_renderer(|renderer, front| {
+            // With r_anaglyphMode the engine sends every frame twice. The first eye's picture is the one that is shown.
+            front.skip_eye = stereo == super::abi::STEREO_RIGHT;
+            if front.skip_eye {
+                return Ok(());
+            }
+            if let Some(cvars) = &front.cvars {
+                cvars::write_back_clamps(engine, cvars);
+                cvars::apply(cvars, front.fullscreen, &mut front.settings);
+            }
+            front.frame_start = Some(Instant::now());
+            renderer.set_settings(&front.settings);
+            renderer.begin_frame(engine.milliseconds());
+            Ok(())
+        })
+    });
+}
+
+/// What is to be handed to the engine once the frame is done and the state is back in its cell.
+#[derive(Default)]
+struct Outbox {
+    files: Vec<(String, Vec<u8>, bool)>,
+    video: Option<(*mut u8, c_int)>,
+    lines: Vec<String>,
+    front_end_ms: c_int,
+    back_end_ms: c_int,
+}
+
+/// `re.EndFrame`.
+pub extern "C" fn end_frame(front_end_ms: *mut c_int, back_end_ms: *mut c_int) {
+    entry(|| {
+        let Some(engine) = Engine::current() else {
+            return Ok(());
+        };
+        run_videos(engine)?;
+        let outbox = with_renderer(finish_frame)?;
+        for (to, value) in [
+            (front_end_ms, outbox.front_end_ms),
+            (back_end_ms, outbox.back_end_ms),
+        ] {
+            if !to.is_null() {
+                // SAFETY: the engine's own integer.
+                unsafe { to.write_unaligned(value) };
+            }
+        }
+        deliver(engine, outbox);
+        if let Some(cvars) = session::with(|session| session.front.cvars.take()).flatten() {
+            // Taken out, because a switch of the window may make the engine call back.
+            window::follow_fullscreen(engine, &cvars);
+            session::with(|session| {
+                session
+                    .front
+                    .cvars
+                    .get_or_insert(cvars)
+                    .modified(Cvar::Fullscreen)
+            });
+        }
+        Ok(())
+    });
+}
+
+fn milliseconds(duration: std::time::Duration) -> c_int {
+    c_int::try_from(duration.as_millis()).unwrap_or(c_int::MAX)
+}
+
+/// Ends the frame on the GPU, and takes the pictures that were asked for before it is shown.
+fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Failure> {
+    let mut outbox = Outbox::default();
+    front.skip_eye = false;
+    let start = Instant::now();
+    outbox.front_end_ms = front
+        .frame_start
+        .take()
+        .map_or(0, |begin| milliseconds(start - begin));
+    let shots = std::mem::take(&mut front.captures.shots);
+    let video = front.captures.video.take();
+    if !shots.is_empty() || video.is_some() {
+        let picture = renderer.read_pixels().map_err(failure)?;
+        for shot in shots {
+            take_shot(
+                &picture,
+                &shot,
+                commands::screenshot_quality(front),
+                &mut outbox,
+            )?;
+        }
+        if let Some(frame) = video {
+            let bytes = capture::video_frame(&picture, &frame, commands::video_quality(front))?;
+            outbox.video = keep_video(&frame, &bytes);
+        }
+    }
+    let stats = renderer.end_frame().map_err(failure)?;
+    outbox.back_end_ms = milliseconds(start.elapsed());
+    if front.settings.speeds != 0 {
+        outbox.lines.push(format!(
+            "{:.2} ms GPU, {} ms to submit",
+            stats.gpu_ms, outbox.back_end_ms
+        ));
+    }
+    Ok(outbox)
+}
+
+fn take_shot(
+    picture: &Picture,
+    shot: &Shot,
+    quality: i32,
+    outbox: &mut Outbox,
+) -> Result<(), Failure> {
+    let (path, bytes, silent) = match shot {
+        Shot::Screen {
+            format: Format::Tga,
+            path,
+            silent,
+        } => (path, capture::tga(picture)?, *silent),
+        Shot::Screen {
+            format: Format::Jpeg,
+            path,
+            silent,
+        } => (path, capture::jpeg(picture, quality)?, *silent),
+        Shot::Level { path } => (path, capture::tga(&capture::level_shot(picture))?, true),
+    };
+    outbox.files.push((path.clone(), bytes, silent));
+    Ok(())
+}
+
+/// Copies an encoded frame into the engine's buffer, so that nothing of ours is alive when the engine writes it.
+fn keep_video(frame: &VideoFrame, bytes: &[u8]) -> Option<(*mut u8, c_int)> {
+    let room = frame.width as usize * frame.height as usize * 4;
+    let length = c_int::try_from(bytes.len()).ok()?;
+    if frame.encode_buffer.is_null() || bytes.len() > room {
+        return None;
+    }
+    // SAFETY: the engine's buffer has `width * height * 4` bytes and is its own until the frame is handed over.
+    unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), frame.encode_buffer, bytes.len()) };
+    Some((frame.encode_buffer, length))
+}
+
+fn deliver(engine: Engine, outbox: Outbox) {
+    for (path, bytes, silent) in outbox.files {
+        if let Some(name) = valid_game_path(&path) {
+            engine.write_file(&name, &bytes);
+            if !silent {
+                engine.say(&format!("Wrote {path}\n"));
+            }
+        }
+    }
+    for line in outbox.lines {
+        engine.say(&format!("{line}\n"));
+    }
+    if let Some((data, length)) = outbox.video {
+        // SAFETY: the engine's own buffer, filled with `length` bytes just now.
+        unsafe { engine.write_avi_frame(data, length) };
+    }
+}
+
+/// Lets the engine decode the videos that are in view. It calls `UploadCinematic` from inside, so the state is in its
+/// cell meanwhile.
+fn run_videos(engine: Engine) -> Result<(), Failure> {
+    let wanted = with_renderer(|renderer, front| {
+        let known = |request: vk::VideoRequest| (front.cinematics.state(&request.name), request);
+        Ok(renderer
+            .active_videos()
+            .into_iter()
+            .map(known)
+            .collect::<Vec<_>>())
+    })?;
+    for (state, request) in wanted {
+        let handle = match state {
+            Some(handle) => handle,
+            None => {
+                let handle =
+                    valid_game_path(&request.name).and_then(|name| engine.play_cinematic(&name));
+                session::with(|session| session.front.cinematics.remember(request.name, handle));
+                handle
+            }
+        };
+        if let Some(handle) = handle {
+            engine.run_cinematic(handle);
+        }
+    }
+    Ok(())
+}
+
+/// `re.TakeVideoFrame`. The header of the engine calls the first two height and width, but the engine passes the width
+/// first.
+pub extern "C" fn take_video_frame(
+    width: c_int,
+    height: c_int,
+    _capture: *mut u8,
+    encode_buffer: *mut u8,
+    motion_jpeg: QBool,
+) {
+    entry(|| {
+        with_renderer(|_, front| {
+            if let (Ok(width @ 1..), Ok(height @ 1..), false) = (
+                u32::try_from(width),
+                u32::try_from(height),
+                encode_buffer.is_null(),
+            ) {
+                front.captures.video = Some(VideoFrame {
+                    width,
+                    height,
+                    encode_buffer,
+                    motion_jpeg: motion_jpeg != 0,
+                });
+            }
+            Ok(())
+        })
+    });
+}

@@ -1,0 +1,80 @@
+//! The front end for ioquake3 (Debian's 1.36 and HEAD: one ABI).
+//!
+//! Another engine gets a module like this one beside it, with its own tables and its own rules about windows; the
+//! scene structures in [`abi`] and everything outside this folder serve all of them. The version number that
+//! `GetRefAPI` gets does not tell engines apart (five of them use 8), so each will need a library name of its own.
+
+pub mod abi;
+mod convert;
+pub mod engine;
+mod exports;
+mod layout;
+mod lifecycle;
+mod scene;
+
+pub use exports::EXPORTS;
+#[cfg(test)]
+pub use {
+    exports::call_everything as call_everything_for_tests,
+    lifecycle::shutdown as shutdown_for_tests,
+};
+
+use crate::{fallback, logging, session};
+use abi::{API_VERSION, refexport_t, refimport_t};
+use engine::Engine;
+use std::cell::UnsafeCell;
+use std::ffi::c_int;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::ptr;
+
+/// The table of a renderer that works in our place, where the engine can read it.
+struct Borrowed(UnsafeCell<Option<refexport_t>>);
+
+// SAFETY: written and read by `get_ref_api` on the engine's main thread.
+unsafe impl Sync for Borrowed {}
+
+static BORROWED: Borrowed = Borrowed(UnsafeCell::new(None));
+
+/// `GetRefAPI`: starts over with the engine behind `imports` and answers the table of our functions, or null when the
+/// engine speaks another version of the interface. Without usable Vulkan it answers the table of the engine's own
+/// OpenGL renderer.
+///
+/// # Safety
+/// `imports` must be null or point at the import table of an ioquake3 engine.
+pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *const refexport_t {
+    if imports.is_null() {
+        return ptr::null();
+    }
+    // SAFETY: by the caller's promise. The table lies on the engine's stack, so it is copied.
+    let table = unsafe { imports.read_unaligned() };
+    // SAFETY: an engine calls this on its main thread, with none of our functions running.
+    let engine = unsafe { Engine::install(table) };
+    if api_version != API_VERSION {
+        engine.say(&format!("Relight speaks version {API_VERSION} of the renderer interface, this engine wants {api_version}\n"));
+        return ptr::null();
+    }
+    logging::install();
+    let prepared = catch_unwind(AssertUnwindSafe(|| {
+        session::reset();
+        lifecycle::probe(engine)
+    }));
+    let problem = match prepared {
+        Ok(Ok(())) => return &EXPORTS,
+        Ok(Err(problem)) => problem,
+        Err(_) => format!("looking for Vulkan failed{}", logging::take_panic_place()),
+    };
+    engine.say(&format!("Relight needs Vulkan 1.2: {problem}\n"));
+    // SAFETY: `table` is the engine's.
+    match unsafe { fallback::load(engine, api_version, &table) } {
+        Some(exports) => {
+            // SAFETY: main thread; the engine copies the table at once.
+            unsafe {
+                let slot = BORROWED.0.get();
+                *slot = Some(exports);
+                (*slot).as_ref().map_or(ptr::null(), ptr::from_ref)
+            }
+        }
+        // No renderer at all: ours, whose `BeginRegistration` will say what is missing and end the game.
+        None => &EXPORTS,
+    }
+}

@@ -1,0 +1,471 @@
+//! Registration of assets, the scene, 2D drawing and questions about the world.
+
+use super::abi::{
+    QBool, Vec3C, fontInfo_t, markFragment_t, orientation_t, polyVert_t, refEntity_t, refdef_t,
+};
+use super::convert;
+use super::engine::{Engine, string_from};
+use super::lifecycle::failure;
+use crate::boundary::{Failure, entry};
+use crate::contract::Renderer;
+use crate::cvars::Cvar;
+use crate::session::{draw, with_renderer};
+use glam::Vec3;
+use renderer_vk::api::DynamicLight;
+use std::ffi::{c_char, c_float, c_int, c_uchar};
+
+/// Corners of a decal's polygon that are looked at.
+const MAX_MARK_POINTS: usize = 64;
+/// Longest side of a picture that is handed over for drawing; keeps sizes far from overflow.
+const MAX_RAW_SIDE: c_int = 1 << 14;
+
+/// Runs a registration of something by name.
+fn register(name: *const c_char, f: impl FnOnce(&mut Renderer, &str) -> i32) -> c_int {
+    entry(|| {
+        // SAFETY: the engine passes a C string.
+        let name = unsafe { string_from(name) };
+        with_renderer(|renderer, _| Ok(f(renderer, &name)))
+    })
+}
+
+pub extern "C" fn register_model(name: *const c_char) -> c_int {
+    register(name, |renderer, name| renderer.register_model(name))
+}
+
+pub extern "C" fn register_skin(name: *const c_char) -> c_int {
+    register(name, |renderer, name| renderer.register_skin(name))
+}
+
+pub extern "C" fn register_shader(name: *const c_char) -> c_int {
+    register(name, |renderer, name| renderer.register_shader(name, true))
+}
+
+pub extern "C" fn register_shader_no_mip(name: *const c_char) -> c_int {
+    register(name, |renderer, name| renderer.register_shader(name, false))
+}
+
+pub extern "C" fn register_font(_name: *const c_char, point_size: c_int, out: *mut fontInfo_t) {
+    entry(|| {
+        with_renderer(|renderer, _| {
+            // The file is found by the size alone, whatever the font is called.
+            match renderer.register_font(point_size) {
+                // SAFETY: the engine's own structure of this type.
+                Some(font) if !out.is_null() => unsafe {
+                    out.write_unaligned(*convert::font(&font))
+                },
+                Some(_) => {}
+                None => log::warn!("there is no font of {point_size} points"),
+            }
+            Ok(())
+        })
+    });
+}
+
+pub extern "C" fn load_world(name: *const c_char) {
+    entry(|| {
+        // SAFETY: the engine passes a C string.
+        let name = unsafe { string_from(name) };
+        with_renderer(|renderer, _| {
+            if renderer.world_name().is_some() {
+                return Err(Failure::drop(format!("{name}: a map is loaded already")));
+            }
+            renderer.load_world(&name).map_err(Failure::drop)
+        })
+    });
+}
+
+/// The engine's copy of the map's visibility. The renderer reads the same data from the map itself.
+pub extern "C" fn set_world_vis_data(_vis: *const c_uchar) {}
+
+pub extern "C" fn clear_scene() {
+    entry(|| {
+        draw(|renderer, _| {
+            renderer.clear_scene();
+            Ok(())
+        })
+    });
+}
+
+pub extern "C" fn add_ref_entity(from: *const refEntity_t) {
+    entry(|| {
+        if from.is_null() {
+            return Ok(());
+        }
+        // SAFETY: the engine passes an entity, perhaps out of a game module's memory, which aligns nothing.
+        let from = unsafe { from.read_unaligned() };
+        draw(|renderer, front| {
+            if from.origin.iter().any(|v| v.is_nan()) {
+                if !front.warned_bad_origin {
+                    front.warned_bad_origin = true;
+                    log::warn!(
+                        "the game sent an entity without a place; such entities are left out"
+                    );
+                }
+                return Ok(());
+            }
+            let Some(entity) = convert::entity(&from) else {
+                return Err(Failure::drop(format!(
+                    "the game sent an entity of type {}, which does not exist",
+                    from.reType
+                )));
+            };
+            renderer.add_entity(&entity);
+            Ok(())
+        })
+    });
+}
+
+pub extern "C" fn add_poly(shader: c_int, num_verts: c_int, verts: *const polyVert_t, num: c_int) {
+    entry(|| {
+        let (Ok(per_poly @ 1..), Ok(polygons @ 1..), false) = (
+            usize::try_from(num_verts),
+            usize::try_from(num),
+            verts.is_null(),
+        ) else {
+            return Ok(());
+        };
+        if shader == 0 {
+            log::warn!("the game sent a polygon without a shader");
+            return Ok(());
+        }
+        let Some(count) = per_poly.checked_mul(polygons) else {
+            return Ok(());
+        };
+        let corners: Vec<_> = (0..count)
+            .map(|i| {
+                // SAFETY: the engine promises `num` polygons of `num_verts` corners each.
+                convert::poly_vert(&unsafe { verts.add(i).read_unaligned() })
+            })
+            .collect();
+        draw(|renderer, _| {
+            renderer.add_poly(shader, &corners, per_poly);
+            Ok(())
+        })
+    });
+}
+
+fn add_light_of(origin: *const Vec3C, radius: f32, color: Vec3, additive: bool) {
+    entry(|| {
+        // SAFETY: the engine passes a vector.
+        let origin = unsafe { convert::vector(origin) };
+        draw(|renderer, _| {
+            // Also false for a radius that is no number.
+            if radius > 0.0 && origin.is_finite() && color.is_finite() {
+                renderer.add_light(DynamicLight {
+                    origin,
+                    radius,
+                    color,
+                    additive,
+                });
+            }
+            Ok(())
+        })
+    });
+}
+
+pub extern "C" fn add_light(
+    origin: *const Vec3C,
+    radius: c_float,
+    r: c_float,
+    g: c_float,
+    b: c_float,
+) {
+    add_light_of(origin, radius, Vec3::new(r, g, b), false);
+}
+
+pub extern "C" fn add_additive_light(
+    origin: *const Vec3C,
+    radius: c_float,
+    r: c_float,
+    g: c_float,
+    b: c_float,
+) {
+    add_light_of(origin, radius, Vec3::new(r, g, b), true);
+}
+
+pub extern "C" fn render_scene(from: *const refdef_t) {
+    entry(|| {
+        if from.is_null() {
+            return Ok(());
+        }
+        // SAFETY: the engine passes a view, perhaps out of a game module's memory.
+        let view = convert::view(&unsafe { from.read_unaligned() });
+        draw(|renderer, front| {
+            if front
+                .cvars
+                .as_ref()
+                .is_some_and(|cvars| cvars.flag(Cvar::NoRefresh))
+            {
+                return Ok(());
+            }
+            renderer.render_scene(&view).map_err(failure)
+        })
+    });
+}
+
+pub extern "C" fn set_color(rgba: *const [c_float; 4]) {
+    entry(|| {
+        // SAFETY: the engine passes four floats or null.
+        let color = (!rgba.is_null()).then(|| unsafe { rgba.read_unaligned() });
+        draw(|renderer, _| {
+            renderer.set_color(color);
+            Ok(())
+        })
+    });
+}
+
+#[rustfmt::skip]
+#[allow(clippy::too_many_arguments)] // the engine's signature
+pub extern "C" fn stretch_pic(x: c_float, y: c_float, w: c_float, h: c_float, s1: c_float, t1: c_float, s2: c_float, t2: c_float, shader: c_int) {
+    entry(|| {
+        draw(|renderer, _| {
+            renderer.stretch_pic(x, y, w, h, s1, t1, s2, t2, shader);
+            Ok(())
+        })
+    });
+}
+
+/// The pixels behind a raw picture, copied: `cols * rows` of four bytes.
+///
+/// # Safety
+/// `data` must be null or hold that many bytes.
+unsafe fn raw_pixels(
+    cols: c_int,
+    rows: c_int,
+    data: *const c_uchar,
+) -> Option<(u32, u32, Vec<u8>)> {
+    if data.is_null() || !(1..=MAX_RAW_SIDE).contains(&cols) || !(1..=MAX_RAW_SIDE).contains(&rows)
+    {
+        return None;
+    }
+    let (cols, rows) = (u32::try_from(cols).ok()?, u32::try_from(rows).ok()?);
+    // SAFETY: by the caller's promise. At most 2^14 * 2^14 * 4 = 2^30 bytes.
+    let pixels = unsafe { std::slice::from_raw_parts(data, cols as usize * rows as usize * 4) };
+    Some((cols, rows, pixels.to_vec()))
+}
+
+#[rustfmt::skip]
+#[allow(clippy::too_many_arguments)] // the engine's signature
+pub extern "C" fn stretch_raw(x: c_int, y: c_int, w: c_int, h: c_int, cols: c_int, rows: c_int, data: *const c_uchar, client: c_int, dirty: QBool) {
+    entry(|| {
+        // Decided before a byte is read: the engine's own renderer stops on such sizes too.
+        if [cols, rows].iter().any(|&n| n <= 0 || !n.cast_unsigned().is_power_of_two()) {
+            return Err(Failure::drop(format!("a raw picture of {cols}x{rows} pixels: both must be powers of two")));
+        }
+        // SAFETY: the engine passes that many pixels.
+        let pixels = unsafe { raw_pixels(cols, rows, data) };
+        draw(|renderer, _| match (pixels, usize::try_from(client)) {
+            (Some((cols, rows, rgba)), Ok(client)) => renderer.stretch_raw(x, y, w, h, cols, rows, &rgba, client, dirty != 0).map_err(Failure::drop),
+            _ => Ok(()),
+        })
+    });
+}
+
+pub extern "C" fn upload_cinematic(
+    _w: c_int,
+    _h: c_int,
+    cols: c_int,
+    rows: c_int,
+    data: *const c_uchar,
+    client: c_int,
+    dirty: QBool,
+) {
+    entry(|| {
+        // SAFETY: the engine passes that many pixels.
+        let pixels = unsafe { raw_pixels(cols, rows, data) };
+        with_renderer(|renderer, _| {
+            if let (Some((cols, rows, rgba)), Ok(client)) = (pixels, usize::try_from(client)) {
+                renderer.upload_cinematic(cols, rows, &rgba, client, dirty != 0);
+            }
+            Ok(())
+        })
+    });
+}
+
+pub extern "C" fn light_for_point(
+    point: *const Vec3C,
+    ambient: *mut Vec3C,
+    directed: *mut Vec3C,
+    direction: *mut Vec3C,
+) -> c_int {
+    entry(|| {
+        // SAFETY: the engine passes a vector.
+        let point = unsafe { convert::vector(point) };
+        with_renderer(|renderer, _| {
+            let Some(light) = renderer.light_for_point(point) else {
+                return Ok(0);
+            };
+            for (to, value) in [
+                (ambient, light.ambient),
+                (directed, light.directed),
+                (direction, light.direction),
+            ] {
+                // SAFETY: the engine's own vectors.
+                unsafe { convert::write_vector(to, value) };
+            }
+            Ok(1)
+        })
+    })
+}
+
+#[rustfmt::skip]
+#[allow(clippy::too_many_arguments)] // the engine's signature
+pub extern "C" fn mark_fragments(num_points: c_int, points: *const Vec3C, projection: *const Vec3C, max_points: c_int, point_buffer: *mut Vec3C, max_fragments: c_int, fragment_buffer: *mut markFragment_t) -> c_int {
+    entry(|| {
+        let sizes = (usize::try_from(num_points), usize::try_from(max_points), usize::try_from(max_fragments));
+        let (Ok(count @ 1..), Ok(max_points @ 1..), Ok(max_fragments @ 1..)) = sizes else { return Ok(0) };
+        if points.is_null() || point_buffer.is_null() || fragment_buffer.is_null() {
+            return Ok(0);
+        }
+        let polygon: Vec<Vec3> = (0..count.min(MAX_MARK_POINTS))
+            .map(|i| {
+                // SAFETY: the engine promises `num_points` vectors.
+                unsafe { convert::vector(points.add(i)) }
+            })
+            .collect();
+        // SAFETY: the engine passes a vector.
+        let projection = unsafe { convert::vector(projection) };
+        with_renderer(|renderer, _| {
+            let (points, fragments) = renderer.mark_fragments(&polygon, projection, max_points, max_fragments);
+            for (i, point) in points.iter().take(max_points).enumerate() {
+                // SAFETY: the engine's buffer has room for `max_points`.
+                unsafe { convert::write_vector(point_buffer.add(i), *point) };
+            }
+            let mut written = 0;
+            for fragment in fragments.iter().take(max_fragments) {
+                // Nothing may point outside what was written.
+                if fragment.first_point.checked_add(fragment.num_points).is_none_or(|end| end > points.len().min(max_points)) {
+                    break;
+                }
+                // SAFETY: the engine's buffer has room for `max_fragments`, of which `written` are used.
+                unsafe { fragment_buffer.add(written).write_unaligned(convert::mark_fragment(fragment)) };
+                written += 1;
+            }
+            Ok(c_int::try_from(written).unwrap_or(0))
+        })
+    })
+}
+
+pub extern "C" fn lerp_tag(
+    out: *mut orientation_t,
+    model: c_int,
+    start: c_int,
+    end: c_int,
+    frac: c_float,
+    name: *const c_char,
+) -> c_int {
+    entry(|| {
+        // SAFETY: the engine passes a C string.
+        let name = unsafe { string_from(name) };
+        let tag =
+            with_renderer(|renderer, _| Ok(renderer.lerp_tag(model, start, end, frac, &name)))?;
+        if !out.is_null() {
+            // SAFETY: the engine's own structure of this type.
+            unsafe { out.write_unaligned(convert::orientation(tag)) };
+        }
+        Ok(c_int::from(tag.is_some()))
+    })
+}
+
+pub extern "C" fn model_bounds(model: c_int, mins: *mut Vec3C, maxs: *mut Vec3C) {
+    entry(|| {
+        let (low, high) = with_renderer(|renderer, _| Ok(renderer.model_bounds(model)))?;
+        // SAFETY: the engine's own vectors.
+        unsafe {
+            convert::write_vector(mins, low);
+            convert::write_vector(maxs, high);
+        }
+        Ok(())
+    });
+}
+
+/// The leading number of a text, as C's `atof` reads it; 0 without one.
+fn number(text: &str) -> f32 {
+    let text = text.trim_start();
+    let mut best = 0.0;
+    for (end, _) in text
+        .char_indices()
+        .skip(1)
+        .chain([(text.len(), ' ')])
+        .take_while(|&(end, _)| end <= 32)
+    {
+        if let Some(value) = text
+            .get(..end)
+            .and_then(|head| head.parse::<f32>().ok())
+            .filter(|value| value.is_finite())
+        {
+            best = value;
+        }
+    }
+    best
+}
+
+pub extern "C" fn remap_shader(old: *const c_char, new: *const c_char, time_offset: *const c_char) {
+    entry(|| {
+        // SAFETY: the engine passes C strings; the last may be null.
+        let (old, new, offset) = unsafe {
+            (
+                string_from(old),
+                string_from(new),
+                (!time_offset.is_null()).then(|| string_from(time_offset)),
+            )
+        };
+        with_renderer(|renderer, _| {
+            renderer.remap_shader(&old, &new, offset.map(|text| number(&text)));
+            Ok(())
+        })
+    });
+}
+
+pub extern "C" fn get_entity_token(buffer: *mut c_char, size: c_int) -> QBool {
+    entry(|| {
+        let (Ok(room @ 1..), false) = (usize::try_from(size), buffer.is_null()) else {
+            return Ok(0);
+        };
+        let token = with_renderer(|renderer, _| Ok(renderer.entity_token()))?;
+        let bytes = token.as_deref().unwrap_or("").as_bytes();
+        let length = bytes.len().min(room - 1);
+        // SAFETY: the engine's buffer has `size` bytes: `length` of text and a zero.
+        unsafe {
+            std::ptr::copy_nonoverlapping(bytes.as_ptr().cast(), buffer, length);
+            *buffer.add(length) = 0;
+        }
+        Ok(QBool::from(token.is_some()))
+    })
+}
+
+pub extern "C" fn in_pvs(from: *const Vec3C, to: *const Vec3C) -> QBool {
+    entry(|| {
+        let Some(engine) = Engine::current() else {
+            return Ok(0);
+        };
+        // SAFETY: the engine passes vectors.
+        let (from, to) = unsafe { (convert::vector(from), convert::vector(to)) };
+        let clusters = with_renderer(|renderer, _| {
+            Ok(renderer
+                .world_name()
+                .is_some()
+                .then(|| (renderer.leaf_cluster(from), renderer.leaf_cluster(to))))
+        })?;
+        // The engine's collision model holds the same map; its rows have a bit for each cluster of it.
+        Ok(QBool::from(
+            clusters.is_some_and(|(from, to)| engine.cluster_sees(from, to)),
+        ))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_read_as_c_does() {
+        assert_eq!(number("1.5"), 1.5);
+        assert_eq!(number("  -2 seconds"), -2.0);
+        assert_eq!(number("12abc"), 12.0);
+        assert_eq!(number("abc"), 0.0);
+        assert_eq!(number(""), 0.0);
+        assert_eq!(number("."), 0.0);
+        assert_eq!(number("1e3é"), 1000.0);
+    }
+}

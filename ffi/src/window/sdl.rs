@@ -1,0 +1,425 @@
+//! SDL 2, found at run time: the one instance that the engine itself uses.
+//!
+//! Declarations from SDL's stable 2.0 ABI (`SDL_video.h`, `SDL_vulkan.h`), written out by hand.
+
+use libloading::Library;
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::ptr;
+
+/// `SDL_INIT_VIDEO`.
+const INIT_VIDEO: u32 = 0x20;
+
+/// `SDL_WindowFlags`.
+#[allow(missing_docs)]
+pub mod flags {
+    pub const FULLSCREEN: u32 = 0x1;
+    pub const SHOWN: u32 = 0x4;
+    pub const BORDERLESS: u32 = 0x10;
+    pub const RESIZABLE: u32 = 0x20;
+    pub const VULKAN: u32 = 0x1000_0000;
+}
+
+/// `SDL_WINDOWPOS_UNDEFINED`.
+pub const POSITION_ANY: c_int = 0x1FFF_0000;
+/// `SDL_WINDOWPOS_CENTERED`.
+pub const POSITION_CENTERED: c_int = 0x2FFF_0000;
+
+/// An `SDL_Window`.
+pub type WindowPtr = *mut c_void;
+
+/// `SDL_DisplayMode`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct DisplayMode {
+    /// `SDL_PixelFormatEnum`; 0 = any.
+    pub format: u32,
+    /// Pixels (or points, see SDL).
+    pub w: c_int,
+    /// Pixels.
+    pub h: c_int,
+    /// Hz; 0 = any.
+    pub refresh_rate: c_int,
+    /// SDL's own.
+    pub driverdata: *mut c_void,
+}
+
+impl Default for DisplayMode {
+    fn default() -> Self {
+        Self {
+            format: 0,
+            w: 0,
+            h: 0,
+            refresh_rate: 0,
+            driverdata: ptr::null_mut(),
+        }
+    }
+}
+
+/// Why SDL cannot give a window.
+#[derive(Debug, thiserror::Error)]
+pub enum SdlError {
+    /// Neither the engine nor the system has SDL.
+    #[error("no SDL 2 to make a window with: {0}")]
+    NoLibrary(String),
+    /// SDL is too old.
+    #[error("SDL lacks {0}: version 2.0.6 or newer is needed")]
+    NoFunction(String),
+    /// A call failed.
+    #[error("{call}: {message}")]
+    Call {
+        /// SDL's name of the function.
+        call: &'static str,
+        /// What SDL says.
+        message: String,
+    },
+}
+
+macro_rules! sdl {
+    ($( $field:ident = $symbol:literal : fn($($arg:ty),*) $(-> $ret:ty)?; )*) => {
+        /// SDL's functions. Copied out of a library that is never closed.
+        #[derive(Clone, Copy)]
+        pub struct Sdl { $( $field: unsafe extern "C" fn($($arg),*) $(-> $ret)? ),* }
+
+        impl Sdl {
+            fn from_library(library: &Library) -> Result<Self, SdlError> {
+                Ok(Self { $(
+                    // SAFETY: the signature is the one of SDL's header.
+                    $field: *unsafe { library.get::<unsafe extern "C" fn($($arg),*) $(-> $ret)?>(concat!($symbol, "\0").as_bytes()) }
+                        .map_err(|_| SdlError::NoFunction($symbol.to_string()))?,
+                )* })
+            }
+        }
+    };
+}
+
+sdl! {
+    init_subsystem = "SDL_InitSubSystem": fn(u32) -> c_int;
+    was_init = "SDL_WasInit": fn(u32) -> u32;
+    quit_subsystem = "SDL_QuitSubSystem": fn(u32);
+    get_error = "SDL_GetError": fn() -> *const c_char;
+    video_driver = "SDL_GetCurrentVideoDriver": fn() -> *const c_char;
+    create_window = "SDL_CreateWindow": fn(*const c_char, c_int, c_int, c_int, c_int, u32) -> WindowPtr;
+    destroy_window = "SDL_DestroyWindow": fn(WindowPtr);
+    minimize_window = "SDL_MinimizeWindow": fn(WindowPtr);
+    window_flags = "SDL_GetWindowFlags": fn(WindowPtr) -> u32;
+    set_fullscreen = "SDL_SetWindowFullscreen": fn(WindowPtr, u32) -> c_int;
+    set_window_mode = "SDL_SetWindowDisplayMode": fn(WindowPtr, *const DisplayMode) -> c_int;
+    window_mode = "SDL_GetWindowDisplayMode": fn(WindowPtr, *mut DisplayMode) -> c_int;
+    display_index = "SDL_GetWindowDisplayIndex": fn(WindowPtr) -> c_int;
+    desktop_mode = "SDL_GetDesktopDisplayMode": fn(c_int, *mut DisplayMode) -> c_int;
+    num_display_modes = "SDL_GetNumDisplayModes": fn(c_int) -> c_int;
+    display_mode = "SDL_GetDisplayMode": fn(c_int, c_int, *mut DisplayMode) -> c_int;
+    pump_events = "SDL_PumpEvents": fn();
+    vulkan_extensions = "SDL_Vulkan_GetInstanceExtensions": fn(WindowPtr, *mut u32, *mut *const c_char) -> c_int;
+    vulkan_loader = "SDL_Vulkan_GetVkGetInstanceProcAddr": fn() -> *mut c_void;
+    vulkan_surface = "SDL_Vulkan_CreateSurface": fn(WindowPtr, *mut c_void, *mut u64) -> c_int;
+    vulkan_drawable_size = "SDL_Vulkan_GetDrawableSize": fn(WindowPtr, *mut c_int, *mut c_int);
+}
+
+impl std::fmt::Debug for Sdl {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Sdl")
+    }
+}
+
+#[cfg(windows)]
+const SDL_NAME: &str = "SDL2.dll";
+#[cfg(target_os = "macos")]
+const SDL_NAME: &str = "libSDL2-2.0.0.dylib";
+#[cfg(all(unix, not(target_os = "macos")))]
+const SDL_NAME: &str = "libSDL2-2.0.so.0";
+
+/// The SDL that is in the process already, as a shared library of its own or inside the executable; else the system's.
+fn open() -> Result<Library, SdlError> {
+    #[cfg(unix)]
+    {
+        use libloading::os::unix::{Library as UnixLibrary, RTLD_LAZY, RTLD_NOW};
+        // glibc's value; the others of this family of systems agree or ignore it.
+        #[cfg(target_os = "linux")]
+        const RTLD_NOLOAD: c_int = 4;
+        #[cfg(not(target_os = "linux"))]
+        const RTLD_NOLOAD: c_int = 0x10;
+        // SAFETY: with NOLOAD no code of the library runs.
+        if let Ok(library) = unsafe { UnixLibrary::open(Some(SDL_NAME), RTLD_LAZY | RTLD_NOLOAD) } {
+            return Ok(library.into());
+        }
+        let own: Library = UnixLibrary::this().into();
+        // SAFETY: only asked whether it is there.
+        if unsafe { own.get::<*const c_void>(b"SDL_CreateWindow\0") }.is_ok() {
+            return Ok(own);
+        }
+        // SAFETY: SDL's initialisers are made to run at load time.
+        unsafe { UnixLibrary::open(Some(SDL_NAME), RTLD_NOW) }
+            .map(Into::into)
+            .map_err(|e| SdlError::NoLibrary(e.to_string()))
+    }
+    #[cfg(windows)]
+    {
+        // LoadLibrary answers the copy that the engine already loaded.
+        // SAFETY: SDL's initialisers are made to run at load time.
+        unsafe { Library::new(SDL_NAME) }.map_err(|e| SdlError::NoLibrary(e.to_string()))
+    }
+}
+
+impl Sdl {
+    /// Finds SDL. The library stays loaded: the engine holds it anyway.
+    ///
+    /// # Errors
+    /// When there is none, or it is too old for Vulkan.
+    pub fn load() -> Result<Sdl, SdlError> {
+        let library = open()?;
+        let sdl = Sdl::from_library(&library);
+        std::mem::forget(library);
+        sdl
+    }
+
+    fn error(&self, call: &'static str) -> SdlError {
+        // SAFETY: SDL answers its own NUL-terminated buffer; copied at once.
+        let message = unsafe { crate::ioq3::engine::string_from((self.get_error)()) };
+        SdlError::Call { call, message }
+    }
+
+    /// Starts SDL's video unless it runs. Answers the driver's name.
+    ///
+    /// # Errors
+    /// When no display can be reached.
+    pub fn start_video(&self) -> Result<String, SdlError> {
+        // SAFETY: plain calls on the main thread.
+        unsafe {
+            if (self.was_init)(INIT_VIDEO) == 0 && (self.init_subsystem)(INIT_VIDEO) != 0 {
+                return Err(self.error("SDL_Init"));
+            }
+            Ok(crate::ioq3::engine::string_from((self.video_driver)()))
+        }
+    }
+
+    /// Ends SDL's video. No window may be left.
+    pub fn stop_video(&self) {
+        // SAFETY: plain call on the main thread.
+        unsafe { (self.quit_subsystem)(INIT_VIDEO) }
+    }
+
+    /// Size of the desktop of a display, if SDL knows it.
+    pub fn desktop(&self, display: c_int) -> Option<DisplayMode> {
+        let mut mode = DisplayMode::default();
+        // SAFETY: SDL fills the structure.
+        (unsafe { (self.desktop_mode)(display, &mut mode) } == 0).then_some(mode)
+    }
+
+    /// Sizes that a display offers in full screen.
+    pub fn display_sizes(&self, display: c_int) -> Vec<(u32, u32)> {
+        // SAFETY: plain call; a bad index gives a negative count.
+        let count = unsafe { (self.num_display_modes)(display) };
+        (0..count)
+            .filter_map(|index| {
+                let mut mode = DisplayMode::default();
+                // SAFETY: SDL fills the structure.
+                let known = unsafe { (self.display_mode)(display, index, &mut mode) } == 0;
+                known.then_some((u32::try_from(mode.w).ok()?, u32::try_from(mode.h).ok()?))
+            })
+            .collect()
+    }
+
+    /// Makes a window for Vulkan.
+    ///
+    /// # Errors
+    /// What SDL says, in particular when the video driver cannot do Vulkan.
+    pub fn create(
+        &self,
+        title: &CStr,
+        position: c_int,
+        width: u32,
+        height: u32,
+        flags: u32,
+    ) -> Result<WindowPtr, SdlError> {
+        let (Ok(width), Ok(height)) = (c_int::try_from(width), c_int::try_from(height)) else {
+            return Err(SdlError::Call {
+                call: "SDL_CreateWindow",
+                message: format!("{width}x{height} is too large"),
+            });
+        };
+        // SAFETY: the title is copied.
+        let window = unsafe {
+            (self.create_window)(
+                title.as_ptr(),
+                position,
+                position,
+                width,
+                height,
+                flags | flags::VULKAN,
+            )
+        };
+        if window.is_null() {
+            Err(self.error("SDL_CreateWindow"))
+        } else {
+            Ok(window)
+        }
+    }
+
+    /// Destroys a window.
+    ///
+    /// # Safety
+    /// `window` must be a window of this SDL that is not used again.
+    pub unsafe fn destroy(&self, window: WindowPtr) {
+        // SAFETY: by the caller's promise.
+        unsafe { (self.destroy_window)(window) }
+    }
+
+    /// Minimizes a window.
+    ///
+    /// # Safety
+    /// `window` must be a window of this SDL.
+    pub unsafe fn minimize(&self, window: WindowPtr) {
+        // SAFETY: by the caller's promise.
+        unsafe { (self.minimize_window)(window) }
+    }
+
+    /// Whether a window fills its screen.
+    ///
+    /// # Safety
+    /// `window` must be a window of this SDL.
+    pub unsafe fn is_fullscreen(&self, window: WindowPtr) -> bool {
+        // SAFETY: by the caller's promise.
+        unsafe { (self.window_flags)(window) & flags::FULLSCREEN != 0 }
+    }
+
+    /// Fills the screen or goes back to a window.
+    ///
+    /// # Errors
+    /// What SDL says.
+    ///
+    /// # Safety
+    /// `window` must be a window of this SDL.
+    pub unsafe fn switch_fullscreen(&self, window: WindowPtr, on: bool) -> Result<(), SdlError> {
+        let flags = if on { flags::FULLSCREEN } else { 0 };
+        // SAFETY: by the caller's promise.
+        if unsafe { (self.set_fullscreen)(window, flags) } != 0 {
+            return Err(self.error("SDL_SetWindowFullscreen"));
+        }
+        // SAFETY: plain call; the new size is known once the window system's answer is in.
+        unsafe { (self.pump_events)() };
+        Ok(())
+    }
+
+    /// Says which size and rate a window wants in full screen.
+    ///
+    /// # Errors
+    /// What SDL says.
+    ///
+    /// # Safety
+    /// `window` must be a window of this SDL.
+    pub unsafe fn set_mode(
+        &self,
+        window: WindowPtr,
+        width: u32,
+        height: u32,
+        refresh: c_int,
+    ) -> Result<(), SdlError> {
+        let mode = DisplayMode {
+            w: c_int::try_from(width).unwrap_or(0),
+            h: c_int::try_from(height).unwrap_or(0),
+            refresh_rate: refresh,
+            ..DisplayMode::default()
+        };
+        // SAFETY: by the caller's promise; SDL copies the structure.
+        if unsafe { (self.set_window_mode)(window, &mode) } == 0 {
+            Ok(())
+        } else {
+            Err(self.error("SDL_SetWindowDisplayMode"))
+        }
+    }
+
+    /// The display's rate in Hz for a window; 0 if unknown.
+    ///
+    /// # Safety
+    /// `window` must be a window of this SDL.
+    pub unsafe fn refresh_rate(&self, window: WindowPtr) -> c_int {
+        let mut mode = DisplayMode::default();
+        // SAFETY: by the caller's promise; SDL fills the structure.
+        if unsafe { (self.window_mode)(window, &mut mode) } == 0 {
+            mode.refresh_rate
+        } else {
+            0
+        }
+    }
+
+    /// The display that a window is on; the first if unknown.
+    ///
+    /// # Safety
+    /// `window` must be a window of this SDL.
+    pub unsafe fn display_of(&self, window: WindowPtr) -> c_int {
+        // SAFETY: by the caller's promise.
+        unsafe { (self.display_index)(window) }.max(0)
+    }
+
+    /// Size in pixels of what Vulkan draws to; `None` if it has none.
+    ///
+    /// # Safety
+    /// `window` must be a window of this SDL.
+    pub unsafe fn drawable_size(&self, window: WindowPtr) -> Option<(u32, u32)> {
+        let (mut width, mut height) = (0, 0);
+        // SAFETY: by the caller's promise; SDL fills both.
+        unsafe { (self.vulkan_drawable_size)(window, &mut width, &mut height) };
+        let size = (u32::try_from(width).ok()?, u32::try_from(height).ok()?);
+        (size.0 > 0 && size.1 > 0).then_some(size)
+    }
+
+    /// Instance extensions that a surface for this window needs.
+    ///
+    /// # Errors
+    /// What SDL says.
+    ///
+    /// # Safety
+    /// `window` must be a window of this SDL, made for Vulkan.
+    pub unsafe fn instance_extensions(&self, window: WindowPtr) -> Result<Vec<CString>, SdlError> {
+        let mut count = 0;
+        // SAFETY: by the caller's promise; without a list SDL only counts.
+        if unsafe { (self.vulkan_extensions)(window, &mut count, ptr::null_mut()) } == 0 {
+            return Err(self.error("SDL_Vulkan_GetInstanceExtensions"));
+        }
+        let mut names = vec![ptr::null(); usize::try_from(count).unwrap_or(0)];
+        // SAFETY: the list has room for `count` names.
+        if unsafe { (self.vulkan_extensions)(window, &mut count, names.as_mut_ptr()) } == 0 {
+            return Err(self.error("SDL_Vulkan_GetInstanceExtensions"));
+        }
+        names.truncate(usize::try_from(count).unwrap_or(0));
+        // SAFETY: SDL's names are static NUL-terminated strings.
+        Ok(names
+            .into_iter()
+            .filter(|name| !name.is_null())
+            .map(|name| unsafe { CStr::from_ptr(name) }.to_owned())
+            .collect())
+    }
+
+    /// `vkGetInstanceProcAddr` of the Vulkan loader that SDL took.
+    ///
+    /// # Errors
+    /// When SDL has no Vulkan.
+    pub fn vulkan_entry(&self) -> Result<*const c_void, SdlError> {
+        // SAFETY: plain call.
+        let entry = unsafe { (self.vulkan_loader)() };
+        if entry.is_null() {
+            Err(self.error("SDL_Vulkan_GetVkGetInstanceProcAddr"))
+        } else {
+            Ok(entry)
+        }
+    }
+
+    /// Makes a `VkSurfaceKHR` for a window.
+    ///
+    /// # Errors
+    /// What SDL says.
+    ///
+    /// # Safety
+    /// `window` must be a window of this SDL made for Vulkan, `instance` a live `VkInstance` with the extensions of
+    /// [`Sdl::instance_extensions`].
+    pub unsafe fn create_surface(&self, window: WindowPtr, instance: u64) -> Result<u64, SdlError> {
+        let mut surface = 0;
+        let instance = ptr::with_exposed_provenance_mut(usize::try_from(instance).unwrap_or(0));
+        // SAFETY: by the caller's promise. A VkSurfaceKHR has 64 bits everywhere.
+        if unsafe { (self.vulkan_surface)(window, instance, &mut surface) } == 0 {
+            return Err(self.error("SDL_Vulkan_CreateSurface"));
+        }
+        Ok(surface)
+    }
+}
