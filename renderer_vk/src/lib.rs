@@ -7,3 +7,4 @@ pub mod api;
 pub mod gpu;
 pub mod scene;
 pub mod settings;
+pub mod trace;

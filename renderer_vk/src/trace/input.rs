@@ -1,0 +1,105 @@
+//! What the traced look is given: plain descriptions of a map and of a view's surroundings, so that the passes depend
+//! on no loader and tests can make scenes by hand.
+
+use shaders::trace_types::SkyRecord;
+use shaders::types::constants as c;
+use shaders::types::{Fog, MaterialBuffers, Vertex};
+
+/// What a material is to a ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Kind {
+    /// Stops every ray.
+    Opaque,
+    /// Stops a ray where its alpha test passes.
+    Tested,
+    /// Is passed, and composed over what lies behind.
+    Translucent,
+    /// Shows the sky.
+    Sky,
+}
+
+impl Kind {
+    /// From a material's `MATERIAL_*` bits; `None` if no ray sees it. Fog brushes are volumes, not surfaces. A portal's
+    /// surface stops the ray, because what lies behind is replaced by what it shows.
+    pub fn of(flags: u32) -> Option<Self> {
+        if flags & (c::MATERIAL_INVISIBLE | c::MATERIAL_FOG) != 0 {
+            None
+        } else if flags & c::MATERIAL_SKY != 0 {
+            Some(Self::Sky)
+        } else if flags & c::MATERIAL_PORTAL != 0 {
+            Some(Self::Opaque)
+        } else if flags & c::MATERIAL_CUT_OUT != 0 {
+            Some(Self::Tested)
+        } else if flags & c::MATERIAL_TRANSLUCENT != 0 {
+            Some(Self::Translucent)
+        } else {
+            Some(Self::Opaque)
+        }
+    }
+
+    /// The value of `KIND_*` in GLSL.
+    pub fn index(self) -> u32 {
+        use shaders::trace_types::constants as t;
+        match self {
+            Self::Opaque => t::KIND_OPAQUE,
+            Self::Tested => t::KIND_TESTED,
+            Self::Translucent => t::KIND_TRANSLUCENT,
+            Self::Sky => t::KIND_SKY,
+        }
+    }
+}
+
+/// What the tracer's CPU side asks about a material.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MaterialInfo {
+    /// `MATERIAL_*` bits.
+    pub flags: u32,
+    /// Sort value: surfaces are drawn in rising order.
+    pub sort: f32,
+    /// Order among materials of one sort value.
+    pub order: u32,
+    /// For skies.
+    pub sky: Option<SkyRecord>,
+}
+
+/// Looks materials up by index.
+pub trait MaterialTable {
+    /// The material that is drawn for `index` (remapping applied), and what it is.
+    fn info(&self, index: u32) -> (u32, MaterialInfo);
+    /// Addresses of the arrays on the GPU.
+    fn buffers(&self) -> MaterialBuffers;
+    /// Changes whenever an answer of [`info`](Self::info) may have changed.
+    fn generation(&self) -> u64;
+}
+
+/// A surface of the map that keeps its shape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StaticSurface {
+    /// First index in [`StaticScene::indices`].
+    pub first_index: u32,
+    /// Number of indices.
+    pub index_count: u32,
+    /// Index of the material.
+    pub material: u32,
+    /// Fog volume plus one; 0 none.
+    pub fog: u32,
+    /// Bindless texture of the lightmap page, or `NO_TEXTURE`.
+    pub lightmap: u32,
+    /// BSP model: 0 is the world, others are placed by entities.
+    pub model: u32,
+}
+
+/// A map's geometry that keeps its shape.
+#[derive(Clone, Debug)]
+pub struct StaticScene<'a> {
+    /// Vertices.
+    pub vertices: &'a [Vertex],
+    /// Device address of the same vertices.
+    pub vertex_address: u64,
+    /// Indices, three a triangle, clockwise from the front.
+    pub indices: &'a [u32],
+    /// Surfaces.
+    pub surfaces: Vec<StaticSurface>,
+    /// Fog volumes.
+    pub fogs: &'a [Fog],
+}

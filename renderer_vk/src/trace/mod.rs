@@ -1,0 +1,20 @@
+//! The traced look: acceleration structures, and the passes from camera rays to the picture.
+//!
+//! A frame, in the order of [`look`]: [`accel`] builds what moves and the top level; [`passes::Primary`] finds what each
+//! pixel shows; [`passes::Direct`] and [`passes::Indirect`] light it; [`passes::Composite`], [`passes::Accumulate`],
+//! [`passes::Exposure`] and [`passes::ToneMap`] make the picture of it. Rays are launched only from the ray generation
+//! shaders; hit shaders report what was hit and decide cut-outs.
+//!
+//! Radiometry: light is carried as `L`, the radiance that a white diffuse surface shows (irradiance divided by pi), in
+//! units where 1 is display white. Estimators divide by their probabilities, so all of them agree in the mean.
+#![forbid(unsafe_code)]
+
+pub mod accel;
+pub mod geometry;
+pub mod input;
+pub mod lights;
+pub mod look;
+pub mod passes;
+pub mod targets;
+
+pub use look::TraceLook;

@@ -1,0 +1,177 @@
+//! The passes of a traced frame after the acceleration structures: each type owns its pipelines and records one step.
+//! All of them read their inputs and outputs from one `TraceView`, whose address `record` is given.
+
+use shaders::Spirv;
+
+use crate::gpu::{
+    Access, ComputePipeline, Device, Error, HitGroup, RayTracingDesc, RayTracingPipeline, Recorder,
+};
+
+/// A ray tracing pipeline with the hit shaders that all passes share.
+fn ray_pipeline(device: &Device, name: &str, raygen: &Spirv) -> Result<RayTracingPipeline, Error> {
+    RayTracingPipeline::new(
+        device,
+        &RayTracingDesc {
+            name,
+            raygen,
+            miss: &[&shaders::TRACE_MISS_RMISS],
+            hit: &[
+                HitGroup {
+                    closest_hit: Some(&shaders::TRACE_HIT_RCHIT),
+                    any_hit: Some(&shaders::TRACE_TESTED_RAHIT),
+                },
+                HitGroup {
+                    closest_hit: Some(&shaders::TRACE_HIT_RCHIT),
+                    any_hit: Some(&shaders::TRACE_TRANSLUCENT_RAHIT),
+                },
+            ],
+            constants: &[],
+        },
+    )
+}
+
+fn trace(
+    rec: &mut Recorder,
+    name: &str,
+    pipeline: &RayTracingPipeline,
+    view: u64,
+    size: [u32; 2],
+) -> Result<(), Error> {
+    let mut pass = rec.pass(name, Access::RAY_TRACING, Access::RAY_TRACING)?;
+    pass.bind_rays(pipeline);
+    pass.push(&view);
+    pass.trace_rays(size[0], size[1], 1);
+    Ok(())
+}
+
+/// Edge of the groups of the compute passes over pixels, see their `local_size`.
+const TILE: u32 = 8;
+
+fn dispatch(
+    rec: &mut Recorder,
+    name: &str,
+    pipeline: &ComputePipeline,
+    view: u64,
+    size: [u32; 2],
+) -> Result<(), Error> {
+    let mut pass = rec.pass(name, Access::COMPUTE, Access::COMPUTE)?;
+    pass.bind_compute(pipeline);
+    pass.push(&view);
+    pass.dispatch(size[0].div_ceil(TILE), size[1].div_ceil(TILE), 1);
+    Ok(())
+}
+
+macro_rules! ray_pass {
+    ($(#[$doc:meta])* $type:ident, $name:literal, $raygen:ident) => {
+        $(#[$doc])*
+        pub struct $type(RayTracingPipeline);
+
+        impl $type {
+            /// Compiles the pipeline.
+            ///
+            /// # Errors
+            /// The driver refuses the pipeline.
+            pub fn new(device: &Device) -> Result<Self, Error> {
+                Ok(Self(ray_pipeline(device, $name, &shaders::$raygen)?))
+            }
+
+            /// Records the pass. `view`: device address of the `TraceView`; `size`: its pixels.
+            ///
+            /// # Errors
+            /// Out of memory.
+            pub fn record(&self, rec: &mut Recorder, view: u64, size: [u32; 2]) -> Result<(), Error> {
+                trace(rec, $name, &self.0, view, size)
+            }
+        }
+    };
+}
+
+macro_rules! pixel_pass {
+    ($(#[$doc:meta])* $type:ident, $name:literal, $shader:ident) => {
+        $(#[$doc])*
+        pub struct $type(ComputePipeline);
+
+        impl $type {
+            /// Compiles the pipeline.
+            ///
+            /// # Errors
+            /// The driver refuses the pipeline.
+            pub fn new(device: &Device) -> Result<Self, Error> {
+                Ok(Self(ComputePipeline::new(device, $name, &shaders::$shader, &[])?))
+            }
+
+            /// Records the pass. `view`: device address of the `TraceView`; `size`: its pixels.
+            ///
+            /// # Errors
+            /// Out of memory.
+            pub fn record(&self, rec: &mut Recorder, view: u64, size: [u32; 2]) -> Result<(), Error> {
+                dispatch(rec, $name, &self.0, view, size)
+            }
+        }
+    };
+}
+
+ray_pass!(
+    /// Reads the acceleration structures and materials; writes the G-buffer (`position`, `surface`) and `front`: the
+    /// picture of all that lies in front of the surface whose light is asked for.
+    Primary, "trace_primary", TRACE_PRIMARY_RGEN
+);
+ray_pass!(
+    /// Reads the G-buffer and the light lists; writes `direct`.
+    Direct, "trace_direct", TRACE_DIRECT_RGEN
+);
+ray_pass!(
+    /// Reads the G-buffer and the light lists; writes `indirect`.
+    Indirect, "trace_indirect", TRACE_INDIRECT_RGEN
+);
+pixel_pass!(
+    /// Reads the G-buffer, `front`, `direct` and `indirect`; writes `hdr`.
+    Composite, "trace_composite", TRACE_COMPOSITE_COMP
+);
+pixel_pass!(
+    /// Reads `hdr` and `accumulation`; writes the new sum to `accumulation` and the mean to `hdr`.
+    Accumulate, "trace_accumulate", TRACE_ACCUMULATE_COMP
+);
+pixel_pass!(
+    /// Reads `hdr` and the exposure; writes the view's rectangle of the target.
+    ToneMap, "trace_tonemap", TRACE_TONEMAP_COMP
+);
+
+/// Reads `hdr`; writes the exposure.
+pub struct Exposure {
+    histogram: ComputePipeline,
+    adapt: ComputePipeline,
+}
+
+impl Exposure {
+    /// Bytes of the state that outlives a frame: the exposure and the histogram.
+    pub const STATE_SIZE: u64 = 4 + 4 * 128;
+
+    /// Compiles the pipelines.
+    ///
+    /// # Errors
+    /// The driver refuses a pipeline.
+    pub fn new(device: &Device) -> Result<Self, Error> {
+        Ok(Self {
+            histogram: ComputePipeline::new(device, "trace_histogram", &shaders::TRACE_HISTOGRAM_COMP, &[])?,
+            adapt: ComputePipeline::new(device, "trace_exposure", &shaders::TRACE_EXPOSURE_COMP, &[])?,
+        })
+    }
+
+    /// Records the pass. `view`: device address of the `TraceView`; `size`: its pixels.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn record(&self, rec: &mut Recorder, view: u64, size: [u32; 2]) -> Result<(), Error> {
+        const HISTOGRAM_TILE: u32 = 16;
+        let mut pass = rec.pass("trace_exposure", Access::COMPUTE, Access::COMPUTE)?;
+        pass.bind_compute(&self.histogram);
+        pass.push(&view);
+        pass.dispatch(size[0].div_ceil(HISTOGRAM_TILE), size[1].div_ceil(HISTOGRAM_TILE), 1);
+        pass.barrier();
+        pass.bind_compute(&self.adapt);
+        pass.push(&view);
+        pass.dispatch(1, 1, 1);
+        Ok(())
+    }
+}
