@@ -149,7 +149,8 @@ impl Accel {
 
         let mut records: Vec<GeometryRecord> = Vec::new();
         let mut placed: Vec<gpu::Instance> = Vec::new();
-        let custom_index = |records: &Vec<GeometryRecord>| u32::try_from(records.len()).unwrap_or(0);
+        let custom_index =
+            |records: &Vec<GeometryRecord>| u32::try_from(records.len()).unwrap_or(0);
 
         if let Some(geometry) = geometry {
             let submodels = view.submodels.iter().map(|s| (s.model, s.instance));
@@ -191,7 +192,8 @@ impl Accel {
             geometries.push([BlasGeometry {
                 vertex_address: position_address,
                 vertex_stride: size_of::<Vec3>() as u64,
-                max_vertex: u32::try_from(self.positions.len().saturating_sub(1)).unwrap_or(u32::MAX),
+                max_vertex: u32::try_from(self.positions.len().saturating_sub(1))
+                    .unwrap_or(u32::MAX),
                 index_address,
                 triangle_count: u32::try_from(slot.triangles.len()).unwrap_or(u32::MAX),
                 opaque: matches!(slot.kind, Kind::Opaque | Kind::Sky),
@@ -234,7 +236,9 @@ impl Accel {
             geometries: geometry_address,
             instances: instance_address,
             first_person: self.slots.iter().any(|s| {
-                s.seen == Seen::FirstPerson && s.kind != Kind::Translucent && !s.triangles.is_empty()
+                s.seen == Seen::FirstPerson
+                    && s.kind != Kind::Translucent
+                    && !s.triangles.is_empty()
             }),
         })
     }
@@ -246,7 +250,8 @@ impl Accel {
             slot.indices.clear();
         }
         self.positions.clear();
-        self.positions.extend(view.vertices.iter().map(|v| v.position));
+        self.positions
+            .extend(view.vertices.iter().map(|v| v.position));
         self.used.clear();
         self.used.resize(view.vertices.len(), false);
         // in drawing order, so that of two translucent layers in one plane the later primitive is drawn later
@@ -272,16 +277,20 @@ impl Accel {
             return;
         };
         let seen = Seen::of(instance.flags);
-        let slot = self.slots.iter_mut().find(|s| s.seen == seen && s.kind == kind);
+        let slot = self
+            .slots
+            .iter_mut()
+            .find(|s| s.seen == seen && s.kind == kind);
         let Some(slot) = slot else {
             return;
         };
         let first = mesh.first_vertex as usize;
         let range = first..first.saturating_add(mesh.vertex_count as usize);
         let axis = Mat3::from_cols(instance.axis[0], instance.axis[1], instance.axis[2]);
-        if let (Some(positions), Some(used)) =
-            (self.positions.get_mut(range.clone()), self.used.get_mut(range))
-        {
+        if let (Some(positions), Some(used)) = (
+            self.positions.get_mut(range.clone()),
+            self.used.get_mut(range),
+        ) {
             for (position, used) in positions.iter_mut().zip(used) {
                 // two meshes of one entity may share vertices
                 if !std::mem::replace(used, true) {
@@ -289,8 +298,8 @@ impl Accel {
                 }
             }
         }
-        let world = if mesh.world_surface.is_some() || instance.flags & c::INSTANCE_WORLD != 0 && mesh.instance != 0
-        {
+        // what is baked into the world's own vertices is not part of the material
+        let world = if mesh.world_surface.is_some() {
             c::TRIANGLE_WORLD
         } else {
             0

@@ -3,14 +3,13 @@
 
 use std::collections::BTreeMap;
 
+use glam::Vec3;
 use shaders::trace_types::SkyRecord;
+use shaders::types::Triangle;
 use shaders::types::constants::{NO_TEXTURE, TRIANGLE_WORLD};
-use shaders::types::{Fog, Triangle, Vertex};
 
 use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface};
-use crate::gpu::{
-    Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error,
-};
+use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
 
 /// One bottom-level structure of the map.
 pub struct StaticBlas {
@@ -62,8 +61,11 @@ struct Grouped {
     skies: Vec<SkyRecord>,
 }
 
+/// Surfaces of one structure with the material that is drawn for each.
+type Members<'a> = Vec<(&'a StaticSurface, u32, MaterialInfo)>;
+
 fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
-    let mut sorted: BTreeMap<(u32, Kind), Vec<(&StaticSurface, u32, MaterialInfo)>> = BTreeMap::new();
+    let mut sorted: BTreeMap<(u32, Kind), Members<'_>> = BTreeMap::new();
     for surface in &scene.surfaces {
         let (material, info) = materials.info(surface.material);
         if let Some(kind) = Kind::of(info.flags) {
@@ -79,7 +81,11 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
     let mut sky_of_material: BTreeMap<u32, u32> = BTreeMap::new();
     for (key, mut list) in sorted {
         // in the engine's order, so that a later primitive is one that is drawn later; stable, as its order is
-        list.sort_by(|a, b| a.2.sort.total_cmp(&b.2.sort).then(a.2.order.cmp(&b.2.order)));
+        list.sort_by(|a, b| {
+            a.2.sort
+                .total_cmp(&b.2.sort)
+                .then(a.2.order.cmp(&b.2.order))
+        });
         let first = grouped.triangles.len();
         for (surface, material, info) in list {
             let lightmap = if key.1 == Kind::Sky {
@@ -137,6 +143,14 @@ impl StaticGeometry {
             BufferUsage::ACCEL_INPUT,
             &indices,
         )?;
+        // of their own, because only these need to be readable by builds
+        let positions: Vec<Vec3> = scene.vertices.iter().map(|v| v.position).collect();
+        let position_buffer = Buffer::with_data(
+            device,
+            "trace static positions",
+            BufferUsage::ACCEL_INPUT,
+            &positions,
+        )?;
         let triangles = Buffer::with_data(
             device,
             "trace static triangles",
@@ -157,10 +171,12 @@ impl StaticGeometry {
                 blas: Blas::new(device, &format!("trace model {model} {kind:?}"), flags),
             });
             geometries.push([BlasGeometry {
-                vertex_address: scene.vertex_address,
-                vertex_stride: size_of::<Vertex>() as u64,
-                max_vertex: u32::try_from(scene.vertices.len().saturating_sub(1)).unwrap_or(u32::MAX),
-                index_address: index_buffer.address() + (group.first * size_of::<[u32; 3]>()) as u64,
+                vertex_address: position_buffer.address(),
+                vertex_stride: size_of::<Vec3>() as u64,
+                max_vertex: u32::try_from(scene.vertices.len().saturating_sub(1))
+                    .unwrap_or(u32::MAX),
+                index_address: index_buffer.address()
+                    + (group.first * size_of::<[u32; 3]>()) as u64,
                 triangle_count: u32::try_from(group.count).unwrap_or(u32::MAX),
                 opaque: matches!(kind, Kind::Opaque | Kind::Sky),
                 no_duplicate_any_hit: kind == Kind::Translucent,

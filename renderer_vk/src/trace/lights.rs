@@ -171,7 +171,9 @@ fn tree(bsp: &Bsp) -> (Vec<t::BspNode>, Vec<i32>) {
         .nodes
         .iter()
         .map(|node| {
-            let plane = usize::try_from(node.plane).ok().and_then(|i| bsp.planes.get(i));
+            let plane = usize::try_from(node.plane)
+                .ok()
+                .and_then(|i| bsp.planes.get(i));
             t::BspNode {
                 plane: plane.map_or([0.0; 4], |p| [p.normal.x, p.normal.y, p.normal.z, p.dist]),
                 children: node.children,

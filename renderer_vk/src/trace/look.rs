@@ -119,19 +119,40 @@ impl TraceLook {
             return Ok(());
         };
         // what lies outside of the target is not traced, unless the view begins to its left or above
-        let room = |size: u32, start: i32| i64::from(size) - i64::from(start.min(0)) - i64::from(start.max(0));
-        if width == 0 || height == 0 || room(target.width(), x) <= 0 || room(target.height(), y) <= 0 {
+        let room = |size: u32, start: i32| {
+            i64::from(size) - i64::from(start.min(0)) - i64::from(start.max(0))
+        };
+        if width == 0
+            || height == 0
+            || room(target.width(), x) <= 0
+            || room(target.height(), y) <= 0
+        {
             return Ok(());
         }
         let size = [width, height];
-        if !self.targets.as_ref().is_some_and(|t| [t.width, t.height] == size) {
+        if self
+            .targets
+            .as_ref()
+            .is_none_or(|t| [t.width, t.height] != size)
+        {
             self.targets = Some(Targets::new(&self.device, width, height)?);
             self.accumulated = (0, 0);
         }
         let map = map.filter(|_| view.has_world);
         let accumulated = self.accumulated_before(view, materials, settings);
-        let accel = self.accel.record(rec, view, map.map(|m| m.geometry), materials)?;
-        let params = self.params(rec, view, map, materials, settings, target, accel, accumulated)?;
+        let accel = self
+            .accel
+            .record(rec, view, map.map(|m| m.geometry), materials)?;
+        let params = self.params(
+            rec,
+            view,
+            map,
+            materials,
+            settings,
+            target,
+            accel,
+            accumulated,
+        )?;
         let address = rec.arena().push(&[params])?;
 
         self.primary.record(rec, address, size)?;
@@ -150,13 +171,22 @@ impl TraceLook {
     }
 
     /// Number of frames that the accumulated sum holds before this one; 0 if anything that shows has changed.
-    fn accumulated_before(&mut self, view: &ViewScene, materials: &dyn MaterialTable, settings: &Settings) -> u32 {
+    fn accumulated_before(
+        &mut self,
+        view: &ViewScene,
+        materials: &dyn MaterialTable,
+        settings: &Settings,
+    ) -> u32 {
         if !settings.rt_reference {
             self.accumulated = (0, 0);
             return 0;
         }
         let key = content_hash(view, materials, settings);
-        let before = if self.accumulated.0 == key { self.accumulated.1 } else { 0 };
+        let before = if self.accumulated.0 == key {
+            self.accumulated.1
+        } else {
+            0
+        };
         self.accumulated = (key, before.saturating_add(1));
         before
     }
@@ -202,7 +232,13 @@ impl TraceLook {
         let exposure_blend = if settings.rt_reference || !self.exposure_started {
             1.0
         } else {
-            1.0 - (-EXPOSURE_RATE * if passed > 0.0 { passed.min(1.0) } else { 1.0 / 60.0 }).exp()
+            1.0 - (-EXPOSURE_RATE
+                * if passed > 0.0 {
+                    passed.min(1.0)
+                } else {
+                    1.0 / 60.0
+                })
+            .exp()
         };
         Ok(TraceView {
             geometries: accel.geometries,
@@ -230,7 +266,11 @@ impl TraceLook {
             target_y: camera.viewport[1],
             scene: accel.scene,
             flags,
-            seed: if settings.rt_reference { accumulated } else { self.frame },
+            seed: if settings.rt_reference {
+                accumulated
+            } else {
+                self.frame
+            },
             accumulated,
             time: view.time,
             pixel_spread: pixel_spread(camera.tan_y, targets.height),
@@ -318,16 +358,33 @@ fn content_hash(view: &ViewScene, materials: &dyn MaterialTable, settings: &Sett
     bytemuck::cast_slice::<_, u8>(&view.vertices).hash(&mut hasher);
     view.indices.hash(&mut hasher);
     for mesh in &view.meshes {
-        (mesh.first_index, mesh.index_count, mesh.material, mesh.instance).hash(&mut hasher);
+        (
+            mesh.first_index,
+            mesh.index_count,
+            mesh.material,
+            mesh.instance,
+        )
+            .hash(&mut hasher);
     }
     for submodel in &view.submodels {
         (submodel.model, submodel.instance).hash(&mut hasher);
     }
     view.has_world.hash(&mut hasher);
     materials.generation().hash(&mut hasher);
-    (settings.rt_max_depth, settings.rt_bounces, settings.fast_sky, settings.fullbright).hash(&mut hasher);
+    (
+        settings.rt_max_depth,
+        settings.rt_bounces,
+        settings.fast_sky,
+        settings.fullbright,
+    )
+        .hash(&mut hasher);
     (settings.dynamic_light, settings.no_portals).hash(&mut hasher);
     // estimators with the same mean could go on together, but a comparison wants them apart
-    (settings.rt_light_sampling as u32, settings.rt_samples, settings.rt_candidates).hash(&mut hasher);
+    (
+        settings.rt_light_sampling as u32,
+        settings.rt_samples,
+        settings.rt_candidates,
+    )
+        .hash(&mut hasher);
     hasher.finish()
 }

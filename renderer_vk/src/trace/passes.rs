@@ -153,8 +153,18 @@ impl Exposure {
     /// The driver refuses a pipeline.
     pub fn new(device: &Device) -> Result<Self, Error> {
         Ok(Self {
-            histogram: ComputePipeline::new(device, "trace_histogram", &shaders::TRACE_HISTOGRAM_COMP, &[])?,
-            adapt: ComputePipeline::new(device, "trace_exposure", &shaders::TRACE_EXPOSURE_COMP, &[])?,
+            histogram: ComputePipeline::new(
+                device,
+                "trace_histogram",
+                &shaders::TRACE_HISTOGRAM_COMP,
+                &[],
+            )?,
+            adapt: ComputePipeline::new(
+                device,
+                "trace_exposure",
+                &shaders::TRACE_EXPOSURE_COMP,
+                &[],
+            )?,
         })
     }
 
@@ -167,7 +177,11 @@ impl Exposure {
         let mut pass = rec.pass("trace_exposure", Access::COMPUTE, Access::COMPUTE)?;
         pass.bind_compute(&self.histogram);
         pass.push(&view);
-        pass.dispatch(size[0].div_ceil(HISTOGRAM_TILE), size[1].div_ceil(HISTOGRAM_TILE), 1);
+        pass.dispatch(
+            size[0].div_ceil(HISTOGRAM_TILE),
+            size[1].div_ceil(HISTOGRAM_TILE),
+            1,
+        );
         pass.barrier();
         pass.bind_compute(&self.adapt);
         pass.push(&view);

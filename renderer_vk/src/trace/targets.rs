@@ -32,7 +32,10 @@ impl Targets {
     pub fn new(device: &Device, width: u32, height: u32) -> Result<Self, Error> {
         let make = |name, format| {
             let usage = ImageUsage::STORAGE;
-            Image::new(device, &crate::gpu::ImageDesc::new(name, width, height, format, usage))
+            Image::new(
+                device,
+                &crate::gpu::ImageDesc::new(name, width, height, format, usage),
+            )
         };
         Ok(Self {
             width,
