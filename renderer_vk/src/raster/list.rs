@@ -1,0 +1,338 @@
+//! From visible surfaces to draw calls: groups what can be drawn at once, and gives each group one draw per stage,
+//! then its dynamic lights, then its fog, as the engine does.
+
+use shaders::types::constants as c;
+use shaders::types::{Draw, Vertex};
+
+use super::pipelines::{CullFaces, Depth, State};
+use super::sky;
+use crate::api::DynamicLight;
+use crate::assets::{Combine, Material, Materials, RasterPass};
+use crate::scene::{DrawSurface, Geometry, View, ViewScene, VisibleSky};
+use shaderscript::{Cull, sort};
+
+/// `surfaceparm nodlight` and `surfaceparm sky`: no dynamic light falls on these.
+const NO_DYNAMIC_LIGHT: u32 = 0x20000 | 0x4;
+/// As many dynamic lights as the engine draws on surfaces: one bit each.
+const MAX_LIGHTS: usize = 32;
+
+/// The part of the depth range that a draw uses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthRange {
+    /// All of it.
+    Normal,
+    /// The nearest third: a first-person weapon does not stick in walls.
+    Near,
+    /// The far end: the sky lies behind everything.
+    Sky,
+    /// The near end: debugging lines show through everything.
+    Front,
+}
+
+/// One draw call.
+#[derive(Clone, Copy, Debug)]
+pub struct Call {
+    /// Pipeline state.
+    pub state: State,
+    /// Depth range.
+    pub range: DepthRange,
+    /// First index in [`DrawList::indices`].
+    pub first_index: u32,
+    /// Number of indices.
+    pub index_count: u32,
+    /// Index of its record in [`DrawList::draws`].
+    pub draw: u32,
+}
+
+/// The draw calls of a view and the arrays that they read. Kept between frames so that nothing is allocated anew.
+#[derive(Default)]
+pub struct DrawList {
+    /// In drawing order.
+    pub calls: Vec<Call>,
+    /// One for each call.
+    pub draws: Vec<Draw>,
+    /// Indices of all calls, into the static or the dynamic vertices.
+    pub indices: Vec<u32>,
+    /// Vertices that move: the view's, then the sky's.
+    pub vertices: Vec<Vertex>,
+}
+
+/// What a group of surfaces has in common.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Group {
+    material: u32,
+    instance: u32,
+    fog: u32,
+    lightmap: u32,
+    dynamic: bool,
+}
+
+impl Group {
+    fn of(surface: &DrawSurface) -> Self {
+        Self {
+            material: surface.material,
+            instance: surface.instance,
+            fog: surface.fog,
+            lightmap: surface.lightmap,
+            dynamic: matches!(surface.geometry, Geometry::Dynamic { .. }),
+        }
+    }
+}
+
+impl DrawList {
+    /// Empties the list.
+    pub fn clear(&mut self) {
+        self.calls.clear();
+        self.draws.clear();
+        self.indices.clear();
+        self.vertices.clear();
+    }
+
+    /// Adds everything that a view shows. `static_indices` is the world's index array; `identity_light` the
+    /// brightness of the sky box.
+    pub fn add_view(
+        &mut self,
+        scene: &ViewScene,
+        materials: &Materials,
+        static_indices: &[u32],
+        identity_light: f32,
+        show_edges: bool,
+    ) {
+        self.vertices.extend_from_slice(&scene.vertices);
+        let (before_sky, rest) = scene.surfaces.split_at(
+            scene
+                .surfaces
+                .partition_point(|s| materials.get(s.material).sort < sort::SKY),
+        );
+        self.add_surfaces(before_sky, scene, materials, static_indices, show_edges);
+        for visible in &scene.skies {
+            self.add_sky(visible, &scene.view, materials, identity_light);
+        }
+        self.add_surfaces(rest, scene, materials, static_indices, show_edges);
+    }
+
+    fn add_surfaces(
+        &mut self,
+        surfaces: &[DrawSurface],
+        scene: &ViewScene,
+        materials: &Materials,
+        static_indices: &[u32],
+        show_edges: bool,
+    ) {
+        let mut rest = surfaces;
+        while let Some(first) = rest.first() {
+            let group = Group::of(first);
+            let count = rest.iter().take_while(|s| Group::of(s) == group).count();
+            let (these, others) = rest.split_at(count);
+            rest = others;
+
+            let first_index = self.indices.len() as u32;
+            let mut lights = 0;
+            for surface in these {
+                lights |= surface.dlights;
+                let (source, first, count) = match surface.geometry {
+                    Geometry::Static { first_index, index_count } => (static_indices, first_index, index_count),
+                    Geometry::Dynamic { first_index, index_count } => {
+                        (scene.indices.as_slice(), first_index, index_count)
+                    }
+                };
+                let range = first as usize..first as usize + count as usize;
+                self.indices.extend_from_slice(source.get(range).unwrap_or_default());
+            }
+            let flags = scene.instances.get(group.instance as usize).map_or(0, |i| i.flags);
+            let range = if flags & c::INSTANCE_DEPTH_HACK != 0 {
+                DepthRange::Near
+            } else {
+                DepthRange::Normal
+            };
+            let span = (first_index, self.indices.len() as u32 - first_index);
+            self.add_group(group, materials.get(group.material), span, range, lights, scene, show_edges);
+        }
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn add_group(
+        &mut self,
+        group: Group,
+        material: &Material,
+        span: (u32, u32),
+        range: DepthRange,
+        lights: u32,
+        scene: &ViewScene,
+        show_edges: bool,
+    ) {
+        if span.1 == 0 || material.sky.is_some() {
+            return;
+        }
+        let cull = faces(material.shader.cull, scene.view.mirrored);
+        let draw = Draw {
+            material: group.material,
+            instance: group.instance,
+            lightmap: group.lightmap,
+            fog: group.fog,
+            dynamic_vertices: group.dynamic.into(),
+            ..Draw::default()
+        };
+        let opaque = material.sort <= sort::OPAQUE;
+        let first_blends = material.passes.first().is_some_and(|p| p.blend.is_some());
+        for pass in &material.passes {
+            let state = State {
+                blend: pass.blend,
+                depth: stage_depth(pass),
+                depth_write: pass.depth_write,
+                cull,
+                offset: material.polygon_offset,
+                wireframe: false,
+            };
+            let fog_adjust = if group.fog != 0 && first_blends && !opaque {
+                fog_adjust(pass.blend)
+            } else {
+                c::FOG_ADJUST_NONE
+            };
+            self.push(
+                state,
+                range,
+                span,
+                Draw { fog_adjust, ..stage_draw(pass, draw) },
+            );
+        }
+        let over = |blend, depth| State {
+            blend: Some(blend),
+            depth,
+            depth_write: false,
+            cull,
+            offset: material.polygon_offset,
+            wireframe: false,
+        };
+        if opaque && material.surface_flags & NO_DYNAMIC_LIGHT == 0 {
+            for (i, light) in scene.dlights.iter().enumerate().take(MAX_LIGHTS) {
+                if lights & (1 << i) != 0 {
+                    let state = over((light_source_factor(light), c::BLEND_ONE), Depth::Equal);
+                    self.push(state, range, span, Draw { mode: c::DRAW_LIGHT, argument: i as u32, ..draw });
+                }
+            }
+        }
+        if group.fog != 0 && (opaque || material.flags & c::MATERIAL_FOG != 0) {
+            let depth = if opaque { Depth::Equal } else { Depth::LessEqual };
+            let state = over((c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA), depth);
+            self.push(state, range, span, Draw { mode: c::DRAW_FOG, ..draw });
+        }
+        if show_edges {
+            let state = State {
+                blend: None,
+                depth: Depth::Always,
+                depth_write: false,
+                cull: CullFaces::None,
+                offset: false,
+                wireframe: true,
+            };
+            self.push(state, DepthRange::Front, span, Draw { mode: c::DRAW_PLAIN, ..draw });
+        }
+    }
+
+    fn add_sky(&mut self, visible: &VisibleSky, view: &View, materials: &Materials, identity_light: f32) {
+        let material = materials.get(visible.material);
+        let Some(sky) = &material.sky else { return };
+        let size = view.far / 1.75;
+        let grey = (identity_light.clamp(0.0, 1.0) * 255.0) as u32;
+        let color = 0xFF00_0000 | grey << 16 | grey << 8 | grey;
+        let state = |blend, depth_write| State {
+            blend,
+            depth: Depth::LessEqual,
+            depth_write,
+            cull: CullFaces::None,
+            offset: false,
+            wireframe: false,
+        };
+        let draw = Draw {
+            material: visible.material,
+            lightmap: c::NO_TEXTURE,
+            dynamic_vertices: 1,
+            ..Draw::default()
+        };
+        if let Some(images) = &sky.faces {
+            for (face, &image) in images.iter().enumerate() {
+                let span = sky::append_face(
+                    &mut self.vertices,
+                    &mut self.indices,
+                    face,
+                    view.origin,
+                    size,
+                    color,
+                    sky::Coordinates::Box,
+                );
+                let draw = Draw { mode: c::DRAW_IMAGE, argument: image, ..draw };
+                self.push(state(None, false), DepthRange::Sky, span, draw);
+            }
+        }
+        if material.passes.is_empty() {
+            return;
+        }
+        let first_index = self.indices.len() as u32;
+        for face in 0..sky::FACES - 1 {
+            let clouds = sky::Coordinates::Clouds(sky.cloud_height);
+            sky::append_face(&mut self.vertices, &mut self.indices, face, view.origin, size, color, clouds);
+        }
+        let span = (first_index, self.indices.len() as u32 - first_index);
+        for pass in &material.passes {
+            self.push(state(pass.blend, pass.depth_write), DepthRange::Sky, span, stage_draw(pass, draw));
+        }
+    }
+
+    fn push(&mut self, state: State, range: DepthRange, (first_index, index_count): (u32, u32), draw: Draw) {
+        self.calls.push(Call {
+            state,
+            range,
+            first_index,
+            index_count,
+            draw: self.draws.len() as u32,
+        });
+        self.draws.push(draw);
+    }
+}
+
+/// `draw` as a draw of the stages of `pass`.
+pub fn stage_draw(pass: &RasterPass, draw: Draw) -> Draw {
+    Draw {
+        mode: c::DRAW_STAGE,
+        stages: pass.stages,
+        stage_count: pass.stage_count,
+        combine: match pass.combine {
+            Combine::Modulate => c::COMBINE_MODULATE,
+            Combine::Add => c::COMBINE_ADD,
+        },
+        ..draw
+    }
+}
+
+/// The depth comparison of a stage.
+pub fn stage_depth(pass: &RasterPass) -> Depth {
+    match (pass.depth_test, pass.depth_equal) {
+        (false, _) => Depth::Always,
+        (true, true) => Depth::Equal,
+        (true, false) => Depth::LessEqual,
+    }
+}
+
+fn light_source_factor(light: &DynamicLight) -> u32 {
+    if light.additive { c::BLEND_ONE } else { c::BLEND_DST_COLOR }
+}
+
+/// The engine's front faces wind clockwise; a mirror turns them round.
+fn faces(cull: Cull, mirrored: bool) -> CullFaces {
+    match (cull, mirrored) {
+        (Cull::None, _) => CullFaces::None,
+        (Cull::Front, false) | (Cull::Back, true) => CullFaces::CounterClockwise,
+        (Cull::Back, false) | (Cull::Front, true) => CullFaces::Clockwise,
+    }
+}
+
+/// Which channels fog scales on a blended stage, by the way it blends.
+fn fog_adjust(blend: Option<(u32, u32)>) -> u32 {
+    match blend {
+        Some((c::BLEND_ONE, c::BLEND_ONE) | (c::BLEND_ZERO, c::BLEND_ONE_MINUS_SRC_COLOR)) => c::FOG_ADJUST_RGB,
+        Some((c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA)) => c::FOG_ADJUST_ALPHA,
+        Some((c::BLEND_ONE, c::BLEND_ONE_MINUS_SRC_ALPHA)) => c::FOG_ADJUST_RGBA,
+        _ => c::FOG_ADJUST_NONE,
+    }
+}

@@ -1,0 +1,192 @@
+//! The classic look: multi-stage materials with lightmaps as the engine's own renderer draws them, and the 2D overlay
+//! that both looks share.
+//!
+//! Colours stay as displayed (encoded) throughout: the target is RGBA8 without conversion, and stages blend in that
+//! space, as they do in the engine.
+
+mod list;
+mod overlay;
+mod pipelines;
+mod present;
+pub(crate) mod sky;
+
+use glam::{Mat4, Vec3};
+use shaders::types::{Instance, MaterialBuffers, RasterLight, RasterView};
+
+pub use list::DrawList;
+pub use overlay::{Overlay, Picture2d, overlay_instance};
+pub use present::Present;
+
+use crate::api::DynamicLight;
+use crate::gpu::{self, Device, Format, Image, Recorder, Rendering, Viewport};
+use list::DepthRange;
+use pipelines::Pipelines;
+
+/// Format of the frame's colour image.
+pub const COLOR_FORMAT: Format = Format::Rgba8;
+/// Format of the frame's depth image.
+pub const DEPTH_FORMAT: Format = Format::D32F;
+
+/// Where a view is drawn.
+#[derive(Clone, Copy)]
+pub struct Target<'a> {
+    /// Colour, RGBA8.
+    pub color: &'a Image,
+    /// Depth.
+    pub depth: &'a Image,
+}
+
+/// What a draw list needs besides itself.
+pub struct ViewParameters<'a> {
+    /// World to clip space.
+    pub world_to_clip: Mat4,
+    /// Only the positive side of `xyz.p = w` shows; zero: everything.
+    pub clip_plane: [f32; 4],
+    /// Eye.
+    pub eye: Vec3,
+    /// View direction.
+    pub forward: Vec3,
+    /// See [`RasterView::identity_light`].
+    pub identity_light: f32,
+    /// Materials.
+    pub materials: MaterialBuffers,
+    /// Address of the world's vertices, or 0.
+    pub static_vertices: u64,
+    /// Address of the fog volumes, or 0.
+    pub fogs: u64,
+    /// Instances of the view.
+    pub instances: &'a [Instance],
+    /// Dynamic lights.
+    pub lights: &'a [DynamicLight],
+    /// Pixels from the left and the top, width, height.
+    pub viewport: [i32; 4],
+    /// Depth starts afresh (3D views; the overlay draws over what is there).
+    pub clear_depth: bool,
+    /// Colour that the viewport is filled with first.
+    pub clear_color: Option<[f32; 4]>,
+}
+
+/// Draws [`DrawList`]s.
+pub struct Raster {
+    pipelines: Pipelines,
+}
+
+impl Raster {
+    /// Makes the shared objects; pipelines follow when first used.
+    pub fn new(device: &Device) -> Self {
+        Self {
+            pipelines: Pipelines::new(device, COLOR_FORMAT, DEPTH_FORMAT, (-1.0, -2.0)),
+        }
+    }
+
+    /// The decals' depth offset.
+    pub fn set_offset(&mut self, factor: f32, units: f32) {
+        self.pipelines.set_offset((factor, units));
+    }
+
+    /// Records a draw list as one pass called `name`.
+    ///
+    /// # Errors
+    /// The device is out of memory or cannot make a pipeline.
+    pub fn record(
+        &mut self,
+        recorder: &mut Recorder,
+        name: &str,
+        target: Target<'_>,
+        list: &DrawList,
+        p: &ViewParameters<'_>,
+    ) -> Result<(), gpu::Error> {
+        for call in &list.calls {
+            self.pipelines.prepare(call.state)?;
+        }
+        let lights: Vec<RasterLight> = p
+            .lights
+            .iter()
+            .map(|l| RasterLight {
+                origin: l.origin,
+                radius: l.radius,
+                color: l.color,
+            })
+            .collect();
+        let arena = recorder.arena();
+        let view = RasterView {
+            world_to_clip: p.world_to_clip.to_cols_array_2d(),
+            clip_plane: p.clip_plane,
+            eye: p.eye,
+            forward: p.forward,
+            identity_light: p.identity_light,
+            materials: p.materials,
+            static_vertices: p.static_vertices,
+            dynamic_vertices: arena.push(&list.vertices)?,
+            instances: arena.push(p.instances)?,
+            draws: arena.push(&list.draws)?,
+            fogs: p.fogs,
+            lights: arena.push(&lights)?,
+        };
+        let view = arena.push(&[view])?;
+        let indices = arena.alloc(std::mem::size_of_val(list.indices.as_slice()).max(4) as u64, 16)?;
+        let bytes: &[u8] = bytemuck::cast_slice(&list.indices);
+        if let Some(out) = indices.bytes().get_mut(..bytes.len()) {
+            out.copy_from_slice(bytes);
+        }
+
+        let mut pass = recorder.pass(
+            name,
+            gpu::Access::GRAPHICS,
+            gpu::Access::GRAPHICS,
+        )?;
+        pass.begin_rendering(&Rendering {
+            color: Some(target.color),
+            depth: Some(target.depth),
+            clear_color: None,
+            clear_depth: None,
+        })?;
+        let [x, y, width, height] = clip_to(p.viewport, target.color);
+        if width == 0 || height == 0 {
+            return Ok(());
+        }
+        pass.set_scissor(x, y, width, height);
+        if let Some(color) = p.clear_color {
+            pass.clear_color_rect([x, y, width as i32, height as i32], color);
+        }
+        if p.clear_depth {
+            pass.clear_depth_rect([x, y, width as i32, height as i32], 1.0);
+        }
+        pass.bind_index_buffer(indices.buffer(), indices.offset());
+        let mut state = None;
+        let mut range = None;
+        for call in &list.calls {
+            if state != Some(call.state) {
+                let Some(pipeline) = self.pipelines.get(&call.state) else { continue };
+                pass.bind_graphics(pipeline);
+                pass.push(&view);
+                state = Some(call.state);
+            }
+            if range != Some(call.range) {
+                let (min_depth, max_depth) = match call.range {
+                    DepthRange::Normal => (0.0, 1.0),
+                    DepthRange::Near => (0.0, 0.3),
+                    DepthRange::Sky => (1.0, 1.0),
+                    DepthRange::Front => (0.0, 0.0),
+                };
+                let [x, y, width, height] = p.viewport.map(|v| v as f32);
+                pass.set_viewport(&Viewport { x, y, width, height, min_depth, max_depth });
+                range = Some(call.range);
+            }
+            pass.draw_indexed(call.index_count, 1, call.first_index, 0, call.draw);
+        }
+        Ok(())
+    }
+}
+
+/// The part of a rectangle that lies within the image.
+fn clip_to([x, y, width, height]: [i32; 4], image: &Image) -> [u32; 4] {
+    let clip = |start: i32, size: i32, limit: u32| {
+        let from = start.clamp(0, limit as i32);
+        let to = start.saturating_add(size.max(0)).clamp(from, limit as i32);
+        (from as u32, (to - from) as u32)
+    };
+    let (x, width) = clip(x, width, image.width());
+    let (y, height) = clip(y, height, image.height());
+    [x, y, width, height]
+}

@@ -1,0 +1,162 @@
+//! The 2D overlay: pictures in window pixels, drawn in the order of the calls, through the same draw list.
+
+use glam::{Vec2, Vec3};
+use shaders::types::constants as c;
+use shaders::types::{Draw, Instance, Vertex};
+
+use super::list::{Call, DepthRange, DrawList, stage_depth, stage_draw};
+use super::pipelines::{CullFaces, Depth, State};
+use crate::assets::Materials;
+
+/// What a picture shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Content {
+    Material(u32),
+    /// A bindless texture (cinematics), clamped and without mip levels.
+    Texture(u32),
+}
+
+/// A run of pictures with the same content.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    content: Content,
+    first: u32,
+    count: u32,
+}
+
+/// The pictures queued since the last 3D view.
+#[derive(Default)]
+pub struct Overlay {
+    vertices: Vec<Vertex>,
+    runs: Vec<Run>,
+}
+
+/// A rectangle of window pixels (y down) with the texture coordinates of its corners.
+#[derive(Clone, Copy, Debug)]
+pub struct Picture2d {
+    /// Left, top.
+    pub position: Vec2,
+    /// Width and height; with one of them negative nothing is drawn, as in the engine.
+    pub size: Vec2,
+    /// Texture coordinates of the left top corner.
+    pub st1: Vec2,
+    /// Texture coordinates of the right bottom corner.
+    pub st2: Vec2,
+    /// RGBA, red in the lowest byte.
+    pub color: u32,
+}
+
+impl Overlay {
+    /// Nothing is queued.
+    pub fn is_empty(&self) -> bool {
+        self.runs.is_empty()
+    }
+
+    /// Forgets what is queued.
+    pub fn clear(&mut self) {
+        self.vertices.clear();
+        self.runs.clear();
+    }
+
+    /// Queues a picture drawn with a material.
+    pub fn add(&mut self, material: u32, picture: &Picture2d) {
+        self.push(Content::Material(material), picture);
+    }
+
+    /// Queues a plain texture.
+    pub fn add_texture(&mut self, texture: u32, picture: &Picture2d) {
+        self.push(Content::Texture(texture), picture);
+    }
+
+    fn push(&mut self, content: Content, p: &Picture2d) {
+        // such quads face away from the viewer
+        if p.size.x * p.size.y <= 0.0 {
+            return;
+        }
+        let corner = |x: f32, y: f32| Vertex {
+            position: (p.position + p.size * Vec2::new(x, y)).extend(0.0),
+            normal: Vec3::NEG_Z,
+            st: p.st1 + (p.st2 - p.st1) * Vec2::new(x, y),
+            lightmap: Vec2::ZERO,
+            color: p.color,
+        };
+        match self.runs.last_mut() {
+            Some(run) if run.content == content => run.count += 1,
+            _ => self.runs.push(Run {
+                content,
+                first: (self.vertices.len() / 4) as u32,
+                count: 1,
+            }),
+        }
+        self.vertices
+            .extend([corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)]);
+    }
+
+    /// Turns the queued pictures into draw calls.
+    pub fn draw(&self, list: &mut DrawList, materials: &Materials) {
+        list.clear();
+        list.vertices.extend_from_slice(&self.vertices);
+        for quad in 0..(self.vertices.len() / 4) as u32 {
+            let v = quad * 4;
+            list.indices.extend([v, v + 1, v + 2, v, v + 2, v + 3]);
+        }
+        for run in &self.runs {
+            let mut push = |state: State, draw: Draw| {
+                list.calls.push(Call {
+                    state,
+                    range: DepthRange::Normal,
+                    first_index: run.first * 6,
+                    index_count: run.count * 6,
+                    draw: list.draws.len() as u32,
+                });
+                list.draws.push(Draw {
+                    lightmap: c::NO_TEXTURE,
+                    dynamic_vertices: 1,
+                    ..draw
+                });
+            };
+            let plain = State {
+                blend: None,
+                depth: Depth::Always,
+                depth_write: false,
+                cull: CullFaces::None,
+                offset: false,
+                wireframe: false,
+            };
+            match run.content {
+                Content::Texture(texture) => push(
+                    plain,
+                    Draw {
+                        mode: c::DRAW_IMAGE,
+                        argument: texture,
+                        ..Draw::default()
+                    },
+                ),
+                Content::Material(index) => {
+                    for pass in &materials.get(index).passes {
+                        let state = State {
+                            blend: pass.blend,
+                            depth: stage_depth(pass),
+                            depth_write: pass.depth_write && pass.depth_test,
+                            ..plain
+                        };
+                        let draw = Draw { material: index, ..Draw::default() };
+                        push(state, stage_draw(pass, draw));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The one instance of the overlay: no transform, shader time in seconds.
+pub fn overlay_instance(time: f32) -> Instance {
+    Instance {
+        axis: [Vec3::X, Vec3::Y, Vec3::Z],
+        viewer: Vec3::new(0.0, 0.0, -1.0),
+        color: [1.0; 4],
+        time,
+        ambient: Vec3::ONE,
+        ..Instance::default()
+    }
+}

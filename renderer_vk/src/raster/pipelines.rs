@@ -1,0 +1,138 @@
+//! The pipelines of the classic look: one for each combination of state that a stage asks for, made when first used.
+
+use std::collections::HashMap;
+
+use shaders::types::constants as c;
+
+use crate::gpu::{
+    self, BlendFactor, Cull, DepthTest, Device, Format, GraphicsDesc, GraphicsPipeline,
+};
+
+/// Fixed-function state of a draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct State {
+    /// Source and destination factor, `BLEND_*`; `None` overwrites.
+    pub blend: Option<(u32, u32)>,
+    /// Depth comparison.
+    pub depth: Depth,
+    /// Whether depth is written.
+    pub depth_write: bool,
+    /// Faces that are not drawn.
+    pub cull: CullFaces,
+    /// Decal offset.
+    pub offset: bool,
+    /// Edges only.
+    pub wireframe: bool,
+}
+
+/// Depth comparison of a draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Depth {
+    /// None.
+    Always,
+    /// Nearer or the same.
+    LessEqual,
+    /// The same.
+    Equal,
+}
+
+/// Which faces are dropped. The engine's front faces wind clockwise on the screen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CullFaces {
+    /// None.
+    None,
+    /// Those that wind clockwise.
+    Clockwise,
+    /// Those that wind counter-clockwise.
+    CounterClockwise,
+}
+
+fn factor(blend: u32) -> BlendFactor {
+    match blend {
+        c::BLEND_ZERO => BlendFactor::Zero,
+        c::BLEND_DST_COLOR => BlendFactor::DstColor,
+        c::BLEND_ONE_MINUS_DST_COLOR => BlendFactor::OneMinusDstColor,
+        c::BLEND_SRC_ALPHA => BlendFactor::SrcAlpha,
+        c::BLEND_ONE_MINUS_SRC_ALPHA => BlendFactor::OneMinusSrcAlpha,
+        c::BLEND_DST_ALPHA => BlendFactor::DstAlpha,
+        c::BLEND_ONE_MINUS_DST_ALPHA => BlendFactor::OneMinusDstAlpha,
+        c::BLEND_SRC_ALPHA_SATURATE => BlendFactor::SrcAlphaSaturate,
+        c::BLEND_SRC_COLOR => BlendFactor::SrcColor,
+        c::BLEND_ONE_MINUS_SRC_COLOR => BlendFactor::OneMinusSrcColor,
+        _ => BlendFactor::One,
+    }
+}
+
+/// All pipelines made so far.
+pub struct Pipelines {
+    device: Device,
+    color: Format,
+    depth: Format,
+    offset: (f32, f32),
+    made: HashMap<State, GraphicsPipeline>,
+}
+
+impl Pipelines {
+    /// For targets of these formats; `offset` is the decals' factor and units.
+    pub fn new(device: &Device, color: Format, depth: Format, offset: (f32, f32)) -> Self {
+        Self {
+            device: device.clone(),
+            color,
+            depth,
+            offset,
+            made: HashMap::new(),
+        }
+    }
+
+    /// Changes the decals' offset; pipelines made with another one are dropped.
+    pub fn set_offset(&mut self, offset: (f32, f32)) {
+        if self.offset != offset {
+            self.offset = offset;
+            self.made.retain(|state, _| !state.offset);
+        }
+    }
+
+    /// Makes the pipeline of `state` unless it is there.
+    ///
+    /// # Errors
+    /// The device cannot make it.
+    pub fn prepare(&mut self, state: State) -> Result<(), gpu::Error> {
+        if self.made.contains_key(&state) {
+            return Ok(());
+        }
+        let pipeline = GraphicsPipeline::new(
+            &self.device,
+            &GraphicsDesc {
+                color: Some(self.color),
+                depth: Some(self.depth),
+                blend: state.blend.map(|(s, d)| (factor(s), factor(d))),
+                depth_test: match state.depth {
+                    Depth::Always => DepthTest::Always,
+                    Depth::LessEqual => DepthTest::LessEqual,
+                    Depth::Equal => DepthTest::Equal,
+                },
+                depth_write: state.depth_write,
+                // gpu's front is counter-clockwise as it lies on the screen
+                cull: match state.cull {
+                    CullFaces::None => Cull::None,
+                    CullFaces::Clockwise => Cull::Back,
+                    CullFaces::CounterClockwise => Cull::Front,
+                },
+                polygon_offset: state.offset.then_some(self.offset),
+                wireframe: state.wireframe && self.device.info().wireframe,
+                ..GraphicsDesc::new(
+                    "raster",
+                    &shaders::RASTER_DRAW_VERT,
+                    Some(&shaders::RASTER_DRAW_FRAG),
+                )
+            },
+        )?;
+        self.made.insert(state, pipeline);
+        Ok(())
+    }
+
+    /// The pipeline of a prepared state.
+    pub fn get(&self, state: &State) -> Option<&GraphicsPipeline> {
+        self.made.get(state)
+    }
+}

@@ -1,0 +1,94 @@
+//! The last pass: the frame's picture onto the window, through overbright bits and gamma.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::gpu::{
+    self, Access, Cull, DepthTest, Device, Format, GraphicsDesc, GraphicsPipeline, Image, Recorder,
+    Rendering, Viewport,
+};
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Parameters {
+    image: u32,
+    scale: f32,
+    inverse_gamma: f32,
+    srgb_target: u32,
+}
+
+/// Copies the frame to a target of one format.
+pub struct Present {
+    pipeline: GraphicsPipeline,
+    format: Format,
+}
+
+impl Present {
+    /// For targets of `format`.
+    ///
+    /// # Errors
+    /// The device cannot make the pipeline.
+    pub fn new(device: &Device, format: Format) -> Result<Self, gpu::Error> {
+        let pipeline = GraphicsPipeline::new(
+            device,
+            &GraphicsDesc {
+                color: Some(format),
+                depth: None,
+                blend: None,
+                depth_test: DepthTest::Always,
+                depth_write: false,
+                cull: Cull::None,
+                ..GraphicsDesc::new(
+                    "present",
+                    &shaders::RASTER_PRESENT_VERT,
+                    Some(&shaders::RASTER_PRESENT_FRAG),
+                )
+            },
+        )?;
+        Ok(Self { pipeline, format })
+    }
+
+    /// The format that it was made for.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// Records the copy of `frame` to `target`: each channel becomes `c^(1/gamma) * 2^overbright_bits`.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        frame: &Image,
+        target: &Image,
+        gamma: f32,
+        overbright_bits: u32,
+    ) -> Result<(), gpu::Error> {
+        let mut pass = recorder.pass("present", Access::GRAPHICS, Access::GRAPHICS)?;
+        pass.begin_rendering(&Rendering {
+            color: Some(target),
+            depth: None,
+            clear_color: None,
+            clear_depth: None,
+        })?;
+        let (width, height) = (target.width(), target.height());
+        pass.set_viewport(&Viewport {
+            x: 0.0,
+            y: 0.0,
+            width: width as f32,
+            height: height as f32,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        });
+        pass.set_scissor(0, 0, width, height);
+        pass.bind_graphics(&self.pipeline);
+        pass.push(&Parameters {
+            image: frame.texture_index(),
+            scale: (1 << overbright_bits.min(2)) as f32,
+            inverse_gamma: 1.0 / gamma.clamp(0.5, 3.0),
+            srgb_target: matches!(self.format, Format::Rgba8Srgb).into(),
+        });
+        pass.draw(3, 1, 0, 0);
+        Ok(())
+    }
+}
