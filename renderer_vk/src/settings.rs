@@ -86,6 +86,22 @@ pub struct Settings {
     pub offset_units: f32,
 }
 
+impl Settings {
+    /// Overbright bits in force: only a full-screen window with a gamma ramp shows colours doubled.
+    pub fn effective_overbright_bits(&self) -> u32 {
+        if self.ignore_hw_gamma || !self.fullscreen {
+            0
+        } else {
+            self.overbright_bits.min(2)
+        }
+    }
+
+    /// What the engine calls identity light: the brightness that shows as white.
+    pub fn identity_light(&self) -> f32 {
+        1.0 / (1 << self.effective_overbright_bits()) as f32
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {

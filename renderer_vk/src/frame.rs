@@ -1,0 +1,136 @@
+//! One frame: what was queued, in order. The passes of a traced view are listed in `trace`; a classic view is one pass.
+
+use glam::{Mat4, Vec3, Vec4};
+
+use crate::assets::Assets;
+use crate::gpu::{self, Image, Recorder};
+use crate::raster::{
+    DrawList, Overlay, Raster, Target, ViewParameters, overlay_instance,
+};
+use crate::scene::ViewScene;
+use crate::settings::Settings;
+use crate::trace::TraceLook;
+use crate::world::World;
+
+/// What the game asked for, in its order.
+pub enum Item {
+    /// 2D pictures, with the shader time in seconds.
+    Overlay(Overlay, f32),
+    /// A 3D view in the classic look: at most one portal view, then the view itself.
+    Classic(Vec<ViewScene>),
+    /// A 3D view in the traced look.
+    Traced(Box<ViewScene>),
+}
+
+/// What the items of a frame are drawn with and onto.
+pub struct FrameContext<'a> {
+    /// Colour image of the frame.
+    pub color: &'a Image,
+    /// Depth image of the frame.
+    pub depth: &'a Image,
+    /// Materials and textures.
+    pub assets: &'a Assets,
+    /// The map, once loaded.
+    pub world: Option<&'a World>,
+    /// Settings of the frame.
+    pub settings: &'a Settings,
+    /// The classic look.
+    pub raster: &'a mut Raster,
+    /// The traced look, where the device traces rays.
+    pub trace: Option<&'a mut TraceLook>,
+    /// Draw list, reused.
+    pub list: &'a mut DrawList,
+}
+
+impl FrameContext<'_> {
+    /// Records one item.
+    ///
+    /// # Errors
+    /// The device is out of memory or lost.
+    pub fn record(&mut self, recorder: &mut Recorder, item: &Item) -> Result<(), gpu::Error> {
+        match item {
+            Item::Overlay(overlay, time) => self.overlay(recorder, overlay, *time),
+            Item::Classic(scenes) => scenes.iter().try_for_each(|scene| self.classic(recorder, scene)),
+            Item::Traced(scene) => match (self.trace.as_deref_mut(), self.world) {
+                (Some(trace), Some(world)) => {
+                    trace.record(recorder, scene, world, self.assets, self.settings, self.color)
+                }
+                _ => Ok(()),
+            },
+        }
+    }
+
+    fn overlay(&mut self, recorder: &mut Recorder, overlay: &Overlay, time: f32) -> Result<(), gpu::Error> {
+        overlay.draw(self.list, &self.assets.materials);
+        let (width, height) = (self.color.width() as f32, self.color.height() as f32);
+        let instance = overlay_instance(time);
+        let parameters = ViewParameters {
+            // window pixels to clip space, everything at the near plane
+            world_to_clip: Mat4::from_cols(
+                Vec4::new(2.0 / width, 0.0, 0.0, 0.0),
+                Vec4::new(0.0, 2.0 / height, 0.0, 0.0),
+                Vec4::ZERO,
+                Vec4::new(-1.0, -1.0, 0.0, 1.0),
+            ),
+            clip_plane: [0.0; 4],
+            eye: Vec3::new(0.0, 0.0, -1.0),
+            forward: Vec3::Z,
+            identity_light: self.settings.identity_light(),
+            materials: self.assets.materials.addresses(),
+            static_vertices: 0,
+            fogs: 0,
+            instances: &[instance],
+            lights: &[],
+            viewport: [0, 0, width as i32, height as i32],
+            clear_depth: false,
+            clear_color: None,
+        };
+        let target = Target { color: self.color, depth: self.depth };
+        self.raster.record(recorder, "overlay", target, self.list, &parameters)
+    }
+
+    fn classic(&mut self, recorder: &mut Recorder, scene: &ViewScene) -> Result<(), gpu::Error> {
+        let settings = self.settings;
+        let world = self.world.filter(|_| scene.has_world);
+        self.list.clear();
+        self.list.add_view(
+            scene,
+            &self.assets.materials,
+            world.map_or(&[], World::indices),
+            settings.identity_light(),
+            settings.show_tris,
+        );
+        let view = &scene.view;
+        let parameters = ViewParameters {
+            world_to_clip: view.world_to_clip,
+            clip_plane: view.clip_plane.map_or([0.0; 4], |plane| plane.to_array()),
+            eye: view.origin,
+            forward: view.axis[0],
+            identity_light: settings.identity_light(),
+            materials: self.assets.materials.addresses(),
+            static_vertices: world.map_or(0, World::vertex_address),
+            fogs: world.map_or(0, World::fog_address),
+            instances: &scene.instances,
+            lights: &scene.dlights,
+            viewport: view.viewport,
+            clear_depth: true,
+            clear_color: clear_color(scene, settings),
+        };
+        let target = Target { color: self.color, depth: self.depth };
+        self.raster.record(recorder, "classic", target, self.list, &parameters)
+    }
+}
+
+/// The engine clears colour only where a setting or the game asks for it.
+pub fn clear_color(scene: &ViewScene, settings: &Settings) -> Option<[f32; 4]> {
+    if scene.def.flags & crate::api::rdflags::HYPERSPACE != 0 {
+        let grey = (scene.def.time_ms & 255) as f32 / 255.0;
+        Some([grey, grey, grey, 1.0])
+    } else if settings.clear {
+        Some([1.0, 0.0, 0.5, 1.0])
+    } else if settings.fast_sky && scene.has_world {
+        Some([0.0, 0.0, 0.0, 1.0])
+    } else {
+        None
+    }
+}

@@ -1,0 +1,613 @@
+//! The renderer as a front end sees it.
+
+use std::ffi::CString;
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+use relight::GameFiles;
+
+use crate::api::{
+    DynamicLight, MarkFragment, Orientation, Picture, PointLighting, PolyVert, RefDef, RefEntity, rdflags,
+};
+use crate::assets::Assets;
+use crate::error::Error;
+use crate::frame::{FrameContext, Item};
+use crate::gpu::{
+    Device, DeviceInfo, DeviceOptions, FrameRing, Image, ImageDesc, ImageUsage, Swapchain, SwapchainDesc,
+};
+use crate::raster::{self, DrawList, Overlay, Picture2d, Present, Raster};
+use crate::scene::{Look, Scene};
+use crate::settings::Settings;
+use crate::trace::TraceLook;
+use crate::world::World;
+
+pub use crate::gpu::WindowSource;
+
+/// How to make a renderer.
+pub struct RendererOptions {
+    /// Width of the picture, pixels.
+    pub width: u32,
+    /// Height of the picture, pixels.
+    pub height: u32,
+    /// The window to present to; `None` renders without one.
+    pub window: Option<WindowSource>,
+    /// Vulkan's validation layer.
+    pub validation: bool,
+    /// Part of the name of the device to prefer.
+    pub device: Option<String>,
+    /// Wait for the display's refresh.
+    pub vsync: bool,
+}
+
+/// Counts of one frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FrameStats {
+    /// 3D views drawn.
+    pub views: u32,
+    /// Draw calls of the classic look and the overlay.
+    pub draws: u32,
+}
+
+/// The renderer: one device, one window or none, and what the game has registered.
+pub struct Renderer {
+    // dropped in this order: what the device owns comes before it
+    trace: Option<TraceLook>,
+    world: Option<World>,
+    scene: Scene,
+    assets: Option<Assets>,
+    list: DrawList,
+    raster: Raster,
+    present: Option<Present>,
+    color: Image,
+    depth: Image,
+    swapchain: Option<Swapchain>,
+    ring: FrameRing,
+    device: Device,
+
+    files: Option<Arc<dyn GameFiles>>,
+    settings: Settings,
+    queue: Vec<Item>,
+    overlay: Overlay,
+    spare_overlays: Vec<Overlay>,
+    overlay_time: f32,
+    color_2d: u32,
+    entity_position: usize,
+    warned_no_rays: bool,
+}
+
+/// Looks for a device without making a window: what it is called and what it can do.
+///
+/// # Errors
+/// There is no Vulkan, or no device that fits; the message says which.
+pub fn probe(device: Option<&str>) -> Result<DeviceInfo, Error> {
+    Ok(Device::probe(device)?)
+}
+
+impl Renderer {
+    /// Makes the device, the swapchain if there is a window, and the frame's images. No game data is read.
+    ///
+    /// # Errors
+    /// There is no Vulkan, no device that fits, or it is out of memory.
+    pub fn new(options: RendererOptions) -> Result<Self, Error> {
+        let device_options = DeviceOptions {
+            app_name: "Relight".into(),
+            validation: options.validation,
+            prefer: options.device.clone(),
+            ..DeviceOptions::default()
+        };
+        let (device, swapchain) = match options.window {
+            Some(window) => {
+                let device = Device::with_window(&device_options, window)?;
+                let swapchain = Swapchain::new(
+                    &device,
+                    SwapchainDesc { width: options.width, height: options.height, vsync: options.vsync },
+                )?;
+                (device, Some(swapchain))
+            }
+            None => (Device::headless(&device_options)?, None),
+        };
+        let (color, depth) = frame_images(&device, options.width, options.height)?;
+        let present = match &swapchain {
+            Some(swapchain) => Some(Present::new(&device, swapchain.format())?),
+            None => None,
+        };
+        Ok(Self {
+            trace: None,
+            world: None,
+            scene: Scene::default(),
+            assets: None,
+            list: DrawList::default(),
+            raster: Raster::new(&device),
+            present,
+            color,
+            depth,
+            swapchain,
+            ring: FrameRing::new(&device, 2)?,
+            device,
+            files: None,
+            settings: Settings::default(),
+            queue: Vec::new(),
+            overlay: Overlay::default(),
+            spare_overlays: Vec::new(),
+            overlay_time: 0.0,
+            color_2d: u32::MAX,
+            entity_position: 0,
+            warned_no_rays: false,
+        })
+    }
+
+    /// The device in use.
+    pub fn device_info(&self) -> &DeviceInfo {
+        self.device.info()
+    }
+
+    /// What the validation layer has said so far.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.device.validation_messages()
+    }
+
+    /// GPU milliseconds of each pass of the newest finished frame.
+    pub fn timings(&self) -> Vec<(String, f32)> {
+        self.device.timings()
+    }
+
+    /// Changes the size of the picture.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn resize(&mut self, width: u32, height: u32) -> Result<(), Error> {
+        if (width, height) == (self.color.width(), self.color.height()) {
+            return Ok(());
+        }
+        (self.color, self.depth) = frame_images(&self.device, width, height)?;
+        if let Some(swapchain) = &mut self.swapchain {
+            swapchain.resize(width, height, self.settings.swap_interval != 0);
+        }
+        Ok(())
+    }
+
+    /// Size of the picture, pixels.
+    pub fn size(&self) -> (u32, u32) {
+        (self.color.width(), self.color.height())
+    }
+
+    // --- registration ---------------------------------------------------------------------------------------------
+
+    /// Starts afresh: forgets every model, texture, material and the map, and reads the scripts through `files`.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn begin_registration(&mut self, files: Arc<dyn GameFiles>, settings: &Settings) -> Result<(), Error> {
+        self.shutdown_registration();
+        self.settings = settings.clone();
+        self.assets = Some(Assets::new(&self.device, &*files, settings)?);
+        self.files = Some(files);
+        Ok(())
+    }
+
+    /// The game has registered everything.
+    pub fn end_registration(&mut self) {}
+
+    /// Forgets every model, texture, material and the map. May be called again and again.
+    pub fn shutdown_registration(&mut self) {
+        self.queue.clear();
+        self.overlay.clear();
+        self.scene = Scene::default();
+        self.world = None;
+        self.trace = None;
+        self.assets = None;
+        self.files = None;
+        self.entity_position = 0;
+    }
+
+    /// Handle of a material by name; `mip` is false for 2D art. 0: there is none, the default is drawn.
+    pub fn register_shader(&mut self, name: &str, mip: bool) -> i32 {
+        match (&mut self.assets, &self.files) {
+            (Some(assets), Some(files)) => assets.register_shader(&**files, name, mip),
+            _ => 0,
+        }
+    }
+
+    /// Handle of a model by file name, or `*n` for the map's inline models. 0: there is none.
+    pub fn register_model(&mut self, name: &str) -> i32 {
+        match (&mut self.assets, &self.files) {
+            (Some(assets), Some(files)) => assets.register_model(&**files, name),
+            _ => 0,
+        }
+    }
+
+    /// Handle of a `.skin` file or of a skin of one material. 0: the default.
+    pub fn register_skin(&mut self, name: &str) -> i32 {
+        match (&mut self.assets, &self.files) {
+            (Some(assets), Some(files)) => assets.register_skin(&**files, name),
+            _ => 0,
+        }
+    }
+
+    /// A pre-rendered font of a size in points (0: 12), with its glyphs' materials registered.
+    pub fn register_font(&mut self, point_size: i32) -> Option<q3model::FontInfo> {
+        match (&mut self.assets, &self.files) {
+            (Some(assets), Some(files)) => assets.register_font(&**files, point_size),
+            _ => None,
+        }
+    }
+
+    /// Loads a map (`maps/NAME.bsp`).
+    ///
+    /// # Errors
+    /// The file is missing or broken, or a map is loaded already; the message names file and place.
+    pub fn load_world(&mut self, name: &str) -> Result<(), Error> {
+        let (Some(assets), Some(files)) = (&mut self.assets, &self.files) else {
+            return Err(Error::NotRegistered);
+        };
+        if self.world.is_some() {
+            return Err(Error::WorldTwice { name: name.into() });
+        }
+        let world = World::load(&self.device, assets, &**files, name, &self.settings)?;
+        if self.device.info().ray_tracing.is_some() {
+            self.trace = Some(TraceLook::new(&self.device, &world, assets)?);
+        }
+        self.world = Some(world);
+        self.entity_position = 0;
+        Ok(())
+    }
+
+    /// Draws `new` wherever `old` would be; `old` = `new` takes that back.
+    pub fn remap_shader(&mut self, old: &str, new: &str, time_offset: Option<f32>) {
+        if let (Some(assets), Some(files)) = (&mut self.assets, &self.files) {
+            assets.remap_shader(&**files, old, new, time_offset);
+        }
+    }
+
+    // --- the scene ------------------------------------------------------------------------------------------------
+
+    /// Settings for what follows. What is latched counts at the next [`begin_registration`](Self::begin_registration).
+    pub fn set_settings(&mut self, settings: &Settings) {
+        if self.settings != *settings {
+            self.settings.clone_from(settings);
+            self.raster.set_offset(settings.offset_factor, settings.offset_units);
+        }
+    }
+
+    /// Forgets what was added since the last view.
+    pub fn clear_scene(&mut self) {
+        self.scene.clear();
+    }
+
+    /// Adds an entity to the next view.
+    pub fn add_entity(&mut self, entity: &RefEntity) {
+        self.scene.add_entity(entity);
+    }
+
+    /// Adds polygons of `verts_per_poly` corners each.
+    pub fn add_poly(&mut self, shader: i32, verts: &[PolyVert], verts_per_poly: usize) {
+        self.scene.add_poly(shader, verts, verts_per_poly);
+    }
+
+    /// Adds a dynamic light.
+    pub fn add_light(&mut self, light: DynamicLight) {
+        self.scene.add_light(light);
+    }
+
+    /// Queues a view of what was added.
+    ///
+    /// # Errors
+    /// [`Error::NoWorld`]: there is no map, and the view wants one. An entity has a kind that cannot be drawn.
+    pub fn render_scene(&mut self, def: &RefDef) -> Result<(), Error> {
+        let wants_world = def.flags & rdflags::NO_WORLD_MODEL == 0;
+        if wants_world && self.world.is_none() {
+            return Err(Error::NoWorld);
+        }
+        let Some(assets) = &mut self.assets else {
+            return Err(Error::NotRegistered);
+        };
+        self.queue_overlay();
+        let traced = self.settings.rt && wants_world;
+        if traced && self.trace.is_none() && !self.warned_no_rays {
+            self.warned_no_rays = true;
+            log::warn!(
+                "{} does not trace rays; r_rt stays without effect",
+                self.device.info().name
+            );
+        }
+        let look = if traced && self.trace.is_some() { Look::Traced } else { Look::Classic };
+        let world = self.world.as_ref();
+        let mut scenes = self.scene.gather(world, assets, &self.settings, def, look)?;
+        self.queue.push(match look {
+            Look::Classic => Item::Classic(scenes),
+            Look::Traced => match scenes.pop() {
+                Some(scene) => Item::Traced(Box::new(scene)),
+                None => return Ok(()),
+            },
+        });
+        Ok(())
+    }
+
+    // --- 2D ---------------------------------------------------------------------------------------------------------
+
+    /// Colour of the pictures that follow; `None` is white. Values become bytes as the engine makes them.
+    pub fn set_color(&mut self, rgba: Option<[f32; 4]>) {
+        self.color_2d = rgba.map_or(u32::MAX, |rgba| {
+            // truncated and wrapped, not clamped
+            u32::from_le_bytes(rgba.map(|c| (c * 255.0) as i32 as u8))
+        });
+    }
+
+    /// Draws a material in a rectangle of window pixels.
+    #[allow(clippy::too_many_arguments)]
+    pub fn stretch_pic(&mut self, x: f32, y: f32, w: f32, h: f32, s1: f32, t1: f32, s2: f32, t2: f32, shader: i32) {
+        let Some(assets) = &self.assets else { return };
+        let material = assets.materials.resolve(assets.material_of_handle(shader));
+        self.overlay.add(
+            material,
+            &Picture2d {
+                position: Vec2::new(x, y),
+                size: Vec2::new(w, h),
+                st1: Vec2::new(s1, t1),
+                st2: Vec2::new(s2, t2),
+                color: self.color_2d,
+            },
+        );
+    }
+
+    /// Draws RGBA8 pixels, stretched to a rectangle of the window.
+    ///
+    /// # Errors
+    /// The picture's size is not a power of two, or the data is too short.
+    #[allow(clippy::too_many_arguments)]
+    pub fn stretch_raw(
+        &mut self,
+        x: i32,
+        y: i32,
+        w: i32,
+        h: i32,
+        cols: u32,
+        rows: u32,
+        rgba: &[u8],
+        client: usize,
+        dirty: bool,
+    ) -> Result<(), Error> {
+        if !cols.is_power_of_two() || !rows.is_power_of_two() {
+            return Err(Error::NotPowerOfTwo { cols, rows });
+        }
+        self.upload_cinematic(cols, rows, rgba, client, dirty)?;
+        let Some(assets) = &self.assets else { return Ok(()) };
+        let grey = (self.settings.identity_light() * 255.0) as u8;
+        let half = Vec2::new(0.5 / cols as f32, 0.5 / rows as f32);
+        self.overlay.add_texture(
+            assets.textures.scratch(client),
+            &Picture2d {
+                position: Vec2::new(x as f32, y as f32),
+                size: Vec2::new(w as f32, h as f32),
+                st1: half,
+                st2: Vec2::ONE - half,
+                color: u32::from_le_bytes([grey, grey, grey, 255]),
+            },
+        );
+        Ok(())
+    }
+
+    /// Replaces the picture of a cinematic.
+    ///
+    /// # Errors
+    /// The data is shorter than the size says, or the device is out of memory.
+    pub fn upload_cinematic(
+        &mut self,
+        cols: u32,
+        rows: u32,
+        rgba: &[u8],
+        client: usize,
+        dirty: bool,
+    ) -> Result<(), Error> {
+        match &mut self.assets {
+            Some(assets) => assets.textures.upload_scratch(client, cols, rows, rgba, dirty),
+            None => Ok(()),
+        }
+    }
+
+    // --- the frame --------------------------------------------------------------------------------------------------
+
+    /// Starts a frame; `time_ms` is the time that 2D materials see.
+    pub fn begin_frame(&mut self, time_ms: i32) {
+        self.overlay_time = time_ms as f32 * 0.001;
+    }
+
+    fn queue_overlay(&mut self) {
+        if !self.overlay.is_empty() {
+            let empty = self.spare_overlays.pop().unwrap_or_default();
+            let overlay = std::mem::replace(&mut self.overlay, empty);
+            self.queue.push(Item::Overlay(overlay, self.overlay_time));
+        }
+    }
+
+    /// Draws what is queued, and shows it.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn end_frame(&mut self) -> Result<FrameStats, Error> {
+        let stats = self.flush(true)?;
+        self.scene.end_frame();
+        Ok(stats)
+    }
+
+    fn flush(&mut self, show: bool) -> Result<FrameStats, Error> {
+        self.queue_overlay();
+        let mut stats = FrameStats::default();
+        let mut recorder = self.ring.begin()?;
+        if let Some(assets) = &mut self.assets {
+            assets.upload(&self.device)?;
+            let mut context = FrameContext {
+                color: &self.color,
+                depth: &self.depth,
+                assets,
+                world: self.world.as_ref(),
+                settings: &self.settings,
+                raster: &mut self.raster,
+                trace: self.trace.as_mut(),
+                list: &mut self.list,
+            };
+            for item in &self.queue {
+                context.record(&mut recorder, item)?;
+                stats.views += u32::from(!matches!(item, Item::Overlay(..)));
+                stats.draws += context.list.calls.len() as u32;
+            }
+        }
+        for item in self.queue.drain(..) {
+            if let Item::Overlay(mut overlay, _) = item {
+                overlay.clear();
+                self.spare_overlays.push(overlay);
+            }
+        }
+        match &mut self.swapchain {
+            Some(swapchain) if show => {
+                if let Some(target) = swapchain.acquire(&mut recorder)? {
+                    // a new format comes with a new swapchain
+                    if self.present.as_ref().is_none_or(|p| p.format() != target.format()) {
+                        self.present = Some(Present::new(&self.device, target.format())?);
+                    }
+                    if let Some(present) = &self.present {
+                        let bits = self.settings.effective_overbright_bits();
+                        present.record(&mut recorder, &self.color, &target, self.settings.gamma, bits)?;
+                    }
+                }
+                self.ring.end_present(recorder, swapchain)?;
+            }
+            _ => self.ring.end(recorder)?,
+        }
+        Ok(stats)
+    }
+
+    /// The picture as it stands after everything queued so far, as the display shows it.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn read_pixels(&mut self) -> Result<Picture, Error> {
+        self.flush(false)?;
+        let (width, height) = self.size();
+        let rgba = self.device.read_image(&self.color)?;
+        let (gamma, bits) = (self.settings.gamma.clamp(0.5, 3.0), self.settings.effective_overbright_bits());
+        let table: Vec<u8> = (0..256)
+            .map(|i| {
+                let value = (i as f32 / 255.0).powf(1.0 / gamma) * 255.0 + 0.5;
+                ((value as u32) << bits).min(255) as u8
+            })
+            .collect();
+        let rgb = rgba
+            .chunks_exact(4)
+            .flat_map(|p| [p[0], p[1], p[2]])
+            .map(|v| table[usize::from(v)])
+            .collect();
+        Ok(Picture { width, height, rgb })
+    }
+
+    // --- queries ----------------------------------------------------------------------------------------------------
+
+    /// Light of the map's grid at a point; `None` without a map or grid.
+    pub fn light_for_point(&self, point: Vec3) -> Option<PointLighting> {
+        self.world.as_ref()?.light_for_point(point, &self.settings)
+    }
+
+    /// The pieces of the map that a decal's polygon covers, projected along `projection`.
+    pub fn mark_fragments(
+        &self,
+        points: &[Vec3],
+        projection: Vec3,
+        max_points: usize,
+        max_fragments: usize,
+    ) -> (Vec<Vec3>, Vec<MarkFragment>) {
+        match (&self.world, &self.assets) {
+            (Some(world), Some(assets)) => {
+                world.mark_fragments(assets, &self.settings, points, projection, max_points, max_fragments)
+            }
+            _ => (Vec::new(), Vec::new()),
+        }
+    }
+
+    /// Where a model's tag is between two frames (`frac` weighs the end frame); `None`: no such model or tag.
+    pub fn lerp_tag(&self, model: i32, start: i32, end: i32, frac: f32, name: &str) -> Option<Orientation> {
+        self.assets.as_ref()?.models.lerp_tag(model, start, end, frac, name)
+    }
+
+    /// Bounds of a model's first frame, or of an inline model.
+    pub fn model_bounds(&self, model: i32) -> (Vec3, Vec3) {
+        match &self.assets {
+            Some(assets) => assets.models.bounds(model, self.world.as_ref()),
+            None => (Vec3::ZERO, Vec3::ZERO),
+        }
+    }
+
+    /// Cluster of the leaf at a point; -1: none.
+    pub fn leaf_cluster(&self, point: Vec3) -> i32 {
+        self.world.as_ref().map_or(-1, |world| world.leaf_cluster(point))
+    }
+
+    /// Whether the map's visibility lets cluster `a` see cluster `b`.
+    pub fn cluster_sees(&self, a: i32, b: i32) -> bool {
+        self.world.as_ref().is_none_or(|world| world.relit.bsp.cluster_sees(a, b))
+    }
+
+    /// The next token of the map's entity text; `None` at the end, after which it starts over.
+    pub fn entity_token(&mut self) -> Option<String> {
+        let world = self.world.as_ref()?;
+        let token = world.entity_token(&mut self.entity_position);
+        if token.is_none() {
+            self.entity_position = 0;
+        }
+        token
+    }
+
+    /// Name of the loaded map, as it was asked for.
+    pub fn world_name(&self) -> Option<&str> {
+        self.world.as_ref().map(|world| world.name.as_str())
+    }
+
+    /// The map, for tools.
+    pub fn world(&self) -> Option<&World> {
+        self.world.as_ref()
+    }
+
+    /// One line for each image.
+    pub fn image_list(&self) -> Vec<String> {
+        self.assets.as_ref().map_or_else(Vec::new, |a| a.textures.list())
+    }
+
+    /// One line for each material; in drawing order if `sorted`.
+    pub fn shader_list(&self, sorted: bool) -> Vec<String> {
+        self.assets.as_ref().map_or_else(Vec::new, |a| a.materials.list_lines(sorted))
+    }
+
+    /// One line for each skin and each of its surfaces.
+    pub fn skin_list(&self) -> Vec<String> {
+        self.assets.as_ref().map_or_else(Vec::new, |a| a.skins.list())
+    }
+
+    /// One line for each model.
+    pub fn model_list(&self) -> Vec<String> {
+        self.assets.as_ref().map_or_else(Vec::new, |a| a.models.list())
+    }
+}
+
+fn frame_images(device: &Device, width: u32, height: u32) -> Result<(Image, Image), Error> {
+    let (width, height) = (width.max(1), height.max(1));
+    let color = Image::new(
+        device,
+        &ImageDesc::new(
+            "frame colour",
+            width,
+            height,
+            raster::COLOR_FORMAT,
+            ImageUsage::COLOR | ImageUsage::SAMPLED | ImageUsage::STORAGE,
+        ),
+    )?;
+    let depth = Image::new(
+        device,
+        &ImageDesc::new("frame depth", width, height, raster::DEPTH_FORMAT, ImageUsage::DEPTH),
+    )?;
+    // neither the game nor the engine clears the picture before it is first seen
+    device.immediate(|recorder| {
+        let mut pass = recorder.pass("clear frame", crate::gpu::Access::NONE, crate::gpu::Access::TRANSFER)?;
+        pass.clear_image(&color, [0.0, 0.0, 0.0, 1.0]);
+        Ok(())
+    })?;
+    Ok((color, depth))
+}
