@@ -34,6 +34,7 @@ mod select;
 mod swapchain;
 mod timers;
 mod upload;
+mod window;
 
 pub use accel::{Blas, BlasBuild, BlasFlags, BlasGeometry, Instance, Tlas};
 pub use access::Access;
@@ -55,3 +56,4 @@ pub use recorder::Recorder;
 pub use select::{DeviceInfo, DeviceKind, RayTracingLimits};
 pub use shaders::Spirv;
 pub use swapchain::{Swapchain, SwapchainDesc};
+pub use window::{CreateSurface, Window};
