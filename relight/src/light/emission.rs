@@ -18,7 +18,7 @@ use crate::files::GameFiles;
 use crate::image::{self, Image};
 use crate::world::WorldMaterial;
 use glam::Vec3;
-use shaderscript::light::{SurfaceClass, classify};
+use shaderscript::light::SurfaceClass;
 use shaderscript::{Cull, Deform, Shader};
 use std::collections::HashMap;
 
@@ -66,6 +66,23 @@ pub struct Emission {
     pub turns_to_viewer: bool,
 }
 
+impl Emission {
+    /// Emission of a material, from the sides that are drawn. Sky emits to its front whatever its script says:
+    /// it is only seen from inside.
+    pub(super) fn of(material: &WorldMaterial, source: EmissionSource, strength: Vec3) -> Emission {
+        let definition = material.resolved.definition();
+        let sky = material.is_sky();
+        let turns = |d: &Deform| matches!(d, Deform::AutoSprite | Deform::AutoSprite2);
+        Emission {
+            source,
+            strength,
+            two_sided: definition.cull == Cull::None && !sky,
+            reversed: definition.cull == Cull::Back && !sky,
+            turns_to_viewer: definition.deforms.iter().any(turns),
+        }
+    }
+}
+
 /// Least mean emission (luminance, linear) that makes an opaque material without directives a light: that of
 /// a display grey of 37 %. Full-bright trim is dimmer than that; lamps, screens and lava are not.
 pub const GLOW_THRESHOLD: f32 = 0.11;
@@ -96,14 +113,6 @@ impl<'a> Finder<'a> {
     pub fn emission(&mut self, material: &WorldMaterial) -> Option<Emission> {
         let definition = material.resolved.definition();
         let sky = material.is_sky();
-        let autosprite = definition.deforms.contains(&Deform::AutoSprite);
-        let emission = |source, strength: Vec3| Emission {
-            source,
-            strength,
-            two_sided: definition.cull == Cull::None && !sky,
-            reversed: definition.cull == Cull::Back && !sky,
-            turns_to_viewer: autosprite || definition.deforms.contains(&Deform::AutoSprite2),
-        };
         let positive = |v: Option<f32>| v.filter(|v| v.is_finite() && *v > 0.0).unwrap_or(0.0);
         let surface_light = positive(definition.light.surface_light);
         let dome = if sky {
@@ -113,40 +122,69 @@ impl<'a> Finder<'a> {
         };
         if surface_light > 0.0 || dome > 0.0 {
             let color = self.light_color(definition);
-            return Some(match (sky, autosprite) {
-                (true, _) => emission(
+            let (source, strength) = if sky {
+                (
                     EmissionSource::Sky,
-                    color * (surface_light * SURFACE_LIGHT_RADIANCE + dome * SKY_LIGHT_RADIANCE),
-                ),
-                (false, true) => emission(
+                    surface_light * SURFACE_LIGHT_RADIANCE + dome * SKY_LIGHT_RADIANCE,
+                )
+            } else if definition.deforms.contains(&Deform::AutoSprite) {
+                (
                     EmissionSource::Sprite,
-                    color * (surface_light * POINT_LIGHT_INTENSITY),
-                ),
-                (false, false) => emission(
+                    surface_light * POINT_LIGHT_INTENSITY,
+                )
+            } else {
+                (
                     EmissionSource::SurfaceLight,
-                    color * (surface_light * SURFACE_LIGHT_RADIANCE),
-                ),
-            });
+                    surface_light * SURFACE_LIGHT_RADIANCE,
+                )
+            };
+            return Some(Emission::of(material, source, color * strength));
         }
-        let glow = self.glow(material)?;
-        Some(emission(EmissionSource::Glow, glow))
-    }
-
-    /// Radiance of an opaque material whose stages glow.
-    fn glow(&mut self, material: &WorldMaterial) -> Option<Vec3> {
-        let shader = &material.resolved.shader;
         let solid = matches!(
-            classify(shader).class,
+            material.class.class,
             SurfaceClass::Opaque | SurfaceClass::CutOut
         );
-        if !solid || material.resolved.fault.is_some() || material.is_sky() {
+        if !solid || sky {
             return None;
         }
-        for name in shader.image_names() {
-            self.image(name);
+        let shown = self.shown(material);
+        (luminance(shown) >= GLOW_THRESHOLD)
+            .then(|| Emission::of(material, EmissionSource::Glow, shown))
+    }
+
+    /// Mean radiance that a material's stages show where no light falls.
+    pub(super) fn shown(&mut self, material: &WorldMaterial) -> Vec3 {
+        let shader = &material.resolved.shader;
+        if material.resolved.fault.is_some() {
+            return Vec3::ZERO;
         }
-        let mean = mean_emission(shader, |name| self.images.get(name)?.as_ref());
-        (luminance(mean) >= GLOW_THRESHOLD).then_some(mean)
+        if shaderscript::light::is_glowing(shader) {
+            for name in shader.image_names() {
+                self.image(name);
+            }
+        }
+        mean_emission(shader, |name| self.images.get(name)?.as_ref())
+    }
+
+    /// Mean radiance of what a sky shows: the sides of its box that exist, and its clouds.
+    pub(super) fn sky_radiance(&mut self, material: &WorldMaterial) -> Vec3 {
+        let clouds = self.shown(material);
+        let outer = material
+            .resolved
+            .definition()
+            .sky
+            .as_ref()
+            .and_then(|sky| sky.outer.clone());
+        let mut sum = Vec3::ZERO;
+        let mut sides = 0.0f32;
+        for side in ["rt", "lf", "bk", "ft", "up", "dn"] {
+            let name = outer.as_ref().map(|outer| format!("{outer}_{side}"));
+            if let Some(image) = name.and_then(|name| self.image(&name)) {
+                sum += image.mean_linear();
+                sides += 1.0;
+            }
+        }
+        clouds + sum / sides.max(1.0)
     }
 
     /// Colour of the light that directives ask for, its largest channel 1.

@@ -44,6 +44,7 @@
 
 mod emission;
 mod entities;
+mod fallback;
 mod glow;
 mod lists;
 mod report;
@@ -55,6 +56,7 @@ pub use report::{EmitterSummary, LightReport};
 
 pub(crate) use emission::Finder;
 pub(crate) use entities::{ambient, light_entities};
+pub(crate) use fallback::rescue;
 pub(crate) use lists::Clusters;
 pub(crate) use surfaces::{place, suns};
 

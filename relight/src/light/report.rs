@@ -20,6 +20,9 @@ pub struct LightReport {
     pub mean_list_length: f64,
     /// Longest list of a cluster.
     pub longest_list: usize,
+    /// Whether directives and glowing stages gave no light at all, and weaker evidence was taken: skies and
+    /// glows as they look, flares as lamps.
+    pub fallback: bool,
     /// Visibility clusters.
     pub clusters: usize,
 }

@@ -205,6 +205,9 @@ impl RelitWorld {
             bsp,
         };
         light::place(&mut world);
+        if world.light_count() == 0 {
+            light::rescue(&mut world, &mut finder);
+        }
         world.sky = world.largest_sky();
 
         begin(Stage::LightLists);

@@ -4,6 +4,8 @@ mod fog;
 mod geometry;
 mod load;
 mod material;
+#[cfg(test)]
+mod tests;
 
 pub use fog::WorldFog;
 pub use geometry::{Flare, NO_LIGHT, WorldModel, WorldSurface, WorldVertex};
