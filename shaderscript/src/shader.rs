@@ -270,8 +270,8 @@ impl Sun {
 /// What a material tells the map compiler about light.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct LightDirectives {
-    /// `q3map_surfacelight`: light that the surface emits per area, in the compiler's units. `None` also when the
-    /// argument is not a number.
+    /// `q3map_surfacelight`: light that the surface emits per area, in the compiler's units. Lines whose
+    /// argument is no number do not count.
     pub surface_light: Option<f32>,
     /// `q3map_lightimage`: image whose average is the colour of emission.
     pub light_image: Option<String>,

@@ -153,6 +153,8 @@ fn is_space(byte: u8) -> bool {
 #[derive(Clone, Copy)]
 pub struct Lexer<'a> {
     bytes: Bytes<'a>,
+    /// The next token is the first of its line: nothing is read yet, or a line end is already consumed.
+    fresh_line: bool,
 }
 
 impl<'a> Lexer<'a> {
@@ -166,6 +168,7 @@ impl<'a> Lexer<'a> {
                 quoted: false,
                 newline: false,
             },
+            fresh_line: true,
         }
     }
 
@@ -198,7 +201,6 @@ impl<'a> Lexer<'a> {
     }
 
     fn read(&mut self, allow_line_breaks: bool) -> Option<Token> {
-        let mut starts_line = self.bytes.position == Position { line: 1, column: 1 };
         let mut passed_newline = false;
         let (first, position) = loop {
             let before = self.bytes;
@@ -209,6 +211,7 @@ impl<'a> Lexer<'a> {
             }
             if passed_newline && !allow_line_breaks {
                 self.bytes = before;
+                self.fresh_line = true;
                 return None;
             }
             if self.bytes.reading == Reading::Raw && byte == b'/' {
@@ -220,7 +223,7 @@ impl<'a> Lexer<'a> {
             }
             break (byte, position);
         };
-        starts_line |= passed_newline;
+        let starts_line = std::mem::take(&mut self.fresh_line) || passed_newline;
 
         let mut text = Vec::new();
         if first == b'"' {
@@ -260,6 +263,7 @@ impl<'a> Lexer<'a> {
         let mut text = Vec::new();
         while let Some((byte, _)) = self.bytes.next() {
             if byte == b'\n' {
+                self.fresh_line = true;
                 break;
             }
             text.push(byte);

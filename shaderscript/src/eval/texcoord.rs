@@ -4,6 +4,9 @@ use super::wave::{shape, shape_index, sine, wave};
 use crate::stage::{TcGen, TcMod, WaveFunction};
 use glam::{Vec2, Vec3};
 
+/// Smallest size that `tcMod stretch` divides by.
+const MIN_STRETCH: f32 = 1e-6;
+
 /// Texture coordinates of a stage at a vertex, before `tcMod`s.
 ///
 /// `st` and `lightmap` are the vertex's own; `position`, `normal` and `viewer` (the eye) are in entity space.
@@ -37,7 +40,7 @@ pub fn environment(position: Vec3, normal: Vec3, viewer: Vec3) -> Vec2 {
 ///
 /// * turb: s += sine((x + z) / 1024 + phase + time frequency) amplitude, t likewise with y alone
 /// * scroll and entityTranslate: adds the fraction of speed times time
-/// * stretch: by 1 / wave about (0.5, 0.5)
+/// * stretch: by 1 / wave about (0.5, 0.5); a wave nearer to 0 than 1e-6 counts as 1e-6
 /// * rotate: by -degrees times time about (0.5, 0.5), in steps of 1 / 1024 turn
 pub fn apply_tc_mods(
     tc_mods: &[TcMod],
@@ -74,7 +77,13 @@ pub fn apply_tc_mods(
         TcMod::Scroll(speed) => st + scroll(*speed),
         TcMod::EntityTranslate => st + scroll(entity_st),
         TcMod::Stretch(w) => {
-            let p = 1.0 / wave(w, time);
+            // The engine divides by zero here; a scale this large shows the image's mean just as well.
+            let size = wave(w, time);
+            let p = if size.abs() < MIN_STRETCH {
+                MIN_STRETCH.recip().copysign(size)
+            } else {
+                size.recip()
+            };
             transform(st, [[p, 0.0], [0.0, p]], Vec2::splat(0.5 - 0.5 * p))
         }
         TcMod::Transform { matrix, translate } => transform(st, *matrix, *translate),
@@ -182,6 +191,18 @@ mod tests {
             Vec2::new(0.375, 0.625),
         );
         near(one(stretch, Vec3::ZERO, 0.5), Vec2::new(0.4375, 0.5625));
+    }
+
+    #[test]
+    fn stretch_to_nothing_stays_finite() {
+        let nothing = TcMod::Stretch(Wave {
+            function: WaveFunction::Sawtooth,
+            base: 0.0,
+            amplitude: 1.0,
+            phase: 0.0,
+            frequency: 1.0,
+        });
+        assert!(one(nothing, Vec3::ZERO, 0.0).is_finite());
     }
 
     #[test]

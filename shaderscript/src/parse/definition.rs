@@ -18,8 +18,14 @@ const MAX_STAGES: usize = 8;
 /// Deformations that the engine allows.
 const MAX_DEFORMS: usize = 3;
 
+/// Faults reported for one definition; a generated file of nothing but faults must not fill the memory with them.
+const MAX_REPORTS: usize = 64;
+
 /// Why the engine gives up on a definition.
 pub(super) struct Rejection(pub(super) String);
+
+/// The reason that no author minds: tools' materials (clip, caulk ...) are written so, and the engine says nothing.
+const NOTHING_TO_DRAW: &str = "no stages, and neither sky nor fog";
 
 /// Reads one definition.
 pub(super) struct DefinitionParser<'text, 'reporter, 'file> {
@@ -30,6 +36,8 @@ pub(super) struct DefinitionParser<'text, 'reporter, 'file> {
     pub(super) at: Position,
     /// Braces open around the keyword being read.
     pub(super) depth: u32,
+    /// Faults reported so far.
+    reports: usize,
 }
 
 /// Keywords that may stand alone on a line before a stage, and all others; `q3map` and `qer` are prefixes.
@@ -80,6 +88,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
             reporter,
             at: name.position,
             depth: 0,
+            reports: 0,
         }
     }
 
@@ -87,8 +96,13 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
     pub(super) fn parse(mut self, closed: bool) -> Shader {
         if let Err(Rejection(reason)) = self.body() {
             if closed {
+                let severity = if reason == NOTHING_TO_DRAW {
+                    Severity::Note
+                } else {
+                    Severity::Error
+                };
                 self.report(
-                    Severity::Error,
+                    severity,
                     format!("{reason}; the engine rejects the definition"),
                 );
             }
@@ -99,8 +113,15 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
     }
 
     fn report(&mut self, severity: Severity, message: String) {
-        self.reporter
-            .report(severity, self.at, Some(&self.shader.name), message);
+        self.reports += 1;
+        let name = Some(self.shader.name.as_str());
+        // An error is the last fault of a definition and is always told.
+        if self.reports <= MAX_REPORTS || severity == Severity::Error {
+            self.reporter.report(severity, self.at, name, message);
+        } else if self.reports == MAX_REPORTS + 1 {
+            let message = "further faults of this definition are not listed";
+            self.reporter.report(Severity::Note, self.at, name, message);
+        }
     }
 
     pub(super) fn warn(&mut self, message: impl Into<String>) {
@@ -149,7 +170,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
             && self.shader.sky.is_none()
             && self.shader.content_flags & CONTENTS_FOG == 0
         {
-            return Err(Rejection("no stages, and neither sky nor fog".to_owned()));
+            return Err(Rejection(NOTHING_TO_DRAW.to_owned()));
         }
         Ok(())
     }
@@ -272,7 +293,8 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
             "wave" => {
                 let div = argument(self)?;
                 let spread = if div != 0.0 {
-                    1.0 / div
+                    // Finite even for the smallest number, since infinity times zero is not.
+                    (1.0 / div).clamp(f32::MIN, f32::MAX)
                 } else {
                     self.warn("deformVertexes wave: a div of 0 is not allowed, using 0.01");
                     100.0
@@ -426,7 +448,8 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
             value
         };
         match keyword.text.to_ascii_lowercase().as_str() {
-            "q3map_surfacelight" => light.surface_light = read(0),
+            // An argument that is no number leaves what an earlier line said.
+            "q3map_surfacelight" => light.surface_light = read(0).or(light.surface_light),
             "q3map_lightimage" => light.light_image = arguments.first().cloned(),
             "q3map_lightrgb" => {
                 light.light_rgb = (|| Some(Vec3::new(read(0)?, read(1)?, read(2)?)))();
