@@ -4,7 +4,9 @@
 #![deny(unsafe_code)]
 
 pub mod api;
+pub mod assets;
 pub mod gpu;
 pub mod scene;
 pub mod settings;
 pub mod trace;
+pub mod world;

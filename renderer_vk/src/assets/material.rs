@@ -1,0 +1,141 @@
+//! What a material is once it is registered: a script's definition bound to images, in the form that the passes read.
+
+use shaderscript::{Cull, Fog, Shader};
+
+/// What a surface's light comes from: part of a material's identity, as the engine's lightmap index is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LightmapClass {
+    /// A lightmap page (index 0 and above).
+    Page,
+    /// Models and sprites: lit by the light grid (index -1).
+    None,
+    /// Full light (index -2).
+    White,
+    /// Light baked into vertex colours (index -3).
+    Vertex,
+    /// Pictures on the screen (index -4).
+    TwoD,
+}
+
+impl LightmapClass {
+    /// Every class.
+    pub const ALL: [Self; 5] = [
+        Self::Page,
+        Self::None,
+        Self::White,
+        Self::Vertex,
+        Self::TwoD,
+    ];
+}
+
+/// How the two stages of a collapsed pass combine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Combine {
+    /// first x second x colour
+    Modulate,
+    /// first x colour + second
+    Add,
+}
+
+/// One drawing pass: a stage, or two that the engine draws as one with two texture units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RasterPass {
+    /// Indices of the GPU stages; the second counts only when `stage_count` is 2.
+    pub stages: [u32; 2],
+    /// 1 or 2.
+    pub stage_count: u32,
+    /// How two stages combine.
+    pub combine: Combine,
+    /// `BLEND_*` factors of source and destination; `None` overwrites.
+    pub blend: Option<(u32, u32)>,
+    /// Writes depth.
+    pub depth_write: bool,
+    /// Passes only where the depth is already this surface's.
+    pub depth_equal: bool,
+    /// `false`: drawn whatever the depth says (implicit 2D materials).
+    pub depth_test: bool,
+    /// One of the `ALPHAFUNC_*` constants.
+    pub alpha_func: u32,
+}
+
+/// `skyParms`, with its images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkyBox {
+    /// Bindless indices of the far box's sides `rt bk lf ft up dn`; `None` without a box (or when its first side is
+    /// missing: the engine then draws none).
+    pub faces: Option<[u32; 6]>,
+    /// Height of the cloud layer, units.
+    pub cloud_height: f32,
+}
+
+/// A stage that plays a video.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct VideoStage {
+    /// Index of the GPU stage.
+    pub stage: u32,
+    /// File name as written.
+    pub name: String,
+    /// The client number whose pictures it shows, see [`Textures::scratch`](super::Textures::scratch).
+    pub client: usize,
+}
+
+/// A registered material.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// Name without extension, as first asked for.
+    pub name: String,
+    /// Which of the engine's variants it is. A material of class `Page` whose script has no lightmap stage keeps its
+    /// class.
+    pub lightmap_class: LightmapClass,
+    /// The definition, detail stages dropped and stages after a missing image cut off.
+    pub shader: Shader,
+    /// It comes from a script.
+    pub explicit: bool,
+    /// The definition is unusable (rejected, or an image is missing). Skins draw what is left of it; everything else
+    /// uses the default material in its place.
+    pub defaulted: bool,
+    /// Sort value that applies.
+    pub sort: f32,
+    /// Creation order.
+    pub order: u32,
+    /// `MATERIAL_*` bits.
+    pub flags: u32,
+    /// Which faces are drawn.
+    pub cull: Cull,
+    /// Drawn slightly nearer than it is.
+    pub polygon_offset: bool,
+    /// Drawing passes of the classic look, in order.
+    pub passes: Vec<RasterPass>,
+    /// First GPU stage.
+    pub stage_first: u32,
+    /// Number of GPU stages.
+    pub stage_count: u32,
+    /// Set for skies.
+    pub sky: Option<SkyBox>,
+    /// Fog parameters, for the materials of fog brushes.
+    pub fog: Option<Fog>,
+    /// `SURF_*` bits of the script.
+    pub surface_flags: u32,
+    /// `CONTENTS_*` bits of the script.
+    pub content_flags: u32,
+    /// Distance at which an `alphaGen portal` stage hides what is behind, units; the engine's default is 256.
+    pub portal_range: f32,
+    /// Drawn instead of this one (`RemapShader`).
+    pub remapped: Option<u32>,
+    /// Seconds subtracted from shader time.
+    pub time_offset: f32,
+    /// Stages that play videos.
+    pub videos: Vec<VideoStage>,
+}
+
+impl Material {
+    /// Whether vertices move with time or view, so that its surfaces are dynamic meshes.
+    pub fn deforms(&self) -> bool {
+        !self.shader.deforms.is_empty()
+    }
+
+    /// Whether the material is a sky.
+    pub fn is_sky(&self) -> bool {
+        self.shader.sky.is_some()
+    }
+}

@@ -1,0 +1,634 @@
+//! All materials of a registration: found by name as the engine finds them, compiled to the arrays that shaders read.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::Vec3;
+use shaders::types;
+use shaderscript::{ImplicitKind, Shader, StageImage, strip_extension};
+
+use super::compile::{self, StageArrays, VideoClients};
+use super::flags;
+use super::material::{Combine, LightmapClass, Material, RasterPass, SkyBox, VideoStage};
+use super::source::{ImageFlags, ImageSource};
+use crate::gpu::{self, Buffer, BufferUsage, Device};
+
+/// Distance at which a portal without `alphaGen portal` is opaque, units: the engine's default.
+pub const DEFAULT_PORTAL_RANGE: f32 = 256.0;
+/// `clamp_time` of a material that never stops.
+const ENDLESS: f32 = 1.0e30;
+/// Suffixes of a sky box's sides, in the order of [`SkyBox::faces`].
+const SKY_SIDES: [&str; 6] = ["rt", "bk", "lf", "ft", "up", "dn"];
+
+/// What the settings say about materials; changes only at registration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MaterialSettings {
+    /// Stages marked `detail` are drawn.
+    pub detail_textures: bool,
+    /// One stage with vertex light instead of lightmaps.
+    pub vertex_light: bool,
+}
+
+/// Device addresses of the arrays. Zero before the first [`Materials::upload`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MaterialBuffers {
+    /// `types::Material`, index = material.
+    pub materials: u64,
+    /// `types::Stage`.
+    pub stages: u64,
+    /// `types::TcMod`.
+    pub tc_mods: u64,
+    /// `u32` bindless texture indices; `Stage::image_first` counts in it.
+    pub images: u64,
+}
+
+/// The arrays on the GPU.
+struct Uploaded {
+    materials: Buffer,
+    stages: Buffer,
+    tc_mods: Buffer,
+    images: Buffer,
+}
+
+/// Materials by index; 0 is the default material.
+pub struct Materials {
+    list: Vec<Material>,
+    by_key: HashMap<(String, LightmapClass), u32>,
+    arrays: StageArrays,
+    /// What the traced look adds: mean emission and radiance as a light.
+    emission: Vec<(Vec3, Vec3)>,
+    /// Indices in drawing order.
+    sorted: Vec<u32>,
+    /// Place of each material in `sorted`.
+    ranks: Vec<u32>,
+    videos: VideoClients,
+    scripts: Arc<relight::Materials>,
+    settings: MaterialSettings,
+    internal: Internal,
+    last_cloud_height: f32,
+    last_sun: Option<Vec3>,
+    uploaded: Option<Uploaded>,
+    dirty: bool,
+}
+
+/// Materials that the renderer draws with itself.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Internal {
+    /// Red, added to what is there: beams.
+    pub beam: u32,
+    /// Vertex colour: the axes that stand for a missing model.
+    pub axes: u32,
+    /// The white image with vertex colour, for the 2D overlay.
+    pub white: u32,
+}
+
+impl Materials {
+    /// The default material and the renderer's own ones. `scripts` are the game's.
+    pub fn new(
+        scripts: Arc<relight::Materials>,
+        settings: MaterialSettings,
+        source: &mut dyn ImageSource,
+    ) -> Self {
+        let mut materials = Self {
+            list: Vec::new(),
+            by_key: HashMap::new(),
+            arrays: StageArrays::default(),
+            emission: Vec::new(),
+            sorted: Vec::new(),
+            ranks: Vec::new(),
+            videos: VideoClients::default(),
+            scripts,
+            settings,
+            internal: Internal::default(),
+            last_cloud_height: 512.0,
+            last_sun: None,
+            uploaded: None,
+            dirty: true,
+        };
+        let default = internal_shader("*default", |stage| {
+            stage.image = StageImage::Map("*default".into());
+            stage.rgb_gen = shaderscript::RgbGen::Identity;
+        });
+        materials.add(
+            "*default",
+            default,
+            LightmapClass::None,
+            false,
+            None,
+            source,
+        );
+        let beam = internal_shader("*beam", |stage| {
+            stage.rgb_gen = shaderscript::RgbGen::Const(Vec3::X);
+            stage.blend = Some((
+                shaderscript::BlendFactor::One,
+                shaderscript::BlendFactor::One,
+            ));
+            stage.depth_write = false;
+        });
+        materials.internal.beam =
+            materials.add("*beam", beam, LightmapClass::None, false, None, source);
+        let axes = internal_shader("*axes", |stage| {
+            stage.rgb_gen = shaderscript::RgbGen::ExactVertex;
+        });
+        materials.internal.axes =
+            materials.add("*axes", axes, LightmapClass::None, false, None, source);
+        let mut white = Shader::implicit("*white", ImplicitKind::TwoD);
+        for stage in &mut white.stages {
+            stage.image = StageImage::White;
+        }
+        materials.internal.white =
+            materials.add("*white", white, LightmapClass::TwoD, false, None, source);
+        materials
+    }
+
+    /// The index of the material that a name stands for on surfaces of a class, compiled at its first use.
+    ///
+    /// Identity as in the engine: the name without extension, compared without case, and the class; a name that has no
+    /// usable definition is one material for all classes. `mip` matters only for names that no script defines.
+    pub fn find(
+        &mut self,
+        source: &mut dyn ImageSource,
+        name: &str,
+        class: LightmapClass,
+        mip: bool,
+    ) -> u32 {
+        if name.is_empty() {
+            return 0;
+        }
+        let class = if self.settings.vertex_light && class == LightmapClass::Page {
+            LightmapClass::Vertex
+        } else {
+            class
+        };
+        let stripped = strip_extension(name).to_ascii_lowercase();
+        if let Some(found) = self.known(&stripped, class) {
+            return found;
+        }
+        let key = (stripped, class);
+        let index = if let Some(shader) = self.scripts.library().find(name).cloned() {
+            self.add(strip_extension(name), shader, class, true, None, source)
+        } else {
+            let kind = match class {
+                LightmapClass::Page => ImplicitKind::Lightmapped,
+                LightmapClass::None => ImplicitKind::EntityLit,
+                LightmapClass::White => ImplicitKind::White,
+                LightmapClass::Vertex => ImplicitKind::Vertex,
+                LightmapClass::TwoD => ImplicitKind::TwoD,
+            };
+            let (shader, flags) = if mip {
+                (Shader::implicit(name, kind), ImageFlags::WORLD)
+            } else {
+                (Shader::implicit_no_mip(name, kind), ImageFlags::NO_MIP)
+            };
+            self.add(
+                strip_extension(name),
+                shader,
+                class,
+                false,
+                Some(flags),
+                source,
+            )
+        };
+        self.by_key.insert(key, index);
+        index
+    }
+
+    fn known(&self, stripped: &str, class: LightmapClass) -> Option<u32> {
+        let find = |class| self.by_key.get(&(stripped.to_owned(), class)).copied();
+        find(class).or_else(|| {
+            LightmapClass::ALL
+                .into_iter()
+                .filter_map(find)
+                .find(|&index| self.get(index).defaulted)
+        })
+    }
+
+    /// [`find`](Self::find), with the default material in place of an unusable one: what world and model surfaces
+    /// draw.
+    pub fn find_or_default(
+        &mut self,
+        source: &mut dyn ImageSource,
+        name: &str,
+        class: LightmapClass,
+    ) -> u32 {
+        let index = self.find(source, name, class, true);
+        if self.get(index).defaulted { 0 } else { index }
+    }
+
+    /// Binds a definition to its images and appends it.
+    fn add(
+        &mut self,
+        name: &str,
+        mut shader: Shader,
+        class: LightmapClass,
+        explicit: bool,
+        implicit: Option<ImageFlags>,
+        source: &mut dyn ImageSource,
+    ) -> u32 {
+        let mut defaulted = shader.rejected.is_some();
+        if let Some(reason) = &shader.rejected {
+            log::warn!("{name}: {reason}; the default material is drawn instead");
+        }
+        if !self.settings.detail_textures {
+            shader.stages.retain(|stage| !stage.detail);
+        }
+        if let Some(sun) = &shader.sun {
+            self.last_sun = Some(sun.direction.normalize_or_zero());
+        }
+        // the order value is decided before anything is taken away
+        let sort = shader.sort_value();
+        if self.settings.vertex_light && shader.stages.len() > 1 {
+            shader = shaderscript::collapse_vertex_light(&shader, class == LightmapClass::None);
+        }
+        let stage_first = self.arrays.stages.len();
+        let mut videos = Vec::new();
+        let mut kept = 0;
+        for stage in &shader.stages {
+            let pushed = self
+                .arrays
+                .push_stage(stage, implicit, &mut self.videos, source);
+            match pushed {
+                Ok((stage, video)) => {
+                    kept += 1;
+                    videos.extend(video.map(|(name, client)| VideoStage {
+                        stage,
+                        name,
+                        client,
+                    }));
+                }
+                Err(image) => {
+                    // menus and mods ask for pictures that do not exist all the time: only scripts are worth a warning
+                    if explicit {
+                        log::warn!(
+                            "{name}: image {image} is missing; the default material is drawn instead"
+                        );
+                    } else {
+                        log::debug!("{name}: no script and no image of that name");
+                    }
+                    defaulted = true;
+                    break;
+                }
+            }
+        }
+        shader.stages.truncate(kept);
+        let sky = shader.sky.clone().map(|sky| {
+            self.last_cloud_height = sky.cloud_height;
+            SkyBox {
+                faces: sky
+                    .outer
+                    .as_deref()
+                    .and_then(|outer| sky_faces(outer, source)),
+                cloud_height: sky.cloud_height,
+            }
+        });
+        let stage_first = u32::try_from(stage_first).unwrap_or(u32::MAX);
+        let stage_count = u32::try_from(kept).unwrap_or(0);
+        let order = u32::try_from(self.list.len()).unwrap_or(u32::MAX);
+        let portal_range = shader
+            .stages
+            .iter()
+            .find_map(|stage| match stage.alpha_gen {
+                shaderscript::AlphaGen::Portal { range } => Some(range),
+                _ => None,
+            })
+            .unwrap_or(DEFAULT_PORTAL_RANGE);
+        let mean = flags::mean_emission(&shader, class, &self.arrays, stage_first as usize, source);
+        self.emission.push((mean, Vec3::ZERO));
+        let material = Material {
+            name: name.to_owned(),
+            lightmap_class: class,
+            explicit,
+            defaulted,
+            sort,
+            order,
+            flags: flags::material_flags(&shader, class),
+            cull: shader.cull,
+            polygon_offset: shader.polygon_offset,
+            passes: passes(&shader, stage_first),
+            stage_first,
+            stage_count,
+            sky,
+            fog: shader.fog,
+            surface_flags: shader.surface_flags,
+            content_flags: shader.content_flags,
+            portal_range,
+            remapped: None,
+            time_offset: 0.0,
+            videos,
+            shader,
+        };
+        self.list.push(material);
+        self.insert_sorted(order, sort);
+        self.dirty = true;
+        order
+    }
+
+    /// Keeps the drawing order: by sort value, then by creation.
+    fn insert_sorted(&mut self, index: u32, sort: f32) {
+        let at = self
+            .sorted
+            .partition_point(|&other| self.get(other).sort.total_cmp(&sort).is_le());
+        self.sorted.insert(at, index);
+        self.ranks.resize(self.list.len(), 0);
+        for (rank, &material) in (0u32..).zip(&self.sorted).skip(at) {
+            if let Some(slot) = self.ranks.get_mut(material as usize) {
+                *slot = rank;
+            }
+        }
+    }
+
+    /// A material; the default one for an index that does not exist.
+    pub fn get(&self, index: u32) -> &Material {
+        self.list.get(index as usize).unwrap_or(&self.list[0])
+    }
+
+    /// Number of materials.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Never: the default material is always there.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// Every material in order of creation.
+    pub fn iter(&self) -> impl Iterator<Item = &Material> {
+        self.list.iter()
+    }
+
+    /// What is drawn in place of a material (`RemapShader`).
+    pub fn resolve(&self, index: u32) -> u32 {
+        let index = if (index as usize) < self.list.len() {
+            index
+        } else {
+            0
+        };
+        self.get(index).remapped.unwrap_or(index)
+    }
+
+    /// Place of a material in the drawing order.
+    pub fn rank(&self, index: u32) -> u32 {
+        self.ranks.get(index as usize).copied().unwrap_or(0)
+    }
+
+    /// Materials in drawing order.
+    pub fn sorted(&self) -> &[u32] {
+        &self.sorted
+    }
+
+    /// The renderer's own materials.
+    pub fn internal(&self) -> Internal {
+        self.internal
+    }
+
+    /// Cloud height of the sky parsed last: the engine has one cloud dome for all skies.
+    pub fn last_cloud_height(&self) -> f32 {
+        self.last_cloud_height
+    }
+
+    /// Direction towards the sun of the material parsed last that has one.
+    pub fn last_sun(&self) -> Option<Vec3> {
+        self.last_sun
+    }
+
+    /// Forgets the sun of materials parsed so far: a map begins.
+    pub fn forget_sun(&mut self) {
+        self.last_sun = None;
+    }
+
+    /// Video files in use with their client numbers.
+    pub fn videos(&self) -> impl Iterator<Item = (&str, usize)> {
+        self.videos.iter()
+    }
+
+    /// Draws `new` wherever `old` is asked for, in every class (`RemapShader`); equal names cancel. `time_offset` is
+    /// subtracted from the new material's time.
+    pub fn remap(
+        &mut self,
+        source: &mut dyn ImageSource,
+        old: &str,
+        new: &str,
+        time_offset: Option<f32>,
+    ) {
+        let stripped = |name: &str| strip_extension(name).to_ascii_lowercase();
+        let any_class = |materials: &Self, name: &str| {
+            let name = stripped(name);
+            materials
+                .list
+                .iter()
+                .find(|m| m.name.eq_ignore_ascii_case(&name))
+                .map(|m| m.order)
+        };
+        let mut usable = |materials: &mut Self, name: &str| {
+            let index = match any_class(materials, name) {
+                Some(index) => index,
+                None => materials.find(source, name, LightmapClass::None, true),
+            };
+            if index == 0 || materials.get(index).defaulted {
+                log::warn!("remap of {old} to {new}: no material {name}");
+                return None;
+            }
+            Some(index)
+        };
+        if usable(self, old).is_none() {
+            return;
+        }
+        let Some(target) = usable(self, new) else {
+            return;
+        };
+        let old = stripped(old);
+        let cancels = old == stripped(new);
+        for material in &mut self.list {
+            if material.name.eq_ignore_ascii_case(&old) {
+                material.remapped = (!cancels && material.order != target).then_some(target);
+            }
+        }
+        if let (Some(offset), Some(material)) = (time_offset, self.list.get_mut(target as usize)) {
+            material.time_offset = offset;
+            self.dirty = true;
+        }
+    }
+
+    /// Says that surfaces of a material are in the light list, and which radiance (display-white units) they have
+    /// beyond what their stages show.
+    pub fn set_emitter(&mut self, index: u32, radiance: Vec3) {
+        let slots = (
+            self.list.get_mut(index as usize),
+            self.emission.get_mut(index as usize),
+        );
+        if let (Some(material), Some((_, light))) = slots {
+            material.flags |= types::constants::MATERIAL_EMITTER;
+            *light = light.max(radiance);
+            self.dirty = true;
+        }
+    }
+
+    /// Points every stage that shows texture `old` for a client at `new`.
+    pub fn replace_scratch(&mut self, client: usize, new: u32) {
+        for material in &self.list {
+            for video in material.videos.iter().filter(|v| v.client == client) {
+                let first = self
+                    .arrays
+                    .stages
+                    .get(video.stage as usize)
+                    .map(|stage| stage.image_first as usize);
+                if let Some(image) = first.and_then(|first| self.arrays.images.get_mut(first)) {
+                    *image = new;
+                    self.dirty = true;
+                }
+            }
+        }
+    }
+
+    /// The stages, on the CPU; samplers are kinds, not bindless indices.
+    pub fn stages(&self, material: &Material) -> &[types::Stage] {
+        let first = material.stage_first as usize;
+        self.arrays
+            .stages
+            .get(first..first + material.stage_count as usize)
+            .unwrap_or_default()
+    }
+
+    /// The arrays, on the CPU.
+    pub fn arrays(&self) -> &StageArrays {
+        &self.arrays
+    }
+
+    /// Marks everything for a new upload (a change of samplers).
+    pub fn invalidate(&mut self) {
+        self.dirty = true;
+    }
+
+    /// Copies the arrays to the GPU if anything changed. `samplers` translates sampler kinds to bindless indices.
+    pub fn upload(
+        &mut self,
+        device: &Device,
+        samplers: &super::Samplers,
+    ) -> Result<(), gpu::Error> {
+        if !self.dirty && self.uploaded.is_some() {
+            return Ok(());
+        }
+        let stages: Vec<types::Stage> = self
+            .arrays
+            .stages
+            .iter()
+            .map(|stage| types::Stage {
+                sampler_index: samplers.index(stage.sampler_index),
+                ..*stage
+            })
+            .collect();
+        let materials: Vec<types::Material> = self
+            .list
+            .iter()
+            .zip(&self.emission)
+            .map(|(material, &emission)| gpu_material(material, emission))
+            .collect();
+        let usage = BufferUsage::STORAGE;
+        self.uploaded = Some(Uploaded {
+            materials: Buffer::with_data(device, "materials", usage, &materials)?,
+            stages: Buffer::with_data(device, "stages", usage, &stages)?,
+            tc_mods: Buffer::with_data(device, "tcMods", usage, &self.arrays.tc_mods)?,
+            images: Buffer::with_data(device, "stage images", usage, &self.arrays.images)?,
+        });
+        self.dirty = false;
+        Ok(())
+    }
+
+    /// Device addresses as of the last upload.
+    pub fn addresses(&self) -> MaterialBuffers {
+        self.uploaded
+            .as_ref()
+            .map_or_else(MaterialBuffers::default, |u| MaterialBuffers {
+                materials: u.materials.address(),
+                stages: u.stages.address(),
+                tc_mods: u.tc_mods.address(),
+                images: u.images.address(),
+            })
+    }
+
+    /// One line each, for `shaderlist`: stages, L with a lightmap, E when a script defines it, name.
+    pub fn list(&self, in_drawing_order: bool) -> Vec<String> {
+        let line = |m: &Material| {
+            format!(
+                "{} {} {} {}{}",
+                m.stage_count,
+                if m.lightmap_class == LightmapClass::Page {
+                    'L'
+                } else {
+                    ' '
+                },
+                if m.explicit { 'E' } else { ' ' },
+                m.name,
+                if m.defaulted { " (DEFAULTED)" } else { "" }
+            )
+        };
+        if in_drawing_order {
+            self.sorted.iter().map(|&i| line(self.get(i))).collect()
+        } else {
+            self.list.iter().map(line).collect()
+        }
+    }
+}
+
+fn gpu_material(material: &Material, (mean, light): (Vec3, Vec3)) -> types::Material {
+    types::Material {
+        stage_first: material.stage_first,
+        stage_count: material.stage_count,
+        flags: material.flags,
+        time_offset: material.time_offset,
+        clamp_time: material.shader.clamp_time.unwrap_or(ENDLESS),
+        mean_emission: mean,
+        light_radiance: light,
+    }
+}
+
+/// A material of one white stage, changed by `edit`.
+fn internal_shader(name: &str, edit: impl FnOnce(&mut shaderscript::Stage)) -> Shader {
+    let mut stage = shaderscript::Stage::default();
+    edit(&mut stage);
+    let mut shader = Shader::new(name);
+    shader.cull = shaderscript::Cull::None;
+    shader.stages.push(stage);
+    shader
+}
+
+/// The sides of a far box; a missing side is the default image, a missing first side is no box.
+fn sky_faces(outer: &str, source: &mut dyn ImageSource) -> Option<[u32; 6]> {
+    let flags = ImageFlags {
+        mipmap: true,
+        picmip: true,
+        clamp: true,
+    };
+    let faces = SKY_SIDES.map(|side| source.image(&format!("{outer}_{side}.tga"), flags));
+    faces[0]?;
+    let missing = source.default_image();
+    Some(faces.map(|face| face.unwrap_or(missing)))
+}
+
+/// The drawing passes of the classic look.
+fn passes(shader: &Shader, stage_first: u32) -> Vec<RasterPass> {
+    let index = |stage: usize| stage_first + u32::try_from(stage).unwrap_or(0);
+    shaderscript::collapse(shader)
+        .into_iter()
+        .filter_map(|pass| {
+            let stage = shader.stages.get(pass.first)?;
+            let combine = match pass.combine {
+                shaderscript::Combine::Add => Combine::Add,
+                shaderscript::Combine::None | shaderscript::Combine::Modulate => Combine::Modulate,
+            };
+            Some(RasterPass {
+                stages: [index(pass.first), index(pass.second.unwrap_or(pass.first))],
+                stage_count: if pass.second.is_some() { 2 } else { 1 },
+                combine,
+                blend: pass
+                    .blend
+                    .map(|(src, dst)| (compile::blend_factor(src), compile::blend_factor(dst))),
+                depth_write: stage.depth_write,
+                depth_equal: stage.depth_func == shaderscript::DepthFunc::Equal,
+                depth_test: stage.depth_func != shaderscript::DepthFunc::Disabled,
+                alpha_func: compile::alpha_func(stage.alpha_func),
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,153 @@
+//! What the game registers: images, materials, models, skins and fonts, as handles to data on the GPU.
+
+pub mod compile;
+mod flags;
+mod fonts;
+mod material;
+mod materials;
+mod models;
+pub mod prepare;
+mod skins;
+mod source;
+mod textures;
+
+use std::sync::Arc;
+
+use relight::GameFiles;
+
+pub use fonts::LoadedFont;
+pub use material::{Combine, LightmapClass, Material, RasterPass, SkyBox, VideoStage};
+pub use materials::{DEFAULT_PORTAL_RANGE, Internal, MaterialBuffers, MaterialSettings, Materials};
+pub use models::{MAX_LODS, Md3Lod, Model, Models};
+pub use prepare::TextureSettings;
+pub use skins::{LoadedSkin, Skins};
+pub use source::{ImageFlags, ImageSource};
+pub use textures::{Samplers, Textures};
+
+use crate::gpu::{self, Device};
+use crate::settings::Settings;
+
+/// Everything registered since the last `BeginRegistration`.
+pub struct Assets {
+    /// The GPU that it lives on.
+    pub device: Device,
+    /// Images.
+    pub textures: Textures,
+    /// Materials.
+    pub materials: Materials,
+    /// Models.
+    pub models: Models,
+    /// Skins.
+    pub skins: Skins,
+    /// Samplers of the texture mode in force.
+    pub samplers: Samplers,
+    /// The game's scripts.
+    pub scripts: Arc<relight::Materials>,
+    fonts: Vec<LoadedFont>,
+    texture_mode: String,
+    anisotropy: f32,
+}
+
+impl Assets {
+    /// Nothing but the built-in images and materials. `scripts` are the game's.
+    pub fn new(
+        device: &Device,
+        files: Arc<dyn GameFiles>,
+        scripts: Arc<relight::Materials>,
+        settings: &Settings,
+    ) -> Result<Self, gpu::Error> {
+        let samplers = Samplers::new(device, &settings.texture_mode, settings.anisotropy)?;
+        let texture_settings = TextureSettings::new(settings, MAX_TEXTURE_SIZE);
+        let mut textures = Textures::new(device, files, texture_settings)?;
+        let materials = Materials::new(
+            Arc::clone(&scripts),
+            MaterialSettings {
+                detail_textures: settings.detail_textures,
+                vertex_light: settings.vertex_light,
+            },
+            &mut textures,
+        );
+        Ok(Self {
+            device: device.clone(),
+            textures,
+            materials,
+            models: Models::default(),
+            skins: Skins::default(),
+            samplers,
+            scripts,
+            fonts: Vec::new(),
+            texture_mode: settings.texture_mode.clone(),
+            anisotropy: settings.anisotropy,
+        })
+    }
+
+    /// Registers a picture or material for the game; 0 when it is unusable. `mip`: with smaller levels, repeated.
+    pub fn register_shader(&mut self, name: &str, mip: bool) -> i32 {
+        let index = self
+            .materials
+            .find(&mut self.textures, name, LightmapClass::TwoD, mip);
+        if self.materials.get(index).defaulted {
+            return 0;
+        }
+        i32::try_from(index).unwrap_or(0)
+    }
+
+    /// Registers a model; 0 when it is unusable.
+    pub fn register_model(&mut self, name: &str) -> i32 {
+        let files = Arc::clone(self.textures.files());
+        self.models
+            .register(&*files, &mut self.materials, &mut self.textures, name)
+    }
+
+    /// Registers a skin; 0 when it is unusable.
+    pub fn register_skin(&mut self, name: &str) -> i32 {
+        let files = Arc::clone(self.textures.files());
+        self.skins
+            .register(&*files, &mut self.materials, &mut self.textures, name)
+    }
+
+    /// The material index of a handle that the game passes in; the default material for a bad one.
+    pub fn material_of_handle(&self, handle: i32) -> u32 {
+        u32::try_from(handle)
+            .ok()
+            .filter(|&index| (index as usize) < self.materials.len())
+            .unwrap_or(0)
+    }
+
+    /// `RemapShader`.
+    pub fn remap_shader(&mut self, old: &str, new: &str, time_offset: Option<f32>) {
+        self.materials
+            .remap(&mut self.textures, old, new, time_offset);
+    }
+
+    /// Shows new pixels of a cinematic, see [`Textures::update_scratch`].
+    pub fn update_scratch(
+        &mut self,
+        client: usize,
+        width: u32,
+        height: u32,
+        rgba: &[u8],
+        dirty: bool,
+    ) -> Result<(), gpu::Error> {
+        let changed = self
+            .textures
+            .update_scratch(client, width, height, rgba, dirty)?;
+        if let Some((_, new)) = changed {
+            self.materials.replace_scratch(client, new);
+        }
+        Ok(())
+    }
+
+    /// Once a frame, before anything is recorded: takes over a changed texture mode and copies changed materials.
+    pub fn prepare_frame(&mut self, settings: &Settings) -> Result<(), gpu::Error> {
+        if settings.texture_mode != self.texture_mode {
+            self.texture_mode.clone_from(&settings.texture_mode);
+            self.samplers = Samplers::new(&self.device, &self.texture_mode, self.anisotropy)?;
+            self.materials.invalidate();
+        }
+        self.materials.upload(&self.device, &self.samplers)
+    }
+}
+
+/// Largest side of a texture: what every Vulkan device has to offer.
+const MAX_TEXTURE_SIZE: u32 = 4096;

@@ -1,0 +1,285 @@
+//! An image file's pixels as the levels of a texture, by the engine's rules and the player's settings.
+//!
+//! Source: engine behaviour of `renderer_opengl1`: sides become powers of two, `r_picmip` halves, then the mip chain.
+
+use glam::Vec4;
+use relight::image::Image;
+use relight::overbright;
+
+use super::source::ImageFlags;
+use crate::settings::Settings;
+
+/// The settings that textures depend on; they change only at registration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextureSettings {
+    /// Halvings of images that allow it.
+    pub picmip: u32,
+    /// Odd sizes shrink to a power of two instead of growing.
+    pub round_down: bool,
+    /// Box filter for smaller levels; otherwise a weighted 4 x 4 one.
+    pub simple_mip_maps: bool,
+    /// Factor on the colours of mipmapped images, at least 1.
+    pub intensity: f32,
+    /// 0..1: how much colour is taken out.
+    pub greyscale: f32,
+    /// Largest side the device can have.
+    pub max_size: u32,
+}
+
+impl TextureSettings {
+    /// The part of the settings that matters here.
+    pub fn new(settings: &Settings, max_size: u32) -> Self {
+        Self {
+            picmip: settings.picmip.min(16),
+            round_down: settings.round_images_down,
+            simple_mip_maps: settings.simple_mip_maps,
+            intensity: if settings.intensity.is_finite() {
+                settings.intensity.max(1.0)
+            } else {
+                1.0
+            },
+            greyscale: if settings.greyscale.is_finite() {
+                settings.greyscale.clamp(0.0, 1.0)
+            } else {
+                0.0
+            },
+            max_size: max_size.max(1),
+        }
+    }
+}
+
+/// The levels of a texture, the largest first; at least one.
+pub fn prepare(image: &Image, flags: ImageFlags, settings: &TextureSettings) -> Vec<Image> {
+    let mut base = image.to_power_of_two(settings.round_down);
+    if settings.greyscale > 0.0 {
+        desaturate(&mut base.rgba, settings.greyscale);
+    }
+    let halvings = if flags.picmip { settings.picmip } else { 0 };
+    let target = |side: u32| {
+        side.checked_shr(halvings)
+            .unwrap_or(0)
+            .clamp(1, settings.max_size)
+    };
+    let (width, height) = (target(base.width), target(base.height));
+    while base.width > width || base.height > height {
+        base = smaller(&base, settings.simple_mip_maps);
+    }
+    if flags.mipmap && settings.intensity > 1.0 {
+        brighten(&mut base.rgba, settings.intensity);
+    }
+    if !flags.mipmap {
+        return vec![base];
+    }
+    let mut levels = vec![base];
+    while let Some(last) = levels.last()
+        && (last.width > 1 || last.height > 1)
+    {
+        let next = smaller(last, settings.simple_mip_maps);
+        levels.push(next);
+    }
+    levels
+}
+
+/// Mean linear colour and mean alpha.
+pub fn mean(image: &Image) -> Vec4 {
+    image.mean_linear().extend(image.mean_alpha())
+}
+
+fn smaller(image: &Image, simple: bool) -> Image {
+    // the weighted filter needs two texels each way; the engine falls back as well
+    if simple || image.width < 2 || image.height < 2 {
+        image.halve()
+    } else {
+        weighted(image)
+    }
+}
+
+/// Half the size by the weights 1 2 2 1 / 2 4 4 2 / 2 4 4 2 / 1 2 2 1 (of 36), wrapping round the edges.
+fn weighted(image: &Image) -> Image {
+    let (width, height) = (image.width / 2, image.height / 2);
+    let texels = image.rgba.as_chunks::<4>().0;
+    let at = |x: u32, y: u32| {
+        let index = (y % image.height) as usize * image.width as usize + (x % image.width) as usize;
+        texels.get(index).copied().unwrap_or_default()
+    };
+    const WEIGHTS: [u32; 4] = [1, 2, 2, 1];
+    let mut rgba = Vec::with_capacity(width as usize * height as usize * 4);
+    for y in 0..height {
+        for x in 0..width {
+            let mut sum = [0u32; 4];
+            for (dy, wy) in (0u32..).zip(WEIGHTS) {
+                for (dx, wx) in (0u32..).zip(WEIGHTS) {
+                    // one texel up and left of the 2 x 2 block; adding the size first keeps it unsigned
+                    let texel = at(x * 2 + dx + image.width - 1, y * 2 + dy + image.height - 1);
+                    for (sum, byte) in sum.iter_mut().zip(texel) {
+                        *sum += u32::from(byte) * wx * wy;
+                    }
+                }
+            }
+            rgba.extend(sum.map(|s| u8::try_from(s / 36).unwrap_or(u8::MAX)));
+        }
+    }
+    Image::from_rgba(width, height, rgba).unwrap_or_else(|| image.halve())
+}
+
+/// Moves colours towards their luma (Rec. 709 weights, as the engine).
+pub fn desaturate(rgba: &mut [u8], amount: f32) {
+    for texel in rgba.as_chunks_mut::<4>().0 {
+        let [r, g, b, _] = *texel;
+        let luma = 0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b);
+        for channel in texel.iter_mut().take(3) {
+            let value = f32::from(*channel);
+            *channel = (value + (luma - value) * amount) as u8;
+        }
+    }
+}
+
+fn brighten(rgba: &mut [u8], intensity: f32) {
+    for texel in rgba.as_chunks_mut::<4>().0 {
+        for channel in texel.iter_mut().take(3) {
+            *channel = (f32::from(*channel) * intensity).min(255.0) as u8;
+        }
+    }
+}
+
+/// A lightmap page or other RGB bytes as an opaque picture, overbright shift applied; `None` when the length does
+/// not fit.
+pub fn light_page(rgb: &[u8], side: u32, shift_bits: u32, greyscale: f32) -> Option<Image> {
+    let mut rgba = Vec::with_capacity(rgb.len() / 3 * 4);
+    for texel in rgb.as_chunks::<3>().0 {
+        let [r, g, b] = overbright::shift(*texel, shift_bits);
+        rgba.extend([r, g, b, 255]);
+    }
+    if greyscale > 0.0 {
+        desaturate(&mut rgba, greyscale);
+    }
+    Image::from_rgba(side, side, rgba)
+}
+
+/// The 16 x 16 grid for what is missing: dark grey with a white border.
+pub fn default_picture() -> Image {
+    picture(16, |x, y| {
+        if x == 0 || y == 0 || x == 15 || y == 15 {
+            [255; 4]
+        } else {
+            [32, 32, 32, 32]
+        }
+    })
+}
+
+/// The 16 x 16 blob of a dynamic light: falls off with the square of the distance from its middle.
+pub fn dynamic_light_picture() -> Image {
+    picture(16, |x, y| {
+        let (dx, dy) = (7.5 - x as f32, 7.5 - y as f32);
+        let brightness = (4000.0 / (dx * dx + dy * dy)).min(255.0);
+        let byte = if brightness < 75.0 {
+            0
+        } else {
+            brightness as u8
+        };
+        [byte, byte, byte, 255]
+    })
+}
+
+fn picture(side: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Image {
+    let mut rgba = Vec::with_capacity((side * side * 4) as usize);
+    for y in 0..side {
+        for x in 0..side {
+            rgba.extend(texel(x, y));
+        }
+    }
+    Image::from_rgba(side, side, rgba).unwrap_or_else(|| Image::uniform([255; 4]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings() -> TextureSettings {
+        TextureSettings::new(&Settings::default(), 4096)
+    }
+
+    fn grey(width: u32, height: u32, value: u8) -> Image {
+        let rgba = [value, value, value, 255].repeat((width * height) as usize);
+        Image::from_rgba(width, height, rgba).unwrap()
+    }
+
+    #[test]
+    fn sizes_follow_the_flags() {
+        let sizes = |flags, settings: &TextureSettings| {
+            prepare(&grey(100, 60, 9), flags, settings)
+                .iter()
+                .map(|i| (i.width, i.height))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(sizes(ImageFlags::NO_MIP, &settings()), [(64, 32)]);
+        let chain = sizes(ImageFlags::WORLD, &settings());
+        assert_eq!(chain.len(), 7);
+        assert_eq!(chain.last(), Some(&(1, 1)));
+        let small = TextureSettings {
+            picmip: 2,
+            ..settings()
+        };
+        assert_eq!(sizes(ImageFlags::WORLD, &small)[0], (16, 8));
+        assert_eq!(sizes(ImageFlags::NO_MIP, &small), [(64, 32)]);
+        let huge = TextureSettings {
+            picmip: 16,
+            ..settings()
+        };
+        assert_eq!(sizes(ImageFlags::WORLD, &huge), [(1, 1)]);
+        let limited = TextureSettings {
+            max_size: 8,
+            round_down: false,
+            ..settings()
+        };
+        assert_eq!(sizes(ImageFlags::NO_MIP, &limited), [(8, 8)]);
+    }
+
+    #[test]
+    fn intensity_is_for_mipmapped_images() {
+        let bright = TextureSettings {
+            intensity: 2.0,
+            ..settings()
+        };
+        assert_eq!(
+            prepare(&grey(2, 2, 100), ImageFlags::WORLD, &bright)[0].rgba[0],
+            200
+        );
+        assert_eq!(
+            prepare(&grey(2, 2, 200), ImageFlags::WORLD, &bright)[0].rgba[0],
+            255
+        );
+        assert_eq!(
+            prepare(&grey(2, 2, 100), ImageFlags::NO_MIP, &bright)[0].rgba[0],
+            100
+        );
+    }
+
+    #[test]
+    fn weighted_filter_keeps_an_even_picture() {
+        let weighted = TextureSettings {
+            simple_mip_maps: false,
+            ..settings()
+        };
+        for level in prepare(&grey(8, 8, 77), ImageFlags::WORLD, &weighted) {
+            assert!(level.rgba.chunks(4).all(|t| t == [77, 77, 77, 255]));
+        }
+    }
+
+    #[test]
+    fn light_pages_are_shifted() {
+        let page = light_page(&[10, 20, 30].repeat(4), 2, 2, 0.0).unwrap();
+        assert_eq!(&page.rgba[..4], [40, 80, 120, 255]);
+        assert!(light_page(&[0; 9], 2, 0, 0.0).is_none());
+    }
+
+    #[test]
+    fn blob_is_bright_in_the_middle_and_black_outside() {
+        let blob = dynamic_light_picture();
+        let at = |x: usize, y: usize| blob.rgba[(y * 16 + x) * 4];
+        assert_eq!(at(7, 7), 255);
+        assert_eq!(at(0, 0), 0);
+        assert_eq!(at(7, 15), 0);
+        assert!(at(7, 12) > 75);
+    }
+}

@@ -1,0 +1,343 @@
+//! Textures by name, on the GPU.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::Vec4;
+use relight::GameFiles;
+use relight::image::{self, Image};
+
+use super::prepare::{self, TextureSettings};
+use super::source::{ImageFlags, ImageSource};
+use crate::gpu::{
+    self, Device, Filter, Format, ImageDesc, ImageUsage, MipFilter, SamplerDesc, Wrap,
+};
+
+/// The samplers of textures: bindless indices in the order of [`compile::sampler`](super::compile::sampler).
+///
+/// On a fresh device they are 0 to 4. Those without mip levels never change; a change of `r_textureMode` or
+/// anisotropy replaces the first two.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Samplers(pub [u32; 5]);
+
+impl Samplers {
+    /// Makes or finds them for an `r_textureMode` and an anisotropy (1 and below: none).
+    pub fn new(device: &Device, texture_mode: &str, anisotropy: f32) -> Result<Self, gpu::Error> {
+        let (filter, mip) = texture_filter(texture_mode);
+        let anisotropy = if anisotropy.is_finite() {
+            anisotropy
+        } else {
+            0.0
+        };
+        let make = |filter, mip, wrap, anisotropy| {
+            device.sampler(&SamplerDesc {
+                filter,
+                mip,
+                wrap,
+                anisotropy,
+                lod_bias: 0.0,
+            })
+        };
+        Ok(Self([
+            make(filter, mip, Wrap::Repeat, anisotropy)?,
+            make(filter, mip, Wrap::Clamp, anisotropy)?,
+            make(Filter::Linear, MipFilter::None, Wrap::Repeat, 0.0)?,
+            make(Filter::Linear, MipFilter::None, Wrap::Clamp, 0.0)?,
+            make(Filter::Nearest, MipFilter::None, Wrap::Clamp, 0.0)?,
+        ]))
+    }
+
+    /// Bindless index of one of [`compile::sampler`](super::compile::sampler)'s.
+    pub fn index(&self, kind: u32) -> u32 {
+        self.0.get(kind as usize).copied().unwrap_or(self.0[0])
+    }
+}
+
+/// Filters of an `r_textureMode`; an unknown name is trilinear.
+fn texture_filter(mode: &str) -> (Filter, MipFilter) {
+    match mode.to_ascii_uppercase().as_str() {
+        "GL_NEAREST" => (Filter::Nearest, MipFilter::None),
+        "GL_LINEAR" => (Filter::Linear, MipFilter::None),
+        "GL_NEAREST_MIPMAP_NEAREST" => (Filter::Nearest, MipFilter::Nearest),
+        "GL_LINEAR_MIPMAP_NEAREST" => (Filter::Linear, MipFilter::Nearest),
+        "GL_NEAREST_MIPMAP_LINEAR" => (Filter::Nearest, MipFilter::Linear),
+        _ => (Filter::Linear, MipFilter::Linear),
+    }
+}
+
+/// A texture that a name stands for.
+struct Texture {
+    name: String,
+    /// `None` when no usable file was found.
+    image: Option<gpu::Image>,
+    flags: ImageFlags,
+}
+
+/// A picture that changes: cinematics and raw pictures.
+struct Scratch {
+    image: gpu::Image,
+}
+
+/// All textures of a registration.
+pub struct Textures {
+    device: Device,
+    files: Arc<dyn GameFiles>,
+    settings: TextureSettings,
+    by_name: HashMap<String, usize>,
+    textures: Vec<Texture>,
+    means: HashMap<u32, Vec4>,
+    unnamed: Vec<gpu::Image>,
+    scratch: HashMap<usize, Scratch>,
+    white: u32,
+    default_image: u32,
+    black: u32,
+    dynamic_light: u32,
+    failure: Option<gpu::Error>,
+}
+
+impl Textures {
+    /// No textures but the built-in ones.
+    pub fn new(
+        device: &Device,
+        files: Arc<dyn GameFiles>,
+        settings: TextureSettings,
+    ) -> Result<Self, gpu::Error> {
+        let mut textures = Self {
+            device: device.clone(),
+            files,
+            settings,
+            by_name: HashMap::new(),
+            textures: Vec::new(),
+            means: HashMap::new(),
+            unnamed: Vec::new(),
+            scratch: HashMap::new(),
+            white: 0,
+            default_image: 0,
+            black: 0,
+            dynamic_light: 0,
+            failure: None,
+        };
+        textures.white = textures.built_in("*white", &Image::uniform([255; 4]))?;
+        textures.black = textures.built_in("*black", &Image::uniform([0, 0, 0, 255]))?;
+        let grid = prepare::default_picture();
+        textures.default_image = textures.built_in("*default", &grid)?;
+        let blob = prepare::dynamic_light_picture();
+        textures.dynamic_light = textures.built_in("*dlight", &blob)?;
+        Ok(textures)
+    }
+
+    /// The files that names are looked up in.
+    pub fn files(&self) -> &Arc<dyn GameFiles> {
+        &self.files
+    }
+
+    /// The settings in force.
+    pub fn settings(&self) -> &TextureSettings {
+        &self.settings
+    }
+
+    /// The 16 x 16 blob that dynamic lights put on walls.
+    pub fn dynamic_light(&self) -> u32 {
+        self.dynamic_light
+    }
+
+    /// Black.
+    pub fn black(&self) -> u32 {
+        self.black
+    }
+
+    /// The bindless index of the image that `name` stands for, loaded at its first use; `None` when no usable file
+    /// exists. Names are compared exactly and the first user's flags win, as in the engine.
+    pub fn find(&mut self, name: &str, flags: ImageFlags) -> Option<u32> {
+        if let Some(texture) = self.by_name.get(name).and_then(|&i| self.textures.get(i)) {
+            if texture.flags != flags && texture.image.is_some() {
+                log::debug!("{name}: used with other image flags than before; the first ones stay");
+            }
+            return texture.image.as_ref().map(gpu::Image::texture_index);
+        }
+        let image = match image::load(&*self.files, name) {
+            Ok(Some((image, file))) => {
+                if !file.eq_ignore_ascii_case(name) {
+                    log::debug!("{name}: found as {file}");
+                }
+                self.upload(name, &image, flags)
+            }
+            Ok(None) => None,
+            Err(problem) => {
+                log::warn!("{problem}");
+                None
+            }
+        };
+        let index = image.as_ref().map(gpu::Image::texture_index);
+        self.by_name.insert(name.to_owned(), self.textures.len());
+        self.textures.push(Texture {
+            name: name.to_owned(),
+            image,
+            flags,
+        });
+        index
+    }
+
+    /// Uploads a lightmap page (`side` x `side` RGB) whose bytes are final and returns its bindless index.
+    pub fn create_lightmap(&mut self, name: &str, page: &Image) -> Result<u32, gpu::Error> {
+        let image = self.create(name, std::slice::from_ref(page))?;
+        let index = image.texture_index();
+        self.means.insert(index, prepare::mean(page));
+        self.unnamed.push(image);
+        Ok(index)
+    }
+
+    /// Shows new pixels (RGBA rows from the top) under a client number. Returns `(old, new)` when the texture had to be
+    /// made anew, so that stages that show it can be pointed at the new one.
+    pub fn update_scratch(
+        &mut self,
+        client: usize,
+        width: u32,
+        height: u32,
+        rgba: &[u8],
+        dirty: bool,
+    ) -> Result<Option<(u32, u32)>, gpu::Error> {
+        let Some(picture) = expected_bytes(width, height).and_then(|n| rgba.get(..n)) else {
+            log::warn!(
+                "cinematic {client}: {} bytes for {width} x {height}",
+                rgba.len()
+            );
+            return Ok(None);
+        };
+        let known = self.scratch.get(&client);
+        if let Some(scratch) = known
+            && scratch.image.width() == width
+            && scratch.image.height() == height
+        {
+            if dirty {
+                self.device.upload_image(&scratch.image, 0, 0, picture)?;
+            }
+            return Ok(None);
+        }
+        let old = known.map_or(self.black, |s| s.image.texture_index());
+        let image = gpu::Image::new(
+            &self.device,
+            &ImageDesc::new("scratch", width, height, Format::Rgba8, ImageUsage::SAMPLED),
+        )?;
+        self.device.upload_image(&image, 0, 0, picture)?;
+        let new = image.texture_index();
+        self.scratch.insert(client, Scratch { image });
+        Ok(Some((old, new)))
+    }
+
+    /// Names of all images with their sizes, for `imagelist`.
+    pub fn list(&self) -> Vec<String> {
+        self.textures
+            .iter()
+            .map(|t| match &t.image {
+                Some(image) => format!(
+                    "{:4} x {:4}  {} levels  {}",
+                    image.width(),
+                    image.height(),
+                    image.mips(),
+                    t.name
+                ),
+                None => format!("     missing              {}", t.name),
+            })
+            .collect()
+    }
+
+    /// The first failure of the device since the last call: callers that look up by name cannot return it.
+    pub fn take_failure(&mut self) -> Option<gpu::Error> {
+        self.failure.take()
+    }
+
+    fn upload(&mut self, name: &str, image: &Image, flags: ImageFlags) -> Option<gpu::Image> {
+        let levels = prepare::prepare(image, flags, &self.settings);
+        match self.create(name, &levels) {
+            Ok(created) => {
+                if let Some(smallest) = levels.last() {
+                    // the smallest level of a mip chain averages encoded values; the mean is taken of light
+                    let of = levels.first().unwrap_or(smallest);
+                    self.means
+                        .insert(created.texture_index(), prepare::mean(of));
+                }
+                Some(created)
+            }
+            Err(problem) => {
+                log::error!("{name}: {problem}");
+                self.failure.get_or_insert(problem);
+                None
+            }
+        }
+    }
+
+    fn create(&self, name: &str, levels: &[Image]) -> Result<gpu::Image, gpu::Error> {
+        let (width, height) = levels.first().map_or((1, 1), |l| (l.width, l.height));
+        let image = gpu::Image::new(
+            &self.device,
+            &ImageDesc {
+                mips: u32::try_from(levels.len()).unwrap_or(1).max(1),
+                ..ImageDesc::new(name, width, height, Format::Rgba8, ImageUsage::SAMPLED)
+            },
+        )?;
+        for (mip, level) in (0u32..).zip(levels) {
+            self.device.upload_image(&image, mip, 0, &level.rgba)?;
+        }
+        Ok(image)
+    }
+
+    fn built_in(&mut self, name: &str, image: &Image) -> Result<u32, gpu::Error> {
+        let levels = prepare::prepare(
+            image,
+            ImageFlags {
+                picmip: false,
+                ..ImageFlags::WORLD
+            },
+            &TextureSettings {
+                picmip: 0,
+                intensity: 1.0,
+                ..self.settings.clone()
+            },
+        );
+        let created = self.create(name, &levels)?;
+        let index = created.texture_index();
+        self.means.insert(index, prepare::mean(image));
+        self.by_name.insert(name.to_owned(), self.textures.len());
+        self.textures.push(Texture {
+            name: name.to_owned(),
+            image: Some(created),
+            flags: ImageFlags {
+                picmip: false,
+                ..ImageFlags::WORLD
+            },
+        });
+        Ok(index)
+    }
+}
+
+fn expected_bytes(width: u32, height: u32) -> Option<usize> {
+    if width == 0 || height == 0 {
+        return None;
+    }
+    usize::try_from(u64::from(width) * u64::from(height) * 4).ok()
+}
+
+impl ImageSource for Textures {
+    fn image(&mut self, name: &str, flags: ImageFlags) -> Option<u32> {
+        self.find(name, flags)
+    }
+
+    fn white(&self) -> u32 {
+        self.white
+    }
+
+    fn default_image(&self) -> u32 {
+        self.default_image
+    }
+
+    fn scratch(&mut self, client: usize) -> u32 {
+        self.scratch
+            .get(&client)
+            .map_or(self.black, |s| s.image.texture_index())
+    }
+
+    fn mean(&self, texture: u32) -> Vec4 {
+        self.means.get(&texture).copied().unwrap_or(Vec4::ONE)
+    }
+}

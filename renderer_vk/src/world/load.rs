@@ -1,0 +1,279 @@
+//! From a relit map to what is drawn: materials found, lightmaps made, curves given their levels of detail.
+
+use glam::Vec3;
+use q3bsp::lightmap_index;
+use relight::RelitWorld;
+use relight::image::Image;
+use shaders::types::{self, Vertex, constants::NO_TEXTURE};
+
+use super::patch_lod::PatchLod;
+use super::visible::Tree;
+use super::{Bounds, BrushModel, WorldData, WorldSurface};
+use crate::assets::{ImageSource, LightmapClass, Materials, Textures, prepare};
+use crate::gpu;
+use crate::settings::Settings;
+
+/// The direction that the engine gives the sun before any material says otherwise.
+const DEFAULT_SUN: Vec3 = Vec3::new(0.45, 0.3, 0.9);
+
+/// The settings that loading a map depends on.
+#[derive(Clone, Debug)]
+pub struct WorldOptions {
+    /// Largest distance of a curve from its mesh, units.
+    pub subdivisions: f32,
+    /// Left shift of stored light.
+    pub overbright_shift: u32,
+    /// Desaturation of lightmaps and vertex colours, 0..1.
+    pub greyscale: f32,
+    /// Lightmaps count as white.
+    pub fullbright: bool,
+    /// Light comes from vertices instead of lightmaps.
+    pub vertex_light: bool,
+}
+
+impl WorldOptions {
+    /// The part of the settings that matters here.
+    pub fn new(settings: &Settings) -> Self {
+        let display = display_overbright_bits(settings);
+        Self {
+            subdivisions: settings.subdivisions,
+            overbright_shift: settings.map_overbright_bits.saturating_sub(display),
+            greyscale: settings.greyscale.clamp(0.0, 1.0),
+            fullbright: settings.fullbright,
+            vertex_light: settings.vertex_light,
+        }
+    }
+
+    /// The same for the converter.
+    pub fn relight(&self) -> relight::Options<'static> {
+        relight::Options {
+            subdivisions: self.subdivisions,
+            overbright_shift: self.overbright_shift,
+            ..relight::Options::default()
+        }
+    }
+}
+
+/// Doublings of brightness that the display adds: `r_overBrightBits` in full screen with a hardware gamma ramp, none in
+/// a window.
+pub fn display_overbright_bits(settings: &Settings) -> u32 {
+    if settings.fullscreen && !settings.ignore_hw_gamma {
+        settings.overbright_bits.min(2)
+    } else {
+        0
+    }
+}
+
+/// Takes lightmap pages. [`Textures`] puts them on the GPU.
+pub trait LightmapSink: ImageSource {
+    /// Bindless index of a page.
+    fn lightmap(&mut self, name: &str, page: &Image) -> Result<u32, gpu::Error>;
+}
+
+impl LightmapSink for Textures {
+    fn lightmap(&mut self, name: &str, page: &Image) -> Result<u32, gpu::Error> {
+        self.create_lightmap(name, page)
+    }
+}
+
+fn class_of(lightmap: i32, options: &WorldOptions) -> LightmapClass {
+    match lightmap {
+        // in this order: the engine lets full brightness win over vertex light
+        _ if options.fullbright => LightmapClass::White,
+        _ if options.vertex_light => LightmapClass::Vertex,
+        0.. => LightmapClass::Page,
+        lightmap_index::NONE => LightmapClass::None,
+        lightmap_index::WHITE => LightmapClass::White,
+        lightmap_index::TWO_D => LightmapClass::TwoD,
+        _ => LightmapClass::Vertex,
+    }
+}
+
+impl WorldData {
+    /// Finds materials and makes lightmaps for a relit map. A failure of the device is left in `failure` and the
+    /// surfaces go without lightmap.
+    pub fn new<S: LightmapSink>(
+        relit: RelitWorld,
+        materials: &mut Materials,
+        source: &mut S,
+        options: &WorldOptions,
+        failure: &mut Option<gpu::Error>,
+    ) -> Self {
+        materials.forget_sun();
+        let lightmaps = make_lightmaps(&relit, source, options, failure);
+        let patches = relit.bsp.patch_meshes(options.subdivisions);
+        let mut indices = relit.indices.clone();
+        let mut surfaces = Vec::with_capacity(relit.surfaces.len());
+        for (index, stored) in relit.surfaces.iter().enumerate() {
+            let material = relit.materials.get(stored.material as usize);
+            let name = material.map_or("", |m| m.name.as_str());
+            let class = class_of(stored.lightmap, options);
+            let found = materials.find_or_default(source, name, class);
+            if let Some(light) = relit.lights.get(stored.first_light as usize)
+                && stored.num_lights > 0
+            {
+                // what glows or is sky shows its light by its stages
+                let hidden = light.source == relight::light::EmissionSource::SurfaceLight;
+                materials.set_emitter(found, if hidden { light.radiance } else { Vec3::ZERO });
+            }
+            let lod = patches
+                .get(index)
+                .and_then(Option::as_ref)
+                .filter(|_| stored.num_indices > 0)
+                .map(|mesh| PatchLod::new(mesh, stored, &mut indices));
+            let registered = materials.get(found);
+            let lightmap = usize::try_from(stored.lightmap)
+                .ok()
+                .filter(|_| class == LightmapClass::Page)
+                .and_then(|page| lightmaps.get(page).copied())
+                .unwrap_or(NO_TEXTURE);
+            surfaces.push(WorldSurface {
+                first_index: stored.first_index,
+                index_count: stored.num_indices,
+                first_vertex: stored.first_vertex,
+                vertex_count: stored.num_vertices,
+                material: found,
+                fog: stored.fog,
+                lightmap,
+                bounds: Bounds {
+                    mins: stored.mins,
+                    maxs: stored.maxs,
+                },
+                plane: stored.plane,
+                kind: stored.kind,
+                model: stored.model,
+                deformed: registered.deforms(),
+                sky: registered.is_sky(),
+                lod,
+            });
+        }
+        let fog_materials = relit
+            .fogs
+            .iter()
+            .map(|fog| materials.find(source, &fog.volume.shader, LightmapClass::None, true))
+            .collect();
+        remap_by_map(&relit, materials, source, options);
+        let mut data = Self {
+            vertices: relit.vertices.iter().map(|v| vertex(v, options)).collect(),
+            indices,
+            models: brush_models(&relit),
+            fogs: relit.fogs.iter().map(fog).collect(),
+            fog_materials,
+            grid: relit.bsp.light_grid(),
+            grid_points: super::grid::shifted_points(&relit.bsp, options.overbright_shift),
+            tree: Tree::new(&relit.bsp),
+            sun_direction: materials
+                .last_sun()
+                .unwrap_or_else(|| DEFAULT_SUN.normalize()),
+            deformed_surfaces: Vec::new(),
+            portal_surfaces: Vec::new(),
+            surfaces,
+            relit,
+        };
+        for (index, surface) in (0u32..).zip(&data.surfaces) {
+            let drawn = surface.index_count > 0;
+            if drawn && surface.deformed && surface.model == 0 {
+                data.deformed_surfaces.push(index);
+            }
+            if drawn && materials.get(surface.material).sort <= shaderscript::sort::PORTAL {
+                data.portal_surfaces.push(index);
+            }
+        }
+        data
+    }
+}
+
+fn make_lightmaps<S: LightmapSink>(
+    relit: &RelitWorld,
+    source: &mut S,
+    options: &WorldOptions,
+    failure: &mut Option<gpu::Error>,
+) -> Vec<u32> {
+    if options.vertex_light || options.fullbright {
+        return Vec::new();
+    }
+    let side = u32::try_from(q3bsp::LIGHTMAP_SIZE).unwrap_or(128);
+    (0..relit.bsp.lightmaps.len())
+        .map(|page| {
+            let picture = relit
+                .lightmap(page)
+                .and_then(|rgb| prepare::light_page(&rgb, side, 0, options.greyscale));
+            let Some(picture) = picture else {
+                return NO_TEXTURE;
+            };
+            match source.lightmap(&format!("*lightmap{page}"), &picture) {
+                Ok(index) => index,
+                Err(problem) => {
+                    failure.get_or_insert(problem);
+                    NO_TEXTURE
+                }
+            }
+        })
+        .collect()
+}
+
+fn vertex(v: &relight::world::WorldVertex, options: &WorldOptions) -> Vertex {
+    let mut color = v.color;
+    if options.greyscale > 0.0 {
+        prepare::desaturate(&mut color, options.greyscale);
+    }
+    Vertex {
+        position: v.position,
+        normal: v.normal,
+        st: v.st,
+        lightmap: v.lightmap,
+        color: u32::from_le_bytes(color),
+    }
+}
+
+fn fog(fog: &relight::world::WorldFog) -> types::Fog {
+    let surface = fog.volume.surface;
+    types::Fog {
+        mins: fog.volume.mins,
+        maxs: fog.volume.maxs,
+        plane: surface.map_or([0.0; 4], |p| [p.normal.x, p.normal.y, p.normal.z, p.dist]),
+        has_surface: u32::from(surface.is_some()),
+        color: fog.color,
+        depth: fog.depth,
+    }
+}
+
+fn brush_models(relit: &RelitWorld) -> Vec<BrushModel> {
+    relit
+        .models
+        .iter()
+        .zip(&relit.bsp.models)
+        .map(|(model, stored)| BrushModel {
+            first_surface: model.first_surface,
+            num_surfaces: model.num_surfaces,
+            bounds: Bounds {
+                mins: stored.mins,
+                maxs: stored.maxs,
+            },
+        })
+        .collect()
+}
+
+/// The map's own remapping: worldspawn keys `remapshader...` with values `old;new`.
+fn remap_by_map<S: LightmapSink>(
+    relit: &RelitWorld,
+    materials: &mut Materials,
+    source: &mut S,
+    options: &WorldOptions,
+) {
+    let entities = relit.bsp.entities();
+    let Some(world) = entities.first() else {
+        return;
+    };
+    let starts = |key: &str, prefix: &str| {
+        key.get(..prefix.len())
+            .is_some_and(|start| start.eq_ignore_ascii_case(prefix))
+    };
+    for (key, value) in &world.pairs {
+        let applies = starts(key, "remapshader")
+            || (options.vertex_light && starts(key, "vertexremapshader"));
+        if let Some((old, new)) = value.split_once(';').filter(|_| applies) {
+            materials.remap(source, old, new, None);
+        }
+    }
+}

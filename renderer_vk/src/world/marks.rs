@@ -1,0 +1,291 @@
+//! Decals: the parts of the world's surfaces that a polygon swept along a direction covers.
+//!
+//! Source: engine behaviour of `MarkFragments`, its tolerances included.
+
+use glam::Vec3;
+use q3bsp::SurfaceKind;
+use shaders::types::Vertex;
+
+use super::visible::Side;
+use super::{Bounds, WorldData, WorldSurface};
+use crate::api::MarkFragment;
+use crate::assets::Materials;
+
+/// Most corners of the polygon and of a clipped piece.
+const MAX_POINTS: usize = 64;
+/// Most surfaces that one call looks at.
+const MAX_SURFACES: usize = 64;
+/// Distance within which a point counts as on a plane.
+const EPSILON: f32 = 0.5;
+/// How far behind the polygon surfaces are still marked, units.
+const BEHIND: f32 = 20.0;
+/// How far along the projection surfaces are marked, units, whatever its length.
+const AHEAD: f32 = 32.0;
+/// Surface and content flags that take no marks.
+const NO_IMPACT: u32 = q3bsp::surface_flags::NOIMPACT | q3bsp::surface_flags::NOMARKS;
+
+/// Keeps what is in front of it.
+#[derive(Clone, Copy, Debug)]
+struct ClipPlane {
+    normal: Vec3,
+    dist: f32,
+}
+
+/// The answer while it grows.
+struct Output {
+    points: Vec<Vec3>,
+    fragments: Vec<MarkFragment>,
+    max_points: usize,
+    max_fragments: usize,
+}
+
+impl Output {
+    fn full(&self) -> bool {
+        self.fragments.len() >= self.max_fragments
+    }
+
+    /// Adds what the planes leave of a triangle; a piece for which there is no room is dropped.
+    fn add(&mut self, triangle: [Vec3; 3], planes: &[ClipPlane]) {
+        let mut piece = triangle.to_vec();
+        for plane in planes {
+            piece = clip(&piece, plane);
+            if piece.is_empty() {
+                return;
+            }
+        }
+        if self.points.len() + piece.len() > self.max_points {
+            return;
+        }
+        self.fragments.push(MarkFragment {
+            first_point: self.points.len(),
+            num_points: piece.len(),
+        });
+        self.points.extend(piece);
+    }
+}
+
+/// The pieces of the world's surfaces that lie under a polygon projected along `projection`: their corners and where
+/// each piece's corners begin. At most `max_points` and `max_fragments` are returned. `on_meshes`: triangle meshes take
+/// marks too.
+pub fn mark_fragments(
+    world: &WorldData,
+    materials: &Materials,
+    points: &[Vec3],
+    projection: Vec3,
+    max_points: usize,
+    max_fragments: usize,
+    on_meshes: bool,
+) -> (Vec<Vec3>, Vec<MarkFragment>) {
+    let mut out = Output {
+        points: Vec::new(),
+        fragments: Vec::new(),
+        max_points,
+        max_fragments,
+    };
+    let points = points
+        .get(..points.len().min(MAX_POINTS))
+        .unwrap_or_default();
+    let Some(&first) = points.first() else {
+        return (out.points, out.fragments);
+    };
+    if max_fragments == 0 || !points.iter().all(|p| p.is_finite()) || !projection.is_finite() {
+        return (out.points, out.fragments);
+    }
+    let direction = projection.normalize_or_zero();
+    let mut bounds = Bounds::EMPTY;
+    for &point in points {
+        bounds = bounds
+            .with(point)
+            .with(point + projection)
+            .with(point - BEHIND * direction);
+    }
+    let planes = clip_planes(points, projection, direction, first);
+    for index in candidates(world, materials, &bounds, direction) {
+        let Some(surface) = world.surfaces.get(index as usize) else {
+            continue;
+        };
+        mark_surface(world, surface, direction, on_meshes, &planes, &mut out);
+        if out.full() {
+            break;
+        }
+    }
+    (out.points, out.fragments)
+}
+
+/// One plane for each side of the polygon, and the two ends of the sweep.
+fn clip_planes(points: &[Vec3], projection: Vec3, direction: Vec3, first: Vec3) -> Vec<ClipPlane> {
+    let next = points.iter().cycle().skip(1);
+    let mut planes: Vec<_> = points
+        .iter()
+        .zip(next)
+        .map(|(&a, &b)| {
+            let normal = (b - a).cross(-projection).normalize_or_zero();
+            ClipPlane {
+                normal,
+                dist: normal.dot(a),
+            }
+        })
+        .collect();
+    let at = direction.dot(first);
+    planes.push(ClipPlane {
+        normal: direction,
+        dist: at - AHEAD,
+    });
+    planes.push(ClipPlane {
+        normal: -direction,
+        dist: -at - BEHIND,
+    });
+    planes
+}
+
+/// Surfaces of the leafs that the box touches and that can take the mark, each once.
+fn candidates(
+    world: &WorldData,
+    materials: &Materials,
+    bounds: &Bounds,
+    direction: Vec3,
+) -> Vec<u32> {
+    let bsp = &world.relit.bsp;
+    let mut found: Vec<u32> = Vec::new();
+    world.tree.leafs_in_box(bsp, bounds, |leaf| {
+        let Some(leaf) = bsp.leafs.get(leaf as usize) else {
+            return;
+        };
+        for &index in bsp.leaf_surface_indices(leaf) {
+            if found.len() >= MAX_SURFACES {
+                return;
+            }
+            let Some((index, surface)) = u32::try_from(index)
+                .ok()
+                .and_then(|i| Some((i, world.surfaces.get(i as usize)?)))
+            else {
+                continue;
+            };
+            if found.contains(&index) || surface.model != 0 {
+                continue;
+            }
+            let material = materials.get(surface.material);
+            if material.surface_flags & NO_IMPACT != 0
+                || material.content_flags & q3bsp::content_flags::FOG != 0
+            {
+                continue;
+            }
+            let taken = match surface.kind {
+                SurfaceKind::Planar => surface.plane.is_some_and(|plane| {
+                    let side = Side::of(bounds, plane.normal, plane.dist);
+                    side.front && side.back && plane.normal.dot(direction) <= -0.5
+                }),
+                SurfaceKind::Patch | SurfaceKind::TriangleSoup => true,
+                _ => false,
+            };
+            if taken {
+                found.push(index);
+            }
+        }
+    });
+    found
+}
+
+fn mark_surface(
+    world: &WorldData,
+    surface: &WorldSurface,
+    direction: Vec3,
+    on_meshes: bool,
+    planes: &[ClipPlane],
+    out: &mut Output,
+) {
+    match surface.kind {
+        SurfaceKind::Patch => mark_curve(world, surface, direction, planes, out),
+        SurfaceKind::Planar => {
+            for triangle in world.triangles(surface.first_index, surface.index_count) {
+                out.add(triangle, planes);
+                if out.full() {
+                    return;
+                }
+            }
+        }
+        SurfaceKind::TriangleSoup if on_meshes => {
+            for triangle in world.triangles(surface.first_index, surface.index_count) {
+                out.add(triangle, planes);
+                if out.full() {
+                    return;
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Both triangles of every cell of the full grid that face the mark.
+fn mark_curve(
+    world: &WorldData,
+    surface: &WorldSurface,
+    direction: Vec3,
+    planes: &[ClipPlane],
+    out: &mut Output,
+) {
+    let Some(lod) = &surface.lod else {
+        return;
+    };
+    let (width, height) = lod.size();
+    let vertices = world.surface_vertices(surface);
+    let at = |row: usize, column: usize| {
+        vertices
+            .get(row * width + column)
+            .map_or(Vec3::ZERO, |v: &Vertex| v.position)
+    };
+    for row in 0..height.saturating_sub(1) {
+        for column in 0..width.saturating_sub(1) {
+            let cell = [
+                (
+                    [at(row, column), at(row + 1, column), at(row, column + 1)],
+                    -0.1,
+                ),
+                (
+                    [
+                        at(row, column + 1),
+                        at(row + 1, column),
+                        at(row + 1, column + 1),
+                    ],
+                    -0.05,
+                ),
+            ];
+            for (triangle, limit) in cell {
+                let [a, b, c] = triangle;
+                let normal = (a - b).cross(c - b).normalize_or_zero();
+                if normal.dot(direction) < limit {
+                    out.add(triangle, planes);
+                    if out.full() {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The part of a convex polygon in front of a plane. Points within [`EPSILON`] of it stay as they are.
+fn clip(polygon: &[Vec3], plane: &ClipPlane) -> Vec<Vec3> {
+    if polygon.len() >= MAX_POINTS - 2 {
+        return Vec::new();
+    }
+    let distance = |p: Vec3| plane.normal.dot(p) - plane.dist;
+    if !polygon.iter().any(|&p| distance(p) > EPSILON) {
+        return Vec::new();
+    }
+    if !polygon.iter().any(|&p| distance(p) < -EPSILON) {
+        return polygon.to_vec();
+    }
+    let mut out = Vec::with_capacity(polygon.len() + 2);
+    for (&a, &b) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
+        let (da, db) = (distance(a), distance(b));
+        if da >= -EPSILON {
+            out.push(a);
+        }
+        let crosses = (da > EPSILON && db < -EPSILON) || (da < -EPSILON && db > EPSILON);
+        if crosses {
+            out.push(a + (b - a) * (da / (da - db)));
+        }
+    }
+    out
+}

@@ -1,0 +1,278 @@
+//! The relit world on the GPU, and what the scene asks about it: visible surfaces, fog, light, decals.
+
+mod grid;
+mod load;
+mod marks;
+mod patch_lod;
+mod tokens;
+mod visible;
+
+use glam::Vec3;
+use q3bsp::{LightGridLayout, Plane, SurfaceKind};
+use relight::RelitWorld;
+use shaders::types::{self, Vertex};
+
+use crate::assets::Assets;
+use crate::gpu::{self, Buffer, BufferUsage, Device};
+use crate::settings::Settings;
+
+pub use grid::GridLight;
+pub use load::{LightmapSink, WorldOptions, display_overbright_bits};
+pub use marks::mark_fragments;
+pub use patch_lod::PatchLod;
+pub use tokens::EntityTokens;
+pub(crate) use visible::outside;
+pub use visible::{Tree, VisibleQuery, VisibleSet};
+
+/// Why a map could not be loaded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WorldError {
+    /// The map is absent, unreadable or damaged.
+    #[error(transparent)]
+    Map(#[from] relight::LoadError),
+    /// The device has no memory left, or worse.
+    #[error(transparent)]
+    Gpu(#[from] gpu::Error),
+}
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bounds {
+    /// Smallest corner.
+    pub mins: Vec3,
+    /// Largest corner.
+    pub maxs: Vec3,
+}
+
+impl Bounds {
+    /// Contains nothing; adding a point makes it that point.
+    pub const EMPTY: Self = Self {
+        mins: Vec3::INFINITY,
+        maxs: Vec3::NEG_INFINITY,
+    };
+
+    /// With a point added.
+    pub fn with(self, point: Vec3) -> Self {
+        Self {
+            mins: self.mins.min(point),
+            maxs: self.maxs.max(point),
+        }
+    }
+
+    /// The eight corners.
+    pub fn corners(&self) -> [Vec3; 8] {
+        std::array::from_fn(|i| {
+            let pick = |bit: usize, lo: f32, hi: f32| if i & bit == 0 { lo } else { hi };
+            Vec3::new(
+                pick(1, self.mins.x, self.maxs.x),
+                pick(2, self.mins.y, self.maxs.y),
+                pick(4, self.mins.z, self.maxs.z),
+            )
+        })
+    }
+}
+
+/// A surface of the map as it is drawn. Index = index of the map's surface.
+#[derive(Clone, Debug)]
+pub struct WorldSurface {
+    /// First index in the static index buffer; indices count from the start of the static vertex buffer. Triangles
+    /// are clockwise seen from the front.
+    pub first_index: u32,
+    /// Number of indices; 0 for what is not drawn (flares, `nodraw` curves).
+    pub index_count: u32,
+    /// First vertex.
+    pub first_vertex: u32,
+    /// Number of vertices.
+    pub vertex_count: u32,
+    /// Index of the material, before remapping.
+    pub material: u32,
+    /// Fog volume plus one; 0 none.
+    pub fog: u32,
+    /// Bindless texture index of the lightmap page, or `NO_TEXTURE`.
+    pub lightmap: u32,
+    /// Bounds in the model's space.
+    pub bounds: Bounds,
+    /// Plane of planar surfaces, normal to the front.
+    pub plane: Option<Plane>,
+    /// What the map stores it as.
+    pub kind: SurfaceKind,
+    /// Brush model that it belongs to; 0 is the world.
+    pub model: u32,
+    /// The material deforms its vertices, so that it is drawn as a dynamic mesh and is not in the static acceleration
+    /// structure.
+    pub deformed: bool,
+    /// It shows the sky.
+    pub sky: bool,
+    /// Index lists of a curve for larger distances.
+    pub lod: Option<PatchLod>,
+}
+
+/// A brush model: surfaces and bounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BrushModel {
+    /// First surface.
+    pub first_surface: u32,
+    /// Number of surfaces.
+    pub num_surfaces: u32,
+    /// Bounds in its own space.
+    pub bounds: Bounds,
+}
+
+/// The world without its GPU buffers.
+pub struct WorldData {
+    /// The relit map.
+    pub relit: RelitWorld,
+    /// Vertices as the GPU has them.
+    pub vertices: Vec<Vertex>,
+    /// Indices as the GPU has them: those of the relit map, then the coarser lists of curves.
+    pub indices: Vec<u32>,
+    /// The map's surfaces.
+    pub surfaces: Vec<WorldSurface>,
+    /// Brush models; 0 is the world.
+    pub models: Vec<BrushModel>,
+    /// Fog volumes; a surface's `fog` is an index into this plus one.
+    pub fogs: Vec<types::Fog>,
+    /// For each fog volume the material of its brush.
+    pub fog_materials: Vec<u32>,
+    /// Layout of the light grid.
+    pub grid: Option<LightGridLayout>,
+    /// Its points, overbright shift applied.
+    pub grid_points: Vec<q3bsp::GridPoint>,
+    /// The tree in a form that cannot lead astray.
+    pub tree: Tree,
+    /// Unit vector towards the engine's sun.
+    pub sun_direction: Vec3,
+    /// World surfaces (model 0) whose material deforms them.
+    pub deformed_surfaces: Vec<u32>,
+    /// Surfaces that are portals or mirrors.
+    pub portal_surfaces: Vec<u32>,
+}
+
+impl WorldData {
+    /// Whether a surface is drawn as a dynamic mesh.
+    pub fn is_deformed(&self, surface: u32) -> bool {
+        self.surfaces
+            .get(surface as usize)
+            .is_some_and(|s| s.deformed)
+    }
+
+    /// Number of the first fog volume that a ball overlaps, plus one; 0 for none.
+    pub fn fog_of_sphere(&self, centre: Vec3, radius: f32) -> u32 {
+        let overlaps = |fog: &types::Fog| {
+            (centre - radius).cmplt(fog.maxs).all() && (centre + radius).cmpgt(fog.mins).all()
+        };
+        self.first_fog(overlaps)
+    }
+
+    /// Number of the first fog volume that a box overlaps, plus one; 0 for none.
+    pub fn fog_of_box(&self, bounds: &Bounds) -> u32 {
+        let overlaps = |fog: &types::Fog| {
+            bounds.maxs.cmpge(fog.mins).all() && bounds.mins.cmple(fog.maxs).all()
+        };
+        self.first_fog(overlaps)
+    }
+
+    fn first_fog(&self, overlaps: impl Fn(&types::Fog) -> bool) -> u32 {
+        (1u32..)
+            .zip(&self.fogs)
+            .find(|(_, fog)| overlaps(fog))
+            .map_or(0, |(number, _)| number)
+    }
+
+    /// The triangles of a static index range, as vertex positions in model space.
+    pub fn triangles(&self, first: u32, count: u32) -> impl Iterator<Item = [Vec3; 3]> + '_ {
+        let range = first as usize..first as usize + count as usize;
+        let position = |i: u32| {
+            self.vertices
+                .get(i as usize)
+                .map_or(Vec3::ZERO, |v| v.position)
+        };
+        self.indices
+            .get(range)
+            .unwrap_or_default()
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .map(move |t| t.map(position))
+    }
+
+    /// The vertices of a surface.
+    pub fn surface_vertices(&self, surface: &WorldSurface) -> &[Vertex] {
+        let first = surface.first_vertex as usize;
+        self.vertices
+            .get(first..first + surface.vertex_count as usize)
+            .unwrap_or_default()
+    }
+}
+
+/// The world with its GPU buffers.
+pub struct World {
+    /// Everything that the CPU needs.
+    pub data: WorldData,
+    /// `types::Vertex`, all surfaces.
+    pub vertex_buffer: Buffer,
+    /// `u32`, all surfaces.
+    pub index_buffer: Buffer,
+    /// `types::Fog`; a surface's `fog` less one is the index.
+    pub fog_buffer: Buffer,
+}
+
+impl std::ops::Deref for World {
+    type Target = WorldData;
+
+    fn deref(&self) -> &WorldData {
+        &self.data
+    }
+}
+
+impl World {
+    /// Loads a map (game path `maps/....bsp`) and everything that its surfaces show. Brush models are registered as
+    /// `*0`, `*1`, ...
+    ///
+    /// # Errors
+    /// [`WorldError`] when the map is absent or damaged, or the device fails. Missing materials are warnings.
+    pub fn load(
+        device: &Device,
+        assets: &mut Assets,
+        name: &str,
+        settings: &Settings,
+    ) -> Result<Self, WorldError> {
+        let files = std::sync::Arc::clone(assets.textures.files());
+        let options = WorldOptions::new(settings);
+        let relit = RelitWorld::load(&*files, &assets.scripts, name, options.relight())?;
+        let mut failure = None;
+        let data = WorldData::new(
+            relit,
+            &mut assets.materials,
+            &mut assets.textures,
+            &options,
+            &mut failure,
+        );
+        if let Some(problem) = failure {
+            return Err(problem.into());
+        }
+        let bounds: Vec<_> = data
+            .models
+            .iter()
+            .map(|m| (m.bounds.mins, m.bounds.maxs))
+            .collect();
+        assets.models.register_inline(&bounds);
+        Ok(Self {
+            vertex_buffer: Buffer::with_data(
+                device,
+                "world vertices",
+                BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT,
+                &data.vertices,
+            )?,
+            index_buffer: Buffer::with_data(
+                device,
+                "world indices",
+                BufferUsage::INDEX | BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT,
+                &data.indices,
+            )?,
+            fog_buffer: Buffer::with_data(device, "fogs", BufferUsage::STORAGE, &data.fogs)?,
+            data,
+        })
+    }
+}
