@@ -141,8 +141,10 @@ impl Buffer {
             Memory::Device => None,
             _ => memory.mapped_ptr().map(|p| Mapped(p.cast())),
         };
+        // SAFETY: the memory object is only used for the binding below.
+        let (object, offset) = (unsafe { memory.memory() }, memory.offset());
         // SAFETY: the memory was allocated for these requirements and is bound once.
-        let bound = unsafe { vk.bind_buffer_memory(raw, memory.memory(), memory.offset()) };
+        let bound = unsafe { vk.bind_buffer_memory(raw, object, offset) };
         let mut inner = BufferInner {
             device: device.clone(),
             raw,

@@ -192,11 +192,15 @@ impl Device {
         lock(&self.0.core.instance.messages).clone()
     }
 
-    /// Waits until the device has nothing to do and frees what was waiting for that. Not for use within a frame.
+    /// Runs waiting uploads, waits until the device has nothing to do and frees what was waiting for that. Not for use
+    /// within a frame.
     ///
     /// # Errors
     /// Device loss.
     pub fn wait_idle(&self) -> Result<(), Error> {
+        if !lock(&self.0.pending).is_empty() {
+            self.immediate(|_| Ok(()))?;
+        }
         {
             let _queue = lock(&self.0.queue);
             // SAFETY: the queue is held, so nothing is submitted meanwhile.

@@ -286,8 +286,10 @@ impl Image {
                     return Err(e);
                 }
             };
+        // SAFETY: the memory object is only used for the binding below.
+        let (object, offset) = (unsafe { memory.memory() }, memory.offset());
         // SAFETY: the memory was allocated for these requirements and is bound once.
-        let bound = unsafe { vk.bind_image_memory(raw, memory.memory(), memory.offset()) };
+        let bound = unsafe { vk.bind_image_memory(raw, object, offset) };
         let only_sampled = desc.usage == ImageUsage::SAMPLED;
         let mut inner = ImageInner {
             device: device.clone(),

@@ -226,10 +226,8 @@ fn messenger_info(messages: &Arc<Messages>) -> vk::DebugUtilsMessengerCreateInfo
             vk::DebugUtilsMessageSeverityFlagsEXT::ERROR
                 | vk::DebugUtilsMessageSeverityFlagsEXT::WARNING,
         )
-        .message_type(
-            vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION
-                | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
-        )
+        // Not PERFORMANCE: it objects to copies in the layout GENERAL, which is the rule here.
+        .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
         .pfn_user_callback(Some(on_message))
         .user_data(Arc::as_ptr(messages).cast_mut().cast())
 }

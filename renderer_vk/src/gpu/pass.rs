@@ -133,7 +133,7 @@ impl<'a> Pass<'a> {
     /// Sets the push constants from offset 0, for all stages; 128 bytes at most, a multiple of 4.
     pub fn push<T: Pod>(&mut self, constants: &T) {
         let bytes = bytemuck::bytes_of(constants);
-        if bytes.len() > PUSH_BYTES as usize || bytes.len() % 4 != 0 || bytes.is_empty() {
+        if bytes.len() > PUSH_BYTES as usize || !bytes.len().is_multiple_of(4) || bytes.is_empty() {
             self.refuse(&format!(
                 "push constants of {} bytes (a multiple of 4 up to {PUSH_BYTES} is possible)",
                 bytes.len()
@@ -526,7 +526,7 @@ impl<'a> Pass<'a> {
         if size == 0 {
             return;
         }
-        if buffer.check(offset, size).is_err() || offset % 4 != 0 || size % 4 != 0 {
+        if buffer.check(offset, size).is_err() || !(offset | size).is_multiple_of(4) {
             self.refuse("a fill outside of the buffer or of odd bytes");
             return;
         }

@@ -90,7 +90,6 @@ pub(crate) struct Abilities {
     pub acceleration: bool,
     pub pipeline: bool,
     pub query: bool,
-    pub position_fetch: bool,
     pub anisotropy: bool,
     pub wireframe: bool,
     pub bc: bool,
@@ -201,14 +200,12 @@ fn examine(
         && has(khr::deferred_host_operations::NAME);
     let pipeline_ext = acceleration_ext && has(khr::ray_tracing_pipeline::NAME);
     let query_ext = acceleration_ext && has(khr::ray_query::NAME);
-    let fetch_ext = acceleration_ext && has(khr::ray_tracing_position_fetch::NAME);
 
     let mut f11 = vk::PhysicalDeviceVulkan11Features::default();
     let mut f12 = vk::PhysicalDeviceVulkan12Features::default();
     let mut f_accel = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
     let mut f_pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default();
     let mut f_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
-    let mut f_fetch = vk::PhysicalDeviceRayTracingPositionFetchFeaturesKHR::default();
     let mut features = vk::PhysicalDeviceFeatures2::default()
         .push_next(&mut f11)
         .push_next(&mut f12);
@@ -220,9 +217,6 @@ fn examine(
     }
     if query_ext {
         features = features.push_next(&mut f_query);
-    }
-    if fetch_ext {
-        features = features.push_next(&mut f_fetch);
     }
     // SAFETY: the chain holds only structures of this version and of extensions that the device has.
     unsafe { raw.get_physical_device_features2(physical, &mut features) };
@@ -306,7 +300,6 @@ fn examine(
         acceleration: pipeline || query,
         pipeline,
         query,
-        position_fetch: fetch_ext && (pipeline || query) && on(f_fetch.ray_tracing_position_fetch),
         anisotropy: on(base.sampler_anisotropy),
         wireframe: on(base.fill_mode_non_solid),
         bc: on(base.texture_compression_bc),
@@ -434,9 +427,6 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
     if a.query {
         extensions.push(khr::ray_query::NAME.as_ptr());
     }
-    if a.position_fetch {
-        extensions.push(khr::ray_tracing_position_fetch::NAME.as_ptr());
-    }
     let features = vk::PhysicalDeviceFeatures::default()
         .shader_int64(true)
         .sampler_anisotropy(a.anisotropy)
@@ -472,8 +462,6 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
     let mut f_pipeline =
         vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
     let mut f_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
-    let mut f_fetch = vk::PhysicalDeviceRayTracingPositionFetchFeaturesKHR::default()
-        .ray_tracing_position_fetch(true);
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default()
         .queue_family_index(choice.queue_family)
@@ -492,9 +480,6 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
     }
     if a.query {
         info = info.push_next(&mut f_query);
-    }
-    if a.position_fetch {
-        info = info.push_next(&mut f_fetch);
     }
     // SAFETY: features and extensions are ones that `examine` found on this device; pointers live here.
     unsafe { instance.raw.create_device(choice.physical, &info, None) }.context("vkCreateDevice")
