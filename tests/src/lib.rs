@@ -1,1 +1,15 @@
-//! tests
+//! What crosses rooms: a stand-in engine that loads the built library as a real one does, runs of the real
+//! engine, and what both need.
+//!
+//! * [`engine`]: the stand-in. It lives at the library's C interface, so it is the one place here with raw pointers.
+//! * [`real`]: Debian's ioquake3, run without a display.
+//! * [`data`]: where OpenArena's data, the library and the tools are, and when a test may be skipped.
+//! * [`maps`]: small maps made by the tests.
+
+#![deny(unsafe_code)]
+
+pub mod data;
+#[allow(unsafe_code)]
+pub mod engine;
+pub mod maps;
+pub mod real;

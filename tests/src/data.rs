@@ -1,0 +1,87 @@
+//! Where the things are that tests need, and what happens when they are not there: a test that lacks something is
+//! skipped with a line that says so, and fails instead when `RELIGHT_REQUIRE_DATA=1` (data, tools) or
+//! `RELIGHT_REQUIRE_GPU=1` (a Vulkan device) promises that nothing is lacking.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// Whether the environment variable is 1.
+pub fn is_set(variable: &str) -> bool {
+    std::env::var(variable).is_ok_and(|v| v == "1")
+}
+
+/// Says that a test is skipped because of `why`; a failure where everything has to be there.
+pub fn skip(why: &str) {
+    assert!(
+        !is_set("RELIGHT_REQUIRE_DATA"),
+        "{why}, and RELIGHT_REQUIRE_DATA=1"
+    );
+    println!("skipped: {why}");
+}
+
+/// OpenArena's game folder (`OPENARENA_DATA`, or where Debian puts it), if it is there.
+pub fn game_data() -> Option<PathBuf> {
+    let folder = std::env::var_os("OPENARENA_DATA").map_or_else(
+        || PathBuf::from("/usr/share/games/openarena/baseoa"),
+        PathBuf::from,
+    );
+    if folder.join("pak0.pk3").is_file() {
+        return Some(folder);
+    }
+    skip(&format!("{} has no pak0.pk3", folder.display()));
+    None
+}
+
+/// The repository's top folder.
+pub fn repository() -> PathBuf {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
+    manifest.parent().unwrap_or(manifest).to_path_buf()
+}
+
+/// The renderer library: `RELIGHT_LIBRARY`, or the one that cargo builds beside the running test, brought up to
+/// date first.
+///
+/// # Panics
+/// When it does not build: every test that needs it has failed then.
+pub fn library() -> PathBuf {
+    static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
+    LIBRARY.get_or_init(find_library).clone()
+}
+
+fn find_library() -> PathBuf {
+    if let Some(path) = std::env::var_os("RELIGHT_LIBRARY") {
+        return PathBuf::from(path);
+    }
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut build = Command::new(cargo);
+    build
+        .args(["build", "--quiet", "-p", "ffi"])
+        .current_dir(repository());
+    // <target>/<profile>/deps/<test>
+    let program = std::env::current_exe().expect("a program knows where it is");
+    let profile = program
+        .parent()
+        .and_then(Path::parent)
+        .expect("cargo puts tests two folders deep");
+    if profile.ends_with("release") {
+        build.arg("--release");
+    }
+    let status = build.status().expect("cargo runs");
+    assert!(status.success(), "cargo build -p ffi failed");
+    let library = profile.join("librelight_ffi.so");
+    assert!(library.is_file(), "cargo built no {}", library.display());
+    library
+}
+
+/// A program on the PATH.
+pub fn tool(name: &str) -> Option<PathBuf> {
+    let path = std::env::var_os("PATH")?;
+    let found = std::env::split_paths(&path)
+        .map(|dir| dir.join(name))
+        .find(|file| file.is_file());
+    if found.is_none() {
+        skip(&format!("{name} is not installed"));
+    }
+    found
+}

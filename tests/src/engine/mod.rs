@@ -1,0 +1,436 @@
+//! A stand-in for the engine: it loads the renderer library, offers it the engine's services and drives it through
+//! the life of a game, in a process that a test can look into.
+//!
+//! It behaves as Debian's ioquake3 does where a renderer can tell: console variables are live structures, temporary
+//! memory is a stack, the hunk is thrown away whole, an error leaves the renderer by `longjmp` after it has been shut
+//! down and registered anew from inside the call that raised it, the library is unloaded and loaded again by a video
+//! restart. It is stricter where the real one would corrupt itself silently: see [`Engine::violations`].
+
+pub mod abi;
+pub mod cvars;
+mod exports;
+pub mod files;
+mod imports;
+pub mod memory;
+
+use std::ffi::{CString, c_void};
+use std::mem::MaybeUninit;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+use tempfile::TempDir;
+use thiserror::Error;
+
+use abi::{GetRefAPI, REF_API_VERSION, glconfig_t, refexport_t};
+pub use exports::View;
+use files::{Files, Packs};
+pub use imports::Message;
+use imports::State;
+
+/// An error that the renderer raised through the engine's `Error`.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("the renderer raised an error of level {level}: {message}")]
+pub struct Raised {
+    /// 0 ends the process, 1 drops the game.
+    pub level: i32,
+    /// What it said.
+    pub message: String,
+}
+
+/// Why the library could not be used at all.
+#[derive(Debug, Error)]
+pub enum LoadError {
+    /// The dynamic linker's reason.
+    #[error("{0}: {1}")]
+    Library(PathBuf, libloading::Error),
+    /// `GetRefAPI` gave no table.
+    #[error("GetRefAPI returned NULL; the renderer said: {0}")]
+    Refused(String),
+    /// It raised an error.
+    #[error(transparent)]
+    Raised(#[from] Raised),
+    /// No temporary folder.
+    #[error("no home folder: {0}")]
+    Home(#[from] std::io::Error),
+}
+
+/// How the engine is to be started.
+#[derive(Default)]
+pub struct Options {
+    /// `set NAME VALUE` before the renderer is loaded.
+    pub cvars: Vec<(String, String)>,
+    /// Files above the packs.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// The game's packs.
+    pub packs: Packs,
+}
+
+/// One engine process at a time: the library has one state.
+static PROCESS: Mutex<()> = Mutex::new(());
+
+/// The running stand-in. Shut down when dropped.
+pub struct Engine {
+    library: Option<Library>,
+    path: PathBuf,
+    home: TempDir,
+    _process: MutexGuard<'static, ()>,
+}
+
+/// Calls the renderer. An error that it raises ends the call and comes back as a value.
+///
+/// The closure is `Copy`, so that nothing in the frames that such an error jumps over has a destructor.
+fn call<R: Copy>(f: impl FnOnce() -> R + Copy) -> Result<R, Raised> {
+    struct Slot<F, R> {
+        f: F,
+        result: MaybeUninit<R>,
+    }
+    unsafe extern "C" fn thunk<F: FnOnce() -> R + Copy, R: Copy>(slot: *mut c_void) {
+        // SAFETY: `call` passes its slot, which lives until the call is over.
+        let slot = unsafe { &mut *slot.cast::<Slot<F, R>>() };
+        slot.result.write((slot.f)());
+    }
+    fn thunk_of<F: FnOnce() -> R + Copy, R: Copy>(
+        _: &Slot<F, R>,
+    ) -> unsafe extern "C" fn(*mut c_void) {
+        thunk::<F, R>
+    }
+    let mut slot = Slot {
+        f,
+        result: MaybeUninit::uninit(),
+    };
+    let thunk = thunk_of(&slot);
+    // SAFETY: the thunk gets the slot that it was made for.
+    let level = unsafe { imports::stand_in_call(thunk, (&raw mut slot).cast()) };
+    if level == -1 {
+        // SAFETY: the thunk returned, so it has written the result.
+        return Ok(unsafe { slot.result.assume_init() });
+    }
+    let message = imports::with(|s| s.raised.take())
+        .flatten()
+        .map_or_else(String::new, |(_, m)| m);
+    Err(Raised { level, message })
+}
+
+/// `BeginRegistration` and what the engine registers right after it.
+fn begin_registration(exports: refexport_t) -> Result<(), Raised> {
+    let Some(config) = imports::with(|s| &raw mut *s.config) else {
+        return Ok(());
+    };
+    // SAFETY: the library is loaded; the structure stays where it is for as long as the engine lives.
+    call(move || unsafe { (exports.BeginRegistration)(config) })?;
+    imports::with(|s| s.registered = true);
+    for name in [c"gfx/2d/bigchars", c"white", c"console"] {
+        let name = name.as_ptr();
+        // SAFETY: a literal.
+        call(move || unsafe { (exports.RegisterShader)(name) })?;
+    }
+    Ok(())
+}
+
+/// Finds what a console command of the renderer's runs and sets its arguments; `set` is done at once.
+fn prepare(text: &str) -> Option<extern "C" fn()> {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    match words.as_slice() {
+        [] => None,
+        ["set" | "seta", name, value @ ..] => {
+            imports::with(|s| s.cvars.set_by_user(name, &value.join(" ")));
+            None
+        }
+        [name, ..] => {
+            let arguments = words.iter().filter_map(|w| CString::new(*w).ok()).collect();
+            let command = imports::with(|s| {
+                s.arguments = arguments;
+                s.commands.get(&name.to_ascii_lowercase()).copied()
+            });
+            let command = command.flatten();
+            if command.is_none() {
+                imports::violation(format!("unknown command {text:?}"));
+            }
+            command
+        }
+    }
+}
+
+impl Engine {
+    /// Starts an engine with the library that cargo built, without a window, up to where menus are drawn.
+    pub fn start(options: Options) -> Result<Self, LoadError> {
+        Self::start_with(&crate::data::library(), options)
+    }
+
+    /// The same with another library.
+    pub fn start_with(library: &Path, options: Options) -> Result<Self, LoadError> {
+        let mut engine = Self::load(library, options)?;
+        engine.begin_registration()?;
+        Ok(engine)
+    }
+
+    /// Loads the library and calls `GetRefAPI`; nothing is registered yet.
+    pub fn load(library: &Path, options: Options) -> Result<Self, LoadError> {
+        let process = PROCESS.lock().unwrap_or_else(PoisonError::into_inner);
+        let home = tempfile::tempdir()?;
+        let mut state = State {
+            exports: None,
+            // SAFETY: numbers and characters alone, for which zero is a value.
+            config: Box::new(unsafe { std::mem::zeroed() }),
+            cvars: cvars::Cvars::default(),
+            commands: Default::default(),
+            arguments: Vec::new(),
+            buffer: Default::default(),
+            files: Files::new(&options.files, options.packs, home.path().to_path_buf()),
+            memory: memory::Memory::default(),
+            lists: Vec::new(),
+            messages: Vec::new(),
+            raised: None,
+            handling: false,
+            registered: false,
+            started: Instant::now(),
+            visibility: None,
+            everything_visible: vec![0xFF; 8192],
+            video: Vec::new(),
+            films: Vec::new(),
+            windows: Vec::new(),
+        };
+        let defaults = [
+            ("r_headless", "1"),
+            ("r_mode", "-1"),
+            ("r_customwidth", "320"),
+            ("r_customheight", "240"),
+            ("r_vkValidation", "1"),
+            ("r_fullscreen", "0"),
+            ("r_ignorehwgamma", "1"),
+        ];
+        for (name, value) in defaults {
+            state.cvars.set_by_user(name, value);
+        }
+        for (name, value) in &options.cvars {
+            state.cvars.set_by_user(name, value);
+        }
+        imports::install(Some(state));
+        let mut engine = Self {
+            library: None,
+            path: library.to_path_buf(),
+            home,
+            _process: process,
+        };
+        engine.load_library()?;
+        Ok(engine)
+    }
+
+    fn load_library(&mut self) -> Result<(), LoadError> {
+        let failed = |e| LoadError::Library(self.path.clone(), e);
+        // SAFETY: the library's initializers are those of a Rust cdylib; the linker flags are the engine's.
+        let library =
+            unsafe { Library::open(Some(&self.path), RTLD_NOW | RTLD_LOCAL) }.map_err(failed)?;
+        // SAFETY: the symbol has this signature by the engine's interface.
+        let get_ref_api = *unsafe { library.get::<GetRefAPI>(b"GetRefAPI\0") }.map_err(failed)?;
+        self.library = Some(library);
+        // The engine passes a structure on its stack and the renderer has to copy it; ours is overwritten below.
+        let mut table = imports::table();
+        let place = &raw mut table;
+        // SAFETY: the table outlives the call.
+        let exports = call(move || unsafe { get_ref_api(REF_API_VERSION, place) })?;
+        // SAFETY: nobody may read it any more, and zeros crash whoever calls through them.
+        unsafe { std::ptr::write_bytes(place, 0, 1) };
+        if exports.is_null() {
+            let said = self.messages().into_iter().map(|m| m.text).collect();
+            return Err(LoadError::Refused(said));
+        }
+        // SAFETY: not NULL, so it is the renderer's table.
+        let exports = unsafe { *exports };
+        imports::with(|s| s.exports = Some(exports));
+        Ok(())
+    }
+
+    /// `BeginRegistration`, and the console's own shaders.
+    pub fn begin_registration(&mut self) -> Result<(), Raised> {
+        begin_registration(self.exports())
+    }
+
+    /// `Shutdown`, with the window or without.
+    pub fn shutdown(&mut self, destroy_window: bool) -> Result<(), Raised> {
+        let exports = self.exports();
+        imports::with(|s| s.registered = false);
+        // SAFETY: the library is loaded.
+        call(move || unsafe { (exports.Shutdown)(destroy_window.into()) })?;
+        let left = imports::with(|s| s.commands.len()).unwrap_or(0);
+        if left > 0 {
+            imports::violation(format!("{left} commands were left after Shutdown"));
+        }
+        Ok(())
+    }
+
+    /// Starts a local map as the engine does: `Shutdown` twice, registration, loading screens, the world.
+    pub fn start_map(&mut self, name: &str) -> Result<(), Raised> {
+        self.shutdown(false)?;
+        self.shutdown(false)?;
+        imports::with(|s| s.memory.clear_hunk());
+        self.load_collision_model(name);
+        self.begin_registration()?;
+        let picture = self.register_shader_no_mip("menu/art/unknownmap")?;
+        for _ in 0..3 {
+            self.begin_frame(0)?;
+            self.draw_stretch_pic([0.0, 0.0, 320.0, 240.0], [0.0, 0.0, 1.0, 1.0], picture)?;
+            self.end_frame()?;
+        }
+        self.load_world(name)?;
+        self.end_registration()
+    }
+
+    /// Restarts the video: the hunk goes first, then the renderer, its library with it, and both come back.
+    pub fn restart_video(&mut self) -> Result<(), LoadError> {
+        imports::with(|s| s.memory.clear_hunk());
+        self.shutdown(true)?;
+        self.library = None;
+        imports::with(|s| s.exports = None);
+        self.load_library()?;
+        self.begin_registration()?;
+        Ok(())
+    }
+
+    /// Reads the map's visibility, which the engine's collision code hands out.
+    fn load_collision_model(&mut self, name: &str) {
+        let visibility = imports::with(|s| s.files.read(name))
+            .flatten()
+            .and_then(|bytes| {
+                let int = |at: usize| -> Option<usize> {
+                    let four = bytes.get(at..at.checked_add(4)?)?;
+                    usize::try_from(i32::from_le_bytes(four.try_into().ok()?)).ok()
+                };
+                // lump 16
+                let (offset, length) = (int(8 + 16 * 8)?, int(8 + 16 * 8 + 4)?);
+                let lump = bytes.get(offset..offset.checked_add(length)?)?;
+                let (clusters, row) = (int(offset)?, int(offset + 4)?);
+                let rows = lump.get(8..8 + clusters.checked_mul(row)?)?.to_vec();
+                Some((clusters, row, rows))
+            });
+        imports::with(|s| s.visibility = visibility);
+    }
+
+    /// Runs a console command, then what it appended to the command buffer.
+    pub fn command(&mut self, text: &str) -> Result<(), Raised> {
+        let mut next = Some(text.to_string());
+        while let Some(text) = next {
+            if let Some(command) = prepare(&text) {
+                call(move || command())?;
+            }
+            next = imports::with(|s| s.buffer.pop_front()).flatten();
+        }
+        Ok(())
+    }
+
+    /// `set NAME VALUE` on the console.
+    pub fn set(&mut self, name: &str, value: &str) {
+        imports::with(|s| s.cvars.set_by_user(name, value));
+    }
+
+    /// A console variable's value, if it exists.
+    pub fn cvar(&self, name: &str) -> Option<String> {
+        imports::with(|s| s.cvars.string(name)).flatten()
+    }
+
+    /// Names of the console variables that the renderer registered.
+    pub fn registered_cvars(&self) -> Vec<String> {
+        imports::with(|s| s.cvars.registered()).unwrap_or_default()
+    }
+
+    /// A console variable's flags, reset value and description.
+    pub fn describe_cvar(&self, name: &str) -> Option<(i32, String, Option<String>)> {
+        imports::with(|s| s.cvars.describe(name)).flatten()
+    }
+
+    /// Names of the commands that exist.
+    pub fn commands(&self) -> Vec<String> {
+        let mut names: Vec<String> =
+            imports::with(|s| s.commands.keys().cloned().collect()).unwrap_or_default();
+        names.sort();
+        names
+    }
+
+    /// What the renderer wrote about itself.
+    pub fn config(&self) -> glconfig_t {
+        // SAFETY: numbers and characters alone.
+        imports::with(|s| (*s.config).clone()).unwrap_or_else(|| unsafe { std::mem::zeroed() })
+    }
+
+    /// Adds or replaces a game file.
+    pub fn insert_file(&mut self, name: &str, bytes: Vec<u8>) {
+        imports::with(|s| s.files.insert(name, bytes));
+    }
+
+    /// A game file's bytes, or those of one that the renderer has written.
+    pub fn read_file(&self, name: &str) -> Option<Vec<u8>> {
+        imports::with(|s| s.files.read(name)).flatten()
+    }
+
+    /// What `FS_ListFiles` gives.
+    pub fn list_files(&self, dir: &str, extension: &str) -> Vec<String> {
+        imports::with(|s| s.files.list(dir, extension)).unwrap_or_default()
+    }
+
+    /// The folder that `FS_WriteFile` writes to.
+    pub fn home(&self) -> &Path {
+        self.home.path()
+    }
+
+    /// Takes the messages since the last call.
+    pub fn take_messages(&mut self) -> Vec<Message> {
+        imports::with(|s| std::mem::take(&mut s.messages)).unwrap_or_default()
+    }
+
+    /// All messages that have not been taken.
+    pub fn messages(&self) -> Vec<Message> {
+        imports::with(|s| s.messages.clone()).unwrap_or_default()
+    }
+
+    /// Takes the frames that the video writer got.
+    pub fn take_video(&mut self) -> Vec<Vec<u8>> {
+        imports::with(|s| std::mem::take(&mut s.video)).unwrap_or_default()
+    }
+
+    /// What the renderer did against the engine's rules: temporary memory freed in the wrong order, commands added
+    /// twice or left behind, memory freed that is none, errors inside errors, forbidden arguments.
+    pub fn violations(&self) -> Vec<String> {
+        let mut all = imports::with(|s| s.memory.violations.clone()).unwrap_or_default();
+        let lists = imports::with(|s| s.lists.len()).unwrap_or(0);
+        if lists > 0 {
+            all.push(format!("{lists} file lists were never freed"));
+        }
+        all
+    }
+
+    /// Messages of Vulkan's validation layers.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.messages()
+            .into_iter()
+            .map(|m| m.text)
+            .filter(|t| t.to_ascii_lowercase().contains("validation:") || t.contains("VUID-"))
+            .collect()
+    }
+
+    /// Fails the test if the renderer broke a rule or the validation layers had to say something.
+    ///
+    /// # Panics
+    /// Then.
+    pub fn assert_clean(&self) {
+        assert_eq!(self.violations(), Vec::<String>::new());
+        assert_eq!(self.validation_messages(), Vec::<String>::new());
+    }
+
+    fn exports(&self) -> refexport_t {
+        imports::with(|s| s.exports)
+            .flatten()
+            .expect("the library is loaded")
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        if imports::with(|s| s.exports.is_some()) == Some(true) {
+            let _ = self.shutdown(true);
+        }
+        self.library = None;
+        imports::install(None);
+    }
+}
