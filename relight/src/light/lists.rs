@@ -1,13 +1,14 @@
 //! Which lights can matter in which cluster: exact lists from the potentially visible sets.
 //!
-//! A light is in a cluster's list when one of the clusters that its surface lies in can see that cluster,
+//! A light is in a cluster's list when one of the clusters that it lies in can see that cluster,
 //! or be seen from it (compilers write matrices that are not symmetric, and light travels both ways), unless
 //! the whole cluster lies behind a one-sided light.
 
 use super::{PointLight, TriangleLight};
-use crate::world::{WorldModel, WorldSurface};
+use crate::world::WorldSurface;
 use glam::Vec3;
 use q3bsp::Bsp;
+use std::collections::HashMap;
 
 /// Lights per cluster, in compressed rows.
 ///
@@ -84,7 +85,7 @@ impl LightLists {
 }
 
 /// A set of clusters.
-#[derive(Clone, PartialEq)]
+#[derive(Clone, PartialEq, Eq, Hash)]
 struct Bits(Vec<u64>);
 
 impl Bits {
@@ -107,6 +108,12 @@ impl Bits {
     fn merge(&mut self, other: &Bits) {
         for (word, more) in self.0.iter_mut().zip(&other.0) {
             *word |= more;
+        }
+    }
+
+    fn keep(&mut self, other: &Bits) {
+        for (word, kept) in self.0.iter_mut().zip(&other.0) {
+            *word &= kept;
         }
     }
 
@@ -214,11 +221,12 @@ impl<'a> Clusters<'a> {
         }
     }
 
-    /// Clusters that can be lit from inside the given box: what the clusters of the leafs that touch it see.
-    /// All clusters when it touches none.
-    fn lit_from_box(&self, mins: Vec3, maxs: Vec3) -> Bits {
+    /// Clusters of the leafs in the tree that touch a box.
+    fn touching(&self, mins: Vec3, maxs: Vec3) -> Bits {
+        let bounds = Bounds { mins, maxs };
         let mut at = Bits::none(self.count);
-        let mut visited = vec![false; self.bsp.nodes.len()];
+        // A damaged tree may share nodes or go in circles: no path needs more steps than there are nodes.
+        let mut steps = self.bsp.nodes.len() * 2;
         let mut stack = vec![0i32];
         while let Some(child) = stack.pop() {
             let Ok(index) = usize::try_from(child) else {
@@ -230,18 +238,17 @@ impl<'a> Clusters<'a> {
                 }
                 continue;
             };
-            let (Some(node), Some(seen)) = (self.bsp.nodes.get(index), visited.get_mut(index))
-            else {
+            let Some(node) = self.bsp.nodes.get(index) else {
                 continue;
             };
-            if std::mem::replace(seen, true) {
-                continue;
-            }
             let plane = usize::try_from(node.plane)
                 .ok()
                 .and_then(|p| self.bsp.planes.get(p));
             let Some(plane) = plane else { continue };
-            let bounds = Bounds { mins, maxs };
+            if steps == 0 {
+                return Bits::none(self.count);
+            }
+            steps -= 1;
             if bounds.furthest_in_front(plane.normal, plane.dist) >= 0.0 {
                 stack.push(node.children[0]);
             }
@@ -249,10 +256,11 @@ impl<'a> Clusters<'a> {
                 stack.push(node.children[1]);
             }
         }
-        self.lit_from(at)
+        at
     }
 
-    fn lit_from(&self, at: Bits) -> Bits {
+    /// Clusters that see one of the given clusters or are seen from it; all when none is given.
+    fn lit_from(&self, at: &Bits) -> Bits {
         if at.is_empty() {
             return Bits::all(self.count);
         }
@@ -265,33 +273,30 @@ impl<'a> Clusters<'a> {
         lit
     }
 
-    /// Clusters that a surface can light. World surfaces are where leafs list them; those of brush models,
-    /// and the few that no leaf lists, where their bounds are.
-    fn lit_from_surface(
-        &self,
-        index: usize,
-        surface: &WorldSurface,
-        model: Option<&WorldModel>,
-    ) -> Bits {
-        let listed = self
-            .of_surface
-            .get(index)
-            .filter(|l| surface.model == 0 && !l.is_empty());
-        match listed {
-            Some(list) => {
-                let mut at = Bits::none(self.count);
-                list.iter().for_each(|&c| at.insert(c as usize));
-                self.lit_from(at)
-            }
-            None => {
-                let offset = model.map_or(Vec3::ZERO, |m| m.origin);
-                let margin = Vec3::splat(SEARCH_MARGIN);
-                self.lit_from_box(
-                    surface.mins + offset - margin,
-                    surface.maxs + offset + margin,
-                )
+    /// Clusters that a triangle light lies in: those that its bounds touch, of a world surface only such as list
+    /// it. (The few world surfaces that no leaf lists, and those of brush models, are where their bounds are.)
+    fn clusters_of(&self, light: &TriangleLight, listed: &Bits) -> Bits {
+        let margin = Vec3::splat(SEARCH_MARGIN);
+        let [a, b, c] = light.vertices;
+        let mut at = self.touching(a.min(b).min(c) - margin, a.max(b).max(c) + margin);
+        if !listed.is_empty() {
+            at.keep(listed);
+            if at.is_empty() {
+                return listed.clone();
             }
         }
+        at
+    }
+
+    /// Clusters whose leafs list a world surface; none for surfaces of brush models.
+    fn listing(&self, index: usize, surfaces: &[WorldSurface]) -> Bits {
+        let mut at = Bits::none(self.count);
+        if surfaces.get(index).is_some_and(|s| s.model == 0) {
+            for &cluster in self.of_surface.get(index).into_iter().flatten() {
+                at.insert(cluster as usize);
+            }
+        }
+        at
     }
 
     /// Whether some of a cluster may lie on an emitting side of a light.
@@ -309,47 +314,31 @@ impl<'a> Clusters<'a> {
         lights: &[TriangleLight],
         points: &[PointLight],
         surfaces: &[WorldSurface],
-        models: &[WorldModel],
     ) -> LightLists {
         let mut rows: Vec<Vec<u32>> = vec![Vec::new(); self.count];
-        let mut last: Option<(u32, Bits)> = None;
+        let mut listed: Option<(u32, Bits)> = None;
+        let mut known: HashMap<Bits, Bits> = HashMap::new();
         for (entry, light) in (0u32..).zip(lights) {
-            let lit = match last.take() {
-                Some((surface, lit)) if surface == light.surface => lit,
-                _ => {
-                    let index = light.surface as usize;
-                    match surfaces.get(index) {
-                        Some(surface) if surface.num_indices > 0 => self.lit_from_surface(
-                            index,
-                            surface,
-                            models.get(surface.model as usize),
-                        ),
-                        _ => {
-                            let corners = || light.vertices.into_iter();
-                            let mins = corners().fold(Vec3::INFINITY, Vec3::min);
-                            let maxs = corners().fold(Vec3::NEG_INFINITY, Vec3::max);
-                            self.lit_from_box(mins, maxs)
-                        }
-                    }
-                }
+            let (surface, listing) = match listed.take() {
+                Some((surface, listing)) if surface == light.surface => (surface, listing),
+                _ => (
+                    light.surface,
+                    self.listing(light.surface as usize, surfaces),
+                ),
             };
+            let at = self.clusters_of(light, &listing);
+            listed = Some((surface, listing));
+            let lit = known.entry(at).or_insert_with_key(|at| self.lit_from(at));
             for cluster in lit.iter().filter(|&c| self.faces(light, c)) {
                 if let Some(row) = rows.get_mut(cluster) {
                     row.push(entry);
                 }
             }
-            last = Some((light.surface, lit));
         }
         for (entry, point) in (lights.len() as u32..).zip(points) {
-            let cluster = usize::try_from(self.bsp.cluster_at(point.origin)).ok();
-            let lit = match cluster.and_then(|c| self.sees.get(c)) {
-                Some(sees) => sees.clone(),
-                None => {
-                    let margin = Vec3::splat(SEARCH_MARGIN.max(point.radius));
-                    self.lit_from_box(point.origin - margin, point.origin + margin)
-                }
-            };
-            for cluster in lit.iter() {
+            let margin = Vec3::splat(SEARCH_MARGIN.max(point.radius));
+            let at = self.touching(point.origin - margin, point.origin + margin);
+            for cluster in self.lit_from(&at).iter() {
                 if let Some(row) = rows.get_mut(cluster) {
                     row.push(entry);
                 }

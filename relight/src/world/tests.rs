@@ -59,6 +59,11 @@ t/wall
     { map t/orange.tga
       blendFunc filter }
 }
+t/haze
+{
+    surfaceparm fog
+    fogparms ( 0.25 0.5 1 ) 300
+}
 t/gone
 {
     q3map_surfacelight 50
@@ -432,6 +437,152 @@ fn invisible_patches_are_left_out_by_their_own_flags() {
     assert_eq!(world.surfaces[b].num_indices, 0);
     assert_ne!(world.surfaces[a].material, world.surfaces[b].material);
     assert_eq!(world.surfaces[a].maxs.z, 20.0);
+}
+
+#[test]
+fn fogs_are_numbered_from_one() {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 1);
+    let haze = map.add_shader("t/haze", 0, q3bsp::content_flags::FOG);
+    map.add_cell(Vec3::splat(-64.0), Vec3::splat(64.0));
+    let fog = map.add_fog_brush(haze, Vec3::splat(-64.0), Vec3::new(64.0, 64.0, 0.0), 5);
+    let inside = map.add_quad(wall, ceiling_lamp(16.0, -8.0));
+    let outside = map.add_quad(wall, ceiling_lamp(16.0, 8.0));
+    map.set_fog(inside, fog);
+    map.set_fog(outside, -1);
+    let world = relight(map);
+    assert_eq!(world.fogs.len(), 1);
+    assert_eq!(world.fogs[0].color, Vec3::new(0.25, 0.5, 1.0));
+    assert_eq!(world.fogs[0].depth, 300.0);
+    assert_eq!(
+        (world.surfaces[inside].fog, world.surfaces[outside].fog),
+        (1, 0)
+    );
+}
+
+/// A map with one of everything, for damaging.
+fn rich_map() -> Vec<u8> {
+    let mut map = MapBuilder::new();
+    let names = [
+        "t/wall", "t/lamp", "t/both", "t/sprite", "t/sky", "t/glow", "t/gone", "t/haze",
+    ];
+    let shaders: Vec<i32> = names.iter().map(|n| map.add_shader(n, 0, 1)).collect();
+    map.add_room(shaders[0], Vec3::splat(-128.0), Vec3::splat(128.0));
+    let other = map.add_room(
+        shaders[4],
+        Vec3::new(200.0, -128.0, -128.0),
+        Vec3::new(400.0, 128.0, 128.0),
+    );
+    map.set_sees(other, 0, false);
+    for (&shader, z) in shaders
+        .iter()
+        .zip([-90.0f32, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0])
+    {
+        map.add_quad(shader, ceiling_lamp(16.0, z));
+    }
+    let point = |i: i32| DrawVert {
+        position: Vec3::new(
+            (i % 3) as f32 * 16.0,
+            (i / 3) as f32 * 16.0,
+            (i % 2) as f32 * 30.0,
+        ),
+        st: Vec2::ZERO,
+        lightmap: Vec2::ZERO,
+        normal: Vec3::Z,
+        color: [9; 4],
+    };
+    let points: Vec<_> = (0..9).map(point).collect();
+    map.add_patch(shaders[1], 3, 3, &points);
+    map.add_soup(shaders[2], &points, &[0, 1, 2, 4, 5, 6]);
+    map.add_flare(shaders[0], Vec3::ZERO, Vec3::Z, Vec3::ONE);
+    map.add_fog_brush(shaders[7], Vec3::splat(-128.0), Vec3::splat(0.0), 5);
+    map.add_lightmap([1, 2, 3]);
+    let model = map.begin_model();
+    map.add_quad(shaders[1], ceiling_lamp(16.0, 10.0));
+    map.add_entity(&[
+        ("classname", "func_door"),
+        ("model", &format!("*{model}")),
+        ("origin", "5 5 5"),
+    ]);
+    map.add_entity(&[
+        ("classname", "light"),
+        ("origin", "0 0 9"),
+        ("target", "a"),
+        ("_color", "1 0 0"),
+    ]);
+    map.add_entity(&[
+        ("classname", "info_null"),
+        ("origin", "0 9 9"),
+        ("targetname", "a"),
+    ]);
+    map.build().write()
+}
+
+/// Damaged maps are refused or relit; they never panic, and what comes out is finite.
+#[test]
+fn damage_does_no_harm() {
+    let files = game();
+    let (materials, _) = Materials::load(&files);
+    let whole = rich_map();
+    let mut state = 1u64;
+    let mut random = |below: usize| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below
+    };
+    let mut relit = 0;
+    for round in 0..600 {
+        let mut bytes = whole.clone();
+        for _ in 0..1 + round % 4 {
+            let at = random(bytes.len() / 4) * 4;
+            let values = [
+                0u32,
+                1,
+                u32::MAX,
+                0x7f80_0000,
+                0x7fc0_0000,
+                0x7f7f_ffff,
+                0xff7f_ffff,
+                0x8000_0000,
+                17,
+            ];
+            let value = values[random(values.len())].to_le_bytes();
+            bytes[at..at + 4].copy_from_slice(&value);
+        }
+        let Ok(bsp) = Bsp::parse(&bytes) else {
+            continue;
+        };
+        let world = RelitWorld::from_bsp(&files, &materials, "damaged", bsp, Options::default());
+        relit += 1;
+        assert!(
+            world
+                .lights
+                .iter()
+                .all(|l| l.radiance.is_finite() && l.area().is_finite())
+        );
+        assert!(
+            world
+                .vertices
+                .iter()
+                .all(|v| v.position.is_finite() && v.normal.is_finite())
+        );
+        assert!(
+            world
+                .indices
+                .iter()
+                .all(|&i| (i as usize) < world.vertices.len())
+        );
+        assert!(
+            world
+                .point_lights
+                .iter()
+                .all(|l| l.intensity.is_finite() && l.origin.is_finite())
+        );
+        let entries = (world.lights.len() + world.point_lights.len()) as u32;
+        assert!(world.light_lists.lights.iter().all(|&l| l < entries));
+    }
+    assert!(relit > 100, "only {relit} of 600 were relit");
 }
 
 #[test]
