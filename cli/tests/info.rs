@@ -1,0 +1,90 @@
+//! `relight info` on a made-up game folder.
+
+use glam::Vec3;
+use q3bsp::builder::MapBuilder;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn map() -> Vec<u8> {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/missing", 0, 1);
+    let lamp = map.add_shader("t/lamp", 0, 1);
+    map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
+    map.add_quad(
+        lamp,
+        [(-8.0, -8.0), (8.0, -8.0), (8.0, 8.0), (-8.0, 8.0)].map(|(x, y)| Vec3::new(x, y, 100.0)),
+    );
+    map.build().write()
+}
+
+fn game(folder: &Path) {
+    let script = "t/lamp\n{\nq3map_lightRGB 1 0 0\nq3map_surfacelight 255\n{\nmap *white\n}\n}\n";
+    std::fs::create_dir_all(folder.join("scripts")).unwrap();
+    std::fs::create_dir_all(folder.join("maps")).unwrap();
+    std::fs::write(folder.join("scripts/a.shader"), script).unwrap();
+    std::fs::write(folder.join("maps/room.bsp"), map()).unwrap();
+}
+
+fn info(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_relight"))
+        .arg("info")
+        .arg("--game")
+        .arg(folder)
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn json_tells_lights_and_what_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    game(folder.path());
+    let output = info(folder.path(), &["--json"]);
+    assert!(output.status.success(), "{output:?}");
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let room = &json["maps"][0];
+    assert_eq!(room["map"], "maps/room.bsp");
+    assert_eq!(room["triangle_lights"], 2);
+    assert_eq!(room["lights_by_source"]["surfacelight"], 2);
+    assert_eq!(room["missing"][0], "t/missing");
+    assert_eq!(room["emitters"][0]["material"], "t/lamp");
+    let red = room["emitters"][0]["radiance"][0].as_f64().unwrap();
+    assert!((red - std::f64::consts::PI).abs() < 1e-5);
+    assert_eq!(json["failures"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn a_broken_map_is_told_and_the_others_are_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    game(folder.path());
+    let broken = folder.path().join("broken.bsp");
+    std::fs::write(&broken, "IBSP").unwrap();
+    let output = info(
+        folder.path(),
+        &["room", broken.to_str().unwrap(), "nowhere"],
+    );
+    assert!(!output.status.success());
+    let (table, errors) = (
+        String::from_utf8(output.stdout).unwrap(),
+        String::from_utf8(output.stderr).unwrap(),
+    );
+    assert!(
+        table.contains("maps/room.bsp") && table.contains("missing: t/missing"),
+        "{table}"
+    );
+    assert!(
+        errors.contains("broken.bsp") && errors.contains("maps/nowhere.bsp"),
+        "{errors}"
+    );
+}
+
+#[test]
+fn no_game_folder_is_one_sentence() {
+    let output = info(Path::new("/nonexistent/game"), &[]);
+    assert!(!output.status.success());
+    assert!(
+        String::from_utf8(output.stderr)
+            .unwrap()
+            .contains("/nonexistent/game")
+    );
+}
