@@ -39,12 +39,13 @@ impl Bsp {
             .map_or(-1, |leaf| leaf.cluster)
     }
 
-    /// Indices of the leafs that can be reached from the root, front before back. Compilers also write
-    /// leafs that cannot: a dummy leaf 0, and one per brush model whose surfaces would wrongly land in
-    /// cluster 0.
+    /// Indices of the leafs that can be reached from the root, each once, front before back. Compilers
+    /// also write leafs that cannot: a dummy leaf 0, and one per brush model whose surfaces would
+    /// wrongly land in cluster 0.
     pub fn tree_leafs(&self) -> Vec<usize> {
         let mut found = Vec::new();
         let mut seen = vec![false; self.nodes.len()];
+        let mut listed = vec![false; self.leafs.len()];
         let mut pending = if self.nodes.is_empty() {
             vec![]
         } else {
@@ -52,7 +53,14 @@ impl Bsp {
         };
         while let Some(at) = pending.pop() {
             match usize::try_from(at) {
-                Err(_) => found.push(usize::try_from(-1 - at).unwrap_or(0)),
+                Err(_) => {
+                    let leaf = usize::try_from(-1 - at).unwrap_or(0);
+                    if let Some(listed) = listed.get_mut(leaf)
+                        && !std::mem::replace(listed, true)
+                    {
+                        found.push(leaf);
+                    }
+                }
                 Ok(at) => {
                     if let (Some(node), Some(seen)) = (self.nodes.get(at), seen.get_mut(at))
                         && !std::mem::replace(seen, true)

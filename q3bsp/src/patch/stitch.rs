@@ -10,6 +10,35 @@ const SAME: f32 = 0.1;
 /// An edge with both ends closer than this on every axis has no room for a point.
 const NO_ROOM: f32 = 0.01;
 
+/// Comparisons of points that one map may cost. Shipped maps need about a hundredth; a hostile one
+/// could ask for the square of its size.
+const MAX_COMPARISONS: u64 = 1_000_000_000;
+
+/// What may still be spent on a map.
+struct Budget {
+    comparisons: u64,
+    new_vertices: u64,
+}
+
+impl Budget {
+    /// Takes what it costs to compare the edges of two meshes; false when it is not there any more.
+    fn compare(&mut self, a: &PatchMesh, b: &PatchMesh) -> bool {
+        let edges = |mesh: &PatchMesh| 2 * (mesh.width + mesh.height) as u64;
+        self.take(|budget| &mut budget.comparisons, edges(a) * edges(b))
+    }
+
+    fn take(&mut self, which: impl Fn(&mut Self) -> &mut u64, cost: u64) -> bool {
+        let left = which(self);
+        let rest = left.checked_sub(cost);
+        *left = rest.unwrap_or(0);
+        rest.is_some()
+    }
+
+    fn is_spent(&self) -> bool {
+        self.comparisons == 0 || self.new_vertices == 0
+    }
+}
+
 /// One of the four edges of a grid.
 #[derive(Clone, Copy)]
 struct Edge {
@@ -170,7 +199,8 @@ impl Grid<'_> {
 }
 
 /// Stitches all meshes and makes touching edges agree on their LOD errors. Only meshes of one LOD group
-/// meet, because others change their detail at different distances.
+/// meet, because others change their detail at different distances. A map that would take too long or
+/// grow too much is left with cracks where the work ended, which is logged.
 pub(super) fn stitch(meshes: &mut [Option<PatchMesh>]) {
     let mut groups: BTreeMap<[u32; 4], Vec<Grid<'_>>> = BTreeMap::new();
     for mesh in meshes.iter_mut().flatten() {
@@ -186,15 +216,22 @@ pub(super) fn stitch(meshes: &mut [Option<PatchMesh>]) {
             .or_default()
             .push(Grid::new(mesh));
     }
+    let mut budget = Budget {
+        comparisons: MAX_COMPARISONS,
+        new_vertices: super::MAX_TOTAL_VERTICES as u64,
+    };
     for grids in groups.values_mut() {
-        stitch_group(grids);
-        share_errors(grids);
+        stitch_group(grids, &mut budget);
+        share_errors(grids, &mut budget);
+    }
+    if budget.is_spent() {
+        log::warn!("too many patches touch each other; some are not stitched");
     }
 }
 
 /// Goes over the group until nothing changes. Every insertion grows a grid, which ends at
 /// [`MAX_GRID_SIZE`].
-fn stitch_group(grids: &mut [Grid<'_>]) {
+fn stitch_group(grids: &mut [Grid<'_>], budget: &mut Budget) {
     let mut changed = true;
     while changed {
         changed = false;
@@ -204,7 +241,12 @@ fn stitch_group(grids: &mut [Grid<'_>]) {
             }
             changed = true;
             for to in 0..grids.len() {
-                while grids[from].touches(&grids[to]) {
+                if !budget.take(|budget| &mut budget.comparisons, 1) {
+                    return;
+                }
+                while grids[from].touches(&grids[to])
+                    && budget.compare(grids[from].mesh, grids[to].mesh)
+                {
                     let Some(missing) = missing_point(grids[from].mesh, grids[to].mesh) else {
                         break;
                     };
@@ -215,6 +257,14 @@ fn stitch_group(grids: &mut [Grid<'_>]) {
                         error,
                     } = missing;
                     grids[to].mesh.insert_line(edge, at, point, error);
+                    let across = if edge.along_row {
+                        grids[to].mesh.height
+                    } else {
+                        grids[to].mesh.width
+                    };
+                    if !budget.take(|budget| &mut budget.new_vertices, across as u64) {
+                        return;
+                    }
                     grids[to].measure();
                     grids[to].done = false;
                 }
@@ -274,7 +324,7 @@ fn missing_point(from: &PatchMesh, to: &PatchMesh) -> Option<Missing> {
 
 /// Spreads the errors of each grid to the points that others share with it, depth first, so that all
 /// leave out the same points at the same distance.
-fn share_errors(grids: &mut [Grid<'_>]) {
+fn share_errors(grids: &mut [Grid<'_>], budget: &mut Budget) {
     for grid in grids.iter_mut() {
         grid.done = false;
     }
@@ -285,7 +335,11 @@ fn share_errors(grids: &mut [Grid<'_>]) {
         let mut path = vec![(first, first + 1)];
         while let Some((from, next)) = path.pop() {
             let hit = (next..grids.len()).find(|&to| {
-                !grids[to].done && grids[from].touches(&grids[to]) && copy_errors(from, to, grids)
+                !grids[to].done
+                    && budget.take(|budget| &mut budget.comparisons, 1)
+                    && grids[from].touches(&grids[to])
+                    && budget.compare(grids[from].mesh, grids[to].mesh)
+                    && copy_errors(from, to, grids)
             });
             if let Some(to) = hit {
                 grids[to].done = true;
