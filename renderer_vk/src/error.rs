@@ -11,7 +11,7 @@ pub enum Error {
     Gpu(#[from] gpu::Error),
     /// A map that cannot be loaded.
     #[error(transparent)]
-    World(#[from] relight::LoadError),
+    World(#[from] crate::world::WorldError),
     /// A second map without a new registration.
     #[error("{name}: a map is loaded already")]
     WorldTwice {

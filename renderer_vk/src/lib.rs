@@ -5,8 +5,11 @@
 
 pub mod api;
 pub mod assets;
+mod error;
 pub mod gpu;
 pub mod scene;
 pub mod settings;
 pub mod trace;
 pub mod world;
+
+pub use error::Error;

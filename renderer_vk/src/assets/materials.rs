@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::Vec3;
-use shaders::types;
+use shaders::types::{self, MaterialBuffers};
 use shaderscript::{ImplicitKind, Shader, StageImage, strip_extension};
 
 use super::compile::{self, StageArrays, VideoClients};
@@ -29,25 +29,13 @@ pub struct MaterialSettings {
     pub vertex_light: bool,
 }
 
-/// Device addresses of the arrays. Zero before the first [`Materials::upload`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct MaterialBuffers {
-    /// `types::Material`, index = material.
-    pub materials: u64,
-    /// `types::Stage`.
-    pub stages: u64,
-    /// `types::TcMod`.
-    pub tc_mods: u64,
-    /// `u32` bindless texture indices; `Stage::image_first` counts in it.
-    pub images: u64,
-}
-
 /// The arrays on the GPU.
 struct Uploaded {
     materials: Buffer,
     stages: Buffer,
     tc_mods: Buffer,
     images: Buffer,
+    noise: Buffer,
 }
 
 /// Materials by index; 0 is the default material.
@@ -69,6 +57,7 @@ pub struct Materials {
     last_sun: Option<Vec3>,
     uploaded: Option<Uploaded>,
     dirty: bool,
+    generation: u64,
 }
 
 /// Materials that the renderer draws with itself.
@@ -104,6 +93,7 @@ impl Materials {
             last_sun: None,
             uploaded: None,
             dirty: true,
+            generation: 0,
         };
         let default = internal_shader("*default", |stage| {
             stage.image = StageImage::Map("*default".into());
@@ -319,7 +309,7 @@ impl Materials {
         };
         self.list.push(material);
         self.insert_sorted(order, sort);
-        self.dirty = true;
+        self.touch();
         order
     }
 
@@ -446,8 +436,8 @@ impl Materials {
         }
         if let (Some(offset), Some(material)) = (time_offset, self.list.get_mut(target as usize)) {
             material.time_offset = offset;
-            self.dirty = true;
         }
+        self.touch();
     }
 
     /// Says that surfaces of a material are in the light list, and which radiance (display-white units) they have
@@ -460,12 +450,13 @@ impl Materials {
         if let (Some(material), Some((_, light))) = slots {
             material.flags |= types::constants::MATERIAL_EMITTER;
             *light = light.max(radiance);
-            self.dirty = true;
+            self.touch();
         }
     }
 
     /// Points every stage that shows texture `old` for a client at `new`.
     pub fn replace_scratch(&mut self, client: usize, new: u32) {
+        let mut changed = false;
         for material in &self.list {
             for video in material.videos.iter().filter(|v| v.client == client) {
                 let first = self
@@ -475,9 +466,12 @@ impl Materials {
                     .map(|stage| stage.image_first as usize);
                 if let Some(image) = first.and_then(|first| self.arrays.images.get_mut(first)) {
                     *image = new;
-                    self.dirty = true;
+                    changed = true;
                 }
             }
+        }
+        if changed {
+            self.touch();
         }
     }
 
@@ -497,7 +491,17 @@ impl Materials {
 
     /// Marks everything for a new upload (a change of samplers).
     pub fn invalidate(&mut self) {
+        self.touch();
+    }
+
+    fn touch(&mut self) {
         self.dirty = true;
+        self.generation += 1;
+    }
+
+    /// Grows whenever a material is added or changed.
+    pub fn generation(&self) -> u64 {
+        self.generation
     }
 
     /// Copies the arrays to the GPU if anything changed. `samplers` translates sampler kinds to bindless indices.
@@ -525,17 +529,28 @@ impl Materials {
             .map(|(material, &emission)| gpu_material(material, emission))
             .collect();
         let usage = BufferUsage::STORAGE;
+        // values as bits, then the permutation: one array of words
+        let noise: Vec<u32> = shaderscript::eval::noise_values()
+            .iter()
+            .map(|value| value.to_bits())
+            .chain(
+                shaderscript::eval::noise_permutation()
+                    .iter()
+                    .map(|&i| u32::from(i)),
+            )
+            .collect();
         self.uploaded = Some(Uploaded {
             materials: Buffer::with_data(device, "materials", usage, &materials)?,
             stages: Buffer::with_data(device, "stages", usage, &stages)?,
             tc_mods: Buffer::with_data(device, "tcMods", usage, &self.arrays.tc_mods)?,
             images: Buffer::with_data(device, "stage images", usage, &self.arrays.images)?,
+            noise: Buffer::with_data(device, "noise", usage, &noise)?,
         });
         self.dirty = false;
         Ok(())
     }
 
-    /// Device addresses as of the last upload.
+    /// Device addresses as of the last upload; zero before the first.
     pub fn addresses(&self) -> MaterialBuffers {
         self.uploaded
             .as_ref()
@@ -544,6 +559,7 @@ impl Materials {
                 stages: u.stages.address(),
                 tc_mods: u.tc_mods.address(),
                 images: u.images.address(),
+                noise: u.noise.address(),
             })
     }
 

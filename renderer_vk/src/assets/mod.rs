@@ -17,7 +17,7 @@ use relight::GameFiles;
 
 pub use fonts::LoadedFont;
 pub use material::{Combine, LightmapClass, Material, RasterPass, SkyBox, VideoStage};
-pub use materials::{DEFAULT_PORTAL_RANGE, Internal, MaterialBuffers, MaterialSettings, Materials};
+pub use materials::{DEFAULT_PORTAL_RANGE, Internal, MaterialSettings, Materials};
 pub use models::{MAX_LODS, Md3Lod, Model, Models};
 pub use prepare::TextureSettings;
 pub use skins::{LoadedSkin, Skins};

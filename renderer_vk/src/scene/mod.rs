@@ -4,12 +4,25 @@
 //! instances, the vertices of everything that moves or deforms (evaluated on the CPU, in the space of their
 //! instance), and the sorted list of visible surfaces that the classic look draws.
 
+mod entity;
+mod gather;
+mod key_frames;
+mod lighting;
+mod mesh;
+mod portal;
+mod shapes;
+mod surfaces;
 pub mod view;
 
 use glam::{Vec3, Vec4};
 use shaders::types::{Instance, Vertex};
 
-use crate::api::{DynamicLight, RefDef};
+use crate::Error;
+use crate::api::{DynamicLight, EntityKind, PolyVert, RefDef, RefEntity};
+use crate::assets::{Assets, Materials, Models, Skins};
+use crate::settings::Settings;
+use crate::world::{VisibleSet, World, WorldData};
+pub use lighting::light_for_point;
 pub use view::View;
 
 /// Where a surface's triangles are.
@@ -142,4 +155,178 @@ pub struct VisibleSky {
     pub material: u32,
     /// The triangles' corners in world space, three each.
     pub triangles: Vec<Vec3>,
+}
+
+/// Which of the two looks a view is gathered for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// Rasterized: what the frustum shows, sorted, with a view for a portal or mirror.
+    Classic,
+    /// Traced: what moves, wherever it is.
+    Traced,
+}
+
+/// What a scene is gathered from.
+#[derive(Clone, Copy)]
+pub struct GatherInput<'a> {
+    /// The map, if one is loaded (also for views without it).
+    pub world: Option<&'a WorldData>,
+    /// Materials.
+    pub materials: &'a Materials,
+    /// Models.
+    pub models: &'a Models,
+    /// Skins.
+    pub skins: &'a Skins,
+    /// Settings.
+    pub settings: &'a Settings,
+}
+
+impl<'a> GatherInput<'a> {
+    /// From a registration.
+    pub fn new(world: Option<&'a WorldData>, assets: &'a Assets, settings: &'a Settings) -> Self {
+        Self {
+            world,
+            materials: &assets.materials,
+            models: &assets.models,
+            skins: &assets.skins,
+            settings,
+        }
+    }
+}
+
+/// A polygon that the game added.
+#[derive(Clone, Copy, Debug)]
+struct Poly {
+    /// Index of the material, before remapping.
+    material: u32,
+    first_vertex: usize,
+    vertex_count: usize,
+}
+
+/// What the game added since the last view, and memory that views reuse.
+#[derive(Default)]
+pub struct Scene {
+    entities: Vec<RefEntity>,
+    polys: Vec<Poly>,
+    poly_vertices: Vec<PolyVert>,
+    lights: Vec<DynamicLight>,
+    visible: VisibleSet,
+    portal_visible: VisibleSet,
+    pool: Vec<ViewScene>,
+    scratch: gather::Scratch,
+    warned_not_finite: bool,
+}
+
+impl Scene {
+    /// An empty scene.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Forgets what was added (`ClearScene`).
+    pub fn clear(&mut self) {
+        self.entities.clear();
+        self.polys.clear();
+        self.poly_vertices.clear();
+        self.lights.clear();
+    }
+
+    /// Forgets everything that belongs to a map or a registration.
+    pub fn reset(&mut self) {
+        self.clear();
+        self.visible.reset();
+        self.portal_visible.reset();
+    }
+
+    /// Adds an entity. One whose place is not a number is left out, with one warning.
+    pub fn add_entity(&mut self, entity: &RefEntity) {
+        if !entity.origin.is_finite() {
+            if !std::mem::replace(&mut self.warned_not_finite, true) {
+                log::warn!("an entity without a finite origin is left out");
+            }
+            return;
+        }
+        self.entities.push(*entity);
+    }
+
+    /// Adds polygons of `vertices_per_poly` corners each. Handle 0 is refused with a warning.
+    pub fn add_poly(&mut self, shader: i32, vertices: &[PolyVert], vertices_per_poly: usize) {
+        let Ok(material) = u32::try_from(shader) else {
+            return;
+        };
+        if material == 0 {
+            log::warn!("a polygon without material is left out");
+            return;
+        }
+        if vertices_per_poly < 3 {
+            return;
+        }
+        for polygon in vertices.chunks_exact(vertices_per_poly) {
+            if !polygon.iter().all(|v| v.position.is_finite()) {
+                continue;
+            }
+            self.polys.push(Poly {
+                material,
+                first_vertex: self.poly_vertices.len(),
+                vertex_count: polygon.len(),
+            });
+            self.poly_vertices.extend_from_slice(polygon);
+        }
+    }
+
+    /// Adds a dynamic light; one without reach is nothing.
+    pub fn add_light(&mut self, light: DynamicLight) {
+        if light.radius > 0.0 && light.origin.is_finite() && light.color.is_finite() {
+            self.lights.push(light);
+        }
+    }
+
+    /// Turns what was added into views and forgets it: at most one view through a portal or mirror (classic look),
+    /// then the view that was asked for. Hand the views back with [`recycle`](Self::recycle).
+    ///
+    /// # Errors
+    /// [`Error::EntityKind`] for an entity of a kind that is never drawn.
+    pub fn gather(
+        &mut self,
+        world: Option<&World>,
+        assets: &Assets,
+        settings: &Settings,
+        def: &RefDef,
+        look: Look,
+    ) -> Result<Vec<ViewScene>, Error> {
+        let input = GatherInput::new(world.map(|world| &world.data), assets, settings);
+        self.gather_from(&input, def, look)
+    }
+
+    /// [`gather`](Self::gather) from parts, none of which is on a GPU.
+    ///
+    /// # Errors
+    /// As [`gather`](Self::gather).
+    pub fn gather_from(
+        &mut self,
+        input: &GatherInput<'_>,
+        def: &RefDef,
+        look: Look,
+    ) -> Result<Vec<ViewScene>, Error> {
+        let undrawable = |e: &RefEntity| e.kind == EntityKind::Poly;
+        if input.settings.draw_entities && self.entities.iter().any(undrawable) {
+            self.clear();
+            return Err(Error::EntityKind {
+                kind: "polygon".into(),
+            });
+        }
+        let views = gather::views(self, input, def, look);
+        self.clear();
+        Ok(views)
+    }
+
+    /// Takes back views that are drawn, so that the next ones need no new memory.
+    pub fn recycle(&mut self, views: Vec<ViewScene>) {
+        self.pool.extend(views);
+    }
+
+    /// The frame is over: what was added and never drawn is forgotten.
+    pub fn end_frame(&mut self) {
+        self.clear();
+    }
 }

@@ -34,7 +34,7 @@ pub struct WorldOptions {
 impl WorldOptions {
     /// The part of the settings that matters here.
     pub fn new(settings: &Settings) -> Self {
-        let display = display_overbright_bits(settings);
+        let display = settings.effective_overbright_bits();
         Self {
             subdivisions: settings.subdivisions,
             overbright_shift: settings.map_overbright_bits.saturating_sub(display),
@@ -51,16 +51,6 @@ impl WorldOptions {
             overbright_shift: self.overbright_shift,
             ..relight::Options::default()
         }
-    }
-}
-
-/// Doublings of brightness that the display adds: `r_overBrightBits` in full screen with a hardware gamma ramp, none in
-/// a window.
-pub fn display_overbright_bits(settings: &Settings) -> u32 {
-    if settings.fullscreen && !settings.ignore_hw_gamma {
-        settings.overbright_bits.min(2)
-    } else {
-        0
     }
 }
 

@@ -17,7 +17,7 @@ use crate::gpu::{self, Buffer, BufferUsage, Device};
 use crate::settings::Settings;
 
 pub use grid::GridLight;
-pub use load::{LightmapSink, WorldOptions, display_overbright_bits};
+pub use load::{LightmapSink, WorldOptions};
 pub use marks::mark_fragments;
 pub use patch_lod::PatchLod;
 pub use tokens::EntityTokens;

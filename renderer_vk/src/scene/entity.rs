@@ -1,0 +1,93 @@
+//! An entity as an instance.
+
+use glam::Vec3;
+use shaders::types::{Instance, constants as c};
+
+use super::View;
+use crate::api::{RefEntity, renderfx};
+use crate::world::GridLight;
+
+/// The world itself: no transform, no colour, no light of its own.
+pub(super) fn world_instance(view: &View, time: f32) -> Instance {
+    Instance {
+        axis: [Vec3::X, Vec3::Y, Vec3::Z],
+        origin: Vec3::ZERO,
+        viewer: view.origin,
+        // the engine's world entity is all zero: `rgbGen entity` is black there
+        color: [0.0; 4],
+        time,
+        flags: c::INSTANCE_WORLD,
+        ..Instance::default()
+    }
+}
+
+/// `INSTANCE_*` bits of an entity's flags.
+fn flags(entity: &RefEntity) -> u32 {
+    [
+        (renderfx::DEPTH_HACK, c::INSTANCE_DEPTH_HACK),
+        (renderfx::FIRST_PERSON, c::INSTANCE_FIRST_PERSON),
+        (renderfx::THIRD_PERSON, c::INSTANCE_THIRD_PERSON),
+        (renderfx::NO_SHADOW, c::INSTANCE_NO_SHADOW),
+    ]
+    .into_iter()
+    .filter(|(flag, _)| entity.renderfx & flag != 0)
+    .fold(0, |bits, (_, bit)| bits | bit)
+}
+
+fn color(entity: &RefEntity) -> [f32; 4] {
+    entity.shader_rgba.map(|byte| f32::from(byte) / 255.0)
+}
+
+/// An entity whose geometry is built in world space: sprites, beams, rails.
+pub(super) fn effect_instance(entity: &RefEntity, view: &View, time: f32) -> Instance {
+    Instance {
+        color: color(entity),
+        texcoord: entity.shader_texcoord,
+        time: time - entity.shader_time,
+        flags: flags(entity),
+        ..world_instance(view, time)
+    }
+}
+
+/// A model in its own space.
+pub(super) fn model_instance(
+    entity: &RefEntity,
+    view: &View,
+    time: f32,
+    light: &GridLight,
+    is_world: bool,
+) -> Instance {
+    let axis = entity.axis;
+    let into_axes = |v: Vec3| Vec3::new(v.dot(axis[0]), v.dot(axis[1]), v.dot(axis[2]));
+    // the engine divides by the length of the first axis once, which is right for evenly scaled axes
+    let scale = if entity.non_normalized_axes {
+        let length = axis[0].length();
+        if length > 0.0 { 1.0 / length } else { 0.0 }
+    } else {
+        1.0
+    };
+    Instance {
+        axis,
+        origin: entity.origin,
+        viewer: into_axes(view.origin - entity.origin) * scale,
+        color: color(entity),
+        texcoord: entity.shader_texcoord,
+        time: time - entity.shader_time,
+        ambient: light.ambient / 255.0,
+        directed: light.directed / 255.0,
+        light_direction: into_axes(light.direction),
+        flags: flags(entity) | if is_world { c::INSTANCE_WORLD } else { 0 },
+    }
+}
+
+/// A point of an instance's space in world space.
+pub(super) fn to_world(instance: &Instance, p: Vec3) -> Vec3 {
+    let [x, y, z] = instance.axis;
+    instance.origin + x * p.x + y * p.y + z * p.z
+}
+
+/// A world direction by an instance's axes.
+pub(super) fn into_axes(instance: &Instance, v: Vec3) -> Vec3 {
+    let [x, y, z] = instance.axis;
+    Vec3::new(v.dot(x), v.dot(y), v.dot(z))
+}

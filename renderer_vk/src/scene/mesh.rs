@@ -1,0 +1,155 @@
+//! Meshes that move: finished (deformed) and put on the view's lists.
+
+use shaders::types::Vertex;
+use shaderscript::eval::{self, DeformContext, DeformVertex};
+
+use super::entity::into_axes;
+use super::{DynamicMesh, View, ViewScene};
+use crate::api::{RefDef, RefEntity};
+use crate::assets::Materials;
+
+/// Memory for deforming, reused.
+#[derive(Default)]
+pub(super) struct DeformScratch {
+    vertices: Vec<DeformVertex>,
+    indices: Vec<u32>,
+    lightmaps: Vec<glam::Vec2>,
+}
+
+/// A mesh whose raw vertices and indices were just appended to a view.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RawMesh {
+    /// Length of [`ViewScene::vertices`] before.
+    pub first_vertex: usize,
+    /// Length of [`ViewScene::indices`] before.
+    pub first_index: usize,
+    /// Index of the material that is drawn.
+    pub material: u32,
+    /// Index of its instance.
+    pub instance: u32,
+    /// Fog volume plus one.
+    pub fog: u32,
+    /// World surface that it is the copy of.
+    pub world_surface: Option<u32>,
+}
+
+impl RawMesh {
+    /// A mesh that begins here.
+    pub fn begin(out: &ViewScene, material: u32, instance: u32, fog: u32) -> Self {
+        Self {
+            first_vertex: out.vertices.len(),
+            first_index: out.indices.len(),
+            material,
+            instance,
+            fog,
+            world_surface: None,
+        }
+    }
+}
+
+/// Deforms what was appended since `raw` began, and lists it. `None` when nothing is left of it.
+pub(super) fn finish(
+    raw: RawMesh,
+    entity: Option<&RefEntity>,
+    materials: &Materials,
+    def: &RefDef,
+    scratch: &mut DeformScratch,
+    out: &mut ViewScene,
+) -> Option<DynamicMesh> {
+    let material = materials.get(raw.material);
+    if material.deforms() {
+        deform(&raw, entity, material, def, scratch, out);
+    }
+    let vertex_count = out.vertices.len() - raw.first_vertex;
+    let index_count = out.indices.len() - raw.first_index;
+    let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+    if index_count == 0 || vertex_count == 0 {
+        out.vertices.truncate(raw.first_vertex);
+        out.indices.truncate(raw.first_index);
+        return None;
+    }
+    let mesh = DynamicMesh {
+        first_index: count(raw.first_index),
+        index_count: count(index_count),
+        first_vertex: count(raw.first_vertex),
+        vertex_count: count(vertex_count),
+        material: raw.material,
+        instance: raw.instance,
+        fog: raw.fog,
+        world_surface: raw.world_surface,
+    };
+    out.meshes.push(mesh);
+    Some(mesh)
+}
+
+fn deform(
+    raw: &RawMesh,
+    entity: Option<&RefEntity>,
+    material: &crate::assets::Material,
+    def: &RefDef,
+    scratch: &mut DeformScratch,
+    out: &mut ViewScene,
+) {
+    let Some(instance) = out.instances.get(raw.instance as usize).copied() else {
+        return;
+    };
+    let base = u32::try_from(raw.first_vertex).unwrap_or(u32::MAX);
+    let DeformScratch {
+        vertices,
+        indices,
+        lightmaps,
+    } = scratch;
+    vertices.clear();
+    lightmaps.clear();
+    for v in out.vertices.get(raw.first_vertex..).unwrap_or_default() {
+        lightmaps.push(v.lightmap);
+        vertices.push(DeformVertex {
+            position: v.position,
+            normal: v.normal,
+            st: v.st,
+            color: v.color.to_le_bytes(),
+        });
+    }
+    indices.clear();
+    let raw_indices = out.indices.get(raw.first_index..).unwrap_or_default();
+    indices.extend(raw_indices.iter().map(|i| i.wrapping_sub(base)));
+    let texts: [&[u8]; 8] = std::array::from_fn(|i| def.text[i].as_slice());
+    let view: &View = &out.view;
+    let scaled = entity.filter(|e| e.non_normalized_axes);
+    let context = DeformContext {
+        time: {
+            let time = f64::from(instance.time) - f64::from(material.time_offset);
+            material
+                .shader
+                .clamp_time
+                .map_or(time, |clamp| time.min(f64::from(clamp)))
+        },
+        frame_time: f64::from(def.time_ms) / 1000.0,
+        view_axes: view.axis.map(|axis| into_axes(&instance, axis)),
+        mirrored: view.mirrored,
+        axis_length: scaled.map_or(1.0, |e| e.axis[0].length()),
+        shadow: None,
+        texts: &texts,
+    };
+    eval::deform(&material.shader.deforms, vertices, indices, &context);
+    out.vertices.truncate(raw.first_vertex);
+    out.indices.truncate(raw.first_index);
+    // deformations that rebuild quads have no use for the lightmap coordinates of the old ones
+    let rebuilt = vertices.len() != lightmaps.len();
+    out.vertices
+        .extend(vertices.iter().enumerate().map(|(i, v)| {
+            Vertex {
+                position: v.position,
+                normal: v.normal,
+                st: v.st,
+                lightmap: lightmaps
+                    .get(i)
+                    .copied()
+                    .filter(|_| !rebuilt)
+                    .unwrap_or_default(),
+                color: u32::from_le_bytes(v.color),
+            }
+        }));
+    out.indices
+        .extend(indices.iter().map(|i| base.wrapping_add(*i)));
+}

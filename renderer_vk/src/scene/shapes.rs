@@ -1,0 +1,319 @@
+//! Entities that are shapes: sprites, beams, rails, lightning. All in world space.
+//!
+//! Source: engine behaviour of `renderer_opengl1` (entity surfaces), with its quirks: a beam begins at the world's
+//! origin, the first corner of a rail's core is dim.
+
+use glam::{Quat, Vec2, Vec3};
+use shaders::types::Vertex;
+
+use super::View;
+use crate::api::RefEntity;
+use crate::settings::Settings;
+
+/// Half-width of a lightning bolt, units.
+const LIGHTNING_WIDTH: f32 = 8.0;
+/// Quads of a lightning bolt.
+const LIGHTNING_QUADS: usize = 4;
+/// Sides and radius of a beam.
+const BEAM_SIDES: u32 = 6;
+const BEAM_RADIUS: f32 = 4.0;
+/// Units of a rail's core for one width of its texture.
+const RAIL_TEXTURE_LENGTH: f32 = 256.0;
+/// Length of the axes that stand for a missing model, and half their width.
+const AXIS_LENGTH: f32 = 16.0;
+const AXIS_WIDTH: f32 = 0.25;
+
+/// Vertices and local indices of a mesh under construction.
+pub(super) struct MeshBuilder<'a> {
+    /// All vertices of the view.
+    pub vertices: &'a mut Vec<Vertex>,
+    /// All indices of the view; they count from the start of `vertices`.
+    pub indices: &'a mut Vec<u32>,
+}
+
+fn packed(rgba: [u8; 4]) -> u32 {
+    u32::from_le_bytes(rgba)
+}
+
+impl MeshBuilder<'_> {
+    fn vertex(&mut self, position: Vec3, normal: Vec3, st: Vec2, color: u32) {
+        self.vertices.push(Vertex {
+            position,
+            normal,
+            st,
+            lightmap: Vec2::ZERO,
+            color,
+        });
+    }
+
+    fn next(&self) -> u32 {
+        u32::try_from(self.vertices.len()).unwrap_or(u32::MAX)
+    }
+
+    /// A quad that faces the camera, turned by the entity's rotation.
+    pub fn sprite(&mut self, entity: &RefEntity, view: &View) {
+        let [forward, axis_left, axis_up] = view.axis;
+        let radius = entity.radius;
+        let (sine, cosine) = entity.rotation.to_radians().sin_cos();
+        let mut left = radius * (cosine * axis_left - sine * axis_up);
+        let up = radius * (cosine * axis_up + sine * axis_left);
+        if view.mirrored {
+            left = -left;
+        }
+        let corners = [left + up, up - left, -left - up, left - up];
+        self.quad(
+            corners.map(|corner| entity.origin + corner),
+            -forward,
+            [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y],
+            packed(entity.shader_rgba),
+        );
+    }
+
+    /// A quad of corners in order around it.
+    fn quad(&mut self, corners: [Vec3; 4], normal: Vec3, st: [Vec2; 4], color: u32) {
+        let base = self.next();
+        for (corner, st) in corners.into_iter().zip(st) {
+            self.vertex(corner, normal, st, color);
+        }
+        self.indices.extend([0, 1, 3, 3, 1, 2].map(|i| base + i));
+    }
+
+    /// A red tube. Its points are not moved to the entity's place: the engine's bug, kept.
+    pub fn beam(&mut self, entity: &RefEntity) {
+        let along = entity.old_origin - entity.origin;
+        let Some(direction) = along.try_normalize() else {
+            return;
+        };
+        let spoke = perpendicular(direction) * BEAM_RADIUS;
+        let base = self.next();
+        for side in 0..BEAM_SIDES {
+            let angle = std::f32::consts::TAU * side as f32 / BEAM_SIDES as f32;
+            let start = Quat::from_axis_angle(direction, angle) * spoke;
+            let normal = start / BEAM_RADIUS;
+            self.vertex(start, normal, Vec2::ZERO, u32::MAX);
+            self.vertex(start + along, normal, Vec2::ZERO, u32::MAX);
+        }
+        for side in 0..BEAM_SIDES {
+            let next = (side + 1) % BEAM_SIDES;
+            let [a, b, c, d] = [side * 2, side * 2 + 1, next * 2, next * 2 + 1].map(|i| base + i);
+            self.indices.extend([a, b, c, c, b, d]);
+        }
+    }
+
+    /// The core of a rail trail: from `old_origin` to `origin`.
+    pub fn rail_core(&mut self, entity: &RefEntity, view: &View, settings: &Settings) {
+        let (start, end) = (entity.old_origin, entity.origin);
+        let side = side_of_line(start, end, view.origin);
+        let width = settings.rail_core_width.trunc();
+        self.core(start, end, side, width, entity.shader_rgba);
+    }
+
+    /// A bolt: four crossed quads from `origin` to `old_origin`.
+    pub fn lightning(&mut self, entity: &RefEntity, view: &View) {
+        let (start, end) = (entity.origin, entity.old_origin);
+        let mut side = side_of_line(start, end, view.origin);
+        let direction = (end - start).normalize_or_zero();
+        let turn = if direction == Vec3::ZERO {
+            Quat::IDENTITY
+        } else {
+            Quat::from_axis_angle(direction, std::f32::consts::FRAC_PI_4)
+        };
+        for _ in 0..LIGHTNING_QUADS {
+            self.core(start, end, side, LIGHTNING_WIDTH, entity.shader_rgba);
+            side = turn * side;
+        }
+    }
+
+    fn core(&mut self, start: Vec3, end: Vec3, side: Vec3, width: f32, rgba: [u8; 4]) {
+        // the engine leaves alpha as it was in its buffer; opaque is what that mostly is
+        let [r, g, b, _] = rgba;
+        let color = packed([r, g, b, 255]);
+        let dim = packed([r / 4, g / 4, b / 4, 255]);
+        let s = (end - start).length().trunc() / RAIL_TEXTURE_LENGTH;
+        let normal = side.cross(end - start).normalize_or(Vec3::Z);
+        let base = self.next();
+        self.vertex(start + side * width, normal, Vec2::ZERO, dim);
+        self.vertex(start - side * width, normal, Vec2::Y, color);
+        self.vertex(end + side * width, normal, Vec2::new(s, 0.0), color);
+        self.vertex(end - side * width, normal, Vec2::new(s, 1.0), color);
+        self.indices.extend([0, 1, 2, 2, 1, 3].map(|i| base + i));
+    }
+
+    /// Rings around a rail trail: from `old_origin` to `origin`.
+    pub fn rail_rings(&mut self, entity: &RefEntity, settings: &Settings) {
+        let (start, end) = (entity.old_origin, entity.origin);
+        let length = (end - start).length();
+        let direction = (end - start).normalize_or_zero();
+        // rings closer than a unit are a line; the engine would divide by zero
+        let spacing = settings.rail_segment_length.trunc().max(1.0);
+        let step = direction * spacing;
+        let mut count = ((length / spacing) as u32).max(1);
+        if count > 1 {
+            count -= 1;
+        }
+        let (right, up) = normal_vectors(direction);
+        let radius = 0.25 * settings.rail_width.trunc();
+        let mut corners: [Vec3; 4] = std::array::from_fn(|i| {
+            let angle = (45.0 + 90.0 * i as f32).to_radians();
+            start + (right * angle.cos() + up * angle.sin()) * radius
+        });
+        if count > 1 {
+            corners = corners.map(|c| c + step);
+        }
+        let [r, g, b, _] = entity.shader_rgba;
+        let st = [Vec2::X, Vec2::ONE, Vec2::Y, Vec2::ZERO];
+        for _ in 0..count {
+            self.quad(corners, direction, st, packed([r, g, b, 255]));
+            corners = corners.map(|c| c + step);
+        }
+    }
+
+    /// Red, green and blue axes in the entity's space. The engine draws lines; here they are thin crosses.
+    pub fn axes(&mut self) {
+        let axes = [
+            (Vec3::X, Vec3::Y, Vec3::Z, [255, 0, 0, 255]),
+            (Vec3::Y, Vec3::Z, Vec3::X, [0, 255, 0, 255]),
+            (Vec3::Z, Vec3::X, Vec3::Y, [0, 0, 255, 255]),
+        ];
+        for (along, a, b, color) in axes {
+            for (side, normal) in [(a, b), (b, a)] {
+                let (end, half) = (along * AXIS_LENGTH, side * AXIS_WIDTH);
+                self.quad(
+                    [half, end + half, end - half, -half],
+                    normal,
+                    [Vec2::ZERO; 4],
+                    packed(color),
+                );
+            }
+        }
+    }
+}
+
+/// Unit vector across a line as the eye sees it; zero when the eye is on the line.
+fn side_of_line(start: Vec3, end: Vec3, eye: Vec3) -> Vec3 {
+    let to_start = (start - eye).normalize_or_zero();
+    let to_end = (end - eye).normalize_or_zero();
+    to_start.cross(to_end).normalize_or_zero()
+}
+
+/// Two unit vectors across a direction, the engine's choice.
+fn normal_vectors(forward: Vec3) -> (Vec3, Vec3) {
+    let turned = Vec3::new(forward.z, -forward.x, forward.y);
+    let right = (turned - turned.dot(forward) * forward).normalize_or_zero();
+    (right, right.cross(forward))
+}
+
+/// A unit vector perpendicular to a unit vector: its smallest component's axis, projected.
+pub(super) fn perpendicular(direction: Vec3) -> Vec3 {
+    let size = direction.abs();
+    let axis = if size.x <= size.y && size.x <= size.z {
+        Vec3::X
+    } else if size.y <= size.z {
+        Vec3::Y
+    } else {
+        Vec3::Z
+    };
+    (axis - axis.dot(direction) * direction).normalize_or_zero()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::api::RefDef;
+
+    fn build(make: impl FnOnce(&mut MeshBuilder<'_>)) -> (Vec<Vertex>, Vec<u32>) {
+        let (mut vertices, mut indices) = (Vec::new(), Vec::new());
+        make(&mut MeshBuilder {
+            vertices: &mut vertices,
+            indices: &mut indices,
+        });
+        assert!(indices.iter().all(|&i| (i as usize) < vertices.len()));
+        (vertices, indices)
+    }
+
+    #[test]
+    fn sprite_corners_face_the_camera() {
+        let view = View::new(&RefDef::default(), 4.0, 1000.0);
+        let entity = RefEntity {
+            origin: Vec3::new(100.0, 0.0, 0.0),
+            radius: 10.0,
+            shader_rgba: [1, 2, 3, 4],
+            ..RefEntity::default()
+        };
+        let (vertices, indices) = build(|m| m.sprite(&entity, &view));
+        let expected = [(10.0, 10.0), (-10.0, 10.0), (-10.0, -10.0), (10.0, -10.0)];
+        for (v, (y, z)) in vertices.iter().zip(expected) {
+            assert!(
+                v.position.abs_diff_eq(Vec3::new(100.0, y, z), 1e-4),
+                "{v:?}"
+            );
+            assert_eq!(v.normal, -Vec3::X);
+            assert_eq!(v.color, 0x0403_0201);
+        }
+        assert_eq!(indices.len(), 6);
+        // a quarter turn carries the left upper corner to the left lower one's place
+        let turned = RefEntity {
+            rotation: 90.0,
+            ..entity
+        };
+        let (vertices, _) = build(|m| m.sprite(&turned, &view));
+        assert!(
+            vertices[0]
+                .position
+                .abs_diff_eq(Vec3::new(100.0, 10.0, -10.0), 1e-4)
+        );
+    }
+
+    #[test]
+    fn rails_and_bolts() {
+        let view = View::new(&RefDef::default(), 4.0, 1000.0);
+        let settings = Settings::default();
+        let entity = RefEntity {
+            origin: Vec3::new(100.0, -50.0, 0.0),
+            old_origin: Vec3::new(100.0, 50.0, 0.0),
+            shader_rgba: [200, 100, 40, 7],
+            ..RefEntity::default()
+        };
+        let (core, _) = build(|m| m.rail_core(&entity, &view, &settings));
+        assert_eq!(core[0].color.to_le_bytes(), [50, 25, 10, 255]);
+        assert_eq!(core[1].color.to_le_bytes(), [200, 100, 40, 255]);
+        assert!((core[0].position - core[1].position).length() - 12.0 < 1e-4);
+        assert!((core[3].st.x - 100.0 / 256.0).abs() < 1e-6);
+        let (rings, _) = build(|m| m.rail_rings(&entity, &settings));
+        assert_eq!(rings.len(), 4 * 2);
+        assert!((rings[0].position.y - (50.0 - 32.0)).abs() < 1e-4);
+        let (bolt, _) = build(|m| m.lightning(&entity, &view));
+        assert_eq!(bolt.len(), 16);
+        let (beam, triangles) = build(|m| m.beam(&entity));
+        assert_eq!((beam.len(), triangles.len()), (12, 36));
+        assert!(beam.iter().all(|v| v.position.x.abs() <= 4.001));
+    }
+
+    #[test]
+    fn degenerate_shapes_stay_finite() {
+        let view = View::new(&RefDef::default(), 4.0, 1000.0);
+        let settings = Settings::default();
+        let entity = RefEntity::default();
+        let (vertices, _) = build(|m| {
+            m.sprite(&entity, &view);
+            m.beam(&entity);
+            m.rail_core(&entity, &view, &settings);
+            m.rail_rings(&entity, &settings);
+            m.lightning(&entity, &view);
+            m.axes();
+        });
+        assert!(
+            vertices
+                .iter()
+                .all(|v| v.position.is_finite() && v.normal.is_finite())
+        );
+    }
+
+    #[test]
+    fn perpendicular_is() {
+        for v in [Vec3::X, Vec3::Y, -Vec3::Z, Vec3::ONE.normalize()] {
+            let p = perpendicular(v);
+            assert!(p.dot(v).abs() < 1e-6 && (p.length() - 1.0).abs() < 1e-5);
+        }
+    }
+}

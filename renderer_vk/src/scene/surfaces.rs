@@ -1,0 +1,257 @@
+//! Surfaces of the world and of its brush models: what is in sight, in which order, touched by which dynamic light.
+
+use glam::{Vec3, Vec4};
+use q3bsp::SurfaceKind;
+use shaderscript::Cull;
+
+use super::{DrawSurface, DynamicMesh, Geometry, ViewScene, VisibleSky};
+use crate::api::DynamicLight;
+use crate::assets::Materials;
+use crate::world::{Bounds, WorldData, WorldSurface, outside};
+
+/// Entity number of the world: after every entity.
+pub(super) const WORLD_ENTITY: u32 = 0xF_FFFF;
+/// As many dynamic lights as fit the bits of a surface.
+const MAX_LIGHT_BITS: usize = 32;
+/// How far behind a face the eye may be before the face counts as turned away, units.
+const BACK_FACE_SLACK: f32 = 8.0;
+
+/// The engine's drawing order in one number: material's place, entity, fog, touched by a light or not.
+///
+/// 24, 20, 19 and 1 bits; larger numbers share the last value, which only loosens the order among them.
+pub(super) fn sort_key(rank: u32, entity: u32, fog: u32, lit: bool) -> u64 {
+    let field = |value: u32, bits: u32| u64::from(value.min((1 << bits) - 1));
+    field(rank, 24) << 40 | field(entity, 20) << 20 | field(fog, 19) << 1 | u64::from(lit)
+}
+
+/// Where surfaces are seen from, in the space of their model.
+pub(super) struct LocalView {
+    /// Eye.
+    pub eye: Vec3,
+    /// Planes pointing inwards; empty when nothing is culled.
+    pub frustum: Vec<Vec4>,
+    /// Dynamic lights in the model's space: origin and radius.
+    pub lights: Vec<(Vec3, f32)>,
+    /// Unit view direction.
+    pub forward: Vec3,
+}
+
+impl LocalView {
+    /// Bits of the lights that reach a box.
+    pub fn lights_at(&self, bounds: &Bounds) -> u32 {
+        self.lights
+            .iter()
+            .take(MAX_LIGHT_BITS)
+            .enumerate()
+            .filter(|(_, (origin, radius))| {
+                let nearest = origin.clamp(bounds.mins, bounds.maxs.max(bounds.mins));
+                // the engine compares with a box around the light
+                (nearest - *origin).abs().max_element() <= *radius
+            })
+            .fold(0, |bits, (i, _)| bits | 1 << i)
+    }
+
+    /// Bits of the lights that reach a surface.
+    fn lights_on(&self, surface: &WorldSurface) -> u32 {
+        let mut bits = self.lights_at(&surface.bounds);
+        if let Some(plane) = &surface.plane {
+            for (i, (origin, radius)) in self.lights.iter().take(MAX_LIGHT_BITS).enumerate() {
+                if plane.distance(*origin).abs() > *radius {
+                    bits &= !(1 << i);
+                }
+            }
+        }
+        bits
+    }
+
+    fn culls(&self, surface: &WorldSurface, cull: Cull) -> bool {
+        if outside(&surface.bounds, &self.frustum) {
+            return true;
+        }
+        let Some(plane) = surface
+            .plane
+            .filter(|_| surface.kind == SurfaceKind::Planar)
+        else {
+            return false;
+        };
+        let distance = plane.distance(self.eye);
+        match cull {
+            Cull::Front => distance < -BACK_FACE_SLACK,
+            Cull::Back => distance > BACK_FACE_SLACK,
+            Cull::None => false,
+        }
+    }
+}
+
+/// What the surfaces of one model are added with.
+pub(super) struct SurfaceRun<'a> {
+    pub world: &'a WorldData,
+    pub materials: &'a Materials,
+    pub local: &'a LocalView,
+    /// Index of the instance.
+    pub instance: u32,
+    /// The engine's entity number.
+    pub entity: u32,
+    /// `r_lodCurveError`.
+    pub curve_error: f32,
+    /// `r_nocurves`.
+    pub no_curves: bool,
+}
+
+impl SurfaceRun<'_> {
+    /// Adds a surface if it is in sight. Returns it when its vertices have to be deformed first.
+    pub fn add(&self, index: u32, out: &mut ViewScene) -> Option<PendingDeform> {
+        let surface = self.world.surfaces.get(index as usize)?;
+        if surface.index_count == 0 || (self.no_curves && surface.kind == SurfaceKind::Patch) {
+            return None;
+        }
+        let material = self.materials.resolve(surface.material);
+        let drawn = self.materials.get(material);
+        // deformed vertices may leave the bounds
+        let deforms = drawn.deforms();
+        if !deforms && self.local.culls(surface, drawn.cull) {
+            return None;
+        }
+        let (first_index, index_count) = match &surface.lod {
+            Some(lod) if !deforms => {
+                let depth = self.local.forward.dot(lod.origin() - self.local.eye);
+                lod.choose(depth, self.curve_error)
+            }
+            _ => (surface.first_index, surface.index_count),
+        };
+        if drawn.is_sky() {
+            self.add_sky(material, first_index, index_count, out);
+            return None;
+        }
+        let dlights = self.local.lights_on(surface);
+        let rank = self.materials.rank(surface.material);
+        let sort_key = sort_key(rank, self.entity, surface.fog, dlights != 0);
+        if deforms {
+            return Some(PendingDeform {
+                surface: index,
+                material,
+                sort_key,
+                dlights,
+            });
+        }
+        out.surfaces.push(DrawSurface {
+            sort_key,
+            material,
+            instance: self.instance,
+            fog: surface.fog,
+            lightmap: surface.lightmap,
+            dlights,
+            geometry: Geometry::Static {
+                first_index,
+                index_count,
+            },
+        });
+        None
+    }
+
+    fn add_sky(&self, material: u32, first_index: u32, index_count: u32, out: &mut ViewScene) {
+        let at = out.skies.iter().position(|sky| sky.material == material);
+        let at = at.unwrap_or_else(|| {
+            out.skies.push(VisibleSky {
+                material,
+                triangles: Vec::new(),
+            });
+            out.skies.len() - 1
+        });
+        let instance = out.instances.get(self.instance as usize).copied();
+        let (Some(sky), Some(instance)) = (out.skies.get_mut(at), instance) else {
+            return;
+        };
+        for triangle in self.world.triangles(first_index, index_count) {
+            sky.triangles
+                .extend(triangle.map(|p| super::entity::to_world(&instance, p)));
+        }
+    }
+}
+
+/// A surface in sight whose vertices have to be deformed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PendingDeform {
+    pub surface: u32,
+    pub material: u32,
+    pub sort_key: u64,
+    pub dlights: u32,
+}
+
+/// Adds a mesh to the surfaces of the classic look.
+pub(super) fn push_mesh_surface(
+    out: &mut ViewScene,
+    mesh: &DynamicMesh,
+    sort_key: u64,
+    lightmap: u32,
+    dlights: u32,
+) {
+    out.surfaces.push(DrawSurface {
+        sort_key,
+        material: mesh.material,
+        instance: mesh.instance,
+        fog: mesh.fog,
+        lightmap,
+        dlights,
+        geometry: Geometry::Dynamic {
+            first_index: mesh.first_index,
+            index_count: mesh.index_count,
+        },
+    });
+}
+
+/// Dynamic lights in a space given by an origin and axes.
+pub(super) fn local_lights(
+    lights: &[DynamicLight],
+    origin: Vec3,
+    axis: &[Vec3; 3],
+) -> Vec<(Vec3, f32)> {
+    lights
+        .iter()
+        .map(|light| {
+            let to = light.origin - origin;
+            let local = Vec3::new(to.dot(axis[0]), to.dot(axis[1]), to.dot(axis[2]));
+            (local, light.radius)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_order_material_then_entity_then_fog_then_light() {
+        let keys = [
+            sort_key(0, WORLD_ENTITY, 31, true),
+            sort_key(1, 0, 0, false),
+            sort_key(1, 0, 0, true),
+            sort_key(1, 0, 1, false),
+            sort_key(1, 1, 0, false),
+            sort_key(1, WORLD_ENTITY, 0, false),
+            sort_key(2, 0, 0, false),
+        ];
+        assert!(keys.is_sorted());
+        assert_eq!(
+            keys.iter().collect::<std::collections::HashSet<_>>().len(),
+            keys.len()
+        );
+    }
+
+    #[test]
+    fn lights_reach_boxes() {
+        let local = LocalView {
+            eye: Vec3::ZERO,
+            frustum: Vec::new(),
+            lights: vec![(Vec3::ZERO, 10.0), (Vec3::X * 100.0, 10.0)],
+            forward: Vec3::X,
+        };
+        let at = |x: f32| Bounds {
+            mins: Vec3::new(x, -1.0, -1.0),
+            maxs: Vec3::new(x + 1.0, 1.0, 1.0),
+        };
+        assert_eq!(local.lights_at(&at(9.0)), 1);
+        assert_eq!(local.lights_at(&at(50.0)), 0);
+        assert_eq!(local.lights_at(&at(95.0)), 2);
+    }
+}
