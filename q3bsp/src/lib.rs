@@ -39,6 +39,7 @@ mod grid;
 mod lumps;
 mod parse;
 mod patch;
+mod surface;
 mod tree;
 mod validate;
 mod visibility;
@@ -52,9 +53,10 @@ pub use fog::FogVolume;
 pub use grid::{GridSample, LightGridLayout};
 pub use lumps::{
     Brush, BrushSide, DrawVert, Fog, GridPoint, LIGHTMAP_BYTES, LIGHTMAP_SIZE, Leaf, Lightmap,
-    Model, Node, Plane, ShaderRef, Surface, SurfaceKind, lightmap_index,
+    Model, Node, Plane, ShaderRef,
 };
 pub use patch::{MAX_GRID_SIZE, PatchMesh, tessellate_patch};
+pub use surface::{Surface, SurfaceKind, lightmap_index};
 pub use visibility::Visibility;
 
 /// A whole map, owned. Indices in the fields are valid after [`Bsp::parse`]; code that changes the

@@ -1,6 +1,7 @@
 //! Walking the tree, and slices that a validated map can hand out without a check.
 
-use crate::lumps::{Brush, BrushSide, DrawVert, Leaf, Model, Surface};
+use crate::lumps::{Brush, BrushSide, DrawVert, Leaf, Model};
+use crate::surface::Surface;
 use crate::{Bsp, Plane};
 use glam::Vec3;
 use std::ops::Range;

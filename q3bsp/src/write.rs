@@ -151,8 +151,9 @@ fn encode<T: Record>(records: &[T]) -> Vec<u8> {
 
 fn stride(lump: Lump) -> usize {
     use crate::lumps::{
-        Brush, BrushSide, DrawVert, Fog, GridPoint, Leaf, Model, Node, Plane, ShaderRef, Surface,
+        Brush, BrushSide, DrawVert, Fog, GridPoint, Leaf, Model, Node, Plane, ShaderRef,
     };
+    use crate::surface::Surface;
     match lump {
         Lump::Shaders => ShaderRef::STRIDE,
         Lump::Planes => Plane::STRIDE,

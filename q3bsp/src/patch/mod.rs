@@ -6,7 +6,8 @@ mod stitch;
 mod subdivide;
 
 use crate::error::Error;
-use crate::lumps::{DrawVert, Surface, SurfaceKind};
+use crate::lumps::DrawVert;
+use crate::surface::{Surface, SurfaceKind};
 use crate::{Bsp, surface_flags};
 use glam::Vec3;
 
