@@ -18,3 +18,6 @@ pub mod passes;
 pub mod targets;
 
 pub use look::TraceLook;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,236 @@
+//! Translucent layers, cut-outs and fog.
+
+use glam::Vec3;
+use shaders::types::Fog;
+use shaders::types::constants as c;
+
+use super::harness::{Gpu, Scene, identity, rectangle, reference, stage, through_byte};
+use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
+
+const TRANSLUCENT: u32 = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
+
+/// A rectangle at distance x that fills the view of `scene()`.
+fn screen(x: f32) -> [Vec3; 4] {
+    // faces -x
+    rectangle(
+        Vec3::new(x, -200.0, -200.0),
+        Vec3::Z * 400.0,
+        Vec3::Y * 400.0,
+    )
+}
+
+fn scene() -> Scene {
+    Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 32)
+}
+
+/// What constant layers (encoded colour, alpha), nearest first, show over a background (encoded).
+fn over(layers: &[([f32; 3], f32)], background: [f32; 3]) -> Vec3 {
+    let linear = |c: [f32; 3]| Vec3::from(c.map(through_byte));
+    layers
+        .iter()
+        .rev()
+        .fold(linear(background), |below, (color, alpha)| {
+            let alpha = (alpha * 255.0 + 0.001).floor() / 255.0;
+            linear(*color) * alpha + below * (1.0 - alpha)
+        })
+}
+
+fn close(a: Vec3, b: Vec3) -> bool {
+    (a - b).abs().max_element() < 2.0e-4
+}
+
+#[test]
+fn layers_are_composed_in_order_however_many_there_are() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    let red = [0.9, 0.1, 0.1];
+    let green = [0.1, 0.8, 0.2];
+    let blue = [0.2, 0.1, 1.0];
+    let back = [0.5, 0.6, 0.4];
+    // given in no order of distance; half of them move
+    let mut scene = scene();
+    let wall = scene.material(&[stage::constant(back)], 0);
+    scene.quad(screen(300.0), wall);
+    let [r, g, b] = [(red, 0.5), (green, 0.25), (blue, 0.75)]
+        .map(|(color, alpha)| scene.material(&[stage::blend(color, alpha)], TRANSLUCENT));
+    scene.quad(screen(200.0), b);
+    scene.mesh(screen(100.0), r, identity());
+    scene.quad(screen(150.0), g);
+    let exact = over(&[(red, 0.5), (green, 0.25), (blue, 0.75)], back);
+    let mean = gpu.mean(&scene, &reference(), 2);
+    assert!(close(mean, exact), "{mean} {exact}");
+    // behind a wall they do not show
+    scene.quad(screen(120.0), wall);
+    let mean = gpu.mean(&scene, &reference(), 2);
+    assert!(close(mean, over(&[(red, 0.5)], back)), "{mean}");
+
+    // many, and additive ones among them
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 8);
+    let thin = scene.material(&[stage::blend(red, 0.05)], TRANSLUCENT);
+    for i in 0..40 {
+        scene.quad(screen(50.0 + 3.0 * i as f32), thin);
+    }
+    let wall = scene.material(&[stage::constant(back)], 0);
+    scene.quad(screen(300.0), wall);
+    let exact = over(&[(red, 0.05); 40], back);
+    let mean = gpu.mean(&scene, &reference(), 1);
+    assert!(close(mean, exact), "{mean} {exact}");
+}
+
+#[test]
+fn layers_in_one_plane_come_in_drawing_order() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    let (first, second, back) = ([0.9, 0.1, 0.1], [0.1, 0.8, 0.2], [0.5, 0.5, 0.5]);
+    let mut scene = scene();
+    let wall = scene.material(&[stage::constant(back)], 0);
+    let a = scene.material(&[stage::blend(first, 0.5)], TRANSLUCENT);
+    let b = scene.material(&[stage::blend(second, 0.5)], TRANSLUCENT);
+    // b has the greater sort value, so it is drawn later and lies on top, wherever it stands in the lists
+    scene.materials[a as usize].1.sort = 4.0;
+    scene.materials[b as usize].1.sort = 9.0;
+    scene.quad(screen(100.0), b);
+    scene.quad(screen(100.0), wall);
+    scene.mesh(screen(100.0), a, identity());
+    let exact = over(&[(second, 0.5), (first, 0.5)], back);
+    let mean = gpu.mean(&scene, &reference(), 2);
+    assert!(close(mean, exact), "{mean} {exact}");
+}
+
+#[test]
+fn lit_layers_and_what_is_behind_them_are_all_lit() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    // two lit layers of one half over a lit wall: 0.5 * albedo * L each, in the mean
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 16);
+    scene.ambient = Vec3::splat(0.8);
+    let wall = scene.diffuse(0.5);
+    scene.quad(screen(300.0), wall);
+    let mut lit = stage::light();
+    lit.alpha_gen = c::ALPHAGEN_CONST;
+    lit.constant = [1.0, 1.0, 1.0, 0.5];
+    lit.blend_src = c::BLEND_SRC_ALPHA;
+    lit.blend_dst = c::BLEND_ONE_MINUS_SRC_ALPHA;
+    let veil = scene.material(&[lit], TRANSLUCENT);
+    scene.quad(screen(100.0), veil);
+    scene.quad(screen(150.0), veil);
+    let alpha = 127.0 / 255.0;
+    let albedo = through_byte(super::harness::encode(0.5));
+    let exact = 0.8 * (alpha + (1.0 - alpha) * alpha + (1.0 - alpha) * (1.0 - alpha) * albedo);
+    let mean = gpu.mean(&scene, &reference(), 64).x;
+    assert!((mean / exact - 1.0).abs() < 0.005, "{mean} {exact}");
+}
+
+#[test]
+fn cut_outs_have_holes_for_eyes_and_shadows() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    let image = Image::new(
+        &gpu.device,
+        &ImageDesc::new("stripes", 2, 1, Format::Rgba8, ImageUsage::SAMPLED),
+    )
+    .expect("image");
+    // left half white and solid, right half a hole
+    gpu.device
+        .upload_image(&image, 0, 0, &[255, 255, 255, 255, 255, 255, 255, 0])
+        .expect("upload");
+    let mut scene = scene();
+    scene.images.push(image.texture_index());
+    let back = [0.2, 0.4, 0.8];
+    let wall = scene.material(&[stage::constant(back)], 0);
+    scene.quad(screen(300.0), wall);
+    let mut grate = stage::image(0);
+    grate.alpha_func = c::ALPHAFUNC_GE128;
+    let grate = scene.material(&[grate], c::MATERIAL_CUT_OUT | c::MATERIAL_TWO_SIDED);
+    // s runs along z, from below to above
+    scene.quad(screen(100.0), grate);
+    let (pixels, _) = gpu.render(&scene, &reference(), 1);
+    let hole = Vec3::from(back.map(through_byte));
+    for (row, color) in [(4, hole), (28, Vec3::ONE)] {
+        for column in 0..32 {
+            let pixel = pixels[row * 32 + column];
+            assert!(close(pixel, color), "row {row}: {pixel}");
+        }
+    }
+    // the same for a shadow: light from beyond the grate falls through the hole only
+    let mut scene = Scene::new(Vec3::new(0.0, 0.0, 50.0), Vec3::ZERO, 60.0, 32);
+    scene.images.push(image.texture_index());
+    let white = scene.diffuse(1.0);
+    scene.quad(
+        rectangle(
+            Vec3::new(-100.0, -100.0, 0.0),
+            Vec3::X * 200.0,
+            Vec3::Y * 200.0,
+        ),
+        white,
+    );
+    let mut stripes = stage::image(0);
+    stripes.alpha_func = c::ALPHAFUNC_GE128;
+    let grate = scene.material(&[stripes], c::MATERIAL_CUT_OUT | c::MATERIAL_TWO_SIDED);
+    // above the eye; s runs along x: the hole is at x > 0
+    scene.quad(
+        rectangle(
+            Vec3::new(-100.0, -100.0, 60.0),
+            Vec3::X * 200.0,
+            Vec3::Y * 200.0,
+        ),
+        grate,
+    );
+    scene.suns.push(relight::light::SunLight {
+        direction: Vec3::Z,
+        irradiance: Vec3::splat(std::f32::consts::PI),
+        angular_radius: 0.001,
+        material: None,
+    });
+    let (pixels, _) = gpu.render(&scene, &reference(), 2);
+    for (i, pixel) in pixels.iter().enumerate() {
+        let p = super::harness::floor_point(&scene, i % 32, i / 32);
+        if p.x.abs() > 3.0 {
+            let exact = if p.x > 0.0 { 1.0 } else { 0.0 };
+            assert!((pixel.x - exact).abs() < 0.002, "{p} {pixel}");
+        }
+    }
+}
+
+#[test]
+fn fog_follows_the_way_through_its_volume() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    let mut scene = Scene::new(
+        Vec3::new(0.0, 0.0, 50.0),
+        Vec3::new(100.0, 0.0, 50.0),
+        1.0,
+        4,
+    );
+    let back = [0.9, 0.9, 0.9];
+    let wall = scene.material(&[stage::constant(back)], 0);
+    scene.quad(screen(300.0), wall);
+    // from x = 100 to 200, below z = 80
+    scene.fogs.push(Fog {
+        mins: Vec3::new(100.0, -500.0, -500.0),
+        maxs: Vec3::new(200.0, 500.0, 500.0),
+        plane: [0.0, 0.0, -1.0, -80.0],
+        has_surface: 1,
+        color: Vec3::new(0.2, 0.4, 0.6),
+        depth: 400.0,
+    });
+    let fog_color = crate::trace::lights::decode(Vec3::new(0.2, 0.4, 0.6));
+    let back_color = Vec3::from(back.map(through_byte));
+    let behind = |length: f32, far: Vec3| {
+        let factor = (length / 400.0).min(1.0).sqrt();
+        fog_color * factor + far * (1.0 - factor)
+    };
+    let mean = gpu.mean(&scene, &reference(), 1);
+    assert!(close(mean, behind(100.0, back_color)), "{mean}");
+    // a layer in the middle: what is in front of it and behind it together are the fog of the whole way
+    let veil = [0.1, 0.9, 0.1];
+    let layer = scene.material(&[stage::blend(veil, 0.5)], TRANSLUCENT);
+    scene.quad(screen(125.0), layer);
+    let alpha = 127.0 / 255.0;
+    let (front, whole) = ((25.0f32 / 400.0).sqrt(), (100.0f32 / 400.0).sqrt());
+    let exact = fog_color * front
+        + Vec3::from(veil.map(through_byte)) * ((1.0 - front) * alpha)
+        + (fog_color * (whole - front) + back_color * (1.0 - whole)) * (1.0 - alpha);
+    let mean = gpu.mean(&scene, &reference(), 1);
+    assert!(close(mean, exact), "{mean} {exact}");
+    // above its surface there is none
+    scene.surfaces.pop();
+    scene.def.view_origin.z = 100.0;
+    let mean = gpu.mean(&scene, &reference(), 1);
+    assert!(close(mean, back_color), "{mean}");
+}

@@ -1,0 +1,373 @@
+//! Direct and bounced light.
+
+use glam::Vec3;
+use relight::light::{PointLight, SunLight};
+
+use super::harness::{Gpu, Scene, floor_point, lambert, rectangle, reference};
+use crate::api::DynamicLight;
+use crate::settings::{LightSampling, Settings};
+
+const ALL: [LightSampling; 3] = [
+    LightSampling::Uniform,
+    LightSampling::Resampled,
+    LightSampling::All,
+];
+
+/// A white floor in sight of a slanted camera.
+fn floor() -> Scene {
+    let mut scene = Scene::new(Vec3::new(-100.0, 0.0, 80.0), Vec3::ZERO, 20.0, 32);
+    let white = scene.diffuse(1.0);
+    scene.quad(
+        rectangle(
+            Vec3::new(-500.0, -500.0, 0.0),
+            Vec3::X * 1000.0,
+            Vec3::Y * 1000.0,
+        ),
+        white,
+    );
+    scene
+}
+
+fn sampled(sampling: LightSampling) -> Settings {
+    Settings {
+        rt_light_sampling: sampling,
+        rt_samples: 4,
+        ..reference()
+    }
+}
+
+/// Mean of |a - b| / b over the picture.
+fn mean_difference(a: &[Vec3], b: impl Fn(usize) -> f32) -> f32 {
+    let sum: f32 = a
+        .iter()
+        .enumerate()
+        .map(|(i, p)| (p.x - b(i)).abs() / b(i).max(1.0e-6))
+        .sum();
+    sum / a.len() as f32
+}
+
+#[test]
+fn one_triangle_gives_the_irradiance_of_the_closed_form() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    // near: sampled by solid angle; far and small: sampled by area
+    for triangle in [
+        [
+            Vec3::new(-40.0, -30.0, 60.0),
+            Vec3::new(0.0, 50.0, 60.0),
+            Vec3::new(50.0, -40.0, 70.0),
+        ],
+        [
+            Vec3::new(300.0, 0.0, 400.0),
+            Vec3::new(303.0, 5.0, 400.0),
+            Vec3::new(306.0, 0.0, 402.0),
+        ],
+    ] {
+        let mut scene = floor();
+        scene.light(triangle, Vec3::splat(5.0));
+        let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::Resampled), 64);
+        let side = scene.def.width as usize;
+        let exact: Vec<f32> = (0..pixels.len())
+            .map(|i| {
+                lambert(
+                    floor_point(&scene, i % side, i / side),
+                    Vec3::Z,
+                    triangle,
+                    5.0,
+                )
+            })
+            .collect();
+        let difference = mean_difference(&pixels, |i| exact[i]);
+        let ratio = pixels.iter().map(|p| p.x).sum::<f32>() / exact.iter().sum::<f32>();
+        println!("mean relative difference {difference}, ratio {ratio}");
+        assert!(difference < 0.02, "{difference}");
+        assert!((ratio - 1.0).abs() < 0.003, "{ratio}");
+        // turned away it gives nothing
+        let mut scene = floor();
+        scene.light([triangle[0], triangle[2], triangle[1]], Vec3::splat(5.0));
+        assert_eq!(
+            gpu.mean(&scene, &sampled(LightSampling::Resampled), 2),
+            Vec3::ZERO
+        );
+    }
+}
+
+#[test]
+fn all_estimators_have_the_same_mean() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    let mut scene = Scene::new(
+        Vec3::new(-180.0, 0.0, 60.0),
+        Vec3::new(100.0, 0.0, -20.0),
+        70.0,
+        32,
+    );
+    let grey = scene.diffuse(0.7);
+    scene.room(
+        Vec3::new(-200.0, -150.0, -80.0),
+        Vec3::new(200.0, 150.0, 120.0),
+        grey,
+    );
+    // a pillar for shadows
+    for i in 0..2 {
+        let side = if i == 0 { Vec3::X } else { Vec3::Y } * 40.0;
+        let corner = Vec3::new(40.0, -20.0, -80.0);
+        scene.quad(rectangle(corner, Vec3::Z * 120.0, side), grey);
+    }
+    for i in 0..12 {
+        let angle = i as f32 * 0.53;
+        let at = Vec3::new(
+            angle.cos() * 150.0,
+            angle.sin() * 120.0,
+            80.0 + (i % 3) as f32 * 10.0,
+        );
+        // downwards
+        scene.light(
+            [at, at + Vec3::Y * 20.0, at + Vec3::X * 20.0],
+            Vec3::splat(4.0 + i as f32),
+        );
+    }
+    scene.points.push(PointLight {
+        origin: Vec3::new(0.0, 90.0, 20.0),
+        intensity: Vec3::splat(2000.0),
+        radius: 4.0,
+        spot: None,
+    });
+    scene.dlights.push(DynamicLight {
+        origin: Vec3::new(-60.0, -80.0, 0.0),
+        radius: 200.0,
+        color: Vec3::ONE,
+        additive: false,
+    });
+    let frames = |sampling| {
+        if sampling == LightSampling::All {
+            96
+        } else {
+            512
+        }
+    };
+    let means: Vec<Vec<Vec3>> = ALL
+        .iter()
+        .map(|&s| gpu.render(&scene, &sampled(s), frames(s)).0)
+        .collect();
+    let total = |m: &[Vec3]| m.iter().map(|p| p.x).sum::<f32>() / m.len() as f32;
+    let truth = total(&means[2]);
+    for (mean, sampling) in means.iter().zip(ALL) {
+        let ratio = total(mean) / truth;
+        let difference = mean_difference(mean, |i| means[2][i].x.max(0.05 * truth));
+        println!("{sampling:?}: mean {ratio} of All, pixels differ by {difference}");
+        assert!((ratio - 1.0).abs() < 0.01, "{sampling:?} {ratio}");
+        // noise of the sampled ones, not bias
+        assert!(difference < 0.08, "{sampling:?} {difference}");
+    }
+    // what resampling is for: fewer errors than uniform choice at the same number of rays
+    let error = |m: &[Vec3]| {
+        m.iter()
+            .zip(&means[2])
+            .map(|(a, b)| (a.x - b.x).powi(2))
+            .sum::<f32>()
+    };
+    assert!(
+        error(&means[1]) < 0.5 * error(&means[0]),
+        "{} {}",
+        error(&means[1]),
+        error(&means[0])
+    );
+}
+
+#[test]
+fn an_umbra_is_black_and_a_penumbra_is_between() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    let triangle = [
+        Vec3::new(-5.0, -5.0, 200.0),
+        Vec3::new(0.0, 5.0, 200.0),
+        Vec3::new(5.0, -5.0, 200.0),
+    ];
+    let mut scene = Scene::new(Vec3::new(0.0, 0.0, 90.0), Vec3::ZERO, 80.0, 32);
+    let white = scene.diffuse(1.0);
+    scene.quad(
+        rectangle(
+            Vec3::new(-500.0, -500.0, 0.0),
+            Vec3::X * 1000.0,
+            Vec3::Y * 1000.0,
+        ),
+        white,
+    );
+    // between light and floor, above the eye
+    scene.quad(
+        rectangle(
+            Vec3::new(-20.0, -20.0, 100.0),
+            Vec3::Y * 40.0,
+            Vec3::X * 40.0,
+        ),
+        white,
+    );
+    scene.light(triangle, Vec3::splat(1000.0));
+    let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::All), 16);
+    let mut umbra = 0;
+    let mut partial = 0;
+    for (i, pixel) in pixels.iter().enumerate() {
+        let p = floor_point(&scene, i % 32, i / 32);
+        let extent = p.x.abs().max(p.y.abs());
+        // the plate's shadow reaches 40 on the floor; the light's size blurs it by 5, a pixel covers 5
+        if extent < 30.0 {
+            umbra += 1;
+            assert_eq!(*pixel, Vec3::ZERO, "{p}");
+        } else if extent > 52.0 {
+            let exact = lambert(p, Vec3::Z, triangle, 1000.0);
+            assert!(
+                (pixel.x / exact - 1.0).abs() < 0.05,
+                "{p} {} {exact}",
+                pixel.x
+            );
+        } else if pixel.x > 0.0 && pixel.x < 0.8 * lambert(p, Vec3::Z, triangle, 1000.0) {
+            partial += 1;
+        }
+    }
+    assert!(umbra > 50 && partial > 20, "{umbra} {partial}");
+}
+
+#[test]
+fn spheres_and_suns_give_their_irradiance() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    let check = |gpu: &mut Gpu, scene: &Scene, exact: &dyn Fn(Vec3) -> f32| {
+        let (pixels, _) = gpu.render(scene, &sampled(LightSampling::Resampled), 32);
+        let difference = mean_difference(&pixels, |i| exact(floor_point(scene, i % 32, i / 32)));
+        println!("{difference}");
+        assert!(difference < 0.01, "{difference}");
+    };
+    let at = Vec3::new(20.0, 10.0, 90.0);
+    // a small sphere is a point: E = I cos / d²
+    let falloff = |p: Vec3| (at.z / (at - p).length()) / (at - p).length_squared();
+    let mut scene = floor();
+    scene.points.push(PointLight {
+        origin: at,
+        intensity: Vec3::splat(7000.0),
+        radius: 4.0,
+        spot: None,
+    });
+    check(&mut gpu, &scene, &|p| {
+        7000.0 * falloff(p) / std::f32::consts::PI
+    });
+    // facing it at half its reach a white surface shows the colour of a dynamic light
+    let mut scene = floor();
+    scene.dlights.push(DynamicLight {
+        origin: at,
+        radius: 200.0,
+        color: Vec3::ONE,
+        additive: false,
+    });
+    check(&mut gpu, &scene, &|p| 100.0 * 100.0 * falloff(p));
+    let mut scene = floor();
+    let direction = Vec3::new(0.3, 0.2, 0.8).normalize();
+    scene.suns.push(SunLight {
+        direction,
+        irradiance: Vec3::splat(2.0),
+        angular_radius: 0.005,
+        material: None,
+    });
+    check(&mut gpu, &scene, &|_| {
+        2.0 * direction.z / std::f32::consts::PI
+    });
+    // and the even light is simply there
+    let mut scene = floor();
+    scene.ambient = Vec3::splat(0.25);
+    check(&mut gpu, &scene, &|_| 0.25);
+}
+
+#[test]
+fn a_white_room_bounces_what_its_walls_give() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    // every wall glows with radiance e and reflects rho: one bounce adds rho * e, two add rho² * e more
+    let mut scene = Scene::new(
+        Vec3::new(-20.0, 10.0, 5.0),
+        Vec3::new(50.0, 20.0, -30.0),
+        90.0,
+        32,
+    );
+    let [glow, albedo] =
+        [0.25, 0.5].map(|v| super::harness::through_byte(super::harness::encode(v)));
+    let code = super::harness::encode(0.5);
+    let glow_code = super::harness::encode(0.25);
+    let wall = scene.material(
+        &[
+            super::harness::stage::light(),
+            super::harness::stage::filter([code; 3]),
+            super::harness::stage::add([glow_code; 3]),
+        ],
+        0,
+    );
+    scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), wall);
+    for (bounces, exact) in [
+        (0, glow),
+        (1, glow * (1.0 + albedo)),
+        (2, glow * (1.0 + albedo + albedo * albedo)),
+    ] {
+        let settings = Settings {
+            rt_bounces: bounces,
+            ..reference()
+        };
+        let mean = gpu.mean(&scene, &settings, 4).x;
+        println!("{bounces}: {mean} {exact}");
+        assert!(
+            (mean / exact - 1.0).abs() < 0.002,
+            "{bounces}: {mean} {exact}"
+        );
+    }
+}
+
+#[test]
+fn bounced_light_of_listed_lights_is_counted_once() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    // a floor lit by a wall that the sun lights: by form factor of the wall, seen from the floor's point
+    let mut scene = Scene::new(
+        Vec3::new(-60.0, 0.0, 40.0),
+        Vec3::new(-40.0, 0.0, 0.0),
+        4.0,
+        32,
+    );
+    let white = scene.diffuse(1.0);
+    let half = scene.diffuse(0.5);
+    scene.quad(
+        rectangle(
+            Vec3::new(-500.0, -500.0, 0.0),
+            Vec3::X * 1000.0,
+            Vec3::Y * 1000.0,
+        ),
+        white,
+    );
+    // a wall at x = 0 that faces -x, and a lamp of the light lists on it that bounced rays must not count
+    let wall = [
+        Vec3::new(0.0, -40.0, 0.0),
+        Vec3::new(0.0, -40.0, 50.0),
+        Vec3::new(0.0, 40.0, 50.0),
+        Vec3::new(0.0, 40.0, 0.0),
+    ];
+    scene.quad(wall, half);
+    // the sun stands low behind the camera: it lights the wall in full and the floor too
+    let direction = Vec3::new(-1.0, 0.0, 0.2).normalize();
+    scene.suns.push(SunLight {
+        direction,
+        irradiance: Vec3::splat(3.0),
+        angular_radius: 0.002,
+        material: None,
+    });
+    let settings = Settings {
+        rt_bounces: 1,
+        ..reference()
+    };
+    let (pixels, _) = gpu.render(&scene, &settings, 256);
+    let direct = 3.0 * direction.z / std::f32::consts::PI;
+    let albedo = super::harness::through_byte(super::harness::encode(0.5));
+    let wall_radiance = albedo * 3.0 * -direction.x / std::f32::consts::PI;
+    let exact = |p: Vec3| {
+        direct
+            + lambert(p, Vec3::Z, [wall[0], wall[1], wall[2]], wall_radiance)
+            + lambert(p, Vec3::Z, [wall[0], wall[2], wall[3]], wall_radiance)
+    };
+    let side = 32;
+    let truth: f32 = (0..pixels.len())
+        .map(|i| exact(floor_point(&scene, i % side, i / side)))
+        .sum();
+    let ratio = pixels.iter().map(|p| p.x).sum::<f32>() / truth;
+    println!("{ratio}");
+    assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+}

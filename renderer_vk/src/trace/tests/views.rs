@@ -1,0 +1,299 @@
+//! Mirrors, portals, sky, who sees what, and the way to the picture.
+
+use glam::Vec3;
+use shaders::trace_types::SkyRecord;
+use shaders::types::Instance;
+use shaders::types::constants as c;
+
+use super::harness::{
+    Gpu, Scene, encode, identity, plane, rectangle, reference, stage, through_byte,
+};
+use crate::scene::Portal;
+use crate::settings::Settings;
+
+const RED: [f32; 3] = [0.9, 0.1, 0.1];
+const GREEN: [f32; 3] = [0.1, 0.8, 0.2];
+const BLUE: [f32; 3] = [0.2, 0.1, 1.0];
+
+fn linear(color: [f32; 3]) -> Vec3 {
+    Vec3::from(color.map(through_byte))
+}
+
+fn close(a: Vec3, b: Vec3) -> bool {
+    (a - b).abs().max_element() < 2.0e-4
+}
+
+/// A rectangle at distance x that faces -x; with a negative distance it faces +x.
+fn screen(x: f32) -> [Vec3; 4] {
+    if x > 0.0 {
+        rectangle(
+            Vec3::new(x, -900.0, -900.0),
+            Vec3::Z * 1800.0,
+            Vec3::Y * 1800.0,
+        )
+    } else {
+        rectangle(
+            Vec3::new(x, -900.0, -900.0),
+            Vec3::Y * 1800.0,
+            Vec3::Z * 1800.0,
+        )
+    }
+}
+
+fn mirror_at(x: f32) -> Portal {
+    let normal = Vec3::NEG_X;
+    let origin = Vec3::new(x, 0.0, 0.0);
+    Portal {
+        plane: plane(normal, origin),
+        mirror: true,
+        surface_origin: origin,
+        surface_axis: [normal, Vec3::Y, Vec3::Z],
+        camera_origin: origin,
+        camera_axis: [-normal, Vec3::Y, Vec3::Z],
+        pvs_origin: origin,
+        entity_origin: origin,
+    }
+}
+
+#[test]
+fn a_mirror_shows_what_is_behind_the_eye_and_who_looks() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
+    let red = scene.material(&[stage::constant(RED)], 0);
+    // a clean mirror: its one stage leaves half of what it shows
+    let mirror = scene.material(&[stage::filter([encode(0.5); 3])], c::MATERIAL_PORTAL);
+    scene.quad(screen(-100.0), red);
+    scene.quad(screen(50.0), mirror);
+    scene.portals.push(mirror_at(50.0));
+    let half = through_byte(encode(0.5));
+    let mean = gpu.mean(&scene, &reference(), 1);
+    assert!(close(mean, linear(RED) * half), "{mean}");
+    // the body of the one who looks shows in the mirror, the weapon before the eye does not
+    let green = scene.material(&[stage::constant(GREEN)], 0);
+    let blue = scene.material(&[stage::constant(BLUE)], 0);
+    let body = Instance {
+        flags: c::INSTANCE_THIRD_PERSON,
+        ..identity()
+    };
+    scene.mesh(screen(-10.0), green, body);
+    let mean = gpu.mean(&scene, &reference(), 1);
+    assert!(close(mean, linear(GREEN) * half), "{mean}");
+    let weapon = Instance {
+        flags: c::INSTANCE_FIRST_PERSON,
+        ..identity()
+    };
+    scene.mesh(screen(-5.0), blue, weapon);
+    let mean = gpu.mean(&scene, &reference(), 1);
+    assert!(close(mean, linear(GREEN) * half), "{mean}");
+    // no mirror deeper than the setting says
+    let shallow = Settings {
+        rt_max_depth: 0,
+        ..reference()
+    };
+    assert_eq!(gpu.mean(&scene, &shallow, 1), Vec3::ZERO);
+    // without an entity that marks it, it is a surface like any other
+    scene.portals.clear();
+    assert_eq!(gpu.mean(&scene, &reference(), 1), Vec3::ZERO);
+    // the weapon is in front of walls that it sticks into, and the body is not seen by its own eye
+    scene.mesh(screen(60.0), blue, weapon);
+    let mean = gpu.mean(&scene, &reference(), 1);
+    assert!(close(mean, linear(BLUE)), "{mean}");
+}
+
+#[test]
+fn a_portal_shows_what_its_camera_sees() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
+    let portal = scene.material(&[stage::add([0.0; 3])], c::MATERIAL_PORTAL);
+    let green = scene.material(&[stage::constant(GREEN)], 0);
+    let red = scene.material(&[stage::constant(RED)], 0);
+    scene.quad(screen(50.0), portal);
+    scene.quad(screen(-100.0), red);
+    // the far camera stands at (5000, 0, 0) and looks along +y, at a green wall there
+    scene.quad(
+        rectangle(
+            Vec3::new(4000.0, 300.0, -900.0),
+            Vec3::X * 2000.0,
+            Vec3::Z * 1800.0,
+        ),
+        green,
+    );
+    scene.portals.push(Portal {
+        mirror: false,
+        camera_origin: Vec3::new(5000.0, 0.0, 0.0),
+        // surface axis 0 looks to the eye; looking into the surface (-axis 0) becomes +y
+        camera_axis: [Vec3::NEG_Y, Vec3::X, Vec3::Z],
+        ..mirror_at(50.0)
+    });
+    let mean = gpu.mean(&scene, &reference(), 1);
+    assert!(close(mean, linear(GREEN)), "{mean}");
+}
+
+#[test]
+fn back_faces_do_not_show() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
+    let red = scene.material(&[stage::constant(RED)], 0);
+    let green = scene.material(&[stage::constant(GREEN)], 0);
+    let two_sided = scene.material(&[stage::constant(BLUE)], c::MATERIAL_TWO_SIDED);
+    let away = |x: f32| {
+        let [a, b, c, d] = screen(x);
+        [d, c, b, a]
+    };
+    scene.quad(screen(200.0), green);
+    scene.quad(away(100.0), red);
+    assert!(close(gpu.mean(&scene, &reference(), 1), linear(GREEN)));
+    scene.quad(away(150.0), two_sided);
+    assert!(close(gpu.mean(&scene, &reference(), 1), linear(BLUE)));
+    let only_back = scene.material(&[stage::constant(RED)], c::MATERIAL_CULL_BACK);
+    scene.quad(screen(60.0), only_back);
+    assert!(close(gpu.mean(&scene, &reference(), 1), linear(BLUE)));
+    scene.quad(away(50.0), only_back);
+    assert!(close(gpu.mean(&scene, &reference(), 1), linear(RED)));
+}
+
+#[test]
+fn the_sky_is_where_its_stages_say_and_lets_the_sun_in() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    let mut scene = Scene::new(
+        Vec3::new(0.0, 0.0, 50.0),
+        Vec3::new(100.0, 0.0, 50.0),
+        90.0,
+        32,
+    );
+    let sky = scene.sky(
+        &[stage::constant(BLUE)],
+        SkyRecord {
+            faces: [c::NO_TEXTURE; 6],
+            cloud_height: 512.0,
+        },
+    );
+    let white = scene.diffuse(1.0);
+    scene.room(
+        Vec3::new(-500.0, -500.0, 0.0),
+        Vec3::new(500.0, 500.0, 400.0),
+        sky,
+    );
+    scene.surfaces.remove(0);
+    scene.quad(
+        rectangle(
+            Vec3::new(-500.0, -500.0, 0.0),
+            Vec3::X * 1000.0,
+            Vec3::Y * 1000.0,
+        ),
+        white,
+    );
+    scene.suns.push(relight::light::SunLight {
+        direction: Vec3::Z,
+        irradiance: Vec3::splat(std::f32::consts::PI),
+        angular_radius: 0.001,
+        material: None,
+    });
+    let (pixels, _) = gpu.render(&scene, &reference(), 2);
+    assert!(
+        close(pixels[4 * 32 + 16], linear(BLUE)),
+        "{}",
+        pixels[4 * 32 + 16]
+    );
+    assert!(
+        (pixels[30 * 32 + 16].x - 1.0).abs() < 0.01,
+        "{}",
+        pixels[30 * 32 + 16]
+    );
+    // the sky is above the roof: shadow
+    scene.quad(
+        rectangle(
+            Vec3::new(-500.0, -500.0, 300.0),
+            Vec3::Y * 1000.0,
+            Vec3::X * 1000.0,
+        ),
+        white,
+    );
+    let (pixels, _) = gpu.render(&scene, &reference(), 2);
+    assert_eq!(pixels[30 * 32 + 16], Vec3::ZERO);
+    // quick sky
+    let fast = Settings {
+        fast_sky: true,
+        ..reference()
+    };
+    let (pixels, _) = gpu.render(&scene, &fast, 1);
+    assert_eq!(pixels[15 * 32 + 16], Vec3::ZERO);
+}
+
+#[test]
+fn display_white_keeps_its_brightness() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    for (value, expected) in [(0.05, 0.05), (0.5, 0.5), (1.0, 0.852_8)] {
+        let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
+        let wall = scene.material(&[stage::constant([encode(value); 3])], 0);
+        scene.quad(screen(100.0), wall);
+        let (_, picture) = gpu.render(&scene, &reference(), 1);
+        let exact = encode(expected) * 255.0;
+        for pixel in picture {
+            assert!(
+                (f32::from(pixel[0]) - exact).abs() < 1.6 && pixel[3] == 255,
+                "{pixel:?} {exact}"
+            );
+        }
+    }
+    // one stop more
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
+    let wall = scene.material(&[stage::constant([encode(0.1); 3])], 0);
+    scene.quad(screen(100.0), wall);
+    let brighter = Settings {
+        rt_exposure: 1.0,
+        ..reference()
+    };
+    let (_, picture) = gpu.render(&scene, &brighter, 1);
+    assert!(
+        (f32::from(picture[100][0]) - encode(0.2) * 255.0).abs() < 1.6,
+        "{:?}",
+        picture[100]
+    );
+    // automatic exposure lifts what is dark, but not to the brightness of what is not
+    let automatic = Settings {
+        rt_auto_exposure: true,
+        ..reference()
+    };
+    let mut levels = Vec::new();
+    for value in [0.01, 0.1] {
+        let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
+        let wall = scene.material(&[stage::constant([encode(value); 3])], 0);
+        scene.quad(screen(100.0), wall);
+        let (_, picture) = gpu.render(&scene, &automatic, 1);
+        levels.push(f32::from(picture[100][0]));
+    }
+    assert!(
+        levels[0] > encode(0.015) * 255.0 && levels[0] < levels[1],
+        "{levels:?}"
+    );
+}
+
+#[test]
+fn frames_can_be_made_again_bit_by_bit() {
+    let Some(mut gpu) = Gpu::new() else { return };
+    let mut scene = Scene::new(
+        Vec3::new(-20.0, 10.0, 5.0),
+        Vec3::new(50.0, 20.0, -30.0),
+        90.0,
+        16,
+    );
+    let wall = scene.diffuse(0.5);
+    scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), wall);
+    scene.light(
+        [
+            Vec3::new(0.0, 0.0, 90.0),
+            Vec3::new(0.0, 20.0, 90.0),
+            Vec3::new(20.0, 0.0, 90.0),
+        ],
+        Vec3::splat(9.0),
+    );
+    let settings = Settings {
+        rt_bounces: 1,
+        ..reference()
+    };
+    let (first, _) = gpu.render(&scene, &settings, 3);
+    let (second, _) = gpu.render(&scene, &settings, 3);
+    assert_eq!(first, second);
+    assert!(first.iter().any(|p| p.x > 0.0));
+}
