@@ -1,6 +1,6 @@
 //! The traced look: acceleration structures, and the passes from camera rays to the picture.
 //!
-//! A frame, in the order of [`look`]: [`accel`] builds what moves and the top level; [`passes::Primary`] finds what each
+//! A frame, in the order of [`view_tracer`]: [`accel`] builds what moves and the top level; [`passes::Primary`] finds what each
 //! pixel shows; [`passes::Direct`] and [`passes::Indirect`] light it; [`passes::Composite`], [`passes::Accumulate`],
 //! [`passes::Exposure`] and [`passes::ToneMap`] make the picture of it. Rays are launched only from the ray generation
 //! shaders; hit shaders report what was hit and decide cut-outs.
@@ -16,6 +16,7 @@ pub mod lights;
 pub mod look;
 pub mod passes;
 pub mod targets;
+pub mod view_tracer;
 
 pub use look::TraceLook;
 

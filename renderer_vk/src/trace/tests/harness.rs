@@ -16,12 +16,12 @@ use crate::settings::Settings;
 use crate::trace::geometry::StaticGeometry;
 use crate::trace::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface};
 use crate::trace::lights::{MapLightSource, MapLights};
-use crate::trace::look::{TraceLook, TracedMap};
+use crate::trace::view_tracer::{TracedMap, ViewTracer};
 
 /// A device with its validation layer on and the look under test.
 pub struct Gpu {
     pub device: Device,
-    look: TraceLook,
+    look: ViewTracer,
     ring: FrameRing,
 }
 
@@ -62,7 +62,7 @@ impl Gpu {
                 .expect("sampler");
         }
         Some(Self {
-            look: TraceLook::new(&device).expect("pipelines"),
+            look: ViewTracer::new(&device).expect("pipelines"),
             ring: FrameRing::new(&device, 2).expect("frames"),
             device,
         })

@@ -1,0 +1,390 @@
+//! The traced look: its state from frame to frame and the order of its passes.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use glam::Vec3;
+use shaders::trace_types::constants as t;
+use shaders::trace_types::{PortalRecord, TraceView};
+
+use super::accel::{Accel, AccelOutput};
+use super::geometry::StaticGeometry;
+use super::input::MaterialTable;
+use super::lights::{MapLights, dynamic_lights};
+use super::passes::{Accumulate, Composite, Direct, Exposure, Indirect, Primary, ToneMap};
+use super::targets::Targets;
+use crate::gpu::{Buffer, BufferDesc, BufferUsage, Device, Error, Image, Memory, Recorder};
+use crate::scene::ViewScene;
+use crate::settings::{LightSampling, Settings};
+
+/// The map that a view shows.
+#[derive(Clone, Copy)]
+pub struct TracedMap<'a> {
+    /// Its geometry.
+    pub geometry: &'a StaticGeometry,
+    /// Its lights.
+    pub lights: &'a MapLights,
+}
+
+/// Draws views by tracing rays.
+pub struct ViewTracer {
+    pub(super) device: Device,
+    accel: Accel,
+    primary: Primary,
+    direct: Direct,
+    indirect: Indirect,
+    composite: Composite,
+    accumulate: Accumulate,
+    exposure: Exposure,
+    tone_map: ToneMap,
+    targets: Option<Targets>,
+    exposure_state: Buffer,
+    exposure_started: bool,
+    no_lights: MapLights,
+    frame: u32,
+    last_time: f32,
+    /// Hash of everything that the accumulated frames show, and how many there are.
+    accumulated: (u64, u32),
+}
+
+/// Frames per second-like rate at which automatic exposure follows the picture: after a third of a second about two
+/// thirds of the difference are gone.
+const EXPOSURE_RATE: f32 = 3.0;
+
+impl ViewTracer {
+    /// Compiles the pipelines and makes what stays from frame to frame.
+    ///
+    /// # Errors
+    /// The device has no ray tracing pipelines, refuses one, or is out of memory.
+    pub fn new(device: &Device) -> Result<Self, Error> {
+        Ok(Self {
+            device: device.clone(),
+            accel: Accel::new(device),
+            primary: Primary::new(device)?,
+            direct: Direct::new(device)?,
+            indirect: Indirect::new(device)?,
+            composite: Composite::new(device)?,
+            accumulate: Accumulate::new(device)?,
+            exposure: Exposure::new(device)?,
+            tone_map: ToneMap::new(device)?,
+            targets: None,
+            exposure_state: Buffer::new(
+                device,
+                &BufferDesc {
+                    name: "trace exposure",
+                    size: Exposure::STATE_SIZE,
+                    usage: BufferUsage::STORAGE,
+                    memory: Memory::Device,
+                },
+            )?,
+            exposure_started: false,
+            no_lights: MapLights::none(device)?,
+            frame: 0,
+            last_time: 0.0,
+            accumulated: (0, 0),
+        })
+    }
+
+    /// How many frames the picture is the mean of; 1 outside of reference mode.
+    pub fn accumulated_frames(&self) -> u32 {
+        self.accumulated.1.max(1)
+    }
+
+    /// The linear picture of the last view, before exposure: RGBA, 32-bit floats.
+    pub fn hdr(&self) -> Option<&Image> {
+        self.targets.as_ref().map(|t| &t.hdr)
+    }
+
+    /// Forgets what was accumulated and lets exposure start anew: the map has changed.
+    pub fn reset(&mut self) {
+        self.accumulated = (0, 0);
+        self.exposure_started = false;
+    }
+
+    /// Records all passes of a view into its rectangle of `target` (RGBA8, usable as storage image). A view without
+    /// area is left out.
+    ///
+    /// # Errors
+    /// Out of memory, or a lost device.
+    pub fn record_view(
+        &mut self,
+        rec: &mut Recorder,
+        view: &ViewScene,
+        map: Option<TracedMap<'_>>,
+        materials: &dyn MaterialTable,
+        settings: &Settings,
+        target: &Image,
+    ) -> Result<(), Error> {
+        let [x, y, width, height] = view.view.viewport;
+        let (Ok(width), Ok(height)) = (u32::try_from(width), u32::try_from(height)) else {
+            return Ok(());
+        };
+        // what lies outside of the target is not traced, unless the view begins to its left or above
+        let room = |size: u32, start: i32| {
+            i64::from(size) - i64::from(start.min(0)) - i64::from(start.max(0))
+        };
+        if width == 0
+            || height == 0
+            || room(target.width(), x) <= 0
+            || room(target.height(), y) <= 0
+        {
+            return Ok(());
+        }
+        let size = [width, height];
+        if self
+            .targets
+            .as_ref()
+            .is_none_or(|t| [t.width, t.height] != size)
+        {
+            self.targets = Some(Targets::new(&self.device, width, height)?);
+            self.accumulated = (0, 0);
+        }
+        let map = map.filter(|_| view.has_world);
+        let accumulated = self.accumulated_before(view, materials, settings);
+        let accel = self
+            .accel
+            .record(rec, view, map.map(|m| m.geometry), materials)?;
+        let params = self.params(
+            rec,
+            view,
+            map,
+            materials,
+            settings,
+            target,
+            accel,
+            accumulated,
+        )?;
+        let address = rec.arena().push(&[params])?;
+
+        self.primary.record(rec, address, size)?;
+        self.direct.record(rec, address, size)?;
+        self.indirect.record(rec, address, size)?;
+        self.composite.record(rec, address, size)?;
+        if settings.rt_reference {
+            self.accumulate.record(rec, address, size)?;
+        }
+        self.exposure.record(rec, address, size)?;
+        self.tone_map.record(rec, address, size)?;
+        self.frame = self.frame.wrapping_add(1);
+        self.last_time = view.time;
+        self.exposure_started = true;
+        Ok(())
+    }
+
+    /// Number of frames that the accumulated sum holds before this one; 0 if anything that shows has changed.
+    fn accumulated_before(
+        &mut self,
+        view: &ViewScene,
+        materials: &dyn MaterialTable,
+        settings: &Settings,
+    ) -> u32 {
+        if !settings.rt_reference {
+            self.accumulated = (0, 0);
+            return 0;
+        }
+        let key = content_hash(view, materials, settings);
+        let before = if self.accumulated.0 == key {
+            self.accumulated.1
+        } else {
+            0
+        };
+        self.accumulated = (key, before.saturating_add(1));
+        before
+    }
+
+    #[allow(clippy::too_many_arguments)] // what a view depends on
+    fn params(
+        &self,
+        rec: &mut Recorder,
+        view: &ViewScene,
+        map: Option<TracedMap<'_>>,
+        materials: &dyn MaterialTable,
+        settings: &Settings,
+        target: &Image,
+        accel: AccelOutput,
+        accumulated: u32,
+    ) -> Result<TraceView, Error> {
+        let Some(targets) = &self.targets else {
+            return Ok(TraceView::default()); // made by the caller
+        };
+        let camera = &view.view;
+        let lights = map.map_or(&self.no_lights, |m| m.lights);
+        let dynamic = if settings.dynamic_light {
+            dynamic_lights(&view.dlights, settings.rt_dlight_scale)
+        } else {
+            Vec::new()
+        };
+        let portals: Vec<PortalRecord> = if settings.no_portals {
+            Vec::new()
+        } else {
+            view.portals.iter().map(portal_record).collect()
+        };
+        let mut flags = 0;
+        let mut set = |bit: u32, on: bool| flags |= if on { bit } else { 0 };
+        set(t::VIEW_JITTER, settings.rt_reference);
+        set(t::VIEW_ACCUMULATE, settings.rt_reference);
+        set(t::VIEW_FIRST_PERSON, accel.first_person);
+        set(t::VIEW_AUTO_EXPOSURE, settings.rt_auto_exposure);
+        set(t::VIEW_EXPOSURE_RESET, !self.exposure_started);
+        set(t::VIEW_FAST_SKY, settings.fast_sky);
+        set(t::VIEW_FULLBRIGHT, settings.fullbright);
+        let passed = view.time - self.last_time;
+        // the picture settles at once where frames must not depend on those before them
+        let exposure_blend = if settings.rt_reference || !self.exposure_started {
+            1.0
+        } else {
+            1.0 - (-EXPOSURE_RATE
+                * if passed > 0.0 {
+                    passed.min(1.0)
+                } else {
+                    1.0 / 60.0
+                })
+            .exp()
+        };
+        Ok(TraceView {
+            geometries: accel.geometries,
+            instances: accel.instances,
+            fogs: map.map_or(0, |m| m.geometry.fogs.address()),
+            portals: rec.arena().push(&portals)?,
+            skies: map.map_or(0, |m| m.geometry.skies.address()),
+            triangle_lights: lights.triangles.address(),
+            sphere_lights: lights.spheres.address(),
+            dynamic_lights: rec.arena().push(&dynamic)?,
+            suns: lights.suns.address(),
+            nodes: lights.nodes.address(),
+            leaf_clusters: lights.leaf_clusters.address(),
+            light_offsets: lights.offsets.address(),
+            light_indices: lights.indices.address(),
+            exposure: self.exposure_state.address(),
+            materials: materials.buffers(),
+            eye: camera.origin,
+            forward: camera.axis[0],
+            left: camera.axis[1] * camera.tan_x,
+            up: camera.axis[2] * camera.tan_y,
+            width: targets.width,
+            height: targets.height,
+            target_x: camera.viewport[0],
+            target_y: camera.viewport[1],
+            scene: accel.scene,
+            flags,
+            seed: if settings.rt_reference {
+                accumulated
+            } else {
+                self.frame
+            },
+            accumulated,
+            time: view.time,
+            pixel_spread: pixel_spread(camera.tan_y, targets.height),
+            ambient: lights.ambient * settings.rt_light_scale.max(0.0),
+            fog_count: map.map_or(0, |m| m.geometry.fog_count),
+            portal_count: u32::try_from(portals.len()).unwrap_or(u32::MAX),
+            triangle_light_count: lights.triangle_count,
+            sun_count: lights.sun_count,
+            dynamic_light_count: u32::try_from(dynamic.len()).unwrap_or(u32::MAX),
+            cluster_count: lights.cluster_count,
+            node_count: lights.node_count,
+            max_depth: settings.rt_max_depth,
+            bounces: settings.rt_bounces,
+            samples: settings.rt_samples.max(1),
+            candidates: settings.rt_candidates.max(1),
+            sampling: match settings.rt_light_sampling {
+                LightSampling::Uniform => t::SAMPLING_UNIFORM,
+                LightSampling::Resampled => t::SAMPLING_RESAMPLED,
+                LightSampling::All => t::SAMPLING_ALL,
+            },
+            image_position: targets.position.storage_index(),
+            image_surface: targets.surface.storage_index(),
+            image_front: targets.front.storage_index(),
+            image_direct: targets.direct.storage_index(),
+            image_indirect: targets.indirect.storage_index(),
+            image_hdr: targets.hdr.storage_index(),
+            image_accumulation: targets.accumulation.storage_index(),
+            image_target: target.storage_index(),
+            exposure_bias: settings.rt_exposure,
+            exposure_blend,
+            light_scale: settings.rt_light_scale.max(0.0),
+            target_width: target.width(),
+            target_height: target.height(),
+        })
+    }
+}
+
+/// Width of a pixel's cone at distance 1.
+#[allow(clippy::cast_precision_loss)] // a height in pixels
+fn pixel_spread(tan_y: f32, height: u32) -> f32 {
+    2.0 * tan_y / height.max(1) as f32
+}
+
+fn portal_record(portal: &crate::scene::Portal) -> PortalRecord {
+    PortalRecord {
+        plane: portal.plane.to_array(),
+        mirror: u32::from(portal.mirror),
+        surface_origin: portal.surface_origin,
+        surface_axis: portal.surface_axis,
+        camera_origin: portal.camera_origin,
+        camera_axis: portal.camera_axis,
+    }
+}
+
+/// A number that changes whenever the mean picture does: camera, everything in the scene, time, settings.
+fn content_hash(view: &ViewScene, materials: &dyn MaterialTable, settings: &Settings) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    let mut floats = |values: &[f32]| {
+        for value in values {
+            value.to_bits().hash(&mut hasher);
+        }
+    };
+    let vector = |v: Vec3| [v.x, v.y, v.z];
+    let camera = &view.view;
+    floats(&vector(camera.origin));
+    for axis in camera.axis {
+        floats(&vector(axis));
+    }
+    floats(&[camera.tan_x, camera.tan_y, view.time]);
+    floats(&[settings.rt_light_scale, settings.rt_dlight_scale]);
+    for light in &view.dlights {
+        floats(&vector(light.origin));
+        floats(&vector(light.color));
+        floats(&[light.radius]);
+    }
+    for portal in &view.portals {
+        floats(&portal.plane.to_array());
+        floats(&vector(portal.camera_origin));
+        for axis in portal.camera_axis {
+            floats(&vector(axis));
+        }
+    }
+    camera.viewport.hash(&mut hasher);
+    bytemuck::cast_slice::<_, u8>(&view.instances).hash(&mut hasher);
+    bytemuck::cast_slice::<_, u8>(&view.vertices).hash(&mut hasher);
+    view.indices.hash(&mut hasher);
+    for mesh in &view.meshes {
+        (
+            mesh.first_index,
+            mesh.index_count,
+            mesh.material,
+            mesh.instance,
+        )
+            .hash(&mut hasher);
+    }
+    for submodel in &view.submodels {
+        (submodel.model, submodel.instance).hash(&mut hasher);
+    }
+    view.has_world.hash(&mut hasher);
+    materials.generation().hash(&mut hasher);
+    (
+        settings.rt_max_depth,
+        settings.rt_bounces,
+        settings.fast_sky,
+        settings.fullbright,
+    )
+        .hash(&mut hasher);
+    (settings.dynamic_light, settings.no_portals).hash(&mut hasher);
+    // estimators with the same mean could go on together, but a comparison wants them apart
+    (
+        settings.rt_light_sampling as u32,
+        settings.rt_samples,
+        settings.rt_candidates,
+    )
+        .hash(&mut hasher);
+    hasher.finish()
+}
