@@ -117,11 +117,55 @@ fn main() {
     }
     generated.push_str("];\n");
 
+    let layouts = layouts(&root);
     assert!(errors.is_empty(), "shader compilation failed\n{errors}");
-    let list = out.join("modules.rs");
-    if !fs::read_to_string(&list).is_ok_and(|old| old == generated) {
-        fs::write(list, generated).expect("OUT_DIR can be written");
+    for (file, text) in [("modules.rs", generated), ("layouts.rs", layouts)] {
+        let file = out.join(file);
+        if !fs::read_to_string(&file).is_ok_and(|old| old == text) {
+            fs::write(file, text).expect("OUT_DIR can be written");
+        }
     }
+}
+
+/// A table of the public structures of the `*types.rs` files with the sizes and offsets that the compiler gives them,
+/// for the test that compares them with SPIR-V. Nobody has to keep a list of fields that way.
+fn layouts(root: &Path) -> String {
+    let mut table = String::from(
+        "/// Name, size, and name and offset of each field.\npub const LAYOUTS: &[Layout] = &[\n",
+    );
+    for module in ["types", "trace_types"] {
+        let text = fs::read_to_string(root.join(format!("src/{module}.rs"))).unwrap_or_default();
+        let mut structure: Option<&str> = None;
+        for line in text.lines() {
+            let line = line.trim();
+            if let Some(name) = line
+                .strip_prefix("pub struct ")
+                .and_then(|rest| rest.strip_suffix('{'))
+            {
+                let name = name.trim();
+                structure = Some(name);
+                let _ = writeln!(
+                    table,
+                    "    (\"{name}\", size_of::<crate::{module}::{name}>(), &["
+                );
+            } else if let Some(name) = structure {
+                if line == "}" {
+                    table.push_str("    ]),\n");
+                    structure = None;
+                } else if let Some((field, _)) = line
+                    .strip_prefix("pub ")
+                    .and_then(|rest| rest.split_once(':'))
+                {
+                    let _ = writeln!(
+                        table,
+                        "        (\"{field}\", std::mem::offset_of!(crate::{module}::{name}, {field})),"
+                    );
+                }
+            }
+        }
+    }
+    table.push_str("];\n");
+    table
 }
 
 /// Collects the paths of all GLSL files below `folder`, relative to `root`, with `/`.

@@ -64,3 +64,6 @@ impl std::fmt::Debug for Spirv {
 }
 
 include!(concat!(env!("OUT_DIR"), "/modules.rs"));
+
+#[cfg(test)]
+mod layout_test;
