@@ -12,7 +12,7 @@ mod search_path;
 pub use folder::Folder;
 pub use memory::MemoryFiles;
 pub use pk3::Pk3;
-pub use search_path::SearchPath;
+pub use search_path::{SearchPath, compare_pack_names};
 
 use std::io;
 
