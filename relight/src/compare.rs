@@ -9,11 +9,23 @@ use thiserror::Error;
 const WINDOW: usize = 7;
 
 /// An RGB picture, 8 bits a channel, rows from the top.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub struct Rgb8 {
     width: usize,
     height: usize,
     pixels: Vec<u8>,
+}
+
+impl std::fmt::Debug for Rgb8 {
+    /// The size and the mean luminance: a message that holds a picture has to stay readable.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (width, height) = (self.width, self.height);
+        write!(
+            f,
+            "picture of {width}x{height}, mean luminance {:.1}",
+            self.mean_luminance()
+        )
+    }
 }
 
 /// Why two pictures cannot be compared.

@@ -85,3 +85,21 @@ pub fn tool(name: &str) -> Option<PathBuf> {
     }
     found
 }
+
+/// Keeps a picture as PNG in the folder `RELIGHT_PICTURES`, if that is set: for whoever wants to see what a test saw.
+pub fn keep_picture(picture: &relight::compare::Rgb8, name: &str) {
+    let Some(folder) = std::env::var_os("RELIGHT_PICTURES").map(PathBuf::from) else {
+        return;
+    };
+    let (width, height) = (picture.width() as u32, picture.height() as u32);
+    let Some(image) = image::RgbImage::from_raw(width, height, picture.pixels().to_vec()) else {
+        return;
+    };
+    let file = folder.join(format!("{name}.png"));
+    let saved = std::fs::create_dir_all(&folder)
+        .map_err(image::ImageError::IoError)
+        .and_then(|()| image.save(&file));
+    if let Err(error) = saved {
+        println!("{}: {error}", file.display());
+    }
+}

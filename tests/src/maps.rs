@@ -85,7 +85,7 @@ pub fn files() -> Vec<(String, Vec<u8>)> {
         ),
         ("models/test.md3", model()),
         ("models/test.skin", b"body,textures/test/floor\n".to_vec()),
-        ("film.roq", vec![0; 16]),
+        ("video/film.roq", vec![0; 16]),
     ];
     files.push(("fonts/fontImage_12.dat", font()));
     files.push(("fonts/fontImage_0_12.tga", tga(256, 256, |_, _| [255; 3])));
@@ -116,7 +116,7 @@ fn rooms() -> Vec<u8> {
     let wall = map.add_shader("textures/test/wall", 0, 1);
     let lamp = map.add_shader("textures/test/lamp", 0, 1);
     let film = map.add_shader("textures/test/film", 0, 1);
-    let page = map.add_lightmap([90, 90, 90]);
+    let page = map.add_lightmap([36, 40, 44]);
     let low = Vec3::new(-256.0, -256.0, 0.0);
     let high = Vec3::new(256.0, 256.0, 256.0);
     let far = Vec3::X * 1000.0;

@@ -433,7 +433,7 @@ impl Engine {
     ) -> Result<Rgb8, Raised> {
         self.begin_frame(0)?;
         draw(self)?;
-        self.command("screenshot picture silent")?;
+        self.command("screenshot picture")?;
         self.end_frame()?;
         let file = "screenshots/picture.tga";
         let bytes = self
