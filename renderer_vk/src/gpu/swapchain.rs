@@ -27,8 +27,8 @@ pub struct Swapchain {
     format: Format,
     images: Vec<(Image, vk::Semaphore)>,
     stale: bool,
-    /// The image of a frame that is not presented yet.
-    acquired: Option<u32>,
+    /// What the acquisition for a frame signals while that frame is not presented yet.
+    acquired: Option<vk::Semaphore>,
 }
 
 impl Swapchain {
@@ -114,7 +114,7 @@ impl Swapchain {
                     let Some((image, finished)) = self.images.get(index as usize) else {
                         return Ok(None);
                     };
-                    self.acquired = Some(index);
+                    self.acquired = Some(available);
                     recorder.acquired = Some(Acquired {
                         image: image.clone(),
                         index,
@@ -241,6 +241,9 @@ impl Swapchain {
     /// Makes the swapchain anew for the window as it is now; without images when the window is minimised. Waits for
     /// the device, because nothing says when the window system has done with the old images.
     fn recreate(&mut self) -> Result<(), Error> {
+        if let Some(available) = self.acquired.take() {
+            self.swallow(available)?;
+        }
         self.wait_device()?;
         let device = self.device.clone();
         let Some(swapchains) = &device.0.swapchain else {
@@ -362,6 +365,23 @@ impl Swapchain {
         Ok(())
     }
 
+    /// Takes the signal of an acquisition whose frame was thrown away, so that its semaphore can be used again.
+    fn swallow(&self, available: vk::Semaphore) -> Result<(), Error> {
+        let waits = [available];
+        let stages = [vk::PipelineStageFlags::ALL_COMMANDS];
+        let submits = [vk::SubmitInfo::default()
+            .wait_semaphores(&waits)
+            .wait_dst_stage_mask(&stages)];
+        let queue = lock(&self.device.0.queue);
+        // SAFETY: the acquisition signals the semaphore, and nothing else waits for it; the queue is held.
+        unsafe {
+            self.device
+                .vk()
+                .queue_submit(*queue, &submits, vk::Fence::null())
+        }
+        .context("vkQueueSubmit")
+    }
+
     fn wait_device(&self) -> Result<(), Error> {
         let _queue = lock(&self.device.0.queue);
         // SAFETY: the queue is held.
@@ -369,7 +389,6 @@ impl Swapchain {
     }
 
     fn forget_images(&mut self) {
-        self.acquired = None;
         for (image, finished) in self.images.drain(..) {
             drop(image);
             self.device.0.bury(Garbage::Semaphore(finished));
@@ -379,7 +398,11 @@ impl Swapchain {
 
 impl Drop for Swapchain {
     fn drop(&mut self) {
-        if let Err(e) = self.wait_device() {
+        let over = match self.acquired.take() {
+            Some(available) => self.swallow(available),
+            None => Ok(()),
+        };
+        if let Err(e) = over.and_then(|()| self.wait_device()) {
             log::warn!("{e}");
         }
         self.forget_images();
@@ -391,5 +414,108 @@ impl Drop for Swapchain {
             // SAFETY: the device is idle. Null is allowed.
             unsafe { functions.destroy_swapchain(self.raw, None) };
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ffi::CString;
+
+    use super::super::{Access, DeviceOptions, FrameRing, Rendering, SurfaceSource};
+    use super::*;
+
+    /// A device with a surface that no window system stands behind, or `None` with a printed line.
+    fn device() -> Option<Device> {
+        let required = std::env::var("RELIGHT_REQUIRE_GPU").is_ok_and(|v| v == "1");
+        // SAFETY: the library is a Vulkan loader by its name.
+        let entry = match unsafe { ash::Entry::load() } {
+            Ok(entry) => entry,
+            Err(e) => {
+                assert!(!required, "{e}");
+                println!("skipped: {e}");
+                return None;
+            }
+        };
+        let mut create = |raw: vk::Instance| {
+            // SAFETY: the instance was just made by this loader.
+            let instance = unsafe { ash::Instance::load(entry.static_fn(), raw) };
+            let functions = ash::ext::headless_surface::Instance::new(&entry, &instance);
+            let info = vk::HeadlessSurfaceCreateInfoEXT::default();
+            // SAFETY: the extension is on.
+            unsafe { functions.create_headless_surface(&info, None) }.map_err(|e| e.to_string())
+        };
+        let extensions = [ash::khr::surface::NAME, ash::ext::headless_surface::NAME]
+            .map(CString::from)
+            .to_vec();
+        // SAFETY: `entry` lives to the end of the process (see below); the surface is of the given instance.
+        let source = unsafe {
+            SurfaceSource::window(
+                entry.static_fn().get_instance_proc_addr,
+                extensions,
+                &mut create,
+            )
+        };
+        let options = DeviceOptions {
+            validation: true,
+            ..DeviceOptions::default()
+        };
+        let device = match Device::new(&options, source) {
+            Ok(device) => Some(device),
+            Err(e) => {
+                println!("skipped: {e}");
+                None
+            }
+        };
+        // The device needs the loader for as long as it lives.
+        std::mem::forget(entry);
+        device
+    }
+
+    #[test]
+    fn frames_are_shown_through_resizes_and_thrown_away_frames() {
+        let Some(device) = device() else { return };
+        let mut ring = FrameRing::new(&device, 2).unwrap();
+        let desc = SwapchainDesc {
+            width: 64,
+            height: 48,
+            vsync: true,
+        };
+        let mut swapchain = Swapchain::new(&device, desc).unwrap();
+        let mut shown = 0;
+        for frame in 0..20u32 {
+            if frame % 5 == 4 {
+                swapchain.resize(64 + frame, 48, frame % 2 == 0);
+            }
+            let mut rec = ring.begin().unwrap();
+            if let Some(image) = swapchain.acquire(&mut rec).unwrap() {
+                assert_eq!(image.format(), swapchain.format());
+                assert_eq!((image.width(), image.height()), swapchain.extent());
+                let mut pass = rec
+                    .pass("clear", Access::GRAPHICS, Access::GRAPHICS)
+                    .unwrap();
+                pass.begin_rendering(&Rendering {
+                    color: Some(&image),
+                    clear_color: Some([0.5; 4]),
+                    ..Rendering::default()
+                })
+                .unwrap();
+                shown += 1;
+            }
+            if frame == 7 {
+                // An image that was acquired and never shown.
+                drop(rec);
+                continue;
+            }
+            ring.end_present(rec, &mut swapchain).unwrap();
+        }
+        assert_eq!(shown, 20);
+        // A frame without an image is possible too.
+        let rec = ring.begin().unwrap();
+        ring.end_present(rec, &mut swapchain).unwrap();
+        drop((swapchain, ring));
+        device.wait_idle().unwrap();
+        assert_eq!(device.graveyard_len(), 0);
+        let messages = device.validation_messages();
+        assert!(messages.is_empty(), "{messages:#?}");
     }
 }
