@@ -1,0 +1,217 @@
+//! Debian's ioquake3 with OpenArena and this renderer, without a display.
+
+#![forbid(unsafe_code)]
+
+use relight::compare::{Rgb8, compare};
+use tests::data::{is_set, keep_picture};
+use tests::real::{self, Run, picture, start_map};
+
+/// Cameras: a map, its start as `x y z yaw`. Chosen for what they show: torches, sky, liquids, curves, models.
+const VIEWS: &[(&str, &str)] = &[
+    ("oa_dm1", "-560 768 60 20"),
+    ("am_galmevish", "-640 -384 60 20"),
+    ("oa_dm5", "936 192 290 180"),
+    ("oa_ctf2", "1504 1760 740 180"),
+];
+
+/// The classic look is at least this similar to the engine's own OpenGL renderer's picture of the same frame.
+const CLASSIC_SSIM: f64 = 0.9;
+
+fn run(renderer: &'static str, size: (u32, u32), commands: Vec<String>) -> real::Outcome {
+    Run {
+        renderer,
+        width: size.0,
+        height: size.1,
+        commands,
+        limit: 600,
+    }
+    .go()
+}
+
+fn set(commands: &mut Vec<String>, lines: &[&str]) {
+    commands.extend(lines.iter().map(|l| l.to_string()));
+}
+
+fn assert_plausible(picture: &Rgb8, what: &str) {
+    let (luminance, colors) = (picture.mean_luminance(), picture.distinct_colors());
+    assert!(
+        (3.0..240.0).contains(&luminance),
+        "{what}: mean luminance {luminance}"
+    );
+    assert!(colors > 200, "{what}: {colors} colours");
+}
+
+#[test]
+fn the_classic_look_is_the_engines_own() {
+    if !real::available() {
+        return;
+    }
+    for (map, camera) in VIEWS {
+        let mut commands = start_map(map);
+        commands.extend(picture(camera, 60, "shot"));
+        let reference = run("opengl1", (640, 480), commands.clone());
+        reference.assert_clean();
+        let reference = reference.picture("shot");
+        assert_plausible(reference, map);
+        let mut commands = [
+            vec!["set r_rt 0".to_string(), "set r_vkValidation 1".to_string()],
+            commands,
+        ]
+        .concat();
+        set(&mut commands, &["gfxinfo"]);
+        let ours = run("vk", (640, 480), commands);
+        ours.assert_clean();
+        let picture = ours.picture("shot");
+        keep_picture(reference, &format!("{map}-opengl1"));
+        keep_picture(picture, &format!("{map}-classic"));
+        let difference = compare(reference, picture).unwrap();
+        println!("{map}: {difference:?}");
+        assert!(difference.ssim >= CLASSIC_SSIM, "{map}: {difference:?}");
+    }
+}
+
+#[test]
+fn a_session_with_everything() {
+    if !real::available() {
+        return;
+    }
+    let mut commands = vec!["set r_rt 0".to_string(), "set r_vkValidation 1".to_string()];
+    commands.extend(start_map("oa_dm1"));
+    let camera = VIEWS[0].1;
+    commands.extend(picture(camera, 20, "classic"));
+    set(&mut commands, &["set r_rt 1"]);
+    commands.extend(picture(camera, 24, "traced"));
+    set(&mut commands, &["set r_rt 0"]);
+    commands.extend(picture(camera, 4, "back"));
+    // another map, both looks, bots that fight
+    set(
+        &mut commands,
+        &[
+            "set bot_enable 1",
+            "set timescale 1000",
+            "devmap oa_dm3",
+            "wait 60",
+            "set timescale 1",
+        ],
+    );
+    set(
+        &mut commands,
+        &[
+            "addbot sarge 3",
+            "addbot grism 3",
+            "wait 100",
+            "screenshot second",
+            "wait 4",
+        ],
+    );
+    set(
+        &mut commands,
+        &[
+            "set r_rt 1",
+            "wait 12",
+            "screenshot secondtraced",
+            "wait 4",
+            "set r_rt 0",
+        ],
+    );
+    // the library is unloaded and comes back in the middle of the game
+    set(
+        &mut commands,
+        &["vid_restart", "wait 40", "screenshot restarted", "wait 4"],
+    );
+    set(
+        &mut commands,
+        &[
+            "r_gamma 1.4",
+            "wait 4",
+            "screenshotJPEG jpeg",
+            "wait 4",
+            "imagelist",
+            "shaderlist",
+        ],
+    );
+    set(
+        &mut commands,
+        &[
+            "rt_timings",
+            "video clip",
+            "wait 8",
+            "stopvideo",
+            "disconnect",
+            "wait 20",
+        ],
+    );
+    let outcome = run("vk", (320, 240), commands);
+    for (name, picture) in &outcome.pictures {
+        keep_picture(picture, &format!("session-{name}"));
+    }
+    for name in [
+        "classic",
+        "traced",
+        "back",
+        "second",
+        "secondtraced",
+        "restarted",
+    ] {
+        assert_plausible(outcome.picture(name), name);
+    }
+    assert_ne!(
+        outcome.picture("classic"),
+        outcome.picture("traced"),
+        "r_rt changes nothing"
+    );
+    let back = compare(outcome.picture("classic"), outcome.picture("back")).unwrap();
+    // torches and items have moved on meanwhile
+    assert!(back.ssim > 0.9, "{back:?}");
+    outcome.assert_clean();
+    assert!(
+        outcome.log.contains("screenshots/jpeg.jpg"),
+        "{}",
+        outcome.log_end()
+    );
+}
+
+#[test]
+fn errors_drop_to_the_menu() {
+    if !real::available() {
+        return;
+    }
+    let mut commands = vec![
+        "set r_vkValidation 1".to_string(),
+        "devmap no_such_map".to_string(),
+    ];
+    set(&mut commands, &["wait 10"]);
+    commands.extend(start_map("oa_dm1"));
+    commands.extend(picture(VIEWS[0].1, 4, "after"));
+    let outcome = run("vk", (320, 240), commands);
+    assert_plausible(outcome.picture("after"), "after the error");
+    assert_eq!(outcome.status, Some(0), "{}", outcome.log_end());
+}
+
+#[test]
+fn many_restarts_and_map_changes() {
+    if !real::available() {
+        return;
+    }
+    let rounds = if is_set("RELIGHT_FULL") { 40 } else { 3 };
+    let mut commands = vec![
+        "set r_vkValidation 1".to_string(),
+        "set timescale 1000".to_string(),
+    ];
+    for round in 0..rounds {
+        let map = VIEWS[round % VIEWS.len()].0;
+        set(
+            &mut commands,
+            &[
+                &format!("set r_rt {}", round % 2),
+                &format!("devmap {map}"),
+                "wait 60",
+            ],
+        );
+        set(&mut commands, &["vid_restart", "wait 20"]);
+    }
+    set(&mut commands, &["screenshot last", "wait 4"]);
+    let outcome = run("vk", (320, 240), commands);
+    assert_plausible(outcome.picture("last"), "the last frame");
+    outcome.assert_clean();
+}
