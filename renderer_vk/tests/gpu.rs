@@ -787,3 +787,54 @@ fn impossible_requests_are_errors() {
         "{messages:#?}"
     );
 }
+
+/// Keeps the warnings and errors that were logged on this thread: the allocator's leak reports and what the validation
+/// layer says while a device is destroyed come after anybody could ask the device.
+struct Capture;
+
+thread_local! {
+    static LOGGED: std::cell::RefCell<Vec<String>> = const { std::cell::RefCell::new(Vec::new()) };
+}
+
+impl log::Log for Capture {
+    fn enabled(&self, metadata: &log::Metadata<'_>) -> bool {
+        metadata.level() <= log::Level::Warn
+    }
+    fn log(&self, record: &log::Record<'_>) {
+        if self.enabled(record.metadata()) {
+            LOGGED.with_borrow_mut(|l| l.push(format!("{}: {}", record.target(), record.args())));
+        }
+    }
+    fn flush(&self) {}
+}
+
+#[test]
+fn a_device_that_ends_in_the_middle_of_everything_leaves_nothing_behind() {
+    log::set_logger(&Capture).unwrap();
+    log::set_max_level(log::LevelFilter::Warn);
+    let Some(device) = device(true) else { return };
+    LOGGED.with_borrow_mut(Vec::clear);
+    let mut ring = FrameRing::new(&device, 2).unwrap();
+    // Uploads that never run, a frame in flight, a frame that is never ended.
+    let buffer = Buffer::with_data(&device, "kept", BufferUsage::STORAGE, &[1u8; 100]).unwrap();
+    let mut rec = ring.begin().unwrap();
+    rec.pass("fill", Access::TRANSFER, Access::TRANSFER)
+        .unwrap()
+        .fill_buffer(&buffer, 0, 16, 7);
+    ring.end(rec).unwrap();
+    let rec = ring.begin().unwrap();
+    let image = Image::new(
+        &device,
+        &ImageDesc::new("never used", 4, 4, Format::Rgba8, ImageUsage::SAMPLED),
+    )
+    .unwrap();
+    device.upload_image(&image, 0, 0, &[1; 64]).unwrap();
+    // The device goes first; the last object ends it.
+    drop(device);
+    drop(ring);
+    drop(image);
+    drop(rec);
+    drop(buffer);
+    let logged = LOGGED.with_borrow(Clone::clone);
+    assert!(logged.is_empty(), "{logged:#?}");
+}

@@ -20,7 +20,9 @@ mod access;
 mod arena;
 mod bindless;
 mod buffer;
+mod copy;
 mod device;
+mod draw;
 mod error;
 mod frame;
 mod graveyard;
@@ -43,11 +45,12 @@ pub use ash::vk;
 pub use bindless::{Filter, MipFilter, SamplerDesc, Wrap};
 pub use buffer::{Buffer, BufferDesc, BufferUsage, Memory};
 pub use device::{Device, DeviceOptions, MemoryReport};
+pub use draw::{Rendering, Viewport};
 pub use error::Error;
 pub use frame::FrameRing;
 pub use image::{Format, Image, ImageDesc, ImageUsage, NO_INDEX};
 pub use instance::{SurfaceSource, WindowSource};
-pub use pass::{Pass, Rendering, Viewport};
+pub use pass::Pass;
 pub use pipeline::{
     BlendFactor, ComputePipeline, Cull, DepthTest, GraphicsDesc, GraphicsPipeline, Topology,
 };

@@ -46,16 +46,11 @@ impl Window {
 
     /// Hands the window to `with` as the source of a device's surface.
     pub(crate) fn source<T>(mut self, with: impl FnOnce(SurfaceSource<'_>) -> T) -> T {
-        let mut create = |instance: vk::Instance| {
-            (self.create)(instance.as_raw()).map(vk::SurfaceKHR::from_raw)
-        };
+        let mut create =
+            |instance: vk::Instance| (self.create)(instance.as_raw()).map(vk::SurfaceKHR::from_raw);
         // SAFETY: what `window` asks for is what the maker of this value promised.
         with(unsafe {
-            SurfaceSource::window(
-                self.get_instance_proc_addr,
-                self.extensions,
-                &mut create,
-            )
+            SurfaceSource::window(self.get_instance_proc_addr, self.extensions, &mut create)
         })
     }
 }

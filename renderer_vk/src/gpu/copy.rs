@@ -1,0 +1,371 @@
+//! Copying commands of a pass: buffers, images, read-backs.
+
+use ash::vk;
+
+use super::buffer::Buffer;
+use super::image::{Image, whole};
+use super::pass::Pass;
+
+impl Pass<'_> {
+    /// Copies bytes between buffers, or between parts of one that do not overlap.
+    pub fn copy_buffer(
+        &mut self,
+        source: &Buffer,
+        source_offset: u64,
+        target: &Buffer,
+        target_offset: u64,
+        size: u64,
+    ) {
+        self.end_rendering();
+        if size == 0 {
+            return;
+        }
+        let checks = source
+            .check(source_offset, size)
+            .and_then(|()| target.check(target_offset, size));
+        if let Err(e) = checks {
+            self.refuse(&e.to_string());
+            return;
+        }
+        let region = vk::BufferCopy {
+            src_offset: source_offset,
+            dst_offset: target_offset,
+            size,
+        };
+        // SAFETY: both ranges are inside; outside of a render pass.
+        unsafe {
+            self.vk()
+                .cmd_copy_buffer(self.cmd(), source.0.raw, target.0.raw, &[region]);
+        }
+    }
+
+    /// Fills bytes (offset and size multiples of 4) with a 32-bit value.
+    pub fn fill_buffer(&mut self, buffer: &Buffer, offset: u64, size: u64, value: u32) {
+        self.end_rendering();
+        if size == 0 {
+            return;
+        }
+        if buffer.check(offset, size).is_err() || !(offset | size).is_multiple_of(4) {
+            self.refuse("a fill outside of the buffer or of odd bytes");
+            return;
+        }
+        // SAFETY: the range is inside and aligned; outside of a render pass.
+        unsafe {
+            self.vk()
+                .cmd_fill_buffer(self.cmd(), buffer.0.raw, offset, size, value);
+        }
+    }
+
+    /// Changes the layout of an image that is not `GENERAL`, for a copy.
+    fn change_layout(&self, image: &Image, from: vk::ImageLayout, to: vk::ImageLayout) {
+        if from == to {
+            return;
+        }
+        let barrier = vk::ImageMemoryBarrier::default()
+            .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
+            .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)
+            .old_layout(from)
+            .new_layout(to)
+            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .image(image.0.raw)
+            .subresource_range(whole(image.0.aspect));
+        let all = vk::PipelineStageFlags::ALL_COMMANDS;
+        // SAFETY: recording, outside of a render pass; `from` is the layout that the image has.
+        unsafe {
+            self.vk().cmd_pipeline_barrier(
+                self.cmd(),
+                all,
+                all,
+                vk::DependencyFlags::empty(),
+                &[],
+                &[],
+                &[barrier],
+            );
+        }
+    }
+
+    /// Runs a copy with an image in a layout that allows it.
+    fn with_layout(
+        &mut self,
+        image: &Image,
+        layout: vk::ImageLayout,
+        copy: impl FnOnce(&Self, vk::ImageLayout),
+    ) {
+        let own = image.0.layout;
+        let during = if own == vk::ImageLayout::GENERAL {
+            own
+        } else {
+            layout
+        };
+        self.change_layout(image, own, during);
+        copy(self, during);
+        self.change_layout(image, during, own);
+    }
+
+    /// Copies level 0, as much as both images have.
+    pub fn copy_image(&mut self, source: &Image, target: &Image) {
+        self.end_rendering();
+        if source.format().block() != target.format().block()
+            || source.0.aspect != target.0.aspect
+            || source.0.raw == target.0.raw
+        {
+            self.refuse("a copy between images whose texels differ, or of an image to itself");
+            return;
+        }
+        let layers = |i: &Image| vk::ImageSubresourceLayers {
+            aspect_mask: i.0.aspect,
+            mip_level: 0,
+            base_array_layer: 0,
+            layer_count: 1,
+        };
+        let region = vk::ImageCopy {
+            src_subresource: layers(source),
+            dst_subresource: layers(target),
+            extent: vk::Extent3D {
+                width: source.width().min(target.width()),
+                height: source.height().min(target.height()),
+                depth: 1,
+            },
+            ..Default::default()
+        };
+        self.with_layout(
+            source,
+            vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            |pass, from| {
+                let own = target.0.layout;
+                let to = if own == vk::ImageLayout::GENERAL {
+                    own
+                } else {
+                    vk::ImageLayout::TRANSFER_DST_OPTIMAL
+                };
+                pass.change_layout(target, own, to);
+                // SAFETY: the region lies inside both images, which are in these layouts.
+                unsafe {
+                    pass.vk().cmd_copy_image(
+                        pass.cmd(),
+                        source.0.raw,
+                        from,
+                        target.0.raw,
+                        to,
+                        &[region],
+                    );
+                }
+                pass.change_layout(target, to, own);
+            },
+        );
+    }
+
+    /// Copies a rectangle (x, y, width, height) of level 0 with scaling and conversion; a negative width or height
+    /// mirrors. Rectangles must lie inside their images.
+    pub fn blit_image(
+        &mut self,
+        source: &Image,
+        source_rect: [i32; 4],
+        target: &Image,
+        target_rect: [i32; 4],
+        linear: bool,
+    ) {
+        self.end_rendering();
+        let corners = |image: &Image, [x, y, w, h]: [i32; 4]| {
+            let (x1, y1) = (x.checked_add(w)?, y.checked_add(h)?);
+            let inside = |v: i32, size: u32| u32::try_from(v).is_ok_and(|v| v <= size);
+            let good = inside(x, image.width())
+                && inside(x1, image.width())
+                && inside(y, image.height())
+                && inside(y1, image.height())
+                && w != 0
+                && h != 0;
+            good.then_some([
+                vk::Offset3D { x, y, z: 0 },
+                vk::Offset3D { x: x1, y: y1, z: 1 },
+            ])
+        };
+        let (Some(from_corners), Some(to_corners)) =
+            (corners(source, source_rect), corners(target, target_rect))
+        else {
+            self.refuse("a blit outside of its images");
+            return;
+        };
+        if source.0.raw == target.0.raw {
+            self.refuse("a blit of an image to itself");
+            return;
+        }
+        let layers = |i: &Image| vk::ImageSubresourceLayers {
+            aspect_mask: i.0.aspect,
+            mip_level: 0,
+            base_array_layer: 0,
+            layer_count: 1,
+        };
+        let region = vk::ImageBlit {
+            src_subresource: layers(source),
+            src_offsets: from_corners,
+            dst_subresource: layers(target),
+            dst_offsets: to_corners,
+        };
+        let filter = if linear {
+            vk::Filter::LINEAR
+        } else {
+            vk::Filter::NEAREST
+        };
+        self.with_layout(
+            source,
+            vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            |pass, from| {
+                let own = target.0.layout;
+                let to = if own == vk::ImageLayout::GENERAL {
+                    own
+                } else {
+                    vk::ImageLayout::TRANSFER_DST_OPTIMAL
+                };
+                pass.change_layout(target, own, to);
+                // SAFETY: the corners lie inside the images, which are in these layouts.
+                unsafe {
+                    pass.vk().cmd_blit_image(
+                        pass.cmd(),
+                        source.0.raw,
+                        from,
+                        target.0.raw,
+                        to,
+                        &[region],
+                        filter,
+                    );
+                }
+                pass.change_layout(target, to, own);
+            },
+        );
+    }
+
+    /// Copies a rectangle (x, y, width, height) of level 0 into a buffer, rows without padding.
+    pub fn copy_image_to_buffer(
+        &mut self,
+        source: &Image,
+        [x, y, width, height]: [u32; 4],
+        target: &Buffer,
+        offset: u64,
+    ) {
+        self.end_rendering();
+        let inside = |start: u32, size: u32, whole: u32| {
+            size > 0 && start.checked_add(size).is_some_and(|end| end <= whole)
+        };
+        let bytes = source.format().bytes(width, height);
+        if !inside(x, width, source.width())
+            || !inside(y, height, source.height())
+            || target.check(offset, bytes).is_err()
+        {
+            self.refuse("a read-back outside of the image or the buffer");
+            return;
+        }
+        let region = vk::BufferImageCopy {
+            buffer_offset: offset,
+            image_subresource: vk::ImageSubresourceLayers {
+                aspect_mask: source.0.aspect,
+                mip_level: 0,
+                base_array_layer: 0,
+                layer_count: 1,
+            },
+            image_offset: vk::Offset3D {
+                x: x.cast_signed(),
+                y: y.cast_signed(),
+                z: 0,
+            },
+            image_extent: vk::Extent3D {
+                width,
+                height,
+                depth: 1,
+            },
+            ..Default::default()
+        };
+        self.with_layout(
+            source,
+            vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            |pass, layout| {
+                // SAFETY: the rectangle and the range are inside; the image is in this layout.
+                unsafe {
+                    pass.vk().cmd_copy_image_to_buffer(
+                        pass.cmd(),
+                        source.0.raw,
+                        layout,
+                        target.0.raw,
+                        &[region],
+                    );
+                }
+            },
+        );
+    }
+
+    /// Fills all levels of a colour image.
+    pub fn clear_image(&mut self, image: &Image, color: [f32; 4]) {
+        self.end_rendering();
+        if image.0.aspect != vk::ImageAspectFlags::COLOR || image.format().block().0 != 1 {
+            self.refuse("a colour clear of a depth or compressed image");
+            return;
+        }
+        let value = vk::ClearColorValue { float32: color };
+        self.with_layout(
+            image,
+            vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+            |pass, layout| {
+                // SAFETY: the image is in this layout; outside of a render pass.
+                unsafe {
+                    pass.vk().cmd_clear_color_image(
+                        pass.cmd(),
+                        image.0.raw,
+                        layout,
+                        &value,
+                        &[whole(image.0.aspect)],
+                    );
+                }
+            },
+        );
+    }
+
+    /// Makes levels 1 and up from level 0, each from the one before by linear filtering.
+    pub fn generate_mips(&mut self, image: &Image) {
+        self.end_rendering();
+        if image.format().block().0 != 1 {
+            self.refuse("mip levels of a compressed image");
+            return;
+        }
+        // In GENERAL all levels can be source and target; barriers separate them.
+        let own = image.0.layout;
+        self.change_layout(image, own, vk::ImageLayout::GENERAL);
+        for mip in 1..image.mips() {
+            let offset = |m: u32| {
+                let (w, h) = image.mip_size(m);
+                vk::Offset3D {
+                    x: w.cast_signed(),
+                    y: h.cast_signed(),
+                    z: 1,
+                }
+            };
+            let layers = |m: u32| vk::ImageSubresourceLayers {
+                aspect_mask: image.0.aspect,
+                mip_level: m,
+                base_array_layer: 0,
+                layer_count: image.layers(),
+            };
+            let region = vk::ImageBlit {
+                src_subresource: layers(mip - 1),
+                src_offsets: [vk::Offset3D::default(), offset(mip - 1)],
+                dst_subresource: layers(mip),
+                dst_offsets: [vk::Offset3D::default(), offset(mip)],
+            };
+            let general = vk::ImageLayout::GENERAL;
+            // SAFETY: levels differ and exist; the image is in GENERAL.
+            unsafe {
+                self.vk().cmd_blit_image(
+                    self.cmd(),
+                    image.0.raw,
+                    general,
+                    image.0.raw,
+                    general,
+                    &[region],
+                    vk::Filter::LINEAR,
+                );
+            }
+            self.barrier();
+        }
+        self.change_layout(image, vk::ImageLayout::GENERAL, own);
+    }
+}
