@@ -4,6 +4,7 @@
 
 mod compare;
 mod info;
+mod render;
 
 use clap::{Parser, Subcommand};
 
@@ -21,11 +22,14 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Tell what is in maps, and where their light comes from
     Info(info::InfoArgs),
+    /// Make a picture of a map, without an engine or a display
+    Render(render::RenderArgs),
 }
 
 fn main() -> anyhow::Result<()> {
     match Cli::parse().command {
         Command::Compare(args) => compare::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Render(args) => render::run(&args),
     }
 }

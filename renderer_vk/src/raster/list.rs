@@ -131,22 +131,38 @@ impl DrawList {
             for surface in these {
                 lights |= surface.dlights;
                 let (source, first, count) = match surface.geometry {
-                    Geometry::Static { first_index, index_count } => (static_indices, first_index, index_count),
-                    Geometry::Dynamic { first_index, index_count } => {
-                        (scene.indices.as_slice(), first_index, index_count)
-                    }
+                    Geometry::Static {
+                        first_index,
+                        index_count,
+                    } => (static_indices, first_index, index_count),
+                    Geometry::Dynamic {
+                        first_index,
+                        index_count,
+                    } => (scene.indices.as_slice(), first_index, index_count),
                 };
                 let range = first as usize..first as usize + count as usize;
-                self.indices.extend_from_slice(source.get(range).unwrap_or_default());
+                self.indices
+                    .extend_from_slice(source.get(range).unwrap_or_default());
             }
-            let flags = scene.instances.get(group.instance as usize).map_or(0, |i| i.flags);
+            let flags = scene
+                .instances
+                .get(group.instance as usize)
+                .map_or(0, |i| i.flags);
             let range = if flags & c::INSTANCE_DEPTH_HACK != 0 {
                 DepthRange::Near
             } else {
                 DepthRange::Normal
             };
             let span = (first_index, self.indices.len() as u32 - first_index);
-            self.add_group(group, materials.get(group.material), span, range, lights, scene, show_edges);
+            self.add_group(
+                group,
+                materials.get(group.material),
+                span,
+                range,
+                lights,
+                scene,
+                show_edges,
+            );
         }
     }
 
@@ -193,7 +209,10 @@ impl DrawList {
                 state,
                 range,
                 span,
-                Draw { fog_adjust, ..stage_draw(pass, draw) },
+                Draw {
+                    fog_adjust,
+                    ..stage_draw(pass, draw)
+                },
             );
         }
         let over = |blend, depth| State {
@@ -208,14 +227,35 @@ impl DrawList {
             for (i, light) in scene.dlights.iter().enumerate().take(MAX_LIGHTS) {
                 if lights & (1 << i) != 0 {
                     let state = over((light_source_factor(light), c::BLEND_ONE), Depth::Equal);
-                    self.push(state, range, span, Draw { mode: c::DRAW_LIGHT, argument: i as u32, ..draw });
+                    self.push(
+                        state,
+                        range,
+                        span,
+                        Draw {
+                            mode: c::DRAW_LIGHT,
+                            argument: i as u32,
+                            ..draw
+                        },
+                    );
                 }
             }
         }
         if group.fog != 0 && (opaque || material.flags & c::MATERIAL_FOG != 0) {
-            let depth = if opaque { Depth::Equal } else { Depth::LessEqual };
+            let depth = if opaque {
+                Depth::Equal
+            } else {
+                Depth::LessEqual
+            };
             let state = over((c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA), depth);
-            self.push(state, range, span, Draw { mode: c::DRAW_FOG, ..draw });
+            self.push(
+                state,
+                range,
+                span,
+                Draw {
+                    mode: c::DRAW_FOG,
+                    ..draw
+                },
+            );
         }
         if show_edges {
             let state = State {
@@ -226,11 +266,25 @@ impl DrawList {
                 offset: false,
                 wireframe: true,
             };
-            self.push(state, DepthRange::Front, span, Draw { mode: c::DRAW_PLAIN, ..draw });
+            self.push(
+                state,
+                DepthRange::Front,
+                span,
+                Draw {
+                    mode: c::DRAW_PLAIN,
+                    ..draw
+                },
+            );
         }
     }
 
-    fn add_sky(&mut self, visible: &VisibleSky, view: &View, materials: &Materials, identity_light: f32) {
+    fn add_sky(
+        &mut self,
+        visible: &VisibleSky,
+        view: &View,
+        materials: &Materials,
+        identity_light: f32,
+    ) {
         let material = materials.get(visible.material);
         let Some(sky) = &material.sky else { return };
         let size = view.far / 1.75;
@@ -261,7 +315,11 @@ impl DrawList {
                     color,
                     sky::Coordinates::Box,
                 );
-                let draw = Draw { mode: c::DRAW_IMAGE, argument: image, ..draw };
+                let draw = Draw {
+                    mode: c::DRAW_IMAGE,
+                    argument: image,
+                    ..draw
+                };
                 self.push(state(None, false), DepthRange::Sky, span, draw);
             }
         }
@@ -271,15 +329,34 @@ impl DrawList {
         let first_index = self.indices.len() as u32;
         for face in 0..sky::FACES - 1 {
             let clouds = sky::Coordinates::Clouds(sky.cloud_height);
-            sky::append_face(&mut self.vertices, &mut self.indices, face, view.origin, size, color, clouds);
+            sky::append_face(
+                &mut self.vertices,
+                &mut self.indices,
+                face,
+                view.origin,
+                size,
+                color,
+                clouds,
+            );
         }
         let span = (first_index, self.indices.len() as u32 - first_index);
         for pass in &material.passes {
-            self.push(state(pass.blend, pass.depth_write), DepthRange::Sky, span, stage_draw(pass, draw));
+            self.push(
+                state(pass.blend, pass.depth_write),
+                DepthRange::Sky,
+                span,
+                stage_draw(pass, draw),
+            );
         }
     }
 
-    fn push(&mut self, state: State, range: DepthRange, (first_index, index_count): (u32, u32), draw: Draw) {
+    fn push(
+        &mut self,
+        state: State,
+        range: DepthRange,
+        (first_index, index_count): (u32, u32),
+        draw: Draw,
+    ) {
         self.calls.push(Call {
             state,
             range,
@@ -315,7 +392,11 @@ pub fn stage_depth(pass: &RasterPass) -> Depth {
 }
 
 fn light_source_factor(light: &DynamicLight) -> u32 {
-    if light.additive { c::BLEND_ONE } else { c::BLEND_DST_COLOR }
+    if light.additive {
+        c::BLEND_ONE
+    } else {
+        c::BLEND_DST_COLOR
+    }
 }
 
 /// The engine's front faces wind clockwise; a mirror turns them round.
@@ -330,7 +411,9 @@ fn faces(cull: Cull, mirrored: bool) -> CullFaces {
 /// Which channels fog scales on a blended stage, by the way it blends.
 fn fog_adjust(blend: Option<(u32, u32)>) -> u32 {
     match blend {
-        Some((c::BLEND_ONE, c::BLEND_ONE) | (c::BLEND_ZERO, c::BLEND_ONE_MINUS_SRC_COLOR)) => c::FOG_ADJUST_RGB,
+        Some((c::BLEND_ONE, c::BLEND_ONE) | (c::BLEND_ZERO, c::BLEND_ONE_MINUS_SRC_COLOR)) => {
+            c::FOG_ADJUST_RGB
+        }
         Some((c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA)) => c::FOG_ADJUST_ALPHA,
         Some((c::BLEND_ONE, c::BLEND_ONE_MINUS_SRC_ALPHA)) => c::FOG_ADJUST_RGBA,
         _ => c::FOG_ADJUST_NONE,

@@ -115,6 +115,7 @@ impl Raster {
             eye: p.eye,
             forward: p.forward,
             identity_light: p.identity_light,
+            padding: 0,
             materials: p.materials,
             static_vertices: p.static_vertices,
             dynamic_vertices: arena.push(&list.vertices)?,
@@ -124,17 +125,16 @@ impl Raster {
             lights: arena.push(&lights)?,
         };
         let view = arena.push(&[view])?;
-        let indices = arena.alloc(std::mem::size_of_val(list.indices.as_slice()).max(4) as u64, 16)?;
-        let bytes: &[u8] = bytemuck::cast_slice(&list.indices);
-        if let Some(out) = indices.bytes().get_mut(..bytes.len()) {
-            out.copy_from_slice(bytes);
-        }
+        let (index_buffer, index_offset) = {
+            let bytes: &[u8] = bytemuck::cast_slice(&list.indices);
+            let mut slice = arena.alloc(bytes.len().max(4) as u64, 16)?;
+            if let Some(out) = slice.bytes().get_mut(..bytes.len()) {
+                out.copy_from_slice(bytes);
+            }
+            (slice.buffer().clone(), slice.offset)
+        };
 
-        let mut pass = recorder.pass(
-            name,
-            gpu::Access::GRAPHICS,
-            gpu::Access::GRAPHICS,
-        )?;
+        let mut pass = recorder.pass(name, gpu::Access::GRAPHICS, gpu::Access::GRAPHICS)?;
         pass.begin_rendering(&Rendering {
             color: Some(target.color),
             depth: Some(target.depth),
@@ -145,19 +145,21 @@ impl Raster {
         if width == 0 || height == 0 {
             return Ok(());
         }
-        pass.set_scissor(x, y, width, height);
+        pass.set_scissor(x, y, width as u32, height as u32);
         if let Some(color) = p.clear_color {
-            pass.clear_color_rect([x, y, width as i32, height as i32], color);
+            pass.clear_color_rect([x, y, width, height], color);
         }
         if p.clear_depth {
-            pass.clear_depth_rect([x, y, width as i32, height as i32], 1.0);
+            pass.clear_depth_rect([x, y, width, height], 1.0);
         }
-        pass.bind_index_buffer(indices.buffer(), indices.offset());
+        pass.bind_index_buffer(&index_buffer, index_offset);
         let mut state = None;
         let mut range = None;
         for call in &list.calls {
             if state != Some(call.state) {
-                let Some(pipeline) = self.pipelines.get(&call.state) else { continue };
+                let Some(pipeline) = self.pipelines.get(&call.state) else {
+                    continue;
+                };
                 pass.bind_graphics(pipeline);
                 pass.push(&view);
                 state = Some(call.state);
@@ -170,7 +172,14 @@ impl Raster {
                     DepthRange::Front => (0.0, 0.0),
                 };
                 let [x, y, width, height] = p.viewport.map(|v| v as f32);
-                pass.set_viewport(&Viewport { x, y, width, height, min_depth, max_depth });
+                pass.set_viewport(&Viewport {
+                    x,
+                    y,
+                    width,
+                    height,
+                    min_depth,
+                    max_depth,
+                });
                 range = Some(call.range);
             }
             pass.draw_indexed(call.index_count, 1, call.first_index, 0, call.draw);
@@ -180,11 +189,11 @@ impl Raster {
 }
 
 /// The part of a rectangle that lies within the image.
-fn clip_to([x, y, width, height]: [i32; 4], image: &Image) -> [u32; 4] {
+fn clip_to([x, y, width, height]: [i32; 4], image: &Image) -> [i32; 4] {
     let clip = |start: i32, size: i32, limit: u32| {
         let from = start.clamp(0, limit as i32);
         let to = start.saturating_add(size.max(0)).clamp(from, limit as i32);
-        (from as u32, (to - from) as u32)
+        (from, to - from)
     };
     let (x, width) = clip(x, width, image.width());
     let (y, height) = clip(y, height, image.height());

@@ -88,8 +88,12 @@ impl Overlay {
                 count: 1,
             }),
         }
-        self.vertices
-            .extend([corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)]);
+        self.vertices.extend([
+            corner(0.0, 0.0),
+            corner(1.0, 0.0),
+            corner(1.0, 1.0),
+            corner(0.0, 1.0),
+        ]);
     }
 
     /// Turns the queued pictures into draw calls.
@@ -140,7 +144,10 @@ impl Overlay {
                             depth_write: pass.depth_write && pass.depth_test,
                             ..plain
                         };
-                        let draw = Draw { material: index, ..Draw::default() };
+                        let draw = Draw {
+                            material: index,
+                            ..Draw::default()
+                        };
                         push(state, stage_draw(pass, draw));
                     }
                 }

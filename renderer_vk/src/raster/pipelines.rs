@@ -123,7 +123,7 @@ impl Pipelines {
                 ..GraphicsDesc::new(
                     "raster",
                     &shaders::RASTER_DRAW_VERT,
-                    Some(&shaders::RASTER_DRAW_FRAG),
+                    &shaders::RASTER_DRAW_FRAG,
                 )
             },
         )?;

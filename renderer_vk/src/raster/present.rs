@@ -40,7 +40,7 @@ impl Present {
                 ..GraphicsDesc::new(
                     "present",
                     &shaders::RASTER_PRESENT_VERT,
-                    Some(&shaders::RASTER_PRESENT_FRAG),
+                    &shaders::RASTER_PRESENT_FRAG,
                 )
             },
         )?;
