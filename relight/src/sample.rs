@@ -111,7 +111,9 @@ fn grain(x: usize, y: usize) -> f32 {
 /// A 32-bit TGA, rows from the bottom as the engine reads them; `texel` is given column and row from the top.
 fn tga(texel: impl Fn(usize, usize) -> [u8; 4]) -> Vec<u8> {
     let side = (SIZE as u16).to_le_bytes();
-    let mut bytes = vec![0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, side[0], side[1], side[0], side[1], 32, 8];
+    let mut bytes = vec![
+        0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, side[0], side[1], side[0], side[1], 32, 8,
+    ];
     for y in (0..SIZE).rev() {
         for x in 0..SIZE {
             let [r, g, b, a] = texel(x, y);
@@ -131,15 +133,26 @@ fn textures() -> Vec<(&'static str, Vec<u8>)> {
         let row = y / 16;
         let joint = y % 16 < 2 || (x + if row.is_multiple_of(2) { 0 } else { 16 }) % 32 < 2;
         let tone = 0.82 + 0.18 * grain(x, y);
-        if joint { shade([120.0, 116.0, 110.0], tone) } else { shade([178.0, 120.0, 92.0], tone) }
+        if joint {
+            shade([120.0, 116.0, 110.0], tone)
+        } else {
+            shade([178.0, 120.0, 92.0], tone)
+        }
     };
     let tile = |x: usize, y: usize| {
         let light = (x / 32 + y / 32).is_multiple_of(2);
         let tone = 0.88 + 0.12 * grain(x, y);
-        shade(if light { [190.0, 186.0, 176.0] } else { [96.0, 104.0, 112.0] }, tone)
+        shade(
+            if light {
+                [190.0, 186.0, 176.0]
+            } else {
+                [96.0, 104.0, 112.0]
+            },
+            tone,
+        )
     };
     let plaster = |x: usize, y: usize| shade([196.0, 196.0, 190.0], 0.9 + 0.1 * grain(x, y));
-    let metal = |x: usize, y: usize| shade([150.0, 156.0, 164.0], 0.8 + 0.2 * grain(x, 0));
+    let metal = |x: usize, _: usize| shade([150.0, 156.0, 164.0], 0.8 + 0.2 * grain(x, 0));
     let grate = |x: usize, y: usize| {
         let bar = x % 16 < 5 || y % 16 < 5;
         let [r, g, b, _] = shade([120.0, 110.0, 96.0], 0.8 + 0.2 * grain(x, y));
@@ -153,8 +166,16 @@ fn textures() -> Vec<(&'static str, Vec<u8>)> {
     };
     let clouds = |x: usize, y: usize| {
         let wave = |a: usize, b: f32| (a as f32 / SIZE as f32 * TAU + b).sin();
-        let cover = 0.5 + 0.25 * wave(x, 0.0) * wave(y, 1.0) + 0.25 * wave(2 * x, 2.0) * wave(2 * y, 0.5);
-        shade([90.0 + 120.0 * cover, 120.0 + 90.0 * cover, 170.0 + 60.0 * cover], 1.0)
+        let cover =
+            0.5 + 0.25 * wave(x, 0.0) * wave(y, 1.0) + 0.25 * wave(2 * x, 2.0) * wave(2 * y, 0.5);
+        shade(
+            [
+                90.0 + 120.0 * cover,
+                120.0 + 90.0 * cover,
+                170.0 + 60.0 * cover,
+            ],
+            1.0,
+        )
     };
     vec![
         ("sample/brick_image.tga", tga(brick)),
@@ -172,9 +193,21 @@ fn textures() -> Vec<(&'static str, Vec<u8>)> {
 
 /// Where the lamps are and what they give, for the sample's own simple lightmaps.
 const LAMPS: [(Vec3, Vec3, Vec3); 3] = [
-    (Vec3::new(-96.0, 0.0, 250.0), Vec3::NEG_Z, Vec3::new(1.0, 0.88, 0.7)),
-    (Vec3::new(-300.0, -160.0, 120.0), Vec3::X, Vec3::new(1.0, 0.27, 0.16)),
-    (Vec3::new(-300.0, 160.0, 120.0), Vec3::X, Vec3::new(0.24, 0.43, 1.0)),
+    (
+        Vec3::new(-96.0, 0.0, 250.0),
+        Vec3::NEG_Z,
+        Vec3::new(1.0, 0.88, 0.7),
+    ),
+    (
+        Vec3::new(-300.0, -160.0, 120.0),
+        Vec3::X,
+        Vec3::new(1.0, 0.27, 0.16),
+    ),
+    (
+        Vec3::new(-300.0, 160.0, 120.0),
+        Vec3::X,
+        Vec3::new(0.24, 0.43, 1.0),
+    ),
 ];
 
 /// Unshadowed light of the lamps at a point, as bytes of a lightmap.
@@ -183,7 +216,8 @@ fn baked(position: Vec3, normal: Vec3) -> [u8; 3] {
     for (origin, direction, color) in LAMPS {
         let to = origin - position;
         let distance = to.length().max(24.0);
-        let cosines = (to.dot(normal) / distance).max(0.0) * (-to.dot(direction) / distance).max(0.0);
+        let cosines =
+            (to.dot(normal) / distance).max(0.0) * (-to.dot(direction) / distance).max(0.0);
         sum += color * cosines * 900_000.0 / (distance * distance);
     }
     sum.min(Vec3::splat(255.0)).to_array().map(|c| c as u8)
@@ -223,13 +257,20 @@ fn shaders(map: &mut MapBuilder) -> Shaders {
 /// A rectangle seen from the side that `normal` points to, with half sizes along two axes.
 fn rectangle(center: Vec3, right: Vec3, up: Vec3) -> [Vec3; 4] {
     // clockwise from the front: the normal is right × up
-    [center - right - up, center - right + up, center + right + up, center + right - up]
+    [
+        center - right - up,
+        center - right + up,
+        center + right + up,
+        center + right - up,
+    ]
 }
 
 /// Gives every surface of `surfaces` a lightmap page computed at its points.
 fn light(map: &mut MapBuilder, surfaces: &[usize]) {
     for &surface in surfaces {
-        let [a, b, .., d] = map.vertices_mut(surface) else { continue };
+        let [a, b, .., d] = map.vertices_mut(surface) else {
+            continue;
+        };
         // the page covers the rectangle: find the position of a texel from three corners
         let (origin, normal) = (a.position, a.normal);
         let (u, v) = (b.lightmap - a.lightmap, d.lightmap - a.lightmap);
@@ -279,22 +320,55 @@ fn build_map() -> q3bsp::Bsp {
     let mut lit = Vec::new();
 
     // the hall: 640 x 512 x 256, with an opening to the sky above its far end
-    let (mins, maxs) = (Vec3::new(-320.0, -256.0, 0.0), Vec3::new(320.0, 256.0, 256.0));
+    let (mins, maxs) = (
+        Vec3::new(-320.0, -256.0, 0.0),
+        Vec3::new(320.0, 256.0, 256.0),
+    );
     let x = |half: f32| Vec3::new(half, 0.0, 0.0);
     let y = |half: f32| Vec3::new(0.0, half, 0.0);
     let z = |half: f32| Vec3::new(0.0, 0.0, half);
-    lit.push(map.add_quad(s.tile, rectangle(Vec3::ZERO, y(-256.0), x(320.0)).map(|p| p + z(mins.z))));
-    lit.push(map.add_quad(s.plaster, rectangle(Vec3::new(-80.0, 0.0, maxs.z), y(256.0), x(240.0))));
-    map.add_quad(s.sky, rectangle(Vec3::new(240.0, 0.0, maxs.z), y(256.0), x(80.0)));
-    lit.push(map.add_quad(s.brick, rectangle(Vec3::new(mins.x, 0.0, 128.0), y(256.0), z(128.0))));
-    lit.push(map.add_quad(s.brick, rectangle(Vec3::new(maxs.x, 0.0, 128.0), y(-256.0), z(128.0))));
-    lit.push(map.add_quad(s.brick, rectangle(Vec3::new(0.0, mins.y, 128.0), x(-320.0), z(128.0))));
-    lit.push(map.add_quad(s.brick, rectangle(Vec3::new(0.0, maxs.y, 128.0), x(320.0), z(128.0))));
+    lit.push(map.add_quad(
+        s.tile,
+        rectangle(Vec3::ZERO, y(-256.0), x(320.0)).map(|p| p + z(mins.z)),
+    ));
+    lit.push(map.add_quad(
+        s.plaster,
+        rectangle(Vec3::new(-80.0, 0.0, maxs.z), y(256.0), x(240.0)),
+    ));
+    map.add_quad(
+        s.sky,
+        rectangle(Vec3::new(240.0, 0.0, maxs.z), y(256.0), x(80.0)),
+    );
+    lit.push(map.add_quad(
+        s.brick,
+        rectangle(Vec3::new(mins.x, 0.0, 128.0), y(256.0), z(128.0)),
+    ));
+    lit.push(map.add_quad(
+        s.brick,
+        rectangle(Vec3::new(maxs.x, 0.0, 128.0), y(-256.0), z(128.0)),
+    ));
+    lit.push(map.add_quad(
+        s.brick,
+        rectangle(Vec3::new(0.0, mins.y, 128.0), x(-320.0), z(128.0)),
+    ));
+    lit.push(map.add_quad(
+        s.brick,
+        rectangle(Vec3::new(0.0, maxs.y, 128.0), x(320.0), z(128.0)),
+    ));
 
     // lamps: a panel under the ceiling, two on the wall behind the camera
-    map.add_quad(s.warm, rectangle(Vec3::new(-96.0, 0.0, 254.0), y(40.0), x(40.0)));
-    map.add_quad(s.red, rectangle(Vec3::new(-318.0, -160.0, 120.0), y(20.0), z(36.0)));
-    map.add_quad(s.blue, rectangle(Vec3::new(-318.0, 160.0, 120.0), y(20.0), z(36.0)));
+    map.add_quad(
+        s.warm,
+        rectangle(Vec3::new(-96.0, 0.0, 254.0), y(40.0), x(40.0)),
+    );
+    map.add_quad(
+        s.red,
+        rectangle(Vec3::new(-318.0, -160.0, 120.0), y(20.0), z(36.0)),
+    );
+    map.add_quad(
+        s.blue,
+        rectangle(Vec3::new(-318.0, 160.0, 120.0), y(20.0), z(36.0)),
+    );
 
     // a pillar and a block
     for (low, high) in [
@@ -305,14 +379,20 @@ fn build_map() -> q3bsp::Bsp {
         map.add_box_brush(s.metal, low, high);
     }
     // the grate hangs under the lamp and throws its shadow on the floor
-    lit.push(map.add_quad(s.grate, rectangle(Vec3::new(-96.0, 0.0, 128.0), y(-64.0), x(64.0))));
+    lit.push(map.add_quad(
+        s.grate,
+        rectangle(Vec3::new(-96.0, 0.0, 128.0), y(-64.0), x(64.0)),
+    ));
     // the mirror on the left wall
-    map.add_quad(s.mirror, rectangle(Vec3::new(130.0, 254.0, 120.0), x(90.0), z(80.0)));
+    map.add_quad(
+        s.mirror,
+        rectangle(Vec3::new(130.0, 254.0, 120.0), x(90.0), z(80.0)),
+    );
     lit.push(patch(&mut map, s.metal));
 
     let quads: Vec<usize> = lit.iter().copied().take(lit.len() - 1).collect();
     light(&mut map, &quads);
-    let patch_page = map.add_lightmap([56, 52, 46]);
+    let patch_page = map.add_lightmap([22, 20, 18]);
     if let Some(&surface) = lit.last() {
         map.set_lightmap(surface, patch_page);
     }
@@ -320,18 +400,38 @@ fn build_map() -> q3bsp::Bsp {
     // mist in the far right corner, with a top that one looks down on
     let fog_box = (Vec3::new(60.0, -256.0, 0.0), Vec3::new(320.0, -120.0, 90.0));
     let fog = map.add_fog_brush(s.mist, fog_box.0, fog_box.1, 5);
-    let top = Vec3::new((fog_box.0.x + fog_box.1.x) * 0.5, (fog_box.0.y + fog_box.1.y) * 0.5, fog_box.1.z);
+    let top = Vec3::new(
+        (fog_box.0.x + fog_box.1.x) * 0.5,
+        (fog_box.0.y + fog_box.1.y) * 0.5,
+        fog_box.1.z,
+    );
     let half = (fog_box.1 - fog_box.0) * 0.5;
     let surface = map.add_quad(s.mist, rectangle(top, y(-half.y), x(half.x)));
     map.set_fog(surface, fog);
 
     map.add_cell(mins, maxs);
-    map.add_entity(&[("classname", "info_player_intermission"), ("origin", "-250 -40 130"), ("angles", "8 8 0")]);
-    map.add_entity(&[("classname", "info_player_deathmatch"), ("origin", "-200 0 30"), ("angle", "0")]);
-    map.add_entity(&[("classname", "misc_portal_surface"), ("origin", "130 250 120")]);
+    map.add_entity(&[
+        ("classname", "info_player_intermission"),
+        ("origin", "-270 -60 190"),
+        ("angles", "18 12 0"),
+    ]);
+    map.add_entity(&[
+        ("classname", "info_player_deathmatch"),
+        ("origin", "-200 0 30"),
+        ("angle", "0"),
+    ]);
+    map.add_entity(&[
+        ("classname", "misc_portal_surface"),
+        ("origin", "130 250 120"),
+    ]);
     map.build_with_grid(Vec3::new(64.0, 64.0, 128.0), |p| {
         let light = baked(p, Vec3::Z);
-        GridPoint { ambient: light, directed: light, longitude: 0, latitude: 0 }
+        GridPoint {
+            ambient: light,
+            directed: light,
+            longitude: 0,
+            latitude: 0,
+        }
     })
 }
 
@@ -364,7 +464,10 @@ mod tests {
         // the six sides of the hall and its sky face the middle
         for surface in bsp.surfaces.iter().take(7) {
             let vertex = &bsp.vertices[surface.first_vert as usize];
-            assert!((middle - vertex.position).dot(vertex.normal) > 0.0, "{surface:?}");
+            assert!(
+                (middle - vertex.position).dot(vertex.normal) > 0.0,
+                "{surface:?}"
+            );
         }
     }
 }

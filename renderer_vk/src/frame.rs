@@ -52,7 +52,14 @@ impl FrameContext<'_> {
                 .iter()
                 .try_for_each(|scene| self.classic(recorder, scene)),
             Item::Traced(scene) => match (self.trace.as_deref_mut(), self.world) {
-                (Some(_trace), Some(_world)) => Ok(()),
+                (Some(trace), Some(world)) => trace.record(
+                    recorder,
+                    scene,
+                    world,
+                    self.assets,
+                    self.settings,
+                    self.color,
+                ),
                 _ => Ok(()),
             },
         }

@@ -204,6 +204,7 @@ impl Renderer {
         self.queue.clear();
         self.overlay.clear();
         self.scene = Scene::default();
+        self.trace = None;
         self.world = None;
         self.assets = None;
         self.entity_tokens = EntityTokens::default();
@@ -247,9 +248,6 @@ impl Renderer {
             return Err(Error::WorldTwice { name: name.into() });
         }
         let world = World::load(&self.device, assets, name, &self.settings)?;
-        if let Some(trace) = &mut self.trace {
-            trace.reset();
-        }
         self.world = Some(world);
         self.entity_tokens = EntityTokens::default();
         Ok(())
@@ -327,9 +325,11 @@ impl Renderer {
     /// Makes the traced look when it is first asked for; `false` (and one warning) where the device cannot.
     fn ready_to_trace(&mut self) -> Result<bool, Error> {
         if self.trace.is_none() && self.device.info().ray_tracing.is_some() {
-            self.trace = Some(TraceLook::new(&self.device)?);
+            if let (Some(world), Some(assets)) = (&self.world, &self.assets) {
+                self.trace = Some(TraceLook::new(&self.device, world, assets)?);
+            }
         }
-        if self.trace.is_none() && !self.warned_no_rays {
+        if self.device.info().ray_tracing.is_none() && !self.warned_no_rays {
             self.warned_no_rays = true;
             log::warn!(
                 "{} does not trace rays; r_rt stays without effect",

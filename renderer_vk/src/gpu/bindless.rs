@@ -122,7 +122,13 @@ impl Bindless {
         if abilities.acceleration {
             counts.push((T::ACCELERATION_STRUCTURE_KHR, SCENES));
         }
-        lock(&self.textures).capacity = info.max_textures;
+        // Index 0 stays empty: the synchronization validation of an array of textures that is indexed at run time
+        // takes every draw for a reader of its first element, which must then not be an image being drawn to.
+        *lock(&self.textures) = Slots {
+            next: 1,
+            capacity: info.max_textures,
+            ..Slots::default()
+        };
         lock(&self.storages).capacity = info.max_storage_images;
         lock(&self.scenes).capacity = if abilities.acceleration { SCENES } else { 0 };
         let bindings: Vec<_> = (0u32..)
