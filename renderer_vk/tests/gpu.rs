@@ -84,6 +84,9 @@ fn compute_writes_a_storage_image_and_reads_by_address() {
     assert!(FrameRing::new(&device, 2).is_err(), "one ring per device");
     let pipeline =
         ComputePipeline::new(&device, "fill", &shaders::TEST_FILL_COMP, &[(3, 5)]).unwrap();
+    // Another compilation of the same file, asked for by a comment in it.
+    let twice =
+        ComputePipeline::new(&device, "twice", &shaders::TEST_FILL_COMP_TWICE, &[(3, 5)]).unwrap();
     let image = Image::new(
         &device,
         &ImageDesc::new(
@@ -112,7 +115,7 @@ fn compute_writes_a_storage_image_and_reads_by_address() {
         let numbers = vec![frame; 300_000];
         let address = rec.arena().push(&numbers).unwrap();
         let mut pass = rec.pass("fill", Access::COMPUTE, Access::COMPUTE).unwrap();
-        pass.bind_compute(&pipeline);
+        pass.bind_compute(if frame == 5 { &twice } else { &pipeline });
         pass.push(&Fill {
             numbers: address,
             sums: result.address(),
@@ -137,7 +140,7 @@ fn compute_writes_a_storage_image_and_reads_by_address() {
     device.wait_idle().unwrap();
     let mut sum = [0; 4];
     result.read(0, &mut sum).unwrap();
-    assert_eq!(u32::from_ne_bytes(sum), 5 * 300_000 + 5);
+    assert_eq!(u32::from_ne_bytes(sum), 2 * (5 * 300_000 + 5));
     let texels: Vec<[f32; 4]> = collect(&device.read_image(&image).unwrap());
     assert_eq!(texels.len(), 61 * 35);
     for (i, texel) in texels.iter().enumerate() {
@@ -150,7 +153,7 @@ fn compute_writes_a_storage_image_and_reads_by_address() {
         assert_eq!(times[0].0, "fill");
         assert!(times[0].1 >= 0.0 && times[0].1 < 60_000.0, "{times:?}");
     }
-    drop((image, result, pipeline, ring));
+    drop((image, result, pipeline, twice, ring));
     finish(device);
 }
 

@@ -1,6 +1,11 @@
 #version 460
+// variants: TWICE=-DFACTOR=2
 // Test of the gpu layer: writes coordinates into a storage image by its index, and sums a buffer by its address.
 #include "common/bindless.glsl"
+
+#ifndef FACTOR
+#define FACTOR 1
+#endif
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = 3) const uint ADDED = 0;
@@ -15,6 +20,6 @@ void main() {
     if (pixel == uvec2(0)) {
         uint sum = ADDED;
         for (uint i = 0; i < count; i++) sum += numbers.at[i];
-        sums.at[0] = sum;
+        sums.at[0] = sum * FACTOR;
     }
 }

@@ -1,6 +1,6 @@
 //! The device: everything else is made from it and holds it alive.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::{ext, khr, vk};
@@ -87,6 +87,7 @@ pub(crate) struct DeviceInner {
     pub pipeline_cache: vk::PipelineCache,
     pub timeline: vk::Semaphore,
     pub timings: Mutex<Vec<(String, f32)>>,
+    pub refused: Mutex<HashSet<String>>,
     pub queue: Mutex<vk::Queue>,
     pub queue_family: u32,
     pub timestamp_mask: u64,
@@ -139,6 +140,7 @@ impl Device {
             pipeline_cache: vk::PipelineCache::null(),
             timeline: vk::Semaphore::null(),
             timings: Mutex::new(Vec::new()),
+            refused: Mutex::new(HashSet::new()),
             // SAFETY: the device was made with one queue of this family.
             queue: Mutex::new(unsafe { vd.get_device_queue(choice.queue_family, 0) }),
             queue_family: choice.queue_family,

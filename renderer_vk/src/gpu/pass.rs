@@ -6,7 +6,7 @@ use bytemuck::Pod;
 use super::arena::UploadArena;
 use super::bindless::PUSH_BYTES;
 use super::buffer::Buffer;
-use super::device::Device;
+use super::device::{Device, lock};
 use super::pipeline::{ComputePipeline, GraphicsPipeline};
 use super::ray_tracing::{RayTracingPipeline, SbtRegions};
 use super::recorder::Recorder;
@@ -183,8 +183,11 @@ impl<'a> Pass<'a> {
             }
         }
     }
+    /// Says that a command was left out; the same words once, because frames repeat themselves.
     pub(crate) fn refuse(&self, what: &str) {
-        log::warn!("GPU command left out: {what}");
+        if lock(&self.rec.device.0.refused).insert(what.to_owned()) {
+            log::warn!("GPU command left out: {what}");
+        }
     }
 }
 impl Drop for Pass<'_> {

@@ -168,6 +168,10 @@ impl Recorder {
     /// # Errors
     /// Out of memory for timestamps.
     pub fn pass(&mut self, name: &str, reads: Access, writes: Access) -> Result<Pass<'_>, Error> {
+        let query = match self.ring_slot {
+            Some(_) => self.slot.timers.begin(name)?,
+            None => None,
+        };
         if let Some(debug) = &self.device.0.debug
             && let Ok(label) = CString::new(name)
         {
@@ -189,10 +193,6 @@ impl Recorder {
                 );
             }
         }
-        let query = match self.ring_slot {
-            Some(_) => self.slot.timers.begin(name)?,
-            None => None,
-        };
         if let Some((pool, query)) = query {
             // SAFETY: the query is reset by the command buffer that runs before this one.
             unsafe {

@@ -93,7 +93,6 @@ pub(crate) struct Abilities {
     pub anisotropy: bool,
     pub wireframe: bool,
     pub bc: bool,
-    pub wide_lines: bool,
     pub extended_formats: bool,
     pub fragment_stores: bool,
     pub vertex_stores: bool,
@@ -252,6 +251,14 @@ fn examine(
             "shaderStorageImageArrayNonUniformIndexing",
             f12.shader_storage_image_array_non_uniform_indexing,
         ),
+        (
+            "shaderSampledImageArrayDynamicIndexing",
+            base.shader_sampled_image_array_dynamic_indexing,
+        ),
+        (
+            "shaderStorageImageArrayDynamicIndexing",
+            base.shader_storage_image_array_dynamic_indexing,
+        ),
         ("shaderInt64", base.shader_int64),
     ];
     let mut missing: Vec<&str> = required.iter().filter(|r| !on(r.1)).map(|r| r.0).collect();
@@ -303,7 +310,6 @@ fn examine(
         anisotropy: on(base.sampler_anisotropy),
         wireframe: on(base.fill_mode_non_solid),
         bc: on(base.texture_compression_bc),
-        wide_lines: on(base.wide_lines),
         extended_formats: on(base.shader_storage_image_extended_formats),
         fragment_stores: on(base.fragment_stores_and_atomics),
         vertex_stores: on(base.vertex_pipeline_stores_and_atomics),
@@ -429,9 +435,10 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
     }
     let features = vk::PhysicalDeviceFeatures::default()
         .shader_int64(true)
+        .shader_sampled_image_array_dynamic_indexing(true)
+        .shader_storage_image_array_dynamic_indexing(true)
         .sampler_anisotropy(a.anisotropy)
         .fill_mode_non_solid(a.wireframe)
-        .wide_lines(a.wide_lines)
         .texture_compression_bc(a.bc)
         .shader_storage_image_extended_formats(a.extended_formats)
         .fragment_stores_and_atomics(a.fragment_stores)
@@ -445,7 +452,6 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
         .buffer_device_address(true)
         .scalar_block_layout(true)
         .timeline_semaphore(true)
-        .descriptor_indexing(false)
         .runtime_descriptor_array(true)
         .descriptor_binding_partially_bound(true)
         .descriptor_binding_update_unused_while_pending(true)
