@@ -3,6 +3,7 @@
 //! No service keeps the state borrowed while it calls the renderer, since the renderer calls back.
 
 use std::cell::RefCell;
+use std::collections::hash_map::Entry;
 use std::collections::{HashMap, VecDeque};
 use std::ffi::{CStr, CString, c_char, c_int, c_long, c_uchar, c_void};
 use std::ptr;
@@ -212,16 +213,17 @@ extern "C" fn cvar_variable_integer_value(name: *const c_char) -> c_int {
 extern "C" fn cmd_add_command(name: *const c_char, command: Option<extern "C" fn()>) {
     let name = text(name).to_ascii_lowercase();
     let Some(command) = command else { return };
-    with(|s| {
-        if s.commands.contains_key(&name) {
-            // The engine keeps the old pointer, which dangles once a library is gone.
-            s.memory
-                .violations
-                .push(format!("the command {name} was added while it existed"));
-        } else {
-            s.commands.insert(name, command);
+    let added = with(|s| match s.commands.entry(name.clone()) {
+        Entry::Vacant(place) => {
+            place.insert(command);
+            true
         }
+        // The engine keeps the old pointer, which dangles once a library is gone.
+        Entry::Occupied(_) => false,
     });
+    if added == Some(false) {
+        violation(format!("the command {name} was added while it existed"));
+    }
 }
 
 extern "C" fn cmd_remove_command(name: *const c_char) {
