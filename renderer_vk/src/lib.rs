@@ -12,6 +12,8 @@ mod raster;
 mod renderer;
 pub mod scene;
 pub mod settings;
+#[cfg(test)]
+mod test_support;
 pub mod trace;
 pub mod world;
 

@@ -151,3 +151,6 @@ impl Assets {
 
 /// Largest side of a texture: what every Vulkan device has to offer.
 const MAX_TEXTURE_SIZE: u32 = 4096;
+
+#[cfg(test)]
+mod tests;

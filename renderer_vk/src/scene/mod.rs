@@ -330,3 +330,6 @@ impl Scene {
         self.clear();
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -19,6 +19,9 @@ const BEAM_SIDES: u32 = 6;
 const BEAM_RADIUS: f32 = 4.0;
 /// Units of a rail's core for one width of its texture.
 const RAIL_TEXTURE_LENGTH: f32 = 256.0;
+/// Length of a rail trail after which no more rings are drawn, units: twice the largest map, so that only a broken
+/// entity gets there.
+const MAX_RAIL_LENGTH: f32 = 262_144.0;
 /// Length of the axes that stand for a missing model, and half their width.
 const AXIS_LENGTH: f32 = 16.0;
 const AXIS_WIDTH: f32 = 0.25;
@@ -142,7 +145,7 @@ impl MeshBuilder<'_> {
     /// Rings around a rail trail: from `old_origin` to `origin`.
     pub fn rail_rings(&mut self, entity: &RefEntity, settings: &Settings) {
         let (start, end) = (entity.old_origin, entity.origin);
-        let length = (end - start).length();
+        let length = (end - start).length().min(MAX_RAIL_LENGTH);
         let direction = (end - start).normalize_or_zero();
         // rings closer than a unit are a line; the engine would divide by zero
         let spacing = settings.rail_segment_length.trunc().max(1.0);

@@ -1,0 +1,293 @@
+//! Worlds without a GPU: what is visible, decals, fog, light.
+
+use glam::{Vec2, Vec3};
+use q3bsp::builder::MapBuilder;
+use q3bsp::{DrawVert, GridPoint};
+
+use super::{VisibleQuery, VisibleSet, WorldData, mark_fragments};
+use crate::settings::Settings;
+use crate::test_support::{PIXEL, Registration};
+
+fn game() -> Registration {
+    Registration::from_entries(&[
+        ("t/wall.tga", PIXEL),
+        (
+            "scripts/t.shader",
+            b"t/nomarks\n{\nsurfaceparm nomarks\n{\nmap t/wall.tga\n}\n}\nt/mist\n{\nsurfaceparm fog\nfogParms ( 0.5 0.25 1 ) 300\n}\n",
+        ),
+    ])
+}
+
+/// Two rooms side by side along x that do not see each other.
+fn two_rooms(game: &mut Registration) -> WorldData {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 0);
+    let a = map.add_room(wall, Vec3::splat(0.0), Vec3::splat(256.0));
+    let b = map.add_room(
+        wall,
+        Vec3::new(256.0, 0.0, 0.0),
+        Vec3::new(512.0, 256.0, 256.0),
+    );
+    map.set_sees(a, b, false);
+    map.set_sees(b, a, false);
+    game.build(map.build())
+}
+
+fn visible(world: &WorldData, at: Vec3, frustum: &[glam::Vec4]) -> Vec<u32> {
+    let mut set = VisibleSet::default();
+    set.gather(
+        world,
+        &VisibleQuery {
+            pvs_origin: at,
+            area_mask: &[0; 32],
+            frustum,
+            no_vis: false,
+            locked: false,
+        },
+    );
+    let mut surfaces = set.surfaces.clone();
+    surfaces.sort_unstable();
+    surfaces
+}
+
+#[test]
+fn a_room_sees_its_own_walls() {
+    let mut game = game();
+    let world = two_rooms(&mut game);
+    let in_first = visible(&world, Vec3::splat(128.0), &[]);
+    assert!((0..6).all(|s| in_first.contains(&s)), "{in_first:?}");
+    // the shared wall may be listed by both rooms; the far walls are not
+    assert!(
+        !in_first.contains(&6) || !in_first.contains(&7),
+        "{in_first:?}"
+    );
+    let outside = visible(&world, Vec3::splat(-500.0), &[]);
+    assert_eq!(outside, (0..12).collect::<Vec<_>>());
+    // a plane that cuts the first room off
+    let plane = Vec3::X.extend(300.0);
+    assert!(visible(&world, Vec3::splat(128.0), &[plane]).is_empty());
+}
+
+#[test]
+fn hidden_areas_and_no_vis() {
+    let mut game = game();
+    let world = two_rooms(&mut game);
+    let mut set = VisibleSet::default();
+    let mut query = VisibleQuery {
+        pvs_origin: Vec3::splat(128.0),
+        area_mask: &[0xFF; 32],
+        frustum: &[],
+        no_vis: false,
+        locked: false,
+    };
+    set.gather(&world, &query);
+    assert!(set.surfaces.is_empty());
+    query.no_vis = true;
+    set.gather(&world, &query);
+    assert_eq!(set.surfaces.len(), 12);
+    // locked: the answer stays as the eye moves
+    query.no_vis = false;
+    query.area_mask = &[0; 32];
+    set.gather(&world, &query);
+    let before = set.surfaces.clone();
+    query.locked = true;
+    query.pvs_origin = Vec3::new(400.0, 100.0, 100.0);
+    set.gather(&world, &query);
+    assert_eq!(set.surfaces, before);
+}
+
+fn quad_corners(size: f32, z: f32) -> [Vec3; 4] {
+    // counter-clockwise seen from above, as games send decals
+    [
+        Vec3::new(-size, -size, z),
+        Vec3::new(-size, size, z),
+        Vec3::new(size, size, z),
+        Vec3::new(size, -size, z),
+    ]
+}
+
+fn floor_map(game: &mut Registration, material: &str) -> WorldData {
+    let mut map = MapBuilder::new();
+    let shader = map.add_shader(material, 0, 0);
+    // clockwise seen from above
+    map.add_quad(
+        shader,
+        [
+            Vec3::new(-100.0, -100.0, 0.0),
+            Vec3::new(-100.0, 100.0, 0.0),
+            Vec3::new(100.0, 100.0, 0.0),
+            Vec3::new(100.0, -100.0, 0.0),
+        ],
+    );
+    game.build(map.build())
+}
+
+fn mark(
+    game: &Registration,
+    world: &WorldData,
+    points: &[Vec3],
+    limits: (usize, usize),
+) -> (f32, usize) {
+    let projection = Vec3::new(0.0, 0.0, -20.0);
+    let (corners, fragments) = mark_fragments(
+        world,
+        &game.materials,
+        points,
+        projection,
+        limits.0,
+        limits.1,
+        false,
+    );
+    let mut area = 0.0;
+    for fragment in &fragments {
+        let piece = &corners[fragment.first_point..][..fragment.num_points];
+        for pair in piece[1..].windows(2) {
+            area += (pair[0] - piece[0]).cross(pair[1] - piece[0]).length() * 0.5;
+        }
+    }
+    (area, fragments.len())
+}
+
+#[test]
+fn a_decal_covers_its_own_area() {
+    let mut game = game();
+    let world = floor_map(&mut game, "t/wall");
+    assert_eq!(world.surfaces[0].plane.unwrap().normal, Vec3::Z);
+    let mut points = quad_corners(10.0, 1.0);
+    let (area, fragments) = mark(&game, &world, &points, (384, 128));
+    assert!((area - 400.0).abs() < 1.0, "{area}");
+    assert_eq!(fragments, 2);
+    // the other way round the planes look outwards and nothing is left
+    points.reverse();
+    assert_eq!(mark(&game, &world, &points, (384, 128)).1, 0);
+}
+
+#[test]
+fn decals_respect_limits_flags_and_distance() {
+    let mut game = game();
+    let world = floor_map(&mut game, "t/wall");
+    let points = quad_corners(10.0, 1.0);
+    assert_eq!(mark(&game, &world, &points, (384, 1)).1, 1);
+    assert_eq!(mark(&game, &world, &points, (5, 128)).1, 1);
+    assert_eq!(mark(&game, &world, &points, (2, 128)).1, 0);
+    assert_eq!(mark(&game, &world, &points, (384, 0)).1, 0);
+    assert_eq!(mark(&game, &world, &[], (384, 128)).1, 0);
+    assert_eq!(mark(&game, &world, &[Vec3::NAN; 4], (384, 128)).1, 0);
+    // more than 20 units behind the floor, and more than the sweep above it
+    assert_eq!(
+        mark(&game, &world, &quad_corners(10.0, -25.0), (384, 128)).1,
+        0
+    );
+    assert_eq!(
+        mark(&game, &world, &quad_corners(10.0, 40.0), (384, 128)).1,
+        0
+    );
+    let mut game = self::game();
+    let world = floor_map(&mut game, "t/nomarks");
+    assert_eq!(mark(&game, &world, &points, (384, 128)).1, 0);
+}
+
+#[test]
+fn curves_take_decals_and_have_levels() {
+    let mut game = game();
+    let mut map = MapBuilder::new();
+    let shader = map.add_shader("t/wall", 0, 0);
+    let point = |x: f32, y: f32, z: f32| DrawVert {
+        position: Vec3::new(x, y, z),
+        st: Vec2::ZERO,
+        lightmap: Vec2::ZERO,
+        normal: Vec3::Z,
+        color: [255; 4],
+    };
+    // an arch: flat along y, bent along x; rows run so that its front is above
+    let mut points = Vec::new();
+    for y in [-100.0, 0.0, 100.0] {
+        for x in [-100.0, 0.0, 100.0] {
+            points.push(point(x, y, if x == 0.0 { 100.0 } else { 0.0 }));
+        }
+    }
+    map.add_patch(shader, 3, 3, &points);
+    let world = game.build(map.build());
+    let surface = &world.surfaces[0];
+    let lod = surface.lod.as_ref().unwrap();
+    let near = lod.choose(0.0, 250.0);
+    let far = lod.choose(100_000.0, 250.0);
+    assert_eq!(near, (surface.first_index, surface.index_count));
+    assert!(far.1 < near.1, "{far:?} {near:?}");
+    assert!(
+        world.indices[far.0 as usize..][..far.1 as usize]
+            .iter()
+            .all(|&i| (i as usize) < world.vertices.len())
+    );
+    let (area, fragments) = mark(&game, &world, &quad_corners(10.0, 52.0), (384, 128));
+    let (flipped, _) = mark(&game, &world, &quad_corners(10.0, 48.0), (384, 128));
+    assert!(fragments > 0 && area > 100.0, "{area}");
+    assert!(flipped > 100.0);
+}
+
+#[test]
+fn fog_volumes_take_in_spheres_and_boxes() {
+    let mut game = game();
+    let mut map = MapBuilder::new();
+    let mist = map.add_shader("t/mist", 0, 0x40);
+    map.add_fog_brush(mist, Vec3::ZERO, Vec3::splat(100.0), 5);
+    let world = game.build(map.build());
+    assert_eq!(world.fogs.len(), 1);
+    let fog = &world.fogs[0];
+    assert_eq!((fog.color, fog.depth), (Vec3::new(0.5, 0.25, 1.0), 300.0));
+    assert_eq!(fog.has_surface, 1);
+    // depth below the surface is positive inside
+    let [x, y, z, w] = fog.plane;
+    assert!(Vec3::new(x, y, z).dot(Vec3::splat(50.0)) - w > 0.0);
+    assert_eq!(world.fog_of_sphere(Vec3::splat(50.0), 1.0), 1);
+    assert_eq!(world.fog_of_sphere(Vec3::new(110.0, 50.0, 50.0), 9.0), 0);
+    assert_eq!(world.fog_of_sphere(Vec3::new(110.0, 50.0, 50.0), 11.0), 1);
+    let bounds = |x: f32| {
+        super::Bounds::EMPTY
+            .with(Vec3::splat(x))
+            .with(Vec3::splat(x + 1.0))
+    };
+    assert_eq!(world.fog_of_box(&bounds(50.0)), 1);
+    assert_eq!(world.fog_of_box(&bounds(150.0)), 0);
+}
+
+#[test]
+fn grid_light_is_shifted_then_scaled() {
+    let mut game = game();
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 0);
+    map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
+    let bsp = map.build_with_grid(Vec3::splat(64.0), |_| GridPoint {
+        ambient: [10, 20, 30],
+        directed: [200, 100, 50],
+        longitude: 0,
+        latitude: 0,
+    });
+    let world = game.build(bsp);
+    let light = world.grid_light(Vec3::ZERO, &Settings::default()).unwrap();
+    assert!(
+        light.ambient.abs_diff_eq(Vec3::new(24.0, 48.0, 72.0), 1e-3),
+        "{}",
+        light.ambient
+    );
+    assert!(
+        light
+            .directed
+            .abs_diff_eq(Vec3::new(255.0, 127.0, 63.0), 1e-3),
+        "{}",
+        light.directed
+    );
+    assert_eq!(light.direction, Vec3::Z);
+}
+
+#[test]
+fn the_map_can_remap_materials() {
+    let mut game = game();
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 0);
+    map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
+    map.set_world_key("remapShader1", "t/wall;t/nomarks");
+    let world = game.build(map.build());
+    let drawn = game.materials.resolve(world.surfaces[0].material);
+    assert_eq!(game.materials.get(drawn).name, "t/nomarks");
+}
