@@ -2,12 +2,12 @@
 
 use crate::boundary::{Failure, entry};
 use crate::capture::{Format, Shot};
-use crate::contract::Renderer;
 use crate::cvars::Cvar;
 use crate::ioq3::engine::{Engine, valid_game_path};
 use crate::session::{self, Front, with_renderer};
 use crate::window;
 use crate::window::modes::MODES;
+use renderer_vk::Renderer;
 use std::ffi::{CStr, CString};
 
 type Function = unsafe extern "C" fn();
@@ -24,6 +24,7 @@ static COMMANDS: &[(&CStr, Function)] = &[
     (c"gfxinfo", gfx_info),
     (c"minimize", minimize),
     (c"rt_timings", timings),
+    (c"rt_lights", lights),
 ];
 
 /// Adds all commands.
@@ -98,6 +99,35 @@ extern "C" fn timings() {
     });
 }
 
+extern "C" fn lights() {
+    print_lines(|renderer, _, _| {
+        let Some(world) = renderer.world() else {
+            return vec!["no map is loaded".into()];
+        };
+        let report = &world.relit.report;
+        let mut lines: Vec<_> = report
+            .emitters
+            .iter()
+            .map(|emitter| {
+                format!(
+                    "{:6} triangles  {:5} surfaces  {:12.0} square units  {}",
+                    emitter.triangles, emitter.surfaces, emitter.area, emitter.name
+                )
+            })
+            .collect();
+        lines.push(format!(
+            "{} triangle lights, {} point lights, {} suns; {} clusters list {:.1} lights each, {} at most",
+            report.triangle_lights,
+            report.point_lights,
+            report.suns,
+            report.clusters,
+            report.mean_list_length,
+            report.longest_list
+        ));
+        lines
+    });
+}
+
 extern "C" fn gfx_info() {
     print_lines(|renderer, front, _| {
         let strings = crate::config::DeviceStrings::new(renderer.device_info());
@@ -119,7 +149,8 @@ extern "C" fn gfx_info() {
             ),
             format!(
                 "GAMMA: {} applied to the picture, {} overbright bits",
-                settings.gamma, settings.overbright_bits
+                settings.gamma,
+                settings.effective_overbright_bits()
             ),
             format!("texturemode: {}", settings.texture_mode),
             format!("picmip: {}", settings.picmip),

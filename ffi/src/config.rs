@@ -1,7 +1,7 @@
 //! What the engine, its menus and the game are told about the renderer (`glconfig_t`).
 
-use crate::contract::DeviceInfo;
 use crate::ioq3::abi::{QBool, glconfig_t};
+use renderer_vk::gpu::DeviceInfo;
 use std::ffi::c_char;
 
 /// The device in the words that menus show.
@@ -55,7 +55,7 @@ fn extensions(info: &DeviceInfo) -> Vec<&'static str> {
         "VK_buffer_device_address",
         "VK_timeline_semaphore",
     ];
-    if info.rt {
+    if info.ray_tracing.is_some() {
         words.extend([
             "VK_KHR_acceleration_structure",
             "VK_KHR_ray_tracing_pipeline",
@@ -100,7 +100,7 @@ pub fn glconfig(info: &DeviceInfo, screen: Screen) -> glconfig_t {
         vendor_string: [0; 1024],
         version_string: [0; 1024],
         extensions_string: [0; 8192],
-        maxTextureSize: pixels(max_texture_size(info)),
+        maxTextureSize: pixels(info.max_image_size),
         numTextureUnits: 32,
         colorBits: 32,
         depthBits: 24,
@@ -126,11 +126,6 @@ pub fn glconfig(info: &DeviceInfo, screen: Screen) -> glconfig_t {
     put(&mut config.version_string, &strings.version);
     put(&mut config.extensions_string, &strings.extensions);
     config
-}
-
-/// Vulkan 1.2 devices do 4096 at least; cinematics are shrunk to 256 pixels when this is not above 256.
-fn max_texture_size(_info: &DeviceInfo) -> u32 {
-    16384
 }
 
 #[cfg(test)]

@@ -24,7 +24,6 @@ mod capture;
 mod cinematics;
 mod commands;
 mod config;
-mod contract;
 mod cvars;
 mod fallback;
 mod files;

@@ -27,11 +27,11 @@ fn level_of(level: Level) -> c_int {
     }
 }
 
-/// A record as a line of the console, in the engine's colours for warnings and errors.
+/// A record as a line of the console; the engine colours it.
 fn line_of(level: Level, text: &str) -> String {
     match level {
-        Level::Error => format!("^1ERROR: {text}\n"),
-        Level::Warn => format!("^3WARNING: {text}\n"),
+        Level::Error => format!("ERROR: {text}\n"),
+        Level::Warn => format!("WARNING: {text}\n"),
         _ => format!("{text}\n"),
     }
 }
@@ -109,7 +109,7 @@ mod tests {
         assert_eq!(level_of(Level::Debug), 1);
         assert_eq!(
             line_of(Level::Warn, "maps/a.bsp: odd"),
-            "^3WARNING: maps/a.bsp: odd\n"
+            "WARNING: maps/a.bsp: odd\n"
         );
     }
 }

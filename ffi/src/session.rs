@@ -8,9 +8,9 @@
 use crate::boundary::Failure;
 use crate::capture::Captures;
 use crate::cinematics::Cinematics;
-use crate::contract::{Renderer, Settings};
 use crate::cvars::Cvars;
 use crate::window;
+use renderer_vk::{Renderer, Settings};
 use std::cell::{Cell, UnsafeCell};
 use std::sync::Mutex;
 use std::sync::PoisonError;

@@ -1,8 +1,8 @@
 //! From console variables to the renderer's settings.
 
 use super::{Cvar, Cvars};
-use crate::contract::{LightSampling, Settings};
 use crate::ioq3::engine::Engine;
+use renderer_vk::{LightSampling, Settings};
 
 /// A count: negative is 0.
 fn count(cvars: &Cvars, cvar: Cvar) -> u32 {
@@ -18,19 +18,9 @@ fn light_sampling(value: i32) -> LightSampling {
     }
 }
 
-/// Doublings of light that the classic look applies to the finished picture: the engine does so in full screen only,
-/// where it owns the display's gamma, and by at most two.
-fn overbright_bits(bits: i32, fullscreen: bool, hardware_gamma: bool) -> u32 {
-    if !fullscreen || !hardware_gamma {
-        return 0;
-    }
-    u32::try_from(bits).unwrap_or(0).min(2)
-}
-
 /// Reads every setting. Cheap: the variables are the engine's memory; text is copied when it changed.
 ///
-/// `window_fullscreen` is what the window was when the renderer was registered: overbright depends on it, and is
-/// latched.
+/// `window_fullscreen` is what the window was when the renderer was registered: what depends on it is latched.
 pub fn apply(cvars: &Cvars, window_fullscreen: bool, settings: &mut Settings) {
     let (value, flag, integer) = (|c| cvars.value(c), |c| cvars.flag(c), |c| cvars.integer(c));
 
@@ -64,11 +54,7 @@ pub fn apply(cvars: &Cvars, window_fullscreen: bool, settings: &mut Settings) {
     settings.map_overbright_bits = count(cvars, Cvar::MapOverBrightBits);
     settings.ignore_hw_gamma = flag(Cvar::IgnoreHwGamma);
     settings.fullscreen = window_fullscreen;
-    settings.overbright_bits = overbright_bits(
-        integer(Cvar::OverBrightBits),
-        window_fullscreen,
-        !settings.ignore_hw_gamma,
-    );
+    settings.overbright_bits = count(cvars, Cvar::OverBrightBits);
     settings.vertex_light = flag(Cvar::VertexLight);
     settings.fullbright = flag(Cvar::FullBright);
     settings.subdivisions = value(Cvar::Subdivisions);
@@ -121,15 +107,6 @@ pub fn write_back_clamps(engine: Engine, cvars: &Cvars) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn overbright_needs_full_screen_and_gamma_of_the_display() {
-        assert_eq!(overbright_bits(1, false, true), 0);
-        assert_eq!(overbright_bits(1, true, false), 0);
-        assert_eq!(overbright_bits(1, true, true), 1);
-        assert_eq!(overbright_bits(9, true, true), 2);
-        assert_eq!(overbright_bits(-3, true, true), 0);
-    }
 
     #[test]
     fn light_sampling_takes_its_documented_numbers() {

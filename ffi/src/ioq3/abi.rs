@@ -49,6 +49,7 @@ pub const EXEC_APPEND: c_int = 2;
 /// `stereoFrame_t` of the second eye.
 pub const STEREO_RIGHT: c_int = 2;
 /// Number of `refEntityType_t` values.
+#[cfg(test)]
 pub const RT_MAX_REF_ENTITY_TYPE: c_int = 8;
 /// `CIN_*` bits for a video that a material shows: again and again, without sound.
 pub const CIN_MATERIAL: c_int = 2 | 8 | 16;

@@ -4,9 +4,9 @@ use super::abi::{
     Vec3C, fontInfo_t, glyphInfo_t, markFragment_t, orientation_t, polyVert_t, refEntity_t,
     refdef_t,
 };
-use crate::contract::FontInfo;
 use glam::{Vec2, Vec3};
 use renderer_vk::api::{EntityKind, MarkFragment, Orientation, PolyVert, RefDef, RefEntity};
+use renderer_vk::assets::LoadedFont;
 use std::ffi::c_char;
 
 /// The kind of an entity; `None` for a number that is none.
@@ -108,7 +108,7 @@ fn text<const N: usize>(from: &str) -> [c_char; N] {
 }
 
 /// A font with its glyphs' shaders registered.
-pub fn font(from: &FontInfo) -> Box<fontInfo_t> {
+pub fn font(from: &LoadedFont) -> Box<fontInfo_t> {
     let blank = glyphInfo_t {
         height: 0,
         top: 0,
@@ -126,15 +126,25 @@ pub fn font(from: &FontInfo) -> Box<fontInfo_t> {
     };
     let mut to = Box::new(fontInfo_t {
         glyphs: [blank; 256],
-        glyphScale: from.glyph_scale,
+        glyphScale: from.info.glyph_scale,
+        // The engine's own renderer answers the file's name here.
         name: text(&from.name),
     });
-    for (to, from) in to.glyphs.iter_mut().zip(&from.glyphs) {
+    for (index, (to, from_glyph)) in to.glyphs.iter_mut().zip(&from.info.glyphs).enumerate() {
         *to = glyphInfo_t {
-            height: from.height,
-            glyph: from.glyph,
-            shaderName: text(&from.shader_name),
-            ..blank
+            height: from_glyph.height,
+            top: from_glyph.top,
+            bottom: from_glyph.bottom,
+            pitch: from_glyph.pitch,
+            xSkip: from_glyph.x_skip,
+            imageWidth: from_glyph.image_width,
+            imageHeight: from_glyph.image_height,
+            s: from_glyph.s,
+            t: from_glyph.t,
+            s2: from_glyph.s2,
+            t2: from_glyph.t2,
+            glyph: from.handles.get(index).copied().unwrap_or(0),
+            shaderName: text(&from_glyph.shader),
         };
     }
     to

@@ -4,13 +4,13 @@ use super::abi::{QBool, glconfig_t};
 use super::engine::{Engine, valid_game_path};
 use crate::boundary::{Failure, entry};
 use crate::capture::{self, Format, Shot, VideoFrame};
-use crate::contract::{self as vk, Error, Renderer, RendererOptions};
 use crate::cvars::{self, Cvar, Cvars};
 use crate::files::EngineFiles;
 use crate::session::{self, Front, with_renderer};
 use crate::window::{self, Window};
 use crate::{commands, config};
 use renderer_vk::api::Picture;
+use renderer_vk::{Error, Renderer, RendererOptions, gpu};
 use std::ffi::c_int;
 use std::sync::Arc;
 use std::time::Instant;
@@ -21,7 +21,7 @@ use std::time::Instant;
 /// One sentence: what is missing.
 pub fn probe(engine: Engine) -> Result<(), String> {
     let device = wanted_device(&Cvars::register(engine));
-    vk::probe(device.as_deref())
+    renderer_vk::probe(device.as_deref())
         .map(|_| ())
         .map_err(|e| e.to_string())
 }
@@ -30,11 +30,17 @@ fn wanted_device(cvars: &Cvars) -> Option<String> {
     Some(cvars.string(Cvar::Device)).filter(|name| !name.is_empty())
 }
 
-/// An error of the renderer as the engine has to hear it. What the GPU did not survive takes the renderer with it.
+/// An error of the renderer as the engine has to hear it. What the device did not survive takes the renderer with it.
 pub fn failure(error: Error) -> Failure {
-    let lost = !matches!(error, Error::NoWorld);
+    let discard = match &error {
+        Error::Gpu(error) => !matches!(
+            error,
+            gpu::Error::Full { .. } | gpu::Error::Unsupported { .. } | gpu::Error::Usage { .. }
+        ),
+        _ => false,
+    };
     Failure {
-        discard: lost,
+        discard,
         ..Failure::drop(error)
     }
 }
@@ -110,10 +116,10 @@ fn start_renderer(engine: Engine, cvars: &Cvars) -> Result<(), Failure> {
             log::info!(
                 "Relight on {}: {}",
                 info.name,
-                if info.rt {
-                    "rays are traced by hardware"
-                } else {
-                    "rays are traced in compute shaders"
+                match (info.ray_tracing.is_some(), info.software) {
+                    (true, false) => "rays are traced by hardware",
+                    (true, true) => "rays are traced in software, which is slow",
+                    (false, _) => "it does not trace rays, so that there is the classic look alone",
                 }
             );
             session::with(|session| session.renderer = Some(renderer));
@@ -143,6 +149,7 @@ fn make_renderer(
         window,
         validation: cvars.flag(Cvar::VkValidation),
         device: wanted_device(cvars),
+        vsync: cvars.flag(Cvar::SwapInterval),
     };
     Renderer::new(options).map_err(|e| e.to_string())
 }
@@ -186,6 +193,13 @@ pub extern "C" fn shutdown(destroy_window: QBool) {
         let Some(engine) = Engine::current() else {
             return Ok(());
         };
+        // A screenshot asked for in the same breath as a new map shows the last picture there was.
+        if let Ok(outbox) = with_renderer(|renderer, front| {
+            let mut outbox = Outbox::default();
+            take_captures(renderer, front, &mut outbox).map(|()| outbox)
+        }) {
+            deliver(engine, outbox);
+        }
         // The engine would keep our pointers after it has unloaded us.
         commands::remove(engine);
         let destroyed = session::with(|session| {
@@ -273,17 +287,11 @@ pub extern "C" fn end_frame(front_end_ms: *mut c_int, back_end_ms: *mut c_int) {
             }
         }
         deliver(engine, outbox);
-        if let Some(cvars) = session::with(|session| session.front.cvars.take()).flatten() {
-            // Taken out, because a switch of the window may make the engine call back.
-            window::follow_fullscreen(engine, &cvars);
-            session::with(|session| {
-                session
-                    .front
-                    .cvars
-                    .get_or_insert(cvars)
-                    .modified(Cvar::Fullscreen)
-            });
-        }
+        session::with(|session| {
+            if let Some(cvars) = &session.front.cvars {
+                window::follow_fullscreen(engine, cvars);
+            }
+        });
         Ok(())
     });
 }
@@ -301,32 +309,39 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
         .frame_start
         .take()
         .map_or(0, |begin| milliseconds(start - begin));
-    let shots = std::mem::take(&mut front.captures.shots);
-    let video = front.captures.video.take();
-    if !shots.is_empty() || video.is_some() {
-        let picture = renderer.read_pixels().map_err(failure)?;
-        for shot in shots {
-            take_shot(
-                &picture,
-                &shot,
-                commands::screenshot_quality(front),
-                &mut outbox,
-            )?;
-        }
-        if let Some(frame) = video {
-            let bytes = capture::video_frame(&picture, &frame, commands::video_quality(front))?;
-            outbox.video = keep_video(&frame, &bytes);
-        }
-    }
+    take_captures(renderer, front, &mut outbox)?;
     let stats = renderer.end_frame().map_err(failure)?;
     outbox.back_end_ms = milliseconds(start.elapsed());
     if front.settings.speeds != 0 {
+        let gpu: f32 = renderer.timings().iter().map(|(_, ms)| ms).sum();
         outbox.lines.push(format!(
-            "{:.2} ms GPU, {} ms to submit",
-            stats.gpu_ms, outbox.back_end_ms
+            "{} views, {} draws, {} ms to submit; {gpu:.2} ms on the GPU in an earlier frame",
+            stats.views, stats.draws, outbox.back_end_ms
         ));
     }
     Ok(outbox)
+}
+
+/// Takes the pictures that were asked for, of what is drawn so far.
+fn take_captures(
+    renderer: &mut Renderer,
+    front: &mut Front,
+    outbox: &mut Outbox,
+) -> Result<(), Failure> {
+    let shots = std::mem::take(&mut front.captures.shots);
+    let video = front.captures.video.take();
+    if shots.is_empty() && video.is_none() {
+        return Ok(());
+    }
+    let picture = renderer.read_pixels().map_err(failure)?;
+    for shot in shots {
+        take_shot(&picture, &shot, commands::screenshot_quality(front), outbox)?;
+    }
+    if let Some(frame) = video {
+        let bytes = capture::video_frame(&picture, &frame, commands::video_quality(front))?;
+        outbox.video = keep_video(&frame, &bytes);
+    }
+    Ok(())
 }
 
 fn take_shot(
@@ -386,20 +401,15 @@ fn deliver(engine: Engine, outbox: Outbox) {
 /// cell meanwhile.
 fn run_videos(engine: Engine) -> Result<(), Failure> {
     let wanted = with_renderer(|renderer, front| {
-        let known = |request: vk::VideoRequest| (front.cinematics.state(&request.name), request);
-        Ok(renderer
-            .active_videos()
-            .into_iter()
-            .map(known)
-            .collect::<Vec<_>>())
+        let state = |(name, client)| (name, client, front.cinematics.state(client));
+        Ok(renderer.videos().into_iter().map(state).collect::<Vec<_>>())
     })?;
-    for (state, request) in wanted {
+    for (name, client, state) in wanted {
         let handle = match state {
             Some(handle) => handle,
             None => {
-                let handle =
-                    valid_game_path(&request.name).and_then(|name| engine.play_cinematic(&name));
-                session::with(|session| session.front.cinematics.remember(request.name, handle));
+                let handle = valid_game_path(&name).and_then(|name| engine.play_cinematic(&name));
+                session::with(|session| session.front.cinematics.remember(client, handle));
                 handle
             }
         };

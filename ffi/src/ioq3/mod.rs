@@ -19,7 +19,7 @@ pub use {
     lifecycle::shutdown as shutdown_for_tests,
 };
 
-use crate::{fallback, logging, session};
+use crate::{fallback, logging, session, window};
 use abi::{API_VERSION, refexport_t, refimport_t};
 use engine::Engine;
 use std::cell::UnsafeCell;
@@ -56,6 +56,8 @@ pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *c
     logging::install();
     let prepared = catch_unwind(AssertUnwindSafe(|| {
         session::reset();
+        // Normally there is none any more; a renderer that was lost may have left one.
+        window::mark_stale();
         lifecycle::probe(engine)
     }));
     let problem = match prepared {

@@ -7,10 +7,10 @@ use super::convert;
 use super::engine::{Engine, string_from};
 use super::lifecycle::failure;
 use crate::boundary::{Failure, entry};
-use crate::contract::Renderer;
 use crate::cvars::Cvar;
 use crate::session::{draw, with_renderer};
 use glam::Vec3;
+use renderer_vk::Renderer;
 use renderer_vk::api::DynamicLight;
 use std::ffi::{c_char, c_float, c_int, c_uchar};
 
@@ -69,7 +69,7 @@ pub extern "C" fn load_world(name: *const c_char) {
             if renderer.world_name().is_some() {
                 return Err(Failure::drop(format!("{name}: a map is loaded already")));
             }
-            renderer.load_world(&name).map_err(Failure::drop)
+            renderer.load_world(&name).map_err(failure)
         })
     });
 }
@@ -255,7 +255,7 @@ pub extern "C" fn stretch_raw(x: c_int, y: c_int, w: c_int, h: c_int, cols: c_in
         // SAFETY: the engine passes that many pixels.
         let pixels = unsafe { raw_pixels(cols, rows, data) };
         draw(|renderer, _| match (pixels, usize::try_from(client)) {
-            (Some((cols, rows, rgba)), Ok(client)) => renderer.stretch_raw(x, y, w, h, cols, rows, &rgba, client, dirty != 0).map_err(Failure::drop),
+            (Some((cols, rows, rgba)), Ok(client)) => renderer.stretch_raw(x, y, w, h, cols, rows, &rgba, client, dirty != 0).map_err(failure),
             _ => Ok(()),
         })
     });
@@ -267,18 +267,20 @@ pub extern "C" fn upload_cinematic(
     cols: c_int,
     rows: c_int,
     data: *const c_uchar,
-    client: c_int,
+    handle: c_int,
     dirty: QBool,
 ) {
     entry(|| {
         // SAFETY: the engine passes that many pixels.
         let pixels = unsafe { raw_pixels(cols, rows, data) };
-        with_renderer(|renderer, _| {
-            if let (Some((cols, rows, rgba)), Ok(client)) = (pixels, usize::try_from(client)) {
-                renderer.upload_cinematic(cols, rows, &rgba, client, dirty != 0);
-            }
-            Ok(())
-        })
+        with_renderer(
+            |renderer, front| match (pixels, front.cinematics.client_of(handle)) {
+                (Some((cols, rows, rgba)), Some(client)) => renderer
+                    .upload_cinematic(cols, rows, &rgba, client, dirty != 0)
+                    .map_err(failure),
+                _ => Ok(()),
+            },
+        )
     });
 }
 

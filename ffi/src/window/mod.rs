@@ -9,6 +9,7 @@ pub mod sdl;
 use crate::cvars::{Cvar, Cvars};
 use crate::ioq3::engine::Engine;
 use modes::{Custom, Mode};
+use renderer_vk::gpu;
 use sdl::{Sdl, SdlError, WindowPtr};
 use std::cell::Cell;
 use std::ffi::c_int;
@@ -274,20 +275,23 @@ impl Window {
     ///
     /// # Errors
     /// When SDL has no Vulkan for this window.
-    pub fn source(&self) -> Result<crate::contract::WindowSource, SdlError> {
+    pub fn source(&self) -> Result<gpu::Window, SdlError> {
         let (sdl, raw) = (self.sdl, self.raw);
         // SAFETY: the window is open.
-        let instance_extensions = unsafe { sdl.instance_extensions(raw) }?;
-        Ok(crate::contract::WindowSource {
-            get_instance_proc_addr: sdl.vulkan_entry()?,
-            instance_extensions,
-            create_surface: Box::new(move |instance| {
-                if current().is_none_or(|window| window.raw != raw) {
-                    return Err("the window is closed".to_string());
-                }
-                // SAFETY: the window is open; the renderer passes the instance that it made with our extensions.
-                unsafe { sdl.create_surface(raw, instance) }.map_err(|e| e.to_string())
-            }),
+        let extensions = unsafe { sdl.instance_extensions(raw) }?;
+        let entry = sdl.vulkan_entry()?;
+        let create = Box::new(move |instance| {
+            if current().is_none_or(|window| window.raw != raw) {
+                return Err("the window is closed".to_string());
+            }
+            // SAFETY: the window is open; the renderer passes the instance that it made with our extensions.
+            unsafe { sdl.create_surface(raw, instance) }.map_err(|e| e.to_string())
+        });
+        // SAFETY: SDL's loader stays in memory, because SDL is never closed; the surface is made with the instance
+        // given; `Shutdown` drops the renderer before it closes the window, and a stale window's renderer is leaked.
+        unsafe { gpu::Window::new(entry, extensions, create) }.ok_or(SdlError::Call {
+            call: "SDL_Vulkan_GetVkGetInstanceProcAddr",
+            message: "there is no Vulkan loader".into(),
         })
     }
 
