@@ -107,7 +107,7 @@ impl Drop for Witness {
 extern "C" fn fails() {
     entry(|| {
         let _witness = Witness;
-        let text = vec![
+        let text = [
             String::from("maps/a.bsp: lump 3"),
             String::from("100% broken %s %n"),
         ];

@@ -56,21 +56,37 @@ fn print_lines(make: impl FnOnce(&mut Renderer, &mut Front, &[String]) -> Vec<St
     });
 }
 
+/// Adds how many there are; lines that begin with a space belong to the one before.
+fn counted(mut lines: Vec<String>, what: &str) -> Vec<String> {
+    let count = lines.iter().filter(|line| !line.starts_with(' ')).count();
+    lines.push("------------------".into());
+    lines.push(format!("{count} {what}"));
+    lines
+}
+
 extern "C" fn image_list() {
-    print_lines(|renderer, _, _| renderer.image_list());
+    print_lines(|renderer, _, _| {
+        let mut lines = renderer.image_list();
+        let count = lines.len();
+        lines.push("------------------".into());
+        lines.push(format!("{count} images"));
+        lines
+    });
 }
 
 extern "C" fn shader_list() {
     // Any argument asks for the order in which they are drawn.
-    print_lines(|renderer, _, arguments| renderer.shader_list(arguments.len() > 1));
+    print_lines(|renderer, _, arguments| {
+        counted(renderer.shader_list(arguments.len() > 1), "shaders")
+    });
 }
 
 extern "C" fn skin_list() {
-    print_lines(|renderer, _, _| renderer.skin_list());
+    print_lines(|renderer, _, _| counted(renderer.skin_list(), "skins"));
 }
 
 extern "C" fn model_list() {
-    print_lines(|renderer, _, _| renderer.model_list());
+    print_lines(|renderer, _, _| counted(renderer.model_list(), "models"));
 }
 
 extern "C" fn mode_list() {
@@ -255,6 +271,15 @@ pub fn video_quality(front: &Front) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lists_end_with_a_count_of_what_they_list() {
+        let lines = ["a", "   of a", "b"].map(String::from).to_vec();
+        let all = counted(lines, "skins");
+        assert_eq!(all.last().map(String::as_str), Some("2 skins"));
+        assert_eq!(all.len(), 5);
+        assert_eq!(counted(Vec::new(), "skins").len(), 2);
+    }
 
     #[test]
     fn level_shots_are_named_after_the_map() {
