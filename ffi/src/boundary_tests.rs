@@ -16,13 +16,14 @@ type Call = extern "C" fn();
 static TURN: Mutex<()> = Mutex::new(());
 
 /// The C half of an engine, installed with an otherwise empty table.
-struct TestEngine {
+pub struct TestEngine {
     library: Library,
     _turn: MutexGuard<'static, ()>,
 }
 
 impl TestEngine {
-    fn start(name: &str) -> Option<Self> {
+    /// Takes the turn; `None` without a C compiler.
+    pub fn start(name: &str) -> Option<Self> {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = scratch(name);
         let file = folder.join("libtest_engine.so");
@@ -90,6 +91,14 @@ impl TestEngine {
         let level: unsafe extern "C" fn() -> c_int = self.function(b"test_level\0");
         // SAFETY: no arguments.
         unsafe { level() }
+    }
+}
+
+impl Drop for TestEngine {
+    fn drop(&mut self) {
+        // Nobody may print through a library that is closed.
+        // SAFETY: zero is "not there" for each entry.
+        unsafe { Engine::install(std::mem::zeroed()) };
     }
 }
 

@@ -114,9 +114,23 @@ pub unsafe fn load(
     api_version: c_int,
     table: *const refimport_t,
 ) -> Option<refexport_t> {
+    // SAFETY: the same contract.
+    unsafe { load_from(&folders(), engine, api_version, table) }
+}
+
+/// [`load`] out of given folders.
+///
+/// # Safety
+/// As for [`load`].
+unsafe fn load_from(
+    folders: &[PathBuf],
+    engine: Engine,
+    api_version: c_int,
+    table: *const refimport_t,
+) -> Option<refexport_t> {
     // One that the engine never shut down must not be loaded twice.
     drop(substitute().take());
-    for folder in folders() {
+    for folder in folders {
         for name in file_names() {
             let path = folder.join(name);
             if !path.is_file() {
@@ -185,6 +199,54 @@ mod tests {
             names[0].starts_with("renderer_opengl1_") && names[1].starts_with("renderer_opengl1.")
         );
         assert!(names[2].starts_with("renderer_opengl2_"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_substitute_is_shut_down_through_us_and_then_unloaded() {
+        use crate::boundary_tests::TestEngine;
+        use crate::c_tests::{compile, scratch, source};
+        use libloading::os::unix::{Library as UnixLibrary, RTLD_NOW};
+        use std::os::unix::ffi::OsStrExt;
+
+        let Some(_engine) = TestEngine::start("fallback") else {
+            return;
+        };
+        let engine = Engine::current().unwrap();
+        let folder = scratch("substitute");
+        let library = folder.join(&file_names()[0]);
+        let report = folder.join("report");
+        let arguments = ["-shared", "-fPIC", "-Wall"];
+        let Some(()) = compile(&source("test_renderer.c"), &library, &arguments) else {
+            return;
+        };
+        let path = std::ffi::CString::new(report.as_os_str().as_bytes()).unwrap();
+        // The made-up renderer reads a path where a real one would find the engine's print function.
+        let mut table = [std::ptr::null::<std::ffi::c_char>(); 40];
+        table[0] = path.as_ptr();
+        let load = |version| {
+            let folders = [folder.join("nowhere"), folder.clone()];
+            // SAFETY: the made-up renderer reads its first entry alone, as what it is here.
+            unsafe { load_from(&folders, engine, version, table.as_ptr().cast()) }
+        };
+        let loaded = || {
+            const NOLOAD: c_int = 4;
+            // SAFETY: with NOLOAD nothing runs.
+            unsafe { UnixLibrary::open(Some(&library), RTLD_NOW | NOLOAD) }.is_ok()
+        };
+        assert!(load(7).is_none(), "it refuses other versions");
+        assert!(!loaded());
+        for _ in 0..2 {
+            let exports = load(8).map(|exports| exports.Shutdown).unwrap();
+            // SAFETY: our own function.
+            unsafe { exports(0) };
+            assert!(loaded());
+            // SAFETY: our own function.
+            unsafe { exports(1) };
+            assert!(!loaded(), "its statics must not outlive it");
+        }
+        assert_eq!(std::fs::read_to_string(&report).unwrap(), "0\n1\n0\n1\n");
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]

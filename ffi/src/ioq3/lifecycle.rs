@@ -102,6 +102,7 @@ fn start_renderer(engine: Engine, cvars: &Cvars) -> Result<(), Failure> {
             window::headless_mode(cvars).map_or((640, 480), |mode| (mode.width, mode.height));
         make_renderer(cvars, size, None)
     } else {
+        window::refresh_size();
         let window = match window::current() {
             Some(window) => Ok(window),
             None => window::open(engine, cvars),
@@ -156,30 +157,14 @@ fn make_renderer(
 
 /// Fills in what depends on the window, and answers what the game is told.
 fn describe(renderer: &Renderer, front: &mut Front, cvars: &Cvars) -> glconfig_t {
-    let screen = match window::current() {
-        Some(window) => config::Screen {
-            size: window.size,
-            aspect: window.aspect,
-            refresh_rate: window.refresh_rate(),
-            fullscreen: window.is_fullscreen(),
-            gamma: !cvars.flag(Cvar::IgnoreHwGamma),
-        },
-        None => {
-            let mode = window::headless_mode(cvars);
-            // The renderer keeps its size until the video system restarts.
-            let size = if front.size == (0, 0) {
-                mode.map_or((640, 480), |m| (m.width, m.height))
-            } else {
-                front.size
-            };
-            config::Screen {
-                size,
-                aspect: size.0 as f32 / size.1 as f32,
-                refresh_rate: 0,
-                fullscreen: false,
-                gamma: !cvars.flag(Cvar::IgnoreHwGamma),
-            }
-        }
+    let size = renderer.size();
+    let window = window::current();
+    let screen = config::Screen {
+        size,
+        aspect: window.map_or(size.0 as f32 / size.1 as f32, |window| window.aspect),
+        refresh_rate: window.map_or(0, |window| window.refresh_rate()),
+        fullscreen: window.is_some_and(|window| window.is_fullscreen()),
+        gamma: !cvars.flag(Cvar::IgnoreHwGamma),
     };
     front.size = screen.size;
     front.fullscreen = screen.fullscreen;
@@ -195,6 +180,8 @@ pub extern "C" fn shutdown(destroy_window: QBool) {
         };
         // A screenshot asked for in the same breath as a new map shows the last picture there was.
         if let Ok(outbox) = with_renderer(|renderer, front| {
+            // The buffer of a video frame may be gone by now.
+            front.captures.video = None;
             let mut outbox = Outbox::default();
             take_captures(renderer, front, &mut outbox).map(|()| outbox)
         }) {

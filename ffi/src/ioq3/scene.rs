@@ -225,23 +225,23 @@ pub extern "C" fn stretch_pic(x: c_float, y: c_float, w: c_float, h: c_float, s1
     });
 }
 
-/// The pixels behind a raw picture, copied: `cols * rows` of four bytes.
+/// The pixels behind a raw picture: `cols * rows` of four bytes.
 ///
 /// # Safety
-/// `data` must be null or hold that many bytes.
-unsafe fn raw_pixels(
+/// `data` must be null or hold that many bytes for as long as the answer is used.
+unsafe fn raw_pixels<'a>(
     cols: c_int,
     rows: c_int,
     data: *const c_uchar,
-) -> Option<(u32, u32, Vec<u8>)> {
-    if data.is_null() || !(1..=MAX_RAW_SIDE).contains(&cols) || !(1..=MAX_RAW_SIDE).contains(&rows)
-    {
+) -> Option<(u32, u32, &'a [u8])> {
+    let sides = 1..=MAX_RAW_SIDE;
+    if data.is_null() || !sides.contains(&cols) || !sides.contains(&rows) {
         return None;
     }
     let (cols, rows) = (u32::try_from(cols).ok()?, u32::try_from(rows).ok()?);
     // SAFETY: by the caller's promise. At most 2^14 * 2^14 * 4 = 2^30 bytes.
     let pixels = unsafe { std::slice::from_raw_parts(data, cols as usize * rows as usize * 4) };
-    Some((cols, rows, pixels.to_vec()))
+    Some((cols, rows, pixels))
 }
 
 #[rustfmt::skip]
@@ -252,10 +252,10 @@ pub extern "C" fn stretch_raw(x: c_int, y: c_int, w: c_int, h: c_int, cols: c_in
         if [cols, rows].iter().any(|&n| n <= 0 || !n.cast_unsigned().is_power_of_two()) {
             return Err(Failure::drop(format!("a raw picture of {cols}x{rows} pixels: both must be powers of two")));
         }
-        // SAFETY: the engine passes that many pixels.
+        // SAFETY: the engine passes that many pixels, and keeps them during the call.
         let pixels = unsafe { raw_pixels(cols, rows, data) };
         draw(|renderer, _| match (pixels, usize::try_from(client)) {
-            (Some((cols, rows, rgba)), Ok(client)) => renderer.stretch_raw(x, y, w, h, cols, rows, &rgba, client, dirty != 0).map_err(failure),
+            (Some((cols, rows, rgba)), Ok(client)) => renderer.stretch_raw(x, y, w, h, cols, rows, rgba, client, dirty != 0).map_err(failure),
             _ => Ok(()),
         })
     });
@@ -271,12 +271,12 @@ pub extern "C" fn upload_cinematic(
     dirty: QBool,
 ) {
     entry(|| {
-        // SAFETY: the engine passes that many pixels.
+        // SAFETY: the engine passes that many pixels, and keeps them during the call.
         let pixels = unsafe { raw_pixels(cols, rows, data) };
         with_renderer(
             |renderer, front| match (pixels, front.cinematics.client_of(handle)) {
                 (Some((cols, rows, rgba)), Some(client)) => renderer
-                    .upload_cinematic(cols, rows, &rgba, client, dirty != 0)
+                    .upload_cinematic(cols, rows, rgba, client, dirty != 0)
                     .map_err(failure),
                 _ => Ok(()),
             },

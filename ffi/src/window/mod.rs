@@ -48,6 +48,18 @@ fn update(change: impl FnOnce(&mut Window)) {
     }
 }
 
+/// Takes note of the open window's present size: a new renderer starts with that.
+pub fn refresh_size() {
+    if let Some(size) = current().and_then(|window| window.drawable_size()) {
+        update(|window| {
+            if window.size != size {
+                window.size = size;
+                window.aspect = size.0 as f32 / size.1 as f32;
+            }
+        });
+    }
+}
+
 /// Marks the open window as used by a renderer that can no longer be reached.
 pub fn mark_stale() {
     update(|window| window.stale = true);
