@@ -690,7 +690,9 @@ fn frame_images(device: &Device, width: u32, height: u32) -> Result<(Image, Imag
             width,
             height,
             raster::COLOR_FORMAT,
-            ImageUsage::COLOR | ImageUsage::SAMPLED | ImageUsage::STORAGE,
+            // Not among the sampled textures: the validation layer takes every draw for a reader of all of them, so a
+            // target among them would be a hazard to itself.
+            ImageUsage::COLOR | ImageUsage::STORAGE,
         ),
     )?;
     let depth = Image::new(

@@ -7,8 +7,8 @@ layout(location = 0) in vec2 in_uv;
 layout(location = 0) out vec4 out_color;
 
 void main() {
-    ivec2 size = textureSize(textures[push.image], 0);
-    vec3 c = texelFetch(textures[push.image], min(ivec2(in_uv * vec2(size)), size - 1), 0).rgb;
+    ivec2 size = imageSize(images_rgba8[push.image]);
+    vec3 c = imageLoad(images_rgba8[push.image], min(ivec2(in_uv * vec2(size)), size - 1)).rgb;
     c = min(pow(c, vec3(push.inverse_gamma)) * push.scale, vec3(1.0));
     // a target that encodes on writing gets linear values
     if (push.srgb_target != 0) c = mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));

@@ -103,3 +103,15 @@ pub fn keep_picture(picture: &relight::compare::Rgb8, name: &str) {
         println!("{}: {error}", file.display());
     }
 }
+
+/// Keeps a log in the folder `RELIGHT_PICTURES`, if that is set.
+pub fn keep_text(text: &str, name: &str) {
+    if let Some(folder) = std::env::var_os("RELIGHT_PICTURES").map(PathBuf::from) {
+        let file = folder.join(format!("{name}.log"));
+        if let Err(error) =
+            std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(&file, text))
+        {
+            println!("{}: {error}", file.display());
+        }
+    }
+}

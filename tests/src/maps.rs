@@ -159,7 +159,7 @@ fn rooms() -> Vec<u8> {
             DrawVert {
                 position: Vec3::new(
                     200.0 - 20.0 * f32::from(i % 3 == 1),
-                    -100.0 + 100.0 * column,
+                    100.0 - 100.0 * column,
                     20.0 + 60.0 * row,
                 ),
                 st: Vec2::new(column / 2.0, row / 2.0),

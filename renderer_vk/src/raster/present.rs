@@ -83,7 +83,7 @@ impl Present {
         pass.set_scissor(0, 0, width, height);
         pass.bind_graphics(&self.pipeline);
         pass.push(&Parameters {
-            image: frame.texture_index(),
+            image: frame.storage_index(),
             scale: (1 << overbright_bits.min(2)) as f32,
             inverse_gamma: 1.0 / gamma.clamp(0.5, 3.0),
             srgb_target: matches!(self.format, Format::Rgba8Srgb).into(),

@@ -78,6 +78,20 @@ pub struct Engine {
     _process: MutexGuard<'static, ()>,
 }
 
+/// Whether a line comes from Vulkan's validation layers.
+pub fn is_validation(line: &str) -> bool {
+    let line = line.to_ascii_lowercase();
+    [
+        "validation:",
+        "validation error",
+        "validation warning",
+        "vuid-",
+        "sync-hazard",
+    ]
+    .iter()
+    .any(|w| line.contains(w))
+}
+
 /// Calls the renderer. An error that it raises ends the call and comes back as a value.
 ///
 /// The closure is `Copy`, so that nothing in the frames that such an error jumps over has a destructor.
@@ -405,7 +419,7 @@ impl Engine {
         self.messages()
             .into_iter()
             .map(|m| m.text)
-            .filter(|t| t.to_ascii_lowercase().contains("validation:") || t.contains("VUID-"))
+            .filter(|t| is_validation(t))
             .collect()
     }
 
