@@ -182,6 +182,10 @@ pub struct TraceView {
     pub light_scale: f32,
     pub target_width: u32,
     pub target_height: u32,
+    /// Clamped, with mip levels: for the images of sky boxes.
+    pub sky_sampler: u32,
+    /// Keeps the size a multiple of eight without hidden bytes.
+    pub padding: u32,
 }
 
 /// Names of constants used on both sides.

@@ -42,8 +42,7 @@ vec3 sky_radiance(SurfacePoint p, vec3 d, float spread) {
     if (image != NO_TEXTURE) {
         vec2 size = vec2(textureSize(textures[nonuniformEXT(image)], 0));
         float lod = max(log2(max(spread * 0.5 * max(size.x, size.y), 1.0e-6)), 0.0);
-        // sampler 1: clamped
-        radiance = decode_display(textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[1]), uv, lod).rgb);
+        radiance = decode_display(textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[VIEW.sky_sampler]), uv, lod).rgb);
     }
     if (face != 5u) {
         p.stage.st = cloud_uv(d, sky.cloud_height);

@@ -36,7 +36,7 @@ struct TraceView {
     uint image_position; uint image_surface; uint image_front; uint image_direct; uint image_indirect; uint image_hdr;
     uint image_accumulation; uint image_target;
     float exposure_bias; float exposure_blend; float light_scale;
-    uint target_width; uint target_height;
+    uint target_width; uint target_height; uint sky_sampler; uint padding;
 };
 
 // What a geometry's triangles are to a ray.

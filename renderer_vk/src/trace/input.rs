@@ -68,6 +68,8 @@ pub trait MaterialTable {
     fn info(&self, index: u32) -> (u32, MaterialInfo);
     /// Addresses of the arrays on the GPU.
     fn buffers(&self) -> MaterialBuffers;
+    /// Bindless index of the clamped sampler with mip levels, for sky boxes.
+    fn sky_sampler(&self) -> u32;
     /// Changes whenever an answer of [`info`](Self::info) may have changed.
     fn generation(&self) -> u64;
 }

@@ -10,16 +10,17 @@ use super::geometry::StaticGeometry;
 use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface};
 use super::lights::{MapLightSource, MapLights};
 use super::view_tracer::{TracedMap, ViewTracer};
+use crate::assets::compile::sampler;
 use crate::assets::{Assets, Materials};
 use crate::gpu::{Device, Error, Image, Recorder};
 use crate::scene::ViewScene;
 use crate::settings::Settings;
 use crate::world::World;
 
-impl MaterialTable for Materials {
+impl MaterialTable for Assets {
     fn info(&self, index: u32) -> (u32, MaterialInfo) {
-        let drawn = self.resolve(index);
-        let material = self.get(drawn);
+        let drawn = self.materials.resolve(index);
+        let material = self.materials.get(drawn);
         let sky = material.sky.as_ref().map(|sky| SkyRecord {
             faces: sky.faces.unwrap_or([NO_TEXTURE; 6]),
             cloud_height: sky.cloud_height,
@@ -34,11 +35,15 @@ impl MaterialTable for Materials {
     }
 
     fn buffers(&self) -> MaterialBuffers {
-        self.addresses()
+        self.materials.addresses()
     }
 
     fn generation(&self) -> u64 {
-        Materials::generation(self)
+        self.materials.generation()
+    }
+
+    fn sky_sampler(&self) -> u32 {
+        self.samplers.index(sampler::CLAMP_MIP)
     }
 }
 
@@ -104,7 +109,7 @@ impl TraceLook {
         };
         Ok(Self {
             tracer: ViewTracer::new(device)?,
-            geometry: StaticGeometry::new(device, &static_scene(world), &assets.materials)?,
+            geometry: StaticGeometry::new(device, &static_scene(world), assets)?,
             lights: MapLights::new(device, &source)?,
             remapping: remapping(&assets.materials),
         })
@@ -127,7 +132,7 @@ impl TraceLook {
         if remapping != self.remapping {
             // triangles name their materials; this happens when a game changes a flag's or button's look
             self.geometry =
-                StaticGeometry::new(rec.device(), &static_scene(world), &assets.materials)?;
+                StaticGeometry::new(rec.device(), &static_scene(world), assets)?;
             self.remapping = remapping;
         }
         let map = TracedMap {
@@ -135,7 +140,7 @@ impl TraceLook {
             lights: &self.lights,
         };
         self.tracer
-            .record_view(rec, view, Some(map), &assets.materials, settings, target)
+            .record_view(rec, view, Some(map), assets, settings, target)
     }
 
     /// How many frames the last picture is the mean of; 1 outside of reference mode.

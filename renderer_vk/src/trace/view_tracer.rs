@@ -304,6 +304,8 @@ impl ViewTracer {
             light_scale: settings.rt_light_scale.max(0.0),
             target_width: target.width(),
             target_height: target.height(),
+            sky_sampler: materials.sky_sampler(),
+            padding: 0,
         })
     }
 }

@@ -22,7 +22,7 @@ use crate::trace::view_tracer::{TracedMap, ViewTracer};
 pub struct Gpu {
     pub device: Device,
     look: ViewTracer,
-    ring: FrameRing,
+    pub ring: FrameRing,
 }
 
 impl Gpu {
@@ -115,6 +115,19 @@ impl Gpu {
             bytemuck::pod_collect_to_vec(&self.device.read_image(hdr).expect("read"));
         let picture: Vec<[u8; 4]> =
             bytemuck::pod_collect_to_vec(&self.device.read_image(&target).expect("read"));
+        self.check_messages();
+        self.look.reset();
+        (
+            floats
+                .chunks_exact(4)
+                .map(|p| Vec3::new(p[0], p[1], p[2]))
+                .collect(),
+            picture,
+        )
+    }
+
+    /// The validation layer has nothing to say.
+    pub fn check_messages(&self) {
         let messages: Vec<String> = self
             .device
             .validation_messages()
@@ -127,14 +140,6 @@ impl Gpu {
             .map(|m| m.chars().take(600).collect())
             .collect();
         assert!(messages.is_empty(), "{messages:#?}");
-        self.look.reset();
-        (
-            floats
-                .chunks_exact(4)
-                .map(|p| Vec3::new(p[0], p[1], p[2]))
-                .collect(),
-            picture,
-        )
     }
 
     /// The mean over the picture of the mean of `frames` frames.
@@ -537,6 +542,10 @@ impl MaterialTable for Table {
             images: self.buffers[3].address(),
             noise: 0,
         }
+    }
+
+    fn sky_sampler(&self) -> u32 {
+        1
     }
 
     fn generation(&self) -> u64 {

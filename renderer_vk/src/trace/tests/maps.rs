@@ -1,0 +1,152 @@
+//! Real maps: whether they look lit, and the same for every estimator. With `RELIGHT_TRACE_PICTURES=folder` the
+//! pictures are kept there; `RELIGHT_TRACE_MAPS=a,b` chooses maps, `RELIGHT_TRACE_FRAMES=n` how long they settle.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::Vec3;
+use relight::{GameFiles, SearchPath};
+
+use super::harness::Gpu;
+use crate::api::RefDef;
+use crate::assets::Assets;
+use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
+use crate::scene::{Look, Scene};
+use crate::settings::Settings;
+use crate::trace::TraceLook;
+use crate::world::World;
+
+const SIZE: [u32; 2] = [320, 240];
+
+/// The game's files, or `None` with a printed line.
+fn files() -> Option<Arc<dyn GameFiles>> {
+    let folder = std::env::var_os("OPENARENA_DATA").map_or_else(
+        || PathBuf::from("/usr/share/games/openarena/baseoa"),
+        PathBuf::from,
+    );
+    if !folder.is_dir() {
+        assert!(
+            std::env::var("RELIGHT_REQUIRE_DATA").as_deref() != Ok("1"),
+            "{} is absent",
+            folder.display()
+        );
+        println!("skipped: no OpenArena data in {}", folder.display());
+        return None;
+    }
+    Some(Arc::new(SearchPath::open(&[folder]).expect("packs")))
+}
+
+/// The view of the first spawn point.
+fn camera(world: &World) -> RefDef {
+    let entities = world.data.relit.bsp.entities();
+    let find = |class: &str| entities.iter().find(|e| e.get("classname") == Some(class));
+    let place = find("info_player_deathmatch").or_else(|| find("team_CTF_redspawn"));
+    let origin = place.and_then(|e| e.vec3("origin")).unwrap_or(Vec3::ZERO) + Vec3::Z * 26.0;
+    let angles = place.and_then(|e| e.vec3("angles")).unwrap_or_else(|| {
+        let yaw = place
+            .and_then(|e| e.get("angle"))
+            .and_then(|v| v.parse().ok());
+        Vec3::new(0.0, yaw.unwrap_or(0.0), 0.0)
+    });
+    let [pitch, yaw] = [angles.x.to_radians(), angles.y.to_radians()];
+    let forward = Vec3::new(
+        pitch.cos() * yaw.cos(),
+        pitch.cos() * yaw.sin(),
+        -pitch.sin(),
+    );
+    let left = Vec3::new(-yaw.sin(), yaw.cos(), 0.0);
+    RefDef {
+        width: SIZE[0] as i32,
+        height: SIZE[1] as i32,
+        fov_x: 90.0,
+        fov_y: 73.74,
+        view_origin: origin,
+        view_axis: [forward, left, forward.cross(left)],
+        time_ms: 1000,
+        ..RefDef::default()
+    }
+}
+
+#[test]
+fn maps_are_lit() {
+    let (Some(files), Some(mut gpu)) = (files(), Gpu::new()) else {
+        return;
+    };
+    let device = &gpu.device.clone();
+    let frames: u32 = std::env::var("RELIGHT_TRACE_FRAMES")
+        .ok()
+        .and_then(|v| v.parse().ok())
+        .unwrap_or(4);
+    let chosen = std::env::var("RELIGHT_TRACE_MAPS").ok();
+    let maps: Vec<String> = match &chosen {
+        Some(list) => list.split(',').map(|m| format!("{m}.bsp")).collect(),
+        None => files.list("maps", ".bsp").into_iter().step_by(30).collect(),
+    };
+    let (scripts, _) = relight::Materials::load(&*files);
+    let scripts = Arc::new(scripts);
+    let settings = Settings {
+        rt: true,
+        rt_reference: true,
+        ..Settings::default()
+    };
+    for map in maps {
+        let mut assets = Assets::new(device, Arc::clone(&files), Arc::clone(&scripts), &settings)
+            .expect("assets");
+        let world =
+            World::load(device, &mut assets, &format!("maps/{map}"), &settings).expect("map");
+        let mut look = TraceLook::new(device, &world, &assets).expect("structures");
+        assets
+            .materials
+            .upload(device, &assets.samplers)
+            .expect("materials");
+        let mut scene = Scene::new();
+        let def = camera(&world);
+        let view = scene
+            .gather(Some(&world), &assets, &settings, &def, Look::Traced)
+            .expect("view")
+            .pop()
+            .expect("view");
+        let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
+        let target = Image::new(
+            device,
+            &ImageDesc::new("picture", SIZE[0], SIZE[1], Format::Rgba8, usage),
+        )
+        .expect("image");
+        for _ in 0..frames {
+            let mut rec = gpu.ring.begin().expect("frame");
+            look.record(&mut rec, &view, &world, &assets, &settings, &target)
+                .expect("recorded");
+            gpu.ring.end(rec).expect("submitted");
+        }
+        device.wait_idle().expect("done");
+        let pixels = device.read_image(&target).expect("read");
+        let hdr: Vec<f32> = bytemuck::pod_collect_to_vec(
+            &device
+                .read_image(look.hdr().expect("traced"))
+                .expect("read"),
+        );
+        let radiance = hdr.chunks_exact(4).map(|p| p[1]).sum::<f32>() / (hdr.len() / 4) as f32;
+        let mean = pixels.chunks_exact(4).map(|p| f32::from(p[1])).sum::<f32>()
+            / (pixels.len() / 4) as f32;
+        let relit = &world.data.relit;
+        println!(
+            "{map}: mean green {mean:.1} of 255, mean radiance {radiance:.3}; {} lights {} points {} suns {} clusters; {:?}",
+            relit.lights.len(),
+            relit.point_lights.len(),
+            relit.suns.len(),
+            relit.light_lists.clusters(),
+            device.timings()
+        );
+        if let Some(folder) = std::env::var_os("RELIGHT_TRACE_PICTURES") {
+            let path = PathBuf::from(folder).join(map.replace(".bsp", ".png"));
+            image::save_buffer(path, &pixels, SIZE[0], SIZE[1], image::ColorType::Rgba8)
+                .expect("saved");
+        }
+        assert!(mean > 4.0 && mean < 230.0, "{map}: {mean}");
+        let mut colors: Vec<&[u8]> = pixels.chunks_exact(4).collect();
+        colors.sort_unstable();
+        colors.dedup();
+        assert!(colors.len() > 100, "{map}: {} colours", colors.len());
+    }
+    gpu.check_messages();
+}
