@@ -124,6 +124,8 @@ pub struct TraceView {
     pub light_offsets: u64,
     /// Light lists: triangle lights first, then the map's sphere lights.
     pub light_indices: u64,
+    /// For each entry of `light_indices` the chance of its row up to and including it (`f32`).
+    pub light_chances: u64,
     /// State of automatic exposure: histogram and current exposure.
     pub exposure: u64,
     pub materials: MaterialBuffers,

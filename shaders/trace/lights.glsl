@@ -207,7 +207,7 @@ LightSample sample_light(uvec2 reference, vec3 position, vec3 normal, vec2 u) {
     return s;
 }
 
-// Target function of resampling: about the luminance that the light would give without shadows. Zero only where the
+// Target function of resampling, for all but suns: about the luminance that the light would give without shadows. Zero only where the
 // light gives exactly nothing, so that choosing by it leaves no light out.
 float light_target(uvec2 reference, vec3 position, vec3 normal) {
     if (reference.x == LIGHT_KIND_TRIANGLE) {
@@ -223,13 +223,6 @@ float light_target(uvec2 reference, vec3 position, vec3 normal) {
         // the flat formula where the spherical one is below its precision
         if (omega < 1.0e-6) omega = 0.5 * abs(dot(face, ua)) / max(dot(a, a), 1.0e-12);
         return luminance(light.radiance) * VIEW.light_scale * max(omega, 1.0e-12) * (cosine / 3.0) / PI;
-    }
-    if (reference.x == LIGHT_KIND_SUN) {
-        SunLight light = SunLights(VIEW.suns).at[reference.y];
-        float sine = sqrt(max(1.0 - light.cos_angle * light.cos_angle, 0.0));
-        float cosine = dot(normal, light.direction);
-        if (cosine <= -sine) return 0.0;
-        return luminance(light.irradiance) * VIEW.light_scale * max(cosine, sine);
     }
     SphereLight light = sphere_light(reference);
     vec3 to = light.origin - position;
@@ -263,28 +256,60 @@ vec3 estimate_uniform(LightSet set, vec3 origin, vec3 position, vec3 normal) {
     return arriving_light(light_reference(set, member), origin, position, normal) * float(set.count);
 }
 
+// The member of a set's list that a number in [0, 1) falls on, and the chance of that.
+uint pick_listed(LightSet set, float u, out float chance) {
+    Chances chances = Chances(VIEW.light_chances);
+    uint low = 0, high = set.listed - 1;
+    while (low < high) {
+        uint middle = (low + high) / 2;
+        if (chances.at[set.first + middle] > u) high = middle;
+        else low = middle + 1;
+    }
+    chance = chances.at[set.first + low] - (low > 0 ? chances.at[set.first + low - 1] : 0.0);
+    return low;
+}
+
+// One of the suns; a map has one as a rule.
+vec3 estimate_sun(vec3 origin, vec3 position, vec3 normal) {
+    uint count = VIEW.sun_count;
+    if (count == 0) return vec3(0.0);
+    uint index = count > 1 ? min(uint(rng_next() * float(count)), count - 1) : 0;
+    return arriving_light(uvec2(LIGHT_KIND_SUN, index), origin, position, normal) * float(count);
+}
+
 // Resampled importance sampling (Talbot et al. 2005): some candidates, one of them chosen by its target, weighed by
-// the inverse of the chance that it had. With at least as many candidates as lights each light is one candidate.
+// the inverse of the chance that it had. Candidates come from the cluster's list, by what each light can give to the
+// cluster; dynamic lights are always among them, and so is the whole list if it is short enough. The target does not
+// know about shadows, and a hidden sun would outshine all that is left in its shadow: suns get a ray of their own.
 vec3 estimate_resampled(LightSet set, vec3 origin, vec3 position, vec3 normal) {
-    uint candidates = max(VIEW.candidates, 1);
-    bool whole = set.count <= candidates;
-    if (whole) candidates = set.count;
-    float spacing = float(set.count) / float(candidates);
+    uint drawn = max(VIEW.candidates, 1);
+    bool whole = set.listed <= drawn;
+    if (whole) drawn = set.listed;
+    uint candidates = drawn + VIEW.dynamic_light_count;
     float sum = 0.0, chosen_target = 0.0;
     uvec2 chosen = uvec2(0);
+    vec3 suns = estimate_sun(origin, position, normal);
     for (uint i = 0; i < candidates; i++) {
-        // stratified over the list: each light is met candidates / count times on average
-        uint member = whole ? i : min(uint((float(i) + rng_next()) * spacing), set.count - 1);
+        uint member = i < drawn ? i : set.listed + VIEW.sun_count + i - drawn;
+        float weight = 1.0;
+        if (i < drawn && !whole) {
+            float chance;
+            // stratified
+            member = pick_listed(set, (float(i) + rng_next()) / float(drawn), chance);
+            if (!(chance > 0.0)) continue;
+            weight = 1.0 / (chance * float(drawn));
+        }
         uvec2 reference = light_reference(set, member);
         float target = light_target(reference, position, normal);
-        sum += target;
-        if (target > 0.0 && rng_next() * sum < target) {
+        if (!(target > 0.0)) continue;
+        sum += target * weight;
+        if (rng_next() * sum < target * weight) {
             chosen = reference;
             chosen_target = target;
         }
     }
-    if (chosen_target <= 0.0) return vec3(0.0);
-    return arriving_light(chosen, origin, position, normal) * (sum / chosen_target * spacing);
+    if (chosen_target <= 0.0) return suns;
+    return suns + arriving_light(chosen, origin, position, normal) * (sum / chosen_target);
 }
 
 vec3 estimate_all(LightSet set, vec3 origin, vec3 position, vec3 normal) {

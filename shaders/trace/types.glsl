@@ -24,7 +24,7 @@ struct PortalRecord {
 struct TraceView {
     uint64_t geometries; uint64_t instances; uint64_t fogs; uint64_t portals; uint64_t skies; uint64_t triangle_lights;
     uint64_t sphere_lights; uint64_t dynamic_lights; uint64_t suns; uint64_t nodes; uint64_t leaf_clusters;
-    uint64_t light_offsets; uint64_t light_indices; uint64_t exposure;
+    uint64_t light_offsets; uint64_t light_indices; uint64_t light_chances; uint64_t exposure;
     MaterialBuffers materials;
     vec3 eye; vec3 forward; vec3 left; vec3 up;
     uint width; uint height; int target_x; int target_y;

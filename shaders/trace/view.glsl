@@ -20,6 +20,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Sun
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BspNodes { BspNode at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Integers { int at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Indices { uint at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Chances { float at[]; };
 
 layout(push_constant, scalar) uniform Push { uint64_t view; } push;
 #define VIEW (TraceViews(push.view).view)

@@ -33,6 +33,8 @@ pub struct MapLights {
     pub offsets: Buffer,
     /// Entries of the lists.
     pub indices: Buffer,
+    /// For each entry the chance to draw one of its row up to it.
+    pub chances: Buffer,
     /// Number of clusters.
     pub cluster_count: u32,
     /// Radiance of a white diffuse surface in the light that is everywhere.
@@ -130,6 +132,7 @@ impl MapLights {
         } else {
             source.lists.offsets.clone()
         };
+        let chances = chances(source, &offsets);
         Ok(Self {
             triangles: Buffer::with_data(device, "trace triangle lights", storage, &triangles)?,
             triangle_count: count(triangles.len()),
@@ -141,6 +144,7 @@ impl MapLights {
             leaf_clusters: Buffer::with_data(device, "trace leafs", storage, &leaf_clusters)?,
             offsets: Buffer::with_data(device, "trace light rows", storage, &offsets)?,
             indices: Buffer::with_data(device, "trace light lists", storage, &source.lists.lights)?,
+            chances: Buffer::with_data(device, "trace light chances", storage, &chances)?,
             cluster_count: count(clusters),
             ambient: source.ambient,
         })
@@ -163,6 +167,107 @@ impl MapLights {
         };
         Self::new(device, &source)
     }
+}
+
+/// Part of a row's chance that is shared out evenly, so that no light is left out by a bad guess.
+const EVEN_PART: f32 = 0.1;
+
+/// Chances for drawing candidates from each row: by what the light can give to the middle of the cluster.
+fn chances(source: &MapLightSource<'_>, offsets: &[u32]) -> Vec<f32> {
+    let bounds = source
+        .bsp
+        .map(|bsp| cluster_bounds(bsp, source.lists.clusters()));
+    let mut chances = vec![0.0; source.lists.lights.len()];
+    let mut weights = Vec::new();
+    for (row, range) in offsets.windows(2).enumerate() {
+        let range = range[0] as usize..range[1] as usize;
+        let (Some(entries), Some(chances)) = (
+            source.lists.lights.get(range.clone()),
+            chances.get_mut(range),
+        ) else {
+            continue;
+        };
+        let place = bounds.as_ref().and_then(|b| b.get(row).copied().flatten());
+        weights.clear();
+        weights.extend(entries.iter().map(|&entry| reach(source, entry, place)));
+        let total: f32 = weights.iter().sum();
+        #[allow(clippy::cast_precision_loss)] // a row's length
+        let even = 1.0 / entries.len().max(1) as f32;
+        let mut sum = 0.0;
+        for (chance, weight) in chances.iter_mut().zip(&weights) {
+            sum += if total > 0.0 && total.is_finite() {
+                EVEN_PART * even + (1.0 - EVEN_PART) * weight / total
+            } else {
+                even
+            };
+            *chance = sum;
+        }
+        // rounding must not leave a gap before 1
+        let scale = if sum > 0.0 { 1.0 / sum } else { 1.0 };
+        for chance in chances.iter_mut() {
+            *chance *= scale;
+        }
+        if let Some(last) = chances.last_mut() {
+            *last = 1.0;
+        }
+    }
+    chances
+}
+
+/// Middle and half diagonal of the boxes of each cluster's leafs; `None` for a cluster without leafs.
+fn cluster_bounds(bsp: &Bsp, clusters: usize) -> Vec<Option<(Vec3, f32)>> {
+    let mut boxes: Vec<Option<(Vec3, Vec3)>> = vec![None; clusters];
+    for leaf in &bsp.leafs {
+        let slot = usize::try_from(leaf.cluster)
+            .ok()
+            .and_then(|c| boxes.get_mut(c));
+        if let Some(slot) = slot {
+            #[allow(clippy::cast_precision_loss)] // map coordinates
+            let [mins, maxs] = [leaf.mins, leaf.maxs].map(|v| Vec3::from(v.map(|x| x as f32)));
+            let (low, high) = slot.unwrap_or((mins, maxs));
+            *slot = Some((low.min(mins), high.max(maxs)));
+        }
+    }
+    let ball = |(low, high): (Vec3, Vec3)| ((low + high) * 0.5, (high - low).length() * 0.5);
+    boxes.into_iter().map(|b| b.map(ball)).collect()
+}
+
+/// About how much light an entry of the lists brings to a cluster; without one its power.
+fn reach(source: &MapLightSource<'_>, entry: u32, cluster: Option<(Vec3, f32)>) -> f32 {
+    let luminance = |c: Vec3| c.dot(Vec3::new(0.2126, 0.7152, 0.0722)).max(0.0);
+    let entry = entry as usize;
+    let (origin, intensity, size) = if let Some(light) = source.triangles.get(entry) {
+        let [a, b, c] = light.vertices;
+        let middle = (a + b + c) / 3.0;
+        let area = light.area();
+        let facing = match cluster {
+            // how far the cluster can lie in front of the light; never none, for it is large
+            Some((centre, radius)) if !light.two_sided => {
+                let to = centre - middle;
+                ((light.normal().dot(to) + radius) / (to.length() + radius).max(1.0))
+                    .clamp(0.05, 1.0)
+            }
+            _ => 1.0,
+        };
+        (middle, luminance(light.radiance) * area * facing, area)
+    } else if let Some(light) = source.points.get(entry - source.triangles.len()) {
+        (
+            light.origin,
+            luminance(light.intensity),
+            light.radius * light.radius,
+        )
+    } else {
+        return 0.0;
+    };
+    // nearer than half the cluster's size all distances are alike
+    let squared = cluster.map_or(1.0, |(centre, radius)| {
+        centre
+            .distance_squared(origin)
+            .max(radius * radius * 0.25)
+            .max(size)
+            .max(1.0)
+    });
+    intensity / squared
 }
 
 /// Nodes with their planes beside them, and the cluster of each leaf.

@@ -131,8 +131,7 @@ impl TraceLook {
         let remapping = remapping(&assets.materials);
         if remapping != self.remapping {
             // triangles name their materials; this happens when a game changes a flag's or button's look
-            self.geometry =
-                StaticGeometry::new(rec.device(), &static_scene(world), assets)?;
+            self.geometry = StaticGeometry::new(rec.device(), &static_scene(world), assets)?;
             self.remapping = remapping;
         }
         let map = TracedMap {

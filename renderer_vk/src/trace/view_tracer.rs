@@ -254,6 +254,7 @@ impl ViewTracer {
             leaf_clusters: lights.leaf_clusters.address(),
             light_offsets: lights.offsets.address(),
             light_indices: lights.indices.address(),
+            light_chances: lights.chances.address(),
             exposure: self.exposure_state.address(),
             materials: materials.buffers(),
             eye: camera.origin,
