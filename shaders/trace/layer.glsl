@@ -43,18 +43,20 @@ vec4 stage_texel(Stage stage, SurfacePoint p, Instance instance, float width) {
     return textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), uv, lod);
 }
 
-// Whether the surface is there at all: the first stage with an alpha test decides.
+// Whether the surface is there at all: where a stage that writes depth passes its alpha test.
 bool is_solid_at(SurfacePoint p, float width) {
     Material material = material_of(p.triangle.material);
     Instance instance = instance_of(p.instance);
     Stages stages = Stages(VIEW.materials.stages);
+    bool tested = false;
     for (uint i = 0; i < material.stage_count; i++) {
         Stage stage = stages.at[material.stage_first + i];
-        if (stage.alpha_func == ALPHAFUNC_NONE) continue;
+        if (stage.alpha_func == ALPHAFUNC_NONE || (stage.flags & STAGE_DEPTH_WRITE) == 0) continue;
+        tested = true;
         float alpha = stage_texel(stage, p, instance, width).a * stage_color(VIEW.materials, stage, instance, p.stage).a;
-        return alpha_passes(stage.alpha_func, alpha);
+        if (alpha_passes(stage.alpha_func, alpha)) return true;
     }
-    return true;
+    return !tested;
 }
 
 // a * b for polynomials in L and the background. Light seen twice counts once: L * L becomes L. What the background
@@ -86,6 +88,9 @@ Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, flo
     }
 }
 
+// One over the linear value of half the display's range.
+const float DOUBLE_PRODUCT = 1.0 / 0.21404114;
+
 // Runs the stages of the point's material over the background.
 Layer evaluate_stages(SurfacePoint p, float width) {
     Material material = material_of(p.triangle.material);
@@ -116,6 +121,11 @@ Layer evaluate_stages(SurfacePoint p, float width) {
             }
         }
         if (stage.alpha_func != ALPHAFUNC_NONE && !alpha_passes(stage.alpha_func, alpha)) continue;
+        if (stage.blend_src == BLEND_DST_COLOR && stage.blend_dst == BLEND_SRC_COLOR) {
+            // twice the product, as displayed: half grey leaves what is below as it is, so it has to here too
+            layer = layer_scale(layer_product(layer, source), DOUBLE_PRODUCT);
+            continue;
+        }
         layer = layer_add(layer_blend(stage.blend_src, source, source, layer, alpha),
             layer_blend(stage.blend_dst, layer, source, layer, alpha));
     }

@@ -85,7 +85,7 @@ fn static_scene(world: &World) -> StaticScene<'_> {
 
 /// The traced look of one map.
 pub struct TraceLook {
-    tracer: ViewTracer,
+    pub(super) tracer: ViewTracer,
     geometry: StaticGeometry,
     lights: MapLights,
     /// Of the materials, when `geometry` was built.

@@ -36,7 +36,7 @@ pub struct ViewTracer {
     accumulate: Accumulate,
     exposure: Exposure,
     tone_map: ToneMap,
-    targets: Option<Targets>,
+    pub(super) targets: Option<Targets>,
     exposure_state: Buffer,
     exposure_started: bool,
     no_lights: MapLights,

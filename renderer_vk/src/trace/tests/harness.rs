@@ -242,7 +242,7 @@ pub mod stage {
         Stage {
             image_first: first,
             image_count: 1,
-            flags: 0,
+            flags: c::STAGE_DEPTH_WRITE,
             ..plain()
         }
     }
