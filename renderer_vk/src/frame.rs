@@ -4,7 +4,7 @@ use glam::{Mat4, Vec3, Vec4};
 
 use crate::assets::Assets;
 use crate::gpu::{self, Image, Recorder};
-use crate::raster::{DrawList, Overlay, Raster, Target, ViewParameters, overlay_instance};
+use crate::raster::{Aids, DrawList, Overlay, Raster, Target, ViewParameters, overlay_instance};
 use crate::scene::ViewScene;
 use crate::settings::Settings;
 use crate::trace::TraceLook;
@@ -112,7 +112,10 @@ impl FrameContext<'_> {
             &self.assets.materials,
             world.map_or(&[], |w| w.indices.as_slice()),
             settings.identity_light(),
-            settings.show_tris,
+            Aids {
+                edges: settings.show_tris,
+                lightmaps: settings.lightmap,
+            },
         );
         let view = &scene.view;
         let parameters = ViewParameters {

@@ -5,14 +5,14 @@
 layout(location = 0) in vec4 in_color;
 layout(location = 1) in vec4 in_uv;
 layout(location = 2) in float in_clip;
-layout(location = 3) in flat uint in_draw;
+layout(location = 3) in flat uvec4 in_draw; // see draw.glsl
 
 layout(location = 0) out vec4 out_color;
 
-vec4 sample_stage(RasterView view, Draw draw, Stage stage, float time, vec2 uv) {
-    uint image = stage_image(view.materials, stage, draw.lightmap, time);
-    if (image == NO_TEXTURE || (stage.flags & STAGE_WHITE) != 0) return vec4(1.0);
-    return texture(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), uv);
+// The indices are the same for the whole draw, so they need no nonuniformEXT.
+vec4 sample_stage(uint image, uint sampler_index, vec2 uv) {
+    if (image == NO_TEXTURE) return vec4(1.0);
+    return texture(sampler2D(textures[image], samplers[sampler_index]), uv);
 }
 
 // The engine's 16x16 blob: brightness 4000 / d^2 in texels from the middle, nothing below 75 of 255, at most 255.
@@ -31,20 +31,14 @@ float blob(vec2 uv) {
 
 void main() {
     if (in_clip < 0.0) discard;
-    RasterView view = Views(push.view).view;
-    Draw draw = Draws(view.draws).at[in_draw];
-    switch (draw.mode) {
+    switch (in_draw.w) {
     case DRAW_STAGE: {
-        Stages stages = Stages(view.materials.stages);
-        Stage first = stages.at[draw.stages[0]];
-        Material material = Materials(view.materials.materials).at[draw.material];
-        float time = shader_time(material, Instances(view.instances).at[draw.instance]);
-        vec4 color = sample_stage(view, draw, first, time, in_uv.xy) * in_color;
-        if (draw.stage_count > 1) {
-            vec4 second = sample_stage(view, draw, stages.at[draw.stages[1]], time, in_uv.zw);
-            color = draw.combine == COMBINE_ADD ? vec4(color.rgb + second.rgb, color.a * second.a) : color * second;
+        vec4 color = sample_stage(in_draw.x, in_draw.z & 0xFF, in_uv.xy) * in_color;
+        if (in_draw.y != NO_TEXTURE) {
+            vec4 second = sample_stage(in_draw.y, in_draw.z >> 8 & 0xFF, in_uv.zw);
+            color = (in_draw.z >> 20 & 1) == COMBINE_ADD ? vec4(color.rgb + second.rgb, color.a * second.a) : color * second;
         }
-        if (!alpha_passes(first.alpha_func, color.a)) discard;
+        if (!alpha_passes(in_draw.z >> 16 & 0xF, color.a)) discard;
         out_color = color;
         break;
     }
@@ -55,8 +49,9 @@ void main() {
         out_color = vec4(in_color.rgb, fog_factor(in_uv.xy));
         break;
     case DRAW_IMAGE:
+    case DRAW_LIGHTMAP:
         // sampler 3: clamped, without mip levels
-        out_color = texture(sampler2D(textures[nonuniformEXT(draw.argument)], samplers[3]), in_uv.xy) * in_color;
+        out_color = sample_stage(in_draw.x, 3, in_uv.xy) * in_color;
         break;
     default:
         out_color = in_color;

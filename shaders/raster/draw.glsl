@@ -10,6 +10,9 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Fog
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RasterLights { RasterLight at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Views { RasterView view; };
 
+// Flat from the vertex to the fragment shader, so that the latter reads no memory but textures: x, y: textures of the
+// stages or NO_TEXTURE (white); z: samplers in bits 0-7 and 8-15, alpha test in 16-19, COMBINE_* in 20; w: DRAW_*.
+
 layout(push_constant, scalar) uniform Push { uint64_t view; } push;
 
 // The engine keeps this in a 256x32 texture; s: distance in the fog, t: how deep.

@@ -6,7 +6,7 @@
 layout(location = 0) out vec4 out_color;
 layout(location = 1) out vec4 out_uv;
 layout(location = 2) out float out_clip;
-layout(location = 3) out flat uint out_draw;
+layout(location = 3) out flat uvec4 out_draw; // see draw.glsl
 
 // Fog texture coordinates of a point: s from the view depth, t from the depth below the fog's surface
 // (engine's RB_CalcFogTexCoords; facts in the reference of the engine's behaviour).
@@ -25,6 +25,10 @@ vec2 fog_coordinates(Fog fog, RasterView view, vec3 world) {
     return vec2(s, t);
 }
 
+uint stage_texture(MaterialBuffers buffers, Stage stage, uint lightmap, float time) {
+    return (stage.flags & STAGE_WHITE) != 0 ? NO_TEXTURE : stage_image(buffers, stage, lightmap, time);
+}
+
 void main() {
     RasterView view = Views(push.view).view;
     Draw draw = Draws(view.draws).at[gl_InstanceIndex];
@@ -34,7 +38,7 @@ void main() {
         + instance.axis[2] * vertex.position.z + instance.origin;
     gl_Position = mat4(view.world_to_clip[0], view.world_to_clip[1], view.world_to_clip[2], view.world_to_clip[3]) * vec4(world, 1.0);
     out_clip = dot(view.clip_plane.xyz, world) - view.clip_plane.w;
-    out_draw = gl_InstanceIndex;
+    out_draw = uvec4(NO_TEXTURE, NO_TEXTURE, 0, draw.mode);
     out_uv = vec4(0.0);
     vec4 color = unpackUnorm4x8(vertex.color);
 
@@ -46,7 +50,14 @@ void main() {
         Stage first = stages.at[draw.stages[0]];
         out_color = stage_color(view.materials, first, instance, point);
         out_uv.xy = stage_texcoord(view.materials, first, instance, point);
-        if (draw.stage_count > 1) out_uv.zw = stage_texcoord(view.materials, stages.at[draw.stages[1]], instance, point);
+        out_draw.x = stage_texture(view.materials, first, draw.lightmap, point.time);
+        out_draw.z = first.sampler_index | first.alpha_func << 16 | draw.combine << 20;
+        if (draw.stage_count > 1) {
+            Stage second = stages.at[draw.stages[1]];
+            out_uv.zw = stage_texcoord(view.materials, second, instance, point);
+            out_draw.y = stage_texture(view.materials, second, draw.lightmap, point.time);
+            out_draw.z |= second.sampler_index << 8;
+        }
         if (draw.fog_adjust != FOG_ADJUST_NONE) {
             float through = 1.0 - fog_factor(fog_coordinates(Fogs(view.fogs).at[draw.fog - 1], view, world));
             if (draw.fog_adjust != FOG_ADJUST_ALPHA) out_color.rgb *= through;
@@ -67,7 +78,9 @@ void main() {
         out_uv.xy = fog_coordinates(fog, view, world);
         out_color = vec4(fog.color * view.identity_light, 1.0);
     } else {
-        out_color = color;
-        out_uv.xy = vertex.st;
+        bool lightmap = draw.mode == DRAW_LIGHTMAP;
+        out_color = lightmap ? vec4(1.0) : color;
+        out_uv.xy = lightmap ? vertex.lightmap : vertex.st;
+        out_draw.x = draw.argument;
     }
 }

@@ -328,6 +328,8 @@ pub mod constants {
         DRAW_IMAGE = 3;
         /// One colour (debugging aids).
         DRAW_PLAIN = 4;
+        /// The lightmap alone (`r_lightmap`).
+        DRAW_LIGHTMAP = 5;
         COMBINE_MODULATE = 0; COMBINE_ADD = 1;
         FOG_ADJUST_NONE = 0; FOG_ADJUST_RGB = 1; FOG_ADJUST_ALPHA = 2; FOG_ADJUST_RGBA = 3;
         /// The triangle belongs to the world (its vertex colours and lightmap are baked light).

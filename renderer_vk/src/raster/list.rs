@@ -7,7 +7,7 @@ use shaders::types::{Draw, Vertex};
 use super::pipelines::{CullFaces, Depth, State};
 use super::sky;
 use crate::api::DynamicLight;
-use crate::assets::{Combine, Material, Materials, RasterPass};
+use crate::assets::{Combine, Materials, RasterPass};
 use crate::scene::{DrawSurface, Geometry, View, ViewScene, VisibleSky};
 use shaderscript::{Cull, sort};
 
@@ -57,6 +57,15 @@ pub struct DrawList {
     pub vertices: Vec<Vertex>,
 }
 
+/// Debugging aids.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Aids {
+    /// Draw the edges of all triangles over everything (`r_showtris`).
+    pub edges: bool,
+    /// Draw lightmaps alone where there are any (`r_lightmap`).
+    pub lightmaps: bool,
+}
+
 /// What a group of surfaces has in common.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Group {
@@ -96,7 +105,7 @@ impl DrawList {
         materials: &Materials,
         static_indices: &[u32],
         identity_light: f32,
-        show_edges: bool,
+        aids: Aids,
     ) {
         self.vertices.extend_from_slice(&scene.vertices);
         let (before_sky, rest) = scene.surfaces.split_at(
@@ -104,11 +113,11 @@ impl DrawList {
                 .surfaces
                 .partition_point(|s| materials.get(s.material).sort < sort::SKY),
         );
-        self.add_surfaces(before_sky, scene, materials, static_indices, show_edges);
+        self.add_surfaces(before_sky, scene, materials, static_indices, aids);
         for visible in &scene.skies {
             self.add_sky(visible, &scene.view, materials, identity_light);
         }
-        self.add_surfaces(rest, scene, materials, static_indices, show_edges);
+        self.add_surfaces(rest, scene, materials, static_indices, aids);
     }
 
     fn add_surfaces(
@@ -117,7 +126,7 @@ impl DrawList {
         scene: &ViewScene,
         materials: &Materials,
         static_indices: &[u32],
-        show_edges: bool,
+        aids: Aids,
     ) {
         let mut rest = surfaces;
         while let Some(first) = rest.first() {
@@ -154,15 +163,7 @@ impl DrawList {
                 DepthRange::Normal
             };
             let span = (first_index, self.indices.len() as u32 - first_index);
-            self.add_group(
-                group,
-                materials.get(group.material),
-                span,
-                range,
-                lights,
-                scene,
-                show_edges,
-            );
+            self.add_group(group, materials, span, range, lights, scene, aids);
         }
     }
 
@@ -170,13 +171,14 @@ impl DrawList {
     fn add_group(
         &mut self,
         group: Group,
-        material: &Material,
+        materials: &Materials,
         span: (u32, u32),
         range: DepthRange,
         lights: u32,
         scene: &ViewScene,
-        show_edges: bool,
+        aids: Aids,
     ) {
+        let material = materials.get(group.material);
         if span.1 == 0 || material.sky.is_some() {
             return;
         }
@@ -192,6 +194,24 @@ impl DrawList {
         let opaque = material.sort <= sort::OPAQUE;
         let first_blends = material.passes.first().is_some_and(|p| p.blend.is_some());
         for pass in &material.passes {
+            if aids.lightmaps && group.lightmap != c::NO_TEXTURE && shows_lightmap(pass, materials)
+            {
+                let state = State {
+                    blend: None,
+                    depth: stage_depth(pass),
+                    depth_write: true,
+                    cull,
+                    offset: material.polygon_offset,
+                    wireframe: false,
+                };
+                let draw = Draw {
+                    mode: c::DRAW_LIGHTMAP,
+                    argument: group.lightmap,
+                    ..draw
+                };
+                self.push(state, range, span, draw);
+                break;
+            }
             let state = State {
                 blend: pass.blend,
                 depth: stage_depth(pass),
@@ -257,7 +277,7 @@ impl DrawList {
                 },
             );
         }
-        if show_edges {
+        if aids.edges {
             let state = State {
                 blend: None,
                 depth: Depth::Always,
@@ -380,6 +400,20 @@ pub fn stage_draw(pass: &RasterPass, draw: Draw) -> Draw {
         },
         ..draw
     }
+}
+
+/// Whether one of the pass's stages draws the lightmap.
+fn shows_lightmap(pass: &RasterPass, materials: &Materials) -> bool {
+    let stages = &materials.arrays().stages;
+    let shows = |&&stage: &&u32| {
+        stages
+            .get(stage as usize)
+            .is_some_and(|s| s.image_count == 0)
+    };
+    pass.stages
+        .iter()
+        .take(pass.stage_count as usize)
+        .any(|stage| shows(&stage))
 }
 
 /// The depth comparison of a stage.

@@ -13,7 +13,7 @@ pub(crate) mod sky;
 use glam::{Mat4, Vec3};
 use shaders::types::{Instance, MaterialBuffers, RasterLight, RasterView};
 
-pub use list::DrawList;
+pub use list::{Aids, DrawList};
 pub use overlay::{Overlay, Picture2d, overlay_instance};
 pub use present::Present;
 
