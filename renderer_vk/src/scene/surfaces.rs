@@ -54,7 +54,7 @@ impl LocalView {
     /// Bits of the lights that reach a surface.
     fn lights_on(&self, surface: &WorldSurface) -> u32 {
         let mut bits = self.lights_at(&surface.bounds);
-        if let Some(plane) = &surface.plane {
+        if let Some(plane) = surface.plane.filter(|_| surface.flat) {
             for (i, (origin, radius)) in self.lights.iter().take(MAX_LIGHT_BITS).enumerate() {
                 if plane.distance(*origin).abs() > *radius {
                     bits &= !(1 << i);
@@ -68,10 +68,7 @@ impl LocalView {
         if outside(&surface.bounds, &self.frustum) {
             return true;
         }
-        let Some(plane) = surface
-            .plane
-            .filter(|_| surface.kind == SurfaceKind::Planar)
-        else {
+        let Some(plane) = surface.plane.filter(|_| surface.flat) else {
             return false;
         };
         let distance = plane.distance(self.eye);

@@ -130,6 +130,7 @@ impl WorldData {
                     maxs: stored.maxs,
                 },
                 plane: stored.plane,
+                flat: is_flat(&relit, stored),
                 kind: stored.kind,
                 model: stored.model,
                 deformed: registered.deforms(),
@@ -171,6 +172,23 @@ impl WorldData {
         }
         data
     }
+}
+
+/// Whether every triangle of a surface lies in its plane, within a unit, and faces as it does.
+fn is_flat(relit: &RelitWorld, surface: &relight::world::WorldSurface) -> bool {
+    let Some(plane) = surface.plane else {
+        return false;
+    };
+    let first = surface.first_index as usize / 3;
+    (first..first + surface.num_indices as usize / 3)
+        .filter_map(|triangle| relit.triangle(triangle))
+        .all(|[a, b, c]| {
+            let front = (c - a).cross(b - a);
+            // slivers face nowhere
+            let faces = front.dot(plane.normal) >= 0.99 * front.length();
+            let sliver = front.length_squared() < 1e-3;
+            (faces || sliver) && [a, b, c].iter().all(|p| plane.distance(*p).abs() <= 1.0)
+        })
 }
 
 fn make_lightmaps<S: LightmapSink>(

@@ -95,6 +95,9 @@ pub struct WorldSurface {
     pub bounds: Bounds,
     /// Plane of planar surfaces, normal to the front.
     pub plane: Option<Plane>,
+    /// Every triangle lies in `plane` and faces as it does. Compilers also write "planar" surfaces that bend, or whose
+    /// stored normal is not their triangles'; those cannot be culled as a whole.
+    pub flat: bool,
     /// What the map stores it as.
     pub kind: SurfaceKind,
     /// Brush model that it belongs to; 0 is the world.
