@@ -186,8 +186,21 @@ pub struct TraceView {
     pub target_height: u32,
     /// Clamped, with mip levels: for the images of sky boxes.
     pub sky_sampler: u32,
-    /// Keeps the size a multiple of eight without hidden bytes.
-    pub padding: u32,
+    pub image_last_position: u32,
+    pub image_last_surface: u32,
+    /// Filtered light of the last frame.
+    pub image_last_light: u32,
+    pub image_moments: u32,
+    pub image_last_moments: u32,
+    /// Light of this and earlier frames, and its variance.
+    pub image_filter: u32,
+    /// The light that the picture is made with, once filtered.
+    pub image_lit: u32,
+    /// Camera of the last frame.
+    pub last_eye: Vec3,
+    pub last_forward: Vec3,
+    pub last_left: Vec3,
+    pub last_up: Vec3,
 }
 
 /// Names of constants used on both sides.
@@ -214,6 +227,8 @@ pub mod constants {
     pub const VIEW_FAST_SKY: u32 = 16;
     pub const VIEW_EXPOSURE_RESET: u32 = 32;
     pub const VIEW_FULLBRIGHT: u32 = 64;
+    pub const VIEW_HISTORY: u32 = 128;
+    pub const VIEW_DENOISE: u32 = 256;
     pub const SAMPLING_UNIFORM: u32 = 0;
     pub const SAMPLING_RESAMPLED: u32 = 1;
     pub const SAMPLING_ALL: u32 = 2;

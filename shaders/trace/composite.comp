@@ -10,7 +10,9 @@ void main() {
     vec3 radiance = imageLoad(images_rgba32f[VIEW.image_front], pixel).rgb;
     GBufferPixel g = gbuffer_read(pixel);
     if (g.path >= 0.0) {
-        vec3 light = imageLoad(images_rgba16f[VIEW.image_direct], pixel).rgb + imageLoad(images_rgba16f[VIEW.image_indirect], pixel).rgb;
+        vec3 light;
+        if ((VIEW.flags & VIEW_DENOISE) != 0) light = imageLoad(images_rgba16f[VIEW.image_lit], pixel).rgb;
+        else light = imageLoad(images_rgba16f[VIEW.image_direct], pixel).rgb + imageLoad(images_rgba16f[VIEW.image_indirect], pixel).rgb;
         radiance += g.albedo * light;
     }
     // one broken number must not spread through exposure and accumulation

@@ -36,7 +36,10 @@ struct TraceView {
     uint image_position; uint image_surface; uint image_front; uint image_direct; uint image_indirect; uint image_hdr;
     uint image_accumulation; uint image_target;
     float exposure_bias; float exposure_blend; float light_scale;
-    uint target_width; uint target_height; uint sky_sampler; uint padding;
+    uint target_width; uint target_height; uint sky_sampler;
+    uint image_last_position; uint image_last_surface; uint image_last_light; uint image_moments; uint image_last_moments;
+    uint image_filter; uint image_lit;
+    vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up;
 };
 
 // What a geometry's triangles are to a ray.
@@ -48,7 +51,7 @@ const uint MASK_SOLID = 0x01, MASK_TRANSLUCENT = 0x02, MASK_SKY = 0x04, MASK_FIR
 const uint LIGHT_TWO_SIDED = 1, LIGHT_SKY = 2;
 // Bits of TraceView.flags.
 const uint VIEW_JITTER = 1, VIEW_FIRST_PERSON = 2, VIEW_ACCUMULATE = 4, VIEW_AUTO_EXPOSURE = 8, VIEW_FAST_SKY = 16,
-    VIEW_EXPOSURE_RESET = 32, VIEW_FULLBRIGHT = 64;
+    VIEW_EXPOSURE_RESET = 32, VIEW_FULLBRIGHT = 64, VIEW_HISTORY = 128, VIEW_DENOISE = 256;
 const uint SAMPLING_UNIFORM = 0, SAMPLING_RESAMPLED = 1, SAMPLING_ALL = 2;
 // Triangle.flags: bits from here on hold the drawing rank, sort value times 8, at most 255.
 const uint TRIANGLE_RANK_SHIFT = 8;

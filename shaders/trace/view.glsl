@@ -22,7 +22,12 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Int
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Indices { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Chances { float at[]; };
 
+#ifdef OWN_PUSH
+// the steps of the wavelet filter: bindless images, and the distance between taps in pixels
+layout(push_constant, scalar) uniform Push { uint64_t view; uint source; uint target; uint spacing; } push;
+#else
 layout(push_constant, scalar) uniform Push { uint64_t view; } push;
+#endif
 #define VIEW (TraceViews(push.view).view)
 
 const float PI = 3.14159265358979;

@@ -8,16 +8,20 @@ pub struct Targets {
     pub width: u32,
     /// Pixels.
     pub height: u32,
-    /// World position and length of the way from the eye.
-    pub position: Image,
-    /// Packed normals and albedo.
-    pub surface: Image,
+    /// World position and length of the way from the eye; of this frame and the last.
+    pub position: [Image; 2],
+    /// Packed normals and albedo; of this frame and the last.
+    pub surface: [Image; 2],
     /// Radiance of what is in front of the surface and of its own glow; alpha: what comes through of the background.
     pub front: Image,
     /// Direct light.
     pub direct: Image,
     /// Bounced light.
     pub indirect: Image,
+    /// Light that the denoiser works on, with its variance: the last frame's and two that change places.
+    pub light: [Image; 3],
+    /// Mean and mean square of the light's luminance over time, number of frames; of this frame and the last.
+    pub moments: [Image; 2],
     /// Linear picture.
     pub hdr: Image,
     /// Sum of frames in reference mode.
@@ -40,13 +44,37 @@ impl Targets {
         Ok(Self {
             width,
             height,
-            position: make("trace position", Format::Rgba32F)?,
-            surface: make("trace surface", Format::Rgba32Uint)?,
+            position: [
+                make("trace position", Format::Rgba32F)?,
+                make("trace last position", Format::Rgba32F)?,
+            ],
+            surface: [
+                make("trace surface", Format::Rgba32Uint)?,
+                make("trace last surface", Format::Rgba32Uint)?,
+            ],
+            light: [
+                make("trace light 0", Format::Rgba16F)?,
+                make("trace light 1", Format::Rgba16F)?,
+                make("trace light 2", Format::Rgba16F)?,
+            ],
+            moments: [
+                make("trace moments", Format::Rgba16F)?,
+                make("trace last moments", Format::Rgba16F)?,
+            ],
             front: make("trace front", Format::Rgba32F)?,
             direct: make("trace direct", Format::Rgba16F)?,
             indirect: make("trace indirect", Format::Rgba16F)?,
             hdr: make("trace hdr", Format::Rgba32F)?,
             accumulation: make("trace accumulation", Format::Rgba32F)?,
         })
+    }
+
+    /// What this frame has written becomes what the last one wrote. `filtered`: the image of `light` that the next
+    /// frame starts from.
+    pub fn advance(&mut self, filtered: usize) {
+        self.position.swap(0, 1);
+        self.surface.swap(0, 1);
+        self.moments.swap(0, 1);
+        self.light.swap(0, filtered.min(2));
     }
 }

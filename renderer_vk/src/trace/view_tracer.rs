@@ -10,7 +10,7 @@ use super::accel::{Accel, AccelOutput};
 use super::geometry::StaticGeometry;
 use super::input::MaterialTable;
 use super::lights::{MapLights, dynamic_lights};
-use super::passes::{Accumulate, Composite, Direct, Exposure, Indirect, Primary, ToneMap};
+use super::passes::{Accumulate, Composite, Denoise, Direct, Exposure, Indirect, Primary, ToneMap};
 use super::targets::Targets;
 use crate::gpu::{Buffer, BufferDesc, BufferUsage, Device, Error, Image, Memory, Recorder};
 use crate::scene::ViewScene;
@@ -32,6 +32,7 @@ pub struct ViewTracer {
     primary: Primary,
     direct: Direct,
     indirect: Indirect,
+    denoise: Denoise,
     composite: Composite,
     accumulate: Accumulate,
     exposure: Exposure,
@@ -42,6 +43,8 @@ pub struct ViewTracer {
     no_lights: MapLights,
     frame: u32,
     last_time: f32,
+    /// Camera of the last frame whose light the denoiser can go on from.
+    history: Option<[Vec3; 4]>,
     /// Hash of everything that the accumulated frames show, and how many there are.
     accumulated: (u64, u32),
 }
@@ -62,6 +65,7 @@ impl ViewTracer {
             primary: Primary::new(device)?,
             direct: Direct::new(device)?,
             indirect: Indirect::new(device)?,
+            denoise: Denoise::new(device)?,
             composite: Composite::new(device)?,
             accumulate: Accumulate::new(device)?,
             exposure: Exposure::new(device)?,
@@ -80,6 +84,7 @@ impl ViewTracer {
             no_lights: MapLights::none(device)?,
             frame: 0,
             last_time: 0.0,
+            history: None,
             accumulated: (0, 0),
         })
     }
@@ -97,6 +102,7 @@ impl ViewTracer {
     /// Forgets what was accumulated and lets exposure start anew: the map has changed.
     pub fn reset(&mut self) {
         self.accumulated = (0, 0);
+        self.history = None;
         self.exposure_started = false;
     }
 
@@ -136,6 +142,7 @@ impl ViewTracer {
             .is_none_or(|t| [t.width, t.height] != size)
         {
             self.targets = Some(Targets::new(&self.device, width, height)?);
+            self.history = None;
             self.accumulated = (0, 0);
         }
         let map = map.filter(|_| view.has_world);
@@ -158,6 +165,11 @@ impl ViewTracer {
         self.primary.record(rec, address, size)?;
         self.direct.record(rec, address, size)?;
         self.indirect.record(rec, address, size)?;
+        if !settings.rt_reference
+            && let Some(targets) = &self.targets
+        {
+            self.denoise.record(rec, address, targets)?;
+        }
         self.composite.record(rec, address, size)?;
         if settings.rt_reference {
             self.accumulate.record(rec, address, size)?;
@@ -166,6 +178,10 @@ impl ViewTracer {
         self.tone_map.record(rec, address, size)?;
         self.frame = self.frame.wrapping_add(1);
         self.last_time = view.time;
+        self.history = (!settings.rt_reference).then(|| camera_frame(view));
+        if let Some(targets) = &mut self.targets {
+            targets.advance(Denoise::HISTORY);
+        }
         self.exposure_started = true;
         Ok(())
     }
@@ -227,6 +243,10 @@ impl ViewTracer {
         set(t::VIEW_EXPOSURE_RESET, !self.exposure_started);
         set(t::VIEW_FAST_SKY, settings.fast_sky);
         set(t::VIEW_FULLBRIGHT, settings.fullbright);
+        set(t::VIEW_DENOISE, !settings.rt_reference);
+        set(t::VIEW_HISTORY, self.history.is_some());
+        let [last_eye, last_forward, last_left, last_up] = self.history.unwrap_or([Vec3::ZERO; 4]);
+        let [eye, forward, left, up] = camera_frame(view);
         let passed = view.time - self.last_time;
         // the picture settles at once where frames must not depend on those before them
         let exposure_blend = if settings.rt_reference || !self.exposure_started {
@@ -257,10 +277,10 @@ impl ViewTracer {
             light_chances: lights.chances.address(),
             exposure: self.exposure_state.address(),
             materials: materials.buffers(),
-            eye: camera.origin,
-            forward: camera.axis[0],
-            left: camera.axis[1] * camera.tan_x,
-            up: camera.axis[2] * camera.tan_y,
+            eye,
+            forward,
+            left,
+            up,
             width: targets.width,
             height: targets.height,
             target_x: camera.viewport[0],
@@ -292,8 +312,8 @@ impl ViewTracer {
                 LightSampling::Resampled => t::SAMPLING_RESAMPLED,
                 LightSampling::All => t::SAMPLING_ALL,
             },
-            image_position: targets.position.storage_index(),
-            image_surface: targets.surface.storage_index(),
+            image_position: targets.position[0].storage_index(),
+            image_surface: targets.surface[0].storage_index(),
             image_front: targets.front.storage_index(),
             image_direct: targets.direct.storage_index(),
             image_indirect: targets.indirect.storage_index(),
@@ -306,9 +326,31 @@ impl ViewTracer {
             target_width: target.width(),
             target_height: target.height(),
             sky_sampler: materials.sky_sampler(),
-            padding: 0,
+            image_last_position: targets.position[1].storage_index(),
+            image_last_surface: targets.surface[1].storage_index(),
+            image_last_light: targets.light[0].storage_index(),
+            image_moments: targets.moments[0].storage_index(),
+            image_last_moments: targets.moments[1].storage_index(),
+            image_filter: targets.light[Denoise::FIRST].storage_index(),
+            image_lit: targets.light[Denoise::RESULT].storage_index(),
+            last_eye,
+            last_forward,
+            last_left,
+            last_up,
         })
     }
+}
+
+/// Eye, forward, and left and up scaled by the tangents of the half angles.
+fn camera_frame(view: &ViewScene) -> [Vec3; 4] {
+    let camera = &view.view;
+    let [forward, left, up] = camera.axis;
+    [
+        camera.origin,
+        forward,
+        left * camera.tan_x,
+        up * camera.tan_y,
+    ]
 }
 
 /// Width of a pixel's cone at distance 1.

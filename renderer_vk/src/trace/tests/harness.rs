@@ -75,6 +75,17 @@ impl Gpu {
         settings: &Settings,
         frames: u32,
     ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
+        self.render_path(scene, settings, frames, |_, _| {})
+    }
+
+    /// As [`render`](Self::render), with a camera that `place` moves before each frame.
+    pub fn render_path(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+        frames: u32,
+        place: impl Fn(u32, &mut RefDef),
+    ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
         let uploaded = scene.upload(&self.device);
         let [width, height] = [scene.def.width as u32, scene.def.height as u32];
         let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
@@ -83,8 +94,10 @@ impl Gpu {
             &ImageDesc::new("test target", width, height, Format::Rgba8, usage),
         )
         .expect("target");
-        let view = scene.view();
-        for _ in 0..frames {
+        let mut view = scene.view();
+        for frame in 0..frames {
+            place(frame, &mut view.def);
+            view.view = View::new(&view.def, 4.0, 10000.0);
             let mut rec = self.ring.begin().expect("frame");
             let map = TracedMap {
                 geometry: &uploaded.geometry,

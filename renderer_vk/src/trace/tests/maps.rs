@@ -1,5 +1,6 @@
 //! Real maps: whether they look lit, and the same for every estimator. With `RELIGHT_TRACE_PICTURES=folder` the
-//! pictures are kept there; `RELIGHT_TRACE_MAPS=a,b` chooses maps, `RELIGHT_TRACE_FRAMES=n` how long they settle.
+//! pictures are kept there; `RELIGHT_TRACE_MAPS=a,b` chooses maps, `RELIGHT_TRACE_FRAMES=n` how long they settle,
+//! `RELIGHT_TRACE_LIVE` takes the denoiser in place of accumulation.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -86,7 +87,7 @@ fn maps_are_lit() {
     let scripts = Arc::new(scripts);
     let settings = Settings {
         rt: true,
-        rt_reference: true,
+        rt_reference: std::env::var_os("RELIGHT_TRACE_LIVE").is_none(),
         ..Settings::default()
     };
     for map in maps {
