@@ -69,7 +69,12 @@ pub struct Internal {
     pub axes: u32,
     /// The white image with vertex colour, for the 2D overlay.
     pub white: u32,
+    /// The game's material for planar shadows (`cg_shadows 3`), if it has one.
+    pub shadow: Option<u32>,
 }
+
+/// Name of the script that the engine draws planar shadows with.
+const SHADOW_MATERIAL: &str = "projectionShadow";
 
 impl Materials {
     /// The default material and the renderer's own ones. `scripts` are the game's.
@@ -128,6 +133,10 @@ impl Materials {
         }
         materials.internal.white =
             materials.add("*white", white, LightmapClass::TwoD, false, None, source);
+        if materials.scripts.library().find(SHADOW_MATERIAL).is_some() {
+            let shadow = materials.find(source, SHADOW_MATERIAL, LightmapClass::None, true);
+            materials.internal.shadow = Some(shadow);
+        }
         materials
     }
 

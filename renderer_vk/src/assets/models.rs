@@ -64,7 +64,14 @@ impl Models {
         if let Some(&handle) = self.by_name.get(name) {
             return self.usable(handle);
         }
-        let model = load_lods(files, materials, source, name);
+        let model = load_lods(files, materials, source, name).or_else(|| {
+            // the engine tries its other kinds of model under the same name
+            let other = format!("{}.md3", shaderscript::strip_extension(name));
+            let other = Some(other).filter(|other| !other.eq_ignore_ascii_case(name))?;
+            let model = load_lods(files, materials, source, &other)?;
+            log::info!("{name}: not found; {other} is used");
+            Some(model)
+        });
         let handle = self.push(name, model);
         self.usable(handle)
     }

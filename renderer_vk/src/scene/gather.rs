@@ -25,6 +25,7 @@ const FAR_WITHOUT_WORLD: f32 = 2048.0;
 pub(super) struct Scratch {
     deform: DeformScratch,
     pending: Vec<PendingDeform>,
+    lights: Vec<(Vec3, f32)>,
 }
 
 /// The views of a scene: at most one through a portal or mirror (classic look), then the main one.
@@ -90,6 +91,9 @@ struct Gatherer<'a> {
     view: View,
     /// The world, when the view shows it.
     world: Option<&'a WorldData>,
+    frustum: [Vec4; 4],
+    /// The frustum counts: not for the traced look, whose rays go anywhere.
+    culling: bool,
 }
 
 impl<'a> Gatherer<'a> {
@@ -123,6 +127,8 @@ impl<'a> Gatherer<'a> {
             look,
             view,
             world: input.world.filter(|_| shows_world),
+            frustum: view.frustum(),
+            culling: look == Look::Classic && !settings.no_cull,
         }
     }
 
@@ -163,25 +169,21 @@ impl<'a> Gatherer<'a> {
             .push(entity::world_instance(&self.view, out.time));
     }
 
-    /// The frustum's planes; none for the traced look, whose rays go anywhere.
-    fn frustum(&self) -> Vec<Vec4> {
-        if self.look == Look::Traced || self.input.settings.no_cull {
-            Vec::new()
-        } else {
-            self.view.frustum().to_vec()
-        }
+    /// The frustum's planes; none when nothing is culled.
+    fn planes(&self) -> &[Vec4] {
+        if self.culling { &self.frustum } else { &[] }
     }
 
     /// Finds the visible surfaces and sets the far plane to the farthest corner of what is visible.
     fn find_visible(&mut self, world: &WorldData, pvs_origin: Vec3, out: &mut ViewScene) {
         let settings = self.input.settings;
-        let frustum = self.frustum();
+        let frustum: &[Vec4] = if self.culling { &self.frustum } else { &[] };
         self.visible.gather(
             world,
             &VisibleQuery {
                 pvs_origin,
                 area_mask: &self.def.area_mask,
-                frustum: &frustum,
+                frustum,
                 no_vis: settings.no_vis,
                 locked: settings.lock_pvs,
             },
@@ -205,14 +207,21 @@ impl<'a> Gatherer<'a> {
         if !settings.draw_world {
             return;
         }
+        let mut pending = std::mem::take(&mut self.scratch.pending);
+        let mut lights = std::mem::take(&mut self.scratch.lights);
+        surfaces::local_lights(
+            self.lights,
+            Vec3::ZERO,
+            &[Vec3::X, Vec3::Y, Vec3::Z],
+            &mut lights,
+        );
         let local = LocalView {
             eye: self.view.origin,
-            frustum: self.frustum(),
-            lights: self.lights.iter().map(|l| (l.origin, l.radius)).collect(),
+            frustum: self.planes(),
+            lights: &lights,
             forward: self.view.axis[0],
         };
         let run = self.run(world, &local, 0, WORLD_ENTITY);
-        let mut pending = std::mem::take(&mut self.scratch.pending);
         match self.look {
             Look::Classic => {
                 for &surface in &self.visible.surfaces {
@@ -230,12 +239,13 @@ impl<'a> Gatherer<'a> {
         }
         self.add_deformed(world, &mut pending, 0, None, out);
         self.scratch.pending = pending;
+        self.scratch.lights = lights;
     }
 
     fn run<'b>(
         &self,
         world: &'b WorldData,
-        local: &'b LocalView,
+        local: &'b LocalView<'b>,
         instance: u32,
         entity: u32,
     ) -> SurfaceRun<'b>
@@ -421,8 +431,8 @@ impl<'a> Gatherer<'a> {
             return;
         }
         match self.input.models.get(entity.model) {
+            Some(Model::Mesh { lods }) => self.add_mesh(number, entity, hidden, lods, out),
             _ if hidden => {}
-            Some(Model::Mesh { lods }) => self.add_mesh(number, entity, lods, out),
             Some(Model::Inline { model, .. }) => self.add_brush_model(number, entity, *model, out),
             None => {
                 let instance = self.push_instance(entity, false, out);
@@ -463,12 +473,17 @@ impl<'a> Gatherer<'a> {
         &mut self,
         number: u32,
         entity: &RefEntity,
+        hidden: bool,
         lods: &[std::sync::Arc<Md3Lod>],
         out: &mut ViewScene,
     ) {
         let Some(finest) = lods.first() else {
             return;
         };
+        let shadow = self.shadow_material(entity);
+        if hidden && shadow.is_none() {
+            return;
+        }
         let frames = Frames::of(entity, finest.md3.frames.len());
         let Some(frame) = finest.md3.frames.get(frames.new) else {
             return;
@@ -494,15 +509,30 @@ impl<'a> Gatherer<'a> {
         });
         let instance = self.push_instance(entity, false, out);
         for (surface, own) in lod.md3.surfaces.iter().zip(&lod.materials) {
+            let materials = self.input.materials;
             let asked = self.surface_material(entity, &surface.name, own);
-            let material = self.input.materials.resolve(asked);
-            let raw = RawMesh::begin(out, material, instance, fog);
-            let base = count(out.vertices.len());
-            key_frames::append_vertices(surface, frames, &mut out.vertices);
-            out.indices
-                .extend(surface.triangles.iter().flatten().map(|i| base + i));
-            self.finish_and_list(raw, asked, number, Some(entity), out);
+            // only opaque surfaces outside of fog cast a planar shadow
+            let opaque = materials.get(asked).sort == shaderscript::sort::OPAQUE;
+            let shadow = shadow.filter(|_| opaque && fog == 0);
+            for asked in shadow.into_iter().chain((!hidden).then_some(asked)) {
+                let raw = RawMesh::begin(out, materials.resolve(asked), instance, fog);
+                let base = count(out.vertices.len());
+                key_frames::append_vertices(surface, frames, &mut out.vertices);
+                out.indices
+                    .extend(surface.triangles.iter().flatten().map(|i| base + i));
+                self.finish_and_list(raw, asked, number, Some(entity), out);
+            }
         }
+    }
+
+    /// The material that an entity casts a planar shadow with, if it casts one (`cg_shadows 3`). Traced views have
+    /// real ones.
+    fn shadow_material(&self, entity: &RefEntity) -> Option<u32> {
+        let casts = self.look == Look::Classic
+            && self.input.settings.shadows == 3
+            && entity.renderfx & renderfx::SHADOW_PLANE != 0
+            && entity.shadow_plane.is_finite();
+        self.input.materials.internal().shadow.filter(|_| casts)
     }
 
     /// The material of a model's surface: the entity's own, its skin's, or the model's.
@@ -533,7 +563,7 @@ impl<'a> Gatherer<'a> {
         let corners = bounds.corners().map(|c| {
             entity.origin + entity.axis[0] * c.x + entity.axis[1] * c.y + entity.axis[2] * c.z
         });
-        self.frustum().iter().any(|plane| {
+        self.planes().iter().any(|plane| {
             corners
                 .iter()
                 .all(|corner| plane.truncate().dot(*corner) < plane.w)
@@ -567,46 +597,29 @@ impl<'a> Gatherer<'a> {
                 pending.extend(deformed.filter_map(|s| self.traced_deform(world, s)));
             }
             Look::Classic => {
-                let local = self.local_view(entity, out, instance, &brush.bounds);
+                let mut lights = std::mem::take(&mut self.scratch.lights);
+                surfaces::local_lights(self.lights, entity.origin, &entity.axis, &mut lights);
+                // a model that no light reaches has surfaces that none reaches
+                if surfaces::lights_at(&lights, &brush.bounds) == 0 {
+                    lights.clear();
+                }
+                // its box was tested; its surfaces are tested by facing alone
+                let placed = out.instances.get(instance as usize);
+                let local = LocalView {
+                    eye: placed.map_or(Vec3::ZERO, |i| i.viewer),
+                    frustum: &[],
+                    lights: &lights,
+                    forward: placed.map_or(Vec3::X, |i| entity::into_axes(i, self.view.axis[0])),
+                };
                 let run = self.run(world, &local, instance, number);
                 for surface in range {
                     pending.extend(run.add(surface, out));
                 }
+                self.scratch.lights = lights;
             }
         }
         self.add_deformed(world, &mut pending, instance, Some(entity), out);
         self.scratch.pending = pending;
-    }
-
-    /// The view in a brush model's space. Its box was tested; its surfaces are tested by facing alone.
-    fn local_view(
-        &self,
-        entity: &RefEntity,
-        out: &ViewScene,
-        instance: u32,
-        bounds: &Bounds,
-    ) -> LocalView {
-        let viewer = out
-            .instances
-            .get(instance as usize)
-            .map_or(Vec3::ZERO, |i| i.viewer);
-        let lights = surfaces::local_lights(self.lights, entity.origin, &entity.axis);
-        let forward = self.view.axis[0];
-        let mut local = LocalView {
-            eye: viewer,
-            frustum: Vec::new(),
-            lights,
-            forward: Vec3::new(
-                forward.dot(entity.axis[0]),
-                forward.dot(entity.axis[1]),
-                forward.dot(entity.axis[2]),
-            ),
-        };
-        // a model that no light reaches has surfaces that none reaches
-        if local.lights_at(bounds) == 0 {
-            local.lights.clear();
-        }
-        local
     }
 }
 

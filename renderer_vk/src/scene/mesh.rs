@@ -1,7 +1,8 @@
 //! Meshes that move: finished (deformed) and put on the view's lists.
 
+use glam::Vec3;
 use shaders::types::Vertex;
-use shaderscript::eval::{self, DeformContext, DeformVertex};
+use shaderscript::eval::{self, DeformContext, DeformVertex, ShadowProjection};
 
 use super::entity::into_axes;
 use super::{DynamicMesh, View, ViewScene};
@@ -128,7 +129,11 @@ fn deform(
         view_axes: view.axis.map(|axis| into_axes(&instance, axis)),
         mirrored: view.mirrored,
         axis_length: scaled.map_or(1.0, |e| e.axis[0].length()),
-        shadow: None,
+        shadow: entity.map(|e| ShadowProjection {
+            up: into_axes(&instance, Vec3::Z),
+            ground_distance: e.origin.z - e.shadow_plane,
+            light: instance.light_direction,
+        }),
         texts: &texts,
     };
     eval::deform(&material.shader.deforms, vertices, indices, &context);

@@ -25,30 +25,35 @@ pub(super) fn sort_key(rank: u32, entity: u32, fog: u32, lit: bool) -> u64 {
 }
 
 /// Where surfaces are seen from, in the space of their model.
-pub(super) struct LocalView {
+pub(super) struct LocalView<'a> {
     /// Eye.
     pub eye: Vec3,
     /// Planes pointing inwards; empty when nothing is culled.
-    pub frustum: Vec<Vec4>,
+    pub frustum: &'a [Vec4],
     /// Dynamic lights in the model's space: origin and radius.
-    pub lights: Vec<(Vec3, f32)>,
+    pub lights: &'a [(Vec3, f32)],
     /// Unit view direction.
     pub forward: Vec3,
 }
 
-impl LocalView {
+/// Bits of the lights (origin and radius) that reach a box.
+pub(super) fn lights_at(lights: &[(Vec3, f32)], bounds: &Bounds) -> u32 {
+    lights
+        .iter()
+        .take(MAX_LIGHT_BITS)
+        .enumerate()
+        .filter(|(_, (origin, radius))| {
+            let nearest = origin.clamp(bounds.mins, bounds.maxs.max(bounds.mins));
+            // the engine compares with a box around the light
+            (nearest - *origin).abs().max_element() <= *radius
+        })
+        .fold(0, |bits, (i, _)| bits | 1 << i)
+}
+
+impl LocalView<'_> {
     /// Bits of the lights that reach a box.
     pub fn lights_at(&self, bounds: &Bounds) -> u32 {
-        self.lights
-            .iter()
-            .take(MAX_LIGHT_BITS)
-            .enumerate()
-            .filter(|(_, (origin, radius))| {
-                let nearest = origin.clamp(bounds.mins, bounds.maxs.max(bounds.mins));
-                // the engine compares with a box around the light
-                (nearest - *origin).abs().max_element() <= *radius
-            })
-            .fold(0, |bits, (i, _)| bits | 1 << i)
+        lights_at(self.lights, bounds)
     }
 
     /// Bits of the lights that reach a surface.
@@ -65,7 +70,7 @@ impl LocalView {
     }
 
     fn culls(&self, surface: &WorldSurface, cull: Cull) -> bool {
-        if outside(&surface.bounds, &self.frustum) {
+        if outside(&surface.bounds, self.frustum) {
             return true;
         }
         let Some(plane) = surface.plane.filter(|_| surface.flat) else {
@@ -84,7 +89,7 @@ impl LocalView {
 pub(super) struct SurfaceRun<'a> {
     pub world: &'a WorldData,
     pub materials: &'a Materials,
-    pub local: &'a LocalView,
+    pub local: &'a LocalView<'a>,
     /// Index of the instance.
     pub instance: u32,
     /// The engine's entity number.
@@ -197,20 +202,19 @@ pub(super) fn push_mesh_surface(
     });
 }
 
-/// Dynamic lights in a space given by an origin and axes.
+/// Replaces `out` by the dynamic lights in a space given by an origin and axes.
 pub(super) fn local_lights(
     lights: &[DynamicLight],
     origin: Vec3,
     axis: &[Vec3; 3],
-) -> Vec<(Vec3, f32)> {
-    lights
-        .iter()
-        .map(|light| {
-            let to = light.origin - origin;
-            let local = Vec3::new(to.dot(axis[0]), to.dot(axis[1]), to.dot(axis[2]));
-            (local, light.radius)
-        })
-        .collect()
+    out: &mut Vec<(Vec3, f32)>,
+) {
+    out.clear();
+    out.extend(lights.iter().map(|light| {
+        let to = light.origin - origin;
+        let local = Vec3::new(to.dot(axis[0]), to.dot(axis[1]), to.dot(axis[2]));
+        (local, light.radius)
+    }));
 }
 
 #[cfg(test)]
@@ -239,8 +243,8 @@ mod tests {
     fn lights_reach_boxes() {
         let local = LocalView {
             eye: Vec3::ZERO,
-            frustum: Vec::new(),
-            lights: vec![(Vec3::ZERO, 10.0), (Vec3::X * 100.0, 10.0)],
+            frustum: &[],
+            lights: &[(Vec3::ZERO, 10.0), (Vec3::X * 100.0, 10.0)],
             forward: Vec3::X,
         };
         let at = |x: f32| Bounds {

@@ -30,6 +30,12 @@ t/sprite
   { map t/wall.tga
     blendFunc add }
 }
+projectionShadow
+{
+  deformVertexes projectionShadow
+  { map t/wall.tga
+    blendFunc blend }
+}
 t/sky { surfaceparm sky
   skyParms - 200 -
   { map t/wall.tga } }
@@ -390,6 +396,41 @@ fn persons_show_where_they_should() {
             .filter(|m| m.world_surface == Some(7))
             .count(),
         1
+    );
+}
+
+#[test]
+fn models_cast_planar_shadows_when_asked() {
+    let mut game = game();
+    let thing = game.model("m/thing.md3");
+    let none = RefDef {
+        flags: rdflags::NO_WORLD_MODEL,
+        ..def()
+    };
+    let standing = RefEntity {
+        model: thing,
+        renderfx: renderfx::SHADOW_PLANE | renderfx::THIRD_PERSON,
+        origin: Vec3::new(0.0, 0.0, 40.0),
+        shadow_plane: 10.0,
+        ..entity(EntityKind::Model)
+    };
+    let mut scene = Scene::new();
+    scene.add_entity(&standing);
+    let views = gather(&mut scene, &game, None, &none, Look::Classic);
+    assert!(views[0].meshes.is_empty());
+    game.settings.shadows = 3;
+    scene.add_entity(&standing);
+    let views = gather(&mut scene, &game, None, &none, Look::Classic);
+    let [mesh] = views[0].meshes.as_slice() else {
+        panic!("no shadow");
+    };
+    assert_eq!(Some(mesh.material), game.materials.internal().shadow);
+    // without any light the model is flattened straight down? there is none to go by: it keeps to the plane's height
+    let first = mesh.first_vertex as usize;
+    let flat = &views[0].vertices[first..first + mesh.vertex_count as usize];
+    assert!(
+        flat.iter().all(|v| (v.position.z - -30.0).abs() < 1e-3),
+        "{flat:?}"
     );
 }
 

@@ -7,8 +7,11 @@ use glam::Vec3;
 use q3bsp::PatchMesh;
 use relight::world::WorldSurface;
 
-/// Most index lists of one curve. Curves with more distinct errors skip some levels towards the finer side.
-const MAX_LEVELS: usize = 24;
+/// Most indices that the lists of one curve may have together. A curve with so many vertices and so many distinct
+/// errors that this is too few skips some levels towards the finer side.
+const MAX_INDICES: usize = 1 << 18;
+/// Least number of levels of a curve that needs more than one.
+const MIN_LEVELS: usize = 8;
 
 /// One index list.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,7 +46,9 @@ impl PatchLod {
         errors.dedup();
         let finest = errors.len() - 1;
         // keep the finest; with too many, every n-th counted from there
-        let step = errors.len().div_ceil(MAX_LEVELS).max(1);
+        let full = surface.num_indices.max(1) as usize;
+        let most = (MAX_INDICES / full).max(MIN_LEVELS);
+        let step = errors.len().div_ceil(most).max(1);
         let mut levels = Vec::new();
         let mut below = f32::NEG_INFINITY;
         for (i, &error) in errors.iter().enumerate() {

@@ -6,7 +6,7 @@ use q3bsp::{DrawVert, GridPoint};
 
 use super::{VisibleQuery, VisibleSet, WorldData, mark_fragments};
 use crate::settings::Settings;
-use crate::test_support::{PIXEL, Registration};
+use crate::test_support::{PIXEL, Registration, openarena};
 
 fn game() -> Registration {
     Registration::from_entries(&[
@@ -290,4 +290,31 @@ fn the_map_can_remap_materials() {
     let world = game.build(map.build());
     let drawn = game.materials.resolve(world.surfaces[0].material);
     assert_eq!(game.materials.get(drawn).name, "t/nomarks");
+}
+
+#[test]
+fn levels_of_real_curves_are_exact() {
+    let Some(files) = openarena() else { return };
+    let mut maps = relight::GameFiles::list(&files, "maps", ".bsp");
+    maps.sort();
+    let mut game = Registration::new(files);
+    let mut curves = 0;
+    for map in maps.iter().step_by(5) {
+        let world = game.load(&format!("maps/{map}"));
+        let meshes = world.relit.bsp.patch_meshes(4.0);
+        for (surface, mesh) in world.surfaces.iter().zip(&meshes) {
+            let (Some(lod), Some(mesh)) = (&surface.lod, mesh) else {
+                continue;
+            };
+            curves += 1;
+            for depth in [0.0, 30.0, 100.0, 250.0, 500.0, 1000.0, 3000.0, 20_000.0] {
+                let limit = 250.0 / (depth - mesh.lod_radius).max(1.0);
+                let (first, count) = lod.choose(depth, 250.0);
+                let list = &world.indices[first as usize..][..count as usize];
+                let relative: Vec<u32> = list.iter().map(|i| i - surface.first_vertex).collect();
+                assert_eq!(relative, mesh.indices_at(limit), "{map} at {depth}");
+            }
+        }
+    }
+    assert!(curves > 100, "{curves}");
 }

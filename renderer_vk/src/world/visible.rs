@@ -117,7 +117,7 @@ impl Tree {
 
     /// Calls `visit` for every leaf that the box touches, front children first.
     pub fn leafs_in_box(&self, bsp: &Bsp, bounds: &Bounds, mut visit: impl FnMut(u32)) {
-        let mut pending = self.root();
+        let mut pending = vec![self.root()];
         while let Some(child) = pending.pop() {
             match child {
                 Child::Nothing => {}
@@ -141,13 +141,13 @@ impl Tree {
         }
     }
 
-    fn root(&self) -> Vec<Child> {
+    fn root(&self) -> Child {
         if !self.nodes.is_empty() {
-            vec![Child::Node(0)]
+            Child::Node(0)
         } else if !self.leafs.is_empty() {
-            vec![Child::Leaf(0)]
+            Child::Leaf(0)
         } else {
-            Vec::new()
+            Child::Nothing
         }
     }
 }
@@ -235,7 +235,7 @@ impl VisibleSet {
             self.stamp = 1;
         }
         self.pending.clear();
-        self.pending.extend(tree.root());
+        self.pending.push(tree.root());
         while let Some(child) = self.pending.pop() {
             match child {
                 Child::Nothing => {}
