@@ -4,21 +4,18 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::Vec3;
-use shaders::types::{self, MaterialBuffers};
+use shaders::types;
 use shaderscript::{ImplicitKind, Shader, StageImage, strip_extension};
 
-use super::compile::{self, StageArrays, VideoClients};
+use super::bind::{internal_shader, passes, sky_faces};
+use super::compile::{StageArrays, VideoClients};
 use super::flags;
-use super::material::{Combine, LightmapClass, Material, RasterPass, SkyBox, VideoStage};
+use super::material::{LightmapClass, Material, SkyBox, VideoStage};
+use super::material_buffers::Uploaded;
 use super::source::{ImageFlags, ImageSource};
-use crate::gpu::{self, Buffer, BufferUsage, Device};
 
 /// Distance at which a portal without `alphaGen portal` is opaque, units: the engine's default.
 pub const DEFAULT_PORTAL_RANGE: f32 = 256.0;
-/// `clamp_time` of a material that never stops.
-const ENDLESS: f32 = 1.0e30;
-/// Suffixes of a sky box's sides, in the order of [`SkyBox::faces`].
-const SKY_SIDES: [&str; 6] = ["rt", "bk", "lf", "ft", "up", "dn"];
 
 /// What the settings say about materials; changes only at registration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,22 +26,13 @@ pub struct MaterialSettings {
     pub vertex_light: bool,
 }
 
-/// The arrays on the GPU.
-struct Uploaded {
-    materials: Buffer,
-    stages: Buffer,
-    tc_mods: Buffer,
-    images: Buffer,
-    noise: Buffer,
-}
-
 /// Materials by index; 0 is the default material.
 pub struct Materials {
-    list: Vec<Material>,
+    pub(super) list: Vec<Material>,
     by_key: HashMap<(String, LightmapClass), u32>,
-    arrays: StageArrays,
+    pub(super) arrays: StageArrays,
     /// What the traced look adds: mean emission and radiance as a light.
-    emission: Vec<(Vec3, Vec3)>,
+    pub(super) emission: Vec<(Vec3, Vec3)>,
     /// Indices in drawing order.
     sorted: Vec<u32>,
     /// Place of each material in `sorted`.
@@ -55,8 +43,8 @@ pub struct Materials {
     internal: Internal,
     last_cloud_height: f32,
     last_sun: Option<Vec3>,
-    uploaded: Option<Uploaded>,
-    dirty: bool,
+    pub(super) uploaded: Option<Uploaded>,
+    pub(super) dirty: bool,
     generation: u64,
 }
 
@@ -513,65 +501,6 @@ impl Materials {
         self.generation
     }
 
-    /// Copies the arrays to the GPU if anything changed. `samplers` translates sampler kinds to bindless indices.
-    pub fn upload(
-        &mut self,
-        device: &Device,
-        samplers: &super::Samplers,
-    ) -> Result<(), gpu::Error> {
-        if !self.dirty && self.uploaded.is_some() {
-            return Ok(());
-        }
-        let stages: Vec<types::Stage> = self
-            .arrays
-            .stages
-            .iter()
-            .map(|stage| types::Stage {
-                sampler_index: samplers.index(stage.sampler_index),
-                ..*stage
-            })
-            .collect();
-        let materials: Vec<types::Material> = self
-            .list
-            .iter()
-            .zip(&self.emission)
-            .map(|(material, &emission)| gpu_material(material, emission))
-            .collect();
-        let usage = BufferUsage::STORAGE;
-        // values as bits, then the permutation: one array of words
-        let noise: Vec<u32> = shaderscript::eval::noise_values()
-            .iter()
-            .map(|value| value.to_bits())
-            .chain(
-                shaderscript::eval::noise_permutation()
-                    .iter()
-                    .map(|&i| u32::from(i)),
-            )
-            .collect();
-        self.uploaded = Some(Uploaded {
-            materials: Buffer::with_data(device, "materials", usage, &materials)?,
-            stages: Buffer::with_data(device, "stages", usage, &stages)?,
-            tc_mods: Buffer::with_data(device, "tcMods", usage, &self.arrays.tc_mods)?,
-            images: Buffer::with_data(device, "stage images", usage, &self.arrays.images)?,
-            noise: Buffer::with_data(device, "noise", usage, &noise)?,
-        });
-        self.dirty = false;
-        Ok(())
-    }
-
-    /// Device addresses as of the last upload; zero before the first.
-    pub fn addresses(&self) -> MaterialBuffers {
-        self.uploaded
-            .as_ref()
-            .map_or_else(MaterialBuffers::default, |u| MaterialBuffers {
-                materials: u.materials.address(),
-                stages: u.stages.address(),
-                tc_mods: u.tc_mods.address(),
-                images: u.images.address(),
-                noise: u.noise.address(),
-            })
-    }
-
     /// One line each, for `shaderlist`: stages, L with a lightmap, E when a script defines it, name.
     pub fn list(&self, in_drawing_order: bool) -> Vec<String> {
         let line = |m: &Material| {
@@ -594,66 +523,4 @@ impl Materials {
             self.list.iter().map(line).collect()
         }
     }
-}
-
-fn gpu_material(material: &Material, (mean, light): (Vec3, Vec3)) -> types::Material {
-    types::Material {
-        stage_first: material.stage_first,
-        stage_count: material.stage_count,
-        flags: material.flags,
-        time_offset: material.time_offset,
-        clamp_time: material.shader.clamp_time.unwrap_or(ENDLESS),
-        mean_emission: mean,
-        light_radiance: light,
-    }
-}
-
-/// A material of one white stage, changed by `edit`.
-fn internal_shader(name: &str, edit: impl FnOnce(&mut shaderscript::Stage)) -> Shader {
-    let mut stage = shaderscript::Stage::default();
-    edit(&mut stage);
-    let mut shader = Shader::new(name);
-    shader.cull = shaderscript::Cull::None;
-    shader.stages.push(stage);
-    shader
-}
-
-/// The sides of a far box; a missing side is the default image, a missing first side is no box.
-fn sky_faces(outer: &str, source: &mut dyn ImageSource) -> Option<[u32; 6]> {
-    let flags = ImageFlags {
-        mipmap: true,
-        picmip: true,
-        clamp: true,
-    };
-    let faces = SKY_SIDES.map(|side| source.image(&format!("{outer}_{side}.tga"), flags));
-    faces[0]?;
-    let missing = source.default_image();
-    Some(faces.map(|face| face.unwrap_or(missing)))
-}
-
-/// The drawing passes of the classic look.
-fn passes(shader: &Shader, stage_first: u32) -> Vec<RasterPass> {
-    let index = |stage: usize| stage_first + u32::try_from(stage).unwrap_or(0);
-    shaderscript::collapse(shader)
-        .into_iter()
-        .filter_map(|pass| {
-            let stage = shader.stages.get(pass.first)?;
-            let combine = match pass.combine {
-                shaderscript::Combine::Add => Combine::Add,
-                shaderscript::Combine::None | shaderscript::Combine::Modulate => Combine::Modulate,
-            };
-            Some(RasterPass {
-                stages: [index(pass.first), index(pass.second.unwrap_or(pass.first))],
-                stage_count: if pass.second.is_some() { 2 } else { 1 },
-                combine,
-                blend: pass
-                    .blend
-                    .map(|(src, dst)| (compile::blend_factor(src), compile::blend_factor(dst))),
-                depth_write: stage.depth_write,
-                depth_equal: stage.depth_func == shaderscript::DepthFunc::Equal,
-                depth_test: stage.depth_func != shaderscript::DepthFunc::Disabled,
-                alpha_func: compile::alpha_func(stage.alpha_func),
-            })
-        })
-        .collect()
 }

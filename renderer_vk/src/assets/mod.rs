@@ -1,9 +1,11 @@
 //! What the game registers: images, materials, models, skins and fonts, as handles to data on the GPU.
 
+mod bind;
 pub mod compile;
 mod flags;
 mod fonts;
 mod material;
+mod material_buffers;
 mod materials;
 mod models;
 pub mod prepare;

@@ -4,6 +4,7 @@
 //! instances, the vertices of everything that moves or deforms (evaluated on the CPU, in the space of their
 //! instance), and the sorted list of visible surfaces that the classic look draws.
 
+mod entities;
 mod entity;
 mod gather;
 mod key_frames;

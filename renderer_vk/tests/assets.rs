@@ -1,0 +1,174 @@
+//! Assets and worlds on whatever Vulkan device there is, with the validation layer where it is installed.
+//!
+//! Without a device each test says so and passes, unless `RELIGHT_REQUIRE_GPU=1`.
+
+use std::sync::Arc;
+
+use relight::{GameFiles, MemoryFiles};
+use renderer_vk::Settings;
+use renderer_vk::api::RefDef;
+use renderer_vk::assets::{Assets, ImageFlags, ImageSource, Samplers};
+use renderer_vk::gpu::{Device, DeviceOptions, SurfaceSource};
+use renderer_vk::scene::{Geometry, Look, Scene};
+use renderer_vk::world::{World, WorldError};
+
+/// A headless device, or `None` with a printed line.
+fn device() -> Option<Device> {
+    let options = DeviceOptions {
+        app_name: "asset tests".to_owned(),
+        validation: true,
+        ..DeviceOptions::default()
+    };
+    match Device::new(&options, SurfaceSource::Headless) {
+        Ok(device) => Some(device),
+        Err(e) => {
+            let required = std::env::var("RELIGHT_REQUIRE_GPU").is_ok_and(|v| v == "1");
+            assert!(!required, "a GPU is required: {e}");
+            println!("skipped: {e}");
+            None
+        }
+    }
+}
+
+fn assets(device: &Device, files: MemoryFiles, settings: &Settings) -> Assets {
+    let files: Arc<dyn GameFiles> = Arc::new(files);
+    let scripts = Arc::new(relight::Materials::load(&*files).0);
+    Assets::new(device, files, scripts, settings).unwrap()
+}
+
+/// Nothing was said by the validation layer, and everything that was dropped is gone.
+fn finish(device: &Device) {
+    device.wait_idle().unwrap();
+    let messages = device.validation_messages();
+    assert!(messages.is_empty(), "validation: {messages:#?}");
+    assert_eq!(device.graveyard_len(), 0, "objects that never died");
+}
+
+const PIXEL: &[u8] = &[
+    0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 24, 0, 10, 20, 30,
+];
+
+#[test]
+fn textures_are_found_once_and_videos_grow() {
+    let Some(device) = device() else { return };
+    let mut files = MemoryFiles::new();
+    files.insert("t/a.tga", PIXEL).unwrap();
+    files.insert("t/text.tga", b"no picture").unwrap();
+    files
+        .insert("scripts/t.shader", "t/film\n{\n{\nvideoMap x.roq\n}\n}\n")
+        .unwrap();
+    let settings = Settings::default();
+    let mut assets = assets(&device, files, &settings);
+
+    let found = assets.textures.find("t/a", ImageFlags::WORLD).unwrap();
+    assert_eq!(assets.textures.find("t/a", ImageFlags::NO_MIP), Some(found));
+    // another spelling is another image, as in the engine
+    let other = assets.textures.find("t/a.tga", ImageFlags::WORLD).unwrap();
+    assert_ne!(found, other);
+    assert_eq!(assets.textures.find("t/none", ImageFlags::WORLD), None);
+    assert_eq!(assets.textures.find("t/text.tga", ImageFlags::WORLD), None);
+    let mean = assets.textures.mean(found);
+    assert!(mean.x > mean.z && mean.w == 1.0, "{mean}");
+    assert_eq!(assets.register_shader("t/a", true), 4);
+    assert_eq!(assets.register_shader("t/none", true), 0);
+    assert_eq!(assets.register_model("m/none.md3"), 0);
+    assert_eq!(assets.register_skin("m/none.skin"), 0);
+
+    let film = assets.register_shader("t/film", true);
+    let material = assets.material_of_handle(film);
+    let (name, client) = {
+        let (name, client) = assets.materials.videos().next().unwrap();
+        (name.to_owned(), client)
+    };
+    assert_eq!(name, "x.roq");
+    let shown = |assets: &Assets| {
+        let stage = assets.materials.stages(assets.materials.get(material))[0];
+        assets.materials.arrays().images[stage.image_first as usize]
+    };
+    assert_eq!(shown(&assets), assets.textures.black());
+    let picture = vec![200; 16 * 16 * 4];
+    assets
+        .update_scratch(client, 16, 16, &picture, true)
+        .unwrap();
+    let first = shown(&assets);
+    assert_eq!(first, assets.textures.scratch(client));
+    assert_ne!(first, assets.textures.black());
+    assets
+        .update_scratch(client, 16, 16, &picture, true)
+        .unwrap();
+    assert_eq!(shown(&assets), first, "the same size keeps its texture");
+    assets.update_scratch(client, 8, 8, &picture, true).unwrap();
+    assert_eq!(shown(&assets), assets.textures.scratch(client));
+    // too little data changes nothing
+    assets
+        .update_scratch(client, 64, 64, &picture, true)
+        .unwrap();
+    assets.update_scratch(client, 0, 0, &[], true).unwrap();
+
+    assets.prepare_frame(&settings).unwrap();
+    let addresses = assets.materials.addresses();
+    assert!(addresses.materials != 0 && addresses.stages != 0 && addresses.noise != 0);
+    assets.prepare_frame(&settings).unwrap();
+    assert_eq!(assets.materials.addresses(), addresses, "nothing changed");
+    let nearest = Settings {
+        texture_mode: "GL_NEAREST".into(),
+        ..settings
+    };
+    let before = assets.samplers;
+    assets.prepare_frame(&nearest).unwrap();
+    assert_ne!(assets.samplers, before);
+    assert_eq!(assets.samplers.0[2..], before.0[2..]);
+    drop(assets);
+    finish(&device);
+}
+
+#[test]
+fn samplers_are_numbered_from_zero() {
+    let Some(device) = device() else { return };
+    let samplers = Samplers::new(&device, "GL_LINEAR_MIPMAP_LINEAR", 0.0).unwrap();
+    assert_eq!(samplers, Samplers([0, 1, 2, 3, 4]));
+    finish(&device);
+}
+
+#[test]
+fn the_sample_map_loads_and_gathers() {
+    let Some(device) = device() else { return };
+    let settings = Settings::default();
+    let mut assets = assets(&device, relight::sample::files().unwrap(), &settings);
+    let missing = World::load(&device, &mut assets, "maps/none.bsp", &settings);
+    assert!(matches!(missing, Err(WorldError::Map(_))));
+    let world = World::load(&device, &mut assets, relight::sample::MAP, &settings).unwrap();
+    assert!(
+        world.vertex_buffer.size() as usize >= std::mem::size_of_val(world.vertices.as_slice())
+    );
+    let bytes = device
+        .read_buffer(&world.index_buffer, 0, world.indices.len() as u64 * 4)
+        .unwrap();
+    let back: Vec<u32> = bytes
+        .chunks_exact(4)
+        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        .collect();
+    assert_eq!(back, world.indices);
+
+    let mut scene = Scene::new();
+    let def = RefDef {
+        time_ms: 1000,
+        ..RefDef::default()
+    };
+    let views = scene
+        .gather(Some(&world), &assets, &settings, &def, Look::Classic)
+        .unwrap();
+    let view = views.last().unwrap();
+    assert!(view.has_world && !view.surfaces.is_empty());
+    let lightmapped = view.surfaces.iter().filter(|s| s.lightmap != u32::MAX);
+    assert!(lightmapped.count() > 0);
+    let drawn = view.surfaces.iter().all(|s| match s.geometry {
+        Geometry::Static { index_count, .. } | Geometry::Dynamic { index_count, .. } => {
+            index_count > 0
+        }
+    });
+    assert!(drawn);
+    scene.recycle(views);
+    drop((world, assets));
+    finish(&device);
+}
