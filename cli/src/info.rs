@@ -7,7 +7,10 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use relight::{GameFiles, Materials, Pk3, RelitWorld, SearchPath};
+use relight::{
+    CalibrationCache, CalibrationOptions, CalibrationReport, GameFiles, Materials, Options, Pk3,
+    RelitWorld, SearchPath,
+};
 use serde::Serialize;
 
 /// Options of `relight info`.
@@ -26,6 +29,12 @@ pub struct InfoArgs {
     /// List the emitting materials of each map
     #[arg(long)]
     emitters: bool,
+    /// Fit the lights to the maps' lightmaps, and tell how well they agree with them
+    #[arg(long)]
+    calibrate: bool,
+    /// Keep what calibration finds in this folder, and take it from there
+    #[arg(long, value_name = "DIR", requires = "calibrate")]
+    cache: Option<PathBuf>,
     /// Maps by name (oa_dm1), by game path (maps/oa_dm1.bsp) or by file; packs (.pk3) stand for all maps in
     /// them. Without any: all maps of the game folders
     #[arg(value_name = "MAP|PK3")]
@@ -60,8 +69,55 @@ struct MapInfo {
     longest_list: usize,
     degenerate_triangles: usize,
     emitters: Vec<Emitter>,
+    /// Light against the map's lightmaps; absent unless asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibration: Option<Calibration>,
     warnings: Vec<String>,
     milliseconds: u128,
+}
+
+/// How well light agrees with the map's lightmaps, over measurements that fitting did not see.
+#[derive(Serialize)]
+struct Calibration {
+    /// What told of light.
+    evidence: &'static str,
+    samples: usize,
+    held_out: usize,
+    known_sources: usize,
+    placed_lights: usize,
+    before: Agreement,
+    after: Agreement,
+    cached: bool,
+    seconds: f64,
+}
+
+/// Computed light against stored light.
+#[derive(Serialize)]
+struct Agreement {
+    median_stops: f32,
+    worst_tenth_stops: f32,
+    sum_ratio: f32,
+}
+
+impl Calibration {
+    fn new(report: &CalibrationReport) -> Calibration {
+        let agreement = |a: &relight::calibrate::Agreement| Agreement {
+            median_stops: a.median_stops,
+            worst_tenth_stops: a.worst_tenth_stops,
+            sum_ratio: a.sum_ratio,
+        };
+        Calibration {
+            evidence: report.evidence.label(),
+            samples: report.samples,
+            held_out: report.held_out,
+            known_sources: report.known,
+            placed_lights: report.placed,
+            before: agreement(&report.before),
+            after: agreement(&report.after),
+            cached: report.cached,
+            seconds: report.seconds,
+        }
+    }
 }
 
 /// One emitting material.
@@ -108,7 +164,7 @@ pub fn run(args: &InfoArgs) -> Result<()> {
         };
         bar.set_message(name.clone());
         let begin = Instant::now();
-        match load(&files, &materials, &source) {
+        match load(&files, &materials, &source, args) {
             Ok(world) => infos.push(describe(&world, begin.elapsed().as_millis())),
             Err(error) => failures.push(Failure {
                 map: name,
@@ -170,20 +226,33 @@ fn find_maps(files: &mut SearchPath, asked: &[String]) -> Result<Vec<Source>> {
     Ok(sources)
 }
 
-fn load(files: &SearchPath, materials: &Materials, source: &Source) -> Result<RelitWorld> {
+fn load(
+    files: &SearchPath,
+    materials: &Materials,
+    source: &Source,
+    args: &InfoArgs,
+) -> Result<RelitWorld> {
+    let calibrate = args.calibrate.then(|| CalibrationOptions {
+        cache: args.cache.as_ref().map(CalibrationCache::new),
+        ..CalibrationOptions::default()
+    });
     match source {
-        Source::Game(map) => Ok(RelitWorld::load(files, materials, map, Default::default())?),
+        Source::Game(map) => {
+            let options = Options {
+                calibrate,
+                ..Options::default()
+            };
+            Ok(RelitWorld::load(files, materials, map, options)?)
+        }
         Source::File(path) => {
             let name = path.display().to_string();
             let bytes = std::fs::read(path).with_context(|| name.clone())?;
             let bsp = q3bsp::Bsp::parse(&bytes).with_context(|| name.clone())?;
-            Ok(RelitWorld::from_bsp(
-                files,
-                materials,
-                &name,
-                bsp,
-                Default::default(),
-            ))
+            let mut world = RelitWorld::from_bsp(files, materials, &name, bsp, Options::default());
+            if let Some(calibrate) = calibrate {
+                relight::calibrate(&mut world, &calibrate);
+            }
+            Ok(world)
         }
     }
 }
@@ -229,6 +298,7 @@ fn describe(world: &RelitWorld, milliseconds: u128) -> MapInfo {
                 area: e.area,
             })
             .collect(),
+        calibration: world.calibration.as_ref().map(Calibration::new),
         warnings: world.warnings.clone(),
         milliseconds,
     }
@@ -269,6 +339,25 @@ fn print_table(infos: &[MapInfo], emitters: bool) {
         );
         if !info.missing.is_empty() {
             println!("    missing: {}", info.missing.join(", "));
+        }
+        if let Some(c) = &info.calibration {
+            println!(
+                "    {}: {} samples ({} held out), {} known sources, {} lights placed; stops off in the median {:.3} -> {:.3}, \
+                 in the worst tenth {:.3} -> {:.3}; sum {:.3} -> {:.3} of stored; {:.2} s{}",
+                c.evidence,
+                c.samples,
+                c.held_out,
+                c.known_sources,
+                c.placed_lights,
+                c.before.median_stops,
+                c.after.median_stops,
+                c.before.worst_tenth_stops,
+                c.after.worst_tenth_stops,
+                c.before.sum_ratio,
+                c.after.sum_ratio,
+                c.seconds,
+                if c.cached { ", from the cache" } else { "" }
+            );
         }
         if emitters {
             for e in &info.emitters {

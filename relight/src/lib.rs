@@ -1,5 +1,6 @@
 //! Map conversion: a map, its materials and its images become a relit world.
 //!
+//! * [`mod@calibrate`]: lights fitted to the map's own lightmaps, and those found again that its compiler stripped.
 //! * [`compare`]: two pictures of one view compared.
 //! * [`files`]: game files behind one trait: packs, folders, an engine, memory.
 //! * [`mod@image`]: texture images as the engine reads them.
@@ -25,6 +26,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)
 )]
 
+pub mod calibrate;
 pub mod compare;
 pub mod files;
 pub mod image;
@@ -36,6 +38,7 @@ pub mod sample;
 mod test_data;
 pub mod world;
 
+pub use calibrate::{CalibrationCache, CalibrationOptions, CalibrationReport, calibrate};
 pub use files::{FileError, GameFiles, MemoryFiles, Pk3, SearchPath};
 pub use light::{LightLists, LightReport, PointLight, SunLight, TriangleLight};
 pub use materials::{Materials, Resolved};

@@ -154,7 +154,11 @@ fn direct(
 fn median_ratio(map: &str) -> Option<f32> {
     let files = SearchPath::open(&[data()?]).unwrap();
     let (materials, _) = Materials::load(&files);
-    let world = RelitWorld::load(&files, &materials, map, Default::default()).unwrap();
+    let options = relight::Options {
+        calibrate: None,
+        ..Default::default()
+    };
+    let world = RelitWorld::load(&files, &materials, map, options).unwrap();
     let occluders = Occluders::new(&world);
     let lit = |s: &&WorldSurface| {
         s.lightmap >= 0

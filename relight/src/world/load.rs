@@ -3,6 +3,7 @@
 use super::geometry::{Flare, Geometry, NO_LIGHT, WorldModel, WorldSurface};
 use super::material::{WorldMaterial, lighting_of, lightmap_of};
 use super::{RelitWorld, fog};
+use crate::calibrate::{CalibrationOptions, calibrate};
 use crate::files::{FileError, GameFiles};
 use crate::light::{self, LightReport, TriangleLight};
 use crate::materials::Materials;
@@ -47,6 +48,8 @@ pub enum Stage {
     Lights,
     /// Listing lights per cluster.
     LightLists,
+    /// Fitting lights to the lightmaps.
+    Calibration,
     /// Done.
     Done,
 }
@@ -60,16 +63,19 @@ pub struct Options<'a> {
     pub subdivisions: f32,
     /// Left shift of lightmaps and vertex colours: `r_mapOverBrightBits` less what the display adds.
     pub overbright_shift: u32,
+    /// How lights are fitted to the map's lightmaps; `None` leaves them as directives say.
+    pub calibrate: Option<CalibrationOptions>,
     /// Told of progress.
     pub progress: Option<Progress<'a>>,
 }
 
 impl Default for Options<'_> {
-    /// The engine's defaults in a window: subdivisions 4, shift 2.
+    /// The engine's defaults in a window: subdivisions 4, shift 2; calibrated, nothing kept.
     fn default() -> Self {
         Options {
             subdivisions: 4.0,
             overbright_shift: MAP_OVERBRIGHT_BITS,
+            calibrate: Some(CalibrationOptions::default()),
             progress: None,
         }
     }
@@ -85,7 +91,7 @@ impl RelitWorld {
         files: &dyn GameFiles,
         materials: &Materials,
         map: &str,
-        options: Options<'_>,
+        mut options: Options<'_>,
     ) -> Result<RelitWorld, LoadError> {
         let bytes = files.read(map)?.ok_or_else(|| LoadError::Absent {
             map: map.to_owned(),
@@ -94,10 +100,33 @@ impl RelitWorld {
             map: map.to_owned(),
             source,
         })?;
-        Ok(RelitWorld::from_bsp(files, materials, map, bsp, options))
+        let calibration = options.calibrate.take();
+        let mut world = RelitWorld::from_bsp(
+            files,
+            materials,
+            map,
+            bsp,
+            Options {
+                subdivisions: options.subdivisions,
+                overbright_shift: options.overbright_shift,
+                calibrate: None,
+                // A new borrow: the rest of the struct moves.
+                progress: options.progress.as_mut().map(|p| &mut **p as Progress<'_>),
+            },
+        );
+        if let Some(calibration) = calibration {
+            if let Some(progress) = options.progress.as_mut() {
+                progress(Stage::Calibration);
+            }
+            calibrate(&mut world, &calibration);
+        }
+        if let Some(progress) = options.progress.as_mut() {
+            progress(Stage::Done);
+        }
+        Ok(world)
     }
 
-    /// Relights a map that was read elsewhere.
+    /// Relights a map that was read elsewhere. It is not calibrated: see [`calibrate`].
     pub fn from_bsp(
         files: &dyn GameFiles,
         materials: &Materials,
@@ -200,6 +229,7 @@ impl RelitWorld {
             ambient: light::ambient(&entities),
             sky: None,
             report: LightReport::default(),
+            calibration: None,
             warnings,
             overbright_shift: options.overbright_shift,
             bsp,
@@ -216,7 +246,6 @@ impl RelitWorld {
         world.report.clusters = world.light_lists.clusters();
         world.report.mean_list_length = world.light_lists.mean_length();
         world.report.longest_list = world.light_lists.longest();
-        begin(Stage::Done);
         world
     }
 

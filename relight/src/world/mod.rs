@@ -12,6 +12,7 @@ pub use geometry::{Flare, NO_LIGHT, WorldModel, WorldSurface, WorldVertex};
 pub use load::{LoadError, Options, Progress, Stage};
 pub use material::WorldMaterial;
 
+use crate::calibrate::CalibrationReport;
 use crate::light::{LightLists, LightReport, PointLight, SunLight, TriangleLight};
 use crate::overbright;
 use glam::Vec3;
@@ -44,18 +45,20 @@ pub struct RelitWorld {
     pub fogs: Vec<WorldFog>,
     /// Emitting triangles; those of one surface follow each other.
     pub lights: Vec<TriangleLight>,
-    /// Light entities left in the map.
+    /// Light entities left in the map, then those that calibration put in.
     pub point_lights: Vec<PointLight>,
     /// Suns.
     pub suns: Vec<SunLight>,
     /// Which lights matter where.
     pub light_lists: LightLists,
-    /// Radiance that comes from everywhere: the compiler's ambient term.
+    /// Radiance that comes from everywhere: the compiler's ambient term, or what calibration found for it.
     pub ambient: Vec3,
     /// Material of the sky that covers the largest area; `None` for a map without sky.
     pub sky: Option<u32>,
     /// What was found, and by which evidence.
     pub report: LightReport,
+    /// How well light agrees with the map's lightmaps; `None` when nobody asked.
+    pub calibration: Option<CalibrationReport>,
     /// What was wrong and is made up for: missing materials, repaired values. Each thing once.
     pub warnings: Vec<String>,
     /// Shift that was applied to vertex colours; see [`overbright`].

@@ -1,4 +1,5 @@
 use super::*;
+use crate::calibrate::CalibrationOptions;
 use crate::files::{GameFiles, MemoryFiles, SearchPath};
 use crate::light::{EmissionSource, LightRef, POINT_LIGHT_INTENSITY, SURFACE_LIGHT_RADIANCE};
 use crate::materials::Materials;
@@ -613,7 +614,14 @@ fn every_openarena_map_has_light() {
             &files,
             &materials,
             &format!("maps/{map}"),
-            Options::default(),
+            Options {
+                calibrate: Some(CalibrationOptions {
+                    samples: 200,
+                    candidates: 100,
+                    ..Default::default()
+                }),
+                ..Options::default()
+            },
         )
         .unwrap();
         assert!(world.light_count() > 0, "{map} is dark");

@@ -1,0 +1,275 @@
+//! Results of calibration, kept in a folder.
+//!
+//! A file's name is the hash of all that its result depends on, so that a file is right or not there. Its text is
+//! checked as any input is: a damaged one counts as absent, with a warning.
+
+use super::report::Agreement;
+use super::samples::Evidence;
+use super::{CalibrationOptions, Solution, VERSION};
+use crate::world::RelitWorld;
+use glam::Vec3;
+use std::fmt::Write as _;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// First words of a file.
+const MAGIC: &str = "relight-calibration";
+
+/// A folder of results.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CalibrationCache {
+    folder: PathBuf,
+}
+
+/// Why a kept result could not be used, or not be kept.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum CacheError {
+    #[error("{}: cannot be read: {source}", path.display())]
+    Read { path: PathBuf, source: io::Error },
+    #[error("{}: cannot be written: {source}", path.display())]
+    Write { path: PathBuf, source: io::Error },
+    #[error("{}: line {line}: {what}; the map is calibrated again", path.display())]
+    Damaged {
+        path: PathBuf,
+        line: usize,
+        what: &'static str,
+    },
+}
+
+impl CalibrationCache {
+    /// Results in a folder, which is made when the first is kept.
+    pub fn new(folder: impl Into<PathBuf>) -> CalibrationCache {
+        CalibrationCache {
+            folder: folder.into(),
+        }
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn path(&self, key: u128) -> PathBuf {
+        self.folder.join(format!("{key:032x}.light"))
+    }
+
+    /// A kept result for `known` known sources; `None` when there is none.
+    pub(super) fn read(&self, key: u128, known: usize) -> Result<Option<Solution>, CacheError> {
+        let path = self.path(key);
+        let bytes = match std::fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(source) => return Err(CacheError::Read { path, source }),
+        };
+        match parse(&String::from_utf8_lossy(&bytes), known) {
+            Ok(solution) => Ok(Some(solution)),
+            Err((line, what)) => Err(CacheError::Damaged { path, line, what }),
+        }
+    }
+
+    /// Keeps a result. The file appears whole or not at all.
+    pub(super) fn write(&self, key: u128, solution: &Solution) -> Result<(), CacheError> {
+        let path = self.path(key);
+        let unfinished = path.with_extension(format!("{}.part", std::process::id()));
+        let write = || {
+            std::fs::create_dir_all(&self.folder)?;
+            std::fs::write(&unfinished, print(solution))?;
+            std::fs::rename(&unfinished, &path)
+        };
+        write().map_err(|source| {
+            // What is left of a failed attempt; that it may not be there is fine.
+            let _ = std::fs::remove_file(&unfinished);
+            CacheError::Write {
+                path: path.clone(),
+                source,
+            }
+        })
+    }
+}
+
+/// Text of a result. Rust prints the shortest number that reads back as the same one.
+fn print(solution: &Solution) -> String {
+    let mut text = String::new();
+    let report = &solution.report;
+    let evidence = report.evidence.label();
+    let three = |v: Vec3| format!("{} {} {}", v.x, v.y, v.z);
+    let agreement =
+        |a: &Agreement| format!("{} {} {}", a.median_stops, a.worst_tenth_stops, a.sum_ratio);
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "{MAGIC} {VERSION}");
+    let _ = writeln!(
+        text,
+        "evidence {evidence} {} {}",
+        report.samples, report.held_out
+    );
+    let _ = writeln!(text, "before {}", agreement(&report.before));
+    let _ = writeln!(text, "after {}", agreement(&report.after));
+    let _ = writeln!(text, "ambient {}", three(solution.ambient));
+    for strength in &solution.known {
+        let _ = writeln!(text, "known {}", three(*strength));
+    }
+    for (origin, intensity) in &solution.placed {
+        let _ = writeln!(text, "placed {} {}", three(*origin), three(*intensity));
+    }
+    let _ = writeln!(text, "end {}", solution.known.len() + solution.placed.len());
+    text
+}
+
+/// Reads what [`print`] wrote; else the line that is wrong, and how.
+fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
+    let mut lines = text.lines().enumerate();
+    let header = lines.next().map(|(_, l)| l.split_whitespace());
+    let header: Vec<&str> = header.into_iter().flatten().collect();
+    if header != [MAGIC, &VERSION.to_string()] {
+        return Err((1, "not a result of this version"));
+    }
+    let mut solution = Solution::default();
+    let mut ended = false;
+    for (number, line) in lines {
+        let wrong = |what| (number + 1, what);
+        if ended {
+            return Err(wrong("text after the end"));
+        }
+        let mut words = line.split_whitespace();
+        let key = words.next().unwrap_or("");
+        let words: Vec<&str> = words.collect();
+        let numbers: Vec<f32> = words
+            .iter()
+            .map(|w| w.parse().unwrap_or(f32::NAN))
+            .collect();
+        let finite = numbers.iter().all(|n| n.is_finite());
+        let agreement = match numbers[..] {
+            [median_stops, worst_tenth_stops, sum_ratio] if finite => Some(Agreement {
+                median_stops,
+                worst_tenth_stops,
+                sum_ratio,
+            }),
+            _ => None,
+        };
+        // Light is never negative.
+        let light = |v: &[f32]| match *v {
+            [x, y, z] if finite && v.iter().all(|n| *n >= 0.0) => Ok(Vec3::new(x, y, z)),
+            _ => Err(wrong("not three strengths")),
+        };
+        match key {
+            "evidence" => {
+                let count = |k: usize| words.get(k).and_then(|w| w.parse().ok());
+                let evidence = words.first().and_then(|w| Evidence::from_label(w));
+                let evidence = evidence.ok_or(wrong("unknown evidence"))?;
+                solution.report.evidence = evidence;
+                solution.report.samples = count(1).ok_or(wrong("not a count"))?;
+                solution.report.held_out = count(2).ok_or(wrong("not a count"))?;
+            }
+            "before" => solution.report.before = agreement.ok_or(wrong("not three numbers"))?,
+            "after" => solution.report.after = agreement.ok_or(wrong("not three numbers"))?,
+            "ambient" => solution.ambient = light(&numbers)?,
+            "known" => solution.known.push(light(&numbers)?),
+            "placed" => {
+                let (origin, intensity) = match numbers.split_at_checked(3) {
+                    Some((&[x, y, z], rest)) => (Vec3::new(x, y, z), light(rest)?),
+                    _ => return Err(wrong("not a place")),
+                };
+                solution.placed.push((origin, intensity));
+            }
+            "end" => {
+                let count = words.first().and_then(|w| w.parse().ok());
+                if count != Some(solution.known.len() + solution.placed.len()) {
+                    return Err(wrong("lights are missing"));
+                }
+                ended = true;
+            }
+            _ => return Err(wrong("unknown key")),
+        }
+    }
+    if !ended {
+        return Err((text.lines().count(), "the end is missing"));
+    }
+    if solution.known.len() != known {
+        return Err((text.lines().count(), "not for this map's lights"));
+    }
+    solution.report.known = known;
+    solution.report.placed = solution.placed.len();
+    Ok(solution)
+}
+
+/// Hash of everything that calibrating a world depends on.
+pub(super) fn key(world: &RelitWorld, options: &CalibrationOptions) -> u128 {
+    let mut hash = Hash::new();
+    hash.number(u64::from(VERSION));
+    hash.number(options.samples as u64);
+    hash.number(options.candidates as u64);
+    hash.number(options.seed);
+    // The file's own bytes: light, geometry, visibility. The entities hold the grid's size.
+    hash.bytes(&world.bsp.write());
+    for surface in &world.surfaces {
+        for number in [
+            surface.material,
+            surface.model,
+            surface.first_index,
+            surface.num_indices,
+            surface.lightmap as u32,
+        ] {
+            hash.number(u64::from(number));
+        }
+    }
+    for vertex in &world.vertices {
+        hash.vector(vertex.position);
+    }
+    for material in &world.materials {
+        hash.number(u64::from(material.is_sky()));
+        hash.number(material.class.class as u64);
+        hash.number(u64::from(material.emission.is_some()));
+    }
+    for light in &world.lights {
+        light.vertices.iter().for_each(|v| hash.vector(*v));
+        hash.vector(light.radiance);
+        hash.number(u64::from(light.surface) << 8 | u64::from(light.two_sided));
+        hash.number(light.source as u64);
+    }
+    for light in &world.point_lights {
+        hash.vector(light.origin);
+        hash.vector(light.intensity);
+    }
+    for sun in &world.suns {
+        hash.vector(sun.direction);
+        hash.vector(sun.irradiance);
+    }
+    hash.vector(world.ambient);
+    hash.finish()
+}
+
+/// Two 64-bit lanes of multiply and rotate. Chance collisions matter here, enemies do not: who can write the folder
+/// can write anything into it.
+struct Hash(u64, u64);
+
+impl Hash {
+    fn new() -> Hash {
+        Hash(0xCBF2_9CE4_8422_2325, 0x9E37_79B9_7F4A_7C15)
+    }
+
+    fn number(&mut self, number: u64) {
+        self.0 = (self.0 ^ number).wrapping_mul(0x0000_0100_0000_01B3);
+        self.0 ^= self.0 >> 29;
+        self.1 = (self.1.rotate_left(23) ^ number).wrapping_mul(0xD6E8_FEB8_6659_FD93);
+    }
+
+    fn vector(&mut self, v: Vec3) {
+        let [x, y, z] = v.to_array().map(|c| u64::from(c.to_bits()));
+        self.number(x << 32 | y);
+        self.number(z);
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) {
+        self.number(bytes.len() as u64);
+        let (whole, rest) = bytes.as_chunks::<8>();
+        whole
+            .iter()
+            .for_each(|b| self.number(u64::from_le_bytes(*b)));
+        rest.iter().for_each(|b| self.number(u64::from(*b)));
+    }
+
+    fn finish(mut self) -> u128 {
+        self.number(0x5851_F42D_4C95_7F2D);
+        u128::from(self.0) << 64 | u128::from(self.1)
+    }
+}

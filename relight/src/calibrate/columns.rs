@@ -1,0 +1,482 @@
+//! What each source of light would give to each measurement: the columns of the linear system.
+//!
+//! A column holds, for every sample that its source reaches, the light (irradiance / π) there for a source of
+//! strength 1; the strength is what is looked for, channel by channel. Shadow rays decide what is reached.
+
+use super::bvh::Occluders;
+use super::parallel;
+use super::random::Random;
+use super::samples::Sample;
+use crate::light::{EmissionSource, EmitterSummary, LightRef, Spot, TriangleLight};
+use crate::world::RelitWorld;
+use glam::Vec3;
+use q3bsp::Bsp;
+use std::collections::HashMap;
+use std::f32::consts::{PI, TAU};
+
+/// Contributions below this part of a sample are traced only sometimes, and then count for more (Russian roulette).
+const ROULETTE: f32 = 0.02;
+
+/// Least light that a contribution is measured against, irradiance / π: two steps of a stored byte.
+const LEAST: f32 = 2.0 * super::samples::STORED_UNIT;
+
+/// Shadow rays to a triangle that is large as seen from a sample.
+const RAYS: u32 = 6;
+
+/// Solid angle, or what comes near to it, above which a triangle is large.
+const LARGE: f32 = 0.15;
+
+/// Which source a column is for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Source {
+    /// All triangle lights of one material and evidence.
+    Group(u32, EmissionSource),
+    /// A light entity of the map.
+    Entity(u32),
+    /// A sun.
+    Sun(u32),
+    /// A light put in by calibration.
+    Placed(Vec3),
+}
+
+/// What is believed of a strength before looking at samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Prior {
+    /// What the map's directives say.
+    pub value: Vec3,
+    /// Least strength.
+    pub low: Vec3,
+    /// Largest strength.
+    pub high: Vec3,
+}
+
+/// A source of light with what it gives.
+#[derive(Debug, Clone)]
+pub(super) struct Column {
+    /// The source.
+    pub source: Source,
+    /// (sample, light there for strength 1), by rising sample.
+    pub rows: Vec<(u32, f32)>,
+    /// Its strength: radiance of a group's brightest triangle, intensity of points, irradiance of suns.
+    pub strength: Vec3,
+    /// `None` for lights put in.
+    pub prior: Option<Prior>,
+}
+
+/// Light per intensity at a sample, and 0 where the light is behind it or out of a spot's cone. No shadows.
+fn unshadowed(sample: &Sample, origin: Vec3, spot: Option<&Spot>) -> f32 {
+    let offset = origin - sample.position;
+    let squared = offset.length_squared();
+    let cosine = sample.normal.dot(offset);
+    if cosine <= 0.0 || squared < 1.0 {
+        return 0.0;
+    }
+    let cone = spot.map_or(1.0, |spot| {
+        let along = -offset.dot(spot.direction);
+        let reach = along * spot.tan_half_angle;
+        let aside = (squared - along * along).max(0.0).sqrt();
+        if along <= 0.0 {
+            0.0
+        } else {
+            ((reach - aside) / 32.0).clamp(0.0, 1.0)
+        }
+    });
+    cosine / (squared * squared.sqrt()) * cone / PI
+}
+
+/// The column of a point light, as far as it reaches.
+pub(super) fn point_rows(
+    bsp: &Bsp,
+    occluders: &Occluders,
+    samples: &[Sample],
+    origin: Vec3,
+    spot: Option<&Spot>,
+    range: f32,
+) -> Vec<(u32, f32)> {
+    let cluster = bsp.cluster_at(origin);
+    let mut rows = Vec::new();
+    for (i, sample) in (0u32..).zip(samples) {
+        if sample.position.distance_squared(origin) > range * range {
+            continue;
+        }
+        let light = unshadowed(sample, origin, spot);
+        if light > 0.0
+            && (bsp.cluster_sees(cluster, sample.cluster)
+                || bsp.cluster_sees(sample.cluster, cluster))
+            && !occluders.blocked(origin, sample.position, false)
+        {
+            rows.push((i, light));
+        }
+    }
+    rows
+}
+
+/// Columns of the lights that the map's directives tell of.
+pub(super) fn known(world: &RelitWorld, occluders: &Occluders, samples: &[Sample]) -> Vec<Column> {
+    let (groups, of_light) = group(world);
+    let found = parallel::map(samples, |i, sample| {
+        let mut random = Random::new(0x7121 + i as u64);
+        triangles_at(world, occluders, sample, &groups, &of_light, &mut random)
+    });
+    let mut columns: Vec<Column> = groups
+        .iter()
+        .map(|g| Column {
+            source: Source::Group(g.material, g.evidence),
+            rows: Vec::new(),
+            strength: g.strength,
+            prior: Some(prior_of(g.strength, g.evidence)),
+        })
+        .collect();
+    for (i, sums) in (0u32..).zip(found) {
+        for (group, light) in sums {
+            if let Some(column) = columns.get_mut(group as usize) {
+                column.rows.push((i, light));
+            }
+        }
+    }
+    let points: Vec<u32> = (0..world.point_lights.len() as u32).collect();
+    let rows = parallel::map(&points, |_, &index| {
+        world
+            .point_lights
+            .get(index as usize)
+            .map_or_else(Vec::new, |light| {
+                let spot = light.spot.as_ref();
+                point_rows(
+                    &world.bsp,
+                    occluders,
+                    samples,
+                    light.origin,
+                    spot,
+                    f32::INFINITY,
+                )
+            })
+    });
+    for ((index, rows), light) in points.into_iter().zip(rows).zip(&world.point_lights) {
+        columns.push(Column {
+            source: Source::Entity(index),
+            rows,
+            strength: light.intensity,
+            prior: Some(prior_of(light.intensity, EmissionSource::SurfaceLight)),
+        });
+    }
+    for (index, sun) in (0u32..).zip(&world.suns) {
+        let reached = parallel::map(samples, |_, sample| {
+            let cosine = sample.normal.dot(sun.direction);
+            let hit = |s: &Sample| occluders.nearest(s.position, sun.direction, f32::INFINITY);
+            (cosine > 0.0 && hit(sample).is_none_or(|hit| hit.sky)).then_some(cosine / PI)
+        });
+        columns.push(Column {
+            source: Source::Sun(index),
+            rows: (0u32..)
+                .zip(reached)
+                .filter_map(|(i, light)| Some((i, light?)))
+                .collect(),
+            strength: sun.irradiance,
+            prior: Some(prior_of(sun.irradiance, EmissionSource::SurfaceLight)),
+        });
+    }
+    columns
+}
+
+/// Number of columns that [`known`] makes.
+pub(super) fn count(world: &RelitWorld) -> usize {
+    group(world).0.len() + world.point_lights.len() + world.suns.len()
+}
+
+/// Gives the lights that the map's directives tell of their strengths, in the order of [`known`]'s columns.
+pub(super) fn set_known(world: &mut RelitWorld, strengths: &[Vec3]) {
+    let (groups, of_light) = group(world);
+    let mut strengths = strengths.iter().copied();
+    let of_group: Vec<Vec3> = strengths.by_ref().take(groups.len()).collect();
+    for (light, (index, part)) in world.lights.iter_mut().zip(of_light) {
+        if let Some(strength) = of_group.get(index as usize) {
+            light.radiance = *strength * part;
+        }
+    }
+    for (group, &strength) in groups.iter().zip(&of_group) {
+        let whole = group.strength.max_element().max(f32::MIN_POSITIVE);
+        let emission = world
+            .materials
+            .get_mut(group.material as usize)
+            .and_then(|m| m.emission.as_mut());
+        if let Some(emission) = emission.filter(|e| e.source == group.evidence) {
+            // Of sprites this is an intensity: the same part of the whole as before.
+            let whole = match emission.source {
+                EmissionSource::Sprite => whole / emission.strength.max_element().max(1e-30),
+                _ => 1.0,
+            };
+            emission.strength = strength / whole.max(f32::MIN_POSITIVE);
+        }
+        let same =
+            |e: &&mut EmitterSummary| e.material == group.material && e.source == group.evidence;
+        if let Some(summary) = world.report.emitters.iter_mut().find(same) {
+            summary.radiance = strength * (summary.radiance.max_element() / whole);
+        }
+    }
+    for (light, strength) in world.point_lights.iter_mut().zip(strengths.by_ref()) {
+        light.intensity = strength;
+    }
+    for (sun, strength) in world.suns.iter_mut().zip(strengths) {
+        sun.irradiance = strength;
+    }
+}
+
+/// Directives are taken at their word within a factor of 4 up and 10 down; a glow or a flare, which the compiler took
+/// no light from, may fade further.
+fn prior_of(value: Vec3, evidence: EmissionSource) -> Prior {
+    let shrink = match evidence {
+        EmissionSource::Glow | EmissionSource::Flare => 0.02,
+        _ => 0.1,
+    };
+    let floor = Vec3::splat(value.max_element() * 0.1);
+    Prior {
+        value,
+        low: value * shrink,
+        high: value.max(floor) * 4.0,
+    }
+}
+
+/// Triangle lights that share a strength.
+struct Group {
+    material: u32,
+    evidence: EmissionSource,
+    /// Radiance of the brightest of them.
+    strength: Vec3,
+}
+
+/// The groups, and for every light the group that it is in and its strength as a part of the group's.
+fn group(world: &RelitWorld) -> (Vec<Group>, Vec<(u32, f32)>) {
+    let mut known: HashMap<(u32, EmissionSource), u32> = HashMap::new();
+    let mut groups: Vec<Group> = Vec::new();
+    let mut of_light = Vec::with_capacity(world.lights.len());
+    for light in &world.lights {
+        let material = material_of(world, light);
+        let index = *known.entry((material, light.source)).or_insert_with(|| {
+            groups.push(Group {
+                material,
+                evidence: light.source,
+                strength: Vec3::ZERO,
+            });
+            (groups.len() - 1) as u32
+        });
+        if let Some(group) = groups.get_mut(index as usize)
+            && light.radiance.max_element() > group.strength.max_element()
+        {
+            group.strength = light.radiance;
+        }
+        of_light.push((index, 0.0));
+    }
+    for (light, slot) in world.lights.iter().zip(&mut of_light) {
+        let whole = groups
+            .get(slot.0 as usize)
+            .map_or(Vec3::ZERO, |g| g.strength);
+        slot.1 = light.radiance.max_element() / whole.max_element().max(f32::MIN_POSITIVE);
+    }
+    (groups, of_light)
+}
+
+/// Material of the surface that a light lies on.
+pub(super) fn material_of(world: &RelitWorld, light: &TriangleLight) -> u32 {
+    world
+        .surfaces
+        .get(light.surface as usize)
+        .map_or(u32::MAX, |s| s.material)
+}
+
+/// Light of each group at a sample, for strength 1.
+fn triangles_at(
+    world: &RelitWorld,
+    occluders: &Occluders,
+    sample: &Sample,
+    groups: &[Group],
+    of_light: &[(u32, f32)],
+    random: &mut Random,
+) -> Vec<(u32, f32)> {
+    let mut sums: Vec<f32> = vec![0.0; groups.len()];
+    let scale = sample.level() + LEAST;
+    for &entry in world.light_lists.row(sample.cluster) {
+        let LightRef::Triangle(index) = world.light_lists.light(entry) else {
+            continue;
+        };
+        let (Some(light), Some(&(group, part))) = (
+            world.lights.get(index as usize),
+            of_light.get(index as usize),
+        ) else {
+            continue;
+        };
+        let geometric = lambert(sample, light) / PI;
+        let expected = geometric * light.radiance.element_sum() / 3.0;
+        if expected <= 0.0 {
+            continue;
+        }
+        let chance = (expected / (scale * ROULETTE)).min(1.0);
+        if chance < 1.0 && random.next() >= chance {
+            continue;
+        }
+        let seen = visible_part(occluders, sample, light, random);
+        if let Some(sum) = sums.get_mut(group as usize) {
+            *sum += geometric * part * seen / chance;
+        }
+    }
+    let lit = (0u32..).zip(sums).filter(|(_, light)| *light > 0.0);
+    lit.collect()
+}
+
+/// Part of a triangle that a sample sees: one ray to the middle, or several to a large one.
+fn visible_part(
+    occluders: &Occluders,
+    sample: &Sample,
+    light: &TriangleLight,
+    random: &mut Random,
+) -> f32 {
+    let [a, b, c] = light.vertices;
+    let middle = (a + b + c) / 3.0;
+    let clear = |to: Vec3| !occluders.blocked(sample.position, to, light.is_sky);
+    let wide = light.area() > LARGE * middle.distance_squared(sample.position);
+    if !wide && sample.normal.dot(middle - sample.position) > 0.0 {
+        return f32::from(u8::from(clear(middle)));
+    }
+    let mut rays = 0.0f32;
+    let mut open = 0.0;
+    for _ in 0..RAYS * 3 {
+        let (u, v) = random.in_triangle();
+        let to = a + (b - a) * u + (c - a) * v;
+        if sample.normal.dot(to - sample.position) <= 0.0 {
+            continue;
+        }
+        rays += 1.0;
+        if clear(to) {
+            open += 1.0;
+        }
+        if rays >= RAYS as f32 {
+            break;
+        }
+    }
+    if rays > 0.0 { open / rays } else { 0.0 }
+}
+
+/// Irradiance from a triangle of radiance 1, cut at the sample's horizon, without shadows.
+///
+/// Source: Lambert's formula for polygons, sum over edges of angle times cosine over 2.
+fn lambert(sample: &Sample, light: &TriangleLight) -> f32 {
+    let [a, b, c] = light.vertices.map(|v| v - sample.position);
+    let facing = -(b - a).cross(c - a).dot(a);
+    if facing <= 0.0 && !light.two_sided {
+        return 0.0;
+    }
+    let heights = [a, b, c].map(|v| v.dot(sample.normal));
+    if heights.iter().all(|h| *h <= 0.0) {
+        return 0.0;
+    }
+    // Small and far: the middle stands for all of it.
+    let middle = (a + b + c) / 3.0;
+    let squared = middle.length_squared();
+    let extent = (a - middle)
+        .length_squared()
+        .max((b - middle).length_squared())
+        .max((c - middle).length_squared());
+    if extent < 0.01 * squared && heights.iter().all(|h| *h > 0.0) {
+        let area = (b - a).cross(c - a) * 0.5;
+        return middle.dot(sample.normal) * area.dot(middle).abs() / (squared * squared);
+    }
+    let mut polygon = [Vec3::ZERO; 4];
+    let mut count = 0;
+    let corners = [(a, heights[0]), (b, heights[1]), (c, heights[2])];
+    let next = [corners[1], corners[2], corners[0]];
+    for ((from, h0), (to, h1)) in corners.into_iter().zip(next) {
+        let mut keep = |p: Vec3| {
+            if let Some(slot) = polygon.get_mut(count) {
+                *slot = p;
+                count += 1;
+            }
+        };
+        if h0 > 0.0 {
+            keep(from);
+        }
+        if (h0 > 0.0) != (h1 > 0.0) {
+            keep(from + (to - from) * (h0 / (h0 - h1)));
+        }
+    }
+    let corners = polygon.get(..count).unwrap_or_default();
+    let mut sum = 0.0;
+    for (i, from) in corners.iter().enumerate() {
+        let to = corners
+            .get(i + 1)
+            .or(corners.first())
+            .copied()
+            .unwrap_or(*from);
+        let cross = from.cross(to);
+        let length = cross.length();
+        if length > 1e-12 {
+            let angle = length.atan2(from.dot(to));
+            sum += angle * cross.dot(sample.normal) / length;
+        }
+    }
+    (sum.abs() / 2.0).min(TAU / 2.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn light(vertices: [Vec3; 3], two_sided: bool) -> TriangleLight {
+        TriangleLight {
+            vertices,
+            radiance: Vec3::ONE,
+            two_sided,
+            surface: 0,
+            triangle: 0,
+            model: 0,
+            is_sky: false,
+            source: EmissionSource::SurfaceLight,
+        }
+    }
+
+    #[test]
+    fn irradiance_agrees_with_adding_up_small_pieces() {
+        let sample = Sample {
+            position: Vec3::ZERO,
+            normal: Vec3::new(0.6, 0.0, 0.8),
+            value: Vec3::ZERO,
+            cluster: 0,
+            saturated: false,
+            held_out: false,
+        };
+        // Facing down; one partly below the horizon, one far away, one seen from behind.
+        let near = [
+            Vec3::new(-50.0, -20.0, 10.0),
+            Vec3::new(20.0, 60.0, 10.0),
+            Vec3::new(40.0, -20.0, 15.0),
+        ];
+        let far = near.map(|v| v + Vec3::new(0.0, 0.0, 900.0));
+        for vertices in [near, far] {
+            let [a, b, c] = vertices;
+            let light = light(vertices, false);
+            let down = light.normal();
+            assert!(down.z < 0.0);
+            let mut sum = 0.0;
+            let pieces = 400;
+            for i in 0..pieces {
+                for j in 0..pieces - i {
+                    for third in [1.0, 2.0] {
+                        if third == 2.0 && j + 1 >= pieces - i {
+                            continue;
+                        }
+                        let (u, v) = (i as f32 + third / 3.0, j as f32 + third / 3.0);
+                        let (u, v) = (u / pieces as f32, v / pieces as f32);
+                        let p = a + (b - a) * u + (c - a) * v;
+                        let d = p.normalize();
+                        sum += d.dot(sample.normal).max(0.0) * -d.dot(down) / p.length_squared()
+                            * light.area()
+                            / (pieces * pieces) as f32;
+                    }
+                }
+            }
+            let found = lambert(&sample, &light);
+            assert!((found / sum - 1.0).abs() < 0.01, "{found} {sum}");
+        }
+        let [a, b, c] = near;
+        assert_eq!(lambert(&sample, &light([a, c, b], false)), 0.0);
+        assert!(lambert(&sample, &light([a, c, b], true)) > 0.1);
+    }
+}

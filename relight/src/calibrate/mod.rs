@@ -1,0 +1,190 @@
+//! Calibration: the strengths of a map's lights, and lights that its compiler threw away, from its lightmaps.
+//!
+//! Compilers strip light entities, and leave their scale factors nowhere; what they computed is still there, as
+//! lightmaps. Light is linear in the strengths of lights, so that finding them is a linear problem: *inverse lighting*.
+//!
+//! 1. [`samples`]: measurements, spread over the map's area. Some are held out, to judge by.
+//! 2. [`columns`]: shadow rays tell what each known light gives to each sample.
+//! 3. [`place`]: candidates for lost lights all over open space, then in front of what stays unexplained;
+//!    [`solve`] chooses among them by sparse non-negative least squares of logarithmic error. What directives say
+//!    is a prior, and what is the same everywhere is ambient, within limits.
+//! 4. The world's lights get their strengths, lost lights are added to
+//!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
+//!
+//! Results can be kept ([`CalibrationCache`]): they depend on the world alone, on no clock and no thread.
+//!
+//! Source: the idea is that of Schoeneman et al., *Painting with Light*, SIGGRAPH 1993.
+
+mod apply;
+mod bvh;
+mod cache;
+mod columns;
+mod parallel;
+mod place;
+mod random;
+mod report;
+mod samples;
+mod solve;
+#[cfg(test)]
+mod tests;
+
+pub use cache::CalibrationCache;
+pub use report::{Agreement, CalibrationReport};
+pub use samples::Evidence;
+
+use crate::world::RelitWorld;
+use columns::Source;
+use glam::Vec3;
+use samples::Sample;
+use solve::Ambient;
+use std::time::Instant;
+
+/// Number that changes whenever the same world would give another result.
+const VERSION: u32 = 1;
+
+/// How a world is calibrated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationOptions {
+    /// Measurements taken, about.
+    pub samples: usize,
+    /// Most places tried at a time for lost lights; 0 places none.
+    pub candidates: usize,
+    /// Seed of the choice of measurements.
+    pub seed: u64,
+    /// Where results are kept.
+    pub cache: Option<CalibrationCache>,
+}
+
+impl Default for CalibrationOptions {
+    /// What takes a few seconds for a map.
+    fn default() -> Self {
+        CalibrationOptions {
+            samples: 6000,
+            candidates: 3000,
+            seed: 1,
+            cache: None,
+        }
+    }
+}
+
+/// What calibration finds: everything that it changes in a world.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct Solution {
+    /// Strength of each known light source, in the order of [`columns::known`].
+    known: Vec<Vec3>,
+    /// Lights put in: origin, intensity.
+    placed: Vec<(Vec3, Vec3)>,
+    ambient: Vec3,
+    report: CalibrationReport,
+}
+
+/// Fits a world's lights to the light that its compiler stored, and puts in lights that the compiler threw away.
+///
+/// Without lightmaps, vertex colours of lit surfaces tell, then the light grid; without those the world stays as it
+/// is. What goes wrong with the cache is a warning of the world's.
+pub fn calibrate(world: &mut RelitWorld, options: &CalibrationOptions) -> CalibrationReport {
+    let begin = Instant::now();
+    let key = options.cache.as_ref().map(|_| cache::key(world, options));
+    let kept = match (&options.cache, key) {
+        (Some(cache), Some(key)) => cache.read(key, columns::count(world)),
+        _ => Ok(None),
+    };
+    let mut solution = match kept {
+        Ok(Some(mut solution)) => {
+            solution.report.cached = true;
+            solution
+        }
+        missing => {
+            if let Err(problem) = missing {
+                world.warnings.push(problem.to_string());
+            }
+            let solution = find(world, options);
+            if let (Some(cache), Some(key)) = (&options.cache, key)
+                && let Err(problem) = cache.write(key, &solution)
+            {
+                world.warnings.push(problem.to_string());
+            }
+            solution
+        }
+    };
+    apply::apply(world, &solution);
+    solution.report.seconds = begin.elapsed().as_secs_f64();
+    world.calibration = Some(solution.report.clone());
+    solution.report
+}
+
+/// Solves for a world's light.
+fn find(world: &RelitWorld, options: &CalibrationOptions) -> Solution {
+    let occluders = samples::occluders(world);
+    let (samples, evidence) = samples::take(world, &occluders, options.samples, options.seed);
+    let mut columns = columns::known(world, &occluders, &samples);
+    let known = columns.len();
+    let mut solution = Solution {
+        known: columns.iter().map(|c| c.strength).collect(),
+        placed: Vec::new(),
+        ambient: world.ambient,
+        report: CalibrationReport {
+            evidence,
+            samples: samples.len(),
+            held_out: samples.iter().filter(|s| s.held_out).count(),
+            known,
+            ..Default::default()
+        },
+    };
+    if samples.is_empty() {
+        return solution;
+    }
+    let before = solve::predict(&samples, &columns, world.ambient);
+    solution.report.before = Agreement::of(&samples, &before);
+    let mut ambient = first_ambient(world, &samples);
+    let effort = solve::Effort {
+        rounds: 4,
+        sweeps: 16,
+        sparsity: 0.0,
+    };
+    solve::solve(&samples, &mut columns, &mut ambient, effort);
+    if options.candidates > 0 {
+        let scene = place::Scene {
+            world,
+            occluders: &occluders,
+            samples: &samples,
+            candidates: options.candidates,
+        };
+        place::place(&scene, &mut columns, &mut ambient);
+    }
+    let after = solve::predict(&samples, &columns, ambient.value);
+    solution.report.after = Agreement::of(&samples, &after);
+    solution.known = columns.iter().take(known).map(|c| c.strength).collect();
+    let placed = columns.iter().skip(known).filter_map(|c| match c.source {
+        Source::Placed(origin) => Some((origin, c.strength)),
+        _ => None,
+    });
+    solution.placed = placed.collect();
+    solution.report.placed = solution.placed.len();
+    solution.ambient = ambient.value;
+    solution
+}
+
+/// Where the ambient term starts, and how far it may go: what darker places have. More would hide lights.
+fn first_ambient(world: &RelitWorld, samples: &[Sample]) -> Ambient {
+    let channel = |k: usize| {
+        let mut values: Vec<f32> = samples
+            .iter()
+            .filter(|s| !s.held_out)
+            .map(|s| s.value[k])
+            .collect();
+        values.sort_by(f32::total_cmp);
+        values.get(values.len() / 5).copied().unwrap_or(0.0)
+    };
+    let dark = Vec3::new(channel(0), channel(1), channel(2));
+    // Without any light, loading took the mean of all light for ambient.
+    let start = if world.light_count() == 0 {
+        Vec3::ZERO
+    } else {
+        world.ambient.min(dark)
+    };
+    Ambient {
+        value: start,
+        limit: dark,
+    }
+}

@@ -1,0 +1,381 @@
+//! Finding the lights that the map compiler threw away.
+//!
+//! First every node of a grid over open space is a candidate, and the sparse solution chooses among them. A light
+//! between nodes is chosen as several of them: near ones that see each other become one, and each looks around for a
+//! better place. Then bright samples that are still not explained put candidates in front of themselves, and the same
+//! is done once more.
+
+use super::bvh::Occluders;
+use super::columns::{Column, Source, point_rows};
+use super::parallel;
+use super::samples::{Sample, mean};
+use super::solve::{Ambient, Effort, FLOOR, Residual, norm, residual, solve};
+use crate::world::RelitWorld;
+use glam::Vec3;
+use std::f32::consts::PI;
+
+/// Least distance of a light from surfaces, id units: its ball must not reach into them.
+pub(super) const CLEARANCE: f32 = 8.0;
+
+/// Grid spacing to begin with, id units.
+const SPACING: f32 = 64.0;
+
+/// How far candidates are tried, id units. Lights that are kept reach as far as they are seen.
+const RANGE: f32 = 700.0;
+
+/// Distances from a sample at which candidates are put in front of it, id units.
+const FRONTS: [f32; 4] = [12.0, 28.0, 60.0, 120.0];
+
+/// Squared error (samples that are off by a factor e) that a light must take away to be kept.
+const WORTH: f32 = 0.6;
+
+/// Samples that a light is moved by: so many tell where it is.
+const JUDGES: usize = 240;
+
+/// Part of a sample's light that a light must be able to give, to be moved by it.
+const INFLUENCE: f32 = 0.05;
+
+const AROUND: [Vec3; 6] = [
+    Vec3::X,
+    Vec3::NEG_X,
+    Vec3::Y,
+    Vec3::NEG_Y,
+    Vec3::Z,
+    Vec3::NEG_Z,
+];
+
+/// What placing lights needs to know.
+pub(super) struct Scene<'a> {
+    pub world: &'a RelitWorld,
+    pub occluders: &'a Occluders,
+    pub samples: &'a [Sample],
+    /// Most candidates at a time.
+    pub candidates: usize,
+}
+
+impl Scene<'_> {
+    fn rows(&self, origin: Vec3, range: f32) -> Vec<(u32, f32)> {
+        self.rows_of(self.samples, origin, range)
+    }
+
+    fn rows_of(&self, samples: &[Sample], origin: Vec3, range: f32) -> Vec<(u32, f32)> {
+        point_rows(
+            &self.world.bsp,
+            self.occluders,
+            samples,
+            origin,
+            None,
+            range,
+        )
+    }
+
+    /// Samples used for fitting that a light of this intensity may matter to when it moves by up to `margin`; evenly
+    /// thinned when they are many.
+    fn influenced(&self, origin: Vec3, intensity: f32, margin: f32) -> Vec<u32> {
+        let all: Vec<u32> = (0u32..)
+            .zip(self.samples)
+            .filter(|(_, s)| {
+                let least = (s.level() + FLOOR) * (INFLUENCE * PI);
+                let distance = (s.position.distance(origin) - margin).max(1.0);
+                let before = (origin - s.position).dot(s.normal) > -margin;
+                !s.held_out && before && intensity > least * distance * distance
+            })
+            .map(|(i, _)| i)
+            .collect();
+        let judges = all.len().min(JUDGES);
+        (0..judges)
+            .filter_map(|k| all.get(k * all.len() / judges.max(1)).copied())
+            .collect()
+    }
+
+    /// Columns of lights at places, in order; such as reach nothing are left out.
+    fn columns(&self, places: &[Vec3], range: f32) -> Vec<Column> {
+        let rows = parallel::map(places, |_, &origin| self.rows(origin, range));
+        let with_rows = places.iter().zip(rows).filter(|(_, r)| !r.is_empty());
+        with_rows
+            .map(|(&origin, rows)| Column {
+                source: Source::Placed(origin),
+                rows,
+                strength: Vec3::ZERO,
+                prior: None,
+            })
+            .collect()
+    }
+
+    /// Whether a light fits at a place: in the map, and clear of surfaces.
+    fn open(&self, origin: Vec3) -> bool {
+        self.world.bsp.cluster_at(origin) >= 0
+            && AROUND
+                .into_iter()
+                .all(|d| self.occluders.nearest(origin, d, CLEARANCE).is_none())
+    }
+
+    fn sees(&self, a: Vec3, b: Vec3) -> bool {
+        !self.occluders.blocked(a, b, false)
+    }
+
+    /// Nodes of a grid over open space: as fine as the number of candidates allows.
+    fn grid(&self) -> (Vec<Vec3>, f32) {
+        let mut mins = Vec3::INFINITY;
+        let mut maxs = Vec3::NEG_INFINITY;
+        for sample in self.samples {
+            mins = mins.min(sample.position);
+            maxs = maxs.max(sample.position);
+        }
+        let mut spacing = SPACING;
+        // Bounded work for maps of any size: a first guess from the volume, then what is open decides.
+        let volume = (maxs - mins).max(Vec3::splat(1.0));
+        let nodes = |s: f32| (volume / s + 1.0).element_product();
+        while nodes(spacing) > 60.0 * self.candidates as f32 {
+            spacing *= 1.1;
+        }
+        loop {
+            let counts = ((maxs - mins) / spacing).floor().max(Vec3::ZERO);
+            let origin = mins + ((maxs - mins) - counts * spacing) * 0.5;
+            let mut places = Vec::new();
+            for z in 0..=counts.z as u32 {
+                for y in 0..=counts.y as u32 {
+                    for x in 0..=counts.x as u32 {
+                        let at = origin + Vec3::new(x as f32, y as f32, z as f32) * spacing;
+                        if self.world.bsp.cluster_at(at) >= 0 {
+                            places.push(at);
+                        }
+                    }
+                }
+            }
+            if places.len() <= self.candidates {
+                places.retain(|&at| self.open(at));
+                return (places, spacing);
+            }
+            spacing *= (places.len() as f32 / self.candidates as f32)
+                .cbrt()
+                .max(1.03);
+        }
+    }
+
+    /// Places in front of bright samples that are not explained, the worst first.
+    fn in_front(&self, state: &Residual) -> Vec<Vec3> {
+        let mut worst: Vec<(f32, usize)> = self
+            .samples
+            .iter()
+            .zip(&state.rest)
+            .enumerate()
+            .filter(|(_, (s, _))| !s.held_out)
+            .map(|(i, (s, rest))| (mean(*rest) / (s.level() + FLOOR), i))
+            .filter(|(missing, _)| *missing > 0.25)
+            .collect();
+        worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let fronts = worst.into_iter().flat_map(|(_, i)| {
+            let sample = self.samples.get(i);
+            FRONTS.into_iter().filter_map(move |distance| {
+                let sample = sample?;
+                Some((sample.position, sample.position + sample.normal * distance))
+            })
+        });
+        fronts
+            .filter(|&(from, at)| self.sees(from, at) && self.open(at))
+            .map(|(_, at)| at)
+            .take(self.candidates)
+            .collect()
+    }
+}
+
+/// Adds lights to `columns` until the samples are explained as well as they can be.
+pub(super) fn place(scene: &Scene<'_>, columns: &mut Vec<Column>, ambient: &mut Ambient) {
+    let known = columns.len();
+    let (nodes, spacing) = scene.grid();
+    choose(scene, columns, known, ambient, &nodes, spacing);
+    let state = residual(scene.samples, columns, ambient.value);
+    let fronts = scene.in_front(&state);
+    choose(scene, columns, known, ambient, &fronts, spacing * 0.5);
+}
+
+/// Tries candidates beside the lights placed so far; keeps the best, merged, moved and solved anew.
+fn choose(
+    scene: &Scene<'_>,
+    columns: &mut Vec<Column>,
+    known: usize,
+    ambient: &mut Ambient,
+    candidates: &[Vec3],
+    spacing: f32,
+) {
+    columns.extend(scene.columns(candidates, RANGE));
+    let sparse = Effort {
+        rounds: 4,
+        sweeps: 16,
+        sparsity: 0.5,
+    };
+    let state = solve(scene.samples, columns, ambient, sparse);
+    drop_useless(columns, known, &state, WORTH * 0.25);
+    merge(scene, columns, known, spacing * 1.5);
+    let refit = Effort {
+        rounds: 2,
+        sweeps: 16,
+        sparsity: 0.2,
+    };
+    let mut state = solve(scene.samples, columns, ambient, refit);
+    for step in [0.5, 0.25, 0.125] {
+        look_around(scene, columns, known, &state, spacing * step);
+        state = solve(scene.samples, columns, ambient, refit);
+        drop_useless(columns, known, &state, WORTH * 0.5);
+    }
+    merge(scene, columns, known, spacing * 0.5);
+    let settle = Effort {
+        rounds: 4,
+        sweeps: 16,
+        sparsity: 0.1,
+    };
+    let state = solve(scene.samples, columns, ambient, settle);
+    drop_useless(columns, known, &state, WORTH);
+    solve(scene.samples, columns, ambient, settle);
+}
+
+/// Removes placed lights without which the error would hardly grow.
+fn drop_useless(columns: &mut Vec<Column>, known: usize, state: &Residual, worth: f32) {
+    let mut index = 0;
+    columns.retain(|column| {
+        index += 1;
+        let strength = mean(column.strength);
+        index <= known
+            || (strength > 0.0 && norm(column, &state.weights) * strength * strength >= worth)
+    });
+}
+
+/// Makes one light of those that are near to each other and see each other, strongest first.
+fn merge(scene: &Scene<'_>, columns: &mut Vec<Column>, known: usize, radius: f32) {
+    let mut placed: Vec<(Vec3, Vec3)> = columns
+        .drain(known..)
+        .filter_map(|c| match c.source {
+            Source::Placed(origin) => Some((origin, c.strength)),
+            _ => None,
+        })
+        .collect();
+    placed.sort_by(|a, b| mean(b.1).total_cmp(&mean(a.1)));
+    let mut taken = vec![false; placed.len()];
+    let mut places = Vec::new();
+    let mut strengths = Vec::new();
+    for (i, &(origin, strength)) in placed.iter().enumerate() {
+        if taken.get(i).copied().unwrap_or(true) {
+            continue;
+        }
+        let mut centre = Vec3::ZERO;
+        let mut total = 0.0;
+        let mut sum = Vec3::ZERO;
+        for (other, taken) in placed.iter().zip(&mut taken).skip(i) {
+            if !*taken
+                && other.0.distance(origin) <= radius
+                && (other.0 == origin || scene.sees(origin, other.0))
+            {
+                *taken = true;
+                centre += other.0 * mean(other.1);
+                total += mean(other.1);
+                sum += other.1;
+            }
+        }
+        let centre = if total > 0.0 { centre / total } else { origin };
+        if centre.distance(origin) > 1e-3 && scene.open(centre) && scene.sees(origin, centre) {
+            places.push(centre);
+            strengths.push(sum);
+        } else {
+            places.push(origin);
+            strengths.push(if sum == Vec3::ZERO { strength } else { sum });
+        }
+    }
+    let rows = parallel::map(&places, |_, &origin| scene.rows(origin, f32::INFINITY));
+    for ((origin, strength), rows) in places.into_iter().zip(strengths).zip(rows) {
+        columns.push(Column {
+            source: Source::Placed(origin),
+            rows,
+            strength,
+            prior: None,
+        });
+    }
+}
+
+/// Moves every placed light by up to two steps to where it would explain more, all others held.
+fn look_around(
+    scene: &Scene<'_>,
+    columns: &mut [Column],
+    known: usize,
+    state: &Residual,
+    step: f32,
+) {
+    let Some(placed) = columns.get_mut(known..) else {
+        return;
+    };
+    let moved = parallel::map(placed, |_, column| better_place(scene, column, state, step));
+    for (column, moved) in placed.iter_mut().zip(moved) {
+        if let Some(moved) = moved {
+            *column = moved;
+        }
+    }
+}
+
+fn better_place(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Option<Column> {
+    let Source::Placed(start) = column.source else {
+        return None;
+    };
+    let around = scene.influenced(start, mean(column.strength), step * 2.0);
+    let judged: Vec<Sample> = around
+        .iter()
+        .filter_map(|&i| scene.samples.get(i as usize).copied())
+        .collect();
+    // What this light would have to explain: the rest, and what it explains now.
+    let mut rows = column.rows.iter().peekable();
+    let wanted: Vec<(Vec3, f32)> = around
+        .iter()
+        .map(|&i| {
+            while rows.peek().is_some_and(|(row, _)| *row < i) {
+                rows.next();
+            }
+            let own = match rows.peek() {
+                Some(&&(row, a)) if row == i => column.strength * a,
+                _ => Vec3::ZERO,
+            };
+            let at = i as usize;
+            let rest = state.rest.get(at).copied().unwrap_or(Vec3::ZERO);
+            (rest + own, state.weights.get(at).copied().unwrap_or(0.0))
+        })
+        .collect();
+    // Error taken away by a light at a place with the strength that is best there, and that strength.
+    let gain = |origin: Vec3| {
+        let mut gradient = Vec3::ZERO;
+        let mut norm = 0.0;
+        for (i, a) in scene.rows_of(&judged, origin, f32::INFINITY) {
+            if let Some((wanted, weight)) = wanted.get(i as usize) {
+                gradient += *wanted * (*weight * a);
+                norm += *weight * a * a;
+            }
+        }
+        let gradient = gradient.max(Vec3::ZERO);
+        if norm > 0.0 {
+            (gradient.length_squared() / norm, gradient / norm)
+        } else {
+            (0.0, Vec3::ZERO)
+        }
+    };
+    let mut best = (start, gain(start));
+    for _ in 0..2 {
+        let from = best.0;
+        for direction in AROUND {
+            let at = from + direction * step;
+            if !scene.open(at) || !scene.sees(from, at) {
+                continue;
+            }
+            let found = gain(at);
+            if found.0 > best.1.0 * 1.001 {
+                best = (at, found);
+            }
+        }
+        if best.0 == from {
+            break;
+        }
+    }
+    let (origin, (_, strength)) = best;
+    (origin != start).then(|| Column {
+        source: Source::Placed(origin),
+        rows: scene.rows(origin, f32::INFINITY),
+        strength,
+        prior: None,
+    })
+}

@@ -1,0 +1,77 @@
+//! How well traced light agrees with stored light.
+
+use super::samples::{Evidence, STORED_UNIT, Sample, mean};
+use glam::Vec3;
+
+/// Stored light below which ratios mean nothing, irradiance / π.
+const DARK: f32 = 2.0 * STORED_UNIT;
+
+/// Least computed light in a ratio, irradiance / π: black counts as this.
+const BLACK: f32 = 0.25 * STORED_UNIT;
+
+/// Computed light against stored light, over measurements that fitting did not see.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Agreement {
+    /// Median of |log2(computed / stored)|, stops: 0 is perfect, 1 is a factor of two.
+    pub median_stops: f32,
+    /// Nine in ten are better than this, stops.
+    pub worst_tenth_stops: f32,
+    /// Sum of computed over sum of stored light.
+    pub sum_ratio: f32,
+}
+
+impl Agreement {
+    /// Of samples that are held out, not cut off and not all dark.
+    pub(super) fn of(samples: &[Sample], computed: &[Vec3]) -> Agreement {
+        let judged = || {
+            samples
+                .iter()
+                .zip(computed)
+                .filter(|(s, _)| s.held_out && !s.saturated && s.level() >= DARK)
+                .map(|(s, c)| (s.level(), mean(*c)))
+        };
+        let mut stops: Vec<f32> = judged()
+            .map(|(stored, computed)| (computed.max(BLACK) / stored).log2().abs())
+            .collect();
+        stops.sort_by(f32::total_cmp);
+        let quantile = |q: f32| {
+            let at = (stops.len().saturating_sub(1) as f32 * q) as usize;
+            stops.get(at).copied().unwrap_or(0.0)
+        };
+        let (stored, computed) = judged().fold((0.0f64, 0.0f64), |(s, c), (stored, computed)| {
+            (s + f64::from(stored), c + f64::from(computed))
+        });
+        Agreement {
+            median_stops: quantile(0.5),
+            worst_tenth_stops: quantile(0.9),
+            sum_ratio: if stored > 0.0 {
+                (computed / stored) as f32
+            } else {
+                0.0
+            },
+        }
+    }
+}
+
+/// What calibration did.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CalibrationReport {
+    /// What told of light.
+    pub evidence: Evidence,
+    /// Measurements taken.
+    pub samples: usize,
+    /// Of those, kept out of fitting.
+    pub held_out: usize,
+    /// Sources that the map's directives tell of; the triangle lights of one material count once.
+    pub known: usize,
+    /// Lights put in.
+    pub placed: usize,
+    /// Agreement of the light that directives tell of.
+    pub before: Agreement,
+    /// Agreement of calibrated light.
+    pub after: Agreement,
+    /// Whether the result was kept from an earlier time.
+    pub cached: bool,
+    /// Time that it took.
+    pub seconds: f64,
+}

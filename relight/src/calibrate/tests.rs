@@ -1,0 +1,398 @@
+use super::*;
+use crate::files::{MemoryFiles, SearchPath};
+use crate::light::{PointLight, SURFACE_LIGHT_RADIANCE};
+use crate::materials::Materials;
+use crate::test_data;
+use crate::world::Options;
+use q3bsp::Bsp;
+use q3bsp::builder::MapBuilder;
+use std::f32::consts::PI;
+
+/// Strength of the lamp's directive.
+const LAMP: f32 = 1000.0;
+
+const SCRIPT: &str = "
+t/wall
+{
+    { map $lightmap }
+    { map *white
+      blendFunc filter }
+}
+t/lamp
+{
+    q3map_lightRGB 1 1 1
+    q3map_surfacelight 1000
+    { map *white }
+}
+";
+
+const ROOM: [Vec3; 2] = [
+    Vec3::new(-320.0, -256.0, 0.0),
+    Vec3::new(320.0, 256.0, 256.0),
+];
+const PILLAR: [Vec3; 2] = [Vec3::new(-32.0, -96.0, 0.0), Vec3::new(32.0, 96.0, 256.0)];
+/// Corners of a lamp under the ceiling, clockwise seen from below.
+const LAMP_CORNERS: [Vec3; 4] = [
+    Vec3::new(180.0, -30.0, 250.0),
+    Vec3::new(220.0, -30.0, 250.0),
+    Vec3::new(220.0, 30.0, 250.0),
+    Vec3::new(180.0, 30.0, 250.0),
+];
+
+/// Whether a way goes through the pillar.
+fn in_pillar(from: Vec3, to: Vec3) -> bool {
+    let inverse = (to - from).recip();
+    let a = (PILLAR[0] - from) * inverse;
+    let b = (PILLAR[1] - from) * inverse;
+    let near = a.min(b).max_element().max(0.0);
+    let far = a.max(b).min_element().min(1.0);
+    near < far - 1e-4
+}
+
+/// A room with a pillar. `light` gives irradiance / π at a point of a wall; without it there are no lightmaps.
+fn room(lamp: bool, light: Option<&dyn Fn(Vec3, Vec3) -> Vec3>) -> RelitWorld {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 1);
+    let mut faces = map.add_box_faces(wall, ROOM[0], ROOM[1], true).to_vec();
+    faces.extend(map.add_box_faces(wall, PILLAR[0], PILLAR[1], false));
+    map.add_cell(ROOM[0], ROOM[1]);
+    if lamp {
+        let shader = map.add_shader("t/lamp", 0, 1);
+        map.add_quad(shader, LAMP_CORNERS);
+    }
+    for face in faces {
+        let Some(light) = light else { continue };
+        let corners = map.vertices_mut(face);
+        let (a, b, d) = (corners[0], corners[1], corners[3]);
+        let normal = a.normal;
+        let size = q3bsp::LIGHTMAP_SIZE as f32;
+        let page = map.add_lightmap_with(|x, y| {
+            let at = (glam::Vec2::new(x as f32, y as f32) + 0.5) / size;
+            let (e1, e2, offset) = (
+                b.lightmap - a.lightmap,
+                d.lightmap - a.lightmap,
+                at - a.lightmap,
+            );
+            let determinant = e1.perp_dot(e2);
+            let (u, v) = (
+                offset.perp_dot(e2) / determinant,
+                e1.perp_dot(offset) / determinant,
+            );
+            let on = a.position + (b.position - a.position) * u + (d.position - a.position) * v;
+            let stored = light(on + normal * 0.1, normal) * 255.0 / 4.0;
+            stored.to_array().map(|c| c.round() as u8)
+        });
+        map.set_lightmap(face, page);
+    }
+    relit(&map.build())
+}
+
+fn relit(bsp: &Bsp) -> RelitWorld {
+    let mut files = MemoryFiles::new();
+    let script = SCRIPT.replace('{', "\n{\n").replace('}', "\n}\n");
+    files.insert("scripts/test.shader", script).unwrap();
+    let (materials, diagnostics) = Materials::load(&files);
+    assert!(diagnostics.is_empty(), "{diagnostics:?}");
+    let bsp = Bsp::parse(&bsp.write()).unwrap();
+    RelitWorld::from_bsp(&files, &materials, "test", bsp, Options::default())
+}
+
+/// The lights that are hidden: origin, intensity.
+const HIDDEN: [(Vec3, Vec3); 3] = [
+    (
+        Vec3::new(-210.0, 77.0, 190.0),
+        Vec3::new(24000.0, 18000.0, 9000.0),
+    ),
+    (
+        Vec3::new(233.0, -141.0, 122.0),
+        Vec3::new(8000.0, 12000.0, 24000.0),
+    ),
+    (
+        Vec3::new(92.0, 189.0, 61.0),
+        Vec3::new(9000.0, 9000.0, 9000.0),
+    ),
+];
+
+fn from_hidden(at: Vec3, normal: Vec3) -> Vec3 {
+    HIDDEN
+        .iter()
+        .filter(|(origin, _)| !in_pillar(at, *origin))
+        .map(|(origin, intensity)| {
+            let offset = *origin - at;
+            *intensity * (normal.dot(offset).max(0.0) / offset.length().powi(3) / PI)
+        })
+        .sum()
+}
+
+fn small() -> CalibrationOptions {
+    CalibrationOptions {
+        samples: 2000,
+        candidates: 600,
+        ..Default::default()
+    }
+}
+
+#[test]
+fn hidden_lights_are_found_again() {
+    let mut world = room(false, Some(&from_hidden));
+    assert_eq!(world.light_count(), 0);
+    let report = calibrate(&mut world, &small());
+    println!("{report:?}");
+    assert_eq!(report.evidence, Evidence::Lightmaps);
+    assert_eq!(report.placed, world.point_lights.len());
+    assert!(report.held_out > 200 && report.held_out < report.samples / 3);
+    // Loading takes the mean of all light for ambient when it finds no lights.
+    assert!(report.before.median_stops > 0.5, "{report:?}");
+    assert!(report.after.median_stops < 0.05, "{report:?}");
+    for (origin, intensity) in HIDDEN {
+        let near = |l: &&PointLight| l.origin.distance(origin) < 24.0;
+        let found: Vec<_> = world.point_lights.iter().filter(near).collect();
+        let sum: Vec3 = found.iter().map(|l| l.intensity).sum();
+        let centre: Vec3 = found
+            .iter()
+            .map(|l| l.origin * l.intensity.element_sum())
+            .sum();
+        let centre = centre / sum.element_sum();
+        println!(
+            "{origin} {intensity}: {} lights, {centre} {sum}",
+            found.len()
+        );
+        assert!(centre.distance(origin) < 8.0, "{centre} for {origin}");
+        let off = (sum / intensity - 1.0).abs().max_element();
+        assert!(off < 0.15, "{sum} for {intensity}");
+    }
+    let total: Vec3 = world.point_lights.iter().map(|l| l.intensity).sum();
+    let hidden: Vec3 = HIDDEN.iter().map(|(_, i)| *i).sum();
+    assert!((total / hidden - 1.0).abs().max_element() < 0.1, "{total}");
+    // The lists know them: all of the room is one cluster.
+    assert_eq!(world.light_lists.row(0).len(), world.point_lights.len());
+    assert_eq!(world.report.point_lights, world.point_lights.len());
+}
+
+#[test]
+fn a_lamp_of_another_strength_gets_it_back() {
+    let radiance = 2.5 * LAMP * SURFACE_LIGHT_RADIANCE;
+    let [a, b, _, d] = LAMP_CORNERS;
+    let from_lamp = |at: Vec3, normal: Vec3| {
+        let mut sum = 0.0;
+        for i in 0..64 {
+            let (u, v) = ((i % 8) as f32 + 0.5, (i / 8) as f32 + 0.5);
+            let origin = a + (b - a) * (u / 8.0) + (d - a) * (v / 8.0);
+            let offset = origin - at;
+            let squared = offset.length_squared();
+            let leaving = offset.z.max(0.0);
+            if !in_pillar(at, origin) {
+                sum += normal.dot(offset).max(0.0) * leaving / (squared * squared);
+            }
+        }
+        Vec3::splat(sum * radiance * 40.0 * 60.0 / 64.0 / PI)
+    };
+    let mut world = room(true, Some(&from_lamp));
+    let before: Vec<_> = world.lights.iter().map(|l| l.radiance).collect();
+    assert!((before[0].x / (LAMP * SURFACE_LIGHT_RADIANCE) - 1.0).abs() < 1e-4);
+    let report = calibrate(&mut world, &small());
+    println!("{report:?} {:?}", world.point_lights);
+    for (light, before) in world.lights.iter().zip(before) {
+        let factor = light.radiance / before;
+        assert!((factor - 2.5).abs().max_element() < 0.15, "{factor}");
+    }
+    let emission = world.materials.iter().find_map(|m| m.emission).unwrap();
+    assert_eq!(emission.strength, world.lights[0].radiance);
+    assert_eq!(world.report.emitters[0].radiance, world.lights[0].radiance);
+    assert!(report.after.median_stops < 0.1, "{report:?}");
+    assert!(report.before.median_stops > 1.2, "{report:?}");
+    let placed: f32 = world.point_lights.iter().map(|l| l.intensity.x).sum();
+    let lamp: f32 = world.lights.iter().map(|l| l.radiance.x * l.area()).sum();
+    assert!(placed < 0.05 * lamp, "{placed} beside {lamp}");
+}
+
+/// What calibration may change.
+fn lights(world: &RelitWorld) -> String {
+    format!(
+        "{:?} {:?} {:?} {:?} {:?}",
+        world.lights, world.point_lights, world.suns, world.ambient, world.light_lists
+    )
+}
+
+#[test]
+fn without_stored_light_nothing_changes() {
+    let mut world = room(true, None);
+    let before = lights(&world);
+    let report = calibrate(&mut world, &small());
+    assert_eq!(report.evidence, Evidence::Nothing);
+    assert_eq!(report.samples, 0);
+    assert_eq!(lights(&world), before);
+}
+
+#[test]
+fn the_light_grid_tells_when_nothing_else_does() {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 1);
+    map.add_room(wall, ROOM[0], ROOM[1]);
+    let (origin, intensity) = HIDDEN[0];
+    let bsp = map.build_with_grid(Vec3::splat(32.0), |p| {
+        let offset = origin - p;
+        let direction = offset.normalize_or_zero();
+        let stored = intensity / offset.length_squared() / PI * 255.0 / 4.0;
+        let turn = 256.0 / std::f32::consts::TAU;
+        let byte = |angle: f32| (angle * turn).round().rem_euclid(256.0) as u8;
+        q3bsp::GridPoint {
+            ambient: [1; 3],
+            directed: stored.to_array().map(|c| c.round().min(255.0) as u8),
+            longitude: byte(direction.z.clamp(-1.0, 1.0).acos()),
+            latitude: byte(direction.y.atan2(direction.x)),
+        }
+    });
+    let mut world = relit(&bsp);
+    let report = calibrate(&mut world, &small());
+    println!("{report:?} {:?}", world.point_lights);
+    assert_eq!(report.evidence, Evidence::Grid);
+    let near = world
+        .point_lights
+        .iter()
+        .filter(|l| l.origin.distance(origin) < 40.0);
+    let sum: Vec3 = near.map(|l| l.intensity).sum();
+    assert!((sum / intensity - 1.0).abs().max_element() < 0.25, "{sum}");
+}
+
+#[test]
+fn results_are_the_same_every_time_and_can_be_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let fresh = || room(true, Some(&from_hidden));
+    let plain = small();
+    let caching = CalibrationOptions {
+        cache: Some(CalibrationCache::new(folder.path().join("light"))),
+        ..plain.clone()
+    };
+    let run = |options: &CalibrationOptions| {
+        let mut world = fresh();
+        let report = calibrate(&mut world, options);
+        (lights(&world), report, world.warnings)
+    };
+    let first = run(&plain);
+    let (kept, report, _) = run(&caching);
+    assert!(first.0 == kept && !report.cached);
+    let (read, report, warnings) = run(&caching);
+    assert_eq!(read, first.0);
+    assert!(report.cached && warnings.is_empty(), "{warnings:?}");
+    let same = CalibrationReport {
+        seconds: 0.0,
+        cached: false,
+        ..report
+    };
+    assert_eq!(
+        same,
+        CalibrationReport {
+            seconds: 0.0,
+            ..first.1
+        }
+    );
+    // Another choice of samples is another result.
+    let other = CalibrationOptions {
+        seed: 2,
+        ..caching.clone()
+    };
+    assert!(!run(&other).1.cached);
+
+    let files = || std::fs::read_dir(folder.path().join("light")).unwrap();
+    assert_eq!(files().count(), 2);
+    let paths: Vec<_> = files().map(|f| f.unwrap().path()).collect();
+    let whole: Vec<_> = paths.iter().map(|p| std::fs::read(p).unwrap()).collect();
+    type Damage<'a> = &'a dyn Fn(&[u8]) -> Vec<u8>;
+    let damages: [Damage<'_>; 7] = [
+        &|_| Vec::new(),
+        &|b| b[..b.len() / 2].to_vec(),
+        &|b| b.iter().map(|c| c ^ 0x80).collect(),
+        &|b| [b, b"placed 1 2 3 4 5 6\n"].concat(),
+        &|b| {
+            String::from_utf8_lossy(b)
+                .replace("known ", "known -")
+                .into()
+        },
+        &|b| {
+            String::from_utf8_lossy(b)
+                .replace("ambient ", "ambient NaN ")
+                .into()
+        },
+        &|b| {
+            String::from_utf8_lossy(b)
+                .replacen("known", "placed 1 2 3", 1)
+                .into()
+        },
+    ];
+    for (number, damage) in damages.iter().enumerate() {
+        for (path, whole) in paths.iter().zip(&whole) {
+            std::fs::write(path, damage(whole)).unwrap();
+        }
+        let (again, report, warnings) = run(&caching);
+        assert!(
+            !report.cached && warnings.len() == 1,
+            "{number}: {warnings:?}"
+        );
+        assert!(warnings[0].contains(".light: line "), "{}", warnings[0]);
+        assert_eq!(again, first.0, "{number}");
+        // It was written anew.
+        assert!(run(&caching).1.cached, "{number}");
+    }
+}
+
+#[test]
+fn a_folder_that_cannot_be_used_is_a_warning() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let mut world = room(false, Some(&from_hidden));
+    let options = CalibrationOptions {
+        samples: 200,
+        candidates: 50,
+        cache: Some(CalibrationCache::new(file.path())),
+        ..Default::default()
+    };
+    let report = calibrate(&mut world, &options);
+    assert!(report.placed > 0 && !world.warnings.is_empty());
+    assert!(
+        world.warnings.iter().all(|w| w.contains("cannot be")),
+        "{:?}",
+        world.warnings
+    );
+}
+
+#[test]
+fn shipped_maps_agree_with_their_lightmaps() {
+    let Some(folder) = test_data::folder() else {
+        return;
+    };
+    let files = SearchPath::open(&[folder]).unwrap();
+    let (materials, _) = Materials::load(&files);
+    // The largest median error on samples that fitting did not see, stops.
+    let maps = [
+        ("oa_dm1", 0.35),
+        ("oa_dm3", 0.35),
+        ("oa_dm5", 0.35),
+        ("oa_dm7", 0.35),
+        ("kaos2", 0.35),
+        ("am_lavactf", 0.35),
+    ];
+    for (map, largest) in maps {
+        let options = Options {
+            calibrate: Some(CalibrationOptions {
+                samples: 3000,
+                candidates: 1500,
+                ..Default::default()
+            }),
+            ..Default::default()
+        };
+        let path = format!("maps/{map}.bsp");
+        let world = RelitWorld::load(&files, &materials, &path, options).unwrap();
+        let report = world.calibration.unwrap();
+        println!("{map}: {report:?}");
+        assert!(report.held_out > 200, "{map}");
+        assert!(report.after.median_stops <= largest, "{map}: {report:?}");
+        assert!(
+            report.after.median_stops * 2.0 <= report.before.median_stops,
+            "{map}: {report:?}"
+        );
+        assert!(
+            (0.8..1.2).contains(&report.after.sum_ratio),
+            "{map}: {report:?}"
+        );
+    }
+}
