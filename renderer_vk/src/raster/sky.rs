@@ -18,8 +18,8 @@ pub const FACES: usize = 6;
 pub fn cube_point(face: usize, s: f32, t: f32) -> Vec3 {
     match face {
         0 => Vec3::new(1.0, -s, t),
-        1 => Vec3::new(-1.0, s, t),
-        2 => Vec3::new(s, 1.0, t),
+        1 => Vec3::new(s, 1.0, t),
+        2 => Vec3::new(-1.0, s, t),
         3 => Vec3::new(-s, -1.0, t),
         4 => Vec3::new(-t, -s, 1.0),
         _ => Vec3::new(t, -s, -1.0),
