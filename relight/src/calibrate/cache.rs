@@ -115,7 +115,7 @@ fn print(solution: &Solution) -> String {
     text
 }
 
-/// Reads what [`print`] wrote; else the line that is wrong, and how.
+/// Reads what [`print()`] wrote; else the line that is wrong, and how.
 fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
     let mut lines = text.lines().enumerate();
     let header = lines.next().map(|(_, l)| l.split_whitespace());
