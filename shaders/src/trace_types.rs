@@ -75,6 +75,54 @@ pub struct BspNode {
     pub children: [i32; 2],
 }
 
+/// A node of a bounding volume hierarchy: the boxes of its two children.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct BvhNode {
+    /// Smallest corners; a child that is not there is a point beyond everything.
+    pub low: [Vec3; 2],
+    /// Largest corners.
+    pub high: [Vec3; 2],
+    /// Of a leaf the first of its entries, otherwise the child's node.
+    pub first: [u32; 2],
+    /// Entries of a leaf; 0: a node.
+    pub count: [u32; 2],
+}
+
+/// A triangle in the order of a hierarchy's leafs.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct BvhTriangle {
+    /// First corner.
+    pub a: Vec3,
+    /// Second corner.
+    pub b: Vec3,
+    /// Third corner.
+    pub c: Vec3,
+    /// Index of the geometry's triangle.
+    pub primitive: u32,
+}
+
+/// A placed hierarchy, in the order of the top hierarchy's leafs.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct BvhInstance {
+    /// Its [`BvhNode`]s.
+    pub nodes: u64,
+    /// Its [`BvhTriangle`]s.
+    pub triangles: u64,
+    /// World to object, three rows.
+    pub to_object: [[f32; 4]; 3],
+    /// Index of the geometry record.
+    pub geometry: u32,
+    /// Rays see it when their mask shares a bit.
+    pub mask: u32,
+    /// `KIND_*`.
+    pub kind: u32,
+    /// Keeps the size a multiple of eight without hidden bytes.
+    pub padding: u32,
+}
+
 /// A sky material.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -128,6 +176,9 @@ pub struct TraceView {
     pub light_chances: u64,
     /// State of automatic exposure: histogram and current exposure.
     pub exposure: u64,
+    /// Top hierarchy of the compute tracer; 0: nothing.
+    pub bvh_nodes: u64,
+    pub bvh_instances: u64,
     pub materials: MaterialBuffers,
     pub eye: Vec3,
     pub forward: Vec3,

@@ -237,23 +237,9 @@ float light_target(uvec2 reference, vec3 position, vec3 normal) {
 
 // Whether the sample's light arrives. Sun and sky arrive where the ray meets sky first or leaves the map.
 bool light_arrives(LightSample s, vec3 origin) {
-    if (s.sky) {
-        Hit hit = trace_closest(origin, 0.0, s.direction, s.distance, MASK_SHADOW | MASK_SKY);
-        return hit.geometry == NO_HIT || Geometries(VIEW.geometries).at[hit.geometry].kind == KIND_SKY;
-    }
-    return s.distance <= 0.0 || !trace_blocked(origin, 0.0, s.direction, s.distance, MASK_SHADOW);
-}
-
-vec3 arriving_light(uvec2 reference, vec3 origin, vec3 position, vec3 normal) {
-    LightSample s = sample_light(reference, position, normal, rng_next2());
-    if (!(max_component(s.light) > 0.0)) return vec3(0.0);
-    return light_arrives(s, origin) ? s.light : vec3(0.0);
-}
-
-// One light, each with the same probability.
-vec3 estimate_uniform(LightSet set, vec3 origin, vec3 position, vec3 normal) {
-    uint member = min(uint(rng_next() * float(set.count)), set.count - 1);
-    return arriving_light(light_reference(set, member), origin, position, normal) * float(set.count);
+    if (!s.sky && s.distance <= 0.0) return true;
+    Hit hit = trace_ray(origin, 0.0, s.direction, s.distance, s.sky ? MASK_SHADOW | MASK_SKY : MASK_SHADOW, !s.sky);
+    return hit.geometry == NO_HIT || (s.sky && Geometries(VIEW.geometries).at[hit.geometry].kind == KIND_SKY);
 }
 
 // The member of a set's list that a number in [0, 1) falls on, and the chance of that.
@@ -269,26 +255,36 @@ uint pick_listed(LightSet set, float u, out float chance) {
     return low;
 }
 
+// A light to send a ray to, and what its light is to be multiplied by; weight 0: none.
+struct LightChoice {
+    uvec2 reference;
+    float weight;
+};
+
+// One light, each with the same probability.
+LightChoice choose_uniform(LightSet set) {
+    uint member = min(uint(rng_next() * float(set.count)), set.count - 1);
+    return LightChoice(light_reference(set, member), float(set.count));
+}
+
 // One of the suns; a map has one as a rule.
-vec3 estimate_sun(vec3 origin, vec3 position, vec3 normal) {
+LightChoice choose_sun() {
     uint count = VIEW.sun_count;
-    if (count == 0) return vec3(0.0);
     uint index = count > 1 ? min(uint(rng_next() * float(count)), count - 1) : 0;
-    return arriving_light(uvec2(LIGHT_KIND_SUN, index), origin, position, normal) * float(count);
+    return LightChoice(uvec2(LIGHT_KIND_SUN, index), float(count));
 }
 
 // Resampled importance sampling (Talbot et al. 2005): some candidates, one of them chosen by its target, weighed by
 // the inverse of the chance that it had. Candidates come from the cluster's list, by what each light can give to the
 // cluster; dynamic lights are always among them, and so is the whole list if it is short enough. The target does not
 // know about shadows, and a hidden sun would outshine all that is left in its shadow: suns get a ray of their own.
-vec3 estimate_resampled(LightSet set, vec3 origin, vec3 position, vec3 normal) {
+LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal) {
     uint drawn = max(VIEW.candidates, 1);
     bool whole = set.listed <= drawn;
     if (whole) drawn = set.listed;
     uint candidates = drawn + VIEW.dynamic_light_count;
     float sum = 0.0, chosen_target = 0.0;
     uvec2 chosen = uvec2(0);
-    vec3 suns = estimate_sun(origin, position, normal);
     for (uint i = 0; i < candidates; i++) {
         uint member = i < drawn ? i : set.listed + VIEW.sun_count + i - drawn;
         float weight = 1.0;
@@ -308,15 +304,7 @@ vec3 estimate_resampled(LightSet set, vec3 origin, vec3 position, vec3 normal) {
             chosen_target = target;
         }
     }
-    if (chosen_target <= 0.0) return suns;
-    return suns + arriving_light(chosen, origin, position, normal) * (sum / chosen_target);
-}
-
-vec3 estimate_all(LightSet set, vec3 origin, vec3 position, vec3 normal) {
-    vec3 sum = vec3(0.0);
-    for (uint member = 0; member < set.count; member++)
-        sum += arriving_light(light_reference(set, member), origin, position, normal);
-    return sum;
+    return LightChoice(chosen, chosen_target > 0.0 ? sum / chosen_target : 0.0);
 }
 
 // Direct light on a point whose surface faces `face_normal`, with `samples` independent estimates.
@@ -326,10 +314,20 @@ vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint sampling, u
     vec3 origin = offset_ray(position, face_normal);
     vec3 sum = vec3(0.0);
     samples = max(samples, 1);
-    for (uint i = 0; i < samples; i++) {
-        if (sampling == SAMPLING_UNIFORM) sum += estimate_uniform(set, origin, position, normal);
-        else if (sampling == SAMPLING_ALL) sum += estimate_all(set, origin, position, normal);
-        else sum += estimate_resampled(set, origin, position, normal);
+    // rays of one estimate
+    uint rays = 1;
+    if (sampling == SAMPLING_ALL) rays = set.count;
+    else if (sampling == SAMPLING_RESAMPLED && VIEW.sun_count > 0) rays = 2;
+    for (uint i = 0; i < samples * rays; i++) {
+        uint ray = i % rays;
+        LightChoice choice;
+        if (sampling == SAMPLING_UNIFORM) choice = choose_uniform(set);
+        else if (sampling == SAMPLING_ALL) choice = LightChoice(light_reference(set, ray), 1.0);
+        else if (ray == 1) choice = choose_sun();
+        else choice = choose_resampled(set, position, normal);
+        if (!(choice.weight > 0.0)) continue;
+        LightSample s = sample_light(choice.reference, position, normal, rng_next2());
+        if (max_component(s.light) > 0.0 && light_arrives(s, origin)) sum += s.light * choice.weight;
     }
     return sum / float(samples);
 }

@@ -15,6 +15,12 @@ struct SunLight { vec3 direction; float cos_angle; vec3 irradiance; };
 
 struct BspNode { vec4 plane; int children[2]; };
 
+struct BvhNode { vec3 low[2]; vec3 high[2]; uint first[2]; uint count[2]; };
+
+struct BvhTriangle { vec3 a; vec3 b; vec3 c; uint primitive; };
+
+struct BvhInstance { uint64_t nodes; uint64_t triangles; vec4 to_object[3]; uint geometry; uint mask; uint kind; uint padding; };
+
 struct SkyRecord { uint faces[6]; float cloud_height; };
 
 struct PortalRecord {
@@ -25,6 +31,7 @@ struct TraceView {
     uint64_t geometries; uint64_t instances; uint64_t fogs; uint64_t portals; uint64_t skies; uint64_t triangle_lights;
     uint64_t sphere_lights; uint64_t dynamic_lights; uint64_t suns; uint64_t nodes; uint64_t leaf_clusters;
     uint64_t light_offsets; uint64_t light_indices; uint64_t light_chances; uint64_t exposure;
+    uint64_t bvh_nodes; uint64_t bvh_instances;
     MaterialBuffers materials;
     vec3 eye; vec3 forward; vec3 left; vec3 up;
     uint width; uint height; int target_x; int target_y;

@@ -5,16 +5,17 @@
 //! bottom-level structure, so a frame builds at most twelve of them, in one batch.
 
 use glam::{Mat3, Vec3};
-use shaders::trace_types::GeometryRecord;
 use shaders::trace_types::constants::{
     MASK_FIRST_SOLID, MASK_FIRST_TRANSLUCENT, MASK_NO_SHADOW, MASK_SKY, MASK_SOLID,
     MASK_THIRD_SOLID, MASK_THIRD_TRANSLUCENT, MASK_TRANSLUCENT, NO_INSTANCE,
 };
+use shaders::trace_types::{BvhInstance, GeometryRecord};
+use shaders::types::Triangle;
 use shaders::types::constants as c;
-use shaders::types::{Instance, Triangle};
 
-use super::geometry::{StaticGeometry, rank_bits};
-use super::input::{Kind, MaterialTable};
+use super::bvh::{Aabb, build, build_triangles};
+use super::geometry::{StaticBlas, StaticGeometry, Structure, rank_bits};
+use super::input::{Kind, MaterialTable, Tracer};
 use crate::gpu::{
     self, Access, Blas, BlasBuild, BlasFlags, BlasGeometry, Device, Error, Recorder, Tlas,
 };
@@ -66,20 +67,23 @@ fn hit_group(kind: Kind) -> u32 {
     u32::from(kind == Kind::Translucent)
 }
 
-/// One bottom-level structure for meshes that move.
+/// Meshes that move and that rays treat alike.
 struct Slot {
     seen: Seen,
     kind: Kind,
-    blas: Blas,
     triangles: Vec<Triangle>,
     indices: Vec<[u32; 3]>,
 }
 
 /// What a frame's rays are traced against.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AccelOutput {
-    /// Bindless index of the top-level structure.
+    /// Bindless index of the driver's top-level structure.
     pub scene: u32,
+    /// Device address of our own top level's nodes; 0: nothing is there.
+    pub nodes: u64,
+    /// Device address of the `BvhInstance`s in the order of its leafs.
+    pub placed: u64,
     /// Device address of the `GeometryRecord`s.
     pub geometries: u64,
     /// Device address of the view's `Instance`s.
@@ -88,10 +92,34 @@ pub struct AccelOutput {
     pub first_person: bool,
 }
 
+/// A structure in its place.
+struct Placement<'a> {
+    part: Part<'a>,
+    axis: Mat3,
+    origin: Vec3,
+    record: u32,
+    mask: u8,
+    kind: Kind,
+}
+
+/// What is placed.
+enum Part<'a> {
+    Static(&'a StaticBlas),
+    /// Index of the slot.
+    Slot(usize),
+}
+
+/// The driver's structures for what changes from frame to frame.
+struct DriverStructures {
+    slots: Vec<Blas>,
+    tlas: Tlas,
+}
+
 /// Builds the structures of each frame in storage that stays.
 pub struct Accel {
     slots: Vec<Slot>,
-    tlas: Tlas,
+    /// With the pipeline tracer.
+    driver: Option<DriverStructures>,
     positions: Vec<Vec3>,
     used: Vec<bool>,
 }
@@ -106,26 +134,29 @@ const KINDS: [Kind; 4] = [Kind::Opaque, Kind::Tested, Kind::Translucent, Kind::S
 
 impl Accel {
     /// Empty structures.
-    pub fn new(device: &Device) -> Self {
-        let flags = BlasFlags {
-            fast_build: true,
-            ..BlasFlags::default()
-        };
+    pub fn new(device: &Device, tracer: Tracer) -> Self {
         let mut slots = Vec::new();
         for seen in SEEN {
             for kind in KINDS {
                 slots.push(Slot {
                     seen,
                     kind,
-                    blas: Blas::new(device, &format!("trace {seen:?} {kind:?}"), flags),
                     triangles: Vec::new(),
                     indices: Vec::new(),
                 });
             }
         }
+        let flags = BlasFlags {
+            fast_build: true,
+            ..BlasFlags::default()
+        };
+        let blas = |s: &Slot| Blas::new(device, &format!("trace {:?} {:?}", s.seen, s.kind), flags);
         Self {
+            driver: (tracer == Tracer::Pipeline).then(|| DriverStructures {
+                slots: slots.iter().map(blas).collect(),
+                tlas: Tlas::new(device, "trace scene"),
+            }),
             slots,
-            tlas: Tlas::new(device, "trace scene"),
             positions: Vec::new(),
             used: Vec::new(),
         }
@@ -143,104 +174,88 @@ impl Accel {
         materials: &dyn MaterialTable,
     ) -> Result<AccelOutput, Error> {
         self.collect(view, materials);
-        let vertex_address = rec.arena().push(&view.vertices)?;
-        let instance_address = rec.arena().push(&view.instances)?;
-        let position_address = rec.arena().push(&self.positions)?;
-
-        let mut records: Vec<GeometryRecord> = Vec::new();
-        let mut placed: Vec<gpu::Instance> = Vec::new();
-        let custom_index =
-            |records: &Vec<GeometryRecord>| u32::try_from(records.len()).unwrap_or(0);
-
-        if let Some(geometry) = geometry {
-            let submodels = view.submodels.iter().map(|s| (s.model, s.instance));
-            for (model, instance_index) in std::iter::once((0, 0)).chain(submodels) {
-                let Some(instance) = view.instances.get(instance_index as usize) else {
-                    continue;
-                };
-                for part in geometry.structures.iter().filter(|s| s.model == model) {
-                    placed.push(gpu::Instance {
-                        transform: transform(instance),
-                        custom_index: custom_index(&records),
-                        mask: mask(Seen::Always, part.kind),
-                        sbt_offset: hit_group(part.kind),
-                        cull_disable: true,
-                        flip_facing: false,
-                        force_opaque: None,
-                        blas: part.blas.address(),
-                    });
-                    records.push(GeometryRecord {
-                        triangles: part.triangles,
-                        vertices: geometry.vertices,
-                        instance: instance_index,
-                        kind: part.kind.index(),
-                    });
-                }
-            }
-        }
-
-        let mut geometries = Vec::new();
-        for slot in self.slots.iter().filter(|s| !s.triangles.is_empty()) {
-            let triangles = rec.arena().push(&slot.triangles)?;
-            let index_address = rec.arena().push(&slot.indices)?;
-            records.push(GeometryRecord {
-                triangles,
-                vertices: vertex_address,
-                instance: NO_INSTANCE,
-                kind: slot.kind.index(),
-            });
-            geometries.push([BlasGeometry {
-                vertex_address: position_address,
-                vertex_stride: size_of::<Vec3>() as u64,
-                max_vertex: u32::try_from(self.positions.len().saturating_sub(1))
-                    .unwrap_or(u32::MAX),
-                index_address,
-                triangle_count: u32::try_from(slot.triangles.len()).unwrap_or(u32::MAX),
-                opaque: matches!(slot.kind, Kind::Opaque | Kind::Sky),
-                no_duplicate_any_hit: slot.kind == Kind::Translucent,
-            }]);
-        }
-        let first_dynamic = records.len() - geometries.len();
-        let geometry_address = rec.arena().push(&records)?;
-
-        let mut pass = rec.pass("trace_accel", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
-        let active = self.slots.iter_mut().filter(|s| !s.triangles.is_empty());
-        let mut builds: Vec<BlasBuild<'_>> = active
-            .zip(&geometries)
-            .map(|(slot, geometries)| BlasBuild {
-                blas: &mut slot.blas,
-                geometries,
-            })
-            .collect();
-        if !builds.is_empty() {
-            pass.build_blas(&mut builds)?;
-            pass.barrier();
-        }
-        let active = self.slots.iter().filter(|s| !s.triangles.is_empty());
-        for (slot, index) in active.zip(first_dynamic..) {
-            placed.push(gpu::Instance {
-                transform: IDENTITY,
-                custom_index: u32::try_from(index).unwrap_or(0),
-                mask: mask(slot.seen, slot.kind),
-                sbt_offset: hit_group(slot.kind),
-                cull_disable: true,
-                flip_facing: false,
-                force_opaque: None,
-                blas: slot.blas.address(),
-            });
-        }
-        pass.build_tlas(&mut self.tlas, &placed)?;
-        drop(pass);
-        Ok(AccelOutput {
-            scene: self.tlas.index(),
-            geometries: geometry_address,
-            instances: instance_address,
+        let vertices = rec.arena().push(&view.vertices)?;
+        let mut output = AccelOutput {
+            instances: rec.arena().push(&view.instances)?,
             first_person: self.slots.iter().any(|s| {
                 s.seen == Seen::FirstPerson
                     && s.kind != Kind::Translucent
                     && !s.triangles.is_empty()
             }),
-        })
+            ..AccelOutput::default()
+        };
+        let mut records: Vec<GeometryRecord> = Vec::new();
+        let mut placed: Vec<Placement<'_>> = Vec::new();
+        let mut place = |part, axis, origin, mask, kind: Kind, record: GeometryRecord| {
+            placed.push(Placement {
+                part,
+                axis,
+                origin,
+                record: u32::try_from(records.len()).unwrap_or(u32::MAX),
+                mask,
+                kind,
+            });
+            records.push(record);
+        };
+        if let Some(geometry) = geometry {
+            let submodels = view.submodels.iter().map(|s| (s.model, s.instance));
+            for (model, index) in std::iter::once((0, 0)).chain(submodels) {
+                let Some(instance) = view.instances.get(index as usize) else {
+                    continue;
+                };
+                let [x, y, z] = instance.axis;
+                for part in geometry.structures.iter().filter(|s| s.model == model) {
+                    let record = GeometryRecord {
+                        triangles: part.triangles,
+                        vertices: geometry.vertices,
+                        instance: index,
+                        kind: part.kind.index(),
+                    };
+                    let mask = mask(Seen::Always, part.kind);
+                    let axis = Mat3::from_cols(x, y, z);
+                    place(
+                        Part::Static(part),
+                        axis,
+                        instance.origin,
+                        mask,
+                        part.kind,
+                        record,
+                    );
+                }
+            }
+        }
+        for (index, slot) in self.slots.iter().enumerate() {
+            if slot.triangles.is_empty() {
+                continue;
+            }
+            let record = GeometryRecord {
+                triangles: rec.arena().push(&slot.triangles)?,
+                vertices,
+                instance: NO_INSTANCE,
+                kind: slot.kind.index(),
+            };
+            let mask = mask(slot.seen, slot.kind);
+            place(
+                Part::Slot(index),
+                Mat3::IDENTITY,
+                Vec3::ZERO,
+                mask,
+                slot.kind,
+                record,
+            );
+        }
+        output.geometries = rec.arena().push(&records)?;
+        match &mut self.driver {
+            Some(driver) => {
+                driver.build(rec, &self.slots, &self.positions, &placed)?;
+                output.scene = driver.tlas.index();
+            }
+            None => {
+                (output.nodes, output.placed) =
+                    build_own(rec, &self.slots, &self.positions, &placed)?;
+            }
+        }
+        Ok(output)
     }
 
     /// Sorts the view's meshes into slots and moves their vertices to world space.
@@ -324,16 +339,126 @@ impl Accel {
     }
 }
 
-const IDENTITY: [[f32; 4]; 3] = [
-    [1.0, 0.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0, 0.0],
-    [0.0, 0.0, 1.0, 0.0],
-];
+impl DriverStructures {
+    /// Builds the bottom level of what moves in one batch, then the top level.
+    fn build(
+        &mut self,
+        rec: &mut Recorder,
+        slots: &[Slot],
+        positions: &[Vec3],
+        placed: &[Placement<'_>],
+    ) -> Result<(), Error> {
+        let vertex_address = rec.arena().push(positions)?;
+        let mut geometries = Vec::with_capacity(slots.len());
+        for slot in slots {
+            geometries.push([BlasGeometry {
+                vertex_address,
+                vertex_stride: size_of::<Vec3>() as u64,
+                max_vertex: u32::try_from(positions.len().saturating_sub(1)).unwrap_or(u32::MAX),
+                index_address: rec.arena().push(&slot.indices)?,
+                triangle_count: u32::try_from(slot.triangles.len()).unwrap_or(u32::MAX),
+                opaque: matches!(slot.kind, Kind::Opaque | Kind::Sky),
+                no_duplicate_any_hit: slot.kind == Kind::Translucent,
+            }]);
+        }
+        let mut pass = rec.pass("trace_accel", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
+        let mut builds: Vec<BlasBuild<'_>> = (self.slots.iter_mut().zip(&geometries))
+            .filter(|(_, geometries)| geometries[0].triangle_count > 0)
+            .map(|(blas, geometries)| BlasBuild { blas, geometries })
+            .collect();
+        if !builds.is_empty() {
+            pass.build_blas(&mut builds)?;
+            pass.barrier();
+        }
+        let instances: Vec<gpu::Instance> = placed
+            .iter()
+            .map(|p| gpu::Instance {
+                transform: rows(p.axis, p.origin),
+                custom_index: p.record,
+                mask: p.mask,
+                sbt_offset: hit_group(p.kind),
+                cull_disable: true,
+                flip_facing: false,
+                force_opaque: None,
+                blas: match &p.part {
+                    Part::Static(part) => match &part.structure {
+                        Structure::Driver(blas) => blas.address(),
+                        Structure::Own(_) => 0,
+                    },
+                    Part::Slot(index) => self.slots.get(*index).map_or(0, Blas::address),
+                },
+            })
+            .collect();
+        pass.build_tlas(&mut self.tlas, &instances)
+    }
+}
+
+/// Builds our own hierarchies of what moves and the one over everything; their addresses in the frame's memory.
+fn build_own(
+    rec: &mut Recorder,
+    slots: &[Slot],
+    positions: &[Vec3],
+    placed: &[Placement<'_>],
+) -> Result<(u64, u64), Error> {
+    let mut instances = Vec::with_capacity(placed.len());
+    let mut boxes = Vec::with_capacity(placed.len());
+    let position = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::NAN);
+    for p in placed {
+        let (nodes, triangles, bounds) = match &p.part {
+            Part::Static(part) => match &part.structure {
+                Structure::Own(own) => (own.nodes.address(), own.triangles.address(), own.bounds),
+                Structure::Driver(_) => continue,
+            },
+            Part::Slot(index) => {
+                let indices = slots.get(*index).map_or(&[][..], |s| &s.indices);
+                let corners: Vec<[Vec3; 3]> = indices.iter().map(|t| t.map(position)).collect();
+                let Some(hierarchy) = build_triangles(&corners) else {
+                    continue;
+                };
+                let nodes = rec.arena().push(&hierarchy.nodes)?;
+                (
+                    nodes,
+                    rec.arena().push(&hierarchy.triangles)?,
+                    hierarchy.bounds,
+                )
+            }
+        };
+        // flattened to nothing it is not to be seen
+        if p.axis.determinant().abs() < 1.0e-12 {
+            continue;
+        }
+        let inverse = p.axis.inverse();
+        boxes.push(
+            bounds
+                .corners()
+                .iter()
+                .fold(Aabb::EMPTY, |b, &c| b.with(p.axis * c + p.origin)),
+        );
+        instances.push(BvhInstance {
+            nodes,
+            triangles,
+            to_object: rows(inverse, -(inverse * p.origin)),
+            geometry: p.record,
+            mask: u32::from(p.mask),
+            kind: p.kind.index(),
+            padding: 0,
+        });
+    }
+    let top = build(&boxes);
+    if top.nodes.is_empty() {
+        return Ok((0, 0));
+    }
+    let ordered: Vec<BvhInstance> = top
+        .order
+        .iter()
+        .filter_map(|&i| instances.get(i as usize).copied())
+        .collect();
+    Ok((rec.arena().push(&top.nodes)?, rec.arena().push(&ordered)?))
+}
 
 /// Rows of the matrix that places an entity.
-fn transform(instance: &Instance) -> [[f32; 4]; 3] {
-    let [x, y, z] = instance.axis;
-    let o = instance.origin;
+fn rows(axis: Mat3, o: Vec3) -> [[f32; 4]; 3] {
+    let (x, y, z) = (axis.x_axis, axis.y_axis, axis.z_axis);
     [
         [x.x, y.x, z.x, o.x],
         [x.y, y.y, z.y, o.y],

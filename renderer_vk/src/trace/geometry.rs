@@ -1,5 +1,5 @@
-//! The acceleration structures of what keeps its shape: one bottom-level structure for each brush model and kind of
-//! material, built once per map, compacted.
+//! The acceleration structures of what keeps its shape: one for each brush model and kind of material, built once per
+//! map.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,8 @@ use shaders::trace_types::SkyRecord;
 use shaders::types::Triangle;
 use shaders::types::constants::{NO_TEXTURE, TRIANGLE_WORLD};
 
-use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface};
+use super::bvh::{Aabb, build_triangles};
+use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
 
 /// One bottom-level structure of the map.
@@ -20,7 +21,25 @@ pub struct StaticBlas {
     /// Device address of its `Triangle`s.
     pub triangles: u64,
     /// The structure.
-    pub blas: Blas,
+    pub structure: Structure,
+}
+
+/// What rays walk.
+pub enum Structure {
+    /// The driver's own, for the ray tracing pipeline.
+    Driver(Blas),
+    /// Ours, for the compute tracer.
+    Own(OwnStructure),
+}
+
+/// A hierarchy on the GPU.
+pub struct OwnStructure {
+    /// `BvhNode`s.
+    pub nodes: Buffer,
+    /// `BvhTriangle`s.
+    pub triangles: Buffer,
+    /// Of all triangles, in the model's space.
+    pub bounds: Aabb,
 }
 
 /// A map's geometry as rays see it.
@@ -132,72 +151,117 @@ impl StaticGeometry {
     /// Out of memory, or a lost device.
     pub fn new(
         device: &Device,
+        tracer: Tracer,
         scene: &StaticScene<'_>,
         materials: &dyn MaterialTable,
     ) -> Result<Self, Error> {
         let grouped = group(scene, materials);
-        let indices: Vec<[u32; 3]> = grouped.triangles.iter().map(|t| t.indices).collect();
-        let index_buffer = Buffer::with_data(
-            device,
-            "trace static indices",
-            BufferUsage::ACCEL_INPUT,
-            &indices,
-        )?;
-        // of their own, because only these need to be readable by builds
-        let positions: Vec<Vec3> = scene.vertices.iter().map(|v| v.position).collect();
-        let position_buffer = Buffer::with_data(
-            device,
-            "trace static positions",
-            BufferUsage::ACCEL_INPUT,
-            &positions,
-        )?;
+        let storage = BufferUsage::STORAGE;
         let triangles = Buffer::with_data(
             device,
             "trace static triangles",
-            BufferUsage::STORAGE,
+            storage,
             &grouped.triangles,
         )?;
-        let flags = BlasFlags {
-            compact: true,
-            ..BlasFlags::default()
+        let structures = match tracer {
+            Tracer::Pipeline => driver_structures(device, scene, &grouped, &triangles)?,
+            Tracer::Compute => own_structures(device, scene, &grouped, &triangles)?,
         };
-        let mut structures = Vec::new();
-        let mut geometries = Vec::new();
-        for ((model, kind), group) in grouped.groups {
-            structures.push(StaticBlas {
-                model,
-                kind,
-                triangles: triangles.address() + (group.first * size_of::<Triangle>()) as u64,
-                blas: Blas::new(device, &format!("trace model {model} {kind:?}"), flags),
-            });
-            geometries.push([BlasGeometry {
-                vertex_address: position_buffer.address(),
-                vertex_stride: size_of::<Vec3>() as u64,
-                max_vertex: u32::try_from(scene.vertices.len().saturating_sub(1))
-                    .unwrap_or(u32::MAX),
-                index_address: index_buffer.address()
-                    + (group.first * size_of::<[u32; 3]>()) as u64,
-                triangle_count: u32::try_from(group.count).unwrap_or(u32::MAX),
-                opaque: matches!(kind, Kind::Opaque | Kind::Sky),
-                no_duplicate_any_hit: kind == Kind::Translucent,
-            }]);
-        }
-        let mut builds: Vec<BlasBuild<'_>> = structures
-            .iter_mut()
-            .zip(&geometries)
-            .map(|(s, g)| BlasBuild {
-                blas: &mut s.blas,
-                geometries: g,
-            })
-            .collect();
-        device.build_static_blas(&mut builds)?;
         Ok(Self {
             structures,
             vertices: scene.vertex_address,
-            skies: Buffer::with_data(device, "trace skies", BufferUsage::STORAGE, &grouped.skies)?,
-            fogs: Buffer::with_data(device, "trace fogs", BufferUsage::STORAGE, scene.fogs)?,
+            skies: Buffer::with_data(device, "trace skies", storage, &grouped.skies)?,
+            fogs: Buffer::with_data(device, "trace fogs", storage, scene.fogs)?,
             fog_count: u32::try_from(scene.fogs.len()).unwrap_or(u32::MAX),
             _triangles: triangles,
         })
     }
+}
+
+/// Structures of the driver: built in one batch, compacted.
+fn driver_structures(
+    device: &Device,
+    scene: &StaticScene<'_>,
+    grouped: &Grouped,
+    triangles: &Buffer,
+) -> Result<Vec<StaticBlas>, Error> {
+    let input = BufferUsage::ACCEL_INPUT;
+    let indices: Vec<[u32; 3]> = grouped.triangles.iter().map(|t| t.indices).collect();
+    let index_buffer = Buffer::with_data(device, "trace static indices", input, &indices)?;
+    // of their own, because only these need to be readable by builds
+    let positions: Vec<Vec3> = scene.vertices.iter().map(|v| v.position).collect();
+    let position_buffer = Buffer::with_data(device, "trace static positions", input, &positions)?;
+    let flags = BlasFlags {
+        compact: true,
+        ..BlasFlags::default()
+    };
+    let mut parts = Vec::new();
+    for ((model, kind), group) in &grouped.groups {
+        let geometry = [BlasGeometry {
+            vertex_address: position_buffer.address(),
+            vertex_stride: size_of::<Vec3>() as u64,
+            max_vertex: u32::try_from(scene.vertices.len().saturating_sub(1)).unwrap_or(u32::MAX),
+            index_address: index_buffer.address() + (group.first * size_of::<[u32; 3]>()) as u64,
+            triangle_count: u32::try_from(group.count).unwrap_or(u32::MAX),
+            opaque: matches!(kind, Kind::Opaque | Kind::Sky),
+            no_duplicate_any_hit: *kind == Kind::Translucent,
+        }];
+        let blas = Blas::new(device, &format!("trace model {model} {kind:?}"), flags);
+        parts.push((*model, *kind, group.first, blas, geometry));
+    }
+    let mut builds: Vec<BlasBuild<'_>> = parts
+        .iter_mut()
+        .map(|(_, _, _, blas, geometries)| BlasBuild { blas, geometries })
+        .collect();
+    device.build_static_blas(&mut builds)?;
+    Ok(parts
+        .into_iter()
+        .map(|(model, kind, first, blas, _)| StaticBlas {
+            model,
+            kind,
+            triangles: triangles.address() + (first * size_of::<Triangle>()) as u64,
+            structure: Structure::Driver(blas),
+        })
+        .collect())
+}
+
+/// Structures of our own.
+fn own_structures(
+    device: &Device,
+    scene: &StaticScene<'_>,
+    grouped: &Grouped,
+    triangles: &Buffer,
+) -> Result<Vec<StaticBlas>, Error> {
+    let mut structures = Vec::new();
+    let position = |i: u32| {
+        scene
+            .vertices
+            .get(i as usize)
+            .map_or(Vec3::ZERO, |v| v.position)
+    };
+    for ((model, kind), group) in &grouped.groups {
+        let members = grouped
+            .triangles
+            .get(group.first..group.first + group.count);
+        let corners: Vec<[Vec3; 3]> = members
+            .unwrap_or_default()
+            .iter()
+            .map(|t| t.indices.map(position))
+            .collect();
+        let Some(hierarchy) = build_triangles(&corners) else {
+            continue;
+        };
+        let storage = BufferUsage::STORAGE;
+        structures.push(StaticBlas {
+            model: *model,
+            kind: *kind,
+            triangles: triangles.address() + (group.first * size_of::<Triangle>()) as u64,
+            structure: Structure::Own(OwnStructure {
+                nodes: Buffer::with_data(device, "trace nodes", storage, &hierarchy.nodes)?,
+                triangles: Buffer::with_data(device, "trace leafs", storage, &hierarchy.triangles)?,
+                bounds: hierarchy.bounds,
+            }),
+        });
+    }
+    Ok(structures)
 }

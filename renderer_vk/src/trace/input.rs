@@ -5,6 +5,28 @@ use shaders::trace_types::SkyRecord;
 use shaders::types::constants as c;
 use shaders::types::{Fog, MaterialBuffers, Vertex};
 
+use crate::gpu::DeviceInfo;
+
+/// What follows the rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tracer {
+    /// The device's ray tracing pipeline.
+    Pipeline,
+    /// Hierarchies of our own, walked by compute shaders: on any device, and faster where the driver traces in software.
+    Compute,
+}
+
+impl Tracer {
+    /// The faster one on a device.
+    pub fn of(info: &DeviceInfo) -> Self {
+        if info.ray_tracing.is_some() && !info.software {
+            Self::Pipeline
+        } else {
+            Self::Compute
+        }
+    }
+}
+
 /// What a material is to a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Kind {

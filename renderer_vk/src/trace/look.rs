@@ -7,7 +7,7 @@ use shaders::types::MaterialBuffers;
 use shaders::types::constants::NO_TEXTURE;
 
 use super::geometry::StaticGeometry;
-use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface};
+use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use super::lights::{MapLightSource, MapLights};
 use super::view_tracer::{TracedMap, ViewTracer};
 use crate::assets::compile::sampler;
@@ -86,6 +86,7 @@ fn static_scene(world: &World) -> StaticScene<'_> {
 /// The traced look of one map.
 pub struct TraceLook {
     pub(super) tracer: ViewTracer,
+    kind: Tracer,
     geometry: StaticGeometry,
     lights: MapLights,
     /// Of the materials, when `geometry` was built.
@@ -96,7 +97,7 @@ impl TraceLook {
     /// Compiles the passes and builds the map's acceleration structures and light lists.
     ///
     /// # Errors
-    /// The device traces no rays, is out of memory or lost.
+    /// The device is out of memory or lost.
     pub fn new(device: &Device, world: &World, assets: &Assets) -> Result<Self, Error> {
         let relit = &world.data.relit;
         let source = MapLightSource {
@@ -107,9 +108,11 @@ impl TraceLook {
             ambient: relit.ambient,
             bsp: Some(&relit.bsp),
         };
+        let tracer = Tracer::of(device.info());
         Ok(Self {
-            tracer: ViewTracer::new(device)?,
-            geometry: StaticGeometry::new(device, &static_scene(world), assets)?,
+            tracer: ViewTracer::new(device, tracer)?,
+            kind: tracer,
+            geometry: StaticGeometry::new(device, tracer, &static_scene(world), assets)?,
             lights: MapLights::new(device, &source)?,
             remapping: remapping(&assets.materials),
         })
@@ -131,7 +134,8 @@ impl TraceLook {
         let remapping = remapping(&assets.materials);
         if remapping != self.remapping {
             // triangles name their materials; this happens when a game changes a flag's or button's look
-            self.geometry = StaticGeometry::new(rec.device(), &static_scene(world), assets)?;
+            self.geometry =
+                StaticGeometry::new(rec.device(), self.kind, &static_scene(world), assets)?;
             self.remapping = remapping;
         }
         let map = TracedMap {

@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 pub mod accel;
+pub mod bvh;
 pub mod geometry;
 pub mod input;
 pub mod lights;

@@ -3,6 +3,7 @@
 
 use shaders::Spirv;
 
+use super::input::Tracer;
 use super::targets::Targets;
 
 use crate::gpu::{
@@ -32,13 +33,33 @@ fn ray_pipeline(device: &Device, name: &str, raygen: &Spirv) -> Result<RayTracin
     )
 }
 
+/// A pass that traces, for one of the tracers.
+enum RayPass {
+    Pipeline(RayTracingPipeline),
+    Compute(ComputePipeline),
+}
+
+/// Groups of the compute tracer's passes.
+const COMPUTE_TILE: [u32; 2] = [8, 4];
+
 fn trace(
     rec: &mut Recorder,
     name: &str,
-    pipeline: &RayTracingPipeline,
+    pipeline: &RayPass,
     view: u64,
     size: [u32; 2],
 ) -> Result<(), Error> {
+    let pipeline = match pipeline {
+        RayPass::Pipeline(pipeline) => pipeline,
+        RayPass::Compute(pipeline) => {
+            let mut pass = rec.pass(name, Access::COMPUTE, Access::COMPUTE)?;
+            pass.bind_compute(pipeline);
+            pass.push(&view);
+            let [x, y] = COMPUTE_TILE;
+            pass.dispatch(size[0].div_ceil(x), size[1].div_ceil(y), 1);
+            return Ok(());
+        }
+    };
     let mut pass = rec.pass(name, Access::RAY_TRACING, Access::RAY_TRACING)?;
     pass.bind_rays(pipeline);
     pass.push(&view);
@@ -64,17 +85,20 @@ fn dispatch(
 }
 
 macro_rules! ray_pass {
-    ($(#[$doc:meta])* $type:ident, $name:literal, $raygen:ident) => {
+    ($(#[$doc:meta])* $type:ident, $name:literal, $raygen:ident, $compute:ident) => {
         $(#[$doc])*
-        pub struct $type(RayTracingPipeline);
+        pub struct $type(RayPass);
 
         impl $type {
             /// Compiles the pipeline.
             ///
             /// # Errors
             /// The driver refuses the pipeline.
-            pub fn new(device: &Device) -> Result<Self, Error> {
-                Ok(Self(ray_pipeline(device, $name, &shaders::$raygen)?))
+            pub fn new(device: &Device, tracer: Tracer) -> Result<Self, Error> {
+                Ok(Self(match tracer {
+                    Tracer::Pipeline => RayPass::Pipeline(ray_pipeline(device, $name, &shaders::$raygen)?),
+                    Tracer::Compute => RayPass::Compute(ComputePipeline::new(device, $name, &shaders::$compute, &[])?),
+                }))
             }
 
             /// Records the pass. `view`: device address of the `TraceView`; `size`: its pixels.
@@ -116,15 +140,18 @@ macro_rules! pixel_pass {
 ray_pass!(
     /// Reads the acceleration structures and materials; writes the G-buffer (`position`, `surface`) and `front`: the
     /// picture of all that lies in front of the surface whose light is asked for.
-    Primary, "trace_primary", TRACE_PRIMARY_RGEN
+    Primary, "trace_primary", TRACE_PRIMARY_RGEN,
+    TRACE_PRIMARY_RGEN_COMPUTE
 );
 ray_pass!(
     /// Reads the G-buffer and the light lists; writes `direct`.
-    Direct, "trace_direct", TRACE_DIRECT_RGEN
+    Direct, "trace_direct", TRACE_DIRECT_RGEN,
+    TRACE_DIRECT_RGEN_COMPUTE
 );
 ray_pass!(
     /// Reads the G-buffer and the light lists; writes `indirect`.
-    Indirect, "trace_indirect", TRACE_INDIRECT_RGEN
+    Indirect, "trace_indirect", TRACE_INDIRECT_RGEN,
+    TRACE_INDIRECT_RGEN_COMPUTE
 );
 pixel_pass!(
     /// Reads the G-buffer, `front`, `direct` and `indirect`; writes `hdr`.

@@ -8,7 +8,7 @@ use shaders::trace_types::{PortalRecord, TraceView};
 
 use super::accel::{Accel, AccelOutput};
 use super::geometry::StaticGeometry;
-use super::input::MaterialTable;
+use super::input::{MaterialTable, Tracer};
 use super::lights::{MapLights, dynamic_lights};
 use super::passes::{Accumulate, Composite, Denoise, Direct, Exposure, Indirect, Primary, ToneMap};
 use super::targets::Targets;
@@ -57,14 +57,14 @@ impl ViewTracer {
     /// Compiles the pipelines and makes what stays from frame to frame.
     ///
     /// # Errors
-    /// The device has no ray tracing pipelines, refuses one, or is out of memory.
-    pub fn new(device: &Device) -> Result<Self, Error> {
+    /// The device refuses a pipeline, or is out of memory.
+    pub fn new(device: &Device, tracer: Tracer) -> Result<Self, Error> {
         Ok(Self {
             device: device.clone(),
-            accel: Accel::new(device),
-            primary: Primary::new(device)?,
-            direct: Direct::new(device)?,
-            indirect: Indirect::new(device)?,
+            accel: Accel::new(device, tracer),
+            primary: Primary::new(device, tracer)?,
+            direct: Direct::new(device, tracer)?,
+            indirect: Indirect::new(device, tracer)?,
             denoise: Denoise::new(device)?,
             composite: Composite::new(device)?,
             accumulate: Accumulate::new(device)?,
@@ -276,6 +276,8 @@ impl ViewTracer {
             light_indices: lights.indices.address(),
             light_chances: lights.chances.address(),
             exposure: self.exposure_state.address(),
+            bvh_nodes: accel.nodes,
+            bvh_instances: accel.placed,
             materials: materials.buffers(),
             eye,
             forward,

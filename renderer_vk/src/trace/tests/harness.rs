@@ -14,46 +14,54 @@ use crate::gpu::{
 use crate::scene::{DynamicMesh, Portal, Submodel, View, ViewScene};
 use crate::settings::Settings;
 use crate::trace::geometry::StaticGeometry;
-use crate::trace::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface};
+use crate::trace::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use crate::trace::lights::{MapLightSource, MapLights};
 use crate::trace::view_tracer::{TracedMap, ViewTracer};
 
 /// A device with its validation layer on and the look under test.
 pub struct Gpu {
     pub device: Device,
+    tracer: Tracer,
     look: ViewTracer,
     pub ring: FrameRing,
 }
 
 impl Gpu {
-    /// `None`, with a printed line, where there is no device that traces rays.
-    pub fn new() -> Option<Self> {
+    /// Runs a test with every tracer that the device has.
+    pub fn each(test: fn(&mut Gpu)) {
+        for tracer in [Tracer::Pipeline, Tracer::Compute] {
+            if let Some(mut gpu) = Self::new(tracer) {
+                println!("{tracer:?}");
+                test(&mut gpu);
+            }
+        }
+    }
+
+    /// `None`, with a printed line, where there is no device for the tracer.
+    pub fn new(tracer: Tracer) -> Option<Self> {
         let options = DeviceOptions {
             validation: true,
+            // without the tracer's extensions, so that it is shown to need none
+            allow_ray_tracing: tracer == Tracer::Pipeline,
             ..DeviceOptions::default()
         };
         let device = match Device::new(&options, SurfaceSource::Headless) {
-            Ok(device) if device.info().ray_tracing.is_some() => device,
+            Ok(device) if device.info().ray_tracing.is_some() || tracer == Tracer::Compute => {
+                device
+            }
             other => {
-                let why = other.map_or_else(
-                    |e| e.to_string(),
-                    |d| format!("{} does not trace rays", d.info().name),
-                );
-                assert!(
-                    std::env::var("RELIGHT_REQUIRE_GPU").as_deref() != Ok("1"),
-                    "{why}"
-                );
+                let name = |d: Device| format!("{} does not trace rays", d.info().name);
+                let why = other.map_or_else(|e| e.to_string(), name);
+                let required = std::env::var("RELIGHT_REQUIRE_GPU").as_deref() == Ok("1");
+                assert!(!required, "{why}");
                 println!("skipped: {why}");
                 return None;
             }
         };
-        for (filter, wrap) in [
-            (Filter::Linear, Wrap::Repeat),
-            (Filter::Linear, Wrap::Clamp),
-        ] {
+        for wrap in [Wrap::Repeat, Wrap::Clamp] {
             device
                 .sampler(&SamplerDesc {
-                    filter,
+                    filter: Filter::Linear,
                     mip: MipFilter::Linear,
                     wrap,
                     anisotropy: 1.0,
@@ -62,7 +70,8 @@ impl Gpu {
                 .expect("sampler");
         }
         Some(Self {
-            look: ViewTracer::new(&device).expect("pipelines"),
+            look: ViewTracer::new(&device, tracer).expect("pipelines"),
+            tracer,
             ring: FrameRing::new(&device, 2).expect("frames"),
             device,
         })
@@ -86,7 +95,7 @@ impl Gpu {
         frames: u32,
         place: impl Fn(u32, &mut RefDef),
     ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
-        let uploaded = scene.upload(&self.device);
+        let uploaded = scene.upload(&self.device, self.tracer);
         let [width, height] = [scene.def.width as u32, scene.def.height as u32];
         let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
         let target = Image::new(
@@ -484,7 +493,7 @@ impl Scene {
         }
     }
 
-    fn upload(&self, device: &Device) -> Uploaded {
+    fn upload(&self, device: &Device, tracer: Tracer) -> Uploaded {
         let storage = BufferUsage::STORAGE;
         let materials: Vec<Material> = self.materials.iter().map(|m| m.0).collect();
         let no_mods: [TcMod; 0] = [];
@@ -522,7 +531,7 @@ impl Scene {
             fogs: &self.fogs,
         };
         Uploaded {
-            geometry: StaticGeometry::new(device, &scene, &materials).expect("structures"),
+            geometry: StaticGeometry::new(device, tracer, &scene, &materials).expect("structures"),
             lights: MapLights::new(device, &source).expect("lights"),
             materials,
             _vertices: vertices,

@@ -41,7 +41,10 @@ fn close(a: Vec3, b: Vec3) -> bool {
 
 #[test]
 fn layers_are_composed_in_order_however_many_there_are() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| layers_are_composed_in_order_however_many_there_are_with(gpu));
+}
+
+fn layers_are_composed_in_order_however_many_there_are_with(gpu: &mut Gpu) {
     let red = [0.9, 0.1, 0.1];
     let green = [0.1, 0.8, 0.2];
     let blue = [0.2, 0.1, 1.0];
@@ -78,7 +81,10 @@ fn layers_are_composed_in_order_however_many_there_are() {
 
 #[test]
 fn layers_in_one_plane_come_in_drawing_order() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| layers_in_one_plane_come_in_drawing_order_with(gpu));
+}
+
+fn layers_in_one_plane_come_in_drawing_order_with(gpu: &mut Gpu) {
     let (first, second, back) = ([0.9, 0.1, 0.1], [0.1, 0.8, 0.2], [0.5, 0.5, 0.5]);
     let mut scene = scene();
     let wall = scene.material(&[stage::constant(back)], 0);
@@ -97,7 +103,10 @@ fn layers_in_one_plane_come_in_drawing_order() {
 
 #[test]
 fn lit_layers_and_what_is_behind_them_are_all_lit() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| lit_layers_and_what_is_behind_them_are_all_lit_with(gpu));
+}
+
+fn lit_layers_and_what_is_behind_them_are_all_lit_with(gpu: &mut Gpu) {
     // two lit layers of one half over a lit wall: 0.5 * albedo * L each, in the mean
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 16);
     scene.ambient = Vec3::splat(0.8);
@@ -120,7 +129,10 @@ fn lit_layers_and_what_is_behind_them_are_all_lit() {
 
 #[test]
 fn cut_outs_have_holes_for_eyes_and_shadows() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| cut_outs_have_holes_for_eyes_and_shadows_with(gpu));
+}
+
+fn cut_outs_have_holes_for_eyes_and_shadows_with(gpu: &mut Gpu) {
     let image = Image::new(
         &gpu.device,
         &ImageDesc::new("stripes", 2, 1, Format::Rgba8, ImageUsage::SAMPLED),
@@ -190,7 +202,10 @@ fn cut_outs_have_holes_for_eyes_and_shadows() {
 
 #[test]
 fn fog_follows_the_way_through_its_volume() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| fog_follows_the_way_through_its_volume_with(gpu));
+}
+
+fn fog_follows_the_way_through_its_volume_with(gpu: &mut Gpu) {
     let mut scene = Scene::new(
         Vec3::new(0.0, 0.0, 50.0),
         Vec3::new(100.0, 0.0, 50.0),

@@ -48,7 +48,10 @@ fn mean_difference(a: &[Vec3], b: impl Fn(usize) -> f32) -> f32 {
 
 #[test]
 fn one_triangle_gives_the_irradiance_of_the_closed_form() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| one_triangle_gives_the_irradiance_of_the_closed_form_with(gpu));
+}
+
+fn one_triangle_gives_the_irradiance_of_the_closed_form_with(gpu: &mut Gpu) {
     // near: sampled by solid angle; far and small: sampled by area
     for triangle in [
         [
@@ -93,7 +96,10 @@ fn one_triangle_gives_the_irradiance_of_the_closed_form() {
 
 #[test]
 fn all_estimators_have_the_same_mean() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| all_estimators_have_the_same_mean_with(gpu));
+}
+
+fn all_estimators_have_the_same_mean_with(gpu: &mut Gpu) {
     let mut scene = Scene::new(
         Vec3::new(-180.0, 0.0, 60.0),
         Vec3::new(100.0, 0.0, -20.0),
@@ -175,7 +181,10 @@ fn all_estimators_have_the_same_mean() {
 
 #[test]
 fn an_umbra_is_black_and_a_penumbra_is_between() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| an_umbra_is_black_and_a_penumbra_is_between_with(gpu));
+}
+
+fn an_umbra_is_black_and_a_penumbra_is_between_with(gpu: &mut Gpu) {
     let triangle = [
         Vec3::new(-5.0, -5.0, 200.0),
         Vec3::new(0.0, 5.0, 200.0),
@@ -227,7 +236,10 @@ fn an_umbra_is_black_and_a_penumbra_is_between() {
 
 #[test]
 fn spheres_and_suns_give_their_irradiance() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| spheres_and_suns_give_their_irradiance_with(gpu));
+}
+
+fn spheres_and_suns_give_their_irradiance_with(gpu: &mut Gpu) {
     let check = |gpu: &mut Gpu, scene: &Scene, exact: &dyn Fn(Vec3) -> f32| {
         let (pixels, _) = gpu.render(scene, &sampled(LightSampling::Resampled), 32);
         let difference = mean_difference(&pixels, |i| exact(floor_point(scene, i % 32, i / 32)));
@@ -244,9 +256,7 @@ fn spheres_and_suns_give_their_irradiance() {
         radius: 4.0,
         spot: None,
     });
-    check(&mut gpu, &scene, &|p| {
-        7000.0 * falloff(p) / std::f32::consts::PI
-    });
+    check(gpu, &scene, &|p| 7000.0 * falloff(p) / std::f32::consts::PI);
     // facing it at half its reach a white surface shows the colour of a dynamic light
     let mut scene = floor();
     scene.dlights.push(DynamicLight {
@@ -255,7 +265,7 @@ fn spheres_and_suns_give_their_irradiance() {
         color: Vec3::ONE,
         additive: false,
     });
-    check(&mut gpu, &scene, &|p| 100.0 * 100.0 * falloff(p));
+    check(gpu, &scene, &|p| 100.0 * 100.0 * falloff(p));
     let mut scene = floor();
     let direction = Vec3::new(0.3, 0.2, 0.8).normalize();
     scene.suns.push(SunLight {
@@ -264,18 +274,19 @@ fn spheres_and_suns_give_their_irradiance() {
         angular_radius: 0.005,
         material: None,
     });
-    check(&mut gpu, &scene, &|_| {
-        2.0 * direction.z / std::f32::consts::PI
-    });
+    check(gpu, &scene, &|_| 2.0 * direction.z / std::f32::consts::PI);
     // and the even light is simply there
     let mut scene = floor();
     scene.ambient = Vec3::splat(0.25);
-    check(&mut gpu, &scene, &|_| 0.25);
+    check(gpu, &scene, &|_| 0.25);
 }
 
 #[test]
 fn a_white_room_bounces_what_its_walls_give() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| a_white_room_bounces_what_its_walls_give_with(gpu));
+}
+
+fn a_white_room_bounces_what_its_walls_give_with(gpu: &mut Gpu) {
     // every wall glows with radiance e and reflects rho: one bounce adds rho * e, two add rho² * e more
     let mut scene = Scene::new(
         Vec3::new(-20.0, 10.0, 5.0),
@@ -316,7 +327,10 @@ fn a_white_room_bounces_what_its_walls_give() {
 
 #[test]
 fn bounced_light_of_listed_lights_is_counted_once() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| bounced_light_of_listed_lights_is_counted_once_with(gpu));
+}
+
+fn bounced_light_of_listed_lights_is_counted_once_with(gpu: &mut Gpu) {
     // a floor lit by a wall that the sun lights: by form factor of the wall, seen from the floor's point
     let mut scene = Scene::new(
         Vec3::new(-60.0, 0.0, 40.0),

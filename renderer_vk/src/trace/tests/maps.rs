@@ -15,6 +15,7 @@ use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::scene::{Look, Scene};
 use crate::settings::Settings;
 use crate::trace::TraceLook;
+use crate::trace::input::Tracer;
 use crate::world::World;
 
 const SIZE: [u32; 2] = [320, 240];
@@ -70,7 +71,7 @@ fn camera(world: &World) -> RefDef {
 
 #[test]
 fn maps_are_lit() {
-    let (Some(files), Some(mut gpu)) = (files(), Gpu::new()) else {
+    let (Some(files), Some(mut gpu)) = (files(), Gpu::new(Tracer::Compute)) else {
         return;
     };
     let device = &gpu.device.clone();

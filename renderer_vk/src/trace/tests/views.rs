@@ -57,7 +57,10 @@ fn mirror_at(x: f32) -> Portal {
 
 #[test]
 fn a_mirror_shows_what_is_behind_the_eye_and_who_looks() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| a_mirror_shows_what_is_behind_the_eye_and_who_looks_with(gpu));
+}
+
+fn a_mirror_shows_what_is_behind_the_eye_and_who_looks_with(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
     let red = scene.material(&[stage::constant(RED)], 0);
     // a clean mirror: its one stage leaves half of what it shows
@@ -102,7 +105,10 @@ fn a_mirror_shows_what_is_behind_the_eye_and_who_looks() {
 
 #[test]
 fn a_portal_shows_what_its_camera_sees() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| a_portal_shows_what_its_camera_sees_with(gpu));
+}
+
+fn a_portal_shows_what_its_camera_sees_with(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
     let portal = scene.material(&[stage::add([0.0; 3])], c::MATERIAL_PORTAL);
     let green = scene.material(&[stage::constant(GREEN)], 0);
@@ -131,7 +137,10 @@ fn a_portal_shows_what_its_camera_sees() {
 
 #[test]
 fn back_faces_do_not_show() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| back_faces_do_not_show_with(gpu));
+}
+
+fn back_faces_do_not_show_with(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
     let red = scene.material(&[stage::constant(RED)], 0);
     let green = scene.material(&[stage::constant(GREEN)], 0);
@@ -154,7 +163,10 @@ fn back_faces_do_not_show() {
 
 #[test]
 fn the_sky_is_where_its_stages_say_and_lets_the_sun_in() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| the_sky_is_where_its_stages_say_and_lets_the_sun_in_with(gpu));
+}
+
+fn the_sky_is_where_its_stages_say_and_lets_the_sun_in_with(gpu: &mut Gpu) {
     let mut scene = Scene::new(
         Vec3::new(0.0, 0.0, 50.0),
         Vec3::new(100.0, 0.0, 50.0),
@@ -222,7 +234,10 @@ fn the_sky_is_where_its_stages_say_and_lets_the_sun_in() {
 
 #[test]
 fn display_white_keeps_its_brightness() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| display_white_keeps_its_brightness_with(gpu));
+}
+
+fn display_white_keeps_its_brightness_with(gpu: &mut Gpu) {
     for (value, expected) in [(0.05, 0.05), (0.5, 0.5), (1.0, 0.852_8)] {
         let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
         let wall = scene.material(&[stage::constant([encode(value); 3])], 0);
@@ -271,7 +286,10 @@ fn display_white_keeps_its_brightness() {
 
 #[test]
 fn frames_can_be_made_again_bit_by_bit() {
-    let Some(mut gpu) = Gpu::new() else { return };
+    Gpu::each(|gpu| frames_can_be_made_again_bit_by_bit_with(gpu));
+}
+
+fn frames_can_be_made_again_bit_by_bit_with(gpu: &mut Gpu) {
     let mut scene = Scene::new(
         Vec3::new(-20.0, 10.0, 5.0),
         Vec3::new(50.0, 20.0, -30.0),

@@ -1,0 +1,378 @@
+//! Bounding volume hierarchies for the compute tracer: binary, split by the surface area heuristic over bins (Wald, On
+//! fast Construction of SAH-based Bounding Volume Hierarchies, 2007).
+
+use glam::Vec3;
+use shaders::trace_types::{BvhNode, BvhTriangle};
+
+/// Entries of a leaf that are no longer split.
+const LEAF: usize = 4;
+/// Bins on an axis.
+const BINS: usize = 12;
+/// Depth at which splitting by cost gives way to splitting in halves, which ends after at most 32 more levels, so that
+/// the shader's stack of 48 is never too small.
+const COST_DEPTH: u32 = 15;
+
+/// Where the box of a child lies that is not there.
+const ABSENT: Vec3 = Vec3::splat(3.0e38);
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Smallest corner.
+    pub low: Vec3,
+    /// Largest corner.
+    pub high: Vec3,
+}
+
+impl Aabb {
+    /// Holds nothing.
+    pub const EMPTY: Self = Self {
+        low: Vec3::INFINITY,
+        high: Vec3::NEG_INFINITY,
+    };
+
+    /// With a point added.
+    #[must_use]
+    pub fn with(self, p: Vec3) -> Self {
+        Self {
+            low: self.low.min(p),
+            high: self.high.max(p),
+        }
+    }
+
+    /// Of both.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+        }
+    }
+
+    /// The eight corners.
+    pub fn corners(self) -> [Vec3; 8] {
+        std::array::from_fn(|i| {
+            let pick = |bit: usize, low: f32, high: f32| if i & bit == 0 { low } else { high };
+            Vec3::new(
+                pick(1, self.low.x, self.high.x),
+                pick(2, self.low.y, self.high.y),
+                pick(4, self.low.z, self.high.z),
+            )
+        })
+    }
+
+    fn half_area(self) -> f32 {
+        let size = (self.high - self.low).max(Vec3::ZERO);
+        size.x * size.y + size.y * size.z + size.z * size.x
+    }
+
+    fn middle(self) -> Vec3 {
+        (self.low + self.high) * 0.5
+    }
+}
+
+/// A hierarchy over numbered entries.
+#[derive(Clone, Debug, Default)]
+pub struct Hierarchy {
+    /// Nodes; the first is the root. Empty for no entries.
+    pub nodes: Vec<BvhNode>,
+    /// The entries in the order of the leafs.
+    pub order: Vec<u32>,
+}
+
+/// A range of entries that becomes the child of a node.
+struct Task {
+    first: usize,
+    count: usize,
+    bounds: Aabb,
+    depth: u32,
+    /// Node and side that wait for it; the root's parent is none.
+    parent: Option<(usize, usize)>,
+}
+
+fn index(n: usize) -> u32 {
+    u32::try_from(n).unwrap_or(u32::MAX)
+}
+
+/// Builds a hierarchy over boxes. Boxes that are not finite are left out: nothing can hit them.
+pub fn build(boxes: &[Aabb]) -> Hierarchy {
+    let usable = |b: &Aabb| b.low.is_finite() && b.high.is_finite() && b.low.cmple(b.high).all();
+    let mut order: Vec<u32> = (0u32..)
+        .zip(boxes)
+        .filter(|(_, b)| usable(b))
+        .map(|(i, _)| i)
+        .collect();
+    if order.is_empty() {
+        return Hierarchy::default();
+    }
+    let of = |i: u32| boxes.get(i as usize).copied().unwrap_or(Aabb::EMPTY);
+    let bounds = order.iter().fold(Aabb::EMPTY, |b, &i| b.union(of(i)));
+    let mut nodes: Vec<BvhNode> = Vec::with_capacity(order.len());
+    let mut tasks = vec![Task {
+        first: 0,
+        count: order.len(),
+        bounds,
+        depth: 0,
+        parent: None,
+    }];
+    while let Some(task) = tasks.pop() {
+        // the root is always a node, be it of one leaf alone
+        if task.count <= LEAF && task.parent.is_some() {
+            attach(&mut nodes, &task, index(task.first), index(task.count));
+            continue;
+        }
+        let node = nodes.len();
+        nodes.push(BvhNode {
+            // a child that is not there is a point that no ray comes to
+            low: [ABSENT; 2],
+            high: [ABSENT; 2],
+            first: [0; 2],
+            count: [1; 2],
+        });
+        attach(&mut nodes, &task, index(node), 0);
+        let entries = order
+            .get_mut(task.first..task.first + task.count)
+            .unwrap_or_default();
+        let left = if task.count <= LEAF {
+            task.count
+        } else {
+            split(entries, &of, task.depth)
+        };
+        let mut first = task.first;
+        for (side, count) in [left, task.count - left].into_iter().enumerate() {
+            if count > 0 {
+                let members = order.get(first..first + count).unwrap_or_default();
+                tasks.push(Task {
+                    first,
+                    count,
+                    bounds: members.iter().fold(Aabb::EMPTY, |b, &i| b.union(of(i))),
+                    depth: task.depth + 1,
+                    parent: Some((node, side)),
+                });
+            }
+            first += count;
+        }
+    }
+    Hierarchy { nodes, order }
+}
+
+fn attach(nodes: &mut [BvhNode], task: &Task, first: u32, count: u32) {
+    if let Some((parent, side)) = task.parent
+        && let Some(node) = nodes.get_mut(parent)
+    {
+        node.low[side] = task.bounds.low;
+        node.high[side] = task.bounds.high;
+        node.first[side] = first;
+        node.count[side] = count;
+    }
+}
+
+/// Reorders entries into two parts and returns the length of the first; both parts have entries.
+fn split(entries: &mut [u32], of: &impl Fn(u32) -> Aabb, depth: u32) -> usize {
+    let half = entries.len() / 2;
+    let middles = entries
+        .iter()
+        .fold(Aabb::EMPTY, |b, &i| b.with(of(i).middle()));
+    let size = middles.high - middles.low;
+    let widest = size.max_position();
+    if depth < COST_DEPTH
+        && let Some((axis, cut)) = cheapest(entries, of, middles)
+    {
+        let mut left = 0;
+        for i in 0..entries.len() {
+            if of(entries[i]).middle()[axis] < cut {
+                entries.swap(i, left);
+                left += 1;
+            }
+        }
+        if left > 0 && left < entries.len() {
+            return left;
+        }
+    }
+    // by the middle entry of the widest axis
+    entries.select_nth_unstable_by(half, |&a, &b| {
+        of(a).middle()[widest]
+            .total_cmp(&of(b).middle()[widest])
+            .then(a.cmp(&b))
+    });
+    half
+}
+
+/// The axis and place of the cheapest split between bins.
+fn cheapest(entries: &[u32], of: &impl Fn(u32) -> Aabb, middles: Aabb) -> Option<(usize, f32)> {
+    let mut best: Option<(f32, usize, f32)> = None;
+    for axis in 0..3 {
+        let (low, size) = (middles.low[axis], middles.high[axis] - middles.low[axis]);
+        if size <= 0.0 {
+            continue;
+        }
+        let mut bins = [(Aabb::EMPTY, 0usize); BINS];
+        #[allow(
+            clippy::cast_precision_loss,
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss
+        )]
+        let bin_of = |x: f32| (((x - low) / size * BINS as f32) as usize).min(BINS - 1);
+        for &i in entries {
+            let bounds = of(i);
+            let bin = &mut bins[bin_of(bounds.middle()[axis])];
+            *bin = (bin.0.union(bounds), bin.1 + 1);
+        }
+        // cost of everything to the right of each cut
+        let mut right = [0.0; BINS];
+        let (mut bounds, mut count) = (Aabb::EMPTY, 0);
+        for i in (1..BINS).rev() {
+            bounds = bounds.union(bins[i].0);
+            count += bins[i].1;
+            #[allow(clippy::cast_precision_loss)]
+            let entries = count as f32;
+            right[i] = if count > 0 {
+                bounds.half_area() * entries
+            } else {
+                0.0
+            };
+        }
+        let (mut bounds, mut count) = (Aabb::EMPTY, 0);
+        for i in 1..BINS {
+            bounds = bounds.union(bins[i - 1].0);
+            count += bins[i - 1].1;
+            if count == 0 || count == entries.len() {
+                continue;
+            }
+            #[allow(clippy::cast_precision_loss)]
+            let cost = bounds.half_area() * count as f32 + right[i];
+            #[allow(clippy::cast_precision_loss)]
+            let cut = low + size * i as f32 / BINS as f32;
+            if best.is_none_or(|b| cost < b.0) {
+                best = Some((cost, axis, cut));
+            }
+        }
+    }
+    best.map(|(_, axis, cut)| (axis, cut))
+}
+
+/// A hierarchy over triangles, with the triangles in the order of its leafs.
+#[derive(Clone, Debug)]
+pub struct TriangleHierarchy {
+    /// Nodes.
+    pub nodes: Vec<BvhNode>,
+    /// Triangles.
+    pub triangles: Vec<BvhTriangle>,
+    /// Of all triangles.
+    pub bounds: Aabb,
+}
+
+/// Builds a hierarchy over triangles given by their corners; `None` if there is none that a ray can hit.
+pub fn build_triangles(corners: &[[Vec3; 3]]) -> Option<TriangleHierarchy> {
+    let boxes: Vec<Aabb> = corners
+        .iter()
+        .map(|t| t.iter().fold(Aabb::EMPTY, |b, &p| b.with(p)))
+        .collect();
+    let hierarchy = build(&boxes);
+    let triangles: Vec<BvhTriangle> = hierarchy
+        .order
+        .iter()
+        .filter_map(|&primitive| {
+            let [a, b, c] = *corners.get(primitive as usize)?;
+            Some(BvhTriangle { a, b, c, primitive })
+        })
+        .collect();
+    let bounds = hierarchy
+        .order
+        .iter()
+        .filter_map(|&i| boxes.get(i as usize))
+        .fold(Aabb::EMPTY, |all, &b| all.union(b));
+    (!triangles.is_empty()).then_some(TriangleHierarchy {
+        nodes: hierarchy.nodes,
+        triangles,
+        bounds,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Depth of the deepest node, and how often each entry occurs in a leaf whose box holds it.
+    fn check(boxes: &[Aabb], hierarchy: &Hierarchy) -> u32 {
+        let mut seen = vec![0; boxes.len()];
+        let mut deepest = 0;
+        let mut stack = vec![(0usize, 1u32)];
+        while let Some((node, depth)) = stack.pop() {
+            deepest = deepest.max(depth);
+            let node = hierarchy.nodes[node];
+            for side in 0..2 {
+                if node.low[side] == ABSENT {
+                    continue;
+                }
+                if node.count[side] == 0 {
+                    stack.push((node.first[side] as usize, depth + 1));
+                }
+                for i in 0..node.count[side] {
+                    let entry = hierarchy.order[(node.first[side] + i) as usize] as usize;
+                    seen[entry] += 1;
+                    assert!(node.low[side].cmple(boxes[entry].low).all());
+                    assert!(node.high[side].cmpge(boxes[entry].high).all());
+                }
+            }
+        }
+        assert!(seen.iter().all(|&n| n == 1));
+        deepest
+    }
+
+    #[test]
+    fn every_entry_is_in_one_leaf() {
+        for n in [1usize, 2, 4, 5, 33, 1000] {
+            let boxes: Vec<Aabb> = (0..n)
+                .map(|i| {
+                    let p = Vec3::new(
+                        (i * 37 % 101) as f32,
+                        (i * 53 % 89) as f32,
+                        (i * 71 % 97) as f32,
+                    );
+                    Aabb {
+                        low: p,
+                        high: p + 3.0,
+                    }
+                })
+                .collect();
+            check(&boxes, &build(&boxes));
+        }
+        assert!(build(&[]).nodes.is_empty());
+    }
+
+    #[test]
+    fn no_arrangement_is_deeper_than_the_stack() {
+        // each box twice as far as the last, and all in one place: what splitting by cost likes least
+        let spread: Vec<Aabb> = (0..4000)
+            .map(|i| {
+                let p = Vec3::X * 1.02f32.powi(i);
+                Aabb { low: p, high: p }
+            })
+            .collect();
+        assert!(check(&spread, &build(&spread)) <= 48);
+        let same = vec![
+            Aabb {
+                low: Vec3::ONE,
+                high: Vec3::ONE
+            };
+            5000
+        ];
+        assert!(check(&same, &build(&same)) <= 48);
+    }
+
+    #[test]
+    fn what_is_not_finite_is_left_out() {
+        let bad = [Vec3::ZERO, Vec3::new(f32::NAN, 0.0, 0.0), Vec3::ONE];
+        assert!(
+            build_triangles(&[bad]).is_none() || !build_triangles(&[bad]).unwrap().nodes.is_empty()
+        );
+        let far = [Vec3::ZERO, Vec3::splat(f32::INFINITY), Vec3::ONE];
+        assert!(build_triangles(&[far]).is_none());
+        let good = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        assert_eq!(
+            build_triangles(&[far, good]).unwrap().triangles[0].primitive,
+            1
+        );
+    }
+}
