@@ -268,12 +268,6 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     })
     .context("no picture without a Vulkan device")?;
     let info = renderer.device_info().clone();
-    if args.look == Look::Traced && info.ray_tracing.is_none() {
-        bail!(
-            "{} has no ray tracing pipelines (VK_KHR_ray_tracing_pipeline); try --look classic, or --device with another one",
-            info.name
-        );
-    }
     let settings = Settings {
         rt: args.look == Look::Traced,
         rt_reference: !args.no_accumulation,

@@ -70,7 +70,6 @@ pub struct Renderer {
     overlay_time: f32,
     color_2d: u32,
     entity_tokens: EntityTokens,
-    warned_no_rays: bool,
 }
 
 /// Looks for a device without making a window: what it is called and what it can do.
@@ -131,7 +130,6 @@ impl Renderer {
             overlay_time: 0.0,
             color_2d: u32::MAX,
             entity_tokens: EntityTokens::default(),
-            warned_no_rays: false,
         })
     }
 
@@ -322,19 +320,12 @@ impl Renderer {
         Ok(())
     }
 
-    /// Makes the traced look when it is first asked for; `false` (and one warning) where the device cannot.
+    /// Makes the traced look when it is first asked for; `false` while there is no map.
     fn ready_to_trace(&mut self) -> Result<bool, Error> {
-        if self.trace.is_none() && self.device.info().ray_tracing.is_some() {
-            if let (Some(world), Some(assets)) = (&self.world, &self.assets) {
-                self.trace = Some(TraceLook::new(&self.device, world, assets)?);
-            }
-        }
-        if self.device.info().ray_tracing.is_none() && !self.warned_no_rays {
-            self.warned_no_rays = true;
-            log::warn!(
-                "{} does not trace rays; r_rt stays without effect",
-                self.device.info().name
-            );
+        if self.trace.is_none()
+            && let (Some(world), Some(assets)) = (&self.world, &self.assets)
+        {
+            self.trace = Some(TraceLook::new(&self.device, world, assets)?);
         }
         Ok(self.trace.is_some())
     }

@@ -119,8 +119,8 @@ fn start_renderer(engine: Engine, cvars: &Cvars) -> Result<(), Failure> {
                 info.name,
                 match (info.ray_tracing.is_some(), info.software) {
                     (true, false) => "rays are traced by hardware",
-                    (true, true) => "rays are traced in software, which is slow",
-                    (false, _) => "it does not trace rays, so that there is the classic look alone",
+                    (_, true) => "rays are traced in software, which is slow",
+                    (false, false) => "rays are traced by compute shaders",
                 }
             );
             session::with(|session| session.renderer = Some(renderer));

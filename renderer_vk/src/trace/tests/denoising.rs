@@ -66,7 +66,7 @@ fn compare(pixels: &[Vec3], truth: &[Vec3]) -> (f32, f32) {
 
 #[test]
 fn filtered_frames_come_near_the_reference() {
-    Gpu::each(|gpu| filtered_frames_come_near_the_reference_with(gpu));
+    Gpu::each(filtered_frames_come_near_the_reference_with);
 }
 
 fn filtered_frames_come_near_the_reference_with(gpu: &mut Gpu) {
@@ -106,7 +106,7 @@ fn filtered_frames_come_near_the_reference_with(gpu: &mut Gpu) {
 
 #[test]
 fn light_that_goes_out_is_gone_soon() {
-    Gpu::each(|gpu| light_that_goes_out_is_gone_soon_with(gpu));
+    Gpu::each(light_that_goes_out_is_gone_soon_with);
 }
 
 fn light_that_goes_out_is_gone_soon_with(gpu: &mut Gpu) {

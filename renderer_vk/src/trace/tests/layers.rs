@@ -41,7 +41,7 @@ fn close(a: Vec3, b: Vec3) -> bool {
 
 #[test]
 fn layers_are_composed_in_order_however_many_there_are() {
-    Gpu::each(|gpu| layers_are_composed_in_order_however_many_there_are_with(gpu));
+    Gpu::each(layers_are_composed_in_order_however_many_there_are_with);
 }
 
 fn layers_are_composed_in_order_however_many_there_are_with(gpu: &mut Gpu) {
@@ -81,7 +81,7 @@ fn layers_are_composed_in_order_however_many_there_are_with(gpu: &mut Gpu) {
 
 #[test]
 fn layers_in_one_plane_come_in_drawing_order() {
-    Gpu::each(|gpu| layers_in_one_plane_come_in_drawing_order_with(gpu));
+    Gpu::each(layers_in_one_plane_come_in_drawing_order_with);
 }
 
 fn layers_in_one_plane_come_in_drawing_order_with(gpu: &mut Gpu) {
@@ -103,7 +103,7 @@ fn layers_in_one_plane_come_in_drawing_order_with(gpu: &mut Gpu) {
 
 #[test]
 fn lit_layers_and_what_is_behind_them_are_all_lit() {
-    Gpu::each(|gpu| lit_layers_and_what_is_behind_them_are_all_lit_with(gpu));
+    Gpu::each(lit_layers_and_what_is_behind_them_are_all_lit_with);
 }
 
 fn lit_layers_and_what_is_behind_them_are_all_lit_with(gpu: &mut Gpu) {
@@ -129,7 +129,7 @@ fn lit_layers_and_what_is_behind_them_are_all_lit_with(gpu: &mut Gpu) {
 
 #[test]
 fn cut_outs_have_holes_for_eyes_and_shadows() {
-    Gpu::each(|gpu| cut_outs_have_holes_for_eyes_and_shadows_with(gpu));
+    Gpu::each(cut_outs_have_holes_for_eyes_and_shadows_with);
 }
 
 fn cut_outs_have_holes_for_eyes_and_shadows_with(gpu: &mut Gpu) {
@@ -202,7 +202,7 @@ fn cut_outs_have_holes_for_eyes_and_shadows_with(gpu: &mut Gpu) {
 
 #[test]
 fn fog_follows_the_way_through_its_volume() {
-    Gpu::each(|gpu| fog_follows_the_way_through_its_volume_with(gpu));
+    Gpu::each(fog_follows_the_way_through_its_volume_with);
 }
 
 fn fog_follows_the_way_through_its_volume_with(gpu: &mut Gpu) {

@@ -48,7 +48,7 @@ fn mean_difference(a: &[Vec3], b: impl Fn(usize) -> f32) -> f32 {
 
 #[test]
 fn one_triangle_gives_the_irradiance_of_the_closed_form() {
-    Gpu::each(|gpu| one_triangle_gives_the_irradiance_of_the_closed_form_with(gpu));
+    Gpu::each(one_triangle_gives_the_irradiance_of_the_closed_form_with);
 }
 
 fn one_triangle_gives_the_irradiance_of_the_closed_form_with(gpu: &mut Gpu) {
@@ -96,7 +96,7 @@ fn one_triangle_gives_the_irradiance_of_the_closed_form_with(gpu: &mut Gpu) {
 
 #[test]
 fn all_estimators_have_the_same_mean() {
-    Gpu::each(|gpu| all_estimators_have_the_same_mean_with(gpu));
+    Gpu::each(all_estimators_have_the_same_mean_with);
 }
 
 fn all_estimators_have_the_same_mean_with(gpu: &mut Gpu) {
@@ -181,7 +181,7 @@ fn all_estimators_have_the_same_mean_with(gpu: &mut Gpu) {
 
 #[test]
 fn an_umbra_is_black_and_a_penumbra_is_between() {
-    Gpu::each(|gpu| an_umbra_is_black_and_a_penumbra_is_between_with(gpu));
+    Gpu::each(an_umbra_is_black_and_a_penumbra_is_between_with);
 }
 
 fn an_umbra_is_black_and_a_penumbra_is_between_with(gpu: &mut Gpu) {
@@ -236,7 +236,7 @@ fn an_umbra_is_black_and_a_penumbra_is_between_with(gpu: &mut Gpu) {
 
 #[test]
 fn spheres_and_suns_give_their_irradiance() {
-    Gpu::each(|gpu| spheres_and_suns_give_their_irradiance_with(gpu));
+    Gpu::each(spheres_and_suns_give_their_irradiance_with);
 }
 
 fn spheres_and_suns_give_their_irradiance_with(gpu: &mut Gpu) {
@@ -283,7 +283,7 @@ fn spheres_and_suns_give_their_irradiance_with(gpu: &mut Gpu) {
 
 #[test]
 fn a_white_room_bounces_what_its_walls_give() {
-    Gpu::each(|gpu| a_white_room_bounces_what_its_walls_give_with(gpu));
+    Gpu::each(a_white_room_bounces_what_its_walls_give_with);
 }
 
 fn a_white_room_bounces_what_its_walls_give_with(gpu: &mut Gpu) {
@@ -327,7 +327,7 @@ fn a_white_room_bounces_what_its_walls_give_with(gpu: &mut Gpu) {
 
 #[test]
 fn bounced_light_of_listed_lights_is_counted_once() {
-    Gpu::each(|gpu| bounced_light_of_listed_lights_is_counted_once_with(gpu));
+    Gpu::each(bounced_light_of_listed_lights_is_counted_once_with);
 }
 
 fn bounced_light_of_listed_lights_is_counted_once_with(gpu: &mut Gpu) {
@@ -384,4 +384,65 @@ fn bounced_light_of_listed_lights_is_counted_once_with(gpu: &mut Gpu) {
     let ratio = pixels.iter().map(|p| p.x).sum::<f32>() / truth;
     println!("{ratio}");
     assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+}
+
+#[test]
+fn a_point_is_lit_by_the_list_of_its_cluster() {
+    Gpu::each(a_point_is_lit_by_the_list_of_its_cluster_with);
+}
+
+fn a_point_is_lit_by_the_list_of_its_cluster_with(gpu: &mut Gpu) {
+    // two cells side by side without a wall between them: what differs is the lists alone
+    let mut map = q3bsp::builder::MapBuilder::new();
+    let far = map.add_cell(
+        Vec3::new(-400.0, -400.0, -64.0),
+        Vec3::new(0.0, 400.0, 320.0),
+    );
+    let near = map.add_cell(
+        Vec3::new(0.0, -400.0, -64.0),
+        Vec3::new(400.0, 400.0, 320.0),
+    );
+    let bsp = map.build();
+    let [left, right] = [far, near].map(|c| usize::try_from(c).expect("a cluster"));
+    let mut scene = Scene::new(Vec3::new(0.0, 0.0, 90.0), Vec3::ZERO, 60.0, 32);
+    let white = scene.diffuse(1.0);
+    scene.quad(
+        rectangle(
+            Vec3::new(-300.0, -300.0, 0.0),
+            Vec3::X * 600.0,
+            Vec3::Y * 600.0,
+        ),
+        white,
+    );
+    let red = [
+        Vec3::new(-20.0, 0.0, 200.0),
+        Vec3::new(-20.0, 9.0, 200.0),
+        Vec3::new(-10.0, 0.0, 200.0),
+    ];
+    let green = red.map(|p| p + Vec3::X * 30.0);
+    scene.light(red, Vec3::new(90.0, 0.0, 0.0));
+    scene.light(green, Vec3::new(0.0, 90.0, 0.0));
+    // the left cell knows the first light, the right one the second, points outside know both
+    let mut rows = [vec![], vec![]];
+    rows[left].push(0);
+    rows[right].push(1);
+    let lights: Vec<u32> = rows.concat().into_iter().chain([0, 1]).collect();
+    let lists = relight::light::LightLists {
+        offsets: vec![0, 1, 2, 4],
+        lights,
+        triangle_lights: 2,
+    };
+    scene.tree = Some((bsp, lists));
+    for sampling in ALL {
+        let (pixels, _) = gpu.render(&scene, &sampled(sampling), 4);
+        for (i, pixel) in pixels.iter().enumerate() {
+            let p = floor_point(&scene, i % 32, i / 32);
+            // a pixel is four units wide
+            if p.x < -4.0 {
+                assert!(pixel.x > 0.0 && pixel.y == 0.0, "{sampling:?} {p} {pixel}");
+            } else if p.x > 4.0 {
+                assert!(pixel.x == 0.0 && pixel.y > 0.0, "{sampling:?} {p} {pixel}");
+            }
+        }
+    }
 }

@@ -10,6 +10,7 @@ use super::harness::{
 };
 use crate::scene::Portal;
 use crate::settings::Settings;
+use crate::trace::input::Tracer;
 
 const RED: [f32; 3] = [0.9, 0.1, 0.1];
 const GREEN: [f32; 3] = [0.1, 0.8, 0.2];
@@ -57,7 +58,7 @@ fn mirror_at(x: f32) -> Portal {
 
 #[test]
 fn a_mirror_shows_what_is_behind_the_eye_and_who_looks() {
-    Gpu::each(|gpu| a_mirror_shows_what_is_behind_the_eye_and_who_looks_with(gpu));
+    Gpu::each(a_mirror_shows_what_is_behind_the_eye_and_who_looks_with);
 }
 
 fn a_mirror_shows_what_is_behind_the_eye_and_who_looks_with(gpu: &mut Gpu) {
@@ -105,7 +106,7 @@ fn a_mirror_shows_what_is_behind_the_eye_and_who_looks_with(gpu: &mut Gpu) {
 
 #[test]
 fn a_portal_shows_what_its_camera_sees() {
-    Gpu::each(|gpu| a_portal_shows_what_its_camera_sees_with(gpu));
+    Gpu::each(a_portal_shows_what_its_camera_sees_with);
 }
 
 fn a_portal_shows_what_its_camera_sees_with(gpu: &mut Gpu) {
@@ -137,7 +138,7 @@ fn a_portal_shows_what_its_camera_sees_with(gpu: &mut Gpu) {
 
 #[test]
 fn back_faces_do_not_show() {
-    Gpu::each(|gpu| back_faces_do_not_show_with(gpu));
+    Gpu::each(back_faces_do_not_show_with);
 }
 
 fn back_faces_do_not_show_with(gpu: &mut Gpu) {
@@ -163,7 +164,7 @@ fn back_faces_do_not_show_with(gpu: &mut Gpu) {
 
 #[test]
 fn the_sky_is_where_its_stages_say_and_lets_the_sun_in() {
-    Gpu::each(|gpu| the_sky_is_where_its_stages_say_and_lets_the_sun_in_with(gpu));
+    Gpu::each(the_sky_is_where_its_stages_say_and_lets_the_sun_in_with);
 }
 
 fn the_sky_is_where_its_stages_say_and_lets_the_sun_in_with(gpu: &mut Gpu) {
@@ -234,7 +235,7 @@ fn the_sky_is_where_its_stages_say_and_lets_the_sun_in_with(gpu: &mut Gpu) {
 
 #[test]
 fn display_white_keeps_its_brightness() {
-    Gpu::each(|gpu| display_white_keeps_its_brightness_with(gpu));
+    Gpu::each(display_white_keeps_its_brightness_with);
 }
 
 fn display_white_keeps_its_brightness_with(gpu: &mut Gpu) {
@@ -286,7 +287,7 @@ fn display_white_keeps_its_brightness_with(gpu: &mut Gpu) {
 
 #[test]
 fn frames_can_be_made_again_bit_by_bit() {
-    Gpu::each(|gpu| frames_can_be_made_again_bit_by_bit_with(gpu));
+    Gpu::each(frames_can_be_made_again_bit_by_bit_with);
 }
 
 fn frames_can_be_made_again_bit_by_bit_with(gpu: &mut Gpu) {
@@ -314,4 +315,82 @@ fn frames_can_be_made_again_bit_by_bit_with(gpu: &mut Gpu) {
     let (second, _) = gpu.render(&scene, &settings, 3);
     assert_eq!(first, second);
     assert!(first.iter().any(|p| p.x > 0.0));
+}
+
+#[test]
+fn both_tracers_make_the_same_picture() {
+    let (Some(mut pipeline), Some(mut compute)) =
+        (Gpu::new(Tracer::Pipeline), Gpu::new(Tracer::Compute))
+    else {
+        return;
+    };
+    let mut scene = Scene::new(
+        Vec3::new(-180.0, 10.0, 40.0),
+        Vec3::new(50.0, 0.0, -10.0),
+        80.0,
+        64,
+    );
+    let grey = scene.diffuse(0.6);
+    scene.room(
+        Vec3::new(-200.0, -150.0, -80.0),
+        Vec3::new(200.0, 150.0, 120.0),
+        grey,
+    );
+    // a crowd of small things, turned and scaled, that throw shadows
+    let veil = scene.material(
+        &[stage::blend(BLUE, 0.4)],
+        c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED,
+    );
+    for i in 0..60 {
+        let at = Vec3::new(
+            (i * 37 % 300) as f32 - 150.0,
+            (i * 53 % 250) as f32 - 125.0,
+            (i * 29 % 150) as f32 - 70.0,
+        );
+        let turn = glam::Mat3::from_rotation_y(i as f32)
+            * glam::Mat3::from_rotation_z(i as f32 * 0.7)
+            * (0.5 + 0.02 * i as f32);
+        let instance = Instance {
+            axis: [turn.x_axis, turn.y_axis, turn.z_axis],
+            origin: at,
+            ..identity()
+        };
+        let square = rectangle(Vec3::splat(-10.0), Vec3::X * 20.0, Vec3::Y * 20.0);
+        scene.mesh(square, if i % 3 == 0 { veil } else { grey }, instance);
+    }
+    // a brush model somewhere else than where it was made
+    let first = scene.surfaces.len();
+    scene.quad(
+        rectangle(Vec3::new(0.0, -20.0, -20.0), Vec3::Z * 40.0, Vec3::Y * 40.0),
+        grey,
+    );
+    scene.surfaces[first].model = 1;
+    scene.instances.push(Instance {
+        origin: Vec3::new(-60.0, 40.0, 20.0),
+        ..identity()
+    });
+    scene.submodels.push(crate::scene::Submodel {
+        model: 1,
+        instance: scene.instances.len() as u32 - 1,
+    });
+    let lamp = Vec3::new(0.0, 60.0, 110.0);
+    scene.light(
+        [lamp, lamp + Vec3::Y * 60.0, lamp + Vec3::X * 60.0],
+        Vec3::splat(12.0),
+    );
+    let settings = Settings {
+        rt_bounces: 2,
+        ..reference()
+    };
+    let (a, _) = pipeline.render(&scene, &settings, 2);
+    let (b, _) = compute.render(&scene, &settings, 2);
+    let differing = a
+        .iter()
+        .zip(&b)
+        .filter(|(a, b)| (**a - **b).abs().max_element() > 0.01 * a.max_element().max(0.1))
+        .count();
+    println!("{differing} of {} pixels differ", a.len());
+    // rays that graze an edge may fall to either side of it
+    assert!(differing < a.len() / 50, "{differing}");
+    assert!(a.iter().filter(|p| p.x > 0.02).count() > a.len() / 2);
 }
