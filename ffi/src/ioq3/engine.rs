@@ -68,7 +68,7 @@ impl Engine {
         unsafe { (*IMPORTS.0.get()).as_ref().and_then(pick) }
     }
 
-    /// Prints. `level` is one of [`print`].
+    /// Prints. `level` is one of [`mod@print`].
     pub fn print(self, level: c_int, text: &str) {
         if let Some(printf) = self.get(|t| t.Printf) {
             in_c_pieces(text, |piece| {
