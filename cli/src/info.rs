@@ -236,23 +236,17 @@ fn load(
         cache: args.cache.as_ref().map(CalibrationCache::new),
         ..CalibrationOptions::default()
     });
+    let options = Options {
+        calibrate,
+        ..Options::default()
+    };
     match source {
-        Source::Game(map) => {
-            let options = Options {
-                calibrate,
-                ..Options::default()
-            };
-            Ok(RelitWorld::load(files, materials, map, options)?)
-        }
+        Source::Game(map) => Ok(RelitWorld::load(files, materials, map, options)?),
         Source::File(path) => {
             let name = path.display().to_string();
             let bytes = std::fs::read(path).with_context(|| name.clone())?;
             let bsp = q3bsp::Bsp::parse(&bytes).with_context(|| name.clone())?;
-            let mut world = RelitWorld::from_bsp(files, materials, &name, bsp, Options::default());
-            if let Some(calibrate) = calibrate {
-                relight::calibrate(&mut world, &calibrate);
-            }
-            Ok(world)
+            Ok(RelitWorld::from_bsp(files, materials, &name, bsp, options))
         }
     }
 }

@@ -23,6 +23,8 @@ pub(super) struct Hit {
     pub front: bool,
     /// What the triangle was tagged with.
     pub tag: u32,
+    /// Barycentric coordinates of its second and third corner.
+    pub at: (f32, f32),
 }
 
 #[derive(Clone, Copy)]
@@ -177,6 +179,7 @@ fn meet(triangle: &Triangle, from: Vec3A, ray: Vec3A, limit: f32) -> Option<Hit>
         // The determinant is positive against the counter-clockwise side.
         front: determinant < 0.0,
         tag: triangle.tag,
+        at: (u, v),
     })
 }
 

@@ -219,6 +219,7 @@ pub(super) fn key(world: &RelitWorld, options: &CalibrationOptions) -> u128 {
         hash.number(u64::from(material.is_sky()));
         hash.number(material.class.class as u64);
         hash.number(u64::from(material.emission.is_some()));
+        hash.vector(material.albedo);
     }
     for light in &world.lights {
         light.vertices.iter().for_each(|v| hash.vector(*v));

@@ -4,11 +4,12 @@
 //! lightmaps. Light is linear in the strengths of lights, so that finding them is a linear problem: *inverse lighting*.
 //!
 //! 1. [`samples`]: measurements, spread over the map's area. Some are held out, to judge by.
-//! 2. [`columns`]: shadow rays tell what each known light gives to each sample.
-//! 3. [`place`]: candidates for lost lights all over open space, then in front of what stays unexplained;
+//! 2. [`bounce`]: the part of each that other surfaces throw there, which tracing will add.
+//! 3. [`columns`]: shadow rays tell what each known light gives to each sample.
+//! 4. [`place`]: candidates for lost lights all over open space, then in front of what stays unexplained;
 //!    [`solve`] chooses among them by sparse non-negative least squares of logarithmic error. What directives say
 //!    is a prior, and what is the same everywhere is ambient, within limits.
-//! 4. The world's lights get their strengths, lost lights are added to
+//! 5. The world's lights get their strengths, lost lights are added to
 //!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
 //!
 //! Results can be kept ([`CalibrationCache`]): they depend on the world alone, on no clock and no thread.
@@ -16,6 +17,7 @@
 //! Source: the idea is that of Schoeneman et al., *Painting with Light*, SIGGRAPH 1993.
 
 mod apply;
+mod bounce;
 mod bvh;
 mod cache;
 mod columns;
@@ -40,7 +42,7 @@ use solve::Ambient;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// How a world is calibrated.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,7 +118,7 @@ pub fn calibrate(world: &mut RelitWorld, options: &CalibrationOptions) -> Calibr
 /// Solves for a world's light.
 fn find(world: &RelitWorld, options: &CalibrationOptions) -> Solution {
     let occluders = samples::occluders(world);
-    let (samples, evidence) = samples::take(world, &occluders, options.samples, options.seed);
+    let (mut samples, evidence) = samples::take(world, &occluders, options.samples, options.seed);
     let mut columns = columns::known(world, &occluders, &samples);
     let known = columns.len();
     let mut solution = Solution {
@@ -136,6 +138,7 @@ fn find(world: &RelitWorld, options: &CalibrationOptions) -> Solution {
     }
     let before = solve::predict(&samples, &columns, world.ambient);
     solution.report.before = Agreement::of(&samples, &before);
+    bounce::gather(world, &occluders, &mut samples);
     let mut ambient = first_ambient(world, &samples);
     let effort = solve::Effort {
         rounds: 4,

@@ -66,9 +66,9 @@ pub struct CalibrationReport {
     pub known: usize,
     /// Lights put in.
     pub placed: usize,
-    /// Agreement of the light that directives tell of.
+    /// Agreement of the light that directives tell of, direct and ambient.
     pub before: Agreement,
-    /// Agreement of calibrated light.
+    /// Agreement of calibrated light: direct, ambient and bounced.
     pub after: Agreement,
     /// Whether the result was kept from an earlier time.
     pub cached: bool,

@@ -31,6 +31,8 @@ pub(super) struct Sample {
     pub normal: Vec3,
     /// Light, irradiance / π.
     pub value: Vec3,
+    /// Part of it that comes by way of other surfaces, irradiance / π: see [`bounce`](super::bounce).
+    pub bounce: Vec3,
     /// Visibility cluster that it lies in.
     pub cluster: i32,
     /// Some channel is at its end: there was at least that much light.
@@ -89,19 +91,18 @@ impl Evidence {
 }
 
 /// Triangles that stop light when the compiler casts shadows: those of the world itself that are opaque. Tagged with
-/// their surface.
+/// their number.
 pub(super) fn occluders(world: &RelitWorld) -> Occluders {
-    let drawn = world.surfaces.iter().enumerate().filter(|(_, s)| {
+    let drawn = world.surfaces.iter().filter(|s| {
         let material = world.materials.get(s.material as usize);
         s.model == 0 && material.is_some_and(|m| m.is_sky() || stops_light(m))
     });
-    Occluders::new(drawn.flat_map(|(index, surface)| {
+    Occluders::new(drawn.flat_map(|surface| {
         let material = world.materials.get(surface.material as usize);
         let sky = material.is_some_and(WorldMaterial::is_sky);
         let first = surface.first_index as usize / 3;
         (first..first + surface.num_indices as usize / 3)
-            .filter_map(|t| world.triangle(t))
-            .map(move |corners| (corners, sky, index as u32))
+            .filter_map(move |t| Some((world.triangle(t)?, sky, t as u32)))
     }))
 }
 
@@ -182,6 +183,7 @@ fn sample_at(
         position,
         normal,
         value: Vec3::from_array(stored.map(f32::from)) * STORED_UNIT,
+        bounce: Vec3::ZERO,
         cluster,
         saturated: stored.contains(&255),
         held_out: false,
@@ -259,7 +261,7 @@ fn texel(
 }
 
 /// Vertices of a triangle.
-fn corners(world: &RelitWorld, triangle: usize) -> Option<[&WorldVertex; 3]> {
+pub(super) fn corners(world: &RelitWorld, triangle: usize) -> Option<[&WorldVertex; 3]> {
     let [a, b, c] = *world.indices.as_chunks::<3>().0.get(triangle)?;
     let vertex = |i: u32| world.vertices.get(i as usize);
     Some([vertex(a)?, vertex(b)?, vertex(c)?])
@@ -344,6 +346,7 @@ fn grid(world: &RelitWorld, count: usize, random: &mut Random) -> Vec<Sample> {
                 position,
                 normal,
                 value: value * STORED_UNIT,
+                bounce: Vec3::ZERO,
                 cluster,
                 saturated: point.directed.contains(&255),
                 held_out: false,

@@ -51,9 +51,9 @@ pub(super) struct Residual {
     pub weights: Vec<f32>,
 }
 
-/// Computed light at every sample.
+/// Computed light at every sample: ambient, bounced and direct.
 pub(super) fn predict(samples: &[Sample], columns: &[Column], ambient: Vec3) -> Vec<Vec3> {
-    let mut light = vec![ambient; samples.len()];
+    let mut light: Vec<Vec3> = samples.iter().map(|s| s.bounce + ambient).collect();
     for column in columns {
         if column.strength == Vec3::ZERO {
             continue;

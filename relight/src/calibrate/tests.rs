@@ -94,7 +94,11 @@ fn relit(bsp: &Bsp) -> RelitWorld {
     let (materials, diagnostics) = Materials::load(&files);
     assert!(diagnostics.is_empty(), "{diagnostics:?}");
     let bsp = Bsp::parse(&bsp.write()).unwrap();
-    RelitWorld::from_bsp(&files, &materials, "test", bsp, Options::default())
+    let options = Options {
+        calibrate: None,
+        ..Options::default()
+    };
+    RelitWorld::from_bsp(&files, &materials, "test", bsp, options)
 }
 
 /// The lights that are hidden: origin, intensity.

@@ -12,7 +12,7 @@
 //! Source: q3map2's choice of the light image; the stage algebra is [`shaderscript::light`]'s.
 
 use super::entities::normalise;
-use super::glow::mean_emission;
+use super::glow::{mean_albedo, mean_emission};
 use super::{POINT_LIGHT_INTENSITY, SKY_LIGHT_RADIANCE, SURFACE_LIGHT_RADIANCE};
 use crate::files::GameFiles;
 use crate::image::{self, Image};
@@ -164,6 +164,18 @@ impl<'a> Finder<'a> {
             }
         }
         mean_emission(shader, |name| self.images.get(name)?.as_ref())
+    }
+
+    /// Mean diffuse albedo of a material: the part of light that it throws back. Black for skies.
+    pub fn albedo(&mut self, material: &WorldMaterial) -> Vec3 {
+        let shader = &material.resolved.shader;
+        if material.is_sky() {
+            return Vec3::ZERO;
+        }
+        for name in shader.image_names() {
+            self.image(name);
+        }
+        mean_albedo(shader, |name| self.images.get(name)?.as_ref())
     }
 
     /// Mean radiance of what a sky shows: the sides of its box that exist, and its clouds.

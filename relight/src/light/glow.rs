@@ -4,7 +4,7 @@ use crate::image::Image;
 use crate::overbright;
 use glam::{Vec2, Vec3, Vec4};
 use shaderscript::eval::{self, ColorContext};
-use shaderscript::light::{StageSample, compose, glow_stages};
+use shaderscript::light::{LightLinear, StageSample, compose, glow_stages};
 use shaderscript::{Shader, Stage, StageImage, TcGen};
 
 /// Samples per side of a texture.
@@ -23,12 +23,32 @@ const TIMES: [f64; 12] = [
 /// that it does not know is black.
 pub(super) fn mean_emission<'a>(
     shader: &Shader,
-    mut image: impl FnMut(&str) -> Option<&'a Image>,
+    image: impl FnMut(&str) -> Option<&'a Image>,
 ) -> Vec3 {
-    let stages = &shader.stages;
     if glow_stages(shader, true).is_empty() {
         return Vec3::ZERO;
     }
+    mean(shader, &TIMES, image, |drawn| drawn.emission)
+}
+
+/// Mean diffuse albedo of a material's stages over texture, linear, as they are at the start: what they show of the
+/// light that falls on them.
+pub(super) fn mean_albedo<'a>(
+    shader: &Shader,
+    image: impl FnMut(&str) -> Option<&'a Image>,
+) -> Vec3 {
+    let start = TIMES.get(..1).unwrap_or_default();
+    mean(shader, start, image, |drawn| drawn.lit).min(Vec3::ONE)
+}
+
+/// Mean over texture and times of a part of what is drawn.
+fn mean<'a>(
+    shader: &Shader,
+    times: &[f64],
+    mut image: impl FnMut(&str) -> Option<&'a Image>,
+    part: impl Fn(LightLinear) -> Vec3,
+) -> Vec3 {
+    let stages = &shader.stages;
     let pictures: Vec<Vec<Option<&Image>>> = stages
         .iter()
         .map(|s| s.image.names().iter().map(|name| image(name)).collect())
@@ -36,7 +56,7 @@ pub(super) fn mean_emission<'a>(
     let table = overbright::byte_table();
     let mut sum = Vec3::ZERO;
     let mut samples = Vec::with_capacity(stages.len());
-    for time in TIMES {
+    for &time in times {
         let context = ColorContext {
             time,
             ..ColorContext::default()
@@ -61,10 +81,10 @@ pub(super) fn mean_emission<'a>(
                     color: *color,
                 });
             }
-            sum += compose(stages, &samples, true).emission.max(Vec3::ZERO);
+            sum += part(compose(stages, &samples, true)).max(Vec3::ZERO);
         }
     }
-    let mean = sum / (GRID * GRID * TIMES.len() as u32) as f32;
+    let mean = sum / (GRID * GRID * times.len() as u32) as f32;
     if mean.is_finite() { mean } else { Vec3::ZERO }
 }
 

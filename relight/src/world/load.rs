@@ -91,7 +91,7 @@ impl RelitWorld {
         files: &dyn GameFiles,
         materials: &Materials,
         map: &str,
-        mut options: Options<'_>,
+        options: Options<'_>,
     ) -> Result<RelitWorld, LoadError> {
         let bytes = files.read(map)?.ok_or_else(|| LoadError::Absent {
             map: map.to_owned(),
@@ -100,33 +100,10 @@ impl RelitWorld {
             map: map.to_owned(),
             source,
         })?;
-        let calibration = options.calibrate.take();
-        let mut world = RelitWorld::from_bsp(
-            files,
-            materials,
-            map,
-            bsp,
-            Options {
-                subdivisions: options.subdivisions,
-                overbright_shift: options.overbright_shift,
-                calibrate: None,
-                // A new borrow: the rest of the struct moves.
-                progress: options.progress.as_mut().map(|p| &mut **p as Progress<'_>),
-            },
-        );
-        if let Some(calibration) = calibration {
-            if let Some(progress) = options.progress.as_mut() {
-                progress(Stage::Calibration);
-            }
-            calibrate(&mut world, &calibration);
-        }
-        if let Some(progress) = options.progress.as_mut() {
-            progress(Stage::Done);
-        }
-        Ok(world)
+        Ok(RelitWorld::from_bsp(files, materials, map, bsp, options))
     }
 
-    /// Relights a map that was read elsewhere. It is not calibrated: see [`calibrate`].
+    /// Relights a map that was read elsewhere.
     pub fn from_bsp(
         files: &dyn GameFiles,
         materials: &Materials,
@@ -246,6 +223,14 @@ impl RelitWorld {
         world.report.clusters = world.light_lists.clusters();
         world.report.mean_list_length = world.light_lists.mean_length();
         world.report.longest_list = world.light_lists.longest();
+        if let Some(calibration) = &options.calibrate {
+            begin(Stage::Calibration);
+            for material in &mut world.materials {
+                material.albedo = finder.albedo(material);
+            }
+            calibrate(&mut world, calibration);
+        }
+        begin(Stage::Done);
         world
     }
 
@@ -315,6 +300,7 @@ fn resolve_materials(
                 lighting,
                 class: shaderscript::light::classify(&resolved.shader),
                 resolved,
+                albedo: Vec3::ZERO,
                 emission: None,
             });
             (list.len() - 1) as u32

@@ -2,6 +2,7 @@
 
 use crate::light::Emission;
 use crate::materials::Resolved;
+use glam::Vec3;
 use q3bsp::{Bsp, SurfaceKind, lightmap_index};
 use shaderscript::ImplicitKind;
 use shaderscript::light::LightClass;
@@ -22,6 +23,9 @@ pub struct WorldMaterial {
     pub resolved: Resolved,
     /// What it is to light, as it is drawn.
     pub class: LightClass,
+    /// Part of incident light that it throws back, diffuse, mean over its texture, linear. Zero unless the world
+    /// was loaded to be calibrated.
+    pub albedo: Vec3,
     /// Light that it emits; `None` for most.
     pub emission: Option<Emission>,
 }

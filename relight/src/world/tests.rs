@@ -86,12 +86,20 @@ fn game() -> MemoryFiles {
     files
 }
 
+/// Lights as directives say, whatever the lightmaps tell.
+fn as_said() -> Options<'static> {
+    Options {
+        calibrate: None,
+        ..Options::default()
+    }
+}
+
 fn relight(map: MapBuilder) -> RelitWorld {
     let files = game();
     let (materials, diagnostics) = Materials::load(&files);
     assert!(diagnostics.is_empty(), "{diagnostics:?}");
     let bsp = Bsp::parse(&map.build().write()).unwrap();
-    RelitWorld::from_bsp(&files, &materials, "test", bsp, Options::default())
+    RelitWorld::from_bsp(&files, &materials, "test", bsp, as_said())
 }
 
 /// A square of 2 × 2 `half`, front to +z, at a height.
