@@ -19,9 +19,6 @@ const LIFT: f32 = 1.0;
 /// Points tried in each stratum before it is given up.
 const TRIES: usize = 8;
 
-/// Texels whose surface is covered by the inside of something within this distance are skipped, id units.
-const COVER: f32 = 64.0;
-
 /// One measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sample {
@@ -174,9 +171,14 @@ fn sample_at(
     if cluster < 0 {
         return None;
     }
-    // What is seen first from behind is something that this place is inside of.
-    let above = occluders.nearest(position, normal, COVER);
-    if above.is_some_and(|hit| !hit.front && !hit.sky) {
+    // What is seen from behind all around is something that this place is inside of.
+    let (u, v) = normal.any_orthonormal_pair();
+    let around = [normal, normal + u, normal - u, normal + v, normal - v];
+    let backs = around
+        .into_iter()
+        .filter_map(|ray| occluders.nearest(position, ray, f32::INFINITY))
+        .filter(|hit| !hit.front && !hit.sky);
+    if backs.count() > around.len() / 2 {
         return None;
     }
     Some(Sample {

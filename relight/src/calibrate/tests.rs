@@ -3,7 +3,7 @@ use crate::files::{MemoryFiles, SearchPath};
 use crate::light::{PointLight, SURFACE_LIGHT_RADIANCE};
 use crate::materials::Materials;
 use crate::test_data;
-use crate::world::Options;
+use crate::world::{Options, Stage};
 use q3bsp::Bsp;
 use q3bsp::builder::MapBuilder;
 use std::f32::consts::PI;
@@ -171,6 +171,56 @@ fn hidden_lights_are_found_again() {
     // The lists know them: all of the room is one cluster.
     assert_eq!(world.light_lists.row(0).len(), world.point_lights.len());
     assert_eq!(world.report.point_lights, world.point_lights.len());
+}
+
+#[test]
+fn bounced_light_in_an_even_room_is_albedo_times_light() {
+    let even = |_: Vec3, _: Vec3| Vec3::new(1.0, 0.5, 0.25);
+    let mut world = room(false, Some(&even));
+    let albedo = Vec3::new(0.5, 0.25, 0.0);
+    for material in &mut world.materials {
+        material.albedo = albedo;
+    }
+    let occluders = samples::occluders(&world);
+    let (mut samples, evidence) = samples::take(&world, &occluders, 500, 1);
+    assert_eq!(evidence, Evidence::Lightmaps);
+    assert!(samples.iter().all(|s| s.bounce == Vec3::ZERO));
+    bounce::gather(&world, &occluders, &mut samples);
+    assert!(samples.len() > 400);
+    for sample in &samples {
+        // Stored values are whole numbers.
+        assert!(
+            (sample.bounce - even(Vec3::ZERO, Vec3::Z) * albedo).length() < 0.01,
+            "{sample:?}"
+        );
+    }
+}
+
+#[test]
+fn loading_calibrates_when_asked() {
+    let plain = room(true, Some(&from_hidden));
+    assert!(plain.calibration.is_none());
+    assert!(plain.materials.iter().all(|m| m.albedo == Vec3::ZERO));
+    let mut stages = Vec::new();
+    let mut files = MemoryFiles::new();
+    let script = SCRIPT.replace('{', "\n{\n").replace('}', "\n}\n");
+    files.insert("scripts/test.shader", script).unwrap();
+    let (materials, _) = Materials::load(&files);
+    let mut progress = |stage| stages.push(stage);
+    let options = Options {
+        calibrate: Some(small()),
+        progress: Some(&mut progress),
+        ..Options::default()
+    };
+    let world = RelitWorld::from_bsp(&files, &materials, "test", plain.bsp, options);
+    let report = world.calibration.as_ref().unwrap();
+    assert_eq!(report.placed, world.point_lights.len());
+    assert!(
+        stages.ends_with(&[Stage::Calibration, Stage::Done]),
+        "{stages:?}"
+    );
+    let wall = world.materials.iter().find(|m| m.name == "t/wall").unwrap();
+    assert!((wall.albedo - 1.0).length() < 1e-3, "{}", wall.albedo);
 }
 
 #[test]
