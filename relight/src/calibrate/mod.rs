@@ -3,11 +3,11 @@
 //! Compilers strip light entities, and leave their scale factors nowhere; what they computed is still there, as
 //! lightmaps. Light is linear in the strengths of lights, so that finding them is a linear problem: *inverse lighting*.
 //!
-//! 1. [`samples`]: measurements, spread over the map's area. Some are held out, to judge by.
-//! 2. [`bounce`]: the part of each that other surfaces throw there, which tracing will add.
-//! 3. [`columns`]: shadow rays tell what each known light gives to each sample.
-//! 4. [`place`]: candidates for lost lights all over open space, then in front of what stays unexplained;
-//!    [`solve`] chooses among them by sparse non-negative least squares of logarithmic error. What directives say
+//! 1. `samples`: measurements, spread over the map's area. Some are held out, to judge by.
+//! 2. `bounce`: the part of each that other surfaces throw there, which tracing will add.
+//! 3. `columns`: shadow rays tell what each known light gives to each sample.
+//! 4. `place`: candidates for lost lights all over open space, then in front of what stays unexplained;
+//!    `solve` chooses among them by sparse non-negative least squares of logarithmic error. What directives say
 //!    is a prior, and what is the same everywhere is ambient, within limits.
 //! 5. The world's lights get their strengths, lost lights are added to
 //!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
