@@ -167,23 +167,39 @@ impl Geometry {
             .extend(corners.iter().take(whole).map(|c| base + c));
     }
 
-    /// Gives a planar surface its plane. The stored normal is zero in many maps: then the vertices' own
-    /// normals decide, then the triangles' winding.
+    /// Gives a planar surface its plane. The stored normal is zero in many maps: then the triangles'
+    /// winding decides, then the vertices' own normals. Compilers also join faces that bend into one "planar"
+    /// surface: such a one has no plane, and keeps the normals of its vertices.
     fn flatten(&mut self, first_vertex: u32, first_index: u32, stored: Vec3) -> Option<Plane> {
         let geometric = self.front(first_index);
-        let vertices = self.vertices.get_mut(first_vertex as usize..)?;
+        let vertices = self.vertices.get(first_vertex as usize..)?;
         let origin = vertices.first()?.position;
         let mean: Vec3 = vertices.iter().map(|v| v.normal).sum();
-        let normal = [stored, mean, geometric]
+        let normal = [stored, geometric, mean]
             .into_iter()
             .map(Vec3::normalize_or_zero)
             .find(|n| *n != Vec3::ZERO)?;
-        for vertex in vertices {
+        if self.bends(first_index, normal) {
+            return None;
+        }
+        for vertex in self.vertices.get_mut(first_vertex as usize..)? {
             vertex.normal = normal;
         }
         Some(Plane {
             normal,
             dist: normal.dot(origin),
+        })
+    }
+
+    /// Whether some triangle from `first_index` on, slivers apart, faces more than about eight degrees away
+    /// from `normal`.
+    fn bends(&self, first_index: u32, normal: Vec3) -> bool {
+        let corners = self.indices.get(first_index as usize..).unwrap_or_default();
+        corners.as_chunks::<3>().0.iter().any(|triangle| {
+            let front = self.triangle_front(triangle);
+            let area = front.length();
+            // a sliver's direction is rounding
+            area > 1.0 && front.dot(normal) < 0.99 * area
         })
     }
 

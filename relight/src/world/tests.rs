@@ -711,3 +711,35 @@ fn check_lists(map: &str, world: &RelitWorld) -> usize {
     }
     checked
 }
+
+#[test]
+fn bent_planar_surfaces_keep_the_normals_of_their_vertices() {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 0);
+    let flat = map.add_quad(wall, ceiling_lamp(64.0, 0.0));
+    let bent = map.add_quad(wall, ceiling_lamp(64.0, 100.0));
+    for surface in [flat, bent] {
+        map.surface_mut(surface).unwrap().lightmap_vecs[2] = Vec3::ZERO;
+        for (i, vertex) in map.vertices_mut(surface).iter_mut().enumerate() {
+            vertex.normal = Vec3::new(i as f32, 0.0, -4.0);
+        }
+    }
+    // one corner pulled down: the two triangles of the quad now face apart
+    map.vertices_mut(bent)[1].position.z -= 60.0;
+    let world = relight(map);
+    let normals = |surface: usize| {
+        let surface = &world.surfaces[surface];
+        let first = surface.first_vertex as usize;
+        world.vertices[first..first + surface.num_vertices as usize]
+            .iter()
+            .map(|v| v.normal)
+            .collect::<Vec<_>>()
+    };
+    assert!(world.surfaces[flat].plane.is_some());
+    assert!(normals(flat).windows(2).all(|pair| pair[0] == pair[1]));
+    assert_eq!(world.surfaces[bent].plane, None);
+    for (i, normal) in normals(bent).into_iter().enumerate() {
+        let stored = Vec3::new(i as f32, 0.0, -4.0).normalize();
+        assert!(normal.abs_diff_eq(stored, 1e-6), "{normal}");
+    }
+}

@@ -3,7 +3,7 @@
 //! Source: engine behaviour of `MarkFragments`, its tolerances included.
 
 use glam::Vec3;
-use q3bsp::SurfaceKind;
+use q3bsp::{Plane, SurfaceKind};
 use shaders::types::Vertex;
 
 use super::visible::Side;
@@ -171,7 +171,7 @@ fn candidates(
                 continue;
             }
             let taken = match surface.kind {
-                SurfaceKind::Planar => surface.plane.is_some_and(|plane| {
+                SurfaceKind::Planar => stored_plane(world, index).is_some_and(|plane| {
                     let side = Side::of(bounds, plane.normal, plane.dist);
                     side.front && side.back && plane.normal.dot(direction) <= -0.5
                 }),
@@ -184,6 +184,17 @@ fn candidates(
         }
     });
     found
+}
+
+/// The plane as the map stores it. Compilers leave it zero on surfaces that they merge, and the engine then marks
+/// nothing.
+fn stored_plane(world: &WorldData, index: u32) -> Option<Plane> {
+    let stored = world.relit.bsp.surfaces.get(index as usize)?;
+    let normal = stored.lightmap_vecs[2];
+    let first = world.relit.bsp.surface_vertices(stored).first()?.position;
+    let dist = normal.dot(first);
+    (normal != Vec3::ZERO && normal.is_finite() && dist.is_finite())
+        .then_some(Plane { normal, dist })
 }
 
 fn mark_surface(

@@ -188,6 +188,18 @@ fn decals_respect_limits_flags_and_distance() {
 }
 
 #[test]
+fn surfaces_without_a_stored_plane_take_no_decals() {
+    let mut game = game();
+    let mut map = MapBuilder::new();
+    let shader = map.add_shader("t/wall", 0, 0);
+    let floor = map.add_quad(shader, quad_corners(100.0, 0.0));
+    map.surface_mut(floor).unwrap().lightmap_vecs[2] = Vec3::ZERO;
+    let world = game.build(map.build());
+    assert_eq!(world.surfaces[0].plane.unwrap().normal, Vec3::Z);
+    assert_eq!(mark(&game, &world, &quad_corners(10.0, 1.0), (384, 128)).1, 0);
+}
+
+#[test]
 fn curves_take_decals_and_have_levels() {
     let mut game = game();
     let mut map = MapBuilder::new();
