@@ -70,6 +70,7 @@ pub struct Renderer {
     overlay_time: f32,
     color_2d: u32,
     entity_tokens: EntityTokens,
+    calibrations: Option<relight::CalibrationCache>,
 }
 
 /// Looks for a device without making a window: what it is called and what it can do.
@@ -130,6 +131,7 @@ impl Renderer {
             overlay_time: 0.0,
             color_2d: u32::MAX,
             entity_tokens: EntityTokens::default(),
+            calibrations: None,
         })
     }
 
@@ -320,11 +322,17 @@ impl Renderer {
         Ok(())
     }
 
+    /// Keeps what is found about maps' lights in a folder, so that the traced look is ready at once the next time.
+    pub fn keep_calibrations(&mut self, folder: Option<std::path::PathBuf>) {
+        self.calibrations = folder.map(relight::CalibrationCache::new);
+    }
+
     /// Makes the traced look when it is first asked for; `false` while there is no map.
     fn ready_to_trace(&mut self) -> Result<bool, Error> {
         if self.trace.is_none()
-            && let (Some(world), Some(assets)) = (&self.world, &self.assets)
+            && let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets)
         {
+            world.calibrate(assets, self.calibrations.as_ref());
             self.trace = Some(TraceLook::new(&self.device, world, assets)?);
         }
         Ok(self.trace.is_some())

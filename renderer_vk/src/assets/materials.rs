@@ -446,7 +446,7 @@ impl Materials {
         );
         if let (Some(material), Some((_, light))) = slots {
             material.flags |= types::constants::MATERIAL_EMITTER;
-            *light = light.max(radiance);
+            *light = radiance;
             self.touch();
         }
     }

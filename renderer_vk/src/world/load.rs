@@ -44,11 +44,13 @@ impl WorldOptions {
         }
     }
 
-    /// The same for the converter.
+    /// The same for the converter. Lights are not calibrated here: only the traced look needs that, see
+    /// [`World::calibrate`](super::World::calibrate).
     pub fn relight(&self) -> relight::Options<'static> {
         relight::Options {
             subdivisions: self.subdivisions,
             overbright_shift: self.overbright_shift,
+            calibrate: None,
             ..relight::Options::default()
         }
     }
@@ -99,13 +101,7 @@ impl WorldData {
             let name = material.map_or("", |m| m.name.as_str());
             let class = class_of(stored.lightmap, options);
             let found = materials.find_or_default(source, name, class);
-            if let Some(light) = relit.lights.get(stored.first_light as usize)
-                && stored.num_lights > 0
-            {
-                // what glows or is sky shows its light by its stages
-                let hidden = light.source == relight::light::EmissionSource::SurfaceLight;
-                materials.set_emitter(found, if hidden { light.radiance } else { Vec3::ZERO });
-            }
+            mark_emitter(&relit, stored, found, materials);
             let lod = patches
                 .get(index)
                 .and_then(Option::as_ref)
@@ -171,6 +167,22 @@ impl WorldData {
             }
         }
         data
+    }
+}
+
+/// Tells a surface's material which light it is.
+pub(super) fn mark_emitter(
+    relit: &RelitWorld,
+    surface: &relight::world::WorldSurface,
+    material: u32,
+    materials: &mut Materials,
+) {
+    if let Some(light) = relit.lights.get(surface.first_light as usize)
+        && surface.num_lights > 0
+    {
+        // what glows or is sky shows its light by its stages
+        let hidden = light.source == relight::light::EmissionSource::SurfaceLight;
+        materials.set_emitter(material, if hidden { light.radiance } else { Vec3::ZERO });
     }
 }
 

@@ -278,6 +278,33 @@ impl World {
             data,
         })
     }
+
+    /// Fits the map's lights to its lightmaps, once; what the traced look needs, and what takes a few seconds unless
+    /// `cache` has it. To be done before light lists are copied to the GPU.
+    pub fn calibrate(&mut self, assets: &mut Assets, cache: Option<&relight::CalibrationCache>) {
+        let relit = &mut self.data.relit;
+        if relit.calibration.is_some() {
+            return;
+        }
+        let options = relight::CalibrationOptions {
+            cache: cache.cloned(),
+            ..relight::CalibrationOptions::default()
+        };
+        let report = relight::calibrate(relit, &options);
+        log::info!(
+            "{}: lights fitted to the light that the map stores, in {:.1} s",
+            relit.name,
+            report.seconds
+        );
+        for (surface, stored) in self.data.surfaces.iter().zip(&self.data.relit.surfaces) {
+            load::mark_emitter(
+                &self.data.relit,
+                stored,
+                surface.material,
+                &mut assets.materials,
+            );
+        }
+    }
 }
 
 #[cfg(test)]

@@ -196,7 +196,10 @@ fn surfaces_without_a_stored_plane_take_no_decals() {
     map.surface_mut(floor).unwrap().lightmap_vecs[2] = Vec3::ZERO;
     let world = game.build(map.build());
     assert_eq!(world.surfaces[0].plane.unwrap().normal, Vec3::Z);
-    assert_eq!(mark(&game, &world, &quad_corners(10.0, 1.0), (384, 128)).1, 0);
+    assert_eq!(
+        mark(&game, &world, &quad_corners(10.0, 1.0), (384, 128)).1,
+        0
+    );
 }
 
 #[test]
