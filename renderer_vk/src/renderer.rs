@@ -481,9 +481,13 @@ impl Renderer {
             }
         }
         for item in self.queue.drain(..) {
-            if let Item::Overlay(mut overlay, _) = item {
-                overlay.clear();
-                self.spare_overlays.push(overlay);
+            match item {
+                Item::Overlay(mut overlay, _) => {
+                    overlay.clear();
+                    self.spare_overlays.push(overlay);
+                }
+                Item::Classic(scenes) => self.scene.recycle(scenes),
+                Item::Traced(scene) => self.scene.recycle([*scene]),
             }
         }
         match &mut self.swapchain {

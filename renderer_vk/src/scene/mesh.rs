@@ -48,7 +48,8 @@ impl RawMesh {
     }
 }
 
-/// Deforms what was appended since `raw` began, and lists it. `None` when nothing is left of it.
+/// Deforms what was appended since `raw` began, and lists it. `None` when nothing is left of it, or some
+/// position is not a number.
 pub(super) fn finish(
     raw: RawMesh,
     entity: Option<&RefEntity>,
@@ -64,7 +65,12 @@ pub(super) fn finish(
     let vertex_count = out.vertices.len() - raw.first_vertex;
     let index_count = out.indices.len() - raw.first_index;
     let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-    if index_count == 0 || vertex_count == 0 {
+    // an acceleration structure must not meet what is not a number
+    let finite = out
+        .vertices
+        .get(raw.first_vertex..)
+        .is_some_and(|added| added.iter().all(|v| v.position.is_finite()));
+    if index_count == 0 || vertex_count == 0 || !finite {
         out.vertices.truncate(raw.first_vertex);
         out.indices.truncate(raw.first_index);
         return None;

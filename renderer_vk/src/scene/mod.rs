@@ -322,7 +322,7 @@ impl Scene {
     }
 
     /// Takes back views that are drawn, so that the next ones need no new memory.
-    pub fn recycle(&mut self, views: Vec<ViewScene>) {
+    pub fn recycle(&mut self, views: impl IntoIterator<Item = ViewScene>) {
         self.pool.extend(views);
     }
 
