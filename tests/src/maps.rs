@@ -18,7 +18,7 @@ const SCRIPT: &str = "
 textures/test/lamp
 {
     surfaceparm nomarks
-    q3map_surfacelight 3000
+    q3map_surfacelight 400
     {
         map textures/test/lamp.tga
         rgbGen identity

@@ -12,7 +12,7 @@ use super::input::{MaterialTable, Tracer};
 use super::lights::{MapLights, dynamic_lights};
 use super::passes::{Accumulate, Composite, Denoise, Direct, Exposure, Indirect, Primary, ToneMap};
 use super::targets::Targets;
-use crate::gpu::{Buffer, BufferDesc, BufferUsage, Device, Error, Image, Memory, Recorder};
+use crate::gpu::{Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::scene::ViewScene;
 use crate::settings::{LightSampling, Settings};
 
@@ -71,14 +71,12 @@ impl ViewTracer {
             exposure: Exposure::new(device)?,
             tone_map: ToneMap::new(device)?,
             targets: None,
-            exposure_state: Buffer::new(
+            // zeros: the first frame counts into the histogram before any pass has emptied it
+            exposure_state: Buffer::with_data(
                 device,
-                &BufferDesc {
-                    name: "trace exposure",
-                    size: Exposure::STATE_SIZE,
-                    usage: BufferUsage::STORAGE,
-                    memory: Memory::Device,
-                },
+                "trace exposure",
+                BufferUsage::STORAGE,
+                &[0u8; Exposure::STATE_SIZE as usize],
             )?,
             exposure_started: false,
             no_lights: MapLights::none(device)?,
