@@ -70,6 +70,42 @@ fn the_classic_look_is_the_engines_own() {
     }
 }
 
+/// The traced look's picture of a view is another one, but of the same place: at least this similar to the picture
+/// of the engine's own renderer.
+const TRACED_SSIM: f64 = 0.2;
+
+#[test]
+fn the_traced_look_shows_the_same_places() {
+    if !real::available() {
+        return;
+    }
+    for (map, camera) in VIEWS {
+        let mut commands = start_map(map);
+        commands.extend(picture(camera, 8, "shot"));
+        let reference = run("opengl1", (320, 240), commands);
+        let reference = reference.picture("shot");
+        let mut commands = start_map(map);
+        set(
+            &mut commands,
+            &[&format!("setviewpos {camera}"), "set r_rt 1"],
+        );
+        commands.extend(picture(camera, 8, "shot"));
+        set(&mut commands, &["rt_lights"]);
+        let ours = run("vk", (320, 240), commands);
+        ours.assert_clean();
+        let picture = ours.picture("shot");
+        keep_picture(picture, &format!("{map}-traced"));
+        assert_plausible(picture, map);
+        let difference = compare(reference, picture).unwrap();
+        println!(
+            "{map}: {difference:?}, luminance {:.1} and {:.1}",
+            reference.mean_luminance(),
+            picture.mean_luminance()
+        );
+        assert!(difference.ssim >= TRACED_SSIM, "{map}: {difference:?}");
+    }
+}
+
 #[test]
 fn a_session_with_everything() {
     if !real::available() {
