@@ -138,9 +138,7 @@ fn the_sample_map_loads_and_gathers() {
     let missing = World::load(&device, &mut assets, "maps/none.bsp", &settings);
     assert!(matches!(missing, Err(WorldError::Map(_))));
     let world = World::load(&device, &mut assets, relight::sample::MAP, &settings).unwrap();
-    assert!(
-        world.vertex_buffer.size() as usize >= size_of_val(world.vertices.as_slice())
-    );
+    assert!(world.vertex_buffer.size() as usize >= size_of_val(world.vertices.as_slice()));
     let bytes = device
         .read_buffer(&world.index_buffer, 0, world.indices.len() as u64 * 4)
         .unwrap();

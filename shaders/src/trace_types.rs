@@ -229,6 +229,8 @@ pub struct TraceView {
     pub image_target: u32,
     /// Stops.
     pub exposure_bias: f32,
+    /// Stops at which the map looks as bright as the engine shows it.
+    pub exposure_base: f32,
     /// How far automatic exposure moves to its aim in this frame, 0..1.
     pub exposure_blend: f32,
     /// Scale of the map's lights.
@@ -252,6 +254,8 @@ pub struct TraceView {
     pub last_forward: Vec3,
     pub last_left: Vec3,
     pub last_up: Vec3,
+    /// Makes the size a multiple of eight without hidden bytes.
+    pub padding: u32,
 }
 
 /// Names of constants used on both sides.

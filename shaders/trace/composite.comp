@@ -7,7 +7,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (pixel.x >= int(VIEW.width) || pixel.y >= int(VIEW.height)) return;
-    vec3 radiance = imageLoad(images_rgba32f[VIEW.image_front], pixel).rgb;
+    // what glows by itself, sky and fog show as the engine shows them when the map is exposed to look as bright as there
+    vec3 radiance = imageLoad(images_rgba32f[VIEW.image_front], pixel).rgb * exp2(-VIEW.exposure_base);
     GBufferPixel g = gbuffer_read(pixel);
     if (g.path >= 0.0) {
         vec3 light;

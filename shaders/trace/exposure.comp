@@ -1,16 +1,17 @@
 #version 460
-// From the histogram to the exposure: the mean logarithm of luminance, without the darkest and brightest parts of the
-// picture, is brought towards a middle grey. The correction is bounded and taken by part only, so that
-// dark rooms stay darker than bright ones: the map's author chose its light.
+// From the histogram to the exposure. The map's own base (stops at which it looks as bright as the engine shows it) is
+// what counts; automatic exposure corrects a part of how far this view is from a usual picture: the mean logarithm of
+// luminance, without the darkest and brightest parts, is brought towards that of a usual picture. Dark rooms stay
+// darker than bright ones: the map's author chose its light.
 #include "trace/exposure.glsl"
 
 layout(local_size_x = 1) in;
 
-// Mean of a well-lit picture, linear; its logarithm is what exposure aims at.
-const float MIDDLE = 0.08;
+// Mean of a usual picture of the engine, linear.
+const float MIDDLE = 0.02;
 // How much of the difference is corrected.
-const float ADAPTATION = 0.8;
-const float MIN_STOPS = -2.0, MAX_STOPS = 5.0;
+const float ADAPTATION = 0.35;
+const float MIN_STOPS = -1.5, MAX_STOPS = 1.5;
 // Pixels left out at the dark and at the bright end, of all.
 const float DARK_PART = 0.2, BRIGHT_PART = 0.05;
 
@@ -30,7 +31,7 @@ void main() {
     }
     float stops = 0.0;
     if ((VIEW.flags & VIEW_AUTO_EXPOSURE) != 0 && weight > 0.0)
-        stops = clamp((log2(MIDDLE) - sum / weight) * ADAPTATION, MIN_STOPS, MAX_STOPS);
+        stops = clamp((log2(MIDDLE) - VIEW.exposure_base - sum / weight) * ADAPTATION, MIN_STOPS, MAX_STOPS);
     float old = log2(clamp(state.exposure, exp2(MIN_STOPS), exp2(MAX_STOPS)));
     if ((VIEW.flags & VIEW_EXPOSURE_RESET) != 0 || isnan(old)) old = stops;
     state.exposure = exp2(mix(old, stops, VIEW.exposure_blend));

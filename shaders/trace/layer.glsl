@@ -132,10 +132,10 @@ Layer evaluate_stages(SurfacePoint p, float width) {
     return layer;
 }
 
-// What a lamp shows of the light that it gives: its radiance, held where the tone curve can still tell the texture.
+// What a lamp shows of the light that it gives: its texture at up to full brightness.
 vec3 shown_glow(Material material) {
     vec3 radiance = material.light_radiance;
-    return radiance / (1.0 + max_component(radiance) * 0.25);
+    return radiance / (1.0 + max_component(radiance));
 }
 
 // The layer as an eye sees it: an emitter's surface glows with its own texture.

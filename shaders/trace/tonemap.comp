@@ -19,7 +19,7 @@ void main() {
     if (pixel.x >= int(VIEW.width) || pixel.y >= int(VIEW.height)) return;
     ivec2 target = pixel + ivec2(VIEW.target_x, VIEW.target_y);
     if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target_width) || target.y >= int(VIEW.target_height)) return;
-    float exposure = ExposureState(VIEW.exposure).exposure * exp2(VIEW.exposure_bias);
+    float exposure = ExposureState(VIEW.exposure).exposure * exp2(VIEW.exposure_base + VIEW.exposure_bias);
     vec3 radiance = max(imageLoad(images_rgba32f[VIEW.image_hdr], pixel).rgb * exposure, 0.0);
     imageStore(images_rgba8[VIEW.image_target], target, vec4(encode_display(tone_curve(radiance)), 1.0));
 }

@@ -42,11 +42,11 @@ struct TraceView {
     uint max_depth; uint bounces; uint samples; uint candidates; uint sampling;
     uint image_position; uint image_surface; uint image_front; uint image_direct; uint image_indirect; uint image_hdr;
     uint image_accumulation; uint image_target;
-    float exposure_bias; float exposure_blend; float light_scale;
+    float exposure_bias; float exposure_base; float exposure_blend; float light_scale;
     uint target_width; uint target_height; uint sky_sampler;
     uint image_last_position; uint image_last_surface; uint image_last_light; uint image_moments; uint image_last_moments;
     uint image_filter; uint image_lit;
-    vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up;
+    vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up; uint padding;
 };
 
 // What a geometry's triangles are to a ray.

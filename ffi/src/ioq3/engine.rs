@@ -103,6 +103,16 @@ impl Engine {
             })
     }
 
+    /// The text of a variable that belongs to the engine; empty where there is none.
+    pub fn cvar_text(self, name: &CStr) -> String {
+        let cvar = self.cvar_get(name, c"", 0);
+        if cvar.is_null() {
+            return String::new();
+        }
+        // SAFETY: not null, so it is a variable that lives as long as the process; its text is copied at once.
+        unsafe { string_from((*cvar).string) }
+    }
+
     /// Sets a cvar, whatever its flags.
     pub fn cvar_set(self, name: &CStr, value: &str) {
         let Ok(value) = CString::new(value) else {

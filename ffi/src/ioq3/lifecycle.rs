@@ -12,6 +12,7 @@ use crate::{commands, config};
 use renderer_vk::api::Picture;
 use renderer_vk::{Error, Renderer, RendererOptions, gpu};
 use std::ffi::c_int;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -45,6 +46,18 @@ pub fn failure(error: Error) -> Failure {
     }
 }
 
+/// Where the game writes its own files: what was found out about a map is kept in a folder of ours below it.
+fn cache_folder(engine: Engine) -> Option<PathBuf> {
+    let home = engine.cvar_text(c"fs_homepath");
+    let game = [c"fs_game", c"com_basegame"]
+        .map(|name| engine.cvar_text(name))
+        .into_iter()
+        .find(|game| !game.is_empty())?;
+    // a game folder is one name; anything else is not a place to write to
+    let plain = !game.contains(['/', '\\', ':']) && !game.contains("..");
+    (plain && !home.is_empty()).then(|| PathBuf::from(home).join(game).join("relight"))
+}
+
 /// `re.BeginRegistration`.
 pub extern "C" fn begin_registration(out: *mut glconfig_t) {
     entry(|| {
@@ -71,6 +84,7 @@ pub extern "C" fn begin_registration(out: *mut glconfig_t) {
         }
         // The input code reads nothing of ours, but it is the engine's: no state is held.
         window::give_to_input_once(engine);
+        let cache_folder = cache_folder(engine);
 
         session::with(|session| {
             let front = &mut session.front;
@@ -83,6 +97,7 @@ pub extern "C" fn begin_registration(out: *mut glconfig_t) {
             front.skip_eye = false;
             front.registered = true;
             let files = Arc::new(EngineFiles::new(engine));
+            renderer.keep_calibrations(cache_folder);
             renderer
                 .begin_registration(files, &front.settings)
                 .map_err(|e| Failure::fatal(format!("Relight cannot start: {e}")))

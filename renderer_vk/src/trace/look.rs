@@ -10,6 +10,8 @@ use super::geometry::StaticGeometry;
 use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use super::lights::{MapLightSource, MapLights};
 use super::view_tracer::{TracedMap, ViewTracer};
+use relight::exposure::display_exposure;
+
 use crate::assets::compile::sampler;
 use crate::assets::{Assets, Materials};
 use crate::gpu::{Device, Error, Image, Recorder};
@@ -109,8 +111,10 @@ impl TraceLook {
             bsp: Some(&relit.bsp),
         };
         let tracer = Tracer::of(device.info());
+        let mut view_tracer = ViewTracer::new(device, tracer)?;
+        view_tracer.exposure_base = display_exposure(relit).log2();
         Ok(Self {
-            tracer: ViewTracer::new(device, tracer)?,
+            tracer: view_tracer,
             kind: tracer,
             geometry: StaticGeometry::new(device, tracer, &static_scene(world), assets)?,
             lights: MapLights::new(device, &source)?,

@@ -40,6 +40,8 @@ pub struct ViewTracer {
     pub(super) targets: Option<Targets>,
     exposure_state: Buffer,
     exposure_started: bool,
+    /// Stops at which the map looks as bright as the engine shows it.
+    pub(super) exposure_base: f32,
     no_lights: MapLights,
     frame: u32,
     last_time: f32,
@@ -79,6 +81,7 @@ impl ViewTracer {
                 &[0u8; Exposure::STATE_SIZE as usize],
             )?,
             exposure_started: false,
+            exposure_base: 0.0,
             no_lights: MapLights::none(device)?,
             frame: 0,
             last_time: 0.0,
@@ -321,6 +324,7 @@ impl ViewTracer {
             image_accumulation: targets.accumulation.storage_index(),
             image_target: target.storage_index(),
             exposure_bias: settings.rt_exposure,
+            exposure_base: self.exposure_base,
             exposure_blend,
             light_scale: settings.rt_light_scale.max(0.0),
             target_width: target.width(),
@@ -337,6 +341,7 @@ impl ViewTracer {
             last_forward,
             last_left,
             last_up,
+            padding: 0,
         })
     }
 }
