@@ -648,7 +648,7 @@ fn random_scenes_stay_within_their_arrays() {
                 lighting_origin: numbers.vec(),
                 shadow_plane: numbers.float(),
                 axis: [numbers.vec(), numbers.vec(), numbers.vec()],
-                non_normalized_axes: numbers.next() % 2 == 0,
+                non_normalized_axes: numbers.next().is_multiple_of(2),
                 origin: numbers.vec(),
                 frame: numbers.int(),
                 old_origin: numbers.vec(),
