@@ -191,35 +191,48 @@ fn textures() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// Where the lamps are and what they give, for the sample's own simple lightmaps.
-const LAMPS: [(Vec3, Vec3, Vec3); 3] = [
+/// Direction to the sun of the script: 35 degrees round, 62 up.
+const SUN: Vec3 = Vec3::new(0.384_57, 0.269_28, 0.882_95);
+
+/// Where the lamps are, which way they look, their colour, and a quarter of their value times their area: the sample's
+/// own simple lightmaps.
+const LAMPS: [(Vec3, Vec3, Vec3, f32); 3] = [
     (
-        Vec3::new(-96.0, 0.0, 250.0),
+        Vec3::new(-96.0, 0.0, 254.0),
         Vec3::NEG_Z,
-        Vec3::new(1.0, 0.88, 0.7),
+        Vec3::new(1.0, 0.76, 0.47),
+        1_440_000.0,
     ),
     (
-        Vec3::new(-300.0, -160.0, 120.0),
+        Vec3::new(-318.0, -160.0, 120.0),
         Vec3::X,
-        Vec3::new(1.0, 0.27, 0.16),
+        Vec3::new(1.0, 0.06, 0.02),
+        1_584_000.0,
     ),
     (
-        Vec3::new(-300.0, 160.0, 120.0),
+        Vec3::new(-318.0, 160.0, 120.0),
         Vec3::X,
-        Vec3::new(0.24, 0.43, 1.0),
+        Vec3::new(0.05, 0.16, 1.0),
+        1_584_000.0,
     ),
 ];
 
-/// Unshadowed light of the lamps at a point, as bytes of a lightmap.
+/// Light of the lamps (unshadowed) and of the sun through the opening, at a point, as bytes of a lightmap: what a map
+/// compiler would store, near enough for the lights to be fitted to it.
 fn baked(position: Vec3, normal: Vec3) -> [u8; 3] {
-    let mut sum = Vec3::splat(10.0);
-    for (origin, direction, color) in LAMPS {
+    let mut sum = Vec3::splat(2.0);
+    for (origin, direction, color, photons) in LAMPS {
         let to = origin - position;
         let distance = to.length().max(24.0);
         let cosines =
             (to.dot(normal) / distance).max(0.0) * (-to.dot(direction) / distance).max(0.0);
-        sum += color * cosines * 900_000.0 / (distance * distance);
+        sum += color * cosines * photons / (distance * distance);
     }
+    let through = position + SUN * ((256.0 - position.z) / SUN.z);
+    if (160.0..320.0).contains(&through.x) && through.y.abs() < 256.0 {
+        sum += Vec3::new(0.8, 0.85, 1.0) * 60.0 * normal.dot(SUN).max(0.0);
+    }
+    // the engine shows four times of what is stored
     sum.min(Vec3::splat(255.0)).to_array().map(|c| c as u8)
 }
 
