@@ -8,7 +8,7 @@ use super::pipelines::{CullFaces, Depth, State};
 use super::sky;
 use crate::api::DynamicLight;
 use crate::assets::{Combine, Materials, RasterPass};
-use crate::scene::{DrawSurface, Geometry, View, ViewScene, VisibleSky};
+use crate::scene::{DrawSurface, Geometry, View, ViewScene};
 use shaderscript::{Cull, sort};
 
 /// `surfaceparm nodlight` and `surfaceparm sky`: no dynamic light falls on these.
@@ -114,8 +114,8 @@ impl DrawList {
                 .partition_point(|s| materials.get(s.material).sort < sort::SKY),
         );
         self.add_surfaces(before_sky, scene, materials, static_indices, aids);
-        for visible in &scene.skies {
-            self.add_sky(visible, &scene.view, materials, identity_light);
+        for &sky in &scene.skies {
+            self.add_sky(sky, &scene.view, materials, identity_light);
         }
         self.add_surfaces(rest, scene, materials, static_indices, aids);
     }
@@ -298,14 +298,8 @@ impl DrawList {
         }
     }
 
-    fn add_sky(
-        &mut self,
-        visible: &VisibleSky,
-        view: &View,
-        materials: &Materials,
-        identity_light: f32,
-    ) {
-        let material = materials.get(visible.material);
+    fn add_sky(&mut self, index: u32, view: &View, materials: &Materials, identity_light: f32) {
+        let material = materials.get(index);
         let Some(sky) = &material.sky else { return };
         let size = view.far / 1.75;
         let grey = (identity_light.clamp(0.0, 1.0) * 255.0) as u32;
@@ -319,7 +313,7 @@ impl DrawList {
             wireframe: false,
         };
         let draw = Draw {
-            material: visible.material,
+            material: index,
             lightmap: c::NO_TEXTURE,
             dynamic_vertices: 1,
             ..Draw::default()

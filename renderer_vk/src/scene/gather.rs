@@ -157,9 +157,6 @@ impl<'a> Gatherer<'a> {
         out.dlights.extend_from_slice(self.lights);
         out.portals.clear();
         out.has_world = self.world.is_some();
-        for sky in &mut out.skies {
-            sky.triangles.clear();
-        }
         out.skies.clear();
         out.instances
             .push(entity::world_instance(&self.view, out.time));

@@ -145,17 +145,8 @@ pub struct ViewScene {
     pub portals: Vec<Portal>,
     /// The world is part of the view.
     pub has_world: bool,
-    /// The sky surfaces in sight: index of the sky material and bounds of what is visible, for the sky pass.
-    pub skies: Vec<VisibleSky>,
-}
-
-/// A visible sky material with the surfaces that show it.
-#[derive(Clone, Debug)]
-pub struct VisibleSky {
-    /// Index of the material.
-    pub material: u32,
-    /// The triangles' corners in world space, three each.
-    pub triangles: Vec<Vec3>,
+    /// Materials of the skies in sight, each once.
+    pub skies: Vec<u32>,
 }
 
 /// Which of the two looks a view is gathered for.

@@ -4,7 +4,7 @@ use glam::{Vec3, Vec4};
 use q3bsp::SurfaceKind;
 use shaderscript::Cull;
 
-use super::{DrawSurface, DynamicMesh, Geometry, ViewScene, VisibleSky};
+use super::{DrawSurface, DynamicMesh, Geometry, ViewScene};
 use crate::api::DynamicLight;
 use crate::assets::Materials;
 use crate::world::{Bounds, WorldData, WorldSurface, outside};
@@ -122,7 +122,9 @@ impl SurfaceRun<'_> {
             _ => (surface.first_index, surface.index_count),
         };
         if drawn.is_sky() {
-            self.add_sky(material, first_index, index_count, out);
+            if !out.skies.contains(&material) {
+                out.skies.push(material);
+            }
             return None;
         }
         let dlights = self.local.lights_on(surface);
@@ -149,25 +151,6 @@ impl SurfaceRun<'_> {
             },
         });
         None
-    }
-
-    fn add_sky(&self, material: u32, first_index: u32, index_count: u32, out: &mut ViewScene) {
-        let at = out.skies.iter().position(|sky| sky.material == material);
-        let at = at.unwrap_or_else(|| {
-            out.skies.push(VisibleSky {
-                material,
-                triangles: Vec::new(),
-            });
-            out.skies.len() - 1
-        });
-        let instance = out.instances.get(self.instance as usize).copied();
-        let (Some(sky), Some(instance)) = (out.skies.get_mut(at), instance) else {
-            return;
-        };
-        for triangle in self.world.triangles(first_index, index_count) {
-            sky.triangles
-                .extend(triangle.map(|p| super::entity::to_world(&instance, p)));
-        }
     }
 }
 

@@ -597,8 +597,7 @@ pub fn floor_point(scene: &Scene, x: usize, y: usize) -> Vec3 {
     def.view_origin + d * (-def.view_origin.z / d.z)
 }
 
-/// Unused by some tests.
-#[allow(dead_code)]
+/// The plane through a point, as `xyz.p = w`.
 pub fn plane(normal: Vec3, point: Vec3) -> Vec4 {
     normal.extend(normal.dot(point))
 }
