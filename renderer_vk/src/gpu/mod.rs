@@ -29,6 +29,7 @@ mod graveyard;
 mod image;
 mod instance;
 mod pass;
+mod pin;
 mod pipeline;
 mod ray_tracing;
 mod recorder;
