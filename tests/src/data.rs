@@ -58,12 +58,13 @@ fn find_library() -> PathBuf {
     build
         .args(["build", "--quiet", "-p", "ffi"])
         .current_dir(repository());
-    // <target>/<profile>/deps/<test>
+    // <target>/<profile>/deps/<test> or <target>/<profile>/<program>
     let program = std::env::current_exe().expect("a program knows where it is");
-    let profile = program
-        .parent()
-        .and_then(Path::parent)
-        .expect("cargo puts tests two folders deep");
+    let folder = program.parent().expect("a program lies in a folder");
+    let profile = match folder.parent() {
+        Some(profile) if folder.ends_with("deps") => profile,
+        _ => folder,
+    };
     if profile.ends_with("release") {
         build.arg("--release");
     }
@@ -72,6 +73,22 @@ fn find_library() -> PathBuf {
     let library = profile.join("librelight_ffi.so");
     assert!(library.is_file(), "cargo built no {}", library.display());
     library
+}
+
+/// The engine's own renderer of that name (`opengl1`), in `ENGINE_DIR` or where Debian puts it, if it is there.
+pub fn engine_renderer(name: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("ENGINE_DIR")
+        .map_or_else(|| PathBuf::from("/usr/lib/ioquake3"), PathBuf::from);
+    let architecture = match std::env::consts::ARCH {
+        "aarch64" => "arm64",
+        other => other,
+    };
+    let file = folder.join(format!("renderer_{name}_{architecture}.so"));
+    if file.is_file() {
+        return Some(file);
+    }
+    skip(&format!("{} is not there", file.display()));
+    None
 }
 
 /// A program on the PATH.

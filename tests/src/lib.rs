@@ -5,11 +5,14 @@
 //! * [`real`]: Debian's ioquake3, run without a display.
 //! * [`data`]: where OpenArena's data, the library and the tools are, and when a test may be skipped.
 //! * [`maps`]: small maps made by the tests.
+//! * [`gallery`]: scenes that the engine's own renderer and ours draw alike, in a private [`display`].
 
 #![deny(unsafe_code)]
 
 pub mod data;
+pub mod display;
 #[allow(unsafe_code)]
 pub mod engine;
+pub mod gallery;
 pub mod maps;
 pub mod real;

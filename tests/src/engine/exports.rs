@@ -11,6 +11,8 @@ use super::{Engine, Raised, call};
 /// A camera.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
+    /// Left and upper edge in the window, pixels.
+    pub place: [i32; 2],
     /// Where it is.
     pub origin: Vec3,
     /// Down, left, roll: degrees.
@@ -25,12 +27,15 @@ pub struct View {
     pub time: i32,
     /// `RDF_*`.
     pub flags: i32,
+    /// The texts that surfaces can show, less than 32 characters each.
+    pub text: [&'static str; 8],
 }
 
 impl View {
     /// The whole window of 320x240 from `origin`, turned left by `yaw` degrees.
     pub fn new(origin: Vec3, yaw: f32) -> Self {
         Self {
+            place: [0; 2],
             origin,
             angles: Vec3::new(0.0, yaw, 0.0),
             width: 320,
@@ -38,6 +43,7 @@ impl View {
             fov: 90.0,
             time: 1000,
             flags: 0,
+            text: [""; 8],
         }
     }
 
@@ -50,9 +56,17 @@ impl View {
     fn refdef(&self) -> refdef_t {
         let fov_y = 2.0
             * ((self.fov.to_radians() / 2.0).tan() * self.height as f32 / self.width as f32).atan();
+        let [x, y] = self.place;
+        let text = self.text.map(|line| {
+            let mut place = [0; 32];
+            for (to, from) in place.iter_mut().take(31).zip(line.bytes()) {
+                *to = from as c_char;
+            }
+            place
+        });
         refdef_t {
-            x: 0,
-            y: 0,
+            x,
+            y,
             width: self.width,
             height: self.height,
             fov_x: self.fov,
@@ -62,7 +76,7 @@ impl View {
             time: self.time,
             rdflags: self.flags,
             areamask: [0; 32],
-            text: [[0; 32]; 8],
+            text,
         }
     }
 }

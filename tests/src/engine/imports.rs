@@ -5,7 +5,7 @@
 use std::cell::RefCell;
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, VecDeque};
-use std::ffi::{CStr, CString, c_char, c_int, c_long, c_uchar, c_void};
+use std::ffi::{CStr, CString, c_char, c_int, c_long, c_uchar, c_uint, c_void};
 use std::ptr;
 use std::time::Instant;
 
@@ -22,6 +22,14 @@ unsafe extern "C" {
     ) -> c_int;
     fn stand_in_printf(level: c_int, format: *const c_char, ...);
     fn stand_in_raise(level: c_int, format: *const c_char, ...);
+    // The C library's.
+    fn srand(seed: c_uint);
+}
+
+/// Starts the C library's random numbers anew.
+pub(super) fn seed_random_numbers() {
+    // SAFETY: sets a number of the C library's.
+    unsafe { srand(1) };
 }
 
 /// A message of the renderer.
@@ -31,6 +39,24 @@ pub struct Message {
     pub level: i32,
     /// The text, with its line end.
     pub text: String,
+}
+
+/// A picture of a film.
+#[derive(Clone)]
+pub(super) struct Film {
+    /// Pixels.
+    pub side: c_int,
+    pub rgba: Vec<u8>,
+}
+
+impl Default for Film {
+    /// Magenta, a colour that nothing else in the small game has.
+    fn default() -> Self {
+        Self {
+            side: 64,
+            rgba: [255u8, 0, 255, 255].repeat(64 * 64),
+        }
+    }
 }
 
 /// Everything that the engine side remembers.
@@ -53,6 +79,8 @@ pub(super) struct State {
     /// `BeginRegistration` has returned since the last `Shutdown`.
     pub registered: bool,
     pub started: Instant,
+    /// Milliseconds, where the test holds the clock.
+    pub clock: Option<c_int>,
     /// The collision model's visibility: clusters, bytes of a row, rows.
     pub visibility: Option<(usize, usize, Vec<u8>)>,
     pub everything_visible: Vec<u8>,
@@ -60,6 +88,8 @@ pub(super) struct State {
     pub video: Vec<Vec<u8>>,
     /// Names of the films that play, by handle.
     pub films: Vec<String>,
+    /// What each of them shows.
+    pub film: Film,
     pub windows: Vec<usize>,
 }
 
@@ -151,7 +181,11 @@ extern "C" fn stand_in_error(level: c_int, message: *const c_char) {
 }
 
 extern "C" fn milliseconds() -> c_int {
-    with(|s| s.started.elapsed().as_millis() as c_int).unwrap_or(0)
+    with(|s| {
+        s.clock
+            .unwrap_or_else(|| s.started.elapsed().as_millis() as c_int)
+    })
+    .unwrap_or(0)
 }
 
 extern "C" fn hunk_alloc(bytes: c_int, _preference: c_int) -> *mut c_void {
@@ -367,32 +401,16 @@ extern "C" fn fs_file_exists(name: *const c_char) -> c_int {
         .into()
 }
 
-/// Side of the pictures of every film.
-const FILM_SIDE: c_int = 64;
-
 extern "C" fn cin_upload(handle: c_int) {
-    let Some((Some(exports), true)) = with(|s| {
-        (
-            s.exports,
-            usize::try_from(handle).is_ok_and(|h| h < s.films.len()),
-        )
+    let Some((Some(exports), true, film)) = with(|s| {
+        let known = usize::try_from(handle).is_ok_and(|h| h < s.films.len());
+        (s.exports, known, s.film.clone())
     }) else {
         return;
     };
-    // Magenta, a colour that nothing else here has.
-    let picture = [255u8, 0, 255, 255].repeat((FILM_SIDE * FILM_SIDE) as usize);
+    let side = film.side;
     // SAFETY: the library is loaded; the picture has the size that is passed and lives for the call.
-    unsafe {
-        (exports.UploadCinematic)(
-            FILM_SIDE,
-            FILM_SIDE,
-            FILM_SIDE,
-            FILM_SIDE,
-            picture.as_ptr(),
-            handle,
-            1,
-        )
-    };
+    unsafe { (exports.UploadCinematic)(side, side, side, side, film.rgba.as_ptr(), handle, 1) };
 }
 
 extern "C" fn cin_play(

@@ -27,7 +27,7 @@ use abi::{GetRefAPI, REF_API_VERSION, glconfig_t, refexport_t};
 pub use exports::View;
 use files::{Files, Packs};
 pub use imports::Message;
-use imports::State;
+use imports::{Film, State};
 
 /// An error that the renderer raised through the engine's `Error`.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -65,6 +65,9 @@ pub struct Options {
     pub files: Vec<(String, Vec<u8>)>,
     /// The game's packs.
     pub packs: Packs,
+    /// What the engine's clock stands at, in milliseconds, until [`Engine::set_clock`] moves it. A clock that runs
+    /// by itself where there is none.
+    pub clock: Option<i32>,
 }
 
 /// One engine process at a time: the library has one state.
@@ -200,10 +203,12 @@ impl Engine {
             handling: false,
             registered: false,
             started: Instant::now(),
+            clock: options.clock,
             visibility: None,
             everything_visible: vec![0xFF; 8192],
             video: Vec::new(),
             films: Vec::new(),
+            film: Film::default(),
             windows: Vec::new(),
         };
         let defaults = [
@@ -234,6 +239,8 @@ impl Engine {
 
     fn load_library(&mut self) -> Result<(), LoadError> {
         let failed = |e| LoadError::Library(self.path.clone(), e);
+        // Renderers fill tables with random numbers when they start: the same ones each time.
+        imports::seed_random_numbers();
         // SAFETY: the library's initializers are those of a Rust cdylib; the linker flags are the engine's.
         let library =
             unsafe { Library::open(Some(&self.path), RTLD_NOW | RTLD_LOCAL) }.map_err(failed)?;
@@ -337,6 +344,20 @@ impl Engine {
     /// `set NAME VALUE` on the console.
     pub fn set(&mut self, name: &str, value: &str) {
         imports::with(|s| s.cvars.set_by_user(name, value));
+    }
+
+    /// Sets the engine's clock, which stands still from then on.
+    pub fn set_clock(&mut self, milliseconds: i32) {
+        imports::with(|s| s.clock = Some(milliseconds));
+    }
+
+    /// What every film shows: a square of `side` pixels, a power of two. The engine's own have 256.
+    ///
+    /// # Panics
+    /// When `rgba` is no such picture.
+    pub fn set_film(&mut self, side: i32, rgba: Vec<u8>) {
+        assert_eq!(rgba.len(), (side * side * 4) as usize);
+        imports::with(|s| s.film = Film { side, rgba });
     }
 
     /// A console variable's value, if it exists.
