@@ -434,6 +434,168 @@ fn triangles_are_drawn_with_depth_blend_and_culling() {
     finish(device);
 }
 
+/// Draws a triangle without indices.
+fn draw_corners(pass: &mut Pass<'_>, pipeline: &GraphicsPipeline, corners: u64, color: [f32; 4]) {
+    pass.bind_graphics(pipeline);
+    pass.push(&Draw { corners, color });
+    pass.draw(3, 1, 0, 0);
+}
+
+#[test]
+fn stencils_count_and_masks_hold_channels_back() {
+    let Some(device) = device(true) else { return };
+    let Some(format) = device.depth_stencil_format() else {
+        println!("skipped: no format with stencil");
+        return;
+    };
+    let image = |name, format, usage| {
+        Image::new(&device, &ImageDesc::new(name, 32, 32, format, usage)).unwrap()
+    };
+    let color = image("color", Format::Rgba8, ImageUsage::COLOR);
+    let depth = image("depth", format, ImageUsage::DEPTH);
+    let desc = GraphicsDesc {
+        color: Some(Format::Rgba8),
+        depth: Some(format),
+        ..GraphicsDesc::new(
+            "stencil",
+            &shaders::TEST_TRIANGLE_VERT,
+            &shaders::TEST_TRIANGLE_FRAG,
+        )
+    };
+    let pipeline = |stencil, color_write| {
+        let desc = GraphicsDesc {
+            stencil,
+            color_write,
+            depth_write: false,
+            ..desc
+        };
+        GraphicsPipeline::new(&device, &desc).unwrap()
+    };
+    let up = pipeline(Some(Stencil::Increment), ColorMask::NONE);
+    let down = pipeline(Some(Stencil::Decrement), ColorMask::NONE);
+    let shade = pipeline(
+        Some(Stencil::NotZero),
+        ColorMask {
+            red: false,
+            ..ColorMask::ALL
+        },
+    );
+    let mut ring = FrameRing::new(&device, 2).unwrap();
+    let mut rec = ring.begin().unwrap();
+    let full = |z: f32| [[-1.0, -1.0, z], [3.0, -1.0, z], [-1.0, 3.0, z]];
+    let half = |z: f32| [[-1.0, -1.0, z], [1.0, 1.0, z], [-1.0, 1.0, z]];
+    let all = rec.arena().push(&full(0.5)).unwrap();
+    let hidden = rec.arena().push(&full(0.9)).unwrap();
+    let lower = rec.arena().push(&half(0.5)).unwrap();
+    let mut pass = rec
+        .pass("stencil", Access::GRAPHICS, Access::GRAPHICS)
+        .unwrap();
+    pass.begin_rendering(&Rendering {
+        color: Some(&color),
+        depth: Some(&depth),
+        clear_color: Some([1.0, 0.0, 0.0, 1.0]),
+        clear_depth: Some(0.75),
+    })
+    .unwrap();
+    pass.clear_stencil_rect([0, 0, 32, 32]);
+    // below the diagonal: 0, not below it and back to 1; above it: 1, then 0
+    draw_corners(&mut pass, &down, lower, [0.0; 4]);
+    draw_corners(&mut pass, &up, all, [0.0; 4]);
+    draw_corners(&mut pass, &up, lower, [0.0; 4]);
+    draw_corners(&mut pass, &down, all, [0.0; 4]);
+    // behind the depth nothing counts
+    draw_corners(&mut pass, &up, hidden, [0.0; 4]);
+    // the right half is cleared again
+    pass.clear_stencil_rect([16, 0, 16, 32]);
+    draw_corners(&mut pass, &shade, all, [0.0, 1.0, 1.0, 1.0]);
+    drop(pass);
+    ring.end(rec).unwrap();
+    let bytes = device.read_image(&color).unwrap();
+    let at = |x: usize, y: usize| {
+        let i = (y * 32 + x) * 4;
+        [bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]
+    };
+    assert_eq!(at(4, 20), [255, 255, 255, 255], "stencil 1, red kept");
+    assert_eq!(at(10, 4), [255, 0, 0, 255], "stencil 0");
+    assert_eq!(at(20, 30), [255, 0, 0, 255], "cleared");
+    // the depth alone is read back
+    let depths = device.read_image(&depth).unwrap();
+    assert_eq!(depths.len(), 32 * 32 * 4);
+    drop((color, depth, up, down, shade, ring));
+    finish(device);
+}
+
+#[test]
+fn several_samples_are_averaged_along_edges() {
+    let Some(device) = device(true) else { return };
+    if !device.supports_samples(Format::Rgba8, 4) || !device.supports_samples(Format::D32F, 4) {
+        println!("skipped: no multisampling");
+        return;
+    }
+    let image = |name, format, usage, samples| {
+        let desc = ImageDesc {
+            samples,
+            ..ImageDesc::new(name, 32, 32, format, usage)
+        };
+        Image::new(&device, &desc)
+    };
+    let several = image("several", Format::Rgba8, ImageUsage::COLOR, 4).unwrap();
+    let depth = image("depth", Format::D32F, ImageUsage::DEPTH, 4).unwrap();
+    let plain = image("plain", Format::D32F, ImageUsage::DEPTH, 1).unwrap();
+    let one = image("one", Format::Rgba8, ImageUsage::COLOR, 1).unwrap();
+    assert!(image("odd", Format::Rgba8, ImageUsage::COLOR, 3).is_err());
+    let pipeline = GraphicsPipeline::new(
+        &device,
+        &GraphicsDesc {
+            color: Some(Format::Rgba8),
+            depth: Some(Format::D32F),
+            samples: 4,
+            ..GraphicsDesc::new(
+                "edges",
+                &shaders::TEST_TRIANGLE_VERT,
+                &shaders::TEST_TRIANGLE_FRAG,
+            )
+        },
+    )
+    .unwrap();
+    let mut ring = FrameRing::new(&device, 2).unwrap();
+    let mut rec = ring.begin().unwrap();
+    let half: [[f32; 3]; 3] = [[-1.0, -1.0, 0.5], [1.0, 1.0, 0.5], [-1.0, 1.0, 0.5]];
+    let half = rec.arena().push(&half).unwrap();
+    let mut pass = rec
+        .pass("edges", Access::GRAPHICS, Access::GRAPHICS)
+        .unwrap();
+    let target = Rendering {
+        color: Some(&several),
+        depth: Some(&depth),
+        clear_color: Some([0.0, 0.0, 0.0, 1.0]),
+        clear_depth: Some(1.0),
+    };
+    let mixed = Rendering {
+        depth: Some(&plain),
+        ..target
+    };
+    assert!(pass.begin_rendering(&mixed).is_err());
+    pass.begin_rendering(&target).unwrap();
+    draw_corners(&mut pass, &pipeline, half, [1.0; 4]);
+    drop(pass);
+    let mut pass = rec
+        .pass("resolve", Access::TRANSFER, Access::TRANSFER)
+        .unwrap();
+    pass.resolve_image(&several, &one);
+    // left out, because the samples do not fit
+    pass.resolve_image(&one, &several);
+    drop(pass);
+    ring.end(rec).unwrap();
+    let bytes = device.read_image(&one).unwrap();
+    let red = |x: usize, y: usize| bytes[(y * 32 + x) * 4];
+    assert_eq!((red(4, 20), red(20, 4)), (255, 0));
+    let edge = red(10, 10);
+    assert!(edge > 0 && edge < 255, "{edge}");
+    drop((several, depth, plain, one, pipeline, ring));
+    finish(device);
+}
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Rays {

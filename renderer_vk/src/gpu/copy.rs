@@ -108,13 +108,14 @@ impl Pass<'_> {
         self.end_rendering();
         if source.format().block() != target.format().block()
             || source.0.aspect != target.0.aspect
+            || source.samples() != target.samples()
             || source.0.raw == target.0.raw
         {
             self.refuse("a copy between images whose texels differ, or of an image to itself");
             return;
         }
         let layers = |i: &Image| vk::ImageSubresourceLayers {
-            aspect_mask: i.0.aspect,
+            aspect_mask: i.0.copied(),
             mip_level: 0,
             base_array_layer: 0,
             layer_count: 1,
@@ -156,6 +157,49 @@ impl Pass<'_> {
         );
     }
 
+    /// Averages the samples of each texel of a colour image into one of another image of the same size and format.
+    pub fn resolve_image(&mut self, source: &Image, target: &Image) {
+        self.end_rendering();
+        let fits = source.samples() > 1
+            && target.samples() == 1
+            && source.format() == target.format()
+            && source.0.aspect == vk::ImageAspectFlags::COLOR
+            && (source.width(), source.height()) == (target.width(), target.height())
+            && target.0.layout == vk::ImageLayout::GENERAL;
+        if !fits {
+            self.refuse("a resolve between images that do not fit each other");
+            return;
+        }
+        let layers = vk::ImageSubresourceLayers {
+            aspect_mask: vk::ImageAspectFlags::COLOR,
+            mip_level: 0,
+            base_array_layer: 0,
+            layer_count: 1,
+        };
+        let region = vk::ImageResolve {
+            src_subresource: layers,
+            dst_subresource: layers,
+            extent: vk::Extent3D {
+                width: source.width(),
+                height: source.height(),
+                depth: 1,
+            },
+            ..Default::default()
+        };
+        let general = vk::ImageLayout::GENERAL;
+        // SAFETY: samples, formats and sizes were checked; what is drawn to stays in GENERAL; outside of a render pass.
+        unsafe {
+            self.vk().cmd_resolve_image(
+                self.cmd(),
+                source.0.raw,
+                general,
+                target.0.raw,
+                general,
+                &[region],
+            );
+        }
+    }
+
     /// Copies a rectangle (x, y, width, height) of level 0 with scaling and conversion; a negative width or height
     /// mirrors. Rectangles must lie inside their images.
     pub fn blit_image(
@@ -187,12 +231,12 @@ impl Pass<'_> {
             self.refuse("a blit outside of its images");
             return;
         };
-        if source.0.raw == target.0.raw {
-            self.refuse("a blit of an image to itself");
+        if source.0.raw == target.0.raw || source.samples().max(target.samples()) > 1 {
+            self.refuse("a blit of an image to itself or with several samples");
             return;
         }
         let layers = |i: &Image| vk::ImageSubresourceLayers {
-            aspect_mask: i.0.aspect,
+            aspect_mask: i.0.copied(),
             mip_level: 0,
             base_array_layer: 0,
             layer_count: 1,
@@ -251,6 +295,7 @@ impl Pass<'_> {
         let bytes = source.format().bytes(width, height);
         if !inside(x, width, source.width())
             || !inside(y, height, source.height())
+            || source.samples() > 1
             || target.check(offset, bytes).is_err()
         {
             self.refuse("a read-back outside of the image or the buffer");
@@ -259,7 +304,7 @@ impl Pass<'_> {
         let region = vk::BufferImageCopy {
             buffer_offset: offset,
             image_subresource: vk::ImageSubresourceLayers {
-                aspect_mask: source.0.aspect,
+                aspect_mask: source.0.copied(),
                 mip_level: 0,
                 base_array_layer: 0,
                 layer_count: 1,

@@ -12,6 +12,7 @@ use gpu_allocator::vulkan::{
 use super::bindless::Bindless;
 use super::error::{Context, Error};
 use super::graveyard::{Garbage, SyncState};
+use super::image::Format;
 use super::instance::{Instance, SurfaceSource};
 use super::pin::pin_library_of;
 use super::pipeline::{cache_from_bytes, cache_to_bytes};
@@ -74,6 +75,7 @@ impl Drop for RawDevice {
 pub(crate) struct RenderPassKey {
     pub color: Option<vk::Format>,
     pub depth: Option<vk::Format>,
+    pub samples: u32,
     pub clear_color: bool,
     pub clear_depth: bool,
 }
@@ -249,6 +251,45 @@ impl Device {
         lock(&self.0.state).graveyard.len()
     }
 
+    /// The format of depth with stencil to use, if the device can draw to one.
+    pub fn depth_stencil_format(&self) -> Option<Format> {
+        let needed = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
+        [Format::D32FS8, Format::D24S8]
+            .into_iter()
+            .find(|format| self.0.features(*format).contains(needed))
+    }
+
+    /// Whether the device draws to images of a colour or depth format with so many samples.
+    pub fn supports_samples(&self, format: Format, samples: u32) -> bool {
+        let usage = if format.aspect() == vk::ImageAspectFlags::COLOR {
+            vk::ImageUsageFlags::COLOR_ATTACHMENT
+                | vk::ImageUsageFlags::TRANSFER_SRC
+                | vk::ImageUsageFlags::TRANSFER_DST
+        } else {
+            vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT
+        };
+        // SAFETY: the physical device belongs to the live instance. An error says that the format cannot be used so.
+        let properties = unsafe {
+            self.0
+                .core
+                .instance
+                .raw
+                .get_physical_device_image_format_properties(
+                    self.0.physical,
+                    format.vk(),
+                    vk::ImageType::TYPE_2D,
+                    vk::ImageTiling::OPTIMAL,
+                    usage,
+                    vk::ImageCreateFlags::empty(),
+                )
+        };
+        samples.is_power_of_two()
+            && properties.is_ok_and(|p| {
+                p.sample_counts
+                    .contains(vk::SampleCountFlags::from_raw(samples))
+            })
+    }
+
     /// The raw device functions.
     pub(crate) fn vk(&self) -> &ash::Device {
         &self.0.core.raw
@@ -300,6 +341,18 @@ impl DeviceInner {
         self.bindless.init(raw, &self.info, self.abilities)?;
         self.name(self.timeline, "frame timeline");
         Ok(())
+    }
+
+    /// What optimally tiled images of a format can be used for.
+    pub fn features(&self, format: Format) -> vk::FormatFeatureFlags {
+        // SAFETY: the physical device belongs to the live instance.
+        unsafe {
+            self.core
+                .instance
+                .raw
+                .get_physical_device_format_properties(self.physical, format.vk())
+        }
+        .optimal_tiling_features
     }
 
     /// Gives an object its name in validation messages and captures.
@@ -360,15 +413,16 @@ impl DeviceInner {
         let attachment = |format, clear: bool| {
             vk::AttachmentDescription::default()
                 .format(format)
-                .samples(vk::SampleCountFlags::TYPE_1)
+                .samples(vk::SampleCountFlags::from_raw(key.samples.max(1)))
                 .load_op(if clear {
                     vk::AttachmentLoadOp::CLEAR
                 } else {
                     vk::AttachmentLoadOp::LOAD
                 })
                 .store_op(vk::AttachmentStoreOp::STORE)
-                .stencil_load_op(vk::AttachmentLoadOp::DONT_CARE)
-                .stencil_store_op(vk::AttachmentStoreOp::DONT_CARE)
+                // without effect where there is no stencil
+                .stencil_load_op(vk::AttachmentLoadOp::LOAD)
+                .stencil_store_op(vk::AttachmentStoreOp::STORE)
                 .initial_layout(vk::ImageLayout::GENERAL)
                 .final_layout(vk::ImageLayout::GENERAL)
         };

@@ -67,6 +67,9 @@ impl Pass<'_> {
             if (image.width(), image.height()) != (width, height) {
                 return Err(image.misuse("has another size than the other attachment"));
             }
+            if image.samples() != first.samples() {
+                return Err(image.misuse("has more or fewer samples than the other attachment"));
+            }
             views.push(image.0.target);
             clears.push(if usage == ImageUsage::COLOR {
                 vk::ClearValue {
@@ -86,6 +89,7 @@ impl Pass<'_> {
         let pass = device.0.render_pass(RenderPassKey {
             color: target.color.map(|i| i.format().vk()),
             depth: target.depth.map(|i| i.format().vk()),
+            samples: first.samples(),
             clear_color: target.color.is_some() && target.clear_color.is_some(),
             clear_depth: target.depth.is_some() && target.clear_depth.is_some(),
         })?;
@@ -280,6 +284,18 @@ impl Pass<'_> {
                         stencil: 0,
                     },
                 },
+            },
+        );
+    }
+
+    /// Clears a rectangle (x, y, width, height) of the stencil to 0. The depth attachment must have one.
+    pub fn clear_stencil_rect(&mut self, rect: [i32; 4]) {
+        self.clear_rect(
+            rect,
+            vk::ClearAttachment {
+                aspect_mask: vk::ImageAspectFlags::STENCIL,
+                color_attachment: 0,
+                clear_value: vk::ClearValue::default(),
             },
         );
     }

@@ -86,6 +86,10 @@ formats! {
     Bc7 = BC7_UNORM_BLOCK, 4, 16;
     /// Depth, float.
     D32F = D32_SFLOAT, 1, 4;
+    /// Depth, float, and 8 bits of stencil. Copies carry the depth alone.
+    D32FS8 = D32_SFLOAT_S8_UINT, 1, 4;
+    /// Depth, 24 bits normalized, and 8 bits of stencil. Copies carry the depth alone.
+    D24S8 = D24_UNORM_S8_UINT, 1, 4;
 }
 
 impl Format {
@@ -96,11 +100,18 @@ impl Format {
     }
 
     pub(crate) fn aspect(self) -> vk::ImageAspectFlags {
-        if self == Self::D32F {
-            vk::ImageAspectFlags::DEPTH
-        } else {
-            vk::ImageAspectFlags::COLOR
+        match self {
+            Self::D32F => vk::ImageAspectFlags::DEPTH,
+            Self::D32FS8 | Self::D24S8 => {
+                vk::ImageAspectFlags::DEPTH | vk::ImageAspectFlags::STENCIL
+            }
+            _ => vk::ImageAspectFlags::COLOR,
         }
+    }
+
+    /// Has a stencil beside the depth.
+    pub fn has_stencil(self) -> bool {
+        self.aspect().contains(vk::ImageAspectFlags::STENCIL)
     }
 }
 
@@ -147,6 +158,8 @@ pub struct ImageDesc<'a> {
     pub format: Format,
     /// What for.
     pub usage: ImageUsage,
+    /// Samples of a texel: 1, or 2, 4, 8 for an image that is only drawn to and resolved.
+    pub samples: u32,
 }
 
 impl<'a> ImageDesc<'a> {
@@ -160,6 +173,7 @@ impl<'a> ImageDesc<'a> {
             layers: 1,
             format,
             usage,
+            samples: 1,
         }
     }
 }
@@ -181,6 +195,7 @@ pub(crate) struct ImageInner {
     layers: u32,
     format: Format,
     usage: ImageUsage,
+    samples: u32,
     texture: u32,
     storage: u32,
     name: String,
@@ -221,6 +236,13 @@ impl Image {
         }
         let most_mips = 32 - desc.width.max(desc.height).leading_zeros();
         let (mips, layers) = (desc.mips.clamp(1, most_mips), desc.layers.max(1));
+        if desc.samples > 1 && !device.supports_samples(desc.format, desc.samples) {
+            return Err(Error::Unsupported {
+                name: desc.name.to_owned(),
+                what: format!("{:?} with {} samples", desc.format, desc.samples),
+                device: device.0.info.name.clone(),
+            });
+        }
         let mut usage = U::TRANSFER_SRC | U::TRANSFER_DST;
         let mut needed = vk::FormatFeatureFlags::empty();
         if desc.usage.has(ImageUsage::SAMPLED) {
@@ -239,16 +261,7 @@ impl Image {
             usage |= U::DEPTH_STENCIL_ATTACHMENT;
             needed |= vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
         }
-        // SAFETY: the physical device belongs to the live instance.
-        let properties = unsafe {
-            device
-                .0
-                .core
-                .instance
-                .raw
-                .get_physical_device_format_properties(device.0.physical, desc.format.vk())
-        };
-        if !properties.optimal_tiling_features.contains(needed) {
+        if !device.0.features(desc.format).contains(needed) {
             return Err(Error::Unsupported {
                 name: desc.name.to_owned(),
                 what: format!("{:?} as {needed:?}", desc.format),
@@ -265,7 +278,7 @@ impl Image {
             })
             .mip_levels(mips)
             .array_layers(layers)
-            .samples(vk::SampleCountFlags::TYPE_1)
+            .samples(vk::SampleCountFlags::from_raw(desc.samples.max(1)))
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(usage)
             .initial_layout(vk::ImageLayout::UNDEFINED);
@@ -309,6 +322,7 @@ impl Image {
             layers,
             format: desc.format,
             usage: desc.usage,
+            samples: desc.samples.max(1),
             texture: NO_INDEX,
             storage: NO_INDEX,
             name: desc.name.to_owned(),
@@ -344,6 +358,7 @@ impl Image {
             layers: 1,
             format,
             usage: ImageUsage::COLOR,
+            samples: 1,
             texture: NO_INDEX,
             storage: NO_INDEX,
             name: name.to_owned(),
@@ -388,6 +403,11 @@ impl Image {
         self.0.format
     }
 
+    /// Samples of a texel.
+    pub fn samples(&self) -> u32 {
+        self.0.samples
+    }
+
     /// The label.
     pub fn name(&self) -> &str {
         &self.0.name
@@ -426,6 +446,15 @@ impl std::fmt::Debug for Image {
 }
 
 impl ImageInner {
+    /// What copies carry: of depth and stencil, the depth.
+    pub fn copied(&self) -> vk::ImageAspectFlags {
+        if self.aspect.contains(vk::ImageAspectFlags::DEPTH) {
+            vk::ImageAspectFlags::DEPTH
+        } else {
+            self.aspect
+        }
+    }
+
     /// Makes the views and enters them into the tables.
     fn make_views(&mut self) -> Result<(), Error> {
         if self.usage.0 == 0 {

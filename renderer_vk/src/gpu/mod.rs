@@ -53,7 +53,8 @@ pub use image::{Format, Image, ImageDesc, ImageUsage, NO_INDEX};
 pub use instance::{SurfaceSource, WindowSource};
 pub use pass::Pass;
 pub use pipeline::{
-    BlendFactor, ComputePipeline, Cull, DepthTest, GraphicsDesc, GraphicsPipeline, Topology,
+    BlendFactor, ColorMask, ComputePipeline, Cull, DepthTest, GraphicsDesc, GraphicsPipeline,
+    Stencil, Topology,
 };
 pub use ray_tracing::{HitGroup, RayTracingDesc, RayTracingPipeline};
 pub use recorder::Recorder;

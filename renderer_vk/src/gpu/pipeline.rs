@@ -56,6 +56,79 @@ pub enum DepthTest {
     Equal,
 }
 
+/// What a draw does with the stencil, where it passes all tests.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stencil {
+    /// Passes everywhere; where depth passes too, adds one, up to 255.
+    Increment,
+    /// Passes everywhere; where depth passes too, takes one, down to 0.
+    Decrement,
+    /// Passes where the stencil is not 0, and leaves it.
+    NotZero,
+}
+
+impl Stencil {
+    fn vk(self) -> vk::StencilOpState {
+        let (compare, pass) = match self {
+            Self::Increment => (vk::CompareOp::ALWAYS, vk::StencilOp::INCREMENT_AND_CLAMP),
+            Self::Decrement => (vk::CompareOp::ALWAYS, vk::StencilOp::DECREMENT_AND_CLAMP),
+            Self::NotZero => (vk::CompareOp::NOT_EQUAL, vk::StencilOp::KEEP),
+        };
+        vk::StencilOpState {
+            fail_op: vk::StencilOp::KEEP,
+            pass_op: pass,
+            depth_fail_op: vk::StencilOp::KEEP,
+            compare_op: compare,
+            compare_mask: 0xFF,
+            write_mask: 0xFF,
+            reference: 0,
+        }
+    }
+}
+
+/// Which channels of the colour attachment a draw writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ColorMask {
+    /// Red.
+    pub red: bool,
+    /// Green.
+    pub green: bool,
+    /// Blue.
+    pub blue: bool,
+    /// Alpha.
+    pub alpha: bool,
+}
+
+impl ColorMask {
+    /// Every channel.
+    pub const ALL: Self = Self {
+        red: true,
+        green: true,
+        blue: true,
+        alpha: true,
+    };
+    /// No channel.
+    pub const NONE: Self = Self {
+        red: false,
+        green: false,
+        blue: false,
+        alpha: false,
+    };
+
+    fn vk(self) -> vk::ColorComponentFlags {
+        use vk::ColorComponentFlags as C;
+        [
+            (self.red, C::R),
+            (self.green, C::G),
+            (self.blue, C::B),
+            (self.alpha, C::A),
+        ]
+        .into_iter()
+        .filter(|(on, _)| *on)
+        .fold(C::empty(), |all, (_, channel)| all | channel)
+    }
+}
+
 /// Which triangles are left out. The front is where the corners go counter-clockwise as they lie on the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Cull {
@@ -101,6 +174,10 @@ pub struct GraphicsDesc<'a> {
     pub depth_test: DepthTest,
     /// Whether passing fragments set the depth.
     pub depth_write: bool,
+    /// What happens with the stencil; needs a depth attachment that has one. `None`: it does not take part.
+    pub stencil: Option<Stencil>,
+    /// Samples of a pixel of the attachments.
+    pub samples: u32,
     /// Which faces are left out.
     pub cull: Cull,
     /// Slope factor and constant units of the depth offset, as OpenGL's `glPolygonOffset` takes them.
@@ -109,8 +186,8 @@ pub struct GraphicsDesc<'a> {
     pub topology: Topology,
     /// Draw the edges of triangles only (needs the device's `wireframe`).
     pub wireframe: bool,
-    /// Whether colour is written.
-    pub color_write: bool,
+    /// Channels that are written.
+    pub color_write: ColorMask,
     /// Specialization constants: id and 32-bit value.
     pub constants: &'a [(u32, u32)],
 }
@@ -127,11 +204,13 @@ impl<'a> GraphicsDesc<'a> {
             blend: None,
             depth_test: DepthTest::LessEqual,
             depth_write: true,
+            stencil: None,
+            samples: 1,
             cull: Cull::None,
             polygon_offset: None,
             topology: Topology::Triangles,
             wireframe: false,
-            color_write: true,
+            color_write: ColorMask::ALL,
             constants: &[],
         }
     }
@@ -286,8 +365,11 @@ impl GraphicsPipeline {
             .depth_bias_constant_factor(units)
             .line_width(1.0);
         let samples = vk::PipelineMultisampleStateCreateInfo::default()
-            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+            .rasterization_samples(vk::SampleCountFlags::from_raw(desc.samples.max(1)));
+        let stencil = desc
+            .stencil
+            .filter(|_| desc.depth.is_some_and(Format::has_stencil));
+        let mut depth = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(desc.depth.is_some())
             .depth_write_enable(desc.depth.is_some() && desc.depth_write)
             .depth_compare_op(match desc.depth_test {
@@ -295,13 +377,14 @@ impl GraphicsPipeline {
                 DepthTest::LessEqual => vk::CompareOp::LESS_OR_EQUAL,
                 DepthTest::Equal => vk::CompareOp::EQUAL,
             });
-        let mut attachment = vk::PipelineColorBlendAttachmentState::default().color_write_mask(
-            if desc.color_write {
-                vk::ColorComponentFlags::RGBA
-            } else {
-                vk::ColorComponentFlags::empty()
-            },
-        );
+        if let Some(stencil) = stencil {
+            depth = depth
+                .stencil_test_enable(true)
+                .front(stencil.vk())
+                .back(stencil.vk());
+        }
+        let mut attachment = vk::PipelineColorBlendAttachmentState::default()
+            .color_write_mask(desc.color_write.vk());
         if let Some((source, target)) = desc.blend {
             // SRC_ALPHA_SATURATE means 1 for the alpha channel, so one pair serves both.
             attachment = attachment
@@ -323,6 +406,7 @@ impl GraphicsPipeline {
         let render_pass = device.0.render_pass(RenderPassKey {
             color: desc.color.map(Format::vk),
             depth: desc.depth.map(Format::vk),
+            samples: desc.samples.max(1),
             clear_color: false,
             clear_depth: false,
         })?;
