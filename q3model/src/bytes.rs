@@ -23,7 +23,7 @@ impl<'a> Region<'a> {
         count: usize,
         stride: usize,
     ) -> Result<&'a [u8], Error> {
-        let length = count as u64 * stride as u64;
+        let length = (count as u64).saturating_mul(stride as u64);
         let start = self.start as i64 + i64::from(offset);
         if length == 0 {
             return Ok(&[]);
@@ -67,6 +67,10 @@ impl<'a> Fields<'a> {
         i32::from_le_bytes(self.bytes())
     }
 
+    pub(crate) fn u32(&mut self) -> u32 {
+        u32::from_le_bytes(self.bytes())
+    }
+
     pub(crate) fn f32(&mut self) -> f32 {
         f32::from_le_bytes(self.bytes())
     }
@@ -85,4 +89,58 @@ impl<'a> Fields<'a> {
         let text = field.split(|&b| b == 0).next().unwrap_or(&[]);
         String::from_utf8_lossy(text).into_owned()
     }
+}
+
+/// Bytes of a triangle in every format.
+pub(crate) const TRIANGLE_BYTES: usize = 12;
+
+/// Parts may overlap in a file, but together claim at most this many times its size.
+const MAX_SHARING: u64 = 4;
+
+/// Refuses files whose parts claim far more memory than there are bytes.
+pub(crate) fn check_sharing(claimed: u64, file_length: usize) -> Result<(), Error> {
+    if claimed > MAX_SHARING * file_length as u64 {
+        return Err(Error::TooMuchSharing {
+            claimed,
+            file_length,
+        });
+    }
+    Ok(())
+}
+
+/// A count that must not be negative.
+pub(crate) fn count(what: &str, value: i32) -> Result<usize, Error> {
+    usize::try_from(value).map_err(|_| Error::Value {
+        what: what.to_owned(),
+        value: i64::from(value),
+        expected: "but cannot be negative".to_owned(),
+    })
+}
+
+/// Triangles of vertices `first` to `first + num_verts`, counted from `first`.
+pub(crate) fn read_triangles(
+    records: &[u8],
+    first: u32,
+    num_verts: usize,
+    what: impl Fn(usize) -> String,
+) -> Result<Vec<[u32; 3]>, Error> {
+    let mut triangles = Vec::with_capacity(records.len() / TRIANGLE_BYTES);
+    for (at, record) in records.chunks_exact(TRIANGLE_BYTES).enumerate() {
+        let mut f = Fields::new(record);
+        let mut triangle = [0; 3];
+        for slot in &mut triangle {
+            let corner = f.i32();
+            *slot = u32::try_from(corner)
+                .ok()
+                .and_then(|corner| corner.checked_sub(first))
+                .filter(|&corner| (corner as usize) < num_verts)
+                .ok_or_else(|| Error::Value {
+                    what: what(at),
+                    value: i64::from(corner),
+                    expected: format!("outside its {num_verts} vertices"),
+                })?;
+        }
+        triangles.push(triangle);
+    }
+    Ok(triangles)
 }

@@ -1,7 +1,8 @@
 //! Bytes to [`Md3`].
 
 use crate::Error;
-use crate::bytes::{Fields, Region};
+pub(crate) use crate::bytes::TRIANGLE_BYTES;
+use crate::bytes::{Fields, Region, check_sharing, count, read_triangles};
 use crate::md3::{Frame, Md3, PackedVertex, Surface, Tag};
 use std::collections::HashSet;
 
@@ -12,12 +13,8 @@ pub(crate) const FRAME_BYTES: usize = 56;
 pub(crate) const TAG_BYTES: usize = 112;
 pub(crate) const SURFACE_BYTES: usize = 108;
 pub(crate) const SHADER_BYTES: usize = 68;
-pub(crate) const TRIANGLE_BYTES: usize = 12;
 pub(crate) const ST_BYTES: usize = 8;
 pub(crate) const VERTEX_BYTES: usize = 8;
-
-/// Surfaces may overlap in the file, but together claim at most this many times its size.
-const MAX_SHARING: u64 = 4;
 
 impl Md3 {
     /// Reads and validates a model. The engine's limits on vertices and triangles per surface do not
@@ -93,14 +90,6 @@ impl Md3 {
             surfaces,
         })
     }
-}
-
-fn count(what: &str, value: i32) -> Result<usize, Error> {
-    usize::try_from(value).map_err(|_| Error::Value {
-        what: what.to_owned(),
-        value: i64::from(value),
-        expected: "but cannot be negative".to_owned(),
-    })
 }
 
 fn read_frame(record: &[u8]) -> Frame {
@@ -200,40 +189,17 @@ fn read_surface(
         .iter()
         .map(|part| part.len() as u64)
         .sum::<u64>();
-    if *claimed > MAX_SHARING * bytes.len() as u64 {
-        return Err(Error::TooMuchSharing {
-            claimed: *claimed,
-            file_length: bytes.len(),
-        });
-    }
-
-    let corners = |record: &[u8]| {
-        let mut f = Fields::new(record);
-        [f.i32(), f.i32(), f.i32()]
-    };
-    let mut checked = Vec::with_capacity(num_triangles);
-    for (at, triangle) in triangles
-        .chunks_exact(TRIANGLE_BYTES)
-        .map(corners)
-        .enumerate()
-    {
-        let outside = |&corner: &i32| usize::try_from(corner).map_or(true, |c| c >= num_verts);
-        if let Some(corner) = triangle.into_iter().find(|c| outside(c)) {
-            return Err(Error::Value {
-                what: what(&format!("corner of triangle {at}")),
-                value: i64::from(corner),
-                expected: format!("outside its {num_verts} vertices"),
-            });
-        }
-        checked.push(triangle.map(i32::unsigned_abs));
-    }
+    check_sharing(*claimed, bytes.len())?;
+    let triangles = read_triangles(triangles, 0, num_verts, |at| {
+        what(&format!("corner of triangle {at}"))
+    })?;
     let surface = Surface {
         name,
         shaders: shaders
             .chunks_exact(SHADER_BYTES)
             .map(|record| Fields::new(record).name::<64>())
             .collect(),
-        triangles: checked,
+        triangles,
         st: st
             .chunks_exact(ST_BYTES)
             .map(|record| Fields::new(record).vec2())

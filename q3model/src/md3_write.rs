@@ -5,7 +5,7 @@ use crate::md3_parse::{
     FRAME_BYTES, HEADER_BYTES, IDENT, SHADER_BYTES, ST_BYTES, SURFACE_BYTES, TAG_BYTES,
     TRIANGLE_BYTES, VERSION, VERTEX_BYTES,
 };
-use glam::Vec3;
+use crate::write::{patch, put, put_count, put_floats, put_name, put_triangles, put_vec3};
 
 impl Md3 {
     /// The model as a file: header, frames, tags, surfaces. Reading it gives an equal model, provided
@@ -33,7 +33,7 @@ impl Md3 {
             put_vec3(&mut out, frame.mins);
             put_vec3(&mut out, frame.maxs);
             put_vec3(&mut out, frame.local_origin);
-            out.extend_from_slice(&frame.radius.to_le_bytes());
+            put_floats(&mut out, [frame.radius]);
             put_name::<16>(&mut out, &frame.name);
         }
         for tag in &self.tags {
@@ -46,10 +46,8 @@ impl Md3 {
         for surface in &self.surfaces {
             self.write_surface(surface, &mut out);
         }
-        let end = i32::try_from(out.len()).unwrap_or(i32::MAX).to_le_bytes();
-        if let Some(slot) = out.get_mut(end_at..end_at + 4) {
-            slot.copy_from_slice(&end);
-        }
+        let end = out.len();
+        patch(&mut out, end_at, end);
         out
     }
 
@@ -69,16 +67,13 @@ impl Md3 {
         for offset in [triangles_at, shaders_at, st_at, vertices_at, end] {
             put_count(out, offset);
         }
-        for corner in surface.triangles.iter().flatten() {
-            out.extend_from_slice(&corner.to_le_bytes());
-        }
+        put_triangles(out, &surface.triangles);
         for shader in &surface.shaders {
             put_name::<64>(out, shader);
             put(out, 0);
         }
         for st in &surface.st {
-            out.extend_from_slice(&st.x.to_le_bytes());
-            out.extend_from_slice(&st.y.to_le_bytes());
+            put_floats(out, st.to_array());
         }
         for vertex in &surface.vertices {
             for value in vertex.position {
@@ -87,26 +82,4 @@ impl Md3 {
             out.extend_from_slice(&vertex.normal.to_le_bytes());
         }
     }
-}
-
-fn put(out: &mut Vec<u8>, value: i32) {
-    out.extend_from_slice(&value.to_le_bytes());
-}
-
-fn put_count(out: &mut Vec<u8>, count: usize) {
-    put(out, i32::try_from(count).unwrap_or(i32::MAX));
-}
-
-fn put_vec3(out: &mut Vec<u8>, v: Vec3) {
-    for value in v.to_array() {
-        out.extend_from_slice(&value.to_le_bytes());
-    }
-}
-
-fn put_name<const N: usize>(out: &mut Vec<u8>, name: &str) {
-    let mut field = [0; N];
-    for (to, &from) in field.iter_mut().take(N - 1).zip(name.as_bytes()) {
-        *to = from;
-    }
-    out.extend_from_slice(&field);
 }

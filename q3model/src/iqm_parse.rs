@@ -1,0 +1,502 @@
+//! Bytes to [`Iqm`].
+
+use crate::Error;
+use crate::bytes::{Fields, Region, TRIANGLE_BYTES, check_sharing, read_triangles};
+use crate::iqm::{IQM_WEIGHTS, Iqm, IqmChannels, IqmJoint, IqmPose, IqmSurface, IqmVertex};
+
+pub(crate) const MAGIC: &[u8; 16] = b"INTERQUAKEMODEL\0";
+pub(crate) const VERSION: u32 = 2;
+pub(crate) const HEADER_BYTES: usize = 124;
+pub(crate) const MESH_BYTES: usize = 24;
+pub(crate) const ARRAY_BYTES: usize = 20;
+pub(crate) const JOINT_BYTES: usize = 48;
+pub(crate) const POSE_BYTES: usize = 88;
+pub(crate) const BOUNDS_BYTES: usize = 32;
+
+/// Kinds of vertex arrays.
+pub(crate) const POSITION: u32 = 0;
+pub(crate) const TEXCOORD: u32 = 1;
+pub(crate) const NORMAL: u32 = 2;
+pub(crate) const TANGENT: u32 = 3;
+pub(crate) const BLEND_INDEXES: u32 = 4;
+pub(crate) const BLEND_WEIGHTS: u32 = 5;
+pub(crate) const COLOR: u32 = 6;
+
+/// Kinds of numbers in them.
+pub(crate) const UBYTE: u32 = 1;
+pub(crate) const INT: u32 = 4;
+pub(crate) const FLOAT: u32 = 7;
+
+/// Longest name of a surface or shader, as long as the engine's.
+const MAX_NAME: usize = 63;
+/// Bytes of a vertex in memory, at most; a file has half of that at least.
+const VERTEX_MEMORY: usize = 64;
+
+/// The header's numbers after magic and version.
+struct Header {
+    file_size: u32,
+    text: (u32, u32),
+    meshes: (u32, u32),
+    num_arrays: u32,
+    num_vertices: u32,
+    arrays_at: u32,
+    triangles: (u32, u32),
+    joints: (u32, u32),
+    poses: (u32, u32),
+    num_frames: u32,
+    numbers_per_frame: u32,
+    frames_at: u32,
+    bounds_at: u32,
+}
+
+impl Header {
+    fn read(bytes: &[u8]) -> Result<Header, Error> {
+        if let Some(start) = bytes.first_chunk::<20>() {
+            let mut f = Fields::new(start);
+            let magic: [u8; 16] = f.bytes();
+            let version = f.u32();
+            if &magic != MAGIC || version != VERSION {
+                return Err(Error::WrongFormat {
+                    found: format!("\"{}\" version {version}", magic.escape_ascii()),
+                    expected: "\"INTERQUAKEMODEL\" version 2",
+                });
+            }
+        }
+        let file = Region::new(bytes, 0);
+        let mut f = Fields::new(file.records(|| "the header".to_owned(), 0, 1, HEADER_BYTES)?);
+        let _magic_and_version: [u8; 20] = f.bytes();
+        let file_size = f.u32();
+        let _flags = f.u32();
+        let list = |f: &mut Fields<'_>| (f.u32(), f.u32());
+        let text = list(&mut f);
+        let meshes = list(&mut f);
+        let (num_arrays, num_vertices, arrays_at) = (f.u32(), f.u32(), f.u32());
+        let triangles = list(&mut f);
+        let _adjacency = f.u32();
+        let joints = list(&mut f);
+        let poses = list(&mut f);
+        // named ranges of frames: the game knows its own
+        let _animations = list(&mut f);
+        Ok(Header {
+            file_size,
+            text,
+            meshes,
+            num_arrays,
+            num_vertices,
+            arrays_at,
+            triangles,
+            joints,
+            poses,
+            num_frames: f.u32(),
+            numbers_per_frame: f.u32(),
+            frames_at: f.u32(),
+            bounds_at: f.u32(),
+        })
+    }
+}
+
+impl Iqm {
+    /// Reads and validates a model. The engine's limits on the size of the file, on joints, and on vertices and
+    /// triangles per surface, do not apply. Animations, tangents, adjacency and extensions are not kept.
+    ///
+    /// # Errors
+    /// A wrong magic or version; a file shorter than it says; no positions, normals or texture coordinates, or no
+    /// weights where there are joints; arrays of a form that the engine does not take; counts or offsets that lead
+    /// outside the file; triangle corners that name no vertex of their surface; weights and parents that name no
+    /// joint, or a parent that does not come first; poses that are not one for each joint.
+    pub fn parse(bytes: &[u8]) -> Result<Iqm, Error> {
+        let header = Header::read(bytes)?;
+        if header.file_size as usize > bytes.len() {
+            return Err(Error::OutsideFile {
+                what: "the file's own size".to_owned(),
+                offset: 0,
+                length: u64::from(header.file_size),
+                file_length: bytes.len(),
+            });
+        }
+        let mut reader = Reader {
+            bytes,
+            text: list(bytes, "text", header.text.1, header.text.0, 1)?,
+            claimed: 0,
+        };
+        let joints = reader.joints(&header)?;
+        let vertices = reader.vertices(&header, joints.len())?;
+        let surfaces = reader.surfaces(&header)?;
+        let channels = reader.channels(&header, joints.len())?;
+        let num_frames = if channels.is_empty() {
+            0
+        } else {
+            header.num_frames as usize
+        };
+        let numbers = header.num_frames.checked_mul(header.numbers_per_frame);
+        let frame_data: Vec<u16> = match numbers.filter(|_| num_frames > 0) {
+            Some(numbers) => list(bytes, "frames", header.frames_at, numbers, 2)?
+                .chunks_exact(2)
+                .map(|number| u16::from_le_bytes(Fields::new(number).bytes()))
+                .collect(),
+            None if num_frames > 0 => {
+                return Err(Error::Value {
+                    what: "numbers per frame".to_owned(),
+                    value: i64::from(header.numbers_per_frame),
+                    expected: format!("which is too much for {num_frames} frames"),
+                });
+            }
+            None => Vec::new(),
+        };
+        // the engine has bounds of every frame, or of a model without frames none
+        let bounds = if header.bounds_at == 0 {
+            Vec::new()
+        } else {
+            list(
+                bytes,
+                "bounds",
+                header.bounds_at,
+                header.num_frames,
+                BOUNDS_BYTES,
+            )?
+            .chunks_exact(BOUNDS_BYTES)
+            .map(|record| {
+                let mut f = Fields::new(record);
+                (f.vec3(), f.vec3())
+            })
+            .collect()
+        };
+        Ok(Iqm {
+            surfaces,
+            vertices,
+            joints,
+            channels,
+            num_frames,
+            frame_data,
+            numbers_per_frame: if num_frames > 0 {
+                header.numbers_per_frame as usize
+            } else {
+                0
+            },
+            bounds,
+        })
+    }
+}
+
+/// A list of records anywhere in the file.
+fn list<'a>(
+    bytes: &'a [u8],
+    what: &str,
+    offset: u32,
+    count: u32,
+    stride: usize,
+) -> Result<&'a [u8], Error> {
+    Region::new(bytes, 0).records(
+        || format!("{count} {what}"),
+        i32::try_from(offset).unwrap_or(i32::MAX),
+        count as usize,
+        stride,
+    )
+}
+
+struct Reader<'a> {
+    bytes: &'a [u8],
+    text: &'a [u8],
+    /// Bytes of memory that names and surfaces ask for.
+    claimed: u64,
+}
+
+impl Reader<'_> {
+    fn claim(&mut self, length: usize) -> Result<(), Error> {
+        self.claimed += length as u64;
+        check_sharing(self.claimed, self.bytes.len())
+    }
+
+    /// A name in the text.
+    fn name(&mut self, at: u32, what: impl Fn() -> String) -> Result<String, Error> {
+        let Some(rest) = self.text.get(at as usize..).filter(|rest| !rest.is_empty()) else {
+            return Err(Error::Value {
+                what: format!("name of {}", what()),
+                value: i64::from(at),
+                expected: format!("outside the text of {} bytes", self.text.len()),
+            });
+        };
+        let name = rest.split(|&b| b == 0).next().unwrap_or(&[]);
+        self.claim(name.len())?;
+        Ok(String::from_utf8_lossy(name).into_owned())
+    }
+
+    fn joints(&mut self, header: &Header) -> Result<Vec<IqmJoint>, Error> {
+        let (count, at) = header.joints;
+        let mut joints = Vec::new();
+        let records = list(self.bytes, "joints", at, count, JOINT_BYTES)?;
+        for (number, record) in records.chunks_exact(JOINT_BYTES).enumerate() {
+            let mut f = Fields::new(record);
+            let name = self.name(f.u32(), || format!("joint {number}"))?;
+            let parent = f.i32();
+            let pose = IqmPose::from_numbers(std::array::from_fn(|_| f.f32()));
+            let parent = match parent {
+                -1 => None,
+                _ => Some(
+                    usize::try_from(parent)
+                        .ok()
+                        .filter(|&parent| parent < number)
+                        .ok_or_else(|| Error::Value {
+                            what: format!("parent of joint {number}"),
+                            value: i64::from(parent),
+                            expected: "but has to be an earlier joint or -1".to_owned(),
+                        })?,
+                ),
+            };
+            joints.push(IqmJoint { name, parent, pose });
+        }
+        Ok(joints)
+    }
+
+    fn vertices(&mut self, header: &Header, joints: usize) -> Result<Vec<IqmVertex>, Error> {
+        let arrays = Arrays::read(self.bytes, header)?;
+        let count = header.num_vertices as usize;
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let [Some(positions), Some(normals), Some(texcoords)] =
+            [arrays.positions, arrays.normals, arrays.texcoords]
+        else {
+            return Err(missing("positions, normals or texture coordinates"));
+        };
+        if joints > 0 && (arrays.indexes.is_none() || arrays.weights.is_none()) {
+            return Err(missing("joints of vertices or their weights"));
+        }
+        self.claim(count.saturating_mul(VERTEX_MEMORY))?;
+        let parts = positions
+            .chunks_exact(12)
+            .zip(normals.chunks_exact(12))
+            .zip(texcoords.chunks_exact(8));
+        let mut vertices: Vec<IqmVertex> = parts
+            .map(|((position, normal), st)| IqmVertex {
+                position: Fields::new(position).vec3(),
+                normal: Fields::new(normal).vec3(),
+                st: Fields::new(st).vec2(),
+                color: [255; 4],
+                joints: [0; IQM_WEIGHTS],
+                weights: [0.0; IQM_WEIGHTS],
+            })
+            .collect();
+        if let Some(colors) = arrays.colors {
+            for (vertex, color) in vertices.iter_mut().zip(colors.chunks_exact(4)) {
+                vertex.color = Fields::new(color).bytes();
+            }
+        }
+        if let (Some(indexes), Some(weights)) = (arrays.indexes, arrays.weights)
+            && joints > 0
+        {
+            for (number, vertex) in vertices.iter_mut().enumerate() {
+                vertex.weights = weights.shares(number);
+                for (slot, joint) in indexes.four(number).into_iter().enumerate() {
+                    let used = vertex.weights.get(..=slot).is_some_and(all_positive);
+                    let joint = if used { joint } else { 0.0 };
+                    if !(joint >= 0.0 && joint < joints as f32 && joint <= 255.0) {
+                        return Err(Error::Value {
+                            what: format!("joint of vertex {number}"),
+                            value: joint as i64,
+                            expected: format!("outside its {joints} joints"),
+                        });
+                    }
+                    if let Some(place) = vertex.joints.get_mut(slot) {
+                        *place = joint as u8;
+                    }
+                }
+            }
+        }
+        Ok(vertices)
+    }
+
+    fn surfaces(&mut self, header: &Header) -> Result<Vec<IqmSurface>, Error> {
+        let (count, at) = header.meshes;
+        let (num_triangles, triangles_at) = header.triangles;
+        let triangles = list(
+            self.bytes,
+            "triangles",
+            triangles_at,
+            num_triangles,
+            TRIANGLE_BYTES,
+        )?;
+        let mut surfaces = Vec::new();
+        let records = list(self.bytes, "meshes", at, count, MESH_BYTES)?;
+        for (number, record) in records.chunks_exact(MESH_BYTES).enumerate() {
+            let what = |part: &str| format!("{part} of mesh {number}");
+            let mut f = Fields::new(record);
+            let mut name = self.name(f.u32(), || format!("mesh {number}"))?;
+            let mut material = self.name(f.u32(), || what("material"))?;
+            for name in [&mut name, &mut material] {
+                name.truncate(name.floor_char_boundary(MAX_NAME));
+            }
+            name.make_ascii_lowercase();
+            let (first_vertex, num_vertices) = (f.u32(), f.u32());
+            let (first_triangle, num_corners) = (f.u32(), f.u32());
+            if first_vertex.saturating_add(num_vertices) > header.num_vertices {
+                return Err(Error::Value {
+                    what: what("vertices"),
+                    value: i64::from(first_vertex) + i64::from(num_vertices),
+                    expected: format!("outside the {} of the model", header.num_vertices),
+                });
+            }
+            let start = (first_triangle as usize).saturating_mul(TRIANGLE_BYTES);
+            let length = (num_corners as usize).saturating_mul(TRIANGLE_BYTES);
+            let Some(own) = triangles.get(start..start.saturating_add(length)) else {
+                return Err(Error::Value {
+                    what: what("triangles"),
+                    value: i64::from(first_triangle) + i64::from(num_corners),
+                    expected: format!("outside the {num_triangles} of the model"),
+                });
+            };
+            self.claim(MESH_BYTES + own.len())?;
+            surfaces.push(IqmSurface {
+                name,
+                material,
+                first_vertex: first_vertex as usize,
+                num_vertices: num_vertices as usize,
+                triangles: read_triangles(own, first_vertex, num_vertices as usize, |at| {
+                    what(&format!("corner of triangle {at}"))
+                })?,
+            });
+        }
+        Ok(surfaces)
+    }
+
+    fn channels(&self, header: &Header, joints: usize) -> Result<Vec<IqmChannels>, Error> {
+        let (count, at) = header.poses;
+        if count != 0 && count as usize != joints {
+            return Err(Error::Value {
+                what: "number of poses".to_owned(),
+                value: i64::from(count),
+                expected: format!("but there are {joints} joints"),
+            });
+        }
+        let channels: Vec<IqmChannels> = list(self.bytes, "poses", at, count, POSE_BYTES)?
+            .chunks_exact(POSE_BYTES)
+            .map(|record| {
+                let mut f = Fields::new(record);
+                // the joints' own parents count
+                let _parent = f.i32();
+                IqmChannels {
+                    mask: f.u32(),
+                    offset: std::array::from_fn(|_| f.f32()),
+                    scale: std::array::from_fn(|_| f.f32()),
+                }
+            })
+            .collect();
+        let stored: usize = channels.iter().map(IqmChannels::stored_numbers).sum();
+        if stored > header.numbers_per_frame as usize {
+            return Err(Error::Value {
+                what: "numbers per frame".to_owned(),
+                value: i64::from(header.numbers_per_frame),
+                expected: format!("but the poses need {stored}"),
+            });
+        }
+        Ok(channels)
+    }
+}
+
+/// The vertex arrays that count.
+#[derive(Default)]
+struct Arrays<'a> {
+    positions: Option<&'a [u8]>,
+    normals: Option<&'a [u8]>,
+    texcoords: Option<&'a [u8]>,
+    colors: Option<&'a [u8]>,
+    indexes: Option<Fours<'a>>,
+    weights: Option<Fours<'a>>,
+}
+
+/// Four numbers for each vertex.
+#[derive(Clone, Copy)]
+struct Fours<'a> {
+    bytes: &'a [u8],
+    format: u32,
+}
+
+impl Fours<'_> {
+    /// Those of a vertex as shares of 1: bytes are shares of 255.
+    fn shares(&self, vertex: usize) -> [f32; IQM_WEIGHTS] {
+        let four = self.four(vertex);
+        if self.format == UBYTE {
+            four.map(|share| share / 255.0)
+        } else {
+            four
+        }
+    }
+
+    /// Those of a vertex.
+    fn four(&self, vertex: usize) -> [f32; IQM_WEIGHTS] {
+        let stride = if self.format == UBYTE { 4 } else { 16 };
+        let record = vertex
+            .checked_mul(stride)
+            .and_then(|at| self.bytes.get(at..))
+            .unwrap_or(&[]);
+        let mut f = Fields::new(record);
+        std::array::from_fn(|_| match self.format {
+            UBYTE => f32::from(f.bytes::<1>()[0]),
+            INT => f.i32() as f32,
+            _ => f.f32(),
+        })
+    }
+}
+
+impl<'a> Arrays<'a> {
+    fn read(bytes: &'a [u8], header: &Header) -> Result<Arrays<'a>, Error> {
+        let mut arrays = Arrays::default();
+        let records = list(
+            bytes,
+            "vertex arrays",
+            header.arrays_at,
+            header.num_arrays,
+            ARRAY_BYTES,
+        )?;
+        for record in records.chunks_exact(ARRAY_BYTES) {
+            let mut f = Fields::new(record);
+            let (kind, _flags, format, size, offset) =
+                (f.u32(), f.u32(), f.u32(), f.u32(), f.u32());
+            let accepted: &[(u32, u32)] = match kind {
+                POSITION | NORMAL => &[(FLOAT, 3)],
+                TEXCOORD => &[(FLOAT, 2)],
+                TANGENT => &[(FLOAT, 4)],
+                BLEND_INDEXES => &[(UBYTE, 4), (INT, 4)],
+                BLEND_WEIGHTS => &[(UBYTE, 4), (FLOAT, 4)],
+                COLOR => &[(UBYTE, 4)],
+                // arrays of a tool's own
+                _ => continue,
+            };
+            if !accepted.contains(&(format, size)) {
+                return Err(Error::Value {
+                    what: format!("format of vertex array {kind}"),
+                    value: i64::from(format),
+                    expected: format!("of {size} numbers, which is not one that engines take"),
+                });
+            }
+            let stride = size as usize * if format == UBYTE { 1 } else { 4 };
+            let found = list(bytes, "vertices", offset, header.num_vertices, stride)?;
+            let four = Some(Fours {
+                bytes: found,
+                format,
+            });
+            match kind {
+                POSITION => arrays.positions = Some(found),
+                NORMAL => arrays.normals = Some(found),
+                TEXCOORD => arrays.texcoords = Some(found),
+                COLOR => arrays.colors = Some(found),
+                BLEND_INDEXES => arrays.indexes = four,
+                BLEND_WEIGHTS => arrays.weights = four,
+                _ => {}
+            }
+        }
+        Ok(arrays)
+    }
+}
+
+fn missing(what: &str) -> Error {
+    Error::Value {
+        what: format!("number of arrays of {what}"),
+        value: 0,
+        expected: "but the model needs them".to_owned(),
+    }
+}
+
+fn all_positive(weights: &[f32]) -> bool {
+    weights.iter().all(|&weight| weight > 0.0)
+}

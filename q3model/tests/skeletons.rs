@@ -1,0 +1,465 @@
+//! Models with skeletons, sound and broken: the readers answer with a model or an error, never otherwise; poses are
+//! what they should be.
+
+use std::sync::LazyLock;
+
+use glam::{Quat, Vec2, Vec3, Vec4};
+use proptest::prelude::*;
+use q3model::{
+    BoneMatrix, Frame, Iqm, IqmJoint, IqmPose, IqmSurface, IqmVertex, Mdr, MdrSurface, MdrTag,
+    MdrVertex, MdrWeight,
+};
+
+fn moved(x: f32, y: f32, z: f32) -> BoneMatrix {
+    let mut bone = BoneMatrix::IDENTITY;
+    for (row, value) in bone.rows.iter_mut().zip([x, y, z]) {
+        row.w = value;
+    }
+    bone
+}
+
+/// A quarter turn about z.
+fn turned() -> BoneMatrix {
+    BoneMatrix {
+        rows: [-Vec4::Y, Vec4::X, Vec4::Z],
+    }
+}
+
+fn mdr() -> Mdr {
+    let frame = |name: &str| Frame {
+        mins: Vec3::splat(-1.0),
+        maxs: Vec3::splat(1.0),
+        local_origin: Vec3::Z,
+        radius: 2.0,
+        name: name.to_owned(),
+    };
+    let weight = |bone, weight, x| MdrWeight {
+        bone,
+        weight,
+        offset: Vec3::X * x,
+    };
+    let vertex = |first_weight, num_weights| MdrVertex {
+        normal: Vec3::X,
+        st: Vec2::new(0.25, 0.75),
+        first_weight,
+        num_weights,
+    };
+    let surface = |name: &str, corners: &[[u32; 3]]| MdrSurface {
+        name: name.to_owned(),
+        shader: "models/a".to_owned(),
+        triangles: corners.to_vec(),
+        vertices: vec![vertex(0, 1), vertex(1, 2), vertex(3, 0), vertex(3, 1)],
+        weights: vec![
+            weight(0, 1.0, 4.0),
+            weight(0, 0.25, 4.0),
+            weight(1, 0.75, 8.0),
+            weight(1, 1.0, 0.0),
+        ],
+    };
+    Mdr {
+        name: "models/a.mdr".to_owned(),
+        frames: vec![frame("one"), frame("two")],
+        bones: vec![
+            BoneMatrix::IDENTITY,
+            moved(1.0, 2.0, 3.0),
+            moved(10.0, 0.0, 0.0),
+            turned(),
+        ],
+        num_bones: 2,
+        lods: vec![
+            vec![
+                surface("body", &[[0, 1, 2], [2, 1, 3]]),
+                surface("hat", &[[0, 1, 2]]),
+            ],
+            vec![surface("body", &[[0, 1, 2]])],
+        ],
+        tags: vec![
+            MdrTag {
+                name: "tag_head".to_owned(),
+                bone: 1,
+            },
+            MdrTag {
+                name: "tag_root".to_owned(),
+                bone: 0,
+            },
+        ],
+    }
+}
+
+fn pose(x: f32, turn: f32) -> IqmPose {
+    IqmPose {
+        translate: Vec3::new(x, 0.0, 0.0),
+        rotate: Quat::from_rotation_z(turn),
+        scale: Vec3::ONE,
+    }
+}
+
+fn iqm() -> Iqm {
+    let vertex = |x: f32, joints: [u8; 4], weights: [f32; 4]| IqmVertex {
+        position: Vec3::X * x,
+        normal: Vec3::X,
+        st: Vec2::new(0.25, 0.75),
+        color: [1, 2, 3, 4],
+        joints,
+        weights,
+    };
+    let joint = |name: &str, parent, x| IqmJoint {
+        name: name.to_owned(),
+        parent,
+        pose: pose(x, 0.0),
+    };
+    let mut model = Iqm {
+        surfaces: vec![
+            IqmSurface {
+                name: "body".to_owned(),
+                material: "models/a".to_owned(),
+                first_vertex: 0,
+                num_vertices: 3,
+                triangles: vec![[0, 1, 2], [2, 1, 0]],
+            },
+            IqmSurface {
+                name: "hat".to_owned(),
+                material: String::new(),
+                first_vertex: 1,
+                num_vertices: 3,
+                triangles: vec![[0, 1, 2]],
+            },
+        ],
+        vertices: vec![
+            vertex(4.0, [0; 4], [1.0, 0.0, 0.0, 0.0]),
+            vertex(12.0, [1, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]),
+            vertex(12.0, [0, 1, 0, 0], [0.5, 0.5, 0.0, 0.0]),
+            vertex(7.0, [0; 4], [0.0; 4]),
+        ],
+        joints: vec![joint("root", None, 0.0), joint("tag_arm", Some(0), 10.0)],
+        bounds: vec![(Vec3::splat(-16.0), Vec3::splat(16.0)); 2],
+        ..Iqm::default()
+    };
+    let quarter = std::f32::consts::FRAC_PI_2;
+    model.set_frames(&[
+        vec![pose(0.0, 0.0), pose(10.0, 0.0)],
+        vec![pose(0.0, quarter), pose(10.0, quarter)],
+    ]);
+    model
+}
+
+fn posed(model: &Iqm, new: usize, old: usize, back: f32) -> Vec<Vec3> {
+    let mut matrices = Vec::new();
+    model.pose(&model.inverse_bind(), new, old, back, &mut matrices);
+    model
+        .vertices
+        .iter()
+        .map(|v| v.skinned(&matrices).0)
+        .collect()
+}
+
+fn near(a: Vec3, b: Vec3) -> bool {
+    a.abs_diff_eq(b, 2e-3)
+}
+
+static MDR: LazyLock<Vec<u8>> = LazyLock::new(|| mdr().write(false));
+static SMALL_MDR: LazyLock<Vec<u8>> = LazyLock::new(|| mdr().write(true));
+static IQM: LazyLock<Vec<u8>> = LazyLock::new(|| iqm().write());
+
+fn survive_mdr(bytes: &[u8]) -> bool {
+    let Ok(model) = Mdr::parse(bytes) else {
+        return false;
+    };
+    assert!(!model.frames.is_empty() && !model.lods.is_empty());
+    let mut bones = Vec::new();
+    model.pose(0, model.frames.len() - 1, 0.5, &mut bones);
+    assert_eq!(bones.len(), model.num_bones);
+    for surface in model.lods.iter().flatten() {
+        for &corner in surface.triangles.iter().flatten() {
+            surface.skinned(&surface.vertices[corner as usize], &bones);
+        }
+        assert!(
+            surface
+                .weights
+                .iter()
+                .all(|w| (w.bone as usize) < bones.len())
+        );
+    }
+    for tag in &model.tags {
+        assert!(model.lerp_tag(&tag.name, -5, i32::MAX, 0.5).is_some());
+    }
+    assert!(model.write(true).len() <= 5 * bytes.len() + 1000);
+    true
+}
+
+fn survive_iqm(bytes: &[u8]) -> bool {
+    let Ok(model) = Iqm::parse(bytes) else {
+        return false;
+    };
+    let mut matrices = Vec::new();
+    let last = model.num_frames.saturating_sub(1);
+    model.pose(&model.inverse_bind(), 0, last, 0.5, &mut matrices);
+    assert!(matrices.is_empty() || matrices.len() == model.joints.len());
+    for surface in &model.surfaces {
+        let vertices = model.surface_vertices(surface);
+        assert_eq!(vertices.len(), surface.num_vertices);
+        for &corner in surface.triangles.iter().flatten() {
+            vertices[corner as usize].skinned(&matrices);
+        }
+    }
+    for joint in &model.joints {
+        assert!(
+            model
+                .lerp_tag(&joint.name, i32::MIN, i32::MAX, 0.5)
+                .is_some()
+        );
+    }
+    assert!(model.write().len() <= 8 * bytes.len() + 1000);
+    true
+}
+
+#[test]
+fn written_models_read_back() {
+    assert_eq!(Mdr::parse(&MDR).unwrap(), mdr());
+    assert_eq!(Iqm::parse(&IQM).unwrap(), iqm());
+    let plain = Iqm {
+        joints: Vec::new(),
+        channels: Vec::new(),
+        num_frames: 0,
+        numbers_per_frame: 0,
+        frame_data: Vec::new(),
+        bounds: Vec::new(),
+        vertices: iqm()
+            .vertices
+            .into_iter()
+            .map(|v| IqmVertex {
+                joints: [0; 4],
+                weights: [0.0; 4],
+                color: [255; 4],
+                ..v
+            })
+            .collect(),
+        ..iqm()
+    };
+    assert_eq!(Iqm::parse(&plain.write()).unwrap(), plain);
+    assert!(!plain.is_animated());
+    assert_eq!(posed(&plain, 0, 0, 0.0)[1], Vec3::X * 12.0);
+}
+
+#[test]
+fn compression_halves_bones_and_keeps_them() {
+    let model = Mdr::parse(&SMALL_MDR).unwrap();
+    assert_eq!(MDR.len() - SMALL_MDR.len(), 2 * 16 + 4 * 24);
+    assert!(model.frames.iter().all(|f| f.name.is_empty()));
+    assert_eq!(model.lods, mdr().lods);
+    for (bone, exact) in model.bones.iter().zip(mdr().bones) {
+        for (row, exact) in bone.rows.iter().zip(exact.rows) {
+            // whole numbers are exact: 1 is 32766 steps
+            assert_eq!(*row, exact);
+        }
+    }
+}
+
+#[test]
+fn mdr_vertices_follow_their_bones() {
+    let model = mdr();
+    let surface = &model.lods[0][0];
+    let mut bones = Vec::new();
+    let mut places = |new, old, back| -> Vec<(Vec3, Vec3)> {
+        model.pose(new, old, back, &mut bones);
+        surface
+            .vertices
+            .iter()
+            .map(|v| surface.skinned(v, &bones))
+            .collect()
+    };
+    let first = places(0, 0, 0.0);
+    assert_eq!(first[0], (Vec3::X * 4.0, Vec3::X));
+    // 0.25 (4, 0, 0) + 0.75 ((8, 0, 0) + (1, 2, 3))
+    assert_eq!(first[1].0, Vec3::new(7.75, 1.5, 2.25));
+    assert_eq!(first[2].0, Vec3::ZERO, "no weight, no place");
+    let second = places(1, 0, 0.0);
+    // 0.25 (14, 0, 0) + 0.75 (0, 8, 0); the normal keeps the length that mixing leaves
+    assert_eq!(second[1].0, Vec3::new(3.5, 6.0, 0.0));
+    assert_eq!(second[1].1, Vec3::new(0.25, 0.75, 0.0));
+    let between = places(1, 0, 0.25);
+    assert_eq!(
+        between[1].0,
+        second[1].0 * 0.75 + first[1].0 * 0.25,
+        "bones are mixed element by element, so places are linear"
+    );
+}
+
+#[test]
+fn mdr_tags_are_bones() {
+    let model = mdr();
+    let tag = model.lerp_tag("tag_head", 0, 1, 0.25).unwrap();
+    assert_eq!(tag.origin, Vec3::new(0.75, 1.5, 2.25));
+    assert!(near(tag.axis[0], Vec3::new(0.75, 0.25, 0.0).normalize()));
+    assert!(near(tag.axis[1], Vec3::new(-0.25, 0.75, 0.0).normalize()));
+    let last = model.lerp_tag("tag_root", 9, 9, 0.0).unwrap();
+    assert_eq!(last.origin, Vec3::X * 10.0);
+    assert_eq!(model.lerp_tag("Tag_Head", 0, 0, 0.0), None, "case counts");
+}
+
+#[test]
+fn iqm_vertices_follow_their_joints() {
+    let model = iqm();
+    let bound = posed(&model, 0, 0, 0.0);
+    for (place, vertex) in bound.iter().zip(&model.vertices) {
+        assert!(near(*place, vertex.position), "{place}");
+    }
+    let turned = posed(&model, 1, 1, 0.0);
+    assert!(near(turned[0], Vec3::Y * 4.0));
+    // ten along the turned root, then two along the arm, which is turned once more
+    assert!(near(turned[1], Vec3::new(-2.0, 10.0, 0.0)));
+    assert!(near(turned[2], Vec3::new(-1.0, 11.0, 0.0)));
+    assert_eq!(turned[3], Vec3::X * 7.0, "no weight, no movement");
+    // rotations go round, they do not cut the corner
+    let half = posed(&model, 0, 1, 0.5);
+    let eighth = std::f32::consts::FRAC_PI_4;
+    assert!(near(
+        half[0],
+        Vec3::new(eighth.cos(), eighth.sin(), 0.0) * 4.0
+    ));
+    let mut matrices = Vec::new();
+    model.pose(&model.inverse_bind(), 1, 1, 0.0, &mut matrices);
+    assert!(near(model.vertices[1].skinned(&matrices).1, -Vec3::X));
+}
+
+#[test]
+fn iqm_tags_are_joints() {
+    let model = iqm();
+    let tag = model.lerp_tag("tag_arm", 0, 1, 1.0).unwrap();
+    assert!(near(tag.origin, Vec3::Y * 10.0));
+    assert!(near(tag.axis[0], -Vec3::X));
+    assert_eq!(model.lerp_tag("body", 0, 0, 0.0), None);
+    // in a model without poses joints are where they were bound
+    let mut still = model;
+    still.set_frames(&[]);
+    let tag = still.lerp_tag("tag_arm", 5, 6, 0.5).unwrap();
+    assert_eq!(tag.origin, Vec3::X * 10.0);
+}
+
+#[test]
+fn scales_stretch_what_is_turned() {
+    let pose = IqmPose {
+        translate: Vec3::Z,
+        rotate: Quat::from_rotation_z(std::f32::consts::FRAC_PI_2),
+        scale: Vec3::new(2.0, 3.0, 4.0),
+    };
+    let matrix = pose.matrix();
+    assert!(near(matrix.point(Vec3::X), Vec3::new(0.0, 3.0, 1.0)));
+    assert!(near(matrix.point(Vec3::Y), Vec3::new(-2.0, 0.0, 1.0)));
+}
+
+#[test]
+fn truncation_anywhere_is_an_error() {
+    for bytes in [&*MDR, &*SMALL_MDR] {
+        // tags come last: without them the file still says that it has two
+        for length in 0..bytes.len() {
+            assert!(!survive_mdr(&bytes[..length]), "{length} bytes were enough");
+        }
+    }
+    for length in 0..IQM.len() {
+        assert!(!survive_iqm(&IQM[..length]), "{length} bytes were enough");
+    }
+}
+
+fn poke(bytes: &[u8], survive: fn(&[u8]) -> bool) {
+    let (mut accepted, mut refused) = (0, 0);
+    for at in (0..bytes.len() - 3).step_by(4) {
+        for value in [
+            -1i32,
+            0,
+            1,
+            0x7fff_ffff,
+            i32::MIN,
+            104,
+            0x7fc0_0000,
+            0x10_0000,
+        ] {
+            let mut bytes = bytes.to_vec();
+            bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
+            *(if survive(&bytes) {
+                &mut accepted
+            } else {
+                &mut refused
+            }) += 1;
+        }
+    }
+    assert!(
+        accepted > 100 && refused > 100,
+        "{accepted} accepted, {refused} refused"
+    );
+}
+
+#[test]
+fn every_word_may_be_anything() {
+    poke(&MDR, survive_mdr);
+    poke(&SMALL_MDR, survive_mdr);
+    poke(&IQM, survive_iqm);
+}
+
+#[test]
+fn loops_end() {
+    let mut bytes = MDR.clone();
+    let lods_at = i32::from_le_bytes(bytes[88..92].try_into().unwrap()) as usize;
+    // a billion levels, each where the last one was
+    bytes[84..88].copy_from_slice(&1_000_000_000i32.to_le_bytes());
+    bytes[lods_at + 8..lods_at + 12].copy_from_slice(&0i32.to_le_bytes());
+    let error = Mdr::parse(&bytes).unwrap_err().to_string();
+    assert!(
+        error.starts_with("offset of level of detail 1 is "),
+        "{error}"
+    );
+}
+
+#[test]
+fn frames_without_numbers_take_no_memory() {
+    let mut model = iqm();
+    let still = vec![pose(0.0, 0.0), pose(10.0, 0.0)];
+    model.set_frames(&[still.clone(), still]);
+    model.bounds.clear();
+    assert_eq!(model.numbers_per_frame, 0);
+    let mut bytes = model.write();
+    bytes[92..96].copy_from_slice(&i32::MAX.to_le_bytes());
+    let model = Iqm::parse(&bytes).unwrap();
+    assert_eq!(model.num_frames, i32::MAX as usize);
+    assert!(near(posed(&model, 1 << 30, 5, 0.5)[0], Vec3::X * 4.0));
+}
+
+#[test]
+fn formats_that_engines_refuse_are_refused() {
+    let arrays_at = i32::from_le_bytes(IQM[52..56].try_into().unwrap()) as usize;
+    let mut bytes = IQM.clone();
+    // doubles
+    bytes[arrays_at + 8..arrays_at + 12].copy_from_slice(&8i32.to_le_bytes());
+    let error = Iqm::parse(&bytes).unwrap_err().to_string();
+    assert!(
+        error.starts_with("format of vertex array 0 is 8"),
+        "{error}"
+    );
+    let mut bytes = IQM.clone();
+    // no positions
+    bytes[arrays_at..arrays_at + 4].copy_from_slice(&100i32.to_le_bytes());
+    let error = Iqm::parse(&bytes).unwrap_err().to_string();
+    assert!(
+        error.starts_with("number of arrays of positions"),
+        "{error}"
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn several_pokes_at_once(
+        which in 0..3usize,
+        pokes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20),
+    ) {
+        let file = [&MDR, &SMALL_MDR, &IQM][which];
+        let survive = if which < 2 { survive_mdr } else { survive_iqm };
+        let mut bytes = file.to_vec();
+        for (at, value) in pokes {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        survive(&bytes);
+    }
+}
