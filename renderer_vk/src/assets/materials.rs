@@ -364,6 +364,14 @@ impl Materials {
         &self.sorted
     }
 
+    /// The index of a handle that the game passes in; the default material for a bad one.
+    pub fn of_handle(&self, handle: i32) -> u32 {
+        u32::try_from(handle)
+            .ok()
+            .filter(|&index| (index as usize) < self.list.len())
+            .unwrap_or(0)
+    }
+
     /// The renderer's own materials.
     pub fn internal(&self) -> Internal {
         self.internal

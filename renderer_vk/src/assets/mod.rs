@@ -7,6 +7,7 @@ mod fonts;
 mod material;
 mod material_buffers;
 mod materials;
+mod model_load;
 mod models;
 pub mod prepare;
 mod skins;
@@ -20,7 +21,7 @@ use relight::GameFiles;
 pub use fonts::LoadedFont;
 pub use material::{Combine, LightmapClass, Material, RasterPass, SkyBox, VideoStage};
 pub use materials::{DEFAULT_PORTAL_RANGE, Internal, MaterialSettings, Materials};
-pub use models::{MAX_LODS, Md3Lod, Model, Models};
+pub use models::{IqmModel, MAX_LODS, Md3Lod, MdrModel, Model, Models};
 pub use prepare::TextureSettings;
 pub use skins::{LoadedSkin, Skins};
 pub use source::{ImageFlags, ImageSource};
@@ -110,10 +111,7 @@ impl Assets {
 
     /// The material index of a handle that the game passes in; the default material for a bad one.
     pub fn material_of_handle(&self, handle: i32) -> u32 {
-        u32::try_from(handle)
-            .ok()
-            .filter(|&index| (index as usize) < self.materials.len())
-            .unwrap_or(0)
+        self.materials.of_handle(handle)
     }
 
     /// `RemapShader`.

@@ -4,11 +4,11 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::Vec3;
-use q3model::Md3;
+use q3model::{BoneMatrix, Iqm, Md3, Mdr};
 use relight::GameFiles;
 
-use super::material::LightmapClass;
 use super::materials::Materials;
+use super::model_load::Loader;
 use super::source::ImageSource;
 use crate::api::Orientation;
 
@@ -24,6 +24,26 @@ pub struct Md3Lod {
     pub materials: Vec<Vec<u32>>,
 }
 
+/// A model whose vertices hang on bones stored per frame.
+#[derive(Debug)]
+pub struct MdrModel {
+    /// The model.
+    pub mdr: Mdr,
+    /// For each level and each of its surfaces the material; the default material for an unusable one.
+    pub materials: Vec<Vec<u32>>,
+}
+
+/// A model whose vertices hang on a skeleton of joints.
+#[derive(Debug)]
+pub struct IqmModel {
+    /// The model.
+    pub iqm: Iqm,
+    /// What takes vertices out of the pose that they were bound in, for each joint.
+    pub inverse_bind: Vec<BoneMatrix>,
+    /// For each surface the material; the default material for an unusable one.
+    pub materials: Vec<u32>,
+}
+
 /// A model.
 #[derive(Debug)]
 pub enum Model {
@@ -33,6 +53,10 @@ pub enum Model {
         /// At least one level.
         lods: Vec<Arc<Md3Lod>>,
     },
+    /// Bones stored per frame, with levels of detail of its own.
+    Mdr(MdrModel),
+    /// A skeleton of joints.
+    Iqm(IqmModel),
     /// A brush model of the current map.
     Inline {
         /// Index of the BSP model.
@@ -64,14 +88,12 @@ impl Models {
         if let Some(&handle) = self.by_name.get(name) {
             return self.usable(handle);
         }
-        let model = load_lods(files, materials, source, name).or_else(|| {
-            // the engine tries its other kinds of model under the same name
-            let other = format!("{}.md3", shaderscript::strip_extension(name));
-            let other = Some(other).filter(|other| !other.eq_ignore_ascii_case(name))?;
-            let model = load_lods(files, materials, source, &other)?;
-            log::info!("{name}: not found; {other} is used");
-            Some(model)
-        });
+        let mut loader = Loader {
+            files,
+            materials,
+            source,
+        };
+        let model = loader.model(name);
         let handle = self.push(name, model);
         self.usable(handle)
     }
@@ -125,26 +147,33 @@ impl Models {
         fraction: f32,
         name: &str,
     ) -> Option<Orientation> {
-        let Model::Mesh { lods } = self.get(handle)? else {
-            return None;
+        let tag = match self.get(handle)? {
+            Model::Mesh { lods } => lods.first()?.md3.lerp_tag(name, start, end, fraction)?,
+            Model::Mdr(model) => model.mdr.lerp_tag(name, start, end, fraction)?,
+            Model::Iqm(model) => model.iqm.lerp_tag(name, start, end, fraction)?,
+            Model::Inline { .. } => return None,
         };
-        let tag = lods.first()?.md3.lerp_tag(name, start, end, fraction)?;
         Some(Orientation {
             origin: tag.origin,
             axis: tag.axis,
         })
     }
 
-    /// Bounds: those of the brush model, or of the first frame of the finest level; zeros for no model.
+    /// Bounds: those of the brush model, or of the first frame of the finest level; zeros for no model and for one that
+    /// tells none.
     pub fn bounds(&self, handle: i32) -> (Vec3, Vec3) {
-        match self.get(handle) {
-            Some(Model::Inline { bounds, .. }) => *bounds,
+        let of_frame = |frame: &q3model::Frame| (frame.mins, frame.maxs);
+        let bounds = match self.get(handle) {
+            Some(Model::Inline { bounds, .. }) => Some(*bounds),
             Some(Model::Mesh { lods }) => lods
                 .first()
                 .and_then(|lod| lod.md3.frames.first())
-                .map_or((Vec3::ZERO, Vec3::ZERO), |frame| (frame.mins, frame.maxs)),
-            None => (Vec3::ZERO, Vec3::ZERO),
-        }
+                .map(of_frame),
+            Some(Model::Mdr(model)) => model.mdr.frames.first().map(of_frame),
+            Some(Model::Iqm(model)) => model.iqm.bounds.first().copied(),
+            None => None,
+        };
+        bounds.unwrap_or((Vec3::ZERO, Vec3::ZERO))
     }
 
     /// One line each, for `modellist`.
@@ -155,78 +184,15 @@ impl Models {
                 None => format!("(missing) {name}"),
                 Some(Model::Inline { .. }) => format!("brush model {name}"),
                 Some(Model::Mesh { lods }) => format!("{} levels  {name}", lods.len()),
+                Some(Model::Mdr(model)) => format!(
+                    "{} levels, {} bones  {name}",
+                    model.mdr.lods.len(),
+                    model.mdr.num_bones
+                ),
+                Some(Model::Iqm(model)) => {
+                    format!("1 level, {} joints  {name}", model.iqm.joints.len())
+                }
             })
             .collect()
     }
-}
-
-/// The name of a level of detail: `name_1.md3`; the name is split at its first dot, as in the engine.
-fn lod_name(name: &str, lod: usize) -> String {
-    let stem = name.split('.').next().unwrap_or(name);
-    let extension = name
-        .get(stem.len()..)
-        .filter(|e| e.len() > 1)
-        .unwrap_or(".md3");
-    if lod == 0 {
-        name.to_owned()
-    } else {
-        format!("{stem}_{lod}{extension}")
-    }
-}
-
-/// Loads what levels there are.
-fn load_lods(
-    files: &dyn GameFiles,
-    materials: &mut Materials,
-    source: &mut dyn ImageSource,
-    name: &str,
-) -> Option<Model> {
-    let mut found: [Option<Arc<Md3Lod>>; MAX_LODS] = Default::default();
-    for (lod, slot) in found.iter_mut().enumerate() {
-        // a level that fails is taken over from a coarser one
-        *slot = load_md3(files, materials, source, &lod_name(name, lod)).map(Arc::new);
-    }
-    let last = found.iter().rposition(Option::is_some)?;
-    let mut lods = Vec::with_capacity(last + 1);
-    let mut coarser = None;
-    for slot in found.into_iter().take(last + 1).rev() {
-        coarser = slot.or(coarser);
-        lods.extend(coarser.clone());
-    }
-    lods.reverse();
-    Some(Model::Mesh { lods })
-}
-
-fn load_md3(
-    files: &dyn GameFiles,
-    materials: &mut Materials,
-    source: &mut dyn ImageSource,
-    file: &str,
-) -> Option<Md3Lod> {
-    let bytes = match files.read(file) {
-        Ok(bytes) => bytes?,
-        Err(problem) => {
-            log::warn!("{problem}");
-            return None;
-        }
-    };
-    let md3 = match Md3::parse(&bytes) {
-        Ok(md3) => md3,
-        Err(problem) => {
-            log::warn!("{file}: {problem}");
-            return None;
-        }
-    };
-    let materials = md3
-        .surfaces
-        .iter()
-        .map(|surface| {
-            surface
-                .shaders
-                .iter()
-                .map(|shader| materials.find_or_default(source, shader, LightmapClass::None))
-                .collect()
-        })
-        .collect();
-    Some(Md3Lod { md3, materials })
 }

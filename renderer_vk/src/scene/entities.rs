@@ -1,20 +1,16 @@
-//! Entities of a view: models between key frames, brush models, and what is built on the spot.
-
-use std::sync::Arc;
+//! Entities of a view: brush models and what is built on the spot; models of triangles are in `models`.
 
 use glam::Vec3;
-use q3model::Frame;
 
 use super::entity;
 use super::gather::{Gatherer, count};
-use super::key_frames::{self, Frames};
 use super::lighting;
 use super::mesh::RawMesh;
 use super::shapes::MeshBuilder;
 use super::surfaces::{self, LocalView};
 use super::{Look, Submodel, ViewScene};
 use crate::api::{EntityKind, RefEntity, renderfx};
-use crate::assets::{Md3Lod, Model};
+use crate::assets::Model;
 use crate::world::Bounds;
 
 impl Gatherer<'_> {
@@ -40,7 +36,7 @@ impl Gatherer<'_> {
             return;
         }
         let materials = self.input.materials;
-        let asked = material_of_handle(materials.len(), entity.custom_shader);
+        let asked = materials.of_handle(entity.custom_shader);
         let material = match entity.kind {
             EntityKind::Beam => materials.internal().beam,
             _ => materials.resolve(asked),
@@ -75,7 +71,9 @@ impl Gatherer<'_> {
             return;
         }
         match self.input.models.get(entity.model) {
-            Some(Model::Mesh { lods }) => self.add_mesh(number, entity, hidden, lods, out),
+            Some(model @ (Model::Mesh { .. } | Model::Mdr(_) | Model::Iqm(_))) => {
+                self.add_animated(number, entity, hidden, model, out);
+            }
             _ if hidden => {}
             Some(Model::Inline { model, .. }) => self.add_brush_model(number, entity, *model, out),
             None => {
@@ -93,7 +91,12 @@ impl Gatherer<'_> {
         }
     }
 
-    fn push_instance(&self, entity: &RefEntity, is_world: bool, out: &mut ViewScene) -> u32 {
+    pub(super) fn push_instance(
+        &self,
+        entity: &RefEntity,
+        is_world: bool,
+        out: &mut ViewScene,
+    ) -> u32 {
         let at = if entity.renderfx & renderfx::LIGHTING_ORIGIN != 0 {
             entity.lighting_origin
         } else {
@@ -113,97 +116,7 @@ impl Gatherer<'_> {
         instance
     }
 
-    fn add_mesh(
-        &mut self,
-        number: u32,
-        entity: &RefEntity,
-        hidden: bool,
-        lods: &[Arc<Md3Lod>],
-        out: &mut ViewScene,
-    ) {
-        let Some(finest) = lods.first() else {
-            return;
-        };
-        let shadow = self.shadow_material(entity);
-        if hidden && shadow.is_none() {
-            return;
-        }
-        let frames = Frames::of(entity, finest.md3.frames.len());
-        let Some(frame) = finest.md3.frames.get(frames.new) else {
-            return;
-        };
-        let old_frame = finest.md3.frames.get(frames.old).unwrap_or(frame);
-        if self.culls_model(entity, frame, old_frame) {
-            return;
-        }
-        let settings = self.input.settings;
-        let level =
-            key_frames::level_of_detail(lods.len(), frame, entity.origin, &self.view, settings);
-        let Some(lod) = lods.get(level) else {
-            return;
-        };
-        // a coarser level may have fewer frames
-        let frames = if lod.md3.frames.len() > frames.new.max(frames.old) {
-            frames
-        } else {
-            Frames::of(&RefEntity::default(), 1)
-        };
-        let fog = self.world.map_or(0, |world| {
-            world.fog_of_sphere(entity.origin + frame.local_origin, frame.radius)
-        });
-        let instance = self.push_instance(entity, false, out);
-        for (surface, own) in lod.md3.surfaces.iter().zip(&lod.materials) {
-            let materials = self.input.materials;
-            let asked = self.surface_material(entity, &surface.name, own);
-            // only opaque surfaces outside of fog cast a planar shadow
-            let opaque = materials.get(asked).sort == shaderscript::sort::OPAQUE;
-            let shadow = shadow.filter(|_| opaque && fog == 0);
-            for asked in shadow.into_iter().chain((!hidden).then_some(asked)) {
-                let raw = RawMesh::begin(out, materials.resolve(asked), instance, fog);
-                let base = count(out.vertices.len());
-                key_frames::append_vertices(surface, frames, &mut out.vertices);
-                out.indices
-                    .extend(surface.triangles.iter().flatten().map(|i| base + i));
-                self.finish_and_list(raw, asked, number, Some(entity), out);
-            }
-        }
-    }
-
-    /// The material that an entity casts a planar shadow with, if it casts one (`cg_shadows 3`). Traced views have
-    /// real ones.
-    fn shadow_material(&self, entity: &RefEntity) -> Option<u32> {
-        let casts = self.look == Look::Classic
-            && self.input.settings.shadows == 3
-            && entity.renderfx & renderfx::SHADOW_PLANE != 0
-            && entity.shadow_plane.is_finite();
-        self.input.materials.internal().shadow.filter(|_| casts)
-    }
-
-    /// The material of a model's surface: the entity's own, its skin's, or the model's.
-    fn surface_material(&self, entity: &RefEntity, name: &str, own: &[u32]) -> u32 {
-        let materials = self.input.materials;
-        if entity.custom_shader != 0 {
-            return material_of_handle(materials.len(), entity.custom_shader);
-        }
-        if let Some(skin) = self.input.skins.get(entity.custom_skin) {
-            return skin.material(name).unwrap_or(0);
-        }
-        let wrapped = usize::try_from(entity.skin_num)
-            .ok()
-            .and_then(|n| n.checked_rem(own.len()));
-        own.get(wrapped.unwrap_or(0)).copied().unwrap_or(0)
-    }
-
-    /// Whether the box around both frames is out of sight.
-    fn culls_model(&self, entity: &RefEntity, frame: &Frame, old: &Frame) -> bool {
-        let bounds = Bounds {
-            mins: frame.mins.min(old.mins),
-            maxs: frame.maxs.max(old.maxs),
-        };
-        self.culls_box(entity, &bounds)
-    }
-
-    fn culls_box(&self, entity: &RefEntity, bounds: &Bounds) -> bool {
+    pub(super) fn culls_box(&self, entity: &RefEntity, bounds: &Bounds) -> bool {
         let corners = bounds.corners().map(|c| {
             entity.origin + entity.axis[0] * c.x + entity.axis[1] * c.y + entity.axis[2] * c.z
         });
@@ -265,12 +178,4 @@ impl Gatherer<'_> {
         self.add_deformed(world, &mut pending, instance, Some(entity), out);
         self.scratch.pending = pending;
     }
-}
-
-/// Index of the material of a handle; the default one for a bad handle.
-fn material_of_handle(materials: usize, handle: i32) -> u32 {
-    u32::try_from(handle)
-        .ok()
-        .filter(|&index| (index as usize) < materials)
-        .unwrap_or(0)
 }

@@ -1,6 +1,7 @@
 //! One view gathered: the world, polygons, entities, in the engine's order.
 
 use glam::{Vec3, Vec4};
+use q3model::BoneMatrix;
 use shaders::types::Vertex;
 use shaders::types::constants::NO_TEXTURE;
 
@@ -21,6 +22,7 @@ pub(super) struct Scratch {
     deform: DeformScratch,
     pub(super) pending: Vec<PendingDeform>,
     pub(super) lights: Vec<(Vec3, f32)>,
+    pub(super) bones: Vec<BoneMatrix>,
 }
 
 /// The views of a scene: at most one through a portal or mirror (classic look), then the main one.

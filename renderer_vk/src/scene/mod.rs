@@ -10,6 +10,7 @@ mod gather;
 mod key_frames;
 mod lighting;
 mod mesh;
+mod models;
 mod portal;
 mod shapes;
 mod surfaces;
@@ -325,3 +326,6 @@ impl Scene {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod model_tests;

@@ -1,0 +1,277 @@
+//! Models with key frames or skeletons: which frames, which level of detail, which material, and their vertices.
+//!
+//! Source: engine behaviour of `renderer_opengl1` (model surfaces).
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use q3model::{BoneMatrix, Frame, Iqm, IqmSurface, MdrSurface};
+use shaders::types::Vertex;
+
+use super::gather::{Gatherer, count};
+use super::key_frames::{self, Frames};
+use super::mesh::RawMesh;
+use super::{Look, ViewScene};
+use crate::api::{RefEntity, renderfx};
+use crate::assets::{IqmModel, Md3Lod, MdrModel, Model};
+use crate::world::Bounds;
+
+/// Half the side of the box that a skeleton without bounds of its own is taken for where fog is looked up, units.
+const UNKNOWN_SIZE: f32 = 8.0;
+
+/// A model placed in a view, ready for its surfaces.
+pub(super) struct Placed<'a> {
+    /// The engine's number of the entity.
+    number: u32,
+    entity: &'a RefEntity,
+    /// Seen in mirrors and portals only, and this is neither.
+    hidden: bool,
+    /// Material of the planar shadow that it casts.
+    shadow: Option<u32>,
+    instance: u32,
+    /// Fog volume plus one; 0 none.
+    fog: u32,
+}
+
+impl Gatherer<'_> {
+    /// Adds a model of triangles. `hidden`: it only casts a shadow.
+    pub(super) fn add_animated(
+        &mut self,
+        number: u32,
+        entity: &RefEntity,
+        hidden: bool,
+        model: &Model,
+        out: &mut ViewScene,
+    ) {
+        let shadow = self.shadow_material(entity);
+        if hidden && shadow.is_none() {
+            return;
+        }
+        let placed = Placed {
+            number,
+            entity,
+            hidden,
+            shadow,
+            instance: 0,
+            fog: 0,
+        };
+        match model {
+            Model::Mesh { lods } => self.add_md3(placed, lods, out),
+            Model::Mdr(model) => self.add_mdr(placed, model, out),
+            Model::Iqm(model) => self.add_iqm(placed, model, out),
+            Model::Inline { .. } => {}
+        }
+    }
+
+    fn add_md3(&mut self, placed: Placed<'_>, lods: &[Arc<Md3Lod>], out: &mut ViewScene) {
+        let Some(finest) = lods.first() else {
+            return;
+        };
+        let Some((frames, level)) = self.frames_in_sight(&placed, &finest.md3.frames, lods.len())
+        else {
+            return;
+        };
+        let (Some(lod), Some(frame)) = (lods.get(level), finest.md3.frames.get(frames.new)) else {
+            return;
+        };
+        // a coarser level may have fewer frames
+        let frames = if lod.md3.frames.len() > frames.new.max(frames.old) {
+            frames
+        } else {
+            Frames::of(&RefEntity::default(), 1)
+        };
+        let placed = self.place(placed, frame.local_origin, frame.radius, out);
+        for (surface, own) in lod.md3.surfaces.iter().zip(&lod.materials) {
+            self.add_surface(&placed, &surface.name, own, out, |out| {
+                let base = count(out.vertices.len());
+                key_frames::append_vertices(surface, frames, &mut out.vertices);
+                append_triangles(base, &surface.triangles, &mut out.indices);
+            });
+        }
+    }
+
+    fn add_mdr(&mut self, placed: Placed<'_>, model: &MdrModel, out: &mut ViewScene) {
+        let mdr = &model.mdr;
+        let Some((frames, level)) = self.frames_in_sight(&placed, &mdr.frames, mdr.lods.len())
+        else {
+            return;
+        };
+        let (Some(surfaces), Some(materials)) = (mdr.lods.get(level), model.materials.get(level))
+        else {
+            return;
+        };
+        let Some(frame) = mdr.frames.get(frames.new) else {
+            return;
+        };
+        let placed = self.place(placed, frame.local_origin, frame.radius, out);
+        let mut bones = std::mem::take(&mut self.scratch.bones);
+        mdr.pose(frames.new, frames.old, frames.backlerp, &mut bones);
+        for (surface, own) in surfaces.iter().zip(materials) {
+            let own = std::slice::from_ref(own);
+            self.add_surface(&placed, &surface.name, own, out, |out| {
+                append_mdr(surface, &bones, out);
+            });
+        }
+        self.scratch.bones = bones;
+    }
+
+    fn add_iqm(&mut self, placed: Placed<'_>, model: &IqmModel, out: &mut ViewScene) {
+        let iqm = &model.iqm;
+        let frames = Frames::of(placed.entity, iqm.num_frames.max(iqm.bounds.len()));
+        let bounds = |frame: usize| {
+            let &(mins, maxs) = iqm.bounds.get(frame)?;
+            Some(Bounds { mins, maxs })
+        };
+        let new = bounds(frames.new);
+        if let (Some(new), Some(old)) = (new, bounds(frames.old)) {
+            let both = Bounds {
+                mins: new.mins.min(old.mins),
+                maxs: new.maxs.max(old.maxs),
+            };
+            if self.culls_box(placed.entity, &both) {
+                return;
+            }
+        }
+        let around = new.unwrap_or(Bounds {
+            mins: Vec3::splat(-UNKNOWN_SIZE),
+            maxs: Vec3::splat(UNKNOWN_SIZE),
+        });
+        let half = (around.maxs - around.mins) * 0.5;
+        let placed = self.place(placed, around.mins + half, half.length(), out);
+        let mut pose = std::mem::take(&mut self.scratch.bones);
+        let inverse_bind = &model.inverse_bind;
+        let Frames { new, old, backlerp } = frames;
+        iqm.pose(inverse_bind, new, old, backlerp, &mut pose);
+        for (surface, own) in iqm.surfaces.iter().zip(&model.materials) {
+            let own = std::slice::from_ref(own);
+            self.add_surface(&placed, &surface.name, own, out, |out| {
+                append_iqm(iqm, surface, &pose, out);
+            });
+        }
+        self.scratch.bones = pose;
+    }
+
+    /// The frames and the level of detail of a model in sight; `None` for one that is out of sight.
+    fn frames_in_sight(
+        &self,
+        placed: &Placed<'_>,
+        list: &[Frame],
+        levels: usize,
+    ) -> Option<(Frames, usize)> {
+        let entity = placed.entity;
+        let frames = Frames::of(entity, list.len());
+        let frame = list.get(frames.new)?;
+        let old = list.get(frames.old).unwrap_or(frame);
+        let both = Bounds {
+            mins: frame.mins.min(old.mins),
+            maxs: frame.maxs.max(old.maxs),
+        };
+        if self.culls_box(entity, &both) {
+            return None;
+        }
+        let settings = self.input.settings;
+        let level = key_frames::level_of_detail(levels, frame, entity.origin, &self.view, settings);
+        Some((frames, level))
+    }
+
+    /// Lights a model and finds the fog that it is in, by the sphere around it: `middle` is in the model's space but
+    /// is not turned with it, as in the engine.
+    fn place<'e>(
+        &self,
+        placed: Placed<'e>,
+        middle: Vec3,
+        radius: f32,
+        out: &mut ViewScene,
+    ) -> Placed<'e> {
+        let fog = self.world.map_or(0, |world| {
+            world.fog_of_sphere(placed.entity.origin + middle, radius)
+        });
+        Placed {
+            instance: self.push_instance(placed.entity, false, out),
+            fog,
+            ..placed
+        }
+    }
+
+    /// Adds a surface, and its shadow. `append` puts its vertices and triangles at the end of the view's.
+    fn add_surface(
+        &mut self,
+        placed: &Placed<'_>,
+        name: &str,
+        own: &[u32],
+        out: &mut ViewScene,
+        append: impl Fn(&mut ViewScene),
+    ) {
+        let materials = self.input.materials;
+        let asked = self.surface_material(placed.entity, name, own);
+        // only opaque surfaces outside of fog cast a planar shadow
+        let opaque = materials.get(asked).sort == shaderscript::sort::OPAQUE;
+        let shadow = placed.shadow.filter(|_| opaque && placed.fog == 0);
+        for asked in shadow.into_iter().chain((!placed.hidden).then_some(asked)) {
+            let material = materials.resolve(asked);
+            let raw = RawMesh::begin(out, material, placed.instance, placed.fog);
+            append(out);
+            self.finish_and_list(raw, asked, placed.number, Some(placed.entity), out);
+        }
+    }
+
+    /// The material that an entity casts a planar shadow with, if it casts one (`cg_shadows 3`). Traced views have
+    /// real ones.
+    fn shadow_material(&self, entity: &RefEntity) -> Option<u32> {
+        let casts = self.look == Look::Classic
+            && self.input.settings.shadows == 3
+            && entity.renderfx & renderfx::SHADOW_PLANE != 0
+            && entity.shadow_plane.is_finite();
+        self.input.materials.internal().shadow.filter(|_| casts)
+    }
+
+    /// The material of a model's surface: the entity's own, its skin's, or the model's.
+    fn surface_material(&self, entity: &RefEntity, name: &str, own: &[u32]) -> u32 {
+        let materials = self.input.materials;
+        if entity.custom_shader != 0 {
+            return materials.of_handle(entity.custom_shader);
+        }
+        if let Some(skin) = self.input.skins.get(entity.custom_skin) {
+            return skin.material(name).unwrap_or(0);
+        }
+        let wrapped = usize::try_from(entity.skin_num)
+            .ok()
+            .and_then(|n| n.checked_rem(own.len()));
+        own.get(wrapped.unwrap_or(0)).copied().unwrap_or(0)
+    }
+}
+
+fn append_triangles(base: u32, triangles: &[[u32; 3]], out: &mut Vec<u32>) {
+    out.extend(triangles.iter().flatten().map(|i| base.wrapping_add(*i)));
+}
+
+fn append_mdr(surface: &MdrSurface, bones: &[BoneMatrix], out: &mut ViewScene) {
+    let base = count(out.vertices.len());
+    out.vertices.extend(surface.vertices.iter().map(|vertex| {
+        let (position, normal) = surface.skinned(vertex, bones);
+        Vertex {
+            position,
+            normal,
+            st: vertex.st,
+            color: u32::MAX,
+            ..Vertex::default()
+        }
+    }));
+    append_triangles(base, &surface.triangles, &mut out.indices);
+}
+
+fn append_iqm(iqm: &Iqm, surface: &IqmSurface, pose: &[BoneMatrix], out: &mut ViewScene) {
+    let base = count(out.vertices.len());
+    let vertices = iqm.surface_vertices(surface).iter();
+    out.vertices.extend(vertices.map(|vertex| {
+        let (position, normal) = vertex.skinned(pose);
+        Vertex {
+            position,
+            normal,
+            st: vertex.st,
+            color: u32::from_le_bytes(vertex.color),
+            ..Vertex::default()
+        }
+    }));
+    append_triangles(base, &surface.triangles, &mut out.indices);
+}
