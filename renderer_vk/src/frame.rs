@@ -3,7 +3,7 @@
 use glam::{Mat4, Vec3, Vec4};
 
 use crate::assets::Assets;
-use crate::gpu::{self, Image, Recorder};
+use crate::gpu::{self, ColorMask, Image, Recorder};
 use crate::raster::{Aids, DrawList, Overlay, Raster, Target, ViewParameters, overlay_instance};
 use crate::scene::ViewScene;
 use crate::settings::Settings;
@@ -94,10 +94,12 @@ impl FrameContext<'_> {
             viewport: [0, 0, width as i32, height as i32],
             clear_depth: false,
             clear_color: None,
+            shadows: None,
         };
         let target = Target {
             color: self.color,
             depth: self.depth,
+            mask: ColorMask::ALL,
         };
         self.raster
             .record(recorder, "overlay", target, self.list, &parameters)
@@ -132,10 +134,12 @@ impl FrameContext<'_> {
             viewport: view.viewport,
             clear_depth: true,
             clear_color: clear_color(scene, settings),
+            shadows: Some((&scene.shadows, view)),
         };
         let target = Target {
             color: self.color,
             depth: self.depth,
+            mask: ColorMask::ALL,
         };
         self.raster
             .record(recorder, "classic", target, self.list, &parameters)

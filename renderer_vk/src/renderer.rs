@@ -106,7 +106,7 @@ impl Renderer {
             }
             None => (Device::new(&device_options, SurfaceSource::Headless)?, None),
         };
-        let (color, depth) = frame_images(&device, options.width, options.height)?;
+        let (color, depth) = frame_images(&device, options.width, options.height, false)?;
         let present = match &swapchain {
             Some(swapchain) => Some(Present::new(&device, swapchain.format())?),
             None => None,
@@ -158,7 +158,8 @@ impl Renderer {
         if (width, height) == (self.color.width(), self.color.height()) {
             return Ok(());
         }
-        (self.color, self.depth) = frame_images(&self.device, width, height)?;
+        let stencil = self.depth.format().has_stencil();
+        (self.color, self.depth) = frame_images(&self.device, width, height, stencil)?;
         if let Some(swapchain) = &mut self.swapchain {
             swapchain.resize(width, height, self.settings.swap_interval != 0);
         }
@@ -458,8 +459,20 @@ impl Renderer {
         Ok(stats)
     }
 
+    /// The depth image has a stencil while shadow volumes are drawn.
+    fn fit_depth(&mut self) -> Result<(), Error> {
+        let stencil = self.settings.shadows == 2;
+        if stencil != self.depth.format().has_stencil()
+            && (!stencil || self.device.depth_stencil_format().is_some())
+        {
+            self.depth = depth_image(&self.device, self.size(), stencil)?;
+        }
+        Ok(())
+    }
+
     fn flush(&mut self, show: bool) -> Result<FrameStats, Error> {
         self.queue_overlay();
+        self.fit_depth()?;
         let mut stats = FrameStats::default();
         let mut recorder = self.ring.begin()?;
         if let Some(assets) = &mut self.assets {
@@ -684,7 +697,24 @@ fn device_options(prefer: Option<&str>, validation: bool) -> DeviceOptions {
     }
 }
 
-fn frame_images(device: &Device, width: u32, height: u32) -> Result<(Image, Image), Error> {
+/// The depth image of a frame; with a stencil if that is asked for and the device has one.
+fn depth_image(
+    device: &Device,
+    (width, height): (u32, u32),
+    stencil: bool,
+) -> Result<Image, Error> {
+    let format = device.depth_stencil_format().filter(|_| stencil);
+    let format = format.unwrap_or(raster::DEPTH_FORMAT);
+    let desc = ImageDesc::new("frame depth", width, height, format, ImageUsage::DEPTH);
+    Ok(Image::new(device, &desc)?)
+}
+
+fn frame_images(
+    device: &Device,
+    width: u32,
+    height: u32,
+    stencil: bool,
+) -> Result<(Image, Image), Error> {
     let (width, height) = (width.max(1), height.max(1));
     let color = Image::new(
         device,
@@ -698,16 +728,7 @@ fn frame_images(device: &Device, width: u32, height: u32) -> Result<(Image, Imag
             ImageUsage::COLOR | ImageUsage::STORAGE,
         ),
     )?;
-    let depth = Image::new(
-        device,
-        &ImageDesc::new(
-            "frame depth",
-            width,
-            height,
-            raster::DEPTH_FORMAT,
-            ImageUsage::DEPTH,
-        ),
-    )?;
+    let depth = depth_image(device, (width, height), stencil)?;
     // neither the game nor the engine clears the picture before it is first seen
     device.immediate(|recorder| {
         let mut pass = recorder.pass(

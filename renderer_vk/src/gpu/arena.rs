@@ -121,4 +121,18 @@ impl UploadArena {
         slice.bytes().copy_from_slice(source);
         Ok(slice.address)
     }
+
+    /// Copies indices and returns where they are, for [`Pass::bind_index_buffer`](super::Pass::bind_index_buffer).
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn push_indices(&mut self, indices: &[u32]) -> Result<(Buffer, u64), Error> {
+        let source: &[u8] = bytemuck::cast_slice(indices);
+        // an empty piece would have no buffer to bind
+        let mut slice = self.alloc(source.len().max(4) as u64, ALIGN)?;
+        if let Some(out) = slice.bytes().get_mut(..source.len()) {
+            out.copy_from_slice(source);
+        }
+        Ok((slice.buffer.clone(), slice.offset))
+    }
 }

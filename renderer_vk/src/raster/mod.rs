@@ -8,7 +8,9 @@ mod list;
 mod overlay;
 mod pipelines;
 mod present;
+mod shadows;
 pub(crate) mod sky;
+mod target;
 
 use glam::{Mat4, Vec3};
 use shaders::types::{Instance, MaterialBuffers, RasterLight, RasterView};
@@ -16,25 +18,19 @@ use shaders::types::{Instance, MaterialBuffers, RasterLight, RasterView};
 pub use list::{Aids, DrawList};
 pub use overlay::{Overlay, Picture2d, overlay_instance};
 pub use present::Present;
+pub use target::Target;
 
 use crate::api::DynamicLight;
 use crate::gpu::{self, Device, Format, Image, Recorder, Rendering, Viewport};
+use crate::scene::{ShadowVolumes, View};
 use list::DepthRange;
 use pipelines::Pipelines;
+use shadows::Shadows;
 
 /// Format of the frame's colour image.
 pub const COLOR_FORMAT: Format = Format::Rgba8;
 /// Format of the frame's depth image.
 pub const DEPTH_FORMAT: Format = Format::D32F;
-
-/// Where a view is drawn.
-#[derive(Clone, Copy)]
-pub struct Target<'a> {
-    /// Colour, RGBA8.
-    pub color: &'a Image,
-    /// Depth.
-    pub depth: &'a Image,
-}
 
 /// What a draw list needs besides itself.
 pub struct ViewParameters<'a> {
@@ -64,18 +60,24 @@ pub struct ViewParameters<'a> {
     pub clear_depth: bool,
     /// Colour that the viewport is filled with first.
     pub clear_color: Option<[f32; 4]>,
+    /// Shadow volumes with the view that they are seen in; without effect unless the depth image has a stencil.
+    pub shadows: Option<(&'a ShadowVolumes, &'a View)>,
 }
 
 /// Draws [`DrawList`]s.
 pub struct Raster {
+    device: Device,
     pipelines: Pipelines,
+    shadows: Shadows,
 }
 
 impl Raster {
     /// Makes the shared objects; pipelines follow when first used.
     pub fn new(device: &Device) -> Self {
         Self {
-            pipelines: Pipelines::new(device, COLOR_FORMAT, DEPTH_FORMAT, (-1.0, -2.0)),
+            device: device.clone(),
+            pipelines: Pipelines::new(device, (-1.0, -2.0)),
+            shadows: Shadows::default(),
         }
     }
 
@@ -96,8 +98,9 @@ impl Raster {
         list: &DrawList,
         p: &ViewParameters<'_>,
     ) -> Result<(), gpu::Error> {
+        let kind = target.kind();
         for call in &list.calls {
-            self.pipelines.prepare(call.state)?;
+            self.pipelines.prepare(kind, call.state)?;
         }
         let lights: Vec<RasterLight> = p
             .lights
@@ -125,13 +128,15 @@ impl Raster {
             lights: arena.push(&lights)?,
         };
         let view = arena.push(&[view])?;
-        let (index_buffer, index_offset) = {
-            let bytes: &[u8] = bytemuck::cast_slice(&list.indices);
-            let mut slice = arena.alloc(bytes.len().max(4) as u64, 16)?;
-            if let Some(out) = slice.bytes().get_mut(..bytes.len()) {
-                out.copy_from_slice(bytes);
+        let (index_buffer, index_offset) = arena.push_indices(&list.indices)?;
+        let shadows = match p.shadows {
+            Some((volumes, view)) if kind.depth.has_stencil() && !volumes.ranges.is_empty() => {
+                let uploaded = self
+                    .shadows
+                    .prepare(recorder, &self.device, kind, volumes)?;
+                Some((uploaded, volumes, view))
             }
-            (slice.buffer().clone(), slice.offset)
+            _ => None,
         };
 
         let mut pass = recorder.pass(name, gpu::Access::GRAPHICS, gpu::Access::GRAPHICS)?;
@@ -152,12 +157,15 @@ impl Raster {
         if p.clear_depth {
             pass.clear_depth_rect([x, y, width, height], 1.0);
         }
+        if shadows.is_some() {
+            pass.clear_stencil_rect([x, y, width, height]);
+        }
         pass.bind_index_buffer(&index_buffer, index_offset);
         let mut state = None;
         let mut range = None;
         for call in &list.calls {
             if state != Some(call.state) {
-                let Some(pipeline) = self.pipelines.get(&call.state) else {
+                let Some(pipeline) = self.pipelines.get(kind, call.state) else {
                     continue;
                 };
                 pass.bind_graphics(pipeline);
@@ -183,6 +191,9 @@ impl Raster {
                 range = Some(call.range);
             }
             pass.draw_indexed(call.index_count, 1, call.first_index, 0, call.draw);
+        }
+        if let Some((uploaded, volumes, view)) = &shadows {
+            self.shadows.draw(&mut pass, kind, uploaded, volumes, view);
         }
         Ok(())
     }

@@ -4,9 +4,8 @@ use std::collections::HashMap;
 
 use shaders::types::constants as c;
 
-use crate::gpu::{
-    self, BlendFactor, Cull, DepthTest, Device, Format, GraphicsDesc, GraphicsPipeline,
-};
+use super::target::TargetKind;
+use crate::gpu::{self, BlendFactor, Cull, DepthTest, Device, GraphicsDesc, GraphicsPipeline};
 
 /// Fixed-function state of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -66,19 +65,15 @@ fn factor(blend: u32) -> BlendFactor {
 /// All pipelines made so far.
 pub struct Pipelines {
     device: Device,
-    color: Format,
-    depth: Format,
     offset: (f32, f32),
-    made: HashMap<State, GraphicsPipeline>,
+    made: HashMap<(TargetKind, State), GraphicsPipeline>,
 }
 
 impl Pipelines {
-    /// For targets of these formats; `offset` is the decals' factor and units.
-    pub fn new(device: &Device, color: Format, depth: Format, offset: (f32, f32)) -> Self {
+    /// None yet; `offset` is the decals' factor and units.
+    pub fn new(device: &Device, offset: (f32, f32)) -> Self {
         Self {
             device: device.clone(),
-            color,
-            depth,
             offset,
             made: HashMap::new(),
         }
@@ -88,7 +83,7 @@ impl Pipelines {
     pub fn set_offset(&mut self, offset: (f32, f32)) {
         if self.offset != offset {
             self.offset = offset;
-            self.made.retain(|state, _| !state.offset);
+            self.made.retain(|(_, state), _| !state.offset);
         }
     }
 
@@ -96,15 +91,17 @@ impl Pipelines {
     ///
     /// # Errors
     /// The device cannot make it.
-    pub fn prepare(&mut self, state: State) -> Result<(), gpu::Error> {
-        if self.made.contains_key(&state) {
+    pub fn prepare(&mut self, target: TargetKind, state: State) -> Result<(), gpu::Error> {
+        if self.made.contains_key(&(target, state)) {
             return Ok(());
         }
         let pipeline = GraphicsPipeline::new(
             &self.device,
             &GraphicsDesc {
-                color: Some(self.color),
-                depth: Some(self.depth),
+                color: Some(target.color),
+                depth: Some(target.depth),
+                samples: target.samples,
+                color_write: target.mask,
                 blend: state.blend.map(|(s, d)| (factor(s), factor(d))),
                 depth_test: match state.depth {
                     Depth::Always => DepthTest::Always,
@@ -127,12 +124,12 @@ impl Pipelines {
                 )
             },
         )?;
-        self.made.insert(state, pipeline);
+        self.made.insert((target, state), pipeline);
         Ok(())
     }
 
     /// The pipeline of a prepared state.
-    pub fn get(&self, state: &State) -> Option<&GraphicsPipeline> {
-        self.made.get(state)
+    pub fn get(&self, target: TargetKind, state: State) -> Option<&GraphicsPipeline> {
+        self.made.get(&(target, state))
     }
 }

@@ -9,7 +9,7 @@ use super::entity;
 use super::mesh::{self, DeformScratch, RawMesh};
 use super::portal;
 use super::surfaces::{self, LocalView, PendingDeform, SurfaceRun, WORLD_ENTITY, sort_key};
-use super::{DynamicMesh, GatherInput, Look, Scene, View, ViewScene};
+use super::{DynamicMesh, GatherInput, Look, Scene, ShadowVolumes, View, ViewScene};
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
 use crate::world::{Bounds, VisibleQuery, VisibleSet, WorldData};
 
@@ -67,6 +67,7 @@ fn empty_view(def: &RefDef, view: View) -> ViewScene {
         portals: Vec::new(),
         has_world: false,
         skies: Vec::new(),
+        shadows: ShadowVolumes::default(),
     }
 }
 
@@ -160,6 +161,7 @@ impl<'a> Gatherer<'a> {
         out.portals.clear();
         out.has_world = self.world.is_some();
         out.skies.clear();
+        out.shadows.clear();
         out.instances
             .push(entity::world_instance(&self.view, out.time));
     }

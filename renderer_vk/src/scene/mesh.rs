@@ -48,6 +48,22 @@ impl RawMesh {
     }
 }
 
+impl ViewScene {
+    /// Adds the shadow volumes of a mesh, before it is deformed.
+    pub(super) fn add_shadow_volumes(&mut self, raw: &RawMesh) {
+        let (Some(instance), Some(vertices), Some(indices), Ok(base)) = (
+            self.instances.get(raw.instance as usize),
+            self.vertices.get(raw.first_vertex..),
+            self.indices.get(raw.first_index..),
+            u32::try_from(raw.first_vertex),
+        ) else {
+            return;
+        };
+        self.shadows
+            .add(raw.instance, instance, vertices, indices, base);
+    }
+}
+
 /// Deforms what was appended since `raw` began, and lists it. `None` when nothing is left of it, or some
 /// position is not a number.
 pub(super) fn finish(

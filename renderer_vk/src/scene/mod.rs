@@ -12,6 +12,7 @@ mod lighting;
 mod mesh;
 mod models;
 mod portal;
+mod shadow_volumes;
 mod shapes;
 mod surfaces;
 pub mod view;
@@ -25,6 +26,7 @@ use crate::assets::{Assets, Materials, Models, Skins};
 use crate::settings::Settings;
 use crate::world::{VisibleSet, World, WorldData};
 pub use lighting::light_for_point;
+pub use shadow_volumes::ShadowVolumes;
 pub use view::View;
 
 /// Where a surface's triangles are.
@@ -148,6 +150,8 @@ pub struct ViewScene {
     pub has_world: bool,
     /// Materials of the skies in sight, each once.
     pub skies: Vec<u32>,
+    /// Shadow volumes of models (classic look, `cg_shadows 2`).
+    pub shadows: ShadowVolumes,
 }
 
 /// Which of the two looks a view is gathered for.

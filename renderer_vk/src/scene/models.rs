@@ -204,13 +204,17 @@ impl Gatherer<'_> {
     ) {
         let materials = self.input.materials;
         let asked = self.surface_material(placed.entity, name, own);
-        // only opaque surfaces outside of fog cast a planar shadow
+        // only opaque surfaces outside of fog cast shadows
         let opaque = materials.get(asked).sort == shaderscript::sort::OPAQUE;
         let shadow = placed.shadow.filter(|_| opaque && placed.fog == 0);
+        let volumes = opaque && placed.fog == 0 && self.casts_volumes(placed.entity);
         for asked in shadow.into_iter().chain((!placed.hidden).then_some(asked)) {
             let material = materials.resolve(asked);
             let raw = RawMesh::begin(out, material, placed.instance, placed.fog);
             append(out);
+            if volumes && Some(asked) != shadow {
+                out.add_shadow_volumes(&raw);
+            }
             self.finish_and_list(raw, asked, placed.number, Some(placed.entity), out);
         }
     }
@@ -223,6 +227,13 @@ impl Gatherer<'_> {
             && entity.renderfx & renderfx::SHADOW_PLANE != 0
             && entity.shadow_plane.is_finite();
         self.input.materials.internal().shadow.filter(|_| casts)
+    }
+
+    /// Whether an entity casts shadow volumes (`cg_shadows 2`).
+    fn casts_volumes(&self, entity: &RefEntity) -> bool {
+        self.look == Look::Classic
+            && self.input.settings.shadows == 2
+            && entity.renderfx & (renderfx::NO_SHADOW | renderfx::DEPTH_HACK) == 0
     }
 
     /// The material of a model's surface: the entity's own, its skin's, or the model's.

@@ -440,6 +440,47 @@ fn models_cast_planar_shadows_when_asked() {
 }
 
 #[test]
+fn opaque_models_cast_shadow_volumes_when_asked() {
+    let mut game = game();
+    let thing = game.model("m/thing.md3");
+    let world = room(&mut game);
+    let standing = RefEntity {
+        model: thing,
+        origin: Vec3::new(0.0, 100.0, 0.0),
+        ..entity(EntityKind::Model)
+    };
+    let volumes = |game: &Registration, entity: RefEntity, look| {
+        let mut scene = Scene::new();
+        scene.add_entity(&entity);
+        let views = gather(&mut scene, game, Some(&world), &def(), look);
+        views.last().unwrap().shadows.ranges.clone()
+    };
+    assert!(volumes(&game, standing, Look::Classic).is_empty());
+    game.settings.shadows = 2;
+    // one triangle that the sun meets from behind: three sides, two triangles each
+    assert_eq!(volumes(&game, standing, Look::Classic), [(0, 18)]);
+    assert!(volumes(&game, standing, Look::Traced).is_empty());
+    let flags = [
+        renderfx::NO_SHADOW,
+        renderfx::DEPTH_HACK,
+        renderfx::THIRD_PERSON,
+    ];
+    for renderfx in flags {
+        let entity = RefEntity {
+            renderfx,
+            ..standing
+        };
+        assert!(volumes(&game, entity, Look::Classic).is_empty());
+    }
+    // its second material blends
+    let glass = RefEntity {
+        skin_num: 1,
+        ..standing
+    };
+    assert!(volumes(&game, glass, Look::Classic).is_empty());
+}
+
+#[test]
 fn brush_models_move_with_their_entity() {
     let mut game = game();
     let world = room(&mut game);

@@ -11,7 +11,7 @@ use crate::gpu::{
     Buffer, BufferUsage, Device, DeviceOptions, Filter, Format, FrameRing, Image, ImageDesc,
     ImageUsage, MipFilter, SamplerDesc, SurfaceSource, Wrap,
 };
-use crate::scene::{DynamicMesh, Portal, Submodel, View, ViewScene};
+use crate::scene::{DynamicMesh, Portal, ShadowVolumes, Submodel, View, ViewScene};
 use crate::settings::Settings;
 use crate::trace::geometry::StaticGeometry;
 use crate::trace::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
@@ -487,6 +487,7 @@ impl Scene {
             portals: self.portals.clone(),
             has_world: true,
             skies: Vec::new(),
+            shadows: ShadowVolumes::default(),
         }
     }
 
