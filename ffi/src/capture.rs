@@ -5,8 +5,7 @@
 
 use crate::boundary::Failure;
 use crate::ioq3::abi::AVI_LINE_PADDING;
-use image::ExtendedColorType;
-use image::codecs::jpeg::JpegEncoder;
+use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 use renderer_vk::api::Picture;
 
 /// File format of a screenshot.
@@ -129,27 +128,33 @@ pub fn tga(picture: &Picture) -> Result<Vec<u8>, Failure> {
     Ok(file)
 }
 
-/// A JPEG file. Chroma is never subsampled: the encoder has no such mode, and at the engine's usual qualities (85 and
-/// more) the engine's own renderer does not do it either.
+/// From this quality on chroma has a sample for each pixel; below it one for four, as in the engine's own renderer.
+const FULL_CHROMA_QUALITY: u8 = 85;
+
+/// A JPEG file; a quality out of 1 to 100 counts as the nearest one.
 ///
 /// # Errors
 /// When the picture is larger than the format's 65535 pixels a side.
 pub fn jpeg(picture: &Picture, quality: i32) -> Result<Vec<u8>, Failure> {
+    let failed = |reason: String| {
+        Failure::drop(format!(
+            "cannot write a JPEG of {}x{} pixels: {reason}",
+            picture.width, picture.height
+        ))
+    };
+    let side = |n: u32| u16::try_from(n).map_err(|_| failed("it is too large".into()));
+    let (width, height) = (side(picture.width)?, side(picture.height)?);
     let mut file = Vec::new();
     let quality = u8::try_from(quality.clamp(1, 100)).unwrap_or(100);
-    JpegEncoder::new_with_quality(&mut file, quality)
-        .encode(
-            &picture.rgb,
-            picture.width,
-            picture.height,
-            ExtendedColorType::Rgb8,
-        )
-        .map_err(|e| {
-            Failure::drop(format!(
-                "cannot write a JPEG of {}x{} pixels: {e}",
-                picture.width, picture.height
-            ))
-        })?;
+    let mut encoder = Encoder::new(&mut file, quality);
+    encoder.set_sampling_factor(if quality >= FULL_CHROMA_QUALITY {
+        SamplingFactor::F_1_1
+    } else {
+        SamplingFactor::F_2_2
+    });
+    encoder
+        .encode(&picture.rgb, width, height, ColorType::Rgb)
+        .map_err(|e| failed(e.to_string()))?;
     Ok(file)
 }
 
@@ -284,11 +289,14 @@ mod tests {
             .sum();
         assert!(error / (32 * 24 * 3) < 6, "mean error {error}");
         assert!(jpeg(&picture, -5).is_ok());
-        // The frame header's sampling factors: every component 1x1.
-        let frame = file.windows(2).position(|w| w == [0xFF, 0xC0]).unwrap();
-        for component in 0..3 {
-            assert_eq!(file[frame + 11 + component * 3], 0x11);
-        }
+        // The frame header's sampling factors.
+        let factors = |file: &[u8]| {
+            let frame = file.windows(2).position(|w| w == [0xFF, 0xC0]).unwrap();
+            [0, 1, 2].map(|component| file[frame + 11 + component * 3])
+        };
+        assert_eq!(factors(&file), [0x11; 3]);
+        assert_eq!(factors(&jpeg(&picture, 85).unwrap()), [0x11; 3]);
+        assert_eq!(factors(&jpeg(&picture, 84).unwrap()), [0x22, 0x11, 0x11]);
     }
 
     #[test]

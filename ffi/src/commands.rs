@@ -56,46 +56,35 @@ fn print_lines(make: impl FnOnce(&mut Renderer, &mut Front, &[String]) -> Vec<St
     });
 }
 
-/// Adds how many there are; lines that begin with a space belong to the one before.
-fn counted(mut lines: Vec<String>, what: &str) -> Vec<String> {
-    let count = lines.iter().filter(|line| !line.starts_with(' ')).count();
-    lines.push("------------------".into());
-    lines.push(format!("{count} {what}"));
-    lines
-}
-
 extern "C" fn image_list() {
-    print_lines(|renderer, _, _| {
-        let mut lines = renderer.image_list();
-        let count = lines.len();
-        lines.push("------------------".into());
-        lines.push(format!("{count} images"));
-        lines
-    });
+    print_lines(|renderer, _, _| renderer.image_list());
 }
 
 extern "C" fn shader_list() {
     // Any argument asks for the order in which they are drawn.
-    print_lines(|renderer, _, arguments| {
-        counted(renderer.shader_list(arguments.len() > 1), "shaders")
-    });
+    print_lines(|renderer, _, arguments| renderer.shader_list(arguments.len() > 1));
 }
 
 extern "C" fn skin_list() {
-    print_lines(|renderer, _, _| counted(renderer.skin_list(), "skins"));
+    print_lines(|renderer, _, _| renderer.skin_list());
 }
 
 extern "C" fn model_list() {
-    print_lines(|renderer, _, _| counted(renderer.model_list(), "models"));
+    print_lines(|renderer, _, _| renderer.model_list());
 }
 
 extern "C" fn mode_list() {
-    print_lines(|_, _, _| {
-        MODES
-            .iter()
-            .enumerate()
-            .map(|(number, (name, ..))| format!("Mode {number:2}: {name}"))
-            .collect()
+    // Not a list of what is registered: it works before anything is.
+    entry(|| {
+        let Some(engine) = Engine::current() else {
+            return Ok(());
+        };
+        engine.say("\n");
+        for (number, (name, ..)) in MODES.iter().enumerate() {
+            engine.say(&format!("Mode {number:2}: {name}\n"));
+        }
+        engine.say("\n");
+        Ok(())
     });
 }
 
@@ -146,30 +135,54 @@ extern "C" fn lights() {
 
 extern "C" fn gfx_info() {
     print_lines(|renderer, front, _| {
-        let strings = crate::config::DeviceStrings::new(renderer.device_info());
+        let info = renderer.device_info();
+        let strings = crate::config::DeviceStrings::new(info);
         let (width, height) = front.size;
         let settings = &front.settings;
+        let refresh = window::current().map_or(0, |window| window.refresh_rate());
+        let mode = front.cvars.as_ref().map_or(0, |c| c.integer(Cvar::Mode));
+        let aids = if settings.anisotropy > 1.0 {
+            format!(
+                "{:.0}x",
+                settings.anisotropy.min(info.anisotropy.unwrap_or(1.0))
+            )
+        } else {
+            "disabled".into()
+        };
         vec![
             String::new(),
             format!("VENDOR: {}", strings.vendor),
             format!("RENDERER: {}", strings.renderer),
             format!("VERSION: {}", strings.version),
             format!("EXTENSIONS: {}", strings.extensions),
+            format!("MAX_TEXTURE_SIZE: {}", info.max_image_size),
+            String::new(),
+            "PIXELFORMAT: color(32-bits) Z(32-bit float)".into(),
             format!(
-                "MODE: {width} x {height} {}",
+                "MODE: {mode}, {width} x {height} {} hz:{}",
                 if front.fullscreen {
                     "fullscreen"
                 } else {
                     "windowed"
+                },
+                if refresh > 0 {
+                    refresh.to_string()
+                } else {
+                    "N/A".into()
                 }
             ),
             format!(
-                "GAMMA: {} applied to the picture, {} overbright bits",
-                settings.gamma,
+                "GAMMA: {} w/ {} overbright bits",
+                if settings.ignore_hw_gamma {
+                    "in textures"
+                } else {
+                    "applied to the picture"
+                },
                 settings.effective_overbright_bits()
             ),
             format!("texturemode: {}", settings.texture_mode),
             format!("picmip: {}", settings.picmip),
+            format!("anisotropic filtering: {aids}"),
             format!("look: {}", if settings.rt { "traced" } else { "classic" }),
         ]
     });
@@ -218,7 +231,8 @@ fn screenshot(format: Format) -> Result<(), Failure> {
         return Ok(());
     }
     let silent = argument == "silent";
-    let path = if !argument.is_empty() && !silent {
+    // A name counts only alone; anything after it makes it one of the numbered pictures.
+    let path = if arguments.len() == 2 && !argument.is_empty() && !silent {
         Some(format!("screenshots/{argument}.{}", format.extension()))
     } else {
         let exists =
@@ -271,15 +285,6 @@ pub fn video_quality(front: &Front) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn lists_end_with_a_count_of_what_they_list() {
-        let lines = ["a", "   of a", "b"].map(String::from).to_vec();
-        let all = counted(lines, "skins");
-        assert_eq!(all.last().map(String::as_str), Some("2 skins"));
-        assert_eq!(all.len(), 5);
-        assert_eq!(counted(Vec::new(), "skins").len(), 2);
-    }
 
     #[test]
     fn level_shots_are_named_after_the_map() {

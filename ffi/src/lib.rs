@@ -30,6 +30,7 @@ mod files;
 mod ioq3;
 mod logging;
 mod session;
+mod speeds;
 mod window;
 
 use ioq3::abi::{refexport_t, refimport_t};

@@ -17,6 +17,7 @@ mod test_support;
 pub mod trace;
 pub mod world;
 
+pub use assets::is_texture_mode;
 pub use error::Error;
 pub use renderer::{FrameStats, Renderer, RendererOptions, probe};
 pub use settings::{LightSampling, Settings};

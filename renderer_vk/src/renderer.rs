@@ -17,7 +17,7 @@ use crate::gpu::{
     Swapchain, SwapchainDesc, Window,
 };
 use crate::raster::{self, DrawList, Overlay, Picture2d, Present, Raster};
-use crate::scene::{Look, Scene};
+use crate::scene::{Look, Scene, Statistics};
 use crate::settings::Settings;
 use crate::trace::TraceLook;
 use crate::world::{EntityTokens, World, mark_fragments};
@@ -45,6 +45,8 @@ pub struct FrameStats {
     pub views: u32,
     /// Draw calls of the classic look and the overlay.
     pub draws: u32,
+    /// What the views of the classic look show; counted only with `r_speeds`.
+    pub scene: Statistics,
 }
 
 /// The renderer: one device, one window or none, and what the game has registered.
@@ -267,6 +269,9 @@ impl Renderer {
     pub fn set_settings(&mut self, settings: &Settings) {
         if self.settings != *settings {
             self.settings.clone_from(settings);
+            if let Some(assets) = &mut self.assets {
+                assets.set_settings(settings);
+            }
             self.raster
                 .set_offset(settings.offset_factor, settings.offset_units);
         }
@@ -298,6 +303,10 @@ impl Renderer {
     /// [`Error::NoWorld`]: there is no map, and the view wants one. An entity has a kind that cannot be drawn.
     pub fn render_scene(&mut self, def: &RefDef) -> Result<(), Error> {
         let wants_world = def.flags & rdflags::NO_WORLD_MODEL == 0;
+        if self.settings.no_refresh {
+            self.scene.clear();
+            return Ok(());
+        }
         if wants_world && self.world.is_none() {
             return Err(Error::NoWorld);
         }
@@ -454,6 +463,12 @@ impl Renderer {
     /// # Errors
     /// The device is lost or out of memory.
     pub fn end_frame(&mut self) -> Result<FrameStats, Error> {
+        if self.settings.skip_back_end {
+            self.queue_overlay();
+            self.recycle_queue();
+            self.scene.end_frame();
+            return Ok(FrameStats::default());
+        }
         let stats = self.flush(true)?;
         self.scene.end_frame();
         Ok(stats)
@@ -468,6 +483,20 @@ impl Renderer {
             self.depth = depth_image(&self.device, self.size(), stencil)?;
         }
         Ok(())
+    }
+
+    /// Forgets what is queued; its memory is used again.
+    fn recycle_queue(&mut self) {
+        for item in self.queue.drain(..) {
+            match item {
+                Item::Overlay(mut overlay, _) => {
+                    overlay.clear();
+                    self.spare_overlays.push(overlay);
+                }
+                Item::Classic(scenes) => self.scene.recycle(scenes),
+                Item::Traced(scene) => self.scene.recycle([*scene]),
+            }
+        }
     }
 
     fn flush(&mut self, show: bool) -> Result<FrameStats, Error> {
@@ -489,20 +518,16 @@ impl Renderer {
             };
             for item in &self.queue {
                 context.record(&mut recorder, item)?;
+                if let Item::Classic(scenes) = item {
+                    for scene in scenes {
+                        stats.scene.add(&scene.statistics);
+                    }
+                }
                 stats.views += u32::from(!matches!(item, Item::Overlay(..)));
                 stats.draws += context.list.calls.len() as u32;
             }
         }
-        for item in self.queue.drain(..) {
-            match item {
-                Item::Overlay(mut overlay, _) => {
-                    overlay.clear();
-                    self.spare_overlays.push(overlay);
-                }
-                Item::Classic(scenes) => self.scene.recycle(scenes),
-                Item::Traced(scene) => self.scene.recycle([*scene]),
-            }
-        }
+        self.recycle_queue();
         match &mut self.swapchain {
             Some(swapchain) if show => {
                 if let Some(target) = swapchain.acquire(&mut recorder)? {

@@ -108,10 +108,7 @@ impl Registration {
         let mut textures = FakeTextures::new(Arc::clone(&files));
         let materials = Materials::new(
             Arc::clone(&scripts),
-            MaterialSettings {
-                detail_textures: settings.detail_textures,
-                vertex_light: settings.vertex_light,
-            },
+            MaterialSettings::new(&settings),
             &mut textures,
         );
         Self {

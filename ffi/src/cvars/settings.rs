@@ -2,7 +2,7 @@
 
 use super::{Cvar, Cvars};
 use crate::ioq3::engine::Engine;
-use renderer_vk::{LightSampling, Settings};
+use renderer_vk::{LightSampling, Settings, is_texture_mode};
 
 /// A count: negative is 0.
 fn count(cvars: &Cvars, cvar: Cvar) -> u32 {
@@ -42,13 +42,22 @@ pub fn apply(cvars: &Cvars, window_fullscreen: bool, settings: &mut Settings) {
     settings.detail_textures = flag(Cvar::DetailTextures);
     settings.intensity = value(Cvar::Intensity).max(1.0);
     settings.greyscale = value(Cvar::Greyscale).clamp(0.0, 1.0);
+    settings.color_mip_levels = flag(Cvar::ColorMipLevels);
+    settings.single_shader = flag(Cvar::SingleShader);
+    settings.print_shaders = flag(Cvar::PrintShaders);
+    settings.lightmap_heat = integer(Cvar::Lightmap) == 2;
     settings.anisotropy = if flag(Cvar::ExtTextureFilterAnisotropic) {
         value(Cvar::ExtMaxAnisotropy).max(1.0)
     } else {
         0.0
     };
     if cvars.modified(Cvar::TextureMode) {
-        settings.texture_mode = cvars.string(Cvar::TextureMode);
+        let mode = cvars.string(Cvar::TextureMode);
+        if is_texture_mode(&mode) {
+            settings.texture_mode = mode;
+        } else {
+            log::info!("bad filter name");
+        }
         cvars.seen(Cvar::TextureMode);
     }
     settings.map_overbright_bits = count(cvars, Cvar::MapOverBrightBits);
@@ -78,6 +87,13 @@ pub fn apply(cvars: &Cvars, window_fullscreen: bool, settings: &mut Settings) {
     settings.no_curves = flag(Cvar::NoCurves);
     // r_fastsky 1 takes the portals away as well, any higher value keeps them.
     settings.no_portals = flag(Cvar::NoPortals) || integer(Cvar::FastSky) == 1;
+    settings.portal_only = flag(Cvar::PortalOnly);
+    settings.no_refresh = flag(Cvar::NoRefresh);
+    settings.skip_back_end = flag(Cvar::SkipBackEnd);
+    settings.face_plane_cull = flag(Cvar::FacePlaneCull);
+    settings.debug_sort = integer(Cvar::DebugSort);
+    settings.show_cluster = integer(Cvar::Showcluster);
+    settings.debug_light = flag(Cvar::Debuglight);
     settings.clear = flag(Cvar::Clear);
     settings.show_tris = flag(Cvar::ShowTris);
     settings.lightmap = flag(Cvar::Lightmap);

@@ -92,7 +92,10 @@ pub extern "C" fn begin_registration(out: *mut glconfig_t) {
                 return Ok(());
             };
             cvars::apply(&cvars, front.fullscreen, &mut front.settings);
-            front.settings.texture_mode = cvars.string(Cvar::TextureMode);
+            let mode = cvars.string(Cvar::TextureMode);
+            if renderer_vk::is_texture_mode(&mode) {
+                front.settings.texture_mode = mode;
+            }
             front.cvars = Some(cvars);
             front.skip_eye = false;
             front.registered = true;
@@ -314,13 +317,9 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
     take_captures(renderer, front, &mut outbox)?;
     let stats = renderer.end_frame().map_err(failure)?;
     outbox.back_end_ms = milliseconds(start.elapsed());
-    if front.settings.speeds != 0 {
-        let gpu: f32 = renderer.timings().iter().map(|(_, ms)| ms).sum();
-        outbox.lines.push(format!(
-            "{} views, {} draws, {} ms to submit; {gpu:.2} ms on the GPU in an earlier frame",
-            stats.views, stats.draws, outbox.back_end_ms
-        ));
-    }
+    outbox
+        .lines
+        .extend(crate::speeds::lines(&front.settings, &stats, renderer));
     Ok(outbox)
 }
 
@@ -332,6 +331,10 @@ fn take_captures(
 ) -> Result<(), Failure> {
     let shots = std::mem::take(&mut front.captures.shots);
     let video = front.captures.video.take();
+    // Like everything else that is drawn, pictures are left out.
+    if front.settings.skip_back_end {
+        return Ok(());
+    }
     if shots.is_empty() && video.is_none() {
         return Ok(());
     }
@@ -363,7 +366,7 @@ fn take_shot(
             path,
             silent,
         } => (path, capture::jpeg(picture, quality)?, *silent),
-        Shot::Level { path } => (path, capture::tga(&capture::level_shot(picture))?, true),
+        Shot::Level { path } => (path, capture::tga(&capture::level_shot(picture))?, false),
     };
     outbox.files.push((path.clone(), bytes, silent));
     Ok(())

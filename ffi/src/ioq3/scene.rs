@@ -7,7 +7,7 @@ use super::convert;
 use super::engine::{Engine, string_from};
 use super::lifecycle::failure;
 use crate::boundary::{Failure, entry};
-use crate::cvars::Cvar;
+use crate::cvars::{self, Cvar};
 use crate::session::{draw, with_renderer};
 use glam::Vec3;
 use renderer_vk::Renderer;
@@ -65,9 +65,14 @@ pub extern "C" fn load_world(name: *const c_char) {
     entry(|| {
         // SAFETY: the engine passes a C string.
         let name = unsafe { string_from(name) };
-        with_renderer(|renderer, _| {
+        with_renderer(|renderer, front| {
             if renderer.world_name().is_some() {
                 return Err(Failure::drop(format!("{name}: a map is loaded already")));
+            }
+            // The game may have changed a latched setting since the frame began, such as one that its server forbids.
+            if let Some(cvars) = &front.cvars {
+                cvars::apply(cvars, front.fullscreen, &mut front.settings);
+                renderer.set_settings(&front.settings);
             }
             renderer.load_world(&name).map_err(failure)
         })

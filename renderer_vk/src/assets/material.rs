@@ -134,6 +134,15 @@ impl Material {
         !self.shader.deforms.is_empty()
     }
 
+    /// Its name in lists: the default material has one of its own.
+    pub fn shown_name(&self) -> &str {
+        if self.order == 0 {
+            "<default>"
+        } else {
+            &self.name
+        }
+    }
+
     /// Whether the material is a sky.
     pub fn is_sky(&self) -> bool {
         self.shader.sky.is_some()

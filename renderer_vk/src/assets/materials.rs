@@ -1,6 +1,6 @@
 //! All materials of a registration: found by name as the engine finds them, compiled to the arrays that shaders read.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use glam::Vec3;
@@ -10,20 +10,34 @@ use shaderscript::{ImplicitKind, Shader, StageImage, strip_extension};
 use super::bind::{internal_shader, passes, sky_faces};
 use super::compile::{StageArrays, VideoClients};
 use super::flags;
-use super::material::{LightmapClass, Material, SkyBox, VideoStage};
+use super::material::{Combine, LightmapClass, Material, SkyBox, VideoStage};
 use super::material_buffers::Uploaded;
 use super::source::{ImageFlags, ImageSource};
+use crate::settings::Settings;
 
 /// Distance at which a portal without `alphaGen portal` is opaque, units: the engine's default.
 pub const DEFAULT_PORTAL_RANGE: f32 = 256.0;
 
-/// What the settings say about materials; changes only at registration.
+/// What the settings say about materials that are found from now on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MaterialSettings {
     /// Stages marked `detail` are drawn.
     pub detail_textures: bool,
     /// One stage with vertex light instead of lightmaps.
     pub vertex_light: bool,
+    /// Scripts that are used are named in the log.
+    pub print: bool,
+}
+
+impl MaterialSettings {
+    /// The part of the settings that matters here.
+    pub fn new(settings: &Settings) -> Self {
+        Self {
+            detail_textures: settings.detail_textures,
+            vertex_light: settings.vertex_light,
+            print: settings.print_shaders,
+        }
+    }
 }
 
 /// Materials by index; 0 is the default material.
@@ -46,6 +60,8 @@ pub struct Materials {
     pub(super) uploaded: Option<Uploaded>,
     pub(super) dirty: bool,
     generation: u64,
+    /// Lightmap pages that each material is shown under.
+    pages: BTreeSet<(u32, i32)>,
 }
 
 /// Materials that the renderer draws with itself.
@@ -87,6 +103,7 @@ impl Materials {
             uploaded: None,
             dirty: true,
             generation: 0,
+            pages: BTreeSet::new(),
         };
         let default = internal_shader("*default", |stage| {
             stage.image = StageImage::Map("*default".into());
@@ -153,6 +170,9 @@ impl Materials {
         }
         let key = (stripped, class);
         let index = if let Some(shader) = self.scripts.library().find(name).cloned() {
+            if self.settings.print {
+                log::info!("*SHADER* {name}");
+            }
             self.add(strip_extension(name), shader, class, true, None, source)
         } else {
             let kind = match class {
@@ -372,6 +392,11 @@ impl Materials {
             .unwrap_or(0)
     }
 
+    /// Settings of materials that are found from now on.
+    pub fn set_settings(&mut self, settings: MaterialSettings) {
+        self.settings = settings;
+    }
+
     /// The renderer's own materials.
     pub fn internal(&self) -> Internal {
         self.internal
@@ -509,26 +534,59 @@ impl Materials {
         self.generation
     }
 
-    /// One line each, for `shaderlist`: stages, L with a lightmap, E when a script defines it, name.
-    pub fn list(&self, in_drawing_order: bool) -> Vec<String> {
-        let line = |m: &Material| {
-            format!(
-                "{} {} {} {}{}",
-                m.stage_count,
-                if m.lightmap_class == LightmapClass::Page {
-                    'L'
-                } else {
-                    ' '
-                },
-                if m.explicit { 'E' } else { ' ' },
-                m.name,
-                if m.defaulted { " (DEFAULTED)" } else { "" }
-            )
-        };
-        if in_drawing_order {
-            self.sorted.iter().map(|&i| line(self.get(i))).collect()
-        } else {
-            self.list.iter().map(line).collect()
+    /// Notes that a surface of the map shows a material under a lightmap page. The engine counts each page as a
+    /// material of its own; here one serves for all.
+    pub fn note_lightmap_page(&mut self, material: u32, page: i32) {
+        if self.get(material).lightmap_class == LightmapClass::Page {
+            self.pages.insert((material, page));
         }
     }
+
+    /// Lines for `shaderlist`, one for each material and lightmap page: passes, `L` under a lightmap, `E` from a
+    /// script, how two textures of the first pass combine, kind, name.
+    pub fn list(&self, in_drawing_order: bool) -> Vec<String> {
+        let order: Vec<u32> = if in_drawing_order {
+            self.sorted.clone()
+        } else {
+            (0u32..).take(self.list.len()).collect()
+        };
+        let mut lines = vec!["-".repeat(23)];
+        for index in order {
+            let material = self.get(index);
+            let pages = self.pages.range((index, i32::MIN)..=(index, i32::MAX));
+            let times = pages.count().max(1);
+            lines.extend(std::iter::repeat_n(list_line(material), times));
+        }
+        lines.push(format!("{} total shaders", lines.len() - 1));
+        lines.push("-".repeat(18));
+        lines
+    }
+}
+
+/// A material's line in `shaderlist`.
+fn list_line(material: &Material) -> String {
+    let combined = match material.passes.first() {
+        Some(pass) if pass.stage_count == 2 => match pass.combine {
+            Combine::Modulate => "MT(m) ",
+            Combine::Add => "MT(a) ",
+        },
+        _ => "      ",
+    };
+    format!(
+        "{} {}{combined}{}{}: {}{}",
+        material.passes.len(),
+        if material.lightmap_class == LightmapClass::Page {
+            "L "
+        } else {
+            "  "
+        },
+        if material.explicit { "E " } else { "  " },
+        if material.is_sky() { "sky " } else { "gen " },
+        material.shown_name(),
+        if material.defaulted {
+            " (DEFAULTED)"
+        } else {
+            ""
+        }
+    )
 }

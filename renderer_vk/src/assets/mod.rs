@@ -25,7 +25,7 @@ pub use models::{IqmModel, MAX_LODS, Md3Lod, MdrModel, Model, Models};
 pub use prepare::TextureSettings;
 pub use skins::{LoadedSkin, Skins};
 pub use source::{ImageFlags, ImageSource};
-pub use textures::{Samplers, Textures};
+pub use textures::{Samplers, Textures, is_texture_mode};
 
 use crate::gpu::{self, Device};
 use crate::settings::Settings;
@@ -64,10 +64,7 @@ impl Assets {
         let mut textures = Textures::new(device, files, texture_settings)?;
         let materials = Materials::new(
             Arc::clone(&scripts),
-            MaterialSettings {
-                detail_textures: settings.detail_textures,
-                vertex_light: settings.vertex_light,
-            },
+            MaterialSettings::new(settings),
             &mut textures,
         );
         Ok(Self {
@@ -82,6 +79,14 @@ impl Assets {
             texture_mode: settings.texture_mode.clone(),
             anisotropy: settings.anisotropy,
         })
+    }
+
+    /// Settings of what is loaded from now on. The game may change a setting that the player cannot change without a
+    /// restart, between `BeginRegistration` and the map.
+    pub fn set_settings(&mut self, settings: &Settings) {
+        self.textures
+            .set_settings(TextureSettings::new(settings, MAX_TEXTURE_SIZE));
+        self.materials.set_settings(MaterialSettings::new(settings));
     }
 
     /// Registers a picture or material for the game; 0 when it is unusable. `mip`: with smaller levels, repeated.

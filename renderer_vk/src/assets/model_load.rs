@@ -17,6 +17,8 @@ pub(super) struct Loader<'a> {
     pub files: &'a dyn GameFiles,
     pub materials: &'a mut Materials,
     pub source: &'a mut dyn ImageSource,
+    /// Bytes of the files that were used.
+    pub bytes: usize,
 }
 
 /// A kind of model file.
@@ -72,7 +74,7 @@ impl Loader<'_> {
     }
 
     fn read<T>(
-        &self,
+        &mut self,
         file: &str,
         parse: impl FnOnce(&[u8]) -> Result<T, q3model::Error>,
     ) -> Option<T> {
@@ -83,9 +85,16 @@ impl Loader<'_> {
                 return None;
             }
         };
-        parse(&bytes)
-            .inspect_err(|problem| log::warn!("{file}: {problem}"))
-            .ok()
+        match parse(&bytes) {
+            Ok(model) => {
+                self.bytes += bytes.len();
+                Some(model)
+            }
+            Err(problem) => {
+                log::warn!("{file}: {problem}");
+                None
+            }
+        }
     }
 
     fn material(&mut self, shader: &str) -> u32 {

@@ -71,6 +71,8 @@ pub enum Model {
 pub struct Models {
     list: Vec<(String, Option<Model>)>,
     by_name: HashMap<String, i32>,
+    /// Bytes of the files of each handle's model.
+    file_bytes: HashMap<i32, usize>,
 }
 
 impl Models {
@@ -92,9 +94,12 @@ impl Models {
             files,
             materials,
             source,
+            bytes: 0,
         };
         let model = loader.model(name);
+        let bytes = loader.bytes;
         let handle = self.push(name, model);
+        self.file_bytes.insert(handle, bytes);
         self.usable(handle)
     }
 
@@ -176,23 +181,24 @@ impl Models {
         bounds.unwrap_or((Vec3::ZERO, Vec3::ZERO))
     }
 
-    /// One line each, for `modellist`.
+    /// Lines for `modellist`: bytes of the files, levels of detail that are files of their own, name; then the sum.
     pub fn list(&self) -> Vec<String> {
-        self.list
-            .iter()
-            .map(|(name, model)| match model {
-                None => format!("(missing) {name}"),
-                Some(Model::Inline { .. }) => format!("brush model {name}"),
-                Some(Model::Mesh { lods }) => format!("{} levels  {name}", lods.len()),
-                Some(Model::Mdr(model)) => format!(
-                    "{} levels, {} bones  {name}",
-                    model.mdr.lods.len(),
-                    model.mdr.num_bones
-                ),
-                Some(Model::Iqm(model)) => {
-                    format!("1 level, {} joints  {name}", model.iqm.joints.len())
+        let mut total = 0;
+        let mut lines = Vec::with_capacity(self.list.len() + 1);
+        for (handle, (name, model)) in (1..).zip(&self.list) {
+            let size = self.file_bytes.get(&handle).copied().unwrap_or(0);
+            let levels = match model {
+                Some(Model::Mesh { lods }) => {
+                    let coarser = lods.iter().skip(1);
+                    let repeated = lods.iter().zip(coarser).filter(|(a, b)| Arc::ptr_eq(a, b));
+                    lods.len() - repeated.count()
                 }
-            })
-            .collect()
+                _ => 1,
+            };
+            total += size;
+            lines.push(format!("{size:8} : ({levels}) {name}"));
+        }
+        lines.push(format!("{total:8} : Total models"));
+        lines
     }
 }

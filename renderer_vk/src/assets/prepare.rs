@@ -22,6 +22,8 @@ pub struct TextureSettings {
     pub intensity: f32,
     /// 0..1: how much colour is taken out.
     pub greyscale: f32,
+    /// Smaller levels are tinted.
+    pub color_mips: bool,
     /// Largest side the device can have.
     pub max_size: u32,
 }
@@ -43,6 +45,7 @@ impl TextureSettings {
             } else {
                 0.0
             },
+            color_mips: settings.color_mip_levels,
             max_size: max_size.max(1),
         }
     }
@@ -71,13 +74,33 @@ pub fn prepare(image: &Image, flags: ImageFlags, settings: &TextureSettings) -> 
         return vec![base];
     }
     let mut levels = vec![base];
+    let mut tints = MIP_TINTS.iter().cycle();
     while let Some(last) = levels.last()
         && (last.width > 1 || last.height > 1)
     {
-        let next = smaller(last, settings.simple_mip_maps);
+        let mut next = smaller(last, settings.simple_mip_maps);
+        if settings.color_mips
+            && let Some(tint) = tints.next()
+        {
+            // the level after it is made of what is tinted here
+            blend_over(&mut next.rgba, *tint);
+        }
         levels.push(next);
     }
     levels
+}
+
+/// Colours of `r_colorMipLevels` from the first smaller level on.
+const MIP_TINTS: [[u8; 3]; 3] = [[255, 0, 0], [0, 255, 0], [0, 0, 255]];
+
+/// Mixes a colour in with the engine's weights: 127 and 128 of 512, so that the levels come out half as bright.
+fn blend_over(rgba: &mut [u8], tint: [u8; 3]) {
+    for texel in rgba.as_chunks_mut::<4>().0 {
+        for (channel, tint) in texel.iter_mut().zip(tint) {
+            let mixed = (u32::from(*channel) * 127 + u32::from(tint) * 128) >> 9;
+            *channel = u8::try_from(mixed).unwrap_or(u8::MAX);
+        }
+    }
 }
 
 /// Mean linear colour and mean alpha.
@@ -154,6 +177,34 @@ pub fn light_page(rgb: &[u8], side: u32, shift_bits: u32, greyscale: f32) -> Opt
         desaturate(&mut rgba, greyscale);
     }
     Image::from_rgba(side, side, rgba)
+}
+
+/// A lightmap page as colours by brightness, red the darkest (`r_lightmap 2`), with the brightness of its brightest
+/// texel, 0 to 1; `None` when the length does not fit.
+pub fn heat_page(rgb: &[u8], side: u32) -> Option<(Image, f32)> {
+    let mut rgba = Vec::with_capacity(rgb.len() / 3 * 4);
+    let mut brightest = 0.0f32;
+    for texel in rgb.as_chunks::<3>().0 {
+        let [r, g, b] = texel.map(f32::from);
+        // the engine's own weights
+        let brightness = ((0.33 * r + 0.685 * g + 0.063 * b) / 255.0).min(1.0);
+        brightest = brightest.max(brightness);
+        let [r, g, b] = hue(brightness);
+        rgba.extend([r, g, b, 255]);
+    }
+    Some((Image::from_rgba(side, side, rgba)?, brightest))
+}
+
+/// The colour of a brightness (0 to 1) at half the value: once from red to magenta.
+fn hue(brightness: f32) -> [u8; 3] {
+    let sixths = brightness * 5.0;
+    // 1 around the channel's own hue, down to 0 a third of a turn away
+    let channel = |centre: f32| {
+        let away = (sixths - centre).abs();
+        let away = away.min(6.0 - away);
+        (2.0 - away).clamp(0.0, 1.0)
+    };
+    [0.0, 2.0, 4.0].map(|centre| (channel(centre) * 0.5 * 255.0) as u8)
 }
 
 /// The 16 x 16 grid for what is missing: dark grey with a white border.
@@ -282,5 +333,29 @@ mod tests {
         assert_eq!(at(0, 0), 0);
         assert_eq!(at(7, 15), 0);
         assert!(at(7, 12) > 75);
+    }
+
+    #[test]
+    fn coloured_levels_are_tinted_one_on_top_of_the_other() {
+        let tinted = TextureSettings {
+            color_mips: true,
+            ..settings()
+        };
+        let levels = prepare(&grey(8, 8, 200), ImageFlags::WORLD, &tinted);
+        assert_eq!(levels[0].rgba[..4], [200, 200, 200, 255]);
+        // (200 * 127 + 255 * 128) / 512, (200 * 127) / 512
+        assert_eq!(levels[1].rgba[..4], [113, 49, 49, 255]);
+        assert_eq!(levels[2].rgba[..4], [28, 75, 12, 255]);
+    }
+
+    #[test]
+    fn heat_goes_from_red_to_magenta() {
+        let (page, brightest) =
+            heat_page(&[0, 0, 0, 51, 51, 51, 255, 255, 255, 0, 0, 0], 2).unwrap();
+        assert_eq!(page.rgba[..4], [127, 0, 0, 255]);
+        assert!(page.rgba[5] > page.rgba[4], "{:?}", &page.rgba[4..8]);
+        assert_eq!(page.rgba[8..12], [127, 0, 127, 255]);
+        assert_eq!(brightest, 1.0);
+        assert!(heat_page(&[0; 5], 2).is_none());
     }
 }

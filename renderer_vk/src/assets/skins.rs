@@ -70,15 +70,25 @@ impl Skins {
         self.list.get(slot)
     }
 
-    /// Lines for `skinlist`: each skin, then its surfaces.
+    /// Lines for `skinlist`: each skin by handle with its surfaces and what they show.
     pub fn list(&self, materials: &Materials) -> Vec<String> {
-        let mut lines = Vec::new();
-        for skin in &self.list {
-            lines.push(skin.name.clone());
+        let default = LoadedSkin {
+            name: "<default skin>".into(),
+            surfaces: vec![(String::new(), 0)],
+        };
+        let rule = "-".repeat(18);
+        let mut lines = vec![rule.clone()];
+        for (handle, skin) in std::iter::once(&default).chain(&self.list).enumerate() {
+            let count = skin.surfaces.len();
+            lines.push(format!("{handle:3}:{} ({count} surfaces)", skin.name));
             lines.extend(skin.surfaces.iter().map(|(surface, material)| {
-                format!("   {surface} = {}", materials.get(*material).name)
+                format!(
+                    "       {surface} = {}",
+                    materials.get(*material).shown_name()
+                )
             }));
         }
+        lines.push(rule);
         lines
     }
 }

@@ -1,6 +1,6 @@
 //! Textures by name, on the GPU.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use glam::Vec4;
@@ -53,16 +53,43 @@ impl Samplers {
     }
 }
 
+/// The names that `r_textureMode` takes, in any case, with their filters.
+const TEXTURE_MODES: [(&str, Filter, MipFilter); 6] = [
+    ("GL_NEAREST", Filter::Nearest, MipFilter::None),
+    ("GL_LINEAR", Filter::Linear, MipFilter::None),
+    (
+        "GL_NEAREST_MIPMAP_NEAREST",
+        Filter::Nearest,
+        MipFilter::Nearest,
+    ),
+    (
+        "GL_LINEAR_MIPMAP_NEAREST",
+        Filter::Linear,
+        MipFilter::Nearest,
+    ),
+    (
+        "GL_NEAREST_MIPMAP_LINEAR",
+        Filter::Nearest,
+        MipFilter::Linear,
+    ),
+    ("GL_LINEAR_MIPMAP_LINEAR", Filter::Linear, MipFilter::Linear),
+];
+
+fn find_mode(mode: &str) -> Option<(Filter, MipFilter)> {
+    TEXTURE_MODES
+        .iter()
+        .find(|(name, ..)| name.eq_ignore_ascii_case(mode))
+        .map(|&(_, filter, mip)| (filter, mip))
+}
+
+/// Whether `r_textureMode` may have this value.
+pub fn is_texture_mode(mode: &str) -> bool {
+    find_mode(mode).is_some()
+}
+
 /// Filters of an `r_textureMode`; an unknown name is trilinear.
 fn texture_filter(mode: &str) -> (Filter, MipFilter) {
-    match mode.to_ascii_uppercase().as_str() {
-        "GL_NEAREST" => (Filter::Nearest, MipFilter::None),
-        "GL_LINEAR" => (Filter::Linear, MipFilter::None),
-        "GL_NEAREST_MIPMAP_NEAREST" => (Filter::Nearest, MipFilter::Nearest),
-        "GL_LINEAR_MIPMAP_NEAREST" => (Filter::Linear, MipFilter::Nearest),
-        "GL_NEAREST_MIPMAP_LINEAR" => (Filter::Nearest, MipFilter::Linear),
-        _ => (Filter::Linear, MipFilter::Linear),
-    }
+    find_mode(mode).unwrap_or((Filter::Linear, MipFilter::Linear))
 }
 
 /// A texture that a name stands for.
@@ -86,7 +113,10 @@ pub struct Textures {
     by_name: HashMap<String, usize>,
     textures: Vec<Texture>,
     means: HashMap<u32, Vec4>,
-    unnamed: Vec<gpu::Image>,
+    /// Lightmap pages with their names.
+    lightmaps: Vec<(String, gpu::Image)>,
+    /// Bindless indices of the images that have a texel that is not opaque.
+    transparent: HashSet<u32>,
     scratch: HashMap<usize, Scratch>,
     white: u32,
     default_image: u32,
@@ -109,7 +139,8 @@ impl Textures {
             by_name: HashMap::new(),
             textures: Vec::new(),
             means: HashMap::new(),
-            unnamed: Vec::new(),
+            lightmaps: Vec::new(),
+            transparent: HashSet::new(),
             scratch: HashMap::new(),
             white: 0,
             default_image: 0,
@@ -129,6 +160,11 @@ impl Textures {
     /// The files that names are looked up in.
     pub fn files(&self) -> &Arc<dyn GameFiles> {
         &self.files
+    }
+
+    /// The settings of textures that are loaded from now on.
+    pub fn set_settings(&mut self, settings: TextureSettings) {
+        self.settings = settings;
     }
 
     /// The settings in force.
@@ -183,7 +219,7 @@ impl Textures {
         let image = self.create(name, std::slice::from_ref(page))?;
         let index = image.texture_index();
         self.means.insert(index, prepare::mean(page));
-        self.unnamed.push(image);
+        self.lightmaps.push((name.to_owned(), image));
         Ok(index)
     }
 
@@ -225,21 +261,37 @@ impl Textures {
         Ok(Some((old, new)))
     }
 
-    /// Names of all images with their sizes, for `imagelist`.
+    /// Lines for `imagelist`: number, size, channels in use, bytes on the GPU, name; then how many bytes and images.
     pub fn list(&self) -> Vec<String> {
-        self.textures
+        let mut bytes = 0;
+        let mut lines = vec![
+            String::new(),
+            "      -w-- -h-- type  -size- --name-------".into(),
+        ];
+        let listed = self
+            .textures
             .iter()
-            .map(|t| match &t.image {
-                Some(image) => format!(
-                    "{:4} x {:4}  {} levels  {}",
-                    image.width(),
-                    image.height(),
-                    image.mips(),
-                    t.name
-                ),
-                None => format!("     missing              {}", t.name),
-            })
-            .collect()
+            .filter_map(|t| Some((t.name.as_str(), t.image.as_ref()?)))
+            .chain(self.lightmaps.iter().map(|(name, i)| (name.as_str(), i)));
+        let mut count = 0;
+        for (name, image) in listed {
+            let size = image_bytes(image);
+            let transparent = self.transparent.contains(&image.texture_index());
+            lines.push(format!(
+                "{count:4}: {:4}x{:4} {} {} {name}",
+                image.width(),
+                image.height(),
+                if transparent { "RGBA " } else { "RGB  " },
+                readable_size(size),
+            ));
+            bytes += size;
+            count += 1;
+        }
+        lines.push(" ---------".into());
+        lines.push(format!(" approx {bytes} bytes"));
+        lines.push(format!(" {count} total images"));
+        lines.push(String::new());
+        lines
     }
 
     /// The first failure of the device since the last call: callers that look up by name cannot return it.
@@ -257,6 +309,7 @@ impl Textures {
                     self.means
                         .insert(created.texture_index(), prepare::mean(of));
                 }
+                self.note_alpha(&created, image);
                 Some(created)
             }
             Err(problem) => {
@@ -264,6 +317,12 @@ impl Textures {
                 self.failure.get_or_insert(problem);
                 None
             }
+        }
+    }
+
+    fn note_alpha(&mut self, created: &gpu::Image, image: &Image) {
+        if image.rgba.chunks_exact(4).any(|texel| texel[3] != 255) {
+            self.transparent.insert(created.texture_index());
         }
     }
 
@@ -298,6 +357,7 @@ impl Textures {
         let created = self.create(name, &levels)?;
         let index = created.texture_index();
         self.means.insert(index, prepare::mean(image));
+        self.note_alpha(&created, image);
         self.by_name.insert(name.to_owned(), self.textures.len());
         self.textures.push(Texture {
             name: name.to_owned(),
@@ -308,6 +368,26 @@ impl Textures {
             },
         });
         Ok(index)
+    }
+}
+
+/// Bytes of an image of four bytes a texel with its mip levels.
+fn image_bytes(image: &gpu::Image) -> u64 {
+    (0..image.mips())
+        .map(|mip| {
+            let side = |size: u32| u64::from((size >> mip).max(1));
+            side(image.width()) * side(image.height()) * 4
+        })
+        .sum()
+}
+
+/// A size in as many characters as the list's column has.
+fn readable_size(bytes: u64) -> String {
+    const KIB: u64 = 1024;
+    match bytes {
+        0..KIB => format!("{bytes:4}b "),
+        KIB..0x10_0000 => format!("{:4}kb", bytes / KIB),
+        _ => format!("{:4.1}Mb", bytes as f64 / (KIB * KIB) as f64),
     }
 }
 

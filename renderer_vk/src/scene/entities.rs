@@ -109,6 +109,11 @@ impl Gatherer<'_> {
             self.lights,
             self.input.settings,
         );
+        if self.input.settings.debug_light && entity.renderfx & renderfx::FIRST_PERSON != 0 {
+            let brightest = |light: Vec3| light.max_element() as i32;
+            let (ambient, directed) = (brightest(light.ambient), brightest(light.directed));
+            log::info!("amb:{ambient}  dir:{directed}");
+        }
         let instance = count(out.instances.len());
         out.instances.push(entity::model_instance(
             entity, &self.view, out.time, &light, is_world,
@@ -167,6 +172,7 @@ impl Gatherer<'_> {
                     frustum: &[],
                     lights: &lights,
                     forward: placed.map_or(Vec3::X, |i| entity::into_axes(i, self.view.axis[0])),
+                    by_facing: self.input.settings.face_plane_cull,
                 };
                 let run = self.run(world, &local, instance, number);
                 for surface in range {

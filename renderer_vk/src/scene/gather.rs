@@ -9,7 +9,7 @@ use super::entity;
 use super::mesh::{self, DeformScratch, RawMesh};
 use super::portal;
 use super::surfaces::{self, LocalView, PendingDeform, SurfaceRun, WORLD_ENTITY, sort_key};
-use super::{DynamicMesh, GatherInput, Look, Scene, ShadowVolumes, View, ViewScene};
+use super::{DynamicMesh, GatherInput, Look, Scene, ShadowVolumes, Statistics, View, ViewScene};
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
 use crate::world::{Bounds, VisibleQuery, VisibleSet, WorldData};
 
@@ -45,6 +45,10 @@ pub(super) fn views(
                 Gatherer::new(scene, input, def, look, seen).gather(portal.pvs_origin, &mut behind);
                 main.portals.push(portal);
                 out.push(behind);
+                if input.settings.portal_only {
+                    scene.pool.push(main);
+                    return out;
+                }
             }
         }
     }
@@ -68,6 +72,7 @@ fn empty_view(def: &RefDef, view: View) -> ViewScene {
         has_world: false,
         skies: Vec::new(),
         shadows: ShadowVolumes::default(),
+        statistics: Statistics::default(),
     }
 }
 
@@ -144,6 +149,9 @@ impl<'a> Gatherer<'a> {
         }
         // equal keys keep the order of submission
         out.surfaces.sort_by_key(|surface| surface.sort_key);
+        if self.input.settings.speeds != 0 && self.look == Look::Classic {
+            out.statistics = self.count_view(out);
+        }
     }
 
     fn clear(&self, out: &mut ViewScene) {
@@ -162,6 +170,7 @@ impl<'a> Gatherer<'a> {
         out.has_world = self.world.is_some();
         out.skies.clear();
         out.shadows.clear();
+        out.statistics = Statistics::default();
         out.instances
             .push(entity::world_instance(&self.view, out.time));
     }
@@ -183,6 +192,7 @@ impl<'a> Gatherer<'a> {
                 frustum,
                 no_vis: settings.no_vis,
                 locked: settings.lock_pvs,
+                show_cluster: settings.show_cluster,
             },
         );
         let bounds = self.visible.bounds;
@@ -217,6 +227,7 @@ impl<'a> Gatherer<'a> {
             frustum: self.planes(),
             lights: &lights,
             forward: self.view.axis[0],
+            by_facing: settings.face_plane_cull,
         };
         let run = self.run(world, &local, 0, WORLD_ENTITY);
         match self.look {

@@ -14,6 +14,7 @@ mod models;
 mod portal;
 mod shadow_volumes;
 mod shapes;
+mod statistics;
 mod surfaces;
 pub mod view;
 
@@ -27,6 +28,7 @@ use crate::settings::Settings;
 use crate::world::{VisibleSet, World, WorldData};
 pub use lighting::light_for_point;
 pub use shadow_volumes::ShadowVolumes;
+pub use statistics::{CullCounts, Statistics};
 pub use view::View;
 
 /// Where a surface's triangles are.
@@ -152,6 +154,8 @@ pub struct ViewScene {
     pub skies: Vec<u32>,
     /// Shadow volumes of models (classic look, `cg_shadows 2`).
     pub shadows: ShadowVolumes,
+    /// Counts, when `r_speeds` asks for them.
+    pub statistics: Statistics,
 }
 
 /// Which of the two looks a view is gathered for.

@@ -23,7 +23,7 @@ pub(super) fn find_first(
 ) -> Option<Portal> {
     let settings = input.settings;
     let world = input.world?;
-    if settings.no_portals || settings.fast_sky || scene.view.is_portal {
+    if settings.no_portals || scene.view.is_portal {
         return None;
     }
     // surfaces are in drawing order, portals first

@@ -34,6 +34,8 @@ pub(super) struct LocalView<'a> {
     pub lights: &'a [(Vec3, f32)],
     /// Unit view direction.
     pub forward: Vec3,
+    /// Flat surfaces that are turned away are left out (`r_facePlaneCull`).
+    pub by_facing: bool,
 }
 
 /// Bits of the lights (origin and radius) that reach a box.
@@ -73,7 +75,7 @@ impl LocalView<'_> {
         if outside(&surface.bounds, self.frustum) {
             return true;
         }
-        let Some(plane) = surface.plane.filter(|_| surface.flat) else {
+        let Some(plane) = surface.plane.filter(|_| surface.flat && self.by_facing) else {
             return false;
         };
         let distance = plane.distance(self.eye);
@@ -229,6 +231,7 @@ mod tests {
             frustum: &[],
             lights: &[(Vec3::ZERO, 10.0), (Vec3::X * 100.0, 10.0)],
             forward: Vec3::X,
+            by_facing: true,
         };
         let at = |x: f32| Bounds {
             mins: Vec3::new(x, -1.0, -1.0),

@@ -29,6 +29,10 @@ pub struct WorldOptions {
     pub fullbright: bool,
     /// Light comes from vertices instead of lightmaps.
     pub vertex_light: bool,
+    /// Everything but skies shows the default material.
+    pub single_shader: bool,
+    /// Lightmaps show brightness as colour.
+    pub lightmap_heat: bool,
 }
 
 impl WorldOptions {
@@ -41,6 +45,8 @@ impl WorldOptions {
             greyscale: settings.greyscale.clamp(0.0, 1.0),
             fullbright: settings.fullbright,
             vertex_light: settings.vertex_light,
+            single_shader: settings.single_shader,
+            lightmap_heat: settings.lightmap_heat,
         }
     }
 
@@ -101,6 +107,12 @@ impl WorldData {
             let name = material.map_or("", |m| m.name.as_str());
             let class = class_of(stored.lightmap, options);
             let found = materials.find_or_default(source, name, class);
+            let found = if options.single_shader && !materials.get(found).is_sky() {
+                0
+            } else {
+                found
+            };
+            materials.note_lightmap_page(found, stored.lightmap);
             mark_emitter(&relit, stored, found, materials);
             let lod = patches
                 .get(index)
@@ -213,11 +225,16 @@ fn make_lightmaps<S: LightmapSink>(
         return Vec::new();
     }
     let side = u32::try_from(q3bsp::LIGHTMAP_SIZE).unwrap_or(128);
-    (0..relit.bsp.lightmaps.len())
+    let mut brightest = 0.0f32;
+    let pages = (0..relit.bsp.lightmaps.len())
         .map(|page| {
-            let picture = relit
-                .lightmap(page)
-                .and_then(|rgb| prepare::light_page(&rgb, side, 0, options.greyscale));
+            let picture = if options.lightmap_heat {
+                heat_page(relit, page, side, &mut brightest)
+            } else {
+                relit
+                    .lightmap(page)
+                    .and_then(|rgb| prepare::light_page(&rgb, side, 0, options.greyscale))
+            };
             let Some(picture) = picture else {
                 return NO_TEXTURE;
             };
@@ -229,7 +246,19 @@ fn make_lightmaps<S: LightmapSink>(
                 }
             }
         })
-        .collect()
+        .collect();
+    if options.lightmap_heat {
+        log::info!("Brightest lightmap value: {}", (brightest * 255.0) as i32);
+    }
+    pages
+}
+
+/// A page in colours by the brightness of what is stored; raises `brightest`.
+fn heat_page(relit: &RelitWorld, page: usize, side: u32, brightest: &mut f32) -> Option<Image> {
+    let stored = relit.bsp.lightmaps.get(page)?;
+    let (picture, most) = prepare::heat_page(&stored.0, side)?;
+    *brightest = brightest.max(most);
+    Some(picture)
 }
 
 fn vertex(v: &relight::world::WorldVertex, options: &WorldOptions) -> Vertex {

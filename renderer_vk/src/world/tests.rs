@@ -43,6 +43,7 @@ fn visible(world: &WorldData, at: Vec3, frustum: &[glam::Vec4]) -> Vec<u32> {
             frustum,
             no_vis: false,
             locked: false,
+            show_cluster: 0,
         },
     );
     let mut surfaces = set.surfaces.clone();
@@ -79,6 +80,7 @@ fn hidden_areas_and_no_vis() {
         frustum: &[],
         no_vis: false,
         locked: false,
+        show_cluster: 0,
     };
     set.gather(&world, &query);
     assert!(set.surfaces.is_empty());

@@ -199,6 +199,8 @@ pub struct VisibleQuery<'a> {
     pub no_vis: bool,
     /// The clusters of the last call stay (`r_lockpvs`).
     pub locked: bool,
+    /// A change finds the visible part anew; other than 0 its cluster is logged (`r_showcluster`).
+    pub show_cluster: i32,
 }
 
 /// The potentially visible part of the world, kept from frame to frame.
@@ -208,7 +210,9 @@ pub struct VisibleSet {
     pub surfaces: Vec<u32>,
     /// Bounds of the visible leafs; `Bounds::EMPTY` when there are none.
     pub bounds: Bounds,
-    marked_for: Option<(i32, [u8; 32], bool)>,
+    /// Leafs in sight of the last call.
+    pub leafs: u32,
+    marked_for: Option<(i32, [u8; 32], bool, i32)>,
     node_marks: Vec<bool>,
     leaf_marks: Vec<bool>,
     surface_stamps: Vec<u32>,
@@ -222,12 +226,18 @@ impl VisibleSet {
         *self = Self::default();
     }
 
+    /// Cluster that the last call was for; `None` before the first.
+    pub fn cluster(&self) -> Option<i32> {
+        self.marked_for.map(|(cluster, ..)| cluster)
+    }
+
     /// Finds the visible surfaces.
     pub fn gather(&mut self, world: &WorldData, query: &VisibleQuery<'_>) {
         let tree = &world.tree;
         self.mark(world, query);
         self.surfaces.clear();
         self.bounds = Bounds::EMPTY;
+        self.leafs = 0;
         self.surface_stamps.resize(world.surfaces.len(), 0);
         self.stamp = self.stamp.wrapping_add(1);
         if self.stamp == 0 {
@@ -257,6 +267,7 @@ impl VisibleSet {
                     };
                     if !outside(&leaf.bounds, query.frustum) {
                         self.bounds = self.bounds.with(leaf.bounds.mins).with(leaf.bounds.maxs);
+                        self.leafs += 1;
                         self.add_leaf(world, index);
                     }
                 }
@@ -291,9 +302,14 @@ impl VisibleSet {
             return;
         }
         let cluster = bsp.cluster_at(query.pvs_origin);
-        let wanted = (cluster, *query.area_mask, query.no_vis);
+        let wanted = (cluster, *query.area_mask, query.no_vis, query.show_cluster);
         if self.marked_for == Some(wanted) {
             return;
+        }
+        if query.show_cluster != 0 {
+            let leaf = bsp.leafs.get(bsp.leaf_at(query.pvs_origin));
+            let area = leaf.map_or(-1, |leaf| leaf.area);
+            log::info!("cluster:{cluster}  area:{area}");
         }
         self.marked_for = Some(wanted);
         self.node_marks.clear();

@@ -488,6 +488,7 @@ impl Scene {
             has_world: true,
             skies: Vec::new(),
             shadows: ShadowVolumes::default(),
+            statistics: Default::default(),
         }
     }
 
