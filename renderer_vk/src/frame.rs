@@ -4,7 +4,9 @@ use glam::{Mat4, Vec3, Vec4};
 
 use crate::assets::Assets;
 use crate::gpu::{self, ColorMask, Image, Recorder};
-use crate::raster::{Aids, DrawList, Overlay, Raster, Target, ViewParameters, overlay_instance};
+use crate::raster::{
+    Aids, DrawList, Overlay, Raster, StageContext, Target, ViewParameters, overlay_instance,
+};
 use crate::scene::ViewScene;
 use crate::settings::Settings;
 use crate::trace::TraceLook;
@@ -40,7 +42,7 @@ pub struct FrameContext<'a> {
     pub list: &'a mut DrawList,
 }
 
-impl FrameContext<'_> {
+impl<'a> FrameContext<'a> {
     /// Records one item.
     ///
     /// # Errors
@@ -65,15 +67,25 @@ impl FrameContext<'_> {
         }
     }
 
+    /// What stages are evaluated with in this frame.
+    fn stages(&self) -> StageContext<'a> {
+        let assets = self.assets;
+        StageContext {
+            materials: &assets.materials,
+            samplers: &assets.samplers,
+            identity_light: self.settings.identity_light(),
+        }
+    }
+
     fn overlay(
         &mut self,
         recorder: &mut Recorder,
         overlay: &Overlay,
         time: f32,
     ) -> Result<(), gpu::Error> {
-        overlay.draw(self.list, &self.assets.materials);
         let (width, height) = (self.color.width() as f32, self.color.height() as f32);
         let instance = overlay_instance(time);
+        overlay.draw(self.list, self.stages(), &instance);
         let parameters = ViewParameters {
             // window pixels to clip space, everything at the near plane
             world_to_clip: Mat4::from_cols(
@@ -109,11 +121,11 @@ impl FrameContext<'_> {
         let settings = self.settings;
         let world = self.world.filter(|_| scene.has_world);
         self.list.clear();
+        let stages = self.stages();
         self.list.add_view(
             scene,
-            &self.assets.materials,
+            stages,
             world.map_or(&[], |w| w.indices.as_slice()),
-            settings.identity_light(),
             Aids {
                 edges: settings.show_tris,
                 lightmaps: settings.lightmap,

@@ -41,8 +41,8 @@ struct RasterView {
 };
 
 struct Draw {
-    uint mode; uint stages[2]; uint stage_count; uint combine; uint material; uint instance; uint lightmap; uint fog;
-    uint fog_adjust; uint argument; uint dynamic_vertices;
+    uint textures[2]; uint stages[2]; float texcoords[2][6]; vec4 color; float time; uint instance; uint fog; uint light;
+    uint dynamic_vertices;
 };
 
 struct RasterLight { vec3 origin; float radius; vec3 color; };
@@ -65,8 +65,9 @@ const uint MATERIAL_TWO_SIDED = 1, MATERIAL_CULL_BACK = 2, MATERIAL_CUT_OUT = 4,
     MATERIAL_PORTAL = 32, MATERIAL_FOG = 64, MATERIAL_LIQUID = 128, MATERIAL_GLASS = 256, MATERIAL_VERTEX_LIGHT = 512,
     MATERIAL_POLYGON_OFFSET = 1024, MATERIAL_EMITTER = 2048, MATERIAL_INVISIBLE = 4096;
 const uint INSTANCE_DEPTH_HACK = 1, INSTANCE_FIRST_PERSON = 2, INSTANCE_THIRD_PERSON = 4, INSTANCE_NO_SHADOW = 8, INSTANCE_WORLD = 16;
-const uint DRAW_STAGE = 0, DRAW_LIGHT = 1, DRAW_FOG = 2, DRAW_IMAGE = 3, DRAW_PLAIN = 4, DRAW_LIGHTMAP = 5;
-const uint COMBINE_MODULATE = 0, COMBINE_ADD = 1;
+const uint DRAW_STAGE = 0, DRAW_LIGHT = 1, DRAW_FOG = 2;
+const uint COMBINE_NONE = 0, COMBINE_MODULATE = 1, COMBINE_ADD = 2;
+const uint COLOR_WHITE = 0, COLOR_FLAT = 1, COLOR_VERTEX = 2;
 const uint FOG_ADJUST_NONE = 0, FOG_ADJUST_RGB = 1, FOG_ADJUST_ALPHA = 2, FOG_ADJUST_RGBA = 3;
 const uint TRIANGLE_WORLD = 1;
 

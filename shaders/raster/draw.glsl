@@ -1,7 +1,21 @@
-// What the vertex and fragment shader of the classic look share: the push constants and the interface between them.
+// What the vertex and fragment shader of the classic look share: the specialization constants (raster/shading.rs), the
+// push constants and the interface between them.
 #extension GL_EXT_buffer_reference2 : require
 #include "common/bindless.glsl"
 #include "common/material.glsl"
+
+layout(constant_id = 0) const uint MODE = 0;          // DRAW_*
+layout(constant_id = 1) const uint TEXTURES = 3;      // bit i: stage i has a texture; otherwise it is white
+layout(constant_id = 2) const uint COMBINE = 0;       // COMBINE_*
+layout(constant_id = 3) const uint ALPHA_FUNC = 0;    // ALPHAFUNC_*
+layout(constant_id = 4) const uint COLOR = 2;         // COLOR_*
+layout(constant_id = 5) const uint RGB_GEN = 0;       // RGBGEN_* of COLOR_VERTEX
+layout(constant_id = 6) const uint ALPHA_GEN = 0;     // ALPHAGEN_* of COLOR_VERTEX
+layout(constant_id = 7) const uint TC_GEN_0 = 0;      // TCGEN_* of the first stage
+layout(constant_id = 8) const uint TC_GEN_1 = 0;      // TCGEN_* of the second stage
+layout(constant_id = 9) const uint TC_MODS = 0;       // bit i: stage i's tcMods differ between vertices
+layout(constant_id = 10) const uint FOG_ADJUST = 0;   // FOG_ADJUST_*
+layout(constant_id = 11) const uint CLIP = 0;         // 1: there is a clip plane
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vertices { Vertex at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Instances { Instance at[]; };
@@ -9,9 +23,6 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Dra
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Fogs { Fog at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RasterLights { RasterLight at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Views { RasterView view; };
-
-// Flat from the vertex to the fragment shader, so that the latter reads no memory but textures: x, y: textures of the
-// stages or NO_TEXTURE (white); z: samplers in bits 0-7 and 8-15, alpha test in 16-19, COMBINE_* in 20; w: DRAW_*.
 
 layout(push_constant, scalar) uniform Push { uint64_t view; } push;
 

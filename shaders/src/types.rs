@@ -227,30 +227,27 @@ pub struct RasterView {
     pub lights: u64,
 }
 
-/// One draw call of the classic look.
+/// One draw call of the classic look. What the shaders are specialised for is not in it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Draw {
-    /// `DRAW_*`: what the draw does.
-    pub mode: u32,
-    /// One or two (multitexture) stages.
+    /// Bindless indices of the textures in the lower 24 bits, of their samplers in the upper 8.
+    pub textures: [u32; 2],
+    /// One or two (multitexture) stages, for what is evaluated per vertex.
     pub stages: [u32; 2],
-    /// 1 or 2.
-    pub stage_count: u32,
-    /// `COMBINE_*`.
-    pub combine: u32,
-    /// Index of the material.
-    pub material: u32,
+    /// What each stage's `tcMod`s come to where they are the same for all vertices:
+    /// `s' = s m[0] + t m[2] + m[4]`, `t' = s m[1] + t m[3] + m[5]`.
+    pub texcoords: [[f32; 6]; 2],
+    /// Colour of the whole draw, where it is the same for all vertices.
+    pub color: [f32; 4],
+    /// The material's time, seconds.
+    pub time: f32,
     /// Index of the instance.
     pub instance: u32,
-    /// Bindless texture of the lightmap page or `NO_TEXTURE`.
-    pub lightmap: u32,
     /// Fog volume plus one; 0 none.
     pub fog: u32,
-    /// `FOG_ADJUST_*`: what fog scales.
-    pub fog_adjust: u32,
-    /// Index of the dynamic light (`DRAW_LIGHT`); bindless texture (`DRAW_IMAGE`).
-    pub argument: u32,
+    /// Index of the dynamic light (`DRAW_LIGHT`).
+    pub light: u32,
     /// 1: dynamic vertices.
     pub dynamic_vertices: u32,
 }
@@ -324,13 +321,10 @@ pub mod constants {
         DRAW_LIGHT = 1;
         /// The fog over an opaque surface.
         DRAW_FOG = 2;
-        /// One plain image (sides of the sky box).
-        DRAW_IMAGE = 3;
-        /// One colour (debugging aids).
-        DRAW_PLAIN = 4;
-        /// The lightmap alone (`r_lightmap`).
-        DRAW_LIGHTMAP = 5;
-        COMBINE_MODULATE = 0; COMBINE_ADD = 1;
+        /// Of a draw: there is one stage, or two of which the second multiplies or is added.
+        COMBINE_NONE = 0; COMBINE_MODULATE = 1; COMBINE_ADD = 2;
+        /// Of a draw: its colour is white, the same for all vertices, or each vertex's own.
+        COLOR_WHITE = 0; COLOR_FLAT = 1; COLOR_VERTEX = 2;
         FOG_ADJUST_NONE = 0; FOG_ADJUST_RGB = 1; FOG_ADJUST_ALPHA = 2; FOG_ADJUST_RGBA = 3;
         /// The triangle belongs to the world (its vertex colours and lightmap are baked light).
         TRIANGLE_WORLD = 1;

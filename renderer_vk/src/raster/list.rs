@@ -5,10 +5,11 @@ use shaders::types::constants as c;
 use shaders::types::{Draw, Vertex};
 
 use super::pipelines::{CullFaces, Depth, State};
+use super::shading::{Shading, StageContext};
 use super::sky;
 use crate::api::DynamicLight;
-use crate::assets::{Combine, Materials, RasterPass};
-use crate::scene::{DrawSurface, Geometry, View, ViewScene};
+use crate::assets::{Materials, RasterPass};
+use crate::scene::{DrawSurface, Geometry, ViewScene};
 use shaderscript::{Cull, sort};
 
 /// `surfaceparm nodlight` and `surfaceparm sky`: no dynamic light falls on these.
@@ -97,34 +98,37 @@ impl DrawList {
         self.vertices.clear();
     }
 
-    /// Adds everything that a view shows. `static_indices` is the world's index array; `identity_light` the
-    /// brightness of the sky box.
+    /// Adds everything that a view shows. `static_indices` is the world's index array.
     pub fn add_view(
         &mut self,
         scene: &ViewScene,
-        materials: &Materials,
+        stages: StageContext<'_>,
         static_indices: &[u32],
-        identity_light: f32,
         aids: Aids,
     ) {
+        let materials = stages.materials;
         self.vertices.extend_from_slice(&scene.vertices);
         let (before_sky, rest) = scene.surfaces.split_at(
             scene
                 .surfaces
                 .partition_point(|s| materials.get(s.material).sort < sort::SKY),
         );
-        self.add_surfaces(before_sky, scene, materials, static_indices, aids);
+        self.add_surfaces(before_sky, scene, stages, static_indices, aids);
         for &sky in &scene.skies {
-            self.add_sky(sky, &scene.view, materials, identity_light);
+            self.add_sky(sky, scene, stages);
         }
-        self.add_surfaces(rest, scene, materials, static_indices, aids);
+        self.add_surfaces(rest, scene, stages, static_indices, aids);
+        let clip = scene.view.clip_plane.is_some();
+        for call in &mut self.calls {
+            call.state.shading.clip = clip;
+        }
     }
 
     fn add_surfaces(
         &mut self,
         surfaces: &[DrawSurface],
         scene: &ViewScene,
-        materials: &Materials,
+        stages: StageContext<'_>,
         static_indices: &[u32],
         aids: Aids,
     ) {
@@ -163,7 +167,7 @@ impl DrawList {
                 DepthRange::Normal
             };
             let span = (first_index, self.indices.len() as u32 - first_index);
-            self.add_group(group, materials, span, range, lights, scene, aids);
+            self.add_group(group, stages, span, range, lights, scene, aids);
         }
     }
 
@@ -171,92 +175,84 @@ impl DrawList {
     fn add_group(
         &mut self,
         group: Group,
-        materials: &Materials,
+        stages: StageContext<'_>,
         span: (u32, u32),
         range: DepthRange,
         lights: u32,
         scene: &ViewScene,
         aids: Aids,
     ) {
-        let material = materials.get(group.material);
+        let material = stages.materials.get(group.material);
+        let Some(instance) = scene.instances.get(group.instance as usize) else {
+            return;
+        };
         if span.1 == 0 || material.sky.is_some() {
             return;
         }
-        let cull = faces(material.shader.cull, scene.view.mirrored);
         let draw = Draw {
-            material: group.material,
             instance: group.instance,
-            lightmap: group.lightmap,
             fog: group.fog,
             dynamic_vertices: group.dynamic.into(),
             ..Draw::default()
         };
+        let plain = State {
+            blend: None,
+            depth: Depth::LessEqual,
+            depth_write: true,
+            cull: faces(material.shader.cull, scene.view.mirrored),
+            offset: material.polygon_offset,
+            wireframe: false,
+            shading: Shading::WHITE,
+        };
         let opaque = material.sort <= sort::OPAQUE;
         let first_blends = material.passes.first().is_some_and(|p| p.blend.is_some());
         for pass in &material.passes {
-            if aids.lightmaps && group.lightmap != c::NO_TEXTURE && shows_lightmap(pass, materials)
+            let depth = stage_depth(pass);
+            if aids.lightmaps
+                && group.lightmap != c::NO_TEXTURE
+                && shows_lightmap(pass, stages.materials)
             {
+                let (shading, draw) = stages.lightmap(group.lightmap, draw);
                 let state = State {
-                    blend: None,
-                    depth: stage_depth(pass),
-                    depth_write: true,
-                    cull,
-                    offset: material.polygon_offset,
-                    wireframe: false,
-                };
-                let draw = Draw {
-                    mode: c::DRAW_LIGHTMAP,
-                    argument: group.lightmap,
-                    ..draw
+                    depth,
+                    shading,
+                    ..plain
                 };
                 self.push(state, range, span, draw);
                 break;
             }
-            let state = State {
-                blend: pass.blend,
-                depth: stage_depth(pass),
-                depth_write: pass.depth_write,
-                cull,
-                offset: material.polygon_offset,
-                wireframe: false,
-            };
             let fog_adjust = if group.fog != 0 && first_blends && !opaque {
                 fog_adjust(pass.blend)
             } else {
                 c::FOG_ADJUST_NONE
             };
-            self.push(
-                state,
-                range,
-                span,
-                Draw {
-                    fog_adjust,
-                    ..stage_draw(pass, draw)
-                },
-            );
+            let (shading, draw) =
+                stages.pass(material, pass, instance, group.lightmap, fog_adjust, draw);
+            let state = State {
+                blend: pass.blend,
+                depth,
+                depth_write: pass.depth_write,
+                shading,
+                ..plain
+            };
+            self.push(state, range, span, draw);
         }
-        let over = |blend, depth| State {
+        let over = |mode, blend, depth| State {
             blend: Some(blend),
             depth,
             depth_write: false,
-            cull,
-            offset: material.polygon_offset,
-            wireframe: false,
+            shading: Shading {
+                mode,
+                ..Shading::WHITE
+            },
+            ..plain
         };
         if opaque && material.surface_flags & NO_DYNAMIC_LIGHT == 0 {
-            for (i, light) in scene.dlights.iter().enumerate().take(MAX_LIGHTS) {
+            for (i, light) in (0..).zip(scene.dlights.iter().take(MAX_LIGHTS)) {
                 if lights & (1 << i) != 0 {
-                    let state = over((light_source_factor(light), c::BLEND_ONE), Depth::Equal);
-                    self.push(
-                        state,
-                        range,
-                        span,
-                        Draw {
-                            mode: c::DRAW_LIGHT,
-                            argument: i as u32,
-                            ..draw
-                        },
-                    );
+                    let blend = (light_source_factor(light), c::BLEND_ONE);
+                    let state = over(c::DRAW_LIGHT, blend, Depth::Equal);
+                    self.push(state, range, span, Draw { light: i, ..draw });
                 }
             }
         }
@@ -266,55 +262,42 @@ impl DrawList {
             } else {
                 Depth::LessEqual
             };
-            let state = over((c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA), depth);
-            self.push(
-                state,
-                range,
-                span,
-                Draw {
-                    mode: c::DRAW_FOG,
-                    ..draw
-                },
-            );
+            let blend = (c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA);
+            self.push(over(c::DRAW_FOG, blend, depth), range, span, draw);
         }
         if aids.edges {
             let state = State {
-                blend: None,
                 depth: Depth::Always,
                 depth_write: false,
                 cull: CullFaces::None,
                 offset: false,
                 wireframe: true,
+                shading: Shading::VERTEX_COLOR,
+                ..plain
             };
-            self.push(
-                state,
-                DepthRange::Front,
-                span,
-                Draw {
-                    mode: c::DRAW_PLAIN,
-                    ..draw
-                },
-            );
+            self.push(state, DepthRange::Front, span, draw);
         }
     }
 
-    fn add_sky(&mut self, index: u32, view: &View, materials: &Materials, identity_light: f32) {
-        let material = materials.get(index);
-        let Some(sky) = &material.sky else { return };
+    fn add_sky(&mut self, index: u32, scene: &ViewScene, stages: StageContext<'_>) {
+        let material = stages.materials.get(index);
+        let (Some(sky), Some(world)) = (&material.sky, scene.instances.first()) else {
+            return;
+        };
+        let view = &scene.view;
         let size = view.far / 1.75;
-        let grey = (identity_light.clamp(0.0, 1.0) * 255.0) as u32;
+        let grey = (stages.identity_light.clamp(0.0, 1.0) * 255.0) as u32;
         let color = 0xFF00_0000 | grey << 16 | grey << 8 | grey;
-        let state = |blend, depth_write| State {
+        let state = |blend, depth_write, shading| State {
             blend,
             depth: Depth::LessEqual,
             depth_write,
             cull: CullFaces::None,
             offset: false,
             wireframe: false,
+            shading,
         };
         let draw = Draw {
-            material: index,
-            lightmap: c::NO_TEXTURE,
             dynamic_vertices: 1,
             ..Draw::default()
         };
@@ -329,12 +312,8 @@ impl DrawList {
                     color,
                     sky::Coordinates::Box,
                 );
-                let draw = Draw {
-                    mode: c::DRAW_IMAGE,
-                    argument: image,
-                    ..draw
-                };
-                self.push(state(None, false), DepthRange::Sky, span, draw);
+                let (shading, draw) = stages.image(image, draw);
+                self.push(state(None, false, shading), DepthRange::Sky, span, draw);
             }
         }
         if material.passes.is_empty() {
@@ -355,12 +334,16 @@ impl DrawList {
         }
         let span = (first_index, self.indices.len() as u32 - first_index);
         for pass in &material.passes {
-            self.push(
-                state(pass.blend, pass.depth_write),
-                DepthRange::Sky,
-                span,
-                stage_draw(pass, draw),
+            let (shading, draw) = stages.pass(
+                material,
+                pass,
+                world,
+                c::NO_TEXTURE,
+                c::FOG_ADJUST_NONE,
+                draw,
             );
+            let state = state(pass.blend, pass.depth_write, shading);
+            self.push(state, DepthRange::Sky, span, draw);
         }
     }
 
@@ -379,20 +362,6 @@ impl DrawList {
             draw: self.draws.len() as u32,
         });
         self.draws.push(draw);
-    }
-}
-
-/// `draw` as a draw of the stages of `pass`.
-pub fn stage_draw(pass: &RasterPass, draw: Draw) -> Draw {
-    Draw {
-        mode: c::DRAW_STAGE,
-        stages: pass.stages,
-        stage_count: pass.stage_count,
-        combine: match pass.combine {
-            Combine::Modulate => c::COMBINE_MODULATE,
-            Combine::Add => c::COMBINE_ADD,
-        },
-        ..draw
     }
 }
 

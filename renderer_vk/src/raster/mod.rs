@@ -8,6 +8,7 @@ mod list;
 mod overlay;
 mod pipelines;
 mod present;
+mod shading;
 mod shadows;
 pub(crate) mod sky;
 mod target;
@@ -18,6 +19,7 @@ use shaders::types::{Instance, MaterialBuffers, RasterLight, RasterView};
 pub use list::{Aids, DrawList};
 pub use overlay::{Overlay, Picture2d, overlay_instance};
 pub use present::Present;
+pub use shading::StageContext;
 pub use target::Target;
 
 use crate::api::DynamicLight;

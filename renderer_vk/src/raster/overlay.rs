@@ -4,9 +4,9 @@ use glam::{Vec2, Vec3};
 use shaders::types::constants as c;
 use shaders::types::{Draw, Instance, Vertex};
 
-use super::list::{Call, DepthRange, DrawList, stage_depth, stage_draw};
+use super::list::{Call, DepthRange, DrawList, stage_depth};
 use super::pipelines::{CullFaces, Depth, State};
-use crate::assets::Materials;
+use super::shading::{Shading, StageContext};
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,8 +96,8 @@ impl Overlay {
         ]);
     }
 
-    /// Turns the queued pictures into draw calls.
-    pub fn draw(&self, list: &mut DrawList, materials: &Materials) {
+    /// Turns the queued pictures into draw calls. `instance` is [`overlay_instance`]'s.
+    pub fn draw(&self, list: &mut DrawList, stages: StageContext<'_>, instance: &Instance) {
         list.clear();
         list.vertices.extend_from_slice(&self.vertices);
         for quad in 0..(self.vertices.len() / 4) as u32 {
@@ -113,11 +113,7 @@ impl Overlay {
                     index_count: run.count * 6,
                     draw: list.draws.len() as u32,
                 });
-                list.draws.push(Draw {
-                    lightmap: c::NO_TEXTURE,
-                    dynamic_vertices: 1,
-                    ..draw
-                });
+                list.draws.push(draw);
             };
             let plain = State {
                 blend: None,
@@ -126,29 +122,36 @@ impl Overlay {
                 cull: CullFaces::None,
                 offset: false,
                 wireframe: false,
+                shading: Shading::WHITE,
+            };
+            let draw = Draw {
+                dynamic_vertices: 1,
+                ..Draw::default()
             };
             match run.content {
-                Content::Texture(texture) => push(
-                    plain,
-                    Draw {
-                        mode: c::DRAW_IMAGE,
-                        argument: texture,
-                        ..Draw::default()
-                    },
-                ),
+                Content::Texture(texture) => {
+                    let (shading, draw) = stages.image(texture, draw);
+                    push(State { shading, ..plain }, draw);
+                }
                 Content::Material(index) => {
-                    for pass in &materials.get(index).passes {
+                    let material = stages.materials.get(index);
+                    for pass in &material.passes {
+                        let (shading, draw) = stages.pass(
+                            material,
+                            pass,
+                            instance,
+                            c::NO_TEXTURE,
+                            c::FOG_ADJUST_NONE,
+                            draw,
+                        );
                         let state = State {
                             blend: pass.blend,
                             depth: stage_depth(pass),
                             depth_write: pass.depth_write && pass.depth_test,
+                            shading,
                             ..plain
                         };
-                        let draw = Draw {
-                            material: index,
-                            ..Draw::default()
-                        };
-                        push(state, stage_draw(pass, draw));
+                        push(state, draw);
                     }
                 }
             }

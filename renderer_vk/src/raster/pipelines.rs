@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use shaders::types::constants as c;
 
+use super::shading::Shading;
 use super::target::TargetKind;
 use crate::gpu::{self, BlendFactor, Cull, DepthTest, Device, GraphicsDesc, GraphicsPipeline};
 
@@ -22,6 +23,8 @@ pub struct State {
     pub offset: bool,
     /// Edges only.
     pub wireframe: bool,
+    /// What the shaders do.
+    pub shading: Shading,
 }
 
 /// Depth comparison of a draw.
@@ -117,6 +120,7 @@ impl Pipelines {
                 },
                 polygon_offset: state.offset.then_some(self.offset),
                 wireframe: state.wireframe && self.device.info().wireframe,
+                constants: &state.shading.constants(),
                 ..GraphicsDesc::new(
                     "raster",
                     &shaders::RASTER_DRAW_VERT,
