@@ -145,7 +145,7 @@ impl StageContext<'_> {
             shading.tc_gen[place] = stage.tc_gen;
             draw.textures[place] = self.handle(texture, stage.sampler_index);
             let tc_mods = script_stage(material, index).map_or(&[][..], |s| &s.tc_mods);
-            match affine(tc_mods, f64::from(time), instance.texcoord) {
+            match affine(tc_mods, seconds(time), instance.texcoord) {
                 Some(matrix) => draw.texcoords[place] = matrix,
                 None => shading.tc_mods |= 1 << i,
             }
@@ -231,7 +231,7 @@ impl StageContext<'_> {
     /// The colour of a stage, if it is the same for every vertex. White is only what is always white, so that a pulse
     /// does not change the pipeline.
     fn color(&self, stage: &shaderscript::Stage, instance: &Instance, time: f32) -> Color {
-        let time = f64::from(time);
+        let time = seconds(time);
         let [er, eg, eb, ea] = instance.color;
         let mut always_white = true;
         // alpha as `rgbGen` leaves it, which `alphaGen identity` keeps where all four channels were set
@@ -299,6 +299,14 @@ impl StageContext<'_> {
         // the engine keeps bytes; see `stage_color` in material.glsl
         Color::Flat([r, g, b, alpha].map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.001).floor() / 255.0))
     }
+}
+
+/// A time as the engine has it. Its clock counts milliseconds, which 32-bit seconds only come near to, and the engine's
+/// tables are read at steps that whole milliseconds fall on.
+fn seconds(time: f32) -> f64 {
+    let near = f64::from(time);
+    let whole = (near * 1000.0).round() / 1000.0;
+    if whole as f32 == time { whole } else { near }
 }
 
 /// The script's stage of a GPU stage.
