@@ -5,23 +5,33 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 use image::RgbImage;
-use relight::compare::{Rgb8, compare};
+use relight::compare::{Rgb8, compare, flip};
 
 /// Options of `relight compare`.
 #[derive(Args, Debug)]
 pub struct CompareArgs {
-    /// The picture to compare with (PNG, JPEG or TGA)
+    /// The picture to compare with (PNG, JPEG or TGA), or a folder of pictures
     reference: PathBuf,
-    /// Pictures to compare with it
+    /// Pictures to compare with it; folders if the first is one, whose pictures have the same names
     others: Vec<PathBuf>,
     /// Write all pictures beside each other to this file (PNG)
     #[arg(long, value_name = "FILE")]
     side_by_side: Option<PathBuf>,
+    /// Of folders: write the pictures that are least alike to this folder, beside the reference and the difference
+    #[arg(long, value_name = "DIR", conflicts_with = "side_by_side")]
+    worst_to: Option<PathBuf>,
+    /// How many of them
+    #[arg(long, default_value_t = 12)]
+    worst: usize,
 }
 
-/// Prints one line for each picture: structural similarity (1 = the same), mean absolute and root mean square
-/// difference (0..255), share of pixels that differ visibly, mean luminance of both.
+/// Prints one line for each picture: structural similarity (1 = the same), mean FLIP (0 = the same), mean absolute
+/// and root mean square difference (0..255), share of pixels that differ visibly, mean luminance of both.
 pub fn run(args: &CompareArgs) -> Result<()> {
+    if args.reference.is_dir() {
+        let to = args.worst_to.as_deref();
+        return crate::table::folders(&args.reference, &args.others, args.worst, to);
+    }
     let reference = read(&args.reference)?;
     let mut pictures = vec![reference];
     for path in &args.others {
@@ -30,9 +40,10 @@ pub fn run(args: &CompareArgs) -> Result<()> {
             let d = compare(reference, &picture)
                 .with_context(|| format!("{} and {}", args.reference.display(), path.display()))?;
             println!(
-                "{}: SSIM {:.4}, mean difference {:.3}, RMS {:.3}, {:.2} % of pixels differ by more than 8, luminance {:.1} and {:.1}",
+                "{}: SSIM {:.4}, FLIP {:.4}, mean difference {:.3}, RMS {:.3}, {:.2} % of pixels differ by more than 8, luminance {:.1} and {:.1}",
                 path.display(),
                 d.ssim,
+                flip(reference, &picture)?,
                 d.mean_absolute,
                 d.root_mean_square,
                 100.0 * d.differing,
@@ -51,7 +62,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 }
 
 /// Reads a picture file of any kind that the game knows, by its extension; alpha is dropped.
-fn read(path: &Path) -> Result<Rgb8> {
+pub(crate) fn read(path: &Path) -> Result<Rgb8> {
     let file = path.display().to_string();
     let extension = path
         .extension()
@@ -70,7 +81,8 @@ fn read(path: &Path) -> Result<Rgb8> {
     )?)
 }
 
-fn write(path: &Path, picture: &Rgb8) -> Result<()> {
+/// Writes a picture as PNG.
+pub(crate) fn write(path: &Path, picture: &Rgb8) -> Result<()> {
     let (width, height) = (
         u32::try_from(picture.width())?,
         u32::try_from(picture.height())?,

@@ -2,9 +2,11 @@
 
 #![forbid(unsafe_code)]
 
+mod cameras;
 mod compare;
 mod info;
 mod render;
+mod table;
 
 use clap::{Parser, Subcommand};
 
@@ -18,6 +20,8 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    /// List places to look at maps from: intermission cameras and spawn points
+    Cameras(cameras::CamerasArgs),
     /// Tell how alike pictures of one view are
     Compare(compare::CompareArgs),
     /// Tell what is in maps, and where their light comes from
@@ -28,6 +32,7 @@ enum Command {
 
 fn main() -> anyhow::Result<()> {
     match Cli::parse().command {
+        Command::Cameras(args) => cameras::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Render(args) => render::run(&args),
