@@ -75,10 +75,14 @@ pub struct Internal {
     pub white: u32,
     /// The game's material for planar shadows (`cg_shadows 3`), if it has one.
     pub shadow: Option<u32>,
+    /// The game's material for the sun's disc (`r_drawSun`), if it has one.
+    pub sun: Option<u32>,
 }
 
 /// Name of the script that the engine draws planar shadows with.
 const SHADOW_MATERIAL: &str = "projectionShadow";
+/// Name of the script that the engine draws the sun with.
+const SUN_MATERIAL: &str = "sun";
 
 impl Materials {
     /// The default material and the renderer's own ones. `scripts` are the game's.
@@ -138,10 +142,13 @@ impl Materials {
         }
         materials.internal.white =
             materials.add("*white", white, LightmapClass::TwoD, false, None, source);
-        if materials.scripts.library().find(SHADOW_MATERIAL).is_some() {
-            let shadow = materials.find(source, SHADOW_MATERIAL, LightmapClass::None, true);
-            materials.internal.shadow = Some(shadow);
-        }
+        let mut scripted = |name| {
+            materials.scripts.library().find(name)?;
+            Some(materials.find(source, name, LightmapClass::None, true))
+        };
+        let (shadow, sun) = (scripted(SHADOW_MATERIAL), scripted(SUN_MATERIAL));
+        materials.internal.shadow = shadow;
+        materials.internal.sun = sun;
         materials
     }
 

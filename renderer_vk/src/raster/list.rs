@@ -2,14 +2,15 @@
 //! then its dynamic lights, then its fog, as the engine does.
 
 use shaders::types::constants as c;
-use shaders::types::{Draw, Vertex};
+use shaders::types::{Draw, Instance, Vertex};
 
 use super::pipelines::{CullFaces, Depth, State};
 use super::shading::{Shading, StageContext};
 use super::sky;
 use crate::api::DynamicLight;
-use crate::assets::{Materials, RasterPass};
-use crate::scene::{DrawSurface, Geometry, ViewScene};
+use crate::assets::compile::sampler;
+use crate::assets::{Material, Materials, RasterPass};
+use crate::scene::{DrawSurface, Geometry, SKY_FACES, Sun, ViewScene, VisibleSky};
 use shaderscript::{Cull, sort};
 
 /// `surfaceparm nodlight` and `surfaceparm sky`: no dynamic light falls on these.
@@ -114,10 +115,13 @@ impl DrawList {
                 .partition_point(|s| materials.get(s.material).sort < sort::SKY),
         );
         self.add_surfaces(before_sky, scene, stages, static_indices, aids);
-        for &sky in &scene.skies {
+        for sky in &scene.skies {
             self.add_sky(sky, scene, stages);
         }
         self.add_surfaces(rest, scene, stages, static_indices, aids);
+        if let Some(sun) = scene.sun.filter(|_| !scene.skies.is_empty()) {
+            self.add_sun(&sun, scene, stages);
+        }
         let clip = scene.view.clip_plane.is_some();
         for call in &mut self.calls {
             call.state.shading.clip = clip;
@@ -279,60 +283,72 @@ impl DrawList {
         }
     }
 
-    fn add_sky(&mut self, index: u32, scene: &ViewScene, stages: StageContext<'_>) {
-        let material = stages.materials.get(index);
+    fn add_sky(&mut self, visible: &VisibleSky, scene: &ViewScene, stages: StageContext<'_>) {
+        let material = stages.materials.get(visible.material);
         let (Some(sky), Some(world)) = (&material.sky, scene.instances.first()) else {
             return;
         };
         let view = &scene.view;
-        let size = view.far / 1.75;
         let grey = (stages.identity_light.clamp(0.0, 1.0) * 255.0) as u32;
         let color = 0xFF00_0000 | grey << 16 | grey << 8 | grey;
-        let state = |blend, depth_write, shading| State {
-            blend,
-            depth: Depth::LessEqual,
-            depth_write,
-            cull: CullFaces::None,
-            offset: false,
-            wireframe: false,
-            shading,
-        };
         let draw = Draw {
             dynamic_vertices: 1,
             ..Draw::default()
         };
         if let Some(images) = &sky.faces {
             for (face, &image) in images.iter().enumerate() {
-                let span = sky::append_face(
-                    &mut self.vertices,
-                    &mut self.indices,
-                    face,
-                    view.origin,
-                    size,
-                    color,
-                    sky::Coordinates::Box,
-                );
-                let (shading, draw) = stages.image(image, draw);
-                self.push(state(None, false, shading), DepthRange::Sky, span, draw);
+                let Some(cells) = visible.coverage.cells(face) else {
+                    continue;
+                };
+                let span = self
+                    .mesh()
+                    .append_face(face, cells, view, color, sky::Coordinates::Box);
+                let (shading, draw) = stages.image(image, sampler::CLAMP_MIP, draw);
+                let state = sky_state(None, false, CullFaces::None, shading);
+                self.push(state, DepthRange::Sky, span, draw);
             }
         }
         if material.passes.is_empty() {
             return;
         }
         let first_index = self.indices.len() as u32;
-        for face in 0..sky::FACES - 1 {
-            let clouds = sky::Coordinates::Clouds(sky.cloud_height);
-            sky::append_face(
-                &mut self.vertices,
-                &mut self.indices,
-                face,
-                view.origin,
-                size,
-                color,
-                clouds,
-            );
+        // one dome serves all skies, and none has clouds below
+        let clouds = sky::Coordinates::Clouds(stages.materials.last_cloud_height());
+        for face in 0..SKY_FACES - 1 {
+            if let Some(cells) = visible.coverage.cells(face) {
+                self.mesh().append_face(face, cells, view, color, clouds);
+            }
         }
         let span = (first_index, self.indices.len() as u32 - first_index);
+        if span.1 > 0 {
+            self.add_sky_passes(material, world, CullFaces::None, span, draw, stages);
+        }
+    }
+
+    /// The sun's disc, behind everything but the sky.
+    fn add_sun(&mut self, sun: &Sun, scene: &ViewScene, stages: StageContext<'_>) {
+        let material = stages.materials.get(sun.material);
+        let Some(world) = scene.instances.first() else {
+            return;
+        };
+        let span = self.mesh().append_sun(sun.direction, &scene.view);
+        let draw = Draw {
+            dynamic_vertices: 1,
+            ..Draw::default()
+        };
+        let cull = faces(material.shader.cull, scene.view.mirrored);
+        self.add_sky_passes(material, world, cull, span, draw, stages);
+    }
+
+    fn add_sky_passes(
+        &mut self,
+        material: &Material,
+        world: &Instance,
+        cull: CullFaces,
+        span: (u32, u32),
+        draw: Draw,
+        stages: StageContext<'_>,
+    ) {
         for pass in &material.passes {
             let (shading, draw) = stages.pass(
                 material,
@@ -342,8 +358,15 @@ impl DrawList {
                 c::FOG_ADJUST_NONE,
                 draw,
             );
-            let state = state(pass.blend, pass.depth_write, shading);
+            let state = sky_state(pass.blend, pass.depth_write, cull, shading);
             self.push(state, DepthRange::Sky, span, draw);
+        }
+    }
+
+    fn mesh(&mut self) -> sky::Mesh<'_> {
+        sky::Mesh {
+            vertices: &mut self.vertices,
+            indices: &mut self.indices,
         }
     }
 
@@ -362,6 +385,24 @@ impl DrawList {
             draw: self.draws.len() as u32,
         });
         self.draws.push(draw);
+    }
+}
+
+/// What is drawn at the far end of the depth range.
+fn sky_state(
+    blend: Option<(u32, u32)>,
+    depth_write: bool,
+    cull: CullFaces,
+    shading: Shading,
+) -> State {
+    State {
+        blend,
+        depth: Depth::LessEqual,
+        depth_write,
+        cull,
+        offset: false,
+        wireframe: false,
+        shading,
     }
 }
 

@@ -34,6 +34,11 @@ pub const COLOR_FORMAT: Format = Format::Rgba8;
 /// Format of the frame's depth image.
 pub const DEPTH_FORMAT: Format = Format::D32F;
 
+/// How far down 3D views are moved, pixels: one step of the usual grid of 1/256. Windows of OpenGL count rows from the
+/// bottom, so of a pixel that an edge cuts through its middle the triangle above the edge gets it there, the one below
+/// the edge here. Level cameras meet such edges often.
+const EDGE_SHIFT: f32 = 1.0 / 256.0;
+
 /// What a draw list needs besides itself.
 pub struct ViewParameters<'a> {
     /// World to clip space.
@@ -181,7 +186,10 @@ impl Raster {
                     DepthRange::Sky => (1.0, 1.0),
                     DepthRange::Front => (0.0, 0.0),
                 };
-                let [x, y, width, height] = p.viewport.map(|v| v as f32);
+                let [x, mut y, width, height] = p.viewport.map(|v| v as f32);
+                if p.clear_depth {
+                    y += EDGE_SHIFT;
+                }
                 pass.set_viewport(&Viewport {
                     x,
                     y,

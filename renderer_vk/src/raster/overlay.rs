@@ -130,7 +130,7 @@ impl Overlay {
             };
             match run.content {
                 Content::Texture(texture) => {
-                    let (shading, draw) = stages.image(texture, draw);
+                    let (shading, draw) = stages.image(texture, sampler::CLAMP, draw);
                     push(State { shading, ..plain }, draw);
                 }
                 Content::Material(index) => {

@@ -49,16 +49,16 @@ pub enum CullFaces {
     CounterClockwise,
 }
 
+/// The engine draws into a window without alpha, which reads as 1; the image here has one.
 fn factor(blend: u32) -> BlendFactor {
     match blend {
-        c::BLEND_ZERO => BlendFactor::Zero,
+        c::BLEND_ZERO | c::BLEND_ONE_MINUS_DST_ALPHA | c::BLEND_SRC_ALPHA_SATURATE => {
+            BlendFactor::Zero
+        }
         c::BLEND_DST_COLOR => BlendFactor::DstColor,
         c::BLEND_ONE_MINUS_DST_COLOR => BlendFactor::OneMinusDstColor,
         c::BLEND_SRC_ALPHA => BlendFactor::SrcAlpha,
         c::BLEND_ONE_MINUS_SRC_ALPHA => BlendFactor::OneMinusSrcAlpha,
-        c::BLEND_DST_ALPHA => BlendFactor::DstAlpha,
-        c::BLEND_ONE_MINUS_DST_ALPHA => BlendFactor::OneMinusDstAlpha,
-        c::BLEND_SRC_ALPHA_SATURATE => BlendFactor::SrcAlphaSaturate,
         c::BLEND_SRC_COLOR => BlendFactor::SrcColor,
         c::BLEND_ONE_MINUS_SRC_COLOR => BlendFactor::OneMinusSrcColor,
         _ => BlendFactor::One,

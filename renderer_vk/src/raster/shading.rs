@@ -173,13 +173,13 @@ impl StageContext<'_> {
         (shading, draw)
     }
 
-    /// The draw of one texture, clamped and without smaller levels, times the vertices' colours.
-    pub fn image(&self, texture: u32, draw: Draw) -> (Shading, Draw) {
+    /// The draw of one texture, by a sampler ([`sampler`]), times the vertices' colours.
+    pub fn image(&self, texture: u32, kind: u32, draw: Draw) -> (Shading, Draw) {
         let shading = Shading {
             textures: 1,
             ..Shading::VERTEX_COLOR
         };
-        (shading, self.textured(texture, draw))
+        (shading, self.textured(texture, kind, draw))
     }
 
     /// The draw of a lightmap page alone.
@@ -189,12 +189,12 @@ impl StageContext<'_> {
             tc_gen: [c::TCGEN_LIGHTMAP, 0],
             ..Shading::WHITE
         };
-        (shading, self.textured(texture, draw))
+        (shading, self.textured(texture, sampler::CLAMP, draw))
     }
 
-    fn textured(&self, texture: u32, draw: Draw) -> Draw {
+    fn textured(&self, texture: u32, kind: u32, draw: Draw) -> Draw {
         Draw {
-            textures: [self.handle(texture, sampler::CLAMP), 0],
+            textures: [self.handle(texture, kind), 0],
             texcoords: [UNCHANGED, UNCHANGED],
             ..draw
         }

@@ -1,4 +1,4 @@
-//! The sky of the classic look: a box around the eye, and cloud layers projected from a sphere onto it.
+//! The sky of the classic look: a box around the eye, cloud layers projected from a sphere onto it, and the sun.
 //!
 //! Source: the engine's sky as described in its behaviour: faces and their texture axes, a dome over a planet of
 //! radius 4096 for the clouds, depth at the far end.
@@ -6,25 +6,14 @@
 use glam::{Vec2, Vec3};
 use shaders::types::Vertex;
 
-/// Cells of a face along each side, at whose corners cloud coordinates are computed.
-const CELLS: usize = 8;
+use crate::scene::{Cells, SKY_CELLS, View, cube_point, perpendicular};
+
 /// Radius of the planet under the clouds, units.
 const PLANET_RADIUS: f32 = 4096.0;
-
-/// Number of faces, in the order of the box's images: right, left, back, front, up, down.
-pub const FACES: usize = 6;
-
-/// The point of face `face` of the cube [-1, 1]³ at texture parameters `s`, `t` in [-1, 1].
-pub fn cube_point(face: usize, s: f32, t: f32) -> Vec3 {
-    match face {
-        0 => Vec3::new(1.0, -s, t),
-        1 => Vec3::new(s, 1.0, t),
-        2 => Vec3::new(-1.0, s, t),
-        3 => Vec3::new(-s, -1.0, t),
-        4 => Vec3::new(-t, -s, 1.0),
-        _ => Vec3::new(t, -s, -1.0),
-    }
-}
+/// How far away the box and the sun are, as a part of the distance of the far plane; less than its corners.
+const DISTANCE: f32 = 1.0 / 1.75;
+/// Half the side of the sun, as a part of its distance.
+const SUN_SIZE: f32 = 0.1;
 
 /// Coordinates on the cloud layer in `direction` (any length), clouds `height` above the ground.
 pub fn cloud_coordinates(direction: Vec3, height: f32) -> Vec2 {
@@ -45,57 +34,85 @@ pub enum Coordinates {
     Clouds(f32),
 }
 
-/// Appends one face around `eye`, `size` units away, and returns the range of its indices.
-pub fn append_face(
-    vertices: &mut Vec<Vertex>,
-    indices: &mut Vec<u32>,
-    face: usize,
-    eye: Vec3,
-    size: f32,
-    color: u32,
-    coordinates: Coordinates,
-) -> (u32, u32) {
-    let first_vertex = vertices.len() as u32;
-    let first_index = indices.len() as u32;
-    for row in 0..=CELLS {
-        for column in 0..=CELLS {
-            let s = column as f32 / CELLS as f32 * 2.0 - 1.0;
-            let t = row as f32 / CELLS as f32 * 2.0 - 1.0;
-            let point = cube_point(face, s, t);
-            let st = match coordinates {
-                Coordinates::Box => Vec2::new((s + 1.0) * 0.5, 1.0 - (t + 1.0) * 0.5),
-                Coordinates::Clouds(height) => cloud_coordinates(point, height),
-            };
-            vertices.push(Vertex {
-                position: eye + point * size,
-                normal: -point.normalize(),
+/// Vertices and indices that are drawn into.
+pub struct Mesh<'a> {
+    /// All vertices.
+    pub vertices: &'a mut Vec<Vertex>,
+    /// All indices.
+    pub indices: &'a mut Vec<u32>,
+}
+
+impl Mesh<'_> {
+    /// Appends the given cells of a face of the box around a view's eye and returns the range of their indices.
+    pub fn append_face(
+        &mut self,
+        face: usize,
+        cells: Cells,
+        view: &View,
+        color: u32,
+        coordinates: Coordinates,
+    ) -> (u32, u32) {
+        let first_vertex = self.vertices.len() as u32;
+        let first_index = self.indices.len() as u32;
+        for row in cells.from[1]..=cells.to[1] {
+            for column in cells.from[0]..=cells.to[0] {
+                let s = column as f32 / SKY_CELLS as f32 * 2.0 - 1.0;
+                let t = row as f32 / SKY_CELLS as f32 * 2.0 - 1.0;
+                let point = cube_point(face, s, t);
+                let st = match coordinates {
+                    Coordinates::Box => Vec2::new((s + 1.0) * 0.5, 1.0 - (t + 1.0) * 0.5),
+                    Coordinates::Clouds(height) => cloud_coordinates(point, height),
+                };
+                self.vertices.push(Vertex {
+                    position: view.origin + point * view.far * DISTANCE,
+                    normal: -point.normalize(),
+                    st,
+                    lightmap: Vec2::ZERO,
+                    color,
+                });
+            }
+        }
+        let (columns, rows) = (cells.to[0] - cells.from[0], cells.to[1] - cells.from[1]);
+        let width = columns as u32 + 1;
+        for row in 0..rows as u32 {
+            for column in 0..columns as u32 {
+                let a = first_vertex + row * width + column;
+                self.indices
+                    .extend([a, a + width, a + 1, a + 1, a + width, a + width + 1]);
+            }
+        }
+        (first_index, self.indices.len() as u32 - first_index)
+    }
+
+    /// Appends the quad of a sun in `direction` (unit length) and returns the range of its indices.
+    pub fn append_sun(&mut self, direction: Vec3, view: &View) -> (u32, u32) {
+        let first_vertex = self.vertices.len() as u32;
+        let first_index = self.indices.len() as u32;
+        let distance = view.far * DISTANCE;
+        let middle = view.origin + direction * distance;
+        let left = perpendicular(direction) * distance * SUN_SIZE;
+        let up = direction.cross(left);
+        let corners = [left + up, up - left, -left - up, left - up];
+        let coordinates = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
+        for (corner, st) in corners.into_iter().zip(coordinates) {
+            self.vertices.push(Vertex {
+                position: middle + corner,
+                normal: -view.axis[0],
                 st,
                 lightmap: Vec2::ZERO,
-                color,
+                color: u32::MAX,
             });
         }
+        self.indices
+            .extend([0, 1, 3, 3, 1, 2].map(|i| first_vertex + i));
+        (first_index, 6)
     }
-    let width = CELLS as u32 + 1;
-    for row in 0..CELLS as u32 {
-        for column in 0..CELLS as u32 {
-            let a = first_vertex + row * width + column;
-            indices.extend([a, a + width, a + 1, a + 1, a + width, a + width + 1]);
-        }
-    }
-    (first_index, indices.len() as u32 - first_index)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn faces_lie_on_the_cube() {
-        for face in 0..FACES {
-            let p = cube_point(face, 0.25, -0.5);
-            assert_eq!(p.abs().max_element(), 1.0, "face {face}: {p}");
-        }
-    }
+    use crate::api::RefDef;
 
     #[test]
     fn clouds_overhead_are_at_a_quarter_turn() {
@@ -107,5 +124,33 @@ mod tests {
         let reach = (2.0_f32 * 4096.0 * 512.0 + 512.0 * 512.0).sqrt();
         let expected = (reach / (4096.0 + 512.0)).acos();
         assert!((uv.x - expected).abs() < 1e-5, "{uv} {expected}");
+    }
+
+    #[test]
+    fn faces_have_the_cells_asked_for() {
+        let view = View::new(&RefDef::default(), 4.0, 1750.0);
+        let (mut vertices, mut indices) = (Vec::new(), Vec::new());
+        let mut mesh = Mesh {
+            vertices: &mut vertices,
+            indices: &mut indices,
+        };
+        let cells = Cells {
+            from: [2, 5],
+            to: [4, 8],
+        };
+        assert_eq!(
+            mesh.append_face(0, cells, &view, 0, Coordinates::Box),
+            (0, 2 * 3 * 6)
+        );
+        assert_eq!(mesh.append_sun(Vec3::Z, &view), (36, 6));
+        assert_eq!(vertices.len(), 3 * 4 + 4);
+        assert!(indices.iter().all(|&i| (i as usize) < vertices.len()));
+        // column 2 of 8, row 5 of 8
+        assert_eq!(vertices[0].st, Vec2::new(0.25, 1.0 - 0.625));
+        assert!((vertices[0].position.x - 1000.0).abs() < 1e-2);
+        let sun = &vertices[12..];
+        assert!(sun.iter().all(|v| (v.position.z - 1000.0).abs() < 1e-2));
+        let diagonal = sun[0].position.distance(sun[2].position);
+        assert!((diagonal - 2.0 * 100.0 * 2.0f32.sqrt()).abs() < 1e-2);
     }
 }

@@ -9,7 +9,9 @@ use super::entity;
 use super::mesh::{self, DeformScratch, RawMesh};
 use super::portal;
 use super::surfaces::{self, LocalView, PendingDeform, SurfaceRun, WORLD_ENTITY, sort_key};
-use super::{DynamicMesh, GatherInput, Look, Scene, ShadowVolumes, Statistics, View, ViewScene};
+use super::{
+    DynamicMesh, GatherInput, Look, Scene, ShadowVolumes, Statistics, Sun, View, ViewScene,
+};
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
 use crate::world::{Bounds, VisibleQuery, VisibleSet, WorldData};
 
@@ -73,6 +75,7 @@ fn empty_view(def: &RefDef, view: View) -> ViewScene {
         skies: Vec::new(),
         shadows: ShadowVolumes::default(),
         statistics: Statistics::default(),
+        sun: None,
     }
 }
 
@@ -171,8 +174,18 @@ impl<'a> Gatherer<'a> {
         out.skies.clear();
         out.shadows.clear();
         out.statistics = Statistics::default();
+        out.sun = self.sun();
         out.instances
             .push(entity::world_instance(&self.view, out.time));
+    }
+
+    /// The sun's disc where it is asked for; the game may have no material for it.
+    fn sun(&self) -> Option<Sun> {
+        let world = self.world.filter(|_| self.input.settings.draw_sun)?;
+        Some(Sun {
+            material: self.input.materials.internal().sun?,
+            direction: world.sun_direction,
+        })
     }
 
     /// The frustum's planes; none when nothing is culled.
@@ -268,6 +281,7 @@ impl<'a> Gatherer<'a> {
             entity,
             curve_error: self.input.settings.lod_curve_error,
             no_curves: self.input.settings.no_curves,
+            no_sky: self.input.settings.fast_sky,
         }
     }
 

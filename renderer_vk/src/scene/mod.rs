@@ -14,6 +14,7 @@ mod models;
 mod portal;
 mod shadow_volumes;
 mod shapes;
+mod sky;
 mod statistics;
 mod surfaces;
 pub mod view;
@@ -28,6 +29,8 @@ use crate::settings::Settings;
 use crate::world::{VisibleSet, World, WorldData};
 pub use lighting::light_for_point;
 pub use shadow_volumes::ShadowVolumes;
+pub(crate) use shapes::perpendicular;
+pub use sky::{CELLS as SKY_CELLS, Cells, FACES as SKY_FACES, SkyCoverage, VisibleSky, cube_point};
 pub use statistics::{CullCounts, Statistics};
 pub use view::View;
 
@@ -122,6 +125,15 @@ pub struct Portal {
     pub entity_origin: Vec3,
 }
 
+/// The sun's disc.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sun {
+    /// Index of the material.
+    pub material: u32,
+    /// Unit vector towards it.
+    pub direction: Vec3,
+}
+
 /// What is needed to draw one view.
 #[derive(Clone, Debug)]
 pub struct ViewScene {
@@ -150,12 +162,14 @@ pub struct ViewScene {
     pub portals: Vec<Portal>,
     /// The world is part of the view.
     pub has_world: bool,
-    /// Materials of the skies in sight, each once.
-    pub skies: Vec<u32>,
     /// Shadow volumes of models (classic look, `cg_shadows 2`).
     pub shadows: ShadowVolumes,
     /// Counts, when `r_speeds` asks for them.
     pub statistics: Statistics,
+    /// The skies in sight, each material once (classic look only).
+    pub skies: Vec<VisibleSky>,
+    /// The sun's disc, when it is to be drawn wherever a sky is in sight.
+    pub sun: Option<Sun>,
 }
 
 /// Which of the two looks a view is gathered for.

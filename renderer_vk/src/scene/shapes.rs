@@ -207,7 +207,7 @@ fn normal_vectors(forward: Vec3) -> (Vec3, Vec3) {
 }
 
 /// A unit vector perpendicular to a unit vector: its smallest component's axis, projected.
-pub(super) fn perpendicular(direction: Vec3) -> Vec3 {
+pub(crate) fn perpendicular(direction: Vec3) -> Vec3 {
     let size = direction.abs();
     let axis = if size.x <= size.y && size.x <= size.z {
         Vec3::X

@@ -4,7 +4,7 @@ use glam::{Vec3, Vec4};
 use q3bsp::SurfaceKind;
 use shaderscript::Cull;
 
-use super::{DrawSurface, DynamicMesh, Geometry, ViewScene};
+use super::{DrawSurface, DynamicMesh, Geometry, SkyCoverage, ViewScene, VisibleSky, entity};
 use crate::api::DynamicLight;
 use crate::assets::Materials;
 use crate::world::{Bounds, WorldData, WorldSurface, outside};
@@ -100,6 +100,8 @@ pub(super) struct SurfaceRun<'a> {
     pub curve_error: f32,
     /// `r_nocurves`.
     pub no_curves: bool,
+    /// `r_fastsky`.
+    pub no_sky: bool,
 }
 
 impl SurfaceRun<'_> {
@@ -124,8 +126,8 @@ impl SurfaceRun<'_> {
             _ => (surface.first_index, surface.index_count),
         };
         if drawn.is_sky() {
-            if !out.skies.contains(&material) {
-                out.skies.push(material);
+            if !self.no_sky {
+                self.add_sky(material, first_index, index_count, out);
             }
             return None;
         }
@@ -153,6 +155,32 @@ impl SurfaceRun<'_> {
             },
         });
         None
+    }
+}
+
+impl SurfaceRun<'_> {
+    /// Adds triangles to what is seen of a sky.
+    fn add_sky(&self, material: u32, first_index: u32, index_count: u32, out: &mut ViewScene) {
+        let Some(instance) = out.instances.get(self.instance as usize) else {
+            return;
+        };
+        let eye = out.view.origin;
+        let at = match out.skies.iter().position(|sky| sky.material == material) {
+            Some(at) => at,
+            None => {
+                out.skies.push(VisibleSky {
+                    material,
+                    coverage: SkyCoverage::EMPTY,
+                });
+                out.skies.len() - 1
+            }
+        };
+        if let Some(sky) = out.skies.get_mut(at) {
+            for triangle in self.world.triangles(first_index, index_count) {
+                let seen = triangle.map(|p| entity::to_world(instance, p) - eye);
+                sky.coverage.add(seen);
+            }
+        }
     }
 }
 

@@ -489,6 +489,7 @@ impl Scene {
             skies: Vec::new(),
             shadows: ShadowVolumes::default(),
             statistics: Default::default(),
+            sun: None,
         }
     }
 
