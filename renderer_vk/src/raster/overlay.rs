@@ -7,6 +7,7 @@ use shaders::types::{Draw, Instance, Vertex};
 use super::list::{Call, DepthRange, DrawList, stage_depth};
 use super::pipelines::{CullFaces, Depth, State};
 use super::shading::{Shading, StageContext};
+use crate::assets::compile::sampler;
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq)]

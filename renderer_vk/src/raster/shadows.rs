@@ -143,7 +143,7 @@ impl Shadows {
         let [x, y, width, height] = view.viewport.map(|v| v as f32);
         pass.set_viewport(&Viewport {
             x,
-            y,
+            y: y + super::EDGE_SHIFT,
             width,
             height,
             min_depth: 0.0,
