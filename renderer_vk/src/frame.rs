@@ -5,7 +5,8 @@ use glam::{Mat4, Vec3, Vec4};
 use crate::assets::Assets;
 use crate::gpu::{self, ColorMask, Image, Recorder};
 use crate::raster::{
-    Aids, DrawList, Overlay, Raster, StageContext, Target, ViewParameters, overlay_instance,
+    Aids, DrawList, Flares, Overlay, Raster, StageContext, Target, ViewParameters,
+    overlay_instance, window_to_clip,
 };
 use crate::scene::ViewScene;
 use crate::settings::Settings;
@@ -36,6 +37,8 @@ pub struct FrameContext<'a> {
     pub settings: &'a Settings,
     /// The classic look.
     pub raster: &'a mut Raster,
+    /// Flares of the classic look.
+    pub flares: &'a mut Flares,
     /// The traced look, where the device traces rays.
     pub trace: Option<&'a mut TraceLook>,
     /// Draw list, reused.
@@ -100,6 +103,7 @@ impl<'a> FrameContext<'a> {
             identity_light: self.settings.identity_light(),
             materials: self.assets.materials.addresses(),
             static_vertices: 0,
+            dynamic_vertices: None,
             fogs: 0,
             instances: &[instance],
             lights: &[],
@@ -140,6 +144,7 @@ impl<'a> FrameContext<'a> {
             identity_light: settings.identity_light(),
             materials: self.assets.materials.addresses(),
             static_vertices: world.map_or(0, |w| w.vertex_buffer.address()),
+            dynamic_vertices: None,
             fogs: world.map_or(0, |w| w.fog_buffer.address()),
             instances: &scene.instances,
             lights: &scene.dlights,
@@ -154,7 +159,50 @@ impl<'a> FrameContext<'a> {
             mask: ColorMask::ALL,
         };
         self.raster
-            .record(recorder, "classic", target, self.list, &parameters)
+            .record(recorder, "classic", target, self.list, &parameters)?;
+        self.flares(recorder, target, scene)
+    }
+
+    /// Draws the flares of a view that was just drawn.
+    fn flares(
+        &mut self,
+        recorder: &mut Recorder,
+        target: Target<'_>,
+        scene: &ViewScene,
+    ) -> Result<(), gpu::Error> {
+        let Some(material) = self.assets.materials.internal().flare else {
+            return Ok(());
+        };
+        let material = self.assets.materials.resolve(material);
+        let speed = self.settings.flare_fade;
+        let stages = self.stages();
+        let evaluated = self
+            .flares
+            .evaluate(recorder, target, scene, material, speed)?;
+        let Some((vertices, quads)) = evaluated else {
+            return Ok(());
+        };
+        self.list.clear();
+        self.list.add_view(quads, stages, &[], Aids::default());
+        let parameters = ViewParameters {
+            world_to_clip: window_to_clip(quads.view.viewport),
+            clip_plane: [0.0; 4],
+            eye: Vec3::new(0.0, 0.0, -1.0),
+            forward: Vec3::Z,
+            identity_light: self.settings.identity_light(),
+            materials: self.assets.materials.addresses(),
+            static_vertices: 0,
+            dynamic_vertices: Some(vertices),
+            fogs: 0,
+            instances: &quads.instances,
+            lights: &[],
+            viewport: quads.view.viewport,
+            clear_depth: false,
+            clear_color: None,
+            shadows: None,
+        };
+        self.raster
+            .record(recorder, "flares", target, self.list, &parameters)
     }
 }
 

@@ -16,7 +16,7 @@ use crate::gpu::{
     Device, DeviceInfo, DeviceOptions, FrameRing, Image, ImageDesc, ImageUsage, SurfaceSource,
     Swapchain, SwapchainDesc, Window,
 };
-use crate::raster::{self, DrawList, Overlay, Picture2d, Present, Raster};
+use crate::raster::{self, DrawList, Flares, Overlay, Picture2d, Present, Raster};
 use crate::scene::{Look, Scene, Statistics};
 use crate::settings::Settings;
 use crate::trace::TraceLook;
@@ -58,6 +58,7 @@ pub struct Renderer {
     assets: Option<Assets>,
     list: DrawList,
     raster: Raster,
+    flares: Flares,
     present: Option<Present>,
     color: Image,
     depth: Image,
@@ -120,6 +121,7 @@ impl Renderer {
             assets: None,
             list: DrawList::default(),
             raster: Raster::new(&device),
+            flares: Flares::new(&device),
             present,
             color,
             depth,
@@ -471,6 +473,7 @@ impl Renderer {
         }
         let stats = self.flush(true)?;
         self.scene.end_frame();
+        self.flares.end_frame();
         Ok(stats)
     }
 
@@ -513,6 +516,7 @@ impl Renderer {
                 world: self.world.as_ref(),
                 settings: &self.settings,
                 raster: &mut self.raster,
+                flares: &mut self.flares,
                 trace: self.trace.as_mut(),
                 list: &mut self.list,
             };

@@ -45,6 +45,10 @@ struct Draw {
     uint dynamic_vertices;
 };
 
+struct Flare { vec3 color; float size; vec2 center; uint pixel[2]; float depth; uint slot; uint fresh; };
+
+struct FlareState { uint seen; uint visible; int since; };
+
 struct RasterLight { vec3 origin; float radius; vec3 color; };
 
 const uint NO_TEXTURE = 0xFFFFFFFFu;

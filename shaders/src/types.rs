@@ -264,6 +264,38 @@ pub struct RasterLight {
     pub color: Vec3,
 }
 
+/// A flare of the classic look: where it is tested, and what is drawn where it shows.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Flare {
+    /// Colour at full brightness, of 255.
+    pub color: Vec3,
+    /// Half the side of its square, pixels.
+    pub size: f32,
+    /// Middle of its square, pixels of the window.
+    pub center: Vec2,
+    /// Pixel of the window where depth is tested.
+    pub pixel: [u32; 2],
+    /// The test passes where the depth is this or more.
+    pub depth: f32,
+    /// Index of its [`FlareState`].
+    pub slot: u32,
+    /// 1: the state is another flare's, or none.
+    pub fresh: u32,
+}
+
+/// What is known of a flare from frame to frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct FlareState {
+    /// 1: the test has passed in this frame.
+    pub seen: u32,
+    /// 1: it passed when it was last evaluated.
+    pub visible: u32,
+    /// Since when, milliseconds of the view's time.
+    pub since: i32,
+}
+
 /// Names of constants used on both sides.
 pub mod constants {
     macro_rules! constants { ($($(#[$doc:meta])* $name:ident = $value:expr;)*) => { $($(#[$doc])* #[allow(missing_docs)] pub const $name: u32 = $value;)* } }

@@ -78,6 +78,9 @@ pub fn apply(cvars: &Cvars, window_fullscreen: bool, settings: &mut Settings) {
     settings.draw_sun = flag(Cvar::DrawSun);
     settings.dynamic_light = flag(Cvar::DynamicLight);
     settings.flares = flag(Cvar::Flares);
+    settings.flare_size = value(Cvar::FlareSize);
+    settings.flare_fade = value(Cvar::FlareFade);
+    settings.flare_coefficient = value(Cvar::FlareCoeff);
     settings.shadows = integer(Cvar::Shadows);
     settings.draw_world = flag(Cvar::DrawWorld);
     settings.draw_entities = flag(Cvar::DrawEntities);

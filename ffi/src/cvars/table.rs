@@ -93,9 +93,9 @@ cvars! {
     LodBias = c"r_lodbias", c"0", ARCHIVE, None, c"Added to the level of detail of models; higher is coarser.";
     LodScale = c"r_lodscale", c"5", CHEAT, None, c"Scales the level of detail of models by their size on screen.";
     Flares = c"r_flares", c"0", ARCHIVE, None, c"1 draws light flares.";
-    FlareSize = c"r_flareSize", c"40", CHEAT, None, c"Size of flares. Kept for old configurations and menus; has no effect here.";
-    FlareFade = c"r_flareFade", c"7", CHEAT, None, c"How fast flares appear and go. Kept for old configurations and menus; has no effect here.";
-    FlareCoeff = c"r_flareCoeff", c"150", CHEAT, None, c"How flares dim with distance. Kept for old configurations and menus; has no effect here.";
+    FlareSize = c"r_flareSize", c"40", CHEAT, None, c"Size of far flares, of a window 640 pixels wide.";
+    FlareFade = c"r_flareFade", c"7", CHEAT, None, c"How often in a second a flare could appear or go.";
+    FlareCoeff = c"r_flareCoeff", c"150", CHEAT, None, c"How bright flares stay with distance.";
     FastSky = c"r_fastsky", c"0", ARCHIVE, None, c"1 draws no sky and no portals, 2 keeps the portals.";
     DrawSun = c"r_drawSun", c"0", ARCHIVE, None, c"1 draws the sun's disc in the sky.";
     DynamicLight = c"r_dynamiclight", c"1", ARCHIVE, None, c"0 ignores lights of explosions, missiles and items.";

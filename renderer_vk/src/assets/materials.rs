@@ -77,12 +77,16 @@ pub struct Internal {
     pub shadow: Option<u32>,
     /// The game's material for the sun's disc (`r_drawSun`), if it has one.
     pub sun: Option<u32>,
+    /// The game's material for flares, if it has one.
+    pub flare: Option<u32>,
 }
 
 /// Name of the script that the engine draws planar shadows with.
 const SHADOW_MATERIAL: &str = "projectionShadow";
 /// Name of the script that the engine draws the sun with.
 const SUN_MATERIAL: &str = "sun";
+/// Name of the script that the engine draws all flares with, whatever their surfaces' own are.
+const FLARE_MATERIAL: &str = "flareShader";
 
 impl Materials {
     /// The default material and the renderer's own ones. `scripts` are the game's.
@@ -146,8 +150,12 @@ impl Materials {
             materials.scripts.library().find(name)?;
             Some(materials.find(source, name, LightmapClass::None, true))
         };
-        let (shadow, sun) = (scripted(SHADOW_MATERIAL), scripted(SUN_MATERIAL));
+        // in the order in which the engine makes them
+        let shadow = scripted(SHADOW_MATERIAL);
+        let flare = scripted(FLARE_MATERIAL);
+        let sun = scripted(SUN_MATERIAL);
         materials.internal.shadow = shadow;
+        materials.internal.flare = flare;
         materials.internal.sun = sun;
         materials
     }

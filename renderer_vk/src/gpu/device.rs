@@ -251,6 +251,11 @@ impl Device {
         lock(&self.0.state).graveyard.len()
     }
 
+    /// Whether fragment shaders can write to buffers.
+    pub fn fragment_stores(&self) -> bool {
+        self.0.abilities.fragment_stores
+    }
+
     /// The format of depth with stencil to use, if the device can draw to one.
     pub fn depth_stencil_format(&self) -> Option<Format> {
         let needed = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;

@@ -4,6 +4,7 @@
 //! Colours stay as displayed (encoded) throughout: the target is RGBA8 without conversion, and stages blend in that
 //! space, as they do in the engine.
 
+mod flares;
 mod list;
 mod overlay;
 mod pipelines;
@@ -16,6 +17,7 @@ mod target;
 use glam::{Mat4, Vec3};
 use shaders::types::{Instance, MaterialBuffers, RasterLight, RasterView};
 
+pub use flares::{Flares, window_to_clip};
 pub use list::{Aids, DrawList};
 pub use overlay::{Overlay, Picture2d, overlay_instance};
 pub use present::Present;
@@ -55,6 +57,8 @@ pub struct ViewParameters<'a> {
     pub materials: MaterialBuffers,
     /// Address of the world's vertices, or 0.
     pub static_vertices: u64,
+    /// Address of the vertices that move, where they are not the list's own.
+    pub dynamic_vertices: Option<u64>,
     /// Address of the fog volumes, or 0.
     pub fogs: u64,
     /// Instances of the view.
@@ -128,7 +132,10 @@ impl Raster {
             padding: 0,
             materials: p.materials,
             static_vertices: p.static_vertices,
-            dynamic_vertices: arena.push(&list.vertices)?,
+            dynamic_vertices: match p.dynamic_vertices {
+                Some(address) => address,
+                None => arena.push(&list.vertices)?,
+            },
             instances: arena.push(p.instances)?,
             draws: arena.push(&list.draws)?,
             fogs: p.fogs,

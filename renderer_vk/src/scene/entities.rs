@@ -152,6 +152,7 @@ impl Gatherer<'_> {
         out.submodels.push(Submodel { model, instance });
         let first = brush.first_surface;
         let range = first..first.saturating_add(brush.num_surfaces);
+        self.add_flares(world, range.clone(), instance, out);
         let mut pending = std::mem::take(&mut self.scratch.pending);
         match self.look {
             Look::Traced => {

@@ -6,12 +6,11 @@ use shaders::types::Vertex;
 use shaders::types::constants::NO_TEXTURE;
 
 use super::entity;
+use super::flares::FlareView;
 use super::mesh::{self, DeformScratch, RawMesh};
 use super::portal;
 use super::surfaces::{self, LocalView, PendingDeform, SurfaceRun, WORLD_ENTITY, sort_key};
-use super::{
-    DynamicMesh, GatherInput, Look, Scene, ShadowVolumes, Statistics, Sun, View, ViewScene,
-};
+use super::{DynamicMesh, GatherInput, Look, Scene, Statistics, Sun, View, ViewScene};
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
 use crate::world::{Bounds, VisibleQuery, VisibleSet, WorldData};
 
@@ -36,14 +35,20 @@ pub(super) fn views(
 ) -> Vec<ViewScene> {
     let mut out = Vec::with_capacity(2);
     let view = View::new(def, input.settings.znear, FAR_WITHOUT_WORLD);
-    let mut main = scene.pool.pop().unwrap_or_else(|| empty_view(def, view));
+    let mut main = scene
+        .pool
+        .pop()
+        .unwrap_or_else(|| ViewScene::empty(def, view));
     Gatherer::new(scene, input, def, look, view).gather(def.view_origin, &mut main);
     match look {
         Look::Traced => portal::find_all(&scene.entities, input, def, &mut main),
         Look::Classic => {
             if let Some(portal) = portal::find_first(&scene.entities, input, def, &main) {
                 let seen = portal::view_through(&portal, &main.view);
-                let mut behind = scene.pool.pop().unwrap_or_else(|| empty_view(def, seen));
+                let mut behind = scene
+                    .pool
+                    .pop()
+                    .unwrap_or_else(|| ViewScene::empty(def, seen));
                 Gatherer::new(scene, input, def, look, seen).gather(portal.pvs_origin, &mut behind);
                 main.portals.push(portal);
                 out.push(behind);
@@ -56,27 +61,6 @@ pub(super) fn views(
     }
     out.push(main);
     out
-}
-
-fn empty_view(def: &RefDef, view: View) -> ViewScene {
-    ViewScene {
-        def: *def,
-        view,
-        time: 0.0,
-        instances: Vec::new(),
-        vertices: Vec::new(),
-        indices: Vec::new(),
-        meshes: Vec::new(),
-        submodels: Vec::new(),
-        surfaces: Vec::new(),
-        dlights: Vec::new(),
-        portals: Vec::new(),
-        has_world: false,
-        skies: Vec::new(),
-        shadows: ShadowVolumes::default(),
-        statistics: Statistics::default(),
-        sun: None,
-    }
 }
 
 /// A length as the GPU counts.
@@ -175,6 +159,7 @@ impl<'a> Gatherer<'a> {
         out.shadows.clear();
         out.statistics = Statistics::default();
         out.sun = self.sun();
+        out.flares.clear();
         out.instances
             .push(entity::world_instance(&self.view, out.time));
     }
@@ -258,9 +243,31 @@ impl<'a> Gatherer<'a> {
                 pending.extend(deformed.filter_map(|&s| self.traced_deform(world, s)));
             }
         }
+        self.add_flares(world, self.visible.surfaces.iter().copied(), 0, out);
         self.add_deformed(world, &mut pending, 0, None, out);
         self.scratch.pending = pending;
         self.scratch.lights = lights;
+    }
+
+    /// Adds the flares among some surfaces, placed by an instance.
+    pub(super) fn add_flares(
+        &self,
+        world: &WorldData,
+        surfaces: impl Iterator<Item = u32>,
+        instance: u32,
+        out: &mut ViewScene,
+    ) {
+        let shown = self.look == Look::Classic && self.input.settings.flares;
+        let Some(placed) = out.instances.get(instance as usize).filter(|_| shown) else {
+            return;
+        };
+        let view = FlareView {
+            view: &self.view,
+            world,
+            settings: self.input.settings,
+        };
+        out.flares
+            .extend(surfaces.filter_map(|surface| view.find(surface, instance, placed)));
     }
 
     pub(super) fn run<'b>(

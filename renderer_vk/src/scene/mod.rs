@@ -6,6 +6,7 @@
 
 mod entities;
 mod entity;
+mod flares;
 mod gather;
 mod key_frames;
 mod lighting;
@@ -27,6 +28,7 @@ use crate::api::{DynamicLight, EntityKind, PolyVert, RefDef, RefEntity};
 use crate::assets::{Assets, Materials, Models, Skins};
 use crate::settings::Settings;
 use crate::world::{VisibleSet, World, WorldData};
+pub use flares::ViewFlare;
 pub use lighting::light_for_point;
 pub use shadow_volumes::ShadowVolumes;
 pub(crate) use shapes::perpendicular;
@@ -170,6 +172,33 @@ pub struct ViewScene {
     pub skies: Vec<VisibleSky>,
     /// The sun's disc, when it is to be drawn wherever a sky is in sight.
     pub sun: Option<Sun>,
+    /// Flares in sight (classic look, `r_flares`).
+    pub flares: Vec<ViewFlare>,
+}
+
+impl ViewScene {
+    /// Nothing, seen by a camera.
+    pub(crate) fn empty(def: &RefDef, view: View) -> Self {
+        Self {
+            def: *def,
+            view,
+            time: 0.0,
+            instances: Vec::new(),
+            vertices: Vec::new(),
+            indices: Vec::new(),
+            meshes: Vec::new(),
+            submodels: Vec::new(),
+            surfaces: Vec::new(),
+            dlights: Vec::new(),
+            portals: Vec::new(),
+            has_world: false,
+            skies: Vec::new(),
+            shadows: ShadowVolumes::default(),
+            statistics: Statistics::default(),
+            sun: None,
+            flares: Vec::new(),
+        }
+    }
 }
 
 /// Which of the two looks a view is gathered for.

@@ -72,6 +72,15 @@ impl View {
         self.world_to_clip = project * rotate * Mat4::from_translation(-self.origin);
     }
 
+    /// Depth of what is so far in front of the eye, 0 and 1 outside of the near and far plane.
+    pub fn depth_at(&self, distance: f32) -> f32 {
+        if distance <= self.near {
+            return 0.0;
+        }
+        let depth = self.far * (distance - self.near) / (distance * (self.far - self.near));
+        depth.clamp(0.0, 1.0)
+    }
+
     /// The four side planes of the view's pyramid, pointing inwards: `xyz.p >= w` is inside.
     pub fn frustum(&self) -> [Vec4; 4] {
         let [forward, left, up] = self.axis;

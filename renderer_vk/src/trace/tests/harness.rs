@@ -490,6 +490,7 @@ impl Scene {
             shadows: ShadowVolumes::default(),
             statistics: Default::default(),
             sun: None,
+            flares: Vec::new(),
         }
     }
 

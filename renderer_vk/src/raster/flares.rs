@@ -1,0 +1,313 @@
+//! Flares of the classic look (`r_flares`): tested against the depth of the view that was just drawn, faded in and out,
+//! and drawn over it, all on the GPU, so that nothing waits for the answer.
+//!
+//! Source: engine behaviour of `renderer_opengl1` (flares).
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, Vec4};
+use shaders::types::{Flare, FlareState, Vertex};
+
+use super::target::{Target, TargetKind};
+use crate::gpu::{
+    self, Access, Buffer, BufferDesc, BufferUsage, ColorMask, ComputePipeline, DepthTest, Device,
+    GraphicsDesc, GraphicsPipeline, Memory, Recorder, Rendering, Topology,
+};
+use crate::scene::{DrawSurface, Geometry, ViewScene};
+
+/// Invocations of a workgroup in `flare_fade.comp`.
+const GROUP: u32 = 64;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct TestParameters {
+    flares: u64,
+    states: u64,
+    size: [f32; 2],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct FadeParameters {
+    flares: u64,
+    states: u64,
+    vertices: u64,
+    count: u32,
+    time: i32,
+    speed: f32,
+    padding: u32,
+}
+
+/// Which flare of which view: surface, entity, number of the view in the frame, seen through a portal or not.
+type Key = (u32, u32, u32, bool);
+
+/// Where a flare's state is.
+struct Slot {
+    index: u32,
+    /// The frame that it was last in sight in.
+    frame: u64,
+}
+
+/// Evaluates flares, and keeps what is known of them from frame to frame.
+pub struct Flares {
+    device: Device,
+    test: HashMap<TargetKind, GraphicsPipeline>,
+    fade: Option<ComputePipeline>,
+    states: Option<Buffer>,
+    vertices: Option<Buffer>,
+    slots: HashMap<Key, Slot>,
+    free: Vec<u32>,
+    /// Slots ever given out.
+    used: u32,
+    frame: u64,
+    /// Views of this frame so far.
+    views: u32,
+    flares: Vec<Flare>,
+    quads: Option<ViewScene>,
+}
+
+impl Flares {
+    /// Nothing is known yet.
+    pub fn new(device: &Device) -> Self {
+        if !device.fragment_stores() {
+            log::warn!("flares are not drawn: the device cannot write from fragment shaders");
+        }
+        Self {
+            device: device.clone(),
+            test: HashMap::new(),
+            fade: None,
+            states: None,
+            vertices: None,
+            slots: HashMap::new(),
+            free: Vec::new(),
+            used: 0,
+            frame: 0,
+            views: 0,
+            flares: Vec::new(),
+            quads: None,
+        }
+    }
+
+    /// A frame of the game is over: what was not in sight in it is forgotten.
+    pub fn end_frame(&mut self) {
+        let frame = self.frame;
+        let free = &mut self.free;
+        self.slots.retain(|_, slot| {
+            let keep = slot.frame == frame;
+            if !keep {
+                free.push(slot.index);
+            }
+            keep
+        });
+        self.frame += 1;
+        self.views = 0;
+    }
+
+    /// Tests the flares of a view that was just drawn to `target`, and makes their squares: returns the address of
+    /// their vertices, four for each flare, and what to draw of them. `None`: there are none.
+    ///
+    /// # Errors
+    /// The device is out of memory or cannot make a pipeline.
+    pub fn evaluate(
+        &mut self,
+        recorder: &mut Recorder,
+        target: Target<'_>,
+        scene: &ViewScene,
+        material: u32,
+        speed: f32,
+    ) -> Result<Option<(u64, &ViewScene)>, gpu::Error> {
+        let view = self.views;
+        self.views += 1;
+        if scene.flares.is_empty() || !self.device.fragment_stores() {
+            return Ok(None);
+        }
+        self.place(scene, view);
+        let count = u32::try_from(self.flares.len()).unwrap_or(u32::MAX);
+        let states = self.fit_states(recorder)?;
+        let vertices = self.fit_vertices()?;
+        let flares = recorder.arena().push(&self.flares)?;
+
+        let kind = target.kind();
+        let test = match self.test.entry(kind) {
+            Entry::Occupied(made) => made.into_mut(),
+            Entry::Vacant(place) => place.insert(test_pipeline(&self.device, kind)?),
+        };
+        let mut pass = recorder.pass("flare test", Access::GRAPHICS, Access::GRAPHICS)?;
+        pass.begin_rendering(&Rendering {
+            color: Some(target.color),
+            depth: Some(target.depth),
+            clear_color: None,
+            clear_depth: None,
+        })?;
+        pass.bind_graphics(test);
+        pass.push(&TestParameters {
+            flares,
+            states: states.address(),
+            size: [target.color.width() as f32, target.color.height() as f32],
+        });
+        pass.draw(count, 1, 0, 0);
+        drop(pass);
+
+        let fade = match &mut self.fade {
+            Some(fade) => fade,
+            none => none.insert(ComputePipeline::new(
+                &self.device,
+                "flare fade",
+                &shaders::RASTER_FLARE_FADE_COMP,
+                &[],
+            )?),
+        };
+        let mut pass = recorder.pass("flare fade", Access::COMPUTE, Access::COMPUTE)?;
+        pass.bind_compute(fade);
+        pass.push(&FadeParameters {
+            flares,
+            states: states.address(),
+            vertices: vertices.address(),
+            count,
+            time: scene.def.time_ms,
+            speed,
+            padding: 0,
+        });
+        pass.dispatch(count.div_ceil(GROUP), 1, 1);
+        drop(pass);
+
+        let quads = self
+            .quads
+            .get_or_insert_with(|| ViewScene::empty(&scene.def, scene.view));
+        list_quads(quads, scene, material, count);
+        Ok(Some((vertices.address(), quads)))
+    }
+
+    /// Fills `flares` with those of the view, each with its slot.
+    fn place(&mut self, scene: &ViewScene, view: u32) {
+        self.flares.clear();
+        for found in &scene.flares {
+            let key = (found.surface, found.instance, view, scene.view.is_portal);
+            let (slot, fresh) = match self.slots.entry(key) {
+                Entry::Occupied(known) => (known.into_mut(), 0),
+                Entry::Vacant(place) => {
+                    let index = self.free.pop().unwrap_or_else(|| {
+                        self.used += 1;
+                        self.used - 1
+                    });
+                    let frame = self.frame;
+                    (place.insert(Slot { index, frame }), 1)
+                }
+            };
+            slot.frame = self.frame;
+            self.flares.push(Flare {
+                slot: slot.index,
+                fresh,
+                ..found.flare
+            });
+        }
+    }
+
+    /// The states, in a buffer that holds every slot in use.
+    fn fit_states(&mut self, recorder: &mut Recorder) -> Result<Buffer, gpu::Error> {
+        let wanted = u64::from(self.used) * size_of::<FlareState>() as u64;
+        if let Some(states) = self.states.as_ref().filter(|s| s.size() >= wanted) {
+            return Ok(states.clone());
+        }
+        let size = wanted.next_power_of_two().max(4096);
+        let grown = storage(&self.device, "flare states", size)?;
+        let mut pass = recorder.pass("flare states", Access::TRANSFER, Access::TRANSFER)?;
+        pass.fill_buffer(&grown, 0, size, 0);
+        if let Some(old) = self.states.take() {
+            pass.barrier();
+            pass.copy_buffer(&old, 0, &grown, 0, old.size());
+        }
+        drop(pass);
+        self.states = Some(grown.clone());
+        Ok(grown)
+    }
+
+    /// A buffer for the squares of all flares of a view.
+    fn fit_vertices(&mut self) -> Result<Buffer, gpu::Error> {
+        let wanted = (self.flares.len() * 4 * size_of::<Vertex>()) as u64;
+        if let Some(vertices) = self.vertices.as_ref().filter(|v| v.size() >= wanted) {
+            return Ok(vertices.clone());
+        }
+        let size = wanted.next_power_of_two().max(16384);
+        let grown = storage(&self.device, "flare squares", size)?;
+        self.vertices = Some(grown.clone());
+        Ok(grown)
+    }
+}
+
+fn storage(device: &Device, name: &str, size: u64) -> Result<Buffer, gpu::Error> {
+    Buffer::new(
+        device,
+        &BufferDesc {
+            name,
+            size,
+            usage: BufferUsage::STORAGE,
+            memory: Memory::Device,
+        },
+    )
+}
+
+fn test_pipeline(device: &Device, target: TargetKind) -> Result<GraphicsPipeline, gpu::Error> {
+    GraphicsPipeline::new(
+        device,
+        &GraphicsDesc {
+            color: Some(target.color),
+            depth: Some(target.depth),
+            samples: target.samples,
+            depth_test: DepthTest::LessEqual,
+            depth_write: false,
+            color_write: ColorMask::NONE,
+            topology: Topology::Points,
+            ..GraphicsDesc::new(
+                "flare test",
+                &shaders::RASTER_FLARE_TEST_VERT,
+                &shaders::RASTER_FLARE_TEST_FRAG,
+            )
+        },
+    )
+}
+
+/// Makes `quads` the view that shows the squares of `count` flares of `scene`.
+fn list_quads(quads: &mut ViewScene, scene: &ViewScene, material: u32, count: u32) {
+    quads.view = scene.view;
+    quads.view.clip_plane = None;
+    quads.time = scene.time;
+    quads.instances.clear();
+    // the engine draws them as parts of the world
+    quads.instances.extend(scene.instances.first());
+    quads.indices.clear();
+    for v in (0..count).map(|quad| quad * 4) {
+        quads.indices.extend([v, v + 1, v + 2, v, v + 2, v + 3]);
+    }
+    quads.surfaces.clear();
+    quads.surfaces.push(DrawSurface {
+        sort_key: 0,
+        material,
+        instance: 0,
+        fog: 0,
+        lightmap: shaders::types::constants::NO_TEXTURE,
+        dlights: 0,
+        geometry: Geometry::Dynamic {
+            first_index: 0,
+            index_count: count * 6,
+        },
+    });
+}
+
+/// Window pixels to clip space, in the middle of the depth range, as the engine draws flares.
+pub fn window_to_clip([x, y, width, height]: [i32; 4]) -> Mat4 {
+    let (width, height) = (width.max(1) as f32, height.max(1) as f32);
+    Mat4::from_cols(
+        Vec4::new(2.0 / width, 0.0, 0.0, 0.0),
+        Vec4::new(0.0, 2.0 / height, 0.0, 0.0),
+        Vec4::ZERO,
+        Vec4::new(
+            -1.0 - 2.0 * x as f32 / width,
+            -1.0 - 2.0 * y as f32 / height,
+            0.5,
+            1.0,
+        ),
+    )
+}

@@ -1,0 +1,146 @@
+//! Flares in sight: what the engine draws where a lamp can be seen.
+//!
+//! Source: engine behaviour of `renderer_opengl1` (flares). Whether a lamp can be seen is found on the GPU, from the
+//! depth of the view that was just drawn.
+
+use glam::{Vec2, Vec3};
+use q3bsp::SurfaceKind;
+use relight::world::Flare;
+use shaders::types;
+
+use super::View;
+use super::entity::to_world;
+use crate::settings::Settings;
+use crate::world::WorldData;
+
+/// How far a flare may be behind what is seen at its place and still show, units.
+const SLACK: f32 = 24.0;
+/// The engine's `r_flareCoeff` where it is 0.
+const DEFAULT_COEFFICIENT: i32 = 150;
+
+/// A flare in sight, as far as the depth at its place is not asked.
+#[derive(Clone, Copy, Debug)]
+pub struct ViewFlare {
+    /// The map's surface.
+    pub surface: u32,
+    /// Entity that the surface belongs to, or the world.
+    pub instance: u32,
+    /// Without slot.
+    pub flare: types::Flare,
+}
+
+/// How a view shows flares.
+pub(super) struct FlareView<'a> {
+    pub view: &'a View,
+    pub world: &'a WorldData,
+    pub settings: &'a Settings,
+}
+
+impl FlareView<'_> {
+    /// The flare of a surface placed by an instance, if it is in sight. `instance` is the number of `placed`.
+    pub fn find(&self, surface: u32, instance: u32, placed: &types::Instance) -> Option<ViewFlare> {
+        let stored = self.world.surfaces.get(surface as usize)?;
+        if stored.kind != SurfaceKind::Flare {
+            return None;
+        }
+        let flares = &self.world.relit.flares;
+        let index = flares.binary_search_by_key(&surface, |f| f.surface).ok()?;
+        let flare = self.shown(flares.get(index)?, placed)?;
+        Some(ViewFlare {
+            surface,
+            instance,
+            flare,
+        })
+    }
+
+    fn shown(&self, flare: &Flare, placed: &types::Instance) -> Option<types::Flare> {
+        let view = self.view;
+        // turned away it does not show; the engine forgets the entity's place here
+        let facing = if flare.normal == Vec3::ZERO {
+            1.0
+        } else {
+            let to_eye = (view.origin - flare.origin).normalize_or_zero();
+            to_eye.dot(flare.normal)
+        };
+        if facing < 0.0 {
+            return None;
+        }
+        let at = to_world(placed, flare.origin);
+        let clip = view.world_to_clip * at.extend(1.0);
+        let inside = clip.x.abs() < clip.w && clip.y.abs() < clip.w;
+        if !inside {
+            return None;
+        }
+        let [x, y, width, height] = view.viewport;
+        // the engine counts pixels from the lower left corner, and rounds up from the middle of one
+        let pixel = |ndc: f32, size: i32| ((1.0 + ndc) * 0.5 * size as f32 + 0.5).floor() as i32;
+        let column = pixel(clip.x / clip.w, width);
+        let row = pixel(-clip.y / clip.w, height);
+        if !(0..width).contains(&column) || !(0..height).contains(&row) {
+            return None;
+        }
+        let tested = [
+            x.checked_add(column)?,
+            y.checked_add(height)?.checked_sub(row)?.checked_sub(1)?,
+        ];
+        let [Ok(tested_x), Ok(tested_y)] = tested.map(u32::try_from) else {
+            return None;
+        };
+        let depth = view.axis[0].dot(at - view.origin);
+        let distance = depth.max(1.0);
+        let size = width as f32 * (self.settings.flare_size / 640.0 + 8.0 / distance);
+        let coefficient = match self.settings.flare_coefficient as i32 {
+            0 => DEFAULT_COEFFICIENT,
+            set => set,
+        } as f32;
+        let spread = distance + size * coefficient.sqrt();
+        let intensity = coefficient * size * size / (spread * spread);
+        let color = flare.color * facing * intensity * 255.0 * self.through_fog(flare.fog, at);
+        // a negative coefficient has no root
+        if !(color.is_finite() && size.is_finite()) {
+            return None;
+        }
+        Some(types::Flare {
+            color,
+            size,
+            center: Vec2::new((x + column) as f32, (y + height - row) as f32),
+            pixel: [tested_x, tested_y],
+            depth: view.depth_at(depth - SLACK),
+            slot: 0,
+            fresh: 0,
+        })
+    }
+
+    /// What fog volume `fog` (plus one; 0 none) leaves of light from a point.
+    fn through_fog(&self, fog: u32, point: Vec3) -> f32 {
+        let volume = fog
+            .checked_sub(1)
+            .and_then(|i| self.world.fogs.get(i as usize));
+        volume.map_or(1.0, |volume| 1.0 - fog_factor(volume, self.view, point))
+    }
+}
+
+/// How much of its colour a fog volume gives a point: the engine's table, whose coordinates are the view depth and the
+/// depth below the fog's surface.
+fn fog_factor(fog: &types::Fog, view: &View, point: Vec3) -> f32 {
+    let mut s = (point - view.origin).dot(view.axis[0]) / (8.0 * fog.depth);
+    let [nx, ny, nz, dist] = fog.plane;
+    let below = |p: Vec3| Vec3::new(nx, ny, nz).dot(p) - dist;
+    let t = if fog.has_surface == 0 {
+        31.0 / 32.0
+    } else {
+        let (here, eye) = (below(point), below(view.origin));
+        match (eye < 0.0, here) {
+            (true, ..1.0) | (false, ..0.0) => 1.0 / 32.0,
+            (true, _) => 1.0 / 32.0 + (30.0 / 32.0) * here / (here - eye),
+            (false, _) => 31.0 / 32.0,
+        }
+    };
+    if s < 0.0 || t < 1.0 / 32.0 {
+        return 0.0;
+    }
+    if t < 31.0 / 32.0 {
+        s *= (t - 1.0 / 32.0) / (30.0 / 32.0);
+    }
+    (s * 8.0).min(1.0).sqrt()
+}

@@ -1,0 +1,258 @@
+//! Effects of the classic look, drawn by a whole renderer without a window: shadows, flares.
+//!
+//! Without a device each test says so and passes, unless `RELIGHT_REQUIRE_GPU=1`.
+
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+use q3bsp::builder::MapBuilder;
+use q3model::{Frame, Md3, PackedVertex, Surface};
+use relight::MemoryFiles;
+use renderer_vk::api::{EntityKind, Picture, RefDef, RefEntity};
+use renderer_vk::{Renderer, RendererOptions, Settings};
+
+/// Side of the picture, pixels.
+const SIDE: u32 = 64;
+
+/// Grey walls and a white flare.
+const SCRIPT: &[u8] = b"
+t/wall { { map $whiteimage
+  rgbGen const ( 0.5 0.5 0.5 ) } }
+flareShader { cull none
+  { map $whiteimage
+    blendFunc add
+    rgbGen vertex } }
+";
+
+/// A renderer of small pictures in a room 512 units wide with a flare on its +x wall and a door beside it; `None`, with
+/// a printed line, without a device.
+struct Stage {
+    renderer: Renderer,
+    settings: Settings,
+    box_model: i32,
+    door: i32,
+}
+
+impl Stage {
+    fn new(settings: Settings) -> Option<Self> {
+        let options = RendererOptions {
+            width: SIDE,
+            height: SIDE,
+            window: None,
+            validation: true,
+            device: None,
+            vsync: false,
+        };
+        let mut renderer = match Renderer::new(options) {
+            Ok(renderer) => renderer,
+            Err(e) => {
+                let required = std::env::var("RELIGHT_REQUIRE_GPU").is_ok_and(|v| v == "1");
+                assert!(!required, "a GPU is required: {e}");
+                println!("skipped: {e}");
+                return None;
+            }
+        };
+        let mut map = MapBuilder::new();
+        let wall = map.add_shader("t/wall", 0, 0);
+        map.add_room(wall, Vec3::splat(-256.0), Vec3::splat(256.0));
+        map.add_flare(wall, Vec3::new(250.0, 0.0, 0.0), Vec3::NEG_X, Vec3::ONE);
+        map.begin_model();
+        map.add_box_faces(wall, Vec3::splat(-16.0), Vec3::splat(16.0), false);
+        let mut files = MemoryFiles::new();
+        files.insert("scripts/t.shader", SCRIPT).unwrap();
+        files.insert("maps/t.bsp", map.build().write()).unwrap();
+        files.insert("m/box.md3", box_model()).unwrap();
+        renderer
+            .begin_registration(Arc::new(files), &settings)
+            .unwrap();
+        renderer.load_world("maps/t.bsp").unwrap();
+        let box_model = renderer.register_model("m/box.md3");
+        let door = renderer.register_model("*1");
+        assert!(box_model > 0 && door > 0);
+        renderer.end_registration();
+        Some(Self {
+            renderer,
+            settings,
+            box_model,
+            door,
+        })
+    }
+
+    /// The picture of one frame with these entities.
+    fn frame(&mut self, def: &RefDef, entities: &[RefEntity]) -> Picture {
+        let renderer = &mut self.renderer;
+        renderer.set_settings(&self.settings);
+        renderer.begin_frame(def.time_ms);
+        renderer.clear_scene();
+        for entity in entities {
+            renderer.add_entity(entity);
+        }
+        renderer.render_scene(def).unwrap();
+        let picture = renderer.read_pixels().unwrap();
+        renderer.end_frame().unwrap();
+        picture
+    }
+}
+
+impl Drop for Stage {
+    fn drop(&mut self) {
+        let messages = self.renderer.validation_messages();
+        if !std::thread::panicking() {
+            assert!(messages.is_empty(), "validation: {messages:#?}");
+        }
+    }
+}
+
+/// A cube of 32 units.
+fn box_model() -> Vec<u8> {
+    let corners: Vec<Vec3> = (0..8u8)
+        .map(|i| {
+            let side = |bit: u8| if i >> bit & 1 == 0 { -16.0 } else { 16.0 };
+            Vec3::new(side(0), side(1), side(2))
+        })
+        .collect();
+    // clockwise seen from outside
+    let faces = [
+        [0, 1, 3, 2],
+        [4, 6, 7, 5],
+        [0, 4, 5, 1],
+        [2, 3, 7, 6],
+        [0, 2, 6, 4],
+        [1, 5, 7, 3],
+    ];
+    Md3 {
+        name: "box".into(),
+        frames: vec![Frame {
+            mins: Vec3::splat(-16.0),
+            maxs: Vec3::splat(16.0),
+            local_origin: Vec3::ZERO,
+            radius: 28.0,
+            name: String::new(),
+        }],
+        tags: Vec::new(),
+        num_tags: 0,
+        surfaces: vec![Surface {
+            name: "body".into(),
+            shaders: vec!["t/wall".into()],
+            triangles: faces
+                .iter()
+                .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+                .collect(),
+            st: vec![Vec2::ZERO; 8],
+            vertices: corners
+                .iter()
+                .map(|p| PackedVertex::pack(*p, p.normalize()))
+                .collect(),
+            num_verts: 8,
+        }],
+    }
+    .write()
+}
+
+fn def() -> RefDef {
+    RefDef {
+        width: 64,
+        height: 64,
+        fov_x: 90.0,
+        fov_y: 90.0,
+        view_origin: Vec3::new(-50.0, 0.0, 0.0),
+        time_ms: 5000,
+        ..RefDef::default()
+    }
+}
+
+fn entity(model: i32, origin: Vec3) -> RefEntity {
+    RefEntity {
+        kind: EntityKind::Model,
+        model,
+        origin,
+        axis: [Vec3::X, Vec3::Y, Vec3::Z],
+        shader_rgba: [255; 4],
+        ..RefEntity::default()
+    }
+}
+
+fn red(picture: &Picture, x: usize, y: usize) -> u8 {
+    picture.rgb[(y * picture.width as usize + x) * 3]
+}
+
+#[test]
+fn stencil_shadows_darken_what_lies_behind_a_model() {
+    let Some(mut stage) = Stage::new(Settings::default()) else {
+        return;
+    };
+    let cube = entity(stage.box_model, Vec3::new(100.0, 0.0, -100.0));
+    let plain = stage.frame(&def(), &[cube]);
+    stage.settings.shadows = 2;
+    let shadowed = stage.frame(&def(), &[cube]);
+    let empty = stage.frame(&def(), &[]);
+    let mut dark = 0;
+    for (a, b) in plain.rgb.iter().zip(&shadowed.rgb) {
+        let shade = (f32::from(*a) * 0.6 + 0.5) as u8;
+        assert!(*b == *a || b.abs_diff(shade) <= 1, "{a} became {b}");
+        dark += usize::from(b != a);
+    }
+    assert!(dark > 60, "{dark}");
+    // without a stencil again, and nothing is left of the shadow
+    stage.settings.shadows = 1;
+    assert!(stage.frame(&def(), &[cube]).rgb == plain.rgb);
+    assert!(stage.frame(&def(), &[]).rgb == empty.rgb);
+}
+
+#[test]
+fn flares_fade_in_where_they_can_be_seen_and_out_where_not() {
+    let settings = Settings {
+        flares: true,
+        flare_coefficient: 1e6,
+        ..Settings::default()
+    };
+    let Some(mut stage) = Stage::new(settings) else {
+        return;
+    };
+    let middle = (32, 32);
+    let at = |stage: &mut Stage, time_ms: i32, entities: &[RefEntity]| {
+        let picture = stage.frame(&RefDef { time_ms, ..def() }, entities);
+        red(&picture, middle.0, middle.1)
+    };
+    // 300 units away: half a side of 64 (40 / 640 + 8 / 300) pixels; seldom more than the rest to 255 shows
+    let size: f32 = 64.0 * (40.0 / 640.0 + 8.0 / 300.0);
+    let full = 255.0 * (1000.0 * size / (300.0 + 1000.0 * size)).powi(2);
+    let expect = |shown: u8, behind: u8, fade: f32| {
+        let wanted = (f32::from(behind) + full * fade).min(255.0);
+        assert!((f32::from(shown) - wanted).abs() <= 2.0, "{shown} {wanted}");
+    };
+    stage.settings.flares = false;
+    let wall = at(&mut stage, 1000, &[]);
+    stage.settings.flares = true;
+    // 7 times a second it could appear
+    expect(at(&mut stage, 1000, &[]), wall, 0.007);
+    expect(at(&mut stage, 1040, &[]), wall, 0.287);
+    expect(at(&mut stage, 1300, &[]), wall, 1.0);
+    // hidden by a door it goes the same way, over the door
+    let door = entity(stage.door, Vec3::new(100.0, 0.0, 0.0));
+    stage.settings.flares = false;
+    let behind = at(&mut stage, 1300, &[door]);
+    stage.settings.flares = true;
+    expect(at(&mut stage, 1400, &[]), wall, 0.007);
+    expect(at(&mut stage, 1900, &[]), wall, 1.0);
+    expect(at(&mut stage, 1950, &[door]), behind, 0.993);
+    expect(at(&mut stage, 2049, &[door]), behind, 0.3);
+    expect(at(&mut stage, 2900, &[door]), behind, 0.0);
+    // from behind there is none, nor where the eye is turned away
+    let views = [
+        (Vec3::new(255.0, 0.0, 0.0), [Vec3::X, Vec3::Y, Vec3::Z]),
+        (Vec3::ZERO, [Vec3::NEG_X, Vec3::NEG_Y, Vec3::Z]),
+    ];
+    for (view_origin, view_axis) in views {
+        let def = RefDef {
+            view_origin,
+            view_axis,
+            time_ms: 4000,
+            ..def()
+        };
+        let with = stage.frame(&def, &[]);
+        stage.settings.flares = false;
+        assert!(stage.frame(&def, &[]).rgb == with.rgb, "{view_origin}");
+        stage.settings.flares = true;
+    }
+}
