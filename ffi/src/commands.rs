@@ -141,6 +141,7 @@ extern "C" fn gfx_info() {
         let settings = &front.settings;
         let refresh = window::current().map_or(0, |window| window.refresh_rate());
         let mode = front.cvars.as_ref().map_or(0, |c| c.integer(Cvar::Mode));
+        let fullscreen = window::current().is_some_and(|window| window.is_fullscreen());
         let aids = if settings.anisotropy > 1.0 {
             format!(
                 "{:.0}x",
@@ -160,11 +161,7 @@ extern "C" fn gfx_info() {
             "PIXELFORMAT: color(32-bits) Z(32-bit float)".into(),
             format!(
                 "MODE: {mode}, {width} x {height} {} hz:{}",
-                if front.fullscreen {
-                    "fullscreen"
-                } else {
-                    "windowed"
-                },
+                if fullscreen { "fullscreen" } else { "windowed" },
                 if refresh > 0 {
                     refresh.to_string()
                 } else {

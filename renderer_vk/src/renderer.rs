@@ -74,6 +74,8 @@ pub struct Renderer {
     color_2d: u32,
     entity_tokens: EntityTokens,
     calibrations: Option<relight::CalibrationCache>,
+    /// The window is not on the screen.
+    hidden: bool,
 }
 
 /// Looks for a device without making a window: what it is called and what it can do.
@@ -136,6 +138,7 @@ impl Renderer {
             color_2d: u32::MAX,
             entity_tokens: EntityTokens::default(),
             calibrations: None,
+            hidden: false,
         })
     }
 
@@ -168,6 +171,12 @@ impl Renderer {
             swapchain.resize(width, height, self.settings.swap_interval != 0);
         }
         Ok(())
+    }
+
+    /// Tells whether the window is off the screen (minimised): frames are drawn but not shown, because the window
+    /// system may keep a hidden window's frames waiting.
+    pub fn set_hidden(&mut self, hidden: bool) {
+        self.hidden = hidden;
     }
 
     /// Size of the picture, pixels.
@@ -533,7 +542,7 @@ impl Renderer {
         }
         self.recycle_queue();
         match &mut self.swapchain {
-            Some(swapchain) if show => {
+            Some(swapchain) if show && !self.hidden => {
                 if let Some(target) = swapchain.acquire(&mut recorder)? {
                     // a new format comes with a new swapchain
                     if self

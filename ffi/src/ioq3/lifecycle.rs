@@ -315,6 +315,7 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
         .take()
         .map_or(0, |begin| milliseconds(start - begin));
     take_captures(renderer, front, &mut outbox)?;
+    renderer.set_hidden(window::current().is_some_and(|window| window.is_hidden()));
     let stats = renderer.end_frame().map_err(failure)?;
     outbox.back_end_ms = milliseconds(start.elapsed());
     outbox

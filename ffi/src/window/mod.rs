@@ -313,6 +313,12 @@ impl Window {
         unsafe { self.sdl.is_fullscreen(self.raw) }
     }
 
+    /// Whether it is off the screen: minimised or not shown yet.
+    pub fn is_hidden(&self) -> bool {
+        // SAFETY: as in `is_fullscreen`.
+        unsafe { self.sdl.is_hidden(self.raw) }
+    }
+
     /// Hz; 0 if unknown.
     pub fn refresh_rate(&self) -> c_int {
         // SAFETY: as in `is_fullscreen`.

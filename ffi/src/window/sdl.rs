@@ -14,8 +14,10 @@ const INIT_VIDEO: u32 = 0x20;
 pub mod flags {
     pub const FULLSCREEN: u32 = 0x1;
     pub const SHOWN: u32 = 0x4;
+    pub const HIDDEN: u32 = 0x8;
     pub const BORDERLESS: u32 = 0x10;
     pub const RESIZABLE: u32 = 0x20;
+    pub const MINIMIZED: u32 = 0x40;
     pub const VULKAN: u32 = 0x1000_0000;
 }
 
@@ -281,6 +283,15 @@ impl Sdl {
     pub unsafe fn is_fullscreen(&self, window: WindowPtr) -> bool {
         // SAFETY: by the caller's promise.
         unsafe { (self.window_flags)(window) & flags::FULLSCREEN != 0 }
+    }
+
+    /// Whether a window is off the screen.
+    ///
+    /// # Safety
+    /// `window` must be a window of this SDL.
+    pub unsafe fn is_hidden(&self, window: WindowPtr) -> bool {
+        // SAFETY: by the caller's promise.
+        unsafe { (self.window_flags)(window) & (flags::HIDDEN | flags::MINIMIZED) != 0 }
     }
 
     /// Fills the screen or goes back to a window.

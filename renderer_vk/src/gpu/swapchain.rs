@@ -8,6 +8,10 @@ use super::graveyard::Garbage;
 use super::image::{Format, Image, whole};
 use super::recorder::{Acquired, Recorder};
 
+/// Nanoseconds that an image is waited for. Window systems hold images back while a window is not on the screen; the
+/// game goes on meanwhile.
+const PATIENCE: u64 = 500_000_000;
+
 /// How to make a [`Swapchain`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SwapchainDesc {
@@ -106,7 +110,7 @@ impl Swapchain {
             }
             // SAFETY: the semaphore is not pending: its last wait belongs to a frame that is over.
             let got = unsafe {
-                functions.acquire_next_image(self.raw, u64::MAX, available, vk::Fence::null())
+                functions.acquire_next_image(self.raw, PATIENCE, available, vk::Fence::null())
             };
             match got {
                 Ok((index, suboptimal)) => {
@@ -131,6 +135,8 @@ impl Swapchain {
                     return Ok(Some(image));
                 }
                 Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.recreate()?,
+                // nothing was promised, so the semaphore stays free
+                Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(None),
                 Err(result) => return Err(result).context("vkAcquireNextImageKHR"),
             }
         }
