@@ -29,7 +29,8 @@ pub struct Iqm {
     pub frame_data: Vec<u16>,
     /// Numbers of one frame.
     pub numbers_per_frame: usize,
-    /// Smallest and largest corner for each key-frame; empty when the file tells none.
+    /// Smallest and largest corner for each key-frame. When the file tells none: of a model without frames those of its
+    /// vertices, else empty.
     pub bounds: Vec<(Vec3, Vec3)>,
 }
 
@@ -57,7 +58,7 @@ pub struct IqmVertex {
     pub normal: Vec3,
     /// Texture coordinates.
     pub st: Vec2,
-    /// Colour; white when the file tells none.
+    /// Colour; black without alpha when the file tells none, as in the engine.
     pub color: [u8; 4],
     /// Joints that it hangs on, each of the skeleton; those after the first weight of 0 mean nothing.
     pub joints: [u8; IQM_WEIGHTS],

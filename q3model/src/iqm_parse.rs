@@ -1,5 +1,7 @@
 //! Bytes to [`Iqm`].
 
+use glam::Vec3;
+
 use crate::Error;
 use crate::bytes::{Fields, Region, TRIANGLE_BYTES, check_sharing, read_triangles};
 use crate::iqm::{IQM_WEIGHTS, Iqm, IqmChannels, IqmJoint, IqmPose, IqmSurface, IqmVertex};
@@ -143,9 +145,13 @@ impl Iqm {
             }
             None => Vec::new(),
         };
-        // the engine has bounds of every frame, or of a model without frames none
         let bounds = if header.bounds_at == 0 {
-            Vec::new()
+            // the engine finds those of a model that never moves itself
+            let none = vertices.is_empty() || header.num_frames > 0;
+            let places = || vertices.iter().map(|vertex| vertex.position);
+            let mins = places().fold(Vec3::INFINITY, Vec3::min);
+            let maxs = places().fold(Vec3::NEG_INFINITY, Vec3::max);
+            if none { Vec::new() } else { vec![(mins, maxs)] }
         } else {
             list(
                 bytes,
@@ -272,7 +278,7 @@ impl Reader<'_> {
                 position: Fields::new(position).vec3(),
                 normal: Fields::new(normal).vec3(),
                 st: Fields::new(st).vec2(),
-                color: [255; 4],
+                color: [0; 4],
                 joints: [0; IQM_WEIGHTS],
                 weights: [0.0; IQM_WEIGHTS],
             })

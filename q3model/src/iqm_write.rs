@@ -148,7 +148,7 @@ impl Iqm {
                 put_floats(out, v.weights);
             }));
         }
-        if self.vertices.iter().any(|v| v.color != [255; 4]) {
+        if self.vertices.iter().any(|v| v.color != [0; 4]) {
             arrays.push(array(COLOR, UBYTE, 4, &|v, out| {
                 out.extend_from_slice(&v.color);
             }));

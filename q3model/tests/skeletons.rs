@@ -223,20 +223,26 @@ fn written_models_read_back() {
         num_frames: 0,
         numbers_per_frame: 0,
         frame_data: Vec::new(),
-        bounds: Vec::new(),
+        bounds: vec![(Vec3::X * 4.0, Vec3::X * 12.0)],
         vertices: iqm()
             .vertices
             .into_iter()
             .map(|v| IqmVertex {
                 joints: [0; 4],
                 weights: [0.0; 4],
-                color: [255; 4],
+                color: [0; 4],
                 ..v
             })
             .collect(),
         ..iqm()
     };
     assert_eq!(Iqm::parse(&plain.write()).unwrap(), plain);
+    // what the file does not tell is found
+    let untold = Iqm {
+        bounds: Vec::new(),
+        ..plain.clone()
+    };
+    assert_eq!(Iqm::parse(&untold.write()).unwrap(), plain);
     assert!(!plain.is_animated());
     assert_eq!(posed(&plain, 0, 0, 0.0)[1], Vec3::X * 12.0);
 }

@@ -22,6 +22,9 @@ mod stage;
 pub mod textures;
 
 mod calls;
+mod entities;
+mod models;
+mod tube;
 
 pub use stage::Stage;
 
@@ -98,6 +101,8 @@ impl Scene {
 pub fn scenes() -> Vec<Scene> {
     let mut all = Vec::new();
     all.extend(calls::scenes());
+    all.extend(entities::scenes());
+    all.extend(models::scenes());
     all
 }
 

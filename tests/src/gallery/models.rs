@@ -1,0 +1,417 @@
+//! Models of every kind: key frames, bones, joints; their skins, levels of detail, tags and bounds.
+
+use glam::Vec3;
+
+use super::board::{Board, MAP, Shape};
+use super::{File, Scene, Stage, tube};
+use crate::engine::Raised;
+use crate::engine::abi::refEntity_t;
+
+/// The scenes of this module.
+pub(super) fn scenes() -> Vec<Scene> {
+    let scene = |name, about, play| Scene {
+        files,
+        ..Scene::new(name, about, play)
+    };
+    vec![
+        Scene {
+            quick: true,
+            ..scene(
+                "models-kinds",
+                "A tube as MD3, MDR, compressed MDR and IQM, in frames and between them.",
+                kinds,
+            )
+        },
+        scene(
+            "models-surfaces",
+            "Skins, skin numbers, the entity's own shader, colours of vertices, on every kind of model.",
+            surfaces,
+        ),
+        scene(
+            "models-frames",
+            "Frames that do not exist, wrapped ones, axes that are not of length 1 or not square.",
+            frames,
+        ),
+        scene(
+            "models-lods",
+            "Levels of detail by distance, by r_lodbias and r_lodscale.",
+            levels,
+        ),
+        Scene {
+            quick: true,
+            ..scene(
+                "models-answers",
+                "Tags between frames and bounds of every kind of model.",
+                answers,
+            )
+        },
+    ]
+}
+
+/// Every kind of model under the name that its file has.
+const KINDS: [&str; 5] = [
+    "m/key.md3",
+    "m/bone.mdr",
+    "m/small.mdr",
+    "m/joint.iqm",
+    "m/stretch.iqm",
+];
+
+const SCRIPT: &str = "
+tube/upper
+{
+    {
+        map g/env.tga
+        rgbGen lightingDiffuse
+    }
+}
+tube/vertex
+{
+    cull none
+    {
+        map g/base.tga
+        rgbGen exactVertex
+    }
+}
+tube/glow
+{
+    {
+        map g/env.tga
+        tcGen environment
+        rgbGen entity
+    }
+}
+";
+
+fn board() -> Board {
+    Board {
+        script: SCRIPT.to_string(),
+        ..Board::new(4, Shape::Face, [""; 0])
+    }
+}
+
+fn files() -> Vec<File> {
+    let own = [
+        ("m/key.md3", tube::md3()),
+        ("m/key_1.md3", tube::md3()),
+        ("m/bone.mdr", tube::mdr(false)),
+        ("m/small.mdr", tube::mdr(true)),
+        ("m/joint.iqm", tube::iqm(false)),
+        ("m/stretch.iqm", tube::iqm(true)),
+        ("m/rigid.iqm", tube::rigid_iqm()),
+        ("m/broken.iqm", b"INTERQUAKEMODEL\0 and no more".to_vec()),
+        ("m/broken.md3", tube::md3()),
+        ("m/skin.skin", b"upper,g/base\nLOWER,tube/glow\n".to_vec()),
+        ("m/half.skin", b"upper,g/env\n".to_vec()),
+    ];
+    let mut files = board().files();
+    files.extend(own.map(|(name, bytes)| (name.to_string(), bytes)));
+    files
+}
+
+/// A row of models, the first at the left.
+fn row(at: usize, of: usize) -> Vec3 {
+    Vec3::new(0.0, (of as f32 / 2.0 - 0.5 - at as f32) * 44.0, 0.0)
+}
+
+fn place(entity: &mut refEntity_t, at: Vec3) {
+    entity.origin = at.to_array();
+}
+
+/// Axes turned about z by `yaw` degrees.
+pub(super) fn turned(yaw: f32) -> [[f32; 3]; 3] {
+    let (s, c) = yaw.to_radians().sin_cos();
+    [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
+}
+
+fn kinds(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(MAP)?;
+    let view = stage.view(Vec3::new(-110.0, 0.0, 10.0), 0.0);
+    for (name, frame, oldframe, backlerp) in [
+        ("first", 0, 0, 0.0),
+        ("bent", 1, 1, 0.7),
+        ("twisted", 2, 2, 0.0),
+        ("between", 1, 0, 0.4),
+        ("back", 1, 2, 0.75),
+    ] {
+        let mut all = Vec::new();
+        for (at, kind) in KINDS.into_iter().enumerate() {
+            let mut entity = refEntity_t {
+                hModel: stage.register_model(kind)?,
+                frame,
+                oldframe,
+                backlerp,
+                axis: turned(25.0),
+                ..refEntity_t::default()
+            };
+            place(&mut entity, row(at, KINDS.len()));
+            all.push(entity);
+        }
+        stage.keep_view(name, &view, |e| {
+            all.iter().try_for_each(|entity| e.add_entity(entity))
+        })?;
+    }
+    Ok(())
+}
+
+fn surfaces(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(MAP)?;
+    let view = stage.view(Vec3::new(-110.0, 0.0, 10.0), 0.0);
+    let plain = refEntity_t {
+        frame: 1,
+        oldframe: 1,
+        axis: turned(25.0),
+        shaderRGBA: [255, 160, 80, 200],
+        ..refEntity_t::default()
+    };
+    let skin = stage.register_skin("m/skin.skin")?;
+    let half = stage.register_skin("m/half.skin")?;
+    let single = stage.register_skin("g/env")?;
+    let missing = stage.register_skin("m/none.skin")?;
+    let vertex = stage.register_shader("tube/vertex")?;
+    stage.fact(
+        "skins",
+        format!("{} {} {} {missing}", skin > 0, half > 0, single > 0),
+    );
+    let variants = [
+        (
+            "skin",
+            refEntity_t {
+                customSkin: skin,
+                ..plain
+            },
+        ),
+        (
+            "half",
+            refEntity_t {
+                customSkin: half,
+                ..plain
+            },
+        ),
+        (
+            "single",
+            refEntity_t {
+                customSkin: single,
+                ..plain
+            },
+        ),
+        (
+            "bad-skin",
+            refEntity_t {
+                customSkin: 999,
+                ..plain
+            },
+        ),
+        (
+            "number1",
+            refEntity_t {
+                skinNum: 1,
+                ..plain
+            },
+        ),
+        (
+            "number5",
+            refEntity_t {
+                skinNum: 5,
+                ..plain
+            },
+        ),
+        (
+            "shader",
+            refEntity_t {
+                customShader: vertex,
+                customSkin: skin,
+                ..plain
+            },
+        ),
+        (
+            "bad-shader",
+            refEntity_t {
+                customShader: 99_999,
+                ..plain
+            },
+        ),
+    ];
+    for (name, variant) in variants {
+        let mut all = Vec::new();
+        for (at, kind) in KINDS.into_iter().enumerate() {
+            // vertices of the other kinds have what colours the reference drew last
+            if name == "shader" && !kind.ends_with("iqm") {
+                continue;
+            }
+            let mut entity = refEntity_t {
+                hModel: stage.register_model(kind)?,
+                ..variant
+            };
+            place(&mut entity, row(at, KINDS.len()));
+            all.push(entity);
+        }
+        stage.keep_view(name, &view, |e| {
+            all.iter().try_for_each(|entity| e.add_entity(entity))
+        })?;
+    }
+    Ok(())
+}
+
+fn frames(stage: &mut Stage) -> Result<(), Raised> {
+    const WRAP_FRAMES: i32 = 0x200;
+    stage.start_map(MAP)?;
+    let view = stage.view(Vec3::new(-110.0, 0.0, 10.0), 0.0);
+    let plain = refEntity_t {
+        axis: turned(25.0),
+        ..refEntity_t::default()
+    };
+    let framed = |frame, oldframe, renderfx| refEntity_t {
+        frame,
+        oldframe,
+        backlerp: 0.25,
+        renderfx,
+        ..plain
+    };
+    let scaled = |forward: f32, left: f32, up: f32| {
+        let [f, l, u] = plain.axis;
+        [(f, forward), (l, left), (u, up)].map(|(axis, scale)| axis.map(|v| v * scale))
+    };
+    let variants = [
+        ("beyond", framed(7, 1, 0)),
+        ("beyond-old", framed(1, 3, 0)),
+        ("wrapped", framed(7, 5, WRAP_FRAMES)),
+        (
+            "scaled",
+            refEntity_t {
+                axis: scaled(1.3, 1.3, 1.3),
+                nonNormalizedAxes: 1,
+                skinNum: 2,
+                ..plain
+            },
+        ),
+        (
+            "squeezed",
+            refEntity_t {
+                axis: scaled(1.0, 0.5, 1.2),
+                nonNormalizedAxes: 1,
+                skinNum: 2,
+                ..plain
+            },
+        ),
+        (
+            "unannounced",
+            refEntity_t {
+                axis: scaled(1.4, 1.4, 0.8),
+                skinNum: 2,
+                ..plain
+            },
+        ),
+        (
+            "mirrored",
+            refEntity_t {
+                axis: scaled(1.0, -1.0, 1.0),
+                ..plain
+            },
+        ),
+        (
+            "flat",
+            refEntity_t {
+                axis: scaled(0.0, 1.0, 1.0),
+                nonNormalizedAxes: 1,
+                ..plain
+            },
+        ),
+    ];
+    for (name, variant) in variants {
+        let mut all = Vec::new();
+        for (at, kind) in KINDS.into_iter().enumerate() {
+            let mut entity = refEntity_t {
+                hModel: stage.register_model(kind)?,
+                ..variant
+            };
+            place(&mut entity, row(at, KINDS.len()));
+            all.push(entity);
+        }
+        stage.keep_view(name, &view, |e| {
+            all.iter().try_for_each(|entity| e.add_entity(entity))
+        })?;
+    }
+    Ok(())
+}
+
+fn levels(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(MAP)?;
+    let view = stage.view(Vec3::new(-280.0, 0.0, 0.0), 0.0);
+    let models = [
+        stage.register_model("m/key.md3")?,
+        stage.register_model("m/bone.mdr")?,
+    ];
+    for (name, bias, scale) in [
+        ("plain", "0", "5"),
+        ("coarser", "1", "5"),
+        ("finer", "-1", "0"),
+        ("coarse", "0", "0"),
+        ("fine", "0", "20"),
+    ] {
+        stage.set("r_lodbias", bias);
+        stage.set("r_lodscale", scale);
+        stage.keep_view(name, &view, |e| {
+            for (side, model) in models.into_iter().enumerate() {
+                for step in 0..5u8 {
+                    let step = f32::from(step);
+                    let mut entity = refEntity_t {
+                        hModel: model,
+                        axis: turned(30.0),
+                        ..refEntity_t::default()
+                    };
+                    let left = if side == 0 { 1.0 } else { -1.0 };
+                    place(
+                        &mut entity,
+                        Vec3::new(step * 60.0 - 230.0, left * (24.0 + step * 34.0), 0.0),
+                    );
+                    e.add_entity(&entity)?;
+                }
+            }
+            Ok(())
+        })?;
+    }
+    Ok(())
+}
+
+fn answers(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(MAP)?;
+    let others = [
+        "m/rigid.iqm",
+        "m/joint",
+        "m/bone.md3",
+        "m/broken.iqm",
+        "m/none.md3",
+        "*0",
+    ];
+    for kind in KINDS.into_iter().chain(others) {
+        let model = stage.register_model(kind)?;
+        stage.fact(&format!("{kind} found"), model > 0);
+        let (mins, maxs) = stage.model_bounds(model)?;
+        let line = |v: Vec3| format!("{} {} {}", v.x, v.y, v.z);
+        stage.fact(
+            &format!("{kind} bounds"),
+            format!("{} {}", line(mins), line(maxs)),
+        );
+        // frames beyond the last are read past the end of its poses by the reference, where a model has joints
+        let beyond = if kind.ends_with("iqm") || kind == "m/joint" {
+            2
+        } else {
+            9
+        };
+        for (start, end, frac) in [(0, 0, 0.0), (0, 1, 0.25), (1, 2, 0.5), (2, beyond, 1.0)] {
+            for tag in [tube::TAG, "root", "TAG_TOP", "none"] {
+                let found = stage.lerp_tag(model, [start, end], frac, tag)?;
+                let text = found.map_or_else(
+                    || "none".to_string(),
+                    |at| {
+                        let axis = at.axis.map(|a| line(a.into()));
+                        format!("{} {}", line(at.origin.into()), axis.join(" "))
+                    },
+                );
+                stage.fact(&format!("{kind} {tag} {start} {end} {frac}"), text);
+            }
+        }
+    }
+    Ok(())
+}
