@@ -141,9 +141,9 @@ vec4 stage_color(MaterialBuffers buffers, Stage stage, Instance instance, StageP
     }
     switch (stage.alpha_gen) {
     case ALPHAGEN_IDENTITY:
-        // what sets all four channels keeps its alpha
-        if (stage.rgb_gen != RGBGEN_ENTITY && stage.rgb_gen != RGBGEN_ONE_MINUS_ENTITY && stage.rgb_gen != RGBGEN_EXACT_VERTEX
-            && stage.rgb_gen != RGBGEN_LIGHTING_DIFFUSE) c.a = 1.0;
+        // vertex colours that nothing scales keep their alpha, as does light, which sets its own
+        if (stage.rgb_gen == RGBGEN_VERTEX && p.identity_light == 1.0) c.a = p.color.a;
+        else if (stage.rgb_gen != RGBGEN_LIGHTING_DIFFUSE) c.a = 1.0;
         break;
     case ALPHAGEN_CONST: c.a = stage.constant.a; break;
     case ALPHAGEN_WAVE: c.a = clamp(wave_value(stage.alpha_wave, p.time), 0.0, 1.0); break;

@@ -345,7 +345,7 @@ pub mod constants {
         /// Only in mirrors and shadows.
         INSTANCE_THIRD_PERSON = 4;
         INSTANCE_NO_SHADOW = 8;
-        /// The instance is the world or one of its submodels.
+        /// The instance is the world itself, which no light falls on.
         INSTANCE_WORLD = 16;
         /// A draw of a material's stage.
         DRAW_STAGE = 0;

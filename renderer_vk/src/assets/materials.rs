@@ -113,10 +113,11 @@ impl Materials {
             generation: 0,
             pages: BTreeSet::new(),
         };
-        let default = internal_shader("*default", |stage| {
+        let mut default = internal_shader("*default", |stage| {
             stage.image = StageImage::Map("*default".into());
             stage.rgb_gen = shaderscript::RgbGen::Identity;
         });
+        default.cull = shaderscript::Cull::Front;
         materials.add(
             "*default",
             default,

@@ -234,8 +234,6 @@ impl StageContext<'_> {
         let time = seconds(time);
         let [er, eg, eb, ea] = instance.color;
         let mut always_white = true;
-        // alpha as `rgbGen` leaves it, which `alphaGen identity` keeps where all four channels were set
-        let mut kept_alpha = 1.0;
         let rgb = match &stage.rgb_gen {
             RgbGen::Identity => [1.0; 3],
             RgbGen::IdentityLighting => {
@@ -256,12 +254,10 @@ impl StageContext<'_> {
             }
             RgbGen::Entity => {
                 always_white = false;
-                kept_alpha = ea;
                 [er, eg, eb]
             }
             RgbGen::OneMinusEntity => {
                 always_white = false;
-                kept_alpha = 1.0 - ea;
                 [1.0 - er, 1.0 - eg, 1.0 - eb]
             }
             RgbGen::Vertex
@@ -270,7 +266,7 @@ impl StageContext<'_> {
             | RgbGen::LightingDiffuse => return Color::Vertex,
         };
         let alpha = match &stage.alpha_gen {
-            AlphaGen::Identity => kept_alpha,
+            AlphaGen::Identity => 1.0,
             AlphaGen::Const(alpha) => {
                 always_white &= *alpha >= 1.0;
                 *alpha

@@ -74,29 +74,29 @@ impl Gatherer<'_> {
             Some(model @ (Model::Mesh { .. } | Model::Mdr(_) | Model::Iqm(_))) => {
                 self.add_animated(number, entity, hidden, model, out);
             }
-            _ if hidden => {}
+            // seen everywhere, whatever the entity asks for
             Some(Model::Inline { model, .. }) => self.add_brush_model(number, entity, *model, out),
+            None if hidden => {}
             None => {
-                let instance = self.push_instance(entity, false, out);
+                // lines in world space: their width is the view's
+                let instance = count(out.instances.len());
+                out.instances
+                    .push(entity::effect_instance(entity, &self.view, out.time));
                 let axes = self.input.materials.internal().axes;
                 let raw = RawMesh::begin(out, axes, instance, 0);
+                let view = self.view;
                 MeshBuilder {
                     vertices: &mut out.vertices,
                     indices: &mut out.indices,
                 }
-                .axes();
+                .axes(entity, &view);
                 // the engine lists it under its default material
                 self.finish_and_list(raw, 0, number, Some(entity), out);
             }
         }
     }
 
-    pub(super) fn push_instance(
-        &self,
-        entity: &RefEntity,
-        is_world: bool,
-        out: &mut ViewScene,
-    ) -> u32 {
+    pub(super) fn push_instance(&self, entity: &RefEntity, out: &mut ViewScene) -> u32 {
         let at = if entity.renderfx & renderfx::LIGHTING_ORIGIN != 0 {
             entity.lighting_origin
         } else {
@@ -115,9 +115,8 @@ impl Gatherer<'_> {
             log::info!("amb:{ambient}  dir:{directed}");
         }
         let instance = count(out.instances.len());
-        out.instances.push(entity::model_instance(
-            entity, &self.view, out.time, &light, is_world,
-        ));
+        out.instances
+            .push(entity::model_instance(entity, &self.view, out.time, &light));
         instance
     }
 
@@ -148,7 +147,7 @@ impl Gatherer<'_> {
         if self.culls_box(entity, &brush.bounds) {
             return;
         }
-        let instance = self.push_instance(entity, true, out);
+        let instance = self.push_instance(entity, out);
         out.submodels.push(Submodel { model, instance });
         let first = brush.first_surface;
         let range = first..first.saturating_add(brush.num_surfaces);

@@ -55,7 +55,6 @@ pub(super) fn model_instance(
     view: &View,
     time: f32,
     light: &GridLight,
-    is_world: bool,
 ) -> Instance {
     let axis = entity.axis;
     let into_axes = |v: Vec3| Vec3::new(v.dot(axis[0]), v.dot(axis[1]), v.dot(axis[2]));
@@ -76,7 +75,7 @@ pub(super) fn model_instance(
         ambient: light.ambient / 255.0,
         directed: light.directed / 255.0,
         light_direction: into_axes(light.direction),
-        flags: flags(entity) | if is_world { c::INSTANCE_WORLD } else { 0 },
+        flags: flags(entity),
     }
 }
 

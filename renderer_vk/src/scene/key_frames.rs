@@ -84,14 +84,16 @@ pub(super) fn level_of_detail(
     clamp(chosen + i64::from(settings.lod_bias))
 }
 
-/// Sines of the 256 angles of a packed normal.
+/// Sines of the 256 angles of a packed normal, as the engine reads them in a table of 1024 whose last entry is the
+/// first one again: a little more than the angle's own.
 fn sines() -> &'static [f32; 256] {
     static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
-    TABLE
-        .get_or_init(|| std::array::from_fn(|i| (i as f32 * (std::f32::consts::TAU / 256.0)).sin()))
+    TABLE.get_or_init(|| {
+        std::array::from_fn(|i| (i as f32 * (4.0 * std::f32::consts::TAU / 1023.0)).sin())
+    })
 }
 
-/// The normal of a packed vertex: as [`PackedVertex::normal`], by table.
+/// The normal of a packed vertex: nearly [`PackedVertex::normal`], by table.
 fn normal(vertex: PackedVertex, sines: &[f32; 256]) -> Vec3 {
     let [longitude, latitude] = vertex.normal.to_le_bytes();
     let sine = |angle: u8| sines[usize::from(angle)];
@@ -203,16 +205,25 @@ mod tests {
     }
 
     #[test]
-    fn table_normals_are_the_packed_ones() {
+    fn table_normals_are_the_engines() {
         for raw in (0..=u16::MAX).step_by(257) {
             let vertex = PackedVertex {
                 position: [0; 3],
                 normal: raw,
             };
-            assert!(
-                normal(vertex, sines()).abs_diff_eq(vertex.normal(), 1e-5),
-                "{raw:x}"
+            let found = normal(vertex, sines());
+            assert!(found.abs_diff_eq(vertex.normal(), 0.02), "{raw:x}");
+            let entry = |angle: u16, quarter: u32| {
+                let entry = (u32::from(angle) * 4 + quarter) % 1024;
+                (f64::from(entry) * std::f64::consts::TAU / 1023.0).sin() as f32
+            };
+            let (around, from_z) = (raw >> 8, raw & 0xff);
+            let expected = Vec3::new(
+                entry(around, 256) * entry(from_z, 0),
+                entry(around, 0) * entry(from_z, 0),
+                entry(from_z, 256),
             );
+            assert!(found.abs_diff_eq(expected, 1e-5), "{raw:x}");
         }
     }
 }

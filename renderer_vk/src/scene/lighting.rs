@@ -42,7 +42,8 @@ pub(super) fn entity_light(
         light.directed += strength * dynamic.color;
         direction += strength * to_light.normalize_or_zero();
     }
-    light.ambient = light.ambient.min(Vec3::splat(255.0 * identity));
+    // the engine keeps this limit in whole numbers
+    light.ambient = light.ambient.min(Vec3::splat((255.0 * identity).trunc()));
     light.direction = direction.normalize_or_zero();
     light
 }

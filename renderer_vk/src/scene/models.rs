@@ -187,7 +187,7 @@ impl Gatherer<'_> {
             world.fog_of_sphere(placed.entity.origin + middle, radius)
         });
         Placed {
-            instance: self.push_instance(placed.entity, false, out),
+            instance: self.push_instance(placed.entity, out),
             fog,
             ..placed
         }

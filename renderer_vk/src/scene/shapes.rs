@@ -22,9 +22,9 @@ const RAIL_TEXTURE_LENGTH: f32 = 256.0;
 /// Length of a rail trail after which no more rings are drawn, units: twice the largest map, so that only a broken
 /// entity gets there.
 const MAX_RAIL_LENGTH: f32 = 262_144.0;
-/// Length of the axes that stand for a missing model, and half their width.
+/// Length of the axes that stand for a missing model, units, and half their width, pixels.
 const AXIS_LENGTH: f32 = 16.0;
-const AXIS_WIDTH: f32 = 0.25;
+const AXIS_HALF_WIDTH: f32 = 1.5;
 
 /// Vertices and local indices of a mesh under construction.
 pub(super) struct MeshBuilder<'a> {
@@ -148,7 +148,7 @@ impl MeshBuilder<'_> {
         let length = (end - start).length().min(MAX_RAIL_LENGTH);
         let direction = (end - start).normalize_or_zero();
         // rings closer than a unit are a line; the engine would divide by zero
-        let spacing = settings.rail_segment_length.trunc().max(1.0);
+        let spacing = settings.rail_segment_length.max(1.0);
         let step = direction * spacing;
         let mut count = ((length / spacing) as u32).max(1);
         if count > 1 {
@@ -171,24 +171,56 @@ impl MeshBuilder<'_> {
         }
     }
 
-    /// Red, green and blue axes in the entity's space. The engine draws lines; here they are thin crosses.
-    pub fn axes(&mut self) {
-        let axes = [
-            (Vec3::X, Vec3::Y, Vec3::Z, [255, 0, 0, 255]),
-            (Vec3::Y, Vec3::Z, Vec3::X, [0, 255, 0, 255]),
-            (Vec3::Z, Vec3::X, Vec3::Y, [0, 0, 255, 255]),
-        ];
-        for (along, a, b, color) in axes {
-            for (side, normal) in [(a, b), (b, a)] {
-                let (end, half) = (along * AXIS_LENGTH, side * AXIS_WIDTH);
-                self.quad(
-                    [half, end + half, end - half, -half],
-                    normal,
-                    [Vec2::ZERO; 4],
-                    packed(color),
-                );
-            }
+    /// Red, green and blue axes of an entity: lines of so many pixels wherever they are.
+    pub fn axes(&mut self, entity: &RefEntity, view: &View) {
+        let colors = [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255]];
+        for (axis, color) in entity.axis.into_iter().zip(colors) {
+            let end = entity.origin + axis * AXIS_LENGTH;
+            self.pixel_line(entity.origin, end, packed(color), view);
         }
+    }
+
+    /// A line as OpenGL draws one that is some pixels wide: as wide in columns, if it is steeper than a diagonal, else
+    /// in rows.
+    fn pixel_line(&mut self, from: Vec3, to: Vec3, color: u32, view: &View) {
+        let [forward, left, up] = view.axis;
+        let [from_depth, to_depth] = [from, to].map(|p| forward.dot(p - view.origin));
+        // what lies before the near plane has no width
+        let near = view.near;
+        let (from, to) = match (from_depth < near, to_depth < near) {
+            (false, false) => (from, to),
+            (true, true) => return,
+            (behind, _) => {
+                let on_plane = from.lerp(to, (near - from_depth) / (to_depth - from_depth));
+                if behind {
+                    (on_plane, to)
+                } else {
+                    (from, on_plane)
+                }
+            }
+        };
+        let [_, _, width, height] = view.viewport.map(|side| side.max(1) as f32);
+        // units that a pixel is at a distance of 1
+        let (across, down) = (2.0 * view.tan_x / width, 2.0 * view.tan_y / height);
+        let pixels = |p: Vec3| {
+            let seen = p - view.origin;
+            let depth = forward.dot(seen);
+            Vec2::new(left.dot(seen) / across, up.dot(seen) / down) / depth
+        };
+        let direction = (pixels(to) - pixels(from)).abs();
+        let wide = if direction.x < direction.y {
+            left * across
+        } else {
+            up * down
+        } * AXIS_HALF_WIDTH;
+        let side = |p: Vec3| wide * forward.dot(p - view.origin);
+        let corners = [
+            from + side(from),
+            to + side(to),
+            to - side(to),
+            from - side(from),
+        ];
+        self.quad(corners, -forward, [Vec2::ZERO; 4], color);
     }
 }
 
@@ -303,13 +335,49 @@ mod tests {
             m.rail_core(&entity, &view, &settings);
             m.rail_rings(&entity, &settings);
             m.lightning(&entity, &view);
-            m.axes();
+            m.axes(&entity, &view);
         });
         assert!(
             vertices
                 .iter()
                 .all(|v| v.position.is_finite() && v.normal.is_finite())
         );
+    }
+
+    #[test]
+    fn lines_are_pixels_wide() {
+        let def = RefDef {
+            width: 200,
+            height: 100,
+            fov_x: 90.0,
+            fov_y: 2.0 * 0.5f32.atan().to_degrees(),
+            ..RefDef::default()
+        };
+        let view = View::new(&def, 4.0, 1000.0);
+        let (flat, steep) = (Vec3::new(50.0, 20.0, 5.0), Vec3::new(50.0, 5.0, 20.0));
+        let start = Vec3::X * 100.0;
+        let width = |to: Vec3| {
+            let (vertices, _) = build(|m| m.pixel_line(start, to, 1, &view));
+            let [a, b, c, d] = [0, 1, 2, 3].map(|i: usize| {
+                let clip = view.world_to_clip * vertices[i].position.extend(1.0);
+                Vec2::new(clip.x * 100.0, clip.y * 50.0) / clip.w
+            });
+            [(a - d).abs(), (b - c).abs()]
+        };
+        for found in width(flat) {
+            assert!(found.abs_diff_eq(Vec2::new(0.0, 3.0), 1e-3), "{found}");
+        }
+        for found in width(steep) {
+            assert!(found.abs_diff_eq(Vec2::new(3.0, 0.0), 1e-3), "{found}");
+        }
+        // cut off at the near plane, whichever end is behind it
+        for (from, to) in [(start, -start), (-start, start)] {
+            let (vertices, _) = build(|m| m.pixel_line(from, to, 1, &view));
+            let nearest = vertices.iter().map(|v| v.position.x).fold(1e9, f32::min);
+            assert!((nearest - 4.0).abs() < 1e-3, "{nearest}");
+        }
+        let (none, _) = build(|m| m.pixel_line(-start, -start * 2.0, 1, &view));
+        assert!(none.is_empty());
     }
 
     #[test]

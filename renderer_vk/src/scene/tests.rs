@@ -507,7 +507,8 @@ fn brush_models_move_with_their_entity() {
     let submodel = view.submodels[0];
     assert_eq!(submodel.model, 1);
     let instance = view.instances[submodel.instance as usize];
-    assert!(instance.flags & c::INSTANCE_WORLD != 0);
+    // unlike the world itself it has an entity's light
+    assert!(instance.flags & c::INSTANCE_WORLD == 0 && instance.ambient.x > 0.0);
     let of_door: Vec<_> = view
         .surfaces
         .iter()
@@ -516,6 +517,13 @@ fn brush_models_move_with_their_entity() {
     // its front and, seen from the side, one more
     assert!((1..=3).contains(&of_door.len()), "{}", of_door.len());
     assert!(of_door.iter().all(|s| s.dlights == 1));
+    // it asks in vain to be seen in mirrors alone
+    scene.add_entity(&RefEntity {
+        renderfx: renderfx::THIRD_PERSON,
+        ..placed
+    });
+    let views = gather(&mut scene, &game, Some(&world), &def(), Look::Classic);
+    assert_eq!(views[0].submodels.len(), 1);
     // out of the light's reach
     scene.add_entity(&placed);
     scene.add_light(DynamicLight {
