@@ -1,11 +1,12 @@
 //! A board of surfaces, one material each, on a wall that the camera faces.
 
-use glam::{Vec2, Vec3};
+use glam::{Mat3, Vec2, Vec3};
 use q3bsp::builder::MapBuilder;
 use q3bsp::{DrawVert, GridPoint};
 
 use super::{File, Stage};
-use crate::engine::{Raised, View};
+use crate::engine::abi::{polyVert_t, refEntity_t};
+use crate::engine::{Engine, Raised, View};
 
 /// Name of the board's map.
 pub const MAP: &str = "maps/board.bsp";
@@ -24,6 +25,14 @@ pub enum Shape {
     Dome(u16),
     /// A curved patch with a lightmap.
     Patch,
+    /// A model, as an entity that is turned and tinted and has a time of its own.
+    Model,
+    /// A polygon that the game adds.
+    Poly,
+    /// A sprite.
+    Sprite,
+    /// A 2D picture, drawn after the scene.
+    Picture,
 }
 
 /// One tile: the body of its shader, between the braces, and its shape.
@@ -78,6 +87,14 @@ impl Board {
         format!("tile/{tile}")
     }
 
+    fn shader_name(&self, tile: usize) -> String {
+        if self.tiles[tile].body.is_empty() {
+            "g/base".to_string()
+        } else {
+            Self::name(tile)
+        }
+    }
+
     /// A tile's centre.
     pub fn center(&self, tile: usize) -> Vec3 {
         let rows = self.tiles.len().div_ceil(self.columns);
@@ -124,12 +141,13 @@ impl Board {
             map.set_lightmap(surface, bright);
         }
         for (i, tile) in self.tiles.iter().enumerate() {
-            let name = if tile.body.is_empty() {
-                "g/base".to_string()
-            } else {
-                Self::name(i)
-            };
-            let shader = map.add_shader(&name, 0, 1);
+            if matches!(
+                tile.shape,
+                Shape::Model | Shape::Poly | Shape::Sprite | Shape::Picture
+            ) {
+                continue;
+            }
+            let shader = map.add_shader(&self.shader_name(i), 0, 1);
             let center = self.center(i);
             match tile.shape {
                 Shape::Face => {
@@ -188,6 +206,7 @@ impl Board {
                     let surface = map.add_patch(shader, 3, 3, &points);
                     map.set_lightmap(surface, page);
                 }
+                Shape::Model | Shape::Poly | Shape::Sprite | Shape::Picture => {}
             }
         }
         map
@@ -206,13 +225,15 @@ impl Board {
             longitude: 40,
             latitude: 100,
         });
-        vec![
+        let mut files = super::model::files();
+        files.extend([
             (
                 "scripts/board.shader".to_string(),
                 self.shaders().into_bytes(),
             ),
             (MAP.to_string(), bsp.write()),
-        ]
+        ]);
+        files
     }
 
     /// The camera before the board.
@@ -226,9 +247,86 @@ impl Board {
         for time in times {
             stage.set_time(*time);
             let view = self.view(stage);
-            stage.keep_view(&format!("t{time}"), &view, |_| Ok(()))?;
+            stage.keep(&format!("t{time}"), |engine| self.draw(engine, &view))?;
         }
         Ok(())
+    }
+
+    /// Draws the scene: the map, what the tiles add to it, and the pictures.
+    pub fn draw(&self, engine: &mut Engine, view: &View) -> Result<(), Raised> {
+        engine.clear_scene()?;
+        self.add(engine)?;
+        engine.render_scene(view)?;
+        self.draw_pictures(engine, view)
+    }
+
+    fn of(&self, shape: Shape) -> impl Iterator<Item = usize> {
+        (0..self.tiles.len()).filter(move |&i| self.tiles[i].shape == shape)
+    }
+
+    fn shader(&self, engine: &mut Engine, tile: usize) -> Result<i32, Raised> {
+        engine.register_shader(&self.shader_name(tile))
+    }
+
+    /// Adds entities and polygons to the scene.
+    pub fn add(&self, engine: &mut Engine) -> Result<(), Raised> {
+        let turn = Mat3::from_rotation_x(0.4) * Mat3::from_rotation_z(0.2);
+        for tile in self.of(Shape::Model) {
+            let entity = refEntity_t {
+                hModel: engine.register_model("g/dome.md3")?,
+                customShader: self.shader(engine, tile)?,
+                origin: self.center(tile).to_array(),
+                axis: turn.to_cols_array_2d(),
+                frame: 1,
+                shaderRGBA: [220, 140, 60, 150],
+                shaderTexCoord: [0.31, -0.73],
+                shaderTime: 1.5,
+                ..refEntity_t::default()
+            };
+            engine.add_entity(&entity)?;
+        }
+        for tile in self.of(Shape::Sprite) {
+            let entity = refEntity_t {
+                reType: 2,
+                customShader: self.shader(engine, tile)?,
+                origin: self.center(tile).to_array(),
+                shaderRGBA: [60, 220, 140, 180],
+                shaderTexCoord: [0.31, -0.73],
+                shaderTime: 0.25,
+                radius: SIDE / 2.0,
+                rotation: 30.0,
+                ..refEntity_t::default()
+            };
+            engine.add_entity(&entity)?;
+        }
+        for tile in self.of(Shape::Poly) {
+            let shader = self.shader(engine, tile)?;
+            let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(s, t)| {
+                let v = vertex(self.center(tile), s, t);
+                polyVert_t {
+                    xyz: v.position.to_array(),
+                    st: v.st.to_array(),
+                    modulate: v.color.map(|c| c.saturating_mul(3)),
+                }
+            });
+            engine.add_poly(shader, &corners, 4)?;
+        }
+        Ok(())
+    }
+
+    /// Draws the 2D pictures where their tiles are seen.
+    pub fn draw_pictures(&self, engine: &mut Engine, view: &View) -> Result<(), Raised> {
+        let scale = view.width as f32 / 2.0 / self.eye().x.abs();
+        for tile in self.of(Shape::Picture) {
+            let shader = self.shader(engine, tile)?;
+            let center = self.center(tile);
+            let x = view.width as f32 / 2.0 + (-center.y - SIDE / 2.0) * scale;
+            let y = view.height as f32 / 2.0 + (-center.z - SIDE / 2.0) * scale;
+            let side = SIDE * scale;
+            engine.set_color(Some([0.9, 0.6, 0.3, 0.7]))?;
+            engine.draw_stretch_pic([x, y, side, side], [0.0, 0.0, 1.0, 1.0], shader)?;
+        }
+        engine.set_color(None)
     }
 }
 

@@ -16,14 +16,20 @@
 //! mip level show.
 
 pub mod board;
+pub mod model;
 pub mod run;
 pub mod sheet;
 mod stage;
 pub mod textures;
 
 mod calls;
+mod colors;
+mod coordinates;
+mod deforms;
 mod entities;
+mod materials;
 mod models;
+mod stages;
 mod tube;
 
 pub use stage::Stage;
@@ -103,6 +109,11 @@ pub fn scenes() -> Vec<Scene> {
     all.extend(calls::scenes());
     all.extend(entities::scenes());
     all.extend(models::scenes());
+    all.extend(colors::scenes());
+    all.extend(coordinates::scenes());
+    all.extend(deforms::scenes());
+    all.extend(stages::scenes());
+    all.extend(materials::scenes());
     all
 }
 

@@ -1,0 +1,240 @@
+//! `rgbGen` and `alphaGen`: every kind, every wave.
+
+use super::Scene;
+use super::board::{Board, Shape};
+
+/// The waves of the language; noise has rules of its own.
+const FUNCTIONS: [&str; 5] = ["sin", "square", "triangle", "sawtooth", "inversesawtooth"];
+/// Base, amplitude, phase, frequency: within range, clamped, backwards, slow.
+const SHAPES: [&str; 4] = [
+    "0.5 0.5 0 1",
+    "0.3 1.2 0.37 0.61",
+    "0.6 -0.4 -1.7 -2.3",
+    "0.25 0.7 0.125 0.013",
+];
+/// Milliseconds after the beginning.
+const TIMES: [i32; 4] = [0, 337, 1250, 3_600_123];
+
+/// Where colours can come from besides waves and constants.
+const RGB: [&str; 10] = [
+    "identity",
+    "identityLighting",
+    "entity",
+    "oneMinusEntity",
+    "vertex",
+    "exactVertex",
+    "oneMinusVertex",
+    "lightingDiffuse",
+    "const ( 0.2 0.7 1.0 )",
+    "wave sin 0.5 0.3 0 0.4",
+];
+const ALPHA: [&str; 8] = [
+    "identity",
+    "const 0.3",
+    "entity",
+    "oneMinusEntity",
+    "vertex",
+    "oneMinusVertex",
+    "lightingSpecular",
+    "wave triangle 0.5 0.4 0.1 0.7",
+];
+
+fn waves(stage: fn(&str) -> String) -> Board {
+    let all = FUNCTIONS
+        .iter()
+        .flat_map(|f| SHAPES.iter().map(move |s| stage(&format!("wave {f} {s}"))));
+    let odd = [
+        stage("wave nonsense 0.5 0.5 0 1"), // a sine, with a warning
+        stage("wave SIN 0.5 0.5 0.25 0"),
+        stage("wave square 0.5 0.5 0.4999 0"),
+        stage("wave sin 2 1 0 1"),
+    ];
+    Board::new(6, Shape::Face, all.chain(odd))
+}
+
+fn rgb_waves() -> Board {
+    waves(|w| format!("{{\nmap g/white.tga\nrgbGen {w}\n}}"))
+}
+
+fn alpha_waves() -> Board {
+    waves(|w| format!("{{\nmap g/base.tga\nblendFunc blend\nrgbGen identity\nalphaGen {w}\n}}"))
+}
+
+fn noise() -> Board {
+    let shapes = [
+        "0.5 0.5 0 1",
+        "0.5 1 0.3 7.1",
+        "1 2 5 0.4",
+        "0.2 0.6 0.7 60",
+    ];
+    Board::new(
+        4,
+        Shape::Face,
+        shapes.map(|s| format!("{{\nmap g/white.tga\nrgbGen wave noise {s}\n}}")),
+    )
+}
+
+fn rgb_kinds(shape: Shape) -> Board {
+    let plain = RGB.map(|g| format!("{{\nmap g/white.tga\nrgbGen {g}\n}}"));
+    let blended = RGB.map(|g| format!("{{\nmap g/base.tga\nblendFunc blend\nrgbGen {g}\n}}"));
+    Board::new(5, shape, plain.into_iter().chain(blended))
+}
+
+fn alpha_kinds(shape: Shape) -> Board {
+    let plain = ALPHA.map(|g| format!("{{\nmap g/base.tga\nblendFunc blend\nalphaGen {g}\n}}"));
+    // what sets all four channels, before and after
+    let mixed = [
+        "alphaGen const 0.4\nrgbGen entity",
+        "rgbGen entity\nalphaGen const 0.4",
+        "rgbGen exactVertex\nalphaGen identity",
+        "alphaGen wave sin 0.5 0.2 0 1\nrgbGen exactVertex",
+        "rgbGen vertex\nalphaGen identity",
+        "alphaGen identity\nrgbGen vertex",
+        "rgbGen vertex",
+        "rgbGen lightingDiffuse\nalphaGen const 0.5",
+    ]
+    .map(|g| format!("{{\nmap g/base.tga\nblendFunc blend\n{g}\n}}"));
+    Board::new(4, shape, plain.into_iter().chain(mixed))
+}
+
+fn portal_alpha() -> Board {
+    let ranges = [64.0, 128.0, 150.0, 200.0, 256.0, 1000.0, 0.0];
+    let stages =
+        ranges.map(|r| format!("{{\nmap g/base.tga\nblendFunc blend\nalphaGen portal {r}\n}}"));
+    let none = "{\nmap g/base.tga\nblendFunc blend\nalphaGen portal\n}".to_string();
+    Board::new(4, Shape::Squares(4), stages.into_iter().chain([none]))
+}
+
+/// A scene that shows a board.
+macro_rules! board_scene {
+    ($name:literal, $about:literal, $board:expr, $times:expr) => {
+        Scene {
+            files: || $board.files(),
+            ..Scene::new($name, $about, |stage| $board.play(stage, $times))
+        }
+    };
+}
+pub(super) use board_scene;
+
+/// The scenes of this module.
+pub(super) fn scenes() -> Vec<Scene> {
+    vec![
+        Scene {
+            quick: true,
+            ..board_scene!(
+                "rgb-waves",
+                "rgbGen wave: every function.",
+                rgb_waves(),
+                &TIMES
+            )
+        },
+        board_scene!(
+            "alpha-waves",
+            "alphaGen wave: every function.",
+            alpha_waves(),
+            &TIMES
+        ),
+        board_scene!(
+            "rgb-noise",
+            "rgbGen wave noise.",
+            noise(),
+            &[0, 337, 1250, 40_000]
+        ),
+        Scene {
+            quick: true,
+            ..board_scene!(
+                "rgb-face",
+                "rgbGen on faces.",
+                rgb_kinds(Shape::Face),
+                &[0, 700]
+            )
+        },
+        board_scene!(
+            "rgb-soup",
+            "rgbGen on triangle soups.",
+            rgb_kinds(Shape::Squares(3)),
+            &[0]
+        ),
+        board_scene!(
+            "rgb-patch",
+            "rgbGen on patches.",
+            rgb_kinds(Shape::Patch),
+            &[0]
+        ),
+        Scene {
+            quick: true,
+            ..board_scene!(
+                "rgb-model",
+                "rgbGen on models.",
+                rgb_kinds(Shape::Model),
+                &[0, 700]
+            )
+        },
+        board_scene!(
+            "rgb-poly",
+            "rgbGen on polygons.",
+            rgb_kinds(Shape::Poly),
+            &[0, 700]
+        ),
+        board_scene!(
+            "rgb-sprite",
+            "rgbGen on sprites.",
+            rgb_kinds(Shape::Sprite),
+            &[0, 700]
+        ),
+        board_scene!(
+            "rgb-picture",
+            "rgbGen in 2D.",
+            rgb_kinds(Shape::Picture),
+            &[0, 700]
+        ),
+        Scene {
+            quick: true,
+            ..board_scene!(
+                "alpha-face",
+                "alphaGen on faces.",
+                alpha_kinds(Shape::Face),
+                &[0, 700]
+            )
+        },
+        board_scene!(
+            "alpha-soup",
+            "alphaGen on soups.",
+            alpha_kinds(Shape::Dome(6)),
+            &[0]
+        ),
+        Scene {
+            quick: true,
+            ..board_scene!(
+                "alpha-model",
+                "alphaGen on models.",
+                alpha_kinds(Shape::Model),
+                &[0]
+            )
+        },
+        board_scene!(
+            "alpha-poly",
+            "alphaGen on polygons.",
+            alpha_kinds(Shape::Poly),
+            &[0]
+        ),
+        board_scene!(
+            "alpha-sprite",
+            "alphaGen on sprites.",
+            alpha_kinds(Shape::Sprite),
+            &[0]
+        ),
+        board_scene!(
+            "alpha-picture",
+            "alphaGen in 2D.",
+            alpha_kinds(Shape::Picture),
+            &[0]
+        ),
+        board_scene!(
+            "alpha-portal",
+            "alphaGen portal: fades by distance.",
+            portal_alpha(),
+            &[0]
+        ),
+    ]
+}

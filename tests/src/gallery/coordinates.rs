@@ -1,0 +1,200 @@
+//! `tcGen` and `tcMod`: every kind, alone and in orders.
+
+use super::Scene;
+use super::board::{Board, Shape};
+use super::colors::board_scene;
+
+const TIMES: [i32; 3] = [0, 337, 61_250];
+
+const GENERATORS: [&str; 9] = [
+    "tcGen base",
+    "tcGen texture",
+    "tcGen lightmap",
+    "tcGen environment",
+    "tcGen vector ( 0 0.02 0 ) ( 0 0 0.03 )",
+    "tcGen vector ( 0.01 0.005 0.01 ) ( 0 -0.01 0.02 )",
+    "texGen environment",
+    "tcGen nonsense",
+    "",
+];
+
+const MODIFIERS: [&str; 24] = [
+    "tcMod turb 0 0.25 0 0.2",
+    "tcMod turb 5 0.1 0.7 1.3",
+    "tcMod turb 0 0.4 -0.3 -0.7",
+    "tcMod scale 2 0.5",
+    "tcMod scale -1 3",
+    "tcMod scroll 0.3 -0.7",
+    "tcMod scroll 25 0.01",
+    "tcMod stretch sin 1 0.5 0 0.4",
+    "tcMod stretch sawtooth 0.5 2 0.1 0.3",
+    "tcMod stretch inversesawtooth 0.5 1 0 0.7",
+    "tcMod stretch triangle 1.5 -0.7 0.2 1",
+    "tcMod stretch square 1 0.5 0 3",
+    "tcMod transform 0.5 0.2 -0.3 1.5 0.1 0.7",
+    "tcMod rotate 45",
+    "tcMod rotate -333",
+    "tcMod entityTranslate",
+    "tcMod scale 2 2\ntcMod rotate 30\ntcMod scroll 0.1 0.2",
+    "tcMod scroll 0.1 0.2\ntcMod rotate 30\ntcMod scale 2 2",
+    "tcMod rotate 30\ntcMod stretch sin 1 0.3 0 1\ntcMod turb 0 0.1 0 1\ntcMod scale 0.7 1.3",
+    "tcMod turb 0 0.1 0 1\ntcMod transform 1 0.5 0 1 0 0\ntcMod entityTranslate\ntcMod rotate 7",
+    "tcMod scroll 0.5 0.5\ntcMod scroll -0.25 1",
+    "tcMod scale 8 8",
+    "tcMod rotate 0",
+    "tcMod scroll 0 0",
+];
+
+fn generators(shape: Shape) -> Board {
+    Board::new(
+        3,
+        shape,
+        GENERATORS.map(|g| format!("{{\nmap g/env.tga\n{g}\n}}")),
+    )
+}
+
+fn modifiers(shape: Shape) -> Board {
+    Board::new(
+        6,
+        shape,
+        MODIFIERS.map(|m| format!("{{\nmap g/base.tga\n{m}\n}}")),
+    )
+}
+
+fn together(shape: Shape) -> Board {
+    let generators = [
+        "environment",
+        "lightmap",
+        "vector ( 0.01 0.01 0 ) ( 0 0.01 0.02 )",
+    ];
+    let all = generators.iter().flat_map(|g| {
+        MODIFIERS[..16]
+            .iter()
+            .step_by(2)
+            .map(move |m| format!("{{\nmap g/env.tga\ntcGen {g}\n{m}\n}}"))
+    });
+    Board::new(6, shape, all)
+}
+
+/// Mip levels: the same fine checkerboard, nearer and farther.
+fn levels() -> Board {
+    let scales = [
+        "0.25 0.25",
+        "0.5 0.5",
+        "1 1",
+        "2 2",
+        "4 4",
+        "1 6",
+        "7 1",
+        "0.3 3",
+    ];
+    let with = |head: &'static str| {
+        scales.map(|s| format!("{head}\n{{\nmap g/fine.tga\ntcMod scale {s}\n}}"))
+    };
+    Board::new(8, Shape::Face, with(""))
+        .and(Shape::Face, with("nomipmaps"))
+        .and(Shape::Patch, with(""))
+}
+
+/// The scenes of this module.
+pub(super) fn scenes() -> Vec<Scene> {
+    vec![
+        Scene {
+            quick: true,
+            ..board_scene!(
+                "tcgen-soup",
+                "tcGen on soups.",
+                generators(Shape::Dome(8)),
+                &[0]
+            )
+        },
+        board_scene!(
+            "tcgen-face",
+            "tcGen on faces.",
+            generators(Shape::Face),
+            &[0]
+        ),
+        board_scene!(
+            "tcgen-patch",
+            "tcGen on patches.",
+            generators(Shape::Patch),
+            &[0]
+        ),
+        board_scene!(
+            "tcgen-model",
+            "tcGen on models.",
+            generators(Shape::Model),
+            &[0]
+        ),
+        board_scene!(
+            "tcgen-poly",
+            "tcGen on polygons.",
+            generators(Shape::Poly),
+            &[0]
+        ),
+        board_scene!(
+            "tcgen-sprite",
+            "tcGen on sprites.",
+            generators(Shape::Sprite),
+            &[0]
+        ),
+        board_scene!(
+            "tcgen-picture",
+            "tcGen in 2D.",
+            generators(Shape::Picture),
+            &[0]
+        ),
+        Scene {
+            quick: true,
+            ..board_scene!(
+                "tcmod-face",
+                "tcMod on faces.",
+                modifiers(Shape::Face),
+                &TIMES
+            )
+        },
+        board_scene!(
+            "tcmod-soup",
+            "tcMod on soups.",
+            modifiers(Shape::Squares(4)),
+            &TIMES
+        ),
+        board_scene!(
+            "tcmod-model",
+            "tcMod on models.",
+            modifiers(Shape::Model),
+            &TIMES
+        ),
+        board_scene!(
+            "tcmod-sprite",
+            "tcMod on sprites.",
+            modifiers(Shape::Sprite),
+            &TIMES
+        ),
+        board_scene!(
+            "tcmod-poly",
+            "tcMod on polygons.",
+            modifiers(Shape::Poly),
+            &[337]
+        ),
+        board_scene!(
+            "tcmod-picture",
+            "tcMod in 2D.",
+            modifiers(Shape::Picture),
+            &TIMES
+        ),
+        board_scene!(
+            "tc-together",
+            "tcGen with tcMod.",
+            together(Shape::Dome(8)),
+            &[0, 700]
+        ),
+        board_scene!(
+            "tc-model",
+            "The same on models.",
+            together(Shape::Model),
+            &[0, 700]
+        ),
+        board_scene!("tc-levels", "Mip levels.", levels(), &[0]),
+    ]
+}

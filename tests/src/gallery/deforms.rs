@@ -1,0 +1,177 @@
+//! `deformVertexes`: every kind.
+
+use super::board::{Board, Shape};
+use super::colors::board_scene;
+use super::{Scene, Stage};
+use crate::engine::Raised;
+
+const TIMES: [i32; 3] = [0, 337, 2_250];
+
+const KINDS: [&str; 14] = [
+    "deformVertexes wave 100 sin 0 8 0 0.5",
+    "deformVertexes wave 30 triangle 2 6 0.3 1.1",
+    "deformVertexes wave 50 square 0 5 0 0.3",
+    "deformVertexes wave 0 sin 0 8 0.25 0.5",
+    "deformVertexes wave 20 sawtooth 3 8 0.2 0",
+    "deformVertexes wave 60 inversesawtooth -4 8 0.1 2",
+    "deformVertexes bulge 6 8 2",
+    "deformVertexes bulge 20 5 -1",
+    "deformVertexes move 4 8 0 sin 0 1 0 0.5",
+    "deformVertexes move 0 0 10 sawtooth 0 1 0.3 0.8",
+    "deformVertexes wave 100 sin 0 8 0 0.5\ndeformVertexes move 0 5 5 sin 0 1 0 1",
+    "deformVertexes move 0 5 5 sin 0 1 0 1\ndeformVertexes bulge 6 8 2\ndeformVertexes wave 40 sin 0 3 0 1",
+    "deformVertexes wave -30 sin 0 6 0 0.7",
+    "",
+];
+
+fn kinds(shape: Shape) -> Board {
+    Board::new(
+        5,
+        shape,
+        KINDS.map(|d| format!("{d}\n{{\nmap g/base.tga\nrgbGen identity\n}}")),
+    )
+}
+
+/// Normals show in environment coordinates and in light.
+fn normals(shape: Shape) -> Board {
+    let kinds = [
+        "",
+        "deformVertexes normal 0.5 1",
+        "deformVertexes normal 2 0.3",
+        "deformVertexes normal 0.1 5",
+        "deformVertexes wave 30 sin 0 8 0 0.5",
+        "deformVertexes normal 0.6 1\ndeformVertexes wave 30 sin 0 8 0 0.5",
+    ];
+    let shown = [
+        "tcGen environment\nrgbGen identity",
+        "rgbGen lightingDiffuse",
+    ];
+    let all = shown
+        .iter()
+        .flat_map(|s| kinds.map(|k| format!("{k}\n{{\nmap g/env.tga\n{s}\n}}")));
+    Board::new(4, shape, all)
+}
+
+fn sprites(shape: Shape) -> Board {
+    let body = |d: &str, s: &str| format!("cull none\n{d}\n{{\nmap g/base.tga\n{s}\n}}");
+    Board::new(
+        3,
+        shape,
+        [
+            body("deformVertexes autosprite", "rgbGen identity"),
+            body("deformVertexes autosprite2", "rgbGen identity"),
+            body("deformVertexes autosprite", "rgbGen vertex"),
+            body("deformVertexes autosprite2", "rgbGen exactVertex"),
+            body(
+                "deformVertexes autosprite\ndeformVertexes move 0 0 8 sin 0 1 0 1",
+                "tcMod scroll 0.1 0",
+            ),
+            body(
+                "deformVertexes wave 30 sin 0 5 0 1\ndeformVertexes autosprite2",
+                "",
+            ),
+        ],
+    )
+}
+
+fn text() -> Board {
+    let lines = (0..8).map(|n| {
+        format!("cull none\ndeformVertexes text{n}\n{{\nmap gfx/2d/bigchars.tga\nblendFunc blend\nrgbGen identity\n}}")
+    });
+    Board::new(4, Shape::Squares(1), lines)
+}
+
+fn play_text(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(super::board::MAP)?;
+    let board = text();
+    let mut view = board.view(stage);
+    view.text = [
+        "HELLO",
+        "a",
+        "",
+        "0123456789",
+        "\u{1}x Y",
+        "thirty-one characters are most.",
+        "<>[]",
+        "last",
+    ];
+    for yaw in [0.0, 12.0] {
+        view.angles.y = yaw;
+        stage.keep(&format!("yaw{yaw}"), |engine| board.draw(engine, &view))?;
+    }
+    Ok(())
+}
+
+/// From the side, where sprites have to turn.
+fn aside(stage: &mut Stage, board: &Board) -> Result<(), Raised> {
+    board.play(stage, &[0, 337])?;
+    let mut view = board.view(stage);
+    view.origin.y += 60.0;
+    view.origin.z += 30.0;
+    view.angles = glam::Vec3::new(14.0, -22.0, 25.0);
+    stage.keep("turned", |engine| board.draw(engine, &view))
+}
+
+/// The scenes of this module.
+pub(super) fn scenes() -> Vec<Scene> {
+    vec![
+        Scene {
+            quick: true,
+            ..board_scene!(
+                "deform-soup",
+                "deformVertexes on soups.",
+                kinds(Shape::Dome(10)),
+                &TIMES
+            )
+        },
+        board_scene!(
+            "deform-squares",
+            "On unconnected squares.",
+            kinds(Shape::Squares(5)),
+            &TIMES
+        ),
+        board_scene!("deform-face", "On faces.", kinds(Shape::Face), &TIMES),
+        board_scene!("deform-patch", "On patches.", kinds(Shape::Patch), &TIMES),
+        board_scene!("deform-model", "On models.", kinds(Shape::Model), &TIMES),
+        board_scene!("deform-sprite", "On sprites.", kinds(Shape::Sprite), &[337]),
+        board_scene!("deform-poly", "On polygons.", kinds(Shape::Poly), &[337]),
+        board_scene!("deform-picture", "In 2D.", kinds(Shape::Picture), &[337]),
+        board_scene!(
+            "deform-normal",
+            "deformVertexes normal on soups.",
+            normals(Shape::Dome(8)),
+            &TIMES
+        ),
+        board_scene!(
+            "deform-normal-model",
+            "On models.",
+            normals(Shape::Model),
+            &TIMES
+        ),
+        Scene {
+            files: || sprites(Shape::Squares(2)).files(),
+            quick: true,
+            ..Scene::new(
+                "autosprite",
+                "deformVertexes autosprite and autosprite2.",
+                |stage| aside(stage, &sprites(Shape::Squares(2))),
+            )
+        },
+        Scene {
+            files: || sprites(Shape::Face).files(),
+            ..Scene::new("autosprite-face", "The same on faces.", |stage| {
+                aside(stage, &sprites(Shape::Face))
+            })
+        },
+        Scene {
+            files: || sprites(Shape::Sprite).files(),
+            ..Scene::new("autosprite-sprite", "The same on sprites.", |stage| {
+                aside(stage, &sprites(Shape::Sprite))
+            })
+        },
+        Scene {
+            files: || text().files(),
+            ..Scene::new("deform-text", "deformVertexes text0 to text7.", play_text)
+        },
+    ]
+}
