@@ -90,11 +90,11 @@ impl<'a> FrameContext<'a> {
         let instance = overlay_instance(time);
         overlay.draw(self.list, self.stages(), &instance);
         let parameters = ViewParameters {
-            // window pixels to clip space, everything at the near plane
+            // window pixels to clip space; pictures lie at the near plane, a depth of 1 before the far one
             world_to_clip: Mat4::from_cols(
                 Vec4::new(2.0 / width, 0.0, 0.0, 0.0),
                 Vec4::new(0.0, 2.0 / height, 0.0, 0.0),
-                Vec4::ZERO,
+                Vec4::new(0.0, 0.0, -1.0, 0.0),
                 Vec4::new(-1.0, -1.0, 0.0, 1.0),
             ),
             clip_plane: [0.0; 4],

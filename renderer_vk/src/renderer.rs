@@ -697,6 +697,14 @@ impl Renderer {
         })
     }
 
+    /// Says that a video of [`videos`](Self::videos) cannot be played: the stages that show it, and those above them,
+    /// are not drawn.
+    pub fn drop_video(&mut self, client: usize) {
+        if let Some(assets) = &mut self.assets {
+            assets.materials.drop_video(client);
+        }
+    }
+
     /// One line for each image.
     pub fn image_list(&self) -> Vec<String> {
         self.assets

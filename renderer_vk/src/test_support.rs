@@ -45,9 +45,9 @@ impl FakeTextures {
 }
 
 impl ImageSource for FakeTextures {
-    fn image(&mut self, name: &str, flags: ImageFlags) -> Option<u32> {
+    fn image(&mut self, name: &str, flags: ImageFlags) -> Option<(u32, ImageFlags)> {
         if let Some(known) = self.by_name.get(name) {
-            return *known;
+            return known.map(|index| (index, self.flags.get(name).copied().unwrap_or(flags)));
         }
         let found = image::find(&*self.files, name).map(|_| {
             self.next += 1;
@@ -55,7 +55,7 @@ impl ImageSource for FakeTextures {
         });
         self.flags.insert(name.into(), flags);
         self.by_name.insert(name.into(), found);
-        found
+        found.map(|index| (index, flags))
     }
 
     fn white(&self) -> u32 {

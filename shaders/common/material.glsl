@@ -131,8 +131,8 @@ vec4 stage_color(MaterialBuffers buffers, Stage stage, Instance instance, StageP
     case RGBGEN_EXACT_VERTEX: c = p.color; break;
     case RGBGEN_ONE_MINUS_VERTEX: c.rgb = (1.0 - p.color.rgb) * p.identity_light; break;
     case RGBGEN_LIGHTING_DIFFUSE:
-        if ((instance.flags & INSTANCE_WORLD) != 0) {
-            c = vec4(0.0); // the engine has no light for the world itself
+        if ((instance.flags & INSTANCE_UNLIT) != 0) {
+            c = vec4(0.0); // the engine has no light for it
         } else {
             float incoming = max(dot(p.normal, instance.light_direction), 0.0);
             c = vec4(min(instance.ambient + incoming * instance.directed, vec3(1.0)), 1.0);

@@ -345,8 +345,8 @@ pub mod constants {
         /// Only in mirrors and shadows.
         INSTANCE_THIRD_PERSON = 4;
         INSTANCE_NO_SHADOW = 8;
-        /// The instance is the world itself, which no light falls on.
-        INSTANCE_WORLD = 16;
+        /// The light grid does not light it: the world, sprites and beams, pictures.
+        INSTANCE_UNLIT = 16;
         /// A draw of a material's stage.
         DRAW_STAGE = 0;
         /// A dynamic light's blob over a surface.

@@ -415,7 +415,13 @@ fn run_videos(engine: Engine) -> Result<(), Failure> {
             Some(handle) => handle,
             None => {
                 let handle = valid_game_path(&name).and_then(|name| engine.play_cinematic(&name));
-                session::with(|session| session.front.cinematics.remember(client, handle));
+                with_renderer(|renderer, front| {
+                    front.cinematics.remember(client, handle);
+                    if handle.is_none() {
+                        renderer.drop_video(client);
+                    }
+                    Ok(())
+                })?;
                 handle
             }
         };

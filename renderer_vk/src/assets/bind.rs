@@ -26,7 +26,11 @@ pub(super) fn sky_faces(outer: &str, source: &mut dyn ImageSource) -> Option<[u3
         picmip: true,
         clamp: true,
     };
-    let faces = SKY_SIDES.map(|side| source.image(&format!("{outer}_{side}.tga"), flags));
+    let faces = SKY_SIDES.map(|side| {
+        source
+            .image(&format!("{outer}_{side}.tga"), flags)
+            .map(|(index, _)| index)
+    });
     faces[0]?;
     let missing = source.default_image();
     Some(faces.map(|face| face.unwrap_or(missing)))

@@ -41,7 +41,8 @@ fn count(len: usize) -> u32 {
     u32::try_from(len).unwrap_or(u32::MAX)
 }
 
-/// `BLEND_*` of a factor.
+/// `BLEND_*` of a factor. The engine's frame has no alpha, which therefore reads as 1: factors that ask for it are
+/// constants.
 pub fn blend_factor(factor: BlendFactor) -> u32 {
     match factor {
         BlendFactor::Zero => c::BLEND_ZERO,
@@ -52,9 +53,8 @@ pub fn blend_factor(factor: BlendFactor) -> u32 {
         BlendFactor::OneMinusDstColor => c::BLEND_ONE_MINUS_DST_COLOR,
         BlendFactor::SrcAlpha => c::BLEND_SRC_ALPHA,
         BlendFactor::OneMinusSrcAlpha => c::BLEND_ONE_MINUS_SRC_ALPHA,
-        BlendFactor::DstAlpha => c::BLEND_DST_ALPHA,
-        BlendFactor::OneMinusDstAlpha => c::BLEND_ONE_MINUS_DST_ALPHA,
-        BlendFactor::SrcAlphaSaturate => c::BLEND_SRC_ALPHA_SATURATE,
+        BlendFactor::DstAlpha => c::BLEND_ONE,
+        BlendFactor::OneMinusDstAlpha | BlendFactor::SrcAlphaSaturate => c::BLEND_ZERO,
     }
 }
 
@@ -267,15 +267,20 @@ impl StageArrays {
                     return Ok(found);
                 }
                 let flags = flags(matches!(image, StageImage::ClampMap(_)));
-                let texture = source.image(name, flags).ok_or_else(|| name.clone())?;
+                let (texture, flags) = source.image(name, flags).ok_or_else(|| name.clone())?;
                 self.images.push(texture);
                 found.sampler = sampler_of(flags);
             }
             StageImage::Animation { frequency, images } => {
-                let flags = flags(false);
+                let mut flags = flags(false);
                 let mut textures = Vec::with_capacity(images.len());
                 for name in images {
-                    textures.push(source.image(name, flags).ok_or_else(|| name.clone())?);
+                    let (texture, first) = source.image(name, flags).ok_or_else(|| name.clone())?;
+                    textures.push(texture);
+                    // One sampler serves all: that of the first image.
+                    if textures.len() == 1 {
+                        flags = first;
+                    }
                 }
                 if textures.is_empty() {
                     return Err("(animation without images)".into());

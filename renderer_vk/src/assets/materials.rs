@@ -521,6 +521,22 @@ impl Materials {
         }
     }
 
+    /// Takes away the stages of a video that cannot be played, and with each all stages after it, as the engine does.
+    pub fn drop_video(&mut self, client: usize) {
+        for material in &mut self.list {
+            let Some(at) = material.videos.iter().position(|v| v.client == client) else {
+                continue;
+            };
+            let stage = material.videos.get(at).map_or(0, |v| v.stage);
+            let kept = stage.saturating_sub(material.stage_first);
+            material.videos.truncate(at);
+            material.stage_count = kept;
+            material.shader.stages.truncate(kept as usize);
+            material.passes = passes(&material.shader, material.stage_first);
+        }
+        self.touch();
+    }
+
     /// The stages, on the CPU; samplers are kinds, not bindless indices.
     pub fn stages(&self, material: &Material) -> &[types::Stage] {
         let first = material.stage_first as usize;

@@ -30,8 +30,9 @@ impl ImageFlags {
 
 /// Finds images by name. [`Textures`](super::Textures) does it with files and a GPU.
 pub trait ImageSource {
-    /// Bindless index of the image that a script or map names; `None` when there is no usable file.
-    fn image(&mut self, name: &str, flags: ImageFlags) -> Option<u32>;
+    /// Bindless index of the image that a script or map names, and the flags that it was loaded with: those of its
+    /// first user. `None` when there is no usable file.
+    fn image(&mut self, name: &str, flags: ImageFlags) -> Option<(u32, ImageFlags)>;
     /// White.
     fn white(&self) -> u32;
     /// The grid that stands for what is missing.

@@ -399,8 +399,10 @@ fn expected_bytes(width: u32, height: u32) -> Option<usize> {
 }
 
 impl ImageSource for Textures {
-    fn image(&mut self, name: &str, flags: ImageFlags) -> Option<u32> {
-        self.find(name, flags)
+    fn image(&mut self, name: &str, flags: ImageFlags) -> Option<(u32, ImageFlags)> {
+        let index = self.find(name, flags)?;
+        let first = self.by_name.get(name).and_then(|&i| self.textures.get(i));
+        Some((index, first.map_or(flags, |texture| texture.flags)))
     }
 
     fn white(&self) -> u32 {

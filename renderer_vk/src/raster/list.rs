@@ -438,7 +438,7 @@ fn light_source_factor(light: &DynamicLight) -> u32 {
 }
 
 /// The engine's front faces wind clockwise; a mirror turns them round.
-fn faces(cull: Cull, mirrored: bool) -> CullFaces {
+pub(super) fn faces(cull: Cull, mirrored: bool) -> CullFaces {
     match (cull, mirrored) {
         (Cull::None, _) => CullFaces::None,
         (Cull::Front, false) | (Cull::Back, true) => CullFaces::CounterClockwise,

@@ -3,8 +3,9 @@
 use glam::{Vec2, Vec3};
 use shaders::types::constants as c;
 use shaders::types::{Draw, Instance, Vertex};
+use shaderscript::eval::{self, DeformContext, DeformVertex};
 
-use super::list::{Call, DepthRange, DrawList, stage_depth};
+use super::list::{Call, DepthRange, DrawList, faces, stage_depth};
 use super::pipelines::{CullFaces, Depth, State};
 use super::shading::{Shading, StageContext};
 use crate::assets::compile::sampler;
@@ -37,7 +38,7 @@ pub struct Overlay {
 pub struct Picture2d {
     /// Left, top.
     pub position: Vec2,
-    /// Width and height; with one of them negative nothing is drawn, as in the engine.
+    /// Width and height; with one of them negative the picture's back is seen.
     pub size: Vec2,
     /// Texture coordinates of the left top corner.
     pub st1: Vec2,
@@ -70,10 +71,6 @@ impl Overlay {
     }
 
     fn push(&mut self, content: Content, p: &Picture2d) {
-        // such quads face away from the viewer
-        if p.size.x * p.size.y <= 0.0 {
-            return;
-        }
         let corner = |x: f32, y: f32| Vertex {
             position: (p.position + p.size * Vec2::new(x, y)).extend(0.0),
             normal: Vec3::NEG_Z,
@@ -97,21 +94,70 @@ impl Overlay {
         ]);
     }
 
+    /// The vertices and indices of a run.
+    fn geometry(&self, run: &Run, stages: &StageContext<'_>, time: f32, list: &mut DrawList) {
+        let base = list.vertices.len() as u32;
+        let first = run.first as usize * 4;
+        let vertices = self.vertices.get(first..first + run.count as usize * 4);
+        let vertices = vertices.unwrap_or_default();
+        let quads = (0..run.count * 4).step_by(4);
+        let indices = quads.flat_map(|v| [v, v + 1, v + 2, v, v + 2, v + 3]);
+        let material = match run.content {
+            Content::Material(index) => Some(stages.materials.get(index)),
+            Content::Texture(_) => None,
+        };
+        let Some(material) = material.filter(|m| m.deforms()) else {
+            list.vertices.extend_from_slice(vertices);
+            list.indices.extend(indices.map(|i| base + i));
+            return;
+        };
+        // rare: scripts made for the world used in a menu
+        let mut deformed: Vec<DeformVertex> = vertices
+            .iter()
+            .map(|v| DeformVertex {
+                position: v.position,
+                normal: Vec3::ZERO,
+                st: v.st,
+                color: v.color.to_le_bytes(),
+            })
+            .collect();
+        let mut indices: Vec<u32> = indices.collect();
+        let time = f64::from(time - material.time_offset);
+        let clamp = material.shader.clamp_time.map_or(f64::INFINITY, f64::from);
+        let context = DeformContext {
+            time: time.min(clamp),
+            frame_time: time,
+            ..DeformContext::default()
+        };
+        eval::deform(
+            &material.shader.deforms,
+            &mut deformed,
+            &mut indices,
+            &context,
+        );
+        list.vertices.extend(deformed.iter().map(|v| Vertex {
+            position: v.position,
+            normal: v.normal,
+            st: v.st,
+            lightmap: Vec2::ZERO,
+            color: u32::from_le_bytes(v.color),
+        }));
+        list.indices.extend(indices.iter().map(|i| base + i));
+    }
+
     /// Turns the queued pictures into draw calls. `instance` is [`overlay_instance`]'s.
     pub fn draw(&self, list: &mut DrawList, stages: StageContext<'_>, instance: &Instance) {
         list.clear();
-        list.vertices.extend_from_slice(&self.vertices);
-        for quad in 0..(self.vertices.len() / 4) as u32 {
-            let v = quad * 4;
-            list.indices.extend([v, v + 1, v + 2, v, v + 2, v + 3]);
-        }
         for run in &self.runs {
+            let first_index = list.indices.len() as u32;
+            self.geometry(run, &stages, instance.time, list);
+            let index_count = list.indices.len() as u32 - first_index;
             let mut push = |state: State, draw: Draw| {
                 list.calls.push(Call {
                     state,
                     range: DepthRange::Normal,
-                    first_index: run.first * 6,
-                    index_count: run.count * 6,
+                    first_index,
+                    index_count,
                     draw: list.draws.len() as u32,
                 });
                 list.draws.push(draw);
@@ -146,6 +192,8 @@ impl Overlay {
                             draw,
                         );
                         let state = State {
+                            cull: faces(material.cull, false),
+                            offset: material.polygon_offset,
                             blend: pass.blend,
                             depth: stage_depth(pass),
                             depth_write: pass.depth_write && pass.depth_test,
@@ -160,14 +208,15 @@ impl Overlay {
     }
 }
 
-/// The one instance of the overlay: no transform, shader time in seconds.
+/// The one instance of the overlay: no transform, shader time in seconds. As the engine's entity for pictures it has
+/// neither colour nor light.
 pub fn overlay_instance(time: f32) -> Instance {
     Instance {
         axis: [Vec3::X, Vec3::Y, Vec3::Z],
         viewer: Vec3::new(0.0, 0.0, -1.0),
-        color: [1.0; 4],
+        color: [0.0; 4],
         time,
-        ambient: Vec3::ONE,
+        flags: c::INSTANCE_UNLIT,
         ..Instance::default()
     }
 }

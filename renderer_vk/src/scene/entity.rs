@@ -16,7 +16,7 @@ pub(super) fn world_instance(view: &View, time: f32) -> Instance {
         // the engine's world entity is all zero: `rgbGen entity` is black there
         color: [0.0; 4],
         time,
-        flags: c::INSTANCE_WORLD,
+        flags: c::INSTANCE_UNLIT,
         ..Instance::default()
     }
 }
@@ -44,7 +44,7 @@ pub(super) fn effect_instance(entity: &RefEntity, view: &View, time: f32) -> Ins
         color: color(entity),
         texcoord: entity.shader_texcoord,
         time: time - entity.shader_time,
-        flags: flags(entity),
+        flags: flags(entity) | c::INSTANCE_UNLIT,
         ..world_instance(view, time)
     }
 }

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use shaders::types::Vertex;
+use shaderscript::Deform;
 use shaderscript::eval::{self, DeformContext, DeformVertex, ShadowProjection};
 
 use super::entity::into_axes;
@@ -161,8 +162,9 @@ fn deform(
     eval::deform(&material.shader.deforms, vertices, indices, &context);
     out.vertices.truncate(raw.first_vertex);
     out.indices.truncate(raw.first_index);
-    // deformations that rebuild quads have no use for the lightmap coordinates of the old ones
-    let rebuilt = vertices.len() != lightmaps.len();
+    // deformations that rebuild quads give them both coordinates alike
+    let rebuilt = (material.shader.deforms.iter())
+        .any(|deform| matches!(deform, Deform::AutoSprite | Deform::Text(_)));
     out.vertices
         .extend(vertices.iter().enumerate().map(|(i, v)| {
             Vertex {
@@ -173,7 +175,7 @@ fn deform(
                     .get(i)
                     .copied()
                     .filter(|_| !rebuilt)
-                    .unwrap_or_default(),
+                    .unwrap_or(v.st),
                 color: u32::from_le_bytes(v.color),
             }
         }));

@@ -44,7 +44,8 @@ impl MeshBuilder<'_> {
             position,
             normal,
             st,
-            lightmap: Vec2::ZERO,
+            // the engine's quads have both coordinates alike
+            lightmap: st,
             color,
         });
     }

@@ -508,7 +508,7 @@ fn brush_models_move_with_their_entity() {
     assert_eq!(submodel.model, 1);
     let instance = view.instances[submodel.instance as usize];
     // unlike the world itself it has an entity's light
-    assert!(instance.flags & c::INSTANCE_WORLD == 0 && instance.ambient.x > 0.0);
+    assert!(instance.flags & c::INSTANCE_UNLIT == 0 && instance.ambient.x > 0.0);
     let of_door: Vec<_> = view
         .surfaces
         .iter()

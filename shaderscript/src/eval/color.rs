@@ -24,8 +24,8 @@ pub struct ColorContext {
     pub identity_light: f32,
     /// The entity's colour.
     pub entity: [u8; 4],
-    /// Light at the entity.
-    pub light: DiffuseLight,
+    /// Light at the entity; `None` for what the light grid does not light: the world, sprites, pictures.
+    pub light: Option<DiffuseLight>,
     /// Eye, in entity space.
     pub viewer: Vec3,
     /// Eye in the space that `alphaGen portal` measures in: the world, for the world's own surfaces.
@@ -33,13 +33,13 @@ pub struct ColorContext {
 }
 
 impl Default for ColorContext {
-    /// Time 0, no overbright, a white entity in darkness, the eye at the origin.
+    /// Time 0, no overbright, a white entity without light, the eye at the origin.
     fn default() -> Self {
         ColorContext {
             time: 0.0,
             identity_light: 1.0,
             entity: [255; 4],
-            light: DiffuseLight::default(),
+            light: None,
             viewer: Vec3::ZERO,
             portal_eye: Vec3::ZERO,
         }
@@ -55,7 +55,12 @@ pub fn vertex_color(
     vertex: [u8; 4],
 ) -> [u8; 4] {
     let [r, g, b] = rgb_gen(&stage.rgb_gen, context, normal, vertex);
-    let a = alpha_gen(&stage.alpha_gen, context, position, normal, vertex);
+    let a = match (&stage.alpha_gen, &stage.rgb_gen) {
+        // Light has an alpha of its own, and vertices keep theirs where the engine copies them as they are.
+        (AlphaGen::Identity, RgbGen::LightingDiffuse) if context.light.is_none() => 0,
+        (AlphaGen::Identity, RgbGen::Vertex) if context.identity_light == 1.0 => vertex[3],
+        (kind, _) => alpha_gen(kind, context, position, normal, vertex),
+    };
     [r, g, b, a]
 }
 
@@ -83,7 +88,10 @@ pub fn rgb_gen(rgb_gen: &RgbGen, context: &ColorContext, normal: Vec3, vertex: [
         RgbGen::Vertex => [r, g, b].map(|c| byte(f32::from(c) * idl)),
         RgbGen::ExactVertex => [r, g, b],
         RgbGen::OneMinusVertex => [r, g, b].map(|c| byte(f32::from(255 - c) * idl)),
-        RgbGen::LightingDiffuse => diffuse(&context.light, normal),
+        RgbGen::LightingDiffuse => context
+            .light
+            .as_ref()
+            .map_or([0; 3], |light| diffuse(light, normal)),
     }
 }
 
@@ -221,6 +229,32 @@ mod tests {
             )
         };
         assert_eq!((at(0.0), at(128.0), at(300.0)), (0, 127, 255));
+    }
+
+    #[test]
+    fn alpha_without_alpha_gen() {
+        let alpha = |rgb_gen, context: &ColorContext| {
+            let stage = Stage {
+                rgb_gen,
+                ..Stage::default()
+            };
+            vertex_color(&stage, context, Vec3::ZERO, Vec3::Z, VERTEX)[3]
+        };
+        let bright = ColorContext {
+            identity_light: 1.0,
+            ..context()
+        };
+        for rgb_gen in [RgbGen::Entity, RgbGen::OneMinusEntity, RgbGen::ExactVertex] {
+            assert_eq!(alpha(rgb_gen, &bright), 255);
+        }
+        assert_eq!(alpha(RgbGen::Vertex, &bright), 40);
+        assert_eq!(alpha(RgbGen::Vertex, &context()), 255);
+        assert_eq!(alpha(RgbGen::LightingDiffuse, &bright), 0);
+        let lit = ColorContext {
+            light: Some(DiffuseLight::default()),
+            ..bright
+        };
+        assert_eq!(alpha(RgbGen::LightingDiffuse, &lit), 255);
     }
 
     #[test]

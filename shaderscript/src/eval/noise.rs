@@ -1,10 +1,9 @@
 //! Four-dimensional value noise.
 //!
-//! The engine fills its lattice from the C library's `rand()`, so its noise differs from system to system; only the
-//! scheme is fixed: 256 values in -1..1, found by a chained permutation of the four lattice coordinates, blended
-//! linearly. Here both tables come from a linear congruential generator (Knuth's MMIX constants: multiplier
-//! 6364136223846793005, increment 1442695040888963407, modulus 2^64, seed 0x51A3E; the upper 32 bits are used), and
-//! the permutation is a true one (Fisher-Yates shuffle).
+//! The engine fills its lattice from the C library's `rand()`, so its noise differs from system to system and from run
+//! to run; only the scheme is fixed: 256 values in -1..1, found by a chained permutation of the four lattice
+//! coordinates, blended linearly. The tables here are those that come out with glibc's generator as a program finds it
+//! (seed 1), so that the two can be compared.
 
 use std::sync::OnceLock;
 
@@ -16,22 +15,54 @@ struct Tables {
     permutation: [u8; NOISE_SIZE],
 }
 
+/// glibc's `rand()` with seed 1: an additive feedback generator of degree 31 with taps 3 and 31, whose first words come
+/// from the minimal standard generator (multiplier 16807, modulus 2^31 - 1) and whose first 310 outputs are dropped.
+struct Random {
+    words: [u32; 31],
+    next: usize,
+}
+
+impl Random {
+    fn new() -> Self {
+        let mut word = 1_u64;
+        let words = std::array::from_fn(|_| {
+            let here = word as u32;
+            word = word * 16_807 % 0x7FFF_FFFF;
+            here
+        });
+        let mut random = Self { words, next: 3 };
+        for _ in 0..310 {
+            random.number();
+        }
+        random
+    }
+
+    /// The next number below 2^31.
+    fn number(&mut self) -> u32 {
+        let tap = self.words[(self.next + 28) % 31];
+        let word = &mut self.words[self.next];
+        *word = word.wrapping_add(tap);
+        let number = *word >> 1;
+        self.next = (self.next + 1) % 31;
+        number
+    }
+
+    /// In 0..=1, as the engine computes it in single precision.
+    fn unit(&mut self) -> f32 {
+        self.number() as f32 / 0x7FFF_FFFF as f32
+    }
+}
+
 fn tables() -> &'static Tables {
     static TABLES: OnceLock<Tables> = OnceLock::new();
     TABLES.get_or_init(|| {
-        let mut state = 0x51A3E_u64;
-        let mut random = move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 32) as u32
-        };
-        let values =
-            std::array::from_fn(|_| (f64::from(random()) / f64::from(u32::MAX) * 2.0 - 1.0) as f32);
-        let mut permutation: [u8; NOISE_SIZE] = std::array::from_fn(|i| i as u8);
-        for last in (1..NOISE_SIZE).rev() {
-            let other = random() as usize % (last + 1);
-            permutation.swap(last, other);
+        let mut random = Random::new();
+        let mut values = [0.0; NOISE_SIZE];
+        // No true permutation: the engine draws with replacement.
+        let mut permutation = [0; NOISE_SIZE];
+        for (value, entry) in values.iter_mut().zip(&mut permutation) {
+            *value = (f64::from(random.unit()) * 2.0 - 1.0) as f32;
+            *entry = (random.unit() * 255.0) as u8;
         }
         Tables {
             values,
@@ -88,20 +119,19 @@ mod tests {
 
     #[test]
     fn tables_have_the_documented_form() {
-        let mut seen = *noise_permutation();
-        seen.sort_unstable();
-        assert!(seen.iter().enumerate().all(|(i, &v)| usize::from(v) == i));
         let mean = noise_values().iter().sum::<f32>() / NOISE_SIZE as f32;
         assert!(mean.abs() < 0.15, "{mean}");
         assert!(noise_values().iter().all(|v| v.abs() <= 1.0));
         assert!(noise_values().iter().any(|v| *v > 0.8));
         assert!(noise_values().iter().any(|v| *v < -0.8));
-        // First output of the generator: (seed * a + c) >> 32, worked out with big integers.
-        let state =
-            (0x51A3E_u128 * 6_364_136_223_846_793_005 + 1_442_695_040_888_963_407) % (1_u128 << 64);
-        let first = state >> 32;
-        let value = (first as f64 / f64::from(u32::MAX) * 2.0 - 1.0) as f32;
-        assert_eq!(noise_values()[0], value);
+        // The generator's first numbers, as every C program without a seed sees them.
+        let mut random = Random::new();
+        let first: [u32; 4] = std::array::from_fn(|_| random.number());
+        assert_eq!(
+            first,
+            [1_804_289_383, 846_930_886, 1_681_692_777, 1_714_636_915]
+        );
+        assert_eq!(noise_permutation()[0], 100);
     }
 
     #[test]

@@ -135,6 +135,8 @@ fn begin_registration(exports: refexport_t) -> Result<(), Raised> {
     let Some(config) = imports::with(|s| &raw mut *s.config) else {
         return Ok(());
     };
+    // Renderers fill tables with random numbers when they start: the same ones each time.
+    imports::seed_random_numbers();
     // SAFETY: the library is loaded; the structure stays where it is for as long as the engine lives.
     call(move || unsafe { (exports.BeginRegistration)(config) })?;
     imports::with(|s| s.registered = true);
@@ -239,8 +241,6 @@ impl Engine {
 
     fn load_library(&mut self) -> Result<(), LoadError> {
         let failed = |e| LoadError::Library(self.path.clone(), e);
-        // Renderers fill tables with random numbers when they start: the same ones each time.
-        imports::seed_random_numbers();
         // SAFETY: the library's initializers are those of a Rust cdylib; the linker flags are the engine's.
         let library =
             unsafe { Library::open(Some(&self.path), RTLD_NOW | RTLD_LOCAL) }.map_err(failed)?;

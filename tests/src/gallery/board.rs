@@ -25,8 +25,10 @@ pub enum Shape {
     Dome(u16),
     /// A curved patch with a lightmap.
     Patch,
-    /// A model, as an entity that is turned and tinted and has a time of its own.
+    /// A model, as an entity that is turned and tinted and has a time of its own; the tile's shader is the entity's.
     Model,
+    /// The same; the tile's shader is that of the model's skin.
+    Skin,
     /// A polygon that the game adds.
     Poly,
     /// A sprite.
@@ -143,7 +145,7 @@ impl Board {
         for (i, tile) in self.tiles.iter().enumerate() {
             if matches!(
                 tile.shape,
-                Shape::Model | Shape::Poly | Shape::Sprite | Shape::Picture
+                Shape::Model | Shape::Skin | Shape::Poly | Shape::Sprite | Shape::Picture
             ) {
                 continue;
             }
@@ -206,7 +208,7 @@ impl Board {
                     let surface = map.add_patch(shader, 3, 3, &points);
                     map.set_lightmap(surface, page);
                 }
-                Shape::Model | Shape::Poly | Shape::Sprite | Shape::Picture => {}
+                Shape::Model | Shape::Skin | Shape::Poly | Shape::Sprite | Shape::Picture => {}
             }
         }
         map
@@ -226,6 +228,10 @@ impl Board {
             latitude: 100,
         });
         let mut files = super::model::files();
+        for tile in self.of(Shape::Skin) {
+            let line = format!("body,{}\n", self.shader_name(tile));
+            files.push((format!("tile/{tile}.skin"), line.into_bytes()));
+        }
         files.extend([
             (
                 "scripts/board.shader".to_string(),
@@ -271,10 +277,17 @@ impl Board {
     /// Adds entities and polygons to the scene.
     pub fn add(&self, engine: &mut Engine) -> Result<(), Raised> {
         let turn = Mat3::from_rotation_x(0.4) * Mat3::from_rotation_z(0.2);
-        for tile in self.of(Shape::Model) {
+        for tile in self.of(Shape::Model).chain(self.of(Shape::Skin)) {
+            let skin = self.tiles[tile].shape == Shape::Skin;
+            let [shader, skin] = if skin {
+                [0, engine.register_skin(&format!("tile/{tile}.skin"))?]
+            } else {
+                [self.shader(engine, tile)?, 0]
+            };
             let entity = refEntity_t {
                 hModel: engine.register_model("g/dome.md3")?,
-                customShader: self.shader(engine, tile)?,
+                customShader: shader,
+                customSkin: skin,
                 origin: self.center(tile).to_array(),
                 axis: turn.to_cols_array_2d(),
                 frame: 1,

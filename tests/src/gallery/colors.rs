@@ -75,9 +75,12 @@ fn noise() -> Board {
 }
 
 fn rgb_kinds(shape: Shape) -> Board {
-    let plain = RGB.map(|g| format!("{{\nmap g/white.tga\nrgbGen {g}\n}}"));
-    let blended = RGB.map(|g| format!("{{\nmap g/base.tga\nblendFunc blend\nrgbGen {g}\n}}"));
-    Board::new(5, shape, plain.into_iter().chain(blended))
+    // Models have no colours and pictures and polygons no normals: the reference shows what was drawn before them.
+    let defined = |g: &&&str| shape != Shape::Model || !g.to_lowercase().contains("vertex");
+    let kinds = || RGB.iter().filter(defined);
+    let plain = kinds().map(|g| format!("{{\nmap g/white.tga\nrgbGen {g}\n}}"));
+    let blended = kinds().map(|g| format!("{{\nmap g/base.tga\nblendFunc blend\nrgbGen {g}\n}}"));
+    Board::new(5, shape, plain.chain(blended))
 }
 
 fn alpha_kinds(shape: Shape) -> Board {
@@ -94,7 +97,13 @@ fn alpha_kinds(shape: Shape) -> Board {
         "rgbGen lightingDiffuse\nalphaGen const 0.5",
     ]
     .map(|g| format!("{{\nmap g/base.tga\nblendFunc blend\n{g}\n}}"));
-    Board::new(4, shape, plain.into_iter().chain(mixed))
+    let defined = |body: &String| match shape {
+        Shape::Model => !body.to_lowercase().contains("vertex"),
+        Shape::Poly | Shape::Picture => !body.contains("Specular"),
+        _ => true,
+    };
+    let all = plain.into_iter().chain(mixed);
+    Board::new(4, shape, all.filter(defined))
 }
 
 fn portal_alpha() -> Board {

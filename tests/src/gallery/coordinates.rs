@@ -46,10 +46,17 @@ const MODIFIERS: [&str; 24] = [
 ];
 
 fn generators(shape: Shape) -> Board {
+    // Pictures and polygons have no normals, and those and models no lightmap: the reference shows what was drawn
+    // before them.
+    let bare = matches!(shape, Shape::Poly | Shape::Picture);
+    let unlit = bare || shape == Shape::Model;
+    let kinds = GENERATORS
+        .iter()
+        .filter(|g| !(bare && g.contains("environment") || unlit && g.contains("lightmap")));
     Board::new(
         3,
         shape,
-        GENERATORS.map(|g| format!("{{\nmap g/env.tga\n{g}\n}}")),
+        kinds.map(|g| format!("{{\nmap g/env.tga\n{g}\n}}")),
     )
 }
 
@@ -67,7 +74,10 @@ fn together(shape: Shape) -> Board {
         "lightmap",
         "vector ( 0.01 0.01 0 ) ( 0 0.01 0.02 )",
     ];
-    let all = generators.iter().flat_map(|g| {
+    let lit = generators
+        .iter()
+        .filter(|g| shape != Shape::Model || **g != "lightmap");
+    let all = lit.flat_map(|g| {
         MODIFIERS[..16]
             .iter()
             .step_by(2)

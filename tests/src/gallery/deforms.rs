@@ -25,10 +25,15 @@ const KINDS: [&str; 14] = [
 ];
 
 fn kinds(shape: Shape) -> Board {
+    // Pictures and polygons have no normals to move along.
+    let bare = matches!(shape, Shape::Poly | Shape::Picture);
+    let kinds = KINDS
+        .iter()
+        .filter(|d| !bare || !(d.contains("wave") || d.contains("bulge")));
     Board::new(
         5,
         shape,
-        KINDS.map(|d| format!("{d}\n{{\nmap g/base.tga\nrgbGen identity\n}}")),
+        kinds.map(|d| format!("{d}\n{{\nmap g/base.tga\nrgbGen identity\n}}")),
     )
 }
 
@@ -54,24 +59,24 @@ fn normals(shape: Shape) -> Board {
 
 fn sprites(shape: Shape) -> Board {
     let body = |d: &str, s: &str| format!("cull none\n{d}\n{{\nmap g/base.tga\n{s}\n}}");
-    Board::new(
-        3,
-        shape,
-        [
-            body("deformVertexes autosprite", "rgbGen identity"),
-            body("deformVertexes autosprite2", "rgbGen identity"),
-            body("deformVertexes autosprite", "rgbGen vertex"),
-            body("deformVertexes autosprite2", "rgbGen exactVertex"),
-            body(
-                "deformVertexes autosprite\ndeformVertexes move 0 0 8 sin 0 1 0 1",
-                "tcMod scroll 0.1 0",
-            ),
-            body(
-                "deformVertexes wave 30 sin 0 5 0 1\ndeformVertexes autosprite2",
-                "",
-            ),
-        ],
-    )
+    // A sprite is a square, of which the second kind cannot tell which sides are the short ones.
+    let square = |body: &String| shape != Shape::Sprite || !body.contains("autosprite2");
+    let bodies = [
+        body("deformVertexes autosprite", "rgbGen identity"),
+        body("deformVertexes autosprite", "tcGen lightmap"),
+        body("deformVertexes autosprite2", "rgbGen identity"),
+        body("deformVertexes autosprite", "rgbGen vertex"),
+        body("deformVertexes autosprite2", "rgbGen exactVertex"),
+        body(
+            "deformVertexes autosprite\ndeformVertexes move 0 0 8 sin 0 1 0 1",
+            "tcMod scroll 0.1 0",
+        ),
+        body(
+            "deformVertexes wave 30 sin 0 5 0 1\ndeformVertexes autosprite2",
+            "",
+        ),
+    ];
+    Board::new(3, shape, bodies.into_iter().filter(square))
 }
 
 fn text() -> Board {

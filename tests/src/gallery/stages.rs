@@ -163,16 +163,15 @@ fn images() -> Board {
 
 /// Two stages that are collapsed into one pass, and those that are not.
 fn collapse(shape: Shape) -> Board {
+    // Models have no colours.
+    let defined = |body: &String| shape != Shape::Model || !body.contains("vertex");
     let second = |first: &str, second: &str| {
         format!("{{\nmap g/base.tga\n{first}\n}}\n{{\nmap g/env.tga\n{second}\n}}")
     };
     let lightmap = |rest: &str| {
         format!("{{\nmap $lightmap\nrgbGen identity\n}}\n{{\nmap g/base.tga\n{rest}\n}}")
     };
-    Board::new(
-        6,
-        shape,
-        [
+    let bodies = [
             lightmap("blendFunc filter\nrgbGen identity"),
             lightmap("blendFunc GL_ZERO GL_SRC_COLOR\nrgbGen identity"),
             lightmap("blendFunc GL_DST_COLOR GL_SRC_COLOR\nrgbGen identity"),
@@ -197,8 +196,8 @@ fn collapse(shape: Shape) -> Board {
             second("rgbGen identity\nalphaGen const 0.5", "blendFunc filter\nrgbGen identity\nalphaGen const 0.5"),
             format!("{}\n{{\nmap g/grey.tga\nblendFunc add\nrgbGen wave sin 0.3 0.2 0 1\n}}", lightmap("blendFunc filter\nrgbGen identity")),
             format!("{}\n{{\nmap g/alpha.tga\nblendFunc blend\n}}\n{{\nmap g/grey.tga\nblendFunc filter\n}}", lightmap("blendFunc filter")),
-        ],
-    )
+        ];
+    Board::new(6, shape, bodies.into_iter().filter(defined))
 }
 
 fn details() -> Board {
@@ -328,7 +327,7 @@ pub(super) fn scenes() -> Vec<Scene> {
             ..board_scene!(
                 "collapse-vertex-model",
                 "With r_vertexLight, models.",
-                collapse(Shape::Model),
+                collapse(Shape::Skin),
                 &[0]
             )
         },

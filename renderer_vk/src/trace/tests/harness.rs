@@ -330,7 +330,7 @@ impl Scene {
             ambient: Vec3::ZERO,
             fogs: Vec::new(),
             instances: vec![Instance {
-                flags: c::INSTANCE_WORLD,
+                flags: c::INSTANCE_UNLIT,
                 ..identity()
             }],
             dynamic_vertices: Vec::new(),
