@@ -26,9 +26,11 @@ t/flow
     rgbGen wave sin 0.5 0.25 0.1 2
     alphaGen const 0.5
     blendFunc blend }
-  { clampmap t/b.tga
+  { clampmap t/c.tga
     alphaFunc GE128
     depthFunc equal
+    blendFunc add }
+  { clampmap t/b.tga
     blendFunc add }
 }
 t/gone
@@ -51,6 +53,14 @@ t/film
 {
   { videoMap film.roq }
 }
+t/broken
+{
+  { map t/a.tga }
+  { videoMap broken.roq
+    blendFunc add }
+  { map t/a.tga
+    blendFunc add }
+}
 t/low { sort 1.5
   { map t/a.tga } }
 t/sky
@@ -64,6 +74,7 @@ fn game() -> Registration {
     Registration::from_entries(&[
         ("scripts/t.shader", SCRIPT),
         ("t/a.tga", PIXEL),
+        ("t/c.tga", PIXEL),
         ("t/b.jpg", PIXEL),
         ("t/plain.tga", PIXEL),
         ("t/box_rt.tga", PIXEL),
@@ -141,10 +152,12 @@ fn stages_keep_what_the_script_says() {
     assert_eq!(first.sampler_index, super::compile::sampler::REPEAT);
     let second = stages[1];
     assert_eq!(second.sampler_index, super::compile::sampler::CLAMP);
+    // its first user repeats it
+    assert_eq!(stages[2].sampler_index, super::compile::sampler::REPEAT);
     assert_eq!(second.alpha_func, c::ALPHAFUNC_GE128);
     assert!(second.flags & c::STAGE_DEPTH_EQUAL != 0);
     assert!(!game.textures.flags["t/a.tga"].mipmap);
-    assert_eq!(material.passes.len(), 2);
+    assert_eq!(material.passes.len(), 3);
     assert!(material.flags & c::MATERIAL_TRANSLUCENT != 0);
     assert!(material.flags & c::MATERIAL_TWO_SIDED != 0);
     assert_eq!(material.sort, shaderscript::sort::BLEND);
@@ -249,6 +262,18 @@ fn settings_change_stages() {
         game.materials.stages(material)[0].rgb_gen,
         c::RGBGEN_EXACT_VERTEX
     );
+}
+
+#[test]
+fn films_that_cannot_be_played_take_later_stages_along() {
+    let mut game = game();
+    let index = game.find("t/broken", LightmapClass::None, true);
+    assert_eq!(game.materials.get(index).stage_count, 3);
+    let client = game.materials.get(index).videos[0].client;
+    game.materials.drop_video(client);
+    let material = game.materials.get(index);
+    assert_eq!((material.stage_count, material.passes.len()), (1, 1));
+    assert!(material.videos.is_empty());
 }
 
 #[test]

@@ -233,7 +233,7 @@ fn play_films(stage: &mut Stage) -> Result<(), Raised> {
         (0..256usize * 256)
             .flat_map(|at| {
                 let (x, y) = (at % 256, at / 256);
-                let on = (x + offset) / 32 % 2 == 0;
+                let on = ((x + offset) / 32).is_multiple_of(2);
                 [x as u8, y as u8, if on { 255 } else { 0 }, 255]
             })
             .collect()
