@@ -88,7 +88,12 @@ impl<'a> FrameContext<'a> {
     ) -> Result<(), gpu::Error> {
         let (width, height) = (self.color.width() as f32, self.color.height() as f32);
         let instance = overlay_instance(time);
-        overlay.draw(self.list, self.stages(), &instance);
+        let aids = Aids {
+            edges: self.settings.show_tris && self.raster.draws_edges(),
+            last_sort: self.settings.debug_sort,
+            ..Aids::default()
+        };
+        overlay.draw(self.list, self.stages(), &instance, aids);
         let parameters = ViewParameters {
             // window pixels to clip space; pictures lie at the near plane, a depth of 1 before the far one
             world_to_clip: Mat4::from_cols(
@@ -107,6 +112,7 @@ impl<'a> FrameContext<'a> {
             fogs: 0,
             instances: &[instance],
             lights: &[],
+            light_backs: true,
             viewport: [0, 0, width as i32, height as i32],
             clear_depth: false,
             clear_color: None,
@@ -131,8 +137,12 @@ impl<'a> FrameContext<'a> {
             stages,
             world.map_or(&[], |w| w.indices.as_slice()),
             Aids {
-                edges: settings.show_tris,
+                edges: settings.show_tris && self.raster.draws_edges(),
+                normals: (settings.show_normals && self.raster.draws_edges())
+                    .then(|| world.map_or(&[][..], |w| w.vertices.as_slice())),
                 lightmaps: settings.lightmap,
+                sky_in_front: settings.show_sky,
+                last_sort: settings.debug_sort,
             },
         );
         let view = &scene.view;
@@ -148,6 +158,7 @@ impl<'a> FrameContext<'a> {
             fogs: world.map_or(0, |w| w.fog_buffer.address()),
             instances: &scene.instances,
             lights: &scene.dlights,
+            light_backs: settings.dlight_backs,
             viewport: view.viewport,
             clear_depth: true,
             clear_color: clear_color(scene, settings),
@@ -196,6 +207,7 @@ impl<'a> FrameContext<'a> {
             fogs: 0,
             instances: &quads.instances,
             lights: &[],
+            light_backs: true,
             viewport: quads.view.viewport,
             clear_depth: false,
             clear_color: None,

@@ -511,7 +511,24 @@ impl Renderer {
         }
     }
 
+    /// `r_showImages`: covers the picture with all images.
+    fn queue_image_sheet(&mut self) {
+        if let (1.., Some(assets)) = (self.settings.show_images, &self.assets) {
+            let proportional = self.settings.show_images == 2;
+            let (size, textures) = (self.size(), &assets.textures);
+            let white = ImageSource::white(textures);
+            raster::image_sheet(
+                &mut self.overlay,
+                size,
+                proportional,
+                white,
+                textures.images(),
+            );
+        }
+    }
+
     fn flush(&mut self, show: bool) -> Result<FrameStats, Error> {
+        self.queue_image_sheet();
         self.queue_overlay();
         self.fit_depth()?;
         let mut stats = FrameStats::default();

@@ -87,6 +87,11 @@ pub struct Settings {
     /// Materials of a greater sort value are left out; 0: none are.
     pub debug_sort: i32,
     pub show_cluster: i32,
+    pub show_normals: bool,
+    pub show_sky: bool,
+    /// 1: all images on a grid; 2: in proportion to their sizes.
+    pub show_images: i32,
+    pub dlight_backs: bool,
     pub debug_light: bool,
     pub clear: bool,
     pub show_tris: bool,
@@ -178,6 +183,10 @@ impl Default for Settings {
             face_plane_cull: true,
             debug_sort: 0,
             show_cluster: 0,
+            show_normals: false,
+            show_sky: false,
+            show_images: 0,
+            dlight_backs: true,
             debug_light: false,
             clear: false,
             show_tris: false,

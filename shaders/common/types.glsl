@@ -36,7 +36,7 @@ struct Fog { vec3 mins; vec3 maxs; vec4 plane; uint has_surface; vec3 color; flo
 struct MaterialBuffers { uint64_t materials; uint64_t stages; uint64_t tc_mods; uint64_t images; uint64_t noise; };
 
 struct RasterView {
-    vec4 world_to_clip[4]; vec4 clip_plane; vec3 eye; vec3 forward; float identity_light; uint padding; MaterialBuffers materials;
+    vec4 world_to_clip[4]; vec4 clip_plane; vec3 eye; vec3 forward; float identity_light; uint light_backs; MaterialBuffers materials;
     uint64_t static_vertices; uint64_t dynamic_vertices; uint64_t instances; uint64_t draws; uint64_t fogs; uint64_t lights;
 };
 
@@ -70,7 +70,7 @@ const uint MATERIAL_TWO_SIDED = 1, MATERIAL_CULL_BACK = 2, MATERIAL_CUT_OUT = 4,
     MATERIAL_POLYGON_OFFSET = 1024, MATERIAL_EMITTER = 2048, MATERIAL_INVISIBLE = 4096;
 const uint INSTANCE_DEPTH_HACK = 1, INSTANCE_FIRST_PERSON = 2, INSTANCE_THIRD_PERSON = 4, INSTANCE_NO_SHADOW = 8, INSTANCE_UNLIT = 16;
 const uint DRAW_STAGE = 0, DRAW_LIGHT = 1, DRAW_FOG = 2;
-const uint COMBINE_NONE = 0, COMBINE_MODULATE = 1, COMBINE_ADD = 2;
+const uint COMBINE_NONE = 0, COMBINE_MODULATE = 1, COMBINE_ADD = 2, COMBINE_REPLACE = 3;
 const uint COLOR_WHITE = 0, COLOR_FLAT = 1, COLOR_VERTEX = 2;
 const uint FOG_ADJUST_NONE = 0, FOG_ADJUST_RGB = 1, FOG_ADJUST_ALPHA = 2, FOG_ADJUST_RGBA = 3;
 const uint TRIANGLE_WORLD = 1;

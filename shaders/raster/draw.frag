@@ -43,7 +43,8 @@ void main() {
         if (COLOR == COLOR_VERTEX) color *= in_color;
         if (COMBINE != COMBINE_NONE) {
             vec4 second = sample_stage(1, in_textures.y, in_uv.zw);
-            color = COMBINE == COMBINE_ADD ? vec4(color.rgb + second.rgb, color.a * second.a) : color * second;
+            if (COMBINE == COMBINE_REPLACE) color = second;
+            else color = COMBINE == COMBINE_ADD ? vec4(color.rgb + second.rgb, color.a * second.a) : color * second;
         }
         if (ALPHA_FUNC != ALPHAFUNC_NONE && !alpha_passes(ALPHA_FUNC, color.a)) discard;
         out_color = color;

@@ -63,6 +63,7 @@ void main() {
         out_uv.xy = 0.5 + delta.xy / light.radius;
         float height = abs(delta.z);
         float m = height > light.radius ? 0.0 : height < light.radius * 0.5 ? 1.0 : 2.0 * (light.radius - height) / light.radius;
+        if (view.light_backs == 0 && dot(delta, vertex.normal) < 0.0) m = 0.0;
         out_color = vec4(light.color * m, 1.0);
     } else if (MODE == DRAW_FOG) {
         Fog fog = Fogs(view.fogs).at[draw.fog - 1];

@@ -209,8 +209,8 @@ pub struct RasterView {
     pub forward: Vec3,
     /// `identityLight`: 1 over 2 to the power of the overbright bits.
     pub identity_light: f32,
-    /// Keeps the addresses at multiples of eight without hidden bytes.
-    pub padding: u32,
+    /// 0: dynamic lights leave out what is turned away from them (`r_dlightBacks`).
+    pub light_backs: u32,
     /// Materials.
     pub materials: MaterialBuffers,
     /// The world's [`Vertex`] array.
@@ -354,7 +354,7 @@ pub mod constants {
         /// The fog over an opaque surface.
         DRAW_FOG = 2;
         /// Of a draw: there is one stage, or two of which the second multiplies or is added.
-        COMBINE_NONE = 0; COMBINE_MODULATE = 1; COMBINE_ADD = 2;
+        COMBINE_NONE = 0; COMBINE_MODULATE = 1; COMBINE_ADD = 2; COMBINE_REPLACE = 3;
         /// Of a draw: its colour is white, the same for all vertices, or each vertex's own.
         COLOR_WHITE = 0; COLOR_FLAT = 1; COLOR_VERTEX = 2;
         FOG_ADJUST_NONE = 0; FOG_ADJUST_RGB = 1; FOG_ADJUST_ALPHA = 2; FOG_ADJUST_RGBA = 3;

@@ -97,6 +97,10 @@ pub fn apply(cvars: &Cvars, window_fullscreen: bool, settings: &mut Settings) {
     settings.debug_sort = integer(Cvar::DebugSort);
     settings.show_cluster = integer(Cvar::Showcluster);
     settings.debug_light = flag(Cvar::Debuglight);
+    settings.show_normals = flag(Cvar::Shownormals);
+    settings.show_sky = flag(Cvar::Showsky);
+    settings.show_images = integer(Cvar::ShowImages);
+    settings.dlight_backs = flag(Cvar::DlightBacks);
     settings.clear = flag(Cvar::Clear);
     settings.show_tris = flag(Cvar::ShowTris);
     settings.lightmap = flag(Cvar::Lightmap);

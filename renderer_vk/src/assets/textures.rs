@@ -261,6 +261,15 @@ impl Textures {
         Ok(Some((old, new)))
     }
 
+    /// Texture, width and height of each image, in the order of `imagelist`.
+    pub fn images(&self) -> impl Iterator<Item = (u32, u32, u32)> {
+        self.textures
+            .iter()
+            .filter_map(|t| t.image.as_ref())
+            .chain(self.lightmaps.iter().map(|(_, image)| image))
+            .map(|image| (image.texture_index(), image.width(), image.height()))
+    }
+
     /// Lines for `imagelist`: number, size, channels in use, bytes on the GPU, name; then how many bytes and images.
     pub fn list(&self) -> Vec<String> {
         let mut bytes = 0;

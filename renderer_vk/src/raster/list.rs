@@ -4,6 +4,7 @@
 use shaders::types::constants as c;
 use shaders::types::{Draw, Instance, Vertex};
 
+use super::aids::Aids;
 use super::pipelines::{CullFaces, Depth, State};
 use super::shading::{Shading, StageContext};
 use super::sky;
@@ -59,15 +60,6 @@ pub struct DrawList {
     pub vertices: Vec<Vertex>,
 }
 
-/// Debugging aids.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Aids {
-    /// Draw the edges of all triangles over everything (`r_showtris`).
-    pub edges: bool,
-    /// Draw lightmaps alone where there are any (`r_lightmap`).
-    pub lightmaps: bool,
-}
-
 /// What a group of surfaces has in common.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Group {
@@ -105,7 +97,7 @@ impl DrawList {
         scene: &ViewScene,
         stages: StageContext<'_>,
         static_indices: &[u32],
-        aids: Aids,
+        aids: Aids<'_>,
     ) {
         let materials = stages.materials;
         self.vertices.extend_from_slice(&scene.vertices);
@@ -116,11 +108,11 @@ impl DrawList {
         );
         self.add_surfaces(before_sky, scene, stages, static_indices, aids);
         for sky in &scene.skies {
-            self.add_sky(sky, scene, stages);
+            self.add_sky(sky, scene, stages, aids);
         }
         self.add_surfaces(rest, scene, stages, static_indices, aids);
         if let Some(sun) = scene.sun.filter(|_| !scene.skies.is_empty()) {
-            self.add_sun(&sun, scene, stages);
+            self.add_sun(&sun, scene, stages, aids);
         }
         let clip = scene.view.clip_plane.is_some();
         for call in &mut self.calls {
@@ -134,7 +126,7 @@ impl DrawList {
         scene: &ViewScene,
         stages: StageContext<'_>,
         static_indices: &[u32],
-        aids: Aids,
+        aids: Aids<'_>,
     ) {
         let mut rest = surfaces;
         while let Some(first) = rest.first() {
@@ -184,13 +176,13 @@ impl DrawList {
         range: DepthRange,
         lights: u32,
         scene: &ViewScene,
-        aids: Aids,
+        aids: Aids<'_>,
     ) {
         let material = stages.materials.get(group.material);
         let Some(instance) = scene.instances.get(group.instance as usize) else {
             return;
         };
-        if span.1 == 0 || material.sky.is_some() {
+        if span.1 == 0 || material.sky.is_some() || aids.leaves_out(material.sort) {
             return;
         }
         let draw = Draw {
@@ -212,26 +204,22 @@ impl DrawList {
         let first_blends = material.passes.first().is_some_and(|p| p.blend.is_some());
         for pass in &material.passes {
             let depth = stage_depth(pass);
-            if aids.lightmaps
-                && group.lightmap != c::NO_TEXTURE
-                && shows_lightmap(pass, stages.materials)
-            {
-                let (shading, draw) = stages.lightmap(group.lightmap, draw);
-                let state = State {
-                    depth,
-                    shading,
-                    ..plain
-                };
-                self.push(state, range, span, draw);
-                break;
-            }
             let fog_adjust = if group.fog != 0 && first_blends && !opaque {
                 fog_adjust(pass.blend)
             } else {
                 c::FOG_ADJUST_NONE
             };
-            let (shading, draw) =
+            let (mut shading, mut draw) =
                 stages.pass(material, pass, instance, group.lightmap, fog_adjust, draw);
+            let shows_light = aids.lightmaps && shows_lightmap(pass, stages.materials);
+            // of two textures in one pass the second is shown, which with a lightmap is the lightmap
+            if aids.lightmaps && pass.stage_count == 2 {
+                (shading, draw) = match (shows_light, group.lightmap) {
+                    (false, _) => (shading.second_alone(), draw),
+                    (true, c::NO_TEXTURE) => (Shading::WHITE, draw),
+                    (true, page) => stages.lightmap(page, draw),
+                };
+            }
             let state = State {
                 blend: pass.blend,
                 depth,
@@ -240,6 +228,9 @@ impl DrawList {
                 ..plain
             };
             self.push(state, range, span, draw);
+            if shows_light {
+                break;
+            }
         }
         let over = |mode, blend, depth| State {
             blend: Some(blend),
@@ -270,24 +261,27 @@ impl DrawList {
             self.push(over(c::DRAW_FOG, blend, depth), range, span, draw);
         }
         if aids.edges {
-            let state = State {
-                depth: Depth::Always,
-                depth_write: false,
-                cull: CullFaces::None,
-                offset: false,
-                wireframe: true,
-                shading: Shading::VERTEX_COLOR,
-                ..plain
-            };
-            self.push(state, DepthRange::Front, span, draw);
+            self.push_edges(span, draw, plain.cull);
+        }
+        if let Some(statics) = aids.normals {
+            self.push_normals(span.0, statics, draw);
         }
     }
 
-    fn add_sky(&mut self, visible: &VisibleSky, scene: &ViewScene, stages: StageContext<'_>) {
+    fn add_sky(
+        &mut self,
+        visible: &VisibleSky,
+        scene: &ViewScene,
+        stages: StageContext<'_>,
+        aids: Aids<'_>,
+    ) {
         let material = stages.materials.get(visible.material);
         let (Some(sky), Some(world)) = (&material.sky, scene.instances.first()) else {
             return;
         };
+        if aids.leaves_out(material.sort) {
+            return;
+        }
         let view = &scene.view;
         let grey = (stages.identity_light.clamp(0.0, 1.0) * 255.0) as u32;
         let color = 0xFF00_0000 | grey << 16 | grey << 8 | grey;
@@ -305,7 +299,7 @@ impl DrawList {
                     .append_face(face, cells, view, color, sky::Coordinates::Box);
                 let (shading, draw) = stages.image(image, sampler::CLAMP_MIP, draw);
                 let state = sky_state(None, false, CullFaces::None, shading);
-                self.push(state, DepthRange::Sky, span, draw);
+                self.push(state, aids.sky_range(), span, draw);
             }
         }
         if material.passes.is_empty() {
@@ -321,12 +315,16 @@ impl DrawList {
         }
         let span = (first_index, self.indices.len() as u32 - first_index);
         if span.1 > 0 {
-            self.add_sky_passes(material, world, CullFaces::None, span, draw, stages);
+            let range = aids.sky_range();
+            self.add_sky_passes(material, world, CullFaces::None, range, span, draw, stages);
+            if aids.edges {
+                self.push_edges(span, draw, CullFaces::None);
+            }
         }
     }
 
     /// The sun's disc, behind everything but the sky.
-    fn add_sun(&mut self, sun: &Sun, scene: &ViewScene, stages: StageContext<'_>) {
+    fn add_sun(&mut self, sun: &Sun, scene: &ViewScene, stages: StageContext<'_>, aids: Aids<'_>) {
         let material = stages.materials.get(sun.material);
         let Some(world) = scene.instances.first() else {
             return;
@@ -337,14 +335,17 @@ impl DrawList {
             ..Draw::default()
         };
         let cull = faces(material.shader.cull, scene.view.mirrored);
-        self.add_sky_passes(material, world, cull, span, draw, stages);
+        let range = aids.sky_range();
+        self.add_sky_passes(material, world, cull, range, span, draw, stages);
     }
 
+    #[allow(clippy::too_many_arguments)]
     fn add_sky_passes(
         &mut self,
         material: &Material,
         world: &Instance,
         cull: CullFaces,
+        range: DepthRange,
         span: (u32, u32),
         draw: Draw,
         stages: StageContext<'_>,
@@ -359,7 +360,7 @@ impl DrawList {
                 draw,
             );
             let state = sky_state(pass.blend, pass.depth_write, cull, shading);
-            self.push(state, DepthRange::Sky, span, draw);
+            self.push(state, range, span, draw);
         }
     }
 
@@ -370,7 +371,7 @@ impl DrawList {
         }
     }
 
-    fn push(
+    pub(super) fn push(
         &mut self,
         state: State,
         range: DepthRange,

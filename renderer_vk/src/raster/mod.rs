@@ -4,6 +4,7 @@
 //! Colours stay as displayed (encoded) throughout: the target is RGBA8 without conversion, and stages blend in that
 //! space, as they do in the engine.
 
+mod aids;
 mod flares;
 mod list;
 mod overlay;
@@ -17,8 +18,9 @@ mod target;
 use glam::{Mat4, Vec3};
 use shaders::types::{Instance, MaterialBuffers, RasterLight, RasterView};
 
+pub use aids::{Aids, image_sheet};
 pub use flares::{Flares, window_to_clip};
-pub use list::{Aids, DrawList};
+pub use list::DrawList;
 pub use overlay::{Overlay, Picture2d, overlay_instance};
 pub use present::Present;
 pub use shading::StageContext;
@@ -65,6 +67,8 @@ pub struct ViewParameters<'a> {
     pub instances: &'a [Instance],
     /// Dynamic lights.
     pub lights: &'a [DynamicLight],
+    /// They shine on what is turned away from them too.
+    pub light_backs: bool,
     /// Pixels from the left and the top, width, height.
     pub viewport: [i32; 4],
     /// Depth starts afresh (3D views; the overlay draws over what is there).
@@ -90,6 +94,11 @@ impl Raster {
             pipelines: Pipelines::new(device, (-1.0, -2.0)),
             shadows: Shadows::default(),
         }
+    }
+
+    /// Whether edges of triangles can be drawn.
+    pub fn draws_edges(&self) -> bool {
+        self.device.info().wireframe
     }
 
     /// The decals' depth offset.
@@ -129,7 +138,7 @@ impl Raster {
             eye: p.eye,
             forward: p.forward,
             identity_light: p.identity_light,
-            padding: 0,
+            light_backs: p.light_backs.into(),
             materials: p.materials,
             static_vertices: p.static_vertices,
             dynamic_vertices: match p.dynamic_vertices {

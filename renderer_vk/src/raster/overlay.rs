@@ -5,6 +5,7 @@ use shaders::types::constants as c;
 use shaders::types::{Draw, Instance, Vertex};
 use shaderscript::eval::{self, DeformContext, DeformVertex};
 
+use super::aids::Aids;
 use super::list::{Call, DepthRange, DrawList, faces, stage_depth};
 use super::pipelines::{CullFaces, Depth, State};
 use super::shading::{Shading, StageContext};
@@ -16,6 +17,8 @@ enum Content {
     Material(u32),
     /// A bindless texture (cinematics), clamped and without mip levels.
     Texture(u32),
+    /// The same, blended by its alpha.
+    Transparent(u32),
 }
 
 /// A run of pictures with the same content.
@@ -70,6 +73,11 @@ impl Overlay {
         self.push(Content::Texture(texture), picture);
     }
 
+    /// Queues a plain texture that is blended by its alpha.
+    pub fn add_transparent_texture(&mut self, texture: u32, picture: &Picture2d) {
+        self.push(Content::Transparent(texture), picture);
+    }
+
     fn push(&mut self, content: Content, p: &Picture2d) {
         let corner = |x: f32, y: f32| Vertex {
             position: (p.position + p.size * Vec2::new(x, y)).extend(0.0),
@@ -104,7 +112,7 @@ impl Overlay {
         let indices = quads.flat_map(|v| [v, v + 1, v + 2, v, v + 2, v + 3]);
         let material = match run.content {
             Content::Material(index) => Some(stages.materials.get(index)),
-            Content::Texture(_) => None,
+            Content::Texture(_) | Content::Transparent(_) => None,
         };
         let Some(material) = material.filter(|m| m.deforms()) else {
             list.vertices.extend_from_slice(vertices);
@@ -146,7 +154,13 @@ impl Overlay {
     }
 
     /// Turns the queued pictures into draw calls. `instance` is [`overlay_instance`]'s.
-    pub fn draw(&self, list: &mut DrawList, stages: StageContext<'_>, instance: &Instance) {
+    pub fn draw(
+        &self,
+        list: &mut DrawList,
+        stages: StageContext<'_>,
+        instance: &Instance,
+        aids: Aids<'_>,
+    ) {
         list.clear();
         for run in &self.runs {
             let first_index = list.indices.len() as u32;
@@ -180,8 +194,21 @@ impl Overlay {
                     let (shading, draw) = stages.image(texture, sampler::CLAMP, draw);
                     push(State { shading, ..plain }, draw);
                 }
+                Content::Transparent(texture) => {
+                    let (shading, draw) = stages.image(texture, sampler::CLAMP, draw);
+                    let blend = Some((c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA));
+                    let state = State {
+                        blend,
+                        shading,
+                        ..plain
+                    };
+                    push(state, draw);
+                }
                 Content::Material(index) => {
                     let material = stages.materials.get(index);
+                    if aids.leaves_out(material.sort) {
+                        continue;
+                    }
                     for pass in &material.passes {
                         let (shading, draw) = stages.pass(
                             material,
@@ -203,6 +230,9 @@ impl Overlay {
                         push(state, draw);
                     }
                 }
+            }
+            if aids.edges {
+                list.push_edges((first_index, index_count), draw, CullFaces::None);
             }
         }
     }

@@ -66,6 +66,14 @@ impl Shading {
         ..Self::WHITE
     };
 
+    /// The same with the second of two textures alone (`r_lightmap`).
+    pub fn second_alone(self) -> Self {
+        Self {
+            combine: c::COMBINE_REPLACE,
+            ..self
+        }
+    }
+
     /// The specialization constants: id and value.
     pub fn constants(&self) -> [(u32, u32); CONSTANTS] {
         [

@@ -1,0 +1,171 @@
+//! Debugging aids of the classic look: what they add to a view, and the sheet of all images.
+
+use glam::Vec2;
+use shaders::types::{Draw, Vertex};
+
+use super::list::{DepthRange, DrawList};
+use super::overlay::{Overlay, Picture2d};
+use super::pipelines::{CullFaces, Depth, State};
+use super::shading::Shading;
+
+/// Length of a shown normal, units.
+const NORMAL_LENGTH: f32 = 2.0;
+/// A shown normal is the outline of a sliver; this wide, units.
+const SLIVER: f32 = 0.001;
+
+/// Debugging aids.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Aids<'a> {
+    /// Draw the edges of all triangles over everything (`r_showtris`).
+    pub edges: bool,
+    /// Draw the normals of all vertices over everything (`r_shownormals`); the world's vertices.
+    pub normals: Option<&'a [Vertex]>,
+    /// Draw lightmaps alone where there are any (`r_lightmap`).
+    pub lightmaps: bool,
+    /// Draw skies over everything (`r_showsky`).
+    pub sky_in_front: bool,
+    /// Leave out materials of a greater sort value (`r_debugSort`); 0: none.
+    pub last_sort: i32,
+}
+
+impl Aids<'_> {
+    /// Whether a material of this sort value is left out.
+    pub fn leaves_out(&self, sort: f32) -> bool {
+        self.last_sort != 0 && (self.last_sort as f32) < sort
+    }
+
+    /// The part of the depth range that skies take.
+    pub fn sky_range(&self) -> DepthRange {
+        if self.sky_in_front {
+            DepthRange::Front
+        } else {
+            DepthRange::Sky
+        }
+    }
+}
+
+impl DrawList {
+    /// Draws the edges of triangles in white, in front of everything before and after. `cull`: faces left out.
+    pub(super) fn push_edges(&mut self, span: (u32, u32), draw: Draw, cull: CullFaces) {
+        self.push(outlines(cull), DepthRange::Front, span, draw);
+    }
+
+    /// Draws the normals of the vertices that the indices from `first_index` on use. `statics` are the world's
+    /// vertices; the view's own are in the list.
+    pub(super) fn push_normals(&mut self, first_index: u32, statics: &[Vertex], draw: Draw) {
+        let used = self.indices.get(first_index as usize..).unwrap_or_default();
+        let mut used = used.to_vec();
+        used.sort_unstable();
+        used.dedup();
+        let start = self.indices.len() as u32;
+        for index in used {
+            let source = if draw.dynamic_vertices != 0 {
+                self.vertices.as_slice()
+            } else {
+                statics
+            };
+            let Some(&vertex) = source.get(index as usize) else {
+                continue;
+            };
+            let tip = vertex.position + vertex.normal * NORMAL_LENGTH;
+            let aside = vertex.normal.any_orthogonal_vector() * SLIVER;
+            let base = self.vertices.len() as u32;
+            self.vertices.extend(
+                [vertex.position, tip, tip + aside].map(|position| Vertex { position, ..vertex }),
+            );
+            self.indices.extend([base, base + 1, base + 2]);
+        }
+        let span = (start, self.indices.len() as u32 - start);
+        if span.1 > 0 {
+            let draw = Draw {
+                dynamic_vertices: 1,
+                ..draw
+            };
+            self.push(outlines(CullFaces::None), DepthRange::Front, span, draw);
+        }
+    }
+}
+
+fn outlines(cull: CullFaces) -> State {
+    State {
+        blend: None,
+        depth: Depth::LessEqual,
+        depth_write: true,
+        cull,
+        offset: false,
+        wireframe: true,
+        shading: Shading::WHITE,
+    }
+}
+
+/// The sheet of `r_showImages`: every image on a grid of 20 x 15 over the window, in 2 at its size in proportion to 512
+/// texels. `images` are texture, width and height.
+pub fn image_sheet(
+    overlay: &mut Overlay,
+    window: (u32, u32),
+    proportional: bool,
+    white: u32,
+    images: impl IntoIterator<Item = (u32, u32, u32)>,
+) {
+    const COLUMNS: u32 = 20;
+    const ROWS: u32 = 15;
+    let (width, height) = (window.0 as f32, window.1 as f32);
+    let picture = |position: Vec2, size: Vec2, color: u32| Picture2d {
+        position,
+        size,
+        st1: Vec2::ZERO,
+        st2: Vec2::ONE,
+        color,
+    };
+    let black = picture(Vec2::ZERO, Vec2::new(width, height), 0xFF00_0000);
+    overlay.add_texture(white, &black);
+    let cell = Vec2::new(width / COLUMNS as f32, height / ROWS as f32);
+    for (i, (texture, texels_x, texels_y)) in (0u32..).zip(images) {
+        let at = Vec2::new((i % COLUMNS) as f32, (i / COLUMNS) as f32) * cell;
+        let size = if proportional {
+            cell * Vec2::new(texels_x as f32, texels_y as f32) / 512.0
+        } else {
+            cell
+        };
+        overlay.add_transparent_texture(texture, &picture(at, size, u32::MAX));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn normals_are_slivers_of_two_units_from_each_vertex_once() {
+        let vertex = |x: f32| Vertex {
+            position: Vec3::X * x,
+            normal: Vec3::Z,
+            ..Vertex::default()
+        };
+        let statics = [vertex(0.0), vertex(1.0), vertex(2.0)];
+        let mut list = DrawList::default();
+        list.indices.extend([0, 1, 2, 2, 1, 0]);
+        list.push_normals(0, &statics, Draw::default());
+        assert_eq!(list.indices.len(), 6 + 9);
+        assert_eq!(list.vertices.len(), 9);
+        assert_eq!(list.vertices[0].position, Vec3::ZERO);
+        assert_eq!(list.vertices[1].position, Vec3::Z * 2.0);
+        assert_eq!(list.calls.len(), 1);
+        assert_eq!(
+            (list.calls[0].first_index, list.calls[0].index_count),
+            (6, 9)
+        );
+    }
+
+    #[test]
+    fn sort_values_past_the_last_are_left_out() {
+        let aids = Aids {
+            last_sort: 3,
+            ..Aids::default()
+        };
+        assert!(!aids.leaves_out(3.0));
+        assert!(aids.leaves_out(4.0));
+        assert!(!Aids::default().leaves_out(16.0));
+    }
+}
