@@ -126,7 +126,7 @@ impl Materials {
             None,
             source,
         );
-        let beam = internal_shader("*beam", |stage| {
+        let mut beam = internal_shader("*beam", |stage| {
             stage.rgb_gen = shaderscript::RgbGen::Const(Vec3::X);
             stage.blend = Some((
                 shaderscript::BlendFactor::One,
@@ -134,6 +134,8 @@ impl Materials {
             ));
             stage.depth_write = false;
         });
+        // the engine leaves culling as the surface before had it, which mostly has one side
+        beam.cull = shaderscript::Cull::Front;
         materials.internal.beam =
             materials.add("*beam", beam, LightmapClass::None, false, None, source);
         let axes = internal_shader("*axes", |stage| {

@@ -161,10 +161,10 @@ impl Gatherer<'_> {
             Look::Classic => {
                 let mut lights = std::mem::take(&mut self.scratch.lights);
                 surfaces::local_lights(self.lights, entity.origin, &entity.axis, &mut lights);
-                // a model that no light reaches has surfaces that none reaches
-                if surfaces::lights_at(&lights, &brush.bounds) == 0 {
-                    lights.clear();
-                }
+                // a model that no light reaches has surfaces that none reaches; of the lights that reach one the
+                // engine keeps no more than whether there are any, which stands for the first of the view
+                let reached = surfaces::lights_at(&lights, &brush.bounds) != 0;
+                lights.truncate(usize::from(reached));
                 // its box was tested; its surfaces are tested by facing alone
                 let placed = out.instances.get(instance as usize);
                 let local = LocalView {

@@ -9,7 +9,9 @@ use super::entity;
 use super::flares::FlareView;
 use super::mesh::{self, DeformScratch, RawMesh};
 use super::portal;
-use super::surfaces::{self, LocalView, PendingDeform, SurfaceRun, WORLD_ENTITY, sort_key};
+use super::surfaces::{
+    self, LocalLight, LocalView, PendingDeform, SurfaceRun, WORLD_ENTITY, sort_key,
+};
 use super::{DynamicMesh, GatherInput, Look, Scene, Statistics, Sun, View, ViewScene};
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
 use crate::world::{Bounds, VisibleQuery, VisibleSet, WorldData};
@@ -22,7 +24,7 @@ const FAR_WITHOUT_WORLD: f32 = 2048.0;
 pub(super) struct Scratch {
     deform: DeformScratch,
     pub(super) pending: Vec<PendingDeform>,
-    pub(super) lights: Vec<(Vec3, f32)>,
+    pub(super) lights: Vec<LocalLight>,
     pub(super) bones: Vec<BoneMatrix>,
 }
 

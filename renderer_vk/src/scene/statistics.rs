@@ -184,7 +184,9 @@ impl Gatherer<'_> {
     }
 
     fn count_world(&self, world: &WorldData, counts: &mut Statistics) {
-        let lights: Vec<_> = self.lights.iter().map(|l| (l.origin, l.radius)).collect();
+        let mut lights = Vec::new();
+        let axes = [Vec3::X, Vec3::Y, Vec3::Z];
+        super::surfaces::local_lights(self.lights, Vec3::ZERO, &axes, &mut lights);
         for &index in &self.visible.surfaces {
             let Some(surface) = world.surfaces.get(index as usize) else {
                 continue;
@@ -198,7 +200,7 @@ impl Gatherer<'_> {
                     .iter()
                     .enumerate()
                     .filter(|(i, _)| *i < 32 && near & (1 << i) != 0)
-                    .any(|(_, (origin, radius))| plane.distance(*origin).abs() <= *radius)
+                    .any(|(_, light)| plane.distance(light.world).abs() <= light.radius)
             });
             counts.unlit_surfaces += u32::from(near != 0 && !reached);
         }

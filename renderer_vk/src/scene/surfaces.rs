@@ -24,24 +24,34 @@ pub(super) fn sort_key(rank: u32, entity: u32, fog: u32, lit: bool) -> u64 {
     field(rank, 24) << 40 | field(entity, 20) << 20 | field(fog, 19) << 1 | u64::from(lit)
 }
 
+/// A dynamic light as a model sees it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LocalLight {
+    /// Where it is in the model's space.
+    pub local: Vec3,
+    /// Where it is in the world.
+    pub world: Vec3,
+    /// Reach, units.
+    pub radius: f32,
+}
+
 /// Where surfaces are seen from, in the space of their model.
 pub(super) struct LocalView<'a> {
     /// Eye.
     pub eye: Vec3,
     /// Planes pointing inwards; empty when nothing is culled.
     pub frustum: &'a [Vec4],
-    /// Dynamic lights in the model's space: origin and radius.
-    pub lights: &'a [(Vec3, f32)],
+    /// Dynamic lights.
+    pub lights: &'a [LocalLight],
     /// Unit view direction.
     pub forward: Vec3,
     /// Flat surfaces that are turned away are left out (`r_facePlaneCull`).
     pub by_facing: bool,
 }
 
-/// Bits of the lights (origin and radius) that reach a box.
-pub(super) fn lights_at(lights: &[(Vec3, f32)], bounds: &Bounds) -> u32 {
+/// Bits of the lights that reach a box.
+fn bits_at(lights: impl Iterator<Item = (Vec3, f32)>, bounds: &Bounds) -> u32 {
     lights
-        .iter()
         .take(MAX_LIGHT_BITS)
         .enumerate()
         .filter(|(_, (origin, radius))| {
@@ -52,18 +62,30 @@ pub(super) fn lights_at(lights: &[(Vec3, f32)], bounds: &Bounds) -> u32 {
         .fold(0, |bits, (i, _)| bits | 1 << i)
 }
 
+/// Bits of the lights that reach a box in the model's space.
+pub(super) fn lights_at(lights: &[LocalLight], bounds: &Bounds) -> u32 {
+    bits_at(
+        lights.iter().map(|light| (light.local, light.radius)),
+        bounds,
+    )
+}
+
 impl LocalView<'_> {
     /// Bits of the lights that reach a box.
     pub fn lights_at(&self, bounds: &Bounds) -> u32 {
         lights_at(self.lights, bounds)
     }
 
-    /// Bits of the lights that reach a surface.
+    /// Bits of the lights that reach a surface. Flat and curved ones are compared with where a light is in the world,
+    /// although the surface may have been moved away: what the engine does not light there stays dark.
     fn lights_on(&self, surface: &WorldSurface) -> u32 {
         let mut bits = self.lights_at(&surface.bounds);
-        if let Some(plane) = surface.plane.filter(|_| surface.flat) {
-            for (i, (origin, radius)) in self.lights.iter().take(MAX_LIGHT_BITS).enumerate() {
-                if plane.distance(*origin).abs() > *radius {
+        if surface.kind == SurfaceKind::Patch {
+            let in_world = self.lights.iter().map(|light| (light.world, light.radius));
+            bits &= bits_at(in_world, &surface.bounds);
+        } else if let Some(plane) = surface.plane.filter(|_| surface.flat) {
+            for (i, light) in self.lights.iter().take(MAX_LIGHT_BITS).enumerate() {
+                if plane.distance(light.world).abs() > light.radius {
                     bits &= !(1 << i);
                 }
             }
@@ -215,18 +237,21 @@ pub(super) fn push_mesh_surface(
     });
 }
 
-/// Replaces `out` by the dynamic lights in a space given by an origin and axes.
+/// Replaces `out` by the dynamic lights as seen from a space given by an origin and axes.
 pub(super) fn local_lights(
     lights: &[DynamicLight],
     origin: Vec3,
     axis: &[Vec3; 3],
-    out: &mut Vec<(Vec3, f32)>,
+    out: &mut Vec<LocalLight>,
 ) {
     out.clear();
     out.extend(lights.iter().map(|light| {
         let to = light.origin - origin;
-        let local = Vec3::new(to.dot(axis[0]), to.dot(axis[1]), to.dot(axis[2]));
-        (local, light.radius)
+        LocalLight {
+            local: Vec3::new(to.dot(axis[0]), to.dot(axis[1]), to.dot(axis[2])),
+            world: light.origin,
+            radius: light.radius,
+        }
     }));
 }
 
@@ -257,7 +282,11 @@ mod tests {
         let local = LocalView {
             eye: Vec3::ZERO,
             frustum: &[],
-            lights: &[(Vec3::ZERO, 10.0), (Vec3::X * 100.0, 10.0)],
+            lights: &[0.0, 100.0].map(|x| LocalLight {
+                local: Vec3::X * x,
+                world: Vec3::X * x,
+                radius: 10.0,
+            }),
             forward: Vec3::X,
             by_facing: true,
         };
