@@ -18,9 +18,9 @@ struct Likeness {
     differing: f64,
 }
 
-/// Compares the pictures of `folders` with those of the same names in `reference` and prints a table, tabs between
-/// columns. The `worst` pictures of the first folder that are least alike are written to `to`: reference, ours, and
-/// their difference.
+/// Compares the pictures in the first of `folders`, and those of the same names in the others, with `reference` and
+/// prints a table, tabs between columns. The `worst` pictures of the first folder that are least alike are written to
+/// `to`: reference, ours, and their difference.
 ///
 /// # Errors
 /// A folder or a picture cannot be read, a picture is missing or of another size, there are none.
@@ -30,9 +30,15 @@ pub fn folders(
     worst: usize,
     to: Option<&Path>,
 ) -> Result<()> {
-    let names = names(reference)?;
+    let Some(first) = folders.first() else {
+        bail!(
+            "{}: a folder to compare with it is missing",
+            reference.display()
+        );
+    };
+    let names = names(first)?;
     if names.is_empty() {
-        bail!("{}: no pictures in it", reference.display());
+        bail!("{}: no pictures in it", first.display());
     }
     let mut header = vec!["picture".to_owned()];
     for folder in folders {
@@ -72,7 +78,7 @@ pub fn folders(
         differing: column.map(|l| l.differing).fold(0.0, f64::max),
     });
     println!("worst\t{}", cells(extremes));
-    if let (Some(to), Some(first)) = (to, folders.first()) {
+    if let Some(to) = to {
         std::fs::create_dir_all(to).with_context(|| to.display().to_string())?;
         let ssim = |row: &(&String, Vec<Likeness>)| row.1.first().map_or(1.0, |l| l.ssim);
         rows.sort_by(|a, b| ssim(a).total_cmp(&ssim(b)));
@@ -139,7 +145,9 @@ mod tests {
         assert_eq!(names(&worst).unwrap(), ["other.png"]);
         assert_eq!(read(&worst.join("other.png")).unwrap().width(), 3 * 16 + 8);
         std::fs::remove_file(b.join("same.png")).unwrap();
-        assert!(folders(&a, &[b], 1, None).is_err());
+        folders(&a, std::slice::from_ref(&b), 1, None).unwrap();
+        assert!(folders(&b, std::slice::from_ref(&a), 1, None).is_err());
+        assert!(folders(&a, &[], 1, None).is_err());
         assert!(folders(&worst.join("nowhere"), &[], 1, None).is_err());
     }
 }
