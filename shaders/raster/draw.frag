@@ -36,7 +36,7 @@ void main() {
     if (MODE == DRAW_LIGHT) {
         out_color = vec4(in_color.rgb * blob(in_uv.xy), 1.0);
     } else if (MODE == DRAW_FOG) {
-        out_color = vec4(in_flat_color.rgb, fog_factor(in_uv.xy));
+        out_color = vec4(in_flat_color.rgb, sample_stage(0, in_textures.x, in_uv.xy).a);
     } else {
         vec4 color = sample_stage(0, in_textures.x, in_uv.xy);
         if (COLOR == COLOR_FLAT) color *= in_flat_color;

@@ -26,10 +26,11 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Vie
 
 layout(push_constant, scalar) uniform Push { uint64_t view; } push;
 
-// The engine keeps this in a 256x32 texture; s: distance in the fog, t: how deep.
+// How much of what is seen is fog; s: distance in the fog, t: how deep. The engine takes the root from a table of 256
+// values. Fog over opaque surfaces is a picture of this instead (`fog_picture` in assets/prepare.rs).
 float fog_factor(vec2 c) {
     float s = c.x - 1.0 / 512.0;
     if (s < 0.0 || c.y < 1.0 / 32.0) return 0.0;
     if (c.y < 31.0 / 32.0) s *= (c.y - 1.0 / 32.0) / (30.0 / 32.0);
-    return sqrt(min(s * 8.0, 1.0));
+    return sqrt(floor(min(s * 8.0, 1.0) * 255.0) / 255.0);
 }

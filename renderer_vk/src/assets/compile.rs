@@ -34,6 +34,9 @@ pub struct StageArrays {
     pub images: Vec<u32>,
 }
 
+/// Name of the picture that fog is drawn with, see [`fog_picture`](super::prepare::fog_picture).
+pub const FOG_IMAGE: &str = "*fog";
+
 /// Client numbers from here on belong to `videoMap` stages; lower ones are the engine's own.
 pub const FIRST_VIDEO_CLIENT: usize = 32;
 

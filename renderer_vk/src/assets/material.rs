@@ -1,6 +1,6 @@
 //! What a material is once it is registered: a script's definition bound to images, in the form that the passes read.
 
-use shaderscript::{Cull, Fog, Shader};
+use shaderscript::{AlphaGen, Cull, Fog, Shader, TcGen};
 
 /// What a surface's light comes from: part of a material's identity, as the engine's lightmap index is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -141,6 +141,14 @@ impl Material {
         } else {
             &self.name
         }
+    }
+
+    /// Whether the look of a surface depends on its normals.
+    pub fn uses_normals(&self) -> bool {
+        let by_normal = |stage: &shaderscript::Stage| {
+            stage.tc_gen == TcGen::Environment || stage.alpha_gen == AlphaGen::LightingSpecular
+        };
+        self.deforms() || self.shader.stages.iter().any(by_normal)
     }
 
     /// Whether the material is a sky.

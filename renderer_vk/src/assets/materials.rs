@@ -8,7 +8,7 @@ use shaders::types;
 use shaderscript::{ImplicitKind, Shader, StageImage, strip_extension};
 
 use super::bind::{internal_shader, passes, sky_faces};
-use super::compile::{StageArrays, VideoClients};
+use super::compile::{FOG_IMAGE, StageArrays, VideoClients};
 use super::flags;
 use super::material::{Combine, LightmapClass, Material, SkyBox, VideoStage};
 use super::material_buffers::Uploaded;
@@ -75,6 +75,8 @@ pub struct Internal {
     pub white: u32,
     /// The game's material for planar shadows (`cg_shadows 3`), if it has one.
     pub shadow: Option<u32>,
+    /// Bindless texture of the picture that fog is drawn with.
+    pub fog_image: u32,
     /// The game's material for the sun's disc (`r_drawSun`), if it has one.
     pub sun: Option<u32>,
     /// The game's material for flares, if it has one.
@@ -143,6 +145,8 @@ impl Materials {
         });
         materials.internal.axes =
             materials.add("*axes", axes, LightmapClass::None, false, None, source);
+        let fog = source.image(FOG_IMAGE, ImageFlags::NO_MIP);
+        materials.internal.fog_image = fog.unwrap_or_else(|| source.white());
         let mut white = Shader::implicit("*white", ImplicitKind::TwoD);
         for stage in &mut white.stages {
             stage.image = StageImage::White;

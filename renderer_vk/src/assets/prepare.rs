@@ -209,7 +209,7 @@ fn hue(brightness: f32) -> [u8; 3] {
 
 /// The 16 x 16 grid for what is missing: dark grey with a white border.
 pub fn default_picture() -> Image {
-    picture(16, |x, y| {
+    picture((16, 16), |x, y| {
         if x == 0 || y == 0 || x == 15 || y == 15 {
             [255; 4]
         } else {
@@ -220,7 +220,7 @@ pub fn default_picture() -> Image {
 
 /// The 16 x 16 blob of a dynamic light: falls off with the square of the distance from its middle.
 pub fn dynamic_light_picture() -> Image {
-    picture(16, |x, y| {
+    picture((16, 16), |x, y| {
         let (dx, dy) = (7.5 - x as f32, 7.5 - y as f32);
         let brightness = (4000.0 / (dx * dx + dy * dy)).min(255.0);
         let byte = if brightness < 75.0 {
@@ -232,14 +232,33 @@ pub fn dynamic_light_picture() -> Image {
     })
 }
 
-fn picture(side: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Image {
-    let mut rgba = Vec::with_capacity((side * side * 4) as usize);
-    for y in 0..side {
-        for x in 0..side {
+/// How much of what is seen is fog, as alpha: from left to right by the distance in it, from top to bottom by how much
+/// of that lies below the fog's surface. Its filtering is part of how fog looks: a little even at the surface.
+pub fn fog_picture() -> Image {
+    const WIDTH: u32 = 256;
+    const HEIGHT: u32 = 32;
+    picture((WIDTH, HEIGHT), |x, y| {
+        let below = (y as f32 + 0.5) / HEIGHT as f32;
+        let mut distance = x as f32 / WIDTH as f32;
+        if below < 1.0 / 32.0 {
+            distance = 0.0;
+        } else if below < 31.0 / 32.0 {
+            distance *= (below - 1.0 / 32.0) / (30.0 / 32.0);
+        }
+        // eight times the distance at which the fog is full fits in the picture; the root comes from a table
+        let step = ((distance * 8.0).min(1.0) * 255.0).floor();
+        [255, 255, 255, ((step / 255.0).sqrt() * 255.0) as u8]
+    })
+}
+
+fn picture((width, height): (u32, u32), texel: impl Fn(u32, u32) -> [u8; 4]) -> Image {
+    let mut rgba = Vec::with_capacity((width * height * 4) as usize);
+    for y in 0..height {
+        for x in 0..width {
             rgba.extend(texel(x, y));
         }
     }
-    Image::from_rgba(side, side, rgba).unwrap_or_else(|| Image::uniform([255; 4]))
+    Image::from_rgba(width, height, rgba).unwrap_or_else(|| Image::uniform([255; 4]))
 }
 
 #[cfg(test)]
@@ -323,6 +342,17 @@ mod tests {
         let page = light_page(&[10, 20, 30].repeat(4), 2, 2, 0.0).unwrap();
         assert_eq!(&page.rgba[..4], [40, 80, 120, 255]);
         assert!(light_page(&[0; 9], 2, 0, 0.0).is_none());
+    }
+
+    #[test]
+    fn fog_thickens_with_distance_and_depth() {
+        let fog = fog_picture();
+        let at = |x: usize, y: usize| fog.rgba[(y * 256 + x) * 4 + 3];
+        assert_eq!((at(0, 31), at(255, 0)), (0, 0));
+        assert_eq!((at(32, 31), at(255, 31)), (255, 255));
+        // an eighth of the way to full: the root of 1/8
+        assert!((i32::from(at(4, 31)) - 90).abs() <= 1, "{}", at(4, 31));
+        assert!(at(16, 10) < at(16, 20) && at(16, 20) < at(16, 31));
     }
 
     #[test]

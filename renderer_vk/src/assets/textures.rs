@@ -154,6 +154,7 @@ impl Textures {
         textures.default_image = textures.built_in("*default", &grid)?;
         let blob = prepare::dynamic_light_picture();
         textures.dynamic_light = textures.built_in("*dlight", &blob)?;
+        textures.built_in(super::compile::FOG_IMAGE, &prepare::fog_picture())?;
         Ok(textures)
     }
 

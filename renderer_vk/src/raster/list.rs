@@ -232,21 +232,20 @@ impl DrawList {
                 break;
             }
         }
-        let over = |mode, blend, depth| State {
-            blend: Some(blend),
-            depth,
-            depth_write: false,
-            shading: Shading {
-                mode,
-                ..Shading::WHITE
-            },
-            ..plain
-        };
         if opaque && material.surface_flags & NO_DYNAMIC_LIGHT == 0 {
             for (i, light) in (0..).zip(scene.dlights.iter().take(MAX_LIGHTS)) {
                 if lights & (1 << i) != 0 {
                     let blend = (light_source_factor(light), c::BLEND_ONE);
-                    let state = over(c::DRAW_LIGHT, blend, Depth::Equal);
+                    let state = State {
+                        blend: Some(blend),
+                        depth: Depth::Equal,
+                        depth_write: false,
+                        shading: Shading {
+                            mode: c::DRAW_LIGHT,
+                            ..Shading::WHITE
+                        },
+                        ..plain
+                    };
                     self.push(state, range, span, Draw { light: i, ..draw });
                 }
             }
@@ -258,7 +257,15 @@ impl DrawList {
                 Depth::LessEqual
             };
             let blend = (c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA);
-            self.push(over(c::DRAW_FOG, blend, depth), range, span, draw);
+            let (shading, draw) = stages.fog(draw);
+            let state = State {
+                blend: Some(blend),
+                depth,
+                depth_write: false,
+                shading,
+                ..plain
+            };
+            self.push(state, range, span, draw);
         }
         if aids.edges {
             self.push_edges(span, draw, plain.cull);

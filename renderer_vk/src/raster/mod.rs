@@ -38,10 +38,10 @@ pub const COLOR_FORMAT: Format = Format::Rgba8;
 /// Format of the frame's depth image.
 pub const DEPTH_FORMAT: Format = Format::D32F;
 
-/// How far down 3D views are moved, pixels: just enough for corners to be rounded to the next step of the usual grid of
-/// 1/256. Windows of OpenGL count rows from the bottom, so of a pixel that an edge cuts through its middle the triangle
+/// How far down 3D views are moved, pixels: one step of the usual grid of 1/256 that corners are rounded to. Windows of
+/// OpenGL count rows from the bottom, so of a pixel that an edge cuts through its middle the triangle
 /// above the edge gets it there, the one below the edge here. Level cameras meet such edges often.
-const EDGE_SHIFT: f32 = 1.0 / 500.0;
+const EDGE_SHIFT: f32 = 1.0 / 256.0;
 
 /// What a draw list needs besides itself.
 pub struct ViewParameters<'a> {

@@ -190,6 +190,17 @@ impl StageContext<'_> {
         (shading, self.textured(texture, kind, draw))
     }
 
+    /// The draw of fog over a surface.
+    pub fn fog(&self, draw: Draw) -> (Shading, Draw) {
+        let shading = Shading {
+            mode: c::DRAW_FOG,
+            textures: 1,
+            ..Shading::WHITE
+        };
+        let picture = self.materials.internal().fog_image;
+        (shading, self.textured(picture, sampler::CLAMP, draw))
+    }
+
     /// The draw of a lightmap page alone.
     pub fn lightmap(&self, texture: u32, draw: Draw) -> (Shading, Draw) {
         let shading = Shading {

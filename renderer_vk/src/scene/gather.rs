@@ -322,8 +322,11 @@ impl<'a> Gatherer<'a> {
             let first = surface.first_index as usize;
             let range = first..first + surface.index_count as usize;
             let base = count(out.vertices.len());
-            out.vertices
-                .extend_from_slice(world.surface_vertices(surface));
+            let own = world.surface_vertices(surface);
+            let classic = world
+                .classic_vertices(surface)
+                .filter(|_| self.look == Look::Classic);
+            out.vertices.extend_from_slice(classic.unwrap_or(own));
             out.indices.extend(
                 world
                     .indices

@@ -145,7 +145,10 @@ impl SurfaceRun<'_> {
                 let depth = self.local.forward.dot(lod.origin() - self.local.eye);
                 lod.choose(depth, self.curve_error)
             }
-            _ => (surface.first_index, surface.index_count),
+            _ => {
+                let copy = surface.classic.map(|copy| copy.first_index);
+                (copy.unwrap_or(surface.first_index), surface.index_count)
+            }
         };
         if drawn.is_sky() {
             if !self.no_sky {

@@ -1,14 +1,14 @@
 //! From a relit map to what is drawn: materials found, lightmaps made, curves given their levels of detail.
 
 use glam::Vec3;
-use q3bsp::lightmap_index;
+use q3bsp::{SurfaceKind, lightmap_index};
 use relight::RelitWorld;
 use relight::image::Image;
 use shaders::types::{self, Vertex, constants::NO_TEXTURE};
 
 use super::patch_lod::PatchLod;
 use super::visible::Tree;
-use super::{Bounds, BrushModel, WorldData, WorldSurface};
+use super::{Bounds, BrushModel, ClassicCopy, WorldData, WorldSurface};
 use crate::assets::{ImageSource, LightmapClass, Materials, Textures, prepare};
 use crate::gpu;
 use crate::settings::Settings;
@@ -144,7 +144,15 @@ impl WorldData {
                 deformed: registered.deforms(),
                 sky: registered.is_sky(),
                 lod,
+                classic: None,
             });
+        }
+        let mut vertices: Vec<Vertex> = relit.vertices.iter().map(|v| vertex(v, options)).collect();
+        for (index, surface) in surfaces.iter_mut().enumerate() {
+            if materials.get(surface.material).uses_normals() {
+                surface.classic =
+                    copy_for_classic(&relit, index, surface, &mut vertices, &mut indices);
+            }
         }
         let fog_materials = relit
             .fogs
@@ -153,7 +161,7 @@ impl WorldData {
             .collect();
         remap_by_map(&relit, materials, source, options);
         let mut data = Self {
-            vertices: relit.vertices.iter().map(|v| vertex(v, options)).collect(),
+            vertices,
             indices,
             models: brush_models(&relit),
             fogs: relit.fogs.iter().map(fog).collect(),
@@ -213,6 +221,46 @@ fn is_flat(relit: &RelitWorld, surface: &relight::world::WorldSurface) -> bool {
             let sliver = front.length_squared() < 1e-3;
             (faces || sliver) && [a, b, c].iter().all(|p| plane.distance(*p).abs() <= 1.0)
         })
+}
+
+/// Appends a planar surface with the normal that the map stores for it, if its vertices have others.
+fn copy_for_classic(
+    relit: &RelitWorld,
+    index: usize,
+    surface: &WorldSurface,
+    vertices: &mut Vec<Vertex>,
+    indices: &mut Vec<u32>,
+) -> Option<ClassicCopy> {
+    if surface.kind != SurfaceKind::Planar {
+        return None;
+    }
+    let stored = relit.bsp.surfaces.get(index)?.lightmap_vecs[2];
+    let first = surface.first_vertex as usize;
+    let own = vertices.get(first..first + surface.vertex_count as usize)?;
+    let same = |v: &Vertex| v.normal.abs_diff_eq(stored, 1e-3);
+    if !stored.is_finite() || own.iter().all(same) {
+        return None;
+    }
+    let own = own.to_vec();
+    let list = surface.first_index as usize..;
+    let list = indices
+        .get(list)?
+        .get(..surface.index_count as usize)?
+        .to_vec();
+    let copy = ClassicCopy {
+        first_vertex: u32::try_from(vertices.len()).ok()?,
+        first_index: u32::try_from(indices.len()).ok()?,
+    };
+    vertices.extend(own.into_iter().map(|v| Vertex {
+        normal: stored,
+        ..v
+    }));
+    let moved = |i: u32| {
+        i.wrapping_sub(surface.first_vertex)
+            .wrapping_add(copy.first_vertex)
+    };
+    indices.extend(list.into_iter().map(moved));
+    Some(copy)
 }
 
 fn make_lightmaps<S: LightmapSink>(

@@ -109,6 +109,18 @@ pub struct WorldSurface {
     pub sky: bool,
     /// Index lists of a curve for larger distances.
     pub lod: Option<PatchLod>,
+    /// What the classic look draws instead, where the normals matter and the engine's are not the surface's.
+    pub classic: Option<ClassicCopy>,
+}
+
+/// A copy of a planar surface that has the one normal that the map stores for it, as in the engine: compilers store none
+/// for faces that they joined, so reflections and highlights on these do not follow the face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ClassicCopy {
+    /// First vertex; there are as many as the surface has.
+    pub first_vertex: u32,
+    /// First index; there are as many as the surface has.
+    pub first_index: u32,
 }
 
 /// A brush model: surfaces and bounds.
@@ -126,9 +138,10 @@ pub struct BrushModel {
 pub struct WorldData {
     /// The relit map.
     pub relit: RelitWorld,
-    /// Vertices as the GPU has them.
+    /// Vertices as the GPU has them: those of the relit map, then the copies for the classic look.
     pub vertices: Vec<Vertex>,
-    /// Indices as the GPU has them: those of the relit map, then the coarser lists of curves.
+    /// Indices as the GPU has them: those of the relit map, then the coarser lists of curves, then the copies for the
+    /// classic look.
     pub indices: Vec<u32>,
     /// The map's surfaces.
     pub surfaces: Vec<WorldSurface>,
@@ -198,6 +211,13 @@ impl WorldData {
             .0
             .iter()
             .map(move |t| t.map(position))
+    }
+
+    /// The vertices of a surface's copy for the classic look, if it has one.
+    pub fn classic_vertices(&self, surface: &WorldSurface) -> Option<&[Vertex]> {
+        let first = surface.classic?.first_vertex as usize;
+        self.vertices
+            .get(first..first + surface.vertex_count as usize)
     }
 
     /// The vertices of a surface.
