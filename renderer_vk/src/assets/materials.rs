@@ -146,7 +146,7 @@ impl Materials {
         materials.internal.axes =
             materials.add("*axes", axes, LightmapClass::None, false, None, source);
         let fog = source.image(FOG_IMAGE, ImageFlags::NO_MIP);
-        materials.internal.fog_image = fog.unwrap_or_else(|| source.white());
+        materials.internal.fog_image = fog.map_or_else(|| source.white(), |(texture, _)| texture);
         let mut white = Shader::implicit("*white", ImplicitKind::TwoD);
         for stage in &mut white.stages {
             stage.image = StageImage::White;
