@@ -208,26 +208,32 @@ impl Gatherer<'_> {
 
     fn count_models(&self, counts: &mut Statistics) {
         for entity in self.entities {
-            let Some(Model::Mesh { lods }) = self.input.models.get(entity.model) else {
+            let model = self.input.models.get(entity.model);
+            let Some(model) = model.filter(|_| entity.kind == crate::api::EntityKind::Model) else {
                 continue;
             };
-            let frames = lods.first().map(|lod| lod.md3.frames.as_slice());
-            let frame = usize::try_from(entity.frame)
-                .ok()
-                .and_then(|frame| frames?.get(frame));
-            let Some(frame) = frame.filter(|_| entity.kind == crate::api::EntityKind::Model) else {
+            let frame = usize::try_from(entity.frame).ok();
+            let Some((mins, maxs)) = frame.and_then(|frame| frame_bounds(model, frame)) else {
                 continue;
             };
-            let bounds = Bounds {
-                mins: frame.mins,
-                maxs: frame.maxs,
-            };
+            let bounds = Bounds { mins, maxs };
             let corners = bounds.corners().map(|c| {
                 entity.origin + entity.axis[0] * c.x + entity.axis[1] * c.y + entity.axis[2] * c.z
             });
             counts.models.add(&corners, &self.frustum);
         }
     }
+}
+
+/// The box around a frame of a model of triangles.
+fn frame_bounds(model: &Model, frame: usize) -> Option<(Vec3, Vec3)> {
+    let frames = match model {
+        Model::Mesh { lods } => &lods.first()?.md3.frames,
+        Model::Mdr(model) => &model.mdr.frames,
+        Model::Iqm(model) => return model.iqm.bounds.get(frame).copied(),
+        Model::Inline { .. } => return None,
+    };
+    frames.get(frame).map(|frame| (frame.mins, frame.maxs))
 }
 
 #[cfg(test)]

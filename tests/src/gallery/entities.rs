@@ -314,8 +314,8 @@ fn shapes(stage: &mut Stage) -> Result<(), Raised> {
     ];
     let beams = [0, add, round, add].into_iter().zip(beams);
     let beams: Vec<_> = beams
-        .map(|(customShader, beam)| refEntity_t {
-            customShader,
+        .map(|(shader, beam)| refEntity_t {
+            customShader: shader,
             ..beam
         })
         .collect();

@@ -38,6 +38,22 @@ pub(super) fn scenes() -> Vec<Scene> {
             levels,
         ),
         Scene {
+            cvars: &[("cg_shadows", "2"), ("r_stencilbits", "8")],
+            ..scene(
+                "models-volumes",
+                "Stencil shadows of every kind of model, and of those that ask for none.",
+                shadows,
+            )
+        },
+        Scene {
+            cvars: &[("cg_shadows", "3")],
+            ..scene(
+                "models-planes",
+                "Planar shadows of every kind of model, seen or not.",
+                shadows,
+            )
+        },
+        Scene {
             packs: true,
             ..scene(
                 "models-player",
@@ -71,6 +87,17 @@ tube/upper
     {
         map g/env.tga
         rgbGen lightingDiffuse
+    }
+}
+projectionShadow
+{
+    polygonOffset
+    deformVertexes projectionShadow
+    {
+        map g/black.tga
+        blendFunc blend
+        rgbGen const ( 0 0 0 )
+        alphaGen const 0.5
     }
 }
 tube/vertex
@@ -474,6 +501,41 @@ fn player(stage: &mut Stage) -> Result<(), Raised> {
     let mut view = stage.view(Vec3::new(-60.0, 0.0, 8.0), 0.0);
     for (name, flags) in [("world", 0), ("no-world", NO_WORLD_MODEL)] {
         view.flags = flags;
+        stage.keep_view(name, &view, |e| {
+            all.iter().try_for_each(|entity| e.add_entity(entity))
+        })?;
+    }
+    Ok(())
+}
+
+fn shadows(stage: &mut Stage) -> Result<(), Raised> {
+    const THIRD_PERSON: i32 = 0x2;
+    const NO_SHADOW: i32 = 0x40;
+    const SHADOW_PLANE: i32 = 0x100;
+    stage.start_map(MAP)?;
+    let mut view = stage.view(Vec3::new(-130.0, 0.0, 60.0), 0.0);
+    view.angles.x = 30.0;
+    for (name, renderfx) in [
+        ("plain", 0),
+        ("plane", SHADOW_PLANE),
+        ("plane-none", SHADOW_PLANE | NO_SHADOW),
+        ("plane-third", SHADOW_PLANE | THIRD_PERSON),
+    ] {
+        let mut all = Vec::new();
+        for (at, kind) in KINDS.into_iter().enumerate() {
+            let mut entity = refEntity_t {
+                hModel: stage.register_model(kind)?,
+                frame: 1,
+                oldframe: 0,
+                backlerp: 0.3,
+                axis: turned(25.0),
+                renderfx,
+                shadowPlane: -40.0,
+                ..refEntity_t::default()
+            };
+            place(&mut entity, row(at, KINDS.len()));
+            all.push(entity);
+        }
         stage.keep_view(name, &view, |e| {
             all.iter().try_for_each(|entity| e.add_entity(entity))
         })?;
