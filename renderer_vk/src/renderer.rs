@@ -13,8 +13,8 @@ use crate::assets::{Assets, ImageSource, LoadedFont};
 use crate::error::Error;
 use crate::frame::{FrameContext, Item};
 use crate::gpu::{
-    Device, DeviceInfo, DeviceOptions, FrameRing, Image, ImageDesc, ImageUsage, SurfaceSource,
-    Swapchain, SwapchainDesc, Window,
+    Device, DeviceInfo, DeviceOptions, FrameRing, Image, ImageDesc, ImageUsage, Recorder,
+    SurfaceSource, Swapchain, SwapchainDesc, Window,
 };
 use crate::raster::{self, DrawList, Flares, Overlay, Picture2d, Present, Raster};
 use crate::scene::{Look, Scene, Statistics};
@@ -68,6 +68,8 @@ pub struct Renderer {
 
     settings: Settings,
     queue: Vec<Item>,
+    /// The last frame's picture is not shown yet.
+    unshown: bool,
     overlay: Overlay,
     spare_overlays: Vec<Overlay>,
     overlay_time: f32,
@@ -111,6 +113,7 @@ impl Renderer {
             }
             None => (Device::new(&device_options, SurfaceSource::Headless)?, None),
         };
+        device.measure(!device.info().software);
         let (color, depth) = frame_images(&device, options.width, options.height, false)?;
         let present = match &swapchain {
             Some(swapchain) => Some(Present::new(&device, swapchain.format())?),
@@ -132,6 +135,7 @@ impl Renderer {
             device,
             settings: Settings::default(),
             queue: Vec::new(),
+            unshown: false,
             overlay: Overlay::default(),
             spare_overlays: Vec::new(),
             overlay_time: 0.0,
@@ -153,7 +157,10 @@ impl Renderer {
     }
 
     /// GPU milliseconds of each pass of the newest finished frame.
+    ///
+    /// On a software device passes are timed once this was called.
     pub fn timings(&self) -> Vec<(String, f32)> {
+        self.device.measure(true);
         self.device.timings()
     }
 
@@ -195,6 +202,7 @@ impl Renderer {
         files: Arc<dyn GameFiles>,
         settings: &Settings,
     ) -> Result<(), Error> {
+        self.show_finished()?;
         self.shutdown_registration();
         self.settings = settings.clone();
         let (scripts, diagnostics) = relight::Materials::load(&*files);
@@ -233,6 +241,10 @@ impl Renderer {
 
     /// Handle of a model by file name, or `*n` for the map's inline models. 0: there is none.
     pub fn register_model(&mut self, name: &str) -> i32 {
+        // loading takes a while after the picture that tells of it
+        if let Err(e) = self.show_finished() {
+            log::warn!("{e}");
+        }
         self.assets
             .as_mut()
             .map_or(0, |assets| assets.register_model(name))
@@ -255,6 +267,7 @@ impl Renderer {
     /// # Errors
     /// The file is missing or broken, or a map is loaded already; the message names file and place.
     pub fn load_world(&mut self, name: &str) -> Result<(), Error> {
+        self.show_finished()?;
         let Some(assets) = &mut self.assets else {
             return Err(Error::NotRegistered);
         };
@@ -532,6 +545,11 @@ impl Renderer {
         self.queue_overlay();
         self.fit_depth()?;
         let mut stats = FrameStats::default();
+        let show = show && !self.hidden && self.swapchain.is_some();
+        let later = show && self.device.info().software;
+        if later {
+            self.show_finished()?;
+        }
         let mut recorder = self.ring.begin()?;
         if let Some(assets) = &mut self.assets {
             assets.prepare_frame(&self.settings)?;
@@ -558,8 +576,30 @@ impl Renderer {
             }
         }
         self.recycle_queue();
+        if later || !show {
+            self.ring.end(recorder)?;
+            self.unshown |= later;
+        } else {
+            self.show(recorder)?;
+        }
+        Ok(stats)
+    }
+
+    /// Shows the picture that a software device still worked on when its frame ended. Such a device works in the
+    /// game's own time, and presenting waits for it: so the picture is shown when the next one begins, and meanwhile
+    /// the game goes on.
+    fn show_finished(&mut self) -> Result<(), Error> {
+        if std::mem::take(&mut self.unshown) {
+            let recorder = self.ring.begin()?;
+            self.show(recorder)?;
+        }
+        Ok(())
+    }
+
+    /// Ends a frame with the picture on its way to the window.
+    fn show(&mut self, mut recorder: Recorder) -> Result<(), Error> {
         match &mut self.swapchain {
-            Some(swapchain) if show && !self.hidden => {
+            Some(swapchain) => {
                 if let Some(target) = swapchain.acquire(&mut recorder)? {
                     // a new format comes with a new swapchain
                     if self
@@ -577,14 +617,15 @@ impl Renderer {
                             &target,
                             self.settings.gamma,
                             bits,
+                            swapchain.copies(),
                         )?;
                     }
                 }
                 self.ring.end_present(recorder, swapchain)?;
             }
-            _ => self.ring.end(recorder)?,
+            None => self.ring.end(recorder)?,
         }
-        Ok(stats)
+        Ok(())
     }
 
     /// The picture as it stands after everything queued so far, as the display shows it.

@@ -26,6 +26,11 @@ impl Access {
     /// Reading by the CPU after the frame.
     pub const HOST: Self = Self(32);
 
+    /// Whether the CPU may read what such work wrote: copies go to its memory, too.
+    pub(crate) fn reaches_host(self) -> bool {
+        self.0 & (Self::HOST.0 | Self::TRANSFER.0) != 0
+    }
+
     /// The pipeline stages; those of absent extensions are left out.
     pub(crate) fn stages(self, abilities: Abilities) -> vk::PipelineStageFlags {
         use vk::PipelineStageFlags as S;

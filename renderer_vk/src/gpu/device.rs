@@ -1,6 +1,7 @@
 //! The device: everything else is made from it and holds it alive.
 
 use std::collections::{HashMap, HashSet};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::{ext, khr, vk};
@@ -90,6 +91,8 @@ pub(crate) struct DeviceInner {
     pub pipeline_cache: vk::PipelineCache,
     pub timeline: vk::Semaphore,
     pub timings: Mutex<Vec<(String, f32)>>,
+    /// Passes are timed.
+    pub measuring: AtomicBool,
     pub refused: Mutex<HashSet<String>>,
     pub queue: Mutex<vk::Queue>,
     pub queue_family: u32,
@@ -144,6 +147,7 @@ impl Device {
             pipeline_cache: vk::PipelineCache::null(),
             timeline: vk::Semaphore::null(),
             timings: Mutex::new(Vec::new()),
+            measuring: AtomicBool::new(true),
             refused: Mutex::new(HashSet::new()),
             // SAFETY: the device was made with one queue of this family.
             queue: Mutex::new(unsafe { vd.get_device_queue(choice.queue_family, 0) }),
@@ -185,6 +189,12 @@ impl Device {
     /// What the device is and can do.
     pub fn info(&self) -> &DeviceInfo {
         &self.0.info
+    }
+
+    /// Whether passes of the frames that follow are timed, which they are at first. Software drivers finish all drawing
+    /// at each time stamp.
+    pub fn measure(&self, on: bool) {
+        self.0.measuring.store(on, Ordering::Relaxed);
     }
 
     /// GPU milliseconds of each pass of the newest frame whose results have arrived, in order of recording. Empty

@@ -22,6 +22,32 @@ pub struct Rendering<'a> {
     pub clear_depth: Option<f32>,
 }
 
+/// The images of a [`Rendering`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Attachments {
+    color: vk::ImageView,
+    depth: vk::ImageView,
+    extent: vk::Extent2D,
+}
+
+impl Attachments {
+    pub fn of(target: &Rendering<'_>) -> Self {
+        let view = |image: Option<&Image>| image.map_or(vk::ImageView::null(), |i| i.0.target);
+        let extent = target
+            .color
+            .or(target.depth)
+            .map_or(vk::Extent2D::default(), |first| vk::Extent2D {
+                width: first.width(),
+                height: first.height(),
+            });
+        Self {
+            color: view(target.color),
+            depth: view(target.depth),
+            extent,
+        }
+    }
+}
+
 /// Where clip space lands. A negative height turns the picture upside down, as Vulkan 1.1 allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewport {
@@ -116,6 +142,19 @@ impl Pass<'_> {
                 .cmd_begin_render_pass(self.cmd(), &info, vk::SubpassContents::INLINE);
         }
         self.rendering = Some(extent);
+        self.show_all(extent);
+        Ok(())
+    }
+
+    /// Goes on with the drawing that the pass before left open.
+    pub(crate) fn go_on(&mut self, attachments: Attachments) {
+        self.rendering = Some(attachments.extent);
+        self.stays_open = Some(attachments);
+        self.show_all(attachments.extent);
+    }
+
+    /// Sets viewport and scissor to the attachments' whole size.
+    fn show_all(&mut self, vk::Extent2D { width, height }: vk::Extent2D) {
         #[allow(clippy::cast_precision_loss)]
         self.set_viewport(&Viewport {
             x: 0.0,
@@ -126,11 +165,11 @@ impl Pass<'_> {
             max_depth: 1.0,
         });
         self.set_scissor(0, 0, width, height);
-        Ok(())
     }
 
     /// Stops drawing; without effect when nothing is drawn to.
     pub fn end_rendering(&mut self) {
+        self.stays_open = None;
         if self.rendering.take().is_some() {
             // SAFETY: a render pass is open.
             unsafe { self.vk().cmd_end_render_pass(self.cmd()) };

@@ -117,6 +117,8 @@ impl FrameRing {
             slot: resources,
             acquired: None,
             ring_slot: Some(index),
+            open: None,
+            host_reads: false,
             available: Some(available),
             recording: Some(Recording(device.clone())),
             device,
@@ -149,16 +151,18 @@ impl FrameRing {
     }
 
     /// Submits; returns the acquired image and the semaphore that says when it is drawn.
-    fn submit(&mut self, recorder: Recorder) -> Result<Option<(u32, vk::Semaphore)>, Error> {
+    fn submit(&mut self, mut recorder: Recorder) -> Result<Option<(u32, vk::Semaphore)>, Error> {
         let device = self.device.clone();
+        recorder.close_drawing();
         let Recorder {
             slot,
+            host_reads,
             acquired,
             ring_slot,
             recording,
             ..
         } = recorder;
-        slot.finish()?;
+        slot.finish(host_reads)?;
         let mut pending = std::mem::take(&mut *lock(&device.0.pending));
         let value = lock(&device.0.state).submitted + 1;
         let before = slot.record_before(&pending);

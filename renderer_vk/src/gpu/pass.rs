@@ -7,6 +7,7 @@ use super::arena::UploadArena;
 use super::bindless::PUSH_BYTES;
 use super::buffer::Buffer;
 use super::device::{Device, lock};
+use super::draw::Attachments;
 use super::pipeline::{ComputePipeline, GraphicsPipeline};
 use super::ray_tracing::{RayTracingPipeline, SbtRegions};
 use super::recorder::Recorder;
@@ -18,6 +19,8 @@ pub struct Pass<'a> {
     query: Option<(vk::QueryPool, u32)>,
     /// Size of the attachments while drawing.
     pub(crate) rendering: Option<vk::Extent2D>,
+    /// Drawing need not end with the pass.
+    pub(crate) stays_open: Option<Attachments>,
     rays: Option<SbtRegions>,
     pub(crate) bound: Bound,
 }
@@ -35,6 +38,7 @@ impl<'a> Pass<'a> {
             rec,
             query,
             rendering: None,
+            stays_open: None,
             rays: None,
             bound: Bound::default(),
         }
@@ -192,7 +196,10 @@ impl<'a> Pass<'a> {
 }
 impl Drop for Pass<'_> {
     fn drop(&mut self) {
-        self.end_rendering();
+        match self.stays_open {
+            Some(attachments) if self.rendering.is_some() => self.rec.open = Some(attachments),
+            _ => self.end_rendering(),
+        }
         if let Some((pool, query)) = self.query {
             // SAFETY: the query is reset by the command buffer that runs before this one.
             unsafe {

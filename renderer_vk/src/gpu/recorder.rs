@@ -8,6 +8,7 @@ use super::access::{Access, pass_barrier};
 use super::arena::UploadArena;
 use super::buffer::{Buffer, BufferDesc, BufferUsage, Memory};
 use super::device::{Device, lock};
+use super::draw::{Attachments, Rendering};
 use super::error::{Context, Error};
 use super::graveyard::Garbage;
 use super::image::Image;
@@ -79,9 +80,13 @@ impl SlotResources {
         unsafe { self.device.vk().end_command_buffer(self.before) }.context("vkEndCommandBuffer")
     }
 
-    /// Ends the main command buffer, with everything visible to the CPU once the submission is over.
-    pub fn finish(&self) -> Result<(), Error> {
+    /// Ends the main command buffer; with `host_reads`, everything is visible to the CPU once the submission is over.
+    pub fn finish(&self, host_reads: bool) -> Result<(), Error> {
         let vk = self.device.vk();
+        if !host_reads {
+            // SAFETY: the buffer is being recorded.
+            return unsafe { vk.end_command_buffer(self.main) }.context("vkEndCommandBuffer");
+        }
         let memory = [vk::MemoryBarrier::default()
             .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
             .dst_access_mask(vk::AccessFlags::HOST_READ)];
@@ -145,6 +150,10 @@ pub struct Recorder {
     pub(crate) acquired: Option<Acquired>,
     /// Index in the ring; `None` for immediate work.
     pub(crate) ring_slot: Option<usize>,
+    /// What is drawn to, while drawing may go on in the next pass; see [`Recorder::drawing`].
+    pub(crate) open: Option<Attachments>,
+    /// A pass wrote what the CPU may read once the frame is over.
+    pub(crate) host_reads: bool,
     /// What an acquisition of a swapchain image for this frame signals.
     pub(crate) available: Option<vk::Semaphore>,
     // Last, so that the slot of a frame that is thrown away is buried as one of that frame.
@@ -168,6 +177,44 @@ impl Recorder {
     /// # Errors
     /// Out of memory for timestamps.
     pub fn pass(&mut self, name: &str, reads: Access, writes: Access) -> Result<Pass<'_>, Error> {
+        self.close_drawing();
+        self.host_reads |= (reads | writes).reaches_host();
+        self.begin_pass(name, Some((reads, writes)))
+    }
+
+    /// Begins a pass that draws to images. When the pass before drew to the same ones, it goes on where that stopped,
+    /// without a barrier: what both draw comes out in order, and the pass must read nothing else that the other wrote.
+    /// Software drivers finish all drawing at each barrier, and other ones at least drain their pipeline.
+    ///
+    /// # Errors
+    /// Those of [`pass`](Self::pass) and [`Pass::begin_rendering`].
+    pub fn drawing(&mut self, name: &str, target: &Rendering<'_>) -> Result<Pass<'_>, Error> {
+        let attachments = Attachments::of(target);
+        let clears = target.clear_color.is_some() || target.clear_depth.is_some();
+        if clears || self.open != Some(attachments) {
+            let mut pass = self.pass(name, Access::GRAPHICS, Access::GRAPHICS)?;
+            pass.begin_rendering(target)?;
+            pass.stays_open = Some(attachments);
+            return Ok(pass);
+        }
+        let mut pass = self.begin_pass(name, None)?;
+        pass.go_on(attachments);
+        Ok(pass)
+    }
+
+    /// Ends the drawing that a [`drawing`](Self::drawing) left open.
+    pub(crate) fn close_drawing(&mut self) {
+        if self.open.take().is_some() {
+            // SAFETY: a render pass is open.
+            unsafe { self.device.vk().cmd_end_render_pass(self.cmd) };
+        }
+    }
+
+    fn begin_pass(
+        &mut self,
+        name: &str,
+        access: Option<(Access, Access)>,
+    ) -> Result<Pass<'_>, Error> {
         let query = match self.ring_slot {
             Some(_) => self.slot.timers.begin(name)?,
             None => None,
@@ -179,7 +226,9 @@ impl Recorder {
             // SAFETY: the command buffer is being recorded.
             unsafe { debug.cmd_begin_debug_utils_label(self.cmd, &info) };
         }
-        if let Some((stages, memory)) = pass_barrier(self.device.0.abilities, reads, writes) {
+        let abilities = self.device.0.abilities;
+        let barrier = access.and_then(|(reads, writes)| pass_barrier(abilities, reads, writes));
+        if let Some((stages, memory)) = barrier {
             // SAFETY: recording outside of a render pass; the stages belong to extensions that are on.
             unsafe {
                 self.device.vk().cmd_pipeline_barrier(
@@ -262,12 +311,15 @@ impl Device {
             slot,
             acquired: None,
             ring_slot: None,
+            open: None,
+            host_reads: true,
             available: None,
             recording: None,
         };
         let value = record(&mut recorder)?;
+        recorder.close_drawing();
         let slot = recorder.slot;
-        slot.finish()?;
+        slot.finish(true)?;
         let mut pending = std::mem::take(&mut *lock(&self.0.pending));
         let done = slot
             .record_before(&pending)

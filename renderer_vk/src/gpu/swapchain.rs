@@ -31,6 +31,8 @@ pub struct Swapchain {
     format: Format,
     images: Vec<(Image, vk::Semaphore)>,
     stale: bool,
+    /// Images can be copied to.
+    copies: bool,
     /// What the acquisition for a frame signals while that frame is not presented yet.
     acquired: Option<vk::Semaphore>,
 }
@@ -48,6 +50,7 @@ impl Swapchain {
             format: Format::Bgra8,
             images: Vec::new(),
             stale: true,
+            copies: false,
             acquired: None,
         };
         swapchain.format = swapchain.choose_format()?.0;
@@ -58,6 +61,11 @@ impl Swapchain {
     /// Format of the images: 8 bits, as stored, red or blue first.
     pub fn format(&self) -> Format {
         self.format
+    }
+
+    /// Whether the images can be copied to, besides being drawn to.
+    pub fn copies(&self) -> bool {
+        self.copies
     }
 
     /// Size of the images; zero while the window is minimised.
@@ -126,6 +134,7 @@ impl Swapchain {
                         finished: *finished,
                     });
                     let image = image.clone();
+                    recorder.close_drawing();
                     self.change_layout(
                         recorder,
                         &image,
@@ -145,6 +154,7 @@ impl Swapchain {
 
     /// Records the change to the layout for showing.
     pub(crate) fn prepare_present(&self, recorder: &mut Recorder) {
+        recorder.close_drawing();
         if let Some(acquired) = &recorder.acquired {
             let image = acquired.image.clone();
             self.change_layout(
@@ -323,6 +333,7 @@ impl Swapchain {
             | vk::ImageUsageFlags::TRANSFER_DST
             | vk::ImageUsageFlags::TRANSFER_SRC)
             & caps.supported_usage_flags;
+        self.copies = usage.contains(vk::ImageUsageFlags::TRANSFER_DST);
         let old = self.raw;
         let info = vk::SwapchainCreateInfoKHR::default()
             .surface(surface)

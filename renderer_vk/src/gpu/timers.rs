@@ -1,5 +1,7 @@
 //! GPU time of passes.
 
+use std::sync::atomic::Ordering;
+
 use ash::vk;
 
 use super::device::{Device, lock};
@@ -32,7 +34,7 @@ impl Timers {
 
     /// Enters a pass: the pool and the first of its two queries. `None` without timestamps.
     pub fn begin(&mut self, name: &str) -> Result<Option<(vk::QueryPool, u32)>, Error> {
-        if !self.device.0.info.timestamps {
+        if !self.device.0.info.timestamps || !self.device.0.measuring.load(Ordering::Relaxed) {
             return Ok(None);
         }
         let index = self.names.len();

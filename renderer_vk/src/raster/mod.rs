@@ -162,13 +162,13 @@ impl Raster {
             _ => None,
         };
 
-        let mut pass = recorder.pass(name, gpu::Access::GRAPHICS, gpu::Access::GRAPHICS)?;
-        pass.begin_rendering(&Rendering {
+        let rendering = Rendering {
             color: Some(target.color),
             depth: Some(target.depth),
             clear_color: None,
             clear_depth: None,
-        })?;
+        };
+        let mut pass = recorder.drawing(name, &rendering)?;
         let [x, y, width, height] = clip_to(p.viewport, target.color);
         if width == 0 || height == 0 {
             return Ok(());
