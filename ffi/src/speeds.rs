@@ -45,6 +45,8 @@ fn classic(speeds: i32, stats: &FrameStats) -> Vec<String> {
             scene.lit_surfaces, scene.unlit_surfaces, scene.lit_vertices, scene.lit_triangles
         )],
         5 => vec![format!("zFar: {:.0}", scene.far)],
+        // whether they are covered is known on the GPU alone
+        6 => vec![format!("flare adds:{0} tests:{0}", scene.flares)],
         _ => Vec::new(),
     }
 }

@@ -170,4 +170,18 @@ mod tests {
             assert!(spec.description.to_bytes().len() > 10, "{:?}", spec.name);
         }
     }
+
+    #[test]
+    fn the_documentation_lists_each_with_its_default() {
+        let text = include_str!("../../../docs/settings.md");
+        for spec in TABLE {
+            let (name, default) = (spec.name.to_str().unwrap(), spec.default.to_str().unwrap());
+            let start = match default {
+                "" => format!("| `{name}` |  | "),
+                default => format!("| `{name}` | `{default}` | "),
+            };
+            let rows = text.lines().filter(|line| line.starts_with(&start));
+            assert_eq!(rows.count(), 1, "{name} in docs/settings.md");
+        }
+    }
 }

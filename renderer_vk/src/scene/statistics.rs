@@ -48,6 +48,8 @@ pub struct Statistics {
     pub lit_vertices: u32,
     /// Triangles drawn once more for a dynamic light.
     pub lit_triangles: u32,
+    /// Flares in sight, before what covers them is known.
+    pub flares: u32,
     /// Distance of the far plane, units.
     pub far: f32,
 }
@@ -96,6 +98,7 @@ impl Statistics {
             unlit_surfaces,
             lit_vertices,
             lit_triangles,
+            flares,
             far,
         } = *other;
         self.shaders += shaders;
@@ -114,6 +117,7 @@ impl Statistics {
         self.unlit_surfaces += unlit_surfaces;
         self.lit_vertices += lit_vertices;
         self.lit_triangles += lit_triangles;
+        self.flares += flares;
         self.far = far;
     }
 
@@ -145,6 +149,7 @@ impl Gatherer<'_> {
         let mut counts = Statistics {
             cluster: -1,
             far: out.view.far,
+            flares: super::gather::count(out.flares.len()),
             ..Statistics::default()
         };
         let static_indices = self.world.map_or(&[][..], |world| world.indices.as_slice());
