@@ -50,6 +50,14 @@ pub fn from_linear(linear: f32) -> f32 {
     }
 }
 
+/// What a display's gamma ramp shows for every byte: `c^(1/gamma)`, then shifted left by `bits`.
+pub fn gamma_table(gamma: f32, bits: u32) -> [u8; 256] {
+    std::array::from_fn(|i| {
+        let value = (i as f32 / 255.0).powf(1.0 / gamma) * 255.0 + 0.5;
+        ((value as u32) << bits.min(8)).min(255) as u8
+    })
+}
+
 /// Linear value (0..=1) of every sRGB-encoded byte.
 pub fn byte_table() -> [f32; 256] {
     std::array::from_fn(|i| to_linear(i as f32 / 255.0))
@@ -75,6 +83,14 @@ mod tests {
         assert_eq!(shift([1, 2, 3], 0), [1, 2, 3]);
         assert_eq!(shift([255, 255, 255], 99), [255, 255, 255]);
         assert_eq!(shift_rgba([64, 0, 0, 7], 2), [255, 0, 0, 7]);
+    }
+
+    #[test]
+    fn gamma_brightens_and_bits_double() {
+        let plain = gamma_table(1.0, 0);
+        assert!(plain.iter().zip(0..=255).all(|(a, b)| *a == b));
+        let bright = gamma_table(2.0, 1);
+        assert_eq!((bright[0], bright[16], bright[255]), (0, 128, 255));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
-use relight::GameFiles;
+use relight::{GameFiles, overbright};
 
 use crate::api::{
     DynamicLight, MarkFragment, Orientation, Picture, PointLighting, PolyVert, RefDef, RefEntity,
@@ -615,7 +615,7 @@ impl Renderer {
                             &mut recorder,
                             &self.color,
                             &target,
-                            self.settings.gamma,
+                            self.settings.display_gamma(),
                             bits,
                             swapchain.copies(),
                         )?;
@@ -636,16 +636,10 @@ impl Renderer {
         self.flush(false)?;
         let (width, height) = self.size();
         let rgba = self.device.read_image(&self.color)?;
-        let (gamma, bits) = (
-            self.settings.gamma.clamp(0.5, 3.0),
+        let table = overbright::gamma_table(
+            self.settings.display_gamma(),
             self.settings.effective_overbright_bits(),
         );
-        let table: Vec<u8> = (0..256)
-            .map(|i| {
-                let value = (i as f32 / 255.0).powf(1.0 / gamma) * 255.0 + 0.5;
-                ((value as u32) << bits).min(255) as u8
-            })
-            .collect();
         let rgb = rgba
             .chunks_exact(4)
             .flat_map(|p| [p[0], p[1], p[2]])

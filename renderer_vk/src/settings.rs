@@ -117,6 +117,24 @@ impl Settings {
         }
     }
 
+    /// The gamma that the finished picture is shown with.
+    pub fn display_gamma(&self) -> f32 {
+        if self.ignore_hw_gamma {
+            1.0
+        } else {
+            self.gamma.clamp(0.5, 3.0)
+        }
+    }
+
+    /// The gamma that images get when they are loaded.
+    pub fn software_gamma(&self) -> f32 {
+        if self.ignore_hw_gamma {
+            self.gamma.clamp(0.5, 3.0)
+        } else {
+            1.0
+        }
+    }
+
     /// What the engine calls identity light: the brightness that shows as white.
     pub fn identity_light(&self) -> f32 {
         1.0 / (1 << self.effective_overbright_bits()) as f32

@@ -20,6 +20,8 @@ pub struct TextureSettings {
     pub simple_mip_maps: bool,
     /// Factor on the colours of mipmapped images, at least 1.
     pub intensity: f32,
+    /// Brightening of images where the display does none: `r_gamma` with `r_ignorehwgamma`, otherwise 1.
+    pub gamma: f32,
     /// 0..1: how much colour is taken out.
     pub greyscale: f32,
     /// Smaller levels are tinted.
@@ -40,6 +42,7 @@ impl TextureSettings {
             } else {
                 1.0
             },
+            gamma: settings.software_gamma(),
             greyscale: if settings.greyscale.is_finite() {
                 settings.greyscale.clamp(0.0, 1.0)
             } else {
@@ -69,6 +72,11 @@ pub fn prepare(image: &Image, flags: ImageFlags, settings: &TextureSettings) -> 
     }
     if flags.mipmap && settings.intensity > 1.0 {
         brighten(&mut base.rgba, settings.intensity);
+    }
+    // the engine hands small plain pictures on as they are
+    let resized = (base.width, base.height) != (image.width, image.height);
+    if settings.gamma != 1.0 && (flags.mipmap || resized) {
+        apply_gamma(&mut base.rgba, settings.gamma);
     }
     if !flags.mipmap {
         return vec![base];
@@ -161,6 +169,16 @@ fn brighten(rgba: &mut [u8], intensity: f32) {
     for texel in rgba.as_chunks_mut::<4>().0 {
         for channel in texel.iter_mut().take(3) {
             *channel = (f32::from(*channel) * intensity).min(255.0) as u8;
+        }
+    }
+}
+
+/// Brightens colours as a display's gamma ramp would.
+fn apply_gamma(rgba: &mut [u8], gamma: f32) {
+    let table = overbright::gamma_table(gamma, 0);
+    for texel in rgba.as_chunks_mut::<4>().0 {
+        for channel in texel.iter_mut().take(3) {
+            *channel = table[usize::from(*channel)];
         }
     }
 }
@@ -304,6 +322,31 @@ mod tests {
         };
         // both sides are halved together until the larger one fits
         assert_eq!(sizes(ImageFlags::NO_MIP, &limited), [(8, 4)]);
+    }
+
+    #[test]
+    fn gamma_is_for_images_that_are_scaled() {
+        let brighter = TextureSettings {
+            gamma: 2.0,
+            ..settings()
+        };
+        let first = |side, flags| prepare(&grey(side, side, 64), flags, &brighter)[0].rgba[0];
+        // 255 * (64 / 255) ^ 0.5
+        assert_eq!(first(2, ImageFlags::WORLD), 128);
+        assert_eq!(first(3, ImageFlags::NO_MIP), 128);
+        assert_eq!(first(2, ImageFlags::NO_MIP), 64);
+        // only where the display does none
+        let player = Settings {
+            gamma: 2.0,
+            ..Settings::default()
+        };
+        assert_eq!(TextureSettings::new(&player, 4096).gamma, 1.0);
+        let ignoring = Settings {
+            ignore_hw_gamma: true,
+            ..player
+        };
+        assert_eq!(TextureSettings::new(&ignoring, 4096).gamma, 2.0);
+        assert_eq!(ignoring.display_gamma(), 1.0);
     }
 
     #[test]
