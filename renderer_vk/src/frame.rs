@@ -25,10 +25,14 @@ pub enum Item {
 
 /// What the items of a frame are drawn with and onto.
 pub struct FrameContext<'a> {
-    /// Colour image of the frame.
+    /// The picture: what the traced look writes.
     pub color: &'a Image,
-    /// Depth image of the frame.
+    /// What the classic look draws to.
+    pub drawn: &'a Image,
+    /// Depth of what the classic look draws to.
     pub depth: &'a Image,
+    /// Channels that the item is drawn in.
+    pub mask: ColorMask,
     /// Materials and textures.
     pub assets: &'a Assets,
     /// The map, once loaded.
@@ -102,6 +106,7 @@ impl<'a> FrameContext<'a> {
                 Vec4::new(0.0, 0.0, -1.0, 0.0),
                 Vec4::new(-1.0, -1.0, 0.0, 1.0),
             ),
+            near_world_to_clip: None,
             clip_plane: [0.0; 4],
             eye: Vec3::new(0.0, 0.0, -1.0),
             forward: Vec3::Z,
@@ -119,9 +124,9 @@ impl<'a> FrameContext<'a> {
             shadows: None,
         };
         let target = Target {
-            color: self.color,
+            color: self.drawn,
             depth: self.depth,
-            mask: ColorMask::ALL,
+            mask: self.mask,
         };
         self.raster
             .record(recorder, "overlay", target, self.list, &parameters)
@@ -148,6 +153,7 @@ impl<'a> FrameContext<'a> {
         let view = &scene.view;
         let parameters = ViewParameters {
             world_to_clip: view.world_to_clip,
+            near_world_to_clip: view.near_world_to_clip(),
             clip_plane: view.clip_plane.map_or([0.0; 4], |plane| plane.to_array()),
             eye: view.origin,
             forward: view.axis[0],
@@ -165,9 +171,9 @@ impl<'a> FrameContext<'a> {
             shadows: Some((&scene.shadows, view)),
         };
         let target = Target {
-            color: self.color,
+            color: self.drawn,
             depth: self.depth,
-            mask: ColorMask::ALL,
+            mask: self.mask,
         };
         self.raster
             .record(recorder, "classic", target, self.list, &parameters)?;
@@ -197,6 +203,7 @@ impl<'a> FrameContext<'a> {
         self.list.add_view(quads, stages, &[], Aids::default());
         let parameters = ViewParameters {
             world_to_clip: window_to_clip(quads.view.viewport),
+            near_world_to_clip: None,
             clip_plane: [0.0; 4],
             eye: Vec3::new(0.0, 0.0, -1.0),
             forward: Vec3::Z,

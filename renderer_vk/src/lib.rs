@@ -12,6 +12,8 @@ mod raster;
 mod renderer;
 pub mod scene;
 pub mod settings;
+mod stereo;
+mod targets;
 #[cfg(test)]
 mod test_support;
 pub mod trace;
@@ -21,3 +23,4 @@ pub use assets::is_texture_mode;
 pub use error::Error;
 pub use renderer::{FrameStats, Renderer, RendererOptions, probe};
 pub use settings::{LightSampling, Settings};
+pub use stereo::Eye;

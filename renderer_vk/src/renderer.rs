@@ -13,12 +13,14 @@ use crate::assets::{Assets, ImageSource, LoadedFont};
 use crate::error::Error;
 use crate::frame::{FrameContext, Item};
 use crate::gpu::{
-    Device, DeviceInfo, DeviceOptions, FrameRing, Image, ImageDesc, ImageUsage, Recorder,
-    SurfaceSource, Swapchain, SwapchainDesc, Window,
+    ColorMask, Device, DeviceInfo, DeviceOptions, FrameRing, Recorder, SurfaceSource, Swapchain,
+    SwapchainDesc, Window,
 };
 use crate::raster::{self, DrawList, Flares, Overlay, Picture2d, Present, Raster};
 use crate::scene::{Look, Scene, Statistics};
 use crate::settings::Settings;
+use crate::stereo::Eye;
+use crate::targets::FrameTargets;
 use crate::trace::TraceLook;
 use crate::world::{EntityTokens, World, mark_fragments};
 
@@ -60,16 +62,19 @@ pub struct Renderer {
     raster: Raster,
     flares: Flares,
     present: Option<Present>,
-    color: Image,
-    depth: Image,
+    targets: FrameTargets,
     swapchain: Option<Swapchain>,
     ring: FrameRing,
     device: Device,
 
     settings: Settings,
-    queue: Vec<Item>,
     /// The last frame's picture is not shown yet.
     unshown: bool,
+    /// With the channels that each is drawn in.
+    queue: Vec<(Item, ColorMask)>,
+    eye: Eye,
+    /// `r_anaglyphMode` of the newest frame.
+    shown_anaglyph: u32,
     overlay: Overlay,
     spare_overlays: Vec<Overlay>,
     overlay_time: f32,
@@ -114,7 +119,7 @@ impl Renderer {
             None => (Device::new(&device_options, SurfaceSource::Headless)?, None),
         };
         device.measure(!device.info().software);
-        let (color, depth) = frame_images(&device, options.width, options.height, false)?;
+        let targets = FrameTargets::new(&device, options.width, options.height)?;
         let present = match &swapchain {
             Some(swapchain) => Some(Present::new(&device, swapchain.format())?),
             None => None,
@@ -128,14 +133,15 @@ impl Renderer {
             raster: Raster::new(&device),
             flares: Flares::new(&device),
             present,
-            color,
-            depth,
+            targets,
             swapchain,
             ring: FrameRing::new(&device, 2)?,
             device,
             settings: Settings::default(),
             queue: Vec::new(),
             unshown: false,
+            eye: Eye::Both,
+            shown_anaglyph: 0,
             overlay: Overlay::default(),
             spare_overlays: Vec::new(),
             overlay_time: 0.0,
@@ -169,11 +175,10 @@ impl Renderer {
     /// # Errors
     /// The device is out of memory.
     pub fn resize(&mut self, width: u32, height: u32) -> Result<(), Error> {
-        if (width, height) == (self.color.width(), self.color.height()) {
+        if (width, height) == self.size() {
             return Ok(());
         }
-        let stencil = self.depth.format().has_stencil();
-        (self.color, self.depth) = frame_images(&self.device, width, height, stencil)?;
+        self.targets = FrameTargets::new(&self.device, width, height)?;
         if let Some(swapchain) = &mut self.swapchain {
             swapchain.resize(width, height, self.settings.swap_interval != 0);
         }
@@ -188,7 +193,8 @@ impl Renderer {
 
     /// Size of the picture, pixels.
     pub fn size(&self) -> (u32, u32) {
-        (self.color.width(), self.color.height())
+        let color = self.targets.color();
+        (color.width(), color.height())
     }
 
     // --- registration ---------------------------------------------------------------------------------------------
@@ -346,13 +352,15 @@ impl Renderer {
         let mut scenes =
             self.scene
                 .gather(self.world.as_ref(), assets, &self.settings, def, look)?;
-        self.queue.push(match look {
+        let item = match look {
             Look::Classic => Item::Classic(scenes),
             Look::Traced => match scenes.pop() {
                 Some(scene) => Item::Traced(Box::new(scene)),
                 None => return Ok(()),
             },
-        });
+        };
+        self.queue
+            .push((item, self.eye.mask(self.settings.anaglyph)));
         Ok(())
     }
 
@@ -471,14 +479,26 @@ impl Renderer {
 
     /// Starts a frame; `time_ms` is the time that 2D materials see.
     pub fn begin_frame(&mut self, time_ms: i32) {
+        self.set_eye(Eye::Both);
         self.overlay_time = time_ms as f32 * 0.001;
+    }
+
+    /// Says whose picture the calls that follow are for, after [`begin_frame`](Self::begin_frame). A frame begins with
+    /// both eyes'. The traced look has one picture: with `rt` this is without effect.
+    pub fn set_eye(&mut self, eye: Eye) {
+        let eye = if self.settings.rt { Eye::Both } else { eye };
+        self.queue_overlay();
+        self.eye = eye;
+        self.scene.set_eye(eye);
     }
 
     fn queue_overlay(&mut self) {
         if !self.overlay.is_empty() {
             let empty = self.spare_overlays.pop().unwrap_or_default();
             let overlay = std::mem::replace(&mut self.overlay, empty);
-            self.queue.push(Item::Overlay(overlay, self.overlay_time));
+            let mask = self.eye.mask(self.settings.anaglyph);
+            self.queue
+                .push((Item::Overlay(overlay, self.overlay_time), mask));
         }
     }
 
@@ -499,20 +519,9 @@ impl Renderer {
         Ok(stats)
     }
 
-    /// The depth image has a stencil while shadow volumes are drawn.
-    fn fit_depth(&mut self) -> Result<(), Error> {
-        let stencil = self.settings.shadows == 2;
-        if stencil != self.depth.format().has_stencil()
-            && (!stencil || self.device.depth_stencil_format().is_some())
-        {
-            self.depth = depth_image(&self.device, self.size(), stencil)?;
-        }
-        Ok(())
-    }
-
     /// Forgets what is queued; its memory is used again.
     fn recycle_queue(&mut self) {
-        for item in self.queue.drain(..) {
+        for (item, _) in self.queue.drain(..) {
             match item {
                 Item::Overlay(mut overlay, _) => {
                     overlay.clear();
@@ -543,7 +552,7 @@ impl Renderer {
     fn flush(&mut self, show: bool) -> Result<FrameStats, Error> {
         self.queue_image_sheet();
         self.queue_overlay();
-        self.fit_depth()?;
+        self.targets.fit(&self.device, &self.settings)?;
         let mut stats = FrameStats::default();
         let show = show && !self.hidden && self.swapchain.is_some();
         let later = show && self.device.info().software;
@@ -551,11 +560,18 @@ impl Renderer {
             self.show_finished()?;
         }
         let mut recorder = self.ring.begin()?;
+        // channels that no eye draws keep what was there
+        if self.shown_anaglyph != self.settings.anaglyph {
+            self.shown_anaglyph = self.settings.anaglyph;
+            self.targets.clear(&mut recorder)?;
+        }
         if let Some(assets) = &mut self.assets {
             assets.prepare_frame(&self.settings)?;
             let mut context = FrameContext {
-                color: &self.color,
-                depth: &self.depth,
+                color: self.targets.color(),
+                drawn: self.targets.drawn(),
+                depth: self.targets.depth(),
+                mask: ColorMask::ALL,
                 assets,
                 world: self.world.as_ref(),
                 settings: &self.settings,
@@ -564,7 +580,8 @@ impl Renderer {
                 trace: self.trace.as_mut(),
                 list: &mut self.list,
             };
-            for item in &self.queue {
+            for (item, mask) in &self.queue {
+                context.mask = *mask;
                 context.record(&mut recorder, item)?;
                 if let Item::Classic(scenes) = item {
                     for scene in scenes {
@@ -574,6 +591,9 @@ impl Renderer {
                 stats.views += u32::from(!matches!(item, Item::Overlay(..)));
                 stats.draws += context.list.calls.len() as u32;
             }
+        }
+        if !self.queue.is_empty() {
+            self.targets.resolve(&mut recorder)?;
         }
         self.recycle_queue();
         if later || !show {
@@ -613,7 +633,7 @@ impl Renderer {
                         let bits = self.settings.effective_overbright_bits();
                         present.record(
                             &mut recorder,
-                            &self.color,
+                            self.targets.color(),
                             &target,
                             self.settings.display_gamma(),
                             bits,
@@ -635,7 +655,7 @@ impl Renderer {
     pub fn read_pixels(&mut self) -> Result<Picture, Error> {
         self.flush(false)?;
         let (width, height) = self.size();
-        let rgba = self.device.read_image(&self.color)?;
+        let rgba = self.device.read_image(self.targets.color())?;
         let table = overbright::gamma_table(
             self.settings.display_gamma(),
             self.settings.effective_overbright_bits(),
@@ -793,49 +813,4 @@ fn device_options(prefer: Option<&str>, validation: bool) -> DeviceOptions {
         prefer: prefer.map(str::to_owned),
         ..DeviceOptions::default()
     }
-}
-
-/// The depth image of a frame; with a stencil if that is asked for and the device has one.
-fn depth_image(
-    device: &Device,
-    (width, height): (u32, u32),
-    stencil: bool,
-) -> Result<Image, Error> {
-    let format = device.depth_stencil_format().filter(|_| stencil);
-    let format = format.unwrap_or(raster::DEPTH_FORMAT);
-    let desc = ImageDesc::new("frame depth", width, height, format, ImageUsage::DEPTH);
-    Ok(Image::new(device, &desc)?)
-}
-
-fn frame_images(
-    device: &Device,
-    width: u32,
-    height: u32,
-    stencil: bool,
-) -> Result<(Image, Image), Error> {
-    let (width, height) = (width.max(1), height.max(1));
-    let color = Image::new(
-        device,
-        &ImageDesc::new(
-            "frame colour",
-            width,
-            height,
-            raster::COLOR_FORMAT,
-            // Not among the sampled textures: the validation layer takes every draw for a reader of all of them, so a
-            // target among them would be a hazard to itself.
-            ImageUsage::COLOR | ImageUsage::STORAGE,
-        ),
-    )?;
-    let depth = depth_image(device, (width, height), stencil)?;
-    // neither the game nor the engine clears the picture before it is first seen
-    device.immediate(|recorder| {
-        let mut pass = recorder.pass(
-            "clear frame",
-            crate::gpu::Access::NONE,
-            crate::gpu::Access::TRANSFER,
-        )?;
-        pass.clear_image(&color, [0.0, 0.0, 0.0, 1.0]);
-        Ok(())
-    })?;
-    Ok((color, depth))
 }

@@ -73,6 +73,14 @@ pub struct Settings {
     pub flare_fade: f32,
     pub flare_coefficient: f32,
     pub shadows: i32,
+    /// Samples of a pixel of the classic look that are wished for.
+    pub multisample: u32,
+    /// `r_anaglyphMode`.
+    pub anaglyph: u32,
+    /// Distance at which the eyes' pictures meet over that of an eye from the middle.
+    pub stereo_separation: f32,
+    /// Distance at which the eyes' pictures meet, units.
+    pub convergence: f32,
     pub draw_world: bool,
     pub draw_entities: bool,
     pub no_vis: bool,
@@ -188,6 +196,10 @@ impl Default for Settings {
             flare_fade: 7.0,
             flare_coefficient: 150.0,
             shadows: 1,
+            multisample: 0,
+            anaglyph: 0,
+            stereo_separation: 64.0,
+            convergence: 64.0,
             draw_world: true,
             draw_entities: true,
             no_vis: false,

@@ -1,4 +1,4 @@
-//! Effects of the classic look, drawn by a whole renderer without a window: shadows, flares.
+//! Effects of the classic look, drawn by a whole renderer without a window: shadows, flares, smooth edges, stereo.
 //!
 //! Without a device each test says so and passes, unless `RELIGHT_REQUIRE_GPU=1`.
 
@@ -9,7 +9,7 @@ use q3bsp::builder::MapBuilder;
 use q3model::{Frame, Md3, PackedVertex, Surface};
 use relight::MemoryFiles;
 use renderer_vk::api::{EntityKind, Picture, RefDef, RefEntity};
-use renderer_vk::{Renderer, RendererOptions, Settings};
+use renderer_vk::{Eye, Renderer, RendererOptions, Settings};
 
 /// Side of the picture, pixels.
 const SIDE: u32 = 64;
@@ -18,6 +18,8 @@ const SIDE: u32 = 64;
 const SCRIPT: &[u8] = b"
 t/wall { { map $whiteimage
   rgbGen const ( 0.5 0.5 0.5 ) } }
+t/body { { map $whiteimage
+  rgbGen const ( 0.25 0.25 0.25 ) } }
 flareShader { cull none
   { map $whiteimage
     blendFunc add
@@ -133,7 +135,7 @@ fn box_model() -> Vec<u8> {
         num_tags: 0,
         surfaces: vec![Surface {
             name: "body".into(),
-            shaders: vec!["t/wall".into()],
+            shaders: vec!["t/body".into()],
             triangles: faces
                 .iter()
                 .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
@@ -255,4 +257,77 @@ fn flares_fade_in_where_they_can_be_seen_and_out_where_not() {
         assert!(stage.frame(&def, &[]).rgb == with.rgb, "{view_origin}");
         stage.settings.flares = true;
     }
+}
+
+#[test]
+fn several_samples_smooth_edges_along_with_shadows_and_flares() {
+    let settings = Settings {
+        flares: true,
+        shadows: 2,
+        ..Settings::default()
+    };
+    let Some(mut stage) = Stage::new(settings) else {
+        return;
+    };
+    // turned, so that edges are not along the pixels
+    let cube = RefEntity {
+        axis: [Vec3::new(0.8, 0.6, 0.0), Vec3::new(-0.6, 0.8, 0.0), Vec3::Z],
+        ..entity(stage.box_model, Vec3::new(100.0, 60.0, -60.0))
+    };
+    let shades = |picture: &Picture| {
+        let mut seen: Vec<u8> = picture.rgb.clone();
+        seen.sort_unstable();
+        seen.dedup();
+        seen.len()
+    };
+    let hard = stage.frame(&def(), &[cube]);
+    stage.settings.multisample = 4;
+    let smooth = stage.frame(&def(), &[cube]);
+    assert!(shades(&smooth) > shades(&hard), "{}", shades(&smooth));
+    let differing = hard.rgb.iter().zip(&smooth.rgb).filter(|(a, b)| a != b);
+    assert!(differing.count() < hard.rgb.len() / 10);
+    stage.settings.multisample = 0;
+    assert!(stage.frame(&def(), &[cube]).rgb == hard.rgb);
+}
+
+#[test]
+fn each_eye_draws_its_channels_from_its_place() {
+    let Some(mut stage) = Stage::new(Settings::default()) else {
+        return;
+    };
+    let cube = entity(stage.box_model, Vec3::new(0.0, 0.0, 0.0));
+    let both = stage.frame(&def(), &[cube]);
+    stage.settings.anaglyph = 1;
+    // far apart, and meeting far behind the cube
+    stage.settings.stereo_separation = 64.0;
+    stage.settings.convergence = 320.0;
+    let renderer = &mut stage.renderer;
+    renderer.set_settings(&stage.settings);
+    for eye in [Eye::Left, Eye::Right] {
+        renderer.begin_frame(5000);
+        renderer.set_eye(eye);
+        renderer.clear_scene();
+        renderer.add_entity(&cube);
+        renderer.render_scene(&def()).unwrap();
+    }
+    let picture = renderer.read_pixels().unwrap();
+    renderer.end_frame().unwrap();
+    // where the cube's front begins and ends in the middle row
+    let span = |picture: &Picture, channel: usize| {
+        let row = 32 * picture.width as usize;
+        let shade = |x: usize| picture.rgb[(row + x) * 3 + channel];
+        let face = shade(32);
+        let first = (0..32).rev().find(|x| shade(*x) != face).unwrap();
+        let last = (32..64).find(|x| shade(*x) != face).unwrap();
+        (first, last)
+    };
+    let (left, right) = span(&both, 0);
+    let [red, green, blue] = [0, 1, 2].map(|channel| span(&picture, channel));
+    // to the left eye what is before the meeting distance lies to the right
+    assert!(red.0 > left && red.1 > right, "{red:?} {left} {right}");
+    assert!(green.0 < left && green.1 < right, "{green:?}");
+    assert_eq!(green, blue);
+    // alone again
+    stage.settings.anaglyph = 0;
+    assert!(stage.frame(&def(), &[cube]).rgb == both.rgb);
 }

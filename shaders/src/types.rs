@@ -347,6 +347,8 @@ pub mod constants {
         INSTANCE_NO_SHADOW = 8;
         /// The light grid does not light it: the world, sprites and beams, pictures.
         INSTANCE_UNLIT = 16;
+        /// A crosshair: in stereo it stays where the view has it.
+        INSTANCE_CROSSHAIR = 32;
         /// A draw of a material's stage.
         DRAW_STAGE = 0;
         /// A dynamic light's blob over a surface.

@@ -82,6 +82,10 @@ pub fn apply(cvars: &Cvars, window_fullscreen: bool, settings: &mut Settings) {
     settings.flare_fade = value(Cvar::FlareFade);
     settings.flare_coefficient = value(Cvar::FlareCoeff);
     settings.shadows = integer(Cvar::Shadows);
+    settings.multisample = count(cvars, Cvar::ExtMultisample);
+    settings.anaglyph = count(cvars, Cvar::AnaglyphMode);
+    settings.stereo_separation = value(Cvar::StereoSeparation);
+    settings.convergence = value(Cvar::ZProj);
     settings.draw_world = flag(Cvar::DrawWorld);
     settings.draw_entities = flag(Cvar::DrawEntities);
     settings.no_vis = flag(Cvar::NoVis);

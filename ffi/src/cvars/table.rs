@@ -57,11 +57,11 @@ cvars! {
     Depthbits = c"r_depthbits", c"0", ARCHIVE | LATCH, None, c"Depth buffer precision. Kept for old configurations and menus; has no effect here.";
     Stencilbits = c"r_stencilbits", c"8", ARCHIVE | LATCH, None, c"Stencil buffer precision. Kept for old configurations and menus; has no effect here.";
     Texturebits = c"r_texturebits", c"0", ARCHIVE | LATCH, None, c"Texture colour depth. Kept for old configurations and menus; has no effect here.";
-    ExtMultisample = c"r_ext_multisample", c"0", ARCHIVE | LATCH, range(0.0, 4.0, true), c"Samples of a pixel. Kept for old configurations and menus; has no effect here.";
-    StereoEnabled = c"r_stereoEnabled", c"0", ARCHIVE | LATCH, None, c"Quad-buffered stereo. Kept for old configurations and menus; has no effect here.";
-    AnaglyphMode = c"r_anaglyphMode", c"0", ARCHIVE, None, c"Red-cyan and similar stereo. Only the first eye's picture is drawn here.";
-    StereoSeparation = c"r_stereoSeparation", c"64", ARCHIVE, None, c"Convergence distance over the distance of the eyes. Kept for old configurations and menus; has no effect here.";
-    ZProj = c"r_zproj", c"64", ARCHIVE, None, c"Distance at which both eyes' pictures meet. Kept for old configurations and menus; has no effect here.";
+    ExtMultisample = c"r_ext_multisample", c"0", ARCHIVE | LATCH, range(0.0, 4.0, true), c"Samples of a pixel, for smooth edges; the next number that the device has. The traced look has none.";
+    StereoEnabled = c"r_stereoEnabled", c"0", ARCHIVE | LATCH, None, c"Quad-buffered stereo. Windows of Vulkan have one picture for both eyes: has no effect here.";
+    AnaglyphMode = c"r_anaglyphMode", c"0", ARCHIVE, None, c"Stereo through coloured glasses: 1 red-cyan, 2 red-blue, 3 red-green, 4 green-magenta; 5 to 8 the same, eyes swapped.";
+    StereoSeparation = c"r_stereoSeparation", c"64", ARCHIVE, None, c"Convergence distance over the distance of an eye from the middle; negative swaps the eyes.";
+    ZProj = c"r_zproj", c"64", ARCHIVE, None, c"Distance at which both eyes' pictures meet.";
     ZNear = c"r_znear", c"4", CHEAT, range(0.001, 200.0, false), c"Distance of the near plane in units.";
     DrawBuffer = c"r_drawBuffer", c"GL_BACK", CHEAT, None, c"Buffer to draw to. Kept for old configurations and menus; has no effect here.";
     AllowSoftwareGL = c"r_allowSoftwareGL", c"0", LATCH, None, c"Software drivers. Kept for old configurations and menus; has no effect here.";

@@ -46,6 +46,8 @@ pub mod cvar_flags {
 
 /// `cbufExec_t`: run when the engine next empties its command buffer.
 pub const EXEC_APPEND: c_int = 2;
+/// `stereoFrame_t` of the first eye.
+pub const STEREO_LEFT: c_int = 1;
 /// `stereoFrame_t` of the second eye.
 pub const STEREO_RIGHT: c_int = 2;
 /// Number of `refEntityType_t` values.

@@ -10,7 +10,7 @@ use crate::session::{self, Front, with_renderer};
 use crate::window::{self, Window};
 use crate::{commands, config};
 use renderer_vk::api::Picture;
-use renderer_vk::{Error, Renderer, RendererOptions, gpu};
+use renderer_vk::{Error, Eye, Renderer, RendererOptions, gpu};
 use std::ffi::c_int;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -247,9 +247,18 @@ pub extern "C" fn begin_frame(stereo: c_int) {
             return Ok(());
         };
         with_renderer(|renderer, front| {
-            // With r_anaglyphMode the engine sends every frame twice. The first eye's picture is the one that is shown.
-            front.skip_eye = stereo == super::abi::STEREO_RIGHT;
-            if front.skip_eye {
+            // With r_anaglyphMode the engine sends every frame twice. The traced look shows the first eye's picture.
+            let eye = match stereo {
+                super::abi::STEREO_LEFT => Eye::Left,
+                super::abi::STEREO_RIGHT => Eye::Right,
+                _ => Eye::Both,
+            };
+            front.skip_eye = eye == Eye::Right && front.settings.rt;
+            if eye == Eye::Right {
+                if !front.skip_eye {
+                    renderer.begin_frame(engine.milliseconds());
+                    renderer.set_eye(eye);
+                }
                 return Ok(());
             }
             if let Some(cvars) = &front.cvars {
@@ -259,6 +268,7 @@ pub extern "C" fn begin_frame(stereo: c_int) {
             front.frame_start = Some(Instant::now());
             renderer.set_settings(&front.settings);
             renderer.begin_frame(engine.milliseconds());
+            renderer.set_eye(eye);
             Ok(())
         })
     });

@@ -24,8 +24,10 @@ const MAX_LIGHTS: usize = 32;
 pub enum DepthRange {
     /// All of it.
     Normal,
-    /// The nearest third: a first-person weapon does not stick in walls.
+    /// The nearest third: a first-person weapon does not stick in walls. In stereo its pictures meet at the near plane.
     Near,
+    /// The nearest third, with the view's own projection in stereo.
+    Crosshair,
     /// The far end: the sky lies behind everything.
     Sky,
     /// The near end: debugging lines show through everything.
@@ -157,10 +159,11 @@ impl DrawList {
                 .instances
                 .get(group.instance as usize)
                 .map_or(0, |i| i.flags);
-            let range = if flags & c::INSTANCE_DEPTH_HACK != 0 {
-                DepthRange::Near
-            } else {
-                DepthRange::Normal
+            let has = |bit: u32| flags & bit != 0;
+            let range = match (has(c::INSTANCE_DEPTH_HACK), has(c::INSTANCE_CROSSHAIR)) {
+                (true, false) => DepthRange::Near,
+                (true, true) => DepthRange::Crosshair,
+                _ => DepthRange::Normal,
             };
             let span = (first_index, self.indices.len() as u32 - first_index);
             self.add_group(group, stages, span, range, lights, scene, aids);

@@ -5,6 +5,7 @@
 //! space, as they do in the engine.
 
 mod aids;
+mod cover;
 mod flares;
 mod list;
 mod overlay;
@@ -27,8 +28,9 @@ pub use shading::StageContext;
 pub use target::Target;
 
 use crate::api::DynamicLight;
-use crate::gpu::{self, Device, Format, Image, Recorder, Rendering, Viewport};
+use crate::gpu::{self, ColorMask, Device, Format, Image, Recorder, Rendering, Viewport};
 use crate::scene::{ShadowVolumes, View};
+use cover::Cover;
 use list::DepthRange;
 use pipelines::Pipelines;
 use shadows::Shadows;
@@ -47,6 +49,8 @@ const EDGE_SHIFT: f32 = 1.0 / 256.0;
 pub struct ViewParameters<'a> {
     /// World to clip space.
     pub world_to_clip: Mat4,
+    /// World to clip space of [`DepthRange::Near`], where it differs.
+    pub near_world_to_clip: Option<Mat4>,
     /// Only the positive side of `xyz.p = w` shows; zero: everything.
     pub clip_plane: [f32; 4],
     /// Eye.
@@ -84,6 +88,7 @@ pub struct Raster {
     device: Device,
     pipelines: Pipelines,
     shadows: Shadows,
+    cover: Cover,
 }
 
 impl Raster {
@@ -93,6 +98,7 @@ impl Raster {
             device: device.clone(),
             pipelines: Pipelines::new(device, (-1.0, -2.0)),
             shadows: Shadows::default(),
+            cover: Cover::default(),
         }
     }
 
@@ -122,6 +128,9 @@ impl Raster {
         for call in &list.calls {
             self.pipelines.prepare(kind, call.state)?;
         }
+        if p.clear_color.is_some() && target.mask != ColorMask::ALL {
+            self.cover.prepare(&self.device, kind)?;
+        }
         let lights: Vec<RasterLight> = p
             .lights
             .iter()
@@ -150,6 +159,13 @@ impl Raster {
             fogs: p.fogs,
             lights: arena.push(&lights)?,
         };
+        let near_view = match p.near_world_to_clip {
+            Some(matrix) => Some(arena.push(&[RasterView {
+                world_to_clip: matrix.to_cols_array_2d(),
+                ..view
+            }])?),
+            None => None,
+        };
         let view = arena.push(&[view])?;
         let (index_buffer, index_offset) = arena.push_indices(&list.indices)?;
         let shadows = match p.shadows {
@@ -174,8 +190,13 @@ impl Raster {
             return Ok(());
         }
         pass.set_scissor(x, y, width as u32, height as u32);
-        if let Some(color) = p.clear_color {
-            pass.clear_color_rect([x, y, width, height], color);
+        match p.clear_color {
+            Some(color) if target.mask == ColorMask::ALL => {
+                pass.clear_color_rect([x, y, width, height], color);
+            }
+            // clears heed no mask
+            Some(color) => self.cover.draw(&mut pass, kind, color),
+            None => {}
         }
         if p.clear_depth {
             pass.clear_depth_rect([x, y, width, height], 1.0);
@@ -186,19 +207,28 @@ impl Raster {
         pass.bind_index_buffer(&index_buffer, index_offset);
         let mut state = None;
         let mut range = None;
+        let mut pushed = 0;
         for call in &list.calls {
             if state != Some(call.state) {
                 let Some(pipeline) = self.pipelines.get(kind, call.state) else {
                     continue;
                 };
                 pass.bind_graphics(pipeline);
-                pass.push(&view);
                 state = Some(call.state);
+            }
+            // every pipeline has the same layout, so what was pushed stays
+            let wanted = match call.range {
+                DepthRange::Near => near_view.unwrap_or(view),
+                _ => view,
+            };
+            if pushed != wanted {
+                pass.push(&wanted);
+                pushed = wanted;
             }
             if range != Some(call.range) {
                 let (min_depth, max_depth) = match call.range {
                     DepthRange::Normal => (0.0, 1.0),
-                    DepthRange::Near => (0.0, 0.3),
+                    DepthRange::Near | DepthRange::Crosshair => (0.0, 0.3),
                     DepthRange::Sky => (1.0, 1.0),
                     DepthRange::Front => (0.0, 0.0),
                 };

@@ -9,10 +9,11 @@ use std::collections::hash_map::Entry;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use super::cover::{self, CoverParameters};
 use super::target::TargetKind;
 use crate::gpu::{
-    self, BlendFactor, Buffer, ColorMask, Cull, DepthTest, Device, GraphicsDesc, GraphicsPipeline,
-    Pass, Recorder, Stencil, Viewport,
+    self, Buffer, ColorMask, Cull, Device, GraphicsDesc, GraphicsPipeline, Pass, Recorder, Stencil,
+    Viewport,
 };
 use crate::scene::{ShadowVolumes, View};
 
@@ -27,13 +28,6 @@ struct VolumeParameters {
     world_to_clip: [[f32; 4]; 4],
     clip_plane: [f32; 4],
     positions: u64,
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct ShadeParameters {
-    color: [f32; 4],
-    depth: f32,
 }
 
 /// The pipelines for one kind of target.
@@ -74,23 +68,7 @@ impl Made {
                 volume(Stencil::Decrement, Cull::Front)?,
                 volume(Stencil::Decrement, Cull::Back)?,
             ],
-            shade: GraphicsPipeline::new(
-                device,
-                &GraphicsDesc {
-                    color: Some(target.color),
-                    depth: Some(target.depth),
-                    samples: target.samples,
-                    stencil: Some(Stencil::NotZero),
-                    depth_test: DepthTest::LessEqual,
-                    blend: Some((BlendFactor::DstColor, BlendFactor::Zero)),
-                    color_write: target.mask,
-                    ..GraphicsDesc::new(
-                        "shade",
-                        &shaders::RASTER_COVER_VERT,
-                        &shaders::RASTER_COVER_FRAG,
-                    )
-                },
-            )?,
+            shade: cover::pipeline(device, target, true)?,
         })
     }
 }
@@ -167,7 +145,7 @@ impl Shadows {
             }
         }
         pass.bind_graphics(&made.shade);
-        pass.push(&ShadeParameters {
+        pass.push(&CoverParameters {
             color: [SHADE, SHADE, SHADE, 1.0],
             depth: shade_depth(view),
         });

@@ -28,6 +28,7 @@ fn flags(entity: &RefEntity) -> u32 {
         (renderfx::FIRST_PERSON, c::INSTANCE_FIRST_PERSON),
         (renderfx::THIRD_PERSON, c::INSTANCE_THIRD_PERSON),
         (renderfx::NO_SHADOW, c::INSTANCE_NO_SHADOW),
+        (renderfx::CROSSHAIR, c::INSTANCE_CROSSHAIR),
     ]
     .into_iter()
     .filter(|(flag, _)| entity.renderfx & flag != 0)

@@ -36,7 +36,11 @@ pub(super) fn views(
     look: Look,
 ) -> Vec<ViewScene> {
     let mut out = Vec::with_capacity(2);
-    let view = View::new(def, input.settings.znear, FAR_WITHOUT_WORLD);
+    let mut view = View::new(def, input.settings.znear, FAR_WITHOUT_WORLD);
+    if look == Look::Classic {
+        view.stereo = scene.eye.stereo(input.settings);
+        view.update();
+    }
     let mut main = scene
         .pool
         .pop()

@@ -27,6 +27,7 @@ use crate::Error;
 use crate::api::{DynamicLight, EntityKind, PolyVert, RefDef, RefEntity};
 use crate::assets::{Assets, Materials, Models, Skins};
 use crate::settings::Settings;
+use crate::stereo::Eye;
 use crate::world::{VisibleSet, World, WorldData};
 pub use flares::ViewFlare;
 pub use lighting::light_for_point;
@@ -259,6 +260,7 @@ pub struct Scene {
     pool: Vec<ViewScene>,
     scratch: gather::Scratch,
     warned_not_finite: bool,
+    eye: Eye,
 }
 
 impl Scene {
@@ -280,6 +282,11 @@ impl Scene {
         self.clear();
         self.visible.reset();
         self.portal_visible.reset();
+    }
+
+    /// Whose views follow.
+    pub fn set_eye(&mut self, eye: Eye) {
+        self.eye = eye;
     }
 
     /// Adds an entity. One whose place is not a number is left out, with one warning.

@@ -3,6 +3,7 @@
 use glam::{Mat4, Vec3, Vec4};
 
 use crate::api::RefDef;
+use crate::stereo::Stereo;
 
 /// A camera with its viewport. World space is id Tech's; clip space is Vulkan's (y down, depth 0..1).
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +30,8 @@ pub struct View {
     pub clip_plane: Option<Vec4>,
     /// This is what a portal or mirror shows.
     pub is_portal: bool,
+    /// The eye's place beside the middle.
+    pub stereo: Stereo,
 }
 
 impl View {
@@ -47,6 +50,7 @@ impl View {
             mirrored: false,
             clip_plane: None,
             is_portal: false,
+            stereo: Stereo::default(),
         };
         view.update();
         view
@@ -54,6 +58,21 @@ impl View {
 
     /// Recomputes the matrix after a change of the other fields.
     pub fn update(&mut self) {
+        self.world_to_clip = self.project(self.stereo);
+    }
+
+    /// World to clip space for what is drawn in front of everything near, such as the weapon in the hands: its pictures
+    /// meet at the near plane. `None` where that is no difference.
+    pub fn near_world_to_clip(&self) -> Option<Mat4> {
+        (self.stereo.slope != 0.0).then(|| {
+            self.project(Stereo {
+                distance: self.near,
+                ..self.stereo
+            })
+        })
+    }
+
+    fn project(&self, stereo: Stereo) -> Mat4 {
         let [forward, left, up] = self.axis;
         let rotate = Mat4::from_cols(
             Vec4::new(-left.x, -up.x, forward.x, 0.0),
@@ -66,10 +85,10 @@ impl View {
         let project = Mat4::from_cols(
             Vec4::new(1.0 / self.tan_x, 0.0, 0.0, 0.0),
             Vec4::new(0.0, 1.0 / self.tan_y, 0.0, 0.0),
-            Vec4::new(0.0, 0.0, depth, 1.0),
-            Vec4::new(0.0, 0.0, -depth * self.near, 0.0),
+            Vec4::new(-stereo.slope / self.tan_x, 0.0, depth, 1.0),
+            Vec4::new(stereo.offset() / self.tan_x, 0.0, -depth * self.near, 0.0),
         );
-        self.world_to_clip = project * rotate * Mat4::from_translation(-self.origin);
+        project * rotate * Mat4::from_translation(-self.origin)
     }
 
     /// Depth of what is so far in front of the eye, 0 and 1 outside of the near and far plane.
@@ -84,13 +103,15 @@ impl View {
     /// The four side planes of the view's pyramid, pointing inwards: `xyz.p >= w` is inside.
     pub fn frustum(&self) -> [Vec4; 4] {
         let [forward, left, up] = self.axis;
+        let eye = self.origin + left * self.stereo.offset();
         let plane = |normal: Vec3| {
             let normal = normal.normalize();
-            normal.extend(normal.dot(self.origin))
+            normal.extend(normal.dot(eye))
         };
+        let slope = self.stereo.slope;
         [
-            plane(forward * self.tan_x - left),
-            plane(forward * self.tan_x + left),
+            plane(forward * (self.tan_x - slope) - left),
+            plane(forward * (self.tan_x + slope) + left),
             plane(forward * self.tan_y - up),
             plane(forward * self.tan_y + up),
         ]
@@ -124,6 +145,41 @@ mod tests {
         // left of the view is the negative x of clip space, up is the negative y (Vulkan)
         assert!((clip(&view, Vec3::new(10.0, 10.0, 0.0)).x + 1.0).abs() < 1e-5);
         assert!((clip(&view, Vec3::new(10.0, 0.0, 10.0)).y + 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_eyes_pictures_meet_at_their_distance() {
+        let mut view = View::new(
+            &RefDef {
+                fov_x: 90.0,
+                fov_y: 90.0,
+                ..RefDef::default()
+            },
+            4.0,
+            1000.0,
+        );
+        let middle = clip(&view, Vec3::new(64.0, 20.0, 0.0));
+        view.stereo = Stereo {
+            slope: 1.0 / 64.0,
+            distance: 64.0,
+        };
+        view.update();
+        let left = clip(&view, Vec3::new(64.0, 20.0, 0.0));
+        assert!((left.x - middle.x).abs() < 1e-5);
+        // to the left eye what is nearer lies farther to the right
+        assert!(clip(&view, Vec3::new(32.0, 0.0, 0.0)).x > 0.01);
+        assert!(clip(&view, Vec3::new(128.0, 0.0, 0.0)).x < -0.005);
+        // what is on the edge of the picture is on the edge of the frustum
+        for (x, edge) in [(-1.0, 0), (1.0, 1)] {
+            let p = view
+                .world_to_clip
+                .inverse()
+                .project_point3(Vec3::new(x, 0.0, 0.5));
+            let plane = view.frustum()[edge];
+            let off = plane.truncate().dot(p) - plane.w;
+            assert!(off.abs() < 1e-2, "{edge}: {off}");
+        }
+        assert!(view.near_world_to_clip().is_some());
     }
 
     #[test]

@@ -1,0 +1,158 @@
+//! The images that a frame is drawn to, as the settings want them.
+
+use crate::Error;
+use crate::gpu::{self, Access, Device, Image, ImageDesc, ImageUsage, Recorder};
+use crate::raster;
+use crate::settings::Settings;
+
+/// Colour and depth of a frame.
+pub struct FrameTargets {
+    /// The picture, one sample a pixel.
+    color: Image,
+    /// What the classic look draws to, where pixels have several samples.
+    several: Option<Image>,
+    /// Depth of what the classic look draws to.
+    depth: Image,
+}
+
+impl FrameTargets {
+    /// Images of a size in pixels, without stencil and multisampling.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn new(device: &Device, width: u32, height: u32) -> Result<Self, Error> {
+        let (width, height) = (width.max(1), height.max(1));
+        let color = Image::new(
+            device,
+            &ImageDesc::new(
+                "frame colour",
+                width,
+                height,
+                raster::COLOR_FORMAT,
+                // Not among the sampled textures: the validation layer takes every draw for a reader of all of them,
+                // so a target among them would be a hazard to itself.
+                ImageUsage::COLOR | ImageUsage::STORAGE,
+            ),
+        )?;
+        // neither the game nor the engine clears the picture before it is first seen
+        clear(device, &color)?;
+        Ok(Self {
+            depth: depth_image(device, &color, 1, false)?,
+            color,
+            several: None,
+        })
+    }
+
+    /// Makes the images anew that the settings want otherwise: several samples where `r_ext_multisample` asks for them
+    /// and nothing is traced, a stencil while shadow volumes are drawn.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn fit(&mut self, device: &Device, settings: &Settings) -> Result<(), Error> {
+        let wanted = if settings.rt { 0 } else { settings.multisample };
+        let stencil = settings.shadows == 2 && device.depth_stencil_format().is_some();
+        let samples = samples(device, wanted, stencil);
+        let drawn = self.drawn().samples();
+        if samples != drawn {
+            self.several = None;
+            if samples > 1 {
+                let (width, height) = (self.color.width(), self.color.height());
+                let (format, usage) = (raster::COLOR_FORMAT, ImageUsage::COLOR);
+                let desc = ImageDesc {
+                    samples,
+                    ..ImageDesc::new("frame samples", width, height, format, usage)
+                };
+                let several = Image::new(device, &desc)?;
+                clear(device, &several)?;
+                self.several = Some(several);
+            }
+        }
+        if samples != self.depth.samples() || stencil != self.depth.format().has_stencil() {
+            self.depth = depth_image(device, &self.color, samples, stencil)?;
+        }
+        Ok(())
+    }
+
+    /// The picture, once resolved.
+    pub fn color(&self) -> &Image {
+        &self.color
+    }
+
+    /// The colour that the classic look draws to.
+    pub fn drawn(&self) -> &Image {
+        self.several.as_ref().unwrap_or(&self.color)
+    }
+
+    /// The depth that the classic look draws to.
+    pub fn depth(&self) -> &Image {
+        &self.depth
+    }
+
+    /// Records that the picture becomes black.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn clear(&self, recorder: &mut Recorder) -> Result<(), gpu::Error> {
+        let mut pass = recorder.pass("clear frame", Access::TRANSFER, Access::TRANSFER)?;
+        pass.clear_image(self.drawn(), BLACK);
+        Ok(())
+    }
+
+    /// Records the averaging of samples into the picture.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn resolve(&self, recorder: &mut Recorder) -> Result<(), gpu::Error> {
+        if let Some(several) = &self.several {
+            let mut pass = recorder.pass("resolve", Access::TRANSFER, Access::TRANSFER)?;
+            pass.resolve_image(several, &self.color);
+        }
+        Ok(())
+    }
+}
+
+const BLACK: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+
+fn clear(device: &Device, image: &Image) -> Result<(), gpu::Error> {
+    device.immediate(|recorder| {
+        let mut pass = recorder.pass("clear frame", Access::NONE, Access::TRANSFER)?;
+        pass.clear_image(image, BLACK);
+        Ok(())
+    })
+}
+
+/// Samples of a pixel for a wish: at least as many where the device has them, otherwise as many as it has.
+fn samples(device: &Device, wish: u32, stencil: bool) -> u32 {
+    if wish < 2 {
+        return 1;
+    }
+    let depth = device.depth_stencil_format().filter(|_| stencil);
+    let depth = depth.unwrap_or(raster::DEPTH_FORMAT);
+    let can = |samples: &u32| {
+        device.supports_samples(raster::COLOR_FORMAT, *samples)
+            && device.supports_samples(depth, *samples)
+    };
+    let wish = wish.next_power_of_two();
+    let mut sizes = [2, 4, 8].into_iter().filter(can);
+    let more = sizes.clone().find(|size| *size >= wish);
+    more.or_else(|| sizes.next_back()).unwrap_or(1)
+}
+
+/// A depth image as large as `color`; with a stencil if that is asked for and the device has one.
+fn depth_image(
+    device: &Device,
+    color: &Image,
+    samples: u32,
+    stencil: bool,
+) -> Result<Image, gpu::Error> {
+    let format = device.depth_stencil_format().filter(|_| stencil);
+    let format = format.unwrap_or(raster::DEPTH_FORMAT);
+    let (width, height) = (color.width(), color.height());
+    Image::new(
+        device,
+        &ImageDesc {
+            samples,
+            ..ImageDesc::new("frame depth", width, height, format, ImageUsage::DEPTH)
+        },
+    )
+}
