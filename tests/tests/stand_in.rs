@@ -7,6 +7,7 @@ use relight::compare::Rgb8;
 use tests::engine::abi::{polyVert_t, refEntity_t};
 use tests::engine::files::Packs;
 use tests::engine::{Engine, Options, View};
+use tests::gallery::tube;
 use tests::maps::{self, ELSEWHERE, HERE, ROOMS};
 
 /// An engine with the small game, its menu registered.
@@ -329,6 +330,68 @@ fn scenes_hold_what_was_added() {
         assert_eq!(
             shown(&mut engine, &|_| ()).mean_luminance().round(),
             empty.mean_luminance().round()
+        );
+    }
+    engine.assert_clean();
+}
+
+#[test]
+fn models_of_every_kind_show_in_both_looks() {
+    let mut files = maps::files();
+    let models = [
+        ("m/key.md3", tube::md3(2)),
+        ("m/bone.mdr", tube::mdr(false)),
+        ("m/small.mdr", tube::mdr(true)),
+        ("m/joint.iqm", tube::iqm(false)),
+    ];
+    let names = models.each_ref().map(|(name, _)| *name);
+    files.extend(models.map(|(name, bytes)| (name.to_string(), bytes)));
+    let mut engine = Engine::start(Options {
+        files,
+        ..Options::default()
+    })
+    .expect("the library starts");
+    engine.start_map(ROOMS).expect("the map loads");
+    let view = View::new(HERE, 0.0);
+    for look in ["0", "1"] {
+        engine.set("r_rt", look);
+        engine.set("rt_reference", "1");
+        let shown = |engine: &mut Engine, entity: Option<refEntity_t>| {
+            let mut frame = || {
+                engine.picture_of(|e| {
+                    e.clear_scene()?;
+                    entity.iter().try_for_each(|entity| e.add_entity(entity))?;
+                    e.render_scene(&view)
+                })
+            };
+            frame().unwrap();
+            frame().unwrap();
+            frame().unwrap()
+        };
+        let empty = shown(&mut engine, None);
+        let mut sizes = Vec::new();
+        for name in names {
+            let entity = refEntity_t {
+                hModel: engine.register_model(name).unwrap(),
+                origin: [-40.0, 0.0, 40.0],
+                frame: 2,
+                oldframe: 2,
+                ..refEntity_t::default()
+            };
+            let picture = shown(&mut engine, Some(entity));
+            dump(&picture, &format!("model-{look}-{}", sizes.len()));
+            // what their shaders name is not there: they have the default image, dark with a bright edge
+            let changed = (0..320 * 240).filter(|at| {
+                let (x, y) = (at % 320, at / 320);
+                !near(pixel(&picture, x, y), pixel(&empty, x, y), 60)
+            });
+            sizes.push(changed.count());
+        }
+        // frames, bones and joints: one and the same shape
+        let first = sizes[0];
+        assert!(
+            first > 500 && sizes.iter().all(|size| size.abs_diff(first) < first / 20),
+            "r_rt {look}: {names:?} have {sizes:?} pixels"
         );
     }
     engine.assert_clean();

@@ -185,7 +185,7 @@ fn board() -> Board {
 }
 
 fn with_models(mut files: Vec<File>) -> Vec<File> {
-    files.push(("m/key.md3".to_string(), tube::md3()));
+    files.push(("m/key.md3".to_string(), tube::md3(2)));
     files
 }
 

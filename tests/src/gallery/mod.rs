@@ -30,7 +30,7 @@ mod entities;
 mod materials;
 mod models;
 mod stages;
-mod tube;
+pub mod tube;
 
 pub use stage::Stage;
 

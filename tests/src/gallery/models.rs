@@ -127,15 +127,15 @@ fn board() -> Board {
 
 fn files() -> Vec<File> {
     let own = [
-        ("m/key.md3", tube::md3()),
-        ("m/key_1.md3", tube::md3()),
+        ("m/key.md3", tube::md3(2)),
+        ("m/key_1.md3", tube::md3(1)),
         ("m/bone.mdr", tube::mdr(false)),
         ("m/small.mdr", tube::mdr(true)),
         ("m/joint.iqm", tube::iqm(false)),
         ("m/stretch.iqm", tube::iqm(true)),
         ("m/rigid.iqm", tube::rigid_iqm()),
         ("m/broken.iqm", b"INTERQUAKEMODEL\0 and no more".to_vec()),
-        ("m/broken.md3", tube::md3()),
+        ("m/broken.md3", tube::md3(2)),
         ("m/skin.skin", b"upper,g/base\nLOWER,tube/glow\n".to_vec()),
         ("m/half.skin", b"upper,g/env\n".to_vec()),
     ];
@@ -379,6 +379,7 @@ fn levels(stage: &mut Stage) -> Result<(), Raised> {
     ];
     for (name, bias, scale) in [
         ("plain", "0", "5"),
+        ("mixed", "0", "2"),
         ("coarser", "1", "5"),
         ("finer", "-1", "0"),
         ("coarse", "0", "0"),
@@ -396,10 +397,9 @@ fn levels(stage: &mut Stage) -> Result<(), Raised> {
                         ..refEntity_t::default()
                     };
                     let left = if side == 0 { 1.0 } else { -1.0 };
-                    place(
-                        &mut entity,
-                        Vec3::new(step * 60.0 - 230.0, left * (24.0 + step * 34.0), 0.0),
-                    );
+                    let distance = 50.0 + step * 60.0;
+                    let y = left * distance * (0.85 - step * 0.17);
+                    place(&mut entity, Vec3::new(distance - 280.0, y, 0.0));
                     e.add_entity(&entity)?;
                 }
             }

@@ -126,8 +126,8 @@ fn frame(number: usize) -> Frame {
     }
 }
 
-/// With vertices per frame. Each part has `g/base`, its own shader and `g/env` as skins 0, 1 and 2.
-pub fn md3() -> Vec<u8> {
+/// With vertices per frame, `parts` of two. Each part has `g/base`, its own shader and `g/env` as skins 0, 1 and 2.
+pub fn md3(parts: usize) -> Vec<u8> {
     let tag = |number: usize| {
         let [_, upper] = bones(number);
         Tag {
@@ -157,7 +157,7 @@ pub fn md3() -> Vec<u8> {
         frames: (0..FRAMES).map(frame).collect(),
         tags: (0..FRAMES).map(tag).collect(),
         num_tags: 1,
-        surfaces: PARTS.map(surface).to_vec(),
+        surfaces: PARTS.into_iter().take(parts).map(surface).collect(),
     }
     .write()
 }
