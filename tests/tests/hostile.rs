@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 use tests::engine::{Engine, Options, View};
+use tests::gallery::tube;
 use tests::maps::{self, HERE, ROOMS};
 
 fn engine_with(files: Vec<(&str, Vec<u8>)>) -> Engine {
@@ -205,6 +206,68 @@ fn broken_models_are_refused() {
             .unwrap();
     }
     assert_goes_on(&mut engine);
+}
+
+#[test]
+fn broken_skeletons_are_refused_or_drawn() {
+    let mut engine = engine_with(vec![]);
+    engine.start_map(ROOMS).unwrap();
+    let view = View::new(HERE, 0.0);
+    let mut numbers = 12345u32;
+    let mut next = || {
+        numbers = numbers.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (numbers >> 8) as usize
+    };
+    let kinds = [
+        ("mdr", tube::mdr(false)),
+        ("mdr", tube::mdr(true)),
+        ("iqm", tube::iqm(true)),
+    ];
+    for (number, (kind, whole)) in kinds.into_iter().enumerate() {
+        for part in 0..8 {
+            let name = format!("models/cut{number}-{part}.{kind}");
+            engine.insert_file(&name, whole[..whole.len() * part / 8].to_vec());
+            assert_eq!(engine.register_model(&name).unwrap(), 0, "{part} eighths");
+            // what is not there at all is no more than missing
+            if part > 0 {
+                line_about(&engine, &name);
+            }
+        }
+        let mut models = Vec::new();
+        for part in 0..60 {
+            let mut bytes = whole.clone();
+            for _ in 0..8 {
+                let at = next() % bytes.len();
+                bytes[at] = next() as u8;
+            }
+            let name = format!("models/poked{number}-{part}.{kind}");
+            engine.insert_file(&name, bytes);
+            models.push(engine.register_model(&name).unwrap());
+        }
+        assert!(models.iter().any(|model| *model > 0));
+        for look in ["0", "1"] {
+            engine.set("r_rt", look);
+            let picture = engine.picture_of(|e| {
+                e.clear_scene()?;
+                for &model in &models {
+                    e.model_bounds(model)?;
+                    e.lerp_tag(model, [-3, i32::MAX], 0.5, tube::TAG)?;
+                    e.add_entity(&tests::engine::abi::refEntity_t {
+                        hModel: model,
+                        frame: 2,
+                        oldframe: 1,
+                        backlerp: 0.5,
+                        origin: [-40.0, 0.0, 40.0],
+                        ..Default::default()
+                    })?;
+                }
+                e.render_scene(&view)
+            });
+            picture.unwrap();
+        }
+        engine.set("r_rt", "0");
+    }
+    engine.assert_clean();
 }
 
 #[test]

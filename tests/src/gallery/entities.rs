@@ -72,6 +72,12 @@ pub(super) fn scenes() -> Vec<Scene> {
             polys,
         ),
         scene(
+            "entities-order",
+            "Translucent entities in the order of their numbers and shaders, several scenes in a frame.",
+            plain_files,
+            order,
+        ),
+        scene(
             "entities-values",
             "Colour, texture offset and time of an entity in its material.",
             plain_files,
@@ -679,6 +685,63 @@ fn polys(stage: &mut Stage) -> Result<(), Raised> {
         e.add_poly(round, &corners, 5)?;
         e.add_poly(add, &corners[..2], 2)?;
         e.add_poly(0, &corners, 5)
+    })
+}
+
+fn order(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(MAP)?;
+    let round = stage.register_shader("e/sprite")?;
+    let add = stage.register_shader("e/add")?;
+    let view = stage.view(Vec3::new(-120.0, 0.0, 0.0), 0.0);
+    let mut all = Vec::new();
+    for at in 0..8u8 {
+        let step = f32::from(at);
+        // nearer ones before and after farther ones
+        let x = if at % 3 == 0 { -step } else { step };
+        let shader = if at % 2 == 0 { round } else { add };
+        all.push(refEntity_t {
+            rotation: step * 20.0,
+            shaderRGBA: [255, 32 * at, 255 - 32 * at, 255],
+            ..sprite(
+                Vec3::new(x * 6.0, step * 14.0 - 50.0, step * 6.0),
+                22.0,
+                shader,
+            )
+        });
+    }
+    all.push(tube_at(stage, Vec3::new(0.0, 10.0, 0.0))?);
+    keep(stage, "numbers", &view, &all)?;
+    all.reverse();
+    keep(stage, "reversed", &view, &all)?;
+    let half = View {
+        width: view.width / 2,
+        ..view
+    };
+    let right = View {
+        place: [view.width / 2, 40],
+        height: view.height / 2,
+        ..half
+    };
+    stage.keep("scenes", |e| {
+        e.clear_scene()?;
+        all.iter()
+            .take(4)
+            .try_for_each(|entity| e.add_entity(entity))?;
+        e.add_light(Vec3::new(0.0, 30.0, 30.0), 150.0, Vec3::ONE)?;
+        e.render_scene(&half)?;
+        // what was drawn is gone, without being cleared
+        all.iter()
+            .skip(3)
+            .try_for_each(|entity| e.add_entity(entity))?;
+        e.render_scene(&right)?;
+        e.add_entity(&all[0])?;
+        e.clear_scene()?;
+        e.render_scene(&View {
+            place: [view.width / 2, 300],
+            height: 100,
+            flags: NO_WORLD_MODEL,
+            ..half
+        })
     })
 }
 
