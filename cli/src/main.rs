@@ -7,6 +7,7 @@ mod compare;
 mod info;
 mod render;
 mod table;
+mod timings;
 
 use clap::{Parser, Subcommand};
 

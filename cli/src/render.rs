@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::timings::Timings;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use glam::Vec3;
@@ -81,9 +82,12 @@ pub struct RenderArgs {
     /// Switch Vulkan's validation layer on; any message is an error
     #[arg(long)]
     validate: bool,
-    /// Print GPU milliseconds of each pass (the mean over the frames) as JSON
+    /// Print milliseconds as JSON: of the GPU for each pass (the mean over the frames), and of GPU and CPU for a frame
     #[arg(long)]
     timings: bool,
+    /// Turn the camera once round over the frames, so that they show different things
+    #[arg(long)]
+    turn: bool,
     /// Measure frames as a game would send them: nothing accumulates
     #[arg(long)]
     no_accumulation: bool,
@@ -320,21 +324,24 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         "{msg} {bar:40} {pos}/{len} frames, {eta} left",
     )?);
     bar.set_message(format!("{map} on {}", info.name));
-    let mut timings: Vec<(String, f32, u32)> = Vec::new();
-    for _ in 0..frames {
+    let mut timings = Timings::default();
+    for frame in 0..frames {
+        let mut def = def;
+        if args.turn {
+            let turned = Camera {
+                yaw: camera.yaw + 360.0 * frame as f32 / frames as f32,
+                ..camera
+            };
+            def.view_axis = turned.axis();
+        }
         renderer.begin_frame(def.time_ms);
         renderer.clear_scene();
         for entity in &entities {
             renderer.add_entity(entity);
         }
         renderer.render_scene(&def)?;
-        renderer.end_frame()?;
-        for (name, ms) in renderer.timings() {
-            match timings.iter_mut().find(|(n, ..)| *n == name) {
-                Some((_, sum, count)) => (*sum, *count) = (*sum + ms, *count + 1),
-                None => timings.push((name, ms, 1)),
-            }
-        }
+        let stats = renderer.end_frame()?;
+        timings.add(&renderer.timings(), &stats);
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -349,14 +356,17 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     .with_context(|| format!("{}: cannot be written", args.output.display()))?;
     println!("{}", args.output.display());
     if args.timings {
-        let passes: serde_json::Map<_, _> = timings
-            .into_iter()
-            .map(|(name, sum, count)| (name, serde_json::json!(sum / count as f32)))
-            .collect();
-        let report = serde_json::json!({
-            "device": info.name, "map": map, "width": width, "height": height, "frames": frames, "ms": passes,
-        });
-        println!("{report}");
+        let mut report = timings.report();
+        for (key, value) in [
+            ("device", serde_json::json!(info.name)),
+            ("map", serde_json::json!(map)),
+            ("width", serde_json::json!(width)),
+            ("height", serde_json::json!(height)),
+            ("frames", serde_json::json!(frames)),
+        ] {
+            report.insert(key.into(), value);
+        }
+        println!("{}", serde_json::Value::Object(report));
     }
     let messages = renderer.validation_messages();
     if !messages.is_empty() {

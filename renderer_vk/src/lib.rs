@@ -21,6 +21,6 @@ pub mod world;
 
 pub use assets::is_texture_mode;
 pub use error::Error;
-pub use renderer::{FrameStats, Renderer, RendererOptions, probe};
+pub use renderer::{CpuTimes, FrameStats, Renderer, RendererOptions, probe};
 pub use settings::{LightSampling, Settings};
 pub use stereo::Eye;

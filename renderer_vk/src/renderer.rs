@@ -1,6 +1,7 @@
 //! The renderer as a front end sees it.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use glam::{Vec2, Vec3};
 use relight::{GameFiles, overbright};
@@ -49,6 +50,25 @@ pub struct FrameStats {
     pub draws: u32,
     /// What the views of the classic look show; counted only with `r_speeds`.
     pub scene: Statistics,
+    /// Milliseconds of the CPU on the frame.
+    pub cpu: CpuTimes,
+}
+
+/// Where the calling thread's time went in a frame, milliseconds.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CpuTimes {
+    /// Finding out what the views show.
+    pub gather: f32,
+    /// Waiting for an earlier frame; with two in flight the one before the last.
+    pub wait: f32,
+    /// Recording commands, with the upload of what moves.
+    pub record: f32,
+    /// Handing them to the driver, and the picture to the window.
+    pub submit: f32,
+}
+
+fn milliseconds(from: Instant, to: Instant) -> f32 {
+    to.duration_since(from).as_secs_f32() * 1000.0
 }
 
 /// The renderer: one device, one window or none, and what the game has registered.
@@ -75,6 +95,8 @@ pub struct Renderer {
     eye: Eye,
     /// `r_anaglyphMode` of the newest frame.
     shown_anaglyph: u32,
+    /// Milliseconds spent on gathering views since the last frame.
+    gather_ms: f32,
     overlay: Overlay,
     spare_overlays: Vec<Overlay>,
     overlay_time: f32,
@@ -142,6 +164,7 @@ impl Renderer {
             unshown: false,
             eye: Eye::Both,
             shown_anaglyph: 0,
+            gather_ms: 0.0,
             overlay: Overlay::default(),
             spare_overlays: Vec::new(),
             overlay_time: 0.0,
@@ -224,8 +247,26 @@ impl Renderer {
         Ok(())
     }
 
-    /// The game has registered everything.
-    pub fn end_registration(&mut self) {}
+    /// The game has registered everything: makes the pipelines that it will draw with.
+    pub fn end_registration(&mut self) {
+        let fits = self.targets.fit(&self.device, &self.settings);
+        let Some(assets) = &self.assets else { return };
+        let target = raster::Target {
+            color: self.targets.drawn(),
+            depth: self.targets.depth(),
+            mask: ColorMask::ALL,
+        };
+        let stages = raster::StageContext {
+            materials: &assets.materials,
+            samplers: &assets.samplers,
+            identity_light: self.settings.identity_light(),
+        };
+        // what is not made now is made when it is drawn
+        let made = self.raster.expect_materials(target.kind(), stages);
+        if let Err(e) = fits.and(made.map_err(Error::from)) {
+            log::warn!("pipelines are not made ahead: {e}");
+        }
+    }
 
     /// Forgets every model, texture, material and the map. May be called again and again.
     pub fn shutdown_registration(&mut self) {
@@ -349,9 +390,11 @@ impl Renderer {
         let Some(assets) = &mut self.assets else {
             return Err(Error::NotRegistered);
         };
+        let begin = Instant::now();
         let mut scenes =
             self.scene
                 .gather(self.world.as_ref(), assets, &self.settings, def, look)?;
+        self.gather_ms += milliseconds(begin, Instant::now());
         let item = match look {
             Look::Classic => Item::Classic(scenes),
             Look::Traced => match scenes.pop() {
@@ -559,7 +602,9 @@ impl Renderer {
         if later {
             self.show_finished()?;
         }
+        let begin = Instant::now();
         let mut recorder = self.ring.begin()?;
+        let ready = Instant::now();
         // channels that no eye draws keep what was there
         if self.shown_anaglyph != self.settings.anaglyph {
             self.shown_anaglyph = self.settings.anaglyph;
@@ -596,12 +641,19 @@ impl Renderer {
             self.targets.resolve(&mut recorder)?;
         }
         self.recycle_queue();
+        let recorded = Instant::now();
         if later || !show {
             self.ring.end(recorder)?;
             self.unshown |= later;
         } else {
             self.show(recorder)?;
         }
+        stats.cpu = CpuTimes {
+            gather: std::mem::take(&mut self.gather_ms),
+            wait: milliseconds(begin, ready),
+            record: milliseconds(ready, recorded),
+            submit: milliseconds(recorded, Instant::now()),
+        };
         Ok(stats)
     }
 

@@ -6,6 +6,7 @@
 
 mod aids;
 mod cover;
+mod expected;
 mod flares;
 mod list;
 mod overlay;
@@ -34,6 +35,7 @@ use cover::Cover;
 use list::DepthRange;
 use pipelines::Pipelines;
 use shadows::Shadows;
+use target::TargetKind;
 
 /// Format of the frame's colour image.
 pub const COLOR_FORMAT: Format = Format::Rgba8;
@@ -110,6 +112,28 @@ impl Raster {
     /// The decals' depth offset.
     pub fn set_offset(&mut self, factor: f32, units: f32) {
         self.pipelines.set_offset((factor, units));
+    }
+
+    /// Makes the pipelines that the registered materials will need on a target.
+    ///
+    /// # Errors
+    /// The device is out of memory or cannot make a pipeline.
+    pub fn expect_materials(
+        &mut self,
+        target: TargetKind,
+        stages: StageContext<'_>,
+    ) -> Result<(), gpu::Error> {
+        let mut result = Ok(());
+        let mut make = |state| {
+            if result.is_ok() {
+                result = self.pipelines.prepare(target, state);
+            }
+        };
+        for material in stages.materials.iter() {
+            expected::states(&stages, material, &mut make);
+        }
+        expected::light_states(&mut make);
+        result
     }
 
     /// Records a draw list as one pass called `name`.
