@@ -88,6 +88,14 @@ pub struct IqmPose {
     pub scale: Vec3,
 }
 
+/// The joints of a model when it was bound, in the model's space ([`Iqm::skeleton`]).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct IqmSkeleton {
+    bind: Vec<BoneMatrix>,
+    /// What undoes them, provided that joints are scaled evenly.
+    inverse: Vec<BoneMatrix>,
+}
+
 /// How the poses of one joint are stored: number `c` of its pose is `offset[c]` and, if bit `c` of the mask is set,
 /// `scale[c]` times the next stored number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -270,35 +278,49 @@ impl Iqm {
         }
     }
 
-    /// For each joint what takes a vertex out of the pose that it was bound in ([`Self::pose`] wants it).
-    pub fn inverse_bind(&self) -> Vec<BoneMatrix> {
+    /// The skeleton as it was when the model was bound.
+    pub fn skeleton(&self) -> IqmSkeleton {
+        let mut bind = Vec::new();
+        self.bind_pose(&mut bind);
         let mut inverse: Vec<BoneMatrix> = Vec::with_capacity(self.joints.len());
         for joint in &self.joints {
             let local = joint.pose.matrix().inverse_of_even();
             let parent = joint.parent.and_then(|parent| inverse.get(parent));
             inverse.push(parent.map_or(local, |parent| local.after(parent)));
         }
-        inverse
+        IqmSkeleton { bind, inverse }
     }
 
     /// Replaces `out` by what moves the vertices of each joint between two frames; `back` is the weight of the old
-    /// one. `inverse_bind` is [`Self::inverse_bind`], which is the same for every pose. Empty for a model without
-    /// poses: its vertices stay where they are.
+    /// one. `skeleton` is [`Self::skeleton`], which is the same for every pose. Empty for a model without poses: its
+    /// vertices stay where they are.
     pub fn pose(
         &self,
-        inverse_bind: &[BoneMatrix],
+        skeleton: &IqmSkeleton,
         new: usize,
         old: usize,
         back: f32,
         out: &mut Vec<BoneMatrix>,
     ) {
+        out.clear();
         if !self.is_animated() {
-            out.clear();
             return;
         }
-        self.joint_matrices(new, old, back, out);
-        for (matrix, inverse) in out.iter_mut().zip(inverse_bind) {
-            *matrix = matrix.after(inverse);
+        let between = self.frame_poses(new).zip(self.frame_poses(old));
+        let joints = self.joints.iter().zip(&skeleton.inverse);
+        for ((new_pose, old_pose), (joint, inverse)) in between.zip(joints) {
+            let pose = if new == old {
+                new_pose
+            } else {
+                new_pose.mix(&old_pose, back)
+            };
+            let local = pose.matrix().after(inverse);
+            // where the inverse does not undo the bound pose exactly this is not the joint's own place, but the engine's
+            let parent = joint.parent.and_then(|parent| {
+                let bind = skeleton.bind.get(parent)?;
+                Some(out.get(parent)?.after(bind))
+            });
+            out.push(parent.map_or(local, |parent| parent.after(&local)));
         }
     }
 

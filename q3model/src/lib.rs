@@ -31,7 +31,8 @@ pub use bone::BoneMatrix;
 pub use error::Error;
 pub use font::{FONT_FILE_BYTES, FontInfo, GLYPHS_PER_FONT, Glyph};
 pub use iqm::{
-    IQM_CHANNELS, IQM_WEIGHTS, Iqm, IqmChannels, IqmJoint, IqmPose, IqmSurface, IqmVertex,
+    IQM_CHANNELS, IQM_WEIGHTS, Iqm, IqmChannels, IqmJoint, IqmPose, IqmSkeleton, IqmSurface,
+    IqmVertex,
 };
 pub use md3::{Frame, Md3, PackedVertex, Surface, Tag};
 pub use mdr::{Mdr, MdrSurface, MdrTag, MdrVertex, MdrWeight};

@@ -145,7 +145,7 @@ fn iqm() -> Iqm {
 
 fn posed(model: &Iqm, new: usize, old: usize, back: f32) -> Vec<Vec3> {
     let mut matrices = Vec::new();
-    model.pose(&model.inverse_bind(), new, old, back, &mut matrices);
+    model.pose(&model.skeleton(), new, old, back, &mut matrices);
     model
         .vertices
         .iter()
@@ -193,7 +193,7 @@ fn survive_iqm(bytes: &[u8]) -> bool {
     };
     let mut matrices = Vec::new();
     let last = model.num_frames.saturating_sub(1);
-    model.pose(&model.inverse_bind(), 0, last, 0.5, &mut matrices);
+    model.pose(&model.skeleton(), 0, last, 0.5, &mut matrices);
     assert!(matrices.is_empty() || matrices.len() == model.joints.len());
     for surface in &model.surfaces {
         let vertices = model.surface_vertices(surface);
@@ -324,7 +324,7 @@ fn iqm_vertices_follow_their_joints() {
         Vec3::new(eighth.cos(), eighth.sin(), 0.0) * 4.0
     ));
     let mut matrices = Vec::new();
-    model.pose(&model.inverse_bind(), 1, 1, 0.0, &mut matrices);
+    model.pose(&model.skeleton(), 1, 1, 0.0, &mut matrices);
     assert!(near(model.vertices[1].skinned(&matrices).1, -Vec3::X));
 }
 
@@ -428,6 +428,51 @@ fn frames_without_numbers_take_no_memory() {
     let model = Iqm::parse(&bytes).unwrap();
     assert_eq!(model.num_frames, i32::MAX as usize);
     assert!(near(posed(&model, 1 << 30, 5, 0.5)[0], Vec3::X * 4.0));
+}
+
+#[test]
+fn weights_may_be_bytes_and_joints_integers() {
+    let model = iqm();
+    let mut bytes = IQM.clone();
+    let arrays_at = i32::from_le_bytes(IQM[52..56].try_into().unwrap()) as usize;
+    // positions, texture coordinates, normals, joints, weights, colours
+    let mut replace = |array: usize, format: i32, data: &[u8]| {
+        let record = arrays_at + array * 20;
+        let offset = bytes.len() as i32;
+        bytes[record + 8..record + 12].copy_from_slice(&format.to_le_bytes());
+        bytes[record + 16..record + 20].copy_from_slice(&offset.to_le_bytes());
+        bytes.extend_from_slice(data);
+    };
+    let joints: Vec<u8> = model
+        .vertices
+        .iter()
+        .flat_map(|v| v.joints.map(i32::from))
+        .flat_map(i32::to_le_bytes)
+        .collect();
+    replace(3, 4, &joints);
+    let weights: Vec<u8> = model
+        .vertices
+        .iter()
+        .flat_map(|v| v.weights.map(|w| (w * 255.0) as u8))
+        .collect();
+    replace(4, 1, &weights);
+    let length = bytes.len() as i32;
+    bytes[20..24].copy_from_slice(&length.to_le_bytes());
+    let read = Iqm::parse(&bytes).unwrap();
+    for (found, expected) in read.vertices.iter().zip(&model.vertices) {
+        assert_eq!(found.joints, expected.joints);
+        for (found, expected) in found.weights.iter().zip(expected.weights) {
+            assert!((found - expected).abs() < 1.0 / 255.0);
+        }
+    }
+    assert_eq!(read.vertices[0].weights[0], 1.0);
+    // a joint that no weight asks for may be anything; one that is asked for has to be there
+    let first = bytes.len() - weights.len() - joints.len();
+    bytes[first + 12] = 99;
+    assert!(Iqm::parse(&bytes).is_ok());
+    bytes[first] = 99;
+    let error = Iqm::parse(&bytes).unwrap_err().to_string();
+    assert_eq!(error, "joint of vertex 0 is 99, outside its 2 joints");
 }
 
 #[test]

@@ -106,10 +106,10 @@ impl Loader<'_> {
         let iqm = self.read(file, Iqm::parse)?;
         let surfaces = iqm.surfaces.iter();
         let materials = surfaces.map(|s| self.material(&s.material)).collect();
-        let inverse_bind = iqm.inverse_bind();
+        let skeleton = iqm.skeleton();
         Some(Model::Iqm(IqmModel {
             iqm,
-            inverse_bind,
+            skeleton,
             materials,
         }))
     }

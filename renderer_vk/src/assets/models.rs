@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::Vec3;
-use q3model::{BoneMatrix, Iqm, Md3, Mdr};
+use q3model::{Iqm, IqmSkeleton, Md3, Mdr};
 use relight::GameFiles;
 
 use super::materials::Materials;
@@ -38,8 +38,8 @@ pub struct MdrModel {
 pub struct IqmModel {
     /// The model.
     pub iqm: Iqm,
-    /// What takes vertices out of the pose that they were bound in, for each joint.
-    pub inverse_bind: Vec<BoneMatrix>,
+    /// Its joints when it was bound.
+    pub skeleton: IqmSkeleton,
     /// For each surface the material; the default material for an unusable one.
     pub materials: Vec<u32>,
 }

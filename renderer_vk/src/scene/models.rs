@@ -139,9 +139,8 @@ impl Gatherer<'_> {
         let half = (around.maxs - around.mins) * 0.5;
         let placed = self.place(placed, around.mins + half, half.length(), out);
         let mut pose = std::mem::take(&mut self.scratch.bones);
-        let inverse_bind = &model.inverse_bind;
         let Frames { new, old, backlerp } = frames;
-        iqm.pose(inverse_bind, new, old, backlerp, &mut pose);
+        iqm.pose(&model.skeleton, new, old, backlerp, &mut pose);
         for (surface, own) in iqm.surfaces.iter().zip(&model.materials) {
             let own = std::slice::from_ref(own);
             self.add_surface(&placed, &surface.name, own, out, |out| {

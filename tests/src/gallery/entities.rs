@@ -4,8 +4,8 @@ use glam::Vec3;
 use q3bsp::builder::MapBuilder;
 
 use super::board::{Board, MAP, Shape};
-use super::models::turned;
-use super::{File, Limit, Scene, Stage, tube};
+use super::models::{KINDS, model_files, turned};
+use super::{File, Limit, Scene, Stage};
 use crate::engine::abi::{polyVert_t, refEntity_t};
 use crate::engine::{Raised, View};
 
@@ -191,7 +191,7 @@ fn board() -> Board {
 }
 
 fn with_models(mut files: Vec<File>) -> Vec<File> {
-    files.push(("m/key.md3".to_string(), tube::md3(2)));
+    files.extend(model_files());
     files
 }
 
@@ -613,8 +613,20 @@ fn fog(stage: &mut Stage) -> Result<(), Raised> {
             Vec3::new(30.0, -90.0, 40.0),
         )
     });
+    let mut kinds = Vec::new();
+    for (row, height) in [(0, 36.0), (1, 14.0), (2, -30.0)] {
+        for (at, kind) in KINDS.into_iter().enumerate() {
+            // the middle ones reach into the fog: whether they have it depends on the sphere around them
+            let place = Vec3::new(f32::from(row as u8) * 20.0, 80.0 - at as f32 * 40.0, height);
+            kinds.push(refEntity_t {
+                hModel: stage.register_model(kind)?,
+                ..tube_at(stage, place)?
+            });
+        }
+    }
     for (name, height) in [("above", 40.0), ("inside", -40.0)] {
         let view = stage.view(Vec3::new(-150.0, 0.0, height), 0.0);
+        keep(stage, &format!("{name}-kinds"), &view, &kinds)?;
         keep(stage, name, &view, &all)?;
         stage.keep_view(&format!("{name}-polys"), &view, |e| {
             for step in 0..6u8 {

@@ -23,6 +23,11 @@ pub(super) fn scenes() -> Vec<Scene> {
             )
         },
         scene(
+            "models-odd",
+            "An IQM without poses, and one whose joints are bound unevenly.",
+            odd,
+        ),
+        scene(
             "models-surfaces",
             "Skins, skin numbers, the entity's own shader, colours of vertices, on every kind of model.",
             surfaces,
@@ -73,7 +78,7 @@ pub(super) fn scenes() -> Vec<Scene> {
 }
 
 /// Every kind of model under the name that its file has.
-const KINDS: [&str; 5] = [
+pub(super) const KINDS: [&str; 5] = [
     "m/key.md3",
     "m/bone.mdr",
     "m/small.mdr",
@@ -126,6 +131,13 @@ fn board() -> Board {
 }
 
 fn files() -> Vec<File> {
+    let mut files = board().files();
+    files.extend(model_files());
+    files
+}
+
+/// The models and their skins.
+pub(super) fn model_files() -> Vec<File> {
     let own = [
         ("m/key.md3", tube::md3(2)),
         ("m/key_1.md3", tube::md3(1)),
@@ -134,14 +146,13 @@ fn files() -> Vec<File> {
         ("m/joint.iqm", tube::iqm(false)),
         ("m/stretch.iqm", tube::iqm(true)),
         ("m/rigid.iqm", tube::rigid_iqm()),
+        ("m/skewed.iqm", tube::skewed_iqm()),
         ("m/broken.iqm", b"INTERQUAKEMODEL\0 and no more".to_vec()),
         ("m/broken.md3", tube::md3(2)),
         ("m/skin.skin", b"upper,g/base\nLOWER,tube/glow\n".to_vec()),
         ("m/half.skin", b"upper,g/env\n".to_vec()),
     ];
-    let mut files = board().files();
-    files.extend(own.map(|(name, bytes)| (name.to_string(), bytes)));
-    files
+    own.map(|(name, bytes)| (name.to_string(), bytes)).to_vec()
 }
 
 /// A row of models, the first at the left.
@@ -187,6 +198,29 @@ fn kinds(stage: &mut Stage) -> Result<(), Raised> {
         })?;
     }
     Ok(())
+}
+
+/// Models that no other kind has the like of: without poses, and bound in a way that cannot be undone.
+fn odd(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(MAP)?;
+    let view = stage.view(Vec3::new(-110.0, 0.0, 10.0), 0.0);
+    let mut all = Vec::new();
+    let models = ["rigid", "skewed", "skewed", "skewed"];
+    for (at, (name, frame)) in models.into_iter().zip([1, 0, 1, 2]).enumerate() {
+        let mut entity = refEntity_t {
+            hModel: stage.register_model(&format!("m/{name}.iqm"))?,
+            frame,
+            oldframe: frame / 2,
+            backlerp: 0.4,
+            axis: turned(25.0),
+            ..refEntity_t::default()
+        };
+        place(&mut entity, row(at, models.len()));
+        all.push(entity);
+    }
+    stage.keep_view("row", &view, |e| {
+        all.iter().try_for_each(|entity| e.add_entity(entity))
+    })
 }
 
 fn surfaces(stage: &mut Stage) -> Result<(), Raised> {

@@ -286,6 +286,16 @@ pub fn iqm(stretched: bool) -> Vec<u8> {
     model.write()
 }
 
+/// The same, bound with joints that lean and are scaled unevenly, so that nothing undoes their matrices exactly.
+pub fn skewed_iqm() -> Vec<u8> {
+    let mut model = Iqm::parse(&iqm(true)).expect("a model of one's own");
+    for (joint, scale) in model.joints.iter_mut().zip([1.2, 0.8]) {
+        joint.pose.rotate *= Quat::from_rotation_x(0.4) * Quat::from_rotation_y(0.3);
+        joint.pose.scale = Vec3::new(scale, 1.0, 1.1);
+    }
+    model.write()
+}
+
 /// The same without poses, joints and bounds.
 pub fn rigid_iqm() -> Vec<u8> {
     let model = Iqm::parse(&iqm(true)).expect("a model of one's own");
