@@ -16,6 +16,7 @@ mod bytes;
 mod error;
 mod font;
 mod iqm;
+mod iqm_arrays;
 mod iqm_parse;
 mod iqm_write;
 mod md3;

@@ -1,5 +1,8 @@
 //! Models of every kind: key frames, bones, joints; their skins, levels of detail, tags and bounds.
 
+mod answers;
+mod placed;
+
 use glam::Vec3;
 
 use super::board::{Board, MAP, Shape};
@@ -47,7 +50,7 @@ pub(super) fn scenes() -> Vec<Scene> {
             ..scene(
                 "models-volumes",
                 "Stencil shadows of every kind of model, and of those that ask for none.",
-                shadows,
+                placed::shadows,
             )
         },
         Scene {
@@ -55,7 +58,7 @@ pub(super) fn scenes() -> Vec<Scene> {
             ..scene(
                 "models-planes",
                 "Planar shadows of every kind of model, seen or not.",
-                shadows,
+                placed::shadows,
             )
         },
         Scene {
@@ -63,7 +66,7 @@ pub(super) fn scenes() -> Vec<Scene> {
             ..scene(
                 "models-player",
                 "A player of the game put together by tags, in a map and in a view without one.",
-                player,
+                placed::player,
             )
         },
         Scene {
@@ -71,7 +74,7 @@ pub(super) fn scenes() -> Vec<Scene> {
             ..scene(
                 "models-answers",
                 "Tags between frames and bounds of every kind of model.",
-                answers,
+                answers::answers,
             )
         },
     ]
@@ -438,140 +441,6 @@ fn levels(stage: &mut Stage) -> Result<(), Raised> {
                 }
             }
             Ok(())
-        })?;
-    }
-    Ok(())
-}
-
-fn answers(stage: &mut Stage) -> Result<(), Raised> {
-    stage.start_map(MAP)?;
-    let others = [
-        "m/rigid.iqm",
-        "m/joint",
-        "m/bone.md3",
-        "m/broken.iqm",
-        "m/none.md3",
-        "*0",
-    ];
-    for kind in KINDS.into_iter().chain(others) {
-        let model = stage.register_model(kind)?;
-        stage.fact(&format!("{kind} found"), model > 0);
-        let (mins, maxs) = stage.model_bounds(model)?;
-        let line = |v: Vec3| format!("{} {} {}", v.x, v.y, v.z);
-        stage.fact(
-            &format!("{kind} bounds"),
-            format!("{} {}", line(mins), line(maxs)),
-        );
-        // frames beyond the last are read past the end of its poses by the reference, where a model has joints
-        let beyond = if kind.ends_with("iqm") || kind == "m/joint" {
-            2
-        } else {
-            9
-        };
-        for (start, end, frac) in [(0, 0, 0.0), (0, 1, 0.25), (1, 2, 0.5), (2, beyond, 1.0)] {
-            for tag in [tube::TAG, "root", "TAG_TOP", "none"] {
-                let found = stage.lerp_tag(model, [start, end], frac, tag)?;
-                let text = found.map_or_else(
-                    || "none".to_string(),
-                    |at| {
-                        let axis = at.axis.map(|a| line(a.into()));
-                        format!("{} {}", line(at.origin.into()), axis.join(" "))
-                    },
-                );
-                stage.fact(&format!("{kind} {tag} {start} {end} {frac}"), text);
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Hangs an entity on a tag of another one.
-fn hang(
-    stage: &mut Stage,
-    child: &mut refEntity_t,
-    parent: &refEntity_t,
-    tag: &str,
-) -> Result<(), Raised> {
-    let frames = [parent.oldframe, parent.frame];
-    let found = stage.lerp_tag(parent.hModel, frames, 1.0 - parent.backlerp, tag)?;
-    let found = found.unwrap_or_default();
-    let [x, y, z] = parent.axis.map(Vec3::from);
-    let turn = |v: [f32; 3]| x * v[0] + y * v[1] + z * v[2];
-    child.origin = (Vec3::from(parent.origin) + turn(found.origin)).to_array();
-    child.axis = found.axis.map(|axis| turn(axis).to_array());
-    Ok(())
-}
-
-fn player(stage: &mut Stage) -> Result<(), Raised> {
-    const NO_WORLD_MODEL: i32 = 1;
-    stage.start_map(MAP)?;
-    let mut all = Vec::new();
-    for (name, at) in [("sarge", -26.0), ("major", 26.0)] {
-        let mut part = |part: &str, frame| -> Result<refEntity_t, Raised> {
-            let folder = format!("models/players/{name}");
-            Ok(refEntity_t {
-                hModel: stage.register_model(&format!("{folder}/{part}.md3"))?,
-                customSkin: stage.register_skin(&format!("{folder}/{part}_default.skin"))?,
-                frame: frame + 1,
-                oldframe: frame,
-                backlerp: 0.3,
-                ..refEntity_t::default()
-            })
-        };
-        let (mut lower, mut upper, mut head) =
-            (part("lower", 95)?, part("upper", 130)?, part("head", -1)?);
-        head.oldframe = 0;
-        lower.axis = turned(150.0);
-        place(&mut lower, Vec3::new(0.0, at, 0.0));
-        hang(stage, &mut upper, &lower, "tag_torso")?;
-        hang(stage, &mut head, &upper, "tag_head")?;
-        let mut weapon = refEntity_t {
-            hModel: stage.register_model("models/weapons2/rocketl/rocketl.md3")?,
-            ..refEntity_t::default()
-        };
-        hang(stage, &mut weapon, &upper, "tag_weapon")?;
-        all.extend([lower, upper, head, weapon]);
-    }
-    let mut view = stage.view(Vec3::new(-60.0, 0.0, 8.0), 0.0);
-    for (name, flags) in [("world", 0), ("no-world", NO_WORLD_MODEL)] {
-        view.flags = flags;
-        stage.keep_view(name, &view, |e| {
-            all.iter().try_for_each(|entity| e.add_entity(entity))
-        })?;
-    }
-    Ok(())
-}
-
-fn shadows(stage: &mut Stage) -> Result<(), Raised> {
-    const THIRD_PERSON: i32 = 0x2;
-    const NO_SHADOW: i32 = 0x40;
-    const SHADOW_PLANE: i32 = 0x100;
-    stage.start_map(MAP)?;
-    let mut view = stage.view(Vec3::new(-130.0, 0.0, 60.0), 0.0);
-    view.angles.x = 30.0;
-    for (name, renderfx) in [
-        ("plain", 0),
-        ("plane", SHADOW_PLANE),
-        ("plane-none", SHADOW_PLANE | NO_SHADOW),
-        ("plane-third", SHADOW_PLANE | THIRD_PERSON),
-    ] {
-        let mut all = Vec::new();
-        for (at, kind) in KINDS.into_iter().enumerate() {
-            let mut entity = refEntity_t {
-                hModel: stage.register_model(kind)?,
-                frame: 1,
-                oldframe: 0,
-                backlerp: 0.3,
-                axis: turned(25.0),
-                renderfx,
-                shadowPlane: -40.0,
-                ..refEntity_t::default()
-            };
-            place(&mut entity, row(at, KINDS.len()));
-            all.push(entity);
-        }
-        stage.keep_view(name, &view, |e| {
-            all.iter().try_for_each(|entity| e.add_entity(entity))
         })?;
     }
     Ok(())
