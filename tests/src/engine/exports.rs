@@ -447,6 +447,23 @@ impl Engine {
     ) -> Result<Rgb8, Raised> {
         self.begin_frame(0)?;
         draw(self)?;
+        self.take_picture()
+    }
+
+    /// What a frame of two eyes looks like, the left one's calls first.
+    pub fn stereo_picture_of(
+        &mut self,
+        draw: impl Fn(&mut Self) -> Result<(), Raised>,
+    ) -> Result<Rgb8, Raised> {
+        for eye in [1, 2] {
+            self.begin_frame(eye)?;
+            draw(self)?;
+        }
+        self.take_picture()
+    }
+
+    /// Ends the frame with a screenshot.
+    fn take_picture(&mut self) -> Result<Rgb8, Raised> {
         self.command("screenshot picture")?;
         self.end_frame()?;
         let file = "screenshots/picture.tga";

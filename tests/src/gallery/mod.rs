@@ -26,6 +26,7 @@ mod calls;
 mod colors;
 mod coordinates;
 mod deforms;
+mod effects;
 mod entities;
 mod materials;
 mod models;
@@ -109,6 +110,7 @@ pub fn scenes() -> Vec<Scene> {
     all.extend(calls::scenes());
     all.extend(entities::scenes());
     all.extend(models::scenes());
+    all.extend(effects::scenes());
     all.extend(colors::scenes());
     all.extend(coordinates::scenes());
     all.extend(deforms::scenes());

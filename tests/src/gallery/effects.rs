@@ -1,0 +1,233 @@
+//! Effects of views: flares, stereo, shadows in mirrors.
+
+use glam::Vec3;
+use q3bsp::builder::MapBuilder;
+
+use super::board::{Board, MAP, Shape};
+use super::models::turned;
+use super::{File, Scene, Stage, tube};
+use crate::engine::Raised;
+use crate::engine::abi::refEntity_t;
+
+const DEPTH_HACK: i32 = 0x8;
+const CROSSHAIR: i32 = 0x10;
+
+/// The scenes of this module.
+pub(super) fn scenes() -> Vec<Scene> {
+    let scene = |name, about, cvars, play| Scene {
+        files,
+        cvars,
+        ..Scene::new(name, about, play)
+    };
+    vec![
+        Scene {
+            quick: true,
+            ..scene(
+                "effects-flares",
+                "Flares that appear, stay, are hidden and go, straight on and aside.",
+                &[("r_flares", "1")],
+                flares,
+            )
+        },
+        Scene {
+            quick: true,
+            ..scene(
+                "effects-eyes",
+                "Each anaglyph mode, the eyes' distance and where their pictures meet.",
+                &[],
+                eyes,
+            )
+        },
+        Scene {
+            files: mirror_files,
+            ..scene(
+                "effects-mirror",
+                "Stencil shadows and flares in a mirror.",
+                &[
+                    ("cg_shadows", "2"),
+                    ("r_stencilbits", "8"),
+                    ("r_flares", "1"),
+                ],
+                mirror,
+            )
+        },
+    ]
+}
+
+const SCRIPT: &str = "
+flareShader
+{
+    {
+        map g/grey.tga
+        blendFunc add
+        rgbGen vertex
+    }
+}
+e/solid
+{
+    {
+        map g/grey.tga
+        rgbGen lightingDiffuse
+    }
+}
+e/mirror
+{
+    portal
+    {
+        map g/grey.tga
+        blendFunc GL_DST_COLOR GL_ZERO
+        depthWrite
+    }
+}
+";
+
+fn board() -> Board {
+    Board {
+        script: SCRIPT.to_string(),
+        ..Board::new(4, Shape::Face, [""; 0])
+    }
+}
+
+/// The board's room with flares, one of them turned away.
+fn map() -> MapBuilder {
+    let mut map = board().map();
+    let lamp = map.add_shader("e/lamp", 0, 0);
+    let orange = Vec3::new(1.0, 0.5, 0.1);
+    let blue = Vec3::new(0.2, 0.4, 1.0);
+    map.add_flare(lamp, Vec3::new(30.0, 60.0, 30.0), Vec3::NEG_X, Vec3::ONE);
+    map.add_flare(lamp, Vec3::new(20.0, -50.0, 20.0), Vec3::ZERO, orange);
+    map.add_flare(lamp, Vec3::new(0.0, 10.0, 60.0), Vec3::NEG_Z, blue);
+    map.add_flare(lamp, Vec3::new(10.0, 30.0, 10.0), Vec3::X, Vec3::ONE);
+    map
+}
+
+fn with_models(mut files: Vec<File>) -> Vec<File> {
+    files.push(("m/key.md3".to_string(), tube::md3(2)));
+    files
+}
+
+fn files() -> Vec<File> {
+    with_models(board().files_with(map()))
+}
+
+fn mirror_files() -> Vec<File> {
+    let mut map = map();
+    let mirror = map.add_shader("e/mirror", 0, 1);
+    let corner = |y: f32, z: f32| Vec3::new(36.0, y * 64.0, z * 64.0);
+    let corners = [
+        corner(1.0, 1.0),
+        corner(-1.0, 1.0),
+        corner(-1.0, -1.0),
+        corner(1.0, -1.0),
+    ];
+    map.add_quad(mirror, corners);
+    with_models(board().files_with(map))
+}
+
+fn tube_at(stage: &mut Stage, at: Vec3) -> Result<refEntity_t, Raised> {
+    Ok(refEntity_t {
+        hModel: stage.register_model("m/key.md3")?,
+        customShader: stage.register_shader("e/solid")?,
+        origin: at.to_array(),
+        axis: turned(25.0),
+        frame: 1,
+        oldframe: 1,
+        ..refEntity_t::default()
+    })
+}
+
+fn flares(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(MAP)?;
+    let blind = tube_at(stage, Vec3::new(-60.0, 22.0, 20.0))?;
+    let look = |stage: &mut Stage, name: &str, time: i32, yaw: f32, hidden: bool| {
+        stage.set_time(time);
+        let view = stage.view(Vec3::new(-130.0, 0.0, 10.0), yaw);
+        stage.keep_once(name, |e| {
+            e.clear_scene()?;
+            if hidden {
+                e.add_entity(&blind)?;
+            }
+            e.render_scene(&view)
+        })
+    };
+    look(stage, "begins", 0, 0.0, false)?;
+    look(stage, "appears", 60, 0.0, false)?;
+    look(stage, "shows", 400, 0.0, false)?;
+    look(stage, "aside", 450, 25.0, false)?;
+    look(stage, "goes", 500, 0.0, true)?;
+    look(stage, "is-going", 560, 0.0, true)?;
+    look(stage, "is-gone", 1500, 0.0, true)?;
+    stage.set("r_flareSize", "90");
+    stage.set("r_flareCoeff", "900");
+    look(stage, "set", 1600, 0.0, false)?;
+    look(stage, "is-set", 2600, 0.0, false)
+}
+
+fn eyes(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(MAP)?;
+    let far = tube_at(stage, Vec3::new(0.0, 20.0, 10.0))?;
+    let near = tube_at(stage, Vec3::new(-110.0, -8.0, -4.0))?;
+    let weapon = refEntity_t {
+        renderfx: DEPTH_HACK,
+        ..near
+    };
+    let crosshair = refEntity_t {
+        renderfx: DEPTH_HACK | CROSSHAIR,
+        origin: [-60.0, 0.0, 10.0],
+        ..near
+    };
+    let white = stage.register_shader("white")?;
+    let other = stage.register_shader("gfx/2d/bigchars")?;
+    let view = stage.view(Vec3::new(-130.0, 0.0, 10.0), 5.0);
+    let look = |stage: &mut Stage, name: &str| {
+        let draw = |e: &mut crate::engine::Engine| {
+            e.clear_scene()?;
+            for entity in [&far, &weapon, &crosshair] {
+                e.add_entity(entity)?;
+            }
+            e.render_scene(&view)?;
+            e.draw_stretch_pic([20.0, 20.0, 60.0, 40.0], [0.0, 0.0, 1.0, 1.0], white)?;
+            // another shader ends the run of pictures, which the reference would not read back otherwise
+            e.draw_stretch_pic([0.0; 4], [0.0; 4], other)
+        };
+        // a change of the mode counts from the frame after
+        stage.stereo_picture_of(draw)?;
+        let picture = stage.stereo_picture_of(draw)?;
+        stage.keep_picture(name, &picture);
+        Ok(())
+    };
+    for mode in 1..=8 {
+        stage.set("r_anaglyphMode", &mode.to_string());
+        look(stage, &format!("mode-{mode}"))?;
+    }
+    stage.set("r_anaglyphMode", "1");
+    stage.set("r_zproj", "150");
+    look(stage, "far")?;
+    stage.set("r_stereoSeparation", "-30");
+    look(stage, "wide")?;
+    stage.set("r_fastsky", "1");
+    look(stage, "cleared")
+}
+
+fn mirror(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(MAP)?;
+    let plane = refEntity_t {
+        reType: 7,
+        origin: [36.0, 0.0, 0.0],
+        oldorigin: [36.0, 0.0, 0.0],
+        ..refEntity_t::default()
+    };
+    let tubes = [
+        tube_at(stage, Vec3::new(0.0, 20.0, 10.0))?,
+        tube_at(stage, Vec3::new(-60.0, -20.0, 0.0))?,
+    ];
+    for (name, time) in [("mirror", 0), ("later", 1000)] {
+        stage.set_time(time);
+        let view = stage.view(Vec3::new(-130.0, 0.0, 10.0), 8.0);
+        stage.keep_view(name, &view, |e| {
+            e.add_entity(&plane)?;
+            tubes.iter().try_for_each(|tube| e.add_entity(tube))
+        })?;
+    }
+    Ok(())
+}
