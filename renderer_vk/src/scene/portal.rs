@@ -33,7 +33,8 @@ pub(super) fn find_first(
         .take_while(|s| input.materials.get(s.material).sort <= shaderscript::sort::PORTAL)
         .find_map(|surface| {
             let triangles = triangles(world, scene, surface);
-            let plane = plane_of(triangles.first()?)?;
+            let plane =
+                stored_plane(world, scene, surface).or_else(|| plane_of(triangles.first()?))?;
             let portal = portal_at(plane, entities, def)?;
             let range = input.materials.get(surface.material).portal_range;
             let reach = (!portal.mirror).then_some(range);
@@ -68,10 +69,13 @@ pub(super) fn find_all(
         let Some(instance) = placed else {
             continue;
         };
-        let first = world
-            .triangles(surface.first_index, surface.index_count)
-            .next();
-        let plane = first.and_then(|t| plane_of(&t.map(|p| entity::to_world(&instance, p))));
+        let plane = surface.plane.map(|plane| placed_plane(plane, &instance));
+        let plane = plane.or_else(|| {
+            let triangle = world
+                .triangles(surface.first_index, surface.index_count)
+                .next()?;
+            plane_of(&triangle.map(|p| entity::to_world(&instance, p)))
+        });
         let Some(portal) = plane.and_then(|plane| portal_at(plane, entities, def)) else {
             continue;
         };
@@ -81,6 +85,37 @@ pub(super) fn find_all(
         if !known {
             out.portals.push(portal);
         }
+    }
+}
+
+/// The plane that the map stores for a surface of the view. Which way is up in a portal depends on the least of its
+/// normal's components, so that of triangles does not do: they may be deformed, and their zeros are not exact.
+fn stored_plane(world: &WorldData, scene: &ViewScene, surface: &DrawSurface) -> Option<Plane> {
+    let instance = scene.instances.get(surface.instance as usize)?;
+    let mut portals = world
+        .portal_surfaces
+        .iter()
+        .filter_map(|&index| world.surfaces.get(index as usize));
+    let found = match surface.geometry {
+        Geometry::Static { first_index, .. } => portals.find(|s| {
+            s.first_index == first_index || s.classic.is_some_and(|c| c.first_index == first_index)
+        })?,
+        Geometry::Dynamic { first_index, .. } => {
+            let mut meshes = scene.meshes.iter();
+            let mesh = meshes.find(|mesh| mesh.first_index == first_index)?;
+            world.surfaces.get(mesh.world_surface? as usize)?
+        }
+    };
+    found.plane.map(|plane| placed_plane(plane, instance))
+}
+
+/// A plane of a model's space in the world.
+fn placed_plane(plane: Plane, instance: &Instance) -> Plane {
+    let [x, y, z] = instance.axis;
+    let normal = x * plane.normal.x + y * plane.normal.y + z * plane.normal.z;
+    Plane {
+        normal,
+        dist: plane.dist + normal.dot(instance.origin),
     }
 }
 
