@@ -162,15 +162,17 @@ pub fn jpeg(picture: &Picture, quality: i32) -> Result<Vec<u8>, Failure> {
 pub fn level_shot(picture: &Picture) -> Picture {
     const SIDE: u32 = 128;
     let mut rgb = Vec::with_capacity((SIDE * SIDE * 3) as usize);
-    // Samples lie on a grid of 512x384 over the whole screen.
+    // Samples lie on a grid of 512x384 over the whole screen, counted from its lower left corner.
     let source = |length: u32, index: u32, samples: u32| {
         (u64::from(length) * u64::from(index) / u64::from(samples)) as u32
     };
     for y in 0..SIDE {
+        let y = SIDE - 1 - y;
         for x in 0..SIDE {
             let mut sum = [0u32; 3];
             for sample_y in 0..3 {
-                let line = row(picture, source(picture.height, y * 3 + sample_y, SIDE * 3));
+                let up = source(picture.height, y * 3 + sample_y, SIDE * 3);
+                let line = row(picture, picture.height.saturating_sub(up + 1));
                 for sample_x in 0..4 {
                     let at = source(picture.width, x * 4 + sample_x, SIDE * 4) as usize * 3;
                     for (total, &value) in sum.iter_mut().zip(line.get(at..at + 3).unwrap_or(&[])) {

@@ -10,7 +10,7 @@ use crate::api::{
     DynamicLight, MarkFragment, Orientation, Picture, PointLighting, PolyVert, RefDef, RefEntity,
     rdflags,
 };
-use crate::assets::{Assets, ImageSource, LoadedFont};
+use crate::assets::{Assets, LoadedFont};
 use crate::error::Error;
 use crate::frame::{FrameContext, Item};
 use crate::gpu::{
@@ -482,7 +482,7 @@ impl Renderer {
             return Err(Error::NotPowerOfTwo { cols, rows });
         }
         self.upload_cinematic(cols, rows, rgba, client, dirty)?;
-        let Some(texture) = self.assets.as_mut().map(|a| a.textures.scratch(client)) else {
+        let Some(texture) = (self.assets.as_mut()).map(|a| a.textures.queue_scratch(client)) else {
             return Ok(());
         };
         let grey = (self.settings.identity_light() * 255.0) as u8;
@@ -557,6 +557,9 @@ impl Renderer {
             return Ok(FrameStats::default());
         }
         let stats = self.flush(true)?;
+        if let Some(assets) = &mut self.assets {
+            assets.textures.end_frame();
+        }
         self.scene.end_frame();
         self.flares.end_frame();
         Ok(stats)

@@ -70,6 +70,10 @@ impl ImageSource for FakeTextures {
         5000 + u32::try_from(client).unwrap()
     }
 
+    fn lightmap(&self, page: usize) -> Option<u32> {
+        (page < self.lightmaps).then(|| 1001 + u32::try_from(page).unwrap())
+    }
+
     fn mean(&self, texture: u32) -> Vec4 {
         if texture == WHITE {
             Vec4::ONE

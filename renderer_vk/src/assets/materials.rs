@@ -444,6 +444,25 @@ impl Materials {
         self.videos.iter()
     }
 
+    /// A material that only `RemapShader` names. The engine gives it the map's first lightmap page, wherever it shows.
+    fn find_with_first_page(&mut self, source: &mut dyn ImageSource, name: &str) -> u32 {
+        let Some(page) = source.lightmap(0) else {
+            return self.find(source, name, LightmapClass::None, true);
+        };
+        let index = self.find(source, name, LightmapClass::Page, true);
+        let material = self.get(index);
+        let first = material.stage_first as usize;
+        let stages = first..first + material.stage_count as usize;
+        for stage in self.arrays.stages.get_mut(stages).unwrap_or_default() {
+            if stage.image_count == 0 {
+                stage.image_first = u32::try_from(self.arrays.images.len()).unwrap_or(u32::MAX);
+                stage.image_count = 1;
+                self.arrays.images.push(page);
+            }
+        }
+        index
+    }
+
     /// Draws `new` wherever `old` is asked for, in every class (`RemapShader`); equal names cancel. `time_offset` is
     /// subtracted from the new material's time.
     pub fn remap(
@@ -465,7 +484,7 @@ impl Materials {
         let mut usable = |materials: &mut Self, name: &str| {
             let index = match any_class(materials, name) {
                 Some(index) => index,
-                None => materials.find(source, name, LightmapClass::None, true),
+                None => materials.find_with_first_page(source, name),
             };
             if index == 0 || materials.get(index).defaulted {
                 log::warn!("remap of {old} to {new}: no material {name}");

@@ -39,6 +39,8 @@ pub trait ImageSource {
     fn default_image(&self) -> u32;
     /// The picture that a cinematic of this client number is uploaded to; black before the first.
     fn scratch(&mut self, client: usize) -> u32;
+    /// A lightmap page of the map.
+    fn lightmap(&self, page: usize) -> Option<u32>;
     /// Mean of an image: linear colour 0..1 and alpha 0..1; white for an unknown one.
     fn mean(&self, texture: u32) -> Vec4;
 }

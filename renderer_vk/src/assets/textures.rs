@@ -103,6 +103,8 @@ struct Texture {
 /// A picture that changes: cinematics and raw pictures.
 struct Scratch {
     image: gpu::Image,
+    /// It is to be drawn in this frame.
+    queued: bool,
 }
 
 /// All textures of a registration.
@@ -245,6 +247,8 @@ impl Textures {
         if let Some(scratch) = known
             && scratch.image.width() == width
             && scratch.image.height() == height
+            // what is queued shows the picture that it was queued with
+            && !(dirty && scratch.queued)
         {
             if dirty {
                 self.device.upload_image(&scratch.image, 0, 0, picture)?;
@@ -258,7 +262,8 @@ impl Textures {
         )?;
         self.device.upload_image(&image, 0, 0, picture)?;
         let new = image.texture_index();
-        self.scratch.insert(client, Scratch { image });
+        let queued = false;
+        self.scratch.insert(client, Scratch { image, queued });
         Ok(Some((old, new)))
     }
 
@@ -269,6 +274,20 @@ impl Textures {
             .filter_map(|t| t.image.as_ref())
             .chain(self.lightmaps.iter().map(|(_, image)| image))
             .map(|image| (image.texture_index(), image.width(), image.height()))
+    }
+
+    /// The picture of a client that is to be drawn in this frame: until [`Self::end_frame`] another one gets a texture
+    /// of its own.
+    pub fn queue_scratch(&mut self, client: usize) -> u32 {
+        if let Some(scratch) = self.scratch.get_mut(&client) {
+            scratch.queued = true;
+        }
+        self.scratch(client)
+    }
+
+    /// What was queued has been drawn.
+    pub fn end_frame(&mut self) {
+        self.scratch.values_mut().for_each(|s| s.queued = false);
     }
 
     /// Lines for `imagelist`: number, size, channels in use, bytes on the GPU, name; then how many bytes and images.
@@ -427,6 +446,10 @@ impl ImageSource for Textures {
         self.scratch
             .get(&client)
             .map_or(self.black, |s| s.image.texture_index())
+    }
+
+    fn lightmap(&self, page: usize) -> Option<u32> {
+        self.lightmaps.get(page).map(|(_, i)| i.texture_index())
     }
 
     fn mean(&self, texture: u32) -> Vec4 {

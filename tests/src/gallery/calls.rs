@@ -201,7 +201,8 @@ fn pictures(stage: &mut Stage) -> Result<(), Raised> {
                 };
                 let (x, y) = (column as f32 * 160.0, row as f32 * 240.0);
                 let mut place = |dx: f32, dy: f32, st| {
-                    e.draw_stretch_pic([x + dx, y + dy, 70.5, 70.25], st, shader)
+                    // no edge through the middle of a pixel
+                    e.draw_stretch_pic([x + dx, y + dy, 70.7, 70.4], st, shader)
                 };
                 place(2.5, 3.25, [0.25, 0.5, 0.75, 1.0])?;
                 place(80.0, 3.0, [1.0, 0.0, 0.0, 1.0])?;
@@ -601,6 +602,7 @@ fn views(stage: &mut Stage) -> Result<(), Raised> {
         frame: 1,
         ..refEntity_t::default()
     };
+    stage.set_color(None)?;
     let mut inset = stage.view(Vec3::ZERO, 0.0);
     (inset.place, inset.width, inset.height) = ([400, 20], 200, 150);
     inset.flags = 1;
