@@ -10,7 +10,7 @@ use crate::api::{
     DynamicLight, MarkFragment, Orientation, Picture, PointLighting, PolyVert, RefDef, RefEntity,
     rdflags,
 };
-use crate::assets::{Assets, LoadedFont};
+use crate::assets::{Assets, ImageSource, LoadedFont};
 use crate::error::Error;
 use crate::frame::{FrameContext, Item};
 use crate::gpu::{
