@@ -425,6 +425,10 @@ fn keywords_outside_stages() {
         })
     );
     assert!(script("skyParms a 512\n").shaders[0].sky.is_none());
+    let short = script("skyParms a\n{\nmap g/a.tga\nanimMap 2\n}");
+    let short = &short.shaders[0];
+    assert!(short.sky.is_none() && short.rejected.is_none());
+    assert_eq!(short.stages[0].image, StageImage::Map("g/a.tga".into()));
     assert_eq!(
         shader("surfaceparm fog\nfogParms ( .1 .2 .3 ) 400 old words").fog,
         Some(Fog {

@@ -339,7 +339,9 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
 
     fn sky(&mut self) {
         let mut argument = || self.lexer.token_on_line().map(|t| t.text);
-        let (Some(outer), Some(height), Some(inner)) = (argument(), argument(), argument()) else {
+        // Nothing is asked for after the line's end: that would be the next line's.
+        let mut arguments = || Some((argument()?, argument()?, argument()?));
+        let Some((outer, height, inner)) = arguments() else {
             self.warn("skyParms needs three arguments; this is not a sky");
             return;
         };

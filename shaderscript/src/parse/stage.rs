@@ -131,10 +131,10 @@ impl DefinitionParser<'_, '_, '_> {
 
     fn animation(&mut self, draft: &mut Draft) -> Result<(), Rejection> {
         let frequency = number(&self.required("animMap")?);
-        let mut images = match draft.image.take() {
+        let (before, mut images) = match draft.image.take() {
             // A second line adds to the first.
-            Some(StageImage::Animation { images, .. }) => images,
-            _ => Vec::new(),
+            Some(StageImage::Animation { images, .. }) => (None, images),
+            other => (other, Vec::new()),
         };
         let mut found = images.len();
         while let Some(token) = self.lexer.token_on_line() {
@@ -148,7 +148,12 @@ impl DefinitionParser<'_, '_, '_> {
                 "animMap has {found} images, of which {MAX_ANIMATION_IMAGES} are shown"
             ));
         }
-        draft.image = (!images.is_empty()).then_some(StageImage::Animation { frequency, images });
+        // Without images the stage keeps the one that it had.
+        draft.image = if images.is_empty() {
+            before
+        } else {
+            Some(StageImage::Animation { frequency, images })
+        };
         Ok(())
     }
 
