@@ -30,6 +30,8 @@ pub struct Pass<'a> {
 pub(crate) struct Bound {
     pub graphics: bool,
     compute: bool,
+    /// The bind point that the descriptor set was bound for last.
+    set: Option<vk::PipelineBindPoint>,
 }
 
 impl<'a> Pass<'a> {
@@ -66,10 +68,14 @@ impl<'a> Pass<'a> {
         self.rec.cmd
     }
 
-    fn bind(&self, point: vk::PipelineBindPoint, pipeline: vk::Pipeline) {
-        let bindless = &self.rec.device.0.bindless;
+    fn bind(&mut self, point: vk::PipelineBindPoint, pipeline: vk::Pipeline) {
         // SAFETY: recording; the pipeline is alive (the graveyard keeps it for this frame).
         unsafe { self.vk().cmd_bind_pipeline(self.cmd(), point, pipeline) };
+        // All pipelines have the same layout, so the set stays bound from one to the next.
+        if self.bound.set.replace(point) == Some(point) {
+            return;
+        }
+        let bindless = &self.rec.device.0.bindless;
         // SAFETY: every pipeline has this layout; the set is update-after-bind.
         unsafe {
             self.vk().cmd_bind_descriptor_sets(
