@@ -316,6 +316,14 @@ mod tests {
             (128, 128, 128 * 128 * 3)
         );
         assert_eq!(small.rgb[..6], [20, 20, 20, 0, 0, 0]);
+        // 384 samples of 480 rows, counted from the bottom, leave the top row out.
+        let mut tall = Picture {
+            width: 512,
+            height: 480,
+            rgb: vec![0; 512 * 480 * 3],
+        };
+        tall.rgb[..512 * 3].fill(240);
+        assert_eq!(level_shot(&tall).rgb[..3], [0, 0, 0]);
         let tiny = level_shot(&gradient(3, 2));
         assert_eq!(tiny.rgb.len(), 128 * 128 * 3);
     }

@@ -26,6 +26,16 @@ pub struct Session {
     pub front: Front,
 }
 
+/// What is decided when the window is opened, whatever the settings become: the engine's own renderer looks at them
+/// there and no more.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WindowFacts {
+    /// It fills the screen.
+    pub fullscreen: bool,
+    /// `r_gamma` works on the finished picture, not on textures (`r_ignorehwgamma 0`).
+    pub gamma: bool,
+}
+
 /// What the front end knows.
 #[derive(Default)]
 pub struct Front {
@@ -41,8 +51,8 @@ pub struct Front {
     pub cinematics: Cinematics,
     /// Pixels of the window as the game was told.
     pub size: (u32, u32),
-    /// Was the window full screen when the renderer was registered?
-    pub fullscreen: bool,
+    /// As of when the window was opened.
+    pub window: WindowFacts,
     /// The second eye's commands of a stereo frame are left out.
     pub skip_eye: bool,
     /// When the frame's first `BeginFrame` came.

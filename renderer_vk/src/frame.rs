@@ -81,6 +81,10 @@ impl<'a> FrameContext<'a> {
             materials: &assets.materials,
             samplers: &assets.samplers,
             identity_light: self.settings.identity_light(),
+            only_texture: self
+                .settings
+                .no_bind
+                .then(|| assets.textures.dynamic_light()),
         }
     }
 

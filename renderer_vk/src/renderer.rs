@@ -260,6 +260,7 @@ impl Renderer {
             materials: &assets.materials,
             samplers: &assets.samplers,
             identity_light: self.settings.identity_light(),
+            only_texture: None,
         };
         // what is not made now is made when it is drawn
         let made = self.raster.expect_materials(target.kind(), stages);

@@ -95,6 +95,7 @@ pub struct Settings {
     /// Materials of a greater sort value are left out; 0: none are.
     pub debug_sort: i32,
     pub show_cluster: i32,
+    pub no_bind: bool,
     pub show_normals: bool,
     pub show_sky: bool,
     /// 1: all images on a grid; 2: in proportion to their sizes.
@@ -213,6 +214,7 @@ impl Default for Settings {
             face_plane_cull: true,
             debug_sort: 0,
             show_cluster: 0,
+            no_bind: false,
             show_normals: false,
             show_sky: false,
             show_images: 0,

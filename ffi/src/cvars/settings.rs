@@ -2,6 +2,7 @@
 
 use super::{Cvar, Cvars};
 use crate::ioq3::engine::Engine;
+use crate::session::WindowFacts;
 use renderer_vk::{LightSampling, Settings, is_texture_mode};
 
 /// A count: negative is 0.
@@ -20,8 +21,8 @@ fn light_sampling(value: i32) -> LightSampling {
 
 /// Reads every setting. Cheap: the variables are the engine's memory; text is copied when it changed.
 ///
-/// `window_fullscreen` is what the window was when the renderer was registered: what depends on it is latched.
-pub fn apply(cvars: &Cvars, window_fullscreen: bool, settings: &mut Settings) {
+/// What depends on the window is as it was when the window was opened.
+pub fn apply(cvars: &Cvars, window: WindowFacts, settings: &mut Settings) {
     let (value, flag, integer) = (|c| cvars.value(c), |c| cvars.flag(c), |c| cvars.integer(c));
 
     settings.rt = flag(Cvar::RayTrace);
@@ -61,8 +62,8 @@ pub fn apply(cvars: &Cvars, window_fullscreen: bool, settings: &mut Settings) {
         cvars.seen(Cvar::TextureMode);
     }
     settings.map_overbright_bits = count(cvars, Cvar::MapOverBrightBits);
-    settings.ignore_hw_gamma = flag(Cvar::IgnoreHwGamma);
-    settings.fullscreen = window_fullscreen;
+    settings.ignore_hw_gamma = !window.gamma;
+    settings.fullscreen = window.fullscreen;
     settings.overbright_bits = count(cvars, Cvar::OverBrightBits);
     settings.vertex_light = flag(Cvar::VertexLight);
     settings.fullbright = flag(Cvar::FullBright);
@@ -101,6 +102,7 @@ pub fn apply(cvars: &Cvars, window_fullscreen: bool, settings: &mut Settings) {
     settings.debug_sort = integer(Cvar::DebugSort);
     settings.show_cluster = integer(Cvar::Showcluster);
     settings.debug_light = flag(Cvar::Debuglight);
+    settings.no_bind = flag(Cvar::Nobind);
     settings.show_normals = flag(Cvar::Shownormals);
     settings.show_sky = flag(Cvar::Showsky);
     settings.show_images = integer(Cvar::ShowImages);

@@ -131,7 +131,7 @@ cvars! {
     SkipBackEnd = c"r_skipBackEnd", c"0", CHEAT, None, c"1 draws nothing and takes no pictures.";
     NoRefresh = c"r_norefresh", c"0", CHEAT, None, c"1 leaves out 3D views.";
     MeasureOverdraw = c"r_measureOverdraw", c"0", CHEAT, None, c"Counts overdraw by stencil. Kept for old configurations and menus; has no effect here.";
-    Nobind = c"r_nobind", c"0", CHEAT, None, c"One texture for all. Kept for old configurations and menus; has no effect here.";
+    Nobind = c"r_nobind", c"0", CHEAT, None, c"1 draws everything with one texture, the spot of dynamic lights.";
     ShowTris = c"r_showtris", c"0", CHEAT, None, c"1 shows triangle edges in the classic look.";
     Shownormals = c"r_shownormals", c"0", CHEAT, None, c"1 shows the normals of vertices in the classic look.";
     Showsky = c"r_showsky", c"0", CHEAT, None, c"1 draws the sky before everything.";

@@ -6,7 +6,7 @@ use crate::boundary::{Failure, entry};
 use crate::capture::{self, Format, Shot, VideoFrame};
 use crate::cvars::{self, Cvar, Cvars};
 use crate::files::EngineFiles;
-use crate::session::{self, Front, with_renderer};
+use crate::session::{self, Front, WindowFacts, with_renderer};
 use crate::window::{self, Window};
 use crate::{commands, config};
 use renderer_vk::api::Picture;
@@ -75,7 +75,7 @@ pub extern "C" fn begin_registration(out: *mut glconfig_t) {
             start_renderer(engine, &cvars)?;
         }
         let info = session::with(|session| {
-            describe(session.renderer.as_ref()?, &mut session.front, &cvars).into()
+            describe(session.renderer.as_ref()?, &mut session.front).into()
         })
         .flatten();
         if let (Some(config), false) = (info, out.is_null()) {
@@ -91,7 +91,7 @@ pub extern "C" fn begin_registration(out: *mut glconfig_t) {
             let Some(renderer) = &mut session.renderer else {
                 return Ok(());
             };
-            cvars::apply(&cvars, front.fullscreen, &mut front.settings);
+            cvars::apply(&cvars, front.window, &mut front.settings);
             let mode = cvars.string(Cvar::TextureMode);
             if renderer_vk::is_texture_mode(&mode) {
                 front.settings.texture_mode = mode;
@@ -141,7 +141,13 @@ fn start_renderer(engine: Engine, cvars: &Cvars) -> Result<(), Failure> {
                     (false, false) => "rays are traced by compute shaders",
                 }
             );
-            session::with(|session| session.renderer = Some(renderer));
+            session::with(|session| {
+                session.renderer = Some(renderer);
+                session.front.window = WindowFacts {
+                    fullscreen: window::current().is_some_and(|window| window.is_fullscreen()),
+                    gamma: !cvars.flag(Cvar::IgnoreHwGamma),
+                };
+            });
             Ok(())
         }
         Err(message) => {
@@ -174,18 +180,17 @@ fn make_renderer(
 }
 
 /// Fills in what depends on the window, and answers what the game is told.
-fn describe(renderer: &Renderer, front: &mut Front, cvars: &Cvars) -> glconfig_t {
+fn describe(renderer: &Renderer, front: &mut Front) -> glconfig_t {
     let size = renderer.size();
     let window = window::current();
     let screen = config::Screen {
         size,
         aspect: window.map_or(size.0 as f32 / size.1 as f32, |window| window.aspect),
         refresh_rate: window.map_or(0, |window| window.refresh_rate()),
-        fullscreen: window.is_some_and(|window| window.is_fullscreen()),
-        gamma: !cvars.flag(Cvar::IgnoreHwGamma),
+        fullscreen: front.window.fullscreen,
+        gamma: front.window.gamma,
     };
     front.size = screen.size;
-    front.fullscreen = screen.fullscreen;
     config::glconfig(renderer.device_info(), screen)
 }
 
@@ -263,7 +268,7 @@ pub extern "C" fn begin_frame(stereo: c_int) {
             }
             if let Some(cvars) = &front.cvars {
                 cvars::write_back_clamps(engine, cvars);
-                cvars::apply(cvars, front.fullscreen, &mut front.settings);
+                cvars::apply(cvars, front.window, &mut front.settings);
             }
             front.frame_start = Some(Instant::now());
             renderer.set_settings(&front.settings);

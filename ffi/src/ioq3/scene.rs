@@ -71,7 +71,7 @@ pub extern "C" fn load_world(name: *const c_char) {
             }
             // The game may have changed a latched setting since the frame began, such as one that its server forbids.
             if let Some(cvars) = &front.cvars {
-                cvars::apply(cvars, front.fullscreen, &mut front.settings);
+                cvars::apply(cvars, front.window, &mut front.settings);
                 renderer.set_settings(&front.settings);
             }
             renderer.load_world(&name).map_err(failure)

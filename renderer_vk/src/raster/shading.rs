@@ -110,6 +110,8 @@ pub struct StageContext<'a> {
     pub samplers: &'a Samplers,
     /// 1 over 2 to the power of the overbright bits.
     pub identity_light: f32,
+    /// Shown in place of every texture (`r_nobind`).
+    pub only_texture: Option<u32>,
 }
 
 impl StageContext<'_> {
@@ -221,6 +223,11 @@ impl StageContext<'_> {
 
     /// A texture with a sampler ([`sampler`]).
     fn handle(&self, texture: u32, kind: u32) -> u32 {
+        // the spot is clamped, whatever it stands for
+        let (texture, kind) = match self.only_texture {
+            Some(only) => (only, sampler::CLAMP),
+            None => (texture, kind),
+        };
         texture & ((1 << TEXTURE_BITS) - 1) | self.samplers.index(kind) << TEXTURE_BITS
     }
 
@@ -231,6 +238,9 @@ impl StageContext<'_> {
         lightmap: u32,
         time: f32,
     ) -> Option<u32> {
+        if self.only_texture.is_some() {
+            return self.only_texture;
+        }
         if stage.flags & c::STAGE_WHITE != 0 {
             return None;
         }
