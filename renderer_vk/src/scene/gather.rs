@@ -140,6 +140,10 @@ impl<'a> Gatherer<'a> {
         for (number, entity) in entities.iter().enumerate() {
             self.add_entity(count(number), entity, out);
         }
+        let greyscale = self.input.settings.greyscale.clamp(0.0, 1.0);
+        if greyscale > 0.0 && self.look == Look::Classic {
+            out.take_color(greyscale);
+        }
         // equal keys keep the order of submission
         out.surfaces.sort_by_key(|surface| surface.sort_key);
         if self.input.settings.speeds != 0 && self.look == Look::Classic {

@@ -8,6 +8,7 @@ mod entities;
 mod entity;
 mod flares;
 mod gather;
+mod greyscale;
 mod key_frames;
 mod lighting;
 mod mesh;

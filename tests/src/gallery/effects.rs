@@ -38,6 +38,39 @@ pub(super) fn scenes() -> Vec<Scene> {
                 eyes,
             )
         },
+        scene(
+            "effects-gamma",
+            "r_gamma by the display's ramp, grey and brighter textures, stored light shifted further.",
+            &[
+                ("r_gamma", "1.5"),
+                ("r_intensity", "1.6"),
+                ("r_greyscale", "0.5"),
+                ("r_mapOverBrightBits", "3"),
+            ],
+            bright,
+        ),
+        scene(
+            "effects-software-gamma",
+            "r_gamma in textures alone; all grey.",
+            &[
+                ("r_ignorehwgamma", "1"),
+                ("r_gamma", "1.8"),
+                ("r_greyscale", "1"),
+                ("r_mapOverBrightBits", "1"),
+            ],
+            bright,
+        ),
+        scene(
+            "effects-dark-gamma",
+            "A darker r_gamma in textures, overbright bits without effect in a window.",
+            &[
+                ("r_ignorehwgamma", "1"),
+                ("r_gamma", "0.7"),
+                ("r_intensity", "2"),
+                ("r_overBrightBits", "2"),
+            ],
+            bright,
+        ),
         Scene {
             files: mirror_files,
             ..scene(
@@ -207,6 +240,18 @@ fn eyes(stage: &mut Stage) -> Result<(), Raised> {
     look(stage, "wide")?;
     stage.set("r_fastsky", "1");
     look(stage, "cleared")
+}
+
+fn bright(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(MAP)?;
+    let tube = tube_at(stage, Vec3::new(0.0, 20.0, 10.0))?;
+    let view = stage.view(Vec3::new(-130.0, 0.0, 10.0), 8.0);
+    stage.keep("view", |e| {
+        e.clear_scene()?;
+        e.add_entity(&tube)?;
+        e.add_light(Vec3::new(0.0, 60.0, 20.0), 150.0, Vec3::new(1.0, 0.4, 0.2))?;
+        e.render_scene(&view)
+    })
 }
 
 fn mirror(stage: &mut Stage) -> Result<(), Raised> {
