@@ -49,6 +49,7 @@ void main() {
         + instance.axis[2] * vertex.position.z + instance.origin;
     gl_Position = mat4(view.world_to_clip[0], view.world_to_clip[1], view.world_to_clip[2], view.world_to_clip[3]) * vec4(world, 1.0);
     out_clip = CLIP != 0 ? dot(view.clip_plane.xyz, world) - view.clip_plane.w : 0.0;
+    if (MODE == DRAW_DEPTH) return;
     out_textures = uvec2(draw.textures[0], draw.textures[1]);
     out_flat_color = draw.color;
     out_color = vec4(1.0);

@@ -355,6 +355,8 @@ pub mod constants {
         DRAW_LIGHT = 1;
         /// The fog over an opaque surface.
         DRAW_FOG = 2;
+        /// Depth alone, before everything else.
+        DRAW_DEPTH = 3;
         /// Of a draw: there is one stage, or two of which the second multiplies or is added.
         COMBINE_NONE = 0; COMBINE_MODULATE = 1; COMBINE_ADD = 2; COMBINE_REPLACE = 3;
         /// Of a draw: its colour is white, the same for all vertices, or each vertex's own.

@@ -4,6 +4,7 @@
 use shaders::types::constants as c;
 use shaders::types::{Draw, Instance};
 
+use super::depth_first;
 use super::list::{faces, stage_depth};
 use super::pipelines::{CullFaces, State};
 use super::shading::{Shading, StageContext};
@@ -41,6 +42,9 @@ pub fn states(stages: &StageContext<'_>, material: &Material, mut found: impl Fn
         // pictures of the overlay are sprites and marks in views, too, unless no script says how
         if !flat || pass.depth_test {
             found(in_view);
+            if let Some(depth) = depth_first::state(material, in_view) {
+                found(depth);
+            }
         }
         if flat {
             found(State {

@@ -60,6 +60,8 @@ pub struct DrawList {
     pub indices: Vec<u32>,
     /// Vertices that move: the view's, then the sky's.
     pub vertices: Vec<Vertex>,
+    /// See [`super::depth_first`].
+    pub(super) depth_first: Vec<Call>,
 }
 
 /// What a group of surfaces has in common.
@@ -91,6 +93,7 @@ impl DrawList {
         self.draws.clear();
         self.indices.clear();
         self.vertices.clear();
+        self.depth_first.clear();
     }
 
     /// Adds everything that a view shows. `static_indices` is the world's index array.
@@ -117,6 +120,10 @@ impl DrawList {
             self.add_sun(&sun, scene, stages, aids);
         }
         let clip = scene.view.clip_plane.is_some();
+        if clip {
+            self.depth_first.clear();
+        }
+        self.put_depth_first();
         for call in &mut self.calls {
             call.state.shading.clip = clip;
         }
@@ -204,6 +211,9 @@ impl DrawList {
             shading: Shading::WHITE,
         };
         let opaque = material.sort <= sort::OPAQUE;
+        if !group.dynamic && range == DepthRange::Normal {
+            self.note_depth(material, plain, span, draw);
+        }
         let first_blends = material.passes.first().is_some_and(|p| p.blend.is_some());
         for pass in &material.passes {
             let depth = stage_depth(pass);

@@ -6,6 +6,7 @@
 
 mod aids;
 mod cover;
+mod depth_first;
 mod expected;
 mod flares;
 mod list;

@@ -6,7 +6,9 @@ use shaders::types::constants as c;
 
 use super::shading::Shading;
 use super::target::TargetKind;
-use crate::gpu::{self, BlendFactor, Cull, DepthTest, Device, GraphicsDesc, GraphicsPipeline};
+use crate::gpu::{
+    self, BlendFactor, ColorMask, Cull, DepthTest, Device, GraphicsDesc, GraphicsPipeline,
+};
 
 /// Fixed-function state of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -98,13 +100,18 @@ impl Pipelines {
         if self.made.contains_key(&(target, state)) {
             return Ok(());
         }
+        let depth_alone = state.shading.mode == c::DRAW_DEPTH;
         let pipeline = GraphicsPipeline::new(
             &self.device,
             &GraphicsDesc {
                 color: Some(target.color),
                 depth: Some(target.depth),
                 samples: target.samples,
-                color_write: target.mask,
+                color_write: if depth_alone {
+                    ColorMask::NONE
+                } else {
+                    target.mask
+                },
                 blend: state.blend.map(|(s, d)| (factor(s), factor(d))),
                 depth_test: match state.depth {
                     Depth::Always => DepthTest::Always,
@@ -121,6 +128,7 @@ impl Pipelines {
                 polygon_offset: state.offset.then_some(self.offset),
                 wireframe: state.wireframe && self.device.info().wireframe,
                 constants: &state.shading.constants(),
+                fragment: (!depth_alone).then_some(&shaders::RASTER_DRAW_FRAG),
                 ..GraphicsDesc::new(
                     "raster",
                     &shaders::RASTER_DRAW_VERT,
