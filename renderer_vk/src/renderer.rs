@@ -1,29 +1,32 @@
-//! The renderer as a front end sees it.
+//! The renderer as a front end sees it: made, filled with what is registered, told what a frame shows.
+
+mod output;
+mod queries;
 
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::{Vec2, Vec3};
-use relight::{GameFiles, overbright};
+use glam::Vec2;
+use relight::GameFiles;
 
-use crate::api::{
-    DynamicLight, MarkFragment, Orientation, Picture, PointLighting, PolyVert, RefDef, RefEntity,
-    rdflags,
-};
-use crate::assets::{Assets, ImageSource, LoadedFont};
+use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
+use crate::assets::{Assets, LoadedFont};
 use crate::error::Error;
-use crate::frame::{FrameContext, Item};
+use crate::frame::Item;
 use crate::gpu::{
-    ColorMask, Device, DeviceInfo, DeviceOptions, FrameRing, Recorder, SurfaceSource, Swapchain,
+    ColorMask, Device, DeviceInfo, DeviceOptions, FrameRing, SurfaceSource, Swapchain,
     SwapchainDesc, Window,
 };
 use crate::raster::{self, DrawList, Flares, Overlay, Picture2d, Present, Raster};
-use crate::scene::{Look, Scene, Statistics};
+use crate::scene::{Look, Scene};
 use crate::settings::Settings;
 use crate::stereo::Eye;
 use crate::targets::FrameTargets;
 use crate::trace::TraceLook;
-use crate::world::{EntityTokens, World, mark_fragments};
+use crate::world::{EntityTokens, World};
+
+use output::milliseconds;
+pub use output::{CpuTimes, FrameStats};
 
 /// How to make a renderer.
 pub struct RendererOptions {
@@ -39,36 +42,6 @@ pub struct RendererOptions {
     pub device: Option<String>,
     /// Wait for the display's refresh.
     pub vsync: bool,
-}
-
-/// Counts of one frame.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct FrameStats {
-    /// 3D views drawn.
-    pub views: u32,
-    /// Draw calls of the classic look and the overlay.
-    pub draws: u32,
-    /// What the views of the classic look show; counted only with `r_speeds`.
-    pub scene: Statistics,
-    /// Milliseconds of the CPU on the frame.
-    pub cpu: CpuTimes,
-}
-
-/// Where the calling thread's time went in a frame, milliseconds.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct CpuTimes {
-    /// Finding out what the views show.
-    pub gather: f32,
-    /// Waiting for an earlier frame; with two in flight the one before the last.
-    pub wait: f32,
-    /// Recording commands, with the upload of what moves.
-    pub record: f32,
-    /// Handing them to the driver, and the picture to the window.
-    pub submit: f32,
-}
-
-fn milliseconds(from: Instant, to: Instant) -> f32 {
-    to.duration_since(from).as_secs_f32() * 1000.0
 }
 
 /// The renderer: one device, one window or none, and what the game has registered.
@@ -517,348 +490,6 @@ impl Renderer {
             Some(assets) => Ok(assets.update_scratch(client, cols, rows, rgba, dirty)?),
             None => Ok(()),
         }
-    }
-
-    // --- the frame --------------------------------------------------------------------------------------------------
-
-    /// Starts a frame; `time_ms` is the time that 2D materials see.
-    pub fn begin_frame(&mut self, time_ms: i32) {
-        self.set_eye(Eye::Both);
-        self.overlay_time = time_ms as f32 * 0.001;
-    }
-
-    /// Says whose picture the calls that follow are for, after [`begin_frame`](Self::begin_frame). A frame begins with
-    /// both eyes'. The traced look has one picture: with `rt` this is without effect.
-    pub fn set_eye(&mut self, eye: Eye) {
-        let eye = if self.settings.rt { Eye::Both } else { eye };
-        self.queue_overlay();
-        self.eye = eye;
-        self.scene.set_eye(eye);
-    }
-
-    fn queue_overlay(&mut self) {
-        if !self.overlay.is_empty() {
-            let empty = self.spare_overlays.pop().unwrap_or_default();
-            let overlay = std::mem::replace(&mut self.overlay, empty);
-            let mask = self.eye.mask(self.settings.anaglyph);
-            self.queue
-                .push((Item::Overlay(overlay, self.overlay_time), mask));
-        }
-    }
-
-    /// Draws what is queued, and shows it.
-    ///
-    /// # Errors
-    /// The device is lost or out of memory.
-    pub fn end_frame(&mut self) -> Result<FrameStats, Error> {
-        if self.settings.skip_back_end {
-            self.queue_overlay();
-            self.recycle_queue();
-            self.scene.end_frame();
-            return Ok(FrameStats::default());
-        }
-        let stats = self.flush(true)?;
-        if let Some(assets) = &mut self.assets {
-            assets.textures.end_frame();
-        }
-        self.scene.end_frame();
-        self.flares.end_frame();
-        Ok(stats)
-    }
-
-    /// Forgets what is queued; its memory is used again.
-    fn recycle_queue(&mut self) {
-        for (item, _) in self.queue.drain(..) {
-            match item {
-                Item::Overlay(mut overlay, _) => {
-                    overlay.clear();
-                    self.spare_overlays.push(overlay);
-                }
-                Item::Classic(scenes) => self.scene.recycle(scenes),
-                Item::Traced(scene) => self.scene.recycle([*scene]),
-            }
-        }
-    }
-
-    /// `r_showImages`: covers the picture with all images.
-    fn queue_image_sheet(&mut self) {
-        if let (1.., Some(assets)) = (self.settings.show_images, &self.assets) {
-            let proportional = self.settings.show_images == 2;
-            let (size, textures) = (self.size(), &assets.textures);
-            let white = ImageSource::white(textures);
-            raster::image_sheet(
-                &mut self.overlay,
-                size,
-                proportional,
-                white,
-                textures.images(),
-            );
-        }
-    }
-
-    fn flush(&mut self, show: bool) -> Result<FrameStats, Error> {
-        self.queue_image_sheet();
-        self.queue_overlay();
-        self.targets.fit(&self.device, &self.settings)?;
-        let mut stats = FrameStats::default();
-        let show = show && !self.hidden && self.swapchain.is_some();
-        let later = show && self.device.info().software;
-        if later {
-            self.show_finished()?;
-        }
-        let begin = Instant::now();
-        let mut recorder = self.ring.begin()?;
-        let ready = Instant::now();
-        // channels that no eye draws keep what was there
-        if self.shown_anaglyph != self.settings.anaglyph {
-            self.shown_anaglyph = self.settings.anaglyph;
-            self.targets.clear(&mut recorder)?;
-        }
-        if let Some(assets) = &mut self.assets {
-            assets.prepare_frame(&self.settings)?;
-            let mut context = FrameContext {
-                color: self.targets.color(),
-                drawn: self.targets.drawn(),
-                depth: self.targets.depth(),
-                mask: ColorMask::ALL,
-                assets,
-                world: self.world.as_ref(),
-                settings: &self.settings,
-                raster: &mut self.raster,
-                flares: &mut self.flares,
-                trace: self.trace.as_mut(),
-                list: &mut self.list,
-            };
-            for (item, mask) in &self.queue {
-                context.mask = *mask;
-                context.record(&mut recorder, item)?;
-                if let Item::Classic(scenes) = item {
-                    for scene in scenes {
-                        stats.scene.add(&scene.statistics);
-                    }
-                }
-                stats.views += u32::from(!matches!(item, Item::Overlay(..)));
-                stats.draws += context.list.calls.len() as u32;
-            }
-        }
-        if !self.queue.is_empty() {
-            self.targets.resolve(&mut recorder)?;
-        }
-        self.recycle_queue();
-        let recorded = Instant::now();
-        if later || !show {
-            self.ring.end(recorder)?;
-            self.unshown |= later;
-        } else {
-            self.show(recorder)?;
-        }
-        stats.cpu = CpuTimes {
-            gather: std::mem::take(&mut self.gather_ms),
-            wait: milliseconds(begin, ready),
-            record: milliseconds(ready, recorded),
-            submit: milliseconds(recorded, Instant::now()),
-        };
-        Ok(stats)
-    }
-
-    /// Shows the picture that a software device still worked on when its frame ended. Such a device works in the
-    /// game's own time, and presenting waits for it: so the picture is shown when the next one begins, and meanwhile
-    /// the game goes on.
-    fn show_finished(&mut self) -> Result<(), Error> {
-        if std::mem::take(&mut self.unshown) {
-            let recorder = self.ring.begin()?;
-            self.show(recorder)?;
-        }
-        Ok(())
-    }
-
-    /// Ends a frame with the picture on its way to the window.
-    fn show(&mut self, mut recorder: Recorder) -> Result<(), Error> {
-        match &mut self.swapchain {
-            Some(swapchain) => {
-                if let Some(target) = swapchain.acquire(&mut recorder)? {
-                    // a new format comes with a new swapchain
-                    if self
-                        .present
-                        .as_ref()
-                        .is_none_or(|p| p.format() != target.format())
-                    {
-                        self.present = Some(Present::new(&self.device, target.format())?);
-                    }
-                    if let Some(present) = &self.present {
-                        let bits = self.settings.effective_overbright_bits();
-                        present.record(
-                            &mut recorder,
-                            self.targets.color(),
-                            &target,
-                            self.settings.display_gamma(),
-                            bits,
-                            swapchain.copies(),
-                        )?;
-                    }
-                }
-                self.ring.end_present(recorder, swapchain)?;
-            }
-            None => self.ring.end(recorder)?,
-        }
-        Ok(())
-    }
-
-    /// The picture as it stands after everything queued so far, as the display shows it.
-    ///
-    /// # Errors
-    /// The device is lost or out of memory.
-    pub fn read_pixels(&mut self) -> Result<Picture, Error> {
-        self.flush(false)?;
-        let (width, height) = self.size();
-        let rgba = self.device.read_image(self.targets.color())?;
-        let table = overbright::gamma_table(
-            self.settings.display_gamma(),
-            self.settings.effective_overbright_bits(),
-        );
-        let rgb = rgba
-            .chunks_exact(4)
-            .flat_map(|p| [p[0], p[1], p[2]])
-            .map(|v| table[usize::from(v)])
-            .collect();
-        Ok(Picture { width, height, rgb })
-    }
-
-    // --- queries ----------------------------------------------------------------------------------------------------
-
-    /// Light of the map's grid at a point; `None` without a map or grid.
-    pub fn light_for_point(&self, point: Vec3) -> Option<PointLighting> {
-        let light = self.world.as_ref()?.grid_light(point, &self.settings)?;
-        Some(PointLighting {
-            ambient: light.ambient,
-            directed: light.directed,
-            direction: light.direction,
-        })
-    }
-
-    /// The pieces of the map that a decal's polygon covers, projected along `projection`.
-    pub fn mark_fragments(
-        &self,
-        points: &[Vec3],
-        projection: Vec3,
-        max_points: usize,
-        max_fragments: usize,
-    ) -> (Vec<Vec3>, Vec<MarkFragment>) {
-        match (&self.world, &self.assets) {
-            (Some(world), Some(assets)) => {
-                let meshes = self.settings.marks_on_triangle_meshes;
-                mark_fragments(
-                    world,
-                    &assets.materials,
-                    points,
-                    projection,
-                    max_points,
-                    max_fragments,
-                    meshes,
-                )
-            }
-            _ => (Vec::new(), Vec::new()),
-        }
-    }
-
-    /// Where a model's tag is between two frames (`frac` weighs the end frame); `None`: no such model or tag.
-    pub fn lerp_tag(
-        &self,
-        model: i32,
-        start: i32,
-        end: i32,
-        frac: f32,
-        name: &str,
-    ) -> Option<Orientation> {
-        self.assets
-            .as_ref()?
-            .models
-            .lerp_tag(model, start, end, frac, name)
-    }
-
-    /// Bounds of a model's first frame, or of an inline model.
-    pub fn model_bounds(&self, model: i32) -> (Vec3, Vec3) {
-        match &self.assets {
-            Some(assets) => assets.models.bounds(model),
-            None => (Vec3::ZERO, Vec3::ZERO),
-        }
-    }
-
-    /// Cluster of the leaf at a point; -1: none.
-    pub fn leaf_cluster(&self, point: Vec3) -> i32 {
-        self.world
-            .as_ref()
-            .map_or(-1, |world| world.relit.bsp.cluster_at(point))
-    }
-
-    /// Whether the map's visibility lets cluster `a` see cluster `b`.
-    pub fn cluster_sees(&self, a: i32, b: i32) -> bool {
-        self.world
-            .as_ref()
-            .is_none_or(|world| world.relit.bsp.cluster_sees(a, b))
-    }
-
-    /// The next token of the map's entity text; `None` at the end, after which it starts over.
-    pub fn entity_token(&mut self) -> Option<String> {
-        self.entity_tokens
-            .next(&self.world.as_ref()?.relit.bsp.entities)
-    }
-
-    /// Name of the loaded map, as it was asked for.
-    pub fn world_name(&self) -> Option<&str> {
-        self.world.as_ref().map(|world| world.relit.name.as_str())
-    }
-
-    /// The map, for tools.
-    pub fn world(&self) -> Option<&World> {
-        self.world.as_ref()
-    }
-
-    /// The `videoMap` files of registered materials with the client number that
-    /// [`upload_cinematic`](Self::upload_cinematic) takes their pictures under.
-    pub fn videos(&self) -> Vec<(String, usize)> {
-        self.assets.as_ref().map_or_else(Vec::new, |a| {
-            a.materials
-                .videos()
-                .map(|(name, client)| (name.to_owned(), client))
-                .collect()
-        })
-    }
-
-    /// Says that a video of [`videos`](Self::videos) cannot be played: the stages that show it, and those above them,
-    /// are not drawn.
-    pub fn drop_video(&mut self, client: usize) {
-        if let Some(assets) = &mut self.assets {
-            assets.materials.drop_video(client);
-        }
-    }
-
-    /// One line for each image.
-    pub fn image_list(&self) -> Vec<String> {
-        self.assets
-            .as_ref()
-            .map_or_else(Vec::new, |a| a.textures.list())
-    }
-
-    /// One line for each material; in drawing order if `sorted`.
-    pub fn shader_list(&self, sorted: bool) -> Vec<String> {
-        self.assets
-            .as_ref()
-            .map_or_else(Vec::new, |a| a.materials.list(sorted))
-    }
-
-    /// One line for each skin and each of its surfaces.
-    pub fn skin_list(&self) -> Vec<String> {
-        self.assets
-            .as_ref()
-            .map_or_else(Vec::new, |a| a.skins.list(&a.materials))
-    }
-
-    /// One line for each model.
-    pub fn model_list(&self) -> Vec<String> {
-        self.assets
-            .as_ref()
-            .map_or_else(Vec::new, |a| a.models.list())
     }
 }
 

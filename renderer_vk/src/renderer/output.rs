@@ -1,0 +1,250 @@
+//! From what was queued to a picture: recording, showing, reading back, and what that cost.
+
+use std::time::Instant;
+
+use relight::overbright;
+
+use super::Renderer;
+use crate::api::Picture;
+use crate::assets::ImageSource;
+use crate::error::Error;
+use crate::frame::{FrameContext, Item};
+use crate::gpu::{ColorMask, Recorder};
+use crate::raster::{self, Present};
+use crate::scene::Statistics;
+use crate::stereo::Eye;
+
+/// Counts of one frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FrameStats {
+    /// 3D views drawn.
+    pub views: u32,
+    /// Draw calls of the classic look and the overlay.
+    pub draws: u32,
+    /// What the views of the classic look show; counted only with `r_speeds`.
+    pub scene: Statistics,
+    /// Milliseconds of the CPU on the frame.
+    pub cpu: CpuTimes,
+}
+
+/// Where the calling thread's time went in a frame, milliseconds.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CpuTimes {
+    /// Finding out what the views show.
+    pub gather: f32,
+    /// Waiting for an earlier frame; with two in flight the one before the last.
+    pub wait: f32,
+    /// Recording commands, with the upload of what moves.
+    pub record: f32,
+    /// Handing them to the driver, and the picture to the window.
+    pub submit: f32,
+}
+
+pub(super) fn milliseconds(from: Instant, to: Instant) -> f32 {
+    to.duration_since(from).as_secs_f32() * 1000.0
+}
+
+impl Renderer {
+    /// Starts a frame; `time_ms` is the time that 2D materials see.
+    pub fn begin_frame(&mut self, time_ms: i32) {
+        self.set_eye(Eye::Both);
+        self.overlay_time = time_ms as f32 * 0.001;
+    }
+
+    /// Says whose picture the calls that follow are for, after [`begin_frame`](Self::begin_frame). A frame begins with
+    /// both eyes'. The traced look has one picture: with `rt` this is without effect.
+    pub fn set_eye(&mut self, eye: Eye) {
+        let eye = if self.settings.rt { Eye::Both } else { eye };
+        self.queue_overlay();
+        self.eye = eye;
+        self.scene.set_eye(eye);
+    }
+
+    pub(super) fn queue_overlay(&mut self) {
+        if !self.overlay.is_empty() {
+            let empty = self.spare_overlays.pop().unwrap_or_default();
+            let overlay = std::mem::replace(&mut self.overlay, empty);
+            let mask = self.eye.mask(self.settings.anaglyph);
+            self.queue
+                .push((Item::Overlay(overlay, self.overlay_time), mask));
+        }
+    }
+
+    /// Draws what is queued, and shows it.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn end_frame(&mut self) -> Result<FrameStats, Error> {
+        if self.settings.skip_back_end {
+            self.queue_overlay();
+            self.recycle_queue();
+            self.scene.end_frame();
+            return Ok(FrameStats::default());
+        }
+        let stats = self.flush(true)?;
+        if let Some(assets) = &mut self.assets {
+            assets.textures.end_frame();
+        }
+        self.scene.end_frame();
+        self.flares.end_frame();
+        Ok(stats)
+    }
+
+    /// Forgets what is queued; its memory is used again.
+    fn recycle_queue(&mut self) {
+        for (item, _) in self.queue.drain(..) {
+            match item {
+                Item::Overlay(mut overlay, _) => {
+                    overlay.clear();
+                    self.spare_overlays.push(overlay);
+                }
+                Item::Classic(scenes) => self.scene.recycle(scenes),
+                Item::Traced(scene) => self.scene.recycle([*scene]),
+            }
+        }
+    }
+
+    /// `r_showImages`: covers the picture with all images.
+    fn queue_image_sheet(&mut self) {
+        if let (1.., Some(assets)) = (self.settings.show_images, &self.assets) {
+            let proportional = self.settings.show_images == 2;
+            let (size, textures) = (self.size(), &assets.textures);
+            let white = ImageSource::white(textures);
+            raster::image_sheet(
+                &mut self.overlay,
+                size,
+                proportional,
+                white,
+                textures.images(),
+            );
+        }
+    }
+
+    fn flush(&mut self, show: bool) -> Result<FrameStats, Error> {
+        self.queue_image_sheet();
+        self.queue_overlay();
+        self.targets.fit(&self.device, &self.settings)?;
+        let mut stats = FrameStats::default();
+        let show = show && !self.hidden && self.swapchain.is_some();
+        let later = show && self.device.info().software;
+        if later {
+            self.show_finished()?;
+        }
+        let begin = Instant::now();
+        let mut recorder = self.ring.begin()?;
+        let ready = Instant::now();
+        // channels that no eye draws keep what was there
+        if self.shown_anaglyph != self.settings.anaglyph {
+            self.shown_anaglyph = self.settings.anaglyph;
+            self.targets.clear(&mut recorder)?;
+        }
+        if let Some(assets) = &mut self.assets {
+            assets.prepare_frame(&self.settings)?;
+            let mut context = FrameContext {
+                color: self.targets.color(),
+                drawn: self.targets.drawn(),
+                depth: self.targets.depth(),
+                mask: ColorMask::ALL,
+                assets,
+                world: self.world.as_ref(),
+                settings: &self.settings,
+                raster: &mut self.raster,
+                flares: &mut self.flares,
+                trace: self.trace.as_mut(),
+                list: &mut self.list,
+            };
+            for (item, mask) in &self.queue {
+                context.mask = *mask;
+                context.record(&mut recorder, item)?;
+                if let Item::Classic(scenes) = item {
+                    for scene in scenes {
+                        stats.scene.add(&scene.statistics);
+                    }
+                }
+                stats.views += u32::from(!matches!(item, Item::Overlay(..)));
+                stats.draws += context.list.calls.len() as u32;
+            }
+        }
+        if !self.queue.is_empty() {
+            self.targets.resolve(&mut recorder)?;
+        }
+        self.recycle_queue();
+        let recorded = Instant::now();
+        if later || !show {
+            self.ring.end(recorder)?;
+            self.unshown |= later;
+        } else {
+            self.show(recorder)?;
+        }
+        stats.cpu = CpuTimes {
+            gather: std::mem::take(&mut self.gather_ms),
+            wait: milliseconds(begin, ready),
+            record: milliseconds(ready, recorded),
+            submit: milliseconds(recorded, Instant::now()),
+        };
+        Ok(stats)
+    }
+
+    /// Shows the picture that a software device still worked on when its frame ended. Such a device works in the
+    /// game's own time, and presenting waits for it: so the picture is shown when the next one begins, and meanwhile
+    /// the game goes on.
+    pub(super) fn show_finished(&mut self) -> Result<(), Error> {
+        if std::mem::take(&mut self.unshown) {
+            let recorder = self.ring.begin()?;
+            self.show(recorder)?;
+        }
+        Ok(())
+    }
+
+    /// Ends a frame with the picture on its way to the window.
+    fn show(&mut self, mut recorder: Recorder) -> Result<(), Error> {
+        match &mut self.swapchain {
+            Some(swapchain) => {
+                if let Some(target) = swapchain.acquire(&mut recorder)? {
+                    // a new format comes with a new swapchain
+                    if self
+                        .present
+                        .as_ref()
+                        .is_none_or(|p| p.format() != target.format())
+                    {
+                        self.present = Some(Present::new(&self.device, target.format())?);
+                    }
+                    if let Some(present) = &self.present {
+                        let bits = self.settings.effective_overbright_bits();
+                        present.record(
+                            &mut recorder,
+                            self.targets.color(),
+                            &target,
+                            self.settings.display_gamma(),
+                            bits,
+                            swapchain.copies(),
+                        )?;
+                    }
+                }
+                self.ring.end_present(recorder, swapchain)?;
+            }
+            None => self.ring.end(recorder)?,
+        }
+        Ok(())
+    }
+
+    /// The picture as it stands after everything queued so far, as the display shows it.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn read_pixels(&mut self) -> Result<Picture, Error> {
+        self.flush(false)?;
+        let (width, height) = self.size();
+        let rgba = self.device.read_image(self.targets.color())?;
+        let table = overbright::gamma_table(
+            self.settings.display_gamma(),
+            self.settings.effective_overbright_bits(),
+        );
+        let rgb = rgba
+            .chunks_exact(4)
+            .flat_map(|p| [p[0], p[1], p[2]])
+            .map(|v| table[usize::from(v)])
+            .collect();
+        Ok(Picture { width, height, rgb })
+    }
+}

@@ -1,0 +1,144 @@
+//! What the game and its console ask: light, marks, tags, visibility, lists.
+
+use glam::Vec3;
+
+use super::Renderer;
+use crate::api::{MarkFragment, Orientation, PointLighting};
+use crate::world::{World, mark_fragments};
+
+impl Renderer {
+    /// Light of the map's grid at a point; `None` without a map or grid.
+    pub fn light_for_point(&self, point: Vec3) -> Option<PointLighting> {
+        let light = self.world.as_ref()?.grid_light(point, &self.settings)?;
+        Some(PointLighting {
+            ambient: light.ambient,
+            directed: light.directed,
+            direction: light.direction,
+        })
+    }
+
+    /// The pieces of the map that a decal's polygon covers, projected along `projection`.
+    pub fn mark_fragments(
+        &self,
+        points: &[Vec3],
+        projection: Vec3,
+        max_points: usize,
+        max_fragments: usize,
+    ) -> (Vec<Vec3>, Vec<MarkFragment>) {
+        match (&self.world, &self.assets) {
+            (Some(world), Some(assets)) => {
+                let meshes = self.settings.marks_on_triangle_meshes;
+                mark_fragments(
+                    world,
+                    &assets.materials,
+                    points,
+                    projection,
+                    max_points,
+                    max_fragments,
+                    meshes,
+                )
+            }
+            _ => (Vec::new(), Vec::new()),
+        }
+    }
+
+    /// Where a model's tag is between two frames (`frac` weighs the end frame); `None`: no such model or tag.
+    pub fn lerp_tag(
+        &self,
+        model: i32,
+        start: i32,
+        end: i32,
+        frac: f32,
+        name: &str,
+    ) -> Option<Orientation> {
+        self.assets
+            .as_ref()?
+            .models
+            .lerp_tag(model, start, end, frac, name)
+    }
+
+    /// Bounds of a model's first frame, or of an inline model.
+    pub fn model_bounds(&self, model: i32) -> (Vec3, Vec3) {
+        match &self.assets {
+            Some(assets) => assets.models.bounds(model),
+            None => (Vec3::ZERO, Vec3::ZERO),
+        }
+    }
+
+    /// Cluster of the leaf at a point; -1: none.
+    pub fn leaf_cluster(&self, point: Vec3) -> i32 {
+        self.world
+            .as_ref()
+            .map_or(-1, |world| world.relit.bsp.cluster_at(point))
+    }
+
+    /// Whether the map's visibility lets cluster `a` see cluster `b`.
+    pub fn cluster_sees(&self, a: i32, b: i32) -> bool {
+        self.world
+            .as_ref()
+            .is_none_or(|world| world.relit.bsp.cluster_sees(a, b))
+    }
+
+    /// The next token of the map's entity text; `None` at the end, after which it starts over.
+    pub fn entity_token(&mut self) -> Option<String> {
+        self.entity_tokens
+            .next(&self.world.as_ref()?.relit.bsp.entities)
+    }
+
+    /// Name of the loaded map, as it was asked for.
+    pub fn world_name(&self) -> Option<&str> {
+        self.world.as_ref().map(|world| world.relit.name.as_str())
+    }
+
+    /// The map, for tools.
+    pub fn world(&self) -> Option<&World> {
+        self.world.as_ref()
+    }
+
+    /// The `videoMap` files of registered materials with the client number that
+    /// [`upload_cinematic`](Self::upload_cinematic) takes their pictures under.
+    pub fn videos(&self) -> Vec<(String, usize)> {
+        self.assets.as_ref().map_or_else(Vec::new, |a| {
+            a.materials
+                .videos()
+                .map(|(name, client)| (name.to_owned(), client))
+                .collect()
+        })
+    }
+
+    /// Says that a video of [`videos`](Self::videos) cannot be played: the stages that show it, and those above them,
+    /// are not drawn.
+    pub fn drop_video(&mut self, client: usize) {
+        if let Some(assets) = &mut self.assets {
+            assets.materials.drop_video(client);
+        }
+    }
+
+    /// One line for each image.
+    pub fn image_list(&self) -> Vec<String> {
+        self.assets
+            .as_ref()
+            .map_or_else(Vec::new, |a| a.textures.list())
+    }
+
+    /// One line for each material; in drawing order if `sorted`.
+    pub fn shader_list(&self, sorted: bool) -> Vec<String> {
+        self.assets
+            .as_ref()
+            .map_or_else(Vec::new, |a| a.materials.list(sorted))
+    }
+
+    /// One line for each skin and each of its surfaces.
+    pub fn skin_list(&self) -> Vec<String> {
+        self.assets
+            .as_ref()
+            .map_or_else(Vec::new, |a| a.skins.list(&a.materials))
+    }
+
+    /// One line for each model.
+    pub fn model_list(&self) -> Vec<String> {
+        self.assets
+            .as_ref()
+            .map_or_else(Vec::new, |a| a.models.list())
+    }
+}
