@@ -259,12 +259,17 @@ fn publish_sizes(engine: Engine, sdl: Sdl, window: &Window) {
     }
 }
 
-/// Closes the window, if one is open, and SDL's video with it. The engine's input code lets go of it first. No
+/// Closes the window, if one is open, and with `end_video` SDL's video too. The engine's input code lets go of it first. No
 /// Vulkan surface of it may be in use by a renderer that still runs.
 pub fn close(engine: Engine, end_video: bool) {
     let Some(window) = OPEN.0.take() else { return };
     if window.given {
         engine.input_shutdown();
+    }
+    // A renderer was given up in the middle of a call, by a signal or a fatal error: its driver's threads may still be
+    // showing a picture through SDL's connection, which has to stay for the moments that the process has left.
+    if end_video && window.stale {
+        return;
     }
     // SAFETY: the window is open and forgotten by everybody now.
     unsafe { window.sdl.destroy(window.raw) };
