@@ -108,6 +108,27 @@ pub(crate) fn check_sharing(claimed: u64, file_length: usize) -> Result<(), Erro
     Ok(())
 }
 
+/// That a file starts with this identification and version; a file too short for both fails at its header.
+pub(crate) fn check_format(
+    bytes: &[u8],
+    ident: &[u8; 4],
+    version: i32,
+    expected: &'static str,
+) -> Result<(), Error> {
+    let found_ident = bytes.first_chunk::<4>();
+    let found_version = bytes.get(4..8).and_then(|v| v.first_chunk::<4>());
+    if let (Some(found_ident), Some(found_version)) = (found_ident, found_version) {
+        let found_version = i32::from_le_bytes(*found_version);
+        if found_ident != ident || found_version != version {
+            return Err(Error::WrongFormat {
+                found: format!("\"{}\" version {found_version}", found_ident.escape_ascii()),
+                expected,
+            });
+        }
+    }
+    Ok(())
+}
+
 /// A count that must not be negative.
 pub(crate) fn count(what: &str, value: i32) -> Result<usize, Error> {
     usize::try_from(value).map_err(|_| Error::Value {

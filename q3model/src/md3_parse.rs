@@ -2,7 +2,7 @@
 
 use crate::Error;
 pub(crate) use crate::bytes::TRIANGLE_BYTES;
-use crate::bytes::{Fields, Region, check_sharing, count, read_triangles};
+use crate::bytes::{Fields, Region, check_format, check_sharing, count, read_triangles};
 use crate::md3::{Frame, Md3, PackedVertex, Surface, Tag};
 use std::collections::HashSet;
 
@@ -25,17 +25,7 @@ impl Md3 {
     /// triangle corners that name no vertex.
     pub fn parse(bytes: &[u8]) -> Result<Md3, Error> {
         let file = Region::new(bytes, 0);
-        let ident = bytes.first_chunk::<4>();
-        let version = bytes.get(4..8).and_then(|v| v.first_chunk::<4>());
-        if let (Some(ident), Some(version)) = (ident, version) {
-            let version = i32::from_le_bytes(*version);
-            if ident != IDENT || version != VERSION {
-                return Err(Error::WrongFormat {
-                    found: format!("\"{}\" version {version}", ident.escape_ascii()),
-                    expected: "\"IDP3\" version 15",
-                });
-            }
-        }
+        check_format(bytes, IDENT, VERSION, "\"IDP3\" version 15")?;
         let mut header =
             Fields::new(file.records(|| "the header".to_owned(), 0, 1, HEADER_BYTES)?);
         let _ident_and_version: [u8; 8] = header.bytes();

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use glam::Vec4;
 
-use crate::bytes::{Fields, Region, check_sharing, count, read_triangles};
+use crate::bytes::{Fields, Region, check_format, check_sharing, count, read_triangles};
 use crate::mdr::{Mdr, MdrSurface, MdrTag, MdrVertex, MdrWeight};
 use crate::{BoneMatrix, Error, Frame};
 
@@ -39,17 +39,7 @@ impl Mdr {
     /// triangle corners that name no vertex, weights and tags that name no bone.
     pub fn parse(bytes: &[u8]) -> Result<Mdr, Error> {
         let file = Region::new(bytes, 0);
-        let ident = bytes.first_chunk::<4>();
-        let version = bytes.get(4..8).and_then(|v| v.first_chunk::<4>());
-        if let (Some(ident), Some(version)) = (ident, version) {
-            let version = i32::from_le_bytes(*version);
-            if ident != IDENT || version != VERSION {
-                return Err(Error::WrongFormat {
-                    found: format!("\"{}\" version {version}", ident.escape_ascii()),
-                    expected: "\"RDM5\" version 2",
-                });
-            }
-        }
+        check_format(bytes, IDENT, VERSION, "\"RDM5\" version 2")?;
         let mut header =
             Fields::new(file.records(|| "the header".to_owned(), 0, 1, HEADER_BYTES)?);
         let _ident_and_version: [u8; 8] = header.bytes();

@@ -259,8 +259,8 @@ fn publish_sizes(engine: Engine, sdl: Sdl, window: &Window) {
     }
 }
 
-/// Closes the window, if one is open, and with `end_video` SDL's video too. The engine's input code lets go of it first. No
-/// Vulkan surface of it may be in use by a renderer that still runs.
+/// Closes the window, if one is open, and with `end_video` SDL's video too. The engine's input code lets go of it
+/// first. No Vulkan surface of it may be in use by a renderer that still runs.
 pub fn close(engine: Engine, end_video: bool) {
     let Some(window) = OPEN.0.take() else { return };
     if window.given {

@@ -148,19 +148,8 @@ impl DrawList {
             let mut lights = 0;
             for surface in these {
                 lights |= surface.dlights;
-                let (source, first, count) = match surface.geometry {
-                    Geometry::Static {
-                        first_index,
-                        index_count,
-                    } => (static_indices, first_index, index_count),
-                    Geometry::Dynamic {
-                        first_index,
-                        index_count,
-                    } => (scene.indices.as_slice(), first_index, index_count),
-                };
-                let range = first as usize..first as usize + count as usize;
                 self.indices
-                    .extend_from_slice(source.get(range).unwrap_or_default());
+                    .extend_from_slice(scene.indices_of(surface, static_indices));
             }
             let flags = scene
                 .instances

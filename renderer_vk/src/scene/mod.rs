@@ -179,6 +179,22 @@ pub struct ViewScene {
 }
 
 impl ViewScene {
+    /// The indices of a surface of the view. `static_indices` is the world's index array.
+    pub fn indices_of<'a>(&'a self, surface: &DrawSurface, static_indices: &'a [u32]) -> &'a [u32] {
+        let (source, first, count) = match surface.geometry {
+            Geometry::Static {
+                first_index,
+                index_count,
+            } => (static_indices, first_index, index_count),
+            Geometry::Dynamic {
+                first_index,
+                index_count,
+            } => (self.indices.as_slice(), first_index, index_count),
+        };
+        let range = first as usize..first as usize + count as usize;
+        source.get(range).unwrap_or_default()
+    }
+
     /// Nothing, seen by a camera.
     pub(crate) fn empty(def: &RefDef, view: View) -> Self {
         Self {

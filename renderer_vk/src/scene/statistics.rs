@@ -4,7 +4,7 @@ use glam::{Vec3, Vec4};
 use q3bsp::SurfaceKind;
 
 use super::gather::Gatherer;
-use super::{DrawSurface, Geometry, ViewScene};
+use super::{DrawSurface, ViewScene};
 use crate::assets::Model;
 use crate::world::{Bounds, WorldData};
 
@@ -155,19 +155,8 @@ impl Gatherer<'_> {
         let static_indices = self.world.map_or(&[][..], |world| world.indices.as_slice());
         let mut last = None;
         for surface in &out.surfaces {
-            let (source, first, count) = match surface.geometry {
-                Geometry::Static {
-                    first_index,
-                    index_count,
-                } => (static_indices, first_index, index_count),
-                Geometry::Dynamic {
-                    first_index,
-                    index_count,
-                } => (out.indices.as_slice(), first_index, index_count),
-            };
-            let range = first as usize..first as usize + count as usize;
             let material = self.input.materials.get(surface.material);
-            let indices = source.get(range).unwrap_or_default();
+            let indices = out.indices_of(surface, static_indices);
             counts.add_surface(surface, material.passes.len(), indices);
             let run = (
                 surface.material,
