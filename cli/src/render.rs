@@ -274,13 +274,16 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     let info = renderer.device_info().clone();
     let settings = Settings {
         rt: args.look == Look::Traced,
-        rt_reference: !args.no_accumulation,
+        rt_accumulate: !args.no_accumulation,
         rt_bounces: args.bounces,
         rt_exposure: args.exposure,
-        rt_light_sampling: match args.sampling {
-            Sampling::Uniform => renderer_vk::LightSampling::Uniform,
-            Sampling::Resampled => renderer_vk::LightSampling::Resampled,
-            Sampling::All => renderer_vk::LightSampling::All,
+        rt_num_random_dl: match args.sampling {
+            Sampling::Uniform | Sampling::Resampled => 1,
+            Sampling::All => 0,
+        },
+        rt_light_selection: match args.sampling {
+            Sampling::Uniform => renderer_vk::LightSelection::Uniform,
+            Sampling::Resampled | Sampling::All => renderer_vk::LightSelection::Resampled,
         },
         ..Settings::default()
     };

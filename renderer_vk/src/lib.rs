@@ -22,5 +22,5 @@ pub mod world;
 pub use assets::is_texture_mode;
 pub use error::Error;
 pub use renderer::{CpuTimes, FrameStats, Renderer, RendererOptions, probe};
-pub use settings::{LightSampling, Settings};
+pub use settings::{LightSelection, Settings, TracerChoice};
 pub use stereo::Eye;

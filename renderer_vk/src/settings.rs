@@ -1,16 +1,28 @@
 //! The renderer's settings: the values of the cvars, as plain data. The front end owns the cvars (names, ranges,
 //! flags) and hands over a fresh copy each frame; what is latched there changes only at `begin_registration`.
 
-/// How traced direct light chooses among the lights of a cluster.
+/// How a traced light sample picks its light from a cluster's list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum LightSampling {
-    /// One light of the list, each with the same probability.
+pub enum LightSelection {
+    /// Each light with the same probability.
     Uniform,
     /// Resampled importance sampling over a few candidates.
     #[default]
     Resampled,
-    /// Every light of the list.
-    All,
+}
+
+/// What is to follow the rays of the traced look. A device that cannot do it gets the one that `Auto` picks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum TracerChoice {
+    /// The fastest one on the device.
+    #[default]
+    Auto,
+    /// The device's ray tracing pipeline.
+    Pipeline,
+    /// Ray queries in compute shaders.
+    Query,
+    /// Hierarchies of our own, walked by compute shaders.
+    Compute,
 }
 
 /// All settings. Names follow the cvars.
@@ -19,17 +31,49 @@ pub enum LightSampling {
 pub struct Settings {
     // the traced look
     pub rt: bool,
-    /// Accumulate frames while nothing moves (reference mode).
-    pub rt_reference: bool,
-    pub rt_light_sampling: LightSampling,
-    /// Light samples (shadow rays) a pixel and frame.
-    pub rt_samples: u32,
+    /// Latched: what follows the rays.
+    pub rt_tracer: TracerChoice,
+    /// Prints a line of statistics each second.
+    pub rt_print_perf_stats: bool,
+    /// Off: surfaces show their own colour, without light.
+    pub rt_illumination: bool,
+    /// Off: every light of the map is a candidate at every point.
+    pub rt_cull_lights: bool,
+    /// Light samples (shadow rays) a pixel and frame; 0: one for every light that may reach the point.
+    pub rt_num_random_dl: u32,
+    pub rt_light_selection: LightSelection,
     /// Candidates of resampled selection.
     pub rt_candidates: u32,
+    /// Freezes what the traced look shows: view, scene and time.
+    pub rt_pause: bool,
+    /// Accumulate frames while nothing moves (reference mode): neither denoiser nor TAA, towards the exact picture.
+    pub rt_accumulate: bool,
+    /// Camera rays go through all of a pixel's area instead of its middle.
+    pub rt_antialiasing: bool,
+    /// Off: each light is sampled at its middle, so that shadows are sharp.
+    pub rt_soft_shadows: bool,
+    /// Depth of field by a thin lens.
+    pub rt_dof: bool,
+    /// Diameter of the lens, units.
+    pub rt_aperture: f32,
+    /// Distance from the eye of the plane in focus, units.
+    pub rt_focal_length: f32,
+    /// 0 none, 1 A-SVGF, 2 sparse filter.
+    pub rt_denoiser: u32,
+    /// Temporal anti-aliasing.
+    pub rt_taa: bool,
+    /// Pixels traced over pixels shown, along each axis, 0.25 to 1.
+    pub rt_scale: f32,
     /// Mirrors and glass on a path.
     pub rt_max_depth: u32,
-    /// Diffuse bounces.
+    /// Diffuse bounces, 0 to 2.
     pub rt_bounces: u32,
+    /// Strength of bloom: the part of light that is spread; 0 none.
+    pub rt_bloom: f32,
+    /// A lamp at the eye.
+    pub rt_flashlight: bool,
+    /// Number of the debug view in place of the picture; 0 none.
+    pub rt_debug: u32,
     /// Exposure in stops; added to automatic exposure.
     pub rt_exposure: f32,
     pub rt_auto_exposure: bool,
@@ -154,12 +198,28 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             rt: false,
-            rt_reference: false,
-            rt_light_sampling: LightSampling::Resampled,
-            rt_samples: 1,
+            rt_tracer: TracerChoice::Auto,
+            rt_print_perf_stats: false,
+            rt_illumination: true,
+            rt_cull_lights: true,
+            rt_num_random_dl: 1,
+            rt_light_selection: LightSelection::Resampled,
             rt_candidates: 8,
+            rt_pause: false,
+            rt_accumulate: false,
+            rt_antialiasing: true,
+            rt_soft_shadows: true,
+            rt_dof: false,
+            rt_aperture: 4.0,
+            rt_focal_length: 256.0,
+            rt_denoiser: 1,
+            rt_taa: true,
+            rt_scale: 1.0,
             rt_max_depth: 4,
             rt_bounces: 1,
+            rt_bloom: 0.0,
+            rt_flashlight: false,
+            rt_debug: 0,
             rt_exposure: 0.0,
             rt_auto_exposure: true,
             rt_light_scale: 1.0,

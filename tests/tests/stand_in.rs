@@ -92,8 +92,28 @@ fn cvars_and_commands_come_and_go() {
         "r_mode",
         "r_picmip",
         "r_rt",
-        "rt_samples",
-        "rt_reference",
+        "rt_printPerfStats",
+        "rt_illumination",
+        "rt_cullLights",
+        "rt_numRandomDL",
+        "rt_pause",
+        "rt_accumulate",
+        "rt_antialiasing",
+        "rt_softshadows",
+        "rt_dof",
+        "rt_aperture",
+        "rt_focallength",
+        "rt_denoiser",
+        "rt_taa",
+        "rt_tracer",
+        "rt_bounces",
+        "rt_maxDepth",
+        "rt_lightSelection",
+        "rt_exposure",
+        "rt_bloom",
+        "rt_scale",
+        "rt_flashlight",
+        "rt_debug",
         "r_vkValidation",
         "r_flares",
     ] {
@@ -240,7 +260,7 @@ fn scenes_hold_what_was_added() {
     let view = View::new(HERE, 0.0);
     for look in ["0", "1"] {
         engine.set("r_rt", look);
-        engine.set("rt_reference", "1");
+        engine.set("rt_accumulate", "1");
         let shown = |engine: &mut Engine, draw: &dyn Fn(&mut Engine)| {
             let mut last = None;
             for _ in 0..3 {
@@ -355,7 +375,7 @@ fn models_of_every_kind_show_in_both_looks() {
     let view = View::new(HERE, 0.0);
     for look in ["0", "1"] {
         engine.set("r_rt", look);
-        engine.set("rt_reference", "1");
+        engine.set("rt_accumulate", "1");
         let shown = |engine: &mut Engine, entity: Option<refEntity_t>| {
             let mut frame = || {
                 engine.picture_of(|e| {

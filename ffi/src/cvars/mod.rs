@@ -3,7 +3,7 @@
 mod settings;
 pub mod table;
 
-pub use settings::{apply, write_back_clamps};
+pub use settings::{apply, apply_at_registration, write_back_clamps};
 pub use table::{Cvar, TABLE};
 
 use crate::ioq3::abi::{QBool, cvar_t};

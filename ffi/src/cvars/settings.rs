@@ -3,35 +3,70 @@
 use super::{Cvar, Cvars};
 use crate::ioq3::engine::Engine;
 use crate::session::WindowFacts;
-use renderer_vk::{LightSampling, Settings, is_texture_mode};
+use renderer_vk::{LightSelection, Settings, TracerChoice, is_texture_mode};
 
 /// A count: negative is 0.
 fn count(cvars: &Cvars, cvar: Cvar) -> u32 {
     u32::try_from(cvars.integer(cvar)).unwrap_or(0)
 }
 
-/// `rt_lightSampling`: 0 uniform, 1 resampled, 2 all.
-fn light_sampling(value: i32) -> LightSampling {
+/// `rt_lightSelection`: 0 uniform, 1 resampled.
+fn light_selection(value: i32) -> LightSelection {
     match value {
-        0 => LightSampling::Uniform,
-        2 => LightSampling::All,
-        _ => LightSampling::Resampled,
+        0 => LightSelection::Uniform,
+        _ => LightSelection::Resampled,
     }
 }
 
-/// Reads every setting. Cheap: the variables are the engine's memory; text is copied when it changed.
+/// `rt_tracer`, whatever its case; `None` for anything that is no tracer's name.
+fn tracer(name: &str) -> Option<TracerChoice> {
+    let names = [
+        ("auto", TracerChoice::Auto),
+        ("pipeline", TracerChoice::Pipeline),
+        ("query", TracerChoice::Query),
+        ("compute", TracerChoice::Compute),
+    ];
+    let found = names.iter().find(|(n, _)| n.eq_ignore_ascii_case(name));
+    found.map(|&(_, choice)| choice)
+}
+
+/// Reads what counts from registration on: `rt_tracer`. A name that is none is told and taken for `auto`.
+pub fn apply_at_registration(cvars: &Cvars, settings: &mut Settings) {
+    let name = cvars.string(Cvar::RtTracer);
+    settings.rt_tracer = tracer(&name).unwrap_or_else(|| {
+        log::warn!("rt_tracer {name}: not one of auto, pipeline, query, compute; auto is used");
+        TracerChoice::Auto
+    });
+}
+
+/// Reads every other setting. Cheap: the variables are the engine's memory; text is copied when it changed.
 ///
 /// What depends on the window is as it was when the window was opened.
 pub fn apply(cvars: &Cvars, window: WindowFacts, settings: &mut Settings) {
     let (value, flag, integer) = (|c| cvars.value(c), |c| cvars.flag(c), |c| cvars.integer(c));
 
     settings.rt = flag(Cvar::RayTrace);
-    settings.rt_reference = flag(Cvar::RtReference);
-    settings.rt_light_sampling = light_sampling(integer(Cvar::RtLightSampling));
-    settings.rt_samples = count(cvars, Cvar::RtSamples).max(1);
+    settings.rt_print_perf_stats = flag(Cvar::RtPrintPerfStats);
+    settings.rt_illumination = flag(Cvar::RtIllumination);
+    settings.rt_cull_lights = flag(Cvar::RtCullLights);
+    settings.rt_num_random_dl = count(cvars, Cvar::RtNumRandomDL);
+    settings.rt_light_selection = light_selection(integer(Cvar::RtLightSelection));
     settings.rt_candidates = count(cvars, Cvar::RtCandidates).max(1);
+    settings.rt_pause = flag(Cvar::RtPause);
+    settings.rt_accumulate = flag(Cvar::RtAccumulate);
+    settings.rt_antialiasing = flag(Cvar::RtAntialiasing);
+    settings.rt_soft_shadows = flag(Cvar::RtSoftShadows);
+    settings.rt_dof = flag(Cvar::RtDof);
+    settings.rt_aperture = value(Cvar::RtAperture).max(0.0);
+    settings.rt_focal_length = value(Cvar::RtFocalLength).max(1.0);
+    settings.rt_denoiser = count(cvars, Cvar::RtDenoiser).min(2);
+    settings.rt_taa = flag(Cvar::RtTaa);
+    settings.rt_scale = value(Cvar::RtScale).clamp(0.25, 1.0);
     settings.rt_max_depth = count(cvars, Cvar::RtMaxDepth);
-    settings.rt_bounces = count(cvars, Cvar::RtBounces);
+    settings.rt_bounces = count(cvars, Cvar::RtBounces).min(2);
+    settings.rt_bloom = value(Cvar::RtBloom).clamp(0.0, 1.0);
+    settings.rt_flashlight = flag(Cvar::RtFlashlight);
+    settings.rt_debug = count(cvars, Cvar::RtDebug);
     settings.rt_exposure = value(Cvar::RtExposure);
     settings.rt_auto_exposure = flag(Cvar::RtAutoExposure);
     settings.rt_light_scale = value(Cvar::RtLightScale).max(0.0);
@@ -138,9 +173,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn light_sampling_takes_its_documented_numbers() {
-        assert_eq!(light_sampling(0), LightSampling::Uniform);
-        assert_eq!(light_sampling(1), LightSampling::Resampled);
-        assert_eq!(light_sampling(2), LightSampling::All);
+    fn light_selection_takes_its_documented_numbers() {
+        assert_eq!(light_selection(0), LightSelection::Uniform);
+        assert_eq!(light_selection(1), LightSelection::Resampled);
+    }
+
+    #[test]
+    fn tracers_go_by_their_documented_names() {
+        assert_eq!(tracer("auto"), Some(TracerChoice::Auto));
+        assert_eq!(tracer("Pipeline"), Some(TracerChoice::Pipeline));
+        assert_eq!(tracer("query"), Some(TracerChoice::Query));
+        assert_eq!(tracer("COMPUTE"), Some(TracerChoice::Compute));
+        assert_eq!(tracer(""), None);
+        assert_eq!(tracer("gpu"), None);
     }
 }

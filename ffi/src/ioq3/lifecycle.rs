@@ -92,6 +92,7 @@ pub extern "C" fn begin_registration(out: *mut glconfig_t) {
                 return Ok(());
             };
             cvars::apply(&cvars, front.window, &mut front.settings);
+            cvars::apply_at_registration(&cvars, &mut front.settings);
             let mode = cvars.string(Cvar::TextureMode);
             if renderer_vk::is_texture_mode(&mode) {
                 front.settings.texture_mode = mode;

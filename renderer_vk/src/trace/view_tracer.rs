@@ -14,7 +14,7 @@ use super::passes::{Accumulate, Composite, Denoise, Direct, Exposure, Indirect, 
 use super::targets::Targets;
 use crate::gpu::{Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::scene::ViewScene;
-use crate::settings::{LightSampling, Settings};
+use crate::settings::{LightSelection, Settings};
 
 /// The map that a view shows.
 #[derive(Clone, Copy)]
@@ -166,20 +166,20 @@ impl ViewTracer {
         self.primary.record(rec, address, size)?;
         self.direct.record(rec, address, size)?;
         self.indirect.record(rec, address, size)?;
-        if !settings.rt_reference
+        if !settings.rt_accumulate
             && let Some(targets) = &self.targets
         {
             self.denoise.record(rec, address, targets)?;
         }
         self.composite.record(rec, address, size)?;
-        if settings.rt_reference {
+        if settings.rt_accumulate {
             self.accumulate.record(rec, address, size)?;
         }
         self.exposure.record(rec, address, size)?;
         self.tone_map.record(rec, address, size)?;
         self.frame = self.frame.wrapping_add(1);
         self.last_time = view.time;
-        self.history = (!settings.rt_reference).then(|| camera_frame(view));
+        self.history = (!settings.rt_accumulate).then(|| camera_frame(view));
         if let Some(targets) = &mut self.targets {
             targets.advance(Denoise::HISTORY);
         }
@@ -194,7 +194,7 @@ impl ViewTracer {
         materials: &dyn MaterialTable,
         settings: &Settings,
     ) -> u32 {
-        if !settings.rt_reference {
+        if !settings.rt_accumulate {
             self.accumulated = (0, 0);
             return 0;
         }
@@ -237,20 +237,26 @@ impl ViewTracer {
         };
         let mut flags = 0;
         let mut set = |bit: u32, on: bool| flags |= if on { bit } else { 0 };
-        set(t::VIEW_JITTER, settings.rt_reference);
-        set(t::VIEW_ACCUMULATE, settings.rt_reference);
+        set(
+            t::VIEW_JITTER,
+            settings.rt_accumulate && settings.rt_antialiasing,
+        );
+        set(t::VIEW_ACCUMULATE, settings.rt_accumulate);
         set(t::VIEW_FIRST_PERSON, accel.first_person);
         set(t::VIEW_AUTO_EXPOSURE, settings.rt_auto_exposure);
         set(t::VIEW_EXPOSURE_RESET, !self.exposure_started);
         set(t::VIEW_FAST_SKY, settings.fast_sky);
-        set(t::VIEW_FULLBRIGHT, settings.fullbright);
-        set(t::VIEW_DENOISE, !settings.rt_reference);
+        set(
+            t::VIEW_FULLBRIGHT,
+            settings.fullbright || !settings.rt_illumination,
+        );
+        set(t::VIEW_DENOISE, !settings.rt_accumulate);
         set(t::VIEW_HISTORY, self.history.is_some());
         let [last_eye, last_forward, last_left, last_up] = self.history.unwrap_or([Vec3::ZERO; 4]);
         let [eye, forward, left, up] = camera_frame(view);
         let passed = view.time - self.last_time;
         // the picture settles at once where frames must not depend on those before them
-        let exposure_blend = if settings.rt_reference || !self.exposure_started {
+        let exposure_blend = if settings.rt_accumulate || !self.exposure_started {
             1.0
         } else {
             1.0 - (-EXPOSURE_RATE
@@ -290,7 +296,7 @@ impl ViewTracer {
             target_y: camera.viewport[1],
             scene: accel.scene,
             flags,
-            seed: if settings.rt_reference {
+            seed: if settings.rt_accumulate {
                 accumulated
             } else {
                 self.frame
@@ -305,15 +311,20 @@ impl ViewTracer {
             sun_count: lights.sun_count,
             dynamic_light_count: u32::try_from(dynamic.len()).unwrap_or(u32::MAX),
             cluster_count: lights.cluster_count,
-            node_count: lights.node_count,
+            // without its tree every point falls into the row of all lights
+            node_count: if settings.rt_cull_lights {
+                lights.node_count
+            } else {
+                0
+            },
             max_depth: settings.rt_max_depth,
-            bounces: settings.rt_bounces,
-            samples: settings.rt_samples.max(1),
+            bounces: settings.rt_bounces.min(2),
+            samples: settings.rt_num_random_dl.max(1),
             candidates: settings.rt_candidates.max(1),
-            sampling: match settings.rt_light_sampling {
-                LightSampling::Uniform => t::SAMPLING_UNIFORM,
-                LightSampling::Resampled => t::SAMPLING_RESAMPLED,
-                LightSampling::All => t::SAMPLING_ALL,
+            sampling: match settings.rt_light_selection {
+                _ if settings.rt_num_random_dl == 0 => t::SAMPLING_ALL,
+                LightSelection::Uniform => t::SAMPLING_UNIFORM,
+                LightSelection::Resampled => t::SAMPLING_RESAMPLED,
             },
             image_position: targets.position[0].storage_index(),
             image_surface: targets.surface[0].storage_index(),
@@ -425,14 +436,21 @@ fn content_hash(view: &ViewScene, materials: &dyn MaterialTable, settings: &Sett
         settings.rt_max_depth,
         settings.rt_bounces,
         settings.fast_sky,
-        settings.fullbright,
+        settings.fullbright || !settings.rt_illumination,
     )
         .hash(&mut hasher);
     (settings.dynamic_light, settings.no_portals).hash(&mut hasher);
     // estimators with the same mean could go on together, but a comparison wants them apart
     (
-        settings.rt_light_sampling as u32,
-        settings.rt_samples,
+        settings.rt_cull_lights,
+        settings.rt_antialiasing,
+        settings.rt_soft_shadows,
+        settings.rt_flashlight,
+        settings.rt_dof,
+        settings.rt_aperture.to_bits(),
+        settings.rt_focal_length.to_bits(),
+        settings.rt_light_selection as u32,
+        settings.rt_num_random_dl,
         settings.rt_candidates,
     )
         .hash(&mut hasher);

@@ -42,7 +42,7 @@ fn room() -> Scene {
 
 fn live() -> Settings {
     Settings {
-        rt_reference: false,
+        rt_accumulate: false,
         rt_bounces: 1,
         ..reference()
     }

@@ -125,7 +125,7 @@ impl Gpu {
             self.ring.end(rec).expect("submitted");
         }
         self.device.wait_idle().expect("done");
-        if settings.rt_reference {
+        if settings.rt_accumulate {
             assert_eq!(
                 self.look.accumulated_frames(),
                 frames,
@@ -169,7 +169,7 @@ impl Gpu {
 pub fn reference() -> Settings {
     Settings {
         rt: true,
-        rt_reference: true,
+        rt_accumulate: true,
         rt_bounces: 0,
         rt_auto_exposure: false,
         ..Settings::default()

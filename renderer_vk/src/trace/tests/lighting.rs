@@ -5,7 +5,15 @@ use relight::light::{PointLight, SunLight};
 
 use super::harness::{Gpu, Scene, floor_point, lambert, rectangle, reference};
 use crate::api::DynamicLight;
-use crate::settings::{LightSampling, Settings};
+use crate::settings::{LightSelection, Settings};
+
+/// The ways to choose lights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum LightSampling {
+    Uniform,
+    Resampled,
+    All,
+}
 
 const ALL: [LightSampling; 3] = [
     LightSampling::Uniform,
@@ -30,8 +38,12 @@ fn floor() -> Scene {
 
 fn sampled(sampling: LightSampling) -> Settings {
     Settings {
-        rt_light_sampling: sampling,
-        rt_samples: 4,
+        rt_num_random_dl: if sampling == LightSampling::All { 0 } else { 4 },
+        rt_light_selection: if sampling == LightSampling::Uniform {
+            LightSelection::Uniform
+        } else {
+            LightSelection::Resampled
+        },
         ..reference()
     }
 }

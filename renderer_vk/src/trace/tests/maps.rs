@@ -88,7 +88,7 @@ fn maps_are_lit() {
     let scripts = Arc::new(scripts);
     let settings = Settings {
         rt: true,
-        rt_reference: std::env::var_os("RELIGHT_TRACE_LIVE").is_none(),
+        rt_accumulate: std::env::var_os("RELIGHT_TRACE_LIVE").is_none(),
         ..Settings::default()
     };
     for map in maps {
