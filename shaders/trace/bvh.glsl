@@ -2,7 +2,7 @@
 #ifndef RELIGHT_TRACE_BVH_GLSL
 #define RELIGHT_TRACE_BVH_GLSL
 
-#include "trace/layer.glsl"
+#include "trace/candidate.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BvhNodes { BvhNode at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BvhTriangles { BvhTriangle at[]; };
@@ -79,11 +79,9 @@ struct BvhWalk {
 // Takes note of a hit; true ends the walk.
 bool bvh_report(inout BvhWalk walk, Hit hit, uint kind) {
     if (walk.mode == BVH_LAYER) {
-        SurfacePoint p = surface_point(hit);
-        float key = layer_key(p.triangle.flags, hit.t);
-        bool behind = layer_before(walk.last.key, walk.last.geometry, walk.last.primitive, key, hit.geometry, hit.primitive);
-        bool better = walk.key >= 1.0e30 || layer_before(key, hit.geometry, hit.primitive, walk.key, walk.hit.geometry, walk.hit.primitive);
-        if (behind && better && !is_culled(material_of(p.triangle.material).flags, p.face_normal, walk.direction)) {
+        float key;
+        LayerOrder best = LayerOrder(walk.key, walk.hit.geometry, walk.hit.primitive);
+        if (is_next_layer(hit, walk.direction, walk.last, best, key)) {
             walk.hit = hit;
             walk.key = key;
             // nothing farther than this can have a smaller key
@@ -91,7 +89,7 @@ bool bvh_report(inout BvhWalk walk, Hit hit, uint kind) {
         }
         return false;
     }
-    if (kind == KIND_TESTED && !is_solid_at(surface_point(hit), hit.t * VIEW.pixel_spread)) return false;
+    if (kind == KIND_TESTED && !is_stopped_by(hit)) return false;
     walk.hit = hit;
     walk.tmax = hit.t;
     return walk.mode == BVH_ANY;
@@ -193,11 +191,11 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
 Hit trace_layer(vec3 origin, vec3 direction, float tmax, uint mask, inout LayerOrder order) {
     BvhWalk walk;
     walk.mode = BVH_LAYER;
-    walk.tmin = max(order.key - 0.01, 0.0);
+    walk.tmin = layer_start(order);
     walk.tmax = tmax;
     walk.direction = direction;
     walk.hit = Hit(NO_HIT, 0, vec2(0.0), 0.0);
-    walk.key = 1.0e30;
+    walk.key = LAYER_NONE;
     walk.last = order;
     bvh_walk(walk, origin, mask);
     if (walk.hit.geometry != NO_HIT) order = LayerOrder(walk.key, walk.hit.geometry, walk.hit.primitive);

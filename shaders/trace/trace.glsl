@@ -1,27 +1,22 @@
-// The tracer: how a pass asks for rays. Passes use these functions only, so the same pass is compiled for two tracers:
-// the ray tracing pipeline, whose hit shaders report what was hit and decide cut-outs, and (TRACER_COMPUTE) our own
-// hierarchies walked in a compute shader, which needs no ray tracing hardware.
+// The tracer: how a pass asks for rays. Passes use these functions only, so the same pass is compiled for three
+// tracers: the ray tracing pipeline, whose hit shaders report what was hit and decide cut-outs; ray queries
+// (TRACER_QUERY); and our own hierarchies (TRACER_COMPUTE), which need no ray tracing hardware. The last two are walked
+// in a compute shader.
 #ifndef RELIGHT_TRACE_TRACE_GLSL
 #define RELIGHT_TRACE_TRACE_GLSL
 
-#include "trace/geometry.glsl"
-#include "trace/layer_order.glsl"
+#include "trace/candidate.glsl"
 
-// The place of a translucent layer in the order along a ray, nearest first.
-struct LayerOrder {
-    float key;
-    uint geometry;
-    uint primitive;
-};
-
-LayerOrder layer_begin() { return LayerOrder(-1.0e30, NO_HIT, NO_HIT); }
-
-#ifdef TRACER_COMPUTE
-
-#include "trace/bvh.glsl"
+#if defined(TRACER_COMPUTE) || defined(TRACER_QUERY)
 
 layout(local_size_x = 8, local_size_y = 4) in;
 #define LAUNCH_PIXEL ivec2(gl_GlobalInvocationID.xy)
+
+#if defined(TRACER_COMPUTE)
+#include "trace/bvh.glsl"
+#else
+#include "trace/query.glsl"
+#endif
 
 #else
 
@@ -39,7 +34,7 @@ Hit payload_hit() {
 Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
     // where nothing reports, the ray was blocked
     payload.geometry = any_hit ? 0 : NO_HIT;
-    payload.key = 1.0e30;
+    payload.key = LAYER_NONE;
     uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT;
     traceRayEXT(scenes[VIEW.scene], flags, mask, 0, 0, 0, origin, tmin, direction, tmax, 0);
     return payload_hit();
@@ -49,15 +44,13 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
 // order of the engine, what it draws last first.
 Hit trace_layer(vec3 origin, vec3 direction, float tmax, uint mask, inout LayerOrder order) {
     payload.geometry = NO_HIT;
-    payload.key = 1.0e30;
+    payload.key = LAYER_NONE;
     payload.last_key = order.key;
     payload.last_geometry = order.geometry;
     payload.last_primitive = order.primitive;
-    // a layer lies at its key or a bias behind it
-    float tmin = max(order.key - 0.01, 0.0);
-    traceRayEXT(scenes[VIEW.scene], gl_RayFlagsSkipClosestHitShaderEXT, mask, 0, 0, 0, origin, tmin, direction, tmax, 0);
+    traceRayEXT(scenes[VIEW.scene], gl_RayFlagsSkipClosestHitShaderEXT, mask, 0, 0, 0, origin, layer_start(order), direction, tmax, 0);
     Hit hit = payload_hit();
-    if (payload.key >= 1.0e30) hit.geometry = NO_HIT;
+    if (payload.key >= LAYER_NONE) hit.geometry = NO_HIT;
     else order = LayerOrder(payload.key, hit.geometry, hit.primitive);
     return hit;
 }

@@ -118,7 +118,7 @@ struct DriverStructures {
 /// Builds the structures of each frame in storage that stays.
 pub struct Accel {
     slots: Vec<Slot>,
-    /// With the pipeline tracer.
+    /// With the tracers that walk them.
     driver: Option<DriverStructures>,
     positions: Vec<Vec3>,
     used: Vec<bool>,
@@ -152,7 +152,7 @@ impl Accel {
         };
         let blas = |s: &Slot| Blas::new(device, &format!("trace {:?} {:?}", s.seen, s.kind), flags);
         Self {
-            driver: (tracer == Tracer::Pipeline).then(|| DriverStructures {
+            driver: (tracer != Tracer::Compute).then(|| DriverStructures {
                 slots: slots.iter().map(blas).collect(),
                 tlas: Tlas::new(device, "trace scene"),
             }),

@@ -26,7 +26,7 @@ pub struct StaticBlas {
 
 /// What rays walk.
 pub enum Structure {
-    /// The driver's own, for the ray tracing pipeline.
+    /// The driver's own, for the ray tracing pipeline and ray queries.
     Driver(Blas),
     /// Ours, for the compute tracer.
     Own(OwnStructure),
@@ -164,7 +164,9 @@ impl StaticGeometry {
             &grouped.triangles,
         )?;
         let structures = match tracer {
-            Tracer::Pipeline => driver_structures(device, scene, &grouped, &triangles)?,
+            Tracer::Pipeline | Tracer::Query => {
+                driver_structures(device, scene, &grouped, &triangles)?
+            }
             Tracer::Compute => own_structures(device, scene, &grouped, &triangles)?,
         };
         Ok(Self {

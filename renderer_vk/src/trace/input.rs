@@ -12,11 +12,22 @@ use crate::gpu::DeviceInfo;
 pub enum Tracer {
     /// The device's ray tracing pipeline.
     Pipeline,
+    /// The device's ray queries, in compute shaders.
+    Query,
     /// Hierarchies of our own, walked by compute shaders: on any device, and faster where the driver traces in software.
     Compute,
 }
 
 impl Tracer {
+    /// Whether a device can do it.
+    pub fn is_possible(self, info: &DeviceInfo) -> bool {
+        match self {
+            Self::Pipeline => info.ray_tracing.is_some(),
+            Self::Query => info.ray_query,
+            Self::Compute => true,
+        }
+    }
+
     /// The faster one on a device.
     pub fn of(info: &DeviceInfo) -> Self {
         if info.ray_tracing.is_some() && !info.software {

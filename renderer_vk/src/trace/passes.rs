@@ -33,13 +33,13 @@ fn ray_pipeline(device: &Device, name: &str, raygen: &Spirv) -> Result<RayTracin
     )
 }
 
-/// A pass that traces, for one of the tracers.
+/// A pass that traces: launched as rays, or as a compute shader that follows rays itself.
 enum RayPass {
     Pipeline(RayTracingPipeline),
     Compute(ComputePipeline),
 }
 
-/// Groups of the compute tracer's passes.
+/// Groups of the compute shaders that trace.
 const COMPUTE_TILE: [u32; 2] = [8, 4];
 
 fn trace(
@@ -85,7 +85,7 @@ fn dispatch(
 }
 
 macro_rules! ray_pass {
-    ($(#[$doc:meta])* $type:ident, $name:literal, $raygen:ident, $compute:ident) => {
+    ($(#[$doc:meta])* $type:ident, $name:literal, $raygen:ident, $compute:ident, $query:ident) => {
         $(#[$doc])*
         pub struct $type(RayPass);
 
@@ -98,6 +98,7 @@ macro_rules! ray_pass {
                 Ok(Self(match tracer {
                     Tracer::Pipeline => RayPass::Pipeline(ray_pipeline(device, $name, &shaders::$raygen)?),
                     Tracer::Compute => RayPass::Compute(ComputePipeline::new(device, $name, &shaders::$compute, &[])?),
+                    Tracer::Query => RayPass::Compute(ComputePipeline::new(device, $name, &shaders::$query, &[])?),
                 }))
             }
 
@@ -141,17 +142,17 @@ ray_pass!(
     /// Reads the acceleration structures and materials; writes the G-buffer (`position`, `surface`) and `front`: the
     /// picture of all that lies in front of the surface whose light is asked for.
     Primary, "trace_primary", TRACE_PRIMARY_RGEN,
-    TRACE_PRIMARY_RGEN_COMPUTE
+    TRACE_PRIMARY_RGEN_COMPUTE, TRACE_PRIMARY_RGEN_QUERY
 );
 ray_pass!(
     /// Reads the G-buffer and the light lists; writes `direct`.
     Direct, "trace_direct", TRACE_DIRECT_RGEN,
-    TRACE_DIRECT_RGEN_COMPUTE
+    TRACE_DIRECT_RGEN_COMPUTE, TRACE_DIRECT_RGEN_QUERY
 );
 ray_pass!(
     /// Reads the G-buffer and the light lists; writes `indirect`.
     Indirect, "trace_indirect", TRACE_INDIRECT_RGEN,
-    TRACE_INDIRECT_RGEN_COMPUTE
+    TRACE_INDIRECT_RGEN_COMPUTE, TRACE_INDIRECT_RGEN_QUERY
 );
 pixel_pass!(
     /// Reads the G-buffer, `front`, `direct` and `indirect`; writes `hdr`.

@@ -29,7 +29,7 @@ pub struct Gpu {
 impl Gpu {
     /// Runs a test with every tracer that the device has.
     pub fn each(test: fn(&mut Gpu)) {
-        for tracer in [Tracer::Pipeline, Tracer::Compute] {
+        for tracer in [Tracer::Pipeline, Tracer::Query, Tracer::Compute] {
             if let Some(mut gpu) = Self::new(tracer) {
                 println!("{tracer:?}");
                 test(&mut gpu);
@@ -42,13 +42,11 @@ impl Gpu {
         let options = DeviceOptions {
             validation: true,
             // without the tracer's extensions, so that it is shown to need none
-            allow_ray_tracing: tracer == Tracer::Pipeline,
+            allow_ray_tracing: tracer != Tracer::Compute,
             ..DeviceOptions::default()
         };
         let device = match Device::new(&options, SurfaceSource::Headless) {
-            Ok(device) if device.info().ray_tracing.is_some() || tracer == Tracer::Compute => {
-                device
-            }
+            Ok(device) if tracer.is_possible(device.info()) => device,
             other => {
                 let name = |d: Device| format!("{} does not trace rays", d.info().name);
                 let why = other.map_or_else(|e| e.to_string(), name);

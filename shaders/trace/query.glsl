@@ -1,0 +1,46 @@
+// The ray query tracer: the driver's structures, walked from a compute shader; candidates are decided in a loop here.
+#ifndef RELIGHT_TRACE_QUERY_GLSL
+#define RELIGHT_TRACE_QUERY_GLSL
+
+#include "trace/candidate.glsl"
+
+#define QUERY_HIT(query, committed) \
+    Hit(uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, committed)) + uint(rayQueryGetIntersectionGeometryIndexEXT(query, committed)), \
+        uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, committed)), rayQueryGetIntersectionBarycentricsEXT(query, committed), \
+        rayQueryGetIntersectionTEXT(query, committed))
+
+// The nearest thing of the mask between tmin and tmax, translucent ones left out; with `any_hit` only whether there is
+// one: `geometry` is NO_HIT if not, and nothing else of the answer counts.
+Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
+    rayQueryEXT query;
+    uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT : gl_RayFlagsNoneEXT;
+    rayQueryInitializeEXT(query, scenes[VIEW.scene], flags, mask, origin, tmin, direction, tmax);
+    while (rayQueryProceedEXT(query)) {
+        if (is_stopped_by(QUERY_HIT(query, false))) rayQueryConfirmIntersectionEXT(query);
+    }
+    if (rayQueryGetIntersectionTypeEXT(query, true) != gl_RayQueryCommittedIntersectionTriangleEXT)
+        return Hit(NO_HIT, 0, vec2(0.0), 0.0);
+    return QUERY_HIT(query, true);
+}
+
+// The next translucent layer behind `order` and before tmax; moves `order` to it. Layers in one plane come in the
+// order of the engine, what it draws last first.
+Hit trace_layer(vec3 origin, vec3 direction, float tmax, uint mask, inout LayerOrder order) {
+    rayQueryEXT query;
+    rayQueryInitializeEXT(query, scenes[VIEW.scene], gl_RayFlagsNoneEXT, mask, origin, layer_start(order), direction, tmax);
+    Hit found = Hit(NO_HIT, 0, vec2(0.0), 0.0);
+    LayerOrder best = LayerOrder(LAYER_NONE, NO_HIT, NO_HIT);
+    // none is ever confirmed: the best one so far is noted
+    while (rayQueryProceedEXT(query)) {
+        Hit hit = QUERY_HIT(query, false);
+        float key;
+        if (is_next_layer(hit, direction, order, best, key)) {
+            found = hit;
+            best = LayerOrder(key, hit.geometry, hit.primitive);
+        }
+    }
+    if (found.geometry != NO_HIT) order = best;
+    return found;
+}
+
+#endif

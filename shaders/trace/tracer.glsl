@@ -1,0 +1,21 @@
+// Which tracer a ray generation shader is compiled for; include it first, before anything but `#version`. Each such
+// file asks for its variants:
+//
+//     variants: COMPUTE=-DTRACER_COMPUTE -S comp     hierarchies of our own, in compute
+//     variants: QUERY=-DTRACER_QUERY -S comp         ray queries, in compute
+//
+// Without a definition it is for the ray tracing pipeline.
+#ifndef RELIGHT_TRACE_TRACER_GLSL
+#define RELIGHT_TRACE_TRACER_GLSL
+
+#ifdef TRACER_QUERY
+#extension GL_EXT_ray_query : require
+#endif
+#if !defined(TRACER_QUERY) && !defined(TRACER_COMPUTE)
+#extension GL_EXT_ray_tracing : require
+#endif
+#ifndef TRACER_COMPUTE
+#define BINDLESS_SCENES
+#endif
+
+#endif
