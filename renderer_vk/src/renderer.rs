@@ -1,5 +1,6 @@
 //! The renderer as a front end sees it: made, filled with what is registered, told what a frame shows.
 
+mod held;
 mod output;
 mod queries;
 
@@ -25,6 +26,7 @@ use crate::targets::FrameTargets;
 use crate::trace::TraceLook;
 use crate::world::{EntityTokens, World};
 
+use held::HeldViews;
 use output::milliseconds;
 pub use output::{CpuTimes, FrameStats};
 
@@ -50,6 +52,8 @@ pub struct Renderer {
     trace: Option<TraceLook>,
     world: Option<World>,
     scene: Scene,
+    /// What `rt_pause` keeps on show.
+    held: HeldViews,
     assets: Option<Assets>,
     list: DrawList,
     raster: Raster,
@@ -123,6 +127,7 @@ impl Renderer {
             trace: None,
             world: None,
             scene: Scene::default(),
+            held: HeldViews::default(),
             assets: None,
             list: DrawList::default(),
             raster: Raster::new(&device),
@@ -247,6 +252,7 @@ impl Renderer {
         self.queue.clear();
         self.overlay.clear();
         self.scene = Scene::default();
+        self.held.release();
         self.trace = None;
         self.world = None;
         self.assets = None;
@@ -314,6 +320,9 @@ impl Renderer {
     pub fn set_settings(&mut self, settings: &Settings) {
         if self.settings != *settings {
             self.settings.clone_from(settings);
+            if !(settings.rt && settings.rt_pause) {
+                self.held.release();
+            }
             if let Some(assets) = &mut self.assets {
                 assets.set_settings(settings);
             }
@@ -361,6 +370,13 @@ impl Renderer {
         } else {
             Look::Classic
         };
+        let mask = self.eye.mask(self.settings.anaglyph);
+        let pause = self.settings.rt_pause && look == Look::Traced;
+        if pause && let Some(view) = self.held.next(def) {
+            self.scene.clear();
+            self.queue.push((Item::Traced(Box::new(view)), mask));
+            return Ok(());
+        }
         let Some(assets) = &mut self.assets else {
             return Err(Error::NotRegistered);
         };
@@ -372,12 +388,16 @@ impl Renderer {
         let item = match look {
             Look::Classic => Item::Classic(scenes),
             Look::Traced => match scenes.pop() {
-                Some(scene) => Item::Traced(Box::new(scene)),
+                Some(scene) => {
+                    if pause {
+                        self.held.hold(&scene);
+                    }
+                    Item::Traced(Box::new(scene))
+                }
                 None => return Ok(()),
             },
         };
-        self.queue
-            .push((item, self.eye.mask(self.settings.anaglyph)));
+        self.queue.push((item, mask));
         Ok(())
     }
 

@@ -252,6 +252,43 @@ fn both_looks_show_the_room() {
 }
 
 #[test]
+fn a_paused_view_stays_and_adds_up_while_the_game_goes_on() {
+    let mut engine = engine_in_map();
+    engine.set("r_rt", "1");
+    engine.set("rt_accumulate", "1");
+    let difference = |a: &Rgb8, b: &Rgb8| {
+        let pairs = a.pixels().iter().zip(b.pixels());
+        let sum: f64 = pairs.map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
+        sum / a.pixels().len() as f64
+    };
+    let mut time = 1000;
+    let mut picture = |engine: &mut Engine, yaw: f32| {
+        let mut view = View::new(HERE, yaw);
+        time += 50;
+        view.time = time;
+        engine.picture(&view).unwrap()
+    };
+    let other = picture(&mut engine, 120.0);
+    engine.set("rt_pause", "1");
+    let first = picture(&mut engine, 30.0);
+    let shown: Vec<Rgb8> = (0..6).map(|_| picture(&mut engine, 120.0)).collect();
+    for later in &shown {
+        assert!(difference(later, &first) < difference(&other, &first) * 0.5);
+    }
+    let step = |i: usize| difference(&shown[i], &shown[i + 1]);
+    assert!(
+        step(4) < step(0) * 0.7,
+        "{} {}: it does not add up",
+        step(0),
+        step(4)
+    );
+    engine.set("rt_pause", "0");
+    let resumed = picture(&mut engine, 120.0);
+    assert!(difference(&resumed, &other) < difference(&resumed, &first) * 0.5);
+    engine.assert_clean();
+}
+
+#[test]
 fn scenes_hold_what_was_added() {
     let mut engine = engine_in_map();
     let model = engine.register_model("models/test.md3").unwrap();

@@ -296,7 +296,11 @@ pub extern "C" fn end_frame(front_end_ms: *mut c_int, back_end_ms: *mut c_int) {
         let Some(engine) = Engine::current() else {
             return Ok(());
         };
-        run_videos(engine)?;
+        // what rt_pause holds includes the pictures on its walls
+        let held = with_renderer(|_, front| Ok(front.settings.rt && front.settings.rt_pause))?;
+        if !held {
+            run_videos(engine)?;
+        }
         let outbox = with_renderer(finish_frame)?;
         for (to, value) in [
             (front_end_ms, outbox.front_end_ms),

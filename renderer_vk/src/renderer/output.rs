@@ -48,6 +48,7 @@ impl Renderer {
     /// Starts a frame; `time_ms` is the time that 2D materials see.
     pub fn begin_frame(&mut self, time_ms: i32) {
         self.set_eye(Eye::Both);
+        self.held.begin_frame();
         self.overlay_time = time_ms as f32 * 0.001;
     }
 
@@ -99,6 +100,8 @@ impl Renderer {
                     self.spare_overlays.push(overlay);
                 }
                 Item::Classic(scenes) => self.scene.recycle(scenes),
+                // held views are copies: to keep their memory too would let it grow with each frame
+                Item::Traced(_) if self.settings.rt_pause => {}
                 Item::Traced(scene) => self.scene.recycle([*scene]),
             }
         }

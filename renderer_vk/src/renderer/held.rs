@@ -1,0 +1,84 @@
+//! What `rt_pause` keeps on show: the traced views of the frame in which it was switched on, drawn again in every
+//! frame. The game goes on, and so do its 2D pictures.
+
+use crate::api::RefDef;
+use crate::scene::ViewScene;
+
+/// The held views, by their order in a frame.
+#[derive(Default)]
+pub(super) struct HeldViews {
+    views: Vec<ViewScene>,
+    next: usize,
+}
+
+impl HeldViews {
+    /// Holds nothing any more.
+    pub fn release(&mut self) {
+        self.views.clear();
+        self.next = 0;
+    }
+
+    /// A frame begins: its first view is the first one held.
+    pub fn begin_frame(&mut self) {
+        self.next = 0;
+    }
+
+    /// The view to draw in place of one that the game asks for; `None` while there is none of its size.
+    pub fn next(&mut self, def: &RefDef) -> Option<ViewScene> {
+        let rectangle = |d: &RefDef| [d.x, d.y, d.width, d.height];
+        let held = self.views.get(self.next)?;
+        if rectangle(&held.def) != rectangle(def) {
+            return None;
+        }
+        self.next += 1;
+        Some(held.clone())
+    }
+
+    /// Holds a view that [`next`](Self::next) had none for.
+    pub fn hold(&mut self, view: &ViewScene) {
+        self.views.truncate(self.next);
+        self.views.push(view.clone());
+        self.next += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::View;
+
+    fn def(width: i32, time_ms: i32) -> RefDef {
+        RefDef {
+            width,
+            height: 10,
+            fov_x: 90.0,
+            fov_y: 90.0,
+            time_ms,
+            ..RefDef::default()
+        }
+    }
+
+    fn view(def: &RefDef) -> ViewScene {
+        ViewScene::empty(def, View::new(def, 4.0, 100.0))
+    }
+
+    #[test]
+    fn views_are_held_by_their_order_until_their_size_changes() {
+        let mut held = HeldViews::default();
+        for (width, time) in [(20, 1), (5, 2)] {
+            assert!(held.next(&def(width, time)).is_none());
+            held.hold(&view(&def(width, time)));
+        }
+        held.begin_frame();
+        assert_eq!(held.next(&def(20, 50)).map(|v| v.def.time_ms), Some(1));
+        assert_eq!(held.next(&def(5, 50)).map(|v| v.def.time_ms), Some(2));
+        assert!(held.next(&def(5, 50)).is_none());
+        held.begin_frame();
+        assert!(held.next(&def(30, 60)).is_none());
+        held.hold(&view(&def(30, 60)));
+        held.begin_frame();
+        assert_eq!(held.next(&def(30, 70)).map(|v| v.def.time_ms), Some(60));
+        held.release();
+        assert!(held.next(&def(30, 70)).is_none());
+    }
+}
