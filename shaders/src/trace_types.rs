@@ -151,6 +151,43 @@ pub struct PortalRecord {
     pub camera_axis: [Vec3; 3],
 }
 
+/// Where an instance of the view was in the last frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LastInstance {
+    /// Axes then.
+    pub axis: [Vec3; 3],
+    /// Origin then.
+    pub origin: Vec3,
+    /// `LAST_*`: whether it was there at all.
+    pub known: u32,
+}
+
+/// What the motion of surfaces since the last frame is found with.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct MotionView {
+    /// Vertices of what moves ([`crate::types::Vertex`]), in the space of their instances.
+    pub vertices: u64,
+    /// Their size in bytes.
+    pub vertex_bytes: u64,
+    /// For each of them its position in the last frame (`Vec3`), in the space of its instance then.
+    pub last_positions: u64,
+    /// A [`LastInstance`] for each instance of the view.
+    pub last_instances: u64,
+    /// For each portal of the view the [`PortalRecord`] of the last frame.
+    pub last_portals: u64,
+    /// RGBA16F: how far the pixel's surface was from here in the last frame (pixels, right and down), length of the way
+    /// to it then (negative: it was not in the picture, or nobody knows where), length of the way now.
+    pub image: u32,
+    /// The same image of the last frame.
+    pub image_last: u32,
+    /// 1: camera, mirrors and portals are where they were.
+    pub still: u32,
+    /// Makes the size a multiple of eight without hidden bytes.
+    pub padding: u32,
+}
+
 /// All that the passes of one traced view read: camera, arrays, images, settings.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -180,6 +217,7 @@ pub struct TraceView {
     pub bvh_nodes: u64,
     pub bvh_instances: u64,
     pub materials: MaterialBuffers,
+    pub motion: MotionView,
     pub eye: Vec3,
     pub forward: Vec3,
     /// Scaled by the tangent of half the horizontal angle.
@@ -221,6 +259,7 @@ pub struct TraceView {
     pub sampling: u32,
     pub image_position: u32,
     pub image_surface: u32,
+    pub image_albedo: u32,
     pub image_front: u32,
     pub image_direct: u32,
     pub image_indirect: u32,
@@ -254,8 +293,6 @@ pub struct TraceView {
     pub last_forward: Vec3,
     pub last_left: Vec3,
     pub last_up: Vec3,
-    /// Makes the size a multiple of eight without hidden bytes.
-    pub padding: u32,
 }
 
 /// Names of constants used on both sides.
@@ -288,5 +325,8 @@ pub mod constants {
     pub const SAMPLING_RESAMPLED: u32 = 1;
     pub const SAMPLING_ALL: u32 = 2;
     pub const TRIANGLE_RANK_SHIFT: u32 = 8;
+    pub const LAST_UNKNOWN: u32 = 0;
+    pub const LAST_MOVED: u32 = 1;
+    pub const LAST_SAME: u32 = 2;
     pub const NO_INSTANCE: u32 = 0xFFFF_FFFF;
 }

@@ -22,7 +22,7 @@ void main() {
         imageStore(images_rgba16f[push.target], pixel, vec4(0.0));
         return;
     }
-    uvec4 surface = imageLoad(uimages_rgba32ui[VIEW.image_surface], pixel);
+    uvec2 surface = imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).xy;
     vec3 face_normal = unpack_normal(surface.x), normal = unpack_normal(surface.y);
     float value = luminance(middle.rgb);
     // the variance itself is noisy: blurred a little
@@ -49,7 +49,7 @@ void main() {
             vec4 tap_position = imageLoad(images_rgba32f[VIEW.image_position], tap);
             if (tap_position.w < 0.0) continue;
             vec4 light = imageLoad(images_rgba16f[push.source], tap);
-            vec3 tap_normal = unpack_normal(imageLoad(uimages_rgba32ui[VIEW.image_surface], tap).y);
+            vec3 tap_normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], tap).y);
             float weight = (x == 0 ? 2.0 : 1.0) * (y == 0 ? 2.0 : 1.0);
             weight *= pow(max(dot(normal, tap_normal), 0.0), NORMAL_POWER);
             weight *= exp(-abs(dot(tap_position.xyz - position.xyz, face_normal)) * plane_scale

@@ -1,4 +1,5 @@
-// The G-buffer: 40 bytes a pixel. `albedo` holds everything between the eye and the surface: the light L of the point
+// The G-buffer: position and path (16 bytes a pixel), normals (8), albedo (8) and motion (8, see motion.glsl). The first
+// two and the motion are kept for the next frame. `albedo` holds everything between the eye and the surface: the light L of the point
 // is shown as albedo * L + front.
 #ifndef RELIGHT_TRACE_GBUFFER_GLSL
 #define RELIGHT_TRACE_GBUFFER_GLSL
@@ -29,20 +30,19 @@ vec3 unpack_normal(uint packed) {
 
 void gbuffer_write(ivec2 pixel, GBufferPixel g) {
     imageStore(images_rgba32f[VIEW.image_position], pixel, vec4(g.position, g.path));
-    vec3 albedo = min(g.albedo, vec3(60000.0));
-    imageStore(uimages_rgba32ui[VIEW.image_surface], pixel, uvec4(pack_normal(g.face_normal), pack_normal(g.normal),
-        packHalf2x16(albedo.rg), packHalf2x16(vec2(albedo.b, 0.0))));
+    imageStore(uimages_rg32ui[VIEW.image_surface], pixel, uvec4(pack_normal(g.face_normal), pack_normal(g.normal), 0, 0));
+    imageStore(images_rgba16f[VIEW.image_albedo], pixel, vec4(min(g.albedo, vec3(60000.0)), 0.0));
 }
 
 GBufferPixel gbuffer_read(ivec2 pixel) {
     GBufferPixel g;
     vec4 position = imageLoad(images_rgba32f[VIEW.image_position], pixel);
-    uvec4 surface = imageLoad(uimages_rgba32ui[VIEW.image_surface], pixel);
+    uvec2 surface = imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).xy;
     g.position = position.xyz;
     g.path = position.w;
     g.face_normal = unpack_normal(surface.x);
     g.normal = unpack_normal(surface.y);
-    g.albedo = vec3(unpackHalf2x16(surface.z), unpackHalf2x16(surface.w).x);
+    g.albedo = imageLoad(images_rgba16f[VIEW.image_albedo], pixel).rgb;
     return g;
 }
 

@@ -23,6 +23,8 @@ struct SurfacePoint {
     vec3 face_normal;   // unit, on the side that faces front (clockwise)
     vec3 normal;        // unit, interpolated
     float texel_scale;  // texture coordinate per unit of length
+    uint64_t vertices;  // of its geometry
+    vec3 weights;       // of the triangle's corners
     StagePoint stage;
 };
 
@@ -40,11 +42,13 @@ SurfacePoint surface_point(Hit hit) {
     p.triangle = Triangles(record.triangles).at[hit.primitive];
     p.instance = record.instance != NO_INSTANCE ? record.instance : p.triangle.instance;
     p.kind = record.kind;
+    p.vertices = record.vertices;
     TraceVertices vertices = TraceVertices(record.vertices);
     Vertex a = vertices.at[p.triangle.indices[0]];
     Vertex b = vertices.at[p.triangle.indices[1]];
     Vertex c = vertices.at[p.triangle.indices[2]];
     vec3 w = vec3(1.0 - hit.barycentrics.x - hit.barycentrics.y, hit.barycentrics);
+    p.weights = w;
     Instance instance = instance_of(p.instance);
     mat3 axis = mat3(instance.axis[0], instance.axis[1], instance.axis[2]);
 

@@ -34,7 +34,7 @@ vec2 last_pixel(vec3 position) {
 bool same_surface(ivec2 pixel, GBufferPixel g) {
     vec4 last = imageLoad(images_rgba32f[VIEW.image_last_position], pixel);
     if (last.w < 0.0) return false;
-    vec3 normal = unpack_normal(imageLoad(uimages_rgba32ui[VIEW.image_last_surface], pixel).x);
+    vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_last_surface], pixel).x);
     vec3 away = last.xyz - g.position;
     float footprint = g.path * VIEW.pixel_spread;
     return dot(normal, g.face_normal) > 0.9 && abs(dot(away, g.face_normal)) < 0.1 + 2.0 * footprint

@@ -27,12 +27,20 @@ struct PortalRecord {
     vec4 plane; uint mirror; vec3 surface_origin; vec3 surface_axis[3]; vec3 camera_origin; vec3 camera_axis[3];
 };
 
+struct LastInstance { vec3 axis[3]; vec3 origin; uint known; };
+
+struct MotionView {
+    uint64_t vertices; uint64_t vertex_bytes; uint64_t last_positions; uint64_t last_instances; uint64_t last_portals;
+    uint image; uint image_last; uint still; uint padding;
+};
+
 struct TraceView {
     uint64_t geometries; uint64_t instances; uint64_t fogs; uint64_t portals; uint64_t skies; uint64_t triangle_lights;
     uint64_t sphere_lights; uint64_t dynamic_lights; uint64_t suns; uint64_t nodes; uint64_t leaf_clusters;
     uint64_t light_offsets; uint64_t light_indices; uint64_t light_chances; uint64_t exposure;
     uint64_t bvh_nodes; uint64_t bvh_instances;
     MaterialBuffers materials;
+    MotionView motion;
     vec3 eye; vec3 forward; vec3 left; vec3 up;
     uint width; uint height; int target_x; int target_y;
     uint scene; uint flags; uint seed; uint accumulated;
@@ -40,13 +48,13 @@ struct TraceView {
     uint fog_count; uint portal_count; uint triangle_light_count; uint sun_count; uint dynamic_light_count;
     uint cluster_count; uint node_count;
     uint max_depth; uint bounces; uint samples; uint candidates; uint sampling;
-    uint image_position; uint image_surface; uint image_front; uint image_direct; uint image_indirect; uint image_hdr;
+    uint image_position; uint image_surface; uint image_albedo; uint image_front; uint image_direct; uint image_indirect; uint image_hdr;
     uint image_accumulation; uint image_target;
     float exposure_bias; float exposure_base; float exposure_blend; float light_scale;
     uint target_width; uint target_height; uint sky_sampler;
     uint image_last_position; uint image_last_surface; uint image_last_light; uint image_moments; uint image_last_moments;
     uint image_filter; uint image_lit;
-    vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up; uint padding;
+    vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up;
 };
 
 // What a geometry's triangles are to a ray.
@@ -62,6 +70,8 @@ const uint VIEW_JITTER = 1, VIEW_FIRST_PERSON = 2, VIEW_ACCUMULATE = 4, VIEW_AUT
 const uint SAMPLING_UNIFORM = 0, SAMPLING_RESAMPLED = 1, SAMPLING_ALL = 2;
 // Triangle.flags: bits from here on hold the drawing rank, sort value times 8, at most 255.
 const uint TRIANGLE_RANK_SHIFT = 8;
+// LastInstance.known: never seen before, placed elsewhere, placed as now.
+const uint LAST_UNKNOWN = 0, LAST_MOVED = 1, LAST_SAME = 2;
 // No instance of its own: the triangle names it.
 const uint NO_INSTANCE = 0xFFFFFFFFu;
 

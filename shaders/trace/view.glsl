@@ -20,6 +20,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Sun
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BspNodes { BspNode at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Integers { int at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Indices { uint at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Positions { vec3 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LastInstances { LastInstance at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Chances { float at[]; };
 
 #ifdef OWN_PUSH

@@ -12,7 +12,7 @@ use super::portal;
 use super::surfaces::{
     self, LocalLight, LocalView, PendingDeform, SurfaceRun, WORLD_ENTITY, sort_key,
 };
-use super::{DynamicMesh, GatherInput, Look, Scene, Statistics, Sun, View, ViewScene};
+use super::{DynamicMesh, GatherInput, Look, Scene, Statistics, Sun, View, ViewEntity, ViewScene};
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
 use crate::world::{Bounds, VisibleQuery, VisibleSet, WorldData};
 
@@ -138,7 +138,26 @@ impl<'a> Gatherer<'a> {
         self.add_polys(out);
         let entities = self.entities;
         for (number, entity) in entities.iter().enumerate() {
+            let first_instance = count(out.instances.len());
+            let first_mesh = count(out.meshes.len());
             self.add_entity(count(number), entity, out);
+            let instance_count = count(out.instances.len()) - first_instance;
+            if instance_count > 0 {
+                out.entities.push(ViewEntity {
+                    kind: entity.kind,
+                    model: entity.model,
+                    skin: entity.custom_skin,
+                    material: entity.custom_shader,
+                    renderfx: entity.renderfx,
+                    frame: entity.frame,
+                    old_frame: entity.old_frame,
+                    origin: entity.origin,
+                    first_instance,
+                    instance_count,
+                    first_mesh,
+                    mesh_count: count(out.meshes.len()) - first_mesh,
+                });
+            }
         }
         let greyscale = self.input.settings.greyscale.clamp(0.0, 1.0);
         if greyscale > 0.0 && self.look == Look::Classic {
@@ -160,6 +179,7 @@ impl<'a> Gatherer<'a> {
         out.indices.clear();
         out.meshes.clear();
         out.submodels.clear();
+        out.entities.clear();
         out.surfaces.clear();
         out.dlights.clear();
         out.dlights.extend_from_slice(self.lights);

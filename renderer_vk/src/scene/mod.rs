@@ -108,6 +108,36 @@ pub struct Submodel {
     pub instance: u32,
 }
 
+/// What an entity put into a view, and what tells it from others: the traced look finds it again in the next frame,
+/// since the engine's entities have no names.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViewEntity {
+    /// What it is.
+    pub kind: EntityKind,
+    /// Handle of its model.
+    pub model: i32,
+    /// Handle of the skin that replaces the model's.
+    pub skin: i32,
+    /// Handle of the material that replaces all others.
+    pub material: i32,
+    /// Its `renderfx` bits.
+    pub renderfx: u32,
+    /// Key frame.
+    pub frame: i32,
+    /// Key frame before.
+    pub old_frame: i32,
+    /// Where it is.
+    pub origin: Vec3,
+    /// Its first instance in [`ViewScene::instances`].
+    pub first_instance: u32,
+    /// Number of instances.
+    pub instance_count: u32,
+    /// Its first mesh in [`ViewScene::meshes`].
+    pub first_mesh: u32,
+    /// Number of meshes.
+    pub mesh_count: u32,
+}
+
 /// A portal or mirror plane of this view with the transform of what is seen through it.
 #[derive(Clone, Copy, Debug)]
 pub struct Portal {
@@ -157,6 +187,8 @@ pub struct ViewScene {
     pub meshes: Vec<DynamicMesh>,
     /// Inline models.
     pub submodels: Vec<Submodel>,
+    /// The entities that added something, in the game's order.
+    pub entities: Vec<ViewEntity>,
     /// Visible surfaces in drawing order (classic look only).
     pub surfaces: Vec<DrawSurface>,
     /// Static world surfaces that the tracer must not see in the static structure because `meshes` has their
@@ -206,6 +238,7 @@ impl ViewScene {
             indices: Vec::new(),
             meshes: Vec::new(),
             submodels: Vec::new(),
+            entities: Vec::new(),
             surfaces: Vec::new(),
             dlights: Vec::new(),
             portals: Vec::new(),

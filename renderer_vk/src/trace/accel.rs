@@ -88,6 +88,8 @@ pub struct AccelOutput {
     pub geometries: u64,
     /// Device address of the view's `Instance`s.
     pub instances: u64,
+    /// Device address of the view's `Vertex`es.
+    pub vertices: u64,
     /// There is something that only the eye sees.
     pub first_person: bool,
 }
@@ -177,6 +179,7 @@ impl Accel {
         let vertices = rec.arena().push(&view.vertices)?;
         let mut output = AccelOutput {
             instances: rec.arena().push(&view.instances)?,
+            vertices,
             first_person: self.slots.iter().any(|s| {
                 s.seen == Seen::FirstPerson
                     && s.kind != Kind::Translucent

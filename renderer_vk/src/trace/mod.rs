@@ -15,6 +15,7 @@ pub mod geometry;
 pub mod input;
 pub mod lights;
 pub mod look;
+pub mod motion;
 pub mod passes;
 pub mod targets;
 pub mod view_tracer;

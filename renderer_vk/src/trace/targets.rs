@@ -10,8 +10,12 @@ pub struct Targets {
     pub height: u32,
     /// World position and length of the way from the eye; of this frame and the last.
     pub position: [Image; 2],
-    /// Packed normals and albedo; of this frame and the last.
+    /// Packed normals; of this frame and the last.
     pub surface: [Image; 2],
+    /// Albedo, with all that lies between the eye and the surface.
+    pub albedo: Image,
+    /// Where the surface was in the last frame and how far away, see [`super::motion`]; of this frame and the last.
+    pub motion: [Image; 2],
     /// Radiance of what is in front of the surface and of its own glow; alpha: what comes through of the background.
     pub front: Image,
     /// Direct light.
@@ -49,8 +53,13 @@ impl Targets {
                 make("trace last position", Format::Rgba32F)?,
             ],
             surface: [
-                make("trace surface", Format::Rgba32Uint)?,
-                make("trace last surface", Format::Rgba32Uint)?,
+                make("trace surface", Format::Rg32Uint)?,
+                make("trace last surface", Format::Rg32Uint)?,
+            ],
+            albedo: make("trace albedo", Format::Rgba16F)?,
+            motion: [
+                make("trace motion", Format::Rgba16F)?,
+                make("trace last motion", Format::Rgba16F)?,
             ],
             light: [
                 make("trace light 0", Format::Rgba16F)?,
@@ -74,6 +83,7 @@ impl Targets {
     pub fn advance(&mut self, filtered: usize) {
         self.position.swap(0, 1);
         self.surface.swap(0, 1);
+        self.motion.swap(0, 1);
         self.moments.swap(0, 1);
         self.light.swap(0, filtered.min(2));
     }

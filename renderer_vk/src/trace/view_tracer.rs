@@ -4,12 +4,13 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use glam::Vec3;
 use shaders::trace_types::constants as t;
-use shaders::trace_types::{PortalRecord, TraceView};
+use shaders::trace_types::{MotionView, PortalRecord, TraceView};
 
 use super::accel::{Accel, AccelOutput};
 use super::geometry::StaticGeometry;
 use super::input::{MaterialTable, Tracer};
 use super::lights::{MapLights, dynamic_lights};
+use super::motion::Motion;
 use super::passes::{Accumulate, Composite, Denoise, Direct, Exposure, Indirect, Primary, ToneMap};
 use super::targets::Targets;
 use crate::gpu::{Buffer, BufferUsage, Device, Error, Image, Recorder};
@@ -37,6 +38,7 @@ pub struct ViewTracer {
     accumulate: Accumulate,
     exposure: Exposure,
     tone_map: ToneMap,
+    motion: Motion,
     pub(super) targets: Option<Targets>,
     exposure_state: Buffer,
     exposure_started: bool,
@@ -72,6 +74,7 @@ impl ViewTracer {
             accumulate: Accumulate::new(device)?,
             exposure: Exposure::new(device)?,
             tone_map: ToneMap::new(device)?,
+            motion: Motion::default(),
             targets: None,
             // zeros: the first frame counts into the histogram before any pass has emptied it
             exposure_state: Buffer::with_data(
@@ -104,6 +107,7 @@ impl ViewTracer {
     pub fn reset(&mut self) {
         self.accumulated = (0, 0);
         self.history = None;
+        self.motion = Motion::default();
         self.exposure_started = false;
     }
 
@@ -151,6 +155,13 @@ impl ViewTracer {
         let accel = self
             .accel
             .record(rec, view, map.map(|m| m.geometry), materials)?;
+        let portals: Vec<PortalRecord> = if settings.no_portals {
+            Vec::new()
+        } else {
+            view.portals.iter().map(portal_record).collect()
+        };
+        let mut motion = self.motion.record(rec, view, &portals, accel.vertices)?;
+        motion.still &= u32::from(self.history == Some(camera_frame(view)));
         let params = self.params(
             rec,
             view,
@@ -160,6 +171,8 @@ impl ViewTracer {
             target,
             accel,
             accumulated,
+            &portals,
+            motion,
         )?;
         let address = rec.arena().push(&[params])?;
 
@@ -219,6 +232,8 @@ impl ViewTracer {
         target: &Image,
         accel: AccelOutput,
         accumulated: u32,
+        portals: &[PortalRecord],
+        motion: MotionView,
     ) -> Result<TraceView, Error> {
         let Some(targets) = &self.targets else {
             return Ok(TraceView::default()); // made by the caller
@@ -229,11 +244,6 @@ impl ViewTracer {
             dynamic_lights(&view.dlights, settings.rt_dlight_scale)
         } else {
             Vec::new()
-        };
-        let portals: Vec<PortalRecord> = if settings.no_portals {
-            Vec::new()
-        } else {
-            view.portals.iter().map(portal_record).collect()
         };
         let mut flags = 0;
         let mut set = |bit: u32, on: bool| flags |= if on { bit } else { 0 };
@@ -271,7 +281,7 @@ impl ViewTracer {
             geometries: accel.geometries,
             instances: accel.instances,
             fogs: map.map_or(0, |m| m.geometry.fogs.address()),
-            portals: rec.arena().push(&portals)?,
+            portals: rec.arena().push(portals)?,
             skies: map.map_or(0, |m| m.geometry.skies.address()),
             triangle_lights: lights.triangles.address(),
             sphere_lights: lights.spheres.address(),
@@ -286,6 +296,11 @@ impl ViewTracer {
             bvh_nodes: accel.nodes,
             bvh_instances: accel.placed,
             materials: materials.buffers(),
+            motion: MotionView {
+                image: targets.motion[0].storage_index(),
+                image_last: targets.motion[1].storage_index(),
+                ..motion
+            },
             eye,
             forward,
             left,
@@ -328,6 +343,7 @@ impl ViewTracer {
             },
             image_position: targets.position[0].storage_index(),
             image_surface: targets.surface[0].storage_index(),
+            image_albedo: targets.albedo.storage_index(),
             image_front: targets.front.storage_index(),
             image_direct: targets.direct.storage_index(),
             image_indirect: targets.indirect.storage_index(),
@@ -352,7 +368,6 @@ impl ViewTracer {
             last_forward,
             last_left,
             last_up,
-            padding: 0,
         })
     }
 }

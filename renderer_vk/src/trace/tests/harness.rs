@@ -6,12 +6,12 @@ use shaders::trace_types::SkyRecord;
 use shaders::types::constants as c;
 use shaders::types::{Fog, Instance, Material, MaterialBuffers, Stage, TcMod, Vertex};
 
-use crate::api::{DynamicLight, RefDef};
+use crate::api::{DynamicLight, EntityKind, RefDef};
 use crate::gpu::{
     Buffer, BufferUsage, Device, DeviceOptions, Filter, Format, FrameRing, Image, ImageDesc,
     ImageUsage, MipFilter, SamplerDesc, SurfaceSource, Wrap,
 };
-use crate::scene::{DynamicMesh, Portal, ShadowVolumes, Submodel, View, ViewScene};
+use crate::scene::{DynamicMesh, Portal, ShadowVolumes, Submodel, View, ViewEntity, ViewScene};
 use crate::settings::Settings;
 use crate::trace::geometry::StaticGeometry;
 use crate::trace::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
@@ -93,6 +93,19 @@ impl Gpu {
         frames: u32,
         place: impl Fn(u32, &mut RefDef),
     ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
+        self.render_views(scene, settings, frames, |frame, view| {
+            place(frame, &mut view.def);
+        })
+    }
+
+    /// As [`render`](Self::render), with a view that `change` changes before each frame.
+    pub fn render_views(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+        frames: u32,
+        change: impl Fn(u32, &mut ViewScene),
+    ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
         let uploaded = scene.upload(&self.device, self.tracer);
         let [width, height] = [scene.def.width as u32, scene.def.height as u32];
         let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
@@ -103,7 +116,7 @@ impl Gpu {
         .expect("target");
         let mut view = scene.view();
         for frame in 0..frames {
-            place(frame, &mut view.def);
+            change(frame, &mut view);
             view.view = View::new(&view.def, 4.0, 10000.0);
             let mut rec = self.ring.begin().expect("frame");
             let map = TracedMap {
@@ -146,6 +159,17 @@ impl Gpu {
         )
     }
 
+    /// Position and path of each pixel of the last frame, and its motion as the motion image has it.
+    pub fn motion(&self) -> Vec<([f32; 4], [f32; 4])> {
+        let targets = self.look.targets.as_ref().expect("traced");
+        let read = |image| self.device.read_image(image).expect("read");
+        // they have changed places for the next frame
+        let places: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.position[1]));
+        let halves: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.motion[1]));
+        let motions = halves.iter().map(|m| m.map(half));
+        places.into_iter().zip(motions).collect()
+    }
+
     /// The validation layer has nothing to say.
     pub fn check_messages(&self) {
         let messages = self.device.validation_messages();
@@ -160,6 +184,17 @@ impl Gpu {
     pub fn mean(&mut self, scene: &Scene, settings: &Settings, frames: u32) -> Vec3 {
         let (pixels, _) = self.render(scene, settings, frames);
         pixels.iter().sum::<Vec3>() / pixels.len() as f32
+    }
+}
+
+/// The value of a half float.
+fn half(bits: u16) -> f32 {
+    let sign = if bits & 0x8000 != 0 { -1.0 } else { 1.0 };
+    let (exponent, mantissa) = (i32::from(bits >> 10 & 31), f32::from(bits & 0x3ff));
+    sign * match exponent {
+        0 => mantissa * 2f32.powi(-24),
+        31 => f32::INFINITY,
+        _ => (1.0 + mantissa / 1024.0) * 2f32.powi(exponent - 15),
     }
 }
 
@@ -290,6 +325,7 @@ pub struct Scene {
     pub dynamic_indices: Vec<u32>,
     pub meshes: Vec<DynamicMesh>,
     pub submodels: Vec<Submodel>,
+    pub entities: Vec<ViewEntity>,
     pub portals: Vec<Portal>,
     pub dlights: Vec<DynamicLight>,
     /// The map's tree with lists of its own; otherwise all lights are everywhere.
@@ -335,6 +371,7 @@ impl Scene {
             dynamic_indices: Vec::new(),
             meshes: Vec::new(),
             submodels: Vec::new(),
+            entities: Vec::new(),
             portals: Vec::new(),
             dlights: Vec::new(),
             tree: None,
@@ -439,6 +476,20 @@ impl Scene {
     pub fn mesh(&mut self, points: [Vec3; 4], material: u32, instance: Instance) {
         let instance_index = self.instances.len() as u32;
         self.instances.push(instance);
+        self.entities.push(ViewEntity {
+            kind: EntityKind::Model,
+            model: instance_index as i32,
+            skin: 0,
+            material: 0,
+            renderfx: 0,
+            frame: 0,
+            old_frame: 0,
+            origin: instance.origin,
+            first_instance: instance_index,
+            instance_count: 1,
+            first_mesh: self.meshes.len() as u32,
+            mesh_count: 1,
+        });
         let first_vertex = self.dynamic_vertices.len() as u32;
         self.dynamic_vertices.extend(Self::corners(points));
         let first_index = self.dynamic_indices.len() as u32;
@@ -480,6 +531,7 @@ impl Scene {
             indices: self.dynamic_indices.clone(),
             meshes: self.meshes.clone(),
             submodels: self.submodels.clone(),
+            entities: self.entities.clone(),
             surfaces: Vec::new(),
             dlights: self.dlights.clone(),
             portals: self.portals.clone(),

@@ -6,4 +6,5 @@ mod harness;
 mod layers;
 mod lighting;
 mod maps;
+mod motion;
 mod views;

@@ -1,0 +1,109 @@
+// Motion: where the surface that a pixel shows was on the screen in the last frame, and how long the way to it was.
+//
+// What is seen in a plane mirror is seen at its mirror image, and what a portal shows is seen as if it stood behind the
+// portal; both are affine maps from a point to where the eye takes it to be. The map is carried along the path as it was
+// in the last frame, so that motion is right behind any chain of mirrors and portals, moved ones included (the virtual
+// space of Zimmer et al., Path-space Motion Estimation and Decomposition for Robust Animation Filtering, EGSR 2015,
+// section 5, for plane reflections). What is on a texture moves with its surface: scrolling is no motion.
+#ifndef RELIGHT_TRACE_MOTION_GLSL
+#define RELIGHT_TRACE_MOTION_GLSL
+
+#include "trace/geometry.glsl"
+
+// Length of the way to the sky as the motion image holds it: beyond every map, within half floats.
+const float SKY_PATH = 60000.0;
+
+// The motion of a pixel.
+struct Motion {
+    vec2 offset;     // from the pixel to where its surface was in the last frame, pixels
+    float last_path; // length of the way to it then; negative: unknown
+    float path;      // length of the way now; SKY_PATH: the sky
+};
+
+Motion motion_read(ivec2 pixel) {
+    vec4 v = imageLoad(images_rgba16f[VIEW.motion.image], pixel);
+    return Motion(v.xy, v.z, v.w);
+}
+
+// The way to what a pixel showed in the last frame.
+float last_path_read(ivec2 pixel) { return imageLoad(images_rgba16f[VIEW.motion.image_last], pixel).w; }
+
+// Where the eye of the last frame took points to be: x is seen at turn * x + shift.
+struct LastSpace {
+    mat3 turn;
+    vec3 shift;
+};
+
+// A place in the last frame, as its eye saw it.
+struct LastPlace {
+    vec4 at;     // w 1: a point; 0: a direction at infinity; -1: nobody knows
+    float path;  // length of the way in this frame
+    bool rests; // it has not moved itself
+};
+
+LastSpace last_directly() { return LastSpace(mat3(1.0), vec3(0.0)); }
+LastPlace last_nothing() { return LastPlace(vec4(0.0, 0.0, 0.0, -1.0), SKY_PATH, false); }
+
+// A plane that mirrored in the last frame: what it shows is mirrored first.
+LastSpace last_reflected(LastSpace space, vec4 plane) {
+    vec3 n = plane.xyz;
+    vec3 turned = space.turn * n;
+    return LastSpace(space.turn - 2.0 * outerProduct(turned, n), space.shift + turned * (2.0 * plane.w));
+}
+
+// Behind the portal or mirror of this index.
+LastSpace last_through(LastSpace space, uint index) {
+    PortalRecord portal = Portals(VIEW.motion.last_portals).at[index];
+    if (portal.mirror != 0) return last_reflected(space, portal.plane);
+    // from what the far camera sees to the surface that shows it
+    mat3 to_surface = mat3(portal.surface_axis[0], portal.surface_axis[1], portal.surface_axis[2])
+        * transpose(mat3(portal.camera_axis[0], portal.camera_axis[1], portal.camera_axis[2]));
+    vec3 shift = portal.surface_origin - to_surface * portal.camera_origin;
+    return LastSpace(space.turn * to_surface, space.turn * shift + space.shift);
+}
+
+// Where the surface's point was in the last frame: its triangle as it was shaped and placed then.
+LastPlace last_place(LastSpace space, SurfacePoint p, float path) {
+    LastInstance instance = LastInstances(VIEW.motion.last_instances).at[p.instance];
+    if (instance.known == LAST_UNKNOWN) return LastPlace(vec4(0.0, 0.0, 0.0, -1.0), path, false);
+    vec3 local = p.stage.position;
+    // geometry whose vertices are among those that are made anew each frame
+    uint64_t offset = p.vertices - VIEW.motion.vertices;
+    if (p.vertices >= VIEW.motion.vertices && offset < VIEW.motion.vertex_bytes) {
+        const uint vertex_size = 44u;
+        uint base = uint(offset) / vertex_size;
+        Positions last = Positions(VIEW.motion.last_positions);
+        local = last.at[base + p.triangle.indices[0]] * p.weights.x + last.at[base + p.triangle.indices[1]] * p.weights.y
+            + last.at[base + p.triangle.indices[2]] * p.weights.z;
+    }
+    bool same = instance.known == LAST_SAME && local == p.stage.position;
+    vec3 world = p.position;
+    if (!same) world = mat3(instance.axis[0], instance.axis[1], instance.axis[2]) * local + instance.origin;
+    return LastPlace(vec4(space.turn * world + space.shift, 1.0), path, same);
+}
+
+// The sky in a direction of this frame's path.
+LastPlace last_sky(LastSpace space, vec3 direction) {
+    return LastPlace(vec4(space.turn * direction, 0.0), SKY_PATH, true);
+}
+
+// What the motion image holds for a surface seen in the middle of a sample at `seen` (pixels from the left and top).
+vec4 motion_of(vec2 seen, LastPlace place) {
+    float path = min(place.path, SKY_PATH);
+    if (place.at.w < 0.0 || (VIEW.flags & VIEW_HISTORY) == 0) return vec4(0.0, 0.0, -1.0, path);
+    if (place.rests && VIEW.motion.still != 0) return vec4(0.0, 0.0, path, path);
+    vec3 v = place.at.xyz - VIEW.last_eye * place.at.w;
+    float depth = dot(v, VIEW.last_forward);
+    if (depth <= 0.0) return vec4(0.0, 0.0, -1.0, path);
+    vec2 ndc = -vec2(dot(v, VIEW.last_left) / dot(VIEW.last_left, VIEW.last_left),
+        dot(v, VIEW.last_up) / dot(VIEW.last_up, VIEW.last_up)) / depth;
+    vec2 offset = (ndc * 0.5 + 0.5) * vec2(VIEW.width, VIEW.height) - seen;
+    float last_path = place.at.w > 0.0 ? min(length(v), SKY_PATH) : SKY_PATH;
+    return vec4(clamp(offset, -60000.0, 60000.0), last_path, path);
+}
+
+void motion_write(ivec2 pixel, vec2 seen, LastPlace place) {
+    imageStore(images_rgba16f[VIEW.motion.image], pixel, motion_of(seen, place));
+}
+
+#endif
