@@ -16,7 +16,7 @@ const SIZE: i32 = 24;
 
 fn live() -> Settings {
     Settings {
-        rt_reference: false,
+        rt_accumulate: false,
         ..reference()
     }
 }
@@ -66,6 +66,18 @@ fn check(gpu: &Gpu, first: &RefDef, expected: impl Fn(Vec3) -> Option<Vec3>) -> 
     known
 }
 
+#[test]
+fn motion_is_that_of_the_projection() {
+    // one test, because compiling the pipelines takes longer than all of these
+    Gpu::each(|gpu| {
+        what_rests_moves_as_the_camera_does(gpu);
+        meshes_move_with_their_entities_and_by_their_vertices(gpu);
+        what_a_mirror_shows_moves_like_its_mirror_image(gpu);
+        what_a_portal_shows_moves_as_if_it_stood_there(gpu);
+        the_sky_turns_but_does_not_come_nearer(gpu);
+    });
+}
+
 fn room() -> Scene {
     let mut scene = Scene::new(
         Vec3::new(-180.0, 10.0, 20.0),
@@ -83,74 +95,68 @@ fn room() -> Scene {
     scene
 }
 
-#[test]
-fn what_rests_moves_as_the_camera_does() {
-    Gpu::each(|gpu| {
-        let scene = room();
-        gpu.render_views(&scene, &live(), 2, |frame, view| {
-            if frame == 1 {
-                step(&mut view.def);
-            }
-        });
-        let known = check(gpu, &scene.def, Some);
-        assert_eq!(known as i32, SIZE * SIZE);
-        // a camera that rests: no motion at all, to the last bit
-        gpu.render_views(&scene, &live(), 2, |_, _| {});
-        for (_, [u, v, last, now]) in gpu.motion() {
-            assert_eq!([u, v], [0.0, 0.0]);
-            assert_eq!(last, now);
+fn what_rests_moves_as_the_camera_does(gpu: &mut Gpu) {
+    let scene = room();
+    gpu.render_views(&scene, &live(), 2, |frame, view| {
+        if frame == 1 {
+            step(&mut view.def);
         }
-        // the first frame knows nothing
-        gpu.render_views(&scene, &live(), 1, |_, _| {});
-        assert!(gpu.motion().iter().all(|(_, m)| m[2] < 0.0));
     });
+    let known = check(gpu, &scene.def, Some);
+    assert_eq!(known as i32, SIZE * SIZE);
+    // a camera that rests: no motion at all, to the last bit
+    gpu.render_views(&scene, &live(), 2, |_, _| {});
+    for (_, [u, v, last, now]) in gpu.motion() {
+        assert_eq!([u, v], [0.0, 0.0]);
+        assert_eq!(last, now);
+    }
+    // the first frame knows nothing
+    gpu.render_views(&scene, &live(), 1, |_, _| {});
+    assert!(gpu.motion().iter().all(|(_, m)| m[2] < 0.0));
 }
 
-#[test]
-fn meshes_move_with_their_entities_and_by_their_vertices() {
-    Gpu::each(|gpu| {
-        let mut scene = room();
-        let white = scene.diffuse(0.9);
-        let screen = rectangle(
-            Vec3::new(0.0, -300.0, -300.0),
-            Vec3::Z * 600.0,
-            Vec3::Y * 600.0,
-        );
-        let turn = Mat3::from_rotation_z(0.1);
-        scene.mesh(screen, white, identity());
-        let bend = |p: Vec3| p + Vec3::X * (0.05 * p.y);
-        let (from, to) = (Vec3::new(-20.0, 0.0, 0.0), Vec3::new(-22.0, 4.0, 3.0));
-        gpu.render_views(&scene, &live(), 2, |frame, view| {
-            view.time = frame as f32 * 0.02;
-            let instance = view.instances.last_mut().expect("placed");
-            instance.origin = if frame == 0 { from } else { to };
-            view.entities[0].origin = instance.origin;
-            if frame == 1 {
-                instance.axis = instance.axis.map(|v| turn * v);
-                step(&mut view.def);
-                for vertex in &mut view.vertices {
-                    vertex.position = bend(vertex.position);
-                }
+fn meshes_move_with_their_entities_and_by_their_vertices(gpu: &mut Gpu) {
+    let mut scene = room();
+    let white = scene.diffuse(0.9);
+    let screen = rectangle(
+        Vec3::new(0.0, -300.0, -300.0),
+        Vec3::Z * 600.0,
+        Vec3::Y * 600.0,
+    );
+    let turn = Mat3::from_rotation_z(0.1);
+    scene.mesh(screen, white, identity());
+    let bend = |p: Vec3| p + Vec3::X * (0.05 * p.y);
+    let (from, to) = (Vec3::new(-20.0, 0.0, 0.0), Vec3::new(-22.0, 4.0, 3.0));
+    gpu.render_views(&scene, &live(), 2, |frame, view| {
+        view.time = frame as f32 * 0.02;
+        let instance = view.instances.last_mut().expect("placed");
+        instance.origin = if frame == 0 { from } else { to };
+        view.entities[0].origin = instance.origin;
+        if frame == 1 {
+            instance.axis = instance.axis.map(|v| turn * v);
+            step(&mut view.def);
+            for vertex in &mut view.vertices {
+                vertex.position = bend(vertex.position);
             }
-        });
-        let last = |p: Vec3| {
-            let local = turn.transpose() * (p - to);
-            let flat = Vec3::new(local.x - 0.05 * local.y, local.y, local.z);
-            // beside it the room shows
-            Some(if flat.x.abs() < 0.01 { flat + from } else { p })
-        };
-        assert_eq!(check(gpu, &scene.def, last) as i32, SIZE * SIZE);
-
-        // one that was nowhere near has no past
-        gpu.render_views(&scene, &live(), 2, |frame, view| {
-            view.time = frame as f32 * 0.02;
-            let instance = view.instances.last_mut().expect("placed");
-            instance.origin = from + Vec3::Z * if frame == 0 { 200.0 } else { 0.0 };
-            view.entities[0].origin = instance.origin;
-        });
-        let unknown = gpu.motion().iter().filter(|(_, m)| m[2] < 0.0).count() as i32;
-        assert!(unknown > SIZE * SIZE / 2 && unknown < SIZE * SIZE);
+        }
     });
+    let last = |p: Vec3| {
+        let local = turn.transpose() * (p - to);
+        let flat = Vec3::new(local.x - 0.05 * local.y, local.y, local.z);
+        // beside it the room shows
+        Some(if flat.x.abs() < 0.01 { flat + from } else { p })
+    };
+    assert_eq!(check(gpu, &scene.def, last) as i32, SIZE * SIZE);
+
+    // one that was nowhere near has no past
+    gpu.render_views(&scene, &live(), 2, |frame, view| {
+        view.time = frame as f32 * 0.02;
+        let instance = view.instances.last_mut().expect("placed");
+        instance.origin = from + Vec3::Z * if frame == 0 { 200.0 } else { 0.0 };
+        view.entities[0].origin = instance.origin;
+    });
+    let unknown = gpu.motion().iter().filter(|(_, m)| m[2] < 0.0).count() as i32;
+    assert!(unknown > SIZE * SIZE / 2 && unknown < SIZE * SIZE);
 }
 
 fn mirror_at(x: f32) -> Portal {
@@ -168,119 +174,110 @@ fn mirror_at(x: f32) -> Portal {
     }
 }
 
-#[test]
-fn what_a_mirror_shows_moves_like_its_mirror_image() {
-    Gpu::each(|gpu| {
-        let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 50.0, SIZE);
-        let white = scene.diffuse(0.9);
-        scene.ambient = Vec3::ONE;
-        let mirror = scene.material(&[stage::filter([1.0; 3])], c::MATERIAL_PORTAL);
-        let around = |x: f32, up: Vec3, aside: Vec3| {
-            rectangle(Vec3::new(x, -900.0, -900.0), up * 1800.0, aside * 1800.0)
-        };
-        scene.quad(around(50.0, Vec3::Z, Vec3::Y), mirror);
-        scene.mesh(
-            around(-100.0, Vec3::Y, Vec3::Z),
-            white,
-            Instance {
-                flags: c::INSTANCE_THIRD_PERSON,
-                ..identity()
-            },
-        );
-        // the mirror comes nearer too, as one on a moving brush does
-        scene.portals.push(mirror_at(50.0));
-        let moved = Vec3::new(4.0, -3.0, 2.0);
-        gpu.render_views(&scene, &live(), 2, |frame, view| {
-            view.time = frame as f32 * 0.02;
-            if frame == 1 {
-                step(&mut view.def);
-                view.instances.last_mut().expect("placed").origin = moved;
-                view.entities[0].origin = moved;
-            }
-            view.portals[0] = mirror_at(if frame == 0 { 49.5 } else { 50.0 });
-        });
-        let last = |p: Vec3| {
-            let then = p - moved;
-            Some(Vec3::new(2.0 * 49.5 - then.x, then.y, then.z))
-        };
-        assert_eq!(check(gpu, &scene.def, last) as i32, SIZE * SIZE);
+fn what_a_mirror_shows_moves_like_its_mirror_image(gpu: &mut Gpu) {
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 50.0, SIZE);
+    let white = scene.diffuse(0.9);
+    scene.ambient = Vec3::ONE;
+    let mirror = scene.material(&[stage::filter([1.0; 3])], c::MATERIAL_PORTAL);
+    let around = |x: f32, up: Vec3, aside: Vec3| {
+        rectangle(Vec3::new(x, -900.0, -900.0), up * 1800.0, aside * 1800.0)
+    };
+    scene.quad(around(50.0, Vec3::Z, Vec3::Y), mirror);
+    scene.mesh(
+        around(-100.0, Vec3::Y, Vec3::Z),
+        white,
+        Instance {
+            flags: c::INSTANCE_THIRD_PERSON,
+            ..identity()
+        },
+    );
+    // the mirror comes nearer too, as one on a moving brush does
+    scene.portals.push(mirror_at(50.0));
+    let moved = Vec3::new(4.0, -3.0, 2.0);
+    gpu.render_views(&scene, &live(), 2, |frame, view| {
+        view.time = frame as f32 * 0.02;
+        if frame == 1 {
+            step(&mut view.def);
+            view.instances.last_mut().expect("placed").origin = moved;
+            view.entities[0].origin = moved;
+        }
+        view.portals[0] = mirror_at(if frame == 0 { 49.5 } else { 50.0 });
     });
+    let last = |p: Vec3| {
+        let then = p - moved;
+        Some(Vec3::new(2.0 * 49.5 - then.x, then.y, then.z))
+    };
+    assert_eq!(check(gpu, &scene.def, last) as i32, SIZE * SIZE);
 }
 
-#[test]
-fn what_a_portal_shows_moves_as_if_it_stood_there() {
-    Gpu::each(|gpu| {
-        let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 50.0, SIZE);
-        let white = scene.diffuse(0.9);
-        scene.ambient = Vec3::ONE;
-        let portal = scene.material(&[stage::add([0.0; 3])], c::MATERIAL_PORTAL);
-        let wall = rectangle(
-            Vec3::new(50.0, -900.0, -900.0),
+fn what_a_portal_shows_moves_as_if_it_stood_there(gpu: &mut Gpu) {
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 50.0, SIZE);
+    let white = scene.diffuse(0.9);
+    scene.ambient = Vec3::ONE;
+    let portal = scene.material(&[stage::add([0.0; 3])], c::MATERIAL_PORTAL);
+    let wall = rectangle(
+        Vec3::new(50.0, -900.0, -900.0),
+        Vec3::Z * 1800.0,
+        Vec3::Y * 1800.0,
+    );
+    scene.quad(wall, portal);
+    scene.quad(
+        rectangle(
+            Vec3::new(4000.0, 300.0, -900.0),
+            Vec3::X * 2000.0,
             Vec3::Z * 1800.0,
-            Vec3::Y * 1800.0,
-        );
-        scene.quad(wall, portal);
-        scene.quad(
-            rectangle(
-                Vec3::new(4000.0, 300.0, -900.0),
-                Vec3::X * 2000.0,
-                Vec3::Z * 1800.0,
-            ),
-            white,
-        );
-        scene.portals.push(Portal {
-            mirror: false,
-            camera_origin: Vec3::new(5000.0, 0.0, 0.0),
-            camera_axis: [Vec3::NEG_Y, Vec3::X, Vec3::Z],
-            ..mirror_at(50.0)
-        });
-        gpu.render_views(&scene, &live(), 2, |frame, view| {
-            if frame == 1 {
-                step(&mut view.def);
-            }
-        });
-        // 300 in front of the far camera is as if 300 behind the portal
-        let last = |p: Vec3| Some(Vec3::new(50.0 + p.y, p.x - 5000.0, p.z));
-        assert_eq!(check(gpu, &scene.def, last) as i32, SIZE * SIZE);
+        ),
+        white,
+    );
+    scene.portals.push(Portal {
+        mirror: false,
+        camera_origin: Vec3::new(5000.0, 0.0, 0.0),
+        camera_axis: [Vec3::NEG_Y, Vec3::X, Vec3::Z],
+        ..mirror_at(50.0)
     });
-}
-
-#[test]
-fn the_sky_turns_but_does_not_come_nearer() {
-    Gpu::each(|gpu| {
-        let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 70.0, SIZE);
-        let sky = scene.sky(
-            &[stage::constant([0.2, 0.1, 1.0])],
-            SkyRecord {
-                faces: [c::NO_TEXTURE; 6],
-                cloud_height: 512.0,
-            },
-        );
-        scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), sky);
-        let turn = Mat3::from_rotation_z(0.03);
-        gpu.render_views(&scene, &live(), 2, |frame, view| {
-            if frame == 1 {
-                view.def.view_origin += Vec3::new(30.0, 20.0, 10.0);
-                view.def.view_axis = view.def.view_axis.map(|v| turn * v);
-            }
-        });
-        let half = SIZE as f32 * 0.5;
-        let tan = (35.0f32).to_radians().tan();
-        for (i, (_, [u, v, last, _])) in gpu.motion().into_iter().enumerate() {
-            let pixel = Vec2::new(
-                (i as i32 % SIZE) as f32 + 0.5,
-                (i as i32 / SIZE) as f32 + 0.5,
-            );
-            let ndc = (pixel / half - 1.0) * tan;
-            let direction = turn * Vec3::new(1.0, -ndc.x, -ndc.y);
-            let wanted = seen(&scene.def, direction * 1000.0);
-            let found = pixel + Vec2::new(u, v);
-            assert!(
-                last > 0.0 && found.distance(wanted) < 0.1,
-                "{found} {wanted}"
-            );
+    gpu.render_views(&scene, &live(), 2, |frame, view| {
+        if frame == 1 {
+            step(&mut view.def);
         }
     });
+    // 300 in front of the far camera is as if 300 behind the portal
+    let last = |p: Vec3| Some(Vec3::new(50.0 + p.y, p.x - 5000.0, p.z));
+    assert_eq!(check(gpu, &scene.def, last) as i32, SIZE * SIZE);
+}
+
+fn the_sky_turns_but_does_not_come_nearer(gpu: &mut Gpu) {
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 70.0, SIZE);
+    let sky = scene.sky(
+        &[stage::constant([0.2, 0.1, 1.0])],
+        SkyRecord {
+            faces: [c::NO_TEXTURE; 6],
+            cloud_height: 512.0,
+        },
+    );
+    scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), sky);
+    let turn = Mat3::from_rotation_z(0.03);
+    gpu.render_views(&scene, &live(), 2, |frame, view| {
+        if frame == 1 {
+            view.def.view_origin += Vec3::new(30.0, 20.0, 10.0);
+            view.def.view_axis = view.def.view_axis.map(|v| turn * v);
+        }
+    });
+    let half = SIZE as f32 * 0.5;
+    let tan = (35.0f32).to_radians().tan();
+    for (i, (_, [u, v, last, _])) in gpu.motion().into_iter().enumerate() {
+        let pixel = Vec2::new(
+            (i as i32 % SIZE) as f32 + 0.5,
+            (i as i32 / SIZE) as f32 + 0.5,
+        );
+        let ndc = (pixel / half - 1.0) * tan;
+        let direction = turn * Vec3::new(1.0, -ndc.x, -ndc.y);
+        let wanted = seen(&scene.def, direction * 1000.0);
+        let found = pixel + Vec2::new(u, v);
+        assert!(
+            last > 0.0 && found.distance(wanted) < 0.1,
+            "{found} {wanted}"
+        );
+    }
 }
 
 /// An entity of a sort at a place.
