@@ -1,0 +1,148 @@
+//! Bounced light: partial sums of a furnace, colour that bleeds, walls that keep light out.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+use relight::light::{PointLight, SunLight};
+use shaders::types::constants as c;
+
+use super::harness::{Gpu, Scene, encode, floor_point, lambert, rectangle, stage, through_byte};
+use crate::settings::{LightSelection, Settings};
+
+fn bounced(bounces: u32) -> Settings {
+    Settings {
+        rt_bounces: bounces,
+        ..super::harness::reference()
+    }
+}
+
+#[test]
+fn a_furnace_sums_its_bounces() {
+    Gpu::each(a_furnace_sums_its_bounces_with);
+}
+
+fn a_furnace_sums_its_bounces_with(gpu: &mut Gpu) {
+    // every wall glows with e and reflects a: after n bounces it shows e (1 + a + ... + a^n). Of the three albedos one
+    // is below the least chance of going on, one above, and one loses no path at all
+    for albedo in [0.1, 0.5, 1.0] {
+        let mut scene = Scene::new(
+            Vec3::new(-20.0, 10.0, 5.0),
+            Vec3::new(50.0, 20.0, -30.0),
+            90.0,
+            32,
+        );
+        let wall = scene.material(
+            &[
+                stage::light(),
+                stage::filter([encode(albedo); 3]),
+                stage::add([encode(0.25); 3]),
+            ],
+            0,
+        );
+        scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), wall);
+        let [e, a] = [0.25, albedo].map(|v| through_byte(encode(v)));
+        let mut exact = e;
+        let mut power = e;
+        for bounces in 0..=2 {
+            let mean = gpu.mean(&scene, &bounced(bounces), 16).x;
+            println!("albedo {albedo}, {bounces}: {mean} {exact}");
+            assert!(
+                (mean / exact - 1.0).abs() < 0.003,
+                "albedo {albedo}, {bounces} bounces: {mean} {exact}"
+            );
+            power *= a;
+            exact += power;
+        }
+    }
+}
+
+#[test]
+fn a_red_wall_colours_the_floor() {
+    Gpu::each(a_red_wall_colours_the_floor_with);
+}
+
+fn a_red_wall_colours_the_floor_with(gpu: &mut Gpu) {
+    let color = [encode(0.6), encode(0.2), encode(0.05)];
+    let mut scene = Scene::new(
+        Vec3::new(-60.0, 0.0, 40.0),
+        Vec3::new(-40.0, 0.0, 0.0),
+        4.0,
+        32,
+    );
+    let white = scene.diffuse(1.0);
+    let red = scene.material(&[stage::light(), stage::filter(color)], 0);
+    let floor = Vec3::new(-500.0, -500.0, 0.0);
+    scene.quad(rectangle(floor, Vec3::X * 1000.0, Vec3::Y * 1000.0), white);
+    let wall = rectangle(Vec3::new(0.0, -40.0, 0.0), Vec3::Z * 50.0, Vec3::Y * 80.0);
+    scene.quad(wall, red);
+    // shines along the floor on the wall alone
+    scene.suns.push(SunLight {
+        direction: -Vec3::X,
+        irradiance: Vec3::splat(3.0),
+        angular_radius: 1.0e-5,
+        material: None,
+    });
+    let (pixels, _) = gpu.render(&scene, &bounced(1), 256);
+    let mut truth = 0.0;
+    for i in 0..pixels.len() {
+        let p = floor_point(&scene, i % 32, i / 32);
+        truth += lambert(p, Vec3::Z, [wall[0], wall[1], wall[2]], 3.0 / PI)
+            + lambert(p, Vec3::Z, [wall[0], wall[2], wall[3]], 3.0 / PI);
+    }
+    let sum = pixels.iter().sum::<Vec3>();
+    for (channel, code) in color.into_iter().enumerate() {
+        let ratio = sum[channel] / (truth * through_byte(code));
+        println!("channel {channel}: {ratio}");
+        assert!((ratio - 1.0).abs() < 0.015, "channel {channel}: {ratio}");
+    }
+}
+
+#[test]
+fn no_light_leaks_through_walls() {
+    Gpu::each(no_light_leaks_through_walls_with);
+}
+
+fn no_light_leaks_through_walls_with(gpu: &mut Gpu) {
+    // a bright room beside a dark one, a wall of one unit between them, the sun outside of both
+    for culling in [0, c::MATERIAL_TWO_SIDED] {
+        let mut scene = Scene::new(
+            Vec3::new(-90.0, 0.0, 5.0),
+            Vec3::new(0.0, 20.0, -30.0),
+            100.0,
+            32,
+        );
+        let grey = scene.diffuse(0.8);
+        scene.room(Vec3::splat(-100.0), Vec3::new(0.0, 100.0, 100.0), grey);
+        let sheet = scene.material(&[stage::light(), stage::filter([0.8; 3])], culling);
+        scene.room(Vec3::new(1.0, -100.0, -100.0), Vec3::splat(100.0), sheet);
+        scene.points.push(PointLight {
+            origin: Vec3::new(30.0, 0.0, 0.0),
+            intensity: Vec3::splat(50_000.0),
+            radius: 4.0,
+            spot: None,
+        });
+        scene.suns.push(SunLight {
+            direction: Vec3::new(-0.4, 0.3, 0.6).normalize(),
+            irradiance: Vec3::splat(5.0),
+            angular_radius: 0.01,
+            material: None,
+        });
+        for selection in [LightSelection::Uniform, LightSelection::Resampled] {
+            let settings = Settings {
+                rt_light_selection: selection,
+                ..bounced(2)
+            };
+            let (pixels, _) = gpu.render(&scene, &settings, 8);
+            for (i, pixel) in pixels.iter().enumerate() {
+                assert_eq!(
+                    *pixel,
+                    Vec3::ZERO,
+                    "pixel {i}, {selection:?}, cull {culling}"
+                );
+            }
+        }
+        // and the lamp does shine: on its own side
+        scene.def.view_origin = Vec3::new(90.0, 0.0, 5.0);
+        assert!(gpu.mean(&scene, &bounced(0), 4).min_element() > 0.1);
+    }
+}
