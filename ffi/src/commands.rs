@@ -2,6 +2,7 @@
 
 use crate::boundary::{Failure, entry};
 use crate::capture::{Format, Shot};
+use crate::costs::Report;
 use crate::cvars::Cvar;
 use crate::ioq3::engine::{Engine, valid_game_path};
 use crate::session::{self, Front, with_renderer};
@@ -25,6 +26,7 @@ static COMMANDS: &[(&CStr, Function)] = &[
     (c"minimize", minimize),
     (c"rt_timings", timings),
     (c"rt_lights", lights),
+    (c"rt_stats", stats),
 ];
 
 /// Adds all commands.
@@ -101,6 +103,23 @@ extern "C" fn timings() {
             .collect();
         lines.push(format!("{total:8.3} ms  all passes"));
         lines
+    });
+}
+
+extern "C" fn stats() {
+    print_lines(|renderer, front, arguments| {
+        let Some(report) = Report::of(arguments.get(1..).unwrap_or_default()) else {
+            return vec!["usage: rt_stats [json [FILE]]".into()];
+        };
+        if let Report::File(path) = &report
+            && valid_game_path(path).is_none()
+        {
+            return vec![format!("rt_stats: {path}: not a name for a file")];
+        }
+        front.questions.ask(report);
+        // counted from the next frame on; the answer comes when the GPU is done with it
+        renderer.count_rays(true);
+        Vec::new()
     });
 }
 

@@ -24,6 +24,7 @@ mod capture;
 mod cinematics;
 mod commands;
 mod config;
+mod costs;
 mod cvars;
 mod fallback;
 mod files;

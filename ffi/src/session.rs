@@ -8,6 +8,7 @@
 use crate::boundary::Failure;
 use crate::capture::Captures;
 use crate::cinematics::Cinematics;
+use crate::costs::Questions;
 use crate::cvars::Cvars;
 use crate::window;
 use renderer_vk::{Renderer, Settings};
@@ -47,6 +48,8 @@ pub struct Front {
     pub settings: Settings,
     /// Screenshots and video frames to take at the end of the frame.
     pub captures: Captures,
+    /// What `rt_stats` and `rt_printPerfStats` want to know.
+    pub questions: Questions,
     /// Videos on materials.
     pub cinematics: Cinematics,
     /// Pixels of the window as the game was told.

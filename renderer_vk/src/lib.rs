@@ -12,6 +12,7 @@ mod raster;
 mod renderer;
 pub mod scene;
 pub mod settings;
+mod statistics;
 mod stereo;
 mod targets;
 #[cfg(test)]
@@ -23,4 +24,5 @@ pub use assets::is_texture_mode;
 pub use error::Error;
 pub use renderer::{CpuTimes, FrameStats, Renderer, RendererOptions, probe};
 pub use settings::{LightSelection, Settings, TracerChoice};
+pub use statistics::{Costs, MemoryPurpose, PassCost};
 pub use stereo::Eye;

@@ -188,6 +188,24 @@ pub struct MotionView {
     pub padding: u32,
 }
 
+/// What the passes after the light read, and what they count with.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PostView {
+    /// Rays of each counted pass (`COUNT_*`), `COUNTER_ROWS` counters (`u32`) for each; 0: they are not counted.
+    pub counters: u64,
+    /// Texels of the bloom; 0: there is none.
+    pub bloom: u64,
+    /// Part of the light that bloom spreads.
+    pub bloom_strength: f32,
+    /// `DEBUG_*`; 0: the picture.
+    pub debug: u32,
+    /// Storage image of the rays of each pixel (`R32Uint`), or `NO_IMAGE`.
+    pub image_rays: u32,
+    /// As `TraceView::exposure_blend`, for a picture that became darker.
+    pub exposure_blend_dark: f32,
+}
+
 /// All that the passes of one traced view read: camera, arrays, images, settings.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -218,6 +236,7 @@ pub struct TraceView {
     pub bvh_instances: u64,
     pub materials: MaterialBuffers,
     pub motion: MotionView,
+    pub post: PostView,
     pub eye: Vec3,
     pub forward: Vec3,
     /// Scaled by the tangent of half the horizontal angle.
@@ -321,6 +340,21 @@ pub mod constants {
     pub const VIEW_FULLBRIGHT: u32 = 64;
     pub const VIEW_HISTORY: u32 = 128;
     pub const VIEW_DENOISE: u32 = 256;
+    pub const DEBUG_ALBEDO: u32 = 1;
+    pub const DEBUG_NORMALS: u32 = 2;
+    pub const DEBUG_DEPTH: u32 = 3;
+    pub const DEBUG_MOTION: u32 = 4;
+    pub const DEBUG_CLUSTERS: u32 = 5;
+    pub const DEBUG_LIGHTS: u32 = 6;
+    pub const DEBUG_SAMPLES: u32 = 7;
+    pub const DEBUG_VARIANCE: u32 = 8;
+    pub const DEBUG_GRADIENTS: u32 = 9;
+    pub const DEBUG_RAYS: u32 = 10;
+    pub const COUNT_PRIMARY: u32 = 0;
+    pub const COUNT_DIRECT: u32 = 1;
+    pub const COUNT_INDIRECT: u32 = 2;
+    pub const COUNTER_ROWS: u32 = 64;
+    pub const NO_IMAGE: u32 = 0xFFFF_FFFF;
     pub const SAMPLING_UNIFORM: u32 = 0;
     pub const SAMPLING_RESAMPLED: u32 = 1;
     pub const SAMPLING_ALL: u32 = 2;

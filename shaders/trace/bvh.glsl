@@ -176,6 +176,7 @@ void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
 // The nearest thing of the mask between tmin and tmax, translucent ones left out; with `any_hit` only whether there is
 // one: `geometry` is NO_HIT if not, and nothing else of the answer counts.
 Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
+    rays_asked++;
     BvhWalk walk;
     walk.mode = any_hit ? BVH_ANY : BVH_CLOSEST;
     walk.tmin = tmin;
@@ -189,6 +190,7 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
 // The next translucent layer behind `order` and before tmax; moves `order` to it. Layers in one plane come in the
 // order of the engine, what it draws last first.
 Hit trace_layer(vec3 origin, vec3 direction, float tmax, uint mask, inout LayerOrder order) {
+    rays_asked++;
     BvhWalk walk;
     walk.mode = BVH_LAYER;
     walk.tmin = layer_start(order);

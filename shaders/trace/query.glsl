@@ -12,6 +12,7 @@
 // The nearest thing of the mask between tmin and tmax, translucent ones left out; with `any_hit` only whether there is
 // one: `geometry` is NO_HIT if not, and nothing else of the answer counts.
 Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
+    rays_asked++;
     rayQueryEXT query;
     uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT : gl_RayFlagsNoneEXT;
     rayQueryInitializeEXT(query, scenes[VIEW.scene], flags, mask, origin, tmin, direction, tmax);
@@ -26,6 +27,7 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
 // The next translucent layer behind `order` and before tmax; moves `order` to it. Layers in one plane come in the
 // order of the engine, what it draws last first.
 Hit trace_layer(vec3 origin, vec3 direction, float tmax, uint mask, inout LayerOrder order) {
+    rays_asked++;
     rayQueryEXT query;
     rayQueryInitializeEXT(query, scenes[VIEW.scene], gl_RayFlagsNoneEXT, mask, origin, layer_start(order), direction, tmax);
     Hit found = Hit(NO_HIT, 0, vec2(0.0), 0.0);

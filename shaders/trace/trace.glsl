@@ -6,6 +6,7 @@
 #define RELIGHT_TRACE_TRACE_GLSL
 
 #include "trace/candidate.glsl"
+#include "trace/count.glsl"
 
 #if defined(TRACER_COMPUTE) || defined(TRACER_QUERY)
 
@@ -32,6 +33,7 @@ Hit payload_hit() {
 // The nearest thing of the mask between tmin and tmax, translucent ones left out; with `any_hit` only whether there is
 // one: `geometry` is NO_HIT if not, and nothing else of the answer counts.
 Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
+    rays_asked++;
     // where nothing reports, the ray was blocked
     payload.geometry = any_hit ? 0 : NO_HIT;
     payload.key = LAYER_NONE;
@@ -43,6 +45,7 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
 // The next translucent layer behind `order` and before tmax; moves `order` to it. Layers in one plane come in the
 // order of the engine, what it draws last first.
 Hit trace_layer(vec3 origin, vec3 direction, float tmax, uint mask, inout LayerOrder order) {
+    rays_asked++;
     payload.geometry = NO_HIT;
     payload.key = LAYER_NONE;
     payload.last_key = order.key;

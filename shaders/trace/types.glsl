@@ -34,6 +34,10 @@ struct MotionView {
     uint image; uint image_last; uint still; uint padding;
 };
 
+struct PostView {
+    uint64_t counters; uint64_t bloom; float bloom_strength; uint debug; uint image_rays; float exposure_blend_dark;
+};
+
 struct TraceView {
     uint64_t geometries; uint64_t instances; uint64_t fogs; uint64_t portals; uint64_t skies; uint64_t triangle_lights;
     uint64_t sphere_lights; uint64_t dynamic_lights; uint64_t suns; uint64_t nodes; uint64_t leaf_clusters;
@@ -41,6 +45,7 @@ struct TraceView {
     uint64_t bvh_nodes; uint64_t bvh_instances;
     MaterialBuffers materials;
     MotionView motion;
+    PostView post;
     vec3 eye; vec3 forward; vec3 left; vec3 up;
     uint width; uint height; int target_x; int target_y;
     uint scene; uint flags; uint seed; uint accumulated;
@@ -67,6 +72,13 @@ const uint LIGHT_TWO_SIDED = 1, LIGHT_SKY = 2;
 // Bits of TraceView.flags.
 const uint VIEW_JITTER = 1, VIEW_FIRST_PERSON = 2, VIEW_ACCUMULATE = 4, VIEW_AUTO_EXPOSURE = 8, VIEW_FAST_SKY = 16,
     VIEW_EXPOSURE_RESET = 32, VIEW_FULLBRIGHT = 64, VIEW_HISTORY = 128, VIEW_DENOISE = 256;
+// The views of rt_debug.
+const uint DEBUG_ALBEDO = 1, DEBUG_NORMALS = 2, DEBUG_DEPTH = 3, DEBUG_MOTION = 4, DEBUG_CLUSTERS = 5, DEBUG_LIGHTS = 6,
+    DEBUG_SAMPLES = 7, DEBUG_VARIANCE = 8, DEBUG_GRADIENTS = 9, DEBUG_RAYS = 10;
+// Counted passes, and counters of each.
+const uint COUNT_PRIMARY = 0, COUNT_DIRECT = 1, COUNT_INDIRECT = 2, COUNTER_ROWS = 64;
+// No storage image.
+const uint NO_IMAGE = 0xFFFFFFFFu;
 const uint SAMPLING_UNIFORM = 0, SAMPLING_RESAMPLED = 1, SAMPLING_ALL = 2;
 // Triangle.flags: bits from here on hold the drawing rank, sort value times 8, at most 255.
 const uint TRIANGLE_RANK_SHIFT = 8;

@@ -341,6 +341,12 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
     outbox
         .lines
         .extend(crate::speeds::lines(&front.settings, &stats, renderer));
+    let answers = (front.questions).answer(renderer, &front.settings, Instant::now());
+    outbox.lines.extend(answers.lines);
+    let files = answers.files.into_iter();
+    outbox
+        .files
+        .extend(files.map(|(path, bytes)| (path, bytes, false)));
     Ok(outbox)
 }
 

@@ -8,7 +8,7 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
 
-use super::device::{Device, lock};
+use super::device::{Device, MemoryKind, lock};
 use super::error::{Context, Error};
 use super::graveyard::Garbage;
 
@@ -129,7 +129,14 @@ impl Buffer {
             Memory::Upload => MemoryLocation::CpuToGpu,
             Memory::Readback => MemoryLocation::GpuToCpu,
         };
-        let memory = match device.0.allocate(desc.name, requirements, location, true) {
+        let kind = match desc.memory {
+            Memory::Device if desc.usage.has(BufferUsage::ACCEL_STORAGE) => {
+                MemoryKind::AccelerationStructure
+            }
+            Memory::Device => MemoryKind::Buffer,
+            Memory::Upload | Memory::Readback => MemoryKind::Shared,
+        };
+        let memory = match (device.0).allocate(desc.name, kind, requirements, location, true) {
             Ok(memory) => memory,
             Err(e) => {
                 // SAFETY: nothing uses the new buffer.

@@ -47,6 +47,61 @@ impl Default for DeviceOptions {
     }
 }
 
+/// What a piece of memory is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MemoryKind {
+    /// An image that shaders write or that is drawn to.
+    Target,
+    /// An image that is only sampled.
+    Texture,
+    /// A buffer of acceleration structures.
+    AccelerationStructure,
+    /// Any other buffer of the device.
+    Buffer,
+    /// A buffer that the CPU sees.
+    Shared,
+}
+
+impl MemoryKind {
+    const ALL: [Self; 5] = [
+        Self::Target,
+        Self::Texture,
+        Self::AccelerationStructure,
+        Self::Buffer,
+        Self::Shared,
+    ];
+
+    /// What the allocator's name of the memory begins with: it knows names alone.
+    fn mark(self) -> &'static str {
+        match self {
+            Self::Target => "target: ",
+            Self::Texture => "texture: ",
+            Self::AccelerationStructure => "structure: ",
+            Self::Buffer => "buffer: ",
+            Self::Shared => "shared: ",
+        }
+    }
+
+    /// Back from the allocator's name: kind and label.
+    fn of(name: &str) -> (Self, &str) {
+        let found = Self::ALL
+            .iter()
+            .find_map(|kind| Some((*kind, name.strip_prefix(kind.mark())?)));
+        found.unwrap_or((Self::Buffer, name))
+    }
+}
+
+/// A piece of memory in use.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MemoryUse {
+    /// What for.
+    pub kind: MemoryKind,
+    /// Label of the object.
+    pub label: String,
+    /// Bytes.
+    pub bytes: u64,
+}
+
 /// GPU memory in use, for a console command.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MemoryReport {
@@ -256,6 +311,21 @@ impl Device {
             .unwrap_or_default()
     }
 
+    /// Every piece of memory in use.
+    pub fn memory_uses(&self) -> Vec<MemoryUse> {
+        let allocator = lock(&self.0.allocator);
+        let allocations = allocator.as_ref().map(|a| a.generate_report().allocations);
+        let uses = allocations.unwrap_or_default().into_iter().map(|a| {
+            let (kind, label) = MemoryKind::of(&a.name);
+            MemoryUse {
+                kind,
+                label: label.to_owned(),
+                bytes: a.size,
+            }
+        });
+        uses.collect()
+    }
+
     /// How many dropped objects still wait for the frames that may use them.
     pub fn graveyard_len(&self) -> usize {
         lock(&self.0.state).graveyard.len()
@@ -387,6 +457,7 @@ impl DeviceInner {
     pub fn allocate(
         &self,
         name: &str,
+        kind: MemoryKind,
         requirements: vk::MemoryRequirements,
         location: MemoryLocation,
         linear: bool,
@@ -401,7 +472,7 @@ impl DeviceInner {
             .as_mut()
             .ok_or_else(|| fail("the allocator is gone".to_owned()))?
             .allocate(&AllocationCreateDesc {
-                name,
+                name: &format!("{}{name}", kind.mark()),
                 requirements,
                 location,
                 linear,

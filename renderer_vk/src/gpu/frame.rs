@@ -22,6 +22,8 @@ pub struct FrameRing {
     device: Device,
     slots: Vec<Slot>,
     next: usize,
+    /// Frames begun so far.
+    begun: u64,
 }
 
 impl FrameRing {
@@ -45,6 +47,7 @@ impl FrameRing {
             device: device.clone(),
             slots: Vec::new(),
             next: 0,
+            begun: 0,
         };
         for _ in 0..frames.max(1) {
             // SAFETY: plain creation.
@@ -112,11 +115,14 @@ impl FrameRing {
         lock(&device.0.state).recording = true;
         let available = slot.available;
         self.next = (index + 1) % self.slots.len();
+        self.begun += 1;
         Ok(Recorder {
             cmd: resources.main,
             slot: resources,
             acquired: None,
             ring_slot: Some(index),
+            serial: self.begun,
+            finished: self.begun.saturating_sub(self.slots.len() as u64),
             open: None,
             host_reads: false,
             available: Some(available),

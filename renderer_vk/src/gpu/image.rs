@@ -11,7 +11,7 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
 
-use super::device::{Device, lock};
+use super::device::{Device, MemoryKind, lock};
 use super::error::{Context, Error};
 use super::graveyard::Garbage;
 
@@ -287,18 +287,26 @@ impl Image {
         let raw = unsafe { vk.create_image(&info, None) }.context("vkCreateImage")?;
         // SAFETY: `raw` was just made.
         let requirements = unsafe { vk.get_image_memory_requirements(raw) };
-        let memory =
-            match device
-                .0
-                .allocate(desc.name, requirements, MemoryLocation::GpuOnly, false)
-            {
-                Ok(memory) => memory,
-                Err(e) => {
-                    // SAFETY: nothing uses the new image.
-                    unsafe { vk.destroy_image(raw, None) };
-                    return Err(e);
-                }
-            };
+        let drawn = ImageUsage::STORAGE | ImageUsage::COLOR | ImageUsage::DEPTH;
+        let kind = if desc.usage.has(drawn) {
+            MemoryKind::Target
+        } else {
+            MemoryKind::Texture
+        };
+        let memory = match device.0.allocate(
+            desc.name,
+            kind,
+            requirements,
+            MemoryLocation::GpuOnly,
+            false,
+        ) {
+            Ok(memory) => memory,
+            Err(e) => {
+                // SAFETY: nothing uses the new image.
+                unsafe { vk.destroy_image(raw, None) };
+                return Err(e);
+            }
+        };
         // SAFETY: the memory object is only used for the binding below.
         let (object, offset) = (unsafe { memory.memory() }, memory.offset());
         // SAFETY: the memory was allocated for these requirements and is bound once.

@@ -45,7 +45,7 @@ pub use arena::{ArenaSlice, UploadArena};
 pub use ash::vk;
 pub use bindless::{Filter, MipFilter, SamplerDesc, Wrap};
 pub use buffer::{Buffer, BufferDesc, BufferUsage, Memory};
-pub use device::{Device, DeviceOptions, MemoryReport};
+pub use device::{Device, DeviceOptions, MemoryKind, MemoryReport, MemoryUse};
 pub use draw::{Rendering, Viewport};
 pub use error::Error;
 pub use frame::FrameRing;

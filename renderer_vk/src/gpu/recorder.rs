@@ -150,6 +150,8 @@ pub struct Recorder {
     pub(crate) acquired: Option<Acquired>,
     /// Index in the ring; `None` for immediate work.
     pub(crate) ring_slot: Option<usize>,
+    pub(crate) serial: u64,
+    pub(crate) finished: u64,
     /// What is drawn to, while drawing may go on in the next pass; see [`Recorder::drawing`].
     pub(crate) open: Option<Attachments>,
     /// A pass wrote what the CPU may read once the frame is over.
@@ -164,6 +166,16 @@ impl Recorder {
     /// The device.
     pub fn device(&self) -> &Device {
         &self.device
+    }
+
+    /// Number of this frame: the first of a ring has 1, immediate work 0.
+    pub fn serial(&self) -> u64 {
+        self.serial
+    }
+
+    /// The newest frame that the GPU is known to be done with when this one was begun; 0: none.
+    pub fn finished(&self) -> u64 {
+        self.finished
     }
 
     /// Memory for data that this frame alone uses.
@@ -311,6 +323,8 @@ impl Device {
             slot,
             acquired: None,
             ring_slot: None,
+            serial: 0,
+            finished: 0,
             open: None,
             host_reads: true,
             available: None,

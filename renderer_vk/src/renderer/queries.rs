@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::Renderer;
 use crate::api::{MarkFragment, Orientation, PointLighting};
+use crate::statistics::Costs;
 use crate::world::{World, mark_fragments};
 
 impl Renderer {
@@ -83,6 +84,29 @@ impl Renderer {
     pub fn entity_token(&mut self) -> Option<String> {
         self.entity_tokens
             .next(&self.world.as_ref()?.relit.bsp.entities)
+    }
+
+    /// Counts the rays of traced views from the next frame on, or no longer; see [`costs`](Self::costs). Counting is
+    /// not free. Without the traced look there is nothing to count.
+    pub fn count_rays(&mut self, count: bool) {
+        if let Some(trace) = &mut self.trace {
+            trace.count_rays(count);
+        }
+    }
+
+    /// What the newest finished frame cost, and what memory is held for. On a software device passes are timed once
+    /// this was called.
+    pub fn costs(&self) -> Costs {
+        let timings = self.timings();
+        let rays = |pass: &str| self.trace.as_ref().and_then(|trace| trace.rays(pass));
+        Costs {
+            device: self.device_info().name.clone(),
+            tracer: (self.trace.as_ref()).map(|trace| format!("{:?}", trace.tracer())),
+            size: self.size(),
+            passes: Costs::passes(&timings, rays),
+            memory: Costs::memory(&self.device.memory_uses()),
+            reserved: self.device.memory_report().reserved,
+        }
     }
 
     /// Name of the loaded map, as it was asked for.

@@ -6,6 +6,7 @@ use shaders::trace_types::SkyRecord;
 use shaders::types::MaterialBuffers;
 use shaders::types::constants::NO_TEXTURE;
 
+use super::counters::COUNTED;
 use super::geometry::StaticGeometry;
 use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use super::lights::{MapLightSource, MapLights};
@@ -148,6 +149,23 @@ impl TraceLook {
         };
         self.tracer
             .record_view(rec, view, Some(map), assets, settings, target)
+    }
+
+    /// What follows rays.
+    pub fn tracer(&self) -> Tracer {
+        self.kind
+    }
+
+    /// Counts rays from the next view on, or no longer.
+    pub fn count_rays(&mut self, count: bool) {
+        self.tracer.count_rays = count;
+    }
+
+    /// Rays that a pass asked for in the newest finished frame; `None` for a pass that asks for none, or while rays
+    /// are not counted.
+    pub fn rays(&self, pass: &str) -> Option<u64> {
+        let index = COUNTED.iter().position(|name| *name == pass)?;
+        self.tracer.rays()?.get(index).copied()
     }
 
     /// How many frames the last picture is the mean of; 1 outside of reference mode.

@@ -11,6 +11,8 @@
 
 pub mod accel;
 pub mod bvh;
+pub mod counters;
+pub mod debug;
 pub mod geometry;
 pub mod input;
 pub mod lights;

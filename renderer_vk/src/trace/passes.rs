@@ -40,7 +40,7 @@ enum RayPass {
 }
 
 /// Groups of the compute shaders that trace.
-const COMPUTE_TILE: [u32; 2] = [8, 4];
+pub(super) const COMPUTE_TILE: [u32; 2] = [8, 4];
 
 fn trace(
     rec: &mut Recorder,
@@ -70,17 +70,18 @@ fn trace(
 /// Edge of the groups of the compute passes over pixels, see their `local_size`.
 const TILE: u32 = 8;
 
-fn dispatch(
+pub(super) fn dispatch(
     rec: &mut Recorder,
     name: &str,
     pipeline: &ComputePipeline,
     view: u64,
     size: [u32; 2],
+    tile: [u32; 2],
 ) -> Result<(), Error> {
     let mut pass = rec.pass(name, Access::COMPUTE, Access::COMPUTE)?;
     pass.bind_compute(pipeline);
     pass.push(&view);
-    pass.dispatch(size[0].div_ceil(TILE), size[1].div_ceil(TILE), 1);
+    pass.dispatch(size[0].div_ceil(tile[0]), size[1].div_ceil(tile[1]), 1);
     Ok(())
 }
 
@@ -132,7 +133,7 @@ macro_rules! pixel_pass {
             /// # Errors
             /// Out of memory.
             pub fn record(&self, rec: &mut Recorder, view: u64, size: [u32; 2]) -> Result<(), Error> {
-                dispatch(rec, $name, &self.0, view, size)
+                dispatch(rec, $name, &self.0, view, size, [TILE; 2])
             }
         }
     };
@@ -222,7 +223,7 @@ impl Denoise {
     /// Out of memory.
     pub fn record(&self, rec: &mut Recorder, view: u64, targets: &Targets) -> Result<(), Error> {
         let size = [targets.width, targets.height];
-        dispatch(rec, "trace_temporal", &self.temporal, view, size)?;
+        dispatch(rec, "trace_temporal", &self.temporal, view, size, [TILE; 2])?;
         let mut pass = rec.pass("trace_wavelet", Access::COMPUTE, Access::COMPUTE)?;
         pass.bind_compute(&self.wavelet);
         for step in 0..Self::STEPS {

@@ -4,9 +4,11 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use glam::Vec3;
 use shaders::trace_types::constants as t;
-use shaders::trace_types::{MotionView, PortalRecord, TraceView};
+use shaders::trace_types::{MotionView, PortalRecord, PostView, TraceView};
 
 use super::accel::{Accel, AccelOutput};
+use super::counters::{COUNTED, Counting, RayCounters};
+use super::debug::DebugView;
 use super::geometry::StaticGeometry;
 use super::input::{MaterialTable, Tracer};
 use super::lights::{MapLights, dynamic_lights};
@@ -39,6 +41,10 @@ pub struct ViewTracer {
     exposure: Exposure,
     tone_map: ToneMap,
     motion: Motion,
+    debug: DebugView,
+    counters: RayCounters,
+    /// Rays are counted.
+    pub(super) count_rays: bool,
     pub(super) targets: Option<Targets>,
     exposure_state: Buffer,
     exposure_started: bool,
@@ -75,6 +81,9 @@ impl ViewTracer {
             exposure: Exposure::new(device)?,
             tone_map: ToneMap::new(device)?,
             motion: Motion::default(),
+            debug: DebugView::default(),
+            counters: RayCounters::default(),
+            count_rays: false,
             targets: None,
             // zeros: the first frame counts into the histogram before any pass has emptied it
             exposure_state: Buffer::with_data(
@@ -101,6 +110,12 @@ impl ViewTracer {
     /// The linear picture of the last view, before exposure: RGBA, 32-bit floats.
     pub fn hdr(&self) -> Option<&Image> {
         self.targets.as_ref().map(|t| &t.hdr)
+    }
+
+    /// Rays of each of [`COUNTED`](super::counters::COUNTED)'s passes in the newest finished frame; `None` while they
+    /// are not counted.
+    pub fn rays(&self) -> Option<[u64; COUNTED.len()]> {
+        self.counters.rays()
     }
 
     /// Forgets what was accumulated and lets exposure start anew: the map has changed.
@@ -162,7 +177,9 @@ impl ViewTracer {
         };
         let mut motion = self.motion.record(rec, view, &portals, accel.vertices)?;
         motion.still &= u32::from(self.history == Some(camera_frame(view)));
-        let params = self.params(
+        let show_rays = settings.rt_debug == t::DEBUG_RAYS;
+        let counting = (self.counters).begin(rec, size, self.count_rays, show_rays)?;
+        let mut params = self.params(
             rec,
             view,
             map,
@@ -174,11 +191,13 @@ impl ViewTracer {
             &portals,
             motion,
         )?;
+        params.post = post_view(settings, counting);
         let address = rec.arena().push(&[params])?;
 
         self.primary.record(rec, address, size)?;
         self.direct.record(rec, address, size)?;
         self.indirect.record(rec, address, size)?;
+        self.counters.end(rec)?;
         if !settings.rt_accumulate
             && let Some(targets) = &self.targets
         {
@@ -190,6 +209,9 @@ impl ViewTracer {
         }
         self.exposure.record(rec, address, size)?;
         self.tone_map.record(rec, address, size)?;
+        if settings.rt_debug > 0 {
+            self.debug.record(&self.device, rec, address, size)?;
+        }
         self.frame = self.frame.wrapping_add(1);
         self.last_time = view.time;
         self.history = (!settings.rt_accumulate).then(|| camera_frame(view));
@@ -296,6 +318,7 @@ impl ViewTracer {
             bvh_nodes: accel.nodes,
             bvh_instances: accel.placed,
             materials: materials.buffers(),
+            post: PostView::default(), // filled in by the caller
             motion: MotionView {
                 image: targets.motion[0].storage_index(),
                 image_last: targets.motion[1].storage_index(),
@@ -369,6 +392,16 @@ impl ViewTracer {
             last_left,
             last_up,
         })
+    }
+}
+
+/// What the passes after the light read.
+fn post_view(settings: &Settings, counting: Counting) -> PostView {
+    PostView {
+        counters: counting.address,
+        image_rays: counting.image,
+        debug: settings.rt_debug,
+        ..PostView::default()
     }
 }
 

@@ -75,6 +75,16 @@ impl Gpu {
         })
     }
 
+    /// Counts rays in what is rendered from now on, or no longer.
+    pub fn count_rays(&mut self, count: bool) {
+        self.look.count_rays = count;
+    }
+
+    /// Rays of each counted pass in the newest finished frame.
+    pub fn rays(&self) -> Option<[u64; 3]> {
+        self.look.rays()
+    }
+
     /// The mean of `frames` frames before exposure, and the last picture.
     pub fn render(
         &mut self,

@@ -4,6 +4,7 @@
 mod bounces;
 mod denoising;
 mod harness;
+mod inspection;
 mod layers;
 mod lighting;
 mod maps;

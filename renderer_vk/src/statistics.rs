@@ -1,0 +1,327 @@
+//! What a frame costs: time and rays of each pass, memory by kind; as lines and as JSON.
+
+use std::fmt::Write as _;
+
+use crate::gpu::{MemoryKind, MemoryUse};
+
+/// A pass of the newest finished frame; those of the same name are one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassCost {
+    /// Name.
+    pub name: String,
+    /// Milliseconds on the GPU.
+    pub ms: f32,
+    /// Rays that it asked for; `None` for a pass that asks for none, or while rays are not counted.
+    pub rays: Option<u64>,
+}
+
+impl PassCost {
+    /// Millions of rays a second, where both are known.
+    pub fn mrays_per_second(&self) -> Option<f64> {
+        let rays = self.rays.filter(|_| self.ms > 0.0)?;
+        #[allow(clippy::cast_precision_loss)] // a count for people
+        Some(rays as f64 / (f64::from(self.ms) * 1000.0))
+    }
+}
+
+/// What GPU memory is held for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum MemoryPurpose {
+    /// Images as large as the picture.
+    ScreenImages,
+    /// Acceleration structures, and our own hierarchies.
+    AccelerationStructures,
+    /// Light lists and the lights in them.
+    Lights,
+    /// Textures.
+    Textures,
+    /// Other buffers of the device.
+    Buffers,
+    /// Memory that the CPU writes and reads: uploads, what a frame sends, read-backs.
+    Shared,
+}
+
+impl MemoryPurpose {
+    /// All, in the order of reports.
+    pub const ALL: [Self; 6] = [
+        Self::ScreenImages,
+        Self::AccelerationStructures,
+        Self::Lights,
+        Self::Textures,
+        Self::Buffers,
+        Self::Shared,
+    ];
+
+    /// As reports call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ScreenImages => "screen images",
+            Self::AccelerationStructures => "acceleration structures",
+            Self::Lights => "lights",
+            Self::Textures => "textures",
+            Self::Buffers => "buffers",
+            Self::Shared => "shared with the CPU",
+        }
+    }
+
+    /// Of an allocation, by its kind, and for plain buffers by the label that this renderer gave it.
+    pub fn of(allocation: &MemoryUse) -> Self {
+        let any = |parts: &[&str]| parts.iter().any(|part| allocation.label.contains(part));
+        match allocation.kind {
+            MemoryKind::Target => Self::ScreenImages,
+            MemoryKind::Texture => Self::Textures,
+            MemoryKind::AccelerationStructure => Self::AccelerationStructures,
+            MemoryKind::Shared => Self::Shared,
+            MemoryKind::Buffer if any(&["bvh", "trace nodes", "trace leafs", "hierarch"]) => {
+                Self::AccelerationStructures
+            }
+            MemoryKind::Buffer if any(&["light", "trace suns"]) => Self::Lights,
+            MemoryKind::Buffer => Self::Buffers,
+        }
+    }
+}
+
+/// What the newest finished frame cost, and what is held.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Costs {
+    /// Name of the device.
+    pub device: String,
+    /// What follows rays, while the traced look is there.
+    pub tracer: Option<String>,
+    /// Pixels of the picture.
+    pub size: (u32, u32),
+    /// In the order of recording.
+    pub passes: Vec<PassCost>,
+    /// Bytes in use by purpose.
+    pub memory: Vec<(MemoryPurpose, u64)>,
+    /// Bytes taken from the driver.
+    pub reserved: u64,
+}
+
+impl Costs {
+    /// Sums passes by name.
+    pub(crate) fn passes(
+        timings: &[(String, f32)],
+        rays: impl Fn(&str) -> Option<u64>,
+    ) -> Vec<PassCost> {
+        let mut passes: Vec<PassCost> = Vec::new();
+        for (name, ms) in timings {
+            match passes.iter_mut().find(|pass| pass.name == *name) {
+                Some(pass) => pass.ms += ms,
+                None => passes.push(PassCost {
+                    name: name.clone(),
+                    ms: *ms,
+                    rays: rays(name),
+                }),
+            }
+        }
+        passes
+    }
+
+    /// Sums allocations by purpose.
+    pub(crate) fn memory(allocations: &[MemoryUse]) -> Vec<(MemoryPurpose, u64)> {
+        let bytes_of = |purpose| {
+            let held = allocations
+                .iter()
+                .filter(|a| MemoryPurpose::of(a) == purpose);
+            held.map(|a| a.bytes).sum()
+        };
+        MemoryPurpose::ALL.map(|p| (p, bytes_of(p))).to_vec()
+    }
+
+    /// All passes together; `rays` is `None` while they are not counted.
+    pub fn total(&self) -> PassCost {
+        let counted = self.passes.iter().filter_map(|pass| pass.rays);
+        PassCost {
+            name: "all passes".into(),
+            ms: self.passes.iter().map(|pass| pass.ms).sum(),
+            rays: counted.clone().next().map(|_| counted.sum()),
+        }
+    }
+
+    /// For people: a line for each pass, one for all, one for each purpose of memory.
+    pub fn lines(&self) -> Vec<String> {
+        let (width, height) = self.size;
+        let tracer = self.tracer.as_deref().unwrap_or("no tracer");
+        let mut lines = vec![format!("{}, {width} x {height}, {tracer}", self.device)];
+        if self.passes.is_empty() {
+            lines.push("no finished frame was timed yet".into());
+        }
+        for pass in self.passes.iter().chain([&self.total()]) {
+            let rays = match (pass.rays, pass.mrays_per_second()) {
+                (Some(rays), Some(rate)) => format!("{rays:12} rays {rate:9.1} Mrays/s"),
+                (Some(rays), None) => format!("{rays:12} rays {:17}", ""),
+                _ => " ".repeat(35),
+            };
+            lines.push(format!("{:9.3} ms {rays}  {}", pass.ms, pass.name));
+        }
+        for (purpose, bytes) in &self.memory {
+            lines.push(format!("{:9.1} MB  {}", megabytes(*bytes), purpose.name()));
+        }
+        lines.push(format!(
+            "{:9.1} MB  taken from the driver",
+            megabytes(self.reserved)
+        ));
+        lines
+    }
+
+    /// One line: time, the traced passes, rays, memory.
+    pub fn summary(&self) -> String {
+        let total = self.total();
+        let mut line = format!("{:.2} ms", total.ms);
+        for pass in &self.passes {
+            if let Some(name) = pass.name.strip_prefix("trace_") {
+                let _ = write!(line, ", {name} {:.2}", pass.ms);
+            }
+        }
+        if let Some(rays) = total.rays {
+            #[allow(clippy::cast_precision_loss)] // a count for people
+            let _ = write!(line, "; {:.2} Mrays", rays as f64 / 1.0e6);
+        }
+        let held = self.memory.iter().map(|(_, bytes)| bytes).sum();
+        let _ = write!(line, "; {:.0} MB", megabytes(held));
+        line
+    }
+
+    /// The same as JSON, one value a line.
+    pub fn json(&self) -> String {
+        let mut text = String::from("{\n");
+        let _ = writeln!(text, "  \"device\": {},", quoted(&self.device));
+        let tracer = self.tracer.as_deref().map_or("null".into(), quoted);
+        let _ = writeln!(text, "  \"tracer\": {tracer},");
+        let _ = writeln!(text, "  \"width\": {},", self.size.0);
+        let _ = writeln!(text, "  \"height\": {},", self.size.1);
+        text.push_str("  \"passes\": [\n");
+        let passes: Vec<String> = self.passes.iter().map(pass_json).collect();
+        text.push_str(&passes.join(",\n"));
+        let _ = writeln!(text, "\n  ],\n  \"total\":\n{},", pass_json(&self.total()));
+        text.push_str("  \"memory\": {\n");
+        for (purpose, bytes) in &self.memory {
+            let _ = writeln!(text, "    {}: {bytes},", quoted(purpose.name()));
+        }
+        let _ = writeln!(text, "    \"reserved\": {}\n  }}\n}}", self.reserved);
+        text
+    }
+}
+
+fn pass_json(pass: &PassCost) -> String {
+    let number = |value: Option<String>| value.unwrap_or_else(|| "null".into());
+    // a time that is no number is none in JSON either
+    let ms = Some(pass.ms).filter(|ms| ms.is_finite());
+    format!(
+        "    {{ \"name\": {}, \"ms\": {}, \"rays\": {}, \"mrays_per_second\": {} }}",
+        quoted(&pass.name),
+        number(ms.map(|ms| format!("{ms:.4}"))),
+        number(pass.rays.map(|rays| rays.to_string())),
+        number(pass.mrays_per_second().map(|rate| format!("{rate:.2}")))
+    )
+}
+
+/// A JSON string.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' => quoted.push_str("\\\""),
+            '\\' => quoted.push_str("\\\\"),
+            c if c.is_control() => {
+                let _ = write!(quoted, "\\u{:04x}", u32::from(c));
+            }
+            c => quoted.push(c),
+        }
+    }
+    quoted + "\""
+}
+
+fn megabytes(bytes: u64) -> f64 {
+    #[allow(clippy::cast_precision_loss)] // for people
+    let bytes = bytes as f64;
+    bytes / f64::from(1 << 20)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn costs() -> Costs {
+        let timings = [
+            ("trace_direct", 2.0),
+            ("overlay", 0.5),
+            ("trace_direct", 1.0),
+        ];
+        let timings = timings.map(|(name, ms)| (name.to_owned(), ms));
+        let held = |kind, label: &str, bytes| MemoryUse {
+            kind,
+            label: label.into(),
+            bytes,
+        };
+        Costs {
+            device: "a \"device\"\n".into(),
+            tracer: None,
+            size: (4, 2),
+            passes: Costs::passes(&timings, |name| (name == "trace_direct").then_some(6000)),
+            memory: Costs::memory(&[
+                held(MemoryKind::Target, "trace light 0", 10),
+                held(MemoryKind::Buffer, "trace light lists", 20),
+                held(MemoryKind::Buffer, "vertices", 30),
+                held(MemoryKind::Texture, "a sky light", 40),
+            ]),
+            reserved: 1 << 20,
+        }
+    }
+
+    #[test]
+    fn passes_of_a_name_are_one_and_rates_are_rays_over_time() {
+        let costs = costs();
+        assert_eq!(costs.passes.len(), 2);
+        assert_eq!(
+            (costs.passes[0].ms, costs.passes[0].rays),
+            (3.0, Some(6000))
+        );
+        assert_eq!(costs.passes[0].mrays_per_second(), Some(2.0));
+        assert_eq!(costs.passes[1].rays, None);
+        assert_eq!((costs.total().ms, costs.total().rays), (3.5, Some(6000)));
+        assert_eq!(Costs::default().total().rays, None);
+    }
+
+    #[test]
+    fn memory_is_summed_by_purpose() {
+        let of = |purpose| {
+            let costs = costs();
+            costs.memory.iter().find(|m| m.0 == purpose).map(|m| m.1)
+        };
+        assert_eq!(of(MemoryPurpose::ScreenImages), Some(10));
+        assert_eq!(of(MemoryPurpose::Lights), Some(20));
+        assert_eq!(of(MemoryPurpose::Buffers), Some(30));
+        assert_eq!(of(MemoryPurpose::Textures), Some(40));
+        assert_eq!(of(MemoryPurpose::AccelerationStructures), Some(0));
+    }
+
+    #[test]
+    fn json_is_well_formed_whatever_the_names() {
+        let json = costs().json();
+        assert!(json.contains(r#""device": "a \"device\"\u000a""#));
+        assert!(json.contains(r#""name": "overlay", "ms": 0.5000, "rays": null"#));
+        assert_eq!(json.matches('{').count(), json.matches('}').count());
+        assert!(!json.contains(",\n  ]") && !json.contains(",\n  }"));
+    }
+
+    #[test]
+    fn lines_name_every_pass_and_purpose() {
+        let text = costs().lines().join("\n");
+        for part in [
+            "trace_direct",
+            "overlay",
+            "all passes",
+            "screen images",
+            "lights",
+        ] {
+            assert!(text.contains(part), "{part}");
+        }
+        assert!(
+            costs()
+                .summary()
+                .starts_with("3.50 ms, direct 3.00; 0.01 Mrays")
+        );
+    }
+}

@@ -1,0 +1,91 @@
+//! What the traced look tells about itself: counted rays, views of its steps.
+
+use glam::Vec3;
+
+use super::harness::{Gpu, Scene, rectangle, reference};
+use crate::settings::Settings;
+
+const SIZE: u32 = 32;
+
+/// A grey floor that fills the picture, seen from above, under one light.
+fn lit_floor() -> Scene {
+    let mut scene = Scene::new(Vec3::new(0.0, 0.0, 100.0), Vec3::ZERO, 20.0, SIZE as i32);
+    let grey = scene.diffuse(0.25);
+    let corner = Vec3::new(-500.0, -500.0, 0.0);
+    scene.quad(rectangle(corner, Vec3::X * 1000.0, Vec3::Y * 1000.0), grey);
+    let up = 60.0;
+    scene.light(
+        [
+            Vec3::new(-10.0, -10.0, up),
+            Vec3::new(-10.0, 20.0, up),
+            Vec3::new(20.0, -10.0, up),
+        ],
+        Vec3::ONE,
+    );
+    scene
+}
+
+#[test]
+fn rays_are_counted_exactly_and_only_when_asked() {
+    Gpu::each(|gpu| {
+        let scene = lit_floor();
+        let settings = |bounces| Settings {
+            rt_num_random_dl: 0,
+            rt_bounces: bounces,
+            ..reference()
+        };
+        gpu.render(&scene, &settings(0), 4);
+        assert_eq!(gpu.rays(), None);
+        gpu.count_rays(true);
+        gpu.render(&scene, &settings(0), 4);
+        let [primary, direct, indirect] = gpu.rays().expect("counted");
+        let pixels = u64::from(SIZE * SIZE);
+        // for each pixel one for the floor, one for layers in front of it, one to the light
+        assert_eq!([primary, direct, indirect], [2 * pixels, pixels, 0]);
+        gpu.render(&scene, &settings(1), 4);
+        let [_, _, bounced] = gpu.rays().expect("counted");
+        // the floor sees nothing but emptiness
+        assert_eq!(bounced, pixels);
+        gpu.count_rays(false);
+        gpu.render(&scene, &settings(0), 1);
+        assert_eq!(gpu.rays(), None);
+    });
+}
+
+#[test]
+fn debug_views_show_what_they_say() {
+    let Some(mut gpu) = Gpu::new(crate::trace::input::Tracer::Compute) else {
+        return;
+    };
+    let scene = lit_floor();
+    let mut view = |number| {
+        let settings = Settings {
+            rt_debug: number,
+            rt_num_random_dl: 0,
+            ..reference()
+        };
+        let (_, picture) = gpu.render(&scene, &settings, 3);
+        let middle = picture[(SIZE * SIZE / 2 + SIZE / 2) as usize];
+        [middle[0], middle[1], middle[2]]
+    };
+    let near = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).all(|(a, b)| a.abs_diff(b) <= 2);
+    let albedo = view(1);
+    // 0.25 linear is 0.537 as displayed
+    assert!(near(albedo, [137; 3]), "{albedo:?}");
+    let normal = view(2);
+    assert!(near(normal, [128, 128, 255]), "{normal:?}");
+    let depth = view(3);
+    // 100 units
+    let expected = (255.0 * (1.0 - (100f32.log2() - 3.0) / 10.0)) as u8;
+    assert!(near(depth, [expected; 3]), "{depth:?}");
+    let motion = view(4);
+    assert!(motion == [0; 3] || motion == [128, 0, 128], "{motion:?}");
+    let lights = view(6);
+    // one light: a tenth of the way, three fifths of the way to blue
+    assert!(near(lights, [15, 23, 138]), "{lights:?}");
+    let rays = view(10);
+    // three rays: a quarter of the way, half from blue to cyan
+    assert!(near(rays, [13, 115, 230]), "{rays:?}");
+    // one that does not exist shows nothing
+    assert_eq!(view(999), view(1000));
+}

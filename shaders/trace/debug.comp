@@ -1,0 +1,83 @@
+#version 460
+// `rt_debug`: a step of the traced look in place of the picture. docs/settings.md says what the colours mean.
+#define TRACER_COMPUTE
+#include "trace/tracer.glsl"
+#include "trace/lights.glsl"
+#include "trace/gbuffer.glsl"
+#include "trace/motion.glsl"
+
+const vec3 NOTHING = vec3(0.1, 0.1, 0.1);
+
+// 0 black, then blue, cyan, green, yellow, red, 1 white: each sixth of the way is a colour that can be named.
+vec3 heat(float t) {
+    const vec3 COLORS[7] = vec3[](vec3(0, 0, 0), vec3(0.1, 0.15, 0.9), vec3(0, 0.75, 0.9), vec3(0.1, 0.75, 0.15),
+        vec3(0.95, 0.9, 0.1), vec3(0.9, 0.1, 0.05), vec3(1, 1, 1));
+    float place = clamp(t, 0.0, 1.0) * 6.0;
+    uint index = min(uint(place), 5u);
+    return mix(COLORS[index], COLORS[index + 1], place - float(index));
+}
+
+// A count on the scale of `heat`: each doubling of 1 + count is a step, 2^steps is white.
+vec3 heat_count(float count, float steps) { return heat(log2(1.0 + count) / steps); }
+
+// A colour for an angle, full circle.
+vec3 hue(float angle) {
+    vec3 shift = vec3(0.0, 2.0 / 3.0, 1.0 / 3.0);
+    return clamp(abs(fract(angle / (2.0 * PI) + shift) * 6.0 - 3.0) - 1.0, 0.0, 1.0);
+}
+
+vec3 cluster_color(uint cluster, vec3 normal) {
+    // the row of all lights: in no cluster
+    if (cluster == VIEW.cluster_count) return vec3(0.5 + 0.3 * normal.z);
+    uint x = cluster * 0x9E3779B1u;
+    x ^= x >> 15;
+    x *= 0x2C1B3C6Du;
+    x ^= x >> 13;
+    // shades by direction keep the room's shape visible
+    float shade = 0.75 + 0.15 * normal.z + 0.1 * normal.x;
+    return mix(vec3(1.0), hue(float(x & 0xFFFFu) / 65536.0 * 2.0 * PI), 0.45 + 0.5 * float(x >> 16) / 65536.0) * shade;
+}
+
+vec3 debug_color(ivec2 pixel) {
+    GBufferPixel g = gbuffer_read(pixel);
+    bool is_lit = g.path >= 0.0;
+    switch (VIEW.post.debug) {
+    case DEBUG_ALBEDO: return is_lit ? encode_display(clamp(g.albedo, 0.0, 1.0)) : vec3(0.0);
+    case DEBUG_NORMALS: return is_lit ? g.normal * 0.5 + 0.5 : vec3(0.0);
+    case DEBUG_DEPTH: return is_lit ? vec3(1.0 - (log2(max(g.path, 8.0)) - 3.0) / 10.0) : vec3(0.0);
+    case DEBUG_MOTION: {
+        Motion m = motion_read(pixel);
+        if (m.last_path < 0.0) return vec3(0.5, 0.0, 0.5);
+        float size = length(m.offset);
+        // to the right is red; 64 pixels a frame and more are of full strength
+        return size > 0.01 ? hue(atan(-m.offset.y, m.offset.x)) * clamp(log2(1.0 + size) / 6.0, 0.05, 1.0) : vec3(0.0);
+    }
+    case DEBUG_CLUSTERS: return is_lit ? cluster_color(cluster_at(g.position + g.face_normal), g.normal) : NOTHING;
+    case DEBUG_LIGHTS: return is_lit ? heat_count(float(lights_at(g.position, g.face_normal).count), 10.0) : NOTHING;
+    case DEBUG_SAMPLES: {
+        if (!is_lit) return NOTHING;
+        float frames = 1.0;
+        if ((VIEW.flags & VIEW_ACCUMULATE) != 0) frames = float(VIEW.accumulated + 1);
+        else if ((VIEW.flags & VIEW_DENOISE) != 0) frames = max(imageLoad(images_rgba16f[VIEW.image_moments], pixel).z, 1.0);
+        return heat_count(frames * float(VIEW.sampling == SAMPLING_ALL ? 1 : VIEW.samples) - 1.0, 12.0);
+    }
+    case DEBUG_VARIANCE: {
+        if (!is_lit || (VIEW.flags & VIEW_DENOISE) == 0) return NOTHING;
+        vec3 moments = imageLoad(images_rgba16f[VIEW.image_moments], pixel).rgb;
+        float deviation = sqrt(max(moments.y - moments.x * moments.x, 0.0)) / max(moments.x, 1.0e-4);
+        return heat((log2(max(deviation, 1.0e-4)) + 6.0) / 8.0);
+    }
+    case DEBUG_RAYS:
+        if (VIEW.post.image_rays == NO_IMAGE) return NOTHING;
+        return heat_count(float(imageLoad(uimages_r32ui[VIEW.post.image_rays], pixel).x), 8.0);
+    }
+    return NOTHING;
+}
+
+void main() {
+    ivec2 pixel = LAUNCH_PIXEL;
+    if (pixel.x >= int(VIEW.width) || pixel.y >= int(VIEW.height)) return;
+    ivec2 target = pixel + ivec2(VIEW.target_x, VIEW.target_y);
+    if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target_width) || target.y >= int(VIEW.target_height)) return;
+    imageStore(images_rgba8[VIEW.image_target], target, vec4(debug_color(pixel), 1.0));
+}
