@@ -4,12 +4,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::timings::Timings;
+use crate::view::{Camera, map_entities, open};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
-use relight::{FileError, GameFiles, MemoryFiles, Pk3, SearchPath};
-use renderer_vk::api::{EntityKind, RefDef, RefEntity};
+use relight::GameFiles;
+use renderer_vk::api::RefDef;
 use renderer_vk::{Renderer, RendererOptions, Settings};
 
 /// How the picture is made.
@@ -93,7 +94,8 @@ pub struct RenderArgs {
     no_accumulation: bool,
 }
 
-fn parse_size(text: &str) -> Result<(u32, u32), String> {
+/// `WIDTHxHEIGHT`.
+pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let parsed = text
         .split_once('x')
         .and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
@@ -103,164 +105,16 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-/// A loose file over a game's files.
-struct Layered {
-    front: MemoryFiles,
-    back: SearchPath,
-}
-
-impl GameFiles for Layered {
-    fn read(&self, path: &str) -> Result<Option<Vec<u8>>, FileError> {
-        match self.front.read(path)? {
-            Some(bytes) => Ok(Some(bytes)),
-            None => self.back.read(path),
-        }
-    }
-
-    fn list(&self, dir: &str, extension: &str) -> Vec<String> {
-        self.back.list(dir, extension)
-    }
-
-    fn exists(&self, path: &str) -> bool {
-        self.front.exists(path) || self.back.exists(path)
-    }
-}
-
-/// Where the game's files and the map come from.
-fn open(args: &RenderArgs) -> anyhow::Result<(Arc<dyn GameFiles>, String)> {
-    if args.sample {
-        return Ok((
-            Arc::new(relight::sample::files()?),
-            relight::sample::MAP.into(),
-        ));
-    }
-    let mut path = SearchPath::open(&args.game)?;
-    let map = args.map.clone().unwrap_or_default();
-    let file = PathBuf::from(&map);
-    let name = match file.extension().and_then(|e| e.to_str()) {
-        Some("pk3") if file.is_file() => {
-            let pack = Pk3::open(&file)?;
-            let maps = pack.list("maps", ".bsp");
-            path.add_pk3(&file)?;
-            match maps.as_slice() {
-                [one] => format!("maps/{one}"),
-                [] => bail!("{map}: no map in it"),
-                many => bail!(
-                    "{map}: several maps in it ({}); name one and give the pack's folder with --game",
-                    many.join(", ")
-                ),
-            }
-        }
-        Some("bsp") if file.is_file() => {
-            let stem = file.file_stem().and_then(|s| s.to_str()).unwrap_or("map");
-            let name = format!("maps/{stem}.bsp");
-            let mut front = MemoryFiles::new();
-            front.insert(
-                &name,
-                std::fs::read(&file).with_context(|| format!("{map}: cannot be read"))?,
-            )?;
-            return Ok((Arc::new(Layered { front, back: path }), name));
-        }
-        _ if map.starts_with("maps/") => map,
-        _ => format!("maps/{map}.bsp"),
-    };
-    Ok((Arc::new(path), name))
-}
-
-/// A place to look from.
-#[derive(Clone, Copy, Debug)]
-struct Camera {
-    origin: Vec3,
-    yaw: f32,
-    pitch: f32,
-}
-
-impl Camera {
-    /// Forward, left, up.
-    fn axis(&self) -> [Vec3; 3] {
-        let (sy, cy) = self.yaw.to_radians().sin_cos();
-        let (sp, cp) = self.pitch.to_radians().sin_cos();
-        [
-            Vec3::new(cp * cy, cp * sy, -sp),
-            Vec3::new(-sy, cy, 0.0),
-            Vec3::new(sp * cy, sp * sy, cp),
-        ]
-    }
-
-    /// The intermission's view, or that of the first spawn point, eyes 26 units above it.
-    fn of_map(bsp: &q3bsp::Bsp) -> Option<Self> {
-        let entities = bsp.entities();
-        let find = |class: &str| entities.iter().find(|e| e.classname() == class);
-        let number =
-            |e: &q3bsp::Entity, key: &str| e.get(key).and_then(|v| v.trim().parse::<f32>().ok());
-        if let Some(view) = find("info_player_intermission") {
-            let origin = view.vec3("origin")?;
-            let target = view.get("target").and_then(|name| {
-                entities
-                    .iter()
-                    .find(|e| e.get("targetname") == Some(name))
-                    .and_then(|e| e.vec3("origin"))
-            });
-            let (mut yaw, mut pitch) = (number(view, "angle").unwrap_or(0.0), 0.0);
-            if let Some(angles) = view.vec3("angles") {
-                (pitch, yaw) = (angles.x, angles.y);
-            }
-            if let Some(to) = target.map(|t| t - origin).filter(|to| to.length() > 1.0) {
-                yaw = to.y.atan2(to.x).to_degrees();
-                pitch = -to.z.atan2(to.truncate().length()).to_degrees();
-            }
-            return Some(Self { origin, yaw, pitch });
-        }
-        let spawn = [
-            "info_player_deathmatch",
-            "info_player_start",
-            "team_CTF_redspawn",
-            "team_CTF_redplayer",
-        ]
-        .into_iter()
-        .find_map(find)?;
-        Some(Self {
-            origin: spawn.vec3("origin")? + Vec3::Z * 26.0,
-            yaw: number(spawn, "angle").unwrap_or(0.0),
-            pitch: 0.0,
-        })
-    }
-}
-
-/// What the game would add to every view: the map's inline models at rest, and the marks of its mirrors.
-fn map_entities(renderer: &mut Renderer, bsp: &q3bsp::Bsp) -> Vec<RefEntity> {
-    let mut entities = Vec::new();
-    let axis = [Vec3::X, Vec3::Y, Vec3::Z];
-    for entity in bsp.entities() {
-        let origin = entity.vec3("origin").unwrap_or(Vec3::ZERO);
-        let base = RefEntity {
-            axis,
-            origin,
-            old_origin: origin,
-            shader_rgba: [255; 4],
-            ..RefEntity::default()
-        };
-        match entity.get("model") {
-            Some(name) if name.starts_with('*') && name != "*0" => {
-                let model = renderer.register_model(name);
-                entities.push(RefEntity { model, ..base });
-            }
-            _ => {}
-        }
-        // without a target it is a mirror; a camera portal needs the game to turn and move its camera
-        if entity.classname() == "misc_portal_surface" && entity.get("target").is_none() {
-            entities.push(RefEntity {
-                kind: EntityKind::PortalSurface,
-                ..base
-            });
-        }
-    }
-    entities
-}
-
 /// Runs the command.
 pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
-    let (files, map) = open(args)?;
+    let (files, map) = if args.sample {
+        (
+            Arc::new(relight::sample::files()?) as Arc<dyn GameFiles>,
+            relight::sample::MAP.to_owned(),
+        )
+    } else {
+        open(args.map.as_deref().unwrap_or_default(), &args.game)?
+    };
     let (width, height) = args.size;
     let mut renderer = Renderer::new(RendererOptions {
         width,
@@ -305,16 +159,9 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         _ => Camera::of_map(&bsp)
             .context("the map has no place to look from; give one with --camera")?,
     };
-    let half = (args.fov.clamp(1.0, 170.0).to_radians() * 0.5).tan();
     let def = RefDef {
-        width: width as i32,
-        height: height as i32,
-        fov_x: args.fov.clamp(1.0, 170.0),
-        fov_y: (half * height as f32 / width as f32).atan().to_degrees() * 2.0,
-        view_origin: camera.origin,
-        view_axis: camera.axis(),
         time_ms: (args.time * 1000.0) as i32,
-        ..RefDef::default()
+        ..camera.ref_def(args.size, args.fov)
     };
 
     let frames = if args.look == Look::Traced || args.timings {
