@@ -10,7 +10,7 @@ use relight::{GameFiles, SearchPath};
 /// The game puts players this much above their spawn point.
 const SPAWN_LIFT: f32 = 9.0;
 /// Height of the eyes above the player's origin.
-const EYES: f32 = 26.0;
+pub const EYES: f32 = 26.0;
 
 /// Options of `relight cameras`.
 #[derive(Args, Debug)]
@@ -36,9 +36,11 @@ pub struct CamerasArgs {
 }
 
 /// Where a player is put: origin and turn, whole units and degrees as `setviewpos` takes them.
-struct Place {
-    origin: Vec3,
-    yaw: f32,
+pub struct Place {
+    /// Units.
+    pub origin: Vec3,
+    /// Degrees.
+    pub yaw: f32,
 }
 
 /// Prints a line for each place: the map, a tab, `x y z yaw` for the game's `setviewpos`.
@@ -82,7 +84,7 @@ pub fn run(args: &CamerasArgs) -> Result<()> {
 }
 
 /// The intermission's camera and spawn points, `count` at most.
-fn places(entities: &[q3bsp::Entity], count: usize) -> Vec<Place> {
+pub fn places(entities: &[q3bsp::Entity], count: usize) -> Vec<Place> {
     let mut places = Vec::new();
     let intermission = entities
         .iter()

@@ -5,9 +5,11 @@
 mod cameras;
 mod compare;
 mod info;
+mod measure;
 mod render;
 mod table;
 mod timings;
+mod view;
 
 use clap::{Parser, Subcommand};
 
@@ -27,6 +29,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Tell what is in maps, and where their light comes from
     Info(info::InfoArgs),
+    /// Measure the traced look in real time against its reference
+    Measure(measure::MeasureArgs),
     /// Make a picture of a map, without an engine or a display
     Render(render::RenderArgs),
 }
@@ -36,6 +40,7 @@ fn main() -> anyhow::Result<()> {
         Command::Cameras(args) => cameras::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Measure(args) => measure::run(&args),
         Command::Render(args) => render::run(&args),
     }
 }

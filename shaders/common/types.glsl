@@ -21,7 +21,7 @@ struct Stage {
 
 struct Material {
     uint stage_first; uint stage_count; uint flags; float time_offset; float clamp_time;
-    vec3 mean_emission; vec3 light_radiance;
+    uint plain_image; uint plain_sampler; vec3 light_radiance;
 };
 
 struct Instance {

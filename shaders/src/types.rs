@@ -111,8 +111,11 @@ pub struct Material {
     pub time_offset: f32,
     /// `clampTime`, or a very large number.
     pub clamp_time: f32,
-    /// Mean linear colour emitted towards a viewer, display-white units (for bounced light).
-    pub mean_emission: Vec3,
+    /// Bindless texture of a material that is one still image under light, so that rays need not run its stages;
+    /// `NO_TEXTURE` for all others. Where `MATERIAL_VERTEX_LIGHT` is set this holds for the map's own surfaces alone.
+    pub plain_image: u32,
+    /// Bindless sampler of `plain_image`.
+    pub plain_sampler: u32,
     /// Extra radiance of the surface as a light, display-white units, shown as its glow (0 if none).
     pub light_radiance: Vec3,
 }

@@ -94,9 +94,16 @@ const float DOUBLE_PRODUCT = 1.0 / 0.21404114;
 // Runs the stages of the point's material over the background.
 Layer evaluate_stages(SurfacePoint p, float width) {
     Material material = material_of(p.triangle.material);
+    bool world = (p.triangle.flags & TRIANGLE_WORLD) != 0;
+    if (material.plain_image != NO_TEXTURE && (world || (material.flags & MATERIAL_VERTEX_LIGHT) == 0)) {
+        // what the stages below come to, for the many materials that are an image under light
+        float lod = texture_lod(material.plain_image, p.texel_scale, width);
+        vec3 texel = textureLod(sampler2D(textures[nonuniformEXT(material.plain_image)],
+            samplers[nonuniformEXT(material.plain_sampler)]), p.stage.st, lod).rgb;
+        return Layer(decode_display(texel), vec3(0.0), vec3(0.0));
+    }
     Instance instance = instance_of(p.instance);
     Stages stages = Stages(VIEW.materials.stages);
-    bool world = (p.triangle.flags & TRIANGLE_WORLD) != 0;
     Layer layer = Layer(vec3(0.0), vec3(0.0), vec3(1.0));
     for (uint i = 0; i < material.stage_count; i++) {
         Stage stage = stages.at[material.stage_first + i];

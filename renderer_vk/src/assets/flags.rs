@@ -1,13 +1,10 @@
-//! What a material is to light, as `MATERIAL_*` bits and a mean of what it emits.
+//! What a material is to light, as `MATERIAL_*` bits.
 
-use glam::Vec3;
 use shaders::types::constants as c;
 use shaderscript::Shader;
 use shaderscript::light::{self, SurfaceClass};
 
-use super::compile::StageArrays;
 use super::material::LightmapClass;
-use super::source::ImageSource;
 
 /// Whether vertex colours are baked light on surfaces of a class.
 fn has_vertex_light(class: LightmapClass) -> bool {
@@ -48,36 +45,4 @@ pub fn material_flags(shader: &Shader, class: LightmapClass) -> u32 {
         flags |= c::MATERIAL_VERTEX_LIGHT;
     }
     flags
-}
-
-/// Mean linear colour that a material emits towards a viewer: its stages with every image replaced by its mean and
-/// every wave at its brightest, less what depends on incident light. Skies emit all that they show.
-pub fn mean_emission(
-    shader: &Shader,
-    class: LightmapClass,
-    arrays: &StageArrays,
-    stage_first: usize,
-    source: &dyn ImageSource,
-) -> Vec3 {
-    let mut samples = light::stage_samples_white(&shader.stages);
-    for (i, sample) in samples.iter_mut().enumerate() {
-        let Some(stage) = arrays.stages.get(stage_first + i) else {
-            continue;
-        };
-        let first = stage.image_first as usize;
-        let images = arrays
-            .images
-            .get(first..first + stage.image_count as usize)
-            .unwrap_or_default();
-        if !images.is_empty() {
-            let sum: glam::Vec4 = images.iter().map(|&image| source.mean(image)).sum();
-            sample.texture = sum / images.len() as f32;
-        }
-    }
-    let linear = light::compose(&shader.stages, &samples, has_vertex_light(class));
-    if linear.emission.is_finite() {
-        linear.emission.max(Vec3::ZERO)
-    } else {
-        Vec3::ZERO
-    }
 }

@@ -1,6 +1,7 @@
 //! The arrays of all materials on the GPU.
 
 use glam::Vec3;
+use shaders::types::constants as c;
 use shaders::types::{self, MaterialBuffers};
 
 use super::{Material, Materials, Samplers};
@@ -36,8 +37,8 @@ impl Materials {
         let materials: Vec<types::Material> = self
             .list
             .iter()
-            .zip(&self.emission)
-            .map(|(material, &emission)| gpu_material(material, emission))
+            .zip(&self.light_radiance)
+            .map(|(material, &light)| self.gpu_material(material, light, samplers))
             .collect();
         let usage = BufferUsage::STORAGE;
         // values as bits, then the permutation: one array of words
@@ -73,16 +74,70 @@ impl Materials {
                 noise: u.noise.address(),
             })
     }
-}
 
-fn gpu_material(material: &Material, (mean, light): (Vec3, Vec3)) -> types::Material {
-    types::Material {
-        stage_first: material.stage_first,
-        stage_count: material.stage_count,
-        flags: material.flags,
-        time_offset: material.time_offset,
-        clamp_time: material.shader.clamp_time.unwrap_or(ENDLESS),
-        mean_emission: mean,
-        light_radiance: light,
+    fn gpu_material(
+        &self,
+        material: &Material,
+        light: Vec3,
+        samplers: &Samplers,
+    ) -> types::Material {
+        let (plain_image, plain_sampler) = self
+            .plain_image(material)
+            .map_or((c::NO_TEXTURE, 0), |(image, sampler)| {
+                (image, samplers.index(sampler))
+            });
+        types::Material {
+            stage_first: material.stage_first,
+            stage_count: material.stage_count,
+            flags: material.flags,
+            time_offset: material.time_offset,
+            clamp_time: material.shader.clamp_time.unwrap_or(ENDLESS),
+            plain_image,
+            plain_sampler,
+            light_radiance: light,
+        }
+    }
+
+    /// Texture and kind of sampler of a material whose stages come to one still image under light: the image alone
+    /// where light is computed or baked into vertices, or the image and the lightmap multiplied in either order.
+    fn plain_image(&self, material: &Material) -> Option<(u32, u32)> {
+        let stages = self.stages(material);
+        let plain =
+            |s: &types::Stage| s.alpha_func == c::ALPHAFUNC_NONE && s.flags & c::STAGE_WHITE == 0;
+        let opaque = |s: &types::Stage| (s.blend_src, s.blend_dst) == (c::BLEND_ONE, c::BLEND_ZERO);
+        let filter = |s: &types::Stage| {
+            [
+                (c::BLEND_DST_COLOR, c::BLEND_ZERO),
+                (c::BLEND_ZERO, c::BLEND_SRC_COLOR),
+            ]
+            .contains(&(s.blend_src, s.blend_dst))
+        };
+        let full = |s: &types::Stage| {
+            [c::RGBGEN_IDENTITY, c::RGBGEN_IDENTITY_LIGHTING].contains(&s.rgb_gen)
+        };
+        let still = |s: &types::Stage| {
+            s.image_count == 1 && s.tc_gen == c::TCGEN_BASE && s.tc_mod_count == 0
+        };
+        let image = match stages {
+            [one] if plain(one) && opaque(one) && still(one) => {
+                let baked = material.flags & c::MATERIAL_VERTEX_LIGHT != 0
+                    && [c::RGBGEN_VERTEX, c::RGBGEN_EXACT_VERTEX].contains(&one.rgb_gen);
+                (baked || one.rgb_gen == c::RGBGEN_LIGHTING_DIFFUSE).then_some(one)?
+            }
+            [first, second]
+                if [first, second].iter().all(|s| plain(s) && full(s))
+                    && opaque(first)
+                    && filter(second) =>
+            {
+                match (first.image_count, second.image_count) {
+                    (0, 1) if still(second) => second,
+                    (1, 0) if still(first) => first,
+                    _ => return None,
+                }
+            }
+            _ => return None,
+        };
+        let texture = self.arrays.images.get(image.image_first as usize)?;
+        (*texture != c::NO_TEXTURE).then_some((*texture, image.sampler_index))
     }
 }

@@ -45,8 +45,8 @@ pub struct Materials {
     pub(super) list: Vec<Material>,
     by_key: HashMap<(String, LightmapClass), u32>,
     pub(super) arrays: StageArrays,
-    /// What the traced look adds: mean emission and radiance as a light.
-    pub(super) emission: Vec<(Vec3, Vec3)>,
+    /// Of each material: its radiance as a light, which only the traced look knows.
+    pub(super) light_radiance: Vec<Vec3>,
     /// Indices in drawing order.
     sorted: Vec<u32>,
     /// Place of each material in `sorted`.
@@ -101,7 +101,7 @@ impl Materials {
             list: Vec::new(),
             by_key: HashMap::new(),
             arrays: StageArrays::default(),
-            emission: Vec::new(),
+            light_radiance: Vec::new(),
             sorted: Vec::new(),
             ranks: Vec::new(),
             videos: VideoClients::default(),
@@ -321,8 +321,7 @@ impl Materials {
                 _ => None,
             })
             .unwrap_or(DEFAULT_PORTAL_RANGE);
-        let mean = flags::mean_emission(&shader, class, &self.arrays, stage_first as usize, source);
-        self.emission.push((mean, Vec3::ZERO));
+        self.light_radiance.push(Vec3::ZERO);
         let material = Material {
             name: name.to_owned(),
             lightmap_class: class,
@@ -516,9 +515,9 @@ impl Materials {
     pub fn set_emitter(&mut self, index: u32, radiance: Vec3) {
         let slots = (
             self.list.get_mut(index as usize),
-            self.emission.get_mut(index as usize),
+            self.light_radiance.get_mut(index as usize),
         );
-        if let (Some(material), Some((_, light))) = slots {
+        if let (Some(material), Some(light)) = slots {
             material.flags |= types::constants::MATERIAL_EMITTER;
             *light = radiance;
             self.touch();
