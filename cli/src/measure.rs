@@ -119,7 +119,8 @@ impl Stage {
         for light in lights {
             self.renderer.add_light(*light);
         }
-        self.renderer.render_scene(&camera.ref_def(self.size, 90.0))?;
+        self.renderer
+            .render_scene(&camera.ref_def(self.size, 90.0))?;
         self.renderer.end_frame()?;
         Ok(())
     }
@@ -274,7 +275,11 @@ fn place(
         .collect();
 
     let mut results = serde_json::Map::new();
-    for Variant { name: kind, settings } in variants(base) {
+    for Variant {
+        name: kind,
+        settings,
+    } in variants(base)
+    {
         bar.set_message(format!("{name}: {kind}"));
         stage.cut(camera, &settings)?;
         for left in (0..args.frames).rev() {
@@ -452,7 +457,12 @@ fn table(all: &serde_json::Map<String, Value>) {
         }
     }
     for (kind, sum, worst, count) in sums {
-        line("mean (worst off)", &kind, sum.map(|v| v / count), &format!("{worst}"));
+        line(
+            "mean (worst off)",
+            &kind,
+            sum.map(|v| v / count),
+            &format!("{worst}"),
+        );
     }
 }
 

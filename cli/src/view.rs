@@ -181,4 +181,3 @@ pub fn map_entities(renderer: &mut Renderer, bsp: &q3bsp::Bsp) -> Vec<RefEntity>
     }
     entities
 }
-

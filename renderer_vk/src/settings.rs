@@ -60,6 +60,8 @@ pub struct Settings {
     pub rt_focal_length: f32,
     /// 0 none, 1 A-SVGF, 2 sparse filter.
     pub rt_denoiser: u32,
+    /// A-SVGF's temporal gradients. No cvar: off is the baseline that measurements compare with.
+    pub rt_gradients: bool,
     /// Temporal anti-aliasing.
     pub rt_taa: bool,
     /// Pixels traced over pixels shown, along each axis, 0.25 to 1.
@@ -213,6 +215,7 @@ impl Default for Settings {
             rt_aperture: 4.0,
             rt_focal_length: 256.0,
             rt_denoiser: 1,
+            rt_gradients: true,
             rt_taa: true,
             rt_scale: 1.0,
             rt_max_depth: 4,

@@ -100,7 +100,7 @@ impl Materials {
 
     /// Texture and kind of sampler of a material whose stages come to one still image under light: the image alone
     /// where light is computed or baked into vertices, or the image and the lightmap multiplied in either order.
-    fn plain_image(&self, material: &Material) -> Option<(u32, u32)> {
+    pub(super) fn plain_image(&self, material: &Material) -> Option<(u32, u32)> {
         let stages = self.stages(material);
         let plain =
             |s: &types::Stage| s.alpha_func == c::ALPHAFUNC_NONE && s.flags & c::STAGE_WHITE == 0;

@@ -341,3 +341,15 @@ fn skins_name_materials_by_surface() {
     assert!(loaded.material("legs").is_none());
     assert!(game.skins.get(0).is_none() && game.skins.get(-5).is_none());
 }
+
+#[test]
+fn plain_materials_are_one_image_under_light() {
+    let mut game = game();
+    let mut plain = |name: &str, class: LightmapClass| {
+        let index = game.find(name, class, true);
+        let material = game.materials.get(index).clone();
+        game.materials.plain_image(&material).is_some()
+    };
+    assert!(plain("t/wall", LightmapClass::Page), "image x lightmap");
+    assert!(!plain("t/flow", LightmapClass::None), "animated");
+}
