@@ -65,6 +65,111 @@ pub struct SunLight {
     pub irradiance: Vec3,
 }
 
+/// What choosing a light needs to know about it, without reading all of it: a ball around it and what leaves it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LightBounds {
+    /// Centre: of a triangle its centroid, so that it lies in the triangle's plane.
+    pub centre: Vec3,
+    /// Nothing of the light lies farther from the centre.
+    pub radius: f32,
+    /// Of a triangle: normal of the emitting side times area times luminance of the radiance. Of a sphere: direction of
+    /// a spot times the cosine from which on it is dark, shifted by 2 so that it is never zero; zero without a spot.
+    pub axis: Vec3,
+    /// Of a sphere the luminance of its radiant intensity, above 0; of a triangle 0, or -1 if both sides shine.
+    pub even: f32,
+}
+
+/// A slot of a row's alias table: two lights, of which a number in [0, 1) picks the first below `threshold`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LightSlot {
+    /// The light that the slot is for: each of a row's lights has one slot.
+    pub light: u32,
+    /// The other light.
+    pub alias: u32,
+    /// Chance of the first, given the slot.
+    pub threshold: f32,
+    /// Chance of the first when a slot is drawn evenly from the row.
+    pub chance: f32,
+    /// The same of the other light.
+    pub alias_chance: f32,
+    /// About which part of the light reaches the row's cluster, above 0.
+    pub visibility: f32,
+    /// The same of the other light.
+    pub alias_visibility: f32,
+    /// Makes the size a power of two, so that a slot lies in one sector of a cache line.
+    pub padding: u32,
+}
+
+/// The list of a cluster: slots from `first` on.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct LightRow {
+    /// First slot.
+    pub first: u32,
+    /// Number of slots.
+    pub count: u32,
+    /// 1 if suns can reach the cluster.
+    pub suns: u32,
+}
+
+/// The list of a cluster among the lights of this frame: entries of `LightView::dynamic_lights`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct DynamicRow {
+    /// First entry.
+    pub first: u32,
+    /// Number of entries.
+    pub count: u32,
+}
+
+/// Light lists of a view. Arrays of two or four are by kind of light (`LIGHT_*`).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LightView {
+    /// [`LightBounds`] by kind: triangles, changing triangles, spheres, changing spheres.
+    pub bounds: [u64; 4],
+    /// [`TriangleLight`]s that stay as they are, and those of this frame.
+    pub triangles: [u64; 2],
+    /// [`SphereLight`]s of the map, and those of this frame.
+    pub spheres: [u64; 2],
+    /// [`SunLight`]s.
+    pub suns: u64,
+    /// [`LightRow`] of each cluster; the last is for points in none, and holds all lights.
+    pub rows: u64,
+    /// [`LightSlot`]s.
+    pub slots: u64,
+    /// [`DynamicRow`] of each cluster; the last is for points in none.
+    pub dynamic_rows: u64,
+    /// Numbers of the lights of this frame, row by row.
+    pub dynamic_lights: u64,
+    /// [`BspNode`]s.
+    pub nodes: u64,
+    /// Cluster of each leaf (`i32`).
+    pub leaf_clusters: u64,
+    /// Number of nodes; 0: every point lies in no cluster.
+    pub node_count: u32,
+    /// Number of rows.
+    pub row_count: u32,
+    /// Number of dynamic rows; 0 without such lights.
+    pub dynamic_row_count: u32,
+    /// Number of suns.
+    pub sun_count: u32,
+    /// `LIGHTS_*` bits.
+    pub flags: u32,
+    /// `SELECT_*`.
+    pub selection: u32,
+    /// Estimates a pixel.
+    pub samples: u32,
+    /// Candidates of resampled selection.
+    pub candidates: u32,
+    /// Scale of the map's lights.
+    pub scale: f32,
+    /// Makes the size a multiple of eight without hidden bytes.
+    pub padding: u32,
+}
+
 /// A node of the map's tree.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -216,19 +321,6 @@ pub struct TraceView {
     pub fogs: u64,
     pub portals: u64,
     pub skies: u64,
-    pub triangle_lights: u64,
-    pub sphere_lights: u64,
-    pub dynamic_lights: u64,
-    pub suns: u64,
-    pub nodes: u64,
-    /// Cluster of each leaf (`i32`).
-    pub leaf_clusters: u64,
-    /// First entry of each cluster's list in `light_indices`; the row after the last cluster is for points in none.
-    pub light_offsets: u64,
-    /// Light lists: triangle lights first, then the map's sphere lights.
-    pub light_indices: u64,
-    /// For each entry of `light_indices` the chance of its row up to and including it (`f32`).
-    pub light_chances: u64,
     /// State of automatic exposure: histogram and current exposure.
     pub exposure: u64,
     /// Top hierarchy of the compute tracer; 0: nothing.
@@ -237,6 +329,7 @@ pub struct TraceView {
     pub materials: MaterialBuffers,
     pub motion: MotionView,
     pub post: PostView,
+    pub lights: LightView,
     pub eye: Vec3,
     pub forward: Vec3,
     /// Scaled by the tangent of half the horizontal angle.
@@ -264,18 +357,9 @@ pub struct TraceView {
     pub ambient: Vec3,
     pub fog_count: u32,
     pub portal_count: u32,
-    pub triangle_light_count: u32,
-    pub sun_count: u32,
-    pub dynamic_light_count: u32,
-    pub cluster_count: u32,
-    pub node_count: u32,
     /// Mirrors and portals on a path.
     pub max_depth: u32,
     pub bounces: u32,
-    pub samples: u32,
-    pub candidates: u32,
-    /// `SAMPLING_*`.
-    pub sampling: u32,
     pub image_position: u32,
     pub image_surface: u32,
     pub image_albedo: u32,
@@ -291,8 +375,6 @@ pub struct TraceView {
     pub exposure_base: f32,
     /// How far automatic exposure moves to its aim in this frame, 0..1.
     pub exposure_blend: f32,
-    /// Scale of the map's lights.
-    pub light_scale: f32,
     pub target_width: u32,
     pub target_height: u32,
     /// Clamped, with mip levels: for the images of sky boxes.
@@ -355,9 +437,16 @@ pub mod constants {
     pub const COUNT_INDIRECT: u32 = 2;
     pub const COUNTER_ROWS: u32 = 64;
     pub const NO_IMAGE: u32 = 0xFFFF_FFFF;
-    pub const SAMPLING_UNIFORM: u32 = 0;
-    pub const SAMPLING_RESAMPLED: u32 = 1;
-    pub const SAMPLING_ALL: u32 = 2;
+    pub const SELECT_UNIFORM: u32 = 0;
+    pub const SELECT_RESAMPLED: u32 = 1;
+    pub const SELECT_ALL: u32 = 2;
+    pub const LIGHTS_SOFT: u32 = 1;
+    pub const LIGHT_KIND_SHIFT: u32 = 29;
+    pub const LIGHT_TRIANGLE: u32 = 0;
+    pub const LIGHT_CHANGING_TRIANGLE: u32 = 1;
+    pub const LIGHT_SPHERE: u32 = 2;
+    pub const LIGHT_CHANGING_SPHERE: u32 = 3;
+    pub const LIGHT_SUN: u32 = 4;
     pub const TRIANGLE_RANK_SHIFT: u32 = 8;
     pub const LAST_UNKNOWN: u32 = 0;
     pub const LAST_MOVED: u32 = 1;

@@ -11,56 +11,66 @@
 
 const uint MASK_SHADOW = MASK_SOLID | MASK_THIRD_SOLID;
 
-// The lights that may reach a point: a cluster's list, then the suns, then the game's dynamic lights.
+// The lights that may reach a point: a cluster's list, the suns, and the list of lights of this frame.
 struct LightSet {
     uint first;
     uint listed;
-    uint count;
+    uint suns;
+    uint dynamic_first;
+    uint dynamic_count;
 };
+
+uint set_count(LightSet set) { return set.listed + set.suns + set.dynamic_count; }
 
 // Cluster of a point by a walk through the map's tree; the row of "all lights" for a point in no cluster.
 uint cluster_at(vec3 position) {
-    uint all = VIEW.cluster_count;
-    if (VIEW.node_count == 0) return all;
-    BspNodes nodes = BspNodes(VIEW.nodes);
+    uint all = VIEW.lights.row_count - 1;
+    uint node_count = VIEW.lights.node_count;
+    if (node_count == 0) return all;
+    BspNodes nodes = BspNodes(VIEW.lights.nodes);
     int index = 0;
     // a tree is never deeper than it has nodes; this also ends on a cyclic one
-    for (uint i = 0; i <= VIEW.node_count && index >= 0; i++) {
+    for (uint i = 0; i <= node_count && index >= 0; i++) {
         BspNode node = nodes.at[index];
         index = node.children[dot(node.plane.xyz, position) >= node.plane.w ? 0 : 1];
     }
     if (index >= 0) return all;
-    int cluster = Integers(VIEW.leaf_clusters).at[-1 - index];
+    int cluster = Integers(VIEW.lights.leaf_clusters).at[-1 - index];
     return cluster >= 0 && uint(cluster) < all ? uint(cluster) : all;
 }
 
 LightSet lights_at(vec3 position, vec3 normal) {
     // a point of a surface lies on the boundary of leaves: step into the room that it faces
     uint cluster = cluster_at(position + normal);
-    Indices offsets = Indices(VIEW.light_offsets);
-    LightSet set;
-    set.first = offsets.at[cluster];
-    set.listed = offsets.at[cluster + 1] - set.first;
-    set.count = set.listed + VIEW.sun_count + VIEW.dynamic_light_count;
+    LightRow row = LightRows(VIEW.lights.rows).at[cluster];
+    LightSet set = LightSet(row.first, row.count, row.suns != 0 ? VIEW.lights.sun_count : 0, 0, 0);
+    uint dynamic_rows = VIEW.lights.dynamic_row_count;
+    if (dynamic_rows > 0) {
+        DynamicRow moving = DynamicRows(VIEW.lights.dynamic_rows).at[min(cluster, dynamic_rows - 1)];
+        set.dynamic_first = moving.first;
+        set.dynamic_count = moving.count;
+    }
     return set;
 }
 
-const uint LIGHT_KIND_TRIANGLE = 0, LIGHT_KIND_SPHERE = 1, LIGHT_KIND_SUN = 2, LIGHT_KIND_DYNAMIC = 3;
+uint light_kind(uint light) { return light >> LIGHT_KIND_SHIFT; }
+uint light_index(uint light) { return light & ((1u << LIGHT_KIND_SHIFT) - 1); }
 
-// Kind and index of a set's member.
-uvec2 light_reference(LightSet set, uint member) {
-    if (member < set.listed) {
-        uint index = Indices(VIEW.light_indices).at[set.first + member];
-        return index < VIEW.triangle_light_count ? uvec2(LIGHT_KIND_TRIANGLE, index)
-                                                 : uvec2(LIGHT_KIND_SPHERE, index - VIEW.triangle_light_count);
-    }
+uint dynamic_light(LightSet set, uint member) { return Indices(VIEW.lights.dynamic_lights).at[set.dynamic_first + member]; }
+
+// The light that is a set's member: listed ones first, then suns, then those of this frame.
+uint light_of_member(LightSet set, uint member) {
+    if (member < set.listed) return LightSlots(VIEW.lights.slots).at[set.first + member].light;
     member -= set.listed;
-    return member < VIEW.sun_count ? uvec2(LIGHT_KIND_SUN, member) : uvec2(LIGHT_KIND_DYNAMIC, member - VIEW.sun_count);
+    return member < set.suns ? (LIGHT_SUN << LIGHT_KIND_SHIFT) | member : dynamic_light(set, member - set.suns);
 }
 
-SphereLight sphere_light(uvec2 reference) {
-    if (reference.x == LIGHT_KIND_SPHERE) return SphereLights(VIEW.sphere_lights).at[reference.y];
-    return SphereLights(VIEW.dynamic_lights).at[reference.y];
+TriangleLight triangle_light(uint light) {
+    return TriangleLights(VIEW.lights.triangles[light_kind(light) & 1]).at[light_index(light)];
+}
+
+SphereLight sphere_light(uint light) {
+    return SphereLights(VIEW.lights.spheres[light_kind(light) & 1]).at[light_index(light)];
 }
 
 // Solid angle of a triangle of unit vectors (Van Oosterom and Strackee, The Solid Angle of a Plane Triangle, 1983).
@@ -139,6 +149,9 @@ struct LightSample {
 
 LightSample no_light() { return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), false); }
 
+// Whether shadows come from the whole of a light, or from its middle alone.
+bool soft_shadows() { return (VIEW.lights.flags & LIGHTS_SOFT) != 0; }
+
 LightSample sample_triangle(TriangleLight light, vec3 position, vec3 normal, vec2 u) {
     LightSample s = no_light();
     vec3 a = light.corners[0] - position, b = light.corners[1] - position, c = light.corners[2] - position;
@@ -150,7 +163,12 @@ LightSample sample_triangle(TriangleLight light, vec3 position, vec3 normal, vec
     if (height >= 0.0 && (light.flags & LIGHT_TWO_SIDED) == 0) return s;
     vec3 ua = safe_normalize(a, vec3(0)), ub = safe_normalize(b, vec3(0)), uc = safe_normalize(c, vec3(0));
     float omega = solid_angle(ua, ub, uc);
-    if (omega > MIN_SOLID_ANGLE) {
+    if (!soft_shadows()) {
+        vec3 to = (a + b + c) / 3.0;
+        s.distance = length(to);
+        s.direction = safe_normalize(to, normal);
+        s.light = light.radiance * (omega / PI);
+    } else if (omega > MIN_SOLID_ANGLE) {
         s.direction = sample_spherical_triangle(ua, ub, uc, u);
         float rate = dot(s.direction, face);
         if (abs(rate) < 1.0e-7) return no_light();
@@ -168,7 +186,7 @@ LightSample sample_triangle(TriangleLight light, vec3 position, vec3 normal, vec
     }
     s.light *= max(dot(normal, s.direction), 0.0);
     // stop short of the light's own surface
-    s.distance -= 0.02 + 1.0e-3 * s.distance;
+    s.distance -= 0.02 + 2.0e-4 * s.distance;
     s.sky = (light.flags & LIGHT_SKY) != 0;
     return s;
 }
@@ -182,7 +200,7 @@ LightSample sample_sphere(SphereLight light, vec3 position, vec3 normal, vec2 u)
     float sine = min(light.radius / max(d, light.radius), 0.9999);
     float cos_angle = sqrt(1.0 - sine * sine);
     vec3 axis = d > 1.0e-6 ? to / d : normal;
-    s.direction = sample_cone(axis, cos_angle, u);
+    s.direction = soft_shadows() ? sample_cone(axis, cos_angle, u) : axis;
     float omega = 2.0 * PI * (sine * sine) / (1.0 + cos_angle); // 2 pi (1 - cos) without its cancellation
     s.light = light.radiance * (omega / PI * max(dot(normal, s.direction), 0.0) * spot_factor(light, -axis));
     s.distance = d - max(light.clearance, light.radius);
@@ -191,48 +209,63 @@ LightSample sample_sphere(SphereLight light, vec3 position, vec3 normal, vec2 u)
 
 LightSample sample_sun(SunLight light, vec3 normal, vec2 u) {
     LightSample s;
-    s.direction = sample_cone(light.direction, light.cos_angle, u);
+    s.direction = soft_shadows() ? sample_cone(light.direction, light.cos_angle, u) : light.direction;
     s.distance = FAR;
     s.light = light.irradiance * max(dot(normal, s.direction), 0.0);
     s.sky = true;
     return s;
 }
 
-LightSample sample_light(uvec2 reference, vec3 position, vec3 normal, vec2 u) {
+LightSample sample_light(uint light, vec3 position, vec3 normal, vec2 u) {
     LightSample s;
-    if (reference.x == LIGHT_KIND_TRIANGLE) s = sample_triangle(TriangleLights(VIEW.triangle_lights).at[reference.y], position, normal, u);
-    else if (reference.x == LIGHT_KIND_SUN) s = sample_sun(SunLights(VIEW.suns).at[reference.y], normal, u);
-    else s = sample_sphere(sphere_light(reference), position, normal, u);
-    if (reference.x != LIGHT_KIND_DYNAMIC) s.light *= VIEW.light_scale;
+    uint kind = light_kind(light);
+    if (kind == LIGHT_SUN) s = sample_sun(SunLights(VIEW.lights.suns).at[light_index(light)], normal, u);
+    else if (kind >= LIGHT_SPHERE) s = sample_sphere(sphere_light(light), position, normal, u);
+    else s = sample_triangle(triangle_light(light), position, normal, u);
+    // lights of this frame come scaled
+    if (kind == LIGHT_TRIANGLE || kind == LIGHT_SPHERE || kind == LIGHT_SUN) s.light *= VIEW.lights.scale;
     return s;
 }
 
-// Target function of resampling, for all but suns: about the luminance that the light would give without shadows. Zero only where the
-// light gives exactly nothing, so that choosing by it leaves no light out.
-float light_target(uvec2 reference, vec3 position, vec3 normal) {
-    if (reference.x == LIGHT_KIND_TRIANGLE) {
-        TriangleLight light = TriangleLights(VIEW.triangle_lights).at[reference.y];
-        vec3 a = light.corners[0] - position, b = light.corners[1] - position, c = light.corners[2] - position;
-        vec3 face = cross(b - a, c - a);
-        if (dot(a, face) >= 0.0 && (light.flags & LIGHT_TWO_SIDED) == 0) return 0.0;
-        vec3 ua = safe_normalize(a, vec3(0)), ub = safe_normalize(b, vec3(0)), uc = safe_normalize(c, vec3(0));
-        // the cosine at a corner is the greatest over the triangle or near it; nothing above the horizon: no light
-        float cosine = max(dot(normal, ua), 0.0) + max(dot(normal, ub), 0.0) + max(dot(normal, uc), 0.0);
-        if (cosine <= 0.0) return 0.0;
-        float omega = solid_angle(ua, ub, uc);
-        // the flat formula where the spherical one is below its precision
-        if (omega < 1.0e-6) omega = 0.5 * abs(dot(face, ua)) / max(dot(a, a), 1.0e-12);
-        return luminance(light.radiance) * VIEW.light_scale * max(omega, 1.0e-12) * (cosine / 3.0) / PI;
+// What a triangle gives, about, where it is large as seen from the point.
+float large_triangle_target(uint light, vec3 position, vec3 normal) {
+    TriangleLight triangle = triangle_light(light);
+    vec3 a = triangle.corners[0] - position, b = triangle.corners[1] - position, c = triangle.corners[2] - position;
+    vec3 ua = safe_normalize(a, normal), ub = safe_normalize(b, normal), uc = safe_normalize(c, normal);
+    float cosine = max(dot(normal, ua), 0.0) + max(dot(normal, ub), 0.0) + max(dot(normal, uc), 0.0);
+    return luminance(triangle.radiance) * max(solid_angle(ua, ub, uc), 1.0e-6) * (cosine / 3.0) / PI;
+}
+
+// Target function of resampling, for all but suns: about the luminance that the light would give without shadows. Zero
+// only where the light gives exactly nothing, so that choosing by it leaves no light out: where all of it lies below
+// the horizon, or the point behind it or outside of its cone.
+float light_target(uint light, vec3 position, vec3 normal) {
+    uint kind = light_kind(light);
+    LightBounds bounds = LightBoundsArray(VIEW.lights.bounds[kind]).at[light_index(light)];
+    vec3 to = bounds.centre - position;
+    float squared = dot(to, to), aloft = dot(normal, to);
+    if (aloft + bounds.radius <= 0.0) return 0.0;
+    float inverse = inversesqrt(max(squared, 1.0e-6));
+    float scale = kind == LIGHT_TRIANGLE || kind == LIGHT_SPHERE ? VIEW.lights.scale : 1.0;
+    float towards = bounds.even;
+    if (towards <= 0.0) {
+        float facing = -dot(bounds.axis, to);
+        if (towards < 0.0) facing = abs(facing);
+        if (facing <= 0.0) return 0.0;
+        if (bounds.radius * bounds.radius * 4.0 > squared) {
+            float target = large_triangle_target(light, position, normal);
+            // the corners below the horizon: then all is
+            return target * scale;
+        }
+        towards = facing * inverse / PI;
+    } else if (bounds.axis != vec3(0.0)) {
+        float stretch = length(bounds.axis);
+        // a hair wider than the cone
+        if (-dot(bounds.axis, to) * inverse < (stretch - 2.0 - 1.0e-3) * stretch) return 0.0;
     }
-    SphereLight light = sphere_light(reference);
-    vec3 to = light.origin - position;
-    float squared = max(dot(to, to), light.radius * light.radius);
-    vec3 axis = safe_normalize(to, normal);
-    float sine = light.radius * inversesqrt(squared);
-    float cosine = dot(normal, axis);
-    if (cosine <= -sine) return 0.0;
-    float scale = reference.x == LIGHT_KIND_DYNAMIC ? 1.0 : VIEW.light_scale;
-    return luminance(light.radiance) * scale * sine * sine * max(cosine, 0.5 * sine) * spot_factor(light, -axis);
+    // of a light that the horizon cuts a part is left
+    float cosine = clamp(max(aloft, 0.25 * (aloft + bounds.radius)) * inverse, 0.0, 1.0);
+    return towards * scale * cosine / max(squared, 0.25 * bounds.radius * bounds.radius);
 }
 
 // Whether the sample's light arrives. Sun and sky arrive where the ray meets sky first or leaves the map.
@@ -242,65 +275,67 @@ bool light_arrives(LightSample s, vec3 origin) {
     return hit.geometry == NO_HIT || (s.sky && Geometries(VIEW.geometries).at[hit.geometry].kind == KIND_SKY);
 }
 
-// The member of a set's list that a number in [0, 1) falls on, and the chance of that.
-uint pick_listed(LightSet set, float u, out float chance) {
-    Chances chances = Chances(VIEW.light_chances);
-    uint low = 0, high = set.listed - 1;
-    while (low < high) {
-        uint middle = (low + high) / 2;
-        if (chances.at[set.first + middle] > u) high = middle;
-        else low = middle + 1;
-    }
-    chance = chances.at[set.first + low] - (low > 0 ? chances.at[set.first + low - 1] : 0.0);
-    return low;
-}
-
 // A light to send a ray to, and what its light is to be multiplied by; weight 0: none.
 struct LightChoice {
-    uvec2 reference;
+    uint light;
     float weight;
 };
 
 // One light, each with the same probability.
 LightChoice choose_uniform(LightSet set) {
-    uint member = min(uint(rng_next() * float(set.count)), set.count - 1);
-    return LightChoice(light_reference(set, member), float(set.count));
+    uint count = set_count(set);
+    uint member = min(uint(rng_next() * float(count)), count - 1);
+    return LightChoice(light_of_member(set, member), float(count));
 }
 
 // One of the suns; a map has one as a rule.
-LightChoice choose_sun() {
-    uint count = VIEW.sun_count;
+LightChoice choose_sun(uint count) {
     uint index = count > 1 ? min(uint(rng_next() * float(count)), count - 1) : 0;
-    return LightChoice(uvec2(LIGHT_KIND_SUN, index), float(count));
+    return LightChoice((LIGHT_SUN << LIGHT_KIND_SHIFT) | index, float(count));
 }
 
 // Resampled importance sampling (Talbot et al. 2005): some candidates, one of them chosen by its target, weighed by
-// the inverse of the chance that it had. Candidates come from the cluster's list, by what each light can give to the
-// cluster; dynamic lights are always among them, and so is the whole list if it is short enough. The target does not
-// know about shadows, and a hidden sun would outshine all that is left in its shadow: suns get a ray of their own.
+// the inverse of the chance that it had. Candidates come from the cluster's list by alias tables (Walker 1977), with
+// chances by what each light gives to the cluster, shadows included; the whole list is taken if it is short enough.
+// Lights of this frame are candidates of their own. A hidden sun would outshine all that is left in its shadow: suns
+// get a ray of their own.
 LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal) {
-    uint drawn = max(VIEW.candidates, 1);
-    bool whole = set.listed <= drawn;
-    if (whole) drawn = set.listed;
-    uint candidates = drawn + VIEW.dynamic_light_count;
+    uint candidates = max(VIEW.lights.candidates, 1);
+    uint drawn = min(set.listed, candidates), drawn_dynamic = min(set.dynamic_count, candidates);
+    LightSlots slots = LightSlots(VIEW.lights.slots);
     float sum = 0.0, chosen_target = 0.0;
-    uvec2 chosen = uvec2(0);
-    for (uint i = 0; i < candidates; i++) {
-        uint member = i < drawn ? i : set.listed + VIEW.sun_count + i - drawn;
-        float weight = 1.0;
-        if (i < drawn && !whole) {
-            float chance;
+    uint chosen = 0;
+    for (uint i = 0; i < drawn + drawn_dynamic; i++) {
+        uint light;
+        float weight = 1.0, visibility = 1.0;
+        if (i < drawn) {
+            uint member = i;
             // stratified
-            member = pick_listed(set, (float(i) + rng_next()) / float(drawn), chance);
-            if (!(chance > 0.0)) continue;
-            weight = 1.0 / (chance * float(drawn));
+            if (set.listed > drawn) member = min(uint((float(i) + rng_next()) / float(drawn) * float(set.listed)), set.listed - 1);
+            LightSlot slot = slots.at[set.first + member];
+            light = slot.light;
+            visibility = slot.visibility;
+            if (set.listed > drawn) {
+                bool first = rng_next() < slot.threshold;
+                if (!first) {
+                    light = slot.alias;
+                    visibility = slot.alias_visibility;
+                }
+                weight = 1.0 / ((first ? slot.chance : slot.alias_chance) * float(drawn));
+            }
+        } else {
+            uint member = i - drawn;
+            if (set.dynamic_count > drawn_dynamic) {
+                member = min(uint((float(member) + rng_next()) / float(drawn_dynamic) * float(set.dynamic_count)), set.dynamic_count - 1);
+                weight = float(set.dynamic_count) / float(drawn_dynamic);
+            }
+            light = dynamic_light(set, member);
         }
-        uvec2 reference = light_reference(set, member);
-        float target = light_target(reference, position, normal);
+        float target = light_target(light, position, normal) * visibility;
         if (!(target > 0.0)) continue;
         sum += target * weight;
         if (rng_next() * sum < target * weight) {
-            chosen = reference;
+            chosen = light;
             chosen_target = target;
         }
     }
@@ -308,25 +343,26 @@ LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal) {
 }
 
 // Direct light on a point whose surface faces `face_normal`, with `samples` independent estimates.
-vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint sampling, uint samples) {
+vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint selection, uint samples) {
     LightSet set = lights_at(position, face_normal);
-    if (set.count == 0) return vec3(0.0);
+    uint count = set_count(set);
+    if (count == 0) return vec3(0.0);
     vec3 origin = offset_ray(position, face_normal);
     vec3 sum = vec3(0.0);
     samples = max(samples, 1);
     // rays of one estimate
     uint rays = 1;
-    if (sampling == SAMPLING_ALL) rays = set.count;
-    else if (sampling == SAMPLING_RESAMPLED && VIEW.sun_count > 0) rays = 2;
+    if (selection == SELECT_ALL) rays = count;
+    else if (selection == SELECT_RESAMPLED && set.suns > 0) rays = 2;
     for (uint i = 0; i < samples * rays; i++) {
         uint ray = i % rays;
         LightChoice choice;
-        if (sampling == SAMPLING_UNIFORM) choice = choose_uniform(set);
-        else if (sampling == SAMPLING_ALL) choice = LightChoice(light_reference(set, ray), 1.0);
-        else if (ray == 1) choice = choose_sun();
+        if (selection == SELECT_UNIFORM) choice = choose_uniform(set);
+        else if (selection == SELECT_ALL) choice = LightChoice(light_of_member(set, ray), 1.0);
+        else if (ray == 1) choice = choose_sun(set.suns);
         else choice = choose_resampled(set, position, normal);
         if (!(choice.weight > 0.0)) continue;
-        LightSample s = sample_light(choice.reference, position, normal, rng_next2());
+        LightSample s = sample_light(choice.light, position, normal, rng_next2());
         if (max_component(s.light) > 0.0 && light_arrives(s, origin)) sum += s.light * choice.weight;
     }
     return sum / float(samples);

@@ -13,6 +13,24 @@ struct SphereLight { vec3 origin; float radius; vec3 radiance; float clearance; 
 
 struct SunLight { vec3 direction; float cos_angle; vec3 irradiance; };
 
+struct LightBounds { vec3 centre; float radius; vec3 axis; float even; };
+
+struct LightSlot {
+    uint light; uint alias; float threshold; float chance; float alias_chance; float visibility; float alias_visibility; uint padding;
+};
+
+struct LightRow { uint first; uint count; uint suns; };
+
+struct DynamicRow { uint first; uint count; };
+
+struct LightView {
+    uint64_t bounds[4]; uint64_t triangles[2]; uint64_t spheres[2]; uint64_t suns; uint64_t rows; uint64_t slots;
+    uint64_t dynamic_rows; uint64_t dynamic_lights; uint64_t nodes; uint64_t leaf_clusters;
+    uint node_count; uint row_count; uint dynamic_row_count; uint sun_count;
+    uint flags; uint selection; uint samples; uint candidates;
+    float scale; uint padding;
+};
+
 struct BspNode { vec4 plane; int children[2]; };
 
 struct BvhNode { vec3 low[2]; vec3 high[2]; uint first[2]; uint count[2]; };
@@ -39,23 +57,21 @@ struct PostView {
 };
 
 struct TraceView {
-    uint64_t geometries; uint64_t instances; uint64_t fogs; uint64_t portals; uint64_t skies; uint64_t triangle_lights;
-    uint64_t sphere_lights; uint64_t dynamic_lights; uint64_t suns; uint64_t nodes; uint64_t leaf_clusters;
-    uint64_t light_offsets; uint64_t light_indices; uint64_t light_chances; uint64_t exposure;
+    uint64_t geometries; uint64_t instances; uint64_t fogs; uint64_t portals; uint64_t skies; uint64_t exposure;
     uint64_t bvh_nodes; uint64_t bvh_instances;
     MaterialBuffers materials;
     MotionView motion;
     PostView post;
+    LightView lights;
     vec3 eye; vec3 forward; vec3 left; vec3 up;
     uint width; uint height; int target_x; int target_y;
     uint scene; uint flags; uint seed; uint accumulated;
     float time; float pixel_spread; vec3 ambient;
-    uint fog_count; uint portal_count; uint triangle_light_count; uint sun_count; uint dynamic_light_count;
-    uint cluster_count; uint node_count;
-    uint max_depth; uint bounces; uint samples; uint candidates; uint sampling;
+    uint fog_count; uint portal_count;
+    uint max_depth; uint bounces;
     uint image_position; uint image_surface; uint image_albedo; uint image_front; uint image_direct; uint image_indirect; uint image_hdr;
     uint image_accumulation; uint image_target;
-    float exposure_bias; float exposure_base; float exposure_blend; float light_scale;
+    float exposure_bias; float exposure_base; float exposure_blend;
     uint target_width; uint target_height; uint sky_sampler;
     uint image_last_position; uint image_last_surface; uint image_last_light; uint image_moments; uint image_last_moments;
     uint image_filter; uint image_lit;
@@ -79,7 +95,13 @@ const uint DEBUG_ALBEDO = 1, DEBUG_NORMALS = 2, DEBUG_DEPTH = 3, DEBUG_MOTION = 
 const uint COUNT_PRIMARY = 0, COUNT_DIRECT = 1, COUNT_INDIRECT = 2, COUNTER_ROWS = 64;
 // No storage image.
 const uint NO_IMAGE = 0xFFFFFFFFu;
-const uint SAMPLING_UNIFORM = 0, SAMPLING_RESAMPLED = 1, SAMPLING_ALL = 2;
+// How a light is chosen: LightView.selection.
+const uint SELECT_UNIFORM = 0, SELECT_RESAMPLED = 1, SELECT_ALL = 2;
+// Bits of LightView.flags.
+const uint LIGHTS_SOFT = 1;
+// The upper bits of a light's number say what it is, the others which one.
+const uint LIGHT_KIND_SHIFT = 29;
+const uint LIGHT_TRIANGLE = 0, LIGHT_CHANGING_TRIANGLE = 1, LIGHT_SPHERE = 2, LIGHT_CHANGING_SPHERE = 3, LIGHT_SUN = 4;
 // Triangle.flags: bits from here on hold the drawing rank, sort value times 8, at most 255.
 const uint TRIANGLE_RANK_SHIFT = 8;
 // LastInstance.known: never seen before, placed elsewhere, placed as now.

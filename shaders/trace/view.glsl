@@ -22,7 +22,10 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Int
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Indices { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Positions { vec3 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LastInstances { LastInstance at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Chances { float at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer LightBoundsArray { LightBounds at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer LightSlots { LightSlot at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightRows { LightRow at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer DynamicRows { DynamicRow at[]; };
 
 #ifdef OWN_PUSH
 // the steps of the wavelet filter: bindless images, and the distance between taps in pixels

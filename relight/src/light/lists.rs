@@ -4,6 +4,7 @@
 //! or be seen from it (compilers write matrices that are not symmetric, and light travels both ways), unless
 //! the whole cluster lies behind a one-sided light.
 
+use super::sight::{ClusterSet, Sight, furthest_in_front};
 use super::{PointLight, TriangleLight};
 use crate::world::WorldSurface;
 use glam::Vec3;
@@ -84,55 +85,6 @@ impl LightLists {
     }
 }
 
-/// A set of clusters.
-#[derive(Clone, PartialEq, Eq, Hash)]
-struct Bits(Vec<u64>);
-
-impl Bits {
-    fn none(count: usize) -> Bits {
-        Bits(vec![0; count.div_ceil(64)])
-    }
-
-    fn all(count: usize) -> Bits {
-        let mut bits = Bits::none(count);
-        (0..count).for_each(|i| bits.insert(i));
-        bits
-    }
-
-    fn insert(&mut self, bit: usize) {
-        if let Some(word) = self.0.get_mut(bit / 64) {
-            *word |= 1 << (bit % 64);
-        }
-    }
-
-    fn merge(&mut self, other: &Bits) {
-        for (word, more) in self.0.iter_mut().zip(&other.0) {
-            *word |= more;
-        }
-    }
-
-    fn keep(&mut self, other: &Bits) {
-        for (word, kept) in self.0.iter_mut().zip(&other.0) {
-            *word &= kept;
-        }
-    }
-
-    fn is_empty(&self) -> bool {
-        self.0.iter().all(|&word| word == 0)
-    }
-
-    fn iter(&self) -> impl Iterator<Item = usize> + '_ {
-        self.0.iter().enumerate().flat_map(|(at, &word)| {
-            let mut rest = word;
-            std::iter::from_fn(move || {
-                let bit = (rest != 0).then(|| rest.trailing_zeros() as usize)?;
-                rest &= rest - 1;
-                Some(at * 64 + bit)
-            })
-        })
-    }
-}
-
 /// Bounds of a cluster: those of its leafs.
 #[derive(Clone, Copy)]
 struct Bounds {
@@ -145,12 +97,6 @@ impl Bounds {
         mins: Vec3::INFINITY,
         maxs: Vec3::NEG_INFINITY,
     };
-
-    /// The largest distance of a point in the bounds from the plane, positive in front.
-    fn furthest_in_front(&self, normal: Vec3, dist: f32) -> f32 {
-        let corner = Vec3::select(normal.cmpge(Vec3::ZERO), self.maxs, self.mins);
-        corner.dot(normal) - dist
-    }
 }
 
 /// How far in front of a light's plane a cluster must reach to be lit, id units: leaf bounds are whole
@@ -161,35 +107,20 @@ const PLANE_SLACK: f32 = 0.125;
 const SEARCH_MARGIN: f32 = 2.0;
 
 /// Clusters of a map, prepared for asking what sees what.
-pub(crate) struct Clusters<'a> {
-    bsp: &'a Bsp,
-    count: usize,
-    /// For every cluster those that it sees or is seen from.
-    sees: Vec<Bits>,
+pub(crate) struct Clusters {
+    sight: Sight,
     /// Bounds of the leafs of every cluster; `EMPTY` for clusters without a leaf in the tree.
     bounds: Vec<Bounds>,
     /// Clusters whose leafs list a surface.
     of_surface: Vec<Vec<u32>>,
 }
 
-impl<'a> Clusters<'a> {
-    pub fn new(bsp: &'a Bsp) -> Self {
+impl Clusters {
+    pub fn new(bsp: &Bsp) -> Self {
         let leafs = bsp.tree_leafs();
         let leafs = || leafs.iter().filter_map(|&i| bsp.leafs.get(i));
-        // A map without a matrix is one where everything sees everything: no rows at all.
-        let count = bsp.visibility.as_ref().map_or(0, |v| v.clusters);
-        let mut sees = vec![Bits::none(count); count];
-        if let Some(visibility) = &bsp.visibility {
-            for from in 0..count {
-                for to in visibility.visible_from(from) {
-                    for (a, b) in [(from, to), (to, from)] {
-                        if let Some(bits) = sees.get_mut(a) {
-                            bits.insert(b);
-                        }
-                    }
-                }
-            }
-        }
+        let sight = Sight::new(bsp);
+        let count = sight.count();
         let mut bounds = vec![Bounds::EMPTY; count];
         let mut of_surface = vec![Vec::new(); bsp.surfaces.len()];
         for leaf in leafs() {
@@ -213,72 +144,18 @@ impl<'a> Clusters<'a> {
             }
         }
         Self {
-            bsp,
-            count,
-            sees,
+            sight,
             bounds,
             of_surface,
         }
     }
 
-    /// Clusters of the leafs in the tree that touch a box.
-    fn touching(&self, mins: Vec3, maxs: Vec3) -> Bits {
-        let bounds = Bounds { mins, maxs };
-        let mut at = Bits::none(self.count);
-        // A damaged tree may share nodes or go in circles: no path needs more steps than there are nodes.
-        let mut steps = self.bsp.nodes.len() * 2;
-        let mut stack = vec![0i32];
-        while let Some(child) = stack.pop() {
-            let Ok(index) = usize::try_from(child) else {
-                let leaf = usize::try_from(-1 - i64::from(child))
-                    .ok()
-                    .and_then(|l| self.bsp.leafs.get(l));
-                if let Some(cluster) = leaf.and_then(|l| usize::try_from(l.cluster).ok()) {
-                    at.insert(cluster);
-                }
-                continue;
-            };
-            let Some(node) = self.bsp.nodes.get(index) else {
-                continue;
-            };
-            let plane = usize::try_from(node.plane)
-                .ok()
-                .and_then(|p| self.bsp.planes.get(p));
-            let Some(plane) = plane else { continue };
-            if steps == 0 {
-                return Bits::none(self.count);
-            }
-            steps -= 1;
-            if bounds.furthest_in_front(plane.normal, plane.dist) >= 0.0 {
-                stack.push(node.children[0]);
-            }
-            if bounds.furthest_in_front(-plane.normal, -plane.dist) >= 0.0 {
-                stack.push(node.children[1]);
-            }
-        }
-        at
-    }
-
-    /// Clusters that see one of the given clusters or are seen from it; all when none is given.
-    fn lit_from(&self, at: &Bits) -> Bits {
-        if at.is_empty() {
-            return Bits::all(self.count);
-        }
-        let mut lit = Bits::none(self.count);
-        for cluster in at.iter() {
-            if let Some(sees) = self.sees.get(cluster) {
-                lit.merge(sees);
-            }
-        }
-        lit
-    }
-
     /// Clusters that a triangle light lies in: those that its bounds touch, of a world surface only such as list
     /// it. (The few world surfaces that no leaf lists, and those of brush models, are where their bounds are.)
-    fn clusters_of(&self, light: &TriangleLight, listed: &Bits) -> Bits {
+    fn clusters_of(&self, light: &TriangleLight, listed: &ClusterSet) -> ClusterSet {
         let margin = Vec3::splat(SEARCH_MARGIN);
         let [a, b, c] = light.vertices;
-        let mut at = self.touching(a.min(b).min(c) - margin, a.max(b).max(c) + margin);
+        let mut at = self.sight.touching(a.min(b).min(c) - margin, a.max(b).max(c) + margin);
         if !listed.is_empty() {
             at.keep(listed);
             if at.is_empty() {
@@ -289,8 +166,8 @@ impl<'a> Clusters<'a> {
     }
 
     /// Clusters whose leafs list a world surface; none for surfaces of brush models.
-    fn listing(&self, index: usize, surfaces: &[WorldSurface]) -> Bits {
-        let mut at = Bits::none(self.count);
+    fn listing(&self, index: usize, surfaces: &[WorldSurface]) -> ClusterSet {
+        let mut at = ClusterSet::none(self.sight.count());
         if surfaces.get(index).is_some_and(|s| s.model == 0) {
             for &cluster in self.of_surface.get(index).into_iter().flatten() {
                 at.insert(cluster as usize);
@@ -305,7 +182,8 @@ impl<'a> Clusters<'a> {
             return true;
         };
         let normal = light.normal();
-        bounds.furthest_in_front(normal, normal.dot(light.vertices[0])) > PLANE_SLACK
+        let dist = normal.dot(light.vertices[0]);
+        furthest_in_front(bounds.mins, bounds.maxs, normal, dist) > PLANE_SLACK
     }
 
     /// The lists of a map's lights.
@@ -315,9 +193,9 @@ impl<'a> Clusters<'a> {
         points: &[PointLight],
         surfaces: &[WorldSurface],
     ) -> LightLists {
-        let mut rows: Vec<Vec<u32>> = vec![Vec::new(); self.count];
-        let mut listed: Option<(u32, Bits)> = None;
-        let mut known: HashMap<Bits, Bits> = HashMap::new();
+        let mut rows: Vec<Vec<u32>> = vec![Vec::new(); self.sight.count()];
+        let mut listed: Option<(u32, ClusterSet)> = None;
+        let mut known: HashMap<ClusterSet, ClusterSet> = HashMap::new();
         for (entry, light) in (0u32..).zip(lights) {
             let (surface, listing) = match listed.take() {
                 Some((surface, listing)) if surface == light.surface => (surface, listing),
@@ -328,7 +206,7 @@ impl<'a> Clusters<'a> {
             };
             let at = self.clusters_of(light, &listing);
             listed = Some((surface, listing));
-            let lit = known.entry(at).or_insert_with_key(|at| self.lit_from(at));
+            let lit = known.entry(at).or_insert_with_key(|at| self.sight.lit_from(at));
             for cluster in lit.iter().filter(|&c| self.faces(light, c)) {
                 if let Some(row) = rows.get_mut(cluster) {
                     row.push(entry);
@@ -337,8 +215,8 @@ impl<'a> Clusters<'a> {
         }
         for (entry, point) in (lights.len() as u32..).zip(points) {
             let margin = Vec3::splat(SEARCH_MARGIN.max(point.radius));
-            let at = self.touching(point.origin - margin, point.origin + margin);
-            for cluster in self.lit_from(&at).iter() {
+            let at = self.sight.touching(point.origin - margin, point.origin + margin);
+            for cluster in self.sight.lit_from(&at).iter() {
                 if let Some(row) = rows.get_mut(cluster) {
                     row.push(entry);
                 }
@@ -362,17 +240,6 @@ impl<'a> Clusters<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn bits_iterate_what_was_inserted() {
-        let mut bits = Bits::none(200);
-        for bit in [0, 63, 64, 130, 199] {
-            bits.insert(bit);
-        }
-        assert_eq!(bits.iter().collect::<Vec<_>>(), [0, 63, 64, 130, 199]);
-        assert_eq!(Bits::all(70).iter().count(), 70);
-        assert!(Bits::none(3).is_empty() && !bits.is_empty());
-    }
 
     #[test]
     fn rows_are_found_by_cluster() {

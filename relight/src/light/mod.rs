@@ -48,11 +48,13 @@ mod fallback;
 mod glow;
 mod lists;
 mod report;
+mod sight;
 mod surfaces;
 
 pub use emission::{Emission, EmissionSource, GLOW_THRESHOLD};
 pub use lists::{LightLists, LightRef};
 pub use report::{EmitterSummary, LightReport};
+pub use sight::{ClusterSet, Sight};
 
 pub(crate) use emission::Finder;
 pub(crate) use entities::{ambient, light_entities};

@@ -1,0 +1,191 @@
+//! Which clusters can see which, kept apart from the map so that what moves can be asked about in every frame.
+
+use glam::{Vec3, Vec4};
+use q3bsp::Bsp;
+
+/// A set of clusters.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
+pub struct ClusterSet(Vec<u64>);
+
+impl ClusterSet {
+    /// The empty set of a map of so many clusters.
+    pub fn none(count: usize) -> Self {
+        Self(vec![0; count.div_ceil(64)])
+    }
+
+    /// The set of all clusters of a map.
+    pub fn all(count: usize) -> Self {
+        let mut bits = Self::none(count);
+        (0..count).for_each(|i| bits.insert(i));
+        bits
+    }
+
+    /// Adds a cluster; one beyond the map's is left out.
+    pub fn insert(&mut self, bit: usize) {
+        if let Some(word) = self.0.get_mut(bit / 64) {
+            *word |= 1 << (bit % 64);
+        }
+    }
+
+    /// Whether a cluster is in it.
+    pub fn contains(&self, bit: usize) -> bool {
+        self.0
+            .get(bit / 64)
+            .is_some_and(|word| word >> (bit % 64) & 1 == 1)
+    }
+
+    /// Adds the clusters of another set.
+    pub fn merge(&mut self, other: &Self) {
+        for (word, more) in self.0.iter_mut().zip(&other.0) {
+            *word |= more;
+        }
+    }
+
+    /// Keeps only the clusters that are in another set, too.
+    pub fn keep(&mut self, other: &Self) {
+        for (word, kept) in self.0.iter_mut().zip(&other.0) {
+            *word &= kept;
+        }
+    }
+
+    /// Whether there is no cluster in it.
+    pub fn is_empty(&self) -> bool {
+        self.0.iter().all(|&word| word == 0)
+    }
+
+    /// Its clusters, ascending.
+    pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
+        self.0.iter().enumerate().flat_map(|(at, &word)| {
+            let mut rest = word;
+            std::iter::from_fn(move || {
+                let bit = (rest != 0).then(|| rest.trailing_zeros() as usize)?;
+                rest &= rest - 1;
+                Some(at * 64 + bit)
+            })
+        })
+    }
+}
+
+/// The largest distance of a point of a box from a plane, positive in front.
+pub(super) fn furthest_in_front(mins: Vec3, maxs: Vec3, normal: Vec3, dist: f32) -> f32 {
+    Vec3::select(normal.cmpge(Vec3::ZERO), maxs, mins).dot(normal) - dist
+}
+
+/// Clusters of a map, prepared for asking where something is and what sees it.
+#[derive(Debug, Clone, Default)]
+pub struct Sight {
+    /// Number of clusters; 0 for a map without a visibility matrix: there everything sees everything.
+    count: usize,
+    /// For every cluster those that it sees or is seen from: compilers write matrices that are not symmetric, and
+    /// light travels both ways.
+    sees: Vec<ClusterSet>,
+    /// Plane and children of each node; children below 0 are `-1 - leaf`.
+    nodes: Vec<(Vec4, [i32; 2])>,
+    leaf_clusters: Vec<i32>,
+}
+
+impl Sight {
+    /// Of a map.
+    pub fn new(bsp: &Bsp) -> Self {
+        let count = bsp.visibility.as_ref().map_or(0, |v| v.clusters);
+        let mut sees = vec![ClusterSet::none(count); count];
+        if let Some(visibility) = &bsp.visibility {
+            for from in 0..count {
+                for to in visibility.visible_from(from) {
+                    for (a, b) in [(from, to), (to, from)] {
+                        if let Some(bits) = sees.get_mut(a) {
+                            bits.insert(b);
+                        }
+                    }
+                }
+            }
+        }
+        let plane = |index: i32| {
+            let plane = usize::try_from(index).ok().and_then(|p| bsp.planes.get(p));
+            plane.map(|p| p.normal.extend(p.dist))
+        };
+        Self {
+            count,
+            sees,
+            nodes: bsp
+                .nodes
+                .iter()
+                // without its plane a node parts nothing: both sides are looked at
+                .map(|n| (plane(n.plane).unwrap_or(Vec4::ZERO), n.children))
+                .collect(),
+            leaf_clusters: bsp.leafs.iter().map(|leaf| leaf.cluster).collect(),
+        }
+    }
+
+    /// Number of clusters.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Clusters of the leafs that touch a box, world space.
+    pub fn touching(&self, mins: Vec3, maxs: Vec3) -> ClusterSet {
+        let mut at = ClusterSet::none(self.count);
+        if self.nodes.is_empty() {
+            return at;
+        }
+        // A damaged tree may share nodes or go in circles: no path needs more steps than there are nodes.
+        let mut steps = self.nodes.len() * 2;
+        let mut stack = vec![0i32];
+        while let Some(child) = stack.pop() {
+            let Ok(index) = usize::try_from(child) else {
+                let leaf = usize::try_from(-1 - i64::from(child)).ok();
+                let cluster = leaf.and_then(|l| self.leaf_clusters.get(l));
+                if let Some(cluster) = cluster.and_then(|&c| usize::try_from(c).ok()) {
+                    at.insert(cluster);
+                }
+                continue;
+            };
+            let Some(&(plane, children)) = self.nodes.get(index) else {
+                continue;
+            };
+            if steps == 0 {
+                return ClusterSet::none(self.count);
+            }
+            steps -= 1;
+            let (normal, dist) = (plane.truncate(), plane.w);
+            if furthest_in_front(mins, maxs, normal, dist) >= 0.0 {
+                stack.push(children[0]);
+            }
+            if furthest_in_front(mins, maxs, -normal, -dist) >= 0.0 {
+                stack.push(children[1]);
+            }
+        }
+        at
+    }
+
+    /// Clusters that see one of the given clusters or are seen from it; all when none is given.
+    pub fn lit_from(&self, at: &ClusterSet) -> ClusterSet {
+        if at.is_empty() {
+            return ClusterSet::all(self.count);
+        }
+        let mut lit = ClusterSet::none(self.count);
+        for cluster in at.iter() {
+            if let Some(sees) = self.sees.get(cluster) {
+                lit.merge(sees);
+            }
+        }
+        lit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_iterate_what_was_inserted() {
+        let mut bits = ClusterSet::none(200);
+        for bit in [0, 63, 64, 130, 199, 400] {
+            bits.insert(bit);
+        }
+        assert_eq!(bits.iter().collect::<Vec<_>>(), [0, 63, 64, 130, 199]);
+        assert!(bits.contains(63) && !bits.contains(62) && !bits.contains(400));
+        assert_eq!(ClusterSet::all(70).iter().count(), 70);
+        assert!(ClusterSet::none(3).is_empty() && !bits.is_empty());
+    }
+}
