@@ -394,6 +394,8 @@ pub struct TraceView {
     pub last_forward: Vec3,
     pub last_left: Vec3,
     pub last_up: Vec3,
+    /// Makes the size a multiple of eight without hidden bytes.
+    pub padding: u32,
 }
 
 /// Names of constants used on both sides.

@@ -75,7 +75,7 @@ struct TraceView {
     uint target_width; uint target_height; uint sky_sampler;
     uint image_last_position; uint image_last_surface; uint image_last_light; uint image_moments; uint image_last_moments;
     uint image_filter; uint image_lit;
-    vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up;
+    vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up; uint padding;
 };
 
 // What a geometry's triangles are to a ray.

@@ -1,7 +1,7 @@
 //! What was found, written into the world.
 
 use super::{Solution, columns};
-use crate::light::{Clusters, PointLight};
+use crate::light::{self, PointLight};
 use crate::world::RelitWorld;
 
 /// Radius of the balls that lights put in are drawn from, id units: they keep clear of surfaces by as much.
@@ -24,9 +24,6 @@ pub(super) fn apply(world: &mut RelitWorld, solution: &Solution) {
     if solution.placed.is_empty() {
         return;
     }
-    let clusters = Clusters::new(&world.bsp);
-    world.light_lists = clusters.lists(&world.lights, &world.point_lights, &world.surfaces);
+    light::build_lists(world);
     world.report.point_lights = world.point_lights.len();
-    world.report.mean_list_length = world.light_lists.mean_length();
-    world.report.longest_list = world.light_lists.longest();
 }

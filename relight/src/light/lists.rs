@@ -25,6 +25,8 @@ pub struct LightLists {
     pub lights: Vec<u32>,
     /// Number of triangle lights: entries from here on are point lights.
     pub triangle_lights: u32,
+    /// For each cluster whether suns can reach it: see [`LightLists::sees_sky`].
+    pub sky: Vec<bool>,
 }
 
 /// What an entry of [`LightLists`] stands for.
@@ -56,6 +58,13 @@ impl LightLists {
                 .unwrap_or_default(),
             _ => &[],
         }
+    }
+
+    /// Whether light from the sky, and so that of suns, can come to a cluster: whether it can see a cluster with a
+    /// surface of sky in it. True for clusters that nothing is known of.
+    pub fn sees_sky(&self, cluster: i32) -> bool {
+        let known = usize::try_from(cluster).ok().and_then(|c| self.sky.get(c));
+        known.copied().unwrap_or(true)
     }
 
     /// What an entry stands for.
@@ -186,12 +195,38 @@ impl Clusters {
         furthest_in_front(bounds.mins, bounds.maxs, normal, dist) > PLANE_SLACK
     }
 
-    /// The lists of a map's lights.
+    /// For each cluster whether it can see a surface that `is_sky`. Where no surface is, or one belongs to a brush
+    /// model, nothing can be said: the answer is empty.
+    fn sky(
+        &self,
+        surfaces: &[WorldSurface],
+        is_sky: impl Fn(&WorldSurface) -> bool,
+    ) -> Vec<bool> {
+        let mut at = ClusterSet::none(self.sight.count());
+        for (index, surface) in surfaces.iter().enumerate() {
+            if surface.num_indices == 0 || !is_sky(surface) {
+                continue;
+            }
+            let listing = self.listing(index, surfaces);
+            if listing.is_empty() {
+                return Vec::new();
+            }
+            at.merge(&listing);
+        }
+        if at.is_empty() {
+            return Vec::new();
+        }
+        let lit = self.sight.lit_from(&at);
+        (0..self.sight.count()).map(|c| lit.contains(c)).collect()
+    }
+
+    /// The lists of a map's lights. `is_sky` tells surfaces of sky.
     pub fn lists(
         &self,
         lights: &[TriangleLight],
         points: &[PointLight],
         surfaces: &[WorldSurface],
+        is_sky: impl Fn(&WorldSurface) -> bool,
     ) -> LightLists {
         let mut rows: Vec<Vec<u32>> = vec![Vec::new(); self.sight.count()];
         let mut listed: Option<(u32, ClusterSet)> = None;
@@ -228,6 +263,7 @@ impl Clusters {
             offsets: vec![0],
             lights: Vec::new(),
             triangle_lights: lights.len() as u32,
+            sky: self.sky(surfaces, is_sky),
         };
         for row in rows {
             lists.lights.extend(row);
@@ -247,7 +283,9 @@ mod tests {
             offsets: vec![0, 1, 3, 5],
             lights: vec![0, 0, 1, 0, 1],
             triangle_lights: 1,
+            sky: vec![true, false],
         };
+        assert!(lists.sees_sky(0) && !lists.sees_sky(1) && lists.sees_sky(-1));
         assert_eq!(lists.clusters(), 2);
         assert_eq!(lists.row(0), [0]);
         assert_eq!(lists.row(1), [0, 1]);

@@ -59,11 +59,24 @@ pub use sight::{ClusterSet, Sight};
 pub(crate) use emission::Finder;
 pub(crate) use entities::{ambient, light_entities};
 pub(crate) use fallback::rescue;
-pub(crate) use lists::Clusters;
+use lists::Clusters;
 pub(crate) use surfaces::{place, suns};
 
 use glam::Vec3;
 use std::f32::consts::PI;
+
+/// The light lists of a world as it is now.
+pub(crate) fn build_lists(world: &mut crate::world::RelitWorld) {
+    let clusters = Clusters::new(&world.bsp);
+    let sky = |s: &crate::world::WorldSurface| {
+        let material = world.materials.get(s.material as usize);
+        material.is_some_and(crate::world::WorldMaterial::is_sky)
+    };
+    world.light_lists = clusters.lists(&world.lights, &world.point_lights, &world.surfaces, sky);
+    world.report.clusters = world.light_lists.clusters();
+    world.report.mean_list_length = world.light_lists.mean_length();
+    world.report.longest_list = world.light_lists.longest();
+}
 
 /// Radiance of a surface with `q3map_surfacelight 1` of white colour.
 pub const SURFACE_LIGHT_RADIANCE: f32 = PI / 255.0;

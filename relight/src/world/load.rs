@@ -218,11 +218,7 @@ impl RelitWorld {
         world.sky = world.largest_sky();
 
         begin(Stage::LightLists);
-        let clusters = light::Clusters::new(&world.bsp);
-        world.light_lists = clusters.lists(&world.lights, &world.point_lights, &world.surfaces);
-        world.report.clusters = world.light_lists.clusters();
-        world.report.mean_list_length = world.light_lists.mean_length();
-        world.report.longest_list = world.light_lists.longest();
+        light::build_lists(&mut world);
         if let Some(calibration) = &options.calibrate {
             begin(Stage::Calibration);
             for material in &mut world.materials {

@@ -103,11 +103,13 @@ impl TraceLook {
     /// The device is out of memory or lost.
     pub fn new(device: &Device, world: &World, assets: &Assets) -> Result<Self, Error> {
         let relit = &world.data.relit;
+        let model_origins: Vec<_> = relit.models.iter().map(|m| m.origin).collect();
         let source = MapLightSource {
             triangles: &relit.lights,
             points: &relit.point_lights,
             suns: &relit.suns,
             lists: &relit.light_lists,
+            model_origins: &model_origins,
             ambient: relit.ambient,
             bsp: Some(&relit.bsp),
         };

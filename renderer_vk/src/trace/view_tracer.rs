@@ -11,13 +11,13 @@ use super::counters::{COUNTED, Counting, RayCounters};
 use super::debug::DebugView;
 use super::geometry::StaticGeometry;
 use super::input::{MaterialTable, Tracer};
-use super::lights::{MapLights, dynamic_lights};
+use super::lights::MapLights;
 use super::motion::Motion;
 use super::passes::{Accumulate, Composite, Denoise, Direct, Exposure, Indirect, Primary, ToneMap};
 use super::targets::Targets;
 use crate::gpu::{Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::scene::ViewScene;
-use crate::settings::{LightSelection, Settings};
+use crate::settings::Settings;
 
 /// The map that a view shows.
 #[derive(Clone, Copy)]
@@ -262,11 +262,6 @@ impl ViewTracer {
         };
         let camera = &view.view;
         let lights = map.map_or(&self.no_lights, |m| m.lights);
-        let dynamic = if settings.dynamic_light {
-            dynamic_lights(&view.dlights, settings.rt_dlight_scale)
-        } else {
-            Vec::new()
-        };
         let mut flags = 0;
         let mut set = |bit: u32, on: bool| flags |= if on { bit } else { 0 };
         set(
@@ -305,15 +300,6 @@ impl ViewTracer {
             fogs: map.map_or(0, |m| m.geometry.fogs.address()),
             portals: rec.arena().push(portals)?,
             skies: map.map_or(0, |m| m.geometry.skies.address()),
-            triangle_lights: lights.triangles.address(),
-            sphere_lights: lights.spheres.address(),
-            dynamic_lights: rec.arena().push(&dynamic)?,
-            suns: lights.suns.address(),
-            nodes: lights.nodes.address(),
-            leaf_clusters: lights.leaf_clusters.address(),
-            light_offsets: lights.offsets.address(),
-            light_indices: lights.indices.address(),
-            light_chances: lights.chances.address(),
             exposure: self.exposure_state.address(),
             bvh_nodes: accel.nodes,
             bvh_instances: accel.placed,
@@ -324,6 +310,7 @@ impl ViewTracer {
                 image_last: targets.motion[1].storage_index(),
                 ..motion
             },
+            lights: lights.of_view(rec, view, settings)?,
             eye,
             forward,
             left,
@@ -345,25 +332,8 @@ impl ViewTracer {
             ambient: lights.ambient * settings.rt_light_scale.max(0.0),
             fog_count: map.map_or(0, |m| m.geometry.fog_count),
             portal_count: u32::try_from(portals.len()).unwrap_or(u32::MAX),
-            triangle_light_count: lights.triangle_count,
-            sun_count: lights.sun_count,
-            dynamic_light_count: u32::try_from(dynamic.len()).unwrap_or(u32::MAX),
-            cluster_count: lights.cluster_count,
-            // without its tree every point falls into the row of all lights
-            node_count: if settings.rt_cull_lights {
-                lights.node_count
-            } else {
-                0
-            },
             max_depth: settings.rt_max_depth,
             bounces: settings.rt_bounces.min(2),
-            samples: settings.rt_num_random_dl.max(1),
-            candidates: settings.rt_candidates.max(1),
-            sampling: match settings.rt_light_selection {
-                _ if settings.rt_num_random_dl == 0 => t::SAMPLING_ALL,
-                LightSelection::Uniform => t::SAMPLING_UNIFORM,
-                LightSelection::Resampled => t::SAMPLING_RESAMPLED,
-            },
             image_position: targets.position[0].storage_index(),
             image_surface: targets.surface[0].storage_index(),
             image_albedo: targets.albedo.storage_index(),
@@ -376,7 +346,6 @@ impl ViewTracer {
             exposure_bias: settings.rt_exposure,
             exposure_base: self.exposure_base,
             exposure_blend,
-            light_scale: settings.rt_light_scale.max(0.0),
             target_width: target.width(),
             target_height: target.height(),
             sky_sampler: materials.sky_sampler(),
@@ -391,6 +360,7 @@ impl ViewTracer {
             last_forward,
             last_left,
             last_up,
+            padding: 0,
         })
     }
 }

@@ -231,7 +231,7 @@ pub fn encode(linear: f32) -> f32 {
 /// What the shaders make of a constant colour: it passes through a byte.
 pub fn through_byte(encoded: f32) -> f32 {
     let byte = (encoded * 255.0 + 0.001).floor() / 255.0;
-    crate::trace::lights::decode(Vec3::splat(byte)).x
+    crate::trace::frame_lights::decode(Vec3::splat(byte)).x
 }
 
 /// Stages.
@@ -575,12 +575,14 @@ impl Scene {
             offsets: vec![0, all.len() as u32],
             lights: all,
             triangle_lights: self.lights.len() as u32,
+            sky: Vec::new(),
         };
         let source = MapLightSource {
             triangles: &self.lights,
             points: &self.points,
             suns: &self.suns,
             lists: self.tree.as_ref().map_or(&lists, |t| &t.1),
+            model_origins: &[],
             ambient: self.ambient,
             bsp: self.tree.as_ref().map(|t| &t.0),
         };

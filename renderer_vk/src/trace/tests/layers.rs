@@ -224,7 +224,7 @@ fn fog_follows_the_way_through_its_volume_with(gpu: &mut Gpu) {
         color: Vec3::new(0.2, 0.4, 0.6),
         depth: 400.0,
     });
-    let fog_color = crate::trace::lights::decode(Vec3::new(0.2, 0.4, 0.6));
+    let fog_color = crate::trace::frame_lights::decode(Vec3::new(0.2, 0.4, 0.6));
     let back_color = Vec3::from(back.map(through_byte));
     let behind = |length: f32, far: Vec3| {
         let factor = (length / 400.0).min(1.0).sqrt();

@@ -443,6 +443,7 @@ fn a_point_is_lit_by_the_list_of_its_cluster_with(gpu: &mut Gpu) {
         offsets: vec![0, 1, 2, 4],
         lights,
         triangle_lights: 2,
+        sky: Vec::new(),
     };
     scene.tree = Some((bsp, lists));
     for sampling in ALL {

@@ -1,0 +1,262 @@
+//! The lights of one view: the game's dynamic lights, the flashlight, emitting surfaces of brush models where these are
+//! now; and which clusters they can reach.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+use relight::light::{ClusterSet, Sight};
+use shaders::trace_types as t;
+use shaders::trace_types::constants as c;
+use shaders::types::Instance;
+
+use super::lights::{MapLights, count, number, sphere, sphere_bounds, triangle_bounds};
+use crate::api::DynamicLight;
+use crate::gpu::{Error, Recorder};
+use crate::scene::{View, ViewScene};
+use crate::settings::{LightSelection, Settings};
+
+/// Lights of a view, and where they reach.
+#[derive(Debug, Default)]
+struct FrameLights {
+    triangles: Vec<t::TriangleLight>,
+    spheres: Vec<t::SphereLight>,
+    /// Numbers of lights, with the clusters that each can reach.
+    reach: Vec<(u32, ClusterSet)>,
+}
+
+/// How far around a light its clusters are looked for, units: leafs end where lamps begin.
+const SEARCH_MARGIN: f32 = 2.0;
+
+impl FrameLights {
+    fn add_sphere(&mut self, light: t::SphereLight, sight: &Sight) {
+        let margin = Vec3::splat(light.radius.max(SEARCH_MARGIN));
+        let at = sight.touching(light.origin - margin, light.origin + margin);
+        let light_number = number(c::LIGHT_CHANGING_SPHERE, self.spheres.len());
+        self.spheres.push(light);
+        self.reach.push((light_number, sight.lit_from(&at)));
+    }
+
+    /// The emitting triangles of a model.
+    fn add_model(
+        &mut self,
+        lights: &[t::TriangleLight],
+        instance: &Instance,
+        scale: f32,
+        sight: &Sight,
+    ) {
+        let place = |p: Vec3| {
+            let [x, y, z] = instance.axis;
+            x * p.x + y * p.y + z * p.z + instance.origin
+        };
+        let first = self.triangles.len();
+        let (mut mins, mut maxs) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for light in lights {
+            let corners = light.corners.map(place);
+            if !corners.iter().all(|p| p.is_finite()) {
+                continue;
+            }
+            for corner in corners {
+                mins = mins.min(corner);
+                maxs = maxs.max(corner);
+            }
+            self.triangles.push(t::TriangleLight {
+                corners,
+                radiance: light.radiance * scale,
+                flags: light.flags,
+            });
+        }
+        if self.triangles.len() == first {
+            return;
+        }
+        let margin = Vec3::splat(SEARCH_MARGIN);
+        let reached = sight.lit_from(&sight.touching(mins - margin, maxs + margin));
+        for index in first..self.triangles.len() {
+            let light_number = number(c::LIGHT_CHANGING_TRIANGLE, index);
+            self.reach.push((light_number, reached.clone()));
+        }
+    }
+
+    /// The list of each of so many clusters, and at the end that of all lights.
+    fn rows(&self, clusters: usize) -> (Vec<t::DynamicRow>, Vec<u32>) {
+        let mut counts = vec![0u32; clusters];
+        for (_, reach) in &self.reach {
+            for cluster in reach.iter() {
+                if let Some(count) = counts.get_mut(cluster) {
+                    *count += 1;
+                }
+            }
+        }
+        let mut first = 0;
+        let mut rows: Vec<t::DynamicRow> = counts
+            .iter()
+            .map(|&count| {
+                let row = t::DynamicRow { first, count: 0 };
+                first += count;
+                row
+            })
+            .collect();
+        let mut entries = vec![0u32; first as usize];
+        for (light, reach) in &self.reach {
+            for cluster in reach.iter() {
+                let Some(row) = rows.get_mut(cluster) else {
+                    continue;
+                };
+                if let Some(entry) = entries.get_mut((row.first + row.count) as usize) {
+                    *entry = *light;
+                }
+                row.count += 1;
+            }
+        }
+        rows.push(t::DynamicRow {
+            first: count(entries.len()),
+            count: count(self.reach.len()),
+        });
+        entries.extend(self.reach.iter().map(|(light, _)| *light));
+        (rows, entries)
+    }
+}
+
+impl MapLights {
+    /// The lights of a view, with those that only this frame has uploaded for it.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn of_view(
+        &self,
+        rec: &mut Recorder,
+        view: &ViewScene,
+        settings: &Settings,
+    ) -> Result<t::LightView, Error> {
+        let scale = settings.rt_light_scale.max(0.0);
+        let mut frame = FrameLights::default();
+        for submodel in &view.submodels {
+            let lights = self.moving.iter().find(|(m, _)| *m == submodel.model);
+            let instance = view.instances.get(submodel.instance as usize);
+            if let (Some((_, lights)), Some(instance)) = (lights, instance) {
+                frame.add_model(lights, instance, scale, &self.sight);
+            }
+        }
+        if settings.dynamic_light {
+            for light in dynamic_lights(&view.dlights, settings.rt_dlight_scale) {
+                frame.add_sphere(light, &self.sight);
+            }
+        }
+        if settings.rt_flashlight {
+            frame.add_sphere(flashlight(&view.view), &self.sight);
+        }
+        let mut lights = self.fixed();
+        if !frame.reach.is_empty() {
+            let (rows, entries) = frame.rows(self.sight.count());
+            let bounds: Vec<_> = frame.triangles.iter().map(triangle_bounds).collect();
+            let sphere_bounds: Vec<_> = frame.spheres.iter().map(sphere_bounds).collect();
+            let arena = rec.arena();
+            lights.triangles[1] = arena.push(&frame.triangles)?;
+            lights.spheres[1] = arena.push(&frame.spheres)?;
+            lights.bounds[1] = arena.push(&bounds)?;
+            lights.bounds[3] = arena.push(&sphere_bounds)?;
+            lights.dynamic_rows = arena.push(&rows)?;
+            lights.dynamic_lights = arena.push(&entries)?;
+            lights.dynamic_row_count = count(rows.len());
+        }
+        if !settings.rt_cull_lights {
+            // without a tree every point lies in the last row, which holds all lights
+            lights.node_count = 0;
+        }
+        lights.flags = if settings.rt_soft_shadows {
+            c::LIGHTS_SOFT
+        } else {
+            0
+        };
+        lights.selection = match settings.rt_light_selection {
+            _ if settings.rt_num_random_dl == 0 => c::SELECT_ALL,
+            LightSelection::Uniform => c::SELECT_UNIFORM,
+            LightSelection::Resampled => c::SELECT_RESAMPLED,
+        };
+        lights.samples = settings.rt_num_random_dl.max(1);
+        lights.candidates = settings.rt_candidates.max(1);
+        lights.scale = scale;
+        Ok(lights)
+    }
+}
+
+/// Radius of the ball of a dynamic light, as a part of its reach, and its bounds in units: about a muzzle flash.
+const DYNAMIC_LIGHT_SIZE: (f32, f32, f32) = (0.02, 2.0, 8.0);
+
+/// What lies this near to a dynamic light casts no shadow: the projectile or weapon that carries it.
+const DYNAMIC_LIGHT_CLEARANCE: f32 = 20.0;
+
+/// The game's dynamic lights as small spheres.
+///
+/// The engine gives a light a reach `r` and a colour; its classic look adds about the whole colour up to half the reach
+/// and fades to nothing at `r`. Here light falls off with the square of the distance, strong enough that a white
+/// surface that faces it at half the reach shows the light's colour: intensity = colour * pi * (r / 2)². Colours are as
+/// displayed, so they are decoded.
+pub fn dynamic_lights(lights: &[DynamicLight], scale: f32) -> Vec<t::SphereLight> {
+    lights
+        .iter()
+        .filter(|light| {
+            light.radius > 0.0
+                && light.radius.is_finite()
+                && light.origin.is_finite()
+                && light.color.is_finite()
+        })
+        .map(|light| {
+            let half = light.radius * 0.5;
+            let color = decode(light.color.max(Vec3::ZERO));
+            let (part, min, max) = DYNAMIC_LIGHT_SIZE;
+            let radius = (light.radius * part).clamp(min, max);
+            sphere(
+                light.origin,
+                radius,
+                color * (PI * half * half * scale.max(0.0)),
+                DYNAMIC_LIGHT_CLEARANCE,
+            )
+        })
+        .collect()
+}
+
+/// Where the flashlight is held: to the right and below the eye, units. Light from the eye itself would hide every
+/// shadow behind what casts it.
+const FLASHLIGHT_PLACE: (f32, f32) = (6.0, 6.0);
+
+/// Radius of its lens, units.
+const FLASHLIGHT_RADIUS: f32 = 1.5;
+
+/// Distance at which it shows a white surface that faces it as its own colour.
+const FLASHLIGHT_REACH: f32 = 384.0;
+
+/// Its colour, linear: a warm white.
+const FLASHLIGHT_COLOR: Vec3 = Vec3::new(1.0, 0.93, 0.8);
+
+/// Half angles of its cone, degrees: full light up to the first, none from the second on.
+const FLASHLIGHT_ANGLES: (f32, f32) = (9.0, 24.0);
+
+/// What lies this near to it casts no shadow: the player who holds it, whose own model is there for mirrors.
+const FLASHLIGHT_CLEARANCE: f32 = 40.0;
+
+/// The lamp that goes with the eye.
+fn flashlight(view: &View) -> t::SphereLight {
+    let [forward, left, up] = view.axis;
+    let (right, down) = FLASHLIGHT_PLACE;
+    let origin = view.origin - left * right - up * down;
+    let intensity = FLASHLIGHT_COLOR * (PI * FLASHLIGHT_REACH * FLASHLIGHT_REACH);
+    let (inner, outer) = FLASHLIGHT_ANGLES;
+    t::SphereLight {
+        axis: forward,
+        cos_inner: inner.to_radians().cos(),
+        cos_outer: outer.to_radians().cos(),
+        ..sphere(origin, FLASHLIGHT_RADIUS, intensity, FLASHLIGHT_CLEARANCE)
+    }
+}
+
+/// sRGB to linear (IEC 61966-2-1), as `shaders/trace/color.glsl` does it.
+pub fn decode(c: Vec3) -> Vec3 {
+    let channel = |c: f32| {
+        if c <= 0.04045 {
+            c / 12.92
+        } else {
+            ((c + 0.055) / 1.055).powf(2.4)
+        }
+    };
+    Vec3::new(channel(c.x), channel(c.y), channel(c.z))
+}

@@ -1,0 +1,195 @@
+//! Alias tables for drawing lights from a cluster's list.
+
+use glam::Vec3;
+use q3bsp::Bsp;
+use relight::light::{PointLight, TriangleLight};
+use shaders::trace_types::LightSlot;
+
+/// Part of a row's chance that is shared out evenly, so that no light is left out by a bad guess.
+const EVEN_PART: f64 = 0.1;
+
+/// An entry of a row before its table is built.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    /// Number of the light.
+    pub light: u32,
+    /// About how much light it brings to the row's cluster; any unit.
+    pub weight: f32,
+    /// About which part of that arrives, above 0.
+    pub visibility: f32,
+}
+
+/// Appends the slots of a row. Each light's chance is above 0.
+///
+/// Source: Walker's alias method (ACM TOMS 3(3), 1977), built as by Vose (IEEE TSE 17(9), 1991).
+pub fn append_slots(slots: &mut Vec<LightSlot>, entries: &[Entry]) {
+    let weight = |e: &Entry| {
+        let w = f64::from(e.weight * e.visibility);
+        if w.is_finite() { w.max(0.0) } else { 0.0 }
+    };
+    let total: f64 = entries.iter().map(weight).sum();
+    #[allow(clippy::cast_precision_loss)] // a row's length
+    let even = 1.0 / entries.len().max(1) as f64;
+    let chance = |e: &Entry| {
+        if total > 0.0 {
+            EVEN_PART * even + (1.0 - EVEN_PART) * weight(e) / total
+        } else {
+            even
+        }
+    };
+    let first = slots.len();
+    let visibility = |e: &Entry| e.visibility.clamp(1.0e-4, 1.0);
+    #[allow(clippy::cast_possible_truncation)] // to single precision
+    slots.extend(entries.iter().map(|e| LightSlot {
+        light: e.light,
+        alias: e.light,
+        threshold: 1.0,
+        chance: chance(e) as f32,
+        alias_chance: chance(e) as f32,
+        visibility: visibility(e),
+        alias_visibility: visibility(e),
+        padding: 0,
+    }));
+    let Some(row) = slots.get_mut(first..) else {
+        return;
+    };
+    // what each slot has of its own light, in parts of a slot
+    let mut parts: Vec<f64> = entries.iter().map(|e| chance(e) / even).collect();
+    let (mut poor, mut rich): (Vec<usize>, Vec<usize>) =
+        (0..parts.len()).partition(|&i| parts.get(i).is_some_and(|&p| p < 1.0));
+    while let (Some(&low), Some(&high)) = (poor.last(), rich.last()) {
+        poor.pop();
+        let own = parts.get(low).copied().unwrap_or(1.0);
+        let Some(&LightSlot {
+            light,
+            chance,
+            visibility,
+            ..
+        }) = row.get(high)
+        else {
+            break;
+        };
+        if let Some(slot) = row.get_mut(low) {
+            #[allow(clippy::cast_possible_truncation)] // to single precision
+            {
+                slot.threshold = own as f32;
+            }
+            slot.alias = light;
+            slot.alias_chance = chance;
+            slot.alias_visibility = visibility;
+        }
+        if let Some(left) = parts.get_mut(high) {
+            *left -= 1.0 - own;
+            if *left < 1.0 {
+                rich.pop();
+                poor.push(high);
+            }
+        }
+    }
+}
+
+/// Middle and half diagonal of the boxes of each cluster's leafs; `None` for a cluster without leafs.
+pub fn cluster_balls(bsp: &Bsp, clusters: usize) -> Vec<Option<(Vec3, f32)>> {
+    let mut boxes: Vec<Option<(Vec3, Vec3)>> = vec![None; clusters];
+    for leaf in &bsp.leafs {
+        let slot = usize::try_from(leaf.cluster)
+            .ok()
+            .and_then(|c| boxes.get_mut(c));
+        if let Some(slot) = slot {
+            #[allow(clippy::cast_precision_loss)] // map coordinates
+            let [mins, maxs] = [leaf.mins, leaf.maxs].map(|v| Vec3::from(v.map(|x| x as f32)));
+            let (low, high) = slot.unwrap_or((mins, maxs));
+            *slot = Some((low.min(mins), high.max(maxs)));
+        }
+    }
+    let ball = |(low, high): (Vec3, Vec3)| ((low + high) * 0.5, (high - low).length() * 0.5);
+    boxes.into_iter().map(|b| b.map(ball)).collect()
+}
+
+/// Relative luminance of linear Rec. 709 colours, negative ones as none.
+pub fn luminance(c: Vec3) -> f32 {
+    c.dot(Vec3::new(0.2126, 0.7152, 0.0722)).max(0.0)
+}
+
+/// About how much light a triangle brings to a cluster (middle and half diagonal); without one its power.
+pub fn triangle_weight(light: &TriangleLight, cluster: Option<(Vec3, f32)>) -> f32 {
+    let [a, b, c] = light.vertices;
+    let middle = (a + b + c) / 3.0;
+    let area = light.area();
+    let facing = match cluster {
+        // how far the cluster can lie in front of the light; never none, for it is large
+        Some((centre, radius)) if !light.two_sided => {
+            let to = centre - middle;
+            ((light.normal().dot(to) + radius) / (to.length() + radius).max(1.0)).clamp(0.05, 1.0)
+        }
+        _ => 1.0,
+    };
+    luminance(light.radiance) * area * facing / squared_distance(middle, area, cluster)
+}
+
+/// About how much light a point light brings to a cluster; without one its power.
+pub fn point_weight(light: &PointLight, cluster: Option<(Vec3, f32)>) -> f32 {
+    luminance(light.intensity)
+        / squared_distance(light.origin, light.radius * light.radius, cluster)
+}
+
+/// Nearer than half the cluster's size all distances are alike.
+fn squared_distance(origin: Vec3, size: f32, cluster: Option<(Vec3, f32)>) -> f32 {
+    cluster.map_or(1.0, |(centre, radius)| {
+        centre
+            .distance_squared(origin)
+            .max(radius * radius * 0.25)
+            .max(size)
+            .max(1.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Chance of each light as the slots really give it.
+    fn drawn(slots: &[LightSlot]) -> Vec<f64> {
+        let mut chances = vec![0.0; slots.len()];
+        for slot in slots {
+            let part = 1.0 / slots.len() as f64;
+            chances[slot.light as usize] += part * f64::from(slot.threshold);
+            chances[slot.alias as usize] += part * (1.0 - f64::from(slot.threshold));
+        }
+        chances
+    }
+
+    #[test]
+    fn lights_are_drawn_with_the_chance_that_they_tell() {
+        for weights in [
+            vec![1.0],
+            vec![0.0, 0.0, 0.0],
+            vec![1.0, 2.0, 3.0, 0.0, 100.0, 1.0e-6, 7.0],
+            (0..1000).map(|i| ((i * 7919) % 101) as f32).collect(),
+            vec![f32::INFINITY, 1.0, f32::NAN],
+        ] {
+            let entries: Vec<Entry> = (0u32..)
+                .zip(&weights)
+                .map(|(light, &weight)| Entry {
+                    light,
+                    weight,
+                    visibility: if light % 3 == 0 { 1.0 } else { 0.25 },
+                })
+                .collect();
+            let mut slots = Vec::new();
+            append_slots(&mut slots, &entries);
+            assert_eq!(slots.len(), weights.len());
+            let drawn = drawn(&slots);
+            assert!((drawn.iter().sum::<f64>() - 1.0).abs() < 1.0e-5);
+            for (i, slot) in slots.iter().enumerate() {
+                assert_eq!(slot.light as usize, i);
+                let told = f64::from(slot.chance);
+                assert!(told > 0.0);
+                assert!((drawn[i] / told - 1.0).abs() < 1.0e-4, "{} {told}", drawn[i]);
+                assert_eq!(slot.alias_chance, slots[slot.alias as usize].chance);
+                assert_eq!(slot.alias_visibility, slots[slot.alias as usize].visibility);
+            }
+        }
+        append_slots(&mut Vec::new(), &[]);
+    }
+}
