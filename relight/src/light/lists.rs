@@ -164,7 +164,9 @@ impl Clusters {
     fn clusters_of(&self, light: &TriangleLight, listed: &ClusterSet) -> ClusterSet {
         let margin = Vec3::splat(SEARCH_MARGIN);
         let [a, b, c] = light.vertices;
-        let mut at = self.sight.touching(a.min(b).min(c) - margin, a.max(b).max(c) + margin);
+        let mut at = self
+            .sight
+            .touching(a.min(b).min(c) - margin, a.max(b).max(c) + margin);
         if !listed.is_empty() {
             at.keep(listed);
             if at.is_empty() {
@@ -197,11 +199,7 @@ impl Clusters {
 
     /// For each cluster whether it can see a surface that `is_sky`. Where no surface is, or one belongs to a brush
     /// model, nothing can be said: the answer is empty.
-    fn sky(
-        &self,
-        surfaces: &[WorldSurface],
-        is_sky: impl Fn(&WorldSurface) -> bool,
-    ) -> Vec<bool> {
+    fn sky(&self, surfaces: &[WorldSurface], is_sky: impl Fn(&WorldSurface) -> bool) -> Vec<bool> {
         let mut at = ClusterSet::none(self.sight.count());
         for (index, surface) in surfaces.iter().enumerate() {
             if surface.num_indices == 0 || !is_sky(surface) {
@@ -241,7 +239,9 @@ impl Clusters {
             };
             let at = self.clusters_of(light, &listing);
             listed = Some((surface, listing));
-            let lit = known.entry(at).or_insert_with_key(|at| self.sight.lit_from(at));
+            let lit = known
+                .entry(at)
+                .or_insert_with_key(|at| self.sight.lit_from(at));
             for cluster in lit.iter().filter(|&c| self.faces(light, c)) {
                 if let Some(row) = rows.get_mut(cluster) {
                     row.push(entry);
@@ -250,7 +250,9 @@ impl Clusters {
         }
         for (entry, point) in (lights.len() as u32..).zip(points) {
             let margin = Vec3::splat(SEARCH_MARGIN.max(point.radius));
-            let at = self.sight.touching(point.origin - margin, point.origin + margin);
+            let at = self
+                .sight
+                .touching(point.origin - margin, point.origin + margin);
             for cluster in self.sight.lit_from(&at).iter() {
                 if let Some(row) = rows.get_mut(cluster) {
                     row.push(entry);

@@ -185,7 +185,11 @@ mod tests {
                 assert_eq!(slot.light as usize, i);
                 let told = f64::from(slot.chance);
                 assert!(told > 0.0);
-                assert!((drawn[i] / told - 1.0).abs() < 1.0e-4, "{} {told}", drawn[i]);
+                assert!(
+                    (drawn[i] / told - 1.0).abs() < 1.0e-4,
+                    "{} {told}",
+                    drawn[i]
+                );
                 assert_eq!(slot.alias_chance, slots[slot.alias as usize].chance);
                 assert_eq!(slot.alias_visibility, slots[slot.alias as usize].visibility);
             }

@@ -72,12 +72,7 @@ fn spot_cosines(tan_half_angle: f32) -> (f32, f32) {
 }
 
 /// The sphere that gives a radiant intensity (in a unit where irradiance is `intensity / distance²`).
-pub(super) fn sphere(
-    origin: Vec3,
-    radius: f32,
-    intensity: Vec3,
-    clearance: f32,
-) -> t::SphereLight {
+pub(super) fn sphere(origin: Vec3, radius: f32, intensity: Vec3, clearance: f32) -> t::SphereLight {
     let radius = radius.max(0.1);
     t::SphereLight {
         origin,
@@ -127,8 +122,11 @@ fn triangle_light(light: &TriangleLight, origin: Vec3) -> t::TriangleLight {
     t::TriangleLight {
         corners: light.vertices.map(|p| p - origin),
         radiance: light.radiance,
-        flags: if light.two_sided { c::LIGHT_TWO_SIDED } else { 0 }
-            | if light.is_sky { c::LIGHT_SKY } else { 0 },
+        flags: if light.two_sided {
+            c::LIGHT_TWO_SIDED
+        } else {
+            0
+        } | if light.is_sky { c::LIGHT_SKY } else { 0 },
     }
 }
 
