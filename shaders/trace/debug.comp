@@ -28,7 +28,7 @@ vec3 hue(float angle) {
 
 vec3 cluster_color(uint cluster, vec3 normal) {
     // the row of all lights: in no cluster
-    if (cluster == VIEW.cluster_count) return vec3(0.5 + 0.3 * normal.z);
+    if (cluster == VIEW.lights.row_count - 1) return vec3(0.5 + 0.3 * normal.z);
     uint x = cluster * 0x9E3779B1u;
     x ^= x >> 15;
     x *= 0x2C1B3C6Du;
@@ -53,13 +53,13 @@ vec3 debug_color(ivec2 pixel) {
         return size > 0.01 ? hue(atan(-m.offset.y, m.offset.x)) * clamp(log2(1.0 + size) / 6.0, 0.05, 1.0) : vec3(0.0);
     }
     case DEBUG_CLUSTERS: return is_lit ? cluster_color(cluster_at(g.position + g.face_normal), g.normal) : NOTHING;
-    case DEBUG_LIGHTS: return is_lit ? heat_count(float(lights_at(g.position, g.face_normal).count), 10.0) : NOTHING;
+    case DEBUG_LIGHTS: return is_lit ? heat_count(float(set_count(lights_at(g.position, g.face_normal))), 10.0) : NOTHING;
     case DEBUG_SAMPLES: {
         if (!is_lit) return NOTHING;
         float frames = 1.0;
         if ((VIEW.flags & VIEW_ACCUMULATE) != 0) frames = float(VIEW.accumulated + 1);
         else if ((VIEW.flags & VIEW_DENOISE) != 0) frames = max(imageLoad(images_rgba16f[VIEW.image_moments], pixel).z, 1.0);
-        return heat_count(frames * float(VIEW.sampling == SAMPLING_ALL ? 1 : VIEW.samples) - 1.0, 12.0);
+        return heat_count(frames * float(VIEW.lights.selection == SELECT_ALL ? 1 : VIEW.lights.samples) - 1.0, 12.0);
     }
     case DEBUG_VARIANCE: {
         if (!is_lit || (VIEW.flags & VIEW_DENOISE) == 0) return NOTHING;
