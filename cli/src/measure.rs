@@ -91,8 +91,8 @@ fn variants(base: &Settings) -> Vec<Variant> {
     vec![
         with("raw", &|s| (s.rt_denoiser, s.rt_taa) = (0, false)),
         with("denoised", &|s| (s.rt_denoiser, s.rt_taa) = (1, false)),
-        with("denoised+taa", &|s| (s.rt_denoiser, s.rt_taa) = (1, true)),
-        with("sparse+taa", &|s| (s.rt_denoiser, s.rt_taa) = (2, true)),
+        with("denoised-taa", &|s| (s.rt_denoiser, s.rt_taa) = (1, true)),
+        with("sparse-taa", &|s| (s.rt_denoiser, s.rt_taa) = (2, true)),
         with("baseline", &|s| {
             (s.rt_denoiser, s.rt_taa) = (1, true);
             s.rt_light_selection = LightSelection::Uniform;

@@ -424,6 +424,8 @@ pub mod constants {
     pub const VIEW_FULLBRIGHT: u32 = 64;
     pub const VIEW_HISTORY: u32 = 128;
     pub const VIEW_DENOISE: u32 = 256;
+    /// Bounced light is gathered for every other pixel, as on a chess board whose colours change places each frame.
+    pub const VIEW_SPARSE_BOUNCE: u32 = 512;
     pub const DEBUG_ALBEDO: u32 = 1;
     pub const DEBUG_NORMALS: u32 = 2;
     pub const DEBUG_DEPTH: u32 = 3;

@@ -13,7 +13,9 @@ use super::geometry::StaticGeometry;
 use super::input::{MaterialTable, Tracer};
 use super::lights::MapLights;
 use super::motion::Motion;
-use super::passes::{Accumulate, Composite, Denoise, Direct, Exposure, Indirect, Primary, ToneMap};
+use super::passes::{
+    Accumulate, Composite, Denoise, Direct, Exposure, Fill, Indirect, Primary, ToneMap,
+};
 use super::targets::Targets;
 use crate::gpu::{Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::scene::ViewScene;
@@ -35,6 +37,7 @@ pub struct ViewTracer {
     primary: Primary,
     direct: Direct,
     indirect: Indirect,
+    fill: Fill,
     denoise: Denoise,
     composite: Composite,
     accumulate: Accumulate,
@@ -75,6 +78,7 @@ impl ViewTracer {
             primary: Primary::new(device, tracer)?,
             direct: Direct::new(device, tracer)?,
             indirect: Indirect::new(device, tracer)?,
+            fill: Fill::new(device)?,
             denoise: Denoise::new(device)?,
             composite: Composite::new(device)?,
             accumulate: Accumulate::new(device)?,
@@ -196,7 +200,13 @@ impl ViewTracer {
 
         self.primary.record(rec, address, size)?;
         self.direct.record(rec, address, size)?;
-        self.indirect.record(rec, address, size)?;
+        if sparse_bounce(settings) {
+            let cells = [width.div_ceil(2), height];
+            self.indirect.record(rec, address, cells)?;
+            self.fill.record(rec, address, cells)?;
+        } else {
+            self.indirect.record(rec, address, size)?;
+        }
         self.counters.end(rec)?;
         if !settings.rt_accumulate
             && let Some(targets) = &self.targets
@@ -278,6 +288,7 @@ impl ViewTracer {
             settings.fullbright || !settings.rt_illumination,
         );
         set(t::VIEW_DENOISE, !settings.rt_accumulate);
+        set(t::VIEW_SPARSE_BOUNCE, sparse_bounce(settings));
         set(t::VIEW_HISTORY, self.history.is_some());
         let [last_eye, last_forward, last_left, last_up] = self.history.unwrap_or([Vec3::ZERO; 4]);
         let [eye, forward, left, up] = camera_frame(view);
@@ -402,6 +413,12 @@ fn portal_record(portal: &crate::scene::Portal) -> PortalRecord {
         camera_origin: portal.camera_origin,
         camera_axis: portal.camera_axis,
     }
+}
+
+/// Whether bounced light is gathered for half of the pixels: in a picture that is denoised nobody can tell, and it is the
+/// dearest pass. Reference mode and undenoised pictures get every pixel.
+fn sparse_bounce(settings: &Settings) -> bool {
+    !settings.rt_accumulate && settings.rt_denoiser > 0 && settings.rt_bounces > 0
 }
 
 /// A number that changes whenever the mean picture does: camera, everything in the scene, time, settings.
