@@ -81,6 +81,7 @@ impl<'a> FrameContext<'a> {
             materials: &assets.materials,
             samplers: &assets.samplers,
             identity_light: self.settings.identity_light(),
+            light_spot: assets.textures.dynamic_light(),
             only_texture: self
                 .settings
                 .no_bind

@@ -227,7 +227,8 @@ impl Renderer {
 
     /// The game has registered everything: makes the pipelines that it will draw with.
     pub fn end_registration(&mut self) {
-        let fits = self.targets.fit(&self.device, &self.settings);
+        let format = self.picture_format();
+        let fits = self.targets.fit(&self.device, &self.settings, format);
         let Some(assets) = &self.assets else { return };
         let target = raster::Target {
             color: self.targets.drawn(),
@@ -238,6 +239,7 @@ impl Renderer {
             materials: &assets.materials,
             samplers: &assets.samplers,
             identity_light: self.settings.identity_light(),
+            light_spot: assets.textures.dynamic_light(),
             only_texture: None,
         };
         // what is not made now is made when it is drawn

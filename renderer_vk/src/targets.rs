@@ -1,7 +1,7 @@
 //! The images that a frame is drawn to, as the settings want them.
 
 use crate::Error;
-use crate::gpu::{self, Access, Device, Image, ImageDesc, ImageUsage, Recorder};
+use crate::gpu::{self, Access, Device, Format, Image, ImageDesc, ImageUsage, Recorder};
 use crate::raster;
 use crate::settings::Settings;
 
@@ -16,26 +16,13 @@ pub struct FrameTargets {
 }
 
 impl FrameTargets {
-    /// Images of a size in pixels, without stencil and multisampling.
+    /// Images of a size in pixels, without stencil and multisampling, in [`raster::COLOR_FORMAT`].
     ///
     /// # Errors
     /// The device is out of memory.
     pub fn new(device: &Device, width: u32, height: u32) -> Result<Self, Error> {
         let (width, height) = (width.max(1), height.max(1));
-        let color = Image::new(
-            device,
-            &ImageDesc::new(
-                "frame colour",
-                width,
-                height,
-                raster::COLOR_FORMAT,
-                // Not among the sampled textures: the validation layer takes every draw for a reader of all of them,
-                // so a target among them would be a hazard to itself.
-                ImageUsage::COLOR | ImageUsage::STORAGE,
-            ),
-        )?;
-        // neither the game nor the engine clears the picture before it is first seen
-        clear(device, &color)?;
+        let color = color_image(device, width, height, raster::COLOR_FORMAT)?;
         Ok(Self {
             depth: depth_image(device, &color, 1, false)?,
             color,
@@ -44,11 +31,21 @@ impl FrameTargets {
     }
 
     /// Makes the images anew that the settings want otherwise: several samples where `r_ext_multisample` asks for them
-    /// and nothing is traced, a stencil while shadow volumes are drawn.
+    /// and nothing is traced, a stencil while shadow volumes are drawn. `format` is the colour's; only
+    /// [`raster::COLOR_FORMAT`] can be written by shaders other than those of draws.
     ///
     /// # Errors
     /// The device is out of memory.
-    pub fn fit(&mut self, device: &Device, settings: &Settings) -> Result<(), Error> {
+    pub fn fit(
+        &mut self,
+        device: &Device,
+        settings: &Settings,
+        format: Format,
+    ) -> Result<(), Error> {
+        if self.color.format() != format {
+            self.color = color_image(device, self.color.width(), self.color.height(), format)?;
+            self.several = None;
+        }
         let wanted = if settings.rt { 0 } else { settings.multisample };
         let stencil = settings.shadows == 2 && device.depth_stencil_format().is_some();
         let samples = samples(device, wanted, stencil);
@@ -57,7 +54,7 @@ impl FrameTargets {
             self.several = None;
             if samples > 1 {
                 let (width, height) = (self.color.width(), self.color.height());
-                let (format, usage) = (raster::COLOR_FORMAT, ImageUsage::COLOR);
+                let usage = ImageUsage::COLOR;
                 let desc = ImageDesc {
                     samples,
                     ..ImageDesc::new("frame samples", width, height, format, usage)
@@ -112,6 +109,26 @@ impl FrameTargets {
 }
 
 const BLACK: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+
+/// A black image for the picture: neither the game nor the engine clears it before it is first seen.
+fn color_image(
+    device: &Device,
+    width: u32,
+    height: u32,
+    format: Format,
+) -> Result<Image, gpu::Error> {
+    // Not among the sampled textures: the validation layer takes every draw for a reader of all of them, so a target
+    // among them would be a hazard to itself.
+    let usage = if format == raster::COLOR_FORMAT {
+        ImageUsage::COLOR | ImageUsage::STORAGE
+    } else {
+        ImageUsage::COLOR
+    };
+    let desc = ImageDesc::new("frame colour", width, height, format, usage);
+    let color = Image::new(device, &desc)?;
+    clear(device, &color)?;
+    Ok(color)
+}
 
 fn clear(device: &Device, image: &Image) -> Result<(), gpu::Error> {
     device.immediate(|recorder| {

@@ -17,24 +17,10 @@ vec4 sample_stage(uint stage, uint handle, vec2 uv) {
     return texture(sampler2D(textures[handle & 0xFFFFFF], samplers[handle >> 24]), uv);
 }
 
-// The engine's 16x16 blob: brightness 4000 / d^2 in texels from the middle, nothing below 75 of 255, at most 255.
-float blob_texel(vec2 texel) {
-    vec2 d = texel - 7.5;
-    float b = floor(4000.0 / dot(d, d));
-    return b < 75.0 ? 0.0 : min(b, 255.0) / 255.0;
-}
-
-float blob(vec2 uv) {
-    vec2 p = clamp(uv, 0.0, 1.0) * 16.0 - 0.5;
-    vec2 low = floor(p), f = p - low;
-    vec2 a = clamp(low, 0.0, 15.0), b = clamp(low + 1.0, 0.0, 15.0);
-    return mix(mix(blob_texel(a), blob_texel(vec2(b.x, a.y)), f.x), mix(blob_texel(vec2(a.x, b.y)), blob_texel(b), f.x), f.y);
-}
-
 void main() {
     if (CLIP != 0 && in_clip < 0.0) discard;
     if (MODE == DRAW_LIGHT) {
-        out_color = vec4(in_color.rgb * blob(in_uv.xy), 1.0);
+        out_color = vec4(in_color.rgb * sample_stage(0, in_textures.x, in_uv.xy).rgb, 1.0);
     } else if (MODE == DRAW_FOG) {
         out_color = vec4(in_flat_color.rgb, sample_stage(0, in_textures.x, in_uv.xy).a);
     } else {

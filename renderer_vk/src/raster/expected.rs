@@ -67,10 +67,7 @@ pub fn light_states(mut found: impl FnMut(State)) {
             cull: CullFaces::CounterClockwise,
             offset: false,
             wireframe: false,
-            shading: Shading {
-                mode: c::DRAW_LIGHT,
-                ..Shading::WHITE
-            },
+            shading: Shading::LIGHT,
         });
     }
 }

@@ -238,17 +238,15 @@ impl DrawList {
             for (i, light) in (0..).zip(scene.dlights.iter().take(MAX_LIGHTS)) {
                 if lights & (1 << i) != 0 {
                     let blend = (light_source_factor(light), c::BLEND_ONE);
+                    let (shading, draw) = stages.light(Draw { light: i, ..draw });
                     let state = State {
                         blend: Some(blend),
                         depth: Depth::Equal,
                         depth_write: false,
-                        shading: Shading {
-                            mode: c::DRAW_LIGHT,
-                            ..Shading::WHITE
-                        },
+                        shading,
                         ..plain
                     };
-                    self.push(state, range, span, Draw { light: i, ..draw });
+                    self.push(state, range, span, draw);
                 }
             }
         }

@@ -38,7 +38,7 @@ use pipelines::Pipelines;
 use shadows::Shadows;
 use target::TargetKind;
 
-/// Format of the frame's colour image.
+/// Format of the frame's colour image, unless it is shown just as it is: then it has the window's.
 pub const COLOR_FORMAT: Format = Format::Rgba8;
 /// Format of the frame's depth image.
 pub const DEPTH_FORMAT: Format = Format::D32F;

@@ -52,8 +52,8 @@ impl Present {
         self.format
     }
 
-    /// Records the copy of `frame` to `target`: each channel becomes `c^(1/gamma) * 2^overbright_bits`.
-    /// `copies`: the target can be copied to.
+    /// Records the copy of `frame` to `target`: each channel becomes `c^(1/gamma) * 2^overbright_bits`. A frame in the
+    /// target's own format, where that is not [`super::COLOR_FORMAT`], is copied as it is.
     ///
     /// # Errors
     /// The device is out of memory.
@@ -64,15 +64,15 @@ impl Present {
         target: &Image,
         gamma: f32,
         overbright_bits: u32,
-        copies: bool,
     ) -> Result<(), gpu::Error> {
-        // nothing to compute
-        let plain = gamma == 1.0 && overbright_bits == 0;
-        let sizes = [frame, target].map(|image| (image.width(), image.height()));
-        if copies && plain && sizes[0] == sizes[1] && self.format == Format::Bgra8 {
+        if frame.format() != super::COLOR_FORMAT {
             let mut pass = recorder.pass("present", Access::TRANSFER, Access::TRANSFER)?;
-            let all = [0, 0, frame.width() as i32, frame.height() as i32];
-            pass.blit_image(frame, all, target, all, false);
+            let all = |image: &Image| [0, 0, image.width() as i32, image.height() as i32];
+            if all(frame) == all(target) && frame.format() == target.format() {
+                pass.copy_image(frame, target);
+            } else {
+                pass.blit_image(frame, all(frame), target, all(target), false);
+            }
             return Ok(());
         }
         let mut pass = recorder.pass("present", Access::GRAPHICS, Access::GRAPHICS)?;

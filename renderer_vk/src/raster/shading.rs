@@ -59,6 +59,13 @@ impl Shading {
         clip: false,
     };
 
+    /// A dynamic light's spot.
+    pub const LIGHT: Self = Self {
+        mode: c::DRAW_LIGHT,
+        textures: 1,
+        ..Self::WHITE
+    };
+
     /// The vertices' colours.
     pub const VERTEX_COLOR: Self = Self {
         color: c::COLOR_VERTEX,
@@ -110,6 +117,8 @@ pub struct StageContext<'a> {
     pub samplers: &'a Samplers,
     /// 1 over 2 to the power of the overbright bits.
     pub identity_light: f32,
+    /// The spot that a dynamic light makes on a wall.
+    pub light_spot: u32,
     /// Shown in place of every texture (`r_nobind`).
     pub only_texture: Option<u32>,
 }
@@ -190,6 +199,14 @@ impl StageContext<'_> {
             ..Shading::VERTEX_COLOR
         };
         (shading, self.textured(texture, kind, draw))
+    }
+
+    /// The draw of a dynamic light on a surface.
+    pub fn light(&self, draw: Draw) -> (Shading, Draw) {
+        (
+            Shading::LIGHT,
+            self.textured(self.light_spot, sampler::CLAMP, draw),
+        )
     }
 
     /// The draw of fog over a surface.

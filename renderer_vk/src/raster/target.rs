@@ -5,7 +5,7 @@ use crate::gpu::{ColorMask, Format, Image};
 /// Where a view is drawn.
 #[derive(Clone, Copy)]
 pub struct Target<'a> {
-    /// Colour, RGBA8.
+    /// Colour, 8 bits a channel.
     pub color: &'a Image,
     /// Depth, with a stencil or without, with as many samples as the colour.
     pub depth: &'a Image,

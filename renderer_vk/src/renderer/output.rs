@@ -9,7 +9,7 @@ use crate::api::Picture;
 use crate::assets::ImageSource;
 use crate::error::Error;
 use crate::frame::{FrameContext, Item};
-use crate::gpu::{ColorMask, Recorder};
+use crate::gpu::{ColorMask, Format, Recorder};
 use crate::raster::{self, Present};
 use crate::scene::Statistics;
 use crate::stereo::Eye;
@@ -126,12 +126,15 @@ impl Renderer {
     fn flush(&mut self, show: bool) -> Result<FrameStats, Error> {
         self.queue_image_sheet();
         self.queue_overlay();
-        self.targets.fit(&self.device, &self.settings)?;
         let mut stats = FrameStats::default();
         let show = show && !self.hidden && self.swapchain.is_some();
         let later = show && self.device.info().software;
         if later {
             self.show_finished()?;
+        }
+        if !self.queue.is_empty() {
+            let format = self.picture_format();
+            self.targets.fit(&self.device, &self.settings, format)?;
         }
         let begin = Instant::now();
         let mut recorder = self.ring.begin()?;
@@ -220,7 +223,6 @@ impl Renderer {
                             &target,
                             self.settings.display_gamma(),
                             bits,
-                            swapchain.copies(),
                         )?;
                     }
                 }
@@ -231,6 +233,25 @@ impl Renderer {
         Ok(())
     }
 
+    /// The format that the picture is drawn in. The window's own where the picture is shown just as it is: showing it
+    /// then is a copy of bytes, which software drivers make faster than a change of format. Otherwise one that every
+    /// shader can read and write.
+    pub(super) fn picture_format(&self) -> Format {
+        let traced = |(item, _): &(Item, _)| matches!(item, Item::Traced(_));
+        let plain = self.settings.display_gamma() == 1.0
+            && self.settings.effective_overbright_bits() == 0
+            && !self.settings.rt
+            && !self.queue.iter().any(traced);
+        match &self.swapchain {
+            Some(swapchain)
+                if plain && swapchain.copies() && swapchain.format() == Format::Bgra8 =>
+            {
+                Format::Bgra8
+            }
+            _ => raster::COLOR_FORMAT,
+        }
+    }
+
     /// The picture as it stands after everything queued so far, as the display shows it.
     ///
     /// # Errors
@@ -238,14 +259,21 @@ impl Renderer {
     pub fn read_pixels(&mut self) -> Result<Picture, Error> {
         self.flush(false)?;
         let (width, height) = self.size();
-        let rgba = self.device.read_image(self.targets.color())?;
+        let texels = self.device.read_image(self.targets.color())?;
+        let blue_first = self.targets.color().format() == Format::Bgra8;
         let table = overbright::gamma_table(
             self.settings.display_gamma(),
             self.settings.effective_overbright_bits(),
         );
-        let rgb = rgba
+        let rgb = texels
             .chunks_exact(4)
-            .flat_map(|p| [p[0], p[1], p[2]])
+            .flat_map(|p| {
+                if blue_first {
+                    [p[2], p[1], p[0]]
+                } else {
+                    [p[0], p[1], p[2]]
+                }
+            })
             .map(|v| table[usize::from(v)])
             .collect();
         Ok(Picture { width, height, rgb })
