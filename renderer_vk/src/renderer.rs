@@ -414,7 +414,7 @@ impl Renderer {
             && let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets)
         {
             world.calibrate(assets, self.calibrations.as_ref());
-            self.trace = Some(TraceLook::new(&self.device, world, assets)?);
+            self.trace = Some(TraceLook::new(&self.device, world, assets, &self.settings)?);
         }
         Ok(self.trace.is_some())
     }

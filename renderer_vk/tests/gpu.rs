@@ -660,6 +660,7 @@ fn rays_find_triangles_through_pipeline_and_query() {
         .map(|blas| BlasBuild {
             blas,
             geometries: &geometry,
+            refit: false,
         })
         .collect();
     device.build_static_blas(&mut builds).unwrap();
@@ -669,9 +670,16 @@ fn rays_find_triangles_through_pipeline_and_query() {
         "moving",
         BlasFlags {
             fast_build: true,
+            refit: true,
             ..BlasFlags::default()
         },
     );
+    let compact = BlasFlags {
+        compact: true,
+        ..BlasFlags::default()
+    };
+    let mut kept = Blas::new(&device, "kept", compact);
+    let mut asked = None;
     let mut tlas = Tlas::new(&device, "scene");
     let place = |blas: u64, custom_index, x, y| Instance {
         transform: [[0.5, 0.0, 0.0, x], [0.0, 0.5, 0.0, y], [0.0, 0.0, 0.5, 0.0]],
@@ -714,14 +722,39 @@ fn rays_find_triangles_through_pipeline_and_query() {
             let mut pass = rec
                 .pass("build", Access::ACCEL_BUILD, Access::ACCEL_BUILD)
                 .unwrap();
+            // a refit that was never built is built
             pass.build_blas(&mut [BlasBuild {
                 blas: &mut moving,
                 geometries: &geometry,
+                refit: true,
             }])
             .unwrap();
+            // one that stays: built in the first frame, copied to the memory that it needs two frames later
+            match (frame, by_query) {
+                (0, false) => {
+                    pass.build_blas(&mut [BlasBuild {
+                        blas: &mut kept,
+                        geometries: &geometry,
+                        refit: false,
+                    }])
+                    .unwrap();
+                    asked = Some(pass.ask_compacted_sizes(&[&kept]).unwrap());
+                }
+                (2, false) => {
+                    let sizes = asked.take().unwrap().sizes().unwrap();
+                    let before = (kept.address(), kept.size());
+                    let size = sizes.expect("frame 0 is over")[0];
+                    assert!(size > 0 && size <= before.1);
+                    pass.compact_blas(&mut kept, size).unwrap();
+                    assert_eq!(kept.size(), size);
+                    assert_ne!(kept.address(), before.0);
+                    pass.barrier();
+                }
+                _ => {}
+            }
             let mut instances = Vec::new();
             if frame > 0 {
-                instances.push(place(blases[0].address(), 7, 0.0, 0.0));
+                instances.push(place(kept.address(), 7, 0.0, 0.0));
                 instances.push(place(moving.address(), 9, 0.5, 0.5));
                 // Out of sight; many of them in the end.
                 instances.extend(
@@ -782,7 +815,7 @@ fn rays_find_triangles_through_pipeline_and_query() {
         }
     }
     drop((
-        blases, moving, tlas, vertices, indices, hits, pipeline, query, ring,
+        blases, moving, kept, tlas, vertices, indices, hits, pipeline, query, ring,
     ));
     finish(device);
 }

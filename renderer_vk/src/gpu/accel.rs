@@ -17,8 +17,10 @@ const SCRATCH: u64 = 64 << 20;
 pub struct BlasFlags {
     /// Build fast (what moves) instead of tracing fast (what stays).
     pub fast_build: bool,
-    /// May be compacted, which [`Device::build_static_blas`] does.
+    /// May be compacted, which [`Device::build_static_blas`] does, and [`Pass::compact_blas`].
     pub compact: bool,
+    /// May be refitted ([`BlasBuild::refit`]).
+    pub refit: bool,
 }
 
 /// Triangles of a bottom-level structure.
@@ -46,6 +48,9 @@ pub struct BlasBuild<'a> {
     pub blas: &'a mut Blas,
     /// Its triangles.
     pub geometries: &'a [BlasGeometry],
+    /// The triangles are those of the last build, with other positions: the structure is kept and its boxes are fitted
+    /// to them. Asked of a structure that was never built, or whose triangles differ in number, it is built.
+    pub refit: bool,
 }
 
 /// An instance of a bottom-level structure.
@@ -124,7 +129,7 @@ impl Instance {
 }
 
 /// A structure with its memory.
-struct Storage {
+pub(super) struct Storage {
     device: Device,
     raw: vk::AccelerationStructureKHR,
     size: u64,
@@ -133,7 +138,11 @@ struct Storage {
 }
 
 impl Storage {
-    fn new(
+    pub(super) fn raw(&self) -> vk::AccelerationStructureKHR {
+        self.raw
+    }
+
+    pub(super) fn new(
         device: &Device,
         name: &str,
         kind: vk::AccelerationStructureTypeKHR,
@@ -179,7 +188,7 @@ impl Drop for Storage {
     }
 }
 
-fn functions<'a>(
+pub(super) fn functions<'a>(
     device: &'a Device,
     name: &str,
 ) -> Result<&'a ash::khr::acceleration_structure::Device, Error> {
@@ -200,6 +209,8 @@ pub struct Blas {
     name: String,
     flags: BlasFlags,
     storage: Option<Storage>,
+    /// Triangles of each geometry of the last build.
+    built: Vec<u32>,
 }
 
 impl Blas {
@@ -210,6 +221,7 @@ impl Blas {
             name: name.to_owned(),
             flags,
             storage: None,
+            built: Vec::new(),
         }
     }
 
@@ -223,6 +235,22 @@ impl Blas {
         self.storage.as_ref().map_or(0, |s| s.size)
     }
 
+    /// The label.
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What can be copied to less memory, if it is built and was made for that.
+    pub(super) fn compactable(&self) -> Option<vk::AccelerationStructureKHR> {
+        let storage = self.storage.as_ref().filter(|_| self.flags.compact)?;
+        Some(storage.raw)
+    }
+
+    /// Goes on in other memory, which holds a copy.
+    pub(super) fn replace_storage(&mut self, storage: Storage) {
+        self.storage = Some(storage);
+    }
+
     fn build_flags(&self) -> vk::BuildAccelerationStructureFlagsKHR {
         use vk::BuildAccelerationStructureFlagsKHR as F;
         let mut flags = if self.flags.fast_build {
@@ -232,6 +260,9 @@ impl Blas {
         };
         if self.flags.compact {
             flags |= F::ALLOW_COMPACTION;
+        }
+        if self.flags.refit {
+            flags |= F::ALLOW_UPDATE;
         }
         flags
     }
@@ -270,7 +301,27 @@ struct Planned {
     ranges: Vec<vk::AccelerationStructureBuildRangeInfoKHR>,
     flags: vk::BuildAccelerationStructureFlagsKHR,
     target: vk::AccelerationStructureKHR,
+    /// Refitted in place.
+    refit: bool,
     scratch: u64,
+}
+
+impl Planned {
+    /// Vulkan's form, but for the scratch memory.
+    fn info(&self) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
+        use vk::BuildAccelerationStructureModeKHR as Mode;
+        let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+            .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
+            .flags(self.flags)
+            .dst_acceleration_structure(self.target)
+            .geometries(&self.geometries);
+        if self.refit {
+            info.mode(Mode::UPDATE)
+                .src_acceleration_structure(self.target)
+        } else {
+            info.mode(Mode::BUILD)
+        }
+    }
 }
 
 /// Sizes the storage of every build and plans it.
@@ -310,9 +361,10 @@ fn plan(builds: &mut [BlasBuild<'_>]) -> Result<Vec<Planned>, Error> {
                 &mut sizes,
             );
         }
-        if build.blas.size() < sizes.acceleration_structure_size {
+        let refit = build.refit && build.blas.flags.refit && build.blas.built == counts;
+        if !refit && build.blas.size() < sizes.acceleration_structure_size {
             // A structure that is built anew each frame with varying triangles should not be made anew each time.
-            let size = if build.blas.flags.fast_build {
+            let size = if build.blas.flags.fast_build && !build.blas.flags.refit {
                 sizes.acceleration_structure_size.saturating_mul(5) / 4
             } else {
                 sizes.acceleration_structure_size
@@ -331,6 +383,7 @@ fn plan(builds: &mut [BlasBuild<'_>]) -> Result<Vec<Planned>, Error> {
             .as_ref()
             .map(|s| s.raw)
             .unwrap_or_default();
+        build.blas.built.clone_from(&counts);
         planned.push(Planned {
             geometries,
             ranges: counts
@@ -341,7 +394,12 @@ fn plan(builds: &mut [BlasBuild<'_>]) -> Result<Vec<Planned>, Error> {
                 .collect(),
             flags,
             target,
-            scratch: sizes.build_scratch_size,
+            refit,
+            scratch: if refit {
+                sizes.update_scratch_size
+            } else {
+                sizes.build_scratch_size
+            },
         });
     }
     Ok(planned)
@@ -396,15 +454,9 @@ impl Pass<'_> {
             };
             let infos: Vec<_> = parts()
                 .map(|(build, at)| {
-                    vk::AccelerationStructureBuildGeometryInfoKHR::default()
-                        .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
-                        .flags(build.flags)
-                        .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
-                        .dst_acceleration_structure(build.target)
-                        .geometries(&build.geometries)
-                        .scratch_data(vk::DeviceOrHostAddressKHR {
-                            device_address: base + at,
-                        })
+                    build.info().scratch_data(vk::DeviceOrHostAddressKHR {
+                        device_address: base + at,
+                    })
                 })
                 .collect();
             let ranges: Vec<&[_]> = parts().map(|(build, _)| &build.ranges[..]).collect();
@@ -520,6 +572,11 @@ impl Tlas {
         self.storage.as_ref().map_or(0, |s| s.address)
     }
 
+    /// Bytes of its memory.
+    pub fn size(&self) -> u64 {
+        self.storage.as_ref().map_or(0, |s| s.size)
+    }
+
     /// Sees to it that the storage holds `size` bytes.
     fn reserve(&mut self, device: &Device, size: u64) -> Result<(), Error> {
         if self.storage.as_ref().is_some_and(|s| s.size >= size) {
@@ -577,85 +634,22 @@ impl Device {
         if compact.is_empty() {
             return Ok(());
         }
-        let functions = functions(self, "build_static_blas")?;
-        let raw: Vec<_> = compact
-            .iter()
-            .filter_map(|b| b.storage.as_ref().map(|s| s.raw))
-            .collect();
-        let sizes = self.compacted_sizes(functions, &raw)?;
-        // Old storages live until the copies are over.
-        let mut old = Vec::new();
-        for (blas, size) in compact.iter_mut().zip(&sizes) {
-            if *size > 0 && *size < blas.size() {
-                let new = Storage::new(
-                    self,
-                    &blas.name,
-                    vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL,
-                    *size,
-                )?;
-                let source = blas.storage.replace(new);
-                old.extend(source.map(|s| (s, blas.storage.as_ref().map(|n| n.raw))));
-            }
-        }
+        let asked = {
+            let wanted: Vec<&Blas> = compact.iter().map(|b| &**b).collect();
+            self.immediate(|rec| {
+                rec.pass("compacted_size", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?
+                    .ask_compacted_sizes(&wanted)
+            })?
+        };
+        let sizes = asked.sizes()?.unwrap_or_default();
         self.immediate(|rec| {
-            let pass = rec.pass("compact_blas", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
-            for (source, target) in &old {
-                let info = vk::CopyAccelerationStructureInfoKHR::default()
-                    .src(source.raw)
-                    .dst(target.unwrap_or_default())
-                    .mode(vk::CopyAccelerationStructureModeKHR::COMPACT);
-                // SAFETY: the target has the compacted size of the source, which was built with the flag for it.
-                unsafe { functions.cmd_copy_acceleration_structure(pass.cmd(), &info) };
+            let mut pass = rec.pass("compact_blas", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
+            for (blas, size) in compact.iter_mut().zip(&sizes) {
+                if *size < blas.size() {
+                    pass.compact_blas(blas, *size)?;
+                }
             }
             Ok(())
         })
-    }
-
-    fn compacted_sizes(
-        &self,
-        functions: &ash::khr::acceleration_structure::Device,
-        structures: &[vk::AccelerationStructureKHR],
-    ) -> Result<Vec<u64>, Error> {
-        let count = u32::try_from(structures.len()).unwrap_or(u32::MAX);
-        let kind = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
-        let info = vk::QueryPoolCreateInfo::default()
-            .query_type(kind)
-            .query_count(count);
-        // SAFETY: plain creation.
-        let pool =
-            unsafe { self.vk().create_query_pool(&info, None) }.context("vkCreateQueryPool")?;
-        let asked = self.immediate(|rec| {
-            let pass = rec.pass("compacted_size", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
-            // SAFETY: the pool is new and not in use.
-            unsafe { self.vk().cmd_reset_query_pool(pass.cmd(), pool, 0, count) };
-            // SAFETY: the structures were built with ALLOW_COMPACTION in an earlier submission.
-            unsafe {
-                functions.cmd_write_acceleration_structures_properties(
-                    pass.cmd(),
-                    structures,
-                    kind,
-                    pool,
-                    0,
-                );
-            }
-            Ok(())
-        });
-        let mut sizes = vec![0u64; structures.len()];
-        let read = asked.and_then(|()| {
-            // SAFETY: the queries were written by a submission that is over.
-            unsafe {
-                self.vk().get_query_pool_results(
-                    pool,
-                    0,
-                    &mut sizes,
-                    vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT,
-                )
-            }
-            .context("vkGetQueryPoolResults")
-        });
-        // SAFETY: nothing uses the pool any more.
-        unsafe { self.vk().destroy_query_pool(pool, None) };
-        read?;
-        Ok(sizes)
     }
 }

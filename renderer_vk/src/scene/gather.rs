@@ -9,12 +9,19 @@ use super::entity;
 use super::flares::FlareView;
 use super::mesh::{self, DeformScratch, RawMesh};
 use super::portal;
+use super::rigid::RigidMeshes;
 use super::surfaces::{
     self, LocalLight, LocalView, PendingDeform, SurfaceRun, WORLD_ENTITY, sort_key,
 };
-use super::{DynamicMesh, GatherInput, Look, Scene, Statistics, Sun, View, ViewEntity, ViewScene};
+use super::{
+    DynamicMesh, GatherInput, Look, MeshId, Scene, Shape, Statistics, Sun, View, ViewEntity,
+    ViewScene,
+};
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
 use crate::world::{Bounds, VisibleQuery, VisibleSet, WorldData};
+
+/// Stands for the map in the numbers of meshes: models have positive handles.
+const WORLD_MODEL: i32 = -1;
 
 /// Distance of the far plane without a world, units.
 const FAR_WITHOUT_WORLD: f32 = 2048.0;
@@ -26,6 +33,7 @@ pub(super) struct Scratch {
     pub(super) pending: Vec<PendingDeform>,
     pub(super) lights: Vec<LocalLight>,
     pub(super) bones: Vec<BoneMatrix>,
+    pub(super) rigid: RigidMeshes,
 }
 
 /// The views of a scene: at most one through a portal or mirror (classic look), then the main one.
@@ -131,6 +139,7 @@ impl<'a> Gatherer<'a> {
 
     fn gather(mut self, pvs_origin: Vec3, out: &mut ViewScene) {
         self.clear(out);
+        self.scratch.rigid.begin_view();
         if let Some(world) = self.world {
             self.find_visible(world, pvs_origin, out);
             self.add_world(world, out);
@@ -178,6 +187,7 @@ impl<'a> Gatherer<'a> {
         out.vertices.clear();
         out.indices.clear();
         out.meshes.clear();
+        out.rigid.clear();
         out.submodels.clear();
         out.entities.clear();
         out.surfaces.clear();
@@ -347,6 +357,11 @@ impl<'a> Gatherer<'a> {
             };
             let mut raw = RawMesh::begin(out, deform.material, instance, surface.fog);
             raw.world_surface = Some(deform.surface);
+            raw.shape = Shape::Animated(MeshId {
+                model: WORLD_MODEL,
+                level: 0,
+                surface: deform.surface,
+            });
             let first = surface.first_index as usize;
             let range = first..first + surface.index_count as usize;
             let base = count(out.vertices.len());

@@ -6,7 +6,7 @@ use shaderscript::Deform;
 use shaderscript::eval::{self, DeformContext, DeformVertex, ShadowProjection};
 
 use super::entity::into_axes;
-use super::{DynamicMesh, View, ViewScene};
+use super::{DynamicMesh, Shape, View, ViewScene};
 use crate::api::{RefDef, RefEntity};
 use crate::assets::Materials;
 
@@ -33,6 +33,8 @@ pub(super) struct RawMesh {
     pub fog: u32,
     /// World surface that it is the copy of.
     pub world_surface: Option<u32>,
+    /// How much of it is the same in the next frame.
+    pub shape: Shape,
 }
 
 impl RawMesh {
@@ -45,6 +47,7 @@ impl RawMesh {
             instance,
             fog,
             world_surface: None,
+            shape: Shape::Changing,
         }
     }
 }
@@ -101,6 +104,7 @@ pub(super) fn finish(
         instance: raw.instance,
         fog: raw.fog,
         world_surface: raw.world_surface,
+        shape: raw.shape,
     };
     out.meshes.push(mesh);
     Some(mesh)

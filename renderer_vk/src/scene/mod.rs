@@ -14,12 +14,15 @@ mod lighting;
 mod mesh;
 mod models;
 mod portal;
+mod rigid;
 mod shadow_volumes;
 mod shapes;
 mod sky;
 mod statistics;
 mod surfaces;
 pub mod view;
+
+use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
 use shaders::types::{Instance, Vertex};
@@ -32,6 +35,7 @@ use crate::stereo::Eye;
 use crate::world::{VisibleSet, World, WorldData};
 pub use flares::ViewFlare;
 pub use lighting::light_for_point;
+pub use rigid::{MeshId, RigidMesh, Shape};
 pub use shadow_volumes::ShadowVolumes;
 pub(crate) use shapes::perpendicular;
 pub use sky::{CELLS as SKY_CELLS, Cells, FACES as SKY_FACES, SkyCoverage, VisibleSky, cube_point};
@@ -97,6 +101,31 @@ pub struct DynamicMesh {
     pub fog: u32,
     /// The index of the world surface that this mesh is the deformed copy of.
     pub world_surface: Option<u32>,
+    /// How much of it is the same in the next frame.
+    pub shape: Shape,
+}
+
+/// The triangles of a mesh, wherever they are kept; in the space of its instance.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshGeometry<'a> {
+    /// Vertices.
+    pub vertices: &'a [Vertex],
+    /// Indices, three a triangle: `vertices[index - base]`.
+    pub indices: &'a [u32],
+    /// What the indices count from.
+    pub base: u32,
+}
+
+impl MeshGeometry<'_> {
+    /// Triangles as indices into `vertices`; those that point elsewhere are left out.
+    pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        let corner = |i: u32| {
+            let local = i.checked_sub(self.base)?;
+            ((local as usize) < self.vertices.len()).then_some(local)
+        };
+        let triangles = self.indices.as_chunks::<3>().0.iter();
+        triangles.filter_map(move |&[a, b, c]| Some([corner(a)?, corner(b)?, corner(c)?]))
+    }
 }
 
 /// An inline model of the map (`*n`) placed in this view.
@@ -185,6 +214,8 @@ pub struct ViewScene {
     pub indices: Vec<u32>,
     /// What moves. For the traced look these are all meshes of the view; for the classic look those not culled.
     pub meshes: Vec<DynamicMesh>,
+    /// Meshes that keep their shape (traced look only), see [`Shape::Rigid`]; one may occur many times.
+    pub rigid: Vec<Arc<RigidMesh>>,
     /// Inline models.
     pub submodels: Vec<Submodel>,
     /// The entities that added something, in the game's order.
@@ -227,6 +258,31 @@ impl ViewScene {
         source.get(range).unwrap_or_default()
     }
 
+    /// The vertices of a mesh, and its indices, which count from [`MeshGeometry::base`].
+    pub fn mesh_geometry(&self, mesh: &DynamicMesh) -> MeshGeometry<'_> {
+        let range = |first: u32, count: u32| {
+            let first = first as usize;
+            first..first.saturating_add(count as usize)
+        };
+        if let Shape::Rigid(rigid) = mesh.shape {
+            let rigid = self.rigid.get(rigid as usize);
+            return MeshGeometry {
+                vertices: rigid.map_or(&[], |r| &r.vertices),
+                indices: rigid.map_or(&[], |r| &r.indices),
+                base: 0,
+            };
+        }
+        let vertices = self
+            .vertices
+            .get(range(mesh.first_vertex, mesh.vertex_count));
+        let indices = self.indices.get(range(mesh.first_index, mesh.index_count));
+        MeshGeometry {
+            vertices: vertices.unwrap_or_default(),
+            indices: indices.unwrap_or_default(),
+            base: mesh.first_vertex,
+        }
+    }
+
     /// Nothing, seen by a camera.
     pub(crate) fn empty(def: &RefDef, view: View) -> Self {
         Self {
@@ -237,6 +293,7 @@ impl ViewScene {
             vertices: Vec::new(),
             indices: Vec::new(),
             meshes: Vec::new(),
+            rigid: Vec::new(),
             submodels: Vec::new(),
             entities: Vec::new(),
             surfaces: Vec::new(),
@@ -330,6 +387,7 @@ impl Scene {
     /// Forgets everything that belongs to a map or a registration.
     pub fn reset(&mut self) {
         self.clear();
+        self.scratch.rigid.clear();
         self.visible.reset();
         self.portal_visible.reset();
     }

@@ -11,7 +11,7 @@ use shaders::types::Vertex;
 use super::gather::{Gatherer, count};
 use super::key_frames::{self, Frames};
 use super::mesh::RawMesh;
-use super::{Look, ViewScene};
+use super::{DynamicMesh, Look, MeshId, Shape, ViewScene};
 use crate::api::{RefEntity, renderfx};
 use crate::assets::{IqmModel, Md3Lod, MdrModel, Model};
 use crate::world::Bounds;
@@ -31,6 +31,46 @@ pub(super) struct Placed<'a> {
     instance: u32,
     /// Fog volume plus one; 0 none.
     fog: u32,
+}
+
+/// A key frame that a model stands still in.
+#[derive(Clone, Copy)]
+struct StillFrame {
+    frame: usize,
+    /// The model has no other.
+    only: bool,
+}
+
+/// What a surface of a model is made from.
+struct SurfaceSource<'a> {
+    id: MeshId,
+    name: &'a str,
+    /// The materials that the model itself has for it.
+    materials: &'a [u32],
+    /// It stands still.
+    still: Option<StillFrame>,
+}
+
+impl Placed<'_> {
+    fn source<'a>(
+        &self,
+        name: &'a str,
+        materials: &'a [u32],
+        level: usize,
+        surface: usize,
+        still: Option<StillFrame>,
+    ) -> SurfaceSource<'a> {
+        SurfaceSource {
+            id: MeshId {
+                model: self.entity.model,
+                level: count(level),
+                surface: count(surface),
+            },
+            name,
+            materials,
+            still,
+        }
+    }
 }
 
 impl Gatherer<'_> {
@@ -81,8 +121,13 @@ impl Gatherer<'_> {
             Frames::of(&RefEntity::default(), 1)
         };
         let placed = self.place(placed, frame.local_origin, frame.radius, out);
-        for (surface, own) in lod.md3.surfaces.iter().zip(&lod.materials) {
-            self.add_surface(&placed, &surface.name, own, out, |out| {
+        let still = (frames.backlerp == 0.0).then_some(StillFrame {
+            frame: frames.new,
+            only: lod.md3.frames.len() == 1,
+        });
+        for (index, (surface, own)) in lod.md3.surfaces.iter().zip(&lod.materials).enumerate() {
+            let source = placed.source(&surface.name, own, level, index, still);
+            self.add_surface(&placed, source, out, |out| {
                 let base = count(out.vertices.len());
                 key_frames::append_vertices(surface, frames, &mut out.vertices);
                 append_triangles(base, &surface.triangles, &mut out.indices);
@@ -106,9 +151,10 @@ impl Gatherer<'_> {
         let placed = self.place(placed, frame.local_origin, frame.radius, out);
         let mut bones = std::mem::take(&mut self.scratch.bones);
         mdr.pose(frames.new, frames.old, frames.backlerp, &mut bones);
-        for (surface, own) in surfaces.iter().zip(materials) {
+        for (index, (surface, own)) in surfaces.iter().zip(materials).enumerate() {
             let own = std::slice::from_ref(own);
-            self.add_surface(&placed, &surface.name, own, out, |out| {
+            let source = placed.source(&surface.name, own, level, index, None);
+            self.add_surface(&placed, source, out, |out| {
                 append_mdr(surface, &bones, out);
             });
         }
@@ -141,9 +187,14 @@ impl Gatherer<'_> {
         let mut pose = std::mem::take(&mut self.scratch.bones);
         let Frames { new, old, backlerp } = frames;
         iqm.pose(&model.skeleton, new, old, backlerp, &mut pose);
-        for (surface, own) in iqm.surfaces.iter().zip(&model.materials) {
+        let still = (backlerp == 0.0).then_some(StillFrame {
+            frame: new,
+            only: iqm.num_frames <= 1,
+        });
+        for (index, (surface, own)) in iqm.surfaces.iter().zip(&model.materials).enumerate() {
             let own = std::slice::from_ref(own);
-            self.add_surface(&placed, &surface.name, own, out, |out| {
+            let source = placed.source(&surface.name, own, 0, index, still);
+            self.add_surface(&placed, source, out, |out| {
                 append_iqm(iqm, surface, &pose, out);
             });
         }
@@ -196,26 +247,79 @@ impl Gatherer<'_> {
     fn add_surface(
         &mut self,
         placed: &Placed<'_>,
-        name: &str,
-        own: &[u32],
+        source: SurfaceSource<'_>,
         out: &mut ViewScene,
         append: impl Fn(&mut ViewScene),
     ) {
         let materials = self.input.materials;
-        let asked = self.surface_material(placed.entity, name, own);
+        let asked = self.surface_material(placed.entity, source.name, source.materials);
         // only opaque surfaces outside of fog cast shadows
         let opaque = materials.get(asked).sort == shaderscript::sort::OPAQUE;
         let shadow = placed.shadow.filter(|_| opaque && placed.fog == 0);
         let volumes = opaque && placed.fog == 0 && self.casts_volumes(placed.entity);
         for asked in shadow.into_iter().chain((!placed.hidden).then_some(asked)) {
             let material = materials.resolve(asked);
-            let raw = RawMesh::begin(out, material, placed.instance, placed.fog);
+            let mut raw = RawMesh::begin(out, material, placed.instance, placed.fog);
+            raw.shape = Shape::Animated(source.id);
+            if self.add_rigid(&source, &raw, out, &append) {
+                continue;
+            }
             append(out);
             if volumes && Some(asked) != shadow {
                 out.add_shadow_volumes(&raw);
             }
             self.finish_and_list(raw, asked, placed.number, Some(placed.entity), out);
         }
+    }
+
+    /// Adds a surface whose vertices need not be made anew; `false` for one that moves, or that the classic look draws,
+    /// which copies all vertices of a view together.
+    fn add_rigid(
+        &mut self,
+        source: &SurfaceSource<'_>,
+        raw: &RawMesh,
+        out: &mut ViewScene,
+        append: &impl Fn(&mut ViewScene),
+    ) -> bool {
+        let Some(still) = source.still.filter(|_| {
+            self.look == Look::Traced && !self.input.materials.get(raw.material).deforms()
+        }) else {
+            return false;
+        };
+        let make = || {
+            append(out);
+            let vertices = out.vertices.split_off(raw.first_vertex);
+            let mut indices = out.indices.split_off(raw.first_index);
+            for index in &mut indices {
+                *index = index.wrapping_sub(count(raw.first_vertex));
+            }
+            let finite = vertices.iter().all(|v| v.position.is_finite());
+            if finite {
+                (vertices, indices)
+            } else {
+                (Vec::new(), Vec::new())
+            }
+        };
+        let rigid = &mut self.scratch.rigid;
+        let Some(mesh) = rigid.get(source.id, still.frame, still.only, make) else {
+            return false;
+        };
+        if !mesh.indices.is_empty() {
+            let shape = Shape::Rigid(count(out.rigid.len()));
+            out.rigid.push(mesh);
+            out.meshes.push(DynamicMesh {
+                first_index: count(out.indices.len()),
+                index_count: 0,
+                first_vertex: count(out.vertices.len()),
+                vertex_count: 0,
+                material: raw.material,
+                instance: raw.instance,
+                fog: raw.fog,
+                world_surface: None,
+                shape,
+            });
+        }
+        true
     }
 
     /// The material that an entity casts a planar shadow with, if it casts one (`cg_shadows 3`). Traced views have

@@ -1,78 +1,26 @@
-//! The acceleration structures of a frame: what moves, and the top level over everything.
+//! The acceleration structures of a frame: the top level over the map and everything that moves.
 //!
-//! Meshes that move come with vertices in the space of their entity. For the build they are transformed into world
-//! space on the CPU; the hit shading reads the untransformed ones. All meshes that a ray treats alike go into one
-//! bottom-level structure, so a frame builds at most twelve of them, in one batch.
+//! Models are instances of structures that are kept (`shapes`). Polygons, sprites and beams, of which nothing outlives
+//! the frame, are placed in world space on the CPU; those that a ray treats alike share one structure, built each frame.
+//! All builds of a frame are one batch.
 
 use glam::{Mat3, Vec3};
-use shaders::trace_types::constants::{
-    MASK_FIRST_SOLID, MASK_FIRST_TRANSLUCENT, MASK_NO_SHADOW, MASK_SKY, MASK_SOLID,
-    MASK_THIRD_SOLID, MASK_THIRD_TRANSLUCENT, MASK_TRANSLUCENT, NO_INSTANCE,
-};
+use shaders::trace_types::constants::NO_INSTANCE;
 use shaders::trace_types::{BvhInstance, GeometryRecord};
-use shaders::types::Triangle;
-use shaders::types::constants as c;
 
 use super::bvh::{Aabb, build, build_triangles};
-use super::geometry::{StaticBlas, StaticGeometry, Structure, rank_bits};
+use super::geometry::{StaticGeometry, Structure};
 use super::input::{Kind, MaterialTable, Tracer};
+use super::parts::{Parts, Seen, Slot, axes, is_solid};
+use super::shapes::{Bottom, OwnBottom, Shapes};
 use crate::gpu::{
     self, Access, Blas, BlasBuild, BlasFlags, BlasGeometry, Device, Error, Recorder, Tlas,
 };
-use crate::scene::{DynamicMesh, ViewScene};
-
-/// Who sees a mesh that moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Seen {
-    /// Every ray.
-    Always,
-    /// The eye alone.
-    FirstPerson,
-    /// Mirrors, shadows and bounced light.
-    ThirdPerson,
-    /// Everything but shadows.
-    NoShadow,
-}
-
-impl Seen {
-    fn of(flags: u32) -> Self {
-        if flags & c::INSTANCE_FIRST_PERSON != 0 {
-            Self::FirstPerson
-        } else if flags & c::INSTANCE_THIRD_PERSON != 0 {
-            Self::ThirdPerson
-        } else if flags & c::INSTANCE_NO_SHADOW != 0 {
-            Self::NoShadow
-        } else {
-            Self::Always
-        }
-    }
-}
-
-/// Mask of a top-level instance.
-fn mask(seen: Seen, kind: Kind) -> u8 {
-    match (seen, kind) {
-        (_, Kind::Sky) => MASK_SKY,
-        (Seen::Always | Seen::NoShadow, Kind::Translucent) => MASK_TRANSLUCENT,
-        (Seen::FirstPerson, Kind::Translucent) => MASK_FIRST_TRANSLUCENT,
-        (Seen::ThirdPerson, Kind::Translucent) => MASK_THIRD_TRANSLUCENT,
-        (Seen::Always, _) => MASK_SOLID,
-        (Seen::FirstPerson, _) => MASK_FIRST_SOLID,
-        (Seen::ThirdPerson, _) => MASK_THIRD_SOLID,
-        (Seen::NoShadow, _) => MASK_NO_SHADOW,
-    }
-}
+use crate::scene::ViewScene;
 
 /// Hit group: solids report the nearest hit, translucent layers search in their any-hit shader.
 fn hit_group(kind: Kind) -> u32 {
     u32::from(kind == Kind::Translucent)
-}
-
-/// Meshes that move and that rays treat alike.
-struct Slot {
-    seen: Seen,
-    kind: Kind,
-    triangles: Vec<Triangle>,
-    indices: Vec<[u32; 3]>,
 }
 
 /// What a frame's rays are traced against.
@@ -94,6 +42,34 @@ pub struct AccelOutput {
     pub first_person: bool,
 }
 
+/// Bytes of the structures that rays are traced against, by what they hold. What is made for one frame alone is counted
+/// as it was in the last one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AccelMemory {
+    /// The map, with its triangle records.
+    pub map: u64,
+    /// Models that keep their shape, however often they are placed.
+    pub models: u64,
+    /// What is fitted to its vertices each frame.
+    pub animated: u64,
+    /// Triangle records of models.
+    pub skins: u64,
+    /// What is built anew each frame.
+    pub changing: u64,
+    /// The top level.
+    pub top: u64,
+}
+
+/// What is placed, before it is built.
+enum Part<'a> {
+    /// Of the map.
+    Static(&'a Structure),
+    /// Index of the slot.
+    Slot(usize),
+    /// Index of the part.
+    Kept(usize, super::shapes::Prepared),
+}
+
 /// A structure in its place.
 struct Placement<'a> {
     part: Part<'a>,
@@ -104,50 +80,27 @@ struct Placement<'a> {
     kind: Kind,
 }
 
-/// What is placed.
-enum Part<'a> {
-    Static(&'a StaticBlas),
-    /// Index of the slot.
-    Slot(usize),
-}
-
-/// The driver's structures for what changes from frame to frame.
+/// The driver's structures that are built in each frame.
 struct DriverStructures {
+    /// One for each slot.
     slots: Vec<Blas>,
     tlas: Tlas,
 }
 
 /// Builds the structures of each frame in storage that stays.
 pub struct Accel {
-    slots: Vec<Slot>,
+    parts: Parts,
+    shapes: Shapes,
     /// With the tracers that walk them.
     driver: Option<DriverStructures>,
-    positions: Vec<Vec3>,
-    used: Vec<bool>,
+    /// Bytes of our own structures that were made for the last frame: bottom and top.
+    own_bytes: [u64; 2],
 }
-
-const SEEN: [Seen; 4] = [
-    Seen::Always,
-    Seen::FirstPerson,
-    Seen::ThirdPerson,
-    Seen::NoShadow,
-];
-const KINDS: [Kind; 4] = [Kind::Opaque, Kind::Tested, Kind::Translucent, Kind::Sky];
 
 impl Accel {
     /// Empty structures.
     pub fn new(device: &Device, tracer: Tracer) -> Self {
-        let mut slots = Vec::new();
-        for seen in SEEN {
-            for kind in KINDS {
-                slots.push(Slot {
-                    seen,
-                    kind,
-                    triangles: Vec::new(),
-                    indices: Vec::new(),
-                });
-            }
-        }
+        let parts = Parts::default();
         let flags = BlasFlags {
             fast_build: true,
             ..BlasFlags::default()
@@ -155,13 +108,35 @@ impl Accel {
         let blas = |s: &Slot| Blas::new(device, &format!("trace {:?} {:?}", s.seen, s.kind), flags);
         Self {
             driver: (tracer != Tracer::Compute).then(|| DriverStructures {
-                slots: slots.iter().map(blas).collect(),
+                slots: parts.slots.iter().map(blas).collect(),
                 tlas: Tlas::new(device, "trace scene"),
             }),
-            slots,
-            positions: Vec::new(),
-            used: Vec::new(),
+            parts,
+            shapes: Shapes::new(device, tracer),
+            own_bytes: [0; 2],
         }
+    }
+
+    /// Bytes of everything but the map.
+    pub fn memory(&self) -> AccelMemory {
+        let shapes = self.shapes.memory();
+        let [changing, top] = self.driver.as_ref().map_or(self.own_bytes, |driver| {
+            let slots = driver.slots.iter().map(Blas::size).sum();
+            [slots, driver.tlas.size()]
+        });
+        AccelMemory {
+            map: 0,
+            models: shapes.rigid,
+            animated: shapes.animated,
+            skins: shapes.skins,
+            changing,
+            top,
+        }
+    }
+
+    /// How many structures are kept: of models that keep their shape, and such as are fitted each frame.
+    pub fn counts(&self) -> [usize; 2] {
+        self.shapes.counts()
     }
 
     /// Builds the structures of a view. `geometry`: the map, if the view shows it.
@@ -175,16 +150,13 @@ impl Accel {
         geometry: Option<&StaticGeometry>,
         materials: &dyn MaterialTable,
     ) -> Result<AccelOutput, Error> {
-        self.collect(view, materials);
+        self.parts.collect(view, materials);
+        self.shapes.begin_view();
         let vertices = rec.arena().push(&view.vertices)?;
         let mut output = AccelOutput {
             instances: rec.arena().push(&view.instances)?,
             vertices,
-            first_person: self.slots.iter().any(|s| {
-                s.seen == Seen::FirstPerson
-                    && s.kind != Kind::Translucent
-                    && !s.triangles.is_empty()
-            }),
+            first_person: self.shows_first_person(),
             ..AccelOutput::default()
         };
         let mut records: Vec<GeometryRecord> = Vec::new();
@@ -206,7 +178,11 @@ impl Accel {
                 let Some(instance) = view.instances.get(index as usize) else {
                     continue;
                 };
-                let [x, y, z] = instance.axis;
+                let axis = axes(instance);
+                // flattened to nothing it is not to be seen
+                if !is_solid(axis) {
+                    continue;
+                }
                 for part in geometry.structures.iter().filter(|s| s.model == model) {
                     let record = GeometryRecord {
                         triangles: part.triangles,
@@ -214,20 +190,37 @@ impl Accel {
                         instance: index,
                         kind: part.kind.index(),
                     };
-                    let mask = mask(Seen::Always, part.kind);
-                    let axis = Mat3::from_cols(x, y, z);
-                    place(
-                        Part::Static(part),
-                        axis,
-                        instance.origin,
-                        mask,
-                        part.kind,
-                        record,
-                    );
+                    let mask = Seen::Always.mask(part.kind);
+                    let structure = Part::Static(&part.structure);
+                    place(structure, axis, instance.origin, mask, part.kind, record);
                 }
             }
         }
-        for (index, slot) in self.slots.iter().enumerate() {
+        for (index, part) in self.parts.parts.iter().enumerate() {
+            let Some(instance) = view.instances.get(part.instance as usize) else {
+                continue;
+            };
+            let prepared = self
+                .shapes
+                .prepare(rec, view, &self.parts, part, vertices)?;
+            let record = GeometryRecord {
+                triangles: prepared.triangles,
+                vertices: prepared.vertices,
+                instance: part.instance,
+                kind: part.kind.index(),
+            };
+            let mask = part.seen.mask(part.kind);
+            let kept = Part::Kept(index, prepared);
+            place(
+                kept,
+                axes(instance),
+                instance.origin,
+                mask,
+                part.kind,
+                record,
+            );
+        }
+        for (index, slot) in self.parts.slots.iter().enumerate() {
             if slot.triangles.is_empty() {
                 continue;
             }
@@ -237,123 +230,37 @@ impl Accel {
                 instance: NO_INSTANCE,
                 kind: slot.kind.index(),
             };
-            let mask = mask(slot.seen, slot.kind);
-            place(
-                Part::Slot(index),
-                Mat3::IDENTITY,
-                Vec3::ZERO,
-                mask,
-                slot.kind,
-                record,
-            );
+            let mask = slot.seen.mask(slot.kind);
+            let part = Part::Slot(index);
+            place(part, Mat3::IDENTITY, Vec3::ZERO, mask, slot.kind, record);
         }
         output.geometries = rec.arena().push(&records)?;
-        match &mut self.driver {
-            Some(driver) => {
-                driver.build(rec, &self.slots, &self.positions, &placed)?;
-                output.scene = driver.tlas.index();
-            }
-            None => {
-                (output.nodes, output.placed) =
-                    build_own(rec, &self.slots, &self.positions, &placed)?;
-            }
+        if self.driver.is_some() {
+            output.scene = self.build_driver(rec, &placed)?;
+        } else {
+            (output.nodes, output.placed) = self.build_own(rec, &placed)?;
         }
         Ok(output)
     }
 
-    /// Sorts the view's meshes into slots and moves their vertices to world space.
-    fn collect(&mut self, view: &ViewScene, materials: &dyn MaterialTable) {
-        for slot in &mut self.slots {
-            slot.triangles.clear();
-            slot.indices.clear();
-        }
-        self.positions.clear();
-        self.positions
-            .extend(view.vertices.iter().map(|v| v.position));
-        self.used.clear();
-        self.used.resize(view.vertices.len(), false);
-        // in drawing order, so that of two translucent layers in one plane the later primitive is drawn later
-        let mut order: Vec<(f32, u32, usize)> = Vec::with_capacity(view.meshes.len());
-        for (index, mesh) in view.meshes.iter().enumerate() {
-            let (_, info) = materials.info(mesh.material);
-            order.push((info.sort, info.order, index));
-        }
-        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
-        for (_, _, index) in order {
-            if let Some(mesh) = view.meshes.get(index) {
-                self.add_mesh(view, mesh, materials);
-            }
-        }
+    /// Whether anything that stops a ray is seen by the eye alone.
+    fn shows_first_person(&self) -> bool {
+        let solid = |seen, kind| seen == Seen::FirstPerson && kind != Kind::Translucent;
+        let parts = self.parts.parts.iter();
+        let mut slots = self.parts.slots.iter();
+        slots.any(|s| solid(s.seen, s.kind) && !s.triangles.is_empty())
+            || parts.into_iter().any(|p| solid(p.seen, p.kind))
     }
 
-    fn add_mesh(&mut self, view: &ViewScene, mesh: &DynamicMesh, materials: &dyn MaterialTable) {
-        let (material, info) = materials.info(mesh.material);
-        let Some(instance) = view.instances.get(mesh.instance as usize) else {
-            return;
+    /// Builds what the driver's tracers walk: the bottom level in one batch, then the top level, whose index it returns.
+    fn build_driver(&mut self, rec: &mut Recorder, placed: &[Placement<'_>]) -> Result<u32, Error> {
+        let Some(driver) = &mut self.driver else {
+            return Ok(gpu::NO_INDEX);
         };
-        let Some(kind) = Kind::of(info.flags) else {
-            return;
-        };
-        let seen = Seen::of(instance.flags);
-        let slot = self
-            .slots
-            .iter_mut()
-            .find(|s| s.seen == seen && s.kind == kind);
-        let Some(slot) = slot else {
-            return;
-        };
-        let first = mesh.first_vertex as usize;
-        let range = first..first.saturating_add(mesh.vertex_count as usize);
-        let axis = Mat3::from_cols(instance.axis[0], instance.axis[1], instance.axis[2]);
-        if let (Some(positions), Some(used)) = (
-            self.positions.get_mut(range.clone()),
-            self.used.get_mut(range),
-        ) {
-            for (position, used) in positions.iter_mut().zip(used) {
-                // two meshes of one entity may share vertices
-                if !std::mem::replace(used, true) {
-                    *position = axis * *position + instance.origin;
-                }
-            }
-        }
-        // what is baked into the world's own vertices is not part of the material
-        let world = if mesh.world_surface.is_some() {
-            c::TRIANGLE_WORLD
-        } else {
-            0
-        };
-        let first = mesh.first_index as usize;
-        let range = first..first.saturating_add(mesh.index_count as usize);
-        for corner in view.indices.get(range).unwrap_or_default().chunks_exact(3) {
-            let indices = [corner[0], corner[1], corner[2]];
-            if indices.iter().any(|&i| i as usize >= view.vertices.len()) {
-                continue;
-            }
-            slot.indices.push(indices);
-            slot.triangles.push(Triangle {
-                indices,
-                material,
-                instance: mesh.instance,
-                fog: mesh.fog,
-                lightmap: c::NO_TEXTURE,
-                flags: world | rank_bits(&info),
-            });
-        }
-    }
-}
-
-impl DriverStructures {
-    /// Builds the bottom level of what moves in one batch, then the top level.
-    fn build(
-        &mut self,
-        rec: &mut Recorder,
-        slots: &[Slot],
-        positions: &[Vec3],
-        placed: &[Placement<'_>],
-    ) -> Result<(), Error> {
+        let positions = &self.parts.positions;
         let vertex_address = rec.arena().push(positions)?;
-        let mut geometries = Vec::with_capacity(slots.len());
-        for slot in slots {
+        let mut geometries = Vec::with_capacity(self.parts.slots.len());
+        for slot in &self.parts.slots {
             geometries.push([BlasGeometry {
                 vertex_address,
                 vertex_stride: size_of::<Vec3>() as u64,
@@ -365,14 +272,26 @@ impl DriverStructures {
             }]);
         }
         let mut pass = rec.pass("trace_accel", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
-        let mut builds: Vec<BlasBuild<'_>> = (self.slots.iter_mut().zip(&geometries))
+        let changing = (driver.slots.iter_mut().zip(&geometries))
             .filter(|(_, geometries)| geometries[0].triangle_count > 0)
-            .map(|(blas, geometries)| BlasBuild { blas, geometries })
-            .collect();
-        if !builds.is_empty() {
-            pass.build_blas(&mut builds)?;
-            pass.barrier();
-        }
+            .map(|(blas, geometries)| BlasBuild {
+                blas,
+                geometries,
+                refit: false,
+            });
+        self.shapes.build(&mut pass, changing.collect())?;
+        let address = |part: &Part<'_>| match part {
+            Part::Static(Structure::Driver(blas)) => blas.address(),
+            Part::Slot(index) => driver.slots.get(*index).map_or(0, Blas::address),
+            Part::Kept(index, prepared) => {
+                let part = self.parts.parts.get(*index);
+                match part.and_then(|part| self.shapes.bottom(&self.parts, part, prepared)) {
+                    Some(Bottom::Driver(address)) => address,
+                    Some(Bottom::Own(_)) | None => 0,
+                }
+            }
+            Part::Static(Structure::Own(_)) => 0,
+        };
         let instances: Vec<gpu::Instance> = placed
             .iter()
             .map(|p| gpu::Instance {
@@ -383,80 +302,90 @@ impl DriverStructures {
                 cull_disable: true,
                 flip_facing: false,
                 force_opaque: None,
-                blas: match &p.part {
-                    Part::Static(part) => match &part.structure {
-                        Structure::Driver(blas) => blas.address(),
-                        Structure::Own(_) => 0,
-                    },
-                    Part::Slot(index) => self.slots.get(*index).map_or(0, Blas::address),
-                },
+                blas: address(&p.part),
             })
             .collect();
-        pass.build_tlas(&mut self.tlas, &instances)
+        pass.build_tlas(&mut driver.tlas, &instances)?;
+        Ok(driver.tlas.index())
     }
-}
 
-/// Builds our own hierarchies of what moves and the one over everything; their addresses in the frame's memory.
-fn build_own(
-    rec: &mut Recorder,
-    slots: &[Slot],
-    positions: &[Vec3],
-    placed: &[Placement<'_>],
-) -> Result<(u64, u64), Error> {
-    let mut instances = Vec::with_capacity(placed.len());
-    let mut boxes = Vec::with_capacity(placed.len());
-    let position = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::NAN);
-    for p in placed {
-        let (nodes, triangles, bounds) = match &p.part {
-            Part::Static(part) => match &part.structure {
-                Structure::Own(own) => (own.nodes.address(), own.triangles.address(), own.bounds),
-                Structure::Driver(_) => continue,
-            },
-            Part::Slot(index) => {
-                let indices = slots.get(*index).map_or(&[][..], |s| &s.indices);
-                let corners: Vec<[Vec3; 3]> = indices.iter().map(|t| t.map(position)).collect();
-                let Some(hierarchy) = build_triangles(&corners) else {
-                    continue;
-                };
-                let nodes = rec.arena().push(&hierarchy.nodes)?;
-                (
-                    nodes,
-                    rec.arena().push(&hierarchy.triangles)?,
-                    hierarchy.bounds,
-                )
-            }
-        };
-        // flattened to nothing it is not to be seen
-        if p.axis.determinant().abs() < 1.0e-12 {
-            continue;
+    /// Builds our own hierarchies of what changes and the one over everything; their addresses in the frame's memory.
+    fn build_own(
+        &mut self,
+        rec: &mut Recorder,
+        placed: &[Placement<'_>],
+    ) -> Result<(u64, u64), Error> {
+        let mut instances = Vec::with_capacity(placed.len());
+        let mut boxes = Vec::with_capacity(placed.len());
+        let positions = &self.parts.positions;
+        let position = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::NAN);
+        let mut changing = 0;
+        for p in placed {
+            let found = match &p.part {
+                Part::Static(Structure::Own(own)) => Some(OwnBottom {
+                    nodes: own.nodes.address(),
+                    triangles: own.triangles.address(),
+                    bounds: own.bounds,
+                }),
+                Part::Slot(index) => {
+                    let indices = self.parts.slots.get(*index).map_or(&[][..], |s| &s.indices);
+                    let corners: Vec<[Vec3; 3]> = indices.iter().map(|t| t.map(position)).collect();
+                    match build_triangles(&corners) {
+                        Some(hierarchy) => {
+                            changing += size_of_val(hierarchy.nodes.as_slice())
+                                + size_of_val(hierarchy.triangles.as_slice());
+                            Some(OwnBottom {
+                                nodes: rec.arena().push(&hierarchy.nodes)?,
+                                triangles: rec.arena().push(&hierarchy.triangles)?,
+                                bounds: hierarchy.bounds,
+                            })
+                        }
+                        None => None,
+                    }
+                }
+                Part::Kept(index, prepared) => {
+                    let part = self.parts.parts.get(*index);
+                    match part.and_then(|part| self.shapes.bottom(&self.parts, part, prepared)) {
+                        Some(Bottom::Own(own)) => Some(own),
+                        Some(Bottom::Driver(_)) | None => None,
+                    }
+                }
+                Part::Static(Structure::Driver(_)) => None,
+            };
+            let Some(own) = found else {
+                continue;
+            };
+            let inverse = p.axis.inverse();
+            boxes.push(
+                own.bounds
+                    .corners()
+                    .iter()
+                    .fold(Aabb::EMPTY, |b, &c| b.with(p.axis * c + p.origin)),
+            );
+            instances.push(BvhInstance {
+                nodes: own.nodes,
+                triangles: own.triangles,
+                to_object: rows(inverse, -(inverse * p.origin)),
+                geometry: p.record,
+                mask: u32::from(p.mask),
+                kind: p.kind.index(),
+                padding: 0,
+            });
         }
-        let inverse = p.axis.inverse();
-        boxes.push(
-            bounds
-                .corners()
-                .iter()
-                .fold(Aabb::EMPTY, |b, &c| b.with(p.axis * c + p.origin)),
-        );
-        instances.push(BvhInstance {
-            nodes,
-            triangles,
-            to_object: rows(inverse, -(inverse * p.origin)),
-            geometry: p.record,
-            mask: u32::from(p.mask),
-            kind: p.kind.index(),
-            padding: 0,
-        });
+        // an instance costs as much as a node, and more
+        let top = build(&boxes, 1);
+        let ordered: Vec<BvhInstance> = top
+            .order
+            .iter()
+            .filter_map(|&i| instances.get(i as usize).copied())
+            .collect();
+        let bytes = size_of_val(top.nodes.as_slice()) + size_of_val(ordered.as_slice());
+        self.own_bytes = [changing as u64, bytes as u64];
+        if top.nodes.is_empty() {
+            return Ok((0, 0));
+        }
+        Ok((rec.arena().push(&top.nodes)?, rec.arena().push(&ordered)?))
     }
-    let top = build(&boxes);
-    if top.nodes.is_empty() {
-        return Ok((0, 0));
-    }
-    let ordered: Vec<BvhInstance> = top
-        .order
-        .iter()
-        .filter_map(|&i| instances.get(i as usize).copied())
-        .collect();
-    Ok((rec.arena().push(&top.nodes)?, rec.arena().push(&ordered)?))
 }
 
 /// Rows of the matrix that places an entity.

@@ -4,8 +4,8 @@
 use glam::Vec3;
 use shaders::trace_types::{BvhNode, BvhTriangle};
 
-/// Entries of a leaf that are no longer split.
-const LEAF: usize = 4;
+/// Triangles of a leaf that are no longer split.
+pub const LEAF: usize = 4;
 /// Bins on an axis.
 const BINS: usize = 12;
 /// Depth at which splitting by cost gives way to splitting in halves, which ends after at most 32 more levels, so that
@@ -61,7 +61,8 @@ impl Aabb {
         })
     }
 
-    fn half_area(self) -> f32 {
+    /// Half of its surface.
+    pub fn half_area(self) -> f32 {
         let size = (self.high - self.low).max(Vec3::ZERO);
         size.x * size.y + size.y * size.z + size.z * size.x
     }
@@ -94,8 +95,81 @@ fn index(n: usize) -> u32 {
     u32::try_from(n).unwrap_or(u32::MAX)
 }
 
-/// Builds a hierarchy over boxes. Boxes that are not finite are left out: nothing can hit them.
-pub fn build(boxes: &[Aabb]) -> Hierarchy {
+impl Hierarchy {
+    /// Fits the boxes to entries that have moved; which entry is in which leaf stays. `boxes`: of the entries that the
+    /// hierarchy was built from, all finite. Returns the box of everything.
+    pub fn refit(&mut self, boxes: &[Aabb]) -> Aabb {
+        let of = |i: u32| boxes.get(i as usize).copied().unwrap_or(Aabb::EMPTY);
+        // children come behind their parents
+        for index in (0..self.nodes.len()).rev() {
+            let Some(mut node) = self.nodes.get(index).copied() else {
+                break;
+            };
+            for side in 0..2 {
+                if node.low[side] == ABSENT {
+                    continue;
+                }
+                let first = node.first[side] as usize;
+                let fitted = if node.count[side] == 0 {
+                    self.nodes.get(first).map_or(Aabb::EMPTY, bounds_of)
+                } else {
+                    let entries = self.order.get(first..first + node.count[side] as usize);
+                    let entries = entries.unwrap_or_default().iter();
+                    entries.fold(Aabb::EMPTY, |b, &i| b.union(of(i)))
+                };
+                node.low[side] = fitted.low;
+                node.high[side] = fitted.high;
+            }
+            if let Some(slot) = self.nodes.get_mut(index) {
+                *slot = node;
+            }
+        }
+        self.bounds()
+    }
+
+    /// The box of everything.
+    pub fn bounds(&self) -> Aabb {
+        self.nodes.first().map_or(Aabb::EMPTY, bounds_of)
+    }
+
+    /// What a ray that meets the whole costs, in boxes and entries tested: the areas of the parts over that of the whole
+    /// (the surface area heuristic).
+    pub fn cost(&self) -> f32 {
+        let whole = self.bounds().half_area();
+        let mut sum = 0.0;
+        for node in &self.nodes {
+            for side in 0..2 {
+                if node.low[side] != ABSENT {
+                    let part = Aabb {
+                        low: node.low[side],
+                        high: node.high[side],
+                    };
+                    #[allow(clippy::cast_precision_loss)] // a few entries
+                    let tests = node.count[side].max(1) as f32;
+                    sum += part.half_area() * tests;
+                }
+            }
+        }
+        if whole > 0.0 { sum / whole } else { 0.0 }
+    }
+}
+
+/// The box around both children of a node.
+fn bounds_of(node: &BvhNode) -> Aabb {
+    (0..2)
+        .filter(|&side| node.low[side] != ABSENT)
+        .fold(Aabb::EMPTY, |b, side| {
+            b.union(Aabb {
+                low: node.low[side],
+                high: node.high[side],
+            })
+        })
+}
+
+/// Builds a hierarchy over boxes. Boxes that are not finite are left out: nothing can hit them. `leaf`: entries that a
+/// leaf holds at most.
+pub fn build(boxes: &[Aabb], leaf: usize) -> Hierarchy {
+    let leaf = leaf.max(1);
     let usable = |b: &Aabb| b.low.is_finite() && b.high.is_finite() && b.low.cmple(b.high).all();
     let mut order: Vec<u32> = (0u32..)
         .zip(boxes)
@@ -117,7 +191,7 @@ pub fn build(boxes: &[Aabb]) -> Hierarchy {
     }];
     while let Some(task) = tasks.pop() {
         // the root is always a node, be it of one leaf alone
-        if task.count <= LEAF && task.parent.is_some() {
+        if task.count <= leaf && task.parent.is_some() {
             attach(&mut nodes, &task, index(task.first), index(task.count));
             continue;
         }
@@ -133,7 +207,7 @@ pub fn build(boxes: &[Aabb]) -> Hierarchy {
         let entries = order
             .get_mut(task.first..task.first + task.count)
             .unwrap_or_default();
-        let left = if task.count <= LEAF {
+        let left = if task.count <= leaf {
             task.count
         } else {
             split(entries, &of, task.depth)
@@ -251,6 +325,20 @@ fn cheapest(entries: &[u32], of: &impl Fn(u32) -> Aabb, middles: Aabb) -> Option
     best.map(|(_, axis, cut)| (axis, cut))
 }
 
+/// The box of a triangle.
+pub fn box_of(corners: &[Vec3; 3]) -> Aabb {
+    corners.iter().fold(Aabb::EMPTY, |b, &p| b.with(p))
+}
+
+/// The triangles of a hierarchy in the order of its leafs.
+pub fn ordered(hierarchy: &Hierarchy, corners: &[[Vec3; 3]]) -> Vec<BvhTriangle> {
+    let triangle = |&primitive: &u32| {
+        let [a, b, c] = *corners.get(primitive as usize)?;
+        Some(BvhTriangle { a, b, c, primitive })
+    };
+    hierarchy.order.iter().filter_map(triangle).collect()
+}
+
 /// A hierarchy over triangles, with the triangles in the order of its leafs.
 #[derive(Clone, Debug)]
 pub struct TriangleHierarchy {
@@ -264,24 +352,10 @@ pub struct TriangleHierarchy {
 
 /// Builds a hierarchy over triangles given by their corners; `None` if there is none that a ray can hit.
 pub fn build_triangles(corners: &[[Vec3; 3]]) -> Option<TriangleHierarchy> {
-    let boxes: Vec<Aabb> = corners
-        .iter()
-        .map(|t| t.iter().fold(Aabb::EMPTY, |b, &p| b.with(p)))
-        .collect();
-    let hierarchy = build(&boxes);
-    let triangles: Vec<BvhTriangle> = hierarchy
-        .order
-        .iter()
-        .filter_map(|&primitive| {
-            let [a, b, c] = *corners.get(primitive as usize)?;
-            Some(BvhTriangle { a, b, c, primitive })
-        })
-        .collect();
-    let bounds = hierarchy
-        .order
-        .iter()
-        .filter_map(|&i| boxes.get(i as usize))
-        .fold(Aabb::EMPTY, |all, &b| all.union(b));
+    let boxes: Vec<Aabb> = corners.iter().map(box_of).collect();
+    let hierarchy = build(&boxes, LEAF);
+    let triangles = ordered(&hierarchy, corners);
+    let bounds = hierarchy.bounds();
     (!triangles.is_empty()).then_some(TriangleHierarchy {
         nodes: hierarchy.nodes,
         triangles,
@@ -336,9 +410,9 @@ mod tests {
                     }
                 })
                 .collect();
-            check(&boxes, &build(&boxes));
+            check(&boxes, &build(&boxes, LEAF));
         }
-        assert!(build(&[]).nodes.is_empty());
+        assert!(build(&[], LEAF).nodes.is_empty());
     }
 
     #[test]
@@ -350,7 +424,7 @@ mod tests {
                 Aabb { low: p, high: p }
             })
             .collect();
-        assert!(check(&spread, &build(&spread)) <= 48);
+        assert!(check(&spread, &build(&spread, LEAF)) <= 48);
         let same = vec![
             Aabb {
                 low: Vec3::ONE,
@@ -358,7 +432,7 @@ mod tests {
             };
             5000
         ];
-        assert!(check(&same, &build(&same)) <= 48);
+        assert!(check(&same, &build(&same, LEAF)) <= 48);
     }
 
     #[test]

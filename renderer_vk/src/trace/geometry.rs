@@ -55,7 +55,7 @@ pub struct StaticGeometry {
     /// Number of fog volumes.
     pub fog_count: u32,
     // kept alive for the structures' triangles
-    _triangles: Buffer,
+    triangle_records: Buffer,
 }
 
 /// A group of surfaces that become one structure.
@@ -145,6 +145,15 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
 }
 
 impl StaticGeometry {
+    /// Bytes of the structures and of the triangle records.
+    pub fn bytes(&self) -> u64 {
+        let structure = |part: &StaticBlas| match &part.structure {
+            Structure::Driver(blas) => blas.size(),
+            Structure::Own(own) => own.nodes.size() + own.triangles.size(),
+        };
+        self.structures.iter().map(structure).sum::<u64>() + self.triangle_records.size()
+    }
+
     /// Builds the structures of a map, blocking until they are done.
     ///
     /// # Errors
@@ -175,7 +184,7 @@ impl StaticGeometry {
             skies: Buffer::with_data(device, "trace skies", storage, &grouped.skies)?,
             fogs: Buffer::with_data(device, "trace fogs", storage, scene.fogs)?,
             fog_count: u32::try_from(scene.fogs.len()).unwrap_or(u32::MAX),
-            _triangles: triangles,
+            triangle_records: triangles,
         })
     }
 }
@@ -213,7 +222,11 @@ fn driver_structures(
     }
     let mut builds: Vec<BlasBuild<'_>> = parts
         .iter_mut()
-        .map(|(_, _, _, blas, geometries)| BlasBuild { blas, geometries })
+        .map(|(_, _, _, blas, geometries)| BlasBuild {
+            blas,
+            geometries,
+            refit: false,
+        })
         .collect();
     device.build_static_blas(&mut builds)?;
     Ok(parts

@@ -6,6 +6,7 @@ use shaders::types::constants as c;
 use shaders::types::{Fog, MaterialBuffers, Vertex};
 
 use crate::gpu::DeviceInfo;
+use crate::settings::TracerChoice;
 
 /// What follows the rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,13 +29,40 @@ impl Tracer {
         }
     }
 
-    /// The faster one on a device.
-    pub fn of(info: &DeviceInfo) -> Self {
-        if info.ray_tracing.is_some() && !info.software {
-            Self::Pipeline
-        } else {
-            Self::Compute
+    /// The one that is wished for; where the device cannot do that, the fastest one that it can, with a warning.
+    pub fn of(info: &DeviceInfo, wish: TracerChoice) -> Self {
+        let possible = |tracer: Self| tracer.is_possible(info);
+        let found = Self::choose(wish, info.software, possible);
+        if let Some(wished) = Self::wished(wish).filter(|wished| *wished != found) {
+            let name = match wished {
+                Self::Pipeline => "ray tracing pipelines",
+                Self::Query => "ray queries",
+                Self::Compute => "compute",
+            };
+            log::warn!("rt_tracer: {} has no {name}; {found:?} is used", info.name);
         }
+        found
+    }
+
+    fn wished(wish: TracerChoice) -> Option<Self> {
+        match wish {
+            TracerChoice::Auto => None,
+            TracerChoice::Pipeline => Some(Self::Pipeline),
+            TracerChoice::Query => Some(Self::Query),
+            TracerChoice::Compute => Some(Self::Compute),
+        }
+    }
+
+    /// The wish where it is possible, otherwise the fastest, as measured: where the driver traces in software,
+    /// hierarchies of our own.
+    fn choose(wish: TracerChoice, software: bool, possible: impl Fn(Self) -> bool) -> Self {
+        let fastest = [Self::Pipeline, Self::Query].map(|tracer| (!software).then_some(tracer));
+        [Self::wished(wish)]
+            .into_iter()
+            .chain(fastest)
+            .flatten()
+            .find(|tracer| possible(*tracer))
+            .unwrap_or(Self::Compute)
     }
 }
 
@@ -137,4 +165,36 @@ pub struct StaticScene<'a> {
     pub surfaces: Vec<StaticSurface>,
     /// Fog volumes.
     pub fogs: &'a [Fog],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wish_is_met_where_the_device_can() {
+        use Tracer::{Compute, Pipeline, Query};
+        use TracerChoice as W;
+        let (none, both, query) = (
+            &[Compute][..],
+            &[Pipeline, Query, Compute],
+            &[Query, Compute],
+        );
+        for (device, software, wish, found) in [
+            (none, false, W::Auto, Compute),
+            (none, false, W::Pipeline, Compute),
+            (none, false, W::Query, Compute),
+            (both, false, W::Auto, Pipeline),
+            (both, false, W::Query, Query),
+            (both, false, W::Compute, Compute),
+            (query, false, W::Auto, Query),
+            (query, false, W::Pipeline, Query),
+            (both, true, W::Auto, Compute),
+            (both, true, W::Pipeline, Pipeline),
+            (none, true, W::Pipeline, Compute),
+        ] {
+            let chosen = Tracer::choose(wish, software, |tracer| device.contains(&tracer));
+            assert_eq!(chosen, found, "{wish:?} of {device:?}");
+        }
+    }
 }

@@ -6,6 +6,7 @@ use shaders::trace_types::SkyRecord;
 use shaders::types::MaterialBuffers;
 use shaders::types::constants::NO_TEXTURE;
 
+use super::accel::AccelMemory;
 use super::counters::COUNTED;
 use super::geometry::StaticGeometry;
 use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
@@ -101,7 +102,12 @@ impl TraceLook {
     ///
     /// # Errors
     /// The device is out of memory or lost.
-    pub fn new(device: &Device, world: &World, assets: &Assets) -> Result<Self, Error> {
+    pub fn new(
+        device: &Device,
+        world: &World,
+        assets: &Assets,
+        settings: &Settings,
+    ) -> Result<Self, Error> {
         let relit = &world.data.relit;
         let model_origins: Vec<_> = relit.models.iter().map(|m| m.origin).collect();
         let source = MapLightSource {
@@ -113,7 +119,7 @@ impl TraceLook {
             ambient: relit.ambient,
             bsp: Some(&relit.bsp),
         };
-        let tracer = Tracer::of(device.info());
+        let tracer = Tracer::of(device.info(), settings.rt_tracer);
         let mut view_tracer = ViewTracer::new(device, tracer)?;
         view_tracer.exposure_base = display_exposure(relit).log2();
         Ok(Self {
@@ -168,6 +174,14 @@ impl TraceLook {
     pub fn rays(&self, pass: &str) -> Option<u64> {
         let index = COUNTED.iter().position(|name| *name == pass)?;
         self.tracer.rays()?.get(index).copied()
+    }
+
+    /// Bytes of the acceleration structures, by what they hold.
+    pub fn accel_memory(&self) -> AccelMemory {
+        AccelMemory {
+            map: self.geometry.bytes(),
+            ..self.tracer.accel.memory()
+        }
     }
 
     /// How many frames the last picture is the mean of; 1 outside of reference mode.

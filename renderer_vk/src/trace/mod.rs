@@ -20,7 +20,9 @@ pub mod light_tables;
 pub mod lights;
 pub mod look;
 pub mod motion;
+mod parts;
 pub mod passes;
+mod shapes;
 pub mod targets;
 pub mod view_tracer;
 

@@ -33,7 +33,7 @@ pub struct TracedMap<'a> {
 /// Draws views by tracing rays.
 pub struct ViewTracer {
     pub(super) device: Device,
-    accel: Accel,
+    pub(super) accel: Accel,
     primary: Primary,
     direct: Direct,
     indirect: Indirect,
@@ -451,16 +451,14 @@ fn content_hash(view: &ViewScene, materials: &dyn MaterialTable, settings: &Sett
     }
     camera.viewport.hash(&mut hasher);
     bytemuck::cast_slice::<_, u8>(&view.instances).hash(&mut hasher);
-    bytemuck::cast_slice::<_, u8>(&view.vertices).hash(&mut hasher);
-    view.indices.hash(&mut hasher);
     for mesh in &view.meshes {
-        (
-            mesh.first_index,
-            mesh.index_count,
-            mesh.material,
-            mesh.instance,
-        )
-            .hash(&mut hasher);
+        let geometry = view.mesh_geometry(mesh);
+        bytemuck::cast_slice::<_, u8>(geometry.vertices).hash(&mut hasher);
+        // whether a mesh is kept from frame to frame is nothing that shows
+        for triangle in geometry.triangles() {
+            triangle.hash(&mut hasher);
+        }
+        (mesh.material, mesh.instance, mesh.fog).hash(&mut hasher);
     }
     for submodel in &view.submodels {
         (submodel.model, submodel.instance).hash(&mut hasher);

@@ -1,5 +1,7 @@
 //! Scenes made by hand, and what renders them.
 
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3, Vec4};
 use relight::light::{EmissionSource, LightLists, PointLight, SunLight, TriangleLight};
 use shaders::trace_types::SkyRecord;
@@ -11,7 +13,9 @@ use crate::gpu::{
     Buffer, BufferUsage, Device, DeviceOptions, Filter, Format, FrameRing, Image, ImageDesc,
     ImageUsage, MipFilter, SamplerDesc, SurfaceSource, Wrap,
 };
-use crate::scene::{DynamicMesh, Portal, ShadowVolumes, Submodel, View, ViewEntity, ViewScene};
+use crate::scene::{
+    DynamicMesh, Portal, RigidMesh, ShadowVolumes, Shape, Submodel, View, ViewEntity, ViewScene,
+};
 use crate::settings::Settings;
 use crate::trace::geometry::StaticGeometry;
 use crate::trace::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
@@ -21,8 +25,8 @@ use crate::trace::view_tracer::{TracedMap, ViewTracer};
 /// A device with its validation layer on and the look under test.
 pub struct Gpu {
     pub device: Device,
-    tracer: Tracer,
-    look: ViewTracer,
+    pub tracer: Tracer,
+    pub look: ViewTracer,
     pub ring: FrameRing,
 }
 
@@ -334,6 +338,7 @@ pub struct Scene {
     pub dynamic_vertices: Vec<Vertex>,
     pub dynamic_indices: Vec<u32>,
     pub meshes: Vec<DynamicMesh>,
+    pub rigid: Vec<Arc<RigidMesh>>,
     pub submodels: Vec<Submodel>,
     pub entities: Vec<ViewEntity>,
     pub portals: Vec<Portal>,
@@ -380,6 +385,7 @@ impl Scene {
             dynamic_vertices: Vec::new(),
             dynamic_indices: Vec::new(),
             meshes: Vec::new(),
+            rigid: Vec::new(),
             submodels: Vec::new(),
             entities: Vec::new(),
             portals: Vec::new(),
@@ -514,6 +520,7 @@ impl Scene {
             instance: instance_index,
             fog: 0,
             world_surface: None,
+            shape: Shape::Changing,
         });
     }
 
@@ -531,7 +538,7 @@ impl Scene {
         });
     }
 
-    fn view(&self) -> ViewScene {
+    pub fn view(&self) -> ViewScene {
         ViewScene {
             def: self.def,
             view: View::new(&self.def, 4.0, 10000.0),
@@ -540,6 +547,7 @@ impl Scene {
             vertices: self.dynamic_vertices.clone(),
             indices: self.dynamic_indices.clone(),
             meshes: self.meshes.clone(),
+            rigid: self.rigid.clone(),
             submodels: self.submodels.clone(),
             entities: self.entities.clone(),
             surfaces: Vec::new(),
@@ -554,7 +562,7 @@ impl Scene {
         }
     }
 
-    fn upload(&self, device: &Device, tracer: Tracer) -> Uploaded {
+    pub fn upload(&self, device: &Device, tracer: Tracer) -> Uploaded {
         let storage = BufferUsage::STORAGE;
         let materials: Vec<Material> = self.materials.iter().map(|m| m.0).collect();
         let no_mods: [TcMod; 0] = [];
@@ -602,14 +610,14 @@ impl Scene {
     }
 }
 
-struct Uploaded {
-    geometry: StaticGeometry,
+pub struct Uploaded {
+    pub geometry: StaticGeometry,
     lights: MapLights,
-    materials: Table,
+    pub materials: Table,
     _vertices: Buffer,
 }
 
-struct Table {
+pub struct Table {
     infos: Vec<MaterialInfo>,
     buffers: [Buffer; 4],
 }

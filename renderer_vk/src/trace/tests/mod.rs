@@ -9,4 +9,5 @@ mod layers;
 mod lighting;
 mod maps;
 mod motion;
+mod structures;
 mod views;

@@ -1,0 +1,416 @@
+//! The meshes of a view, sorted by what rays do with them and by how much of them outlives the frame.
+
+use std::ops::Range;
+
+use glam::{Mat3, Vec3};
+use shaders::trace_types::constants::{
+    MASK_FIRST_SOLID, MASK_FIRST_TRANSLUCENT, MASK_NO_SHADOW, MASK_SKY, MASK_SOLID,
+    MASK_THIRD_SOLID, MASK_THIRD_TRANSLUCENT, MASK_TRANSLUCENT,
+};
+use shaders::types::constants as c;
+use shaders::types::{Instance, Triangle};
+
+use super::geometry::rank_bits;
+use super::input::{Kind, MaterialInfo, MaterialTable};
+use crate::scene::{DynamicMesh, MeshId, Shape, ViewScene};
+
+/// Smallest volume of an entity's axes that an instance can be turned back from; flatter ones are placed on the CPU.
+const FLAT: f32 = 1.0e-12;
+
+/// Who sees a mesh that moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Seen {
+    /// Every ray.
+    Always,
+    /// The eye alone.
+    FirstPerson,
+    /// Mirrors, shadows and bounced light.
+    ThirdPerson,
+    /// Everything but shadows.
+    NoShadow,
+}
+
+impl Seen {
+    /// All there are.
+    pub const ALL: [Self; 4] = [
+        Self::Always,
+        Self::FirstPerson,
+        Self::ThirdPerson,
+        Self::NoShadow,
+    ];
+
+    /// By an instance's `INSTANCE_*` bits.
+    pub fn of(flags: u32) -> Self {
+        if flags & c::INSTANCE_FIRST_PERSON != 0 {
+            Self::FirstPerson
+        } else if flags & c::INSTANCE_THIRD_PERSON != 0 {
+            Self::ThirdPerson
+        } else if flags & c::INSTANCE_NO_SHADOW != 0 {
+            Self::NoShadow
+        } else {
+            Self::Always
+        }
+    }
+
+    /// Mask of a top-level instance.
+    pub fn mask(self, kind: Kind) -> u8 {
+        match (self, kind) {
+            (_, Kind::Sky) => MASK_SKY,
+            (Self::Always | Self::NoShadow, Kind::Translucent) => MASK_TRANSLUCENT,
+            (Self::FirstPerson, Kind::Translucent) => MASK_FIRST_TRANSLUCENT,
+            (Self::ThirdPerson, Kind::Translucent) => MASK_THIRD_TRANSLUCENT,
+            (Self::Always, _) => MASK_SOLID,
+            (Self::FirstPerson, _) => MASK_FIRST_SOLID,
+            (Self::ThirdPerson, _) => MASK_THIRD_SOLID,
+            (Self::NoShadow, _) => MASK_NO_SHADOW,
+        }
+    }
+}
+
+/// What a part's triangles are made from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Source {
+    /// A mesh that keeps its shape, by its number.
+    Rigid(u64),
+    /// A mesh whose vertices are made anew each frame.
+    Animated(MeshId),
+}
+
+/// What a bottom-level structure is known by: one for each of its meshes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ShapeMesh {
+    /// Kind of its triangles.
+    pub kind: Kind,
+    /// Where they come from.
+    pub source: Source,
+    /// First vertex, counted from the part's first.
+    pub first_vertex: u32,
+    /// Number of vertices.
+    pub vertices: u32,
+    /// Number of indices.
+    pub indices: u32,
+}
+
+/// What a part's triangles are known by, beside their shape: the skin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct SkinMesh {
+    /// The shape.
+    pub shape: ShapeMesh,
+    /// Material that is drawn.
+    pub material: u32,
+    /// Fog volume plus one.
+    pub fog: u32,
+    /// `Triangle.flags`.
+    pub flags: u32,
+}
+
+/// Meshes of one instance that rays treat alike.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Index of the instance.
+    pub instance: u32,
+    /// Who sees it.
+    pub seen: Seen,
+    /// Kind of its triangles.
+    pub kind: Kind,
+    /// Its vertices are made anew each frame.
+    pub animated: bool,
+    /// Of an animated part, its vertices in [`ViewScene::vertices`].
+    pub vertices: Range<usize>,
+    /// Its members in [`Parts::shapes`], [`Parts::skins`] and [`Parts::meshes`].
+    pub members: Range<usize>,
+    /// Place of its first mesh in drawing order.
+    order: usize,
+}
+
+/// Meshes without a shape of their own, in world space.
+pub struct Slot {
+    /// Who sees them.
+    pub seen: Seen,
+    /// Kind of their triangles.
+    pub kind: Kind,
+    /// For hits; they index [`ViewScene::vertices`].
+    pub triangles: Vec<Triangle>,
+    /// The same triangles for builds; they index [`Parts::positions`].
+    pub indices: Vec<[u32; 3]>,
+}
+
+/// What distinguishes one part from another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct PartKey {
+    instance: u32,
+    kind: Kind,
+    animated: bool,
+    /// Translucent layers in one plane keep the order in which they are drawn: one material to a part.
+    material: u32,
+    /// Which surfaces of the map are in sight changes; each is a part.
+    world_surface: u32,
+}
+
+struct Member {
+    key: PartKey,
+    order: usize,
+    mesh: usize,
+    skin: SkinMesh,
+}
+
+/// A view's meshes in order. The memory is reused.
+pub struct Parts {
+    /// Parts in drawing order.
+    pub parts: Vec<Part>,
+    /// Shapes of the members.
+    pub shapes: Vec<ShapeMesh>,
+    /// Skins of the members.
+    pub skins: Vec<SkinMesh>,
+    /// Indices of the members in [`ViewScene::meshes`].
+    pub meshes: Vec<usize>,
+    /// Everything else.
+    pub slots: Vec<Slot>,
+    /// Positions of the slots' triangles, in world space.
+    pub positions: Vec<Vec3>,
+    members: Vec<Member>,
+    order: Vec<(f32, u32, usize)>,
+}
+
+impl Default for Parts {
+    fn default() -> Self {
+        const KINDS: [Kind; 4] = [Kind::Opaque, Kind::Tested, Kind::Translucent, Kind::Sky];
+        let slots = Seen::ALL.into_iter().flat_map(|seen| {
+            KINDS.map(|kind| Slot {
+                seen,
+                kind,
+                triangles: Vec::new(),
+                indices: Vec::new(),
+            })
+        });
+        Self {
+            parts: Vec::new(),
+            shapes: Vec::new(),
+            skins: Vec::new(),
+            meshes: Vec::new(),
+            slots: slots.collect(),
+            positions: Vec::new(),
+            members: Vec::new(),
+            order: Vec::new(),
+        }
+    }
+}
+
+/// Whether an instance can be turned back: its axes span a volume.
+pub fn is_solid(axis: Mat3) -> bool {
+    let volume = axis.determinant().abs();
+    volume.is_finite() && volume > FLAT
+}
+
+/// The axes of an instance.
+pub fn axes(instance: &Instance) -> Mat3 {
+    let [x, y, z] = instance.axis;
+    Mat3::from_cols(x, y, z)
+}
+
+impl Parts {
+    /// Sorts a view's meshes.
+    pub fn collect(&mut self, view: &ViewScene, materials: &dyn MaterialTable) {
+        for slot in &mut self.slots {
+            slot.triangles.clear();
+            slot.indices.clear();
+        }
+        self.positions.clear();
+        self.members.clear();
+        // in drawing order, so that of two translucent layers in one plane the later primitive is drawn later
+        let mut order = std::mem::take(&mut self.order);
+        order.clear();
+        for (index, mesh) in view.meshes.iter().enumerate() {
+            let (_, info) = materials.info(mesh.material);
+            order.push((info.sort, info.order, index));
+        }
+        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+        for (place, &(_, _, index)) in order.iter().enumerate() {
+            if let Some(mesh) = view.meshes.get(index) {
+                let (material, info) = materials.info(mesh.material);
+                self.add(view, mesh, (place, index), material, &info);
+            }
+        }
+        self.order = order;
+        self.group(view);
+    }
+
+    fn add(
+        &mut self,
+        view: &ViewScene,
+        mesh: &DynamicMesh,
+        (order, index): (usize, usize),
+        material: u32,
+        info: &MaterialInfo,
+    ) {
+        let (Some(instance), Some(kind)) = (
+            view.instances.get(mesh.instance as usize),
+            Kind::of(info.flags),
+        ) else {
+            return;
+        };
+        // what is baked into the world's own vertices is not part of the material
+        let world = if mesh.world_surface.is_some() {
+            c::TRIANGLE_WORLD
+        } else {
+            0
+        };
+        let flags = world | rank_bits(info);
+        let solid = is_solid(axes(instance));
+        let (source, vertices, indices) = match mesh.shape {
+            Shape::Rigid(rigid) => {
+                let Some(rigid) = view.rigid.get(rigid as usize).filter(|_| solid) else {
+                    return;
+                };
+                let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+                (
+                    Source::Rigid(rigid.id),
+                    count(rigid.vertices.len()),
+                    count(rigid.indices.len()),
+                )
+            }
+            Shape::Animated(id) if solid && is_whole(view, mesh) => {
+                (Source::Animated(id), mesh.vertex_count, mesh.index_count)
+            }
+            Shape::Animated(_) | Shape::Changing => {
+                self.add_changing(view, mesh, instance, kind, material, flags);
+                return;
+            }
+        };
+        self.members.push(Member {
+            key: PartKey {
+                instance: mesh.instance,
+                kind,
+                animated: matches!(source, Source::Animated(_)),
+                material: if kind == Kind::Translucent {
+                    material
+                } else {
+                    0
+                },
+                world_surface: mesh.world_surface.unwrap_or(u32::MAX),
+            },
+            order,
+            mesh: index,
+            skin: SkinMesh {
+                shape: ShapeMesh {
+                    kind,
+                    source,
+                    first_vertex: mesh.first_vertex,
+                    vertices,
+                    indices,
+                },
+                material,
+                fog: mesh.fog,
+                flags,
+            },
+        });
+    }
+
+    /// Puts the members of each part side by side.
+    fn group(&mut self, view: &ViewScene) {
+        self.parts.clear();
+        self.shapes.clear();
+        self.skins.clear();
+        self.meshes.clear();
+        self.members
+            .sort_by(|a, b| a.key.cmp(&b.key).then(a.order.cmp(&b.order)));
+        for members in self.members.chunk_by_mut(|a, b| a.key == b.key) {
+            let Some(&Member { key, order, .. }) = members.first() else {
+                continue;
+            };
+            let Some(instance) = view.instances.get(key.instance as usize) else {
+                continue;
+            };
+            let first = self.meshes.len();
+            // vertices of an animated part lie side by side in the view, those of a rigid one in its own memory
+            let base = members.iter().map(|m| m.skin.shape.first_vertex).min();
+            let base = base.unwrap_or(0);
+            let mut end = 0;
+            for member in members {
+                let shape = &mut member.skin.shape;
+                shape.first_vertex = if key.animated {
+                    shape.first_vertex - base
+                } else {
+                    end
+                };
+                end = end.max(shape.first_vertex.saturating_add(shape.vertices));
+                self.meshes.push(member.mesh);
+                self.shapes.push(member.skin.shape);
+                self.skins.push(member.skin);
+            }
+            let base = base as usize;
+            self.parts.push(Part {
+                instance: key.instance,
+                seen: Seen::of(instance.flags),
+                kind: key.kind,
+                animated: key.animated,
+                vertices: base..base.saturating_add(end as usize),
+                members: first..self.meshes.len(),
+                order,
+            });
+        }
+        self.parts.sort_by_key(|part| part.order);
+    }
+
+    /// Adds a mesh to those that are placed here. Triangles with a corner that is no number are left out.
+    fn add_changing(
+        &mut self,
+        view: &ViewScene,
+        mesh: &DynamicMesh,
+        instance: &Instance,
+        kind: Kind,
+        material: u32,
+        flags: u32,
+    ) {
+        let seen = Seen::of(instance.flags);
+        let slots = &mut self.slots;
+        let Some(slot) = slots.iter_mut().find(|s| s.seen == seen && s.kind == kind) else {
+            return;
+        };
+        let first = mesh.first_vertex as usize;
+        let vertices = view
+            .vertices
+            .get(first..first.saturating_add(mesh.vertex_count as usize))
+            .unwrap_or_default();
+        let axis = axes(instance);
+        let base = self.positions.len();
+        let placed = vertices.iter().map(|v| axis * v.position + instance.origin);
+        self.positions.extend(placed);
+        let first = mesh.first_index as usize;
+        let range = first..first.saturating_add(mesh.index_count as usize);
+        for indices in view
+            .indices
+            .get(range)
+            .unwrap_or_default()
+            .as_chunks::<3>()
+            .0
+        {
+            let corners = indices.map(|i| {
+                let local = i.checked_sub(mesh.first_vertex)? as usize;
+                let position = self.positions.get(base.checked_add(local)?)?;
+                let index = u32::try_from(base + local).ok()?;
+                position.is_finite().then_some(index)
+            });
+            let [Some(a), Some(b), Some(c)] = corners else {
+                continue;
+            };
+            slot.indices.push([a, b, c]);
+            slot.triangles.push(Triangle {
+                indices: *indices,
+                material,
+                instance: mesh.instance,
+                fog: mesh.fog,
+                lightmap: c::NO_TEXTURE,
+                flags,
+            });
+        }
+    }
+}
+
+/// Whether a mesh's vertices are there and numbers: a structure that is fitted to them must not meet others.
+fn is_whole(view: &ViewScene, mesh: &DynamicMesh) -> bool {
+    let first = mesh.first_vertex as usize;
+    let range = first..first.saturating_add(mesh.vertex_count as usize);
+    let found = view.vertices.get(range);
+    found.is_some_and(|v| v.iter().all(|v| v.position.is_finite()))
+}
