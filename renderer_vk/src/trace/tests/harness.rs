@@ -418,6 +418,7 @@ impl Scene {
                 stage_count: stages.len() as u32,
                 flags,
                 clamp_time: 1.0e30,
+                plain_image: c::NO_TEXTURE,
                 ..Material::default()
             },
             MaterialInfo {
