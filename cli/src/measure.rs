@@ -237,6 +237,32 @@ fn relative_bias(picture: &[f32], truth: &[f32], part: &[bool]) -> f32 {
     if sum > 0.0 { difference / sum } else { 0.0 }
 }
 
+/// Frames that the eye takes to adapt: two seconds.
+const ADAPTATION: u32 = 120;
+
+/// Mean luminance of what a player sees in the traced look over that of the classic look, as displayed.
+fn brightness(
+    stage: &mut Stage,
+    base: &Settings,
+    camera: &Camera,
+    bar: &ProgressBar,
+) -> Result<f64> {
+    let mut seen = |rt, frames| {
+        stage.renderer.set_settings(&Settings {
+            rt,
+            rt_auto_exposure: true,
+            ..base.clone()
+        });
+        for _ in 0..frames {
+            stage.frame(camera, &[])?;
+            bar.inc(1);
+        }
+        anyhow::Ok(stage.picture()?.mean_luminance())
+    };
+    let classic = seen(false, 1)?;
+    Ok(seen(true, ADAPTATION)? / classic.max(1.0e-3))
+}
+
 /// What was measured at one place.
 fn place(
     stage: &mut Stage,
@@ -255,11 +281,18 @@ fn place(
         color: Vec3::new(1.0, 0.75, 0.4),
         additive: false,
     };
+    let brightness = brightness(stage, base, camera, bar)?;
     // a lit picture needs less: it only tells which pixels the light reaches
     let lit = stage.reference(base, camera, &[light(0.0)], args.reference.div_ceil(8), bar)?;
     // the light that moves comes from the left and is here at the end
     let moved = LIGHT_SPEED * args.frames as f32 * 0.25;
-    let moved_truth = stage.reference(base, camera, &[light(-moved)], args.reference, bar)?;
+    let moved_truth = stage.reference(
+        base,
+        camera,
+        &[light(-moved)],
+        args.reference.div_ceil(4),
+        bar,
+    )?;
     let truth_values = luminance(&truth);
     let reached: Vec<bool> = luminance(&lit)
         .iter()
@@ -275,6 +308,7 @@ fn place(
         .collect();
 
     let mut results = serde_json::Map::new();
+    results.insert("brightness".into(), json!(brightness));
     for Variant {
         name: kind,
         settings,
@@ -401,7 +435,10 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
         let cameras = places(&bsp.entities(), args.each);
         let (variants, frames) = (variants(&base).len() as u64, u64::from(args.frames));
         let bar = ProgressBar::new(
-            cameras.len() as u64 * (3 * u64::from(args.reference) + variants * 6 * frames),
+            cameras.len() as u64
+                * (u64::from(args.reference) * 11 / 8
+                    + u64::from(ADAPTATION)
+                    + variants * 6 * frames),
         );
         bar.set_style(ProgressStyle::with_template(
             "{msg} {bar:30} {pos}/{len} frames, {eta} left",
@@ -433,8 +470,20 @@ fn table(all: &serde_json::Map<String, Value>) {
         "place", "picture", "SSIM", "FLIP", "noise %", "off", "fly SSIM", "trail %"
     );
     let mut sums: Vec<(String, [f64; 5], f64, f64)> = Vec::new();
+    let mut brightness = Vec::new();
     for (place, kinds) in all {
-        for (kind, v) in kinds.as_object().into_iter().flatten() {
+        brightness.extend(
+            kinds
+                .pointer("/brightness")
+                .and_then(Value::as_f64)
+                .map(|b| (place, b)),
+        );
+        for (kind, v) in kinds
+            .as_object()
+            .into_iter()
+            .flatten()
+            .filter(|(_, v)| v.is_object())
+        {
             let number = |path: &str| v.pointer(path).and_then(Value::as_f64).unwrap_or(f64::NAN);
             let row = [
                 number("/ssim"),
@@ -463,6 +512,9 @@ fn table(all: &serde_json::Map<String, Value>) {
             sum.map(|v| v / count),
             &format!("{worst}"),
         );
+    }
+    for (place, ratio) in brightness {
+        println!("{place:<20} brightness of the traced over the classic look {ratio:.2}");
     }
 }
 
