@@ -59,6 +59,47 @@ pub struct VideoFrame {
     pub motion_jpeg: bool,
 }
 
+/// The picture of `rt_screenshot` in the making.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StillShot {
+    /// Below the user's game folder.
+    pub path: String,
+    /// Tenths of the work that were told.
+    told: u32,
+}
+
+impl StillShot {
+    /// Begun.
+    pub fn new(path: String) -> Self {
+        Self { path, told: 0 }
+    }
+
+    /// A line for each tenth of the work.
+    pub fn tell(&mut self, done: u32, wanted: u32) -> Option<String> {
+        let tenths = u64::from(done) * 10 / u64::from(wanted.max(1));
+        let tenths = u32::try_from(tenths).unwrap_or(10);
+        if tenths <= self.told || tenths >= 10 {
+            return None;
+        }
+        self.told = tenths;
+        Some(format!("rt_screenshot: {done} of {wanted} samples"))
+    }
+}
+
+/// The arguments of `rt_screenshot`: samples a pixel, and the size if one is named. `None`: they are none.
+pub fn still_arguments(arguments: &[String]) -> Option<(u32, Option<(u32, u32)>)> {
+    let size = |text: &String| {
+        let (width, height) = text.split_once(['x', 'X'])?;
+        Some((width.parse().ok()?, height.parse().ok()?))
+    };
+    let samples = |text: &String| text.parse().ok().filter(|samples| *samples > 0);
+    match arguments {
+        [spp] => Some((samples(spp)?, None)),
+        [spp, text] => Some((samples(spp)?, Some(size(text)?))),
+        _ => None,
+    }
+}
+
 /// What is to be captured, and which file numbers were tried.
 #[derive(Debug, Default)]
 pub struct Captures {
@@ -66,6 +107,8 @@ pub struct Captures {
     pub shots: Vec<Shot>,
     /// At most one a frame.
     pub video: Option<VideoFrame>,
+    /// `rt_screenshot`.
+    pub still: Option<StillShot>,
     next_number: [u32; 2],
 }
 
@@ -77,6 +120,7 @@ impl Captures {
     pub fn clear(&mut self) {
         self.shots.clear();
         self.video = None;
+        self.still = None;
     }
 
     /// The next free `screenshots/shotNNNN` name. `None` when there is none left.
@@ -370,6 +414,29 @@ mod tests {
             ..frame
         };
         assert!(video_frame(&gradient(64, 64), &frame, 90).unwrap().len() <= 64 * 64 * 4);
+    }
+
+    #[test]
+    fn a_still_picture_takes_samples_and_a_size_and_tells_tenths() {
+        let of = |arguments: &[&str]| {
+            let arguments: Vec<String> = arguments.iter().map(|a| (*a).to_owned()).collect();
+            still_arguments(&arguments)
+        };
+        assert_eq!(of(&["64"]), Some((64, None)));
+        assert_eq!(of(&["64", "3840x2160"]), Some((64, Some((3840, 2160)))));
+        for bad in [
+            &[][..],
+            &["0"],
+            &["many"],
+            &["1", "2"],
+            &["1", "2x"],
+            &["1", "2x3", "4"],
+        ] {
+            assert_eq!(of(bad), None, "{bad:?}");
+        }
+        let mut shot = StillShot::new("a.tga".into());
+        let told: Vec<u32> = (1..=25).filter(|i| shot.tell(*i, 25).is_some()).collect();
+        assert_eq!(told, [3, 5, 8, 10, 13, 15, 18, 20, 23]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Console commands.
 
 use crate::boundary::{Failure, entry};
-use crate::capture::{Format, Shot};
+use crate::capture::{Format, Shot, StillShot, still_arguments};
 use crate::costs::Report;
 use crate::cvars::Cvar;
 use crate::ioq3::engine::{Engine, valid_game_path};
@@ -27,6 +27,7 @@ static COMMANDS: &[(&CStr, Function)] = &[
     (c"rt_timings", timings),
     (c"rt_lights", lights),
     (c"rt_stats", stats),
+    (c"rt_screenshot", still),
 ];
 
 /// Adds all commands.
@@ -225,6 +226,44 @@ extern "C" fn screenshot_jpeg() {
 fn map_base_name(world: &str) -> &str {
     let file = world.rsplit(['/', '\\']).next().unwrap_or(world);
     file.rsplit_once('.').map_or(file, |(base, _)| base)
+}
+
+extern "C" fn still() {
+    entry(|| {
+        let Some(engine) = Engine::current() else {
+            return Ok(());
+        };
+        let arguments = engine.arguments();
+        let line = match still_arguments(arguments.get(1..).unwrap_or_default()) {
+            None => Some("usage: rt_screenshot SAMPLES [WIDTHxHEIGHT]".into()),
+            Some((samples, size)) => begin_still(engine, samples, size)?,
+        };
+        if let Some(line) = line {
+            engine.say(&format!("{line}\n"));
+        }
+        Ok(())
+    });
+}
+
+/// Asks for an accumulated picture. Returns what is wrong with that, if anything.
+fn begin_still(
+    engine: Engine,
+    samples: u32,
+    size: Option<(u32, u32)>,
+) -> Result<Option<String>, Failure> {
+    let exists = |path: &str| CString::new(path).is_ok_and(|path| engine.home_file_exists(&path));
+    with_renderer(|renderer, front| {
+        if let Err(reason) = renderer.request_still(samples, size) {
+            return Ok(Some(format!("rt_screenshot: {reason}")));
+        }
+        let path = front.captures.next_path(Format::Tga, exists);
+        let wrong = path.is_none().then(|| {
+            renderer.cancel_still();
+            "rt_screenshot: all 10000 file names are taken".to_owned()
+        });
+        front.captures.still = path.map(StillShot::new);
+        Ok(wrong)
+    })
 }
 
 /// Queues the picture; it is taken once the frame is drawn.

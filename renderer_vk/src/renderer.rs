@@ -3,6 +3,7 @@
 mod held;
 mod output;
 mod queries;
+mod still;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -29,6 +30,7 @@ use crate::world::{EntityTokens, World};
 use held::HeldViews;
 use output::milliseconds;
 pub use output::{CpuTimes, FrameStats};
+use still::StillRequest;
 
 /// How to make a renderer.
 pub struct RendererOptions {
@@ -49,6 +51,7 @@ pub struct RendererOptions {
 /// The renderer: one device, one window or none, and what the game has registered.
 pub struct Renderer {
     // dropped in this order: what the device owns comes before it
+    still: StillRequest,
     trace: Option<TraceLook>,
     world: Option<World>,
     scene: Scene,
@@ -124,6 +127,7 @@ impl Renderer {
             None => None,
         };
         Ok(Self {
+            still: StillRequest::default(),
             trace: None,
             world: None,
             scene: Scene::default(),
@@ -255,6 +259,7 @@ impl Renderer {
         self.overlay.clear();
         self.scene = Scene::default();
         self.held.release();
+        self.still.cancel();
         self.trace = None;
         self.world = None;
         self.assets = None;
@@ -376,6 +381,7 @@ impl Renderer {
         let pause = self.settings.rt_pause && look == Look::Traced;
         if pause && let Some(view) = self.held.next(def) {
             self.scene.clear();
+            self.keep_for_still(&view)?;
             self.queue.push((Item::Traced(Box::new(view)), mask));
             return Ok(());
         }
@@ -394,6 +400,7 @@ impl Renderer {
                     if pause {
                         self.held.hold(&scene);
                     }
+                    self.keep_for_still(&scene)?;
                     Item::Traced(Box::new(scene))
                 }
                 None => return Ok(()),

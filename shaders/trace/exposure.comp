@@ -1,8 +1,11 @@
 #version 460
 // From the histogram to the exposure. The map's own base (stops at which it looks as bright as the engine shows it) is
 // what counts; automatic exposure corrects a part of how far this view is from a usual picture: the mean logarithm of
-// luminance, without the darkest and brightest parts, is brought towards that of a usual picture. Dark rooms stay
-// darker than bright ones: the map's author chose its light.
+// luminance (Reinhard et al., Photographic Tone Reproduction for Digital Images, SIGGRAPH 2002, equation 1), taken
+// between two percentiles, is brought towards that of a usual picture (their equation 2: the key over that mean).
+// Dark rooms stay darker than bright ones, for the map's author chose its light: the key falls with the picture's
+// luminance (as in Krawczyk et al. 2005, section 3.1; here by a constant part of the difference in stops). The exposure
+// follows exponentially, faster into the light than into the dark (their section 3.2).
 #include "trace/exposure.glsl"
 
 layout(local_size_x = 1) in;
@@ -34,5 +37,5 @@ void main() {
         stops = clamp((log2(MIDDLE) - VIEW.exposure_base - sum / weight) * ADAPTATION, MIN_STOPS, MAX_STOPS);
     float old = log2(clamp(state.exposure, exp2(MIN_STOPS), exp2(MAX_STOPS)));
     if ((VIEW.flags & VIEW_EXPOSURE_RESET) != 0 || isnan(old)) old = stops;
-    state.exposure = exp2(mix(old, stops, VIEW.exposure_blend));
+    state.exposure = exp2(mix(old, stops, stops < old ? VIEW.exposure_blend : VIEW.post.exposure_blend_dark));
 }

@@ -1,8 +1,11 @@
 #version 460
-// From linear radiance to the picture: exposure, tone curve, display encoding.
+// From linear radiance to the picture: bloom, exposure, tone curve, display encoding.
 //
-// The curve is the identity up to KNEE and bends smoothly (its slope is continuous) towards 1 above: radiance 1, the
-// white of the classic look, shows as 0.85 of white, and what is brighter still gains.
+// The curve is Uchimura's (HDR theory and practice, CEDEC 2017) with maximum brightness P = 1, contrast a = 1, linear
+// section from m = 0 on, of length l = KNEE, and no toe: the identity up to KNEE, so that textures look as their authors
+// saw them, and above it a film's shoulder, P - (P - KNEE) exp(-a (x - KNEE) / (P - KNEE)), with a continuous slope.
+// Radiance 1, the white of the classic look, shows as 0.85 of white, and what is brighter still gains.
+#include "trace/bloom.glsl"
 #include "trace/exposure.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -14,12 +17,26 @@ vec3 tone_curve(vec3 x) {
     return mix(shoulder, x, lessThan(x, vec3(KNEE)));
 }
 
+// The bloom at a pixel, between its texels.
+vec3 spread_light(ivec2 pixel) {
+    uint start = bloom_start(BLOOM_LEVELS);
+    ivec2 size = bloom_size(0);
+    vec2 at = (vec2(pixel) + 0.5) / float(BLOOM_FIRST) - 0.5;
+    ivec2 low = ivec2(floor(at));
+    vec2 part = at - vec2(low);
+    vec3 above = mix(bloom_read(start, size, low), bloom_read(start, size, low + ivec2(1, 0)), part.x);
+    vec3 below = mix(bloom_read(start, size, low + ivec2(0, 1)), bloom_read(start, size, low + ivec2(1, 1)), part.x);
+    return mix(above, below, part.y);
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (pixel.x >= int(VIEW.width) || pixel.y >= int(VIEW.height)) return;
     ivec2 target = pixel + ivec2(VIEW.target_x, VIEW.target_y);
     if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target_width) || target.y >= int(VIEW.target_height)) return;
     float exposure = ExposureState(VIEW.exposure).exposure * exp2(VIEW.exposure_base + VIEW.exposure_bias);
-    vec3 radiance = max(imageLoad(images_rgba32f[VIEW.image_hdr], pixel).rgb * exposure, 0.0);
+    vec3 radiance = imageLoad(images_rgba32f[VIEW.image_hdr], pixel).rgb;
+    if (VIEW.post.bloom != 0) radiance = mix(radiance, spread_light(pixel), VIEW.post.bloom_strength);
+    radiance = max(radiance * exposure, 0.0);
     imageStore(images_rgba8[VIEW.image_target], target, vec4(encode_display(tone_curve(radiance)), 1.0));
 }

@@ -341,6 +341,7 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
     outbox
         .lines
         .extend(crate::speeds::lines(&front.settings, &stats, renderer));
+    finish_still(renderer, front, &mut outbox)?;
     let answers = (front.questions).answer(renderer, &front.settings, Instant::now());
     outbox.lines.extend(answers.lines);
     let files = answers.files.into_iter();
@@ -348,6 +349,28 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
         .files
         .extend(files.map(|(path, bytes)| (path, bytes, false)));
     Ok(outbox)
+}
+
+/// Tells how far an accumulated picture is, and takes it when it is finished.
+fn finish_still(
+    renderer: &mut Renderer,
+    front: &mut Front,
+    outbox: &mut Outbox,
+) -> Result<(), Failure> {
+    let Some(shot) = &mut front.captures.still else {
+        return Ok(());
+    };
+    match renderer.still_progress() {
+        Some((done, wanted)) => outbox.lines.extend(shot.tell(done, wanted)),
+        // the map it was of is gone
+        None => front.captures.still = None,
+    }
+    if let Some(picture) = renderer.take_still().map_err(failure)?
+        && let Some(shot) = front.captures.still.take()
+    {
+        (outbox.files).push((shot.path, capture::tga(&picture)?, false));
+    }
+    Ok(())
 }
 
 /// Takes the pictures that were asked for, of what is drawn so far.

@@ -123,11 +123,12 @@ impl Renderer {
         }
     }
 
-    fn flush(&mut self, show: bool) -> Result<FrameStats, Error> {
+    /// Draws what is queued; `end`: of a whole frame, which is shown.
+    fn flush(&mut self, end: bool) -> Result<FrameStats, Error> {
         self.queue_image_sheet();
         self.queue_overlay();
         let mut stats = FrameStats::default();
-        let show = show && !self.hidden && self.swapchain.is_some();
+        let show = end && !self.hidden && self.swapchain.is_some();
         let later = show && self.device.info().software;
         if later {
             self.show_finished()?;
@@ -173,6 +174,9 @@ impl Renderer {
         }
         if !self.queue.is_empty() {
             self.targets.resolve(&mut recorder)?;
+        }
+        if end {
+            self.record_still(&mut recorder)?;
         }
         self.recycle_queue();
         let recorded = Instant::now();
@@ -261,11 +265,17 @@ impl Renderer {
         let (width, height) = self.size();
         let texels = self.device.read_image(self.targets.color())?;
         let blue_first = self.targets.color().format() == Format::Bgra8;
+        let rgb = self.displayed(&texels, blue_first);
+        Ok(Picture { width, height, rgb })
+    }
+
+    /// The bytes that the display shows for texels of four bytes, alpha left out.
+    pub(super) fn displayed(&self, texels: &[u8], blue_first: bool) -> Vec<u8> {
         let table = overbright::gamma_table(
             self.settings.display_gamma(),
             self.settings.effective_overbright_bits(),
         );
-        let rgb = texels
+        texels
             .chunks_exact(4)
             .flat_map(|p| {
                 if blue_first {
@@ -275,7 +285,6 @@ impl Renderer {
                 }
             })
             .map(|v| table[usize::from(v)])
-            .collect();
-        Ok(Picture { width, height, rgb })
+            .collect()
     }
 }

@@ -159,6 +159,26 @@ impl TraceLook {
             .record_view(rec, view, Some(map), assets, settings, target)
     }
 
+    /// Records all passes of a view by another tracer than the one whose picture is shown.
+    ///
+    /// # Errors
+    /// Out of memory, or a lost device.
+    pub(super) fn record_by(
+        &self,
+        tracer: &mut ViewTracer,
+        rec: &mut Recorder,
+        view: &ViewScene,
+        assets: &Assets,
+        settings: &Settings,
+        target: &Image,
+    ) -> Result<(), Error> {
+        let map = TracedMap {
+            geometry: &self.geometry,
+            lights: &self.lights,
+        };
+        tracer.record_view(rec, view, Some(map), assets, settings, target)
+    }
+
     /// What follows rays.
     pub fn tracer(&self) -> Tracer {
         self.kind

@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 pub mod accel;
+pub mod bloom;
 pub mod bvh;
 pub mod counters;
 pub mod debug;
@@ -23,6 +24,7 @@ pub mod motion;
 mod parts;
 pub mod passes;
 mod shapes;
+pub mod still;
 pub mod targets;
 pub mod view_tracer;
 

@@ -68,7 +68,7 @@ fn trace(
 }
 
 /// Edge of the groups of the compute passes over pixels, see their `local_size`.
-const TILE: u32 = 8;
+pub(super) const TILE: u32 = 8;
 
 pub(super) fn dispatch(
     rec: &mut Recorder,

@@ -7,7 +7,8 @@ use shaders::trace_types::constants as t;
 use shaders::trace_types::{MotionView, PortalRecord, PostView, TraceView};
 
 use super::accel::{Accel, AccelOutput};
-use super::counters::{COUNTED, Counting, RayCounters};
+use super::bloom::Bloom;
+use super::counters::{COUNTED, RayCounters};
 use super::debug::DebugView;
 use super::geometry::StaticGeometry;
 use super::input::{MaterialTable, Tracer};
@@ -44,6 +45,7 @@ pub struct ViewTracer {
     exposure: Exposure,
     tone_map: ToneMap,
     motion: Motion,
+    bloom: Bloom,
     debug: DebugView,
     counters: RayCounters,
     /// Rays are counted.
@@ -62,9 +64,10 @@ pub struct ViewTracer {
     accumulated: (u64, u32),
 }
 
-/// Frames per second-like rate at which automatic exposure follows the picture: after a third of a second about two
-/// thirds of the difference are gone.
-const EXPOSURE_RATE: f32 = 3.0;
+/// Seconds after which the eye has adapted to a brighter and to a darker view but for 1/e of the difference: those of
+/// cones and rods (Krawczyk, Myszkowski and Seidel, Perceptual Effects in Real-time Tone Mapping, SCCG 2005, section 3.2).
+const LIGHT_ADAPTATION: f32 = 0.1;
+const DARK_ADAPTATION: f32 = 0.4;
 
 impl ViewTracer {
     /// Compiles the pipelines and makes what stays from frame to frame.
@@ -85,6 +88,7 @@ impl ViewTracer {
             exposure: Exposure::new(device)?,
             tone_map: ToneMap::new(device)?,
             motion: Motion::default(),
+            bloom: Bloom::default(),
             debug: DebugView::default(),
             counters: RayCounters::default(),
             count_rays: false,
@@ -195,7 +199,14 @@ impl ViewTracer {
             &portals,
             motion,
         )?;
-        params.post = post_view(settings, counting);
+        params.post = PostView {
+            counters: counting.address,
+            image_rays: counting.image,
+            bloom: self.bloom.prepare(&self.device, size, settings.rt_bloom)?,
+            bloom_strength: settings.rt_bloom.clamp(0.0, 1.0),
+            debug: settings.rt_debug,
+            exposure_blend_dark: self.exposure_blend(view, settings, DARK_ADAPTATION),
+        };
         let address = rec.arena().push(&[params])?;
 
         self.primary.record(rec, address, size)?;
@@ -218,6 +229,7 @@ impl ViewTracer {
             self.accumulate.record(rec, address, size)?;
         }
         self.exposure.record(rec, address, size)?;
+        self.bloom.record(rec, address)?;
         self.tone_map.record(rec, address, size)?;
         if settings.rt_debug > 0 {
             self.debug.record(&self.device, rec, address, size)?;
@@ -230,6 +242,21 @@ impl ViewTracer {
         }
         self.exposure_started = true;
         Ok(())
+    }
+
+    /// How far automatic exposure moves to its aim in this frame, when the eye adapts within `seconds`.
+    fn exposure_blend(&self, view: &ViewScene, settings: &Settings, seconds: f32) -> f32 {
+        // the picture settles at once where frames must not depend on those before them
+        if settings.rt_accumulate || !self.exposure_started {
+            return 1.0;
+        }
+        let passed = view.time - self.last_time;
+        let passed = if passed > 0.0 {
+            passed.min(1.0)
+        } else {
+            1.0 / 60.0
+        };
+        1.0 - (-passed / seconds).exp()
     }
 
     /// Number of frames that the accumulated sum holds before this one; 0 if anything that shows has changed.
@@ -280,31 +307,16 @@ impl ViewTracer {
         );
         set(t::VIEW_ACCUMULATE, settings.rt_accumulate);
         set(t::VIEW_FIRST_PERSON, accel.first_person);
-        set(t::VIEW_AUTO_EXPOSURE, settings.rt_auto_exposure);
+        let is_lit = settings.rt_illumination && !settings.fullbright;
+        set(t::VIEW_AUTO_EXPOSURE, settings.rt_auto_exposure && is_lit);
         set(t::VIEW_EXPOSURE_RESET, !self.exposure_started);
         set(t::VIEW_FAST_SKY, settings.fast_sky);
-        set(
-            t::VIEW_FULLBRIGHT,
-            settings.fullbright || !settings.rt_illumination,
-        );
+        set(t::VIEW_FULLBRIGHT, !is_lit);
         set(t::VIEW_DENOISE, !settings.rt_accumulate);
         set(t::VIEW_SPARSE_BOUNCE, sparse_bounce(settings));
         set(t::VIEW_HISTORY, self.history.is_some());
         let [last_eye, last_forward, last_left, last_up] = self.history.unwrap_or([Vec3::ZERO; 4]);
         let [eye, forward, left, up] = camera_frame(view);
-        let passed = view.time - self.last_time;
-        // the picture settles at once where frames must not depend on those before them
-        let exposure_blend = if settings.rt_accumulate || !self.exposure_started {
-            1.0
-        } else {
-            1.0 - (-EXPOSURE_RATE
-                * if passed > 0.0 {
-                    passed.min(1.0)
-                } else {
-                    1.0 / 60.0
-                })
-            .exp()
-        };
         Ok(TraceView {
             geometries: accel.geometries,
             instances: accel.instances,
@@ -356,7 +368,7 @@ impl ViewTracer {
             image_target: target.storage_index(),
             exposure_bias: settings.rt_exposure,
             exposure_base: self.exposure_base,
-            exposure_blend,
+            exposure_blend: self.exposure_blend(view, settings, LIGHT_ADAPTATION),
             target_width: target.width(),
             target_height: target.height(),
             sky_sampler: materials.sky_sampler(),
@@ -373,16 +385,6 @@ impl ViewTracer {
             last_up,
             padding: 0,
         })
-    }
-}
-
-/// What the passes after the light read.
-fn post_view(settings: &Settings, counting: Counting) -> PostView {
-    PostView {
-        counters: counting.address,
-        image_rays: counting.image,
-        debug: settings.rt_debug,
-        ..PostView::default()
     }
 }
 

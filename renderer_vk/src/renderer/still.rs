@@ -1,0 +1,126 @@
+//! `rt_screenshot`: an accumulated picture of the view, of any size, drawn a few frames of it in each frame of the game.
+
+use std::time::Instant;
+
+use super::Renderer;
+use crate::api::Picture;
+use crate::error::Error;
+use crate::gpu::Recorder;
+use crate::scene::ViewScene;
+use crate::trace::still::Still;
+
+/// A picture that was asked for.
+#[derive(Default)]
+pub(super) struct StillRequest {
+    /// Size and samples, until the next traced view of the world comes.
+    wanted: Option<([u32; 2], u32)>,
+    still: Option<Still>,
+    /// Frames of the picture in a frame of the game.
+    pace: u32,
+    last: Option<Instant>,
+}
+
+/// The game's frames take about this long while a picture is made, in milliseconds: more is done at once while they
+/// are shorter.
+const FRAME_MS: (f32, f32) = (40.0, 120.0);
+
+/// Frames of the picture in a frame of the game at most: each uploads what moves anew.
+const FASTEST: u32 = 16;
+
+impl StillRequest {
+    /// Forgets it.
+    pub fn cancel(&mut self) {
+        *self = Self::default();
+    }
+}
+
+impl Renderer {
+    /// Asks for a picture of the next traced view of the world, `samples` frames averaged; `size` in pixels, `None` for
+    /// the window's. It is made over several frames; ask [`still_progress`](Self::still_progress) and take it with
+    /// [`take_still`](Self::take_still).
+    ///
+    /// # Errors
+    /// A message for the console: the traced look is off, a picture is being made, or the device has no images of the
+    /// size.
+    pub fn request_still(&mut self, samples: u32, size: Option<(u32, u32)>) -> Result<(), String> {
+        if !self.settings.rt {
+            return Err("the traced look is off (r_rt 0)".into());
+        }
+        if self.still.wanted.is_some() || self.still.still.is_some() {
+            return Err("a picture is being made".into());
+        }
+        let (width, height) = size.unwrap_or(self.size());
+        let most = self.device_info().max_image_size;
+        if width == 0 || height == 0 || width > most || height > most {
+            return Err(format!(
+                "{width}x{height}: sides of 1 to {most} pixels are possible"
+            ));
+        }
+        self.still.wanted = Some(([width, height], samples));
+        Ok(())
+    }
+
+    /// Frames averaged and wanted of the picture in the making; `None`: there is none.
+    pub fn still_progress(&self) -> Option<(u32, u32)> {
+        let waiting = self.still.wanted.map(|(_, samples)| (0, samples));
+        (self.still.still.as_ref()).map_or(waiting, |still| Some(still.progress()))
+    }
+
+    /// Gives up the picture in the making.
+    pub fn cancel_still(&mut self) {
+        self.still.cancel();
+    }
+
+    /// The finished picture, as the display would show it. `None` while it is not finished.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn take_still(&mut self) -> Result<Option<Picture>, Error> {
+        let finished = |still: &mut Still| {
+            let (done, wanted) = still.progress();
+            done >= wanted
+        };
+        let Some(still) = self.still.still.take_if(finished) else {
+            return Ok(None);
+        };
+        self.still.cancel();
+        let image = still.image();
+        let rgba = self.device.read_image(image)?;
+        let (width, height) = (image.width(), image.height());
+        Ok(Some(Picture {
+            width,
+            height,
+            rgb: self.displayed(&rgba, false),
+        }))
+    }
+
+    /// Keeps a view for the picture that was asked for.
+    pub(super) fn keep_for_still(&mut self, view: &ViewScene) -> Result<(), Error> {
+        if let (Some((size, samples)), Some(look)) = (self.still.wanted.take(), &self.trace) {
+            let still = Still::new(&self.device, look, view, size, samples)?;
+            self.still.still = Some(still);
+            self.still.pace = 1;
+        }
+        Ok(())
+    }
+
+    /// Records some more of the picture.
+    pub(super) fn record_still(&mut self, rec: &mut Recorder) -> Result<(), Error> {
+        let request = &mut self.still;
+        let (Some(still), Some(look), Some(assets)) =
+            (&mut request.still, &self.trace, &self.assets)
+        else {
+            return Ok(());
+        };
+        let now = Instant::now();
+        if let Some(last) = request.last.replace(now) {
+            let ms = now.duration_since(last).as_secs_f32() * 1000.0;
+            if ms < FRAME_MS.0 {
+                request.pace = (request.pace + 1).min(FASTEST);
+            } else if ms > FRAME_MS.1 {
+                request.pace = (request.pace / 2).max(1);
+            }
+        }
+        Ok(still.record(rec, look, assets, &self.settings, request.pace)?)
+    }
+}

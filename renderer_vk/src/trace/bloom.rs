@@ -1,0 +1,80 @@
+//! Bloom: a part of the light spread around where it comes from; `shaders/trace/bloom.glsl` says how.
+
+use super::passes::{TILE, dispatch};
+use crate::gpu::{
+    Buffer, BufferDesc, BufferUsage, ComputePipeline, Device, Error, Memory, Recorder,
+};
+
+/// As in `bloom.glsl`: levels, and pixels to a texel of the first one.
+const LEVELS: u32 = 5;
+const FIRST: u32 = 4;
+
+/// Pixels to the edge of what a group of the first pass averages.
+const GROUP: u32 = 64;
+
+/// Reads `hdr`; writes the spread light, a texel for each 4 x 4 pixels. Nothing is made before it is first asked for.
+#[derive(Default)]
+pub struct Bloom {
+    pipelines: Option<[ComputePipeline; 2]>,
+    /// With the size of the picture that it is for.
+    texels: Option<([u32; 2], Buffer)>,
+}
+
+impl Bloom {
+    /// Address of the texels for a picture of a size; 0 with a strength of 0, which frees them.
+    ///
+    /// # Errors
+    /// The driver refuses a pipeline; out of memory.
+    pub fn prepare(
+        &mut self,
+        device: &Device,
+        size: [u32; 2],
+        strength: f32,
+    ) -> Result<u64, Error> {
+        self.texels = (self.texels.take()).filter(|(of, _)| strength > 0.0 && *of == size);
+        if strength <= 0.0 {
+            return Ok(0);
+        }
+        if self.pipelines.is_none() {
+            let make = |name, shader| ComputePipeline::new(device, name, shader, &[]);
+            self.pipelines = Some([
+                make("trace_bloom", &shaders::TRACE_BLOOM_DOWN_COMP)?,
+                make("trace_bloom", &shaders::TRACE_BLOOM_UP_COMP)?,
+            ]);
+        }
+        let texels = match &self.texels {
+            Some((_, texels)) => texels,
+            None => {
+                let desc = BufferDesc {
+                    name: "trace bloom",
+                    size: texel_count(size) * 8,
+                    usage: BufferUsage::STORAGE,
+                    memory: Memory::Device,
+                };
+                &self.texels.insert((size, Buffer::new(device, &desc)?)).1
+            }
+        };
+        Ok(texels.address())
+    }
+
+    /// Records the passes, once [`prepare`](Self::prepare) gave an address. `view`: device address of the `TraceView`.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn record(&self, rec: &mut Recorder, view: u64) -> Result<(), Error> {
+        let (Some([down, up]), Some((size, _))) = (&self.pipelines, &self.texels) else {
+            return Ok(());
+        };
+        dispatch(rec, "trace_bloom", down, view, *size, [GROUP; 2])?;
+        dispatch(rec, "trace_bloom", up, view, *size, [TILE * FIRST; 2])
+    }
+}
+
+/// Texels of all levels and of their sum.
+fn texel_count(size: [u32; 2]) -> u64 {
+    let level = |level: u32| {
+        let [w, h] = size.map(|s| u64::from(s.div_ceil(FIRST << level)));
+        w * h
+    };
+    (0..LEVELS).map(level).sum::<u64>() + level(0)
+}
