@@ -86,6 +86,10 @@ pub struct RenderArgs {
     /// Print milliseconds as JSON: of the GPU for each pass (the mean over the frames), and of GPU and CPU for a frame
     #[arg(long)]
     timings: bool,
+    /// Print what the last frames cost as JSON: milliseconds, rays and millions of rays a second of each pass, and bytes
+    /// of GPU memory by purpose
+    #[arg(long)]
+    stats: bool,
     /// Turn the camera once round over the frames, so that they show different things
     #[arg(long)]
     turn: bool,
@@ -164,7 +168,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         ..camera.ref_def(args.size, args.fov)
     };
 
-    let frames = if args.look == Look::Traced || args.timings {
+    let frames = if args.look == Look::Traced || args.timings || args.stats {
         args.frames.max(1)
     } else {
         1
@@ -175,6 +179,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     )?);
     bar.set_message(format!("{map} on {}", info.name));
     let mut timings = Timings::default();
+    renderer.count_rays(args.stats);
     for frame in 0..frames {
         let mut def = def;
         if args.turn {
@@ -195,6 +200,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         bar.inc(1);
     }
     bar.finish_and_clear();
+    let costs = args.stats.then(|| renderer.costs());
     let picture = renderer.read_pixels()?;
     image::save_buffer(
         &args.output,
@@ -205,6 +211,9 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     )
     .with_context(|| format!("{}: cannot be written", args.output.display()))?;
     println!("{}", args.output.display());
+    if let Some(costs) = costs {
+        print!("{}", costs.json());
+    }
     if args.timings {
         let mut report = timings.report();
         for (key, value) in [

@@ -68,6 +68,8 @@ pub struct Renderer {
     device: Device,
 
     settings: Settings,
+    /// Rays of traced views are counted.
+    counts_rays: bool,
     /// The last frame's picture is not shown yet.
     unshown: bool,
     /// With the channels that each is drawn in.
@@ -144,6 +146,7 @@ impl Renderer {
             settings: Settings::default(),
             queue: Vec::new(),
             unshown: false,
+            counts_rays: false,
             eye: Eye::Both,
             shown_anaglyph: 0,
             gather_ms: 0.0,

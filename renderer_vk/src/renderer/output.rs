@@ -145,6 +145,9 @@ impl Renderer {
             self.shown_anaglyph = self.settings.anaglyph;
             self.targets.clear(&mut recorder)?;
         }
+        if let Some(trace) = &mut self.trace {
+            trace.count_rays(self.counts_rays);
+        }
         if let Some(assets) = &mut self.assets {
             assets.prepare_frame(&self.settings)?;
             let mut context = FrameContext {

@@ -89,9 +89,7 @@ impl Renderer {
     /// Counts the rays of traced views from the next frame on, or no longer; see [`costs`](Self::costs). Counting is
     /// not free. Without the traced look there is nothing to count.
     pub fn count_rays(&mut self, count: bool) {
-        if let Some(trace) = &mut self.trace {
-            trace.count_rays(count);
-        }
+        self.counts_rays = count;
     }
 
     /// What the newest finished frame cost, and what memory is held for. On a software device passes are timed once
