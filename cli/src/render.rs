@@ -96,6 +96,21 @@ pub struct RenderArgs {
     /// Measure frames as a game would send them: nothing accumulates
     #[arg(long)]
     no_accumulation: bool,
+    /// Move the camera by this much from frame to frame, so that the last frame is where it was asked for
+    #[arg(long, num_args = 4, allow_negative_numbers = true, value_names = ["X", "Y", "Z", "YAW"])]
+    step: Option<Vec<f32>>,
+    /// Filter of frames that do not accumulate: 0 none, 1 A-SVGF, 2 sparse
+    #[arg(long, default_value_t = 1)]
+    denoiser: u32,
+    /// No temporal antialiasing of frames that do not accumulate
+    #[arg(long)]
+    no_taa: bool,
+    /// Width and height that are traced over those of the picture, 0.25 to 1, for frames that do not accumulate
+    #[arg(long, default_value_t = 1.0)]
+    scale: f32,
+    /// Depth of field: diameter of the lens and distance that is sharp, units
+    #[arg(long, num_args = 2, value_names = ["DIAMETER", "DISTANCE"])]
+    lens: Option<Vec<f32>>,
 }
 
 /// `WIDTHxHEIGHT`.
@@ -130,11 +145,15 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     })
     .context("no picture without a Vulkan device")?;
     let info = renderer.device_info().clone();
-    let settings = Settings {
+    let mut settings = Settings {
         rt: args.look == Look::Traced,
         rt_accumulate: !args.no_accumulation,
         rt_bounces: args.bounces,
         rt_exposure: args.exposure,
+        rt_denoiser: args.denoiser,
+        rt_taa: !args.no_taa,
+        rt_scale: args.scale,
+        rt_dof: args.lens.is_some(),
         rt_num_random_dl: match args.sampling {
             Sampling::Uniform | Sampling::Resampled => 1,
             Sampling::All => 0,
@@ -145,6 +164,10 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         },
         ..Settings::default()
     };
+    if let Some([diameter, distance]) = args.lens.as_deref() {
+        settings.rt_aperture = *diameter;
+        settings.rt_focal_length = *distance;
+    }
     renderer.begin_registration(files, &settings)?;
     renderer.load_world(&map)?;
     renderer.end_registration();
@@ -185,6 +208,15 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         if args.turn {
             let turned = Camera {
                 yaw: camera.yaw + 360.0 * frame as f32 / frames as f32,
+                ..camera
+            };
+            def.view_axis = turned.axis();
+        }
+        if let Some([x, y, z, yaw]) = args.step.as_deref() {
+            let before = (frames - 1 - frame) as f32;
+            def.view_origin -= Vec3::new(*x, *y, *z) * before;
+            let turned = Camera {
+                yaw: camera.yaw - yaw * before,
                 ..camera
             };
             def.view_axis = turned.axis();

@@ -3,7 +3,7 @@
 //! shows as display white; space is the world's unless said otherwise. Addresses are buffer device addresses.
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::types::MaterialBuffers;
 
@@ -311,6 +311,34 @@ pub struct PostView {
     pub exposure_blend_dark: f32,
 }
 
+/// The camera's samples, and how they become the picture.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct AntialiasView {
+    /// Where in its pixel every ray of the frame goes through, from the middle, traced pixels.
+    pub jitter: Vec2,
+    /// Size of the finished picture, pixels; the traced one may be smaller.
+    pub output_width: u32,
+    /// See `output_width`.
+    pub output_height: u32,
+    /// The linear picture that exposure and tone curve work on: RGBA32F while frames are accumulated, else RGBA16F.
+    pub image_picture: u32,
+    /// RGBA16F of the output's size: what is resolved over time, and how many frames' worth it is.
+    pub image_resolved: u32,
+    /// Texture of the last frame's.
+    pub last_resolved: u32,
+    /// Linear sampler that clamps.
+    pub sampler_index: u32,
+    /// 1: there is a resolved picture of the last frame.
+    pub history: u32,
+    /// Radius of the lens, units; 0: a pinhole.
+    pub lens_radius: f32,
+    /// Distance of the plane that is sharp, units along the view.
+    pub focal_distance: f32,
+    /// Makes the size a multiple of eight without hidden bytes.
+    pub padding: u32,
+}
+
 /// All that the passes of one traced view read: camera, arrays, images, settings.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -328,6 +356,7 @@ pub struct TraceView {
     pub bvh_instances: u64,
     pub materials: MaterialBuffers,
     pub motion: MotionView,
+    pub antialias: AntialiasView,
     pub post: PostView,
     pub lights: LightView,
     pub eye: Vec3,
@@ -366,7 +395,8 @@ pub struct TraceView {
     pub image_front: u32,
     pub image_direct: u32,
     pub image_indirect: u32,
-    pub image_hdr: u32,
+    /// RGBA16F, of the traced size; not written while frames are accumulated.
+    pub image_composite: u32,
     pub image_accumulation: u32,
     pub image_target: u32,
     /// Stops.

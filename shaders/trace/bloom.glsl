@@ -7,7 +7,7 @@
 #ifndef RELIGHT_TRACE_BLOOM_GLSL
 #define RELIGHT_TRACE_BLOOM_GLSL
 
-#include "trace/view.glsl"
+#include "trace/picture.glsl"
 
 const uint BLOOM_LEVELS = 5;
 // Pixels to a texel of the first level.
@@ -18,7 +18,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) buffer BloomTexels 
 
 // Texels of a level; the last row and column may lie half outside of the picture.
 ivec2 bloom_size(uint level) {
-    ivec2 picture = imageSize(images_rgba32f[VIEW.image_hdr]);
+    ivec2 picture = picture_size();
     int pixels = BLOOM_FIRST << level;
     return (picture + pixels - 1) / pixels;
 }

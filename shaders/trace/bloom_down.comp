@@ -8,7 +8,7 @@ layout(local_size_x = 16, local_size_y = 16) in;
 shared vec4 texels[16 * 16];
 
 void main() {
-    ivec2 picture = imageSize(images_rgba32f[VIEW.image_hdr]);
+    ivec2 picture = picture_size();
     ivec2 place = ivec2(gl_GlobalInvocationID.xy);
     uint local = gl_LocalInvocationIndex;
     vec3 sum = vec3(0.0);
@@ -17,7 +17,7 @@ void main() {
         for (int x = 0; x < BLOOM_FIRST; x++) {
             ivec2 pixel = place * BLOOM_FIRST + ivec2(x, y);
             if (pixel.x >= picture.x || pixel.y >= picture.y) continue;
-            sum += min(imageLoad(images_rgba32f[VIEW.image_hdr], pixel).rgb, vec3(60000.0));
+            sum += min(picture_load(pixel), vec3(60000.0));
             count += 1.0;
         }
     }

@@ -5,6 +5,7 @@
 #include "trace/lights.glsl"
 #include "trace/gbuffer.glsl"
 #include "trace/motion.glsl"
+#include "trace/picture.glsl"
 
 const vec3 NOTHING = vec3(0.1, 0.1, 0.1);
 
@@ -76,8 +77,10 @@ vec3 debug_color(ivec2 pixel) {
 
 void main() {
     ivec2 pixel = LAUNCH_PIXEL;
-    if (pixel.x >= int(VIEW.width) || pixel.y >= int(VIEW.height)) return;
+    if (any(greaterThanEqual(pixel, picture_size()))) return;
     ivec2 target = pixel + ivec2(VIEW.target_x, VIEW.target_y);
     if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target_width) || target.y >= int(VIEW.target_height)) return;
-    imageStore(images_rgba8[VIEW.image_target], target, vec4(debug_color(pixel), 1.0));
+    // each traced pixel as a block, where fewer are traced than shown
+    ivec2 traced = min(ivec2((vec2(pixel) + 0.5) * vec2(VIEW.width, VIEW.height) / vec2(picture_size())), ivec2(VIEW.width, VIEW.height) - 1);
+    imageStore(images_rgba8[VIEW.image_target], target, vec4(debug_color(traced), 1.0));
 }

@@ -20,7 +20,7 @@ const float DARK_PART = 0.2, BRIGHT_PART = 0.05;
 
 void main() {
     ExposureState state = ExposureState(VIEW.exposure);
-    float total = float(VIEW.width) * float(VIEW.height);
+    float total = float(VIEW.antialias.output_width) * float(VIEW.antialias.output_height);
     float from = total * DARK_PART, to = total * (1.0 - BRIGHT_PART);
     float below = 0.0, sum = 0.0, weight = 0.0;
     for (uint i = 0; i < EXPOSURE_BINS; i++) {

@@ -1,6 +1,7 @@
 #version 460
 // Counts the picture's pixels by the logarithm of their luminance.
 #include "trace/exposure.glsl"
+#include "trace/picture.glsl"
 
 layout(local_size_x = 16, local_size_y = 16) in;
 
@@ -11,8 +12,8 @@ void main() {
     if (local_index < EXPOSURE_BINS) counts[local_index] = 0;
     barrier();
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (pixel.x < int(VIEW.width) && pixel.y < int(VIEW.height)) {
-        float value = log2(max(luminance(imageLoad(images_rgba32f[VIEW.image_hdr], pixel).rgb), 1.0e-6));
+    if (all(lessThan(pixel, picture_size()))) {
+        float value = log2(max(luminance(picture_load(pixel)), 1.0e-6));
         float place = (value - EXPOSURE_MIN_LOG) / (EXPOSURE_MAX_LOG - EXPOSURE_MIN_LOG);
         atomicAdd(counts[uint(clamp(place, 0.0, 0.9999) * float(EXPOSURE_BINS))], 1u);
     }

@@ -8,6 +8,7 @@
 #ifndef RELIGHT_TRACE_MOTION_GLSL
 #define RELIGHT_TRACE_MOTION_GLSL
 
+#include "trace/camera.glsl"
 #include "trace/geometry.glsl"
 
 // Length of the way to the sky as the motion image holds it: beyond every map, within half floats.
@@ -87,23 +88,26 @@ LastPlace last_sky(LastSpace space, vec3 direction) {
     return LastPlace(vec4(space.turn * direction, 0.0), SKY_PATH, true);
 }
 
-// What the motion image holds for a surface seen in the middle of a sample at `seen` (pixels from the left and top).
-vec4 motion_of(vec2 seen, LastPlace place) {
+// What the motion image holds for a surface that a ray of the camera met.
+vec4 motion_of(CameraRay ray, LastPlace place) {
     float path = min(place.path, SKY_PATH);
     if (place.at.w < 0.0 || (VIEW.flags & VIEW_HISTORY) == 0) return vec4(0.0, 0.0, -1.0, path);
     if (place.rests && VIEW.motion.still != 0) return vec4(0.0, 0.0, path, path);
+    // out of focus, a pixel shows what lies beside it; the blur of what rests moves as a thing at its distance would
+    if (VIEW.antialias.lens_radius > 0.0 && place.rests && place.at.w > 0.0)
+        place.at.xyz = VIEW.eye + ray.through_middle * path;
     vec3 v = place.at.xyz - VIEW.last_eye * place.at.w;
     float depth = dot(v, VIEW.last_forward);
     if (depth <= 0.0) return vec4(0.0, 0.0, -1.0, path);
     vec2 ndc = -vec2(dot(v, VIEW.last_left) / dot(VIEW.last_left, VIEW.last_left),
         dot(v, VIEW.last_up) / dot(VIEW.last_up, VIEW.last_up)) / depth;
-    vec2 offset = (ndc * 0.5 + 0.5) * vec2(VIEW.width, VIEW.height) - seen;
+    vec2 offset = (ndc * 0.5 + 0.5) * vec2(VIEW.width, VIEW.height) - ray.seen;
     float last_path = place.at.w > 0.0 ? min(length(v), SKY_PATH) : SKY_PATH;
     return vec4(clamp(offset, -60000.0, 60000.0), last_path, path);
 }
 
-void motion_write(ivec2 pixel, vec2 seen, LastPlace place) {
-    imageStore(images_rgba16f[VIEW.motion.image], pixel, motion_of(seen, place));
+void motion_write(ivec2 pixel, CameraRay ray, LastPlace place) {
+    imageStore(images_rgba16f[VIEW.motion.image], pixel, motion_of(ray, place));
 }
 
 #endif

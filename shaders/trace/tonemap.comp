@@ -7,6 +7,7 @@
 // Radiance 1, the white of the classic look, shows as 0.85 of white, and what is brighter still gains.
 #include "trace/bloom.glsl"
 #include "trace/exposure.glsl"
+#include "trace/picture.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -31,11 +32,11 @@ vec3 spread_light(ivec2 pixel) {
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (pixel.x >= int(VIEW.width) || pixel.y >= int(VIEW.height)) return;
+    if (any(greaterThanEqual(pixel, picture_size()))) return;
     ivec2 target = pixel + ivec2(VIEW.target_x, VIEW.target_y);
     if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target_width) || target.y >= int(VIEW.target_height)) return;
     float exposure = ExposureState(VIEW.exposure).exposure * exp2(VIEW.exposure_base + VIEW.exposure_bias);
-    vec3 radiance = imageLoad(images_rgba32f[VIEW.image_hdr], pixel).rgb;
+    vec3 radiance = picture_load(pixel);
     if (VIEW.post.bloom != 0) radiance = mix(radiance, spread_light(pixel), VIEW.post.bloom_strength);
     radiance = max(radiance * exposure, 0.0);
     imageStore(images_rgba8[VIEW.image_target], target, vec4(encode_display(tone_curve(radiance)), 1.0));

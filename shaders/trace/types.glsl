@@ -56,11 +56,17 @@ struct PostView {
     uint64_t counters; uint64_t bloom; float bloom_strength; uint debug; uint image_rays; float exposure_blend_dark;
 };
 
+struct AntialiasView {
+    vec2 jitter; uint output_width; uint output_height; uint image_picture; uint image_resolved; uint last_resolved;
+    uint sampler_index; uint history; float lens_radius; float focal_distance; uint padding;
+};
+
 struct TraceView {
     uint64_t geometries; uint64_t instances; uint64_t fogs; uint64_t portals; uint64_t skies; uint64_t exposure;
     uint64_t bvh_nodes; uint64_t bvh_instances;
     MaterialBuffers materials;
     MotionView motion;
+    AntialiasView antialias;
     PostView post;
     LightView lights;
     vec3 eye; vec3 forward; vec3 left; vec3 up;
@@ -69,7 +75,7 @@ struct TraceView {
     float time; float pixel_spread; vec3 ambient;
     uint fog_count; uint portal_count;
     uint max_depth; uint bounces;
-    uint image_position; uint image_surface; uint image_albedo; uint image_front; uint image_direct; uint image_indirect; uint image_hdr;
+    uint image_position; uint image_surface; uint image_albedo; uint image_front; uint image_direct; uint image_indirect; uint image_composite;
     uint image_accumulation; uint image_target;
     float exposure_bias; float exposure_base; float exposure_blend;
     uint target_width; uint target_height; uint sky_sampler;

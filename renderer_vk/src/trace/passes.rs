@@ -161,15 +161,11 @@ pixel_pass!(
     Fill, "trace_fill", TRACE_FILL_COMP
 );
 pixel_pass!(
-    /// Reads the G-buffer, `front`, `direct` and `indirect`; writes `hdr`.
+    /// Reads the G-buffer, `front`, `direct` and `indirect`; writes `composite`, or the mean in `accumulation`.
     Composite, "trace_composite", TRACE_COMPOSITE_COMP
 );
 pixel_pass!(
-    /// Reads `hdr` and `accumulation`; writes the new sum to `accumulation` and the mean to `hdr`.
-    Accumulate, "trace_accumulate", TRACE_ACCUMULATE_COMP
-);
-pixel_pass!(
-    /// Reads `hdr` and the exposure; writes the view's rectangle of the target.
+    /// Reads the picture and the exposure; writes the view's rectangle of the target.
     ToneMap, "trace_tonemap", TRACE_TONEMAP_COMP
 );
 
@@ -256,7 +252,7 @@ impl Denoise {
     }
 }
 
-/// Reads `hdr`; writes the exposure.
+/// Reads the picture; writes the exposure.
 pub struct Exposure {
     histogram: ComputePipeline,
     adapt: ComputePipeline,

@@ -1,6 +1,6 @@
 //! The images of the traced look.
 
-use crate::gpu::{Device, Error, Format, Image, ImageUsage};
+use crate::gpu::{Device, Error, Format, Image, ImageDesc, ImageUsage};
 
 /// Images of one size: the G-buffer, the light, the picture before tone mapping, and the accumulated sum.
 pub struct Targets {
@@ -26,10 +26,10 @@ pub struct Targets {
     pub light: [Image; 3],
     /// Mean and mean square of the light's luminance over time, number of frames; of this frame and the last.
     pub moments: [Image; 2],
-    /// Linear picture.
-    pub hdr: Image,
-    /// Sum of frames in reference mode.
-    pub accumulation: Image,
+    /// Linear picture of the traced size.
+    pub composite: Image,
+    /// Mean of the frames in reference mode, while that is on.
+    pub accumulation: Option<Image>,
 }
 
 impl Targets {
@@ -40,10 +40,7 @@ impl Targets {
     pub fn new(device: &Device, width: u32, height: u32) -> Result<Self, Error> {
         let make = |name, format| {
             let usage = ImageUsage::STORAGE;
-            Image::new(
-                device,
-                &crate::gpu::ImageDesc::new(name, width, height, format, usage),
-            )
+            Image::new(device, &ImageDesc::new(name, width, height, format, usage))
         };
         Ok(Self {
             width,
@@ -70,12 +67,32 @@ impl Targets {
                 make("trace moments", Format::Rgba16F)?,
                 make("trace last moments", Format::Rgba16F)?,
             ],
-            front: make("trace front", Format::Rgba32F)?,
+            front: make("trace front", Format::Rgba16F)?,
             direct: make("trace direct", Format::Rgba16F)?,
             indirect: make("trace indirect", Format::Rgba16F)?,
-            hdr: make("trace hdr", Format::Rgba32F)?,
-            accumulation: make("trace accumulation", Format::Rgba32F)?,
+            composite: make("trace composite", Format::Rgba16F)?,
+            accumulation: None,
         })
+    }
+
+    /// Makes or drops the image that only reference mode needs.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn fit(&mut self, device: &Device, accumulates: bool) -> Result<(), Error> {
+        if !accumulates {
+            self.accumulation = None;
+        } else if self.accumulation.is_none() {
+            let (name, format) = ("trace accumulation", Format::Rgba32F);
+            let desc = ImageDesc::new(name, self.width, self.height, format, ImageUsage::STORAGE);
+            self.accumulation = Some(Image::new(device, &desc)?);
+        }
+        Ok(())
+    }
+
+    /// The linear picture, as far as nothing is resolved over time.
+    pub fn picture(&self) -> &Image {
+        self.accumulation.as_ref().unwrap_or(&self.composite)
     }
 
     /// What this frame has written becomes what the last one wrote. `filtered`: the image of `light` that the next

@@ -4,9 +4,10 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use glam::Vec3;
 use shaders::trace_types::constants as t;
-use shaders::trace_types::{MotionView, PortalRecord, PostView, TraceView};
+use shaders::trace_types::{AntialiasView, MotionView, PortalRecord, PostView, TraceView};
 
 use super::accel::{Accel, AccelOutput};
+use super::antialias::{Antialias, traced_size};
 use super::bloom::Bloom;
 use super::counters::{COUNTED, RayCounters};
 use super::debug::DebugView;
@@ -14,9 +15,7 @@ use super::geometry::StaticGeometry;
 use super::input::{MaterialTable, Tracer};
 use super::lights::MapLights;
 use super::motion::Motion;
-use super::passes::{
-    Accumulate, Composite, Denoise, Direct, Exposure, Fill, Indirect, Primary, ToneMap,
-};
+use super::passes::{Composite, Denoise, Direct, Exposure, Fill, Indirect, Primary, ToneMap};
 use super::targets::Targets;
 use crate::gpu::{Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::scene::ViewScene;
@@ -41,7 +40,7 @@ pub struct ViewTracer {
     fill: Fill,
     denoise: Denoise,
     composite: Composite,
-    accumulate: Accumulate,
+    antialias: Antialias,
     exposure: Exposure,
     tone_map: ToneMap,
     motion: Motion,
@@ -84,7 +83,7 @@ impl ViewTracer {
             fill: Fill::new(device)?,
             denoise: Denoise::new(device)?,
             composite: Composite::new(device)?,
-            accumulate: Accumulate::new(device)?,
+            antialias: Antialias::new(device)?,
             exposure: Exposure::new(device)?,
             tone_map: ToneMap::new(device)?,
             motion: Motion::default(),
@@ -115,9 +114,11 @@ impl ViewTracer {
         self.accumulated.1.max(1)
     }
 
-    /// The linear picture of the last view, before exposure: RGBA, 32-bit floats.
+    /// The linear picture of the last view, before exposure: RGBA, floats of 32 bits while frames are accumulated and of
+    /// 16 bits otherwise.
     pub fn hdr(&self) -> Option<&Image> {
-        self.targets.as_ref().map(|t| &t.hdr)
+        let targets = self.targets.as_ref()?;
+        Some(self.antialias.picture().unwrap_or(targets.picture()))
     }
 
     /// Rays of each of [`COUNTED`](super::counters::COUNTED)'s passes in the newest finished frame; `None` while they
@@ -131,6 +132,7 @@ impl ViewTracer {
         self.accumulated = (0, 0);
         self.history = None;
         self.motion = Motion::default();
+        self.antialias.reset();
         self.exposure_started = false;
     }
 
@@ -163,15 +165,19 @@ impl ViewTracer {
         {
             return Ok(());
         }
-        let size = [width, height];
+        let output = [width, height];
+        let size = traced_size(settings, output);
         if self
             .targets
             .as_ref()
             .is_none_or(|t| [t.width, t.height] != size)
         {
-            self.targets = Some(Targets::new(&self.device, width, height)?);
+            self.targets = Some(Targets::new(&self.device, size[0], size[1])?);
             self.history = None;
             self.accumulated = (0, 0);
+        }
+        if let Some(targets) = &mut self.targets {
+            targets.fit(&self.device, settings.rt_accumulate)?;
         }
         let map = map.filter(|_| view.has_world);
         let accumulated = self.accumulated_before(view, materials, settings);
@@ -187,6 +193,16 @@ impl ViewTracer {
         motion.still &= u32::from(self.history == Some(camera_frame(view)));
         let show_rays = settings.rt_debug == t::DEBUG_RAYS;
         let counting = (self.counters).begin(rec, size, self.count_rays, show_rays)?;
+        let antialias = match &self.targets {
+            Some(targets) => self.antialias.prepare(
+                &self.device,
+                settings,
+                output,
+                targets.picture(),
+                self.history.is_some(),
+            )?,
+            None => AntialiasView::default(),
+        };
         let mut params = self.params(
             rec,
             view,
@@ -198,11 +214,14 @@ impl ViewTracer {
             accumulated,
             &portals,
             motion,
+            antialias,
         )?;
         params.post = PostView {
             counters: counting.address,
             image_rays: counting.image,
-            bloom: self.bloom.prepare(&self.device, size, settings.rt_bloom)?,
+            bloom: self
+                .bloom
+                .prepare(&self.device, output, settings.rt_bloom)?,
             bloom_strength: settings.rt_bloom.clamp(0.0, 1.0),
             debug: settings.rt_debug,
             exposure_blend_dark: self.exposure_blend(view, settings, DARK_ADAPTATION),
@@ -225,14 +244,12 @@ impl ViewTracer {
             self.denoise.record(rec, address, targets)?;
         }
         self.composite.record(rec, address, size)?;
-        if settings.rt_accumulate {
-            self.accumulate.record(rec, address, size)?;
-        }
-        self.exposure.record(rec, address, size)?;
+        self.antialias.record(rec, address)?;
+        self.exposure.record(rec, address, output)?;
         self.bloom.record(rec, address)?;
-        self.tone_map.record(rec, address, size)?;
+        self.tone_map.record(rec, address, output)?;
         if settings.rt_debug > 0 {
-            self.debug.record(&self.device, rec, address, size)?;
+            self.debug.record(&self.device, rec, address, output)?;
         }
         self.frame = self.frame.wrapping_add(1);
         self.last_time = view.time;
@@ -240,6 +257,7 @@ impl ViewTracer {
         if let Some(targets) = &mut self.targets {
             targets.advance(Denoise::HISTORY);
         }
+        self.antialias.advance();
         self.exposure_started = true;
         Ok(())
     }
@@ -293,6 +311,7 @@ impl ViewTracer {
         accumulated: u32,
         portals: &[PortalRecord],
         motion: MotionView,
+        antialias: AntialiasView,
     ) -> Result<TraceView, Error> {
         let Some(targets) = &self.targets else {
             return Ok(TraceView::default()); // made by the caller
@@ -333,6 +352,7 @@ impl ViewTracer {
                 image_last: targets.motion[1].storage_index(),
                 ..motion
             },
+            antialias,
             lights: lights.of_view(rec, view, settings)?,
             eye,
             forward,
@@ -363,8 +383,11 @@ impl ViewTracer {
             image_front: targets.front.storage_index(),
             image_direct: targets.direct.storage_index(),
             image_indirect: targets.indirect.storage_index(),
-            image_hdr: targets.hdr.storage_index(),
-            image_accumulation: targets.accumulation.storage_index(),
+            image_composite: targets.composite.storage_index(),
+            image_accumulation: targets
+                .accumulation
+                .as_ref()
+                .map_or(0, Image::storage_index),
             image_target: target.storage_index(),
             exposure_bias: settings.rt_exposure,
             exposure_base: self.exposure_base,
@@ -475,6 +498,9 @@ fn content_hash(view: &ViewScene, materials: &dyn MaterialTable, settings: &Sett
     )
         .hash(&mut hasher);
     (settings.dynamic_light, settings.no_portals).hash(&mut hasher);
+    (settings.rt_antialiasing, settings.rt_dof).hash(&mut hasher);
+    let lens = [settings.rt_aperture, settings.rt_focal_length];
+    lens.map(f32::to_bits).hash(&mut hasher);
     // estimators with the same mean could go on together, but a comparison wants them apart
     (
         settings.rt_cull_lights,

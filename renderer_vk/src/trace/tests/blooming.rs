@@ -10,7 +10,8 @@ const SIZE: i32 = 150;
 
 /// What the picture shows, linear: display codes decoded, below the tone curve's shoulder.
 fn linear(picture: &[[u8; 4]]) -> Vec<f32> {
-    let decode = |p: &[u8; 4]| crate::trace::lights::decode(Vec3::splat(f32::from(p[1]) / 255.0)).x;
+    let decode =
+        |p: &[u8; 4]| crate::trace::frame_lights::decode(Vec3::splat(f32::from(p[1]) / 255.0)).x;
     picture.iter().map(decode).collect()
 }
 

@@ -158,8 +158,15 @@ impl Gpu {
             );
         }
         let hdr = self.look.hdr().expect("traced");
-        let floats: Vec<f32> =
-            bytemuck::pod_collect_to_vec(&self.device.read_image(hdr).expect("read"));
+        let bytes = self.device.read_image(hdr).expect("read");
+        let floats: Vec<f32> = if hdr.format() == Format::Rgba32F {
+            bytemuck::pod_collect_to_vec(&bytes)
+        } else {
+            bytemuck::pod_collect_to_vec::<u8, u16>(&bytes)
+                .into_iter()
+                .map(half)
+                .collect()
+        };
         let picture: Vec<[u8; 4]> =
             bytemuck::pod_collect_to_vec(&self.device.read_image(&target).expect("read"));
         self.check_messages();

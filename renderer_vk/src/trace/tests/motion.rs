@@ -17,6 +17,8 @@ const SIZE: i32 = 24;
 fn live() -> Settings {
     Settings {
         rt_accumulate: false,
+        // through the middles of pixels
+        rt_taa: false,
         ..reference()
     }
 }

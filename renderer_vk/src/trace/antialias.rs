@@ -1,0 +1,249 @@
+//! From the traced picture to the one of the window's size: temporal antialiasing, and upscaling with and without it.
+//!
+//! With temporal antialiasing the rays of each frame go through another place of their pixels (the R2 sequence of
+//! Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018: evenly spread however many frames are taken
+//! of it), and a picture of the output's size is kept from frame to frame.
+
+use glam::Vec2;
+use shaders::trace_types::AntialiasView;
+
+use crate::gpu::{
+    Access, ComputePipeline, Device, Error, Filter, Format, Image, ImageDesc, ImageUsage,
+    MipFilter, Recorder, SamplerDesc, Wrap,
+};
+use crate::settings::Settings;
+
+/// Pixels along each edge of a group of the two passes, see their `local_size`.
+const RESOLVE_GROUP: u32 = 16;
+const UPSCALE_GROUP: u32 = 8;
+
+/// The smallest part of the picture's size that is traced, along each axis.
+const LEAST_SCALE: f32 = 0.25;
+
+/// What makes the picture of a view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Method {
+    /// The traced picture is the picture.
+    Plain,
+    /// Samples of many frames.
+    Temporal,
+    /// A larger picture of one frame.
+    Upscale,
+}
+
+impl Method {
+    fn of(settings: &Settings, output: [u32; 2]) -> Self {
+        if settings.rt_accumulate {
+            Self::Plain
+        } else if settings.rt_taa {
+            Self::Temporal
+        } else if traced_size(settings, output) != output {
+            Self::Upscale
+        } else {
+            Self::Plain
+        }
+    }
+}
+
+/// The size that is traced for a picture of the size `output`, pixels. Reference pictures are traced in full.
+pub fn traced_size(settings: &Settings, output: [u32; 2]) -> [u32; 2] {
+    if settings.rt_accumulate || !(settings.rt_scale < 1.0) {
+        return output;
+    }
+    let scale = settings.rt_scale.max(LEAST_SCALE);
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss
+    )] // a number of pixels
+    output.map(|side| ((side as f32 * scale).round() as u32).clamp(1, side.max(1)))
+}
+
+/// Resolves traced pictures to those of the window.
+pub struct Antialias {
+    resolve: ComputePipeline,
+    upscale: ComputePipeline,
+    sampler: u32,
+    /// This frame's and the last one's, while they are asked for.
+    resolved: Option<[Image; 2]>,
+    /// The last frame left a picture to go on from.
+    history: bool,
+    frame: u32,
+    method: Method,
+}
+
+impl Antialias {
+    /// Compiles the pipelines.
+    ///
+    /// # Errors
+    /// The driver refuses a pipeline.
+    pub fn new(device: &Device) -> Result<Self, Error> {
+        let pipeline = |name, spirv| ComputePipeline::new(device, name, spirv, &[]);
+        Ok(Self {
+            resolve: pipeline("trace_antialias", &shaders::TRACE_ANTIALIAS_COMP)?,
+            upscale: pipeline("trace_upscale", &shaders::TRACE_UPSCALE_COMP)?,
+            sampler: device.sampler(&SamplerDesc {
+                filter: Filter::Linear,
+                mip: MipFilter::None,
+                wrap: Wrap::Clamp,
+                anisotropy: 1.0,
+                lod_bias: 0.0,
+            })?,
+            resolved: None,
+            history: false,
+            frame: 0,
+            method: Method::Plain,
+        })
+    }
+
+    /// The next picture has nothing to do with the last one.
+    pub fn reset(&mut self) {
+        self.history = false;
+    }
+
+    /// Makes ready for a view of the size `output`. `picture`: the image that is the picture if nothing is resolved;
+    /// `history`: the last frame saw the same scene.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn prepare(
+        &mut self,
+        device: &Device,
+        settings: &Settings,
+        output: [u32; 2],
+        picture: &Image,
+        history: bool,
+    ) -> Result<AntialiasView, Error> {
+        let method = Method::of(settings, output);
+        if method == Method::Plain {
+            self.resolved = None;
+        } else if self
+            .resolved
+            .as_ref()
+            .is_none_or(|r| [r[0].width(), r[0].height()] != output)
+        {
+            let usage = ImageUsage::STORAGE | ImageUsage::SAMPLED;
+            let make = |name| {
+                let [width, height] = output;
+                let desc = ImageDesc::new(name, width, height, Format::Rgba16F, usage);
+                Image::new(device, &desc)
+            };
+            self.resolved = Some([make("trace resolved")?, make("trace last resolved")?]);
+            self.history = false;
+        }
+        self.history &= history && method == self.method;
+        self.method = method;
+        let jittered = method == Method::Temporal && settings.rt_antialiasing;
+        let dof = settings.rt_dof && settings.rt_aperture > 0.0;
+        let (image, last) = match &self.resolved {
+            Some([now, last]) => (now.storage_index(), last.texture_index()),
+            None => (0, 0),
+        };
+        Ok(AntialiasView {
+            jitter: if jittered {
+                jitter(self.frame)
+            } else {
+                Vec2::ZERO
+            },
+            output_width: output[0],
+            output_height: output[1],
+            image_picture: if self.resolved.is_some() {
+                image
+            } else {
+                picture.storage_index()
+            },
+            image_resolved: image,
+            last_resolved: last,
+            sampler_index: self.sampler,
+            history: u32::from(self.history),
+            lens_radius: if dof { 0.5 * settings.rt_aperture } else { 0.0 },
+            focal_distance: settings.rt_focal_length.max(1.0),
+            padding: 0,
+        })
+    }
+
+    /// Records the pass, if there is anything to do. `view`: device address of the `TraceView`.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn record(&mut self, rec: &mut Recorder, view: u64) -> Result<(), Error> {
+        let (pipeline, name, group) = match self.method {
+            Method::Plain => return Ok(()),
+            Method::Temporal => (&self.resolve, "trace_antialias", RESOLVE_GROUP),
+            Method::Upscale => (&self.upscale, "trace_upscale", UPSCALE_GROUP),
+        };
+        let Some([now, _]) = &self.resolved else {
+            return Ok(());
+        };
+        let mut pass = rec.pass(name, Access::COMPUTE, Access::COMPUTE)?;
+        pass.bind_compute(pipeline);
+        pass.push(&view);
+        pass.dispatch(now.width().div_ceil(group), now.height().div_ceil(group), 1);
+        Ok(())
+    }
+
+    /// The picture of this frame becomes that of the last one.
+    pub fn advance(&mut self) {
+        if let Some(resolved) = &mut self.resolved {
+            resolved.swap(0, 1);
+        }
+        self.history = self.method == Method::Temporal;
+        self.frame = self.frame.wrapping_add(1);
+    }
+
+    /// The picture that the last frame resolved to, if it did.
+    pub fn picture(&self) -> Option<&Image> {
+        self.resolved.as_ref().map(|r| &r[1])
+    }
+}
+
+/// Where the rays of a frame go through their pixels, from the middle: the R2 sequence in fixed point, so that it stays
+/// exact for as long as a game runs.
+fn jitter(frame: u32) -> Vec2 {
+    // 2^32 over the plastic number, and over its square
+    let step = [3_242_174_889u32, 2_447_445_414];
+    #[allow(clippy::cast_precision_loss)] // 24 bits are kept
+    let part =
+        |step: u32| (frame.wrapping_add(1).wrapping_mul(step) >> 8) as f32 / (1 << 24) as f32 - 0.5;
+    Vec2::new(part(step[0]), part(step[1]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jitter_covers_the_pixel_evenly() {
+        for frames in [16u32, 64, 100] {
+            let mean: Vec2 = (0..frames).map(jitter).sum::<Vec2>() / frames as f32;
+            assert!(mean.length() < 2.0 / frames as f32, "{frames}: {mean}");
+        }
+        // a sample in each sixteenth of the pixel within 40 frames, wherever one begins
+        for begin in [0u32, 1000, u32::MAX - 10] {
+            let mut hit = [false; 16];
+            for i in 0..40 {
+                let at = ((jitter(begin.wrapping_add(i)) + 0.5) * 4.0).floor();
+                assert!((0.0..4.0).contains(&at.x) && (0.0..4.0).contains(&at.y));
+                hit[at.x as usize + 4 * at.y as usize] = true;
+            }
+            assert!(hit.iter().all(|h| *h), "{begin}: {hit:?}");
+        }
+    }
+
+    #[test]
+    fn traced_sizes() {
+        let size = |scale, accumulate| {
+            let settings = Settings {
+                rt_scale: scale,
+                rt_accumulate: accumulate,
+                ..Settings::default()
+            };
+            traced_size(&settings, [641, 3])
+        };
+        assert_eq!(size(1.0, false), [641, 3]);
+        assert_eq!(size(0.5, false), [321, 2]);
+        assert_eq!(size(0.5, true), [641, 3]);
+        assert_eq!(size(0.0, false), [160, 1]);
+        assert_eq!(size(f32::NAN, false), [641, 3]);
+    }
+}

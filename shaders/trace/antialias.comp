@@ -1,0 +1,145 @@
+#version 460
+// Temporal antialiasing and upscaling: the samples of many frames, each frame's a little beside those of the last, join
+// to the picture of the window's size. Karis, High-Quality Temporal Supersampling (SIGGRAPH 2014 course) for the whole;
+// Salvi, An Excursion in Temporal Supersampling (GDC 2016) for the clipping by variance; Yang, Liu, Salvi, A Survey of
+// Temporal Antialiasing Techniques (Eurographics 2020), sections 4 and 5, for weighing samples of a coarser grid by their
+// distance from the pixel.
+//
+// Colours are blended compressed, so that a bright sample does not outweigh all others at an edge, and clipped in YCoCg.
+#include "trace/color.glsl"
+#include "trace/exposure.glsl"
+#include "trace/motion.glsl"
+
+const int GROUP = 16;
+// Traced pixels that a group of pixels can need: as many as its own, and one more on each side.
+const int TILE = GROUP + 2;
+
+layout(local_size_x = GROUP, local_size_y = GROUP) in;
+
+// Compressed colour (YCoCg), and length of the way to what is seen there.
+shared vec4 tile[TILE][TILE];
+
+// Standard deviation of a pixel's filter, output pixels: nearly that of its square.
+const float NARROW = 0.3;
+// The same in traced pixels for a pixel without history.
+const float WIDE = 0.5;
+// Frames' worth of samples that a pixel keeps at rest, and where it is resampled from frame to frame.
+const float REST_FRAMES = 24.0, MOVING_FRAMES = 10.0;
+// Standard deviations that history may differ by, at rest and in motion.
+const float REST_RANGE = 2.0, MOVING_RANGE = 1.0;
+// Part of its length that the way to a surface may be off and still be the way to that surface.
+const float SAME_PATH = 0.04;
+
+// Of the colours that are shown, half of white comes from white.
+vec3 compress(vec3 c, float exposure) { return c / (1.0 + max_component(c) * exposure); }
+vec3 expand(vec3 c, float exposure) { return c / max(1.0 - max_component(c) * exposure, 1.0e-3); }
+
+vec3 to_ycocg(vec3 c) { return vec3(0.25 * c.r + 0.5 * c.g + 0.25 * c.b, 0.5 * (c.r - c.b), 0.5 * c.g - 0.25 * (c.r + c.b)); }
+vec3 from_ycocg(vec3 c) { return vec3(c.x + c.y - c.z, c.x + c.z, c.x - c.y - c.z); }
+
+vec4 last_resolved(vec2 uv) {
+    return textureLod(sampler2D(textures[VIEW.antialias.last_resolved], samplers[VIEW.antialias.sampler_index]), uv, 0.0);
+}
+
+// Catmull-Rom by bilinear taps (Sigg and Hadwiger, GPU Gems 2, chapter 20), without the four corners, whose weights are
+// small (Jimenez, Filmic SMAA, SIGGRAPH 2016). `place`: pixels. Alpha is that of the middle.
+vec4 last_bicubic(vec2 place, vec2 size) {
+    vec2 middle = floor(place - 0.5) + 0.5;
+    vec2 f = place - middle;
+    vec2 w0 = f * (-0.5 + f * (1.0 - 0.5 * f));
+    vec2 w1 = 1.0 + f * f * (-2.5 + 1.5 * f);
+    vec2 w2 = f * (0.5 + f * (2.0 - 1.5 * f));
+    vec2 w3 = f * f * (-0.5 + 0.5 * f);
+    vec2 w12 = w1 + w2;
+    vec2 low = (middle - 1.0) / size, high = (middle + 2.0) / size, inner = (middle + w2 / w12) / size;
+    vec4 center = last_resolved(inner);
+    vec3 sum = center.rgb * (w12.x * w12.y);
+    sum += last_resolved(vec2(inner.x, low.y)).rgb * (w12.x * w0.y);
+    sum += last_resolved(vec2(low.x, inner.y)).rgb * (w0.x * w12.y);
+    sum += last_resolved(vec2(high.x, inner.y)).rgb * (w3.x * w12.y);
+    sum += last_resolved(vec2(inner.x, high.y)).rgb * (w12.x * w3.y);
+    float weight = w12.x * w12.y + w12.x * (w0.y + w3.y) + w12.y * (w0.x + w3.x);
+    return vec4(max(sum / weight, 0.0), center.a);
+}
+
+// Whether one of the four traced pixels around a place showed something at that distance in the last frame.
+bool was_seen(vec2 place, float path) {
+    ivec2 low = ivec2(floor(place - 0.5)), last = ivec2(VIEW.width, VIEW.height) - 1;
+    for (int i = 0; i < 4; i++) {
+        float then = last_path_read(clamp(low + ivec2(i & 1, i >> 1), ivec2(0), last));
+        if (abs(then - path) < SAME_PATH * path + 1.0) return true;
+    }
+    return false;
+}
+
+void main() {
+    ivec2 output_size = ivec2(VIEW.antialias.output_width, VIEW.antialias.output_height);
+    ivec2 traced_size = ivec2(VIEW.width, VIEW.height);
+    vec2 ratio = vec2(traced_size) / vec2(output_size);
+    float exposure = max(ExposureState(VIEW.exposure).exposure, 1.0e-3) * exp2(VIEW.exposure_base + VIEW.exposure_bias);
+
+    ivec2 first = ivec2(floor((vec2(gl_WorkGroupID.xy) * float(GROUP) + 0.5) * ratio)) - 1;
+    for (int i = int(gl_LocalInvocationIndex); i < TILE * TILE; i += GROUP * GROUP) {
+        ivec2 at = ivec2(i % TILE, i / TILE);
+        ivec2 pixel = clamp(first + at, ivec2(0), traced_size - 1);
+        vec3 color = imageLoad(images_rgba16f[VIEW.image_composite], pixel).rgb;
+        tile[at.y][at.x] = vec4(to_ycocg(compress(color, exposure)), motion_read(pixel).path);
+    }
+    barrier();
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(pixel, output_size))) return;
+
+    // the samples around the pixel
+    vec2 place = (vec2(pixel) + 0.5) * ratio;
+    ivec2 middle = ivec2(floor(place));
+    vec3 sum = vec3(0.0), squares = vec3(0.0);
+    vec4 narrow = vec4(0.0), wide = vec4(0.0);
+    float nearest = 1.0e30;
+    ivec2 nearest_at = ivec2(0);
+    for (int y = -1; y <= 1; y++) {
+        for (int x = -1; x <= 1; x++) {
+            ivec2 at = middle + ivec2(x, y) - first;
+            vec4 s = tile[at.y][at.x];
+            vec2 away = vec2(middle + ivec2(x, y)) + 0.5 + VIEW.antialias.jitter - place;
+            vec2 away_output = away / ratio;
+            narrow += vec4(s.rgb, 1.0) * exp(dot(away_output, away_output) * (-0.5 / (NARROW * NARROW)));
+            wide += vec4(s.rgb, 1.0) * exp(dot(away, away) * (-0.5 / (WIDE * WIDE)));
+            sum += s.rgb;
+            squares += s.rgb * s.rgb;
+            if (s.w < nearest) {
+                nearest = s.w;
+                nearest_at = ivec2(x, y);
+            }
+        }
+    }
+    vec3 mean = sum / 9.0;
+    vec3 deviation = sqrt(max(squares / 9.0 - mean * mean, 0.0));
+
+    // the same place in the last frame: an edge moves with what is in front
+    Motion motion = motion_read(clamp(middle + nearest_at, ivec2(0), traced_size - 1));
+    vec2 last_place = vec2(pixel) + 0.5 + motion.offset / ratio;
+    vec3 old = mean;
+    float frames = 0.0;
+    bool known = VIEW.antialias.history != 0 && motion.last_path >= 0.0
+        && all(greaterThanEqual(last_place, vec2(0.0))) && all(lessThan(last_place, vec2(output_size)));
+    bool rests = motion.offset == vec2(0.0);
+    if (known && was_seen(last_place * ratio, motion.last_path)) {
+        vec4 history = last_bicubic(last_place, vec2(output_size));
+        old = to_ycocg(compress(history.rgb, exposure));
+        float range = rests ? REST_RANGE : MOVING_RANGE;
+        vec3 off = old - mean;
+        vec3 parts = abs(off) / (deviation * range + 1.0e-4);
+        old = mean + off / max(max_component(parts), 1.0);
+        frames = min(history.a, rests ? REST_FRAMES : MOVING_FRAMES);
+    }
+    vec3 now = wide.rgb / wide.w;
+    float confidence = 1.0;
+    if (frames > 0.0) {
+        confidence = min(narrow.w, 1.0);
+        if (narrow.w > 1.0e-3) now = narrow.rgb / narrow.w;
+    }
+    float total = frames + confidence;
+    vec3 color = mix(old, now, confidence / total);
+    vec3 shown = expand(max(from_ycocg(color), 0.0), exposure);
+    imageStore(images_rgba16f[VIEW.antialias.image_resolved], pixel, vec4(min(shown, vec3(60000.0)), total));
+}

@@ -1,0 +1,39 @@
+// The camera: where in its pixel a ray goes through, and through which point of the lens. Needs the random numbers of
+// random.glsl to have begun.
+#ifndef RELIGHT_TRACE_CAMERA_GLSL
+#define RELIGHT_TRACE_CAMERA_GLSL
+
+#include "trace/random.glsl"
+#include "trace/view.glsl"
+
+struct CameraRay {
+    vec3 origin;
+    vec3 direction;      // unit
+    vec3 through_middle; // unit: through the middle of the lens
+    vec2 seen;           // place in the picture, traced pixels from the left and top
+};
+
+// A thin lens (Kolb et al., A Realistic Camera Model for Computer Graphics, SIGGRAPH 1995, section 2, and Cook et al.,
+// Distributed Ray Tracing, SIGGRAPH 1984): rays from all of a disc meet in the plane of focus, uniformly chosen by area.
+CameraRay camera_ray(ivec2 pixel) {
+    CameraRay ray;
+    // two numbers: one for each axis of the pixel's square
+    vec2 place = (VIEW.flags & VIEW_JITTER) != 0 ? rng_next2() : vec2(0.5) + VIEW.antialias.jitter;
+    ray.seen = vec2(pixel) + place;
+    vec2 ndc = ray.seen / vec2(VIEW.width, VIEW.height) * 2.0 - 1.0;
+    // one unit deep
+    vec3 direction = VIEW.forward - VIEW.left * ndc.x - VIEW.up * ndc.y;
+    ray.through_middle = normalize(direction);
+    ray.origin = VIEW.eye;
+    ray.direction = ray.through_middle;
+    if (VIEW.antialias.lens_radius > 0.0) {
+        vec2 random = rng_next2();
+        float radius = VIEW.antialias.lens_radius * sqrt(random.x), angle = 2.0 * PI * random.y;
+        vec3 offset = (normalize(VIEW.left) * cos(angle) + normalize(VIEW.up) * sin(angle)) * radius;
+        ray.origin += offset;
+        ray.direction = normalize(direction * VIEW.antialias.focal_distance - offset);
+    }
+    return ray;
+}
+
+#endif

@@ -1,0 +1,15 @@
+// The finished linear picture, as everything after it reads it: bloom, exposure, tone curve. Its size is that of the view
+// in the window, whatever size was traced.
+#ifndef RELIGHT_TRACE_PICTURE_GLSL
+#define RELIGHT_TRACE_PICTURE_GLSL
+
+#include "trace/view.glsl"
+
+ivec2 picture_size() { return ivec2(VIEW.antialias.output_width, VIEW.antialias.output_height); }
+
+vec3 picture_load(ivec2 pixel) {
+    uint image = VIEW.antialias.image_picture;
+    return (VIEW.flags & VIEW_ACCUMULATE) != 0 ? imageLoad(images_rgba32f[image], pixel).rgb : imageLoad(images_rgba16f[image], pixel).rgb;
+}
+
+#endif
