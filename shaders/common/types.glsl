@@ -19,9 +19,11 @@ struct Stage {
     float portal_range; uint alpha_func; uint blend_src; uint blend_dst; uint flags;
 };
 
+struct Dielectric { float index; float ripple; float scale; vec3 absorption; };
+
 struct Material {
     uint stage_first; uint stage_count; uint flags; float time_offset; float clamp_time;
-    uint plain_image; uint plain_sampler; vec3 light_radiance;
+    uint plain_image; uint plain_sampler; vec3 light_radiance; Dielectric dielectric;
 };
 
 struct Instance {
@@ -64,7 +66,7 @@ const uint ALPHAFUNC_NONE = 0, ALPHAFUNC_GT0 = 1, ALPHAFUNC_LT128 = 2, ALPHAFUNC
 const uint BLEND_ZERO = 0, BLEND_ONE = 1, BLEND_DST_COLOR = 2, BLEND_ONE_MINUS_DST_COLOR = 3, BLEND_SRC_ALPHA = 4,
     BLEND_ONE_MINUS_SRC_ALPHA = 5, BLEND_DST_ALPHA = 6, BLEND_ONE_MINUS_DST_ALPHA = 7, BLEND_SRC_ALPHA_SATURATE = 8,
     BLEND_SRC_COLOR = 9, BLEND_ONE_MINUS_SRC_COLOR = 10;
-const uint STAGE_WHITE = 1, STAGE_DEPTH_WRITE = 2, STAGE_DEPTH_EQUAL = 4;
+const uint STAGE_WHITE = 1, STAGE_DEPTH_WRITE = 2, STAGE_DEPTH_EQUAL = 4, STAGE_REFLECTION = 8;
 const uint MATERIAL_TWO_SIDED = 1, MATERIAL_CULL_BACK = 2, MATERIAL_CUT_OUT = 4, MATERIAL_TRANSLUCENT = 8, MATERIAL_SKY = 16,
     MATERIAL_PORTAL = 32, MATERIAL_FOG = 64, MATERIAL_LIQUID = 128, MATERIAL_GLASS = 256, MATERIAL_VERTEX_LIGHT = 512,
     MATERIAL_POLYGON_OFFSET = 1024, MATERIAL_EMITTER = 2048, MATERIAL_INVISIBLE = 4096;

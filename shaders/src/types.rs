@@ -97,6 +97,20 @@ pub struct Stage {
     pub flags: u32,
 }
 
+/// What a material that is seen through does to rays; all zero for what is neither glass nor liquid.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Dielectric {
+    /// Refraction index of what lies behind the surface; 0: rays pass unbent and nothing is reflected.
+    pub index: f32,
+    /// Root mean square slope of the ripples.
+    pub ripple: f32,
+    /// What the stages multiply the background by is multiplied by this: a surface passes no more light than it gets.
+    pub scale: f32,
+    /// Absorption behind the surface, per unit of length (Beer's law).
+    pub absorption: Vec3,
+}
+
 /// A material: a run of stages and what the tracer needs to know at once.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -118,6 +132,8 @@ pub struct Material {
     pub plain_sampler: u32,
     /// Extra radiance of the surface as a light, display-white units, shown as its glow (0 if none).
     pub light_radiance: Vec3,
+    /// How rays pass it.
+    pub dielectric: Dielectric,
 }
 
 /// One entity (or the world, index 0) of a view.
@@ -324,6 +340,8 @@ pub mod constants {
         STAGE_DEPTH_WRITE = 2;
         /// The stage tests depth for equality.
         STAGE_DEPTH_EQUAL = 4;
+        /// The stage's picture stands for a reflection of the surroundings.
+        STAGE_REFLECTION = 8;
         /// Seen from both sides.
         MATERIAL_TWO_SIDED = 1;
         /// Only the back side is seen.

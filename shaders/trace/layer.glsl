@@ -1,5 +1,6 @@
-// A stack of stages as light sees it: what reaches the eye is lit * L + emission + through * background, where L is the
-// light that a white diffuse surface would show here. shaderscript::light has the same algebra on the CPU and its tests.
+// A stack of stages as light sees it: what reaches the eye is lit * L + emission + through * background + reflected * R,
+// where L is the light that a white diffuse surface would show here, and R what the mirrored ray sees.
+// shaderscript::light has the same algebra (without reflections) on the CPU and its tests.
 #ifndef RELIGHT_TRACE_LAYER_GLSL
 #define RELIGHT_TRACE_LAYER_GLSL
 
@@ -10,7 +11,10 @@ struct Layer {
     vec3 lit;
     vec3 emission;
     vec3 through;
+    vec3 reflected;
 };
+
+Layer layer_nothing() { return Layer(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)); }
 
 // Level of detail for a texture whose coordinates change by `scale` per unit where the ray's cone is `width` wide.
 float texture_lod(uint image, float scale, float width) {
@@ -66,12 +70,18 @@ Layer layer_product(Layer a, Layer b) {
     r.lit = a.lit * b.lit + a.lit * b.emission + a.emission * b.lit;
     r.emission = a.emission * b.emission;
     r.through = a.through * (b.lit + b.emission) + b.through * (a.lit + a.emission);
+    // so does it scale what is reflected, which brings its own light, too
+    r.reflected = a.reflected * (b.lit + b.emission) + b.reflected * (a.lit + a.emission);
     return r;
 }
 
-Layer layer_scale(Layer a, float s) { return Layer(a.lit * s, a.emission * s, a.through * s); }
-Layer layer_add(Layer a, Layer b) { return Layer(a.lit + b.lit, a.emission + b.emission, a.through + b.through); }
-Layer layer_subtract(Layer a, Layer b) { return Layer(a.lit - b.lit, a.emission - b.emission, a.through - b.through); }
+Layer layer_scale(Layer a, float s) { return Layer(a.lit * s, a.emission * s, a.through * s, a.reflected * s); }
+Layer layer_add(Layer a, Layer b) {
+    return Layer(a.lit + b.lit, a.emission + b.emission, a.through + b.through, a.reflected + b.reflected);
+}
+Layer layer_subtract(Layer a, Layer b) {
+    return Layer(a.lit - b.lit, a.emission - b.emission, a.through - b.through, a.reflected - b.reflected);
+}
 
 // `value` times a blend factor. The frame buffer has no alpha of its own: destination alpha reads as one.
 Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, float source_alpha) {
@@ -84,7 +94,7 @@ Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, flo
     case BLEND_SRC_ALPHA: return layer_scale(value, source_alpha);
     case BLEND_ONE_MINUS_SRC_ALPHA: return layer_scale(value, 1.0 - source_alpha);
     case BLEND_DST_ALPHA: return value;
-    default: return Layer(vec3(0.0), vec3(0.0), vec3(0.0)); // ZERO, ONE_MINUS_DST_ALPHA, SRC_ALPHA_SATURATE
+    default: return layer_nothing(); // ZERO, ONE_MINUS_DST_ALPHA, SRC_ALPHA_SATURATE
     }
 }
 
@@ -100,20 +110,26 @@ Layer evaluate_stages(SurfacePoint p, float width) {
         float lod = texture_lod(material.plain_image, p.texel_scale, width);
         vec3 texel = textureLod(sampler2D(textures[nonuniformEXT(material.plain_image)],
             samplers[nonuniformEXT(material.plain_sampler)]), p.stage.st, lod).rgb;
-        return Layer(decode_display(texel), vec3(0.0), vec3(0.0));
+        return Layer(decode_display(texel), vec3(0.0), vec3(0.0), vec3(0.0));
     }
     Instance instance = instance_of(p.instance);
     Stages stages = Stages(VIEW.materials.stages);
-    Layer layer = Layer(vec3(0.0), vec3(0.0), vec3(1.0));
+    Layer layer = Layer(vec3(0.0), vec3(0.0), vec3(1.0), vec3(0.0));
     for (uint i = 0; i < material.stage_count; i++) {
         Stage stage = stages.at[material.stage_first + i];
         vec4 color = stage_color(VIEW.materials, stage, instance, p.stage);
-        Layer source = Layer(vec3(0.0), vec3(0.0), vec3(0.0));
+        Layer source = layer_nothing();
         float alpha;
         if (stage.image_count == 0 && (stage.flags & STAGE_WHITE) == 0) {
             // the lightmap: the light itself, as bright as the stage lets it through
             source.lit = decode_display(color.rgb);
             alpha = color.a;
+        } else if ((stage.flags & STAGE_REFLECTION) != 0) {
+            // the picture of an environment in the mean: its smallest level. What it shows, the mirrored ray finds
+            uint image = stage_image(VIEW.materials, stage, NO_TEXTURE, p.stage.time);
+            vec4 mean = textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), vec2(0.5), 32.0);
+            source.reflected = decode_display(mean.rgb) * decode_display(color.rgb);
+            alpha = mean.a * color.a;
         } else {
             vec4 texel = stage_texel(stage, p, instance, width);
             vec3 image = decode_display(texel.rgb);
@@ -153,6 +169,7 @@ Layer evaluate_layer(SurfacePoint p, float width) {
     layer.lit = max(layer.lit, 0.0);
     layer.emission = max(layer.emission, 0.0);
     layer.through = max(layer.through, 0.0);
+    layer.reflected = max(layer.reflected, 0.0);
     return layer;
 }
 

@@ -7,7 +7,7 @@ use shaderscript::light::{self, SurfaceClass};
 use super::material::LightmapClass;
 
 /// Whether vertex colours are baked light on surfaces of a class.
-fn has_vertex_light(class: LightmapClass) -> bool {
+pub(super) fn has_vertex_light(class: LightmapClass) -> bool {
     matches!(class, LightmapClass::Page | LightmapClass::Vertex)
 }
 

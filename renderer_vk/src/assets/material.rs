@@ -1,5 +1,6 @@
 //! What a material is once it is registered: a script's definition bound to images, in the form that the passes read.
 
+use shaders::types::Dielectric;
 use shaderscript::{AlphaGen, Cull, Fog, Shader, TcGen};
 
 /// What a surface's light comes from: part of a material's identity, as the engine's lightmap index is.
@@ -100,6 +101,8 @@ pub struct Material {
     pub order: u32,
     /// `MATERIAL_*` bits.
     pub flags: u32,
+    /// What it does to rays that pass it.
+    pub dielectric: Dielectric,
     /// Which faces are drawn.
     pub cull: Cull,
     /// Drawn slightly nearer than it is.

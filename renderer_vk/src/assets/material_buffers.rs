@@ -95,6 +95,7 @@ impl Materials {
             plain_image,
             plain_sampler,
             light_radiance: light,
+            dielectric: material.dielectric,
         }
     }
 

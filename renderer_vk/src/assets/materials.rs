@@ -9,6 +9,7 @@ use shaderscript::{ImplicitKind, Shader, StageImage, strip_extension};
 
 use super::bind::{internal_shader, passes, sky_faces};
 use super::compile::{FOG_IMAGE, StageArrays, VideoClients};
+use super::dielectric;
 use super::flags;
 use super::material::{Combine, LightmapClass, Material, SkyBox, VideoStage};
 use super::material_buffers::Uploaded;
@@ -277,8 +278,14 @@ impl Materials {
                 .arrays
                 .push_stage(stage, implicit, &mut self.videos, source);
             match pushed {
-                Ok((stage, video)) => {
+                Ok((index, video)) => {
                     kept += 1;
+                    if shaderscript::light::is_reflection(&shader, stage)
+                        && let Some(pushed) = self.arrays.stages.get_mut(index as usize)
+                    {
+                        pushed.flags |= types::constants::STAGE_REFLECTION;
+                    }
+                    let stage = index;
                     videos.extend(video.map(|(name, client)| VideoStage {
                         stage,
                         name,
@@ -322,6 +329,8 @@ impl Materials {
             })
             .unwrap_or(DEFAULT_PORTAL_RANGE);
         self.light_radiance.push(Vec3::ZERO);
+        let dielectric =
+            dielectric::dielectric(&shader, class, &self.arrays, stage_first as usize, source);
         let material = Material {
             name: name.to_owned(),
             lightmap_class: class,
@@ -330,6 +339,7 @@ impl Materials {
             sort,
             order,
             flags: flags::material_flags(&shader, class),
+            dielectric,
             cull: shader.cull,
             polygon_offset: shader.polygon_offset,
             passes: passes(&shader, stage_first),

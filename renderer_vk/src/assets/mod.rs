@@ -2,6 +2,7 @@
 
 mod bind;
 pub mod compile;
+mod dielectric;
 mod flags;
 mod fonts;
 mod material;

@@ -16,7 +16,8 @@ pub struct Targets {
     pub albedo: Image,
     /// Where the surface was in the last frame and how far away, see [`super::motion`]; of this frame and the last.
     pub motion: [Image; 2],
-    /// Radiance of what is in front of the surface and of its own glow; alpha: what comes through of the background.
+    /// Radiance of what is in front of the surface and of its own glow; alpha: the field of a pixel that shows either a
+    /// reflection (2) or what lies behind it (1), otherwise 0.
     pub front: Image,
     /// Direct light.
     pub direct: Image,

@@ -5,9 +5,13 @@
 //! anything.
 
 mod algebra;
+mod dielectric;
 
 pub use algebra::{
     LightLinear, StageSample, compose, glow_stages, is_glowing, stage_samples_white,
+};
+pub use dielectric::{
+    INDEX_GLASS, INDEX_SLIME, INDEX_WATER, is_reflection, refraction_index, ripple_slope,
 };
 
 use crate::{

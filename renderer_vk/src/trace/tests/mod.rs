@@ -4,6 +4,7 @@
 mod blooming;
 mod bounces;
 mod denoising;
+mod dielectrics;
 mod harness;
 mod inspection;
 mod layers;

@@ -1,0 +1,95 @@
+//! What a material that is seen through does to rays, decided from its directives and the means of its images.
+
+use glam::{Vec3, Vec4};
+use shaders::types::{self, constants as c};
+use shaderscript::Shader;
+use shaderscript::light::{self, LightLinear};
+use shaderscript::surface_params::CONTENTS_FOG;
+
+use super::compile::StageArrays;
+use super::flags::has_vertex_light;
+use super::material::LightmapClass;
+use super::source::ImageSource;
+
+/// A material's stages with every image replaced by its mean and every wave at its brightest, without the stages that
+/// stand for reflections.
+fn mean_layer(
+    shader: &Shader,
+    class: LightmapClass,
+    arrays: &StageArrays,
+    stage_first: usize,
+    source: &dyn ImageSource,
+) -> LightLinear {
+    let mut samples = light::stage_samples_white(&shader.stages);
+    for (i, sample) in samples.iter_mut().enumerate() {
+        let Some(stage) = arrays.stages.get(stage_first + i) else {
+            continue;
+        };
+        if stage.flags & c::STAGE_REFLECTION != 0 {
+            sample.texture = Vec4::W;
+            continue;
+        }
+        let first = stage.image_first as usize;
+        let images = arrays
+            .images
+            .get(first..first + stage.image_count as usize)
+            .unwrap_or_default();
+        if !images.is_empty() {
+            let sum: Vec4 = images.iter().map(|&image| source.mean(image)).sum();
+            sample.texture = sum / images.len() as f32;
+        }
+    }
+    light::compose(&shader.stages, &samples, has_vertex_light(class))
+}
+
+/// Distance in a liquid after which white light has the colour that its surface shows, units; fog parameters of the
+/// material tell it better.
+const LIQUID_DEPTH: f32 = 512.0;
+/// A surface that in the mean passes less than this is not seen through, whatever its class: it stays what its stages
+/// show.
+const LEAST_TRANSMISSION: f32 = 0.15;
+/// Darkest that a liquid colours one channel over its depth.
+const LEAST_COLOR: f32 = 0.05;
+
+/// What a material does to rays that pass it. The absorption of a liquid has no directive: it is derived from the colour
+/// that the stages have in the mean over white, in white light, with its brightest channel at 1, or from the colour of
+/// the material's fog parameters. A volume of fog absorbs by itself.
+pub fn dielectric(
+    shader: &Shader,
+    class: LightmapClass,
+    arrays: &StageArrays,
+    stage_first: usize,
+    source: &dyn ImageSource,
+) -> types::Dielectric {
+    let mean = mean_layer(shader, class, arrays, stage_first, source);
+    let passed = mean.through.max_element();
+    let index = match light::refraction_index(shader) {
+        Some(index) if passed.is_finite() && passed >= LEAST_TRANSMISSION => index,
+        _ => return types::Dielectric::default(),
+    };
+    let liquid = light::classify(shader).liquid;
+    let mut absorption = Vec3::ZERO;
+    if liquid && shader.content_flags & CONTENTS_FOG == 0 {
+        let (color, depth) = match &shader.fog {
+            Some(fog) if fog.depth > 1.0 => {
+                (relight::overbright::colour_to_linear(fog.color), fog.depth)
+            }
+            _ => (mean.lit + mean.emission + mean.through, LIQUID_DEPTH),
+        };
+        let color = color / color.max_element().max(1.0e-6);
+        let color = color.clamp(Vec3::splat(LEAST_COLOR), Vec3::ONE);
+        if color.is_finite() {
+            absorption = -color.map(f32::ln) / depth;
+        }
+    }
+    types::Dielectric {
+        index,
+        ripple: if liquid {
+            light::ripple_slope(shader)
+        } else {
+            0.0
+        },
+        scale: 1.0 / passed.max(1.0),
+        absorption,
+    }
+}

@@ -1,0 +1,241 @@
+//! Glass, liquids and shiny stages against closed forms.
+
+use glam::Vec3;
+use shaders::types::constants as c;
+use shaders::types::{Dielectric, Stage};
+
+use super::harness::{Gpu, Scene, encode, rectangle, reference, stage, through_byte};
+use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
+use crate::settings::Settings;
+
+const LIQUID: u32 = c::MATERIAL_LIQUID | c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
+const SIDE: usize = 24;
+/// Linear radiance above and below.
+const ABOVE: f32 = 0.8;
+const BELOW: f32 = 0.3;
+
+/// Unpolarized reflectance by the angles, in the sine and tangent form; `None` when all is reflected.
+fn fresnel(incident: f32, index: f32) -> Option<f32> {
+    let sine = incident.sin() / index;
+    if sine >= 1.0 {
+        return None;
+    }
+    let refracted = sine.asin();
+    if incident < 1.0e-3 {
+        return Some(((index - 1.0) / (index + 1.0)).powi(2));
+    }
+    let (minus, plus) = (incident - refracted, incident + refracted);
+    let s = (minus.sin() / plus.sin()).powi(2);
+    let p = (minus.tan() / plus.tan()).powi(2);
+    Some(0.5 * (s + p))
+}
+
+fn level(z: f32, up: bool) -> [Vec3; 4] {
+    let (x, y) = (Vec3::X * 80_000.0, Vec3::Y * 80_000.0);
+    let corner = Vec3::new(-40_000.0, -40_000.0, z);
+    if up {
+        rectangle(corner, x, y)
+    } else {
+        rectangle(corner, y, x)
+    }
+}
+
+/// Passes the background unchanged.
+fn clear() -> Stage {
+    stage::filter([1.0; 3])
+}
+
+/// A glowing ceiling and floor with a surface at height 0 between them.
+fn scene(eye: Vec3, target: Vec3, stages: &[Stage], flags: u32, dielectric: Dielectric) -> Scene {
+    let mut scene = Scene::new(eye, target, 50.0, SIDE as i32);
+    let above = scene.material(&[stage::constant([encode(ABOVE); 3])], 0);
+    let below = scene.material(&[stage::constant([encode(BELOW); 3])], 0);
+    scene.quad(level(300.0, false), above);
+    scene.quad(level(-100.0, true), below);
+    let surface = scene.material(stages, flags);
+    scene.materials[surface as usize].0.dielectric = dielectric;
+    scene.quad(level(0.0, true), surface);
+    scene
+}
+
+/// Direction of a pixel's middle ray.
+fn direction(scene: &Scene, i: usize) -> Vec3 {
+    let def = &scene.def;
+    let tan = (def.fov_x.to_radians() * 0.5).tan();
+    let at = |n: usize| (n as f32 + 0.5) / SIDE as f32 * 2.0 - 1.0;
+    let (u, v) = (at(i % SIDE), at(i / SIDE));
+    (def.view_axis[0] - def.view_axis[1] * (u * tan) - def.view_axis[2] * (v * tan)).normalize()
+}
+
+/// A picture of the middles of the pixels, in which both sides of a surface are seen one after the other.
+fn middles() -> Settings {
+    Settings {
+        rt_antialiasing: false,
+        ..reference()
+    }
+}
+
+/// Compares every pixel with a closed form over the angle of incidence.
+fn compare(gpu: &mut Gpu, scene: &Scene, settings: &Settings, exact: impl Fn(f32) -> f32) {
+    let (pixels, _) = gpu.render(scene, settings, if settings.rt_accumulate { 2 } else { 1 });
+    let mut worst = 0.0f32;
+    for (i, pixel) in pixels.iter().enumerate() {
+        let (x, y) = (i % SIDE, i / SIDE);
+        if !settings.rt_accumulate && (x == 0 || y == 0 || x == SIDE - 1 || y == SIDE - 1) {
+            continue; // neighbours on one side only
+        }
+        let incident = direction(scene, i).z.abs().acos();
+        worst = worst.max((pixel.x / exact(incident) - 1.0).abs());
+    }
+    println!("worst pixel differs by {worst}");
+    assert!(worst < 0.01, "{worst}");
+}
+
+#[test]
+fn water_reflects_by_fresnel_and_absorbs_by_beer() {
+    Gpu::each(water_reflects_by_fresnel_and_absorbs_by_beer_with);
+}
+
+fn water_reflects_by_fresnel_and_absorbs_by_beer_with(gpu: &mut Gpu) {
+    let [above, below] = [ABOVE, BELOW].map(|v| through_byte(encode(v)));
+    let water = Dielectric {
+        index: 1.33,
+        scale: 1.0,
+        absorption: Vec3::splat(0.004),
+        ripple: 0.0,
+    };
+    let eye = Vec3::new(0.0, 0.0, 60.0);
+    let target = Vec3::new(100.0, 10.0, 0.0);
+    let scene = scene(eye, target, &[clear()], LIQUID, water);
+    let exact = |incident: f32| {
+        let reflected = fresnel(incident, 1.33).unwrap_or(1.0);
+        let way = 100.0 / (incident.sin() / 1.33).asin().cos();
+        reflected * above + (1.0 - reflected) * below * (-0.004 * way).exp()
+    };
+    compare(gpu, &scene, &middles(), exact);
+    // a single frame shows the two sides in turns over the pixels
+    let live = Settings {
+        rt_accumulate: false,
+        rt_taa: false,
+        ..reference()
+    };
+    compare(gpu, &scene, &live, exact);
+}
+
+#[test]
+fn from_below_water_reflects_everything_beyond_its_angle() {
+    Gpu::each(from_below_water_reflects_everything_beyond_its_angle_with);
+}
+
+fn from_below_water_reflects_everything_beyond_its_angle_with(gpu: &mut Gpu) {
+    let [above, below] = [ABOVE, BELOW].map(|v| through_byte(encode(v)));
+    let water = Dielectric {
+        index: 1.33,
+        scale: 1.0,
+        ..Dielectric::default()
+    };
+    let eye = Vec3::new(0.0, 0.0, -60.0);
+    let exact = |incident: f32| {
+        let reflected = fresnel(incident, 1.0 / 1.33).unwrap_or(1.0);
+        reflected * below + (1.0 - reflected) * above
+    };
+    // within the window of 48.75 degrees, across its edge, and beyond it
+    for target in [
+        Vec3::new(2.0, 0.0, 0.0),
+        Vec3::new(70.0, 0.0, 0.0),
+        Vec3::new(160.0, 0.0, 0.0),
+    ] {
+        let mut scene = scene(eye, target, &[clear()], LIQUID, water);
+        scene.def.fov_x = 30.0;
+        scene.def.fov_y = 30.0;
+        compare(gpu, &scene, &middles(), exact);
+    }
+}
+
+#[test]
+fn a_pane_reflects_from_both_faces() {
+    Gpu::each(a_pane_reflects_from_both_faces_with);
+}
+
+fn a_pane_reflects_from_both_faces_with(gpu: &mut Gpu) {
+    let [above, below] = [ABOVE, BELOW].map(|v| through_byte(encode(v)));
+    let glass = Dielectric {
+        index: 1.5,
+        scale: 1.0,
+        ..Dielectric::default()
+    };
+    let eye = Vec3::new(0.0, 0.0, 60.0);
+    let target = Vec3::new(60.0, 10.0, 0.0);
+    // tinted: what is seen through it is multiplied, what it reflects is not
+    let flags = c::MATERIAL_GLASS | c::MATERIAL_TRANSLUCENT;
+    let tint = through_byte(encode(0.6));
+    let stages = [stage::filter([encode(0.6); 3])];
+    let scene = scene(eye, target, &stages, flags, glass);
+    compare(gpu, &scene, &middles(), |incident| {
+        let face = fresnel(incident, 1.5).unwrap_or(1.0);
+        let pane = 2.0 * face / (1.0 + face);
+        pane * above + (1.0 - pane) * tint * below
+    });
+}
+
+#[test]
+fn ripples_keep_the_light_that_a_surface_sends_on() {
+    Gpu::each(ripples_keep_the_light_that_a_surface_sends_on_with);
+}
+
+fn ripples_keep_the_light_that_a_surface_sends_on_with(gpu: &mut Gpu) {
+    // the same radiance on both sides: whatever way a ray takes, it finds it
+    let water = Dielectric {
+        index: 1.33,
+        scale: 1.0,
+        ripple: 0.08,
+        ..Dielectric::default()
+    };
+    let eye = Vec3::new(0.0, 0.0, 60.0);
+    let mut scene = scene(eye, Vec3::new(100.0, 10.0, 0.0), &[clear()], LIQUID, water);
+    let first = scene.stages[0];
+    scene.stages[1] = first;
+    let (pixels, _) = gpu.render(&scene, &middles(), 4);
+    let exact = through_byte(encode(ABOVE));
+    let mean = pixels.iter().map(|p| p.x).sum::<f32>() / pixels.len() as f32;
+    assert!((mean / exact - 1.0).abs() < 0.005, "{mean} {exact}");
+}
+
+#[test]
+fn an_environment_stage_shows_what_is_around() {
+    Gpu::each(an_environment_stage_shows_what_is_around_with);
+}
+
+fn an_environment_stage_shows_what_is_around_with(gpu: &mut Gpu) {
+    let above = through_byte(encode(ABOVE));
+    let image = Image::new(
+        &gpu.device,
+        &ImageDesc::new("environment", 1, 1, Format::Rgba8, ImageUsage::SAMPLED),
+    )
+    .expect("image");
+    gpu.device
+        .upload_image(&image, 0, 0, &[128, 128, 128, 255])
+        .expect("upload");
+    // a body of one colour, shiny by a quarter of what is around
+    let body = stage::constant([0.5; 3]);
+    let shine = Stage {
+        flags: c::STAGE_REFLECTION,
+        tc_gen: c::TCGEN_ENVIRONMENT,
+        blend_src: c::BLEND_ONE,
+        blend_dst: c::BLEND_ONE,
+        ..stage::image(0)
+    };
+    let eye = Vec3::new(0.0, 0.0, 60.0);
+    let target = Vec3::new(100.0, 10.0, 0.0);
+    let mut scene = scene(eye, target, &[body, shine], 0, Dielectric::default());
+    scene.images.push(image.texture_index());
+    let weight = crate::trace::lights::decode(Vec3::splat(128.0 / 255.0)).x;
+    let exact = through_byte(0.5) + weight * above;
+    compare(gpu, &scene, &middles(), |_| exact);
+    // at the depth where rays end the picture itself stands for the reflection
+    let ended = Settings {
+        rt_max_depth: 0,
+        ..reference()
+    };
+    compare(gpu, &scene, &ended, |_| through_byte(0.5) + weight);
+}

@@ -1,0 +1,142 @@
+//! What glass, liquids and shiny stages are to a ray: refraction, waves, and which stages stand for a reflection.
+
+use std::f32::consts::TAU;
+
+use super::{SurfaceClass, classify};
+use crate::{
+    shader::{Deform, Shader},
+    stage::{AlphaGen, RgbGen, Stage, TcGen, TcMod},
+    surface_params::{CONTENTS_LAVA, CONTENTS_SLIME},
+};
+
+/// Refraction index of window glass.
+pub const INDEX_GLASS: f32 = 1.5;
+/// Refraction index of water.
+pub const INDEX_WATER: f32 = 1.33;
+/// Refraction index of slime: that of a strong solution, between water and glass.
+pub const INDEX_SLIME: f32 = 1.4;
+
+/// Index of refraction of what lies behind a surface, or `None` where light is not refracted: everything but glass and
+/// liquids that are seen through. Lava glows and is never seen through, whatever its stages blend.
+pub fn refraction_index(shader: &Shader) -> Option<f32> {
+    match classify(shader).class {
+        SurfaceClass::Glass => Some(INDEX_GLASS),
+        SurfaceClass::Liquid if shader.content_flags & CONTENTS_LAVA != 0 => None,
+        SurfaceClass::Liquid if shader.content_flags & CONTENTS_SLIME != 0 => Some(INDEX_SLIME),
+        SurfaceClass::Liquid => Some(INDEX_WATER),
+        _ => None,
+    }
+}
+
+/// Mean slope of the ripples on a liquid: that of its own `deformVertexes wave` where it has one, a light breeze where
+/// its images move, none where nothing does. Never so steep that a ripple would be a wave.
+pub fn ripple_slope(shader: &Shader) -> f32 {
+    const BREEZE: f32 = 0.03;
+    const STEEPEST: f32 = 0.08;
+    let waves = shader
+        .deforms
+        .iter()
+        .filter_map(|deform| match deform {
+            // turns per unit along x + y + z; the steepest way over the surface is diagonal
+            Deform::Wave { spread, wave } => {
+                Some((TAU * spread * wave.amplitude * std::f32::consts::SQRT_2).abs())
+            }
+            _ => None,
+        })
+        .fold(0.0, f32::max);
+    let moves = |stage: &Stage| stage.tc_mods.iter().any(changes_with_time);
+    let breeze = if waves > 0.0 || shader.stages.iter().any(moves) {
+        BREEZE
+    } else {
+        0.0
+    };
+    if waves.is_finite() {
+        waves.max(breeze).min(STEEPEST)
+    } else {
+        breeze
+    }
+}
+
+/// Whether texture coordinates move by themselves.
+fn changes_with_time(tc_mod: &TcMod) -> bool {
+    match tc_mod {
+        TcMod::Scale(_) | TcMod::Transform { .. } => false,
+        TcMod::Scroll(speed) => *speed != glam::Vec2::ZERO,
+        TcMod::Rotate(degrees) => *degrees != 0.0,
+        TcMod::Turbulent { .. } | TcMod::Stretch(_) | TcMod::EntityTranslate => true,
+    }
+}
+
+/// Whether a stage stands for a reflection of the surroundings: a picture of an environment, placed by the reflected
+/// view direction, on a body that is drawn by another stage. A picture that moves or pulses by itself is an effect (the
+/// glow of a power-up), and so is one that nothing lies under: they show what they show.
+pub fn is_reflection(shader: &Shader, stage: &Stage) -> bool {
+    let is_picture = |s: &Stage| s.tc_gen == TcGen::Environment && !s.image.names().is_empty();
+    let rests = !stage.tc_mods.iter().any(changes_with_time)
+        && !matches!(stage.rgb_gen, RgbGen::Wave(_))
+        && !matches!(stage.alpha_gen, AlphaGen::Wave(_));
+    let has_body = shader.stages.iter().any(|s| s.tc_gen != TcGen::Environment);
+    is_picture(stage) && stage.image.names().len() == 1 && rests && has_body
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parse_script;
+
+    fn shader(body: &str) -> Shader {
+        parse_script("test", format!("t\n{{\n{body}\n}}\n").as_bytes())
+            .shaders
+            .into_iter()
+            .next()
+            .unwrap()
+    }
+
+    #[test]
+    fn indices_are_those_of_the_kind() {
+        const BLEND: &str = "{\nmap a\nblendFunc blend\n}";
+        let index = |body: &str| refraction_index(&shader(&format!("{body}\n{BLEND}")));
+        assert_eq!(index("surfaceparm water"), Some(INDEX_WATER));
+        assert_eq!(index("surfaceparm slime"), Some(INDEX_SLIME));
+        assert_eq!(index("surfaceparm lava"), None);
+        assert_eq!(index(""), None);
+        let environment = "{\nmap e\ntcGen environment\nblendFunc add\n}";
+        let glass = shader(&format!("surfaceparm trans\n{BLEND}\n{environment}"));
+        assert_eq!(refraction_index(&glass), Some(INDEX_GLASS));
+        // nothing is seen through it
+        assert_eq!(
+            refraction_index(&shader("surfaceparm water\n{\nmap a\n}")),
+            None
+        );
+    }
+
+    #[test]
+    fn ripples_come_from_what_moves() {
+        let slope = |body: &str| ripple_slope(&shader(body));
+        assert_eq!(slope("surfaceparm water\n{\nmap a\n}"), 0.0);
+        let breeze = slope("{\nmap a\ntcMod scroll 1 0\n}");
+        assert!(breeze > 0.0);
+        let waves = slope("deformVertexes wave 64 sin 0 .4 0 .5\n{\nmap a\n}");
+        assert!(waves > breeze && waves < 0.08, "{waves}");
+        assert!(slope("deformVertexes wave 8 sin 0 900 0 .5\n{\nmap a\n}") <= 0.08);
+    }
+
+    #[test]
+    fn reflections_have_a_body_and_rest() {
+        const BODY: &str = "{\nmap a\nrgbGen lightingDiffuse\n}";
+        let reflects = |body: &str| {
+            let shader = shader(body);
+            shader.stages.iter().any(|s| is_reflection(&shader, s))
+        };
+        let add = "{\nmap e\ntcGen environment\nblendFunc add\n}";
+        assert!(reflects(&format!("{add}\n{BODY}")));
+        assert!(!reflects(add));
+        assert!(!reflects(BODY));
+        assert!(!reflects(&format!(
+            "{{\nmap e\ntcGen environment\ntcMod rotate 30\nblendFunc add\n}}\n{BODY}"
+        )));
+        assert!(!reflects(&format!(
+            "{{\nmap e\ntcGen environment\nblendFunc add\nrgbGen wave sin 0 1 0 1\n}}\n{BODY}"
+        )));
+    }
+}
