@@ -4,7 +4,7 @@ use glam::{Vec3, Vec4};
 use shaders::types::{self, constants as c};
 use shaderscript::Shader;
 use shaderscript::light::{self, LightLinear};
-use shaderscript::surface_params::CONTENTS_FOG;
+use shaderscript::surface_params::{CONTENTS_FOG, CONTENTS_SLIME};
 
 use super::compile::StageArrays;
 use super::flags::has_vertex_light;
@@ -42,18 +42,17 @@ fn mean_layer(
     light::compose(&shader.stages, &samples, has_vertex_light(class))
 }
 
-/// Distance in a liquid after which white light has the colour that its surface shows, units; fog parameters of the
-/// material tell it better.
+/// Distance in a liquid after which white light has the colour that its surface shows, units.
 const LIQUID_DEPTH: f32 = 512.0;
-/// A surface that in the mean passes less than this is not seen through, whatever its class: it stays what its stages
-/// show.
+/// Slime that in the mean passes less than this is not seen through, whatever its class: it stays what its stages show.
+/// Water is smooth all the same.
 const LEAST_TRANSMISSION: f32 = 0.15;
 /// Darkest that a liquid colours one channel over its depth.
 const LEAST_COLOR: f32 = 0.05;
 
 /// What a material does to rays that pass it. The absorption of a liquid has no directive: it is derived from the colour
-/// that the stages have in the mean over white, in white light, with its brightest channel at 1, or from the colour of
-/// the material's fog parameters. A volume of fog absorbs by itself.
+/// that the stages have in the mean over white, in white light, with its brightest channel at 1. A volume of fog absorbs
+/// by itself.
 pub fn dielectric(
     shader: &Shader,
     class: LightmapClass,
@@ -61,26 +60,24 @@ pub fn dielectric(
     stage_first: usize,
     source: &dyn ImageSource,
 ) -> types::Dielectric {
+    let Some(index) = light::refraction_index(shader) else {
+        return types::Dielectric::default();
+    };
     let mean = mean_layer(shader, class, arrays, stage_first, source);
     let passed = mean.through.max_element();
-    let index = match light::refraction_index(shader) {
-        Some(index) if passed.is_finite() && passed >= LEAST_TRANSMISSION => index,
-        _ => return types::Dielectric::default(),
-    };
+    let dull = shader.content_flags & CONTENTS_SLIME != 0 && passed < LEAST_TRANSMISSION;
+    if dull || !passed.is_finite() {
+        return types::Dielectric::default();
+    }
     let liquid = light::classify(shader).liquid;
     let mut absorption = Vec3::ZERO;
-    if liquid && shader.content_flags & CONTENTS_FOG == 0 {
-        let (color, depth) = match &shader.fog {
-            Some(fog) if fog.depth > 1.0 => {
-                (relight::overbright::colour_to_linear(fog.color), fog.depth)
-            }
-            _ => (mean.lit + mean.emission + mean.through, LIQUID_DEPTH),
-        };
+    let color = mean.lit + mean.emission + mean.through;
+    if liquid && shader.content_flags & CONTENTS_FOG == 0 && color.is_finite() {
         let color = color / color.max_element().max(1.0e-6);
-        let color = color.clamp(Vec3::splat(LEAST_COLOR), Vec3::ONE);
-        if color.is_finite() {
-            absorption = -color.map(f32::ln) / depth;
-        }
+        absorption = -color
+            .clamp(Vec3::splat(LEAST_COLOR), Vec3::ONE)
+            .map(f32::ln)
+            / LIQUID_DEPTH;
     }
     types::Dielectric {
         index,

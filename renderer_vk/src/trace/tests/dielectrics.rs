@@ -229,7 +229,7 @@ fn an_environment_stage_shows_what_is_around_with(gpu: &mut Gpu) {
     let target = Vec3::new(100.0, 10.0, 0.0);
     let mut scene = scene(eye, target, &[body, shine], 0, Dielectric::default());
     scene.images.push(image.texture_index());
-    let weight = crate::trace::lights::decode(Vec3::splat(128.0 / 255.0)).x;
+    let weight = crate::trace::frame_lights::decode(Vec3::splat(128.0 / 255.0)).x;
     let exact = through_byte(0.5) + weight * above;
     compare(gpu, &scene, &middles(), |_| exact);
     // at the depth where rays end the picture itself stands for the reflection
