@@ -5,7 +5,7 @@ use glam::{Mat4, Vec3, Vec4};
 use crate::assets::Assets;
 use crate::gpu::{self, ColorMask, Image, Recorder};
 use crate::raster::{
-    Aids, DrawList, Flares, Overlay, Raster, StageContext, Target, ViewParameters,
+    Aids, DrawList, Flares, Overlay, Raster, StageContext, Statics, Target, ViewParameters,
     overlay_instance, window_to_clip,
 };
 use crate::scene::ViewScene;
@@ -145,11 +145,13 @@ impl<'a> FrameContext<'a> {
         self.list.add_view(
             scene,
             stages,
-            world.map_or(&[], |w| w.indices.as_slice()),
+            world.map_or(Statics::default(), |w| Statics {
+                vertices: &w.vertices,
+                indices: &w.indices,
+            }),
             Aids {
                 edges: settings.show_tris && self.raster.draws_edges(),
-                normals: (settings.show_normals && self.raster.draws_edges())
-                    .then(|| world.map_or(&[][..], |w| w.vertices.as_slice())),
+                normals: settings.show_normals && self.raster.draws_edges(),
                 lightmaps: settings.lightmap,
                 sky_in_front: settings.show_sky,
                 last_sort: settings.debug_sort,
@@ -205,7 +207,8 @@ impl<'a> FrameContext<'a> {
             return Ok(());
         };
         self.list.clear();
-        self.list.add_view(quads, stages, &[], Aids::default());
+        self.list
+            .add_view(quads, stages, Statics::default(), Aids::default());
         let parameters = ViewParameters {
             world_to_clip: window_to_clip(quads.view.viewport),
             near_world_to_clip: None,

@@ -15,11 +15,11 @@ const SLIVER: f32 = 0.001;
 
 /// Debugging aids.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Aids<'a> {
+pub struct Aids {
     /// Draw the edges of all triangles over everything (`r_showtris`).
     pub edges: bool,
-    /// Draw the normals of all vertices over everything (`r_shownormals`); the world's vertices.
-    pub normals: Option<&'a [Vertex]>,
+    /// Draw the normals of all vertices over everything (`r_shownormals`).
+    pub normals: bool,
     /// Draw lightmaps alone where there are any (`r_lightmap`).
     pub lightmaps: bool,
     /// Draw skies over everything (`r_showsky`).
@@ -28,7 +28,7 @@ pub struct Aids<'a> {
     pub last_sort: i32,
 }
 
-impl Aids<'_> {
+impl Aids {
     /// Whether a material of this sort value is left out.
     pub fn leaves_out(&self, sort: f32) -> bool {
         self.last_sort != 0 && (self.last_sort as f32) < sort
@@ -50,10 +50,11 @@ impl DrawList {
         self.push(outlines(cull), DepthRange::Front, span, draw);
     }
 
-    /// Draws the normals of the vertices that the indices from `first_index` on use. `statics` are the world's
+    /// Draws the normals of the vertices that the indices of a span use. `statics` are the world's
     /// vertices; the view's own are in the list.
-    pub(super) fn push_normals(&mut self, first_index: u32, statics: &[Vertex], draw: Draw) {
-        let used = self.indices.get(first_index as usize..).unwrap_or_default();
+    pub(super) fn push_normals(&mut self, span: (u32, u32), statics: &[Vertex], draw: Draw) {
+        let range = span.0 as usize..(span.0 + span.1) as usize;
+        let used = self.indices.get(range).unwrap_or_default();
         let mut used = used.to_vec();
         used.sort_unstable();
         used.dedup();
@@ -146,7 +147,8 @@ mod tests {
         let statics = [vertex(0.0), vertex(1.0), vertex(2.0)];
         let mut list = DrawList::default();
         list.indices.extend([0, 1, 2, 2, 1, 0]);
-        list.push_normals(0, &statics, Draw::default());
+        let list_len = list.indices.len() as u32;
+        list.push_normals((0, list_len), &statics, Draw::default());
         assert_eq!(list.indices.len(), 6 + 9);
         assert_eq!(list.vertices.len(), 9);
         assert_eq!(list.vertices[0].position, Vec3::ZERO);

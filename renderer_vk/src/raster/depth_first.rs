@@ -15,7 +15,7 @@ use super::shading::Shading;
 use crate::assets::Material;
 
 /// Whether the first pass of a material draws, and writes the depth of, everything that its surfaces cover.
-fn covers(material: &Material) -> bool {
+pub(super) fn covers(material: &Material) -> bool {
     let all_of_it = material.passes.first().is_some_and(|pass| {
         pass.blend.is_none()
             && pass.depth_write

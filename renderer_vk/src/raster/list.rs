@@ -1,23 +1,18 @@
-//! From visible surfaces to draw calls: groups what can be drawn at once, and gives each group one draw per stage,
-//! then its dynamic lights, then its fog, as the engine does.
+//! The draw calls of a view: its surfaces ([`super::groups`]), and between the solid ones and the rest its skies.
 
 use shaders::types::constants as c;
 use shaders::types::{Draw, Instance, Vertex};
 
 use super::aids::Aids;
+use super::groups::{Group, GroupContext};
 use super::pipelines::{CullFaces, Depth, State};
 use super::shading::{Shading, StageContext};
 use super::sky;
 use crate::api::DynamicLight;
 use crate::assets::compile::sampler;
 use crate::assets::{Material, Materials, RasterPass};
-use crate::scene::{DrawSurface, Geometry, SKY_FACES, Sun, ViewScene, VisibleSky};
+use crate::scene::{SKY_FACES, Sun, ViewScene, VisibleSky};
 use shaderscript::{Cull, sort};
-
-/// `surfaceparm nodlight` and `surfaceparm sky`: no dynamic light falls on these.
-const NO_DYNAMIC_LIGHT: u32 = 0x20000 | 0x4;
-/// As many dynamic lights as the engine draws on surfaces: one bit each.
-const MAX_LIGHTS: usize = 32;
 
 /// The part of the depth range that a draw uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,6 +44,15 @@ pub struct Call {
     pub draw: u32,
 }
 
+/// The world's arrays as the GPU has them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Statics<'a> {
+    /// Vertices.
+    pub vertices: &'a [Vertex],
+    /// Indices.
+    pub indices: &'a [u32],
+}
+
 /// The draw calls of a view and the arrays that they read. Kept between frames so that nothing is allocated anew.
 #[derive(Default)]
 pub struct DrawList {
@@ -62,28 +66,12 @@ pub struct DrawList {
     pub vertices: Vec<Vertex>,
     /// See [`super::depth_first`].
     pub(super) depth_first: Vec<Call>,
-}
-
-/// What a group of surfaces has in common.
-#[derive(Clone, Copy, PartialEq, Eq)]
-struct Group {
-    material: u32,
-    instance: u32,
-    fog: u32,
-    lightmap: u32,
-    dynamic: bool,
-}
-
-impl Group {
-    fn of(surface: &DrawSurface) -> Self {
-        Self {
-            material: surface.material,
-            instance: surface.instance,
-            fog: surface.fog,
-            lightmap: surface.lightmap,
-            dynamic: matches!(surface.geometry, Geometry::Dynamic { .. }),
-        }
-    }
+    /// Of the material at hand; see [`super::groups`].
+    pub(super) groups: Vec<Group>,
+    /// Lights that were put off.
+    pub(super) lights: Vec<Call>,
+    /// Fog that was put off, to be drawn after the lights.
+    pub(super) fog: Vec<Call>,
 }
 
 impl DrawList {
@@ -96,13 +84,13 @@ impl DrawList {
         self.depth_first.clear();
     }
 
-    /// Adds everything that a view shows. `static_indices` is the world's index array.
+    /// Adds everything that a view shows.
     pub fn add_view(
         &mut self,
         scene: &ViewScene,
         stages: StageContext<'_>,
-        static_indices: &[u32],
-        aids: Aids<'_>,
+        statics: Statics<'_>,
+        aids: Aids,
     ) {
         let materials = stages.materials;
         self.vertices.extend_from_slice(&scene.vertices);
@@ -111,11 +99,21 @@ impl DrawList {
                 .surfaces
                 .partition_point(|s| materials.get(s.material).sort < sort::SKY),
         );
-        self.add_surfaces(before_sky, scene, stages, static_indices, aids);
+        let context = GroupContext {
+            surfaces: before_sky,
+            scene,
+            stages,
+            statics,
+            aids,
+        };
+        self.add_surfaces(&context);
         for sky in &scene.skies {
             self.add_sky(sky, scene, stages, aids);
         }
-        self.add_surfaces(rest, scene, stages, static_indices, aids);
+        self.add_surfaces(&GroupContext {
+            surfaces: rest,
+            ..context
+        });
         if let Some(sun) = scene.sun.filter(|_| !scene.skies.is_empty()) {
             self.add_sun(&sun, scene, stages, aids);
         }
@@ -129,158 +127,12 @@ impl DrawList {
         }
     }
 
-    fn add_surfaces(
-        &mut self,
-        surfaces: &[DrawSurface],
-        scene: &ViewScene,
-        stages: StageContext<'_>,
-        static_indices: &[u32],
-        aids: Aids<'_>,
-    ) {
-        let mut rest = surfaces;
-        while let Some(first) = rest.first() {
-            let group = Group::of(first);
-            let count = rest.iter().take_while(|s| Group::of(s) == group).count();
-            let (these, others) = rest.split_at(count);
-            rest = others;
-
-            let first_index = self.indices.len() as u32;
-            let mut lights = 0;
-            for surface in these {
-                lights |= surface.dlights;
-                self.indices
-                    .extend_from_slice(scene.indices_of(surface, static_indices));
-            }
-            let flags = scene
-                .instances
-                .get(group.instance as usize)
-                .map_or(0, |i| i.flags);
-            let has = |bit: u32| flags & bit != 0;
-            let range = match (has(c::INSTANCE_DEPTH_HACK), has(c::INSTANCE_CROSSHAIR)) {
-                (true, false) => DepthRange::Near,
-                (true, true) => DepthRange::Crosshair,
-                _ => DepthRange::Normal,
-            };
-            let span = (first_index, self.indices.len() as u32 - first_index);
-            self.add_group(group, stages, span, range, lights, scene, aids);
-        }
-    }
-
-    #[allow(clippy::too_many_arguments)]
-    fn add_group(
-        &mut self,
-        group: Group,
-        stages: StageContext<'_>,
-        span: (u32, u32),
-        range: DepthRange,
-        lights: u32,
-        scene: &ViewScene,
-        aids: Aids<'_>,
-    ) {
-        let material = stages.materials.get(group.material);
-        let Some(instance) = scene.instances.get(group.instance as usize) else {
-            return;
-        };
-        if span.1 == 0 || material.sky.is_some() || aids.leaves_out(material.sort) {
-            return;
-        }
-        let draw = Draw {
-            instance: group.instance,
-            fog: group.fog,
-            dynamic_vertices: group.dynamic.into(),
-            ..Draw::default()
-        };
-        let plain = State {
-            blend: None,
-            depth: Depth::LessEqual,
-            depth_write: true,
-            cull: faces(material.shader.cull, scene.view.mirrored),
-            offset: material.polygon_offset,
-            wireframe: false,
-            shading: Shading::WHITE,
-        };
-        let opaque = material.sort <= sort::OPAQUE;
-        if !group.dynamic && range == DepthRange::Normal {
-            self.note_depth(material, plain, span, draw);
-        }
-        let first_blends = material.passes.first().is_some_and(|p| p.blend.is_some());
-        for pass in &material.passes {
-            let depth = stage_depth(pass);
-            let fog_adjust = if group.fog != 0 && first_blends && !opaque {
-                fog_adjust(pass.blend)
-            } else {
-                c::FOG_ADJUST_NONE
-            };
-            let (mut shading, mut draw) =
-                stages.pass(material, pass, instance, group.lightmap, fog_adjust, draw);
-            let shows_light = aids.lightmaps && shows_lightmap(pass, stages.materials);
-            // of two textures in one pass the second is shown, which with a lightmap is the lightmap
-            if aids.lightmaps && pass.stage_count == 2 {
-                (shading, draw) = match (shows_light, group.lightmap) {
-                    (false, _) => (shading.second_alone(), draw),
-                    (true, c::NO_TEXTURE) => (Shading::WHITE, draw),
-                    (true, page) => stages.lightmap(page, draw),
-                };
-            }
-            let state = State {
-                blend: pass.blend,
-                depth,
-                depth_write: pass.depth_write,
-                shading,
-                ..plain
-            };
-            self.push(state, range, span, draw);
-            if shows_light {
-                break;
-            }
-        }
-        if opaque && material.surface_flags & NO_DYNAMIC_LIGHT == 0 {
-            for (i, light) in (0..).zip(scene.dlights.iter().take(MAX_LIGHTS)) {
-                if lights & (1 << i) != 0 {
-                    let blend = (light_source_factor(light), c::BLEND_ONE);
-                    let (shading, draw) = stages.light(Draw { light: i, ..draw });
-                    let state = State {
-                        blend: Some(blend),
-                        depth: Depth::Equal,
-                        depth_write: false,
-                        shading,
-                        ..plain
-                    };
-                    self.push(state, range, span, draw);
-                }
-            }
-        }
-        if group.fog != 0 && (opaque || material.flags & c::MATERIAL_FOG != 0) {
-            let depth = if opaque {
-                Depth::Equal
-            } else {
-                Depth::LessEqual
-            };
-            let blend = (c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA);
-            let (shading, draw) = stages.fog(draw);
-            let state = State {
-                blend: Some(blend),
-                depth,
-                depth_write: false,
-                shading,
-                ..plain
-            };
-            self.push(state, range, span, draw);
-        }
-        if aids.edges {
-            self.push_edges(span, draw, plain.cull);
-        }
-        if let Some(statics) = aids.normals {
-            self.push_normals(span.0, statics, draw);
-        }
-    }
-
     fn add_sky(
         &mut self,
         visible: &VisibleSky,
         scene: &ViewScene,
         stages: StageContext<'_>,
-        aids: Aids<'_>,
+        aids: Aids,
     ) {
         let material = stages.materials.get(visible.material);
         let (Some(sky), Some(world)) = (&material.sky, scene.instances.first()) else {
@@ -331,7 +183,7 @@ impl DrawList {
     }
 
     /// The sun's disc, behind everything but the sky.
-    fn add_sun(&mut self, sun: &Sun, scene: &ViewScene, stages: StageContext<'_>, aids: Aids<'_>) {
+    fn add_sun(&mut self, sun: &Sun, scene: &ViewScene, stages: StageContext<'_>, aids: Aids) {
         let material = stages.materials.get(sun.material);
         let Some(world) = scene.instances.first() else {
             return;
@@ -377,23 +229,6 @@ impl DrawList {
             indices: &mut self.indices,
         }
     }
-
-    pub(super) fn push(
-        &mut self,
-        state: State,
-        range: DepthRange,
-        (first_index, index_count): (u32, u32),
-        draw: Draw,
-    ) {
-        self.calls.push(Call {
-            state,
-            range,
-            first_index,
-            index_count,
-            draw: self.draws.len() as u32,
-        });
-        self.draws.push(draw);
-    }
 }
 
 /// What is drawn at the far end of the depth range.
@@ -415,7 +250,7 @@ fn sky_state(
 }
 
 /// Whether one of the pass's stages draws the lightmap.
-fn shows_lightmap(pass: &RasterPass, materials: &Materials) -> bool {
+pub(super) fn shows_lightmap(pass: &RasterPass, materials: &Materials) -> bool {
     let stages = &materials.arrays().stages;
     let shows = |&&stage: &&u32| {
         stages
@@ -437,7 +272,7 @@ pub fn stage_depth(pass: &RasterPass) -> Depth {
     }
 }
 
-fn light_source_factor(light: &DynamicLight) -> u32 {
+pub(super) fn light_source_factor(light: &DynamicLight) -> u32 {
     if light.additive {
         c::BLEND_ONE
     } else {
@@ -455,7 +290,7 @@ pub(super) fn faces(cull: Cull, mirrored: bool) -> CullFaces {
 }
 
 /// Which channels fog scales on a blended stage, by the way it blends.
-fn fog_adjust(blend: Option<(u32, u32)>) -> u32 {
+pub(super) fn fog_adjust(blend: Option<(u32, u32)>) -> u32 {
     match blend {
         Some((c::BLEND_ONE, c::BLEND_ONE) | (c::BLEND_ZERO, c::BLEND_ONE_MINUS_SRC_COLOR)) => {
             c::FOG_ADJUST_RGB

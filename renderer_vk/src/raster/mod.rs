@@ -9,6 +9,8 @@ mod cover;
 mod depth_first;
 mod expected;
 mod flares;
+mod groups;
+mod light_reach;
 mod list;
 mod overlay;
 mod pipelines;
@@ -23,7 +25,7 @@ use shaders::types::{Instance, MaterialBuffers, RasterLight, RasterView};
 
 pub use aids::{Aids, image_sheet};
 pub use flares::{Flares, window_to_clip};
-pub use list::DrawList;
+pub use list::{DrawList, Statics};
 pub use overlay::{Overlay, Picture2d, overlay_instance};
 pub use present::Present;
 pub use shading::StageContext;

@@ -159,7 +159,7 @@ impl Overlay {
         list: &mut DrawList,
         stages: StageContext<'_>,
         instance: &Instance,
-        aids: Aids<'_>,
+        aids: Aids,
     ) {
         list.clear();
         for run in &self.runs {

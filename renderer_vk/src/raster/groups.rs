@@ -1,0 +1,348 @@
+//! The surfaces of a view, grouped by what one draw needs alike, and the calls of each group: its stages, then its
+//! dynamic lights, then its fog, as in the engine.
+//!
+//! Changing the pipeline is what a call costs most, with software drivers above all. So where the picture cannot tell,
+//! calls of the same state are brought together. Surfaces whose first stage covers all behind them
+//! ([`depth_first::covers`]) end up one in each pixel, whatever the order: of neighbouring groups of one such material
+//! every stage is drawn for all of them before the next stage, and the lights and the fog of all such groups are put off
+//! until something else is drawn. They pass the depth test only on the surface that is in sight.
+
+use shaders::types::constants as c;
+use shaders::types::{Draw, Instance};
+
+use super::aids::Aids;
+use super::depth_first;
+use super::light_reach::LightReach;
+use super::list::{
+    Call, DepthRange, DrawList, Statics, faces, fog_adjust, light_source_factor, shows_lightmap,
+    stage_depth,
+};
+use super::pipelines::{Depth, State};
+use super::shading::{Shading, StageContext};
+use crate::assets::{Material, RasterPass};
+use crate::scene::{DrawSurface, Geometry, ViewScene};
+use shaderscript::sort;
+
+/// `surfaceparm nodlight` and `surfaceparm sky`: no dynamic light falls on these.
+const NO_DYNAMIC_LIGHT: u32 = 0x20000 | 0x4;
+/// As many dynamic lights as the engine draws on surfaces: one bit each.
+const MAX_LIGHTS: usize = 32;
+
+/// What a group of surfaces has in common.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Common {
+    material: u32,
+    instance: u32,
+    fog: u32,
+    lightmap: u32,
+    dynamic: bool,
+}
+
+impl Common {
+    fn of(surface: &DrawSurface) -> Self {
+        Self {
+            material: surface.material,
+            instance: surface.instance,
+            fog: surface.fog,
+            lightmap: surface.lightmap,
+            dynamic: matches!(surface.geometry, Geometry::Dynamic { .. }),
+        }
+    }
+}
+
+/// Neighbouring surfaces that have everything in common.
+#[derive(Clone, Copy)]
+pub(super) struct Group {
+    common: Common,
+    /// Where they begin among the view's, and how many there are.
+    surfaces: (usize, usize),
+    /// First index and number of indices.
+    span: (u32, u32),
+    range: DepthRange,
+}
+
+/// What all groups are drawn with.
+#[derive(Clone, Copy)]
+pub(super) struct GroupContext<'a> {
+    pub surfaces: &'a [DrawSurface],
+    pub scene: &'a ViewScene,
+    pub stages: StageContext<'a>,
+    pub statics: Statics<'a>,
+    pub aids: Aids,
+}
+
+impl GroupContext<'_> {
+    fn instance(&self, group: &Group) -> Option<&Instance> {
+        self.scene.instances.get(group.common.instance as usize)
+    }
+
+    fn plain_state(&self, material: &Material) -> State {
+        State {
+            blend: None,
+            depth: Depth::LessEqual,
+            depth_write: true,
+            cull: faces(material.shader.cull, self.scene.view.mirrored),
+            offset: material.polygon_offset,
+            wireframe: false,
+            shading: Shading::WHITE,
+        }
+    }
+}
+
+fn plain_draw(group: &Group) -> Draw {
+    Draw {
+        instance: group.common.instance,
+        fog: group.common.fog,
+        dynamic_vertices: group.common.dynamic.into(),
+        ..Draw::default()
+    }
+}
+
+impl DrawList {
+    /// Adds the calls of `context.surfaces`.
+    pub(super) fn add_surfaces(&mut self, context: &GroupContext<'_>) {
+        let mut groups = std::mem::take(&mut self.groups);
+        let mut next = 0;
+        while let Some(first) = context.surfaces.get(next) {
+            let material = context.stages.materials.get(first.material);
+            let covers = depth_first::covers(material);
+            groups.clear();
+            loop {
+                let group = self.gather_group(next, context);
+                next += group.surfaces.1;
+                groups.push(group);
+                let goes_on = (context.surfaces.get(next))
+                    .is_some_and(|s| s.material == first.material && covers);
+                if !goes_on {
+                    break;
+                }
+            }
+            if material.sky.is_some() || context.aids.leaves_out(material.sort) {
+                continue;
+            }
+            groups.retain(|group| group.span.1 > 0 && context.instance(group).is_some());
+            if !covers {
+                self.draw_put_off();
+            }
+            self.add_stages(material, &groups, context);
+            for group in &groups {
+                self.add_lights(material, group, context);
+                self.add_fog(material, group, context);
+            }
+            if !covers {
+                self.draw_put_off();
+            }
+            for group in &groups {
+                let draw = plain_draw(group);
+                if context.aids.edges {
+                    let cull = context.plain_state(material).cull;
+                    self.push_edges(group.span, draw, cull);
+                }
+                if context.aids.normals {
+                    self.push_normals(group.span, context.statics.vertices, draw);
+                }
+            }
+        }
+        self.draw_put_off();
+        self.groups = groups;
+    }
+
+    /// The group that begins with a surface, with its indices copied.
+    fn gather_group(&mut self, first: usize, context: &GroupContext<'_>) -> Group {
+        let surfaces = context.surfaces.get(first..).unwrap_or_default();
+        let common = surfaces.first().map(Common::of);
+        let these = || {
+            surfaces
+                .iter()
+                .take_while(|s| Some(Common::of(s)) == common)
+        };
+        let first_index = self.indices.len() as u32;
+        for surface in these() {
+            let indices = context.scene.indices_of(surface, context.statics.indices);
+            self.indices.extend_from_slice(indices);
+        }
+        let common = common.unwrap_or(Common {
+            material: 0,
+            instance: u32::MAX,
+            fog: 0,
+            lightmap: c::NO_TEXTURE,
+            dynamic: false,
+        });
+        let instance = context.scene.instances.get(common.instance as usize);
+        let has = |bit: u32| instance.is_some_and(|i| i.flags & bit != 0);
+        let range = match (has(c::INSTANCE_DEPTH_HACK), has(c::INSTANCE_CROSSHAIR)) {
+            (true, false) => DepthRange::Near,
+            (true, true) => DepthRange::Crosshair,
+            _ => DepthRange::Normal,
+        };
+        Group {
+            common,
+            surfaces: (first, these().count().max(1)),
+            span: (first_index, self.indices.len() as u32 - first_index),
+            range,
+        }
+    }
+
+    /// Adds the stages of groups of one material: each stage for all groups before the next stage.
+    fn add_stages(&mut self, material: &Material, groups: &[Group], context: &GroupContext<'_>) {
+        let plain = context.plain_state(material);
+        for group in groups {
+            if !group.common.dynamic && group.range == DepthRange::Normal {
+                self.note_depth(material, plain, group.span, plain_draw(group));
+            }
+        }
+        for pass in &material.passes {
+            for group in groups {
+                self.add_stage(material, pass, group, context);
+            }
+            if context.aids.lightmaps && shows_lightmap(pass, context.stages.materials) {
+                break;
+            }
+        }
+    }
+
+    fn add_stage(
+        &mut self,
+        material: &Material,
+        pass: &RasterPass,
+        group: &Group,
+        context: &GroupContext<'_>,
+    ) {
+        let (stages, aids) = (context.stages, context.aids);
+        let Some(instance) = context.instance(group) else {
+            return;
+        };
+        let first_blends = material.passes.first().is_some_and(|p| p.blend.is_some());
+        let fog_adjust = if group.common.fog != 0 && first_blends && material.sort > sort::OPAQUE {
+            fog_adjust(pass.blend)
+        } else {
+            c::FOG_ADJUST_NONE
+        };
+        let draw = plain_draw(group);
+        let lightmap = group.common.lightmap;
+        let (mut shading, mut draw) =
+            stages.pass(material, pass, instance, lightmap, fog_adjust, draw);
+        // of two textures in one pass the second is shown, which with a lightmap is the lightmap
+        if aids.lightmaps && pass.stage_count == 2 {
+            (shading, draw) = match (shows_lightmap(pass, stages.materials), lightmap) {
+                (false, _) => (shading.second_alone(), draw),
+                (true, c::NO_TEXTURE) => (Shading::WHITE, draw),
+                (true, page) => stages.lightmap(page, draw),
+            };
+        }
+        let state = State {
+            blend: pass.blend,
+            depth: stage_depth(pass),
+            depth_write: pass.depth_write,
+            shading,
+            ..context.plain_state(material)
+        };
+        self.push(state, group.range, group.span, draw);
+    }
+
+    fn add_lights(&mut self, material: &Material, group: &Group, context: &GroupContext<'_>) {
+        let Some(instance) = context.instance(group) else {
+            return;
+        };
+        if material.sort > sort::OPAQUE || material.surface_flags & NO_DYNAMIC_LIGHT != 0 {
+            return;
+        }
+        let (first, count) = group.surfaces;
+        let surfaces = context.surfaces.get(first..first + count);
+        let surfaces = surfaces.unwrap_or_default();
+        let lights = surfaces.iter().fold(0, |all, s| all | s.dlights);
+        for (i, light) in (0..).zip(context.scene.dlights.iter().take(MAX_LIGHTS)) {
+            if lights & (1 << i) == 0 {
+                continue;
+            }
+            let reach = LightReach::new(light, instance);
+            let first_index = self.indices.len() as u32;
+            for surface in surfaces.iter().filter(|s| s.dlights & (1 << i) != 0) {
+                let (vertices, indices) = match surface.geometry {
+                    Geometry::Static { .. } => (context.statics.vertices, context.statics.indices),
+                    Geometry::Dynamic { .. } => (self.vertices.as_slice(), &[][..]),
+                };
+                let indices = context.scene.indices_of(surface, indices);
+                reach.gather(vertices, indices, &mut self.indices);
+            }
+            let span = (first_index, self.indices.len() as u32 - first_index);
+            if span.1 == 0 {
+                continue;
+            }
+            let draw = Draw {
+                light: i,
+                ..plain_draw(group)
+            };
+            let (shading, draw) = context.stages.light(draw);
+            let state = State {
+                blend: Some((light_source_factor(light), c::BLEND_ONE)),
+                depth: Depth::Equal,
+                depth_write: false,
+                shading,
+                ..context.plain_state(material)
+            };
+            let call = self.call(state, group.range, span, draw);
+            self.lights.push(call);
+        }
+    }
+
+    fn add_fog(&mut self, material: &Material, group: &Group, context: &GroupContext<'_>) {
+        let opaque = material.sort <= sort::OPAQUE;
+        if group.common.fog == 0 || !(opaque || material.flags & c::MATERIAL_FOG != 0) {
+            return;
+        }
+        let (shading, draw) = context.stages.fog(plain_draw(group));
+        let state = State {
+            blend: Some((c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA)),
+            depth: if opaque {
+                Depth::Equal
+            } else {
+                Depth::LessEqual
+            },
+            depth_write: false,
+            shading,
+            ..context.plain_state(material)
+        };
+        let call = self.call(state, group.range, group.span, draw);
+        self.fog.push(call);
+    }
+
+    /// Draws the lights and the fog that were put off.
+    fn draw_put_off(&mut self) {
+        self.calls.append(&mut self.lights);
+        self.calls.append(&mut self.fog);
+    }
+
+    fn call(
+        &mut self,
+        state: State,
+        range: DepthRange,
+        (first_index, index_count): (u32, u32),
+        draw: Draw,
+    ) -> Call {
+        let index = self.draws.len() as u32;
+        self.draws.push(draw);
+        Call {
+            state,
+            range,
+            first_index,
+            index_count,
+            draw: index,
+        }
+    }
+
+    /// Adds a call; one that differs from the last one only in where its indices lie makes that one longer.
+    pub(super) fn push(&mut self, state: State, range: DepthRange, span: (u32, u32), draw: Draw) {
+        if let Some(last) = self.calls.last_mut()
+            && (last.state, last.range) == (state, range)
+            && last.first_index + last.index_count == span.0
+            && let Some(same) = self.draws.get(last.draw as usize)
+            && bytemuck::bytes_of(same) == bytemuck::bytes_of(&draw)
+        {
+            last.index_count += span.1;
+            return;
+        }
+        let call = self.call(state, range, span, draw);
+        self.calls.push(call);
+    }
+}

@@ -1,0 +1,107 @@
+//! Which triangles a dynamic light falls on. Drawing the others would add nothing, at the price of a texture sample for
+//! each of their pixels.
+
+use glam::{Mat3, Vec3};
+use shaders::types::{Instance, Vertex};
+
+use crate::api::DynamicLight;
+
+/// A dynamic light as an instance's own space sees it.
+pub struct LightReach {
+    /// Where the light is, along the instance's axes.
+    origin: Vec3,
+    /// Point of the instance to its place along the instance's axes.
+    along_axes: Mat3,
+    radius: f32,
+}
+
+impl LightReach {
+    /// Of a light on an instance.
+    pub fn new(light: &DynamicLight, instance: &Instance) -> Self {
+        let axes = Mat3::from_cols_array_2d(&instance.axis.map(|axis| axis.to_array()));
+        let onto = axes.transpose();
+        Self {
+            origin: onto * (light.origin - instance.origin),
+            along_axes: onto * axes,
+            radius: light.radius,
+        }
+    }
+
+    /// Appends those of the triangles of `indices` that the light may fall on. The spot is a square column along the
+    /// instance's z axis, as wide as the light's radius and twice as high (`draw.vert`).
+    pub fn gather(&self, vertices: &[Vertex], indices: &[u32], found: &mut Vec<u32>) {
+        for corners in indices.chunks_exact(3) {
+            let beyond = corners.iter().fold(u32::MAX, |all, &index| {
+                all & vertices
+                    .get(index as usize)
+                    .map_or(0, |vertex| self.beyond(vertex.position))
+            });
+            if beyond == 0 {
+                found.extend_from_slice(corners);
+            }
+        }
+    }
+
+    /// One bit for each side of the column that a point lies beyond.
+    fn beyond(&self, point: Vec3) -> u32 {
+        let delta = self.origin - self.along_axes * point;
+        let half = self.radius * 0.5;
+        u32::from(delta.x < -half)
+            | u32::from(delta.x > half) << 1
+            | u32::from(delta.y < -half) << 2
+            | u32::from(delta.y > half) << 3
+            | u32::from(delta.z < -self.radius) << 4
+            | u32::from(delta.z > self.radius) << 5
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn vertex(x: f32, y: f32, z: f32) -> Vertex {
+        Vertex {
+            position: Vec3::new(x, y, z),
+            ..Vertex::default()
+        }
+    }
+
+    #[test]
+    fn triangles_wholly_beyond_one_side_are_left_out() {
+        let light = DynamicLight {
+            origin: Vec3::new(100.0, 10.0, 0.0),
+            radius: 20.0,
+            color: Vec3::ONE,
+            additive: false,
+        };
+        // turned by a quarter and twice as large: the light is at (5, -50, 0) of its own space
+        let instance = Instance {
+            axis: [Vec3::Y * 2.0, Vec3::NEG_X * 2.0, Vec3::Z * 2.0],
+            ..Instance::default()
+        };
+        let reach = LightReach::new(&light, &instance);
+        let vertices = [
+            // around the light
+            vertex(0.0, -52.0, 0.0),
+            vertex(10.0, -52.0, 0.0),
+            vertex(5.0, -48.0, 0.0),
+            // beyond x
+            vertex(8.0, -50.0, 0.0),
+            vertex(9.0, -50.0, 0.0),
+            vertex(8.0, -49.0, 0.0),
+            // across a corner of the column: beyond two sides, but not wholly beyond one
+            vertex(20.0, -50.0, 0.0),
+            vertex(5.0, -30.0, 0.0),
+            vertex(20.0, -30.0, 0.0),
+            // above
+            vertex(5.0, -50.0, 11.0),
+            vertex(6.0, -50.0, 12.0),
+            vertex(5.0, -51.0, 13.0),
+        ];
+        let indices: Vec<u32> = (0..12).chain([99, 3, 4]).collect();
+        let mut found = Vec::new();
+        reach.gather(&vertices, &indices, &mut found);
+        // an index that leads nowhere is drawn as without this
+        assert_eq!(found, [0, 1, 2, 6, 7, 8, 99, 3, 4]);
+    }
+}
