@@ -11,6 +11,7 @@ use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use relight::GameFiles;
 use renderer_vk::api::RefDef;
+use renderer_vk::path::{self, PathPoint};
 use renderer_vk::{Renderer, RendererOptions, Settings};
 
 /// How the picture is made.
@@ -90,6 +91,9 @@ pub struct RenderArgs {
     /// of GPU memory by purpose
     #[arg(long)]
     stats: bool,
+    /// Camera path, a frame a line, as the console command rt_path records it; in place of --camera and --frames
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["camera", "turn"])]
+    path: Option<PathBuf>,
     /// Turn the camera once round over the frames, so that they show different things
     #[arg(long)]
     turn: bool,
@@ -122,6 +126,17 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
         Some((w, h)) if (1..=16384).contains(&w) && (1..=16384).contains(&h) => Ok((w, h)),
         _ => Err("a size is WIDTHxHEIGHT, at most 16384 each, for example 1280x720".into()),
     }
+}
+
+/// The frames of a camera path.
+fn read_path(file: &std::path::Path) -> anyhow::Result<Vec<PathPoint>> {
+    let text = std::fs::read_to_string(file)
+        .with_context(|| format!("{}: cannot be read", file.display()))?;
+    let points = path::parse(&text).with_context(|| file.display().to_string())?;
+    if points.is_empty() {
+        bail!("{}: no frame in it", file.display());
+    }
+    Ok(points)
 }
 
 /// Runs the command.
@@ -191,10 +206,11 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         ..camera.ref_def(args.size, args.fov)
     };
 
-    let frames = if args.look == Look::Traced || args.timings || args.stats {
-        args.frames.max(1)
-    } else {
-        1
+    let points = args.path.as_deref().map(read_path).transpose()?;
+    let frames = match &points {
+        Some(points) => u32::try_from(points.len())?,
+        None if args.look == Look::Traced || args.timings || args.stats => args.frames.max(1),
+        None => 1,
     };
     let bar = ProgressBar::new(frames.into());
     bar.set_style(ProgressStyle::with_template(
@@ -220,6 +236,9 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
                 ..camera
             };
             def.view_axis = turned.axis();
+        }
+        if let Some(point) = points.as_ref().and_then(|p| p.get(frame as usize)) {
+            def = point.ref_def(width, height);
         }
         renderer.begin_frame(def.time_ms);
         renderer.clear_scene();

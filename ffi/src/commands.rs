@@ -28,6 +28,7 @@ static COMMANDS: &[(&CStr, Function)] = &[
     (c"rt_lights", lights),
     (c"rt_stats", stats),
     (c"rt_screenshot", still),
+    (c"rt_path", path),
 ];
 
 /// Adds all commands.
@@ -150,6 +151,39 @@ extern "C" fn lights() {
             report.longest_list
         ));
         lines
+    });
+}
+
+extern "C" fn path() {
+    entry(|| {
+        let Some(engine) = Engine::current() else {
+            return Ok(());
+        };
+        let arguments = engine.arguments();
+        let name = arguments.get(1).map_or("path", String::as_str);
+        let file = format!("paths/{}.txt", name.strip_suffix(".txt").unwrap_or(name));
+        if valid_game_path(&file).is_none() {
+            engine.say(&format!("rt_path: {file}: not a name for a file\n"));
+            return Ok(());
+        }
+        let done = with_renderer(|_, front| {
+            let done = front.path.take();
+            if done.is_none() {
+                front.path = Some((file.clone(), String::new()));
+            }
+            Ok(done)
+        })?;
+        let Some((file, lines)) = done else {
+            engine.say(&format!(
+                "recording the camera to {file}; rt_path ends it\n"
+            ));
+            return Ok(());
+        };
+        if let Some(name) = valid_game_path(&file) {
+            engine.write_file(&name, lines.as_bytes());
+        }
+        engine.say(&format!("{file}: {} frames\n", lines.lines().count()));
+        Ok(())
     });
 }
 

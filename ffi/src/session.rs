@@ -50,6 +50,8 @@ pub struct Front {
     pub captures: Captures,
     /// What `rt_stats` and `rt_printPerfStats` want to know.
     pub questions: Questions,
+    /// The camera path that `rt_path` records: its file and the lines so far.
+    pub path: Option<(String, String)>,
     /// Videos on materials.
     pub cinematics: Cinematics,
     /// Pixels of the window as the game was told.

@@ -11,7 +11,8 @@ use crate::cvars::{self, Cvar};
 use crate::session::{draw, with_renderer};
 use glam::Vec3;
 use renderer_vk::Renderer;
-use renderer_vk::api::DynamicLight;
+use renderer_vk::api::{DynamicLight, rdflags};
+use renderer_vk::path::PathPoint;
 use std::ffi::{c_char, c_float, c_int, c_uchar};
 
 /// Corners of a decal's polygon that are looked at.
@@ -202,6 +203,11 @@ pub extern "C" fn render_scene(from: *const refdef_t) {
                 .is_some_and(|cvars| cvars.flag(Cvar::NoRefresh))
             {
                 return Ok(());
+            }
+            if let Some((_, lines)) = &mut front.path
+                && view.flags & rdflags::NO_WORLD_MODEL == 0
+            {
+                lines.push_str(&PathPoint::of(&view).line());
             }
             renderer.render_scene(&view).map_err(failure)
         })
