@@ -339,6 +339,38 @@ pub struct AntialiasView {
     pub padding: u32,
 }
 
+/// What the denoiser's passes read: bindless indices of their images.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct DenoiseView {
+    /// `DENOISE_*` bits.
+    pub flags: u32,
+    /// Seed of the last frame's random numbers.
+    pub last_seed: u32,
+    /// A pixel of each stratum of the last frame: position, and which pixel it is.
+    pub samples: u32,
+    /// Its normals, light and length of path.
+    pub sample_surfaces: u32,
+    /// Which pixel of each stratum is lit as such a sample, and which sample.
+    pub carried: u32,
+    /// Depth and normal of each stratum.
+    pub stratum_guide: u32,
+    /// The part of direct and indirect light that has changed, of each stratum.
+    pub gradient: u32,
+    /// Depth, normal, number of frames and variance.
+    pub guide: u32,
+    /// The same of the last frame.
+    pub last_guide: u32,
+    /// Light of the frames before, filtered a little.
+    pub history: u32,
+    /// Light of this frame and those before.
+    pub fresh: u32,
+    /// The light that the picture is made with, once filtered.
+    pub lit: u32,
+    /// Change of the inverse of depth from pixel to pixel.
+    pub slope: u32,
+}
+
 /// All that the passes of one traced view read: camera, arrays, images, settings.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -409,21 +441,12 @@ pub struct TraceView {
     pub target_height: u32,
     /// Clamped, with mip levels: for the images of sky boxes.
     pub sky_sampler: u32,
-    pub image_last_position: u32,
-    pub image_last_surface: u32,
-    /// Filtered light of the last frame.
-    pub image_last_light: u32,
-    pub image_moments: u32,
-    pub image_last_moments: u32,
-    /// Light of this and earlier frames, and its variance.
-    pub image_filter: u32,
-    /// The light that the picture is made with, once filtered.
-    pub image_lit: u32,
     /// Camera of the last frame.
     pub last_eye: Vec3,
     pub last_forward: Vec3,
     pub last_left: Vec3,
     pub last_up: Vec3,
+    pub denoise: DenoiseView,
     /// Makes the size a multiple of eight without hidden bytes.
     pub padding: u32,
 }
@@ -471,6 +494,9 @@ pub mod constants {
     pub const COUNT_INDIRECT: u32 = 2;
     pub const COUNTER_ROWS: u32 = 64;
     pub const NO_IMAGE: u32 = 0xFFFF_FFFF;
+    pub const DENOISE_HISTORY: u32 = 1;
+    pub const DENOISE_GRADIENTS: u32 = 2;
+    pub const DENOISE_SPARSE: u32 = 4;
     pub const SELECT_UNIFORM: u32 = 0;
     pub const SELECT_RESAMPLED: u32 = 1;
     pub const SELECT_ALL: u32 = 2;

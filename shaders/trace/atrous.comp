@@ -1,63 +1,77 @@
 #version 460
-// Second half of the denoiser: an edge-avoiding a-trous wavelet step (Dammertz et al., HPG 2010), guided by normals,
-// the surface's plane and the variance of the light (Schied et al. 2017, section 4.3 and 4.4). The kernel is 3x3.
+// An edge-avoiding a-trous wavelet step (Dammertz et al., HPG 2010), guided by normals, the surface's plane and the
+// variance of the light (Schied et al. 2017, section 4.3 and 4.4). The kernel is 3 x 3. Direct and indirect light share
+// what the surface says and differ in what the light says.
 #define OWN_PUSH
-#include "trace/color.glsl"
-#include "trace/gbuffer.glsl"
+#include "trace/denoise.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-bool inside(ivec2 pixel) {
-    return pixel.x >= 0 && pixel.y >= 0 && pixel.x < int(VIEW.width) && pixel.y < int(VIEW.height);
-}
+// Differences of luminance that count as noise, in standard deviations: of direct and indirect light.
+const vec2 LUMINANCE_SIGMA = vec2(4.0, 6.0);
 
-const float NORMAL_POWER = 64.0, LUMINANCE_SIGMA = 4.0;
+// x to the power 64
+float narrow(float x) {
+    x *= x; x *= x; x *= x;
+    x *= x; x *= x; x *= x;
+    return x;
+}
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (!inside(pixel)) return;
-    vec4 middle = imageLoad(images_rgba16f[push.source], pixel);
-    vec4 position = imageLoad(images_rgba32f[VIEW.image_position], pixel);
-    if (position.w < 0.0) {
-        imageStore(images_rgba16f[push.target], pixel, vec4(0.0));
+    LightTexel middle = unpack_texel(imageLoad(uimages_rgba32ui[push.source], pixel));
+    if (middle.guide == 0) {
+        imageStore(uimages_rgba32ui[push.target], pixel, uvec4(0));
         return;
     }
-    uvec2 surface = imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).xy;
-    vec3 face_normal = unpack_normal(surface.x), normal = unpack_normal(surface.y);
-    float value = luminance(middle.rgb);
-    // the variance itself is noisy: blurred a little
-    float blurred = 0.0, blur_weight = 0.0;
-    for (int y = -1; y <= 1; y++) {
-        for (int x = -1; x <= 1; x++) {
-            ivec2 tap = pixel + ivec2(x, y);
-            if (!inside(tap)) continue;
-            float weight = (x == 0 ? 2.0 : 1.0) * (y == 0 ? 2.0 : 1.0);
-            blurred += imageLoad(images_rgba16f[push.source], tap).a * weight;
-            blur_weight += weight;
-        }
-    }
-    float light_scale = 1.0 / (LUMINANCE_SIGMA * sqrt(max(blurred / blur_weight, 0.0)) + 1.0e-3 * value + 1.0e-6);
-    float plane_scale = 1.0 / (0.1 + 0.5 * float(push.spacing) * position.w * VIEW.pixel_spread);
+    vec3 normal = guide_normal(middle.guide);
+    float depth = guide_depth(middle.guide);
+    vec2 slope = imageLoad(images_rg16f[DENOISE.slope], pixel).xy * float(push.spacing);
+    vec2 value = vec2(luminance(middle.direct), luminance(middle.indirect));
+    int spacing = int(push.spacing);
 
-    vec3 sum = middle.rgb * 4.0;
-    float variance = middle.a * 16.0, total = 4.0;
-    for (int y = -1; y <= 1; y++) {
-        for (int x = -1; x <= 1; x++) {
-            if (x == 0 && y == 0) continue;
-            ivec2 tap = pixel + ivec2(x, y) * int(push.spacing);
-            if (!inside(tap)) continue;
-            vec4 tap_position = imageLoad(images_rgba32f[VIEW.image_position], tap);
-            if (tap_position.w < 0.0) continue;
-            vec4 light = imageLoad(images_rgba16f[push.source], tap);
-            vec3 tap_normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], tap).y);
-            float weight = (x == 0 ? 2.0 : 1.0) * (y == 0 ? 2.0 : 1.0);
-            weight *= pow(max(dot(normal, tap_normal), 0.0), NORMAL_POWER);
-            weight *= exp(-abs(dot(tap_position.xyz - position.xyz, face_normal)) * plane_scale
-                - abs(luminance(light.rgb) - value) * light_scale);
-            sum += light.rgb * weight;
-            variance += light.a * weight * weight;
-            total += weight;
-        }
+    // the plane in camera space: its point at tangent (x, y) has the inverse depth a x + b y + c
+    vec2 tangent = tangent_of(vec2(pixel));
+    vec2 rate = -slope / (float(spacing) * VIEW.pixel_spread * depth);
+    vec3 plane = vec3(rate, 1.0 / depth - dot(rate, tangent));
+    float plane_scale = inversesqrt(dot(plane, plane)) / (0.1 + depth * (0.5 * float(spacing) * VIEW.pixel_spread + 3.0e-4));
+
+    // how much of the same surface a tap is; the variance of the middle is itself noisy, that around it is less so
+    LightTexel taps[8];
+    float alike[8];
+    vec2 deviation = middle.variance * 4.0;
+    float count = 4.0;
+    for (int i = 0; i < 8; i++) {
+        int place = i < 4 ? i : i + 1;
+        ivec2 offset = ivec2(place % 3, place / 3) - 1;
+        ivec2 tap = pixel + offset * spacing;
+        alike[i] = 0.0;
+        if (!inside(tap)) continue;
+        taps[i] = unpack_texel(imageLoad(uimages_rgba32ui[push.source], tap));
+        if (taps[i].guide == 0) continue;
+        float off_plane = abs((1.0 + dot(slope, vec2(offset))) * guide_depth(taps[i].guide) / depth - 1.0) * plane_scale;
+        alike[i] = narrow(max(dot(normal, guide_normal(taps[i].guide)), 0.0)) * exp(-off_plane)
+            * (offset.x == 0 ? 2.0 : 1.0) * (offset.y == 0 ? 2.0 : 1.0);
+        deviation += taps[i].variance * alike[i];
+        count += alike[i];
     }
-    imageStore(images_rgba16f[push.target], pixel, vec4(sum / total, min(variance / (total * total), 60000.0)));
+    deviation = sqrt(deviation / count);
+    vec2 light_scale = 1.0 / (LUMINANCE_SIGMA * deviation + 1.0e-3 * value + 1.0e-6);
+
+    vec3 direct = middle.direct * 4.0, indirect = middle.indirect * 4.0;
+    vec2 variance = middle.variance * 16.0, total = vec2(4.0);
+    for (int i = 0; i < 8; i++) {
+        if (alike[i] == 0.0) continue;
+        vec2 away = abs(vec2(luminance(taps[i].direct), luminance(taps[i].indirect)) - value) * light_scale;
+        vec2 weight = alike[i] * exp(-away);
+        direct += taps[i].direct * weight.x;
+        indirect += taps[i].indirect * weight.y;
+        variance += taps[i].variance * weight * weight;
+        total += weight;
+    }
+    middle.direct = direct / total.x;
+    middle.indirect = indirect / total.y;
+    middle.variance = variance / (total * total);
+    imageStore(uimages_rgba32ui[push.target], pixel, pack_texel(middle, dither(pixel, 2)));
 }

@@ -3,7 +3,7 @@
 // frames since anything changed. Where a reflection and what lies behind it are seen in one place, pixels show either in
 // turns, like the fields of a chessboard: there a pixel is the mean of what it shows and what its neighbours of the
 // other field show.
-#include "trace/gbuffer.glsl"
+#include "trace/denoise.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -14,8 +14,11 @@ vec3 shown(ivec2 pixel, vec3 front) {
     GBufferPixel g = gbuffer_read(pixel);
     if (g.path >= 0.0) {
         vec3 light;
-        if ((VIEW.flags & VIEW_DENOISE) != 0) light = imageLoad(images_rgba16f[VIEW.image_lit], pixel).rgb;
-        else light = imageLoad(images_rgba16f[VIEW.image_direct], pixel).rgb + imageLoad(images_rgba16f[VIEW.image_indirect], pixel).rgb;
+        if ((VIEW.flags & VIEW_DENOISE) != 0) {
+            light = filtered_light(pixel);
+        } else {
+            light = light_read(VIEW.image_direct, pixel) + light_read(VIEW.image_indirect, pixel);
+        }
         radiance += g.albedo * light;
     }
     return radiance;

@@ -3,7 +3,7 @@
 #define TRACER_COMPUTE
 #include "trace/tracer.glsl"
 #include "trace/lights.glsl"
-#include "trace/gbuffer.glsl"
+#include "trace/denoise.glsl"
 #include "trace/motion.glsl"
 #include "trace/picture.glsl"
 
@@ -59,14 +59,19 @@ vec3 debug_color(ivec2 pixel) {
         if (!is_lit) return NOTHING;
         float frames = 1.0;
         if ((VIEW.flags & VIEW_ACCUMULATE) != 0) frames = float(VIEW.accumulated + 1);
-        else if ((VIEW.flags & VIEW_DENOISE) != 0) frames = max(imageLoad(images_rgba16f[VIEW.image_moments], pixel).z, 1.0);
+        else if ((VIEW.flags & VIEW_DENOISE) != 0 && (DENOISE.flags & DENOISE_SPARSE) == 0) frames = max(past_frames(imageLoad(uimages_rg32ui[DENOISE.guide], pixel).y).x, 1.0);
         return heat_count(frames * float(VIEW.lights.selection == SELECT_ALL ? 1 : VIEW.lights.samples) - 1.0, 12.0);
     }
     case DEBUG_VARIANCE: {
-        if (!is_lit || (VIEW.flags & VIEW_DENOISE) == 0) return NOTHING;
-        vec3 moments = imageLoad(images_rgba16f[VIEW.image_moments], pixel).rgb;
-        float deviation = sqrt(max(moments.y - moments.x * moments.x, 0.0)) / max(moments.x, 1.0e-4);
+        if (!is_lit || (VIEW.flags & VIEW_DENOISE) == 0 || (DENOISE.flags & DENOISE_SPARSE) != 0) return NOTHING;
+        vec2 variance = past_variance(imageLoad(uimages_rg32ui[DENOISE.guide], pixel).y);
+        float deviation = sqrt(variance.x + variance.y) / max(luminance(filtered_light(pixel)), 1.0e-4);
         return heat((log2(max(deviation, 1.0e-4)) + 6.0) / 8.0);
+    }
+    case DEBUG_GRADIENTS: {
+        if (!is_lit || (DENOISE.flags & DENOISE_GRADIENTS) == 0) return NOTHING;
+        vec2 change = imageLoad(images_rg16f[DENOISE.gradient], pixel / STRATUM).xy;
+        return heat(max(change.x, change.y));
     }
     case DEBUG_RAYS:
         if (VIEW.post.image_rays == NO_IMAGE) return NOTHING;

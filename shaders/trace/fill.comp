@@ -1,7 +1,6 @@
 #version 460
 // Bounced light of the pixels that it was not gathered for: the mean of the four beside them that lie on the same
 // surface. Bounced light changes slowly over a surface, and the denoiser smooths it over far more than a pixel.
-#include "trace/gbuffer.glsl"
 #include "trace/sparse.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -23,7 +22,7 @@ void main() {
             if (any(lessThan(tap, ivec2(0))) || tap.x >= int(VIEW.width) || tap.y >= int(VIEW.height)) continue;
             vec4 other = imageLoad(images_rgba32f[VIEW.image_position], tap);
             if (other.w < 0.0) continue;
-            vec3 found = imageLoad(images_rgba16f[VIEW.image_indirect], tap).rgb;
+            vec3 found = light_read(VIEW.image_indirect, tap);
             any_light += found;
             any_weight += 1.0;
             vec3 other_normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], tap).x);
@@ -34,5 +33,5 @@ void main() {
         if (weight > 0.0) light /= weight;
         else if (any_weight > 0.0) light = any_light / any_weight;
     }
-    imageStore(images_rgba16f[VIEW.image_indirect], pixel, vec4(light, 1.0));
+    light_write(VIEW.image_indirect, pixel, light, dither(pixel, 5));
 }

@@ -1,5 +1,5 @@
-// The G-buffer: position and path (16 bytes a pixel), normals (8), albedo (8) and motion (8, see motion.glsl). The first
-// two and the motion are kept for the next frame. `albedo` holds everything between the eye and the surface: the light L of the point
+// The G-buffer: position and path (16 bytes a pixel), normals (8), albedo (8) and motion (8, see motion.glsl). The motion is kept for the
+// next frame. `albedo` holds everything between the eye and the surface: the light L of the point
 // is shown as albedo * L + front.
 #ifndef RELIGHT_TRACE_GBUFFER_GLSL
 #define RELIGHT_TRACE_GBUFFER_GLSL

@@ -1,106 +1,159 @@
 #version 460
-// First half of the denoiser: the light of this frame joins that of the frames before, where the surface that the pixel
-// shows was in sight then (Schied et al., Spatiotemporal Variance-Guided Filtering, HPG 2017, section 4.1 and 4.2).
-// Works on light without albedo, so textures stay sharp.
-#include "trace/color.glsl"
-#include "trace/gbuffer.glsl"
+// The light of this frame joins that of the frames before, where the surface that the pixel shows was in sight then
+// (Schied et al., Spatiotemporal Variance-Guided Filtering, 2017, section 4.1 and 4.2), the more of it the more the
+// light itself has changed (Schied et al., Gradient Estimation for Real-Time Adaptive Temporal Filtering, 2018,
+// section 4.4). Direct and indirect light each have their history. Works on light without albedo, so textures stay
+// sharp.
+#include "trace/sparse.glsl"
+#include "trace/slope.glsl"
 
-layout(local_size_x = 8, local_size_y = 8) in;
-
-// Least weight of a new frame: how fast changes of light come through.
-const float MIN_WEIGHT = 0.06, MIN_MOMENT_WEIGHT = 0.15;
+// Least weight of a new frame, of direct and indirect light.
+const vec2 MIN_WEIGHT = vec2(0.05, 0.035);
+const float MIN_VARIANCE_WEIGHT = 0.1;
+// A change of the light by this part counts as much as the noise of one frame, filtered.
+const float NOISE = 0.2;
 // Frames before the variance over time can be trusted; until then it is taken over space.
 const float TRUSTED_FRAMES = 4.0;
+// How far around.
+const int AROUND = 3;
 
-bool inside(ivec2 pixel) {
-    return pixel.x >= 0 && pixel.y >= 0 && pixel.x < int(VIEW.width) && pixel.y < int(VIEW.height);
+// What the last frame left.
+struct History {
+    vec3 direct;
+    vec3 indirect;
+    vec2 variance; // of one frame's light
+    vec2 frames;
+    float weight;
+};
+
+void add_tap(inout History h, ivec2 tap, Before before, vec3 face_normal, float tolerance, float weight) {
+    if (!inside(tap) || !(weight > 0.0)) return;
+    uvec2 guide = imageLoad(uimages_rg32ui[DENOISE.last_guide], tap).xy;
+    if (guide.x == 0 || abs(guide_depth(guide.x) - before.depth) > tolerance || dot(guide_normal(guide.x), face_normal) < 0.85) return;
+    LightTexel light = unpack_texel(imageLoad(uimages_rgba32ui[DENOISE.history], tap));
+    h.direct += light.direct * weight;
+    h.indirect += light.indirect * weight;
+    h.variance += past_variance(guide.y) * weight;
+    h.frames += past_frames(guide.y) * weight;
+    h.weight += weight;
 }
 
-vec3 light_of(ivec2 pixel) {
-    return imageLoad(images_rgba16f[VIEW.image_direct], pixel).rgb + imageLoad(images_rgba16f[VIEW.image_indirect], pixel).rgb;
+History history_at(ivec2 pixel, vec3 face_normal, vec2 slope) {
+    History h = History(vec3(0.0), vec3(0.0), vec2(0.0), vec2(0.0), 0.0);
+    if ((DENOISE.flags & DENOISE_HISTORY) == 0) return h;
+    Before before = before_of(pixel);
+    if (!(before.depth > 0.0)) return h;
+    // depths of taps differ by about as much as those of this frame's pixels, and by rounding
+    float tolerance = before.depth * (0.01 + 2.0 * (abs(slope.x) + abs(slope.y))) + 0.1;
+    vec2 low = floor(before.pixel), part = before.pixel - low;
+    for (int i = 0; i < 4; i++) {
+        ivec2 offset = ivec2(i & 1, i >> 1);
+        float weight = (offset.x == 1 ? part.x : 1.0 - part.x) * (offset.y == 1 ? part.y : 1.0 - part.y);
+        // a place that is a rounding error off a pixel's middle is there
+        add_tap(h, ivec2(low) + offset, before, face_normal, tolerance, weight < 1.0e-3 ? 0.0 : weight);
+    }
+    if (h.weight < 0.01) return History(vec3(0.0), vec3(0.0), vec2(0.0), vec2(0.0), 0.0);
+    float scale = 1.0 / h.weight;
+    return History(h.direct * scale, h.indirect * scale, h.variance * scale, h.frames * scale, h.weight);
 }
 
-// Pixel coordinates (middle of the first pixel: 0, 0) where the last frame saw the point.
-vec2 last_pixel(vec3 position) {
-    vec3 v = position - VIEW.last_eye;
-    float depth = dot(v, VIEW.last_forward);
-    if (depth <= 0.0) return vec2(-10.0);
-    vec2 ndc = -vec2(dot(v, VIEW.last_left) / dot(VIEW.last_left, VIEW.last_left),
-        dot(v, VIEW.last_up) / dot(VIEW.last_up, VIEW.last_up)) / depth;
-    return (ndc * 0.5 + 0.5) * vec2(VIEW.width, VIEW.height) - 0.5;
+// Variance of the luminance of this frame's light around a pixel.
+vec2 variance_around(ivec2 pixel, float depth, vec2 slope) {
+    vec4 moments = vec4(0.0);
+    float count = 0.0;
+    for (int y = -AROUND; y <= AROUND; y++) {
+        for (int x = -AROUND; x <= AROUND; x++) {
+            ivec2 tap = pixel + ivec2(x, y);
+            float other = depth_at(tap);
+            if (other == 0.0 || abs(depth / other - 1.0 - dot(slope, vec2(x, y))) > 0.02) continue;
+            vec2 l = vec2(luminance(light_read(VIEW.image_direct, tap)), luminance(light_read(VIEW.image_indirect, tap)));
+            moments += vec4(l, l * l);
+            count += 1.0;
+        }
+    }
+    moments /= max(count, 1.0);
+    return max(moments.zw - moments.xy * moments.xy, vec2(0.0));
 }
 
-// Whether the last frame's pixel shows the same surface.
-bool same_surface(ivec2 pixel, GBufferPixel g) {
-    vec4 last = imageLoad(images_rgba32f[VIEW.image_last_position], pixel);
-    if (last.w < 0.0) return false;
-    vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_last_surface], pixel).x);
-    vec3 away = last.xyz - g.position;
-    float footprint = g.path * VIEW.pixel_spread;
-    return dot(normal, g.face_normal) > 0.9 && abs(dot(away, g.face_normal)) < 0.1 + 2.0 * footprint
-        && dot(away, away) < 1.0 + 100.0 * footprint * footprint;
+// Whether the pixel is the one of its stratum that may be kept for the next frame's gradient; `again`: it is a gradient
+// sample itself, whose random numbers are older than this frame.
+bool is_kept(ivec2 pixel, ivec2 stratum, out bool again) {
+    again = false;
+    Carried c = Carried(false, false, 0, ivec2(0));
+    if ((DENOISE.flags & DENOISE_GRADIENTS) != 0) c = carried_at(stratum);
+    // every other pixel, from the first or the second on: where bounced light is gathered if it is not everywhere
+    int first = (stratum.x + stratum.y + int(VIEW.seed)) & 1, count = 5 - first;
+    int index = first + 2 * min(int(float(count) * dither(stratum, 3)), count - 1);
+    if (c.valid && c.index == index) index = index < 2 ? index + 2 : index - 2;
+    // at the right and the lower edge strata are cut off
+    if (pixel != min(pixel_of(stratum, index), ivec2(VIEW.width, VIEW.height) - 1)) return false;
+    again = c.valid && pixel == pixel_of(stratum, c.index);
+    return true;
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    load_depths();
     if (!inside(pixel)) return;
-    GBufferPixel g = gbuffer_read(pixel);
-    if (g.path < 0.0) {
-        imageStore(images_rgba16f[VIEW.image_filter], pixel, vec4(0.0));
-        imageStore(images_rgba16f[VIEW.image_moments], pixel, vec4(0.0));
+    float depth = own_depth();
+    ivec2 stratum = pixel / STRATUM;
+    bool again, kept = is_kept(pixel, stratum, again);
+    if (kept && (depth == 0.0 || again)) {
+        keep_nothing(stratum);
+        kept = false;
+    }
+    if (depth == 0.0) {
+        imageStore(uimages_rg32ui[DENOISE.guide], pixel, uvec4(0));
+        imageStore(uimages_rgba32ui[DENOISE.fresh], pixel, uvec4(0));
         return;
     }
-    vec3 light = light_of(pixel);
-    float value = luminance(light);
+    vec4 position = imageLoad(images_rgba32f[VIEW.image_position], pixel);
+    uvec2 surface = imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).xy;
+    vec3 face_normal = unpack_normal(surface.x);
+    vec2 slope = slope_at(depth);
 
-    // the last frame, by bilinear weights over the taps that show the same surface
-    vec3 old_light = vec3(0.0);
-    vec3 old_moments = vec3(0.0);
-    float sum = 0.0;
-    if ((VIEW.flags & VIEW_HISTORY) != 0) {
-        vec2 place = last_pixel(g.position);
-        vec2 low = floor(place), part = place - low;
-        for (int i = 0; i < 4; i++) {
-            ivec2 offset = ivec2(i & 1, i >> 1);
-            ivec2 tap = ivec2(low) + offset;
-            if (!inside(tap) || !same_surface(tap, g)) continue;
-            float weight = (offset.x == 1 ? part.x : 1.0 - part.x) * (offset.y == 1 ? part.y : 1.0 - part.y);
-            old_light += imageLoad(images_rgba16f[VIEW.image_last_light], tap).rgb * weight;
-            old_moments += imageLoad(images_rgba16f[VIEW.image_last_moments], tap).rgb * weight;
-            sum += weight;
-        }
-    }
-    float frames = 0.0;
-    vec2 moments = vec2(value, value * value);
-    if (sum > 0.05) {
-        old_light /= sum;
-        old_moments /= sum;
-        frames = old_moments.z;
-        light = mix(old_light, light, max(1.0 / (frames + 1.0), MIN_WEIGHT));
-        moments = mix(old_moments.xy, moments, max(1.0 / (frames + 1.0), MIN_MOMENT_WEIGHT));
-    }
-    frames = min(frames + 1.0, 64.0);
+    LightTexel light;
+    light.direct = light_read(VIEW.image_direct, pixel);
+    light.indirect = light_read(VIEW.image_indirect, pixel);
+    light.guide = pack_guide(depth, unpack_normal(surface.y));
+    vec2 value = vec2(luminance(light.direct), luminance(light.indirect));
 
-    float variance = max(moments.y - moments.x * moments.x, 0.0);
-    if (frames < TRUSTED_FRAMES) {
-        vec2 around = vec2(value, value * value);
-        float count = 1.0;
-        for (int y = -2; y <= 2; y++) {
-            for (int x = -2; x <= 2; x++) {
-                ivec2 tap = pixel + ivec2(x, y);
-                if ((x == 0 && y == 0) || !inside(tap)) continue;
-                vec4 position = imageLoad(images_rgba32f[VIEW.image_position], tap);
-                if (position.w < 0.0 || abs(dot(position.xyz - g.position, g.face_normal)) > 0.1 + 4.0 * g.path * VIEW.pixel_spread) continue;
-                float l = luminance(light_of(tap));
-                around += vec2(l, l * l);
-                count += 1.0;
-            }
+    if (kept) keep_sample(stratum, pixel, position, surface, is_gathered(pixel) ? value : vec2(value.x, -1.0));
+
+    History h = history_at(pixel, face_normal, slope);
+    vec2 frames = vec2(0.0), variance = vec2(0.0);
+    if (h.weight > 0.0) {
+        frames = h.frames;
+        vec2 weight = MIN_WEIGHT, change = vec2(0.0);
+        if ((DENOISE.flags & DENOISE_GRADIENTS) != 0) {
+            // The part of the light that has changed is error in the history; against the noise of the light it is what
+            // decides. As only this frame sees the change, what is older than it loses its say for good.
+            // Of two errors, one of them relative to what is left of the light, the mean of least variance is taken.
+            change = imageLoad(images_rg16f[DENOISE.gradient], pixel / STRATUM).xy;
+            vec2 left = NOISE * (1.0 - change);
+            change *= change;
+            change /= max(change + left * left, 1.0e-6);
+            frames *= 1.0 - change;
+            weight = max(weight, change);
         }
-        around /= count;
-        variance = max(variance, max(around.y - around.x * around.x, 0.0));
+        weight = max(weight, 1.0 / (frames + 1.0));
+        // what is known to be change is no noise
+        vec2 away = (1.0 - change) * (value - vec2(luminance(h.direct), luminance(h.indirect)));
+        variance = mix(h.variance * (1.0 - change), away * away, max(weight, MIN_VARIANCE_WEIGHT));
+        light.direct = mix(h.direct, light.direct, weight.x);
+        light.indirect = mix(h.indirect, light.indirect, weight.y);
     }
-    // of the mean of the frames, not of one: what has settled is left as it is
-    variance /= min(frames, (2.0 - MIN_WEIGHT) / MIN_WEIGHT);
-    imageStore(images_rgba16f[VIEW.image_filter], pixel, vec4(light, min(variance, 60000.0)));
-    imageStore(images_rgba16f[VIEW.image_moments], pixel, vec4(min(moments, vec2(60000.0)), frames, 0.0));
+    frames = min(frames + 1.0, 1.0 / MIN_WEIGHT);
+    if (min(frames.x, frames.y) < TRUSTED_FRAMES) {
+        vec2 around = variance_around(pixel, depth, slope);
+        variance = mix(variance, max(variance, around), lessThan(frames, vec2(TRUSTED_FRAMES)));
+    }
+    // of the mean over the frames: what has settled is left as it is
+    light.variance = variance / min(frames, 2.0 / MIN_WEIGHT - 1.0);
+
+    imageStore(uimages_rgba32ui[DENOISE.fresh], pixel, pack_texel(light, dither(pixel, 0)));
+    imageStore(images_rg16f[DENOISE.slope], pixel, vec4(slope, 0.0, 0.0));
+    float random = dither(pixel, 1);
+    uint past = pack_past(frames, variance, fract(random + vec4(0.0, 0.25, 0.5, 0.75)));
+    imageStore(uimages_rg32ui[DENOISE.guide], pixel, uvec4(pack_guide(depth, face_normal), past, 0, 0));
 }

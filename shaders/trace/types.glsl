@@ -61,6 +61,11 @@ struct AntialiasView {
     uint sampler_index; uint history; float lens_radius; float focal_distance; uint padding;
 };
 
+struct DenoiseView {
+    uint flags; uint last_seed; uint samples; uint sample_surfaces; uint carried; uint stratum_guide; uint gradient;
+    uint guide; uint last_guide; uint history; uint fresh; uint lit; uint slope;
+};
+
 struct TraceView {
     uint64_t geometries; uint64_t instances; uint64_t fogs; uint64_t portals; uint64_t skies; uint64_t exposure;
     uint64_t bvh_nodes; uint64_t bvh_instances;
@@ -79,9 +84,8 @@ struct TraceView {
     uint image_accumulation; uint image_target;
     float exposure_bias; float exposure_base; float exposure_blend;
     uint target_width; uint target_height; uint sky_sampler;
-    uint image_last_position; uint image_last_surface; uint image_last_light; uint image_moments; uint image_last_moments;
-    uint image_filter; uint image_lit;
-    vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up; uint padding;
+    vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up;
+    DenoiseView denoise; uint padding;
 };
 
 // What a geometry's triangles are to a ray.
@@ -102,6 +106,9 @@ const uint DEBUG_ALBEDO = 1, DEBUG_NORMALS = 2, DEBUG_DEPTH = 3, DEBUG_MOTION = 
 const uint COUNT_PRIMARY = 0, COUNT_DIRECT = 1, COUNT_INDIRECT = 2, COUNTER_ROWS = 64;
 // No storage image.
 const uint NO_IMAGE = 0xFFFFFFFFu;
+// Bits of DenoiseView.flags: the last frame's light is there; its samples are lit again; the cheap
+// filter.
+const uint DENOISE_HISTORY = 1, DENOISE_GRADIENTS = 2, DENOISE_SPARSE = 4;
 // How a light is chosen: LightView.selection.
 const uint SELECT_UNIFORM = 0, SELECT_RESAMPLED = 1, SELECT_ALL = 2;
 // Bits of LightView.flags.

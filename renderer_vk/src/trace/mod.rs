@@ -1,7 +1,7 @@
 //! The traced look: acceleration structures, and the passes from camera rays to the picture.
 //!
 //! A frame, in the order of [`view_tracer`]: [`accel`] builds what moves and the top level; [`passes::Primary`] finds what each
-//! pixel shows; [`passes::Direct`] and [`passes::Indirect`] light it; [`passes::Composite`], [`antialias::Antialias`],
+//! pixel shows; [`passes::Direct`] and [`passes::Indirect`] light it; [`denoise`] takes the noise out; [`passes::Composite`], [`antialias::Antialias`],
 //! [`passes::Exposure`] and [`passes::ToneMap`] make the picture of it. Rays are launched only from the ray generation
 //! shaders; hit shaders report what was hit and decide cut-outs.
 //!
@@ -15,6 +15,7 @@ pub mod bloom;
 pub mod bvh;
 pub mod counters;
 pub mod debug;
+pub mod denoise;
 pub mod frame_lights;
 pub mod geometry;
 pub mod input;

@@ -4,8 +4,6 @@
 use shaders::Spirv;
 
 use super::input::Tracer;
-use super::targets::Targets;
-
 use crate::gpu::{
     Access, ComputePipeline, Device, Error, HitGroup, RayTracingDesc, RayTracingPipeline, Recorder,
 };
@@ -168,89 +166,6 @@ pixel_pass!(
     /// Reads the picture and the exposure; writes the view's rectangle of the target.
     ToneMap, "trace_tonemap", TRACE_TONEMAP_COMP
 );
-
-/// Push constants of a wavelet step.
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct WaveletStep {
-    view: u64,
-    source: u32,
-    target: u32,
-    spacing: u32,
-    padding: u32,
-}
-
-/// Reads the G-buffer, `direct`, `indirect` and what the last frame left; writes filtered light and the moments.
-pub struct Denoise {
-    temporal: ComputePipeline,
-    wavelet: ComputePipeline,
-}
-
-impl Denoise {
-    /// Wavelet steps; the distance between taps doubles from step to step.
-    const STEPS: u32 = 5;
-
-    /// Index in [`Targets::light`] of the image that the temporal half writes.
-    pub const FIRST: usize = 1;
-    /// Index of the image after the first wavelet step: what the next frame starts from.
-    pub const HISTORY: usize = 2;
-    /// Index of the image that holds the result.
-    pub const RESULT: usize = 0;
-
-    /// Compiles the pipelines.
-    ///
-    /// # Errors
-    /// The driver refuses a pipeline.
-    pub fn new(device: &Device) -> Result<Self, Error> {
-        Ok(Self {
-            temporal: ComputePipeline::new(
-                device,
-                "trace_temporal",
-                &shaders::TRACE_TEMPORAL_COMP,
-                &[],
-            )?,
-            wavelet: ComputePipeline::new(
-                device,
-                "trace_wavelet",
-                &shaders::TRACE_ATROUS_COMP,
-                &[],
-            )?,
-        })
-    }
-
-    /// Records the pass. `view`: device address of the `TraceView`.
-    ///
-    /// # Errors
-    /// Out of memory.
-    pub fn record(&self, rec: &mut Recorder, view: u64, targets: &Targets) -> Result<(), Error> {
-        let size = [targets.width, targets.height];
-        dispatch(rec, "trace_temporal", &self.temporal, view, size, [TILE; 2])?;
-        let mut pass = rec.pass("trace_wavelet", Access::COMPUTE, Access::COMPUTE)?;
-        pass.bind_compute(&self.wavelet);
-        for step in 0..Self::STEPS {
-            // the first step's result is kept for the next frame; the last frame's image is free by then
-            let (source, target) = match step {
-                0 => (Self::FIRST, Self::HISTORY),
-                1 => (Self::HISTORY, Self::FIRST),
-                s if s % 2 == 0 => (Self::FIRST, Self::RESULT),
-                _ => (Self::RESULT, Self::FIRST),
-            };
-            let [source, target] = [source, target].map(|i| targets.light[i].storage_index());
-            if step > 0 {
-                pass.barrier();
-            }
-            pass.push(&WaveletStep {
-                view,
-                source,
-                target,
-                spacing: 1 << step,
-                padding: 0,
-            });
-            pass.dispatch(size[0].div_ceil(TILE), size[1].div_ceil(TILE), 1);
-        }
-        Ok(())
-    }
-}
 
 /// Reads the picture; writes the exposure.
 pub struct Exposure {

@@ -11,11 +11,12 @@ use super::antialias::{Antialias, traced_size};
 use super::bloom::Bloom;
 use super::counters::{COUNTED, RayCounters};
 use super::debug::DebugView;
+use super::denoise::Denoiser;
 use super::geometry::StaticGeometry;
 use super::input::{MaterialTable, Tracer};
 use super::lights::MapLights;
 use super::motion::Motion;
-use super::passes::{Composite, Denoise, Direct, Exposure, Fill, Indirect, Primary, ToneMap};
+use super::passes::{Composite, Direct, Exposure, Fill, Indirect, Primary, ToneMap};
 use super::targets::Targets;
 use crate::gpu::{Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::scene::ViewScene;
@@ -38,7 +39,7 @@ pub struct ViewTracer {
     direct: Direct,
     indirect: Indirect,
     fill: Fill,
-    denoise: Denoise,
+    pub(super) denoiser: Denoiser,
     composite: Composite,
     antialias: Antialias,
     exposure: Exposure,
@@ -81,7 +82,7 @@ impl ViewTracer {
             direct: Direct::new(device, tracer)?,
             indirect: Indirect::new(device, tracer)?,
             fill: Fill::new(device)?,
-            denoise: Denoise::new(device)?,
+            denoiser: Denoiser::new(device)?,
             composite: Composite::new(device)?,
             antialias: Antialias::new(device)?,
             exposure: Exposure::new(device)?,
@@ -179,6 +180,13 @@ impl ViewTracer {
         if let Some(targets) = &mut self.targets {
             targets.fit(&self.device, settings.rt_accumulate)?;
         }
+        let denoiser = if settings.rt_accumulate {
+            0
+        } else {
+            settings.rt_denoiser
+        };
+        self.denoiser
+            .prepare(denoiser, size, self.history.is_some())?;
         let map = map.filter(|_| view.has_world);
         let accumulated = self.accumulated_before(view, materials, settings);
         let accel = self
@@ -229,6 +237,7 @@ impl ViewTracer {
         let address = rec.arena().push(&[params])?;
 
         self.primary.record(rec, address, size)?;
+        self.denoiser.choose_gradient_samples(rec, address)?;
         self.direct.record(rec, address, size)?;
         if sparse_bounce(settings) {
             let cells = [width.div_ceil(2), height];
@@ -238,11 +247,7 @@ impl ViewTracer {
             self.indirect.record(rec, address, size)?;
         }
         self.counters.end(rec)?;
-        if !settings.rt_accumulate
-            && let Some(targets) = &self.targets
-        {
-            self.denoise.record(rec, address, targets)?;
-        }
+        self.denoiser.filter(rec, address)?;
         self.composite.record(rec, address, size)?;
         self.antialias.record(rec, address)?;
         self.exposure.record(rec, address, output)?;
@@ -254,8 +259,9 @@ impl ViewTracer {
         self.frame = self.frame.wrapping_add(1);
         self.last_time = view.time;
         self.history = (!settings.rt_accumulate).then(|| camera_frame(view));
+        self.denoiser.advance();
         if let Some(targets) = &mut self.targets {
-            targets.advance(Denoise::HISTORY);
+            targets.advance();
         }
         self.antialias.advance();
         self.exposure_started = true;
@@ -331,7 +337,7 @@ impl ViewTracer {
         set(t::VIEW_EXPOSURE_RESET, !self.exposure_started);
         set(t::VIEW_FAST_SKY, settings.fast_sky);
         set(t::VIEW_FULLBRIGHT, !is_lit);
-        set(t::VIEW_DENOISE, !settings.rt_accumulate);
+        set(t::VIEW_DENOISE, self.denoiser.is_on());
         set(t::VIEW_SPARSE_BOUNCE, sparse_bounce(settings));
         set(t::VIEW_HISTORY, self.history.is_some());
         let [last_eye, last_forward, last_left, last_up] = self.history.unwrap_or([Vec3::ZERO; 4]);
@@ -377,8 +383,8 @@ impl ViewTracer {
             portal_count: u32::try_from(portals.len()).unwrap_or(u32::MAX),
             max_depth: settings.rt_max_depth,
             bounces: settings.rt_bounces.min(2),
-            image_position: targets.position[0].storage_index(),
-            image_surface: targets.surface[0].storage_index(),
+            image_position: targets.position.storage_index(),
+            image_surface: targets.surface.storage_index(),
             image_albedo: targets.albedo.storage_index(),
             image_front: targets.front.storage_index(),
             image_direct: targets.direct.storage_index(),
@@ -395,17 +401,11 @@ impl ViewTracer {
             target_width: target.width(),
             target_height: target.height(),
             sky_sampler: materials.sky_sampler(),
-            image_last_position: targets.position[1].storage_index(),
-            image_last_surface: targets.surface[1].storage_index(),
-            image_last_light: targets.light[0].storage_index(),
-            image_moments: targets.moments[0].storage_index(),
-            image_last_moments: targets.moments[1].storage_index(),
-            image_filter: targets.light[Denoise::FIRST].storage_index(),
-            image_lit: targets.light[Denoise::RESULT].storage_index(),
             last_eye,
             last_forward,
             last_left,
             last_up,
+            denoise: self.denoiser.view(self.frame.wrapping_sub(1)),
             padding: 0,
         })
     }

@@ -4,7 +4,10 @@ use glam::Vec3;
 use relight::light::PointLight;
 
 use super::harness::{Gpu, Scene, rectangle, reference};
+use crate::api::DynamicLight;
+use crate::scene::ViewScene;
 use crate::settings::Settings;
+use crate::trace::input::Tracer;
 
 /// A room with a pillar, a lamp and a small light that throws soft and hard shadows.
 fn room() -> Scene {
@@ -43,6 +46,8 @@ fn room() -> Scene {
 fn live() -> Settings {
     Settings {
         rt_accumulate: false,
+        rt_taa: false,
+        rt_denoiser: 1,
         rt_bounces: 1,
         ..reference()
     }
@@ -105,11 +110,11 @@ fn filtered_frames_come_near_the_reference_with(gpu: &mut Gpu) {
 }
 
 #[test]
-fn light_that_goes_out_is_gone_soon() {
-    Gpu::each(light_that_goes_out_is_gone_soon_with);
+fn what_comes_into_sight_has_no_history() {
+    Gpu::each(what_comes_into_sight_has_no_history_with);
 }
 
-fn light_that_goes_out_is_gone_soon_with(gpu: &mut Gpu) {
+fn what_comes_into_sight_has_no_history_with(gpu: &mut Gpu) {
     // a wall slides over everything: what it shows must not come from what was there before
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, 32);
     let white = scene.diffuse(1.0);
@@ -148,4 +153,189 @@ fn light_that_goes_out_is_gone_soon_with(gpu: &mut Gpu) {
         "{:?}",
         pixels.iter().max_by(|a, b| a.x.total_cmp(&b.x))
     );
+}
+
+/// What the denoiser is asked for.
+fn truth_settings() -> Settings {
+    Settings {
+        rt_bounces: 1,
+        rt_antialiasing: false,
+        ..reference()
+    }
+}
+
+/// Means of tiles of 8 x 8 pixels of a picture of 64 x 64, red.
+fn tiles(pixels: &[Vec3]) -> Vec<f32> {
+    let mut sums = vec![0.0; 64];
+    for (i, pixel) in pixels.iter().enumerate() {
+        let (x, y) = (i % 64, i / 64);
+        if let Some(sum) = sums.get_mut(x / 8 + y / 8 * 8) {
+            *sum += pixel.x / 64.0;
+        }
+    }
+    sums
+}
+
+/// Mean over the tiles of the difference, as a part of the truth.
+fn tile_error(pixels: &[Vec3], truth: &[Vec3]) -> f32 {
+    let pairs = tiles(pixels).into_iter().zip(tiles(truth));
+    pairs.map(|(a, b)| (a - b).abs() / b).sum::<f32>() / 64.0
+}
+
+fn lamp(origin: Vec3) -> DynamicLight {
+    DynamicLight {
+        origin,
+        radius: 300.0,
+        color: Vec3::ONE,
+        additive: false,
+    }
+}
+
+/// Frames after frame `change` until the picture is within a tenth of the truth, for good.
+fn frames_until_true(
+    gpu: &mut Gpu,
+    scene: &Scene,
+    frames: u32,
+    change: u32,
+    place: impl Fn(u32, &mut ViewScene),
+    truth: &[Vec3],
+) -> u32 {
+    let mut late = 0;
+    let mut errors = Vec::new();
+    let mut watch = |frame: u32, pixels: &[Vec3]| {
+        let error = tile_error(pixels, truth);
+        errors.push(error);
+        if frame >= change && error > 0.1 {
+            late = frame + 1 - change;
+        }
+    };
+    gpu.render_watched(scene, &live(), frames, place, Some(&mut watch));
+    println!("{:.3?}", errors.get(change as usize..));
+    late + 1
+}
+
+#[test]
+fn light_that_is_switched_is_seen_soon() {
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    let scene = room();
+    let lit = |view: &mut ViewScene| view.dlights = vec![lamp(Vec3::new(0.0, -60.0, 20.0))];
+    let (dark_truth, _) = gpu.render(&scene, &truth_settings(), 128);
+    let (lit_truth, _) = gpu.render_views(&scene, &truth_settings(), 128, |_, view| lit(view));
+    let off = |frame: u32, view: &mut ViewScene| {
+        if frame < 24 {
+            lit(view);
+        } else {
+            view.dlights.clear();
+        }
+    };
+    let on = |frame: u32, view: &mut ViewScene| {
+        if frame >= 24 {
+            lit(view);
+        }
+    };
+    let scratch = frames_until_true(&mut gpu, &scene, 24, 0, |_, _| {}, &dark_truth);
+    assert_eq!(scratch, 1);
+    let off_frames = frames_until_true(&mut gpu, &scene, 48, 24, off, &dark_truth);
+    let on_frames = frames_until_true(&mut gpu, &scene, 48, 24, on, &lit_truth);
+    gpu.use_gradients(false);
+    let off_without = frames_until_true(&mut gpu, &scene, 64, 24, off, &dark_truth);
+    println!(
+        "off after {off_frames} frames, on after {on_frames}, off without gradients after {off_without}"
+    );
+    assert!(off_frames <= 6, "{off_frames}");
+    assert!(on_frames <= 6, "{on_frames}");
+    assert!(off_without > 2 * off_frames, "{off_without}");
+}
+
+#[test]
+fn a_moving_light_leaves_no_trail() {
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    let scene = room();
+    // from one end of the room to the other, as a rocket flies
+    let fly = |frame: u32, view: &mut ViewScene| {
+        let at = Vec3::new(-60.0 + 8.0 * frame as f32, -90.0, -40.0);
+        view.dlights = vec![DynamicLight {
+            radius: 120.0,
+            ..lamp(at)
+        }];
+    };
+    let (truth, _) = gpu.render_views(&scene, &truth_settings(), 128, |_, view| fly(24, view));
+    let (pixels, _) = gpu.render_views(&scene, &live(), 25, fly);
+    gpu.use_gradients(false);
+    let (without, _) = gpu.render_views(&scene, &live(), 25, fly);
+    let (error, error_without) = (tile_error(&pixels, &truth), tile_error(&without, &truth));
+    let (mean, _) = compare(&pixels, &truth);
+    println!("moving light: error {error}, mean {mean}, without gradients {error_without}");
+    assert!(error < 0.2, "{error}");
+    assert!(error < 0.6 * error_without, "{error} {error_without}");
+    assert!((mean - 1.0).abs() < 0.04, "{mean}");
+}
+
+#[test]
+fn a_picture_at_rest_is_quiet() {
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    let scene = room();
+    let (truth, _) = gpu.render(&scene, &truth_settings(), 256);
+    let mut sums = vec![(0.0f32, 0.0f32); truth.len()];
+    let mut watch = |frame: u32, pixels: &[Vec3]| {
+        if frame >= 32 {
+            for (sum, pixel) in sums.iter_mut().zip(pixels) {
+                sum.0 += pixel.x;
+                sum.1 += pixel.x * pixel.x;
+            }
+        }
+    };
+    gpu.render_watched(&scene, &live(), 64, |_, _| {}, Some(&mut watch));
+    let mut noise: Vec<f32> = sums
+        .iter()
+        .map(|(sum, squares)| {
+            let (mean, square) = (sum / 32.0, squares / 32.0);
+            (square - mean * mean).max(0.0).sqrt() / mean
+        })
+        .collect();
+    noise.sort_by(f32::total_cmp);
+    let median = noise.get(noise.len() / 2).copied().unwrap_or(1.0);
+    let mean =
+        sums.iter().map(|s| s.0 / 32.0).sum::<f32>() / truth.iter().map(|p| p.x).sum::<f32>();
+    let means: Vec<Vec3> = sums.iter().map(|s| Vec3::splat(s.0 / 32.0)).collect();
+    let error = tile_error(&means, &truth);
+    println!("at rest: median noise {median}, mean {mean}, error of tiles {error}");
+    assert!(median < 0.02, "{median}");
+    assert!((mean - 1.0).abs() < 0.015, "{mean}");
+    assert!(error < 0.05, "{error}");
+}
+
+#[test]
+fn the_cheap_filter_comes_near_the_truth() {
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    let scene = room();
+    let sparse = Settings {
+        rt_denoiser: 2,
+        ..live()
+    };
+    let none = Settings {
+        rt_denoiser: 0,
+        ..live()
+    };
+    let (truth, _) = gpu.render(&scene, &truth_settings(), 256);
+    let (raw, _) = gpu.render(&scene, &none, 1);
+    let (first, _) = gpu.render(&scene, &sparse, 1);
+    let (settled, _) = gpu.render(&scene, &sparse, 32);
+    let (raw, first, settled) = (
+        compare(&raw, &truth),
+        compare(&first, &truth),
+        compare(&settled, &truth),
+    );
+    println!("sparse filter, mean and error: raw {raw:?}, first {first:?}, settled {settled:?}");
+    assert!((settled.0 - 1.0).abs() < 0.03, "{settled:?}");
+    assert!(first.1 < 0.6 * raw.1, "{first:?} {raw:?}");
+    assert!(settled.1 < 0.5 * raw.1, "{settled:?} {raw:?}");
 }

@@ -120,6 +120,18 @@ impl Gpu {
         frames: u32,
         change: impl Fn(u32, &mut ViewScene),
     ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
+        self.render_watched(scene, settings, frames, change, None)
+    }
+
+    /// As [`render_views`](Self::render_views), and hands the picture before exposure to `watch` after each frame.
+    pub fn render_watched(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+        frames: u32,
+        change: impl Fn(u32, &mut ViewScene),
+        mut watch: Option<&mut dyn FnMut(u32, &[Vec3])>,
+    ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
         let uploaded = scene.upload(&self.device, self.tracer);
         let [width, height] = [scene.def.width as u32, scene.def.height as u32];
         let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
@@ -148,6 +160,10 @@ impl Gpu {
                 )
                 .expect("recorded");
             self.ring.end(rec).expect("submitted");
+            if let Some(watch) = &mut watch {
+                self.device.wait_idle().expect("done");
+                watch(frame, &self.linear_picture());
+            }
         }
         self.device.wait_idle().expect("done");
         if settings.rt_accumulate {
@@ -157,6 +173,16 @@ impl Gpu {
                 "nothing changed between the frames"
             );
         }
+        let linear = self.linear_picture();
+        let picture: Vec<[u8; 4]> =
+            bytemuck::pod_collect_to_vec(&self.device.read_image(&target).expect("read"));
+        self.check_messages();
+        self.look.reset();
+        (linear, picture)
+    }
+
+    /// The picture of the last frame before exposure.
+    fn linear_picture(&self) -> Vec<Vec3> {
         let hdr = self.look.hdr().expect("traced");
         let bytes = self.device.read_image(hdr).expect("read");
         let floats: Vec<f32> = if hdr.format() == Format::Rgba32F {
@@ -167,25 +193,23 @@ impl Gpu {
                 .map(half)
                 .collect()
         };
-        let picture: Vec<[u8; 4]> =
-            bytemuck::pod_collect_to_vec(&self.device.read_image(&target).expect("read"));
-        self.check_messages();
-        self.look.reset();
-        (
-            floats
-                .chunks_exact(4)
-                .map(|p| Vec3::new(p[0], p[1], p[2]))
-                .collect(),
-            picture,
-        )
+        floats
+            .chunks_exact(4)
+            .map(|p| Vec3::new(p[0], p[1], p[2]))
+            .collect()
+    }
+
+    /// Whether the denoiser looks at gradients; it does unless told otherwise.
+    pub fn use_gradients(&mut self, on: bool) {
+        self.look.denoiser.gradients = on;
     }
 
     /// Position and path of each pixel of the last frame, and its motion as the motion image has it.
     pub fn motion(&self) -> Vec<([f32; 4], [f32; 4])> {
         let targets = self.look.targets.as_ref().expect("traced");
         let read = |image| self.device.read_image(image).expect("read");
+        let places: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.position));
         // they have changed places for the next frame
-        let places: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.position[1]));
         let halves: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.motion[1]));
         let motions = halves.iter().map(|m| m.map(half));
         places.into_iter().zip(motions).collect()

@@ -1,0 +1,345 @@
+//! The denoiser.
+//!
+//! `rt_denoiser 1` is A-SVGF (Schied, Peters, Dachsbacher, Gradient Estimation for Real-Time Adaptive Temporal
+//! Filtering, 2018) over direct and indirect light:
+//!
+//! 1. [`Denoiser::choose_gradient_samples`], before anything is lit: in each stratum of 3 × 3 pixels one is to light a
+//!    surface of the last frame again, with the random numbers of then.
+//! 2. [`Denoiser::filter`], after: the change of light that those samples show is spread over their neighbourhood; the
+//!    light joins that of earlier frames, which keep less weight where it has changed; five wavelet steps, guided by
+//!    the variance, even out what noise is left. The first of them is what the next frame starts from.
+//!
+//! `rt_denoiser 2` costs about a third: a running mean over frames, and three passes of few scattered taps.
+
+use shaders::trace_types::DenoiseView;
+use shaders::trace_types::constants as t;
+
+use super::passes::{TILE, dispatch};
+use crate::gpu::{
+    Access, ComputePipeline, Device, Error, Format, Image, ImageDesc, ImageUsage, Recorder,
+};
+
+/// Pixels to the edge of a stratum, see `denoise.glsl`.
+const STRATUM: u32 = 3;
+/// Strata to the edge of a group of the gradient's pass, see `gradient.comp`.
+const GRADIENT_TILE: u32 = 16;
+/// Distances between the taps of the wavelet steps, pixels.
+const WAVELET: [u32; 5] = [1, 2, 4, 8, 16];
+/// Radii of the passes of the cheap filter, pixels.
+const SPARSE: [u32; 3] = [3, 9, 5];
+
+/// Index in [`Images::light`] of the last frame's light, and of the result.
+const RESULT: usize = 0;
+/// Index of the image that the temporal pass writes.
+const FRESH: usize = 1;
+/// Index of the image after the first step: what the next frame starts from.
+const HISTORY: usize = 2;
+
+/// Which filter.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Tier {
+    Adaptive,
+    Sparse,
+}
+
+/// What is kept for one size of view: 73 bytes a pixel, of the cheap filter 28.
+struct Images {
+    tier: Tier,
+    size: [u32; 2],
+    /// Light that is filtered, with its guide; of the adaptive filter with its variance.
+    light: [Image; 3],
+    slope: Image,
+    adaptive: Option<AdaptiveImages>,
+}
+
+/// What the adaptive filter keeps beside.
+struct AdaptiveImages {
+    /// Guide, number of frames and variance; of this frame and the last.
+    guide: [Image; 2],
+    /// A pixel of each stratum as it was lit in the last frame.
+    samples: Image,
+    sample_surfaces: Image,
+    /// The gradient samples of this frame.
+    carried: Image,
+    stratum_guide: Image,
+    gradient: Image,
+}
+
+fn make(device: &Device, name: &str, size: [u32; 2], format: Format) -> Result<Image, Error> {
+    let [width, height] = size;
+    Image::new(
+        device,
+        &ImageDesc::new(name, width, height, format, ImageUsage::STORAGE),
+    )
+}
+
+impl Images {
+    fn new(device: &Device, tier: Tier, size: [u32; 2]) -> Result<Self, Error> {
+        let format = match tier {
+            Tier::Adaptive => Format::Rgba32Uint,
+            Tier::Sparse => Format::Rg32Uint,
+        };
+        Ok(Self {
+            tier,
+            size,
+            light: [
+                make(device, "trace light 0", size, format)?,
+                make(device, "trace light 1", size, format)?,
+                make(device, "trace light 2", size, format)?,
+            ],
+            slope: make(device, "trace slope", size, Format::Rg16F)?,
+            adaptive: match tier {
+                Tier::Adaptive => Some(AdaptiveImages::new(device, size)?),
+                Tier::Sparse => None,
+            },
+        })
+    }
+}
+
+impl AdaptiveImages {
+    fn new(device: &Device, size: [u32; 2]) -> Result<Self, Error> {
+        let strata = size.map(|s| s.div_ceil(STRATUM));
+        let strata = |name, format| make(device, name, strata, format);
+        Ok(Self {
+            guide: [
+                make(device, "trace guide", size, Format::Rg32Uint)?,
+                make(device, "trace last guide", size, Format::Rg32Uint)?,
+            ],
+            samples: strata("trace samples", Format::Rgba32Uint)?,
+            sample_surfaces: strata("trace sample surfaces", Format::Rgba32Uint)?,
+            carried: strata("trace carried", Format::R32Uint)?,
+            stratum_guide: strata("trace stratum guide", Format::R32Uint)?,
+            gradient: strata("trace gradient", Format::Rg16F)?,
+        })
+    }
+}
+
+/// Push constants of a step.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Step {
+    view: u64,
+    source: u32,
+    target: u32,
+    spacing: u32,
+    padding: u32,
+}
+
+/// The denoiser with its images.
+pub struct Denoiser {
+    device: Device,
+    carry: ComputePipeline,
+    gradient: ComputePipeline,
+    temporal: ComputePipeline,
+    wavelet: ComputePipeline,
+    sparse_temporal: ComputePipeline,
+    sparse: ComputePipeline,
+    images: Option<Images>,
+    /// Stands for every image that is not there: software drivers look at the images of branches that are not taken.
+    nothing: Image,
+    /// The images hold the light of the last frame.
+    history: bool,
+    /// Off: history keeps its weight whatever the light does, as in the filter that this one came from. For comparison.
+    pub gradients: bool,
+}
+
+impl Denoiser {
+    /// Compiles the pipelines.
+    ///
+    /// # Errors
+    /// The driver refuses a pipeline.
+    pub fn new(device: &Device) -> Result<Self, Error> {
+        let compute = |name, code| ComputePipeline::new(device, name, code, &[]);
+        Ok(Self {
+            device: device.clone(),
+            carry: compute("trace_carry", &shaders::TRACE_CARRY_COMP)?,
+            gradient: compute("trace_gradient", &shaders::TRACE_GRADIENT_COMP)?,
+            temporal: compute("trace_temporal", &shaders::TRACE_TEMPORAL_COMP)?,
+            wavelet: compute("trace_wavelet", &shaders::TRACE_ATROUS_COMP)?,
+            sparse_temporal: compute(
+                "trace_sparse_temporal",
+                &shaders::TRACE_SCATTER_TEMPORAL_COMP,
+            )?,
+            sparse: compute("trace_sparse", &shaders::TRACE_SCATTER_COMP)?,
+            images: None,
+            nothing: make(device, "trace no light", [1, 1], Format::Rgba32Uint)?,
+            history: false,
+            gradients: true,
+        })
+    }
+
+    /// To be called before a frame's parameters are gathered. `mode`: `rt_denoiser`; `size`: of the view, pixels;
+    /// `goes_on`: the frame follows the last one that was drawn, whose motion and camera are known.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn prepare(&mut self, mode: u32, size: [u32; 2], goes_on: bool) -> Result<(), Error> {
+        let tier = match mode {
+            0 => None,
+            1 => Some(Tier::Adaptive),
+            _ => Some(Tier::Sparse),
+        };
+        let had = self.images.as_ref().map(|i| (i.tier, i.size));
+        if had != tier.map(|tier| (tier, size)) {
+            // the old ones go first: there may not be room for both
+            self.images = None;
+            self.history = false;
+            if let Some(tier) = tier {
+                self.images = Some(Images::new(&self.device, tier, size)?);
+            }
+        }
+        self.history &= goes_on;
+        Ok(())
+    }
+
+    /// Whether this frame is filtered.
+    pub fn is_on(&self) -> bool {
+        self.images.is_some()
+    }
+
+    /// The images for gradients, if this frame has gradient samples.
+    fn carries(&self) -> Option<&Images> {
+        let wanted = self.history && self.gradients;
+        self.images
+            .as_ref()
+            .filter(|i| wanted && i.tier == Tier::Adaptive)
+    }
+
+    /// What the passes read. `last_seed`: of the last frame's random numbers.
+    pub fn view(&self, last_seed: u32) -> DenoiseView {
+        let nothing = self.nothing.storage_index();
+        let empty = DenoiseView {
+            flags: 0,
+            last_seed,
+            samples: nothing,
+            sample_surfaces: nothing,
+            carried: nothing,
+            stratum_guide: nothing,
+            gradient: nothing,
+            guide: nothing,
+            last_guide: nothing,
+            history: nothing,
+            fresh: nothing,
+            lit: nothing,
+            slope: nothing,
+        };
+        let Some(images) = &self.images else {
+            return empty;
+        };
+        let flag = |on: bool, bit: u32| if on { bit } else { 0 };
+        let view = DenoiseView {
+            flags: flag(self.history, t::DENOISE_HISTORY)
+                | flag(self.carries().is_some(), t::DENOISE_GRADIENTS)
+                | flag(images.tier == Tier::Sparse, t::DENOISE_SPARSE),
+            history: images.light[RESULT].storage_index(),
+            fresh: images.light[FRESH].storage_index(),
+            lit: images.light[RESULT].storage_index(),
+            slope: images.slope.storage_index(),
+            ..empty
+        };
+        let Some(adaptive) = &images.adaptive else {
+            return view;
+        };
+        DenoiseView {
+            samples: adaptive.samples.storage_index(),
+            sample_surfaces: adaptive.sample_surfaces.storage_index(),
+            carried: adaptive.carried.storage_index(),
+            stratum_guide: adaptive.stratum_guide.storage_index(),
+            gradient: adaptive.gradient.storage_index(),
+            guide: adaptive.guide[0].storage_index(),
+            last_guide: adaptive.guide[1].storage_index(),
+            ..view
+        }
+    }
+
+    /// Reads the G-buffer and the samples of the last frame; writes which pixels are gradient samples. `view`: device
+    /// address of the `TraceView`.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn choose_gradient_samples(&self, rec: &mut Recorder, view: u64) -> Result<(), Error> {
+        match self.carries() {
+            Some(images) => {
+                let strata = images.size.map(|s| s.div_ceil(STRATUM));
+                dispatch(rec, "trace_carry", &self.carry, view, strata, [TILE; 2])
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Reads the G-buffer, the light of the rays and what the last frame left; writes the filtered light. `view`:
+    /// device address of the `TraceView`.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn filter(&self, rec: &mut Recorder, view: u64) -> Result<(), Error> {
+        let Some(images) = &self.images else {
+            return Ok(());
+        };
+        let size = images.size;
+        if self.carries().is_some() {
+            let strata = size.map(|s| s.div_ceil(STRATUM));
+            let tile = [GRADIENT_TILE; 2];
+            dispatch(rec, "trace_gradient", &self.gradient, view, strata, tile)?;
+        }
+        match images.tier {
+            Tier::Adaptive => {
+                let tile = [TILE; 2];
+                dispatch(rec, "trace_temporal", &self.temporal, view, size, tile)?;
+                steps(rec, "trace_wavelet", &self.wavelet, view, images, &WAVELET)
+            }
+            Tier::Sparse => {
+                let name = "trace_sparse_temporal";
+                dispatch(rec, name, &self.sparse_temporal, view, size, [TILE; 2])?;
+                steps(rec, "trace_sparse", &self.sparse, view, images, &SPARSE)
+            }
+        }
+    }
+
+    /// The frame is recorded: what it wrote becomes what the last one wrote.
+    pub fn advance(&mut self) {
+        self.history = self.images.is_some();
+        if let Some(images) = &mut self.images {
+            images.light.swap(RESULT, HISTORY);
+            if let Some(adaptive) = &mut images.adaptive {
+                adaptive.guide.swap(0, 1);
+            }
+        }
+    }
+}
+
+/// Steps of a filter, an odd number of at least three, from the fresh image to the result; `spacings` is what differs.
+fn steps(
+    rec: &mut Recorder,
+    name: &str,
+    pipeline: &ComputePipeline,
+    view: u64,
+    images: &Images,
+    spacings: &[u32],
+) -> Result<(), Error> {
+    let mut pass = rec.pass(name, Access::COMPUTE, Access::COMPUTE)?;
+    pass.bind_compute(pipeline);
+    let [x, y] = images.size.map(|s| s.div_ceil(TILE));
+    for (step, &spacing) in spacings.iter().enumerate() {
+        // the last frame's light is free by the third step
+        let (source, target) = match step {
+            0 => (FRESH, HISTORY),
+            1 => (HISTORY, FRESH),
+            s if s % 2 == 0 => (FRESH, RESULT),
+            _ => (RESULT, FRESH),
+        };
+        let [source, target] = [source, target].map(|i| images.light[i].storage_index());
+        if step > 0 {
+            pass.barrier();
+        }
+        pass.push(&Step {
+            view,
+            source,
+            target,
+            spacing,
+            padding: 0,
+        });
+        pass.dispatch(x, y, 1);
+    }
+    Ok(())
+}

@@ -1,0 +1,62 @@
+#version 460
+// Finds the samples of the last frame again; see carry.glsl. One invocation is one stratum: it asks each of its pixels
+// where it was, and takes the sample that was next to there.
+#include "trace/carry.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+// Farther from the sample than this, in pixels, a pixel shows something else.
+const float REACH = 1.0;
+
+// Whether the sample is of the surface that the pixel shows; `moved`: which is somewhere else by now.
+bool same_surface(LitSample s, ivec2 pixel, float last_path, out bool moved) {
+    vec4 position = imageLoad(images_rgba32f[VIEW.image_position], pixel);
+    moved = false;
+    if (position.w < 0.0) return false;
+    vec3 face_normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).x);
+    vec3 away = s.position - position.xyz;
+    float footprint = position.w * VIEW.pixel_spread;
+    if (dot(s.face_normal, face_normal) > 0.9 && abs(dot(away, face_normal)) < 0.05 + 0.5 * footprint
+        && dot(away, away) < 1.0 + 100.0 * footprint * footprint) return true;
+    moved = true;
+    return abs(s.path - last_path) < 0.02 * last_path + 0.1;
+}
+
+void main() {
+    ivec2 stratum = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 first = stratum * STRATUM;
+    if (!inside(first)) return;
+
+    ivec2 middle = min(first + 1, ivec2(VIEW.width, VIEW.height) - 1);
+    float path = imageLoad(images_rgba32f[VIEW.image_position], middle).w;
+    uint guide = 0;
+    if (path >= 0.0) guide = pack_guide(depth_of(middle, path), unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], middle).x));
+    imageStore(uimages_r32ui[DENOISE.stratum_guide], stratum, uvec4(guide));
+
+    float nearest = REACH;
+    int found = -1;
+    float found_path = 0.0;
+    ivec2 place = ivec2(0);
+    for (int i = 0; i < 9; i++) {
+        ivec2 pixel = pixel_of(stratum, i);
+        if (!inside(pixel)) continue;
+        vec4 motion = imageLoad(images_rgba16f[VIEW.motion.image], pixel);
+        vec2 before = vec2(pixel) + motion.xy;
+        ivec2 last = ivec2(floor(before + 0.5));
+        if (motion.z < 0.0 || !inside(last)) continue;
+        uint packed = imageLoad(uimages_rgba32ui[DENOISE.samples], last / STRATUM).w;
+        if (packed == NOT_CARRIED) continue;
+        vec2 off = abs(before - vec2(unpack_place(packed)));
+        float distance = max(off.x, off.y);
+        if (distance >= nearest) continue;
+        nearest = distance;
+        found = i;
+        found_path = motion.z;
+        place = unpack_place(packed);
+    }
+    uint record = NOT_CARRIED;
+    bool moved;
+    if (found >= 0 && same_surface(kept_sample(place / STRATUM), pixel_of(stratum, found), found_path, moved))
+        record = pack_carried(found, moved, place);
+    imageStore(uimages_r32ui[DENOISE.carried], stratum, uvec4(record));
+}

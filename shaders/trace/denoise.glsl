@@ -1,0 +1,116 @@
+// What the passes of the denoiser share: its packed images, and where a pixel was in the last frame.
+//
+// The light of a pixel, with all that decides whether it is alike its neighbour's, is one texel of 16 bytes, so that a
+// tap of a filter is one read.
+#ifndef RELIGHT_TRACE_DENOISE_GLSL
+#define RELIGHT_TRACE_DENOISE_GLSL
+
+#include "trace/color.glsl"
+#include "trace/gbuffer.glsl"
+#include "trace/light_image.glsl"
+
+#define DENOISE VIEW.denoise
+
+// Pixels to the edge of a stratum: each has one gradient sample (Schied et al. 2018, section 4.2).
+const int STRATUM = 3;
+
+bool inside(ivec2 pixel) {
+    return pixel.x >= 0 && pixel.y >= 0 && pixel.x < int(VIEW.width) && pixel.y < int(VIEW.height);
+}
+
+// A number in [0, 1) that differs from pixel to pixel, frame to frame and `stream` to stream.
+float dither(ivec2 pixel, uint stream) {
+    uint x = uint(pixel.x) * 0x9E3779B1u ^ uint(pixel.y) * 0x85EBCA77u ^ (VIEW.seed * 64u + stream) * 0xC2B2AE3Du;
+    x ^= x >> 15;
+    x *= 0x2C1B3C6Du;
+    x ^= x >> 12;
+    x *= 0x297A2D39u;
+    return float(x >> 8) * (1.0 / 16777216.0);
+}
+
+// The guide of a pixel in 32 bits: depth as logarithm, steps of 0.025 %, and a normal of 2 x 8 bits. 0: nothing to light.
+const float DEPTH_STEP = 24.0 / 65535.0, DEPTH_FIRST = -4.0;
+
+uint pack_guide(float depth, vec3 normal) {
+    float code = (log2(max(depth, 1.0e-3)) - DEPTH_FIRST) / DEPTH_STEP;
+    vec2 p = normal.xy / max(abs(normal.x) + abs(normal.y) + abs(normal.z), 1.0e-20);
+    if (normal.z < 0.0) p = (1.0 - abs(p.yx)) * vec2(p.x >= 0.0 ? 1.0 : -1.0, p.y >= 0.0 ? 1.0 : -1.0);
+    return uint(clamp(code + 0.5, 1.0, 65535.0)) | packSnorm4x8(vec4(0.0, 0.0, p)) & 0xFFFF0000u;
+}
+
+float guide_depth(uint guide) { return exp2(float(guide & 0xFFFFu) * DEPTH_STEP + DEPTH_FIRST); }
+
+vec3 guide_normal(uint guide) {
+    vec2 p = unpackSnorm4x8(guide).zw;
+    vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
+    if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
+    return normalize(n);
+}
+
+// What a pixel's history is: how many frames direct and indirect light were gathered over, and the variance of the
+// luminance of one frame's, as logarithm in steps of a fourth. In 32 bits.
+const float VARIANCE_STEP = 0.25, VARIANCE_FIRST = -32.0;
+
+// `random`: a number for each rounding, so that slow changes are not lost.
+uint pack_past(vec2 frames, vec2 variance, vec4 random) {
+    vec2 codes = (log2(max(variance, 1.0e-12)) - VARIANCE_FIRST) / VARIANCE_STEP;
+    uvec4 bytes = uvec4(clamp(vec4(frames, codes) + random, 0.0, 255.0));
+    return bytes.x | bytes.y << 8 | bytes.z << 16 | bytes.w << 24;
+}
+
+vec2 past_frames(uint past) { return vec2(past & 0xFFu, past >> 8 & 0xFFu); }
+
+vec2 past_variance(uint past) { return exp2(vec2(past >> 16 & 0xFFu, past >> 24) * VARIANCE_STEP + VARIANCE_FIRST); }
+
+// A texel that is filtered.
+struct LightTexel {
+    vec3 direct;
+    vec3 indirect;
+    vec2 variance; // of the luminance of both, of the mean that they are
+    uint guide;
+};
+
+LightTexel unpack_texel(uvec4 t) {
+    return LightTexel(unpack_light(t.x), unpack_light(t.y), unpackHalf2x16(t.z), t.w);
+}
+
+uvec4 pack_texel(LightTexel t, float dither) {
+    return uvec4(pack_light(t.direct, dither), pack_light(t.indirect, dither), packHalf2x16(min(t.variance, vec2(60000.0))), t.guide);
+}
+
+// Coordinates of a pixel's middle on the plane at distance 1, to the left and up.
+vec2 tangent_of(vec2 pixel) {
+    vec2 ndc = 1.0 - (pixel + 0.5) / vec2(VIEW.width, VIEW.height) * 2.0;
+    return ndc * vec2(length(VIEW.left), length(VIEW.up));
+}
+
+// Depth of what lies `path` away on the ray through a pixel. For what mirrors show it is that of the mirror image.
+float depth_of(ivec2 pixel, float path) {
+    vec2 t = tangent_of(vec2(pixel));
+    return path * inversesqrt(1.0 + dot(t, t));
+}
+
+// Where what a pixel shows was in the last frame.
+struct Before {
+    vec2 pixel;  // middle of the first pixel: 0, 0
+    float depth; // negative: nobody knows, or it was not in the picture
+};
+
+Before before_of(ivec2 pixel) {
+    vec4 motion = imageLoad(images_rgba16f[VIEW.motion.image], pixel);
+    Before before = Before(vec2(pixel) + motion.xy, -1.0);
+    if (motion.z >= 0.0) {
+        vec2 t = tangent_of(before.pixel);
+        before.depth = motion.z * inversesqrt(1.0 + dot(t, t));
+    }
+    return before;
+}
+
+// The light that a picture is made with.
+vec3 filtered_light(ivec2 pixel) {
+    if ((DENOISE.flags & DENOISE_SPARSE) != 0) return unpack_light(imageLoad(uimages_rg32ui[DENOISE.lit], pixel).x);
+    LightTexel lit = unpack_texel(imageLoad(uimages_rgba32ui[DENOISE.lit], pixel));
+    return lit.direct + lit.indirect;
+}
+
+#endif

@@ -1,0 +1,86 @@
+#version 460
+// The temporal gradient of each stratum: how much the light of its sample differs from the light that the same sample
+// had in the last frame, spread over the neighbourhood by three edge-avoiding a-trous steps in shared memory (Schied et
+// al. 2018, section 4.3: the change and the size of the light are filtered apart, and divided at the end).
+#include "trace/sparse.glsl"
+
+const int TILE = 16, BORDER = 7, WIDE = TILE + 2 * BORDER; // steps of 1, 2 and 4 strata reach 7 far
+layout(local_size_x = TILE, local_size_y = TILE) in;
+
+// change and size of direct light, of indirect light, as halfs
+shared uvec2 tile[WIDE * WIDE];
+shared uint guides[WIDE * WIDE];
+
+uvec2 gradient_at(ivec2 stratum) {
+    Carried c = carried_at(stratum);
+    if (!c.valid) return uvec2(0);
+    ivec2 pixel = pixel_of(stratum, c.index);
+    vec2 now = vec2(luminance(light_read(VIEW.image_direct, pixel)), luminance(light_read(VIEW.image_indirect, pixel)));
+    // as the sample was rounded
+    now = unpackHalf2x16(packHalf2x16(now));
+    vec2 then = unpackHalf2x16(imageLoad(uimages_rgba32ui[DENOISE.sample_surfaces], c.last / STRATUM).z);
+    vec2 change = now - then, size = max(now, then);
+    if (then.y < 0.0 || !is_gathered(pixel)) change.y = size.y = 0.0;
+    return uvec2(packHalf2x16(vec2(change.x, size.x)), packHalf2x16(vec2(change.y, size.y)));
+}
+
+uvec2 filtered(ivec2 at, int spacing) {
+    uint guide = guides[at.y * WIDE + at.x];
+    float depth = guide_depth(guide);
+    vec3 normal = guide_normal(guide);
+    vec4 sum = vec4(0.0);
+    for (int y = -1; y <= 1; y++) {
+        for (int x = -1; x <= 1; x++) {
+            int tap = (at.y + y * spacing) * WIDE + at.x + x * spacing;
+            uint other = guides[tap];
+            if (other == 0) continue;
+            float weight = (x == 0 ? 2.0 : 1.0) * (y == 0 ? 2.0 : 1.0);
+            // wide for slanted surfaces: a gradient that leaks costs noise, not light
+            weight *= exp(-8.0 * abs(log(guide_depth(other) / depth)) / float(spacing)) * max(dot(normal, guide_normal(other)), 0.0);
+            sum += weight * vec4(unpackHalf2x16(tile[tap].x), unpackHalf2x16(tile[tap].y));
+        }
+    }
+    // the scale is the same for change and size and falls out at the end; this one keeps it near that of the input
+    sum *= 1.0 / 16.0;
+    return uvec2(packHalf2x16(sum.xy), packHalf2x16(sum.zw));
+}
+
+void main() {
+    ivec2 strata = (ivec2(VIEW.width, VIEW.height) + STRATUM - 1) / STRATUM;
+    ivec2 corner = ivec2(gl_WorkGroupID.xy) * TILE - BORDER;
+    int index = int(gl_LocalInvocationIndex);
+    for (int i = index; i < WIDE * WIDE; i += TILE * TILE) {
+        ivec2 stratum = corner + ivec2(i % WIDE, i / WIDE);
+        bool there = all(greaterThanEqual(stratum, ivec2(0))) && all(lessThan(stratum, strata));
+        uint guide = there ? imageLoad(uimages_r32ui[DENOISE.stratum_guide], stratum).x : 0;
+        guides[i] = guide;
+        tile[i] = guide != 0 ? gradient_at(stratum) : uvec2(0);
+    }
+    int border = 0;
+    for (int spacing = 1; spacing <= 4; spacing *= 2) {
+        barrier();
+        border += spacing;
+        int edge = WIDE - 2 * border;
+        // all are read before any is written
+        uvec2 results[(WIDE * WIDE + TILE * TILE - 1) / (TILE * TILE)];
+        int count = 0;
+        for (int i = index; i < edge * edge; i += TILE * TILE) {
+            ivec2 at = ivec2(i % edge, i / edge) + border;
+            results[count++] = guides[at.y * WIDE + at.x] != 0 ? filtered(at, spacing) : uvec2(0);
+        }
+        barrier();
+        count = 0;
+        for (int i = index; i < edge * edge; i += TILE * TILE) {
+            ivec2 at = ivec2(i % edge, i / edge) + border;
+            tile[at.y * WIDE + at.x] = results[count++];
+        }
+    }
+    barrier();
+    ivec2 stratum = corner + BORDER + ivec2(gl_LocalInvocationID.xy);
+    if (any(greaterThanEqual(stratum, strata))) return;
+    int place = (int(gl_LocalInvocationID.y) + BORDER) * WIDE + int(gl_LocalInvocationID.x) + BORDER;
+    vec2 direct = unpackHalf2x16(tile[place].x), indirect = unpackHalf2x16(tile[place].y);
+    vec2 size = vec2(direct.y, indirect.y);
+    vec2 part = mix(vec2(0.0), abs(vec2(direct.x, indirect.x)) / max(size, 1.0e-6), greaterThan(size, vec2(1.0e-6)));
+    imageStore(images_rg16f[DENOISE.gradient], stratum, vec4(min(part, 1.0), 0.0, 0.0));
+}

@@ -1,0 +1,29 @@
+// Images of light: 4 bytes a pixel, three mantissas of nine bits with one exponent.
+#ifndef RELIGHT_TRACE_LIGHT_IMAGE_GLSL
+#define RELIGHT_TRACE_LIGHT_IMAGE_GLSL
+
+#include "common/bindless.glsl"
+
+// `dither`: uniform in [0, 1) makes the mean over many pixels or frames exact; 0.5 rounds to the nearest.
+uint pack_light(vec3 light, float dither) {
+    light = clamp(light, 0.0, 65000.0); // of a NaN this makes a number
+    float largest = max(light.r, max(light.g, light.b));
+    int exponent = clamp(int(floatBitsToUint(largest) >> 23) - 127, -16, 15);
+    // the largest becomes 256..511; what a rounding up makes of 511.x is cut, a thousandth of the values at most
+    float scale = uintBitsToFloat(uint(8 - exponent + 127) << 23);
+    uvec3 mantissas = uvec3(min(light * scale + dither, 511.0));
+    return mantissas.r | mantissas.g << 9 | mantissas.b << 18 | uint(exponent + 16) << 27;
+}
+
+vec3 unpack_light(uint packed) {
+    float scale = uintBitsToFloat(((packed >> 27) + uint(127 - 16 - 8)) << 23);
+    return vec3(uvec3(packed, packed >> 9, packed >> 18) & 511u) * scale;
+}
+
+vec3 light_read(uint image, ivec2 pixel) { return unpack_light(imageLoad(uimages_r32ui[image], pixel).x); }
+
+void light_write(uint image, ivec2 pixel, vec3 light, float dither) {
+    imageStore(uimages_r32ui[image], pixel, uvec4(pack_light(light, dither)));
+}
+
+#endif

@@ -1,0 +1,51 @@
+#version 460
+// First pass of the cheap filter: the light of this frame joins the running mean of those before, where the surface was
+// in sight.
+#include "trace/scatter.glsl"
+#include "trace/slope.glsl"
+
+const float MIN_WEIGHT = 1.0 / float(SPARSE_FRAMES + 1);
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    load_depths();
+    if (!inside(pixel)) return;
+    float depth = own_depth();
+    if (depth == 0.0) {
+        imageStore(uimages_rg32ui[DENOISE.fresh], pixel, uvec4(0));
+        return;
+    }
+    vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).y);
+    vec2 slope = slope_at(depth);
+    SparseTexel texel;
+    texel.light = light_read(VIEW.image_direct, pixel) + light_read(VIEW.image_indirect, pixel);
+
+    vec3 old = vec3(0.0);
+    float frames = 0.0, sum = 0.0;
+    Before before = before_of(pixel);
+    if ((DENOISE.flags & DENOISE_HISTORY) != 0 && before.depth > 0.0) {
+        float tolerance = before.depth * (0.01 + 2.0 * (abs(slope.x) + abs(slope.y))) + 0.1;
+        vec2 low = floor(before.pixel), part = before.pixel - low;
+        for (int i = 0; i < 4; i++) {
+            ivec2 offset = ivec2(i & 1, i >> 1), tap = ivec2(low) + offset;
+            float weight = (offset.x == 1 ? part.x : 1.0 - part.x) * (offset.y == 1 ? part.y : 1.0 - part.y);
+            if (weight < 1.0e-3 || !inside(tap)) continue;
+            SparseTexel other = sparse_read(DENOISE.history, tap);
+            if (other.guide == 0 || abs(sparse_depth(other.guide) - before.depth) > tolerance
+                || dot(sparse_normal(other.guide), normal) < 0.8) continue;
+            old += other.light * weight;
+            frames += sparse_frames(other.guide) * weight;
+            sum += weight;
+        }
+    }
+    if (sum > 0.01) {
+        frames /= sum;
+        texel.light = mix(old / sum, texel.light, max(1.0 / (frames + 1.0), MIN_WEIGHT));
+    } else {
+        frames = 0.0;
+    }
+    float random = dither(pixel, 0);
+    texel.guide = pack_sparse_guide(depth, normal, uint(frames + 1.0 + random));
+    sparse_write(DENOISE.fresh, pixel, texel, dither(pixel, 1));
+    imageStore(images_rg16f[DENOISE.slope], pixel, vec4(slope, 0.0, 0.0));
+}

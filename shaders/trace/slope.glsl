@@ -1,0 +1,44 @@
+// How the depth of the surface that a pixel shows goes on to its neighbours: what tells a plane from an edge.
+#ifndef RELIGHT_TRACE_SLOPE_GLSL
+#define RELIGHT_TRACE_SLOPE_GLSL
+
+#include "trace/denoise.glsl"
+
+const int TILE = 8;
+layout(local_size_x = TILE, local_size_y = TILE) in;
+
+// Depths of the group's pixels and of those around them; 0: nothing to light.
+shared float depths[(TILE + 2) * (TILE + 2)];
+
+float depth_at(ivec2 pixel) {
+    if (!inside(pixel)) return 0.0;
+    float path = imageLoad(images_rgba32f[VIEW.image_position], pixel).w;
+    return path < 0.0 ? 0.0 : max(depth_of(pixel, path), 1.0e-3);
+}
+
+// To be called by the whole group.
+void load_depths() {
+    ivec2 corner = ivec2(gl_WorkGroupID.xy) * TILE - 1;
+    for (int i = int(gl_LocalInvocationIndex); i < (TILE + 2) * (TILE + 2); i += TILE * TILE)
+        depths[i] = depth_at(corner + ivec2(i % (TILE + 2), i / (TILE + 2)));
+    barrier();
+}
+
+int own_place() { return (int(gl_LocalInvocationID.y) + 1) * (TILE + 2) + int(gl_LocalInvocationID.x) + 1; }
+float own_depth() { return depths[own_place()]; }
+
+// The smaller change of two: an edge on one side does not count.
+float lesser(float a, float b) { return abs(a) < abs(b) ? a : b; }
+
+// By how much the inverse of depth grows from pixel to pixel, in parts of it. That of a plane is linear on the screen,
+// also of one that a flat mirror shows.
+vec2 slope_at(float depth) {
+    int place = own_place();
+    vec4 around = vec4(depths[place - 1], depths[place + 1], depths[place - TILE - 2], depths[place + TILE + 2]);
+    vec4 change = depth / max(around, 1.0e-3) - 1.0;
+    change = mix(change, vec4(1.0e3), equal(around, vec4(0.0)));
+    vec2 slope = vec2(lesser(-change.x, change.y), lesser(-change.z, change.w));
+    return mix(slope, vec2(0.0), greaterThanEqual(abs(slope), vec2(1.0)));
+}
+
+#endif
