@@ -220,7 +220,7 @@ impl Default for Settings {
             rt_scale: 1.0,
             rt_max_depth: 4,
             rt_bounces: 1,
-            rt_bloom: 0.0,
+            rt_bloom: 0.05,
             rt_flashlight: false,
             rt_debug: 0,
             rt_exposure: 0.0,

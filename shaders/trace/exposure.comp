@@ -12,9 +12,10 @@ layout(local_size_x = 1) in;
 
 // Mean of a usual picture of the engine, linear.
 const float MIDDLE = 0.02;
-// How much of the difference is corrected.
-const float ADAPTATION = 0.35;
-const float MIN_STOPS = -1.5, MAX_STOPS = 1.5;
+// How much of the difference is corrected, and bounds. Little: a picture is to stay within a quarter of the brightness
+// that the classic look has, and that look adapts to nothing.
+const float ADAPTATION = 0.15;
+const float MIN_STOPS = -0.75, MAX_STOPS = 0.75;
 // Pixels left out at the dark and at the bright end, of all.
 const float DARK_PART = 0.2, BRIGHT_PART = 0.05;
 

@@ -171,7 +171,7 @@ cvars! {
     RtBounces = c"rt_bounces", c"1", ARCHIVE, range(0.0, 2.0, true), c"Bounces of light from surface to surface.";
     RtExposure = c"rt_exposure", c"0", ARCHIVE, range(-16.0, 16.0, false), c"Exposure in stops, added to the automatic one.";
     RtAutoExposure = c"rt_autoExposure", c"1", ARCHIVE, range(0.0, 1.0, true), c"1 adapts the exposure to the picture.";
-    RtBloom = c"rt_bloom", c"0", ARCHIVE, range(0.0, 1.0, false), c"Part of the light that spreads around bright things; 0 none.";
+    RtBloom = c"rt_bloom", c"0.05", ARCHIVE, range(0.0, 1.0, false), c"Part of the light that spreads around bright things; 0 none.";
     RtFlashlight = c"rt_flashlight", c"0", ARCHIVE, range(0.0, 1.0, true), c"1 carries a lamp at the eye.";
     RtLightScale = c"rt_lightScale", c"1", ARCHIVE, range(0.0, 100.0, false), c"Multiplies every light of the map when it is traced.";
     RtDlightScale = c"rt_dlightScale", c"1", ARCHIVE, range(0.0, 100.0, false), c"Multiplies lights of explosions, missiles and items when they are traced.";

@@ -504,12 +504,8 @@ fn content_hash(view: &ViewScene, materials: &dyn MaterialTable, settings: &Sett
     // estimators with the same mean could go on together, but a comparison wants them apart
     (
         settings.rt_cull_lights,
-        settings.rt_antialiasing,
         settings.rt_soft_shadows,
         settings.rt_flashlight,
-        settings.rt_dof,
-        settings.rt_aperture.to_bits(),
-        settings.rt_focal_length.to_bits(),
         settings.rt_light_selection as u32,
         settings.rt_num_random_dl,
         settings.rt_candidates,

@@ -250,6 +250,7 @@ pub fn reference() -> Settings {
         rt_accumulate: true,
         rt_bounces: 0,
         rt_auto_exposure: false,
+        rt_bloom: 0.0,
         ..Settings::default()
     }
 }

@@ -281,7 +281,7 @@ fn display_white_keeps_its_brightness_with(gpu: &mut Gpu) {
         levels.push(f32::from(picture[100][0]));
     }
     assert!(
-        levels[0] > encode(0.011) * 255.0 && levels[0] < levels[1],
+        levels[0] > encode(0.0105) * 255.0 && levels[0] < levels[1],
         "{levels:?}"
     );
 }
