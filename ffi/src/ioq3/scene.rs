@@ -11,7 +11,7 @@ use crate::cvars::{self, Cvar};
 use crate::session::{draw, with_renderer};
 use glam::Vec3;
 use renderer_vk::Renderer;
-use renderer_vk::api::{DynamicLight, rdflags};
+use renderer_vk::api::{DynamicLight, PolyVert, rdflags};
 use renderer_vk::path::PathPoint;
 use std::ffi::{c_char, c_float, c_int, c_uchar};
 
@@ -137,14 +137,24 @@ pub extern "C" fn add_poly(shader: c_int, num_verts: c_int, verts: *const polyVe
         let Some(count) = per_poly.checked_mul(polygons) else {
             return Ok(());
         };
-        let corners: Vec<_> = (0..count)
-            .map(|i| {
-                // SAFETY: the engine promises `num` polygons of `num_verts` corners each.
-                convert::poly_vert(&unsafe { verts.add(i).read_unaligned() })
-            })
-            .collect();
+        let corner = |i: usize| {
+            // SAFETY: the engine promises `num` polygons of `num_verts` corners each, and `i` is below their product.
+            convert::poly_vert(&unsafe { verts.add(i).read_unaligned() })
+        };
         draw(|renderer, _| {
-            renderer.add_poly(shader, &corners, per_poly);
+            // marks and puffs come by the hundred in a frame and have few corners: those need no memory
+            let mut few = [PolyVert::default(); 16];
+            if let Some(corners) = few.get_mut(..per_poly) {
+                for first in (0..count).step_by(per_poly) {
+                    for (i, place) in (first..).zip(corners.iter_mut()) {
+                        *place = corner(i);
+                    }
+                    renderer.add_poly(shader, corners, per_poly);
+                }
+            } else {
+                let corners: Vec<_> = (0..count).map(corner).collect();
+                renderer.add_poly(shader, &corners, per_poly);
+            }
             Ok(())
         })
     });

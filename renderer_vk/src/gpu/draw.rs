@@ -79,8 +79,9 @@ impl Pass<'_> {
             });
         };
         let (width, height) = (first.width(), first.height());
-        let mut views = Vec::new();
-        let mut clears = Vec::new();
+        let mut views = [vk::ImageView::null(); 2];
+        let mut clears = [vk::ClearValue::default(); 2];
+        let mut count = 0;
         let attachments = [
             (target.color, ImageUsage::COLOR),
             (target.depth, ImageUsage::DEPTH),
@@ -96,8 +97,8 @@ impl Pass<'_> {
             if image.samples() != first.samples() {
                 return Err(image.misuse("has more or fewer samples than the other attachment"));
             }
-            views.push(image.0.target);
-            clears.push(if usage == ImageUsage::COLOR {
+            views[count] = image.0.target;
+            clears[count] = if usage == ImageUsage::COLOR {
                 vk::ClearValue {
                     color: vk::ClearColorValue {
                         float32: target.clear_color.unwrap_or_default(),
@@ -110,7 +111,8 @@ impl Pass<'_> {
                         stencil: 0,
                     },
                 }
-            });
+            };
+            count += 1;
         }
         let pass = device.0.render_pass(RenderPassKey {
             color: target.color.map(|i| i.format().vk()),
@@ -121,7 +123,7 @@ impl Pass<'_> {
         })?;
         let info = vk::FramebufferCreateInfo::default()
             .render_pass(pass)
-            .attachments(&views)
+            .attachments(&views[..count])
             .width(width)
             .height(height)
             .layers(1);
@@ -135,7 +137,7 @@ impl Pass<'_> {
             .render_pass(pass)
             .framebuffer(framebuffer)
             .render_area(extent.into())
-            .clear_values(&clears);
+            .clear_values(&clears[..count]);
         // SAFETY: recording outside of a render pass; the framebuffer lives until this frame is over.
         unsafe {
             self.vk()

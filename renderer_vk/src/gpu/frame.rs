@@ -175,32 +175,32 @@ impl FrameRing {
         let submitted = before.and_then(|()| {
             let first = [slot.before];
             let main = [slot.main];
-            let mut waits = Vec::new();
-            let mut stages = Vec::new();
-            let mut signals = vec![device.0.timeline];
-            let mut values = vec![value];
-            if let Some(image) = &acquired {
-                waits.push(image.available);
-                stages.push(
-                    vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT
-                        | vk::PipelineStageFlags::TRANSFER,
-                );
-                signals.push(image.finished);
-                // Ignored for a binary semaphore, but the counts must agree.
-                values.push(0);
-            }
-            let wait_values = vec![0; waits.len()];
+            let stages =
+                [vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT
+                    | vk::PipelineStageFlags::TRANSFER];
+            // Values of binary semaphores are ignored, but the counts must agree.
+            let values = [value, 0];
+            let (waits, signals, shown) = match &acquired {
+                Some(image) => ([image.available], [device.0.timeline, image.finished], 1),
+                None => (
+                    [vk::Semaphore::null()],
+                    [device.0.timeline, vk::Semaphore::null()],
+                    0,
+                ),
+            };
+            let (waits, stages) = (&waits[..shown], &stages[..shown]);
+            let (signals, values) = (&signals[..1 + shown], &values[..1 + shown]);
             let mut timeline = vk::TimelineSemaphoreSubmitInfo::default()
-                .wait_semaphore_values(&wait_values)
-                .signal_semaphore_values(&values);
+                .wait_semaphore_values(&[0][..shown])
+                .signal_semaphore_values(values);
             let submits = [
                 // Apart, so that uploads do not wait for the swapchain.
                 vk::SubmitInfo::default().command_buffers(&first),
                 vk::SubmitInfo::default()
                     .command_buffers(&main)
-                    .wait_semaphores(&waits)
-                    .wait_dst_stage_mask(&stages)
-                    .signal_semaphores(&signals)
+                    .wait_semaphores(waits)
+                    .wait_dst_stage_mask(stages)
+                    .signal_semaphores(signals)
                     .push_next(&mut timeline),
             ];
             let queue = lock(&device.0.queue);

@@ -94,6 +94,8 @@ pub struct Raster {
     pipelines: Pipelines,
     shadows: Shadows,
     cover: Cover,
+    /// The view's dynamic lights on their way to the GPU; kept so that nothing is allocated anew.
+    lights: Vec<RasterLight>,
 }
 
 impl Raster {
@@ -104,6 +106,7 @@ impl Raster {
             pipelines: Pipelines::new(device, (-1.0, -2.0)),
             shadows: Shadows::default(),
             cover: Cover::default(),
+            lights: Vec::new(),
         }
     }
 
@@ -158,15 +161,12 @@ impl Raster {
         if p.clear_color.is_some() && target.mask != ColorMask::ALL {
             self.cover.prepare(&self.device, kind)?;
         }
-        let lights: Vec<RasterLight> = p
-            .lights
-            .iter()
-            .map(|l| RasterLight {
-                origin: l.origin,
-                radius: l.radius,
-                color: l.color,
-            })
-            .collect();
+        self.lights.clear();
+        self.lights.extend(p.lights.iter().map(|l| RasterLight {
+            origin: l.origin,
+            radius: l.radius,
+            color: l.color,
+        }));
         let arena = recorder.arena();
         let view = RasterView {
             world_to_clip: p.world_to_clip.to_cols_array_2d(),
@@ -184,7 +184,7 @@ impl Raster {
             instances: arena.push(p.instances)?,
             draws: arena.push(&list.draws)?,
             fogs: p.fogs,
-            lights: arena.push(&lights)?,
+            lights: arena.push(&self.lights)?,
         };
         let near_view = match p.near_world_to_clip {
             Some(matrix) => Some(arena.push(&[RasterView {

@@ -34,6 +34,25 @@ pub(super) struct Scratch {
     pub(super) lights: Vec<LocalLight>,
     pub(super) bones: Vec<BoneMatrix>,
     pub(super) rigid: RigidMeshes,
+    order: Vec<(u64, u32)>,
+    sorted: Vec<super::DrawSurface>,
+}
+
+impl Scratch {
+    /// Sorts surfaces by their keys; those of equal keys stay in order. The library's own stable sort takes memory.
+    fn sort(&mut self, surfaces: &mut Vec<super::DrawSurface>) {
+        self.order.clear();
+        self.order
+            .extend((0..).zip(surfaces.iter()).map(|(i, s)| (s.sort_key, i)));
+        self.order.sort_unstable();
+        self.sorted.clear();
+        let in_order = self
+            .order
+            .iter()
+            .filter_map(|(_, i)| surfaces.get(*i as usize));
+        self.sorted.extend(in_order);
+        std::mem::swap(surfaces, &mut self.sorted);
+    }
 }
 
 /// The views of a scene: at most one through a portal or mirror (classic look), then the main one.
@@ -173,7 +192,7 @@ impl<'a> Gatherer<'a> {
             out.take_color(greyscale);
         }
         // equal keys keep the order of submission
-        out.surfaces.sort_by_key(|surface| surface.sort_key);
+        self.scratch.sort(&mut out.surfaces);
         if self.input.settings.speeds != 0 && self.look == Look::Classic {
             out.statistics = self.count_view(out);
         }

@@ -37,6 +37,10 @@ struct Output {
     fragments: Vec<MarkFragment>,
     max_points: usize,
     max_fragments: usize,
+    /// What is left of the triangle at hand.
+    piece: Vec<Vec3>,
+    /// What the next plane leaves of it.
+    clipped: Vec<Vec3>,
 }
 
 impl Output {
@@ -46,21 +50,23 @@ impl Output {
 
     /// Adds what the planes leave of a triangle; a piece for which there is no room is dropped.
     fn add(&mut self, triangle: [Vec3; 3], planes: &[ClipPlane]) {
-        let mut piece = triangle.to_vec();
+        self.piece.clear();
+        self.piece.extend(triangle);
         for plane in planes {
-            piece = clip(&piece, plane);
-            if piece.is_empty() {
+            clip(&self.piece, plane, &mut self.clipped);
+            std::mem::swap(&mut self.piece, &mut self.clipped);
+            if self.piece.is_empty() {
                 return;
             }
         }
-        if self.points.len() + piece.len() > self.max_points {
+        if self.points.len() + self.piece.len() > self.max_points {
             return;
         }
         self.fragments.push(MarkFragment {
             first_point: self.points.len(),
-            num_points: piece.len(),
+            num_points: self.piece.len(),
         });
-        self.points.extend(piece);
+        self.points.extend_from_slice(&self.piece);
     }
 }
 
@@ -81,6 +87,8 @@ pub fn mark_fragments(
         fragments: Vec::new(),
         max_points,
         max_fragments,
+        piece: Vec::new(),
+        clipped: Vec::new(),
     };
     let points = points
         .get(..points.len().min(MAX_POINTS))
@@ -275,19 +283,20 @@ fn mark_curve(
     }
 }
 
-/// The part of a convex polygon in front of a plane. Points within [`EPSILON`] of it stay as they are.
-fn clip(polygon: &[Vec3], plane: &ClipPlane) -> Vec<Vec3> {
+/// Makes `out` the part of a convex polygon in front of a plane. Points within [`EPSILON`] of it stay as they are.
+fn clip(polygon: &[Vec3], plane: &ClipPlane, out: &mut Vec<Vec3>) {
+    out.clear();
     if polygon.len() >= MAX_POINTS - 2 {
-        return Vec::new();
+        return;
     }
     let distance = |p: Vec3| plane.normal.dot(p) - plane.dist;
     if !polygon.iter().any(|&p| distance(p) > EPSILON) {
-        return Vec::new();
+        return;
     }
     if !polygon.iter().any(|&p| distance(p) < -EPSILON) {
-        return polygon.to_vec();
+        out.extend_from_slice(polygon);
+        return;
     }
-    let mut out = Vec::with_capacity(polygon.len() + 2);
     for (&a, &b) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
         let (da, db) = (distance(a), distance(b));
         if da >= -EPSILON {
@@ -298,5 +307,4 @@ fn clip(polygon: &[Vec3], plane: &ClipPlane) -> Vec<Vec3> {
             out.push(a + (b - a) * (da / (da - db)));
         }
     }
-    out
 }

@@ -17,6 +17,43 @@ enum Child {
     Nothing,
 }
 
+/// Children still to be visited, newest first. Memory is taken only for deep trees.
+struct Pending {
+    near: [Child; 64],
+    count: usize,
+    rest: Vec<Child>,
+}
+
+impl Default for Pending {
+    fn default() -> Self {
+        Self {
+            near: [Child::Nothing; 64],
+            count: 0,
+            rest: Vec::new(),
+        }
+    }
+}
+
+impl Pending {
+    fn push(&mut self, child: Child) {
+        match self.near.get_mut(self.count) {
+            Some(place) => {
+                *place = child;
+                self.count += 1;
+            }
+            None => self.rest.push(child),
+        }
+    }
+
+    fn pop(&mut self) -> Option<Child> {
+        if let Some(child) = self.rest.pop() {
+            return Some(child);
+        }
+        self.count = self.count.checked_sub(1)?;
+        self.near.get(self.count).copied()
+    }
+}
+
 #[derive(Clone, Debug)]
 struct TreeNode {
     children: [Child; 2],
@@ -117,7 +154,8 @@ impl Tree {
 
     /// Calls `visit` for every leaf that the box touches, front children first.
     pub fn leafs_in_box(&self, bsp: &Bsp, bounds: &Bounds, mut visit: impl FnMut(u32)) {
-        let mut pending = vec![self.root()];
+        let mut pending = Pending::default();
+        pending.push(self.root());
         while let Some(child) = pending.pop() {
             match child {
                 Child::Nothing => {}
@@ -197,7 +235,7 @@ pub struct VisibleQuery<'a> {
     pub frustum: &'a [Vec4],
     /// Everything is potentially visible (`r_novis`).
     pub no_vis: bool,
-    /// The clusters of the last call stay (`r_lockpvs`).
+    /// The clusters of the last call stay (`r_lockpvs`); everything, if there was none.
     pub locked: bool,
     /// A change finds the visible part anew; other than 0 its cluster is logged (`r_showcluster`).
     pub show_cluster: i32,
@@ -298,7 +336,14 @@ impl VisibleSet {
     fn mark(&mut self, world: &WorldData, query: &VisibleQuery<'_>) {
         let tree = &world.tree;
         let bsp = &world.relit.bsp;
-        if query.locked && self.marked_for.is_some() {
+        if query.locked {
+            // before anything was found, nothing is known to be out of sight
+            if self.marked_for.is_none() {
+                self.node_marks.clear();
+                self.node_marks.resize(tree.nodes.len(), true);
+                self.leaf_marks.clear();
+                self.leaf_marks.resize(tree.leafs.len(), true);
+            }
             return;
         }
         let cluster = bsp.cluster_at(query.pvs_origin);
