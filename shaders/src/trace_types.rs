@@ -180,18 +180,22 @@ pub struct BspNode {
     pub children: [i32; 2],
 }
 
-/// A node of a bounding volume hierarchy: the boxes of its two children.
+/// A node of a bounding volume hierarchy: the boxes of up to four children, in steps of a grid of its own (after Ylitie,
+/// Karras and Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, HPG 2017).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct BvhNode {
-    /// Smallest corners; a child that is not there is a point beyond everything.
-    pub low: [Vec3; 2],
-    /// Largest corners.
-    pub high: [Vec3; 2],
-    /// Of a leaf the first of its entries, otherwise the child's node.
-    pub first: [u32; 2],
-    /// Entries of a leaf; 0: a node.
-    pub count: [u32; 2],
+    /// Corner of the grid.
+    pub origin: Vec3,
+    /// Size of a step along each axis, above 0.
+    pub step: Vec3,
+    /// Of each axis the low sides of the children's boxes, one byte for each child, the first in the lowest byte.
+    pub low: [u32; 3],
+    /// The high sides.
+    pub high: [u32; 3],
+    /// Index of the child's node, or `BVH_LEAF` with the number of its entries less one and the first of them, or
+    /// `BVH_NONE`.
+    pub children: [u32; 4],
 }
 
 /// A triangle in the order of a hierarchy's leafs.
@@ -458,6 +462,12 @@ pub mod constants {
     pub const KIND_TESTED: u32 = 1;
     pub const KIND_TRANSLUCENT: u32 = 2;
     pub const KIND_SKY: u32 = 3;
+    pub const BVH_NONE: u32 = 0xFFFF_FFFF;
+    pub const BVH_LEAF: u32 = 0x8000_0000;
+    pub const BVH_COUNT_SHIFT: u32 = 28;
+    pub const BVH_FIRST: u32 = 0x0FFF_FFFF;
+    /// Entries that a walk of one level keeps for later at most.
+    pub const BVH_STACK: u32 = 48;
     pub const MASK_SOLID: u8 = 0x01;
     pub const MASK_TRANSLUCENT: u8 = 0x02;
     pub const MASK_SKY: u8 = 0x04;

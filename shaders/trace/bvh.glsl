@@ -1,4 +1,5 @@
-// The compute tracer: two levels of binary bounding volume hierarchies, built on the CPU (renderer_vk/src/trace/bvh.rs).
+// The compute tracer: two levels of bounding volume hierarchies, built on the CPU (renderer_vk/src/trace/bvh.rs and
+// wide_bvh.rs).
 #ifndef RELIGHT_TRACE_BVH_GLSL
 #define RELIGHT_TRACE_BVH_GLSL
 
@@ -7,9 +8,6 @@
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BvhNodes { BvhNode at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BvhTriangles { BvhTriangle at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer BvhInstances { BvhInstance at[]; };
-
-// Deepest hierarchy that the builder makes.
-const uint BVH_DEPTH = 48;
 
 // What a walk looks for.
 const uint BVH_CLOSEST = 0, BVH_ANY = 1, BVH_LAYER = 2;
@@ -37,14 +35,25 @@ BvhRay bvh_ray(vec3 origin, vec3 direction) {
     return ray;
 }
 
-// Distance at which the ray enters the box, or a negative number. The far side is widened by what rounding can cost
-// (Ize, Robust BVH Ray Traversal, JCGT 2013).
-float bvh_box(BvhRay ray, vec3 low, vec3 high, float tmin, float tmax) {
-    vec3 a = (low - ray.origin) * ray.inverse, b = (high - ray.origin) * ray.inverse;
-    vec3 near = min(a, b), far = max(a, b) * 1.0000004;
-    float enter = max(max(near.x, near.y), max(near.z, tmin));
-    float leave = min(min(far.x, far.y), min(far.z, tmax));
-    return enter <= leave ? enter : -1.0;
+// The four bytes of a word.
+vec4 bvh_bytes(uint v) { return vec4(v & 255u, (v >> 8) & 255u, (v >> 16) & 255u, v >> 24); }
+
+// Distances at which the ray enters the boxes of a node's children; FAR_AWAY for those that it misses. The far sides are
+// widened by what rounding can cost (Ize, Robust BVH Ray Traversal, JCGT 2013); what rounding costs on the node's grid is
+// in the boxes.
+const float FAR_AWAY = 3.0e38;
+vec4 bvh_boxes(BvhRay ray, BvhNode node, float tmin, float tmax) {
+    vec3 scale = node.step * ray.inverse, shift = (node.origin - ray.origin) * ray.inverse;
+    bvec3 back = lessThan(ray.inverse, vec3(0.0));
+    vec4 enter = bvh_bytes(back.x ? node.high[0] : node.low[0]) * scale.x + shift.x;
+    vec4 leave = bvh_bytes(back.x ? node.low[0] : node.high[0]) * scale.x + shift.x;
+    enter = max(enter, bvh_bytes(back.y ? node.high[1] : node.low[1]) * scale.y + shift.y);
+    leave = min(leave, bvh_bytes(back.y ? node.low[1] : node.high[1]) * scale.y + shift.y);
+    enter = max(enter, bvh_bytes(back.z ? node.high[2] : node.low[2]) * scale.z + shift.z);
+    leave = min(leave, bvh_bytes(back.z ? node.low[2] : node.high[2]) * scale.z + shift.z);
+    enter = max(enter, vec4(tmin));
+    leave = min(leave * 1.000001, vec4(tmax));
+    return mix(vec4(FAR_AWAY), enter, lessThanEqual(enter, leave));
 }
 
 // Watertight test (Woop, Benthin, Wald, JCGT 2013): t and the weights of the corners b and c; t is negative for a miss.
@@ -95,81 +104,99 @@ bool bvh_report(inout BvhWalk walk, Hit hit, uint kind) {
     return walk.mode == BVH_ANY;
 }
 
-// Walks one instance; true ends the whole walk.
-bool bvh_walk_instance(inout BvhWalk walk, BvhInstance instance, vec3 origin, vec3 direction) {
-    vec4 from = vec4(origin, 1.0);
-    vec3 o = vec3(dot(instance.to_object[0], from), dot(instance.to_object[1], from), dot(instance.to_object[2], from));
-    // not normalized: distances stay those of the world
-    vec3 d = vec3(dot(instance.to_object[0].xyz, direction), dot(instance.to_object[1].xyz, direction), dot(instance.to_object[2].xyz, direction));
-    BvhRay ray = bvh_ray(o, d);
-    BvhNodes nodes = BvhNodes(instance.nodes);
-    BvhTriangles triangles = BvhTriangles(instance.triangles);
-    uint stack[BVH_DEPTH];
-    uint size = 0;
-    uint index = 0;
-    while (true) {
-        BvhNode node = nodes.at[index];
-        float t0 = bvh_box(ray, node.low[0], node.high[0], walk.tmin, walk.tmax);
-        float t1 = bvh_box(ray, node.low[1], node.high[1], walk.tmin, walk.tmax);
-        for (uint side = 0; side < 2; side++) {
-            if ((side == 0 ? t0 : t1) < 0.0 || node.count[side] == 0) continue;
-            for (uint i = 0; i < node.count[side]; i++) {
-                BvhTriangle triangle = triangles.at[node.first[side] + i];
-                vec3 found = bvh_triangle(ray, triangle);
-                if (!(found.x >= walk.tmin && found.x <= walk.tmax)) continue;
-                if (bvh_report(walk, Hit(instance.geometry, triangle.primitive, found.yz, found.x), instance.kind)) return true;
-            }
-        }
-        bool go0 = t0 >= 0.0 && node.count[0] == 0, go1 = t1 >= 0.0 && node.count[1] == 0;
-        if (go0 && go1) {
-            bool swapped = t1 < t0;
-            stack[size++] = node.first[swapped ? 0 : 1];
-            index = node.first[swapped ? 1 : 0];
-        } else if (go0) {
-            index = node.first[0];
-        } else if (go1) {
-            index = node.first[1];
-        } else if (size > 0) {
-            index = stack[--size];
-        } else {
-            return false;
-        }
-    }
+// Puts the nearer of two children first.
+void bvh_sort(inout float near_a, inout uint a, inout float near_b, inout uint b) {
+    bool swap = near_b < near_a;
+    float near = near_a;
+    uint child = a;
+    near_a = swap ? near_b : near_a;
+    a = swap ? b : a;
+    near_b = swap ? near : near_b;
+    b = swap ? child : b;
 }
+
+// No instance is being walked.
+const uint BVH_TOP = 0xFFFFFFFFu;
 
 void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
     if (VIEW.bvh_nodes == 0) return;
-    BvhRay ray = bvh_ray(origin, walk.direction);
+    BvhRay outside = bvh_ray(origin, walk.direction);
+    BvhRay ray = outside;
     BvhNodes nodes = BvhNodes(VIEW.bvh_nodes);
     BvhInstances instances = BvhInstances(VIEW.bvh_instances);
-    uint stack[BVH_DEPTH];
+    BvhTriangles triangles = BvhTriangles(uint64_t(0));
+    uint geometry = 0, kind = 0;
+    // what is left for later, and how much of it there was when the instance was entered
+    uint stack[2 * BVH_STACK];
+    float entered[2 * BVH_STACK];
     uint size = 0;
-    uint index = 0;
+    uint base = BVH_TOP;
+    uint current = 0;
     while (true) {
-        BvhNode node = nodes.at[index];
-        float t0 = bvh_box(ray, node.low[0], node.high[0], walk.tmin, walk.tmax);
-        float t1 = bvh_box(ray, node.low[1], node.high[1], walk.tmin, walk.tmax);
-        for (uint side = 0; side < 2; side++) {
-            if ((side == 0 ? t0 : t1) < 0.0) continue;
-            for (uint i = 0; i < node.count[side]; i++) {
-                BvhInstance instance = instances.at[node.first[side] + i];
-                if ((instance.mask & mask) != 0 && bvh_walk_instance(walk, instance, origin, walk.direction)) return;
+        // down to a leaf, or until nothing is left of this level
+        while (current < BVH_LEAF) {
+            BvhNode node = nodes.at[current];
+            vec4 near = bvh_boxes(ray, node, walk.tmin, walk.tmax);
+            uint c0 = node.children[0], c1 = node.children[1], c2 = node.children[2], c3 = node.children[3];
+            float n0 = c0 == BVH_NONE ? FAR_AWAY : near.x, n1 = c1 == BVH_NONE ? FAR_AWAY : near.y;
+            float n2 = c2 == BVH_NONE ? FAR_AWAY : near.z, n3 = c3 == BVH_NONE ? FAR_AWAY : near.w;
+            bvh_sort(n0, c0, n1, c1);
+            bvh_sort(n2, c2, n3, c3);
+            bvh_sort(n0, c0, n2, c2);
+            bvh_sort(n1, c1, n3, c3);
+            bvh_sort(n1, c1, n2, c2);
+            if (n3 < FAR_AWAY) { stack[size] = c3; entered[size++] = n3; }
+            if (n2 < FAR_AWAY) { stack[size] = c2; entered[size++] = n2; }
+            if (n1 < FAR_AWAY) { stack[size] = c1; entered[size++] = n1; }
+            current = c0;
+            if (n0 >= FAR_AWAY) {
+                uint floor = base == BVH_TOP ? 0 : base;
+                current = BVH_NONE;
+                while (size > floor && current == BVH_NONE) {
+                    size--;
+                    if (entered[size] <= walk.tmax) current = stack[size];
+                }
             }
         }
-        bool go0 = t0 >= 0.0 && node.count[0] == 0, go1 = t1 >= 0.0 && node.count[1] == 0;
-        if (go0 && go1) {
-            bool swapped = t1 < t0;
-            stack[size++] = node.first[swapped ? 0 : 1];
-            index = node.first[swapped ? 1 : 0];
-        } else if (go0) {
-            index = node.first[0];
-        } else if (go1) {
-            index = node.first[1];
-        } else if (size > 0) {
-            index = stack[--size];
-        } else {
-            return;
+        if (current != BVH_NONE) {
+            uint first = current & BVH_FIRST;
+            if (base == BVH_TOP) {
+                BvhInstance instance = instances.at[first];
+                if ((instance.mask & mask) != 0) {
+                    vec4 from = vec4(origin, 1.0);
+                    vec3 d = walk.direction;
+                    // not normalized: distances stay those of the world
+                    ray = bvh_ray(
+                        vec3(dot(instance.to_object[0], from), dot(instance.to_object[1], from), dot(instance.to_object[2], from)),
+                        vec3(dot(instance.to_object[0].xyz, d), dot(instance.to_object[1].xyz, d), dot(instance.to_object[2].xyz, d)));
+                    nodes = BvhNodes(instance.nodes);
+                    triangles = BvhTriangles(instance.triangles);
+                    geometry = instance.geometry;
+                    kind = instance.kind;
+                    base = size;
+                    current = 0;
+                    continue;
+                }
+            } else {
+                uint end = first + ((current >> BVH_COUNT_SHIFT) & 7u);
+                for (uint i = first; i <= end; i++) {
+                    BvhTriangle triangle = triangles.at[i];
+                    vec3 found = bvh_triangle(ray, triangle);
+                    if (!(found.x >= walk.tmin && found.x <= walk.tmax)) continue;
+                    if (bvh_report(walk, Hit(geometry, triangle.primitive, found.yz, found.x), kind)) return;
+                }
+            }
         }
+        if (size == base) {
+            base = BVH_TOP;
+            ray = outside;
+            nodes = BvhNodes(VIEW.bvh_nodes);
+        }
+        if (size == 0) return;
+        size--;
+        current = stack[size];
+        // farther than what was found since
+        if (entered[size] > walk.tmax) current = BVH_NONE;
     }
 }
 

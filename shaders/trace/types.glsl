@@ -33,7 +33,7 @@ struct LightView {
 
 struct BspNode { vec4 plane; int children[2]; };
 
-struct BvhNode { vec3 low[2]; vec3 high[2]; uint first[2]; uint count[2]; };
+struct BvhNode { vec3 origin; vec3 step; uint low[3]; uint high[3]; uint children[4]; };
 
 struct BvhTriangle { vec3 a; vec3 b; vec3 c; uint primitive; };
 
@@ -90,6 +90,10 @@ struct TraceView {
 
 // What a geometry's triangles are to a ray.
 const uint KIND_OPAQUE = 0, KIND_TESTED = 1, KIND_TRANSLUCENT = 2, KIND_SKY = 3;
+// BvhNode.children: nothing; the bit of a leaf; where the number of its entries less one stands; the first of them.
+const uint BVH_NONE = 0xFFFFFFFFu, BVH_LEAF = 0x80000000u, BVH_COUNT_SHIFT = 28, BVH_FIRST = 0x0FFFFFFFu;
+// Entries that a walk of one level keeps for later at most.
+const uint BVH_STACK = 48;
 // Masks of top-level instances.
 const uint MASK_SOLID = 0x01, MASK_TRANSLUCENT = 0x02, MASK_SKY = 0x04, MASK_FIRST_SOLID = 0x08, MASK_FIRST_TRANSLUCENT = 0x10,
     MASK_THIRD_SOLID = 0x20, MASK_THIRD_TRANSLUCENT = 0x40, MASK_NO_SHADOW = 0x80;

@@ -13,6 +13,7 @@ use super::geometry::{StaticGeometry, Structure};
 use super::input::{Kind, MaterialTable, Tracer};
 use super::parts::{Parts, Seen, Slot, axes, is_solid};
 use super::shapes::{Bottom, OwnBottom, Shapes};
+use super::wide_bvh::widen;
 use crate::gpu::{
     self, Access, Blas, BlasBuild, BlasFlags, BlasGeometry, Device, Error, Recorder, Tlas,
 };
@@ -379,12 +380,13 @@ impl Accel {
             .iter()
             .filter_map(|&i| instances.get(i as usize).copied())
             .collect();
-        let bytes = size_of_val(top.nodes.as_slice()) + size_of_val(ordered.as_slice());
+        let nodes = widen(&top);
+        let bytes = size_of_val(nodes.as_slice()) + size_of_val(ordered.as_slice());
         self.own_bytes = [changing as u64, bytes as u64];
-        if top.nodes.is_empty() {
+        if nodes.is_empty() {
             return Ok((0, 0));
         }
-        Ok((rec.arena().push(&top.nodes)?, rec.arena().push(&ordered)?))
+        Ok((rec.arena().push(&nodes)?, rec.arena().push(&ordered)?))
     }
 }
 

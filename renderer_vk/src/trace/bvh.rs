@@ -1,15 +1,19 @@
 //! Bounding volume hierarchies for the compute tracer: binary, split by the surface area heuristic over bins (Wald, On
-//! fast Construction of SAH-based Bounding Volume Hierarchies, 2007).
+//! fast Construction of SAH-based Bounding Volume Hierarchies, 2007). Rays walk them in a wider form (`wide_bvh`).
 
 use glam::Vec3;
 use shaders::trace_types::{BvhNode, BvhTriangle};
 
+use super::wide_bvh::widen;
+
 /// Triangles of a leaf that are no longer split.
 pub const LEAF: usize = 4;
 /// Bins on an axis.
-const BINS: usize = 12;
-/// Depth at which splitting by cost gives way to splitting in halves, which ends after at most 32 more levels, so that
-/// the shader's stack of 48 is never too small.
+const BINS: usize = 16;
+/// What testing the boxes of a split costs, in tests of triangles.
+const SPLIT_COST: f32 = 0.7;
+/// Depth at which splitting by cost gives way to splitting in halves, which ends after at most 32 more levels: no
+/// hierarchy is deeper than the shader's stack (`BVH_STACK`).
 const COST_DEPTH: u32 = 15;
 
 /// Where the box of a child lies that is not there.
@@ -72,11 +76,32 @@ impl Aabb {
     }
 }
 
+/// The boxes of two children.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BinaryNode {
+    /// Smallest corners; a child that is not there is a point beyond everything.
+    pub low: [Vec3; 2],
+    /// Largest corners.
+    pub high: [Vec3; 2],
+    /// Of a leaf the first of its entries, otherwise the child's node.
+    pub first: [u32; 2],
+    /// Entries of a leaf; 0: a node.
+    pub count: [u32; 2],
+}
+
+impl BinaryNode {
+    /// The box of a child that is there.
+    pub fn child(&self, side: usize) -> Option<Aabb> {
+        let (&low, &high) = (self.low.get(side)?, self.high.get(side)?);
+        (low != ABSENT).then_some(Aabb { low, high })
+    }
+}
+
 /// A hierarchy over numbered entries.
 #[derive(Clone, Debug, Default)]
 pub struct Hierarchy {
-    /// Nodes; the first is the root. Empty for no entries.
-    pub nodes: Vec<BvhNode>,
+    /// Nodes; the first is the root, children come behind their parents. Empty for no entries.
+    pub nodes: Vec<BinaryNode>,
     /// The entries in the order of the leafs.
     pub order: Vec<u32>,
 }
@@ -139,11 +164,7 @@ impl Hierarchy {
         let mut sum = 0.0;
         for node in &self.nodes {
             for side in 0..2 {
-                if node.low[side] != ABSENT {
-                    let part = Aabb {
-                        low: node.low[side],
-                        high: node.high[side],
-                    };
+                if let Some(part) = node.child(side) {
                     #[allow(clippy::cast_precision_loss)] // a few entries
                     let tests = node.count[side].max(1) as f32;
                     sum += part.half_area() * tests;
@@ -155,15 +176,10 @@ impl Hierarchy {
 }
 
 /// The box around both children of a node.
-fn bounds_of(node: &BvhNode) -> Aabb {
+fn bounds_of(node: &BinaryNode) -> Aabb {
     (0..2)
-        .filter(|&side| node.low[side] != ABSENT)
-        .fold(Aabb::EMPTY, |b, side| {
-            b.union(Aabb {
-                low: node.low[side],
-                high: node.high[side],
-            })
-        })
+        .filter_map(|side| node.child(side))
+        .fold(Aabb::EMPTY, Aabb::union)
 }
 
 /// Builds a hierarchy over boxes. Boxes that are not finite are left out: nothing can hit them. `leaf`: entries that a
@@ -181,7 +197,7 @@ pub fn build(boxes: &[Aabb], leaf: usize) -> Hierarchy {
     }
     let of = |i: u32| boxes.get(i as usize).copied().unwrap_or(Aabb::EMPTY);
     let bounds = order.iter().fold(Aabb::EMPTY, |b, &i| b.union(of(i)));
-    let mut nodes: Vec<BvhNode> = Vec::with_capacity(order.len());
+    let mut nodes: Vec<BinaryNode> = Vec::with_capacity(order.len());
     let mut tasks = vec![Task {
         first: 0,
         count: order.len(),
@@ -190,13 +206,17 @@ pub fn build(boxes: &[Aabb], leaf: usize) -> Hierarchy {
         parent: None,
     }];
     while let Some(task) = tasks.pop() {
+        let entries = order
+            .get_mut(task.first..task.first + task.count)
+            .unwrap_or_default();
+        let parts = split(entries, &of, &task, leaf);
         // the root is always a node, be it of one leaf alone
-        if task.count <= leaf && task.parent.is_some() {
+        if parts.is_none() && task.parent.is_some() {
             attach(&mut nodes, &task, index(task.first), index(task.count));
             continue;
         }
         let node = nodes.len();
-        nodes.push(BvhNode {
+        nodes.push(BinaryNode {
             // a child that is not there is a point that no ray comes to
             low: [ABSENT; 2],
             high: [ABSENT; 2],
@@ -204,14 +224,7 @@ pub fn build(boxes: &[Aabb], leaf: usize) -> Hierarchy {
             count: [1; 2],
         });
         attach(&mut nodes, &task, index(node), 0);
-        let entries = order
-            .get_mut(task.first..task.first + task.count)
-            .unwrap_or_default();
-        let left = if task.count <= leaf {
-            task.count
-        } else {
-            split(entries, &of, task.depth)
-        };
+        let left = parts.unwrap_or(task.count);
         let mut first = task.first;
         for (side, count) in [left, task.count - left].into_iter().enumerate() {
             if count > 0 {
@@ -230,7 +243,7 @@ pub fn build(boxes: &[Aabb], leaf: usize) -> Hierarchy {
     Hierarchy { nodes, order }
 }
 
-fn attach(nodes: &mut [BvhNode], task: &Task, first: u32, count: u32) {
+fn attach(nodes: &mut [BinaryNode], task: &Task, first: u32, count: u32) {
     if let Some((parent, side)) = task.parent
         && let Some(node) = nodes.get_mut(parent)
     {
@@ -241,17 +254,32 @@ fn attach(nodes: &mut [BvhNode], task: &Task, first: u32, count: u32) {
     }
 }
 
-/// Reorders entries into two parts and returns the length of the first; both parts have entries.
-fn split(entries: &mut [u32], of: &impl Fn(u32) -> Aabb, depth: u32) -> usize {
+/// Reorders entries into two parts and returns the length of the first; both parts have entries. `None`: they are to be
+/// one leaf.
+fn split(
+    entries: &mut [u32],
+    of: &impl Fn(u32) -> Aabb,
+    task: &Task,
+    leaf: usize,
+) -> Option<usize> {
     let half = entries.len() / 2;
+    if half == 0 {
+        return None;
+    }
+    let fits = entries.len() <= leaf;
     let middles = entries
         .iter()
         .fold(Aabb::EMPTY, |b, &i| b.with(of(i).middle()));
     let size = middles.high - middles.low;
     let widest = size.max_position();
-    if depth < COST_DEPTH
-        && let Some((axis, cut)) = cheapest(entries, of, middles)
+    if task.depth < COST_DEPTH
+        && let Some((cost, axis, cut)) = cheapest(entries, of, middles)
     {
+        #[allow(clippy::cast_precision_loss)] // a few entries
+        let as_leaf = task.bounds.half_area() * entries.len() as f32;
+        if fits && cost + task.bounds.half_area() * SPLIT_COST >= as_leaf {
+            return None;
+        }
         let mut left = 0;
         for i in 0..entries.len() {
             if of(entries[i]).middle()[axis] < cut {
@@ -260,8 +288,11 @@ fn split(entries: &mut [u32], of: &impl Fn(u32) -> Aabb, depth: u32) -> usize {
             }
         }
         if left > 0 && left < entries.len() {
-            return left;
+            return Some(left);
         }
+    }
+    if fits {
+        return None;
     }
     // by the middle entry of the widest axis
     entries.select_nth_unstable_by(half, |&a, &b| {
@@ -269,11 +300,15 @@ fn split(entries: &mut [u32], of: &impl Fn(u32) -> Aabb, depth: u32) -> usize {
             .total_cmp(&of(b).middle()[widest])
             .then(a.cmp(&b))
     });
-    half
+    Some(half)
 }
 
-/// The axis and place of the cheapest split between bins.
-fn cheapest(entries: &[u32], of: &impl Fn(u32) -> Aabb, middles: Aabb) -> Option<(usize, f32)> {
+/// Cost (areas times entries), axis and place of the cheapest split between bins.
+fn cheapest(
+    entries: &[u32],
+    of: &impl Fn(u32) -> Aabb,
+    middles: Aabb,
+) -> Option<(f32, usize, f32)> {
     let mut best: Option<(f32, usize, f32)> = None;
     for axis in 0..3 {
         let (low, size) = (middles.low[axis], middles.high[axis] - middles.low[axis]);
@@ -322,7 +357,7 @@ fn cheapest(entries: &[u32], of: &impl Fn(u32) -> Aabb, middles: Aabb) -> Option
             }
         }
     }
-    best.map(|(_, axis, cut)| (axis, cut))
+    best
 }
 
 /// The box of a triangle.
@@ -357,7 +392,7 @@ pub fn build_triangles(corners: &[[Vec3; 3]]) -> Option<TriangleHierarchy> {
     let triangles = ordered(&hierarchy, corners);
     let bounds = hierarchy.bounds();
     (!triangles.is_empty()).then_some(TriangleHierarchy {
-        nodes: hierarchy.nodes,
+        nodes: widen(&hierarchy),
         triangles,
         bounds,
     })

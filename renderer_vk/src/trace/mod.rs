@@ -29,6 +29,7 @@ mod shapes;
 pub mod still;
 pub mod targets;
 pub mod view_tracer;
+mod wide_bvh;
 
 pub use look::TraceLook;
 

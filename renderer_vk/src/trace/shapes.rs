@@ -18,6 +18,7 @@ use shaders::types::{Triangle, Vertex};
 use super::bvh::{self, Aabb, Hierarchy, build, build_triangles};
 use super::input::{Kind, Tracer};
 use super::parts::{Part, Parts, ShapeMesh, SkinMesh};
+use super::wide_bvh::widen;
 use crate::gpu::{
     Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, CompactedSizes, Device, Error,
     Pass, Recorder,
@@ -556,7 +557,7 @@ impl Shapes {
                     .map(|bounds| {
                         let triangles = bvh::ordered(hierarchy, &self.corners);
                         Ok::<_, Error>(OwnBottom {
-                            nodes: rec.arena().push(&hierarchy.nodes)?,
+                            nodes: rec.arena().push(&widen(hierarchy))?,
                             triangles: rec.arena().push(&triangles)?,
                             bounds,
                         })
