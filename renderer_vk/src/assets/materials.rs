@@ -8,7 +8,7 @@ use shaders::types;
 use shaderscript::{ImplicitKind, Shader, StageImage, strip_extension};
 
 use super::bind::{internal_shader, passes, sky_faces};
-use super::compile::{FOG_IMAGE, StageArrays, VideoClients};
+use super::compile::{FOG_IMAGE, StageArrays, VideoClients, sampler};
 use super::dielectric;
 use super::flags;
 use super::material::{Combine, LightmapClass, Material, SkyBox, VideoStage};
@@ -578,6 +578,13 @@ impl Materials {
             .stages
             .get(first..first + material.stage_count as usize)
             .unwrap_or_default()
+    }
+
+    /// Bindless texture of a stage of one still image, and whether it ends at its edges instead of repeating.
+    pub fn image(&self, stage: &types::Stage) -> Option<(u32, bool)> {
+        let texture = self.arrays.images.get(stage.image_first as usize)?;
+        let repeats = [sampler::REPEAT_MIP, sampler::REPEAT].contains(&stage.sampler_index);
+        (stage.image_count == 1).then_some((*texture, !repeats))
     }
 
     /// The arrays, on the CPU.

@@ -1,5 +1,6 @@
 //! What the game registers: images, materials, models, skins and fonts, as handles to data on the GPU.
 
+mod alpha;
 mod bind;
 pub mod compile;
 mod dielectric;

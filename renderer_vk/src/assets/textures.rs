@@ -1,12 +1,13 @@
 //! Textures by name, on the GPU.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use glam::Vec4;
+use glam::{Vec2, Vec4};
 use relight::GameFiles;
 use relight::image::{self, Image};
 
+use super::alpha::AlphaGrid;
 use super::prepare::{self, TextureSettings};
 use super::source::{ImageFlags, ImageSource};
 use crate::gpu::{
@@ -117,8 +118,8 @@ pub struct Textures {
     means: HashMap<u32, Vec4>,
     /// Lightmap pages with their names.
     lightmaps: Vec<(String, gpu::Image)>,
-    /// Bindless indices of the images that have a texel that is not opaque.
-    transparent: HashSet<u32>,
+    /// By bindless index where the images are transparent that have a texel that is not opaque.
+    transparent: HashMap<u32, AlphaGrid>,
     scratch: HashMap<usize, Scratch>,
     white: u32,
     default_image: u32,
@@ -142,7 +143,7 @@ impl Textures {
             textures: Vec::new(),
             means: HashMap::new(),
             lightmaps: Vec::new(),
-            transparent: HashSet::new(),
+            transparent: HashMap::new(),
             scratch: HashMap::new(),
             white: 0,
             default_image: 0,
@@ -305,7 +306,7 @@ impl Textures {
         let mut count = 0;
         for (name, image) in listed {
             let size = image_bytes(image);
-            let transparent = self.transparent.contains(&image.texture_index());
+            let transparent = self.transparent.contains_key(&image.texture_index());
             lines.push(format!(
                 "{count:4}: {:4}x{:4} {} {} {name}",
                 image.width(),
@@ -350,8 +351,17 @@ impl Textures {
     }
 
     fn note_alpha(&mut self, created: &gpu::Image, image: &Image) {
-        if image.rgba.chunks_exact(4).any(|texel| texel[3] != 255) {
-            self.transparent.insert(created.texture_index());
+        if let Some(grid) = AlphaGrid::of(image) {
+            self.transparent.insert(created.texture_index(), grid);
+        }
+    }
+
+    /// The least and the greatest alpha of an image within a triangle of texture coordinates; `None` for an image that
+    /// changes or does not exist.
+    pub fn alpha_range(&self, texture: u32, corners: [Vec2; 3], clamped: bool) -> Option<(u8, u8)> {
+        match self.transparent.get(&texture) {
+            Some(grid) => Some(grid.range(corners, clamped)),
+            None => self.means.contains_key(&texture).then_some((255, 255)),
         }
     }
 

@@ -3,12 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use shaders::trace_types::SkyRecord;
 use shaders::types::Triangle;
 use shaders::types::constants::{NO_TEXTURE, TRIANGLE_WORLD};
 
 use super::bvh::{Aabb, build_triangles};
+use super::cutout::Coverage;
 use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
 
@@ -80,16 +81,26 @@ struct Grouped {
     skies: Vec<SkyRecord>,
 }
 
-/// Surfaces of one structure with the material that is drawn for each.
-type Members<'a> = Vec<(&'a StaticSurface, u32, MaterialInfo)>;
+/// Surfaces of one structure with the material that is drawn for each; of a cut-out's only the triangles that are
+/// covered so.
+type Members<'a> = Vec<(&'a StaticSurface, u32, MaterialInfo, Option<Coverage>)>;
 
 fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
     let mut sorted: BTreeMap<(u32, Kind), Members<'_>> = BTreeMap::new();
     for surface in &scene.surfaces {
         let (material, info) = materials.info(surface.material);
         if let Some(kind) = Kind::of(info.flags) {
-            let list = sorted.entry((surface.model, kind)).or_default();
-            list.push((surface, material, info));
+            let mut add = |kind, part| {
+                let list = sorted.entry((surface.model, kind)).or_default();
+                list.push((surface, material, info, part));
+            };
+            if kind == Kind::Tested {
+                // what has no hole need not be tested, and what is all hole is not there
+                add(Kind::Opaque, Some(Coverage::Solid));
+                add(Kind::Tested, Some(Coverage::Mixed));
+            } else {
+                add(kind, None);
+            }
         }
     }
     let mut grouped = Grouped {
@@ -106,7 +117,7 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
                 .then(a.2.order.cmp(&b.2.order))
         });
         let first = grouped.triangles.len();
-        for (surface, material, info) in list {
+        for (surface, material, info, part) in list {
             let lightmap = if key.1 == Kind::Sky {
                 *sky_of_material.entry(material).or_insert_with(|| {
                     grouped.skies.push(info.sky.unwrap_or(SkyRecord {
@@ -124,6 +135,10 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
             for corner in corners.chunks_exact(3) {
                 let indices = [corner[0], corner[1], corner[2]];
                 if indices.iter().any(|&i| i as usize >= scene.vertices.len()) {
+                    continue;
+                }
+                let st = |i: u32| scene.vertices.get(i as usize).map_or(Vec2::ZERO, |v| v.st);
+                if part.is_some_and(|part| materials.coverage(material, indices.map(st)) != part) {
                     continue;
                 }
                 grouped.triangles.push(Triangle {

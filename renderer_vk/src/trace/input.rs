@@ -1,10 +1,12 @@
 //! What the traced look is given: plain descriptions of a map and of a view's surroundings, so that the passes depend
 //! on no loader and tests can make scenes by hand.
 
+use glam::Vec2;
 use shaders::trace_types::SkyRecord;
 use shaders::types::constants as c;
 use shaders::types::{Fog, MaterialBuffers, Vertex};
 
+use super::cutout::Coverage;
 use crate::gpu::DeviceInfo;
 use crate::settings::TracerChoice;
 
@@ -127,6 +129,10 @@ pub struct MaterialInfo {
 pub trait MaterialTable {
     /// The material that is drawn for `index` (remapping applied), and what it is.
     fn info(&self, index: u32) -> (u32, MaterialInfo);
+    /// How much is there of a triangle of a cut-out, by its texture coordinates.
+    fn coverage(&self, _material: u32, _corners: [Vec2; 3]) -> Coverage {
+        Coverage::Mixed
+    }
     /// Addresses of the arrays on the GPU.
     fn buffers(&self) -> MaterialBuffers;
     /// Bindless index of the clamped sampler with mip levels, for sky boxes.

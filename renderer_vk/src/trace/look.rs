@@ -2,12 +2,14 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+use glam::Vec2;
 use shaders::trace_types::SkyRecord;
 use shaders::types::MaterialBuffers;
 use shaders::types::constants::NO_TEXTURE;
 
 use super::accel::AccelMemory;
 use super::counters::COUNTED;
+use super::cutout::{Coverage, coverage};
 use super::geometry::StaticGeometry;
 use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use super::lights::{MapLightSource, MapLights};
@@ -36,6 +38,10 @@ impl MaterialTable for Assets {
             sky,
         };
         (drawn, info)
+    }
+
+    fn coverage(&self, material: u32, corners: [Vec2; 3]) -> Coverage {
+        coverage(self, material, corners)
     }
 
     fn buffers(&self) -> MaterialBuffers {

@@ -14,6 +14,7 @@ pub mod antialias;
 pub mod bloom;
 pub mod bvh;
 pub mod counters;
+pub mod cutout;
 pub mod debug;
 pub mod denoise;
 pub mod frame_lights;
