@@ -19,7 +19,7 @@ struct Stage {
     float portal_range; uint alpha_func; uint blend_src; uint blend_dst; uint flags;
 };
 
-struct Dielectric { float index; float ripple; float scale; vec3 absorption; };
+struct Dielectric { float index; float ripple; float scale; uint filters; vec3 filter_color; vec3 absorption; };
 
 struct Material {
     uint stage_first; uint stage_count; uint flags; float time_offset; float clamp_time;

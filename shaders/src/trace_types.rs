@@ -375,6 +375,18 @@ pub struct DenoiseView {
     pub slope: u32,
 }
 
+/// What lies in the way of light.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct TransportView {
+    /// Boxes around the surfaces of the world that colour the light that passes them: smallest and largest corners.
+    pub filters: u64,
+    /// Absorption of the liquid that the eye is in, per unit of length.
+    pub eye_absorption: Vec3,
+    /// Number of `filters`.
+    pub filter_count: u32,
+}
+
 /// All that the passes of one traced view read: camera, arrays, images, settings.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -395,6 +407,7 @@ pub struct TraceView {
     pub antialias: AntialiasView,
     pub post: PostView,
     pub lights: LightView,
+    pub transport: TransportView,
     pub eye: Vec3,
     pub forward: Vec3,
     /// Scaled by the tangent of half the horizontal angle.

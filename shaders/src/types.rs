@@ -107,6 +107,10 @@ pub struct Dielectric {
     pub ripple: f32,
     /// What the stages multiply the background by is multiplied by this: a surface passes no more light than it gets.
     pub scale: f32,
+    /// 1: light that passes takes on a colour.
+    pub filters: u32,
+    /// What light that passes the surface is multiplied by, in the mean over it.
+    pub filter_color: Vec3,
     /// Absorption behind the surface, per unit of length (Beer's law).
     pub absorption: Vec3,
 }

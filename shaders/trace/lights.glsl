@@ -8,6 +8,7 @@
 #include "trace/color.glsl"
 #include "trace/random.glsl"
 #include "trace/trace.glsl"
+#include "trace/filters.glsl"
 
 const uint MASK_SHADOW = MASK_SOLID | MASK_THIRD_SOLID;
 
@@ -363,7 +364,7 @@ vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint selection, 
         else choice = choose_resampled(set, position, normal);
         if (!(choice.weight > 0.0)) continue;
         LightSample s = sample_light(choice.light, position, normal, rng_next2());
-        if (max_component(s.light) > 0.0 && light_arrives(s, origin)) sum += s.light * choice.weight;
+        if (max_component(s.light) > 0.0 && light_arrives(s, origin)) sum += s.light * choice.weight * filtered(origin, s.direction, s.distance);
     }
     return sum / float(samples);
 }

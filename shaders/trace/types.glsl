@@ -66,6 +66,8 @@ struct DenoiseView {
     uint guide; uint last_guide; uint history; uint fresh; uint lit; uint slope;
 };
 
+struct TransportView { uint64_t filters; vec3 eye_absorption; uint filter_count; };
+
 struct TraceView {
     uint64_t geometries; uint64_t instances; uint64_t fogs; uint64_t portals; uint64_t skies; uint64_t exposure;
     uint64_t bvh_nodes; uint64_t bvh_instances;
@@ -74,6 +76,7 @@ struct TraceView {
     AntialiasView antialias;
     PostView post;
     LightView lights;
+    TransportView transport;
     vec3 eye; vec3 forward; vec3 left; vec3 up;
     uint width; uint height; int target_x; int target_y;
     uint scene; uint flags; uint seed; uint accumulated;

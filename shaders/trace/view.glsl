@@ -19,6 +19,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Sph
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer SunLights { SunLight at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BspNodes { BspNode at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Integers { int at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer FilterBoxes { vec3 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Indices { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Positions { vec3 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LastInstances { LastInstance at[]; };

@@ -130,6 +130,7 @@ mod tests {
         AlphaGrid::of(&Image {
             width: size,
             height: size,
+            has_alpha: true,
             rgba,
         })
         .expect("transparent")
@@ -159,6 +160,7 @@ mod tests {
         let opaque = Image {
             width: 2,
             height: 1,
+            has_alpha: true,
             rgba: vec![9, 9, 9, 255, 1, 2, 3, 255],
         };
         assert_eq!(AlphaGrid::of(&opaque), None);

@@ -60,9 +60,11 @@ pub fn dielectric(
     stage_first: usize,
     source: &dyn ImageSource,
 ) -> types::Dielectric {
-    let Some(index) = light::refraction_index(shader) else {
+    let filters = light::filters_light(shader);
+    let index = light::refraction_index(shader);
+    if index.is_none() && !filters {
         return types::Dielectric::default();
-    };
+    }
     let mean = mean_layer(shader, class, arrays, stage_first, source);
     let passed = mean.through.max_element();
     let dull = shader.content_flags & CONTENTS_SLIME != 0 && passed < LEAST_TRANSMISSION;
@@ -80,13 +82,20 @@ pub fn dielectric(
             / LIQUID_DEPTH;
     }
     types::Dielectric {
-        index,
+        index: index.unwrap_or(0.0),
         ripple: if liquid {
             light::ripple_slope(shader)
         } else {
             0.0
         },
         scale: 1.0 / passed.max(1.0),
+        filters: u32::from(filters || liquid),
+        // a liquid colours light on its way through
+        filter_color: if liquid {
+            Vec3::ONE
+        } else {
+            mean.through.clamp(Vec3::ZERO, Vec3::ONE)
+        },
         absorption,
     }
 }

@@ -11,6 +11,7 @@ use shaders::types::constants::{NO_TEXTURE, TRIANGLE_WORLD};
 use super::bvh::{Aabb, build_triangles};
 use super::cutout::Coverage;
 use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
+use super::surroundings::Surroundings;
 use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
 
 /// One bottom-level structure of the map.
@@ -55,6 +56,8 @@ pub struct StaticGeometry {
     pub fogs: Buffer,
     /// Number of fog volumes.
     pub fog_count: u32,
+    /// What lies in the way of light; nothing unless it is put here.
+    pub surroundings: Surroundings,
     // kept alive for the structures' triangles
     triangle_records: Buffer,
 }
@@ -199,6 +202,7 @@ impl StaticGeometry {
             skies: Buffer::with_data(device, "trace skies", storage, &grouped.skies)?,
             fogs: Buffer::with_data(device, "trace fogs", storage, scene.fogs)?,
             fog_count: u32::try_from(scene.fogs.len()).unwrap_or(u32::MAX),
+            surroundings: Surroundings::default(),
             triangle_records: triangles,
         })
     }

@@ -13,6 +13,7 @@ use super::cutout::{Coverage, coverage};
 use super::geometry::StaticGeometry;
 use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use super::lights::{MapLightSource, MapLights};
+use super::surroundings::Surroundings;
 use super::view_tracer::{TracedMap, ViewTracer};
 use relight::exposure::display_exposure;
 
@@ -93,6 +94,18 @@ fn static_scene(world: &World) -> StaticScene<'_> {
     }
 }
 
+/// What keeps its shape, as rays meet it.
+fn geometry(
+    device: &Device,
+    tracer: Tracer,
+    world: &World,
+    assets: &Assets,
+) -> Result<StaticGeometry, Error> {
+    let mut geometry = StaticGeometry::new(device, tracer, &static_scene(world), assets)?;
+    geometry.surroundings = Surroundings::new(device, world, assets)?;
+    Ok(geometry)
+}
+
 /// The traced look of one map.
 pub struct TraceLook {
     pub(super) tracer: ViewTracer,
@@ -131,7 +144,7 @@ impl TraceLook {
         Ok(Self {
             tracer: view_tracer,
             kind: tracer,
-            geometry: StaticGeometry::new(device, tracer, &static_scene(world), assets)?,
+            geometry: geometry(device, tracer, world, assets)?,
             lights: MapLights::new(device, &source)?,
             remapping: remapping(&assets.materials),
         })
@@ -153,8 +166,7 @@ impl TraceLook {
         let remapping = remapping(&assets.materials);
         if remapping != self.remapping {
             // triangles name their materials; this happens when a game changes a flag's or button's look
-            self.geometry =
-                StaticGeometry::new(rec.device(), self.kind, &static_scene(world), assets)?;
+            self.geometry = geometry(rec.device(), self.kind, world, assets)?;
             self.remapping = remapping;
         }
         let map = TracedMap {

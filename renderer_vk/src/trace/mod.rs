@@ -28,6 +28,7 @@ mod parts;
 pub mod passes;
 mod shapes;
 pub mod still;
+pub mod surroundings;
 pub mod targets;
 pub mod view_tracer;
 mod wide_bvh;

@@ -379,6 +379,9 @@ impl ViewTracer {
             time: view.time,
             pixel_spread: pixel_spread(camera.tan_y, targets.height),
             ambient: lights.ambient * settings.rt_light_scale.max(0.0),
+            transport: map.map_or_else(Default::default, |m| {
+                m.geometry.surroundings.view(camera.origin)
+            }),
             fog_count: map.map_or(0, |m| m.geometry.fog_count),
             portal_count: u32::try_from(portals.len()).unwrap_or(u32::MAX),
             max_depth: settings.rt_max_depth,

@@ -6,7 +6,7 @@ use super::{SurfaceClass, classify};
 use crate::{
     shader::{Deform, Shader},
     stage::{AlphaGen, RgbGen, Stage, TcGen, TcMod},
-    surface_params::{CONTENTS_LAVA, CONTENTS_SLIME},
+    surface_params::{CONTENTS_LAVA, CONTENTS_SLIME, SURF_LIGHTFILTER},
 };
 
 /// Refraction index of window glass.
@@ -25,6 +25,20 @@ pub fn refraction_index(shader: &Shader) -> Option<f32> {
         SurfaceClass::Liquid if shader.content_flags & CONTENTS_SLIME != 0 => Some(INDEX_SLIME),
         SurfaceClass::Liquid => Some(INDEX_WATER),
         _ => None,
+    }
+}
+
+/// Whether light that passes a surface takes on its colour: glass, what says `surfaceparm lightfilter`, and what only
+/// multiplies the background. Decals lie on something that stops the light.
+pub fn filters_light(shader: &Shader) -> bool {
+    let found = classify(shader);
+    match found.class {
+        SurfaceClass::Glass => true,
+        SurfaceClass::Translucent => {
+            let says = shader.surface_flags & SURF_LIGHTFILTER != 0;
+            !shader.polygon_offset && (says || found.filter)
+        }
+        _ => false,
     }
 }
 
@@ -108,6 +122,18 @@ mod tests {
             refraction_index(&shader("surfaceparm water\n{\nmap a\n}")),
             None
         );
+    }
+
+    #[test]
+    fn light_takes_on_the_colour_of_what_multiplies() {
+        let filters = |body: &str| filters_light(&shader(body));
+        const FILTER: &str = "{\nmap a\nblendFunc filter\n}";
+        const BLEND: &str = "{\nmap a\nblendFunc blend\n}";
+        assert!(filters(FILTER));
+        assert!(!filters(BLEND));
+        assert!(filters(&format!("surfaceparm lightfilter\n{BLEND}")));
+        assert!(!filters(&format!("polygonOffset\n{FILTER}")));
+        assert!(!filters("{\nmap a\nblendFunc add\n}"));
     }
 
     #[test]

@@ -11,7 +11,8 @@ pub use algebra::{
     LightLinear, StageSample, compose, glow_stages, is_glowing, stage_samples_white,
 };
 pub use dielectric::{
-    INDEX_GLASS, INDEX_SLIME, INDEX_WATER, is_reflection, refraction_index, ripple_slope,
+    INDEX_GLASS, INDEX_SLIME, INDEX_WATER, filters_light, is_reflection, refraction_index,
+    ripple_slope,
 };
 
 use crate::{

@@ -102,7 +102,7 @@ fn water_reflects_by_fresnel_and_absorbs_by_beer_with(gpu: &mut Gpu) {
         index: 1.33,
         scale: 1.0,
         absorption: Vec3::splat(0.004),
-        ripple: 0.0,
+        ..Dielectric::default()
     };
     let eye = Vec3::new(0.0, 0.0, 60.0);
     let target = Vec3::new(100.0, 10.0, 0.0);
@@ -238,4 +238,50 @@ fn an_environment_stage_shows_what_is_around_with(gpu: &mut Gpu) {
         ..reference()
     };
     compare(gpu, &scene, &ended, |_| through_byte(0.5) + weight);
+}
+
+#[test]
+fn light_takes_on_the_colour_of_what_it_passes() {
+    Gpu::each(light_takes_on_the_colour_of_what_it_passes_with);
+}
+
+fn light_takes_on_the_colour_of_what_it_passes_with(gpu: &mut Gpu) {
+    let mut scene = Scene::new(Vec3::new(0.0, 0.0, 50.0), Vec3::ZERO, 60.0, SIDE as i32);
+    let white = scene.diffuse(1.0);
+    scene.quad(level(0.0, true), white);
+    scene.suns.push(relight::light::SunLight {
+        direction: Vec3::Z,
+        irradiance: Vec3::splat(std::f32::consts::PI),
+        angular_radius: 0.001,
+        material: None,
+    });
+    // a red sheet over x < 0, above the eye, and a second one of half the light over y < 0
+    let sheet = |scene: &mut Scene, corner: Vec3, u: Vec3, v: Vec3, color: Vec3| {
+        let material = scene.material(&[clear()], c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED);
+        scene.materials[material as usize].0.dielectric = Dielectric {
+            filters: 1,
+            filter_color: color,
+            ..Dielectric::default()
+        };
+        scene.quad(rectangle(corner, u, v), material);
+        scene.filters.push([corner - 1.0, corner + u + v + 1.0]);
+    };
+    let (x, y) = (Vec3::X * 200.0, Vec3::Y * 400.0);
+    let red = Vec3::new(0.9, 0.2, 0.1);
+    let corner = Vec3::new(-200.0, -200.0, 70.0);
+    sheet(&mut scene, corner, x, y, red);
+    let grey = Vec3::splat(0.5);
+    sheet(&mut scene, corner + Vec3::Z * 10.0, x * 2.0, y * 0.5, grey);
+    let (pixels, _) = gpu.render(&scene, &middles(), 2);
+    for (i, pixel) in pixels.iter().enumerate() {
+        let p = super::harness::floor_point(&scene, i % SIDE, i / SIDE);
+        let mut exact = Vec3::ONE;
+        if p.x < 0.0 {
+            exact *= red;
+        }
+        if p.y < 0.0 {
+            exact *= grey;
+        }
+        assert!((*pixel - exact).abs().max_element() < 0.005, "{p} {pixel}");
+    }
 }

@@ -20,6 +20,7 @@ use crate::settings::Settings;
 use crate::trace::geometry::StaticGeometry;
 use crate::trace::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use crate::trace::lights::{MapLightSource, MapLights};
+use crate::trace::surroundings::Surroundings;
 use crate::trace::view_tracer::{TracedMap, ViewTracer};
 
 /// A device with its validation layer on and the look under test.
@@ -366,6 +367,8 @@ pub struct Scene {
     pub suns: Vec<SunLight>,
     pub ambient: Vec3,
     pub fogs: Vec<Fog>,
+    /// Boxes around what colours light.
+    pub filters: Vec<[Vec3; 2]>,
     pub instances: Vec<Instance>,
     pub dynamic_vertices: Vec<Vertex>,
     pub dynamic_indices: Vec<u32>,
@@ -410,6 +413,7 @@ impl Scene {
             suns: Vec::new(),
             ambient: Vec3::ZERO,
             fogs: Vec::new(),
+            filters: Vec::new(),
             instances: vec![Instance {
                 flags: c::INSTANCE_UNLIT,
                 ..identity()
@@ -634,8 +638,12 @@ impl Scene {
             surfaces: self.surfaces.clone(),
             fogs: &self.fogs,
         };
+        let mut geometry =
+            StaticGeometry::new(device, tracer, &scene, &materials).expect("structures");
+        geometry.surroundings =
+            Surroundings::of_boxes(device, self.filters.clone()).expect("boxes");
         Uploaded {
-            geometry: StaticGeometry::new(device, tracer, &scene, &materials).expect("structures"),
+            geometry,
             lights: MapLights::new(device, &source).expect("lights"),
             materials,
             _vertices: vertices,

@@ -81,6 +81,67 @@ fn layers_are_composed_in_order_however_many_there_are_with(gpu: &mut Gpu) {
 }
 
 #[test]
+fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass() {
+    Gpu::each(one_to_eight_mixed_layers_are_exact_before_and_behind_glass_with);
+}
+
+fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass_with(gpu: &mut Gpu) {
+    let back = [0.5, 0.6, 0.4];
+    let color = |i: usize| [0.2 + 0.08 * i as f32, 0.9 - 0.1 * i as f32, 0.5];
+    let linear = |c: [f32; 3]| Vec3::from(c.map(through_byte));
+    // a layer over what is below it
+    let over_one = |i: usize, below: Vec3| match i % 3 {
+        0 => {
+            let alpha = 127.0 / 255.0;
+            linear(color(i)) * alpha + below * (1.0 - alpha)
+        }
+        1 => linear(color(i)) + below,
+        _ => linear(color(i)) * below,
+    };
+    // every other count with a pane of glass in the middle, which mirrors the layers before it and the black behind the
+    // eye
+    for count in 1..=8 {
+        let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 2.0, 8);
+        let wall = scene.material(&[stage::constant(back)], 0);
+        scene.quad(screen(300.0), wall);
+        let mut exact = linear(back);
+        // from behind, so that the exact picture is composed as it grows
+        for i in (0..count).rev() {
+            let x = 50.0 + 20.0 * i as f32;
+            if count % 2 == 0 && i == count / 2 {
+                let pane =
+                    scene.material(&[stage::filter([1.0; 3])], TRANSLUCENT | c::MATERIAL_GLASS);
+                scene.materials[pane as usize].0.dielectric = shaders::types::Dielectric {
+                    index: 1.5,
+                    scale: 1.0,
+                    ..Default::default()
+                };
+                scene.quad(screen(x + 10.0), pane);
+                // at right angles a face reflects ((n - 1) / (n + 1))²; a sheet of two sides counts as one face
+                let mirrored = (0..=i).fold(Vec3::ZERO, |below, i| over_one(i, below));
+                exact = exact * 0.96 + mirrored * 0.04;
+            }
+            let c = color(i);
+            let stage = match i % 3 {
+                0 => stage::blend(c, 0.5),
+                1 => stage::add(c),
+                _ => stage::filter(c),
+            };
+            exact = over_one(i, exact);
+            let material = scene.material(&[stage], TRANSLUCENT);
+            if i % 2 == 0 {
+                scene.quad(screen(x), material);
+            } else {
+                scene.mesh(screen(x), material, identity());
+            }
+        }
+        let mean = gpu.mean(&scene, &reference(), 2);
+        let difference = (mean / exact - 1.0).abs().max_element();
+        assert!(difference < 1.0e-3, "{count} layers: {mean} {exact}");
+    }
+}
+
+#[test]
 fn layers_in_one_plane_come_in_drawing_order() {
     Gpu::each(layers_in_one_plane_come_in_drawing_order_with);
 }

@@ -1,0 +1,170 @@
+//! What lies in the way of light in a map: surfaces that colour it, and the liquids that a camera can be in.
+
+use glam::{Vec3, Vec4};
+use q3bsp::Bsp;
+use shaders::trace_types::TransportView;
+
+use crate::assets::Assets;
+use crate::gpu::{Buffer, BufferUsage, Device, Error};
+use crate::world::World;
+
+/// Boxes that shadow rays are held against; with more surfaces each box is around several.
+const MAX_BOXES: usize = 16;
+/// How far a deformed surface leaves its place, units, at most as a rule.
+const DEFORMATION: f32 = 16.0;
+
+/// A box by its smallest and largest corner.
+type Corners = [Vec3; 2];
+
+/// A brush of liquid.
+struct Liquid {
+    /// Outward planes: outside where `xyz . p > w`.
+    planes: Vec<Vec4>,
+    absorption: Vec3,
+}
+
+/// What lies in the way of light.
+#[derive(Default)]
+pub struct Surroundings {
+    boxes: Option<Buffer>,
+    count: u32,
+    liquids: Vec<Liquid>,
+}
+
+impl Surroundings {
+    /// Of a map.
+    ///
+    /// # Errors
+    /// Out of memory, or a lost device.
+    pub fn new(device: &Device, world: &World, assets: &Assets) -> Result<Self, Error> {
+        let data = &world.data;
+        let dielectric = |material: u32| {
+            let drawn = assets.materials.resolve(material);
+            assets.materials.get(drawn).dielectric
+        };
+        let boxes: Vec<Corners> = data
+            .surfaces
+            .iter()
+            .filter(|s| s.model == 0 && s.index_count > 0 && dielectric(s.material).filters != 0)
+            .map(|s| {
+                let margin = if s.deformed { DEFORMATION } else { 0.0 };
+                let margin = Vec3::splat(margin + 1.0);
+                [s.bounds.mins - margin, s.bounds.maxs + margin]
+            })
+            .collect();
+        let liquids = (data.surfaces.iter())
+            .map(|s| s.material)
+            .collect::<std::collections::BTreeSet<u32>>()
+            .into_iter()
+            .filter(|&material| dielectric(material).absorption != Vec3::ZERO)
+            .flat_map(|material| {
+                let name = &assets.materials.get(material).name;
+                brushes(&data.relit.bsp, name, dielectric(material).absorption)
+            })
+            .collect();
+        Ok(Self {
+            liquids,
+            ..Self::of_boxes(device, boxes)?
+        })
+    }
+
+    /// With surfaces that colour light in these boxes alone.
+    ///
+    /// # Errors
+    /// Out of memory, or a lost device.
+    pub fn of_boxes(device: &Device, boxes: Vec<Corners>) -> Result<Self, Error> {
+        let boxes = merged(boxes, MAX_BOXES);
+        let count = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
+        let boxes = (count > 0)
+            .then(|| Buffer::with_data(device, "trace filters", BufferUsage::STORAGE, &boxes))
+            .transpose()?;
+        Ok(Self {
+            boxes,
+            count,
+            liquids: Vec::new(),
+        })
+    }
+
+    /// As shaders read it, for an eye.
+    pub fn view(&self, eye: Vec3) -> TransportView {
+        let outside = |plane: &Vec4| plane.truncate().dot(eye) > plane.w;
+        let around = |liquid: &&Liquid| !liquid.planes.iter().any(outside);
+        TransportView {
+            filters: self.boxes.as_ref().map_or(0, Buffer::address),
+            eye_absorption: (self.liquids.iter().find(around)).map_or(Vec3::ZERO, |l| l.absorption),
+            filter_count: self.count,
+        }
+    }
+}
+
+/// The brushes of the world that a material fills.
+fn brushes(bsp: &Bsp, name: &str, absorption: Vec3) -> Vec<Liquid> {
+    let index = |i: i32| usize::try_from(i).ok();
+    let of_world = bsp.models.first().and_then(|world| {
+        let first = index(world.first_brush)?;
+        bsp.brushes
+            .get(first..first.checked_add(index(world.num_brushes)?)?)
+    });
+    of_world
+        .unwrap_or_default()
+        .iter()
+        .filter(|brush| {
+            let shader = index(brush.shader).and_then(|i| bsp.shaders.get(i));
+            shader.is_some_and(|s| s.name.eq_ignore_ascii_case(name))
+        })
+        .filter_map(|brush| {
+            let first = index(brush.first_side)?;
+            let sides = bsp
+                .brush_sides
+                .get(first..first.checked_add(index(brush.num_sides)?)?)?;
+            let planes: Vec<Vec4> = sides
+                .iter()
+                .filter_map(|side| bsp.planes.get(index(side.plane)?))
+                .map(|plane| plane.normal.extend(plane.dist))
+                .collect();
+            (planes.len() >= 4).then_some(Liquid { planes, absorption })
+        })
+        .collect()
+}
+
+/// At most `limit` boxes that hold all of these: neighbours along the longest axis are put together.
+fn merged(mut boxes: Vec<Corners>, limit: usize) -> Vec<Corners> {
+    boxes.retain(|b| b[0].is_finite() && b[1].is_finite());
+    if boxes.len() <= limit {
+        return boxes;
+    }
+    let join = |a: Corners, b: &Corners| [a[0].min(b[0]), a[1].max(b[1])];
+    let nothing = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+    let all = boxes.iter().fold(nothing, join);
+    let axis = (all[1] - all[0]).max_position();
+    let middle = |b: &Corners| b[0][axis] + b[1][axis];
+    boxes.sort_by(|a, b| middle(a).total_cmp(&middle(b)));
+    let share = boxes.len().div_ceil(limit);
+    (boxes.chunks(share))
+        .map(|part| part.iter().fold(nothing, join))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn merged_boxes_hold_every_one() {
+        let boxes: Vec<Corners> = (0..100)
+            .map(|i| {
+                let at = Vec3::new((i * 37 % 100) as f32 * 10.0, (i % 7) as f32, 0.0);
+                [at, at + 5.0]
+            })
+            .collect();
+        let few = merged(boxes.clone(), 16);
+        assert!(few.len() <= 16 && !few.is_empty());
+        for b in &boxes {
+            let holds = |f: &&Corners| f[0].cmple(b[0]).all() && f[1].cmpge(b[1]).all();
+            assert!(few.iter().find(holds).is_some(), "{b:?}");
+        }
+        // and are not around everything
+        assert!(few.iter().all(|f| f[1].x - f[0].x < 300.0));
+        assert_eq!(merged(boxes[..3].to_vec(), 16), boxes[..3]);
+    }
+}
