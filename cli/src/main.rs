@@ -4,7 +4,9 @@
 
 mod cameras;
 mod compare;
+mod estimators;
 mod info;
+mod lights;
 mod measure;
 mod render;
 mod table;
@@ -27,8 +29,12 @@ enum Command {
     Cameras(cameras::CamerasArgs),
     /// Tell how alike pictures of one view are
     Compare(compare::CompareArgs),
+    /// Compare the ways to choose lights: all of them have the same mean
+    Estimators(estimators::EstimatorsArgs),
     /// Tell what is in maps, and where their light comes from
     Info(info::InfoArgs),
+    /// Judge the light lists of maps by rays
+    Lights(lights::LightsArgs),
     /// Measure the traced look in real time against its reference
     Measure(measure::MeasureArgs),
     /// Make a picture of a map, without an engine or a display
@@ -39,7 +45,9 @@ fn main() -> anyhow::Result<()> {
     match Cli::parse().command {
         Command::Cameras(args) => cameras::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Estimators(args) => estimators::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Lights(args) => lights::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Render(args) => render::run(&args),
     }

@@ -14,7 +14,7 @@ const STACK: usize = 96;
 
 /// What a ray found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Hit {
+pub(crate) struct Hit {
     /// Distance along the ray, in lengths of its direction.
     pub t: f32,
     /// Whether it is sky.
@@ -49,7 +49,7 @@ struct Node {
 }
 
 /// Triangles that stop light, sorted into boxes.
-pub(super) struct Occluders {
+pub(crate) struct Occluders {
     nodes: Vec<Node>,
     triangles: Vec<Triangle>,
 }

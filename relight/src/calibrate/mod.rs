@@ -18,14 +18,14 @@
 
 mod apply;
 mod bounce;
-mod bvh;
+pub(crate) mod bvh;
 mod cache;
 mod columns;
-mod parallel;
+pub(crate) mod parallel;
 mod place;
-mod random;
+pub(crate) mod random;
 mod report;
-mod samples;
+pub(crate) mod samples;
 mod solve;
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 //! Work spread over the processor's cores. Threads end before the call does.
 
 /// `f` of every item, in order. The result does not depend on the number of threads.
-pub(super) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(usize, &T) -> R + Sync) -> Vec<R> {
+pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(usize, &T) -> R + Sync) -> Vec<R> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     // Several pieces for each thread, taken as threads get free: items differ in cost.
     let piece = items.len().div_ceil(threads * 8).max(1);

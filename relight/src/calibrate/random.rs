@@ -1,7 +1,7 @@
 //! A small random generator, so that one map gives one result everywhere.
 
 /// PCG-like: a 64-bit linear congruential generator, of which the high bits are used after a mix.
-pub(super) struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
     /// A generator of its own for every seed.

@@ -89,7 +89,7 @@ impl Evidence {
 
 /// Triangles that stop light when the compiler casts shadows: those of the world itself that are opaque. Tagged with
 /// their number.
-pub(super) fn occluders(world: &RelitWorld) -> Occluders {
+pub(crate) fn occluders(world: &RelitWorld) -> Occluders {
     let drawn = world.surfaces.iter().filter(|s| {
         let material = world.materials.get(s.material as usize);
         s.model == 0 && material.is_some_and(|m| m.is_sky() || stops_light(m))

@@ -221,8 +221,13 @@ impl<'a> Finder<'a> {
         mean.map_or(Vec3::ONE, normalise)
     }
 
+    /// The small copy of an image that was asked for before.
+    pub(super) fn kept(&self, name: &str) -> Option<&Image> {
+        self.images.get(name)?.as_ref()
+    }
+
     /// A small copy of an image, if there is one.
-    fn image(&mut self, name: &str) -> Option<&Image> {
+    pub(super) fn image(&mut self, name: &str) -> Option<&Image> {
         if !self.images.contains_key(name) {
             let loaded = image::load(self.files, name).unwrap_or_else(|problem| {
                 log::warn!("{problem}");

@@ -17,7 +17,7 @@ use std::collections::HashMap;
 /// every cluster. An entry below the number of triangle lights is an index of one of them; the others are
 /// point lights: see [`LightLists::light`]. Entries of a row ascend. Suns are in no list: they matter
 /// wherever the sky can be seen.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct LightLists {
     /// Start of every row in `lights`, and the end of the last: clusters + 2 values.
     pub offsets: Vec<u32>,
@@ -27,6 +27,25 @@ pub struct LightLists {
     pub triangle_lights: u32,
     /// For each cluster whether suns can reach it: see [`LightLists::sees_sky`].
     pub sky: Vec<bool>,
+    /// For each entry of `lights` what it gives to its row's cluster; empty before [`sweep`](super::sweep()).
+    pub shares: Vec<LightShare>,
+}
+
+/// What a light gives to a cluster.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightShare {
+    /// Light without shadows: mean irradiance / π, luminance. 0: not known.
+    pub bare: f32,
+    /// About which part of that arrives, above 0.
+    pub visible: f32,
+}
+
+impl LightShare {
+    /// Nothing is known.
+    pub const UNKNOWN: LightShare = LightShare {
+        bare: 0.0,
+        visible: 1.0,
+    };
 }
 
 /// What an entry of [`LightLists`] stands for.
@@ -39,6 +58,12 @@ pub enum LightRef {
 }
 
 impl LightLists {
+    /// What each entry of a [`row`](Self::row) gives to its cluster; empty where nothing is known.
+    pub fn shares(&self, cluster: i32) -> &[LightShare] {
+        let range = self.range(cluster);
+        self.shares.get(range).unwrap_or_default()
+    }
+
     /// Number of clusters; their rows come first.
     pub fn clusters(&self) -> usize {
         self.offsets.len().saturating_sub(2)
@@ -47,16 +72,18 @@ impl LightLists {
     /// The entries for a cluster, as [`Bsp::cluster_at`] gives it; all lights for -1 and for clusters
     /// that do not exist.
     pub fn row(&self, cluster: i32) -> &[u32] {
+        self.lights.get(self.range(cluster)).unwrap_or_default()
+    }
+
+    /// Where a row is in `lights`.
+    fn range(&self, cluster: i32) -> std::ops::Range<usize> {
         let row = usize::try_from(cluster)
             .ok()
             .filter(|&c| c < self.clusters())
             .unwrap_or(self.clusters());
         match self.offsets.get(row..row + 2) {
-            Some(&[start, end]) => self
-                .lights
-                .get(start as usize..end as usize)
-                .unwrap_or_default(),
-            _ => &[],
+            Some(&[start, end]) => start as usize..end as usize,
+            _ => 0..0,
         }
     }
 
@@ -218,12 +245,13 @@ impl Clusters {
         (0..self.sight.count()).map(|c| lit.contains(c)).collect()
     }
 
-    /// The lists of a map's lights. `is_sky` tells surfaces of sky.
+    /// The lists of a map's lights. `facing`: less what lies behind a light's plane; `is_sky` tells surfaces of sky.
     pub fn lists(
         &self,
         lights: &[TriangleLight],
         points: &[PointLight],
         surfaces: &[WorldSurface],
+        facing: bool,
         is_sky: impl Fn(&WorldSurface) -> bool,
     ) -> LightLists {
         let mut rows: Vec<Vec<u32>> = vec![Vec::new(); self.sight.count()];
@@ -242,7 +270,7 @@ impl Clusters {
             let lit = known
                 .entry(at)
                 .or_insert_with_key(|at| self.sight.lit_from(at));
-            for cluster in lit.iter().filter(|&c| self.faces(light, c)) {
+            for cluster in lit.iter().filter(|&c| !facing || self.faces(light, c)) {
                 if let Some(row) = rows.get_mut(cluster) {
                     row.push(entry);
                 }
@@ -266,6 +294,7 @@ impl Clusters {
             lights: Vec::new(),
             triangle_lights: lights.len() as u32,
             sky: self.sky(surfaces, is_sky),
+            shares: Vec::new(),
         };
         for row in rows {
             lists.lights.extend(row);
@@ -286,6 +315,7 @@ mod tests {
             lights: vec![0, 0, 1, 0, 1],
             triangle_lights: 1,
             sky: vec![true, false],
+            shares: Vec::new(),
         };
         assert!(lists.sees_sky(0) && !lists.sees_sky(1) && lists.sees_sky(-1));
         assert_eq!(lists.clusters(), 2);

@@ -45,16 +45,23 @@
 mod emission;
 mod entities;
 mod fallback;
+mod flicker;
 mod glow;
 mod lists;
 mod report;
 mod sight;
 mod surfaces;
+mod sweep;
 
 pub use emission::{Emission, EmissionSource, GLOW_THRESHOLD};
-pub use lists::{LightLists, LightRef};
+pub use flicker::Flicker;
+pub use lists::{LightLists, LightRef, LightShare};
 pub use report::{EmitterSummary, LightReport};
 pub use sight::{ClusterSet, Sight};
+pub use sweep::{
+    DROPPED_LEAST, DROPPED_PART, ListJudgement, SweepReport, judge, lists_by_geometry,
+    lists_by_visibility, sweep,
+};
 
 pub(crate) use emission::Finder;
 pub(crate) use entities::{ambient, light_entities};
@@ -65,14 +72,20 @@ pub(crate) use surfaces::{place, suns};
 use glam::Vec3;
 use std::f32::consts::PI;
 
-/// The light lists of a world as it is now.
-pub(crate) fn build_lists(world: &mut crate::world::RelitWorld) {
+/// The light lists of a world as it is now. `facing`: less what lies behind a light's plane.
+fn lists_of(world: &crate::world::RelitWorld, facing: bool) -> LightLists {
     let clusters = Clusters::new(&world.bsp);
     let sky = |s: &crate::world::WorldSurface| {
         let material = world.materials.get(s.material as usize);
         material.is_some_and(crate::world::WorldMaterial::is_sky)
     };
-    world.light_lists = clusters.lists(&world.lights, &world.point_lights, &world.surfaces, sky);
+    let (lights, points) = (&world.lights, &world.point_lights);
+    clusters.lists(lights, points, &world.surfaces, facing, sky)
+}
+
+/// Builds a world's light lists.
+pub(crate) fn build_lists(world: &mut crate::world::RelitWorld) {
+    world.light_lists = lists_of(world, true);
     world.report.clusters = world.light_lists.clusters();
     world.report.mean_list_length = world.light_lists.mean_length();
     world.report.longest_list = world.light_lists.longest();

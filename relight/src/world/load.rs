@@ -215,6 +215,9 @@ impl RelitWorld {
         if world.light_count() == 0 {
             light::rescue(&mut world, &mut finder);
         }
+        for material in &mut world.materials {
+            material.flicker = finder.flicker(material);
+        }
         world.sky = world.largest_sky();
 
         begin(Stage::LightLists);
@@ -298,6 +301,7 @@ fn resolve_materials(
                 resolved,
                 albedo: Vec3::ZERO,
                 emission: None,
+                flicker: None,
             });
             (list.len() - 1) as u32
         });

@@ -1,6 +1,6 @@
 //! Materials of a world: each combination of name, flags and lighting that its surfaces use.
 
-use crate::light::Emission;
+use crate::light::{Emission, Flicker};
 use crate::materials::Resolved;
 use glam::Vec3;
 use q3bsp::{Bsp, SurfaceKind, lightmap_index};
@@ -28,6 +28,8 @@ pub struct WorldMaterial {
     pub albedo: Vec3,
     /// Light that it emits; `None` for most.
     pub emission: Option<Emission>,
+    /// How that light changes in time; `None` for most.
+    pub flicker: Option<Flicker>,
 }
 
 impl WorldMaterial {

@@ -13,7 +13,7 @@ pub use load::{LoadError, Options, Progress, Stage};
 pub use material::WorldMaterial;
 
 use crate::calibrate::CalibrationReport;
-use crate::light::{LightLists, LightReport, PointLight, SunLight, TriangleLight};
+use crate::light::{Flicker, LightLists, LightReport, PointLight, SunLight, TriangleLight};
 use crate::overbright;
 use glam::Vec3;
 use q3bsp::Bsp;
@@ -87,6 +87,15 @@ impl RelitWorld {
                 .map_or(Vec3::ZERO, |v| v.position)
         };
         Some(std::array::from_fn(|k| position(&corners[k])))
+    }
+
+    /// How a light changes in time; `None` for most.
+    pub fn flicker_of(&self, light: &TriangleLight) -> Option<&Flicker> {
+        let surface = self.surfaces.get(light.surface as usize)?;
+        self.materials
+            .get(surface.material as usize)?
+            .flicker
+            .as_ref()
     }
 
     /// Number of light sources of all kinds.

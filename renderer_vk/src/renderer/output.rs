@@ -13,6 +13,7 @@ use crate::gpu::{ColorMask, Format, Recorder};
 use crate::raster::{self, Present};
 use crate::scene::Statistics;
 use crate::stereo::Eye;
+use crate::trace::TraceLook;
 
 /// Counts of one frame.
 #[derive(Clone, Copy, Debug, Default)]
@@ -289,5 +290,19 @@ impl Renderer {
             })
             .map(|v| table[usize::from(v)])
             .collect()
+    }
+
+    /// The linear picture of the last traced view before exposure, RGB in rows from the top; empty where nothing was
+    /// traced. Display white has radiance 1.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn read_radiance(&mut self) -> Result<Vec<[f32; 3]>, Error> {
+        self.flush(false)?;
+        let Some(hdr) = self.trace.as_ref().and_then(TraceLook::hdr) else {
+            return Ok(Vec::new());
+        };
+        let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&self.device.read_image(hdr)?);
+        Ok(texels.iter().map(|t| [t[0], t[1], t[2]]).collect())
     }
 }

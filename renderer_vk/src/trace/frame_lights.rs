@@ -1,5 +1,5 @@
-//! The lights of one view: the game's dynamic lights, the flashlight, emitting surfaces of brush models where these are
-//! now; and which clusters they can reach.
+//! The lights of one view: emitters that flicker, as bright as they are now; emitting surfaces of brush models where
+//! these are now; the game's dynamic lights; the flashlight; and which clusters they can reach.
 
 use std::f32::consts::PI;
 
@@ -9,7 +9,9 @@ use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
 use shaders::types::Instance;
 
-use super::lights::{MapLights, count, number, sphere, sphere_bounds, triangle_bounds};
+use super::lights::{
+    ChangingLight, MapLights, count, number, sphere, sphere_bounds, triangle_bounds,
+};
 use crate::api::DynamicLight;
 use crate::gpu::{Error, Recorder};
 use crate::scene::{View, ViewScene};
@@ -36,12 +38,12 @@ impl FrameLights {
         self.reach.push((light_number, sight.lit_from(&at)));
     }
 
-    /// The emitting triangles of a model.
+    /// The emitting triangles of a model. `scale_of`: what the radiance of a light is multiplied by.
     fn add_model(
         &mut self,
-        lights: &[t::TriangleLight],
+        lights: &[ChangingLight],
         instance: &Instance,
-        scale: f32,
+        scale_of: impl Fn(&ChangingLight) -> f32,
         sight: &Sight,
     ) {
         let place = |p: Vec3| {
@@ -51,7 +53,7 @@ impl FrameLights {
         let first = self.triangles.len();
         let (mut mins, mut maxs) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for light in lights {
-            let corners = light.corners.map(place);
+            let corners = light.light.corners.map(place);
             if !corners.iter().all(|p| p.is_finite()) {
                 continue;
             }
@@ -61,8 +63,8 @@ impl FrameLights {
             }
             self.triangles.push(t::TriangleLight {
                 corners,
-                radiance: light.radiance * scale,
-                flags: light.flags,
+                radiance: light.light.radiance * scale_of(light),
+                flags: light.light.flags,
             });
         }
         if self.triangles.len() == first {
@@ -128,12 +130,30 @@ impl MapLights {
         settings: &Settings,
     ) -> Result<t::LightView, Error> {
         let scale = settings.rt_light_scale.max(0.0);
-        let mut frame = FrameLights::default();
+        // the engine's own time, in which its stages change
+        let time = f64::from(view.time);
+        let flickers: Vec<f32> = self.flickers.iter().map(|f| f.scale(time)).collect();
+        let scale_of = |light: &ChangingLight| {
+            let flicker: Option<&f32> = light.flicker.and_then(|f| flickers.get(f));
+            scale * flicker.copied().unwrap_or(1.0)
+        };
+        let mut frame = FrameLights {
+            // the lists name them by their place: they come first, and all of them
+            triangles: self
+                .changing
+                .iter()
+                .map(|changing| t::TriangleLight {
+                    radiance: changing.light.radiance * scale_of(changing),
+                    ..changing.light
+                })
+                .collect(),
+            ..FrameLights::default()
+        };
         for submodel in &view.submodels {
             let lights = self.moving.iter().find(|(m, _)| *m == submodel.model);
             let instance = view.instances.get(submodel.instance as usize);
             if let (Some((_, lights)), Some(instance)) = (lights, instance) {
-                frame.add_model(lights, instance, scale, &self.sight);
+                frame.add_model(lights, instance, scale_of, &self.sight);
             }
         }
         if settings.dynamic_light {
@@ -145,14 +165,16 @@ impl MapLights {
             frame.add_sphere(flashlight(&view.view), &self.sight);
         }
         let mut lights = self.fixed();
+        let arena = rec.arena();
+        if !frame.triangles.is_empty() {
+            let bounds: Vec<_> = frame.triangles.iter().map(triangle_bounds).collect();
+            lights.triangles[1] = arena.push(&frame.triangles)?;
+            lights.bounds[1] = arena.push(&bounds)?;
+        }
         if !frame.reach.is_empty() {
             let (rows, entries) = frame.rows(self.sight.count());
-            let bounds: Vec<_> = frame.triangles.iter().map(triangle_bounds).collect();
             let sphere_bounds: Vec<_> = frame.spheres.iter().map(sphere_bounds).collect();
-            let arena = rec.arena();
-            lights.triangles[1] = arena.push(&frame.triangles)?;
             lights.spheres[1] = arena.push(&frame.spheres)?;
-            lights.bounds[1] = arena.push(&bounds)?;
             lights.bounds[3] = arena.push(&sphere_bounds)?;
             lights.dynamic_rows = arena.push(&rows)?;
             lights.dynamic_lights = arena.push(&entries)?;

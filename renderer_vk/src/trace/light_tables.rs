@@ -111,6 +111,10 @@ pub fn luminance(c: Vec3) -> f32 {
     c.dot(Vec3::new(0.2126, 0.7152, 0.0722)).max(0.0)
 }
 
+/// Irradiance over pi of a surface for power over squared distance: one over pi times the mean cosine of surfaces that
+/// may face any way.
+const USUAL: f32 = 0.25 / std::f32::consts::PI;
+
 /// About how much light a triangle brings to a cluster (middle and half diagonal); without one its power.
 pub fn triangle_weight(light: &TriangleLight, cluster: Option<(Vec3, f32)>) -> f32 {
     let [a, b, c] = light.vertices;
@@ -124,12 +128,12 @@ pub fn triangle_weight(light: &TriangleLight, cluster: Option<(Vec3, f32)>) -> f
         }
         _ => 1.0,
     };
-    luminance(light.radiance) * area * facing / squared_distance(middle, area, cluster)
+    USUAL * luminance(light.radiance) * area * facing / squared_distance(middle, area, cluster)
 }
 
 /// About how much light a point light brings to a cluster; without one its power.
 pub fn point_weight(light: &PointLight, cluster: Option<(Vec3, f32)>) -> f32 {
-    luminance(light.intensity)
+    USUAL * luminance(light.intensity)
         / squared_distance(light.origin, light.radius * light.radius, cluster)
 }
 

@@ -4,7 +4,9 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 use q3bsp::Bsp;
-use relight::light::{LightLists, LightRef, PointLight, Sight, SunLight, TriangleLight};
+use relight::light::{
+    Flicker, LightLists, LightRef, LightShare, PointLight, Sight, SunLight, TriangleLight,
+};
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
 
@@ -28,10 +30,23 @@ pub struct MapLights {
     fixed: t::LightView,
     /// Which cluster sees which.
     pub(super) sight: Sight,
+    /// Lights of the world that change in time.
+    pub(super) changing: Vec<ChangingLight>,
     /// Lights of brush models, in the models' space, by model.
-    pub(super) moving: Vec<(u32, Vec<t::TriangleLight>)>,
+    pub(super) moving: Vec<(u32, Vec<ChangingLight>)>,
+    /// How lights change, each way once.
+    pub(super) flickers: Vec<Flicker>,
     /// Radiance of a white diffuse surface in the light that is everywhere.
     pub ambient: Vec3,
+}
+
+/// A light that each view has in its own form.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ChangingLight {
+    /// As it is in the mean, in the space of its model.
+    pub light: t::TriangleLight,
+    /// Index of how it changes in time.
+    pub flicker: Option<usize>,
 }
 
 /// A map's lights as the loader found them.
@@ -45,6 +60,8 @@ pub struct MapLightSource<'a> {
     pub suns: &'a [SunLight],
     /// Lists; entries below the number of triangle lights are triangle lights, the others point lights.
     pub lists: &'a LightLists,
+    /// For each triangle light how it changes in time; lights without an entry do not.
+    pub flickers: &'a [Option<&'a Flicker>],
     /// Where the map's entities put each brush model at start; triangle lights are there.
     pub model_origins: &'a [Vec3],
     /// Radiance of the even light from everywhere.
@@ -147,21 +164,44 @@ impl MapLights {
     pub fn new(device: &Device, source: &MapLightSource<'_>) -> Result<Self, Error> {
         let storage = BufferUsage::STORAGE;
         let mut triangles: Vec<t::TriangleLight> = Vec::new();
-        let mut moving: Vec<(u32, Vec<t::TriangleLight>)> = Vec::new();
+        let mut changing: Vec<ChangingLight> = Vec::new();
+        let mut moving: Vec<(u32, Vec<ChangingLight>)> = Vec::new();
+        let mut flickers: Vec<Flicker> = Vec::new();
         // what a list's entry is called here; lights of brush models are in no list
         let mut numbers = Vec::with_capacity(source.triangles.len());
-        for light in source.triangles {
+        for (index, light) in source.triangles.iter().enumerate() {
+            let known = source.flickers.get(index).copied().flatten();
+            let flicker = known.map(|flicker| {
+                let at = flickers.iter().position(|f| f == flicker);
+                at.unwrap_or_else(|| {
+                    flickers.push(flicker.clone());
+                    flickers.len() - 1
+                })
+            });
             if light.model == 0 {
-                numbers.push(Some(number(c::LIGHT_TRIANGLE, triangles.len())));
-                triangles.push(triangle_light(light, Vec3::ZERO));
+                let placed = triangle_light(light, Vec3::ZERO);
+                if flicker.is_some() {
+                    let light = number(c::LIGHT_CHANGING_TRIANGLE, changing.len());
+                    numbers.push(Some(light));
+                    changing.push(ChangingLight {
+                        light: placed,
+                        flicker,
+                    });
+                } else {
+                    numbers.push(Some(number(c::LIGHT_TRIANGLE, triangles.len())));
+                    triangles.push(placed);
+                }
                 continue;
             }
             numbers.push(None);
             let origin = source.model_origins.get(light.model as usize);
-            let placed = triangle_light(light, origin.copied().unwrap_or(Vec3::ZERO));
+            let light_of_model = ChangingLight {
+                light: triangle_light(light, origin.copied().unwrap_or(Vec3::ZERO)),
+                flicker,
+            };
             match moving.iter_mut().find(|(model, _)| *model == light.model) {
-                Some((_, lights)) => lights.push(placed),
-                None => moving.push((light.model, vec![placed])),
+                Some((_, lights)) => lights.push(light_of_model),
+                None => moving.push((light.model, vec![light_of_model])),
             }
         }
         let spheres: Vec<t::SphereLight> = source.points.iter().map(point_light).collect();
@@ -205,7 +245,9 @@ impl MapLights {
                 ..t::LightView::default()
             },
             sight: source.bsp.map(Sight::new).unwrap_or_default(),
+            changing,
             moving,
+            flickers,
             ambient: source.ambient,
         };
         lights.fixed.triangles = [lights.triangles.address(), 0];
@@ -234,6 +276,7 @@ impl MapLights {
             points: &[],
             suns: &[],
             lists: &LightLists::default(),
+            flickers: &[],
             model_origins: &[],
             ambient: Vec3::ZERO,
             bsp: None,
@@ -263,8 +306,9 @@ fn tables(
         let ball = balls.as_ref().and_then(|b| b.get(row).copied().flatten());
         entries.clear();
         let listed = lists.row(cluster.unwrap_or(-1)).iter();
-        entries.extend(listed.filter_map(|&entry| {
-            let (light, weight) = match lists.light(entry) {
+        let shares = lists.shares(cluster.unwrap_or(-1));
+        entries.extend(listed.enumerate().filter_map(|(i, &entry)| {
+            let (light, guess) = match lists.light(entry) {
                 LightRef::Triangle(i) => (
                     numbers.get(i as usize).copied().flatten()?,
                     triangle_weight(source.triangles.get(i as usize)?, ball),
@@ -274,10 +318,11 @@ fn tables(
                     point_weight(source.points.get(i as usize)?, ball),
                 ),
             };
+            let share = shares.get(i).copied().unwrap_or(LightShare::UNKNOWN);
             Some(Entry {
                 light,
-                weight,
-                visibility: 1.0,
+                weight: if share.bare > 0.0 { share.bare } else { guess },
+                visibility: share.visible,
             })
         }));
         rows.push(t::LightRow {

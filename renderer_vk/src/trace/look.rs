@@ -129,11 +129,13 @@ impl TraceLook {
     ) -> Result<Self, Error> {
         let relit = &world.data.relit;
         let model_origins: Vec<_> = relit.models.iter().map(|m| m.origin).collect();
+        let flickers: Vec<_> = relit.lights.iter().map(|l| relit.flicker_of(l)).collect();
         let source = MapLightSource {
             triangles: &relit.lights,
             points: &relit.point_lights,
             suns: &relit.suns,
             lists: &relit.light_lists,
+            flickers: &flickers,
             model_origins: &model_origins,
             ambient: relit.ambient,
             bsp: Some(&relit.bsp),

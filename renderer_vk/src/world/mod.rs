@@ -316,6 +316,14 @@ impl World {
             relit.name,
             report.seconds
         );
+        let swept = relight::light::sweep(relit);
+        log::info!(
+            "{}: lists of lights swept by rays in {:.1} s, {} entries of {} left",
+            relit.name,
+            swept.seconds,
+            swept.entries[1],
+            swept.entries[0]
+        );
         for (surface, stored) in self.data.surfaces.iter().zip(&self.data.relit.surfaces) {
             load::mark_emitter(
                 &self.data.relit,

@@ -621,12 +621,14 @@ impl Scene {
             lights: all,
             triangle_lights: self.lights.len() as u32,
             sky: Vec::new(),
+            shares: Vec::new(),
         };
         let source = MapLightSource {
             triangles: &self.lights,
             points: &self.points,
             suns: &self.suns,
             lists: self.tree.as_ref().map_or(&lists, |t| &t.1),
+            flickers: &[],
             model_origins: &[],
             ambient: self.ambient,
             bsp: self.tree.as_ref().map(|t| &t.0),

@@ -446,6 +446,7 @@ fn a_point_is_lit_by_the_list_of_its_cluster_with(gpu: &mut Gpu) {
         lights,
         triangle_lights: 2,
         sky: Vec::new(),
+        shares: Vec::new(),
     };
     scene.tree = Some((bsp, lists));
     for sampling in ALL {

@@ -1,0 +1,274 @@
+//! `relight estimators`: whether every way to choose lights comes to the same picture, and how noisy each one is.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use renderer_vk::api::RefEntity;
+use renderer_vk::{LightSelection, Renderer, RendererOptions, Settings};
+use serde_json::{Value, json};
+
+use crate::render::parse_size;
+use crate::view::{Camera, map_entities, open};
+
+/// Compare the ways to choose lights: all of them have the same mean
+///
+/// Renders a view with every light of the list for each point (the reference), with one light chosen uniformly, with
+/// one chosen by importance, and with every light of the map; then prints for each the relative difference of the whole
+/// picture and of the worst square of 16 x 16 pixels from the reference, how many standard errors these are (noise
+/// stays below 4 or 5, bias grows with the frames), and the noise of a frame. A square darker than a hundredth of the picture is measured against that.
+///
+/// Example: relight estimators oa_dm1 --frames 4096 --size 512x384
+#[derive(Args, Debug)]
+pub struct EstimatorsArgs {
+    /// Maps by name
+    #[arg(required = true)]
+    maps: Vec<String>,
+    /// Game folder with packs; give several in rising priority
+    #[arg(
+        long = "game",
+        value_name = "DIR",
+        default_value = "/usr/share/games/openarena/baseoa"
+    )]
+    games: Vec<PathBuf>,
+    /// Frames of each estimator
+    #[arg(long, default_value_t = 4096)]
+    frames: u32,
+    /// Frames of the reference; default: a sixteenth of the others', at least 16
+    #[arg(long)]
+    reference: Option<u32>,
+    /// Size in pixels
+    #[arg(long, default_value = "512x384", value_parser = parse_size)]
+    size: (u32, u32),
+    /// Diffuse bounces
+    #[arg(long, default_value_t = 0)]
+    bounces: u32,
+    /// Candidates of resampled selection
+    #[arg(long)]
+    candidates: Option<u32>,
+    /// Leave out the pictures lit by every light of the map
+    #[arg(long)]
+    no_unculled: bool,
+    /// Camera: X Y Z YAW PITCH; default: the map's intermission or first spawn point
+    #[arg(long, num_args = 4..=5, allow_negative_numbers = true, value_names = ["X", "Y", "Z", "YAW", "PITCH"])]
+    camera: Option<Vec<f32>>,
+    /// Vulkan device: part of its name
+    #[arg(long)]
+    device: Option<String>,
+}
+
+/// Side of the squares that are compared.
+const TILE: usize = 16;
+
+/// Frames after which the noise is taken.
+const NOISE_FRAMES: u32 = 16;
+
+/// A picture: linear RGB.
+type Picture = Vec<[f32; 3]>;
+
+struct Stage {
+    renderer: Renderer,
+    entities: Vec<RefEntity>,
+    camera: Camera,
+    size: (u32, u32),
+}
+
+impl Stage {
+    /// The mean of `frames` frames, the mean of the first few, and the median milliseconds of the pass for direct light.
+    fn render(
+        &mut self,
+        name: &str,
+        settings: &Settings,
+        frames: u32,
+    ) -> Result<(Picture, Picture, f32)> {
+        let bar = ProgressBar::new(frames.into());
+        bar.set_style(ProgressStyle::with_template(
+            "{msg} {bar:40} {pos}/{len} frames, {eta} left",
+        )?);
+        bar.set_message(name.to_owned());
+        self.renderer.set_settings(settings);
+        let mut early = None;
+        let mut times = Vec::new();
+        for frame in 1..=frames {
+            self.renderer.begin_frame(0);
+            self.renderer.clear_scene();
+            for entity in &self.entities {
+                self.renderer.add_entity(entity);
+            }
+            self.renderer
+                .render_scene(&self.camera.ref_def(self.size, 90.0))?;
+            self.renderer.end_frame()?;
+            if frame == NOISE_FRAMES.min(frames) {
+                early = Some(self.renderer.read_radiance()?);
+            }
+            let passes = self.renderer.timings();
+            times.extend(passes.iter().find(|p| p.0.contains("direct")).map(|p| p.1));
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        times.sort_by(f32::total_cmp);
+        let mean = self.renderer.read_radiance()?;
+        let time = times.get(times.len() / 2).copied().unwrap_or(0.0);
+        Ok((mean, early.unwrap_or_default(), time))
+    }
+}
+
+fn level(p: &[f32; 3]) -> f64 {
+    f64::from(p[0] + p[1] + p[2]) / 3.0
+}
+
+/// Mean relative difference and how many standard errors that is, of the picture and of the worst square.
+fn compare(picture: &Picture, truth: &Picture, width: usize) -> Value {
+    let mean = truth.iter().map(level).sum::<f64>() / truth.len().max(1) as f64;
+    let floor = (mean * 0.01).max(1.0e-9);
+    // the difference of means over that of the reference; pixels are independent, so the squares of their differences
+    // tell the standard error of the sum
+    let score = |pixels: &mut dyn Iterator<Item = (&[f32; 3], &[f32; 3])>| {
+        let (mut sum, mut squares, mut light, mut count) = (0.0, 0.0, 0.0, 0.0f64);
+        for (a, b) in pixels {
+            let d = level(a) - level(b);
+            sum += d;
+            squares += d * d;
+            light += level(b);
+            count += 1.0;
+        }
+        let relative = sum / light.max(floor * count);
+        let errors = if squares > 0.0 {
+            sum / squares.sqrt()
+        } else {
+            0.0
+        };
+        (relative.abs(), errors.abs())
+    };
+    let all = score(&mut picture.iter().zip(truth));
+    let height = truth.len() / width.max(1);
+    let mut tiles = Vec::new();
+    for y in (0..height).step_by(TILE) {
+        for x in (0..width).step_by(TILE) {
+            let mut pixels = (y..(y + TILE).min(height)).flat_map(|row| {
+                let range = row * width + x..row * width + (x + TILE).min(width);
+                let rows = picture.get(range.clone()).zip(truth.get(range));
+                rows.into_iter().flat_map(|(a, b)| a.iter().zip(b))
+            });
+            tiles.push((score(&mut pixels), (x, y)));
+        }
+    }
+    let worst = tiles.iter().max_by(|a, b| a.0.0.total_cmp(&b.0.0));
+    let strangest = tiles.iter().map(|t| t.0.1).fold(0.0, f64::max);
+    let mean_tile = tiles.iter().map(|t| t.0.0).sum::<f64>() / tiles.len().max(1) as f64;
+    json!({
+        "difference": all.0,
+        "standard_errors": all.1,
+        "mean_tile_difference": mean_tile,
+        "worst_tile_difference": worst.map_or(0.0, |w| w.0.0),
+        "worst_tile": worst.map(|w| [w.1.0, w.1.1]),
+        "worst_tile_standard_errors": strangest,
+    })
+}
+
+/// Mean squared error of a frame over the squared mean of the picture, from the mean of some frames.
+fn noise(early: &Picture, truth: &Picture, frames: u32) -> f64 {
+    let mean = truth.iter().map(level).sum::<f64>() / truth.len().max(1) as f64;
+    let squares = early
+        .iter()
+        .zip(truth)
+        .map(|(a, b)| (level(a) - level(b)).powi(2));
+    squares.sum::<f64>() / truth.len().max(1) as f64 * f64::from(frames) / (mean * mean).max(1e-18)
+}
+
+/// Runs the command: one JSON object a map and estimator.
+pub fn run(args: &EstimatorsArgs) -> Result<()> {
+    for map in &args.maps {
+        let (files, map) = open(map, &args.games)?;
+        let base = Settings {
+            rt: true,
+            rt_accumulate: true,
+            rt_bounces: args.bounces,
+            rt_auto_exposure: false,
+            // what differs is to be the light alone
+            rt_antialiasing: false,
+            rt_num_random_dl: 1,
+            rt_candidates: args.candidates.unwrap_or(Settings::default().rt_candidates),
+            ..Settings::default()
+        };
+        let (width, height) = args.size;
+        let mut renderer = Renderer::new(RendererOptions {
+            width,
+            height,
+            window: None,
+            validation: false,
+            device: args.device.clone(),
+            vsync: false,
+        })
+        .context("no picture without a Vulkan device")?;
+        renderer.begin_registration(files, &base)?;
+        renderer.load_world(&map)?;
+        renderer.end_registration();
+        let bsp = renderer.world().map(|w| w.relit.bsp.clone());
+        let bsp = bsp.context("no map")?;
+        let entities = map_entities(&mut renderer, &bsp);
+        let camera = match args.camera.as_deref() {
+            Some([x, y, z, yaw, rest @ ..]) => Camera {
+                origin: glam::Vec3::new(*x, *y, *z),
+                yaw: *yaw,
+                pitch: rest.first().copied().unwrap_or(0.0),
+            },
+            _ => Camera::of_map(&bsp)
+                .context("the map has no place to look from; give one with --camera")?,
+        };
+        let mut stage = Stage {
+            renderer,
+            entities,
+            camera,
+            size: args.size,
+        };
+        let all = Settings {
+            rt_num_random_dl: 0,
+            ..base.clone()
+        };
+        let reference = args.reference.unwrap_or((args.frames / 16).max(16));
+        let (truth, early, time) = stage.render(&format!("{map} all"), &all, reference)?;
+        let print = |name: &str, time: f32, frames: u32, picture: &Picture, early: &Picture| {
+            let mut line = compare(picture, &truth, width as usize);
+            line["map"] = json!(map);
+            line["estimator"] = json!(name);
+            line["frames"] = json!(frames);
+            line["direct_ms"] = json!(time);
+            line["noise_of_a_frame"] = json!(noise(early, &truth, NOISE_FRAMES.min(frames)));
+            println!("{line}");
+        };
+        print("all", time, reference, &truth, &early);
+        let with = |selection, cull, lights| Settings {
+            rt_light_selection: selection,
+            rt_cull_lights: cull,
+            rt_num_random_dl: lights,
+            ..base.clone()
+        };
+        let mut ways = vec![
+            (
+                "uniform",
+                with(LightSelection::Uniform, true, 1),
+                args.frames,
+            ),
+            (
+                "resampled",
+                with(LightSelection::Resampled, true, 1),
+                args.frames,
+            ),
+        ];
+        if !args.no_unculled {
+            ways.push((
+                "all, not culled",
+                with(LightSelection::Resampled, false, 0),
+                reference,
+            ));
+        }
+        for (name, settings, frames) in ways {
+            let (picture, early, time) =
+                stage.render(&format!("{map} {name}"), &settings, frames)?;
+            print(name, time, frames, &picture, &early);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,90 @@
+//! `relight lights`: how good maps' light lists are, judged by rays.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::Result;
+use clap::Args;
+use relight::light::{LightLists, judge, lists_by_geometry, lists_by_visibility, sweep};
+use relight::{CalibrationOptions, Materials, Options, RelitWorld};
+use serde_json::json;
+
+use crate::view::open;
+
+/// Judge the light lists of maps by rays
+///
+/// A pair of a light and a visibility cluster is visible when a ray from some point of the cluster to some point of the
+/// light arrives. Prints for lists from the potentially visible sets alone, with geometry, and swept by rays: recall
+/// (visible pairs that are listed, of all visible ones), precision (visible pairs, of those listed), the part of all
+/// arriving light that listed lights give, and the lists' lengths. The rays are others than those that the lists were
+/// swept with.
+///
+/// Example: relight lights oa_dm1 kaos2 --rays 256
+#[derive(Args, Debug)]
+pub struct LightsArgs {
+    /// Maps by name
+    #[arg(required = true)]
+    maps: Vec<String>,
+    /// Game folder with packs; give several in rising priority
+    #[arg(
+        long = "game",
+        value_name = "DIR",
+        default_value = "/usr/share/games/openarena/baseoa"
+    )]
+    games: Vec<PathBuf>,
+    /// Rays for a pair of light and cluster
+    #[arg(long, default_value_t = 128)]
+    rays: u32,
+    /// Clusters that are judged; they are spread evenly over the map's list
+    #[arg(long, default_value_t = 64)]
+    clusters: usize,
+    /// Do not fit lights to the map's lightmaps first (the game does)
+    #[arg(long)]
+    no_calibration: bool,
+}
+
+/// Runs the command: one JSON object a map and kind of list.
+pub fn run(args: &LightsArgs) -> Result<()> {
+    for map in &args.maps {
+        let (files, map) = open(map, &args.games)?;
+        let (materials, _) = Materials::load(&*files);
+        let options = Options {
+            calibrate: (!args.no_calibration).then(CalibrationOptions::default),
+            ..Options::default()
+        };
+        let mut world = RelitWorld::load(&*files, &materials, &map, options)?;
+        let begin = Instant::now();
+        let visible = lists_by_visibility(&world);
+        let visible_seconds = begin.elapsed().as_secs_f64();
+        let begin = Instant::now();
+        let geometric = lists_by_geometry(&world);
+        let geometric_seconds = begin.elapsed().as_secs_f64();
+        let swept = sweep(&mut world);
+        let lists: [(&str, &LightLists, f64); 3] = [
+            ("pvs", &visible, visible_seconds),
+            ("pvs+geometry", &geometric, geometric_seconds),
+            ("pvs+geometry+rays", &world.light_lists, swept.seconds),
+        ];
+        let clusters = world.light_lists.clusters();
+        let step = clusters.div_ceil(args.clusters.max(1));
+        let judged = judge(&world, &lists.map(|l| l.1), args.rays, step);
+        for ((name, lists, seconds), judged) in lists.iter().zip(judged) {
+            let line = json!({
+                "map": map,
+                "lists": name,
+                "lights": world.lights.len() + world.point_lights.len(),
+                "clusters": clusters,
+                "recall": judged.recall(),
+                "precision": judged.precision(),
+                "light_found": judged.light_found,
+                "mean_length": lists.mean_length(),
+                "longest": lists.longest(),
+                "seconds": seconds,
+                "pairs_judged": judged.pairs,
+                "pairs_visible": judged.visible,
+            });
+            println!("{line}");
+        }
+    }
+    Ok(())
+}

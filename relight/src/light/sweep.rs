@@ -1,0 +1,564 @@
+//! Shadow rays at load: how much of each light arrives in each cluster of its lists.
+//!
+//! Points of a cluster (of its surfaces, and some in the open for what moves) look at random points of each light of
+//! the cluster's list. What comes out is two numbers for each pair: the light that the cluster would get without
+//! shadows, and the part of it that arrives. They make good chances for picking lights, and tell which lights can be
+//! left out.
+//!
+//! # What is left out
+//!
+//! A light is left out of a cluster's list only if none of its rays arrived, and only as long as all that is left out
+//! of the list together stays below [`DROPPED_PART`] of the light that does arrive there. Of a light that none of n
+//! rays found, less than 3 / n arrives, with a confidence of 95 % (the "rule of three": (1 - 3 / n)^n is about 5 %),
+//! so 3 / n of its unshadowed light is what it is charged with. Strong lights that no ray found stay in the list with a
+//! small chance, and the estimators stay as unbiased as they are without sweeping, but for that part.
+
+use super::{LightRef, PointLight, TriangleLight};
+use crate::calibrate::bvh::Occluders;
+use crate::calibrate::random::Random;
+use crate::calibrate::{parallel, samples};
+use crate::world::RelitWorld;
+use glam::Vec3;
+use std::f32::consts::PI;
+use std::time::Instant;
+
+/// Part of a cluster's light that may be left out of its list. The step of a display in sRGB from one code to the next
+/// is about 2.4 / (code + 14) of the light: 0.9 % at the bright end and more below. This is half of it at the most.
+pub const DROPPED_PART: f32 = 0.004;
+
+/// Light (irradiance / π, luminance) that may be left out of a dark cluster's list: a tenth of the first display code.
+pub const DROPPED_LEAST: f32 = 3.0e-5;
+
+/// Points of a cluster on surfaces, and in the open.
+const ON_SURFACES: usize = 24;
+const IN_THE_OPEN: usize = 8;
+
+/// Rays after which a light that was seen is known well enough.
+const ENOUGH: u32 = 6;
+
+/// Most rays for a pair of light and cluster.
+const MOST: u32 = 48;
+
+/// Fewest, on maps of so many pairs that [`BUDGET`] would leave less.
+const FEWEST: u32 = 8;
+
+/// Rays for a map: a second or two on a processor of eight cores.
+const BUDGET: usize = 24_000_000;
+
+/// How far off its surface a point lies, id units.
+const LIFT: f32 = 0.5;
+
+/// A place where light is gathered.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Receiver {
+    pub position: Vec3,
+    /// Unit normal; zero in the open.
+    pub normal: Vec3,
+}
+
+/// What sweeping did.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SweepReport {
+    /// Entries of the clusters' lists before and after.
+    pub entries: [usize; 2],
+    /// Clusters without a point to look from; their lists stay.
+    pub unseen: usize,
+    /// Seconds.
+    pub seconds: f64,
+}
+
+/// Points of each cluster: random ones on what is drawn there, and in the open.
+pub(super) fn receivers(
+    world: &RelitWorld,
+    clusters: usize,
+    on_surfaces: usize,
+    in_the_open: usize,
+    seed: u64,
+) -> Vec<Vec<Receiver>> {
+    let bsp = &world.bsp;
+    let mut surfaces: Vec<Vec<u32>> = vec![Vec::new(); clusters];
+    let mut boxes: Vec<Vec<(Vec3, Vec3)>> = vec![Vec::new(); clusters];
+    for leaf in bsp.tree_leafs() {
+        let Some(leaf) = bsp.leafs.get(leaf) else {
+            continue;
+        };
+        let Ok(cluster) = usize::try_from(leaf.cluster) else {
+            continue;
+        };
+        let (Some(surfaces), Some(boxes)) = (surfaces.get_mut(cluster), boxes.get_mut(cluster))
+        else {
+            continue;
+        };
+        let corner = |c: [i32; 3]| Vec3::from_array(c.map(|v| v as f32));
+        boxes.push((corner(leaf.mins), corner(leaf.maxs)));
+        let listed = bsp.leaf_surface_indices(leaf).iter();
+        surfaces.extend(listed.filter_map(|&s| u32::try_from(s).ok()));
+    }
+    let rooms: Vec<_> = surfaces.into_iter().zip(boxes).collect();
+    parallel::map(&rooms, |cluster, (surfaces, boxes)| {
+        let mut random = Random::new(seed ^ (cluster as u64) << 8);
+        let inside = |p: Vec3| usize::try_from(bsp.cluster_at(p)).is_ok_and(|c| c == cluster);
+        let mut points = on_drawn(world, surfaces, boxes, on_surfaces, &mut random, inside);
+        // where nothing is drawn, more in the open
+        let open = in_the_open.max((on_surfaces + in_the_open - points.len()) / 2);
+        in_boxes(boxes, open, &mut random, inside, &mut points);
+        points
+    })
+}
+
+/// Points on the surfaces of a cluster, evenly over the area that lies in its leafs' boxes, as nearly as a few tries do.
+fn on_drawn(
+    world: &RelitWorld,
+    surfaces: &[u32],
+    boxes: &[(Vec3, Vec3)],
+    count: usize,
+    random: &mut Random,
+    inside: impl Fn(Vec3) -> bool,
+) -> Vec<Receiver> {
+    let mut listed = surfaces.to_vec();
+    listed.sort_unstable();
+    listed.dedup();
+    let mut triangles = Vec::new();
+    let mut total = 0.0f32;
+    for index in listed {
+        let Some(surface) = world.surfaces.get(index as usize) else {
+            continue;
+        };
+        let first = surface.first_index as usize / 3;
+        for triangle in first..first + surface.num_indices as usize / 3 {
+            let Some([a, b, c]) = world.triangle(triangle) else {
+                continue;
+            };
+            let (mins, maxs) = (a.min(b).min(c), a.max(b).max(c));
+            // only what may lie here
+            let touches = |(low, high): &(Vec3, Vec3)| {
+                mins.cmple(*high + 1.0).all() && maxs.cmpge(*low - 1.0).all()
+            };
+            let area = (b - a).cross(c - a).length() * 0.5;
+            if area > 0.0 && area.is_finite() && boxes.iter().any(touches) {
+                total += area;
+                triangles.push((total, [a, b, c]));
+            }
+        }
+    }
+    let mut points = Vec::with_capacity(count);
+    if triangles.is_empty() {
+        return points;
+    }
+    for _ in 0..count * 8 {
+        if points.len() == count {
+            break;
+        }
+        let at = random.next() * total;
+        let found = triangles
+            .partition_point(|(end, _)| *end <= at)
+            .min(triangles.len() - 1);
+        let Some(&(_, [a, b, c])) = triangles.get(found) else {
+            break;
+        };
+        let (u, v) = random.in_triangle();
+        // fronts are clockwise
+        let normal = (c - a).cross(b - a).normalize_or_zero();
+        let on = a + (b - a) * u + (c - a) * v;
+        // as the shaders look for it
+        if inside(on + normal) {
+            points.push(Receiver {
+                position: on + normal * LIFT,
+                normal,
+            });
+        }
+    }
+    points
+}
+
+/// Points in the open.
+fn in_boxes(
+    boxes: &[(Vec3, Vec3)],
+    count: usize,
+    random: &mut Random,
+    inside: impl Fn(Vec3) -> bool,
+    points: &mut Vec<Receiver>,
+) {
+    let wanted = points.len() + count;
+    for attempt in 0..count * 8 {
+        if points.len() >= wanted || boxes.is_empty() {
+            break;
+        }
+        let Some(&(low, high)) = boxes.get(attempt % boxes.len()) else {
+            break;
+        };
+        let at = Vec3::new(random.next(), random.next(), random.next());
+        let position = low + (high - low) * at;
+        if inside(position) {
+            points.push(Receiver {
+                position,
+                normal: Vec3::ZERO,
+            });
+        }
+    }
+}
+
+/// Luminance of linear Rec. 709 colours.
+fn luminance(color: Vec3) -> f32 {
+    super::emission::luminance(color).max(0.0)
+}
+
+/// A light as rays see it.
+pub(super) enum Target<'a> {
+    Triangle(&'a TriangleLight),
+    Point(&'a PointLight),
+}
+
+impl<'a> Target<'a> {
+    pub fn of(world: &'a RelitWorld, entry: u32) -> Option<Self> {
+        match world.light_lists.light(entry) {
+            LightRef::Triangle(i) => world.lights.get(i as usize).map(Target::Triangle),
+            LightRef::Point(i) => world.point_lights.get(i as usize).map(Target::Point),
+        }
+    }
+
+    /// A random point of it, and what it would give to a receiver if all of it were there, without shadows: irradiance
+    /// / π, luminance.
+    pub fn sample(&self, receiver: &Receiver, random: &mut Random) -> (Vec3, f32) {
+        let cosine = |to: Vec3| {
+            if receiver.normal == Vec3::ZERO {
+                // a surface in the open may face any way
+                0.25
+            } else {
+                receiver.normal.dot(to).max(0.0)
+            }
+        };
+        match self {
+            Target::Triangle(light) => {
+                let [a, b, c] = light.vertices;
+                let (u, v) = random.in_triangle();
+                let point = a + (b - a) * u + (c - a) * v;
+                let offset = point - receiver.position;
+                let area = light.area();
+                let squared = offset.length_squared().max(area * 0.05).max(1.0);
+                let to = offset.normalize_or_zero();
+                let facing = -light.normal().dot(to);
+                let facing = if light.two_sided {
+                    facing.abs()
+                } else {
+                    facing.max(0.0)
+                };
+                let power = luminance(light.radiance) * area;
+                (point, power * facing * cosine(to) / (PI * squared))
+            }
+            Target::Point(light) => {
+                let around = Vec3::new(random.next(), random.next(), random.next()) * 2.0 - 1.0;
+                let point = light.origin + around.clamp_length_max(1.0) * light.radius;
+                let offset = light.origin - receiver.position;
+                let squared = offset
+                    .length_squared()
+                    .max(light.radius * light.radius)
+                    .max(1.0);
+                let to = offset.normalize_or_zero();
+                let in_cone = light.spot.is_none_or(|spot| {
+                    let along = -to.dot(spot.direction);
+                    along > 0.0
+                        && (1.0 - along * along).max(0.0).sqrt() <= along * spot.tan_half_angle
+                });
+                let power = if in_cone {
+                    luminance(light.intensity)
+                } else {
+                    0.0
+                };
+                (point, power * cosine(to) / (PI * squared))
+            }
+        }
+    }
+
+    pub fn is_sky(&self) -> bool {
+        matches!(self, Target::Triangle(light) if light.is_sky)
+    }
+
+    /// Light that comes to a place about there from a light that faces it.
+    fn bare(&self, at: Vec3) -> f32 {
+        let (middle, power) = match self {
+            Target::Triangle(light) => {
+                let [a, b, c] = light.vertices;
+                let power = luminance(light.radiance) * light.area();
+                ((a + b + c) / 3.0, power)
+            }
+            Target::Point(light) => (light.origin, luminance(light.intensity)),
+        };
+        power / (PI * middle.distance_squared(at).max(64.0))
+    }
+}
+
+/// What is known of a light in a cluster.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Pair {
+    entry: u32,
+    /// Mean light without shadows, irradiance / π, luminance.
+    bare: f32,
+    /// Mean light that arrives.
+    arrived: f32,
+    rays: u32,
+    hits: u32,
+}
+
+fn look(
+    entry: u32,
+    target: &Target<'_>,
+    receivers: &[Receiver],
+    occluders: &Occluders,
+    most: u32,
+    random: &mut Random,
+) -> Pair {
+    let (mut bare, mut arrived, mut rays, mut hits, mut tries) = (0.0, 0.0, 0u32, 0u32, 0u32);
+    let start = (random.next() * receivers.len() as f32) as usize;
+    while rays < most && tries < 2 * most && (hits == 0 || rays < ENOUGH) {
+        let Some(receiver) = receivers.get((start + tries as usize) % receivers.len()) else {
+            break;
+        };
+        tries += 1;
+        let (point, light) = target.sample(receiver, random);
+        bare += light;
+        if light <= 0.0 {
+            continue;
+        }
+        rays += 1;
+        if !occluders.blocked(receiver.position, point, target.is_sky()) {
+            hits += 1;
+            arrived += light;
+        }
+    }
+    let count = tries.max(1) as f32;
+    let bare = if rays > 0 {
+        bare / count
+    } else {
+        // all that looked had it below their horizon or were behind it: others may just see its edge
+        let at = receivers.first().map_or(Vec3::ZERO, |r| r.position);
+        target.bare(at) / count
+    };
+    Pair {
+        entry,
+        bare,
+        arrived: arrived / count,
+        rays: if rays > 0 { rays } else { tries },
+        hits,
+    }
+}
+
+/// The pairs of a cluster's list that stay, by rising entry.
+fn keep(mut pairs: Vec<Pair>, ambient: f32) -> Vec<Pair> {
+    let light: f32 = ambient + pairs.iter().map(|p| p.arrived).sum::<f32>();
+    let mut left = (light * DROPPED_PART).max(DROPPED_LEAST);
+    // those that no ray found, weakest first
+    let charge = |p: &Pair| {
+        if p.hits > 0 {
+            f32::INFINITY
+        } else {
+            p.bare * 3.0 / p.rays.max(1) as f32
+        }
+    };
+    pairs.sort_by(|a, b| charge(a).total_cmp(&charge(b)).then(a.entry.cmp(&b.entry)));
+    let dropped = pairs.iter().take_while(|pair| {
+        left -= charge(pair);
+        left >= 0.0
+    });
+    let dropped = dropped.count();
+    let mut kept = pairs.split_off(dropped);
+    kept.sort_by_key(|p| p.entry);
+    kept
+}
+
+/// Sends rays through a world's light lists: shortens the lists, and notes in them what each light gives where. What
+/// it does depends on the world alone. A world whose lists know already is left as it is.
+pub fn sweep(world: &mut RelitWorld) -> SweepReport {
+    let begin = Instant::now();
+    let clusters = world.light_lists.clusters();
+    let before = |lists: &super::LightLists| {
+        (0..clusters as i32)
+            .map(|c| lists.row(c).len())
+            .sum::<usize>()
+    };
+    let entries = before(&world.light_lists);
+    let mut report = SweepReport {
+        entries: [entries; 2],
+        ..SweepReport::default()
+    };
+    if clusters == 0 || entries == 0 || !world.light_lists.shares.is_empty() {
+        return report;
+    }
+    let occluders = samples::occluders(world);
+    let receivers = receivers(world, clusters, ON_SURFACES, IN_THE_OPEN, 0x5eed);
+    let most = u32::try_from(BUDGET / entries.max(1)).unwrap_or(MOST);
+    let most = most.clamp(FEWEST, MOST);
+    let ambient = luminance(world.ambient);
+    let rows = parallel::map(&receivers, |cluster, receivers| {
+        let row = i32::try_from(cluster).map_or(&[][..], |c| world.light_lists.row(c));
+        if receivers.is_empty() {
+            return None;
+        }
+        let mut random = Random::new(0x11f7 + cluster as u64);
+        let pairs = row.iter().filter_map(|&entry| {
+            let target = Target::of(world, entry)?;
+            Some(look(
+                entry,
+                &target,
+                receivers,
+                &occluders,
+                most,
+                &mut random,
+            ))
+        });
+        Some(keep(pairs.collect(), ambient))
+    });
+    let old = &world.light_lists;
+    let mut lists = super::LightLists {
+        offsets: vec![0],
+        lights: Vec::new(),
+        shares: Vec::new(),
+        ..old.clone()
+    };
+    for (row, cluster) in rows.iter().zip(0i32..) {
+        match row {
+            Some(pairs) => {
+                lists.lights.extend(pairs.iter().map(|p| p.entry));
+                lists.shares.extend(pairs.iter().map(|p| super::LightShare {
+                    bare: p.bare,
+                    // never none: what was not seen may still be there
+                    visible: (p.hits as f32 + 0.5) / (p.rays as f32 + 1.0),
+                }));
+            }
+            None => {
+                report.unseen += 1;
+                lists.lights.extend(old.row(cluster));
+                let unknown = super::LightShare::UNKNOWN;
+                lists
+                    .shares
+                    .extend(std::iter::repeat_n(unknown, old.row(cluster).len()));
+            }
+        }
+        lists.offsets.push(lists.lights.len() as u32);
+    }
+    lists.lights.extend(old.row(-1));
+    let unknown = super::LightShare::UNKNOWN;
+    lists
+        .shares
+        .extend(std::iter::repeat_n(unknown, old.row(-1).len()));
+    lists.offsets.push(lists.lights.len() as u32);
+    report.entries[1] = before(&lists);
+    world.report.mean_list_length = lists.mean_length();
+    world.report.longest_list = lists.longest();
+    world.light_lists = lists;
+    report.seconds = begin.elapsed().as_secs_f64();
+    report
+}
+
+/// Lists against rays: see [`judge`].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ListJudgement {
+    /// Pairs of light and cluster that were looked at.
+    pub pairs: usize,
+    /// Those where some ray arrives.
+    pub visible: usize,
+    /// Of these, those that the lists have.
+    pub found: usize,
+    /// Pairs that the lists have.
+    pub listed: usize,
+    /// Of all light that arrives, the part of lights that the lists have.
+    pub light_found: f64,
+}
+
+impl ListJudgement {
+    /// Part of the visible pairs that the lists have.
+    pub fn recall(&self) -> f64 {
+        self.found as f64 / self.visible.max(1) as f64
+    }
+
+    /// Part of the lists' pairs that are visible.
+    pub fn precision(&self) -> f64 {
+        self.found as f64 / self.listed.max(1) as f64
+    }
+}
+
+/// Judges lists by rays of their own: in every `step`th cluster points other than those of [`sweep`] look at every
+/// light of the map, `rays` times each. For each of several lists of one world what they are worth.
+pub fn judge(
+    world: &RelitWorld,
+    lists: &[&super::LightLists],
+    rays: u32,
+    step: usize,
+) -> Vec<ListJudgement> {
+    let clusters = world.light_lists.clusters();
+    let occluders = samples::occluders(world);
+    let receivers = receivers(world, clusters, 64, 16, 0x0dd5);
+    let chosen: Vec<usize> = (0..clusters).step_by(step.max(1)).collect();
+    let total = (world.lights.len() + world.point_lights.len()) as u32;
+    let found = parallel::map(&chosen, |_, &cluster| {
+        let mut judged = vec![ListJudgement::default(); lists.len()];
+        let mut light = vec![0.0f64; lists.len() + 1];
+        let receivers = receivers.get(cluster).map_or(&[][..], Vec::as_slice);
+        let mut random = Random::new(0x7e57 + cluster as u64);
+        if receivers.is_empty() {
+            return (judged, light);
+        }
+        let row = |lists: &super::LightLists, entry: u32| {
+            let row = i32::try_from(cluster).map_or(&[][..], |c| lists.row(c));
+            row.binary_search(&entry).is_ok()
+        };
+        for entry in 0..total {
+            let Some(target) = Target::of(world, entry) else {
+                continue;
+            };
+            let mut arrived = 0.0f64;
+            for i in 0..rays {
+                let Some(receiver) = receivers.get(i as usize % receivers.len()) else {
+                    break;
+                };
+                let (point, bare) = target.sample(receiver, &mut random);
+                if bare > 0.0 && !occluders.blocked(receiver.position, point, target.is_sky()) {
+                    arrived += f64::from(bare) / f64::from(rays);
+                }
+            }
+            let visible = arrived > 0.0;
+            if let Some(all) = light.last_mut() {
+                *all += arrived;
+            }
+            for ((judged, lists), light) in judged.iter_mut().zip(lists).zip(&mut light) {
+                let listed = row(lists, entry);
+                judged.pairs += 1;
+                judged.visible += usize::from(visible);
+                judged.listed += usize::from(listed);
+                judged.found += usize::from(visible && listed);
+                *light += if listed { arrived } else { 0.0 };
+            }
+        }
+        (judged, light)
+    });
+    let mut sums = vec![ListJudgement::default(); lists.len()];
+    let mut all = 0.0;
+    for (judged, light) in found {
+        for ((sum, one), light) in sums.iter_mut().zip(judged).zip(&light) {
+            sum.pairs += one.pairs;
+            sum.visible += one.visible;
+            sum.listed += one.listed;
+            sum.found += one.found;
+            sum.light_found += light;
+        }
+        all += light.last().copied().unwrap_or(0.0);
+    }
+    for sum in &mut sums {
+        sum.light_found = if all > 0.0 {
+            sum.light_found / all
+        } else {
+            1.0
+        };
+    }
+    sums
+}
+
+/// A world's lists from the potentially visible sets alone, to compare with.
+pub fn lists_by_visibility(world: &RelitWorld) -> super::LightLists {
+    super::lists_of(world, false)
+}
+
+/// A world's lists before any rays: see [`super::lists`].
+pub fn lists_by_geometry(world: &RelitWorld) -> super::LightLists {
+    super::lists_of(world, true)
+}
