@@ -15,7 +15,8 @@ use crate::view::open;
 ///
 /// A pair of a light and a visibility cluster is visible when a ray from some point of the cluster to some point of the
 /// light arrives. Prints for lists from the potentially visible sets alone, with geometry, and swept by rays: recall
-/// (visible pairs that are listed, of all visible ones), precision (visible pairs, of those listed), the part of all
+/// (visible pairs that are listed, of all visible ones, and of those that give more than a fifth of a percent of their
+/// cluster's light), precision (visible pairs, of those listed), the part of all
 /// arriving light that listed lights give, and the lists' lengths. The rays are others than those that the lists were
 /// swept with.
 ///
@@ -75,6 +76,7 @@ pub fn run(args: &LightsArgs) -> Result<()> {
                 "lights": world.lights.len() + world.point_lights.len(),
                 "clusters": clusters,
                 "recall": judged.recall(),
+                "recall_of_mattering": judged.recall_of_mattering(),
                 "precision": judged.precision(),
                 "light_found": judged.light_found,
                 "mean_length": lists.mean_length(),

@@ -490,7 +490,6 @@ pub mod constants {
     pub const MASK_THIRD_TRANSLUCENT: u8 = 0x40;
     pub const MASK_NO_SHADOW: u8 = 0x80;
     pub const LIGHT_TWO_SIDED: u32 = 1;
-    pub const LIGHT_SKY: u32 = 2;
     pub const VIEW_JITTER: u32 = 1;
     pub const VIEW_FIRST_PERSON: u32 = 2;
     pub const VIEW_ACCUMULATE: u32 = 4;

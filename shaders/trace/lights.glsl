@@ -145,7 +145,7 @@ struct LightSample {
     vec3 direction;
     float distance; // to the end of the shadow ray
     vec3 light;
-    bool sky; // comes through the sky: any piece of it in the way lets it in
+    bool sky; // comes from behind the sky: arrives where the ray meets sky first
 };
 
 LightSample no_light() { return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), false); }
@@ -188,7 +188,6 @@ LightSample sample_triangle(TriangleLight light, vec3 position, vec3 normal, vec
     s.light *= max(dot(normal, s.direction), 0.0);
     // stop short of the light's own surface
     s.distance -= 0.02 + 2.0e-4 * s.distance;
-    s.sky = (light.flags & LIGHT_SKY) != 0;
     return s;
 }
 
@@ -269,10 +268,12 @@ float light_target(uint light, vec3 position, vec3 normal) {
     return towards * scale * cosine / max(squared, 0.25 * bounds.radius * bounds.radius);
 }
 
-// Whether the sample's light arrives. Sun and sky arrive where the ray meets sky first or leaves the map.
+// Whether the sample's light arrives. Suns arrive where the ray meets sky first or leaves the map. For all other lights
+// sky is as solid as a wall: pieces of sky that shine are lights of their own, and a ray to one that passes another would
+// count the same direction twice.
 bool light_arrives(LightSample s, vec3 origin) {
     if (!s.sky && s.distance <= 0.0) return true;
-    Hit hit = trace_ray(origin, 0.0, s.direction, s.distance, s.sky ? MASK_SHADOW | MASK_SKY : MASK_SHADOW, !s.sky);
+    Hit hit = trace_ray(origin, 0.0, s.direction, s.distance, MASK_SHADOW | MASK_SKY, !s.sky);
     return hit.geometry == NO_HIT || (s.sky && Geometries(VIEW.geometries).at[hit.geometry].kind == KIND_SKY);
 }
 

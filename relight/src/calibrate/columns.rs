@@ -331,7 +331,7 @@ fn visible_part(
 ) -> f32 {
     let [a, b, c] = light.vertices;
     let middle = (a + b + c) / 3.0;
-    let clear = |to: Vec3| !occluders.blocked(sample.position, to, light.is_sky);
+    let clear = |to: Vec3| !occluders.blocked(sample.position, to, false);
     let wide = light.area() > LARGE * middle.distance_squared(sample.position);
     if !wide && sample.normal.dot(middle - sample.position) > 0.0 {
         return f32::from(u8::from(clear(middle)));

@@ -119,8 +119,7 @@ pub struct TriangleLight {
     pub triangle: u32,
     /// Brush model that it belongs to: 0 is the world, which never moves.
     pub model: u32,
-    /// Whether it is a piece of the sky. Shadow rays that end at it must also accept any other piece
-    /// of sky in their way.
+    /// Whether it is a piece of the sky.
     pub is_sky: bool,
     /// Where its radiance comes from.
     pub source: EmissionSource,

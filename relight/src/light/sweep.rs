@@ -7,7 +7,8 @@
 //!
 //! # What is left out
 //!
-//! A light is left out of a cluster's list only if none of its rays arrived, and only as long as all that is left out
+//! A light is left out of a cluster's list only if none of its rays arrived, neither there nor in a cluster beside it
+//! (where light comes in through a gap, the next cluster sees more of it), and only as long as all that is left out
 //! of the list together stays below [`DROPPED_PART`] of the light that does arrive there. Of a light that none of n
 //! rays found, less than 3 / n arrives, with a confidence of 95 % (the "rule of three": (1 - 3 / n)^n is about 5 %),
 //! so 3 / n of its unshadowed light is what it is charged with. Strong lights that no ray found stay in the list with a
@@ -23,8 +24,8 @@ use std::f32::consts::PI;
 use std::time::Instant;
 
 /// Part of a cluster's light that may be left out of its list. The step of a display in sRGB from one code to the next
-/// is about 2.4 / (code + 14) of the light: 0.9 % at the bright end and more below. This is half of it at the most.
-pub const DROPPED_PART: f32 = 0.004;
+/// is about 2.4 / (code + 14) of the light: 0.9 % at the bright end and more below. This is a quarter of it at the most.
+pub const DROPPED_PART: f32 = 0.002;
 
 /// Light (irradiance / π, luminance) that may be left out of a dark cluster's list: a tenth of the first display code.
 pub const DROPPED_LEAST: f32 = 3.0e-5;
@@ -37,13 +38,18 @@ const IN_THE_OPEN: usize = 8;
 const ENOUGH: u32 = 6;
 
 /// Most rays for a pair of light and cluster.
-const MOST: u32 = 48;
+const MOST: u32 = 96;
 
 /// Fewest, on maps of so many pairs that [`BUDGET`] would leave less.
 const FEWEST: u32 = 8;
 
 /// Rays for a map: a second or two on a processor of eight cores.
-const BUDGET: usize = 24_000_000;
+const BUDGET: usize = 32_000_000;
+
+/// Clusters are beside each other when the boxes around their points meet, after these have been made wider by so many
+/// id units or by such a part of their size: points seldom lie at the very end of their cluster.
+const BESIDE: f32 = 2.0;
+const WIDER: f32 = 0.04;
 
 /// How far off its surface a point lies, id units.
 const LIFT: f32 = 0.5;
@@ -270,10 +276,6 @@ impl<'a> Target<'a> {
         }
     }
 
-    pub fn is_sky(&self) -> bool {
-        matches!(self, Target::Triangle(light) if light.is_sky)
-    }
-
     /// Light that comes to a place about there from a light that faces it.
     fn bare(&self, at: Vec3) -> f32 {
         let (middle, power) = match self {
@@ -321,7 +323,7 @@ fn look(
             continue;
         }
         rays += 1;
-        if !occluders.blocked(receiver.position, point, target.is_sky()) {
+        if !occluders.blocked(receiver.position, point, false) {
             hits += 1;
             arrived += light;
         }
@@ -343,13 +345,32 @@ fn look(
     }
 }
 
-/// The pairs of a cluster's list that stay, by rising entry.
-fn keep(mut pairs: Vec<Pair>, ambient: f32) -> Vec<Pair> {
+/// Bounds of each cluster's receivers, a little larger than they are.
+fn boxes(receivers: &[Vec<Receiver>]) -> Vec<(Vec3, Vec3)> {
+    let of = |points: &Vec<Receiver>| {
+        points
+            .iter()
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), r| {
+                (low.min(r.position), high.max(r.position))
+            })
+    };
+    receivers
+        .iter()
+        .map(|points| {
+            let (low, high) = of(points);
+            let margin = ((high - low) * WIDER).max(Vec3::splat(BESIDE));
+            (low - margin, high + margin)
+        })
+        .collect()
+}
+
+/// The pairs of a cluster's list that stay, by rising entry. `beside`: lights that arrive in clusters beside it, rising.
+fn keep(mut pairs: Vec<Pair>, beside: &[u32], ambient: f32) -> Vec<Pair> {
     let light: f32 = ambient + pairs.iter().map(|p| p.arrived).sum::<f32>();
     let mut left = (light * DROPPED_PART).max(DROPPED_LEAST);
     // those that no ray found, weakest first
     let charge = |p: &Pair| {
-        if p.hits > 0 {
+        if p.hits > 0 || beside.binary_search(&p.entry).is_ok() {
             f32::INFINITY
         } else {
             p.bare * 3.0 / p.rays.max(1) as f32
@@ -406,7 +427,24 @@ pub fn sweep(world: &mut RelitWorld) -> SweepReport {
                 &mut random,
             ))
         });
-        Some(keep(pairs.collect(), ambient))
+        Some(pairs.collect::<Vec<Pair>>())
+    });
+    let boxes = boxes(&receivers);
+    let rows = parallel::map(&rows, |cluster, pairs| {
+        let pairs = pairs.as_ref()?;
+        let &(low, high) = boxes.get(cluster)?;
+        let near = rows
+            .iter()
+            .zip(&boxes)
+            .filter(|(_, other)| low.cmple(other.1).all() && high.cmpge(other.0).all());
+        let mut beside: Vec<u32> = near
+            .flat_map(|(row, _)| row.iter().flatten())
+            .filter(|pair| pair.hits > 0)
+            .map(|pair| pair.entry)
+            .collect();
+        beside.sort_unstable();
+        beside.dedup();
+        Some(keep(pairs.clone(), &beside, ambient))
     });
     let old = &world.light_lists;
     let mut lists = super::LightLists {
@@ -459,6 +497,10 @@ pub struct ListJudgement {
     pub visible: usize,
     /// Of these, those that the lists have.
     pub found: usize,
+    /// Visible pairs that give more than [`DROPPED_PART`] of their cluster's light.
+    pub mattering: usize,
+    /// Of these, those that the lists have.
+    pub mattering_found: usize,
     /// Pairs that the lists have.
     pub listed: usize,
     /// Of all light that arrives, the part of lights that the lists have.
@@ -469,6 +511,11 @@ impl ListJudgement {
     /// Part of the visible pairs that the lists have.
     pub fn recall(&self) -> f64 {
         self.found as f64 / self.visible.max(1) as f64
+    }
+
+    /// Part of the visible pairs that matter that the lists have.
+    pub fn recall_of_mattering(&self) -> f64 {
+        self.mattering_found as f64 / self.mattering.max(1) as f64
     }
 
     /// Part of the lists' pairs that are visible.
@@ -502,6 +549,7 @@ pub fn judge(
             let row = i32::try_from(cluster).map_or(&[][..], |c| lists.row(c));
             row.binary_search(&entry).is_ok()
         };
+        let mut found: Vec<(u32, f64)> = Vec::new();
         for entry in 0..total {
             let Some(target) = Target::of(world, entry) else {
                 continue;
@@ -512,20 +560,27 @@ pub fn judge(
                     break;
                 };
                 let (point, bare) = target.sample(receiver, &mut random);
-                if bare > 0.0 && !occluders.blocked(receiver.position, point, target.is_sky()) {
+                if bare > 0.0 && !occluders.blocked(receiver.position, point, false) {
                     arrived += f64::from(bare) / f64::from(rays);
                 }
             }
+            found.push((entry, arrived));
+        }
+        let all: f64 = found.iter().map(|(_, arrived)| arrived).sum();
+        if let Some(sum) = light.last_mut() {
+            *sum = all;
+        }
+        for (entry, arrived) in found {
             let visible = arrived > 0.0;
-            if let Some(all) = light.last_mut() {
-                *all += arrived;
-            }
+            let matters = arrived > all * f64::from(DROPPED_PART);
             for ((judged, lists), light) in judged.iter_mut().zip(lists).zip(&mut light) {
                 let listed = row(lists, entry);
                 judged.pairs += 1;
                 judged.visible += usize::from(visible);
                 judged.listed += usize::from(listed);
                 judged.found += usize::from(visible && listed);
+                judged.mattering += usize::from(matters);
+                judged.mattering_found += usize::from(matters && listed);
                 *light += if listed { arrived } else { 0.0 };
             }
         }
@@ -538,6 +593,8 @@ pub fn judge(
             sum.pairs += one.pairs;
             sum.visible += one.visible;
             sum.listed += one.listed;
+            sum.mattering += one.mattering;
+            sum.mattering_found += one.mattering_found;
             sum.found += one.found;
             sum.light_found += light;
         }

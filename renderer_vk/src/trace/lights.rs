@@ -143,7 +143,7 @@ fn triangle_light(light: &TriangleLight, origin: Vec3) -> t::TriangleLight {
             c::LIGHT_TWO_SIDED
         } else {
             0
-        } | if light.is_sky { c::LIGHT_SKY } else { 0 },
+        },
     }
 }
 

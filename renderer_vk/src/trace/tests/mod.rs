@@ -9,6 +9,7 @@ mod harness;
 mod inspection;
 mod layers;
 mod lighting;
+mod lights;
 mod maps;
 mod motion;
 mod structures;

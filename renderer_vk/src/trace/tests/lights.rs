@@ -1,0 +1,374 @@
+//! Direct light against closed forms: edges, discs, furnaces, lights that move or are carried, and estimators.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+use relight::light::SunLight;
+use shaders::types::Instance;
+
+use super::harness::{Gpu, Scene, floor_point, identity, lambert, rectangle, reference};
+use crate::api::DynamicLight;
+use crate::settings::{LightSelection, Settings};
+
+const SIDE: usize = 32;
+
+/// A white floor seen from above, `half` units to each side.
+fn floor_from_above(half: f32) -> Scene {
+    let height = 90.0;
+    let fov = 2.0 * (half / height).atan().to_degrees();
+    let mut scene = Scene::new(Vec3::new(0.0, 0.0, height), Vec3::ZERO, fov, SIDE as i32);
+    let white = scene.diffuse(1.0);
+    scene.quad(
+        rectangle(
+            Vec3::new(-900.0, -900.0, 0.0),
+            Vec3::X * 1800.0,
+            Vec3::Y * 1800.0,
+        ),
+        white,
+    );
+    scene
+}
+
+fn all_lights() -> Settings {
+    Settings {
+        rt_num_random_dl: 0,
+        rt_antialiasing: false,
+        ..reference()
+    }
+}
+
+/// The part of a polygon on the positive side of a plane.
+fn clipped(polygon: &[Vec3], normal: Vec3, point: Vec3) -> Vec<Vec3> {
+    let height = |p: Vec3| (p - point).dot(normal);
+    let mut out = Vec::new();
+    for (i, &a) in polygon.iter().enumerate() {
+        let b = polygon[(i + 1) % polygon.len()];
+        let (ha, hb) = (height(a), height(b));
+        if ha >= 0.0 {
+            out.push(a);
+        }
+        if (ha < 0.0) != (hb < 0.0) {
+            out.push(a + (b - a) * (ha / (ha - hb)));
+        }
+    }
+    out
+}
+
+#[test]
+fn an_edge_hides_the_part_of_a_light_that_lies_behind_it() {
+    Gpu::each(an_edge_hides_the_part_of_a_light_that_lies_behind_it_with);
+}
+
+fn an_edge_hides_the_part_of_a_light_that_lies_behind_it_with(gpu: &mut Gpu) {
+    let triangle = [
+        Vec3::new(-40.0, -30.0, 300.0),
+        Vec3::new(0.0, 45.0, 300.0),
+        Vec3::new(40.0, -30.0, 300.0),
+    ];
+    let mut scene = floor_from_above(40.0);
+    let white = scene.diffuse(1.0);
+    // covers x < 0 at half the height, above the eye
+    scene.quad(
+        rectangle(
+            Vec3::new(-900.0, -900.0, 150.0),
+            Vec3::Y * 1800.0,
+            Vec3::X * 900.0,
+        ),
+        white,
+    );
+    scene.light(triangle, Vec3::splat(20.0));
+    let (pixels, _) = gpu.render(&scene, &all_lights(), 256);
+    let (mut worst, mut partial) = (0.0f32, 0);
+    for (i, pixel) in pixels.iter().enumerate() {
+        let p = floor_point(&scene, i % SIDE, i / SIDE);
+        // the plane through the point and the edge x = 0, z = 150; the side that is open
+        let normal = Vec3::new(150.0, 0.0, p.x).normalize();
+        let seen = clipped(&triangle, normal, p);
+        let exact: f32 = (1..seen.len().max(2) - 1)
+            .map(|k| lambert(p, Vec3::Z, [seen[0], seen[k], seen[k + 1]], 20.0))
+            .sum();
+        let whole = lambert(p, Vec3::Z, triangle, 20.0);
+        worst = worst.max((pixel.x - exact).abs() / whole);
+        partial += usize::from(exact > 0.05 * whole && exact < 0.95 * whole);
+    }
+    println!("worst {worst} of the whole light, {partial} pixels in the penumbra");
+    // 256 rays: four standard errors of a fraction are 0.125
+    assert!(worst < 0.125 && partial > 300, "{worst} {partial}");
+    // from the middle of the light alone there is no penumbra
+    let hard = Settings {
+        rt_soft_shadows: false,
+        ..all_lights()
+    };
+    let (pixels, _) = gpu.render(&scene, &hard, 2);
+    let mut dark = 0;
+    for (i, pixel) in pixels.iter().enumerate() {
+        let p = floor_point(&scene, i % SIDE, i / SIDE);
+        let whole = lambert(p, Vec3::Z, triangle, 20.0);
+        let part = pixel.x / whole;
+        assert!(part == 0.0 || (part - 1.0).abs() < 0.05, "{p} {part}");
+        // the middle is above x = 0: its shadow ends where the edge's does
+        assert_eq!(part == 0.0, p.x < 0.0, "{p}");
+        dark += usize::from(part == 0.0);
+    }
+    assert!(dark > 300);
+}
+
+#[test]
+fn the_suns_disc_makes_a_penumbra_of_its_own_width() {
+    Gpu::each(the_suns_disc_makes_a_penumbra_of_its_own_width_with);
+}
+
+fn the_suns_disc_makes_a_penumbra_of_its_own_width_with(gpu: &mut Gpu) {
+    let radius = 0.1f32;
+    let mut scene = floor_from_above(40.0);
+    let white = scene.diffuse(1.0);
+    scene.quad(
+        rectangle(
+            Vec3::new(-900.0, -900.0, 150.0),
+            Vec3::Y * 1800.0,
+            Vec3::X * 900.0,
+        ),
+        white,
+    );
+    scene.suns.push(SunLight {
+        direction: Vec3::Z,
+        irradiance: Vec3::splat(PI),
+        angular_radius: radius,
+        material: None,
+    });
+    let (pixels, _) = gpu.render(&scene, &all_lights(), 256);
+    let mut worst = 0.0f32;
+    for (i, pixel) in pixels.iter().enumerate() {
+        let p = floor_point(&scene, i % SIDE, i / SIDE);
+        // where the edge cuts the disc, in radii from its middle: a chord
+        let t = (-p.x / 150.0).atan() / radius;
+        let hidden = if t <= -1.0 {
+            0.0
+        } else if t >= 1.0 {
+            1.0
+        } else {
+            1.0 - (t.acos() - t * (1.0 - t * t).sqrt()) / PI
+        };
+        worst = worst.max((pixel.x - (1.0 - hidden)).abs());
+    }
+    println!("worst {worst}");
+    assert!(worst < 0.13, "{worst}");
+}
+
+#[test]
+fn in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky() {
+    Gpu::each(in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky_with);
+}
+
+fn in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky_with(gpu: &mut Gpu) {
+    let mut scene = floor_from_above(40.0);
+    let (low, high) = (
+        Vec3::new(-200.0, -150.0, 0.0),
+        Vec3::new(220.0, 170.0, 140.0),
+    );
+    let corner = |i: usize| {
+        Vec3::new(
+            if i & 1 == 0 { low.x } else { high.x },
+            if i & 2 == 0 { low.y } else { high.y },
+            if i & 4 == 0 { low.z } else { high.z },
+        )
+    };
+    // four walls and a ceiling, each facing inwards
+    for quad in [
+        [0, 1, 5, 4],
+        [1, 3, 7, 5],
+        [3, 2, 6, 7],
+        [2, 0, 4, 6],
+        [4, 5, 7, 6],
+    ] {
+        let q = quad.map(corner);
+        let middle = (low + high) * 0.5;
+        for [a, b, c] in [[q[0], q[1], q[2]], [q[0], q[2], q[3]]] {
+            let inwards = (b - a).cross(c - a).dot(middle - a) > 0.0;
+            scene.light(if inwards { [a, b, c] } else { [a, c, b] }, Vec3::ONE);
+        }
+    }
+    for (settings, tolerance) in [
+        (all_lights(), 0.01),
+        (
+            Settings {
+                rt_num_random_dl: 8,
+                ..all_lights()
+            },
+            0.02,
+        ),
+    ] {
+        let (pixels, _) = gpu.render(&scene, &settings, 64);
+        let mean = pixels.iter().map(|p| p.x).sum::<f32>() / pixels.len() as f32;
+        println!("{mean}");
+        assert!((mean - 1.0).abs() < tolerance, "{mean}");
+    }
+}
+
+#[test]
+fn the_flashlight_lights_a_spot_before_the_eye() {
+    Gpu::each(the_flashlight_lights_a_spot_before_the_eye_with);
+}
+
+fn the_flashlight_lights_a_spot_before_the_eye_with(gpu: &mut Gpu) {
+    let scene = floor_from_above(80.0);
+    assert_eq!(gpu.mean(&scene, &all_lights(), 1), Vec3::ZERO);
+    let settings = Settings {
+        rt_flashlight: true,
+        ..all_lights()
+    };
+    let (pixels, _) = gpu.render(&scene, &settings, 8);
+    // (384 / 90)^2 times the colour at the middle, which is a little off: the lamp is held beside the eye
+    let middle = pixels[SIDE / 2 * SIDE + SIDE / 2];
+    let expected = (384.0f32 / 84.0).powi(2);
+    assert!(
+        (middle.x / expected - 1.0).abs() < 0.1,
+        "{middle} {expected}"
+    );
+    assert!(middle.x > middle.y && middle.y > middle.z, "warm: {middle}");
+    // the cone ends at 24 degrees: 40 units from its middle
+    for (i, pixel) in pixels.iter().enumerate() {
+        let p = floor_point(&scene, i % SIDE, i / SIDE);
+        if p.truncate().length() > 60.0 {
+            assert_eq!(*pixel, Vec3::ZERO, "{p}");
+        } else if p.truncate().length() < 25.0 {
+            assert!(pixel.x > 0.0, "{p}");
+        }
+    }
+}
+
+#[test]
+fn lights_of_a_brush_model_go_where_it_goes() {
+    Gpu::each(lights_of_a_brush_model_go_where_it_goes_with);
+}
+
+fn lights_of_a_brush_model_go_where_it_goes_with(gpu: &mut Gpu) {
+    let triangle = [
+        Vec3::new(-5.0, -5.0, 60.0),
+        Vec3::new(0.0, 5.0, 60.0),
+        Vec3::new(5.0, -5.0, 60.0),
+    ];
+    for moved in [Vec3::ZERO, Vec3::new(30.0, -20.0, 10.0)] {
+        let mut scene = floor_from_above(40.0);
+        scene.light(triangle, Vec3::splat(50.0));
+        scene.lights[0].model = 1;
+        // without its entity the model is not there, nor is its light
+        assert_eq!(gpu.mean(&scene, &all_lights(), 1), Vec3::ZERO);
+        let instance = scene.instances.len() as u32;
+        scene.instances.push(Instance {
+            origin: moved,
+            ..identity()
+        });
+        scene
+            .submodels
+            .push(crate::scene::Submodel { model: 1, instance });
+        let (pixels, _) = gpu.render(&scene, &all_lights(), 32);
+        let exact: f32 = (0..pixels.len())
+            .map(|i| {
+                let p = floor_point(&scene, i % SIDE, i / SIDE);
+                lambert(p, Vec3::Z, triangle.map(|c| c + moved), 50.0)
+            })
+            .sum();
+        let ratio = pixels.iter().map(|p| p.x).sum::<f32>() / exact;
+        println!("{ratio}");
+        assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+    }
+}
+
+/// Many lights of all kinds between pillars.
+fn crowd() -> Scene {
+    let mut scene = Scene::new(
+        Vec3::new(-180.0, 0.0, 60.0),
+        Vec3::new(100.0, 0.0, -20.0),
+        70.0,
+        SIDE as i32,
+    );
+    let grey = scene.diffuse(0.7);
+    scene.room(
+        Vec3::new(-200.0, -150.0, -80.0),
+        Vec3::new(200.0, 150.0, 120.0),
+        grey,
+    );
+    for i in 0..2 {
+        let side = if i == 0 { Vec3::X } else { Vec3::Y } * 40.0;
+        scene.quad(
+            rectangle(Vec3::new(40.0, -20.0, -80.0), Vec3::Z * 120.0, side),
+            grey,
+        );
+    }
+    for i in 0..40 {
+        let angle = i as f32 * 2.4;
+        let reach = 20.0 + 3.0 * i as f32;
+        let at = Vec3::new(angle.cos() * reach, angle.sin() * reach, 100.0);
+        let size = 2.0 + (i % 7) as f32 * 6.0;
+        scene.light(
+            [at, at + Vec3::Y * size, at + Vec3::X * size],
+            Vec3::splat(0.5 + (i % 5) as f32),
+        );
+    }
+    for i in 0..70 {
+        let angle = i as f32 * 2.4;
+        scene.dlights.push(DynamicLight {
+            origin: Vec3::new(
+                angle.cos() * 130.0,
+                angle.sin() * 120.0,
+                (i % 9) as f32 * 10.0 - 40.0,
+            ),
+            radius: 20.0 + (i % 4) as f32 * 20.0,
+            color: Vec3::ONE,
+            additive: false,
+        });
+    }
+    for i in 0..3 {
+        scene.suns.push(SunLight {
+            direction: Vec3::new(i as f32 - 1.0, 0.3, 1.5).normalize(),
+            irradiance: Vec3::splat(0.2),
+            angular_radius: 0.01,
+            material: None,
+        });
+    }
+    scene
+}
+
+#[test]
+fn estimators_differ_by_noise_alone() {
+    Gpu::each(estimators_differ_by_noise_alone_with);
+}
+
+fn estimators_differ_by_noise_alone_with(gpu: &mut Gpu) {
+    // pixels are independent and without bias their differences have the mean zero: then the sum of differences over
+    // the root of the sum of their squares is normally distributed with a deviation of one, in the picture and in each
+    // square of it. Four and a half deviations happen to one picture of some hundred thousand.
+    const BOUND: f32 = 4.5;
+    let scene = crowd();
+    let (truth, _) = gpu.render(&scene, &all_lights(), 24);
+    for selection in [LightSelection::Uniform, LightSelection::Resampled] {
+        for candidates in [3, 8] {
+            let settings = Settings {
+                rt_light_selection: selection,
+                rt_num_random_dl: 2,
+                rt_candidates: candidates,
+                ..all_lights()
+            };
+            let (pixels, _) = gpu.render(&scene, &settings, 128);
+            let score = |chosen: &dyn Fn(usize) -> bool| {
+                let differences = pixels.iter().zip(&truth).enumerate();
+                let (sum, squares) = differences
+                    .filter(|(i, _)| chosen(*i))
+                    .map(|(_, (a, b))| a.x - b.x)
+                    .fold((0.0f32, 0.0f32), |(s, q), d| (s + d, q + d * d));
+                sum / squares.sqrt().max(f32::MIN_POSITIVE)
+            };
+            let whole = score(&|_| true);
+            println!("{selection:?} {candidates}: {whole} standard errors");
+            assert!(whole.abs() < BOUND, "{selection:?} {candidates}: {whole}");
+            for tile in 0..16 {
+                let part = score(&|i| i % SIDE / 8 == tile % 4 && i / SIDE / 8 == tile / 4);
+                assert!(
+                    part.abs() < BOUND,
+                    "{selection:?} {candidates}: tile {tile} {part}"
+                );
+            }
+        }
+    }
+}
