@@ -300,6 +300,21 @@ struct Pair {
     arrived: f32,
     rays: u32,
     hits: u32,
+    /// Whether it arrives in a cluster beside.
+    beside: bool,
+}
+
+/// Least that is believed to arrive of a light, for one that arrives in a cluster beside and for others. Where such a
+/// light does come in after all, a smaller chance would make it rare and blinding: noise that no filter takes away.
+const LEAST_VISIBLE: [f32; 2] = [0.1, 0.03];
+
+impl Pair {
+    /// About which part of the light arrives, above 0.
+    fn visible(&self) -> f32 {
+        let [beside, alone] = LEAST_VISIBLE;
+        let least = if self.beside { beside } else { alone };
+        ((self.hits as f32 + 0.5) / (self.rays as f32 + 1.0)).max(least)
+    }
 }
 
 fn look(
@@ -342,6 +357,7 @@ fn look(
         arrived: arrived / count,
         rays: if rays > 0 { rays } else { tries },
         hits,
+        beside: false,
     }
 }
 
@@ -366,11 +382,14 @@ fn boxes(receivers: &[Vec<Receiver>]) -> Vec<(Vec3, Vec3)> {
 
 /// The pairs of a cluster's list that stay, by rising entry. `beside`: lights that arrive in clusters beside it, rising.
 fn keep(mut pairs: Vec<Pair>, beside: &[u32], ambient: f32) -> Vec<Pair> {
+    for pair in &mut pairs {
+        pair.beside = beside.binary_search(&pair.entry).is_ok();
+    }
     let light: f32 = ambient + pairs.iter().map(|p| p.arrived).sum::<f32>();
     let mut left = (light * DROPPED_PART).max(DROPPED_LEAST);
     // those that no ray found, weakest first
     let charge = |p: &Pair| {
-        if p.hits > 0 || beside.binary_search(&p.entry).is_ok() {
+        if p.hits > 0 || p.beside {
             f32::INFINITY
         } else {
             p.bare * 3.0 / p.rays.max(1) as f32
@@ -459,8 +478,7 @@ pub fn sweep(world: &mut RelitWorld) -> SweepReport {
                 lists.lights.extend(pairs.iter().map(|p| p.entry));
                 lists.shares.extend(pairs.iter().map(|p| super::LightShare {
                     bare: p.bare,
-                    // never none: what was not seen may still be there
-                    visible: (p.hits as f32 + 0.5) / (p.rays as f32 + 1.0),
+                    visible: p.visible(),
                 }));
             }
             None => {

@@ -218,9 +218,9 @@ fn the_flashlight_lights_a_spot_before_the_eye_with(gpu: &mut Gpu) {
         ..all_lights()
     };
     let (pixels, _) = gpu.render(&scene, &settings, 8);
-    // (384 / 90)^2 times the colour at the middle, which is a little off: the lamp is held beside the eye
+    // held beside the eye, as high above the floor
     let middle = pixels[SIDE / 2 * SIDE + SIDE / 2];
-    let expected = (384.0f32 / 84.0).powi(2);
+    let expected = (384.0f32 / 90.0).powi(2);
     assert!(
         (middle.x / expected - 1.0).abs() < 0.1,
         "{middle} {expected}"
