@@ -15,7 +15,7 @@ use super::error::{Context, Error};
 use super::graveyard::{Garbage, SyncState};
 use super::image::Format;
 use super::instance::{Instance, SurfaceSource};
-use super::pin::pin_library_of;
+use super::pin::pin_drivers;
 use super::pipeline::{cache_from_bytes, cache_to_bytes};
 use super::select::{self, Abilities, DeviceInfo};
 use super::upload::Pending;
@@ -189,7 +189,7 @@ impl Device {
             options.allow_ray_tracing,
         )?;
         let raw = select::create_device(&instance, &choice)?;
-        pin_library_of(raw.fp_v1_0().queue_submit);
+        pin_drivers(raw.fp_v1_0().queue_submit);
         let core = RawDevice { raw, instance };
         let a = choice.abilities;
         let (vi, vd) = (&core.instance.raw, &core.raw);

@@ -2,49 +2,67 @@
 //!
 //! The Vulkan loader unloads a driver with its last instance. Some drivers (seen: NVIDIA 580) take a piece of the
 //! process's static thread-local storage each time they are loaded and do not give it back, so that after about thirty
-//! times the loader finds no driver any more. An engine unloads the renderer at every `vid_restart`, so a long session
-//! gets there.
+//! times the loader finds no driver any more; and they consist of several libraries of which one, left loaded alone,
+//! is torn down twice. An engine unloads the renderer at every `vid_restart`, so a long session gets there.
 
 use ash::vk;
 
-/// Pins the library that `function` lives in. Without effect where the system does not tell which one that is (it is
-/// asked through `/proc`): then nothing is lost but the driver's place in memory.
+/// Pins the library that `function` lives in and every Vulkan driver in memory: what exports the entry point that the
+/// loader's interface demands of drivers. Without effect where the system does not tell what is in memory (it is asked
+/// through `/proc`): then nothing is lost but the driver's place there.
 #[cfg(unix)]
-pub(crate) fn pin_library_of(function: vk::PFN_vkQueueSubmit) {
+pub(crate) fn pin_drivers(function: vk::PFN_vkQueueSubmit) {
+    use libloading::os::unix::{Library, RTLD_NOW};
+    use std::collections::BTreeSet;
     use std::os::unix::ffi::OsStrExt;
+
+    /// Finds what is loaded; loads nothing.
+    const RTLD_NOLOAD: i32 = 4;
+    const ENTRY_POINT: &[u8] = b"vk_icdGetInstanceProcAddr\0";
 
     let Ok(maps) = std::fs::read("/proc/self/maps") else {
         return;
     };
-    let Some(path) = mapped_file(&maps, function as usize as u64) else {
-        return;
-    };
-    // SAFETY: the library is in memory already, so no initializer runs; its handle is forgotten and so never closed.
-    if let Ok(library) = unsafe { libloading::Library::new(std::ffi::OsStr::from_bytes(path)) } {
-        std::mem::forget(library);
+    let own = mapped_file(&maps, function as usize as u64);
+    let files: BTreeSet<&[u8]> = mappings(&maps).map(|(_, _, file)| file).collect();
+    for file in files {
+        let path = std::ffi::OsStr::from_bytes(file);
+        // SAFETY: the library is in memory already, so no initializer runs.
+        let Ok(library) = (unsafe { Library::open(Some(path), RTLD_NOW | RTLD_NOLOAD) }) else {
+            continue; // no library
+        };
+        // SAFETY: the symbol is looked for, never called.
+        let driver = unsafe { library.get::<*const ()>(ENTRY_POINT) }.is_ok();
+        if driver || own == Some(file) {
+            std::mem::forget(library); // never closed
+        }
     }
 }
 
 /// Elsewhere drivers are left to the loader.
 #[cfg(not(unix))]
-pub(crate) fn pin_library_of(_function: vk::PFN_vkQueueSubmit) {}
+pub(crate) fn pin_drivers(_function: vk::PFN_vkQueueSubmit) {}
 
-/// The file that is mapped at `address`, by a process's memory map: lines of `from-to permissions offset device inode
-/// path`, the addresses in hexadecimal.
+/// The files of a process's memory map with where they are mapped, from and to. The map has lines of `from-to permissions
+/// offset device inode path`, the addresses in hexadecimal.
 #[cfg(unix)]
-fn mapped_file(maps: &[u8], address: u64) -> Option<&[u8]> {
+fn mappings(maps: &[u8]) -> impl Iterator<Item = (u64, u64, &[u8])> {
     let hexadecimal =
         |digits: &[u8]| u64::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok();
-    maps.split(|&b| b == b'\n').find_map(|line| {
-        let mut fields = line.split(|&b| b == b' ');
-        let mut range = fields.next()?.split(|&b| b == b'-');
+    maps.split(|&b| b == b'\n').filter_map(move |line| {
+        let mut range = line.split(|&b| b == b' ').next()?.split(|&b| b == b'-');
         let (from, to) = (hexadecimal(range.next()?)?, hexadecimal(range.next()?)?);
-        if !(from..to).contains(&address) {
-            return None;
-        }
         let path = line.get(line.iter().position(|&b| b == b'/')?..)?;
-        Some(path)
+        Some((from, to, path))
     })
+}
+
+/// The file that is mapped at `address`.
+#[cfg(unix)]
+fn mapped_file(maps: &[u8], address: u64) -> Option<&[u8]> {
+    mappings(maps)
+        .find(|(from, to, _)| (*from..*to).contains(&address))
+        .map(|(_, _, file)| file)
 }
 
 #[cfg(all(test, target_os = "linux"))]
