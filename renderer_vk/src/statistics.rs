@@ -24,6 +24,15 @@ impl PassCost {
     }
 }
 
+/// Labels of the buffers of our own hierarchies.
+const STRUCTURES: [&str; 5] = [
+    "trace nodes",
+    "trace leafs",
+    "trace rigid",
+    "trace skin",
+    "trace animated",
+];
+
 /// What GPU memory is held for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MemoryPurpose {
@@ -72,7 +81,7 @@ impl MemoryPurpose {
             MemoryKind::Texture => Self::Textures,
             MemoryKind::AccelerationStructure => Self::AccelerationStructures,
             MemoryKind::Shared => Self::Shared,
-            MemoryKind::Buffer if any(&["bvh", "trace nodes", "trace leafs", "hierarch"]) => {
+            MemoryKind::Buffer if any(&STRUCTURES) => {
                 Self::AccelerationStructures
             }
             MemoryKind::Buffer if any(&["light", "trace suns"]) => Self::Lights,
