@@ -10,10 +10,16 @@ layout(local_size_x = TILE, local_size_y = TILE) in;
 // change and size of direct light, of indirect light, as halfs
 shared uvec2 tile[WIDE * WIDE];
 shared uint guides[WIDE * WIDE];
+// logarithms of the luminance that the last frame was left with, of both, as halfs: bright light that has not changed
+// must not hide that dim light beside it has
+shared uint levels[WIDE * WIDE];
 
-uvec2 gradient_at(ivec2 stratum) {
-    Carried c = carried_at(stratum);
-    if (!c.valid) return uvec2(0);
+uint level_of(Carried c) {
+    LightTexel light = unpack_texel(imageLoad(uimages_rgba32ui[DENOISE.history], c.last));
+    return packHalf2x16(log2(vec2(luminance(light.direct), luminance(light.indirect)) + 1.0e-5));
+}
+
+uvec2 gradient_at(ivec2 stratum, Carried c) {
     ivec2 pixel = pixel_of(stratum, c.index);
     vec2 now = vec2(luminance(light_read(VIEW.image_direct, pixel)), luminance(light_read(VIEW.image_indirect, pixel)));
     // as the sample was rounded
@@ -28,6 +34,7 @@ uvec2 filtered(ivec2 at, int spacing) {
     uint guide = guides[at.y * WIDE + at.x];
     float depth = guide_depth(guide);
     vec3 normal = guide_normal(guide);
+    uint own = levels[at.y * WIDE + at.x];
     vec4 sum = vec4(0.0);
     for (int y = -1; y <= 1; y++) {
         for (int x = -1; x <= 1; x++) {
@@ -37,7 +44,10 @@ uvec2 filtered(ivec2 at, int spacing) {
             float weight = (x == 0 ? 2.0 : 1.0) * (y == 0 ? 2.0 : 1.0);
             // wide for slanted surfaces: a gradient that leaks costs noise, not light
             weight *= exp(-8.0 * abs(log(guide_depth(other) / depth)) / float(spacing)) * max(dot(normal, guide_normal(other)), 0.0);
-            sum += weight * vec4(unpackHalf2x16(tile[tap].x), unpackHalf2x16(tile[tap].y));
+            vec2 weights = vec2(weight);
+            // a stratum without a sample takes from all around
+            if (own != 0 && levels[tap] != 0) weights *= exp2(-abs(unpackHalf2x16(own) - unpackHalf2x16(levels[tap])));
+            sum += weights.xxyy * vec4(unpackHalf2x16(tile[tap].x), unpackHalf2x16(tile[tap].y));
         }
     }
     // the scale is the same for change and size and falls out at the end; this one keeps it near that of the input
@@ -54,7 +64,13 @@ void main() {
         bool there = all(greaterThanEqual(stratum, ivec2(0))) && all(lessThan(stratum, strata));
         uint guide = there ? imageLoad(uimages_r32ui[DENOISE.stratum_guide], stratum).x : 0;
         guides[i] = guide;
-        tile[i] = guide != 0 ? gradient_at(stratum) : uvec2(0);
+        levels[i] = 0;
+        tile[i] = uvec2(0);
+        if (guide == 0) continue;
+        Carried c = carried_at(stratum);
+        if (!c.valid) continue;
+        levels[i] = level_of(c);
+        tile[i] = gradient_at(stratum, c);
     }
     int border = 0;
     for (int spacing = 1; spacing <= 4; spacing *= 2) {
