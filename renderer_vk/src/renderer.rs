@@ -384,7 +384,7 @@ impl Renderer {
         let pause = self.settings.rt_pause && look == Look::Traced;
         if pause && let Some(view) = self.held.next(def) {
             self.scene.clear();
-            self.keep_for_still(&view)?;
+            self.keep_for_still(&view);
             self.queue.push((Item::Traced(Box::new(view)), mask));
             return Ok(());
         }
@@ -403,7 +403,7 @@ impl Renderer {
                     if pause {
                         self.held.hold(&scene);
                     }
-                    self.keep_for_still(&scene)?;
+                    self.keep_for_still(&scene);
                     Item::Traced(Box::new(scene))
                 }
                 None => return Ok(()),

@@ -81,9 +81,7 @@ impl MemoryPurpose {
             MemoryKind::Texture => Self::Textures,
             MemoryKind::AccelerationStructure => Self::AccelerationStructures,
             MemoryKind::Shared => Self::Shared,
-            MemoryKind::Buffer if any(&STRUCTURES) => {
-                Self::AccelerationStructures
-            }
+            MemoryKind::Buffer if any(&STRUCTURES) => Self::AccelerationStructures,
             MemoryKind::Buffer if any(&["light", "trace suns"]) => Self::Lights,
             MemoryKind::Buffer => Self::Buffers,
         }

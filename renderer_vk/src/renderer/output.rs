@@ -180,7 +180,7 @@ impl Renderer {
             self.targets.resolve(&mut recorder)?;
         }
         if end {
-            self.record_still(&mut recorder)?;
+            self.record_still(&mut recorder);
         }
         self.recycle_queue();
         let recorded = Instant::now();

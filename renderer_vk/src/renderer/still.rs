@@ -94,23 +94,24 @@ impl Renderer {
         }))
     }
 
-    /// Keeps a view for the picture that was asked for.
-    pub(super) fn keep_for_still(&mut self, view: &ViewScene) -> Result<(), Error> {
+    /// Keeps a view for the picture that was asked for. A picture that the device has no memory for is given up with a
+    /// warning: the game goes on.
+    pub(super) fn keep_for_still(&mut self, view: &ViewScene) {
         if let (Some((size, samples)), Some(look)) = (self.still.wanted.take(), &self.trace) {
-            let still = Still::new(&self.device, look, view, size, samples)?;
-            self.still.still = Some(still);
-            self.still.pace = 1;
+            match Still::new(&self.device, look, view, size, samples) {
+                Ok(still) => (self.still.still, self.still.pace) = (Some(still), 1),
+                Err(e) => log::warn!("rt_screenshot: {e}"),
+            }
         }
-        Ok(())
     }
 
-    /// Records some more of the picture.
-    pub(super) fn record_still(&mut self, rec: &mut Recorder) -> Result<(), Error> {
+    /// Records some more of the picture; gives it up as [`keep_for_still`](Self::keep_for_still) does.
+    pub(super) fn record_still(&mut self, rec: &mut Recorder) {
         let request = &mut self.still;
         let (Some(still), Some(look), Some(assets)) =
             (&mut request.still, &self.trace, &self.assets)
         else {
-            return Ok(());
+            return;
         };
         let now = Instant::now();
         if let Some(last) = request.last.replace(now) {
@@ -121,6 +122,9 @@ impl Renderer {
                 request.pace = (request.pace / 2).max(1);
             }
         }
-        Ok(still.record(rec, look, assets, &self.settings, request.pace)?)
+        if let Err(e) = still.record(rec, look, assets, &self.settings, request.pace) {
+            log::warn!("rt_screenshot: {e}");
+            request.cancel();
+        }
     }
 }

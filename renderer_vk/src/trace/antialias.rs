@@ -47,7 +47,7 @@ impl Method {
 
 /// The size that is traced for a picture of the size `output`, pixels. Reference pictures are traced in full.
 pub fn traced_size(settings: &Settings, output: [u32; 2]) -> [u32; 2] {
-    if settings.rt_accumulate || !(settings.rt_scale < 1.0) {
+    if settings.rt_accumulate || settings.rt_scale.is_nan() || settings.rt_scale >= 1.0 {
         return output;
     }
     let scale = settings.rt_scale.max(LEAST_SCALE);

@@ -125,6 +125,7 @@ impl Gpu {
     }
 
     /// As [`render_views`](Self::render_views), and hands the picture before exposure to `watch` after each frame.
+    #[allow(clippy::type_complexity)] // of an optional closure
     pub fn render_watched(
         &mut self,
         scene: &Scene,
