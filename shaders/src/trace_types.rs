@@ -339,8 +339,8 @@ pub struct AntialiasView {
     pub lens_radius: f32,
     /// Distance of the plane that is sharp, units along the view.
     pub focal_distance: f32,
-    /// Makes the size a multiple of eight without hidden bytes.
-    pub padding: u32,
+    /// Size of what a ray sees of a texture, over that of a traced pixel: less where many rays make a pixel.
+    pub texture_scale: f32,
 }
 
 /// What the denoiser's passes read: bindless indices of their images.

@@ -24,15 +24,18 @@ const float NARROW = 0.3;
 // The same in traced pixels for a pixel without history.
 const float WIDE = 0.5;
 // Frames' worth of samples that a pixel keeps at rest, and where it is resampled from frame to frame.
-const float REST_FRAMES = 24.0, MOVING_FRAMES = 10.0;
+const float REST_FRAMES = 24.0, MOVING_FRAMES = 8.0;
 // Standard deviations that history may differ by, at rest and in motion.
 const float REST_RANGE = 2.0, MOVING_RANGE = 1.0;
+// Part of the way to a pixel's surface at which a neighbour's is in front of it.
+const float IN_FRONT = 0.9;
 // Part of its length that the way to a surface may be off and still be the way to that surface.
 const float SAME_PATH = 0.04;
 
-// Of the colours that are shown, half of white comes from white.
+// Nearly linear up to white, so that edges get the mean of both sides, and at most as much as four times white.
 vec3 compress(vec3 c, float exposure) { return c / (1.0 + max_component(c) * exposure); }
 vec3 expand(vec3 c, float exposure) { return c / max(1.0 - max_component(c) * exposure, 1.0e-3); }
+const float COMPRESSION = 0.25;
 
 vec3 to_ycocg(vec3 c) { return vec3(0.25 * c.r + 0.5 * c.g + 0.25 * c.b, 0.5 * (c.r - c.b), 0.5 * c.g - 0.25 * (c.r + c.b)); }
 vec3 from_ycocg(vec3 c) { return vec3(c.x + c.y - c.z, c.x + c.z, c.x - c.y - c.z); }
@@ -62,21 +65,27 @@ vec4 last_bicubic(vec2 place, vec2 size) {
     return vec4(max(sum / weight, 0.0), center.a);
 }
 
-// Whether one of the four traced pixels around a place showed something at that distance in the last frame.
+// Whether the traced pixels around a place showed something at that distance in the last frame: within their range, because
+// a floor seen aslant has many distances. They are taken from a pixel around, because the samples of an edge's pixels
+// meet one side in one frame and the other in the next.
 bool was_seen(vec2 place, float path) {
-    ivec2 low = ivec2(floor(place - 0.5)), last = ivec2(VIEW.width, VIEW.height) - 1;
+    ivec2 last = ivec2(VIEW.width, VIEW.height) - 1;
+    float least = 1.0e30, most = 0.0;
     for (int i = 0; i < 4; i++) {
-        float then = last_path_read(clamp(low + ivec2(i & 1, i >> 1), ivec2(0), last));
-        if (abs(then - path) < SAME_PATH * path + 1.0) return true;
+        vec2 beside = vec2((i & 1) * 2 - 1, (i >> 1) * 2 - 1) * 0.99;
+        float then = last_path_read(clamp(ivec2(floor(place + beside)), ivec2(0), last));
+        least = min(least, then);
+        most = max(most, then);
     }
-    return false;
+    float slack = SAME_PATH * path + 1.0;
+    return path > least - slack && path < most + slack;
 }
 
 void main() {
     ivec2 output_size = ivec2(VIEW.antialias.output_width, VIEW.antialias.output_height);
     ivec2 traced_size = ivec2(VIEW.width, VIEW.height);
     vec2 ratio = vec2(traced_size) / vec2(output_size);
-    float exposure = max(ExposureState(VIEW.exposure).exposure, 1.0e-3) * exp2(VIEW.exposure_base + VIEW.exposure_bias);
+    float exposure = COMPRESSION * max(ExposureState(VIEW.exposure).exposure, 1.0e-3) * exp2(VIEW.exposure_base + VIEW.exposure_bias);
 
     ivec2 first = ivec2(floor((vec2(gl_WorkGroupID.xy) * float(GROUP) + 0.5) * ratio)) - 1;
     for (int i = int(gl_LocalInvocationIndex); i < TILE * TILE; i += GROUP * GROUP) {
@@ -94,7 +103,8 @@ void main() {
     ivec2 middle = ivec2(floor(place));
     vec3 sum = vec3(0.0), squares = vec3(0.0);
     vec4 narrow = vec4(0.0), wide = vec4(0.0);
-    float nearest = 1.0e30;
+    // an edge moves with what is in front; on one surface the pixel's own motion is the right one
+    float nearest = tile[middle.y - first.y][middle.x - first.x].w * IN_FRONT;
     ivec2 nearest_at = ivec2(0);
     for (int y = -1; y <= 1; y++) {
         for (int x = -1; x <= 1; x++) {
@@ -115,7 +125,7 @@ void main() {
     vec3 mean = sum / 9.0;
     vec3 deviation = sqrt(max(squares / 9.0 - mean * mean, 0.0));
 
-    // the same place in the last frame: an edge moves with what is in front
+    // the same place in the last frame
     Motion motion = motion_read(clamp(middle + nearest_at, ivec2(0), traced_size - 1));
     vec2 last_place = vec2(pixel) + 0.5 + motion.offset / ratio;
     vec3 old = mean;

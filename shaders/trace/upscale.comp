@@ -6,6 +6,8 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
+const float COMPRESSION = 0.25;
+
 vec4 weights(float f) {
     return vec4(f * (-0.5 + f * (1.0 - 0.5 * f)), 1.0 + f * f * (-2.5 + 1.5 * f), f * (0.5 + f * (2.0 - 1.5 * f)), f * f * (-0.5 + 0.5 * f));
 }
@@ -15,7 +17,7 @@ void main() {
     ivec2 output_size = ivec2(VIEW.antialias.output_width, VIEW.antialias.output_height);
     if (any(greaterThanEqual(pixel, output_size))) return;
     ivec2 traced_size = ivec2(VIEW.width, VIEW.height);
-    float exposure = max(ExposureState(VIEW.exposure).exposure, 1.0e-3) * exp2(VIEW.exposure_base + VIEW.exposure_bias);
+    float exposure = COMPRESSION * max(ExposureState(VIEW.exposure).exposure, 1.0e-3) * exp2(VIEW.exposure_base + VIEW.exposure_bias);
     vec2 place = (vec2(pixel) + 0.5) * vec2(traced_size) / vec2(output_size) - 0.5 - VIEW.antialias.jitter;
     ivec2 low = ivec2(floor(place));
     vec4 across = weights(place.x - float(low.x)), down = weights(place.y - float(low.y));

@@ -158,7 +158,7 @@ impl Antialias {
             history: u32::from(self.history),
             lens_radius: if dof { 0.5 * settings.rt_aperture } else { 0.0 },
             focal_distance: settings.rt_focal_length.max(1.0),
-            padding: 0,
+            texture_scale: texture_scale(settings, output, jittered),
         })
     }
 
@@ -195,6 +195,17 @@ impl Antialias {
     pub fn picture(&self) -> Option<&Image> {
         self.resolved.as_ref().map(|r| &r[1])
     }
+}
+
+/// Textures are read finer than a traced pixel is wide where the samples of many frames make a pixel: as fine as the
+/// output's pixels, and half a level more, which their mean smooths again.
+fn texture_scale(settings: &Settings, output: [u32; 2], jittered: bool) -> f32 {
+    if !jittered {
+        return 1.0;
+    }
+    #[allow(clippy::cast_precision_loss)] // a number of pixels
+    let ratio = traced_size(settings, output)[1] as f32 / output[1].max(1) as f32;
+    ratio * std::f32::consts::FRAC_1_SQRT_2
 }
 
 /// Where the rays of a frame go through their pixels, from the middle: the R2 sequence in fixed point, so that it stays

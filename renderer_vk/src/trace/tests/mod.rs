@@ -1,6 +1,7 @@
 //! The traced look against closed forms, on whatever Vulkan device there is (Mesa's lavapipe in continuous
 //! integration). Without one the tests are skipped with a printed line, unless `RELIGHT_REQUIRE_GPU=1`.
 
+mod antialiasing;
 mod blooming;
 mod bounces;
 mod denoising;

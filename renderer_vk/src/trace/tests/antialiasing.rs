@@ -1,0 +1,256 @@
+//! Temporal antialiasing, upscaling and the lens against pictures of many samples a pixel.
+
+use glam::{Mat3, Vec3};
+use relight::compare::{Rgb8, compare};
+
+use super::harness::{Gpu, Scene, identity, rectangle, reference, stage};
+use crate::settings::Settings;
+use crate::trace::input::Tracer;
+
+const SIZE: i32 = 64;
+
+fn live() -> Settings {
+    Settings {
+        rt_accumulate: false,
+        rt_denoiser: 0,
+        ..reference()
+    }
+}
+
+fn plain() -> Settings {
+    Settings {
+        rt_taa: false,
+        ..live()
+    }
+}
+
+fn picture(pixels: &[[u8; 4]]) -> Rgb8 {
+    let rgb = pixels.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
+    Rgb8::new(SIZE as usize, SIZE as usize, rgb).expect("a picture")
+}
+
+fn ssim(a: &[[u8; 4]], b: &[[u8; 4]]) -> f64 {
+    compare(&picture(a), &picture(b)).expect("compared").ssim
+}
+
+/// Root of the mean square difference of what is shown, 0..255.
+fn error(a: &[[u8; 4]], b: &[[u8; 4]]) -> f64 {
+    let difference = compare(&picture(a), &picture(b)).expect("compared");
+    difference.root_mean_square
+}
+
+/// A floor of black and white squares seen aslant, with a few poles on it. What glows needs no light, so nothing in the
+/// picture is noisy but its edges.
+fn checkerboard() -> Scene {
+    let mut scene = Scene::new(
+        Vec3::new(-150.0, 20.0, 70.0),
+        Vec3::new(60.0, 0.0, -10.0),
+        60.0,
+        SIZE,
+    );
+    let white = scene.material(&[stage::constant([0.9; 3])], 0);
+    let black = scene.material(&[stage::constant([0.1; 3])], 0);
+    let grey = scene.material(&[stage::constant([0.4, 0.5, 0.6])], 0);
+    scene.room(Vec3::splat(-1000.0), Vec3::splat(1000.0), grey);
+    for i in -4..6 {
+        for k in -5..5 {
+            let corner = Vec3::new(i as f32 * 30.0, k as f32 * 30.0, 0.0);
+            let material = if (i + k) % 2 == 0 { white } else { black };
+            scene.quad(rectangle(corner, Vec3::X * 30.0, Vec3::Y * 30.0), material);
+        }
+    }
+    for y in [-40.0, 10.0, 45.0] {
+        let foot = Vec3::new(20.0 + y, y, 0.0);
+        scene.quad(
+            rectangle(foot, Vec3::new(5.0, 3.0, 60.0), Vec3::new(1.0, 5.0, 0.0)),
+            white,
+        );
+    }
+    scene
+}
+
+#[test]
+fn temporal_antialiasing() {
+    // one test, because compiling the pipelines takes longer than all of these; none of it depends on what traces
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    at_rest_it_comes_to_the_mean_of_many_samples(&mut gpu);
+    in_motion_it_stays_sharp(&mut gpu);
+    what_moves_leaves_nothing_behind(&mut gpu);
+    a_smaller_traced_picture_comes_to_the_full_one(&mut gpu);
+    the_lens_blurs_by_its_circle_of_confusion(&mut gpu);
+}
+
+fn at_rest_it_comes_to_the_mean_of_many_samples(gpu: &mut Gpu) {
+    let scene = checkerboard();
+    let (_, truth) = gpu.render(&scene, &reference(), 1024);
+    let (_, jagged) = gpu.render(&scene, &plain(), 1);
+    let (_, settled) = gpu.render(&scene, &live(), 64);
+    let (raw, now) = (error(&jagged, &truth), error(&settled, &truth));
+    let alike = [&jagged, &settled].map(|p| ssim(p, &truth));
+    println!("at rest: error {raw} without, {now} with; SSIM {alike:?}");
+    assert!(now < 0.3 * raw, "{now} {raw}");
+    assert!(alike[1] > 0.975, "{alike:?}");
+    // it does not flicker
+    let (_, next) = gpu.render(&scene, &live(), 65);
+    let flicker = error(&settled, &next);
+    println!("from frame to frame: {flicker}");
+    assert!(flicker < 0.15 * raw, "{flicker} {raw}");
+}
+
+fn in_motion_it_stays_sharp(gpu: &mut Gpu) {
+    let scene = checkerboard();
+    let (_, truth) = gpu.render(&scene, &reference(), 1024);
+    let (_, jagged) = gpu.render(&scene, &plain(), 1);
+    let (_, moved) = gpu.render_path(&scene, &live(), 48, |frame, def| {
+        let back = 47.0 - frame as f32;
+        def.view_origin = scene.def.view_origin + Vec3::new(-0.9, 0.6, 0.2) * back;
+        let turn = Mat3::from_rotation_z(0.004 * back);
+        def.view_axis = scene.def.view_axis.map(|v| turn * v);
+    });
+    let (raw, now) = (error(&jagged, &truth), error(&moved, &truth));
+    let alike = [&jagged, &moved].map(|p| ssim(p, &truth));
+    println!("moving: error {raw} without, {now} with; SSIM {alike:?}");
+    assert!(now < 0.75 * raw, "{now} {raw}");
+    assert!(alike[1] > alike[0] && alike[1] > 0.91, "{alike:?}");
+}
+
+fn what_moves_leaves_nothing_behind(gpu: &mut Gpu) {
+    let mut scene = checkerboard();
+    let red = scene.material(&[stage::constant([0.9, 0.1, 0.1])], 0);
+    let from = Vec3::new(-40.0, 40.0, 20.0);
+    let shape = rectangle(Vec3::ZERO, Vec3::Z * 30.0, Vec3::Y * 30.0);
+    scene.mesh(shape, red, identity());
+    let at = |frame: f32| from - Vec3::Y * (5.0 * frame);
+    let place = |frame: f32, view: &mut crate::scene::ViewScene| {
+        view.time = frame * 0.02;
+        view.instances.last_mut().expect("placed").origin = at(frame);
+        view.entities[0].origin = at(frame);
+    };
+    let last = 14;
+    let (_, truth) = gpu.render_views(&scene, &reference(), 1024, |_, view| {
+        place(last as f32, view);
+    });
+    let (_, jagged) = gpu.render_views(&scene, &plain(), 1, |_, view| place(last as f32, view));
+    let (_, moved) = gpu.render_views(&scene, &live(), last + 1, |frame, view| {
+        place(frame as f32, view);
+    });
+    let (raw, now) = (error(&jagged, &truth), error(&moved, &truth));
+    println!("a thing that moves: error {raw} without, {now} with");
+    assert!(now < 0.6 * raw, "{now} {raw}");
+    // nowhere is there red where it was but is not: nor does the thing itself wear the floor
+    let redness = |p: &[u8; 4]| i32::from(p[0]) - i32::from(p[1]);
+    let wrong = |p: &[[u8; 4]]| {
+        let pairs = p.iter().zip(&truth);
+        pairs
+            .filter(|(a, b)| (redness(a) - redness(b)).abs() > 60)
+            .count()
+    };
+    let counts = [wrong(&jagged), wrong(&moved)];
+    println!("pixels of the wrong colour: {counts:?}");
+    assert!(counts[1] <= counts[0], "{counts:?}");
+}
+
+fn a_smaller_traced_picture_comes_to_the_full_one(gpu: &mut Gpu) {
+    let scene = checkerboard();
+    let (_, truth) = gpu.render(&scene, &reference(), 1024);
+    let half = |settings: Settings| Settings {
+        rt_scale: 0.5,
+        ..settings
+    };
+    let (_, upscaled) = gpu.render(&scene, &half(plain()), 1);
+    let (_, settled) = gpu.render(&scene, &half(live()), 96);
+    // the mean of the four nearest, as a texture unit would have it
+    let (_, small) = gpu.render(&half_size(&scene), &plain(), 1);
+    let bilinear = bilinear(&small);
+    let alike = [&bilinear, &upscaled, &settled].map(|p| ssim(p, &truth));
+    println!("half the size: SSIM bilinear, upscaled, over time {alike:?}");
+    assert!(alike[1] > alike[0], "{alike:?}");
+    assert!(alike[2] > alike[0] + 0.35 * (1.0 - alike[0]), "{alike:?}");
+    assert!(alike[2] > 0.85, "{alike:?}");
+    // a size that divides nothing
+    let odd = |settings: Settings| Settings {
+        rt_scale: 0.27,
+        ..settings
+    };
+    let (_, upscaled) = gpu.render(&scene, &odd(plain()), 1);
+    let (_, settled) = gpu.render(&scene, &odd(live()), 128);
+    let alike = [&upscaled, &settled].map(|p| ssim(p, &truth));
+    println!("0.27 of the size: SSIM upscaled, over time {alike:?}");
+    assert!(alike[1] > alike[0], "{alike:?}");
+}
+
+fn half_size(scene: &Scene) -> Scene {
+    let mut small = checkerboard();
+    small.def = scene.def;
+    small.def.width /= 2;
+    small.def.height /= 2;
+    small
+}
+
+/// A picture twice as large.
+fn bilinear(small: &[[u8; 4]]) -> Vec<[u8; 4]> {
+    let half = SIZE / 2;
+    let at = |x: i32, y: i32| small[(y.clamp(0, half - 1) * half + x.clamp(0, half - 1)) as usize];
+    let mut out = Vec::new();
+    for y in 0..SIZE {
+        for x in 0..SIZE {
+            let (u, v) = ((x as f32 - 0.5) * 0.5, (y as f32 - 0.5) * 0.5);
+            let (i, k) = (u.floor(), v.floor());
+            out.push(std::array::from_fn(|c| {
+                let value = |dx, dy| f32::from(at(i as i32 + dx, k as i32 + dy)[c]);
+                let above = value(0, 0) + (value(1, 0) - value(0, 0)) * (u - i);
+                let below = value(0, 1) + (value(1, 1) - value(0, 1)) * (u - i);
+                (above + (below - above) * (v - k)).round() as u8
+            }));
+        }
+    }
+    out
+}
+
+fn the_lens_blurs_by_its_circle_of_confusion(gpu: &mut Gpu) {
+    // an upright edge between white and black 400 away, the lens set to some distance
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 10.0, SIZE);
+    let white = scene.material(&[stage::constant([1.0; 3])], 0);
+    let black = scene.material(&[stage::constant([0.0; 3])], 0);
+    let distance = 400.0;
+    for (y, material) in [(0.0, white), (-500.0, black)] {
+        let corner = Vec3::new(distance, y, -500.0);
+        scene.quad(
+            rectangle(corner, Vec3::Z * 1000.0, Vec3::Y * 500.0),
+            material,
+        );
+    }
+    let aperture = 40.0;
+    for focus in [distance, 250.0, 800.0] {
+        let settings = Settings {
+            rt_dof: true,
+            rt_aperture: aperture,
+            rt_focal_length: focus,
+            ..reference()
+        };
+        let (pixels, _) = gpu.render(&scene, &settings, 192);
+        // radius of the circle that a point is spread over, in the plane of the edge
+        let radius = 0.5 * aperture * (distance - focus).abs() / focus;
+        for x in 0..SIZE {
+            let column = (0..SIZE).map(|y| pixels[(y * SIZE + x) as usize].x);
+            let found = column.sum::<f32>() / SIZE as f32;
+            let tan = 5.0f32.to_radians().tan();
+            let y = -((x as f32 + 0.5) / SIZE as f32 * 2.0 - 1.0) * tan * distance;
+            if radius == 0.0 {
+                // sharp but for the column that the edge runs along
+                let wanted = if y > 0.0 { 1.0 } else { 0.0 };
+                assert!((found - wanted).abs() < 1.0e-3, "{x}: {found} {wanted}");
+                continue;
+            }
+            // part of the disc that lies beyond the edge
+            let h = (y / radius).clamp(-1.0, 1.0);
+            let wanted = 0.5 + (h.asin() + h * (1.0 - h * h).sqrt()) / std::f32::consts::PI;
+            assert!(
+                (found - wanted).abs() < 0.02,
+                "focus {focus}, column {x}: {found}, not {wanted}"
+            );
+        }
+    }
+}
