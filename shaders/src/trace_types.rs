@@ -359,6 +359,8 @@ pub struct DenoiseView {
     pub carried: u32,
     /// Depth and normal of each stratum.
     pub stratum_guide: u32,
+    /// Change and size of direct and indirect light around each stratum.
+    pub gradient_sums: u32,
     /// The part of direct and indirect light that has changed, of each stratum.
     pub gradient: u32,
     /// Depth, normal, number of frames and variance.
@@ -464,8 +466,6 @@ pub struct TraceView {
     pub last_left: Vec3,
     pub last_up: Vec3,
     pub denoise: DenoiseView,
-    /// Makes the size a multiple of eight without hidden bytes.
-    pub padding: u32,
 }
 
 /// Names of constants used on both sides.

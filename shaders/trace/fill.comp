@@ -20,6 +20,8 @@ void main() {
         for (int i = 0; i < 4; i++) {
             ivec2 tap = pixel + beside[i];
             if (any(lessThan(tap, ivec2(0))) || tap.x >= int(VIEW.width) || tap.y >= int(VIEW.height)) continue;
+            // a gradient sample has taken its turn
+            if (!is_gathered(tap)) continue;
             vec4 other = imageLoad(images_rgba32f[VIEW.image_position], tap);
             if (other.w < 0.0) continue;
             vec3 found = light_read(VIEW.image_indirect, tap);

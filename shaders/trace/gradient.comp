@@ -1,7 +1,8 @@
 #version 460
 // The temporal gradient of each stratum: how much the light of its sample differs from the light that the same sample
 // had in the last frame, spread over the neighbourhood by three edge-avoiding a-trous steps in shared memory (Schied et
-// al. 2018, section 4.3: the change and the size of the light are filtered apart, and divided at the end).
+// al. 2018, section 4.3: the change and the size of the light are filtered apart, and divided at the end, which
+// gradient_wide.comp does).
 #include "trace/sparse.glsl"
 
 const int TILE = 16, BORDER = 7, WIDE = TILE + 2 * BORDER; // steps of 1, 2 and 4 strata reach 7 far
@@ -95,8 +96,5 @@ void main() {
     ivec2 stratum = corner + BORDER + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(stratum, strata))) return;
     int place = (int(gl_LocalInvocationID.y) + BORDER) * WIDE + int(gl_LocalInvocationID.x) + BORDER;
-    vec2 direct = unpackHalf2x16(tile[place].x), indirect = unpackHalf2x16(tile[place].y);
-    vec2 size = vec2(direct.y, indirect.y);
-    vec2 part = mix(vec2(0.0), abs(vec2(direct.x, indirect.x)) / max(size, 1.0e-6), greaterThan(size, vec2(1.0e-6)));
-    imageStore(images_rg16f[DENOISE.gradient], stratum, vec4(min(part, 1.0), 0.0, 0.0));
+    imageStore(images_rgba16f[DENOISE.gradient_sums], stratum, vec4(unpackHalf2x16(tile[place].x), unpackHalf2x16(tile[place].y)));
 }

@@ -62,7 +62,7 @@ struct AntialiasView {
 };
 
 struct DenoiseView {
-    uint flags; uint last_seed; uint samples; uint sample_surfaces; uint carried; uint stratum_guide; uint gradient;
+    uint flags; uint last_seed; uint samples; uint sample_surfaces; uint carried; uint stratum_guide; uint gradient_sums; uint gradient;
     uint guide; uint last_guide; uint history; uint fresh; uint lit; uint slope;
 };
 
@@ -88,7 +88,7 @@ struct TraceView {
     float exposure_bias; float exposure_base; float exposure_blend;
     uint target_width; uint target_height; uint sky_sampler;
     vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up;
-    DenoiseView denoise; uint padding;
+    DenoiseView denoise;
 };
 
 // What a geometry's triangles are to a ray.

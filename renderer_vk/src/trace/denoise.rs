@@ -62,6 +62,7 @@ struct AdaptiveImages {
     /// The gradient samples of this frame.
     carried: Image,
     stratum_guide: Image,
+    gradient_sums: Image,
     gradient: Image,
 }
 
@@ -109,6 +110,7 @@ impl AdaptiveImages {
             sample_surfaces: strata("trace sample surfaces", Format::Rgba32Uint)?,
             carried: strata("trace carried", Format::R32Uint)?,
             stratum_guide: strata("trace stratum guide", Format::R32Uint)?,
+            gradient_sums: strata("trace gradient sums", Format::Rgba16F)?,
             gradient: strata("trace gradient", Format::Rg16F)?,
         })
     }
@@ -130,6 +132,7 @@ pub struct Denoiser {
     device: Device,
     carry: ComputePipeline,
     gradient: ComputePipeline,
+    gradient_wide: ComputePipeline,
     temporal: ComputePipeline,
     wavelet: ComputePipeline,
     sparse_temporal: ComputePipeline,
@@ -154,6 +157,7 @@ impl Denoiser {
             device: device.clone(),
             carry: compute("trace_carry", &shaders::TRACE_CARRY_COMP)?,
             gradient: compute("trace_gradient", &shaders::TRACE_GRADIENT_COMP)?,
+            gradient_wide: compute("trace_gradient_wide", &shaders::TRACE_GRADIENT_WIDE_COMP)?,
             temporal: compute("trace_temporal", &shaders::TRACE_TEMPORAL_COMP)?,
             wavelet: compute("trace_wavelet", &shaders::TRACE_ATROUS_COMP)?,
             sparse_temporal: compute(
@@ -215,6 +219,7 @@ impl Denoiser {
             sample_surfaces: nothing,
             carried: nothing,
             stratum_guide: nothing,
+            gradient_sums: nothing,
             gradient: nothing,
             guide: nothing,
             last_guide: nothing,
@@ -245,6 +250,7 @@ impl Denoiser {
             sample_surfaces: adaptive.sample_surfaces.storage_index(),
             carried: adaptive.carried.storage_index(),
             stratum_guide: adaptive.stratum_guide.storage_index(),
+            gradient_sums: adaptive.gradient_sums.storage_index(),
             gradient: adaptive.gradient.storage_index(),
             guide: adaptive.guide[0].storage_index(),
             last_guide: adaptive.guide[1].storage_index(),
@@ -281,6 +287,8 @@ impl Denoiser {
             let strata = size.map(|s| s.div_ceil(STRATUM));
             let tile = [GRADIENT_TILE; 2];
             dispatch(rec, "trace_gradient", &self.gradient, view, strata, tile)?;
+            let name = "trace_gradient_wide";
+            dispatch(rec, name, &self.gradient_wide, view, strata, [TILE; 2])?;
         }
         match images.tier {
             Tier::Adaptive => {

@@ -409,7 +409,6 @@ impl ViewTracer {
             last_left,
             last_up,
             denoise: self.denoiser.view(self.frame.wrapping_sub(1)),
-            padding: 0,
         })
     }
 }

@@ -1,0 +1,44 @@
+#version 460
+// The last step of the gradient's filter: 5 x 5 taps, six strata apart. Light that comes by rare paths changes in few
+// samples, and a neighbourhood that holds none of them would not know. One that does see a change keeps its own.
+#include "trace/denoise.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+const int SPACING = 6;
+
+vec2 part_of(vec4 sums) {
+    vec2 size = sums.yw;
+    return min(mix(vec2(0.0), abs(sums.xz) / max(size, 1.0e-6), greaterThan(size, vec2(1.0e-6))), 1.0);
+}
+
+void main() {
+    ivec2 stratum = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 strata = (ivec2(VIEW.width, VIEW.height) + STRATUM - 1) / STRATUM;
+    if (any(greaterThanEqual(stratum, strata))) return;
+    uint guide = imageLoad(uimages_r32ui[DENOISE.stratum_guide], stratum).x;
+    vec4 own = imageLoad(images_rgba16f[DENOISE.gradient_sums], stratum);
+    vec2 part = part_of(own);
+    if (guide != 0) {
+        float depth = guide_depth(guide);
+        vec3 normal = guide_normal(guide);
+        const float kernel[3] = float[](6.0, 4.0, 1.0);
+        vec4 sum = own * 36.0;
+        for (int y = -2; y <= 2; y++) {
+            for (int x = -2; x <= 2; x++) {
+                ivec2 tap = stratum + ivec2(x, y) * SPACING;
+                if ((x == 0 && y == 0) || any(lessThan(tap, ivec2(0))) || any(greaterThanEqual(tap, strata))) continue;
+                uint other = imageLoad(uimages_r32ui[DENOISE.stratum_guide], tap).x;
+                if (other == 0) continue;
+                vec4 sums = imageLoad(images_rgba16f[DENOISE.gradient_sums], tap);
+                float weight = kernel[abs(x)] * kernel[abs(y)] * max(dot(normal, guide_normal(other)), 0.0)
+                    * exp(-abs(log(guide_depth(other) / depth)));
+                // as in the steps before: what is much brighter is another thing
+                vec2 alike = exp2(-abs(log2((sums.yw + 1.0e-5) / (own.yw + 1.0e-5))));
+                sum += sums * (weight * alike).xxyy;
+            }
+        }
+        part = max(part, part_of(sum));
+    }
+    imageStore(images_rg16f[DENOISE.gradient], stratum, vec4(part, 0.0, 0.0));
+}
