@@ -98,7 +98,7 @@ fn rooms(side: i32, seed: u64) -> RelitWorld {
     for i in 0..=side {
         for j in 0..side {
             let inner = i > 0 && i < side;
-            let mut door = || inner && random.next() % 3 > 0;
+            let mut door = || inner && !random.next().is_multiple_of(3);
             let (a, b) = (door(), door());
             wall(&mut map, plain, at(i, j), Vec3::Y * ROOM, a);
             wall(&mut map, plain, at(j, i), Vec3::X * ROOM, b);

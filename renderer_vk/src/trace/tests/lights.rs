@@ -37,6 +37,15 @@ fn all_lights() -> Settings {
     }
 }
 
+/// 256 light samples a pixel, in few frames.
+fn many_samples() -> (Settings, u32) {
+    let settings = Settings {
+        rt_num_random_dl: 64,
+        ..all_lights()
+    };
+    (settings, 4)
+}
+
 /// The part of a polygon on the positive side of a plane.
 fn clipped(polygon: &[Vec3], normal: Vec3, point: Vec3) -> Vec<Vec3> {
     let height = |p: Vec3| (p - point).dot(normal);
@@ -77,7 +86,8 @@ fn an_edge_hides_the_part_of_a_light_that_lies_behind_it_with(gpu: &mut Gpu) {
         white,
     );
     scene.light(triangle, Vec3::splat(20.0));
-    let (pixels, _) = gpu.render(&scene, &all_lights(), 256);
+    let (settings, frames) = many_samples();
+    let (pixels, _) = gpu.render(&scene, &settings, frames);
     let (mut worst, mut partial) = (0.0f32, 0);
     for (i, pixel) in pixels.iter().enumerate() {
         let p = floor_point(&scene, i % SIDE, i / SIDE);
@@ -136,7 +146,8 @@ fn the_suns_disc_makes_a_penumbra_of_its_own_width_with(gpu: &mut Gpu) {
         angular_radius: radius,
         material: None,
     });
-    let (pixels, _) = gpu.render(&scene, &all_lights(), 256);
+    let (settings, frames) = many_samples();
+    let (pixels, _) = gpu.render(&scene, &settings, frames);
     let mut worst = 0.0f32;
     for (i, pixel) in pixels.iter().enumerate() {
         let p = floor_point(&scene, i % SIDE, i / SIDE);
@@ -198,7 +209,7 @@ fn in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky_with(gpu: &mut Gpu)
             0.02,
         ),
     ] {
-        let (pixels, _) = gpu.render(&scene, &settings, 64);
+        let (pixels, _) = gpu.render(&scene, &settings, 16);
         let mean = pixels.iter().map(|p| p.x).sum::<f32>() / pixels.len() as f32;
         println!("{mean}");
         assert!((mean - 1.0).abs() < tolerance, "{mean}");
@@ -341,16 +352,16 @@ fn estimators_differ_by_noise_alone_with(gpu: &mut Gpu) {
     // square of it. Four and a half deviations happen to one picture of some hundred thousand.
     const BOUND: f32 = 4.5;
     let scene = crowd();
-    let (truth, _) = gpu.render(&scene, &all_lights(), 24);
+    let (truth, _) = gpu.render(&scene, &all_lights(), 16);
     for selection in [LightSelection::Uniform, LightSelection::Resampled] {
         for candidates in [3, 8] {
             let settings = Settings {
                 rt_light_selection: selection,
-                rt_num_random_dl: 2,
+                rt_num_random_dl: 16,
                 rt_candidates: candidates,
                 ..all_lights()
             };
-            let (pixels, _) = gpu.render(&scene, &settings, 128);
+            let (pixels, _) = gpu.render(&scene, &settings, 12);
             let score = |chosen: &dyn Fn(usize) -> bool| {
                 let differences = pixels.iter().zip(&truth).enumerate();
                 let (sum, squares) = differences
