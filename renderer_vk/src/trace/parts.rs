@@ -17,6 +17,9 @@ use crate::scene::{DynamicMesh, MeshId, Shape, ViewScene};
 /// Smallest volume of an entity's axes that an instance can be turned back from; flatter ones are placed on the CPU.
 const FLAT: f32 = 1.0e-12;
 
+/// Triangles of a deformed surface of the map from which on it has a structure of its own.
+const SCRAP: u32 = 128;
+
 /// Who sees a mesh that moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
@@ -269,7 +272,7 @@ impl Parts {
                     count(rigid.indices.len()),
                 )
             }
-            Shape::Animated(id) if solid && is_whole(view, mesh) => {
+            Shape::Animated(id) if solid && !is_scrap(mesh) && is_whole(view, mesh) => {
                 (Source::Animated(id), mesh.vertex_count, mesh.index_count)
             }
             Shape::Animated(_) | Shape::Changing => {
@@ -405,6 +408,12 @@ impl Parts {
             });
         }
     }
+}
+
+/// Whether a deformed surface of the map is so small that it is better built together with all others of its sort:
+/// flames and lamps that turn to the eye come by hundreds, and each structure costs a build and an instance.
+fn is_scrap(mesh: &DynamicMesh) -> bool {
+    mesh.world_surface.is_some() && mesh.index_count < 3 * SCRAP
 }
 
 /// Whether a mesh's vertices are there and numbers: a structure that is fitted to them must not meet others.

@@ -206,6 +206,14 @@ fn a_thousand_entities_of_one_model_share_one_structure() {
             let instance = turned(&mut numbers);
             add(&mut scene, How::Rigid, &rigid, 1, solid, instance);
         }
+        // small deformed surfaces of the map are built together, a large one is fitted
+        for triangles in [20, 30, 500] {
+            let (vertices, indices) = shards(4, triangles);
+            let surface = Arc::new(RigidMesh::new(vertices, indices));
+            let id = triangles as i32;
+            add(&mut scene, How::Animated, &surface, id, solid, identity());
+            scene.meshes.last_mut().expect("added").world_surface = Some(triangles as u32);
+        }
         let uploaded = scene.upload(&gpu.device, tracer);
         let mut accel = Accel::new(&gpu.device, tracer);
         let view = scene.view();
@@ -221,7 +229,7 @@ fn a_thousand_entities_of_one_model_share_one_structure() {
                 )
                 .expect("recorded");
             gpu.ring.end(rec).expect("submitted");
-            assert_eq!(accel.counts(), [1, 0]);
+            assert_eq!(accel.counts(), [1, 1]);
             let models = accel.memory().models;
             match frame {
                 0 => before = Some(models),
