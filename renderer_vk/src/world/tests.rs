@@ -335,3 +335,64 @@ fn levels_of_real_curves_are_exact() {
     }
     assert!(curves > 100, "{curves}");
 }
+
+#[test]
+fn what_rays_meet_of_a_curve_is_as_fine_as_asked() {
+    // a quarter of a cylinder of radius 128 along y: control points on its tangents
+    let radius = 128.0;
+    let profile = [
+        Vec3::new(radius, 0.0, 0.0),
+        Vec3::new(radius, 0.0, radius),
+        Vec3::new(0.0, 0.0, radius),
+    ];
+    let points: Vec<DrawVert> = (0..3)
+        .flat_map(|row| {
+            profile.map(|p| DrawVert {
+                position: p + Vec3::Y * 64.0 * row as f32,
+                normal: Vec3::Z,
+                st: Vec2::ZERO,
+                lightmap: Vec2::ZERO,
+                color: [255; 4],
+            })
+        })
+        .collect();
+    let mut worst = Vec::new();
+    for subdivisions in [32.0, 4.0, 0.5] {
+        let mut game = game();
+        game.settings.subdivisions = subdivisions;
+        let mut map = MapBuilder::new();
+        let wall = map.add_shader("t/wall", 0, 0);
+        map.add_room(wall, Vec3::splat(-512.0), Vec3::splat(512.0));
+        let patch = map.add_patch(wall, 3, 3, &points);
+        let world = game.build(map.build());
+        let surface = &world.surfaces[patch];
+        // the parabola of the control points, along an edge of the mesh
+        let curve = |t: f32| {
+            profile[0] * (1.0 - t) * (1.0 - t)
+                + profile[1] * 2.0 * t * (1.0 - t)
+                + profile[2] * t * t
+        };
+        let first = surface.first_index as usize;
+        let triangles = &world.indices[first..first + surface.index_count as usize];
+        let mut distance = 0.0f32;
+        for i in 0..=64 {
+            let on = curve(i as f32 / 64.0);
+            let nearest = triangles
+                .chunks_exact(3)
+                .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])])
+                .map(|(a, b)| {
+                    let [a, b] = [a, b].map(|i| world.vertices[i as usize].position);
+                    // edges of the mesh seen along y
+                    let [a, b, p] = [a, b, on].map(|p| Vec2::new(p.x, p.z));
+                    let along =
+                        ((p - a).dot(b - a) / (b - a).length_squared().max(1e-9)).clamp(0.0, 1.0);
+                    p.distance(a.lerp(b, along))
+                })
+                .fold(f32::INFINITY, f32::min);
+            distance = distance.max(nearest);
+        }
+        assert!(distance <= subdivisions, "{distance} at {subdivisions}");
+        worst.push(distance);
+    }
+    assert!(worst[0] > worst[1] && worst[1] > worst[2], "{worst:?}");
+}
