@@ -63,6 +63,30 @@ t/broken
 }
 t/low { sort 1.5
   { map t/a.tga } }
+t/water
+{
+  surfaceparm water
+  surfaceparm trans
+  cull none
+  { map $whiteimage
+    blendFunc GL_DST_COLOR GL_ONE
+    rgbGen const ( 1 0.5 0.25 )
+    tcMod scroll 1 0 }
+}
+t/lava
+{
+  surfaceparm lava
+  { map t/a.tga
+    blendFunc blend }
+}
+t/shiny
+{
+  { map t/a.tga
+    rgbGen lightingDiffuse }
+  { map t/b.tga
+    blendFunc add
+    tcGen environment }
+}
 t/sky
 {
   skyParms t/box 300 -
@@ -161,6 +185,29 @@ fn stages_keep_what_the_script_says() {
     assert!(material.flags & c::MATERIAL_TRANSLUCENT != 0);
     assert!(material.flags & c::MATERIAL_TWO_SIDED != 0);
     assert_eq!(material.sort, shaderscript::sort::BLEND);
+}
+
+#[test]
+fn liquids_and_reflections_come_from_directives() {
+    let mut game = game();
+    let mut material = |name| {
+        let index = game.find(name, LightmapClass::Page, true);
+        game.materials.get(index).clone()
+    };
+    let water = material("t/water").dielectric;
+    assert!((water.index - 1.33).abs() < 1.0e-6 && water.ripple > 0.0);
+    // its stage doubles the brightest channel of what is behind: that much is taken back
+    assert!((water.scale - 0.5).abs() < 0.01, "{}", water.scale);
+    // red goes through, blue least of all
+    let [red, green, blue] = water.absorption.to_array();
+    assert!(red.abs() < 1.0e-6 && green > 0.0 && blue > green);
+    assert_eq!(material("t/lava").dielectric.index, 0.0);
+    assert_eq!(material("t/wall").dielectric, Default::default());
+    let shiny = material("t/shiny");
+    let reflects: Vec<bool> = (game.materials.stages(&shiny).iter())
+        .map(|stage| stage.flags & c::STAGE_REFLECTION != 0)
+        .collect();
+    assert_eq!(reflects, [false, true]);
 }
 
 #[test]
