@@ -38,13 +38,13 @@ const IN_THE_OPEN: usize = 8;
 const ENOUGH: u32 = 6;
 
 /// Most rays for a pair of light and cluster.
-const MOST: u32 = 96;
+const MOST: u32 = 64;
 
 /// Fewest, on maps of so many pairs that [`BUDGET`] would leave less.
 const FEWEST: u32 = 8;
 
 /// Rays for a map: a second or two on a processor of eight cores.
-const BUDGET: usize = 32_000_000;
+const BUDGET: usize = 24_000_000;
 
 /// Clusters are beside each other when the boxes around their points meet, after these have been made wider by so many
 /// id units or by such a part of their size: points seldom lie at the very end of their cluster.
