@@ -24,6 +24,7 @@ pub mod light_tables;
 pub mod lights;
 pub mod look;
 pub mod motion;
+mod part_mesh;
 mod parts;
 pub mod passes;
 mod shapes;

@@ -1,0 +1,83 @@
+//! The triangles of a part, gathered from its meshes.
+
+use glam::Vec3;
+use shaders::types::Vertex;
+
+use super::input::Kind;
+use super::parts::{Part, Parts};
+use crate::gpu::BlasGeometry;
+use crate::scene::{MeshGeometry, ViewScene};
+
+/// The geometry of one mesh of a part.
+pub struct MeshPart<'a> {
+    /// Its vertices and indices.
+    pub mesh: MeshGeometry<'a>,
+    /// First vertex, counted from the part's first.
+    pub offset: u32,
+}
+
+impl MeshPart<'_> {
+    /// Triangles that count from the part's first vertex.
+    pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        let offset = self.offset;
+        self.mesh.triangles().map(move |t| t.map(|i| i + offset))
+    }
+}
+
+/// The meshes of a part.
+pub fn members<'a>(view: &'a ViewScene, parts: &Parts, part: &Part) -> Vec<MeshPart<'a>> {
+    let members = part.members.clone();
+    let meshes = parts.meshes.get(members.clone()).unwrap_or_default();
+    let shapes = parts.shapes.get(members).unwrap_or_default();
+    // one that is not there is an empty one, so that members and skins stay side by side
+    const NOTHING: MeshGeometry<'_> = MeshGeometry {
+        vertices: &[],
+        indices: &[],
+        base: 0,
+    };
+    let found = meshes.iter().zip(shapes).map(|(&mesh, shape)| MeshPart {
+        mesh: view
+            .meshes
+            .get(mesh)
+            .map_or(NOTHING, |mesh| view.mesh_geometry(mesh)),
+        offset: shape.first_vertex,
+    });
+    found.collect()
+}
+
+/// All triangles of a part.
+pub fn part_indices(meshes: &[MeshPart<'_>]) -> Vec<[u32; 3]> {
+    meshes.iter().flat_map(MeshPart::triangles).collect()
+}
+
+/// Whether a part has these triangles.
+pub fn is_same(indices: &[[u32; 3]], meshes: &[MeshPart<'_>]) -> bool {
+    let now = meshes.iter().flat_map(MeshPart::triangles);
+    now.eq(indices.iter().copied())
+}
+
+/// Positions of triangles' corners.
+pub fn part_corners(vertices: &[Vertex], indices: &[[u32; 3]]) -> Vec<[Vec3; 3]> {
+    let position = |i: u32| vertices.get(i as usize).map_or(Vec3::NAN, |v| v.position);
+    indices.iter().map(|t| t.map(position)).collect()
+}
+
+/// A part's triangles as the driver builds from them; `vertices` and `triangles` are counts.
+pub fn geometry(
+    kind: Kind,
+    vertex_address: u64,
+    vertices: usize,
+    index_address: u64,
+    triangles: usize,
+) -> BlasGeometry {
+    let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+    BlasGeometry {
+        vertex_address,
+        vertex_stride: size_of::<Vertex>() as u64,
+        max_vertex: count(vertices.saturating_sub(1)),
+        index_address,
+        triangle_count: count(triangles),
+        opaque: matches!(kind, Kind::Opaque | Kind::Sky),
+        no_duplicate_any_hit: kind == Kind::Translucent,
+    }
+}
