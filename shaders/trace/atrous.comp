@@ -3,6 +3,7 @@
 // variance of the light (Schied et al. 2017, section 4.3 and 4.4). The kernel is 3 x 3. Direct and indirect light share
 // what the surface says and differ in what the light says.
 #define OWN_PUSH
+#extension GL_EXT_control_flow_attributes : require
 #include "trace/denoise.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -37,23 +38,24 @@ void main() {
     vec3 plane = vec3(rate, 1.0 / depth - dot(rate, tangent));
     float plane_scale = inversesqrt(dot(plane, plane)) / (0.1 + depth * (0.5 * float(spacing) * VIEW.pixel_spread + 3.0e-4));
 
-    // how much of the same surface a tap is; the variance of the middle is itself noisy, that around it is less so
-    LightTexel taps[8];
+    // how much of the same surface a tap is; the variance of the middle is itself noisy, that around it is less so.
+    // Taps are kept packed, 16 bytes each: unpacked ones would take so many registers that few pixels run at a time
+    float inverse_depth = 1.0 / depth;
+    uvec4 taps[8];
     float alike[8];
     vec2 deviation = middle.variance * 4.0;
     float count = 4.0;
-    for (int i = 0; i < 8; i++) {
-        int place = i < 4 ? i : i + 1;
-        ivec2 offset = ivec2(place % 3, place / 3) - 1;
+    [[unroll]] for (int i = 0; i < 8; i++) {
+        const int place = i < 4 ? i : i + 1;
+        const ivec2 offset = ivec2(place % 3, place / 3) - 1;
         ivec2 tap = pixel + offset * spacing;
-        alike[i] = 0.0;
-        if (!inside(tap)) continue;
-        taps[i] = unpack_texel(imageLoad(uimages_rgba32ui[push.source], tap));
-        if (taps[i].guide == 0) continue;
-        float off_plane = abs((1.0 + dot(slope, vec2(offset))) * guide_depth(taps[i].guide) / depth - 1.0) * plane_scale;
-        alike[i] = narrow(max(dot(normal, guide_normal(taps[i].guide)), 0.0)) * exp(-off_plane)
+        taps[i] = inside(tap) ? imageLoad(uimages_rgba32ui[push.source], tap) : uvec4(0);
+        uint guide = taps[i].w;
+        float off_plane = abs((1.0 + dot(slope, vec2(offset))) * guide_depth(guide) * inverse_depth - 1.0) * plane_scale;
+        float same = narrow(max(dot(normal, guide_normal(guide)), 0.0)) * exp(-off_plane)
             * (offset.x == 0 ? 2.0 : 1.0) * (offset.y == 0 ? 2.0 : 1.0);
-        deviation += taps[i].variance * alike[i];
+        alike[i] = guide == 0 ? 0.0 : same;
+        deviation += unpackHalf2x16(taps[i].z) * alike[i];
         count += alike[i];
     }
     deviation = sqrt(deviation / count);
@@ -61,13 +63,13 @@ void main() {
 
     vec3 direct = middle.direct * 4.0, indirect = middle.indirect * 4.0;
     vec2 variance = middle.variance * 16.0, total = vec2(4.0);
-    for (int i = 0; i < 8; i++) {
-        if (alike[i] == 0.0) continue;
-        vec2 away = abs(vec2(luminance(taps[i].direct), luminance(taps[i].indirect)) - value) * light_scale;
+    [[unroll]] for (int i = 0; i < 8; i++) {
+        vec3 tap_direct = unpack_light(taps[i].x), tap_indirect = unpack_light(taps[i].y);
+        vec2 away = abs(vec2(luminance(tap_direct), luminance(tap_indirect)) - value) * light_scale;
         vec2 weight = alike[i] * exp(-away);
-        direct += taps[i].direct * weight.x;
-        indirect += taps[i].indirect * weight.y;
-        variance += taps[i].variance * weight * weight;
+        direct += tap_direct * weight.x;
+        indirect += tap_indirect * weight.y;
+        variance += unpackHalf2x16(taps[i].z) * weight * weight;
         total += weight;
     }
     middle.direct = direct / total.x;
