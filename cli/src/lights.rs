@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::Result;
 use clap::Args;
 use relight::light::{LightLists, judge, lists_by_geometry, lists_by_visibility, sweep};
-use relight::{CalibrationOptions, Materials, Options, RelitWorld};
+use relight::{CalibrationCache, CalibrationOptions, Materials, Options, RelitWorld};
 use serde_json::json;
 
 use crate::view::open;
@@ -42,6 +42,9 @@ pub struct LightsArgs {
     /// Do not fit lights to the map's lightmaps first (the game does)
     #[arg(long)]
     no_calibration: bool,
+    /// Folder to keep what calibration and rays find in
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
 }
 
 /// Runs the command: one JSON object a map and kind of list.
@@ -49,8 +52,13 @@ pub fn run(args: &LightsArgs) -> Result<()> {
     for map in &args.maps {
         let (files, map) = open(map, &args.games)?;
         let (materials, _) = Materials::load(&*files);
+        let cache = args.cache.as_ref().map(CalibrationCache::new);
+        let calibrate = (!args.no_calibration).then(|| CalibrationOptions {
+            cache: cache.clone(),
+            ..CalibrationOptions::default()
+        });
         let options = Options {
-            calibrate: (!args.no_calibration).then(CalibrationOptions::default),
+            calibrate,
             ..Options::default()
         };
         let mut world = RelitWorld::load(&*files, &materials, &map, options)?;
@@ -60,12 +68,13 @@ pub fn run(args: &LightsArgs) -> Result<()> {
         let begin = Instant::now();
         let geometric = lists_by_geometry(&world);
         let geometric_seconds = begin.elapsed().as_secs_f64();
-        let swept = sweep(&mut world);
+        let swept = sweep(&mut world, cache.as_ref());
         let lists: [(&str, &LightLists, f64); 3] = [
             ("pvs", &visible, visible_seconds),
             ("pvs+geometry", &geometric, geometric_seconds),
             ("pvs+geometry+rays", &world.light_lists, swept.seconds),
         ];
+        eprintln!("{map}: {swept:?}");
         let clusters = world.light_lists.clusters();
         let step = clusters.div_ceil(args.clusters.max(1));
         let judged = judge(&world, &lists.map(|l| l.1), args.rays, step);

@@ -122,7 +122,7 @@ fn what_rays_find_stays_in_the_lists() {
         let mut world = rooms(4, seed);
         let visible = lists_by_visibility(&world);
         let geometric = lists_by_geometry(&world);
-        let report = sweep(&mut world);
+        let report = sweep(&mut world, None);
         let swept = &world.light_lists;
         assert_eq!(report.unseen, 0);
         let rows = 0..16;
@@ -159,7 +159,7 @@ fn what_rays_find_stays_in_the_lists() {
         assert!(kept.light_found >= 1.0 - f64::from(DROPPED_PART) / 4.0);
         assert!(kept.precision() >= 1.5 * all.precision());
         // a second sweep finds nothing to do
-        let again = sweep(&mut world);
+        let again = sweep(&mut world, None);
         assert_eq!(again.entries[0], again.entries[1]);
     }
 }
@@ -198,7 +198,7 @@ fn on_a_real_map_lists_are_short_and_whole() {
     let map = format!("maps/{map}.bsp");
     let mut world = RelitWorld::load(&files, &materials, &map, options).expect("a map");
     let visible = lists_by_visibility(&world);
-    let report = sweep(&mut world);
+    let report = sweep(&mut world, None);
     let judged = judge(&world, &[&visible, &world.light_lists], 128, 8);
     for j in &judged {
         println!(

@@ -15,6 +15,9 @@ use std::path::{Path, PathBuf};
 /// First words of a file.
 const MAGIC: &str = "relight-calibration";
 
+/// How the names of its files end.
+const KIND: &str = "light";
+
 /// A folder of results.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CalibrationCache {
@@ -23,7 +26,7 @@ pub struct CalibrationCache {
 
 /// Why a kept result could not be used, or not be kept.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum CacheError {
+pub(crate) enum CacheError {
     #[error("{}: cannot be read: {source}", path.display())]
     Read { path: PathBuf, source: io::Error },
     #[error("{}: cannot be written: {source}", path.display())]
@@ -34,6 +37,8 @@ pub(super) enum CacheError {
         line: usize,
         what: &'static str,
     },
+    #[error("{}: {what}; the lists of lights are swept again", path.display())]
+    Lists { path: PathBuf, what: &'static str },
 }
 
 impl CalibrationCache {
@@ -49,17 +54,16 @@ impl CalibrationCache {
         &self.folder
     }
 
-    fn path(&self, key: u128) -> PathBuf {
-        self.folder.join(format!("{key:032x}.light"))
+    /// The file of a result of some kind.
+    pub(crate) fn path(&self, key: u128, kind: &str) -> PathBuf {
+        self.folder.join(format!("{key:032x}.{kind}"))
     }
 
     /// A kept result for `known` known sources; `None` when there is none.
     pub(super) fn read(&self, key: u128, known: usize) -> Result<Option<Solution>, CacheError> {
-        let path = self.path(key);
-        let bytes = match std::fs::read(&path) {
-            Ok(bytes) => bytes,
-            Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Err(source) => return Err(CacheError::Read { path, source }),
+        let path = self.path(key, KIND);
+        let Some(bytes) = read_file(&path)? else {
+            return Ok(None);
         };
         match parse(&String::from_utf8_lossy(&bytes), known) {
             Ok(solution) => Ok(Some(solution)),
@@ -67,23 +71,36 @@ impl CalibrationCache {
         }
     }
 
-    /// Keeps a result. The file appears whole or not at all.
+    /// Keeps a result.
     pub(super) fn write(&self, key: u128, solution: &Solution) -> Result<(), CacheError> {
-        let path = self.path(key);
+        self.write_file(self.path(key, KIND), print(solution).as_bytes())
+    }
+
+    /// Writes a file of the folder. It appears whole or not at all.
+    pub(crate) fn write_file(&self, path: PathBuf, bytes: &[u8]) -> Result<(), CacheError> {
         let unfinished = path.with_extension(format!("{}.part", std::process::id()));
         let write = || {
             std::fs::create_dir_all(&self.folder)?;
-            std::fs::write(&unfinished, print(solution))?;
+            std::fs::write(&unfinished, bytes)?;
             std::fs::rename(&unfinished, &path)
         };
         write().map_err(|source| {
             // What is left of a failed attempt; that it may not be there is fine.
             let _ = std::fs::remove_file(&unfinished);
-            CacheError::Write {
-                path: path.clone(),
-                source,
-            }
+            CacheError::Write { path, source }
         })
+    }
+}
+
+/// The bytes of a file; `None` when there is none.
+pub(crate) fn read_file(path: &Path) -> Result<Option<Vec<u8>>, CacheError> {
+    match std::fs::read(path) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(CacheError::Read {
+            path: path.into(),
+            source,
+        }),
     }
 }
 
@@ -199,68 +216,73 @@ pub(super) fn key(world: &RelitWorld, options: &CalibrationOptions) -> u128 {
     hash.number(options.samples as u64);
     hash.number(options.candidates as u64);
     hash.number(options.seed);
-    // The file's own bytes: light, geometry, visibility. The entities hold the grid's size.
-    hash.bytes(&world.bsp.write());
-    for surface in &world.surfaces {
-        for number in [
-            surface.material,
-            surface.model,
-            surface.first_index,
-            surface.num_indices,
-            surface.lightmap as u32,
-        ] {
-            hash.number(u64::from(number));
-        }
-    }
-    for vertex in &world.vertices {
-        hash.vector(vertex.position);
-    }
-    for material in &world.materials {
-        hash.number(u64::from(material.is_sky()));
-        hash.number(material.class.class as u64);
-        hash.number(u64::from(material.emission.is_some()));
-        hash.vector(material.albedo);
-    }
-    for light in &world.lights {
-        light.vertices.iter().for_each(|v| hash.vector(*v));
-        hash.vector(light.radiance);
-        hash.number(u64::from(light.surface) << 8 | u64::from(light.two_sided));
-        hash.number(light.source as u64);
-    }
-    for light in &world.point_lights {
-        hash.vector(light.origin);
-        hash.vector(light.intensity);
-    }
-    for sun in &world.suns {
-        hash.vector(sun.direction);
-        hash.vector(sun.irradiance);
-    }
-    hash.vector(world.ambient);
+    hash.world(world);
     hash.finish()
 }
 
 /// Two 64-bit lanes of multiply and rotate. Chance collisions matter here, enemies do not: who can write the folder
 /// can write anything into it.
-struct Hash(u64, u64);
+pub(crate) struct Hash(u64, u64);
 
 impl Hash {
-    fn new() -> Hash {
+    pub(crate) fn new() -> Hash {
         Hash(0xCBF2_9CE4_8422_2325, 0x9E37_79B9_7F4A_7C15)
     }
 
-    fn number(&mut self, number: u64) {
+    /// What light in a world depends on: its geometry, its materials, its lights.
+    pub(crate) fn world(&mut self, world: &RelitWorld) {
+        // The file's own bytes: light, geometry, visibility. The entities hold the grid's size.
+        self.bytes(&world.bsp.write());
+        for surface in &world.surfaces {
+            for number in [
+                surface.material,
+                surface.model,
+                surface.first_index,
+                surface.num_indices,
+                surface.lightmap as u32,
+            ] {
+                self.number(u64::from(number));
+            }
+        }
+        for vertex in &world.vertices {
+            self.vector(vertex.position);
+        }
+        for material in &world.materials {
+            self.number(u64::from(material.is_sky()));
+            self.number(material.class.class as u64);
+            self.number(u64::from(material.emission.is_some()));
+            self.vector(material.albedo);
+        }
+        for light in &world.lights {
+            light.vertices.iter().for_each(|v| self.vector(*v));
+            self.vector(light.radiance);
+            self.number(u64::from(light.surface) << 8 | u64::from(light.two_sided));
+            self.number(light.source as u64);
+        }
+        for light in &world.point_lights {
+            self.vector(light.origin);
+            self.vector(light.intensity);
+        }
+        for sun in &world.suns {
+            self.vector(sun.direction);
+            self.vector(sun.irradiance);
+        }
+        self.vector(world.ambient);
+    }
+
+    pub(crate) fn number(&mut self, number: u64) {
         self.0 = (self.0 ^ number).wrapping_mul(0x0000_0100_0000_01B3);
         self.0 ^= self.0 >> 29;
         self.1 = (self.1.rotate_left(23) ^ number).wrapping_mul(0xD6E8_FEB8_6659_FD93);
     }
 
-    fn vector(&mut self, v: Vec3) {
+    pub(crate) fn vector(&mut self, v: Vec3) {
         let [x, y, z] = v.to_array().map(|c| u64::from(c.to_bits()));
         self.number(x << 32 | y);
         self.number(z);
     }
 
-    fn bytes(&mut self, bytes: &[u8]) {
+    pub(crate) fn bytes(&mut self, bytes: &[u8]) {
         self.number(bytes.len() as u64);
         let (whole, rest) = bytes.as_chunks::<8>();
         whole
@@ -269,7 +291,7 @@ impl Hash {
         rest.iter().for_each(|b| self.number(u64::from(*b)));
     }
 
-    fn finish(mut self) -> u128 {
+    pub(crate) fn finish(mut self) -> u128 {
         self.number(0x5851_F42D_4C95_7F2D);
         u128::from(self.0) << 64 | u128::from(self.1)
     }

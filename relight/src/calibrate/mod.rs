@@ -19,7 +19,7 @@
 mod apply;
 mod bounce;
 pub(crate) mod bvh;
-mod cache;
+pub(crate) mod cache;
 mod columns;
 pub(crate) mod parallel;
 mod place;

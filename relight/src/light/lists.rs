@@ -75,6 +75,16 @@ impl LightLists {
         self.lights.get(self.range(cluster)).unwrap_or_default()
     }
 
+    /// Appends the last row, of all lights, as `old` has it: nothing is known of what they give to a point in no
+    /// cluster.
+    pub(super) fn end_with_all(&mut self, old: &LightLists) {
+        let all = old.row(-1);
+        self.lights.extend(all);
+        let unknown = std::iter::repeat_n(LightShare::UNKNOWN, all.len());
+        self.shares.extend(unknown);
+        self.offsets.push(self.lights.len() as u32);
+    }
+
     /// Where a row is in `lights`.
     fn range(&self, cluster: i32) -> std::ops::Range<usize> {
         let row = usize::try_from(cluster)

@@ -47,6 +47,8 @@ mod entities;
 mod fallback;
 mod flicker;
 mod glow;
+mod judge;
+mod kept;
 mod lists;
 mod report;
 mod sight;
@@ -55,13 +57,11 @@ mod sweep;
 
 pub use emission::{Emission, EmissionSource, GLOW_THRESHOLD};
 pub use flicker::Flicker;
+pub use judge::{ListJudgement, judge, lists_by_geometry, lists_by_visibility};
 pub use lists::{LightLists, LightRef, LightShare};
 pub use report::{EmitterSummary, LightReport};
 pub use sight::{ClusterSet, Sight};
-pub use sweep::{
-    DROPPED_LEAST, DROPPED_PART, ListJudgement, SweepReport, judge, lists_by_geometry,
-    lists_by_visibility, sweep,
-};
+pub use sweep::{DROPPED_LEAST, DROPPED_PART, SweepReport, sweep};
 
 pub(crate) use emission::Finder;
 pub(crate) use entities::{ambient, light_entities};

@@ -13,8 +13,18 @@
 //! rays found, less than 3 / n arrives, with a confidence of 95 % (the "rule of three": (1 - 3 / n)^n is about 5 %),
 //! so 3 / n of its unshadowed light is what it is charged with. Strong lights that no ray found stay in the list with a
 //! small chance, and the estimators stay as unbiased as they are without sweeping, but for that part.
+//!
+//! # How long it may take
+//!
+//! A map gets [`BUDGET`] rays at the most, each cluster as many of them as its list has of all lists' entries, so that
+//! the result depends on no clock. Rays that visible lights leave go to those that come after them in the list. Where
+//! not even [`FEWEST`] rays are left for each pair, the lights that would give most without shadows come first; pairs
+//! that get no ray stay in the list as the potentially visible sets have them, with a chance by their unshadowed light.
+//!
+//! What was found can be kept: see [`sweep`].
 
-use super::{LightRef, PointLight, TriangleLight};
+use super::{LightLists, LightRef, LightShare, PointLight, TriangleLight, kept};
+use crate::calibrate::CalibrationCache;
 use crate::calibrate::bvh::Occluders;
 use crate::calibrate::random::Random;
 use crate::calibrate::{parallel, samples};
@@ -43,8 +53,9 @@ const MOST: u32 = 64;
 /// Fewest, on maps of so many pairs that [`BUDGET`] would leave less.
 const FEWEST: u32 = 8;
 
-/// Rays for a map: a second or two on a processor of eight cores.
-const BUDGET: usize = 24_000_000;
+/// Most rays for a map: see the [module](self). Less than two seconds of two processor cores on large maps; four times
+/// as many would make their lists 4 % shorter.
+const BUDGET: u64 = 6_000_000;
 
 /// Clusters are beside each other when the boxes around their points meet, after these have been made wider by so many
 /// id units or by such a part of their size: points seldom lie at the very end of their cluster.
@@ -69,6 +80,12 @@ pub struct SweepReport {
     pub entries: [usize; 2],
     /// Clusters without a point to look from; their lists stay.
     pub unseen: usize,
+    /// Entries before that no ray was left for; they stay.
+    pub unswept: usize,
+    /// Rays.
+    pub rays: u64,
+    /// Whether it comes from a cache; rays and what they did not reach are not counted then.
+    pub cached: bool,
     /// Seconds.
     pub seconds: f64,
 }
@@ -312,11 +329,16 @@ impl Pair {
     /// About which part of the light arrives, above 0.
     fn visible(&self) -> f32 {
         let [beside, alone] = LEAST_VISIBLE;
+        if self.rays == 0 {
+            // not known
+            return 1.0;
+        }
         let least = if self.beside { beside } else { alone };
         ((self.hits as f32 + 0.5) / (self.rays as f32 + 1.0)).max(least)
     }
 }
 
+/// Looks at a light with `most` rays at the most; also the number that were sent.
 fn look(
     entry: u32,
     target: &Target<'_>,
@@ -324,7 +346,7 @@ fn look(
     occluders: &Occluders,
     most: u32,
     random: &mut Random,
-) -> Pair {
+) -> (Pair, u32) {
     let (mut bare, mut arrived, mut rays, mut hits, mut tries) = (0.0, 0.0, 0u32, 0u32, 0u32);
     let start = (random.next() * receivers.len() as f32) as usize;
     while rays < most && tries < 2 * most && (hits == 0 || rays < ENOUGH) {
@@ -351,14 +373,68 @@ fn look(
         let at = receivers.first().map_or(Vec3::ZERO, |r| r.position);
         target.bare(at) / count
     };
-    Pair {
+    let pair = Pair {
         entry,
         bare,
         arrived: arrived / count,
         rays: if rays > 0 { rays } else { tries },
         hits,
         beside: false,
+    };
+    (pair, rays)
+}
+
+/// Looks from a cluster at the lights of its list, with as many rays as are `allowed` for all.
+fn look_at_all(
+    world: &RelitWorld,
+    row: &[u32],
+    receivers: &[Receiver],
+    occluders: &Occluders,
+    allowed: u64,
+    random: &mut Random,
+) -> Row {
+    let sum: Vec3 = receivers.iter().map(|r| r.position).sum();
+    let middle = sum / receivers.len().max(1) as f32;
+    let targets = row.iter().filter_map(|&e| Some((e, Target::of(world, e)?)));
+    let mut targets: Vec<_> = targets.map(|(e, t)| (t.bare(middle), e, t)).collect();
+    if allowed < targets.len() as u64 * u64::from(FEWEST) {
+        targets.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     }
+    let mut left = allowed;
+    let count = targets.len();
+    let pairs = targets
+        .iter()
+        .enumerate()
+        .map(|(i, (bare, entry, target))| {
+            let share = u32::try_from(left / (count - i).max(1) as u64).unwrap_or(MOST);
+            let most = share.clamp(FEWEST, MOST);
+            if u64::from(most) > left {
+                let nothing = Pair {
+                    entry: *entry,
+                    bare: *bare,
+                    arrived: 0.0,
+                    rays: 0,
+                    hits: 0,
+                    beside: false,
+                };
+                return (nothing, 0);
+            }
+            let (pair, sent) = look(*entry, target, receivers, occluders, most, random);
+            left -= u64::from(sent).min(left);
+            (pair, sent)
+        });
+    let (pairs, sent): (Vec<Pair>, Vec<u32>) = pairs.unzip();
+    Row {
+        pairs,
+        rays: sent.into_iter().map(u64::from).sum(),
+    }
+}
+
+/// What is known of a cluster's list.
+struct Row {
+    pairs: Vec<Pair>,
+    /// Rays that it took.
+    rays: u64,
 }
 
 /// Bounds of each cluster's receivers, a little larger than they are.
@@ -389,7 +465,7 @@ fn keep(mut pairs: Vec<Pair>, beside: &[u32], ambient: f32) -> Vec<Pair> {
     let mut left = (light * DROPPED_PART).max(DROPPED_LEAST);
     // those that no ray found, weakest first
     let charge = |p: &Pair| {
-        if p.hits > 0 || p.beside {
+        if p.hits > 0 || p.beside || p.rays == 0 {
             f32::INFINITY
         } else {
             p.bare * 3.0 / p.rays.max(1) as f32
@@ -407,66 +483,74 @@ fn keep(mut pairs: Vec<Pair>, beside: &[u32], ambient: f32) -> Vec<Pair> {
 }
 
 /// Sends rays through a world's light lists: shortens the lists, and notes in them what each light gives where. What
-/// it does depends on the world alone. A world whose lists know already is left as it is.
-pub fn sweep(world: &mut RelitWorld) -> SweepReport {
+/// it does depends on the world alone: its geometry, and its lights as they are now. A world whose lists know already
+/// is left as it is. With a `cache` a result is taken from there, or kept there; what goes wrong with it is a warning
+/// of the world's.
+pub fn sweep(world: &mut RelitWorld, cache: Option<&CalibrationCache>) -> SweepReport {
     let begin = Instant::now();
-    let clusters = world.light_lists.clusters();
-    let before = |lists: &super::LightLists| {
-        (0..clusters as i32)
-            .map(|c| lists.row(c).len())
-            .sum::<usize>()
-    };
-    let entries = before(&world.light_lists);
-    let mut report = SweepReport {
-        entries: [entries; 2],
-        ..SweepReport::default()
-    };
-    if clusters == 0 || entries == 0 || !world.light_lists.shares.is_empty() {
-        return report;
+    let lists = &world.light_lists;
+    let entries = lists.lights.len() - lists.row(-1).len();
+    if lists.clusters() == 0 || entries == 0 || !lists.shares.is_empty() {
+        return SweepReport {
+            entries: [entries; 2],
+            ..SweepReport::default()
+        };
     }
+    let (lists, mut report) = kept::kept(world, cache, |world| fresh(world, entries, BUDGET));
+    world.report.mean_list_length = lists.mean_length();
+    world.report.longest_list = lists.longest();
+    world.light_lists = lists;
+    report.seconds = begin.elapsed().as_secs_f64();
+    report
+}
+
+/// A world's lists of so many entries, swept with so many rays at the most.
+pub(super) fn fresh(world: &RelitWorld, entries: usize, budget: u64) -> (LightLists, SweepReport) {
+    let old = &world.light_lists;
+    let clusters = old.clusters();
     let occluders = samples::occluders(world);
     let receivers = receivers(world, clusters, ON_SURFACES, IN_THE_OPEN, 0x5eed);
-    let most = u32::try_from(BUDGET / entries.max(1)).unwrap_or(MOST);
-    let most = most.clamp(FEWEST, MOST);
     let ambient = luminance(world.ambient);
     let rows = parallel::map(&receivers, |cluster, receivers| {
-        let row = i32::try_from(cluster).map_or(&[][..], |c| world.light_lists.row(c));
         if receivers.is_empty() {
             return None;
         }
+        let row = i32::try_from(cluster).map_or(&[][..], |c| old.row(c));
+        let allowed = u128::from(budget) * row.len() as u128 / entries.max(1) as u128;
+        let allowed = u64::try_from(allowed).unwrap_or(budget);
         let mut random = Random::new(0x11f7 + cluster as u64);
-        let pairs = row.iter().filter_map(|&entry| {
-            let target = Target::of(world, entry)?;
-            Some(look(
-                entry,
-                &target,
-                receivers,
-                &occluders,
-                most,
-                &mut random,
-            ))
-        });
-        Some(pairs.collect::<Vec<Pair>>())
+        let row = look_at_all(world, row, receivers, &occluders, allowed, &mut random);
+        Some(row)
     });
+    let found = || rows.iter().flatten();
+    let mut report = SweepReport {
+        entries: [entries; 2],
+        unseen: rows.iter().filter(|r| r.is_none()).count(),
+        unswept: found()
+            .flat_map(|r| &r.pairs)
+            .filter(|p| p.rays == 0)
+            .count(),
+        rays: found().map(|r| r.rays).sum(),
+        ..SweepReport::default()
+    };
     let boxes = boxes(&receivers);
-    let rows = parallel::map(&rows, |cluster, pairs| {
-        let pairs = pairs.as_ref()?;
+    let rows = parallel::map(&rows, |cluster, row| {
+        let row = row.as_ref()?;
         let &(low, high) = boxes.get(cluster)?;
         let near = rows
             .iter()
             .zip(&boxes)
             .filter(|(_, other)| low.cmple(other.1).all() && high.cmpge(other.0).all());
         let mut beside: Vec<u32> = near
-            .flat_map(|(row, _)| row.iter().flatten())
+            .flat_map(|(row, _)| row.iter().flat_map(|r| &r.pairs))
             .filter(|pair| pair.hits > 0)
             .map(|pair| pair.entry)
             .collect();
         beside.sort_unstable();
         beside.dedup();
-        Some(keep(pairs.clone(), &beside, ambient))
+        Some(keep(row.pairs.clone(), &beside, ambient))
     });
-    let old = &world.light_lists;
-    let mut lists = super::LightLists {
+    let mut lists = LightLists {
         offsets: vec![0],
         lights: Vec::new(),
         shares: Vec::new(),
@@ -476,164 +560,23 @@ pub fn sweep(world: &mut RelitWorld) -> SweepReport {
         match row {
             Some(pairs) => {
                 lists.lights.extend(pairs.iter().map(|p| p.entry));
-                lists.shares.extend(pairs.iter().map(|p| super::LightShare {
-                    bare: p.bare,
-                    visible: p.visible(),
+                lists.shares.extend(pairs.iter().map(|p| {
+                    kept::rounded(LightShare {
+                        bare: p.bare,
+                        visible: p.visible(),
+                    })
                 }));
             }
             None => {
-                report.unseen += 1;
-                lists.lights.extend(old.row(cluster));
-                let unknown = super::LightShare::UNKNOWN;
-                lists
-                    .shares
-                    .extend(std::iter::repeat_n(unknown, old.row(cluster).len()));
+                let row = old.row(cluster);
+                lists.lights.extend(row);
+                let unknown = std::iter::repeat_n(LightShare::UNKNOWN, row.len());
+                lists.shares.extend(unknown);
             }
         }
         lists.offsets.push(lists.lights.len() as u32);
     }
-    lists.lights.extend(old.row(-1));
-    let unknown = super::LightShare::UNKNOWN;
-    lists
-        .shares
-        .extend(std::iter::repeat_n(unknown, old.row(-1).len()));
-    lists.offsets.push(lists.lights.len() as u32);
-    report.entries[1] = before(&lists);
-    world.report.mean_list_length = lists.mean_length();
-    world.report.longest_list = lists.longest();
-    world.light_lists = lists;
-    report.seconds = begin.elapsed().as_secs_f64();
-    report
-}
-
-/// Lists against rays: see [`judge`].
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct ListJudgement {
-    /// Pairs of light and cluster that were looked at.
-    pub pairs: usize,
-    /// Those where some ray arrives.
-    pub visible: usize,
-    /// Of these, those that the lists have.
-    pub found: usize,
-    /// Visible pairs that give more than [`DROPPED_PART`] of their cluster's light.
-    pub mattering: usize,
-    /// Of these, those that the lists have.
-    pub mattering_found: usize,
-    /// Pairs that the lists have.
-    pub listed: usize,
-    /// Of all light that arrives, the part of lights that the lists have.
-    pub light_found: f64,
-}
-
-impl ListJudgement {
-    /// Part of the visible pairs that the lists have.
-    pub fn recall(&self) -> f64 {
-        self.found as f64 / self.visible.max(1) as f64
-    }
-
-    /// Part of the visible pairs that matter that the lists have.
-    pub fn recall_of_mattering(&self) -> f64 {
-        self.mattering_found as f64 / self.mattering.max(1) as f64
-    }
-
-    /// Part of the lists' pairs that are visible.
-    pub fn precision(&self) -> f64 {
-        self.found as f64 / self.listed.max(1) as f64
-    }
-}
-
-/// Judges lists by rays of their own: in every `step`th cluster points other than those of [`sweep`] look at every
-/// light of the map, `rays` times each. For each of several lists of one world what they are worth.
-pub fn judge(
-    world: &RelitWorld,
-    lists: &[&super::LightLists],
-    rays: u32,
-    step: usize,
-) -> Vec<ListJudgement> {
-    let clusters = world.light_lists.clusters();
-    let occluders = samples::occluders(world);
-    let receivers = receivers(world, clusters, 64, 16, 0x0dd5);
-    let chosen: Vec<usize> = (0..clusters).step_by(step.max(1)).collect();
-    let total = (world.lights.len() + world.point_lights.len()) as u32;
-    let found = parallel::map(&chosen, |_, &cluster| {
-        let mut judged = vec![ListJudgement::default(); lists.len()];
-        let mut light = vec![0.0f64; lists.len() + 1];
-        let receivers = receivers.get(cluster).map_or(&[][..], Vec::as_slice);
-        let mut random = Random::new(0x7e57 + cluster as u64);
-        if receivers.is_empty() {
-            return (judged, light);
-        }
-        let row = |lists: &super::LightLists, entry: u32| {
-            let row = i32::try_from(cluster).map_or(&[][..], |c| lists.row(c));
-            row.binary_search(&entry).is_ok()
-        };
-        let mut found: Vec<(u32, f64)> = Vec::new();
-        for entry in 0..total {
-            let Some(target) = Target::of(world, entry) else {
-                continue;
-            };
-            let mut arrived = 0.0f64;
-            for i in 0..rays {
-                let Some(receiver) = receivers.get(i as usize % receivers.len()) else {
-                    break;
-                };
-                let (point, bare) = target.sample(receiver, &mut random);
-                if bare > 0.0 && !occluders.blocked(receiver.position, point, false) {
-                    arrived += f64::from(bare) / f64::from(rays);
-                }
-            }
-            found.push((entry, arrived));
-        }
-        let all: f64 = found.iter().map(|(_, arrived)| arrived).sum();
-        if let Some(sum) = light.last_mut() {
-            *sum = all;
-        }
-        for (entry, arrived) in found {
-            let visible = arrived > 0.0;
-            let matters = arrived > all * f64::from(DROPPED_PART);
-            for ((judged, lists), light) in judged.iter_mut().zip(lists).zip(&mut light) {
-                let listed = row(lists, entry);
-                judged.pairs += 1;
-                judged.visible += usize::from(visible);
-                judged.listed += usize::from(listed);
-                judged.found += usize::from(visible && listed);
-                judged.mattering += usize::from(matters);
-                judged.mattering_found += usize::from(matters && listed);
-                *light += if listed { arrived } else { 0.0 };
-            }
-        }
-        (judged, light)
-    });
-    let mut sums = vec![ListJudgement::default(); lists.len()];
-    let mut all = 0.0;
-    for (judged, light) in found {
-        for ((sum, one), light) in sums.iter_mut().zip(judged).zip(&light) {
-            sum.pairs += one.pairs;
-            sum.visible += one.visible;
-            sum.listed += one.listed;
-            sum.mattering += one.mattering;
-            sum.mattering_found += one.mattering_found;
-            sum.found += one.found;
-            sum.light_found += light;
-        }
-        all += light.last().copied().unwrap_or(0.0);
-    }
-    for sum in &mut sums {
-        sum.light_found = if all > 0.0 {
-            sum.light_found / all
-        } else {
-            1.0
-        };
-    }
-    sums
-}
-
-/// A world's lists from the potentially visible sets alone, to compare with.
-pub fn lists_by_visibility(world: &RelitWorld) -> super::LightLists {
-    super::lists_of(world, false)
-}
-
-/// A world's lists before any rays: see [`super::lists`].
-pub fn lists_by_geometry(world: &RelitWorld) -> super::LightLists {
-    super::lists_of(world, true)
+    report.entries[1] = lists.lights.len();
+    lists.end_with_all(old);
+    (lists, report)
 }

@@ -299,8 +299,8 @@ impl World {
         })
     }
 
-    /// Fits the map's lights to its lightmaps, once; what the traced look needs, and what takes a few seconds unless
-    /// `cache` has it. To be done before light lists are copied to the GPU.
+    /// Fits the map's lights to its lightmaps and sweeps its light lists, once; what the traced look needs, and what
+    /// takes a few seconds unless `cache` has it. To be done before light lists are copied to the GPU.
     pub fn calibrate(&mut self, assets: &mut Assets, cache: Option<&relight::CalibrationCache>) {
         let relit = &mut self.data.relit;
         if relit.calibration.is_some() {
@@ -310,16 +310,25 @@ impl World {
             cache: cache.cloned(),
             ..relight::CalibrationOptions::default()
         };
+        let warned = relit.warnings.len();
         let report = relight::calibrate(relit, &options);
         log::info!(
             "{}: lights fitted to the light that the map stores, in {:.1} s",
             relit.name,
             report.seconds
         );
-        let swept = relight::light::sweep(relit);
+        let swept = relight::light::sweep(relit, cache);
+        for warning in relit.warnings.iter().skip(warned) {
+            log::warn!("{}: {warning}", relit.name);
+        }
         log::info!(
-            "{}: lists of lights swept by rays in {:.1} s, {} entries of {} left",
+            "{}: lists of lights swept by rays {} {:.2} s, {} entries of {} left",
             relit.name,
+            if swept.cached {
+                "before, read in"
+            } else {
+                "in"
+            },
             swept.seconds,
             swept.entries[1],
             swept.entries[0]

@@ -1,0 +1,139 @@
+//! Light lists against shadow rays: what they have of what is visible.
+
+use super::sweep::{DROPPED_PART, Target, receivers};
+use super::{LightLists, lists_of};
+use crate::calibrate::random::Random;
+use crate::calibrate::{parallel, samples};
+use crate::world::RelitWorld;
+
+/// Lists against rays: see [`judge`].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ListJudgement {
+    /// Pairs of light and cluster that were looked at.
+    pub pairs: usize,
+    /// Those where some ray arrives.
+    pub visible: usize,
+    /// Of these, those that the lists have.
+    pub found: usize,
+    /// Visible pairs that give more than [`DROPPED_PART`] of their cluster's light.
+    pub mattering: usize,
+    /// Of these, those that the lists have.
+    pub mattering_found: usize,
+    /// Pairs that the lists have.
+    pub listed: usize,
+    /// Of all light that arrives, the part of lights that the lists have.
+    pub light_found: f64,
+}
+
+impl ListJudgement {
+    /// Part of the visible pairs that the lists have.
+    pub fn recall(&self) -> f64 {
+        self.found as f64 / self.visible.max(1) as f64
+    }
+
+    /// Part of the visible pairs that matter that the lists have.
+    pub fn recall_of_mattering(&self) -> f64 {
+        self.mattering_found as f64 / self.mattering.max(1) as f64
+    }
+
+    /// Part of the lists' pairs that are visible.
+    pub fn precision(&self) -> f64 {
+        self.found as f64 / self.listed.max(1) as f64
+    }
+}
+
+/// Judges lists by rays of their own: in every `step`th cluster points other than those of [`sweep`](super::sweep()) look at every
+/// light of the map, `rays` times each. For each of several lists of one world what they are worth.
+pub fn judge(
+    world: &RelitWorld,
+    lists: &[&LightLists],
+    rays: u32,
+    step: usize,
+) -> Vec<ListJudgement> {
+    let clusters = world.light_lists.clusters();
+    let occluders = samples::occluders(world);
+    let receivers = receivers(world, clusters, 64, 16, 0x0dd5);
+    let chosen: Vec<usize> = (0..clusters).step_by(step.max(1)).collect();
+    let total = (world.lights.len() + world.point_lights.len()) as u32;
+    let found = parallel::map(&chosen, |_, &cluster| {
+        let mut judged = vec![ListJudgement::default(); lists.len()];
+        let mut light = vec![0.0f64; lists.len() + 1];
+        let receivers = receivers.get(cluster).map_or(&[][..], Vec::as_slice);
+        let mut random = Random::new(0x7e57 + cluster as u64);
+        if receivers.is_empty() {
+            return (judged, light);
+        }
+        let row = |lists: &LightLists, entry: u32| {
+            let row = i32::try_from(cluster).map_or(&[][..], |c| lists.row(c));
+            row.binary_search(&entry).is_ok()
+        };
+        let mut found: Vec<(u32, f64)> = Vec::new();
+        for entry in 0..total {
+            let Some(target) = Target::of(world, entry) else {
+                continue;
+            };
+            let mut arrived = 0.0f64;
+            for i in 0..rays {
+                let Some(receiver) = receivers.get(i as usize % receivers.len()) else {
+                    break;
+                };
+                let (point, bare) = target.sample(receiver, &mut random);
+                if bare > 0.0 && !occluders.blocked(receiver.position, point, false) {
+                    arrived += f64::from(bare) / f64::from(rays);
+                }
+            }
+            found.push((entry, arrived));
+        }
+        let all: f64 = found.iter().map(|(_, arrived)| arrived).sum();
+        if let Some(sum) = light.last_mut() {
+            *sum = all;
+        }
+        for (entry, arrived) in found {
+            let visible = arrived > 0.0;
+            let matters = arrived > all * f64::from(DROPPED_PART);
+            for ((judged, lists), light) in judged.iter_mut().zip(lists).zip(&mut light) {
+                let listed = row(lists, entry);
+                judged.pairs += 1;
+                judged.visible += usize::from(visible);
+                judged.listed += usize::from(listed);
+                judged.found += usize::from(visible && listed);
+                judged.mattering += usize::from(matters);
+                judged.mattering_found += usize::from(matters && listed);
+                *light += if listed { arrived } else { 0.0 };
+            }
+        }
+        (judged, light)
+    });
+    let mut sums = vec![ListJudgement::default(); lists.len()];
+    let mut all = 0.0;
+    for (judged, light) in found {
+        for ((sum, one), light) in sums.iter_mut().zip(judged).zip(&light) {
+            sum.pairs += one.pairs;
+            sum.visible += one.visible;
+            sum.listed += one.listed;
+            sum.mattering += one.mattering;
+            sum.mattering_found += one.mattering_found;
+            sum.found += one.found;
+            sum.light_found += light;
+        }
+        all += light.last().copied().unwrap_or(0.0);
+    }
+    for sum in &mut sums {
+        sum.light_found = if all > 0.0 {
+            sum.light_found / all
+        } else {
+            1.0
+        };
+    }
+    sums
+}
+
+/// A world's lists from the potentially visible sets alone, to compare with.
+pub fn lists_by_visibility(world: &RelitWorld) -> LightLists {
+    lists_of(world, false)
+}
+
+/// A world's lists before any rays: by visibility, less what lies behind a light's plane.
+pub fn lists_by_geometry(world: &RelitWorld) -> LightLists {
+    lists_of(world, true)
+}
