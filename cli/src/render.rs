@@ -103,6 +103,9 @@ pub struct RenderArgs {
     /// Move the camera by this much from frame to frame, so that the last frame is where it was asked for
     #[arg(long, num_args = 4, allow_negative_numbers = true, value_names = ["X", "Y", "Z", "YAW"])]
     step: Option<Vec<f32>>,
+    /// Look into a step of the traced look: the numbers of the console variable rt_debug
+    #[arg(long, default_value_t = 0)]
+    debug: u32,
     /// Filter of frames that do not accumulate: 0 none, 1 A-SVGF, 2 sparse
     #[arg(long, default_value_t = 1)]
     denoiser: u32,
@@ -164,6 +167,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         rt: args.look == Look::Traced,
         rt_accumulate: !args.no_accumulation,
         rt_bounces: args.bounces,
+        rt_debug: args.debug,
         rt_exposure: args.exposure,
         rt_denoiser: args.denoiser,
         rt_taa: !args.no_taa,
