@@ -122,7 +122,7 @@ impl ViewTracer {
         Some(self.antialias.picture().unwrap_or(targets.picture()))
     }
 
-    /// Rays of each of [`COUNTED`](super::counters::COUNTED)'s passes in the newest finished frame; `None` while they
+    /// Rays of each of [`COUNTED`]'s passes in the newest finished frame; `None` while they
     /// are not counted.
     pub fn rays(&self) -> Option<[u64; COUNTED.len()]> {
         self.counters.rays()
