@@ -24,9 +24,9 @@ const float NARROW = 0.3;
 // The same in traced pixels for a pixel without history.
 const float WIDE = 0.5;
 // Frames' worth of samples that a pixel keeps at rest, and where it is resampled from frame to frame.
-const float REST_FRAMES = 24.0, MOVING_FRAMES = 8.0;
+const float REST_FRAMES = 16.0, MOVING_FRAMES = 5.0;
 // Standard deviations that history may differ by, at rest and in motion.
-const float REST_RANGE = 2.0, MOVING_RANGE = 1.0;
+const float REST_RANGE = 1.25, MOVING_RANGE = 1.0;
 // Part of the way to a pixel's surface at which a neighbour's is in front of it.
 const float IN_FRONT = 0.9;
 // Part of its length that the way to a surface may be off and still be the way to that surface.
