@@ -1,7 +1,5 @@
 //! `relight estimators`: whether every way to choose lights comes to the same picture, and how noisy each one is.
 
-use std::path::PathBuf;
-
 use anyhow::{Context, Result};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -10,7 +8,7 @@ use renderer_vk::{LightSelection, Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
 
 use crate::render::parse_size;
-use crate::view::{Camera, map_entities, open};
+use crate::view::{Camera, Maps, map_entities, open};
 
 /// Compare the ways to choose lights: all of them have the same mean
 ///
@@ -22,16 +20,8 @@ use crate::view::{Camera, map_entities, open};
 /// Example: relight estimators oa_dm1 --frames 4096 --size 512x384
 #[derive(Args, Debug)]
 pub struct EstimatorsArgs {
-    /// Maps by name
-    #[arg(required = true)]
-    maps: Vec<String>,
-    /// Game folder with packs; give several in rising priority
-    #[arg(
-        long = "game",
-        value_name = "DIR",
-        default_value = "/usr/share/games/openarena/baseoa"
-    )]
-    games: Vec<PathBuf>,
+    #[command(flatten)]
+    chosen: Maps,
     /// Frames of each estimator
     #[arg(long, default_value_t = 4096)]
     frames: u32,
@@ -179,8 +169,8 @@ fn noise(early: &Picture, truth: &Picture, frames: u32) -> f64 {
 
 /// Runs the command: one JSON object a map and estimator.
 pub fn run(args: &EstimatorsArgs) -> Result<()> {
-    for map in &args.maps {
-        let (files, map) = open(map, &args.games)?;
+    for map in &args.chosen.maps {
+        let (files, map) = open(map, &args.chosen.games)?;
         let base = Settings {
             rt: true,
             rt_accumulate: true,

@@ -9,7 +9,7 @@ use relight::light::{LightLists, judge, lists_by_geometry, lists_by_visibility, 
 use relight::{CalibrationCache, CalibrationOptions, Materials, Options, RelitWorld};
 use serde_json::json;
 
-use crate::view::open;
+use crate::view::{Maps, open};
 
 /// Judge the light lists of maps by rays
 ///
@@ -23,16 +23,8 @@ use crate::view::open;
 /// Example: relight lights oa_dm1 kaos2 --rays 256
 #[derive(Args, Debug)]
 pub struct LightsArgs {
-    /// Maps by name
-    #[arg(required = true)]
-    maps: Vec<String>,
-    /// Game folder with packs; give several in rising priority
-    #[arg(
-        long = "game",
-        value_name = "DIR",
-        default_value = "/usr/share/games/openarena/baseoa"
-    )]
-    games: Vec<PathBuf>,
+    #[command(flatten)]
+    chosen: Maps,
     /// Rays for a pair of light and cluster
     #[arg(long, default_value_t = 128)]
     rays: u32,
@@ -49,8 +41,8 @@ pub struct LightsArgs {
 
 /// Runs the command: one JSON object a map and kind of list.
 pub fn run(args: &LightsArgs) -> Result<()> {
-    for map in &args.maps {
-        let (files, map) = open(map, &args.games)?;
+    for map in &args.chosen.maps {
+        let (files, map) = open(map, &args.chosen.games)?;
         let (materials, _) = Materials::load(&*files);
         let cache = args.cache.as_ref().map(CalibrationCache::new);
         let calibrate = (!args.no_calibration).then(|| CalibrationOptions {

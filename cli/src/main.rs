@@ -9,6 +9,7 @@ mod info;
 mod lights;
 mod measure;
 mod render;
+mod statistics;
 mod table;
 mod timings;
 mod view;

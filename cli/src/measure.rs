@@ -17,7 +17,8 @@ use serde_json::{Value, json};
 
 use crate::cameras::{EYES, places};
 use crate::render::parse_size;
-use crate::view::{Camera, map_entities, open};
+use crate::statistics::{luminance, relative_bias, relative_error, temporal_noise};
+use crate::view::{Camera, Maps, map_entities, open};
 
 /// Measure the traced look in real time against its reference
 ///
@@ -28,16 +29,8 @@ use crate::view::{Camera, map_entities, open};
 /// Example: relight measure oa_dm1 kaos2 --reference 4096 -o out/measure
 #[derive(Args, Debug)]
 pub struct MeasureArgs {
-    /// Maps by name
-    #[arg(required = true)]
-    maps: Vec<String>,
-    /// Game folder with packs; give several in rising priority
-    #[arg(
-        long = "game",
-        value_name = "DIR",
-        default_value = "/usr/share/games/openarena/baseoa"
-    )]
-    games: Vec<PathBuf>,
+    #[command(flatten)]
+    chosen: Maps,
     /// Places of each map
     #[arg(long, default_value_t = 2)]
     each: usize,
@@ -179,62 +172,6 @@ fn on_the_way(camera: &Camera, left: u32) -> Camera {
         yaw: camera.yaw - TURN * left,
         ..*camera
     }
-}
-
-/// Radiance as displayed of each pixel: luminance of the decoded values, 0 to 1.
-fn luminance(picture: &Rgb8) -> Vec<f32> {
-    let decode = |v: u8| {
-        let v = f32::from(v) / 255.0;
-        if v <= 0.04045 {
-            v / 12.92
-        } else {
-            ((v + 0.055) / 1.055).powf(2.4)
-        }
-    };
-    let pixels = picture.pixels().chunks_exact(3);
-    pixels
-        .map(|p| 0.2126 * decode(p[0]) + 0.7152 * decode(p[1]) + 0.0722 * decode(p[2]))
-        .collect()
-}
-
-/// Median over the pixels of standard deviation over mean of their values in time.
-fn temporal_noise(frames: &[Vec<f32>]) -> f32 {
-    let count = frames.len() as f32;
-    let pixels = frames.first().map_or(0, Vec::len);
-    let mut ratios: Vec<f32> = (0..pixels)
-        .filter_map(|pixel| {
-            let values = || frames.iter().filter_map(|f| f.get(pixel));
-            let mean = values().sum::<f32>() / count;
-            let variance = values().map(|v| (v - mean) * (v - mean)).sum::<f32>() / count;
-            // black has no noise that could be seen, and no ratio
-            (mean > 1.0e-3).then(|| variance.sqrt() / mean)
-        })
-        .collect();
-    ratios.sort_by(f32::total_cmp);
-    ratios.get(ratios.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// Mean error of `picture` relative to the mean of `truth`, over the pixels that `part` marks.
-fn relative_error(picture: &[f32], truth: &[f32], part: &[bool]) -> f32 {
-    let (mut error, mut sum) = (0.0, 0.0);
-    for ((value, truth), _) in picture
-        .iter()
-        .zip(truth)
-        .zip(part)
-        .filter(|(_, marked)| **marked)
-    {
-        error += (value - truth).abs();
-        sum += truth;
-    }
-    if sum > 0.0 { error / sum } else { 0.0 }
-}
-
-/// Signed: how much too bright the marked pixels are in the mean, relative to the truth's mean.
-fn relative_bias(picture: &[f32], truth: &[f32], part: &[bool]) -> f32 {
-    let marked = || picture.iter().zip(truth).zip(part).filter(|(_, m)| **m);
-    let sum: f32 = marked().map(|((_, t), _)| t).sum();
-    let difference: f32 = marked().map(|((v, t), _)| v - t).sum();
-    if sum > 0.0 { difference / sum } else { 0.0 }
 }
 
 /// Frames that the eye takes to adapt: two seconds.
@@ -402,8 +339,8 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
         bail!("--frames is at least 2, --reference and --each at least 1");
     }
     let mut all = serde_json::Map::new();
-    for map in &args.maps {
-        let (files, path) = open(map, &args.games)?;
+    for map in &args.chosen.maps {
+        let (files, path) = open(map, &args.chosen.games)?;
         let mut renderer = Renderer::new(RendererOptions {
             width: args.size.0,
             height: args.size.1,
@@ -527,22 +464,6 @@ fn line(place: &str, kind: &str, [ssim, flip, noise, fly, trail]: [f64; 5], off:
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn noise_is_the_median_of_deviation_over_mean() {
-        // pixels: still, between 1 and 3 (deviation 1, mean 2), black
-        let frames = [vec![1.0, 1.0, 0.0], vec![1.0, 3.0, 0.0]];
-        assert!((temporal_noise(&frames) - 0.5).abs() < 1.0e-6);
-        assert_eq!(temporal_noise(&[]), 0.0);
-    }
-
-    #[test]
-    fn errors_are_taken_over_the_marked_pixels() {
-        let (picture, truth, part) = ([1.5, 0.5, 9.0], [1.0, 1.0, 1.0], [true, true, false]);
-        assert!((relative_error(&picture, &truth, &part) - 0.5).abs() < 1.0e-6);
-        assert!(relative_bias(&picture, &truth, &part).abs() < 1.0e-6);
-        assert_eq!(relative_error(&picture, &truth, &[false; 3]), 0.0);
-    }
 
     #[test]
     fn the_camera_arrives() {

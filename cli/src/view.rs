@@ -4,10 +4,26 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Context, bail};
+use clap::Args;
 use glam::Vec3;
 use relight::{FileError, GameFiles, MemoryFiles, Pk3, SearchPath};
 use renderer_vk::Renderer;
 use renderer_vk::api::{EntityKind, RefDef, RefEntity};
+
+/// Which maps a command is about.
+#[derive(Args, Debug)]
+pub struct Maps {
+    /// Maps by name
+    #[arg(required = true)]
+    pub maps: Vec<String>,
+    /// Game folder with packs; give several in rising priority
+    #[arg(
+        long = "game",
+        value_name = "DIR",
+        default_value = "/usr/share/games/openarena/baseoa"
+    )]
+    pub games: Vec<PathBuf>,
+}
 
 /// A loose file over a game's files.
 struct Layered {
