@@ -2,6 +2,7 @@
 
 #![forbid(unsafe_code)]
 
+mod calibration;
 mod cameras;
 mod compare;
 mod estimators;
@@ -26,6 +27,8 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    /// Tell how well traced light agrees with maps' lightmaps, before and after calibration
+    Calibration(calibration::CalibrationArgs),
     /// List places to look at maps from: intermission cameras and spawn points
     Cameras(cameras::CamerasArgs),
     /// Tell how alike pictures of one view are
@@ -44,6 +47,7 @@ enum Command {
 
 fn main() -> anyhow::Result<()> {
     match Cli::parse().command {
+        Command::Calibration(args) => calibration::run(&args),
         Command::Cameras(args) => cameras::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Estimators(args) => estimators::run(&args),

@@ -1,0 +1,148 @@
+//! `relight calibration`: how well the light that is found agrees with the light that the map compiler stored.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use relight::calibrate::{Agreement, CalibrationReport};
+use relight::{CalibrationCache, CalibrationOptions, Materials, Options, RelitWorld};
+use serde_json::{Value, json};
+
+use crate::view::{Maps, open};
+
+/// Tell how well traced light agrees with maps' lightmaps, before and after calibration
+///
+/// Compared is the irradiance that tracing gives (direct, bounced and ambient) with stored light, at measurements that
+/// fitting did not see: the median of |log2(traced / stored)| in stops, before (what directives say) and after. `sum` is
+/// all traced light over all stored light.
+///
+/// Example: relight calibration oa_dm1 fan --cache ~/.cache/relight
+#[derive(Args, Debug)]
+pub struct CalibrationArgs {
+    #[command(flatten)]
+    chosen: Maps,
+    /// Measurements taken, about; more are more exact and take longer
+    #[arg(long)]
+    samples: Option<usize>,
+    /// Seed of the choice of measurements
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Folder to keep results in
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
+    /// One JSON object a map, in place of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command: one line a map, then the medians and the worst of all maps.
+///
+/// # Errors
+/// A map cannot be found or read.
+pub fn run(args: &CalibrationArgs) -> Result<()> {
+    if !args.json {
+        println!(
+            "{:20} {:>9} {:>7} {:>5} {:>6} {:>7} {:>7} {:>6} {:>7} {:>7} {:>8}",
+            "map",
+            "evidence",
+            "samples",
+            "known",
+            "placed",
+            "before",
+            "after",
+            "ratio",
+            "sum",
+            "sum",
+            "seconds"
+        );
+    }
+    let mut reports = Vec::new();
+    for map in &args.chosen.maps {
+        let (files, path) = open(map, &args.chosen.games)?;
+        let (materials, _) = Materials::load(&*files);
+        let default = CalibrationOptions::default();
+        let options = Options {
+            calibrate: Some(CalibrationOptions {
+                samples: args.samples.unwrap_or(default.samples),
+                seed: args.seed.unwrap_or(default.seed),
+                cache: args.cache.as_ref().map(CalibrationCache::new),
+                ..default
+            }),
+            ..Options::default()
+        };
+        let world = RelitWorld::load(&*files, &materials, &path, options)?;
+        for warning in &world.warnings {
+            log::warn!("{path}: {warning}");
+        }
+        let Some(report) = &world.calibration else {
+            continue;
+        };
+        if args.json {
+            println!("{}", as_json(map, report));
+        } else {
+            println!(
+                "{map:20} {:>9} {:7} {:5} {:6} {:7.3} {:7.3} {:6.2} {:7.3} {:7.3} {:8.2}",
+                report.evidence.label(),
+                report.samples,
+                report.known,
+                report.placed,
+                report.before.median_stops,
+                report.after.median_stops,
+                ratio(report),
+                report.before.sum_ratio,
+                report.after.sum_ratio,
+                report.seconds
+            );
+        }
+        reports.push(report.clone());
+    }
+    if !args.json && reports.len() > 1 {
+        let all = |of: fn(&CalibrationReport) -> f32| {
+            let mut values: Vec<f32> = reports.iter().map(of).collect();
+            values.sort_by(f32::total_cmp);
+            let median = values.get(values.len() / 2).copied().unwrap_or(0.0);
+            (median, values.last().copied().unwrap_or(0.0))
+        };
+        let (before, after) = (
+            all(|r| r.before.median_stops),
+            all(|r| r.after.median_stops),
+        );
+        println!(
+            "{} maps: median {:.3} before, {:.3} after; worst {:.3} before, {:.3} after",
+            reports.len(),
+            before.0,
+            after.0,
+            before.1,
+            after.1
+        );
+    }
+    Ok(())
+}
+
+/// By what factor calibration brings light nearer to stored light.
+fn ratio(report: &CalibrationReport) -> f32 {
+    report.before.median_stops / report.after.median_stops.max(1e-4)
+}
+
+fn as_json(map: &str, report: &CalibrationReport) -> Value {
+    let agreement = |a: &Agreement| {
+        json!({
+            "median_stops": a.median_stops,
+            "worst_tenth_stops": a.worst_tenth_stops,
+            "sum_ratio": a.sum_ratio,
+        })
+    };
+    json!({
+        "map": map,
+        "evidence": report.evidence.label(),
+        "samples": report.samples,
+        "held_out": report.held_out,
+        "known": report.known,
+        "placed": report.placed,
+        "before": agreement(&report.before),
+        "after": agreement(&report.after),
+        "ratio": ratio(report),
+        "cached": report.cached,
+        "seconds": report.seconds,
+    })
+}
