@@ -24,6 +24,15 @@ impl<'a> Fields<'a> {
         }
     }
 
+    pub(crate) fn u8(&mut self) -> u8 {
+        let [byte] = self.bytes();
+        byte
+    }
+
+    pub(crate) fn u16(&mut self) -> u16 {
+        u16::from_le_bytes(self.bytes())
+    }
+
     pub(crate) fn i32(&mut self) -> i32 {
         i32::from_le_bytes(self.bytes())
     }

@@ -2,8 +2,8 @@
 
 use crate::error::Lump;
 
-/// Bytes of the header: identification, version and seventeen directory entries.
-pub(crate) const HEADER_BYTES: usize = 144;
+/// Most directory entries that a format read here has.
+pub(crate) const SLOTS: usize = 18;
 
 /// Where a lump lies in the file, as the directory says. Empty lumps may have any offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,14 +44,16 @@ pub struct Repair {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Container {
     /// The directory, by [`Lump::index`].
-    pub lumps: [LumpRange; 17],
+    pub lumps: [LumpRange; SLOTS],
+    /// Bytes of the header and the directory.
+    pub header_length: usize,
     /// Bytes outside header and lumps, ascending.
     pub gaps: Vec<Gap>,
     /// Length of the file; 0 when the map was not read from one.
     pub file_length: usize,
     /// Bytes at the end of a lump that are no whole record, by [`Lump::index`]. For the visibility
     /// lump also everything that the matrix does not cover.
-    pub trailing: [Vec<u8>; 17],
+    pub trailing: [Vec<u8>; SLOTS],
     /// Replaced values.
     pub repairs: Vec<Repair>,
 }
@@ -60,7 +62,7 @@ impl Container {
     /// The bytes directly behind the header that no lump claims, where compilers leave their banner.
     pub fn banner(&self) -> &[u8] {
         match self.gaps.first() {
-            Some(gap) if gap.offset == HEADER_BYTES => &gap.bytes,
+            Some(gap) if gap.offset == self.header_length => &gap.bytes,
             _ => &[],
         }
     }

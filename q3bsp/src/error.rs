@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// The seventeen lumps, in directory order.
+/// The lumps: the seventeen of `IBSP` in directory order, then those that other formats add.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs)] // the names are the format's own
 pub enum Lump {
@@ -23,10 +23,14 @@ pub enum Lump {
     Lightmaps,
     LightGrid,
     Visibility,
+    /// Lump 17 of `RBSP` and `FBSP`.
+    LightArray,
+    /// Lump 17 of Quake Live.
+    Advertisements,
 }
 
 impl Lump {
-    /// All lumps in directory order.
+    /// The lumps of `IBSP` in directory order.
     pub const ALL: [Lump; 17] = [
         Lump::Entities,
         Lump::Shaders,
@@ -47,9 +51,12 @@ impl Lump {
         Lump::Visibility,
     ];
 
-    /// Place in the directory, 0 to 16.
+    /// Place in the directory, 0 to 17.
     pub fn index(self) -> usize {
-        self as usize
+        match self {
+            Lump::Advertisements => Lump::LightArray as usize,
+            _ => self as usize,
+        }
     }
 
     /// Lower-case name as used in messages.
@@ -72,6 +79,8 @@ impl Lump {
             Lump::Lightmaps => "lightmaps",
             Lump::LightGrid => "lightgrid",
             Lump::Visibility => "visibility",
+            Lump::LightArray => "lightarray",
+            Lump::Advertisements => "advertisements",
         }
     }
 }
@@ -95,7 +104,7 @@ pub enum Error {
         needed: usize,
     },
     /// Not a map of the kind read here.
-    #[error("file is {found}, not IBSP version 46")]
+    #[error("file is {found}, not a map format that is read")]
     WrongFormat {
         /// Identification and version found, with the format's name where it is known.
         found: String,
@@ -177,6 +186,14 @@ pub enum Error {
         /// Most accepted.
         limit: u64,
     },
+    /// One of the errors above, with its place in the file.
+    #[error("{error}, at byte {offset} of the file")]
+    At {
+        /// Bytes from the start of the file to the record or lump.
+        offset: u64,
+        /// What is wrong there.
+        error: Box<Error>,
+    },
     /// Control points that do not form a patch.
     #[error("patch of {width} by {height} control points with {points} points: {reason}")]
     Patch {
@@ -189,6 +206,29 @@ pub enum Error {
         /// What is wrong.
         reason: &'static str,
     },
+}
+
+impl Error {
+    /// The error without its place in the file.
+    pub fn without_offset(&self) -> &Error {
+        match self {
+            Error::At { error, .. } => error.without_offset(),
+            other => other,
+        }
+    }
+
+    /// Lump and record that the error is about.
+    pub(crate) fn place(&self) -> Option<(Lump, usize)> {
+        match *self {
+            Error::LumpLength { lump, .. }
+            | Error::Empty { lump }
+            | Error::TooMuchSharing { lump, .. } => Some((lump, 0)),
+            Error::Value { lump, element, .. } | Error::Range { lump, element, .. } => {
+                Some((lump, element))
+            }
+            _ => None,
+        }
+    }
 }
 
 /// Something odd that was tolerated, as the engine does, and what was made of it.

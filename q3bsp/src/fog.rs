@@ -3,6 +3,9 @@
 use crate::{Bsp, Plane};
 use glam::Vec3;
 
+/// Farthest coordinate of a map, id units.
+const WORLD_EXTENT: f32 = 131_072.0;
+
 /// A fog volume, in the order of [`Bsp::fogs`], so that [`crate::Surface::fog`] indexes it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FogVolume {
@@ -18,7 +21,7 @@ pub struct FogVolume {
 }
 
 impl Bsp {
-    /// The fog volumes. Bounds come from the first six sides of the brush, which compilers write as
+    /// The fog volumes. A fog without a brush fills the world. Bounds come from the first six sides of the brush, which compilers write as
     /// -x +x -y +y -z +z; numbers that are not finite become 0.
     pub fn fog_volumes(&self) -> Vec<FogVolume> {
         self.fogs
@@ -27,6 +30,14 @@ impl Bsp {
                 let brush = usize::try_from(fog.brush)
                     .ok()
                     .and_then(|b| self.brushes.get(b));
+                if brush.is_none() {
+                    return FogVolume {
+                        mins: Vec3::splat(-WORLD_EXTENT),
+                        maxs: Vec3::splat(WORLD_EXTENT),
+                        surface: None,
+                        shader: fog.shader.clone(),
+                    };
+                }
                 let sides = brush.map_or(&[][..], |brush| self.sides_of(brush));
                 let plane = |side: usize| -> Option<Plane> {
                     let plane = self.plane_of(sides.get(side)?)?;

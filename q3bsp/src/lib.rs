@@ -1,4 +1,7 @@
-//! id Tech 3 maps (`IBSP` version 46): bytes to typed, validated data and back.
+//! id Tech 3 maps: bytes to typed, validated data and back.
+//!
+//! Read are `IBSP` 46 (Quake III and its mods), `IBSP` 47 (RTCW, Enemy Territory, Quake Live), `RBSP` 1 (Raven's games)
+//! and `FBSP` 1 (QFusion), all into the same [`Bsp`]; [`Bsp::format`] tells which it was.
 //!
 //! [`Bsp::parse`] checks everything that a reader would otherwise have to check again: the directory,
 //! the record sizes and every index of every lump. What the engine refuses is a typed [`Error`] that
@@ -35,7 +38,10 @@ pub mod entities;
 mod error;
 mod flags;
 mod fog;
+mod foliage;
+mod format;
 mod grid;
+mod layers;
 mod lumps;
 mod parse;
 mod patch;
@@ -50,7 +56,9 @@ pub use entities::Entity;
 pub use error::{Error, Lump, Warning};
 pub use flags::{content_flags, surface_flags};
 pub use fog::FogVolume;
+pub use format::Format;
 pub use grid::{GridSample, LightGridLayout};
+pub use layers::{Advertisement, GridLayers, Layers, NO_STYLE, SurfaceLayers, VertexLayers};
 pub use lumps::{
     Brush, BrushSide, DrawVert, Fog, GridPoint, LIGHTMAP_BYTES, LIGHTMAP_SIZE, Leaf, Lightmap,
     Model, Node, Plane, ShaderRef,
@@ -63,6 +71,8 @@ pub use visibility::Visibility;
 /// fields by hand takes over that duty ([`Bsp::validate`] checks it again).
 #[derive(Clone, Debug, Default)]
 pub struct Bsp {
+    /// The format that the map was read from and is written in.
+    pub format: Format,
     /// Lump 0 as stored: entity text, meaningful up to the first NUL. See [`Bsp::entities`].
     pub entities: Vec<u8>,
     /// Lump 1: shader references of surfaces, brushes and brush sides. The same name may occur
@@ -98,8 +108,19 @@ pub struct Bsp {
     pub light_grid: Vec<GridPoint>,
     /// Lump 16: potentially visible sets. `None` when absent or unusable: everything sees everything.
     pub visibility: Option<Visibility>,
+    /// Light styles and what else `RBSP` and `FBSP` add; empty in other formats.
+    pub layers: Layers,
+    /// Lump 17 of Quake Live.
+    pub advertisements: Vec<Advertisement>,
     /// What the file looked like around the data.
     pub container: Container,
     /// Tolerated oddities found by [`Bsp::parse`], in the order found.
     pub warnings: Vec<Warning>,
+}
+
+impl Bsp {
+    /// Texels per side of each of [`Bsp::lightmaps`].
+    pub fn lightmap_size(&self) -> usize {
+        self.format.lightmap_size()
+    }
 }

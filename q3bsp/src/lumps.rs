@@ -1,6 +1,7 @@
 //! The records of the lumps: one struct per kind, with its decoder and encoder.
 
 use crate::bytes::{Fields, Put, name_field, name_text};
+use crate::flags;
 use glam::{Vec2, Vec3};
 
 /// A record of fixed size in a lump.
@@ -24,6 +25,9 @@ pub struct ShaderRef {
     pub surface_flags: u32,
     /// See [`crate::content_flags`].
     pub content_flags: u32,
+    /// Surface and content flags as stored, where the format's game gives the bits other meanings and the two fields
+    /// above are a translation.
+    pub raw_flags: Option<[u32; 2]>,
 }
 
 impl ShaderRef {
@@ -34,7 +38,28 @@ impl ShaderRef {
             raw_name: name_field(name, &[0; 64]),
             surface_flags,
             content_flags,
+            raw_flags: None,
         }
+    }
+
+    /// With the flags of Raven's games said in ours.
+    pub(crate) fn read_as_raven(mut self) -> ShaderRef {
+        let raw = [self.surface_flags, self.content_flags];
+        [self.surface_flags, self.content_flags] = flags::from_raven(raw);
+        self.raw_flags = Some(raw);
+        self
+    }
+
+    /// With flags as Raven's games store them: those read, as long as they still say the same.
+    pub(crate) fn to_raven(&self) -> ShaderRef {
+        let ours = [self.surface_flags, self.content_flags];
+        let stored = self
+            .raw_flags
+            .filter(|&raw| flags::from_raven(raw) == ours)
+            .unwrap_or_else(|| flags::to_raven(ours));
+        let mut shader = self.clone();
+        [shader.surface_flags, shader.content_flags] = stored;
+        shader
     }
 }
 
@@ -47,6 +72,7 @@ impl Record for ShaderRef {
             raw_name,
             surface_flags: f.u32(),
             content_flags: f.u32(),
+            raw_flags: None,
         }
     }
     fn encode(&self, out: &mut Vec<u8>) {
@@ -346,7 +372,7 @@ pub struct Fog {
     pub shader: String,
     /// The name field as stored.
     pub raw_shader: [u8; 64],
-    /// The brush, which has at least six sides.
+    /// The brush, which has at least six sides; -1 for fog that fills the world (not in `IBSP` 46).
     pub brush: i32,
     /// Side of the brush (relative to its first) through which one looks into the fog; -1 for none.
     pub visible_side: i32,
@@ -370,14 +396,14 @@ impl Record for Fog {
     }
 }
 
-/// Texels per side of a lightmap page.
+/// Texels per side of a lightmap page of `IBSP` and `RBSP`; others have other sizes, see [`Lightmap::size`].
 pub const LIGHTMAP_SIZE: usize = 128;
 
-/// Bytes of a lightmap page.
+/// Bytes of such a page.
 pub const LIGHTMAP_BYTES: usize = LIGHTMAP_SIZE * LIGHTMAP_SIZE * 3;
 
-/// Lump 14: one page of 128 × 128 texels, red green blue, first row first, before the over-bright shift.
-/// Always [`LIGHTMAP_BYTES`] long.
+/// Lump 14: one square page of texels, red green blue, first row first, before the over-bright shift. All pages of a
+/// map have the same size, that of its format ([`crate::Bsp::lightmap_size`]).
 #[derive(Clone, PartialEq, Eq)]
 pub struct Lightmap(
     /// The bytes.
@@ -391,9 +417,16 @@ impl std::fmt::Debug for Lightmap {
 }
 
 impl Lightmap {
+    /// Texels per side.
+    pub fn size(&self) -> usize {
+        (self.0.len() / 3).isqrt()
+    }
+
     /// The texel at column `x`, row `y`; coordinates beyond the page are clamped to its edge.
     pub fn texel(&self, x: usize, y: usize) -> [u8; 3] {
-        let at = (y.min(LIGHTMAP_SIZE - 1) * LIGHTMAP_SIZE + x.min(LIGHTMAP_SIZE - 1)) * 3;
+        let size = self.size();
+        let most = size.saturating_sub(1);
+        let at = (y.min(most) * size + x.min(most)) * 3;
         match self.0.get(at..at + 3) {
             Some(&[r, g, b]) => [r, g, b],
             _ => [0; 3],
@@ -402,7 +435,7 @@ impl Lightmap {
 }
 
 /// Lump 15: light that arrives at one point of the grid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct GridPoint {
     /// Light from everywhere; all zero when the point is inside a wall.
     pub ambient: [u8; 3],

@@ -1,64 +1,152 @@
 //! Bytes to [`Bsp`]: the directory and the records. What they refer to is checked in `validate`.
 
 use crate::bytes::Fields;
-use crate::container::{Container, Gap, HEADER_BYTES, LumpRange};
+use crate::container::{Container, Gap, LumpRange, SLOTS};
 use crate::error::{Error, Lump, Warning};
-use crate::lumps::{LIGHTMAP_BYTES, Lightmap, Record};
+use crate::format::{Announced, Format, announced};
+use crate::layers::{GridLayers, LayeredSide, LayeredSurface, LayeredVertex};
+use crate::lumps::{GridPoint, Lightmap, Record, ShaderRef};
 use crate::{Bsp, Visibility};
 
 impl Bsp {
-    /// Reads and validates a map.
+    /// Reads and validates a map of any [`Format`].
     ///
     /// # Errors
     /// Whatever the engine refuses (wrong format, odd lump sizes, missing world) and every reference
     /// that leads out of its lump, which the engine would follow. Oddities that the engine tolerates
     /// are in [`Bsp::warnings`].
     pub fn parse(bytes: &[u8]) -> Result<Bsp, Error> {
-        let lumps = directory(bytes)?;
+        let format = match announced(bytes) {
+            Announced::Known(format) => format,
+            Announced::Foreign(found) => return Err(Error::WrongFormat { found }),
+            Announced::Nothing => {
+                return Err(Error::TooShort {
+                    found: bytes.len(),
+                    needed: Format::Ibsp46.header_bytes(),
+                });
+            }
+        };
+        let lumps = directory(bytes, format)?;
         let mut bsp = Bsp {
+            format,
             container: Container {
                 lumps,
                 file_length: bytes.len(),
+                header_length: format.header_bytes(),
                 ..Container::default()
             },
             ..Bsp::default()
         };
         bsp.find_gaps(bytes);
+        match bsp.read_lumps(bytes).and_then(|()| bsp.validate()) {
+            Ok(()) => Ok(bsp),
+            Err(error) => Err(bsp.located(error)),
+        }
+    }
 
-        let data = |lump: Lump| lump_bytes(bytes, lumps[lump.index()]);
-        bsp.entities = data(Lump::Entities).to_vec();
-        bsp.shaders = records(Lump::Shaders, data(Lump::Shaders))?;
-        bsp.planes = records(Lump::Planes, data(Lump::Planes))?;
-        bsp.nodes = records(Lump::Nodes, data(Lump::Nodes))?;
-        bsp.leafs = records(Lump::Leafs, data(Lump::Leafs))?;
-        bsp.leaf_surfaces = records(Lump::LeafSurfaces, data(Lump::LeafSurfaces))?;
-        bsp.leaf_brushes = records(Lump::LeafBrushes, data(Lump::LeafBrushes))?;
-        bsp.models = records(Lump::Models, data(Lump::Models))?;
-        bsp.brushes = records(Lump::Brushes, data(Lump::Brushes))?;
-        bsp.brush_sides = records(Lump::BrushSides, data(Lump::BrushSides))?;
-        bsp.vertices = records(Lump::DrawVerts, data(Lump::DrawVerts))?;
-        bsp.indices = records(Lump::DrawIndexes, data(Lump::DrawIndexes))?;
-        bsp.fogs = records(Lump::Fogs, data(Lump::Fogs))?;
-        bsp.surfaces = records(Lump::Surfaces, data(Lump::Surfaces))?;
+    fn read_lumps(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        let lumps = self.container.lumps;
+        let data = |lump: Lump| {
+            let range = lumps.get(lump.index()).copied().unwrap_or_default();
+            lump_bytes(bytes, range)
+        };
+        self.entities = data(Lump::Entities).to_vec();
+        self.shaders = records(Lump::Shaders, data(Lump::Shaders))?;
+        self.planes = records(Lump::Planes, data(Lump::Planes))?;
+        self.nodes = records(Lump::Nodes, data(Lump::Nodes))?;
+        self.leafs = records(Lump::Leafs, data(Lump::Leafs))?;
+        self.leaf_surfaces = records(Lump::LeafSurfaces, data(Lump::LeafSurfaces))?;
+        self.leaf_brushes = records(Lump::LeafBrushes, data(Lump::LeafBrushes))?;
+        self.models = records(Lump::Models, data(Lump::Models))?;
+        self.brushes = records(Lump::Brushes, data(Lump::Brushes))?;
+        self.indices = records(Lump::DrawIndexes, data(Lump::DrawIndexes))?;
+        self.fogs = records(Lump::Fogs, data(Lump::Fogs))?;
 
-        let (pages, rest) = split_records(data(Lump::Lightmaps), LIGHTMAP_BYTES);
-        bsp.lightmaps = pages
-            .chunks_exact(LIGHTMAP_BYTES)
+        let (points, rest) = if self.format.has_layers() {
+            self.read_layers(&data)?
+        } else {
+            self.brush_sides = records(Lump::BrushSides, data(Lump::BrushSides))?;
+            self.vertices = records(Lump::DrawVerts, data(Lump::DrawVerts))?;
+            self.surfaces = records(Lump::Surfaces, data(Lump::Surfaces))?;
+            let (points, rest) = split_records(data(Lump::LightGrid), GridPoint::STRIDE);
+            (records(Lump::LightGrid, points)?, rest)
+        };
+        self.light_grid = points;
+        self.keep_trailing(Lump::LightGrid, rest, "the partial point is ignored");
+        if self.format == Format::Rbsp {
+            let shaders = std::mem::take(&mut self.shaders);
+            self.shaders = shaders.into_iter().map(ShaderRef::read_as_raven).collect();
+        }
+        if self.format == Format::QuakeLive {
+            self.advertisements = records(Lump::Advertisements, data(Lump::Advertisements))?;
+        }
+
+        let page_bytes = self.lightmap_size() * self.lightmap_size() * 3;
+        let (pages, rest) = split_records(data(Lump::Lightmaps), page_bytes);
+        self.lightmaps = pages
+            .chunks_exact(page_bytes)
             .map(|page| Lightmap(page.into()))
             .collect();
-        bsp.keep_trailing(Lump::Lightmaps, rest, "the partial page is ignored");
-
-        let (points, rest) = split_records(data(Lump::LightGrid), 8);
-        bsp.light_grid = records(Lump::LightGrid, points)?;
-        bsp.keep_trailing(Lump::LightGrid, rest, "the partial point is ignored");
+        self.keep_trailing(Lump::Lightmaps, rest, "the partial page is ignored");
 
         let (visibility, rest, oddity) = Visibility::decode(data(Lump::Visibility));
-        bsp.visibility = visibility;
-        bsp.container.trailing[Lump::Visibility.index()] = rest.to_vec();
-        bsp.warnings.extend(oddity);
+        self.visibility = visibility;
+        self.container.trailing[Lump::Visibility.index()] = rest.to_vec();
+        self.warnings.extend(oddity);
+        Ok(())
+    }
 
-        bsp.validate()?;
-        Ok(bsp)
+    /// Reads the lumps whose records have layers. Returns the light grid as one without styles has it, and the bytes
+    /// that are no whole point.
+    fn read_layers<'a>(
+        &mut self,
+        data: &dyn Fn(Lump) -> &'a [u8],
+    ) -> Result<(Vec<GridPoint>, &'a [u8]), Error> {
+        let layers = &mut self.layers;
+        for LayeredSide(side, surface) in records(Lump::BrushSides, data(Lump::BrushSides))? {
+            self.brush_sides.push(side);
+            layers.side_surfaces.push(surface);
+        }
+        for LayeredVertex(vertex, more) in records(Lump::DrawVerts, data(Lump::DrawVerts))? {
+            self.vertices.push(vertex);
+            layers.vertices.push(more);
+        }
+        for LayeredSurface(surface, more) in records(Lump::Surfaces, data(Lump::Surfaces))? {
+            self.surfaces.push(surface);
+            layers.surfaces.push(more);
+        }
+        let (points, rest) = split_records(data(Lump::LightGrid), GridLayers::STRIDE);
+        layers.grid_points = records(Lump::LightGrid, points)?;
+        layers.grid_indices = records(Lump::LightArray, data(Lump::LightArray))?;
+        let beyond = |&index: &u16| usize::from(index) >= layers.grid_points.len();
+        let count = layers.grid_indices.iter().filter(|i| beyond(i)).count();
+        if count > 0 {
+            self.warnings.push(Warning {
+                lump: Lump::LightArray,
+                element: layers.grid_indices.iter().position(beyond),
+                field: "number of indices beyond the lightgrid, of which this is the first,",
+                value: count as i64,
+                action: "taken as points in walls",
+            });
+        }
+        Ok((self.layers.spread_grid(), rest))
+    }
+
+    /// The error with its place in the file this map was read from.
+    fn located(&self, error: Error) -> Error {
+        let Some((lump, element)) = error.place() else {
+            return error;
+        };
+        let range = self.container.lumps.get(lump.index());
+        let start = range.and_then(|r| u64::try_from(r.offset).ok());
+        let offset = start.map(|start| start + (element * self.format.stride(lump)) as u64);
+        match offset {
+            Some(offset) => Error::At {
+                offset,
+                error: Box::new(error),
+            },
+            None => error,
+        }
     }
 
     fn keep_trailing(&mut self, lump: Lump, rest: &[u8], action: &'static str) {
@@ -76,7 +164,8 @@ impl Bsp {
 
     /// Collects the bytes that no lump claims, and notes lumps that share bytes.
     fn find_gaps(&mut self, bytes: &[u8]) {
-        let mut ranges: Vec<(usize, usize, Lump)> = Lump::ALL
+        let lumps = self.format.lumps();
+        let mut ranges: Vec<(usize, usize, Lump)> = lumps
             .iter()
             .filter_map(|&lump| {
                 let range = self.container.lumps[lump.index()];
@@ -86,7 +175,7 @@ impl Bsp {
             })
             .collect();
         ranges.sort_by_key(|&(start, end, _)| (start, end));
-        let mut covered = HEADER_BYTES;
+        let mut covered = self.container.header_length;
         for (start, end, lump) in ranges {
             if start < covered {
                 self.warnings.push(Warning {
@@ -116,18 +205,16 @@ impl Bsp {
 }
 
 /// Reads the header and checks that every lump lies inside the file.
-fn directory(bytes: &[u8]) -> Result<[LumpRange; 17], Error> {
-    if let Some(found) = foreign_format(bytes) {
-        return Err(Error::WrongFormat { found });
-    }
-    let header = bytes.get(..HEADER_BYTES).ok_or(Error::TooShort {
+fn directory(bytes: &[u8], format: Format) -> Result<[LumpRange; SLOTS], Error> {
+    let needed = format.header_bytes();
+    let header = bytes.get(..needed).ok_or(Error::TooShort {
         found: bytes.len(),
-        needed: HEADER_BYTES,
+        needed,
     })?;
     let mut fields = Fields::new(header);
     let _ident_and_version: [u8; 8] = fields.bytes();
-    let mut lumps = [LumpRange::default(); 17];
-    for (lump, range) in Lump::ALL.into_iter().zip(&mut lumps) {
+    let mut lumps = [LumpRange::default(); SLOTS];
+    for (&lump, range) in format.lumps().iter().zip(&mut lumps) {
         let (offset, length) = (fields.i32(), fields.i32());
         let fits = length == 0
             || (offset >= 0
@@ -144,34 +231,6 @@ fn directory(bytes: &[u8]) -> Result<[LumpRange; 17], Error> {
         *range = LumpRange { offset, length };
     }
     Ok(lumps)
-}
-
-/// Names what the first eight bytes announce, unless they announce IBSP 46.
-fn foreign_format(bytes: &[u8]) -> Option<String> {
-    let (ident, rest) = bytes.split_first_chunk::<4>()?;
-    let version = i32::from_le_bytes(*rest.first_chunk::<4>()?);
-    let known = match (ident, version) {
-        (b"IBSP", 46) => return None,
-        (b"IBSP", 38) => "Quake II",
-        (b"IBSP", 43..=45) => "a Quake III test version",
-        (b"IBSP", 47) => "RTCW, Enemy Territory or Quake Live",
-        (b"IBSP", 48) => "Iron Grip: Warlord",
-        (b"IBSP", 666) => "Dark Salvation",
-        (b"IBSP", _) if version == 46i32.swap_bytes() => "big-endian",
-        (b"PSBI", _) => "big-endian",
-        (b"RBSP", _) => "Raven Software's format",
-        (b"FBSP", _) => "Warsow",
-        (b"FAKK", _) => "Ritual's format",
-        (b"VBSP", _) => "Source",
-        (b"BSP2" | b"2PSB", _) => "extended Quake",
-        ([29, 0, 0, 0], _) => "Quake",
-        ([30, 0, 0, 0], _) => "GoldSrc",
-        _ => "unknown",
-    };
-    Some(format!(
-        "\"{}\" version {version} ({known})",
-        ident.escape_ascii()
-    ))
 }
 
 /// The bytes of a lump whose range was checked.

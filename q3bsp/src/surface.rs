@@ -15,6 +15,9 @@ pub enum SurfaceKind {
     TriangleSoup,
     /// A point that shows a corona, without geometry; stored 4.
     Flare,
+    /// A mesh that stands in many places (`IBSP` 47, Enemy Territory); stored 5. `patch_height` vertices are the mesh,
+    /// the `patch_width` that follow are its places. See [`crate::Bsp::foliage_mesh`].
+    Foliage,
     /// A number that the engine does not know. Never in a validated map.
     Other(i32),
 }
@@ -27,6 +30,7 @@ impl SurfaceKind {
             2 => SurfaceKind::Patch,
             3 => SurfaceKind::TriangleSoup,
             4 => SurfaceKind::Flare,
+            5 => SurfaceKind::Foliage,
             other => SurfaceKind::Other(other),
         }
     }
@@ -38,6 +42,7 @@ impl SurfaceKind {
             SurfaceKind::Patch => 2,
             SurfaceKind::TriangleSoup => 3,
             SurfaceKind::Flare => 4,
+            SurfaceKind::Foliage => 5,
             SurfaceKind::Other(raw) => raw,
         }
     }
@@ -87,9 +92,9 @@ pub struct Surface {
     /// World steps per texel and the plane normal (often zero); of a patch: mins and maxs of its LOD
     /// group; of a flare: colour, unused, normal.
     pub lightmap_vecs: [Vec3; 3],
-    /// Control points per row: odd and at least 3 for a patch.
+    /// Control points per row: odd and at least 3 for a patch. Of foliage: places.
     pub patch_width: i32,
-    /// Rows of control points: odd and at least 3 for a patch.
+    /// Rows of control points: odd and at least 3 for a patch. Of foliage: vertices of the mesh.
     pub patch_height: i32,
 }
 

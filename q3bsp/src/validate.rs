@@ -364,6 +364,9 @@ impl Bsp {
             repairs: &mut self.container.repairs,
         };
         for (element, fog) in self.fogs.iter_mut().enumerate() {
+            if fog.brush == -1 && self.format.has_global_fog() {
+                continue;
+            }
             let at = index(
                 Lump::Fogs,
                 element,

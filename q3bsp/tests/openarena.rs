@@ -46,7 +46,7 @@ fn every_map_is_read_and_written_back() {
                 SurfaceKind::Patch => &mut totals.patches,
                 SurfaceKind::TriangleSoup => &mut totals.soups,
                 SurfaceKind::Flare => &mut totals.flares,
-                SurfaceKind::Other(raw) => panic!("{pak}/{name}: surface type {raw}"),
+                other => panic!("{pak}/{name}: surface type {}", other.raw()),
             } += 1;
         }
         let odd: Vec<_> = bsp

@@ -3,13 +3,20 @@
 use super::{Field, Repairs, in_range, index};
 use crate::Bsp;
 use crate::error::{Error, Lump};
-use crate::surface::{SurfaceKind, lightmap_index};
+use crate::format::Format;
+use crate::layers::LayeredSurface;
+use crate::surface::{Surface, SurfaceKind, lightmap_index};
 
 impl Bsp {
     pub(super) fn check_surfaces(&mut self) -> Result<(), Error> {
         let (shaders, fogs) = (self.shaders.len(), self.fogs.len() as i64);
         let (vertices, indices) = (self.vertices.len(), self.indices.len());
         let pages = self.lightmaps.len() as i64;
+        let lightmap_offset = match self.format.has_layers() {
+            true => LayeredSurface::LIGHTMAP_OFFSET,
+            false => 28,
+        };
+        let has_foliage = matches!(self.format, Format::Ibsp47 | Format::QuakeLive);
         let mut log = Repairs {
             lump: Lump::Surfaces,
             warnings: &mut self.warnings,
@@ -40,7 +47,7 @@ impl Bsp {
                 let by_vertex = lightmap_index::BY_VERTEX;
                 log.replace(
                     element,
-                    Field("lightmapNum", 28),
+                    Field("lightmapNum", lightmap_offset),
                     &mut s.lightmap,
                     by_vertex,
                     action,
@@ -68,13 +75,18 @@ impl Bsp {
                     }
                     false
                 }
-                SurfaceKind::Other(raw) => {
+                SurfaceKind::Foliage if has_foliage => {
+                    check_foliage(element, s)?;
+                    true
+                }
+                SurfaceKind::Foliage | SurfaceKind::Other(_) => {
+                    let most = if has_foliage { 5 } else { 4 };
                     return Err(Error::Value {
                         lump: Lump::Surfaces,
                         element,
                         field: "surfaceType",
-                        value: i64::from(raw),
-                        expected: "not one of 1 to 4".to_owned(),
+                        value: i64::from(s.kind.raw()),
+                        expected: format!("not one of 1 to {most}"),
                     });
                 }
             };
@@ -110,17 +122,31 @@ impl Bsp {
                 log.replace(element, num_indexes, &mut s.num_indices, 0, action);
             }
         }
+        for (element, layers) in self.layers.surfaces.iter_mut().enumerate() {
+            for (layer, page) in layers.lightmaps.iter_mut().enumerate() {
+                if *page < lightmap_index::TWO_D || i64::from(*page) >= pages {
+                    let field = Field(
+                        "lightmapNum of a further layer",
+                        lightmap_offset + 4 + layer * 4,
+                    );
+                    let action = "no such page; lit by vertex";
+                    log.replace(element, field, page, lightmap_index::BY_VERTEX, action);
+                }
+            }
+        }
         Ok(())
     }
 
     /// Triangle corners must lie among their surface's vertices.
     pub(super) fn check_indices(&self) -> Result<(), Error> {
         for s in &self.surfaces {
-            if !matches!(s.kind, SurfaceKind::Planar | SurfaceKind::TriangleSoup) {
-                continue;
-            }
+            let vertices = match s.kind {
+                SurfaceKind::Planar | SurfaceKind::TriangleSoup => s.num_verts,
+                SurfaceKind::Foliage => s.patch_height,
+                _ => continue,
+            };
             let corners = self.surface_indices(s);
-            let outside = |&corner: &i32| corner < 0 || corner >= s.num_verts;
+            let outside = |&corner: &i32| corner < 0 || corner >= vertices;
             if let Some(at) = corners.iter().position(outside) {
                 let element = usize::try_from(s.first_index).unwrap_or(0) + at;
                 return Err(Error::Value {
@@ -128,12 +154,30 @@ impl Bsp {
                     element,
                     field: "corner",
                     value: i64::from(corners.get(at).copied().unwrap_or(0)),
-                    expected: format!("outside the {} vertices of its surface", s.num_verts),
+                    expected: format!("outside the {vertices} vertices of its surface"),
                 });
             }
         }
         Ok(())
     }
+}
+
+/// Foliage must have the vertices of its mesh and one for each place.
+fn check_foliage(element: usize, s: &Surface) -> Result<(), Error> {
+    let (places, mesh) = (i64::from(s.patch_width), i64::from(s.patch_height));
+    if places >= 0 && mesh >= 0 && places + mesh <= i64::from(s.num_verts) {
+        return Ok(());
+    }
+    Err(Error::Value {
+        lump: Lump::Surfaces,
+        element,
+        field: "patchHeight",
+        value: mesh,
+        expected: format!(
+            "which with the {places} places of patchWidth is not among its {} vertices",
+            s.num_verts
+        ),
+    })
 }
 
 /// Number of control points of a patch whose sizes are acceptable to the engine.

@@ -10,7 +10,7 @@ use super::random::Random;
 use super::samples::{STORED_UNIT, Sample, corners};
 use crate::world::RelitWorld;
 use glam::{Vec2, Vec3};
-use q3bsp::{LIGHTMAP_SIZE, lightmap_index};
+use q3bsp::lightmap_index;
 use std::f32::consts::TAU;
 
 /// Rays per sample: a square of this many strata a side.
@@ -72,13 +72,10 @@ fn thrown_back(world: &RelitWorld, of_triangle: &[u32], hit: &Hit) -> Option<Vec
     let light = match surface.lightmap {
         page @ 0.. => {
             let at: Vec2 = a.lightmap * (1.0 - u - v) + b.lightmap * u + c.lightmap * v;
-            let at = at * LIGHTMAP_SIZE as f32;
+            let page = world.bsp.lightmaps.get(page as usize)?;
+            let at = at * page.size() as f32;
             // Casts saturate.
-            let texel = world
-                .bsp
-                .lightmaps
-                .get(page as usize)?
-                .texel(at.x as usize, at.y as usize);
+            let texel = page.texel(at.x as usize, at.y as usize);
             Vec3::from_array(texel.map(f32::from)) * STORED_UNIT
         }
         lightmap_index::BY_VERTEX => {

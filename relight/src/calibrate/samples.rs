@@ -7,7 +7,7 @@ use super::bvh::Occluders;
 use super::random::Random;
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
 use glam::{Vec2, Vec3};
-use q3bsp::{LIGHTMAP_SIZE, SurfaceKind};
+use q3bsp::SurfaceKind;
 use shaderscript::light::SurfaceClass;
 
 /// Radiance of white for a stored value of 1.
@@ -243,9 +243,9 @@ fn texel(
     surface: &WorldSurface,
     random: &mut Random,
 ) -> Option<(Vec3, Vec3, [u8; 3])> {
-    let size = LIGHTMAP_SIZE as f32;
     let page = usize::try_from(surface.lightmap).ok()?;
     let page = world.bsp.lightmaps.get(page)?;
+    let size = page.size() as f32;
     let (u, v) = random.in_triangle();
     let [a, b, c] = corners(world, triangle)?.map(|c| c.lightmap * size);
     let cell = (a + (b - a) * u + (c - a) * v).floor();
@@ -257,7 +257,7 @@ fn texel(
     let others = first..first + surface.num_indices as usize / 3;
     let (on, normal) = std::iter::once(triangle)
         .chain(others)
-        .find_map(|t| place_of(corners(world, t)?, middle))?;
+        .find_map(|t| place_of(corners(world, t)?, middle, size))?;
     let stored = page.texel(cell.x as usize, cell.y as usize);
     Some((on, normal, stored))
 }
@@ -269,9 +269,8 @@ pub(super) fn corners(world: &RelitWorld, triangle: usize) -> Option<[&WorldVert
     Some([vertex(a)?, vertex(b)?, vertex(c)?])
 }
 
-/// Position and normal of a place in a lightmap page, in texels, if the triangle covers it.
-fn place_of([a, b, c]: [&WorldVertex; 3], at: Vec2) -> Option<(Vec3, Vec3)> {
-    let size = LIGHTMAP_SIZE as f32;
+/// Position and normal of a place in a lightmap page of `size` texels a side, in texels, if the triangle covers it.
+fn place_of([a, b, c]: [&WorldVertex; 3], at: Vec2, size: f32) -> Option<(Vec3, Vec3)> {
     let (e1, e2) = (
         (b.lightmap - a.lightmap) * size,
         (c.lightmap - a.lightmap) * size,

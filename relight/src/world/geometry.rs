@@ -132,6 +132,13 @@ impl Geometry {
                     plane = self.flatten(first_vertex, first_index, stored_normal(bsp, index));
                 }
             }
+            (SurfaceKind::Foliage, _) => {
+                let surface = bsp.surfaces.get(index);
+                if let Some((vertices, corners)) = surface.and_then(|s| bsp.foliage_mesh(s)) {
+                    let vertices: Vec<_> = vertices.iter().map(DrawVert::finite).collect();
+                    self.append(&vertices, &corners, shift);
+                }
+            }
             _ => {}
         }
         self.repair_normals(first_vertex, first_index);

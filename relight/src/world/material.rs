@@ -47,7 +47,9 @@ pub(super) fn lightmap_of(bsp: &Bsp, index: usize) -> i32 {
     };
     let page = usize::try_from(surface.lightmap).ok();
     match surface.kind {
-        SurfaceKind::TriangleSoup | SurfaceKind::Flare => lightmap_index::BY_VERTEX,
+        SurfaceKind::TriangleSoup | SurfaceKind::Flare | SurfaceKind::Foliage => {
+            lightmap_index::BY_VERTEX
+        }
         _ if page.is_some_and(|page| page >= bsp.lightmaps.len()) => lightmap_index::BY_VERTEX,
         _ if surface.lightmap < lightmap_index::TWO_D => lightmap_index::BY_VERTEX,
         _ => surface.lightmap,

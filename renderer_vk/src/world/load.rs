@@ -272,7 +272,7 @@ fn make_lightmaps<S: LightmapSink>(
     if options.vertex_light || options.fullbright {
         return Vec::new();
     }
-    let side = u32::try_from(q3bsp::LIGHTMAP_SIZE).unwrap_or(128);
+    let side = u32::try_from(relit.bsp.lightmap_size()).unwrap_or(128);
     let mut brightest = 0.0f32;
     let pages = (0..relit.bsp.lightmaps.len())
         .map(|page| {

@@ -1,0 +1,168 @@
+//! The formats that are read, and how one is told from another.
+
+use crate::container::LumpRange;
+use crate::error::Lump;
+
+/// A map format. All are read into the same [`crate::Bsp`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Format {
+    /// `IBSP` version 46: Quake III Arena and the games and mods made with its engine.
+    #[default]
+    Ibsp46,
+    /// `IBSP` version 47: Return to Castle Wolfenstein and Enemy Territory. As version 46 with fog that fills the
+    /// world and, in Enemy Territory, foliage.
+    Ibsp47,
+    /// `IBSP` version 47 with an eighteenth lump, the advertisements of Quake Live.
+    QuakeLive,
+    /// `RBSP` version 1: Jedi Outcast, Jedi Academy, Soldier of Fortune II. Up to four light styles per surface,
+    /// vertex and grid point.
+    Rbsp,
+    /// `FBSP` version 1: QFusion (Warsow, Warfork). As `RBSP` with lightmap pages of 512 × 512 texels.
+    Fbsp,
+}
+
+impl Format {
+    /// Name for people: identification, version and games.
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Ibsp46 => "IBSP 46 (Quake III)",
+            Format::Ibsp47 => "IBSP 47 (RTCW, Enemy Territory)",
+            Format::QuakeLive => "IBSP 47 (Quake Live)",
+            Format::Rbsp => "RBSP 1 (Raven)",
+            Format::Fbsp => "FBSP 1 (QFusion)",
+        }
+    }
+
+    /// Texels per side of a lightmap page.
+    pub fn lightmap_size(self) -> usize {
+        match self {
+            Format::Fbsp => 512,
+            _ => 128,
+        }
+    }
+
+    /// Whether surfaces, vertices and grid points have up to four layers of light ([`crate::Layers`]).
+    pub fn has_layers(self) -> bool {
+        matches!(self, Format::Rbsp | Format::Fbsp)
+    }
+
+    /// Whether a fog may have no brush and fill the world.
+    pub fn has_global_fog(self) -> bool {
+        !matches!(self, Format::Ibsp46)
+    }
+
+    /// The lumps in directory order.
+    pub fn lumps(self) -> &'static [Lump] {
+        match self {
+            Format::Ibsp46 | Format::Ibsp47 => &Lump::ALL,
+            Format::QuakeLive => &QUAKE_LIVE_LUMPS,
+            Format::Rbsp | Format::Fbsp => &RAVEN_LUMPS,
+        }
+    }
+
+    /// Bytes of the header: identification, version and directory.
+    pub(crate) fn header_bytes(self) -> usize {
+        8 + 8 * self.lumps().len()
+    }
+
+    /// Identification and version as they begin a file.
+    pub(crate) fn magic(self) -> (&'static [u8; 4], i32) {
+        match self {
+            Format::Ibsp46 => (b"IBSP", 46),
+            Format::Ibsp47 | Format::QuakeLive => (b"IBSP", 47),
+            Format::Rbsp => (b"RBSP", 1),
+            Format::Fbsp => (b"FBSP", 1),
+        }
+    }
+}
+
+impl std::fmt::Display for Format {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+const fn with_eighteenth(lump: Lump) -> [Lump; 18] {
+    let mut lumps = [lump; 18];
+    let mut at = 0;
+    while at < Lump::ALL.len() {
+        lumps[at] = Lump::ALL[at];
+        at += 1;
+    }
+    lumps
+}
+
+const RAVEN_LUMPS: [Lump; 18] = with_eighteenth(Lump::LightArray);
+const QUAKE_LIVE_LUMPS: [Lump; 18] = with_eighteenth(Lump::Advertisements);
+
+/// What the first eight bytes announce.
+pub(crate) enum Announced {
+    /// A format that is read.
+    Known(Format),
+    /// Another one: what was found, with its name where it is known.
+    Foreign(String),
+    /// Fewer than eight bytes.
+    Nothing,
+}
+
+/// Reads identification and version.
+pub(crate) fn announced(bytes: &[u8]) -> Announced {
+    let Some((ident, rest)) = bytes.split_first_chunk::<4>() else {
+        return Announced::Nothing;
+    };
+    let Some(version) = rest.first_chunk::<4>().map(|v| i32::from_le_bytes(*v)) else {
+        return Announced::Nothing;
+    };
+    let known = match (ident, version) {
+        (b"IBSP", 46) => return Announced::Known(Format::Ibsp46),
+        (b"IBSP", 47) if has_advertisements(bytes) => return Announced::Known(Format::QuakeLive),
+        (b"IBSP", 47) => return Announced::Known(Format::Ibsp47),
+        (b"RBSP", 1) => return Announced::Known(Format::Rbsp),
+        (b"FBSP", 1) => return Announced::Known(Format::Fbsp),
+        (b"IBSP", 38) => "Quake II",
+        (b"IBSP", 43..=45) => "a Quake III test version",
+        (b"IBSP", 48) => "Iron Grip: Warlord",
+        (b"IBSP", 666) => "Dark Salvation",
+        (b"IBSP", _) if version == 46i32.swap_bytes() => "big-endian",
+        (b"PSBI", _) => "big-endian",
+        (b"FAKK" | b"2015" | b"EF2!", _) => "Ritual's format",
+        (b"VBSP", _) => "Source",
+        (b"BSP2" | b"2PSB", _) => "extended Quake",
+        ([29, 0, 0, 0], _) => "Quake",
+        ([30, 0, 0, 0], _) => "GoldSrc",
+        (b"PK\x03\x04", _) => "a zip archive",
+        _ => "unknown",
+    };
+    Announced::Foreign(format!(
+        "\"{}\" version {version} ({known})",
+        ident.escape_ascii()
+    ))
+}
+
+/// Whether an `IBSP` 47 file has the eighteenth lump of Quake Live: RTCW and Enemy Territory have the same version
+/// and no such lump, so that the entry must lie before all data, and be one.
+fn has_advertisements(bytes: &[u8]) -> bool {
+    let entry = |at: usize| -> Option<LumpRange> {
+        let (offset, length) = bytes
+            .get(8 + at * 8..16 + at * 8)?
+            .split_first_chunk::<4>()?;
+        Some(LumpRange {
+            offset: i32::from_le_bytes(*offset),
+            length: i32::from_le_bytes(*length.first_chunk::<4>()?),
+        })
+    };
+    let first_data = (0..Lump::ALL.len())
+        .filter_map(entry)
+        .filter(|range| range.length > 0)
+        .map(|range| i64::from(range.offset))
+        .min();
+    let header = Format::QuakeLive.header_bytes() as i64;
+    let Some(entry) = entry(Lump::ALL.len()) else {
+        return false;
+    };
+    first_data.is_some_and(|first| first >= header)
+        && entry.length > 0
+        && entry.length % 128 == 0
+        && i64::from(entry.offset) >= header
+        && i64::from(entry.offset) + i64::from(entry.length) <= bytes.len() as i64
+}
