@@ -5,6 +5,7 @@
 mod calibration;
 mod cameras;
 mod compare;
+mod convert;
 mod estimators;
 mod info;
 mod lights;
@@ -14,6 +15,8 @@ mod statistics;
 mod table;
 mod timings;
 mod view;
+
+use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
@@ -33,6 +36,8 @@ enum Command {
     Cameras(cameras::CamerasArgs),
     /// Tell how alike pictures of one view are
     Compare(compare::CompareArgs),
+    /// Write maps for other programs
+    Convert(convert::ConvertArgs),
     /// Compare the ways to choose lights: all of them have the same mean
     Estimators(estimators::EstimatorsArgs),
     /// Tell what is in maps, and where their light comes from
@@ -45,15 +50,17 @@ enum Command {
     Render(render::RenderArgs),
 }
 
-fn main() -> anyhow::Result<()> {
+fn main() -> anyhow::Result<ExitCode> {
     match Cli::parse().command {
         Command::Calibration(args) => calibration::run(&args),
         Command::Cameras(args) => cameras::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Convert(args) => return convert::run(&args),
         Command::Estimators(args) => estimators::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Lights(args) => lights::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Render(args) => render::run(&args),
-    }
+    }?;
+    Ok(ExitCode::SUCCESS)
 }

@@ -2,6 +2,7 @@
 //!
 //! * [`mod@calibrate`]: lights fitted to the map's own lightmaps, and those found again that its compiler stripped.
 //! * [`compare`]: two pictures of one view compared.
+//! * [`export`]: maps written for other programs.
 //! * [`exposure`]: how bright a map is meant to look.
 //! * [`files`]: game files behind one trait: packs, folders, an engine, memory.
 //! * [`mod@image`]: texture images as the engine reads them.
@@ -29,6 +30,7 @@
 
 pub mod calibrate;
 pub mod compare;
+pub mod export;
 pub mod exposure;
 pub mod files;
 pub mod image;

@@ -1,0 +1,326 @@
+//! `relight convert`: maps for other programs.
+
+mod inputs;
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use relight::export::{
+    Export, ExportOptions, ExportReport, Format, ImagePlace, ImageStore, Lightmaps,
+    METRES_PER_UNIT, export,
+};
+use relight::{CalibrationCache, CalibrationOptions, Materials, Options, RelitWorld, SearchPath};
+use serde::Serialize;
+
+use inputs::Input;
+
+/// Exit code for maps that cannot be read.
+const BAD_INPUT: u8 = 2;
+
+/// Write maps for other programs
+///
+/// Geometry with curves, normals and both sets of texture coordinates, materials with their images, lights, entities
+/// and cameras. A file appears whole or not at all. Exit code: 0 when everything was written, 2 when some map cannot be
+/// read, 1 for everything else.
+///
+/// Examples: relight convert oa_dm1 -o oa_dm1.glb; relight convert pak1-maps.pk3 -o converted;
+/// relight convert pak1-maps.pk3:maps/kaos.bsp my.bsp -o out --format gltf
+#[derive(Args, Debug)]
+pub struct ConvertArgs {
+    /// Maps: a .bsp file, a pack (.pk3) for all maps in it, pack.pk3:maps/x.bsp, or the name of a map of the game
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<String>,
+    /// File to write, or for several maps the folder; maps of several packs get a folder each
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// Format; by default that of OUT's extension, else the first
+    #[arg(long, value_parser = parse_format)]
+    format: Option<Format>,
+    /// Game folder with packs, for images and scripts; give several in rising priority
+    #[arg(
+        long = "game",
+        value_name = "DIR",
+        default_value = "/usr/share/games/openarena/baseoa"
+    )]
+    games: Vec<PathBuf>,
+    /// Length of an id unit in the output
+    #[arg(long, default_value_t = METRES_PER_UNIT)]
+    scale: f32,
+    /// What becomes of lightmaps and of light in vertex colours
+    #[arg(long, value_enum, default_value_t = LightmapChoice::Keep)]
+    lightmaps: LightmapChoice,
+    /// Where images go: as usual for the format, inside the file, or into a folder beside it
+    #[arg(long, value_enum, default_value_t = ImageChoice::Usual)]
+    images: ImageChoice,
+    /// Write moving textures as animations, which strict readers of glTF refuse
+    #[arg(long)]
+    animate: bool,
+    /// Write no point lights and suns
+    #[arg(long)]
+    no_lights: bool,
+    /// Largest distance of a curve from its mesh, id units
+    #[arg(long, default_value_t = 4.0)]
+    subdivisions: f32,
+    /// Fit lights to the lightmaps first, and find those again that the compiler left out (some seconds a map)
+    #[arg(long)]
+    calibrate: bool,
+    /// Keep what calibration finds in this folder, and take it from there
+    #[arg(long, value_name = "DIR", requires = "calibrate")]
+    cache: Option<PathBuf>,
+    /// Maps converted at a time; by default one a core
+    #[arg(long)]
+    jobs: Option<NonZeroUsize>,
+    /// Print what was written as JSON
+    #[arg(long)]
+    json: bool,
+    /// Print every warning instead of their number
+    #[arg(long, short)]
+    verbose: bool,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug)]
+enum LightmapChoice {
+    Keep,
+    Strip,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug)]
+enum ImageChoice {
+    Usual,
+    Embed,
+    Beside,
+}
+
+fn parse_format(text: &str) -> Result<Format, String> {
+    Format::from_extension(text).ok_or_else(|| {
+        let known: Vec<_> = Format::ALL.iter().map(|f| f.extension()).collect();
+        format!("formats are {}", known.join(", "))
+    })
+}
+
+/// What is told about a map that was written.
+#[derive(Serialize)]
+struct Converted {
+    map: String,
+    output: PathBuf,
+    files: Vec<PathBuf>,
+    bytes: u64,
+    triangles: usize,
+    degenerate_triangles: usize,
+    vertices: usize,
+    materials: usize,
+    images: usize,
+    warnings: Vec<String>,
+    milliseconds: u128,
+}
+
+/// What is told about a map that was not.
+#[derive(Serialize)]
+struct Failure {
+    map: String,
+    error: String,
+    /// Whether the map is at fault.
+    bad_input: bool,
+}
+
+/// Everything that the threads share.
+struct Shared<'a> {
+    args: &'a ConvertArgs,
+    format: Format,
+    files: &'a SearchPath,
+    materials: &'a Materials,
+    images: &'a ImageStore,
+}
+
+/// Converts the maps.
+pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
+    let format = format_of(args)?;
+    let mut files = SearchPath::open(&args.games)?;
+    let inputs = match inputs::find(&mut files, &args.games, &args.inputs) {
+        Ok(inputs) => inputs,
+        Err(problem) => {
+            eprintln!("{problem:#}");
+            return Ok(ExitCode::from(BAD_INPUT));
+        }
+    };
+    let outputs = inputs::outputs(&inputs, &args.output, format)?;
+    let (materials, _) = Materials::load(&files);
+    let images = ImageStore::default();
+    let shared = Shared {
+        args,
+        format,
+        files: &files,
+        materials: &materials,
+        images: &images,
+    };
+    let bar = ProgressBar::new(inputs.len() as u64);
+    bar.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}")?);
+    let results: Vec<Mutex<Option<Result<Converted, Failure>>>> =
+        inputs.iter().map(|_| Mutex::new(None)).collect();
+    let next = AtomicUsize::new(0);
+    let threads = args
+        .jobs
+        .or_else(|| std::thread::available_parallelism().ok())
+        .map_or(1, NonZeroUsize::get)
+        .min(inputs.len());
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let (Some(input), Some(output), Some(slot)) =
+                        (inputs.get(index), outputs.get(index), results.get(index))
+                    else {
+                        break;
+                    };
+                    bar.set_message(input.to_string());
+                    let result = convert(&shared, input, output);
+                    if let Ok(mut slot) = slot.lock() {
+                        *slot = Some(result);
+                    }
+                    bar.inc(1);
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    let results = results
+        .into_iter()
+        .filter_map(|slot| slot.into_inner().ok().flatten());
+    let (mut converted, mut failures) = (Vec::new(), Vec::new());
+    for result in results {
+        match result {
+            Ok(one) => converted.push(one),
+            Err(one) => failures.push(one),
+        }
+    }
+    tell(args, &converted, &failures)?;
+    Ok(if failures.is_empty() {
+        ExitCode::SUCCESS
+    } else if failures.iter().any(|f| f.bad_input) {
+        ExitCode::from(BAD_INPUT)
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+/// The format asked for: by name, by the output's extension, or the first of all.
+fn format_of(args: &ConvertArgs) -> Result<Format> {
+    let by_name = args
+        .output
+        .extension()
+        .and_then(|e| Format::from_extension(&e.to_string_lossy()));
+    let Some(first) = Format::ALL.first().copied() else {
+        bail!("no format");
+    };
+    Ok(args.format.or(by_name).unwrap_or(first))
+}
+
+fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, Failure> {
+    let args = shared.args;
+    let begin = Instant::now();
+    let failure = |bad_input: bool| {
+        move |error: anyhow::Error| Failure {
+            map: input.to_string(),
+            error: format!("{error:#}"),
+            bad_input,
+        }
+    };
+    let calibrate = args.calibrate.then(|| CalibrationOptions {
+        cache: args.cache.as_ref().map(CalibrationCache::new),
+        ..CalibrationOptions::default()
+    });
+    let options = Options {
+        subdivisions: args.subdivisions,
+        calibrate,
+        ..Options::default()
+    };
+    let bytes = input.read(shared.files).map_err(failure(true))?;
+    let bsp = q3bsp::Bsp::parse(&bytes)
+        .with_context(|| input.to_string())
+        .map_err(failure(true))?;
+    drop(bytes);
+    let name = input.to_string();
+    let world = RelitWorld::from_bsp(shared.files, shared.materials, &name, bsp, options);
+    let source = Export {
+        world: &world,
+        files: shared.files,
+        images: shared.images,
+        options: ExportOptions {
+            scale: args.scale,
+            lightmaps: match args.lightmaps {
+                LightmapChoice::Keep => Lightmaps::Keep,
+                LightmapChoice::Strip => Lightmaps::Strip,
+            },
+            images: match args.images {
+                ImageChoice::Usual => ImagePlace::Usual,
+                ImageChoice::Embed => ImagePlace::Embed,
+                ImageChoice::Beside => ImagePlace::Beside,
+            },
+            lights: !args.no_lights,
+            animate: args.animate,
+        },
+    };
+    let report = export(&source, shared.format, output)
+        .with_context(|| name.clone())
+        .map_err(failure(false))?;
+    Ok(Converted::new(name, output, report, begin))
+}
+
+impl Converted {
+    fn new(map: String, output: &Path, report: ExportReport, begin: Instant) -> Converted {
+        Converted {
+            map,
+            output: output.to_owned(),
+            bytes: report.files.iter().map(|(_, size)| size).sum(),
+            files: report.files.into_iter().map(|(path, _)| path).collect(),
+            triangles: report.triangles,
+            degenerate_triangles: report.degenerate,
+            vertices: report.vertices,
+            materials: report.materials,
+            images: report.images,
+            warnings: report.warnings,
+            milliseconds: begin.elapsed().as_millis(),
+        }
+    }
+}
+
+fn tell(args: &ConvertArgs, converted: &[Converted], failures: &[Failure]) -> Result<()> {
+    if args.json {
+        let all = serde_json::json!({ "converted": converted, "failures": failures });
+        println!("{}", serde_json::to_string_pretty(&all)?);
+    } else {
+        for one in converted {
+            println!(
+                "{} -> {}: {} triangles, {} materials, {} images, {:.1} MiB, {} ms{}",
+                one.map,
+                one.output.display(),
+                one.triangles,
+                one.materials,
+                one.images,
+                one.bytes as f64 / f64::from(1 << 20),
+                one.milliseconds,
+                match one.warnings.len() {
+                    0 => String::new(),
+                    _ if args.verbose => ":".to_owned(),
+                    1 => "; 1 warning".to_owned(),
+                    count => format!("; {count} warnings"),
+                }
+            );
+            for warning in one.warnings.iter().filter(|_| args.verbose) {
+                println!("    {warning}");
+            }
+        }
+    }
+    for failure in failures {
+        eprintln!("{}", failure.error);
+    }
+    Ok(())
+}

@@ -1,0 +1,88 @@
+//! How strongly materials glow: as strongly as the lights that they are.
+
+use super::Export;
+use super::look::{Look, Picture, look};
+use crate::world::{RelitWorld, WorldMaterial};
+use glam::{Vec3, Vec4};
+
+/// For every material the mean radiance of its lights, by area; zero where it has none.
+pub fn radiances(world: &RelitWorld) -> Vec<Vec3> {
+    let mut sums = vec![Vec4::ZERO; world.materials.len()];
+    for light in &world.lights {
+        let material = world
+            .surfaces
+            .get(light.surface as usize)
+            .and_then(|s| sums.get_mut(s.material as usize));
+        if let Some(sum) = material {
+            let area = light.area();
+            *sum += (light.radiance * area).extend(area);
+        }
+    }
+    let mean = |sum: Vec4| {
+        let mean = sum.truncate() / sum.w;
+        if mean.is_finite() { mean } else { Vec3::ZERO }
+    };
+    sums.into_iter().map(mean).collect()
+}
+
+/// Relative luminance of linear colours (Rec. 709).
+fn luminance(color: Vec3) -> f32 {
+    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
+
+/// What a picture is multiplied with so that its mean is `radiance`. Where the picture lacks a colour of the light, its
+/// brightness alone is matched.
+fn factor(radiance: Vec3, mean: Vec3) -> Vec3 {
+    if mean.min_element() >= 0.05 * mean.max_element() && mean.min_element() > 0.0 {
+        radiance / mean
+    } else {
+        Vec3::splat(luminance(radiance) / luminance(mean).max(1.0e-4))
+    }
+}
+
+impl Export<'_> {
+    /// The mean of a picture, linear, with its alpha; `None` for one that is missing.
+    pub(super) fn mean(&self, material: &WorldMaterial, picture: &Picture) -> Option<Vec4> {
+        let shader = &material.resolved.shader;
+        let found = self.images.get(self.files, picture, shader).ok()??;
+        Some(found.mean.extend(found.mean_alpha))
+    }
+
+    /// What other programs can say of a material whose lights have the mean radiance `radiance`.
+    pub(super) fn look(&self, material: &WorldMaterial, radiance: Option<Vec3>) -> Look {
+        let mut look = look(material, &mut |name| {
+            self.mean(material, &Picture::File(name.to_owned()))
+        });
+        let Some(radiance) = radiance.filter(|r| r.max_element() > 0.0) else {
+            return look;
+        };
+        if look.glow.is_none() {
+            look.glow = look.color.clone();
+        }
+        let mean = look
+            .glow
+            .as_ref()
+            .and_then(|slot| self.mean(material, &slot.picture));
+        look.glow_factor = match mean {
+            Some(mean) => factor(radiance, mean.truncate()),
+            None => radiance,
+        };
+        look
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_glow_is_as_bright_as_its_light() {
+        let mean = Vec3::new(0.5, 0.25, 0.1);
+        let light = Vec3::new(4.0, 3.0, 2.0);
+        assert!((factor(light, mean) * mean - light).length() < 1.0e-5);
+        // a red picture cannot be white; it is as bright
+        let red = Vec3::new(0.5, 0.0, 0.0);
+        let white = Vec3::ONE;
+        assert!((luminance(factor(white, red) * red) - 1.0).abs() < 1.0e-5);
+    }
+}

@@ -1,0 +1,223 @@
+//! What of a map is drawn, joined by model and material.
+
+use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
+use glam::Vec2;
+use q3bsp::surface_flags;
+use shaderscript::light::SurfaceClass;
+use std::collections::{BTreeMap, HashMap};
+
+/// Texture coordinates beyond this many repetitions are moved back by whole ones: far out, floats have no fraction left.
+const FAR: f32 = 256.0;
+
+/// What becomes of surfaces of a material.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Drawn {
+    /// They are drawn.
+    Yes,
+    /// They are windows to the sky.
+    Sky,
+    /// They are not: no stage, the boundary of a fog, or flags that say so.
+    No,
+}
+
+/// Whether a material is drawn. What the map's own flags hide stays hidden whatever its script says.
+pub fn drawn(material: &WorldMaterial) -> Drawn {
+    let hidden = surface_flags::NODRAW | surface_flags::HINT | surface_flags::SKIP;
+    if material.is_sky() {
+        Drawn::Sky
+    } else if material.surface_flags & hidden != 0
+        || matches!(
+            material.class.class,
+            SurfaceClass::Invisible | SurfaceClass::Fog
+        )
+    {
+        Drawn::No
+    } else {
+        Drawn::Yes
+    }
+}
+
+/// Triangles of one model and material. Space and winding are the map's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// Index into the world's materials.
+    pub material: u32,
+    /// Vertices, each once. Coordinates in the lightmap are those of [`Atlas`](super::lightmaps::Atlas) where there is
+    /// one, else of the page.
+    pub vertices: Vec<WorldVertex>,
+    /// Three corners a triangle.
+    pub indices: Vec<u32>,
+}
+
+/// A brush model; 0 is the world.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mesh {
+    /// One per material, in the order of the world's materials.
+    pub parts: Vec<Part>,
+}
+
+/// Everything drawn.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Geometry {
+    /// One per model of the map.
+    pub models: Vec<Mesh>,
+    /// Windows to the sky, of all models, one per material; world space.
+    pub sky: Vec<Part>,
+    /// Triangles left out because they have no area.
+    pub degenerate: usize,
+}
+
+impl Geometry {
+    /// Number of triangles, sky apart.
+    pub fn triangles(&self) -> usize {
+        self.parts().map(|part| part.indices.len() / 3).sum()
+    }
+
+    /// Number of vertices, sky apart.
+    pub fn vertices(&self) -> usize {
+        self.parts().map(|part| part.vertices.len()).sum()
+    }
+
+    /// All parts, sky apart.
+    pub fn parts(&self) -> impl Iterator<Item = &Part> {
+        self.models.iter().flat_map(|model| &model.parts)
+    }
+}
+
+/// Vertices of a part, each once by all that it holds.
+#[derive(Default)]
+struct Joiner {
+    known: HashMap<[u32; 11], u32>,
+    vertices: Vec<WorldVertex>,
+    indices: Vec<u32>,
+}
+
+/// The bits of a vertex; -0 counts as 0.
+fn key(v: &WorldVertex) -> [u32; 11] {
+    let bits = |f: f32| (f + 0.0).to_bits();
+    let [px, py, pz] = v.position.to_array().map(bits);
+    let [nx, ny, nz] = v.normal.to_array().map(bits);
+    let [s, t] = v.st.to_array().map(bits);
+    let [ls, lt] = v.lightmap.to_array().map(bits);
+    [
+        px,
+        py,
+        pz,
+        nx,
+        ny,
+        nz,
+        s,
+        t,
+        ls,
+        lt,
+        u32::from_le_bytes(v.color),
+    ]
+}
+
+impl Joiner {
+    fn index(&mut self, vertex: WorldVertex) -> u32 {
+        *self.known.entry(key(&vertex)).or_insert_with(|| {
+            self.vertices.push(vertex);
+            (self.vertices.len() - 1) as u32
+        })
+    }
+
+    fn finish(self, material: u32) -> Part {
+        Part {
+            material,
+            vertices: self.vertices,
+            indices: self.indices,
+        }
+    }
+}
+
+/// Joins what is drawn. `place` gives the coordinates that a surface's vertices have in the light's image, from those
+/// in its page.
+pub fn gather(world: &RelitWorld, place: &dyn Fn(&WorldSurface, Vec2) -> Vec2) -> Geometry {
+    let mut parts: BTreeMap<(u32, u32), Joiner> = BTreeMap::new();
+    let mut sky: BTreeMap<u32, Joiner> = BTreeMap::new();
+    let mut degenerate = 0;
+    for surface in &world.surfaces {
+        let Some(material) = world.materials.get(surface.material as usize) else {
+            continue;
+        };
+        if surface.num_indices == 0 {
+            continue;
+        }
+        let origin = world
+            .models
+            .get(surface.model as usize)
+            .map_or(glam::Vec3::ZERO, |model| model.origin);
+        let (joiner, origin) = match drawn(material) {
+            Drawn::No => continue,
+            Drawn::Sky => (sky.entry(surface.material).or_default(), origin),
+            Drawn::Yes => (
+                parts.entry((surface.model, surface.material)).or_default(),
+                glam::Vec3::ZERO,
+            ),
+        };
+        let shift = far_shift(world, surface, material);
+        let first = surface.first_index as usize;
+        let indices = world
+            .indices
+            .get(first..first + surface.num_indices as usize)
+            .unwrap_or_default();
+        for corners in indices.as_chunks::<3>().0 {
+            let [Some(a), Some(b), Some(c)] = corners.map(|i| world.vertices.get(i as usize))
+            else {
+                continue;
+            };
+            if (b.position - a.position).cross(c.position - a.position) == glam::Vec3::ZERO {
+                degenerate += 1;
+                continue;
+            }
+            let corner = [a, b, c].map(|v| {
+                joiner.index(WorldVertex {
+                    position: v.position + origin,
+                    st: v.st - shift,
+                    lightmap: place(surface, v.lightmap),
+                    ..*v
+                })
+            });
+            joiner.indices.extend(corner);
+        }
+    }
+    let mut geometry = Geometry {
+        models: vec![Mesh::default(); world.models.len().max(1)],
+        sky: sky.into_iter().map(|(m, j)| j.finish(m)).collect(),
+        degenerate,
+    };
+    for ((model, material), joiner) in parts {
+        if let Some(mesh) = geometry.models.get_mut(model as usize)
+            && !joiner.indices.is_empty()
+        {
+            mesh.parts.push(joiner.finish(material));
+        }
+    }
+    geometry.sky.retain(|part| !part.indices.is_empty());
+    geometry
+}
+
+/// Whole repetitions that a surface's texture coordinates are moved back by: none unless they are far out.
+fn far_shift(world: &RelitWorld, surface: &WorldSurface, material: &WorldMaterial) -> Vec2 {
+    let first = surface.first_vertex as usize;
+    let vertices = world
+        .vertices
+        .get(first..first + surface.num_vertices as usize)
+        .unwrap_or_default();
+    let Some(least) = vertices.iter().map(|v| v.st).reduce(Vec2::min) else {
+        return Vec2::ZERO;
+    };
+    // Whole repetitions of the coordinates are whole ones of the image only where it repeats and nothing scales.
+    let plain = material.resolved.shader.stages.iter().all(|stage| {
+        stage.tc_mods.is_empty() && !matches!(stage.image, shaderscript::StageImage::ClampMap(_))
+    });
+    let back = |v: f32| {
+        if plain && v.abs() > FAR {
+            v.floor()
+        } else {
+            0.0
+        }
+    };
+    Vec2::new(back(least.x), back(least.y))
+}

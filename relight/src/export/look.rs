@@ -1,0 +1,468 @@
+//! A material as far as other programs can say it: one image for colour, one for glow, transparency, refraction.
+//!
+//! The stages are told apart by what they do, as everywhere ([`shaderscript::light`]). Those whose images lie on the
+//! surface in the same way become one picture; of what moves against that, the brightest addition is kept as glow and
+//! the rest is told in [`Look::lost`].
+
+use super::stack::{self, Part, tiling};
+use crate::world::WorldMaterial;
+use glam::{Vec2, Vec3, Vec4};
+use shaderscript::light::{LightLinear, SurfaceClass, base_stage, cut_out_stage, refraction_index};
+use shaderscript::surface_params::{CONTENTS_FOG, CONTENTS_SLIME};
+use shaderscript::{
+    AlphaFunc, AlphaGen, BlendFactor, Cull, Deform, ImplicitKind, RgbGen, Shader, Stage,
+    StageImage, TcGen, TcMod, eval,
+};
+
+/// Distance in a liquid after which white light has the colour that its surface shows, id units; as the traced look.
+const LIQUID_DEPTH: f32 = 512.0;
+/// What passes less than this is not seen through: it stays what its stages show.
+const LEAST_TRANSMISSION: f32 = 0.15;
+/// Darkest that a liquid colours one channel over its depth.
+const LEAST_COLOR: f32 = 0.05;
+/// Roughness of what has a stage that shows its surroundings.
+const SHINY: f32 = 0.3;
+
+/// A change of an image's alpha.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Edit {
+    /// 255 − alpha.
+    Inverted,
+    /// For images that are added: alpha is the brightness, the colour is divided by it.
+    FromBrightness,
+    /// For images that multiply: black, alpha is what is taken away.
+    FromDarkness,
+}
+
+impl Edit {
+    /// A short name, for files.
+    pub fn label(self) -> &'static str {
+        match self {
+            Edit::Inverted => "inverted",
+            Edit::FromBrightness => "added",
+            Edit::FromDarkness => "filter",
+        }
+    }
+}
+
+/// What an image is made of.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Picture {
+    /// An image as the game has it.
+    File(String),
+    /// The same with another alpha.
+    Edited(String, Edit),
+    /// Several stages of a material together.
+    Baked {
+        /// The material, lower case.
+        name: String,
+        /// Which of its stages.
+        stages: Vec<usize>,
+        /// Which part of what they show.
+        part: Part,
+    },
+}
+
+/// A picture and how it lies on the surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slot {
+    /// The picture.
+    pub picture: Picture,
+    /// Whether it ends at its edge instead of repeating.
+    pub clamp: bool,
+    /// Changes to the texture coordinates.
+    pub tc_mods: Vec<TcMod>,
+}
+
+/// How a surface hides what is behind it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Alpha {
+    /// Fully.
+    Opaque,
+    /// Where alpha is at least this.
+    Mask(f32),
+    /// By alpha.
+    Blend,
+}
+
+/// Glass and liquids.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dielectric {
+    /// Index of refraction.
+    pub index: f32,
+    /// Part of light that passes.
+    pub transmission: f32,
+    /// Colour of white light after a distance in id units; `None` for panes, which have no inside.
+    pub liquid: Option<(Vec3, f32)>,
+}
+
+/// A material for other programs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Look {
+    /// Image of its colour; `None` where no stage has one.
+    pub color: Option<Slot>,
+    /// Multiplies the colour, linear; alpha multiplies alpha.
+    pub factor: Vec4,
+    /// How it hides what is behind it.
+    pub alpha: Alpha,
+    /// Image of its glow.
+    pub glow: Option<Slot>,
+    /// Multiplies the glow, linear radiance.
+    pub glow_factor: Vec3,
+    /// Whether both sides are drawn.
+    pub two_sided: bool,
+    /// Whether the back is drawn instead of the front.
+    pub reversed: bool,
+    /// Whether colours of vertices multiply it, and whether these are light that the compiler found.
+    pub vertex_color: Option<VertexColor>,
+    /// Whether alpha of vertices multiplies alpha.
+    pub vertex_alpha: bool,
+    /// Whether it is lit by lightmaps.
+    pub lightmapped: bool,
+    /// What glass and liquids do to light.
+    pub dielectric: Option<Dielectric>,
+    /// Whether it is a mirror.
+    pub mirror: bool,
+    /// Roughness, 0..1.
+    pub roughness: f32,
+    /// What of it could not be said.
+    pub lost: Vec<String>,
+}
+
+/// What colours of vertices are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum VertexColor {
+    /// Light that the map's compiler found.
+    Light,
+    /// Paint.
+    Paint,
+}
+
+/// Reads a material. `mean` gives the mean colour of an image, linear, with its alpha; `None` for one that is missing.
+pub fn look(material: &WorldMaterial, mean: &mut dyn FnMut(&str) -> Option<Vec4>) -> Look {
+    let shader = &material.resolved.shader;
+    let class = material.class;
+    let vertex_light = material.lighting != ImplicitKind::Lightmapped;
+    let mut look = Look {
+        color: None,
+        factor: Vec4::ONE,
+        alpha: Alpha::Opaque,
+        glow: None,
+        glow_factor: Vec3::ZERO,
+        two_sided: class.two_sided,
+        reversed: shader.cull == Cull::Back,
+        vertex_color: None,
+        vertex_alpha: false,
+        lightmapped: !vertex_light && shader.has_lightmap_stage(),
+        dielectric: None,
+        mirror: class.class == SurfaceClass::Mirror,
+        roughness: if class.environment { SHINY } else { 1.0 },
+        lost: Vec::new(),
+    };
+    if look.mirror {
+        look.roughness = 0.0;
+    }
+    told_losses(shader, &mut look.lost);
+    let base = match class.class {
+        SurfaceClass::CutOut => cut_out_stage(shader).or_else(|| base_stage(shader)),
+        _ => base_stage(shader),
+    };
+    let Some((base, stage)) = base.and_then(|i| Some((i, shader.stages.get(i)?))) else {
+        bare(shader, vertex_light, &mut look);
+        return look;
+    };
+    let group = group_of(shader, base, stage, &mut look.lost);
+    colors_of_vertices(material, shader, &group, &mut look);
+    let slot = |picture: Picture, stage: &Stage| Slot {
+        picture,
+        clamp: matches!(stage.image, StageImage::ClampMap(_)),
+        tc_mods: stage.tc_mods.clone(),
+    };
+    let name = stage.image.names().first().cloned().unwrap_or_default();
+    let images = |group: &[usize]| {
+        let has = |i: &&usize| {
+            shader
+                .stages
+                .get(**i)
+                .is_some_and(|s| !s.image.names().is_empty())
+        };
+        group.iter().filter(has).count()
+    };
+    let drawn = stack::mean_of(
+        &stack::without_reflections(shader, &group),
+        vertex_light,
+        mean,
+    );
+    let color = stack::mean_color(stage);
+    if class.additive && group.len() == 1 {
+        look.alpha = Alpha::Blend;
+        look.factor = Vec4::new(0.0, 0.0, 0.0, 1.0);
+        look.color = Some(slot(Picture::Edited(name, Edit::FromBrightness), stage));
+        look.glow = look.color.clone();
+        look.glow_factor = color.truncate();
+        look.lost
+            .push("adds light to what is behind it; said by transparency".to_owned());
+    } else if class.filter && group.len() == 1 {
+        look.alpha = Alpha::Blend;
+        look.color = Some(slot(Picture::Edited(name, Edit::FromDarkness), stage));
+        look.lost
+            .push("multiplies what is behind it; said by transparency".to_owned());
+    } else if images(&group) == 1 && plain_blend(stage).is_some() {
+        let (alpha, edit) = plain_blend(stage).unwrap_or((Alpha::Opaque, None));
+        look.alpha = if class.class == SurfaceClass::Opaque {
+            Alpha::Opaque
+        } else {
+            alpha
+        };
+        let picture = match edit {
+            Some(edit) => Picture::Edited(name, edit),
+            None => Picture::File(name),
+        };
+        look.color = Some(slot(picture, stage));
+        // What the stack makes of one image is that image times something.
+        let alpha = color.w;
+        let through = if look.alpha == Alpha::Blend {
+            (1.0 - drawn.through.element_sum() / 3.0).max(1.0e-3)
+        } else {
+            1.0
+        };
+        let texture = look
+            .color
+            .as_ref()
+            .and_then(|_| mean(stage.image.names().first()?))
+            .unwrap_or(Vec4::ONE)
+            .truncate()
+            .max(Vec3::splat(1.0e-4));
+        let part = |part: Vec3| (part / through / texture).clamp(Vec3::ZERO, Vec3::ONE);
+        look.factor = part(drawn.lit).extend(alpha);
+        look.glow_factor = part(drawn.emission);
+        if look.glow_factor.max_element() > 1.0e-3 {
+            look.glow = look.color.clone();
+        }
+    } else {
+        look.alpha = match class.class {
+            SurfaceClass::Opaque => Alpha::Opaque,
+            SurfaceClass::CutOut => Alpha::Mask(0.5),
+            _ => Alpha::Blend,
+        };
+        let baked = |part| Picture::Baked {
+            name: material.name.to_ascii_lowercase(),
+            stages: group.clone(),
+            part,
+        };
+        if class.class == SurfaceClass::CutOut
+            && let Some((alpha, _)) = plain_blend(stage)
+        {
+            look.alpha = alpha;
+        }
+        if drawn.lit.max_element() > 1.0e-3 {
+            look.color = Some(slot(baked(Part::Color), stage));
+        } else {
+            look.color = Some(slot(baked(Part::Glow), stage));
+            look.factor = Vec4::new(0.0, 0.0, 0.0, 1.0);
+        }
+        if drawn.emission.max_element() > 1.0e-3 {
+            look.glow = Some(slot(baked(Part::Glow), stage));
+            look.glow_factor = Vec3::ONE;
+        }
+    }
+    if look.glow.is_none() {
+        add_moving_glow(shader, &group, &mut look);
+    }
+    dielectric(shader, &drawn, &mut look);
+    look
+}
+
+/// The stages that lie on the surface as the base stage does; what becomes of the others is told in `lost`.
+fn group_of(shader: &Shader, base: usize, stage: &Stage, lost: &mut Vec<String>) -> Vec<usize> {
+    let mut group = Vec::new();
+    for (i, other) in shader.stages.iter().enumerate() {
+        let alike = i == base
+            || other.is_lightmap()
+            || other.image == StageImage::White
+            || (tiling(other, &stage.tc_mods).is_some()
+                && !matches!(other.alpha_gen, AlphaGen::Vertex | AlphaGen::OneMinusVertex)
+                && other.image.names().len() <= 1);
+        if alike {
+            group.push(i);
+        } else if other.tc_gen == TcGen::Environment {
+            lost.push(format!(
+                "stage {i}: a picture of the surroundings; said by roughness"
+            ));
+        } else {
+            lost.push(format!("stage {i}: lies on the surface in another way"));
+        }
+    }
+    group
+}
+
+/// A material without an image of its own: one colour.
+fn bare(shader: &Shader, vertex_light: bool, look: &mut Look) {
+    let all: Vec<usize> = (0..shader.stages.len()).collect();
+    let stages = stack::without_reflections(shader, &all);
+    let drawn = stack::mean_of(&stages, vertex_light, &mut |_| None);
+    look.factor = drawn.lit.clamp(Vec3::ZERO, Vec3::ONE).extend(1.0);
+    look.glow_factor = drawn.emission.clamp(Vec3::ZERO, Vec3::ONE);
+    let through = drawn.through.element_sum() / 3.0;
+    if through > 1.0e-3 {
+        look.alpha = Alpha::Blend;
+        look.factor.w = (1.0 - through).clamp(0.0, 1.0);
+    }
+}
+
+/// How a stage by itself hides what is behind it, and the change of its alpha that this needs; `None` for what only
+/// its whole stack can tell.
+fn plain_blend(stage: &Stage) -> Option<(Alpha, Option<Edit>)> {
+    use BlendFactor::{DstColor, OneMinusSrcAlpha, SrcAlpha, SrcColor, Zero};
+    match (stage.alpha_func, stage.blend) {
+        (Some(AlphaFunc::Ge128), _) => Some((Alpha::Mask(0.5), None)),
+        (Some(AlphaFunc::Gt0), _) => Some((Alpha::Mask(1.0 / 255.0), None)),
+        (Some(AlphaFunc::Lt128), _) => Some((Alpha::Mask(0.5), Some(Edit::Inverted))),
+        // an image that multiplies a lightmap under it
+        (None, None | Some((DstColor, Zero) | (Zero, SrcColor))) => Some((Alpha::Opaque, None)),
+        (None, Some((SrcAlpha, OneMinusSrcAlpha))) => Some((Alpha::Blend, None)),
+        (None, Some((OneMinusSrcAlpha, SrcAlpha))) => Some((Alpha::Blend, Some(Edit::Inverted))),
+        _ => None,
+    }
+}
+
+/// Whether and how colours of vertices multiply the group.
+fn colors_of_vertices(material: &WorldMaterial, shader: &Shader, group: &[usize], look: &mut Look) {
+    let stages = || group.iter().filter_map(|&i| shader.stages.get(i));
+    let from_vertex = |s: &Stage| {
+        matches!(
+            s.rgb_gen,
+            RgbGen::Vertex | RgbGen::ExactVertex | RgbGen::OneMinusVertex
+        )
+    };
+    if stages().any(from_vertex) {
+        look.vertex_color = Some(match material.lighting {
+            ImplicitKind::Lightmapped => VertexColor::Paint,
+            _ => VertexColor::Light,
+        });
+    }
+    if stages().any(|s| matches!(s.rgb_gen, RgbGen::OneMinusVertex)) {
+        look.vertex_color = None;
+        look.lost
+            .push("is lit by the reverse of vertex colours".to_owned());
+    }
+    look.vertex_alpha =
+        stages().any(|s| s.alpha_gen == AlphaGen::Vertex && !s.is_lightmap() && s.blend.is_some());
+}
+
+/// Of what moves against the colour, or lies on it in another way, the first stage that adds light becomes the glow.
+fn add_moving_glow(shader: &Shader, group: &[usize], look: &mut Look) {
+    if look.alpha != Alpha::Opaque {
+        return;
+    }
+    let found = shader.stages.iter().enumerate().find(|(i, stage)| {
+        !group.contains(i)
+            && stage.tc_gen == TcGen::Base
+            && matches!(
+                stage.blend,
+                Some((BlendFactor::One | BlendFactor::SrcAlpha, BlendFactor::One))
+            )
+            && !stage.image.names().is_empty()
+    });
+    if let Some((i, stage)) = found
+        && let Some(name) = stage.image.names().first()
+    {
+        look.glow = Some(Slot {
+            picture: Picture::File(name.clone()),
+            clamp: matches!(stage.image, StageImage::ClampMap(_)),
+            tc_mods: stage.tc_mods.clone(),
+        });
+        look.glow_factor = stack::mean_color(stage).truncate();
+        let told = format!("stage {i}: ");
+        look.lost.retain(|l| !l.starts_with(&told));
+    }
+}
+
+/// What glass and liquids do to light.
+fn dielectric(shader: &Shader, drawn: &LightLinear, look: &mut Look) {
+    let Some(index) = refraction_index(shader) else {
+        return;
+    };
+    let transmission = drawn.through.max_element().clamp(0.0, 1.0);
+    if transmission < LEAST_TRANSMISSION && shader.content_flags & CONTENTS_SLIME != 0 {
+        return;
+    }
+    let liquid = shaderscript::light::classify(shader).liquid;
+    let color = drawn.lit + drawn.emission + drawn.through;
+    look.dielectric = Some(Dielectric {
+        index,
+        transmission,
+        liquid: (liquid && shader.content_flags & CONTENTS_FOG == 0 && color.is_finite()).then(
+            || {
+                let color = color / color.max_element().max(1.0e-6);
+                (
+                    color.clamp(Vec3::splat(LEAST_COLOR), Vec3::ONE),
+                    LIQUID_DEPTH,
+                )
+            },
+        ),
+    });
+    look.alpha = Alpha::Opaque;
+    look.roughness = 0.0;
+    // What it shows of its own is seen with what it does not let pass.
+    look.glow_factor *= 1.0 - transmission;
+    look.factor = look.factor.max(Vec4::new(0.0, 0.0, 0.0, 1.0));
+    if look.factor.truncate().max_element() < 1.0e-3 {
+        look.factor = Vec4::ONE;
+    }
+}
+
+/// What no format here can say.
+fn told_losses(shader: &Shader, lost: &mut Vec<String>) {
+    for deform in &shader.deforms {
+        lost.push(
+            match deform {
+                Deform::AutoSprite | Deform::AutoSprite2 => "turns to the viewer",
+                Deform::Text(_) => "shows text",
+                Deform::ProjectionShadow => "is a flat shadow",
+                Deform::Normal { .. } => "its normals move",
+                Deform::Wave { .. } | Deform::Bulge { .. } | Deform::Move { .. } => {
+                    "its vertices move"
+                }
+            }
+            .to_owned(),
+        );
+    }
+    for (i, stage) in shader.stages.iter().enumerate() {
+        if stage
+            .tc_mods
+            .iter()
+            .any(|m| matches!(m, TcMod::Turbulent { .. }))
+        {
+            lost.push(format!("stage {i}: its texture wobbles"));
+        }
+        if stage.image.names().len() > 1 {
+            lost.push(format!(
+                "stage {i}: its images follow each other; the first is shown"
+            ));
+        }
+        if matches!(stage.image, StageImage::Video(_)) {
+            lost.push(format!("stage {i}: a film"));
+        }
+        if matches!(stage.rgb_gen, RgbGen::Wave(_)) || matches!(stage.alpha_gen, AlphaGen::Wave(_))
+        {
+            lost.push(format!(
+                "stage {i}: its brightness changes; the mean is shown"
+            ));
+        }
+    }
+    lost.dedup();
+}
+
+/// `st * matrix + translate`: what changes of texture coordinates come to at a time, wobbles left out.
+/// `matrix[i]` is where coordinate i goes.
+pub fn affine(tc_mods: &[TcMod], time: f64) -> ([Vec2; 2], Vec2) {
+    let still: Vec<TcMod> = tc_mods
+        .iter()
+        .filter(|m| !matches!(m, TcMod::Turbulent { .. } | TcMod::EntityTranslate))
+        .cloned()
+        .collect();
+    let at = |st: Vec2| eval::apply_tc_mods(&still, st, Vec3::ZERO, time, Vec2::ZERO);
+    let origin = at(Vec2::ZERO);
+    ([at(Vec2::X) - origin, at(Vec2::Y) - origin], origin)
+}

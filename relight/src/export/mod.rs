@@ -1,0 +1,205 @@
+//! Maps written for other programs.
+//!
+//! * [`Export`]: what is written: a relit world, and where its images come from.
+//! * [`export`]: writes one map in a [`Format`]; a file appears whole or not at all.
+//! * `geometry`: what is drawn, joined by material, without what other programs stumble over.
+//! * `look`: a material's stages as far as other programs can say them.
+//! * [`ImageStore`]: images as files, each made once for all maps.
+//!
+//! # Space
+//!
+//! Maps have z up and triangles that are clockwise seen from the front. Where a format has y up and counter-clockwise
+//! triangles, a point (x, y, z) becomes `scale` · (x, z, −y), a pure rotation, and the corners of every triangle are
+//! written in reverse.
+
+mod emission;
+mod geometry;
+mod images;
+mod look;
+mod obj;
+mod output;
+mod stack;
+
+pub use images::{Encoded, ImageStore, Mime};
+pub use output::Output;
+
+use crate::files::GameFiles;
+use crate::world::RelitWorld;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Length of an id unit in metres that [`ExportOptions::default`] uses: a power of two, so that nothing is rounded.
+/// A player of 56 units is 1.75 m tall.
+pub const METRES_PER_UNIT: f32 = 1.0 / 32.0;
+
+/// A format that maps are written in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Format {
+    /// Wavefront OBJ with its MTL.
+    Obj,
+}
+
+impl Format {
+    /// All formats.
+    pub const ALL: [Format; 1] = [Format::Obj];
+
+    /// Extension of its files, without the dot; also the name that users give.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Format::Obj => "obj",
+        }
+    }
+
+    /// The format of an extension, given without its dot, case of no importance.
+    pub fn from_extension(extension: &str) -> Option<Format> {
+        Format::ALL
+            .into_iter()
+            .find(|format| format.extension().eq_ignore_ascii_case(extension))
+    }
+}
+
+/// What becomes of a map's lightmaps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Lightmaps {
+    /// Written: one atlas, and the light in vertex colours.
+    #[default]
+    Keep,
+    /// Left out, for programs that compute light themselves.
+    Strip,
+}
+
+/// Where images go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ImagePlace {
+    /// What the format usually does: inside a single binary file, beside a text file.
+    #[default]
+    Usual,
+    /// Inside the file, where the format can.
+    Embed,
+    /// As files of their own, in a folder that all maps of one output folder share.
+    Beside,
+}
+
+/// How a map is written. Patches were tessellated when the world was loaded ([`Options::subdivisions`]).
+///
+/// [`Options::subdivisions`]: crate::Options::subdivisions
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExportOptions {
+    /// Length of an id unit in the output; positive and finite.
+    pub scale: f32,
+    /// What becomes of lightmaps.
+    pub lightmaps: Lightmaps,
+    /// Where images go.
+    pub images: ImagePlace,
+    /// Whether lights that the format knows (points, spots, suns) are written.
+    pub lights: bool,
+    /// Whether moving textures are written as animations, which strict readers of glTF refuse.
+    pub animate: bool,
+}
+
+impl Default for ExportOptions {
+    /// Metres, lightmaps kept, lights written, nothing animated.
+    fn default() -> Self {
+        ExportOptions {
+            scale: METRES_PER_UNIT,
+            lightmaps: Lightmaps::default(),
+            images: ImagePlace::default(),
+            lights: true,
+            animate: false,
+        }
+    }
+}
+
+/// What is exported.
+pub struct Export<'a> {
+    /// The map with its materials and lights.
+    pub world: &'a RelitWorld,
+    /// Where images come from.
+    pub files: &'a dyn GameFiles,
+    /// Images as files; shared between maps.
+    pub images: &'a ImageStore,
+    /// How it is written.
+    pub options: ExportOptions,
+}
+
+/// Why a map could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// A file could not be written.
+    #[error("{path}: {source}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: io::Error,
+    },
+    /// More than the format can hold.
+    #[error("{what} is {found}, more than the {limit} that the format can hold")]
+    TooLarge {
+        /// What is too large.
+        what: &'static str,
+        /// How large it is.
+        found: u64,
+        /// How large it may be.
+        limit: u64,
+    },
+    /// An option that makes no sense.
+    #[error("scale is {0}; it must be a positive number")]
+    Scale(f32),
+    /// An image could not be encoded.
+    #[error("image {name}: {reason}")]
+    Image {
+        /// Name of the image.
+        name: String,
+        /// What the encoder said.
+        reason: String,
+    },
+}
+
+/// What was written.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ExportReport {
+    /// Files written, with their sizes in bytes; files that were there already with the same content are among them.
+    pub files: Vec<(PathBuf, u64)>,
+    /// Triangles.
+    pub triangles: usize,
+    /// Triangles left out because they have no area.
+    pub degenerate: usize,
+    /// Vertices.
+    pub vertices: usize,
+    /// Materials.
+    pub materials: usize,
+    /// Images.
+    pub images: usize,
+    /// What could not be said in the format, each thing once; and the world's own warnings.
+    pub warnings: Vec<String>,
+}
+
+/// Writes a map to `path`, and the files that belong to it beside it.
+///
+/// All files are written under other names first and renamed when everything has been written, the named one last: a
+/// reader never sees half a file.
+///
+/// # Errors
+/// [`ExportError`] when the format cannot hold the map or a file cannot be written; then nothing is left behind.
+pub fn export(
+    source: &Export<'_>,
+    format: Format,
+    path: &Path,
+) -> Result<ExportReport, ExportError> {
+    let scale = source.options.scale;
+    if !(scale.is_finite() && scale > 0.0) {
+        return Err(ExportError::Scale(scale));
+    }
+    let mut output = Output::new(path);
+    let mut report = match format {
+        Format::Obj => obj::write(source, &mut output)?,
+    };
+    report.files = output.finish()?;
+    report
+        .warnings
+        .extend(source.world.warnings.iter().cloned());
+    Ok(report)
+}

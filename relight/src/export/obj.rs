@@ -1,0 +1,194 @@
+//! Wavefront OBJ and MTL: geometry, normals, texture coordinates, one image a material.
+
+use super::emission;
+use super::geometry::{self, Part};
+use super::images::Encoded;
+use super::look::{Alpha, Look, Slot, affine};
+use super::output::Output;
+use super::{Export, ExportError, ExportReport};
+use crate::world::WorldMaterial;
+use glam::Vec3;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::sync::Arc;
+
+/// Writes `NAME.obj`, `NAME.mtl` and the images.
+pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportReport, ExportError> {
+    let world = source.world;
+    let geometry = geometry::gather(world, &|_, page| page);
+    let stem = output.stem();
+    let mut report = ExportReport {
+        triangles: geometry.triangles(),
+        degenerate: geometry.degenerate,
+        vertices: geometry.vertices(),
+        ..ExportReport::default()
+    };
+    let mut materials = String::new();
+    let mut images: BTreeMap<String, Arc<Encoded>> = BTreeMap::new();
+    let mut used: Vec<u32> = geometry.parts().map(|p| p.material).collect();
+    used.sort_unstable();
+    used.dedup();
+    let mut looks = BTreeMap::new();
+    let radiances = emission::radiances(world);
+    for &index in &used {
+        let Some(material) = world.materials.get(index as usize) else {
+            continue;
+        };
+        let look = source.look(material, radiances.get(index as usize).copied());
+        let entry = material_entry(source, index, material, &look, &mut images)?;
+        materials.push_str(&entry);
+        for lost in &look.lost {
+            report
+                .warnings
+                .push(format!("material {}: {lost}", material.name));
+        }
+        looks.insert(index, look);
+    }
+    report.materials = looks.len();
+    report.images = images.len();
+
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        text,
+        "# {}: y up, {} of an id unit",
+        world.name, source.options.scale
+    );
+    let _ = writeln!(text, "mtllib {stem}.mtl");
+    let mut first = 1;
+    for (number, mesh) in geometry.models.iter().enumerate() {
+        if mesh.parts.is_empty() {
+            continue;
+        }
+        let origin = world.models.get(number).map_or(Vec3::ZERO, |m| m.origin);
+        let _ = writeln!(
+            text,
+            "o {}",
+            if number == 0 {
+                "world".to_owned()
+            } else {
+                format!("model_{number}")
+            }
+        );
+        for part in &mesh.parts {
+            let look = looks.get(&part.material);
+            let name = world
+                .materials
+                .get(part.material as usize)
+                .map_or("", |m| &m.name);
+            let _ = writeln!(text, "usemtl {}", material_name(part.material, name));
+            write_part(&mut text, part, look, origin, source.options.scale, first);
+            first += part.vertices.len();
+        }
+    }
+    for image in images.values() {
+        output.write_beside(&format!("images/{}", image.path), &image.bytes)?;
+    }
+    output.write_beside(&format!("{stem}.mtl"), materials.as_bytes())?;
+    output.write_main(text.as_bytes())?;
+    Ok(report)
+}
+
+/// Names of materials must not repeat, and end at the first space.
+fn material_name(index: u32, name: &str) -> String {
+    let name: String = name
+        .chars()
+        .map(|c| {
+            if c.is_whitespace() || c.is_control() {
+                '_'
+            } else {
+                c
+            }
+        })
+        .collect();
+    format!("{name}.{index}")
+}
+
+fn write_part(
+    text: &mut String,
+    part: &Part,
+    look: Option<&Look>,
+    origin: Vec3,
+    scale: f32,
+    first: usize,
+) {
+    let tc_mods = look
+        .and_then(|l| l.color.as_ref())
+        .map_or(&[][..], |slot| &slot.tc_mods);
+    let ([s, t], translate) = affine(tc_mods, 0.0);
+    let turn = |v: Vec3| Vec3::new(v.x, v.z, -v.y);
+    for v in &part.vertices {
+        let p = turn(v.position + origin) * scale;
+        let _ = writeln!(text, "v {} {} {}", p.x, p.y, p.z);
+    }
+    for v in &part.vertices {
+        // Rows of images count from below.
+        let st = s * v.st.x + t * v.st.y + translate;
+        let _ = writeln!(text, "vt {} {}", st.x, 1.0 - st.y);
+    }
+    for v in &part.vertices {
+        let n = turn(v.normal);
+        let _ = writeln!(text, "vn {} {} {}", n.x, n.y, n.z);
+    }
+    let reversed = look.is_some_and(|l| l.reversed);
+    for &[a, b, c] in part.indices.as_chunks::<3>().0 {
+        let [a, b, c] = if reversed { [a, b, c] } else { [c, b, a] }.map(|i| first + i as usize);
+        let _ = writeln!(text, "f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}");
+    }
+}
+
+fn material_entry(
+    source: &Export<'_>,
+    index: u32,
+    material: &WorldMaterial,
+    look: &Look,
+    images: &mut BTreeMap<String, Arc<Encoded>>,
+) -> Result<String, ExportError> {
+    let mut text = String::new();
+    let mut map = |keyword: &str, slot: &Option<Slot>| -> Result<String, ExportError> {
+        let Some(slot) = slot else {
+            return Ok(String::new());
+        };
+        let found = source
+            .images
+            .get(source.files, &slot.picture, &material.resolved.shader)?;
+        let Some(image) = found else {
+            return Ok(String::new());
+        };
+        let clamp = if slot.clamp { "-clamp on " } else { "" };
+        let line = format!("{keyword} {clamp}images/{}\n", image.path);
+        images.insert(image.path.clone(), image);
+        Ok(line)
+    };
+    let [x, y, z, w] = look.factor.to_array();
+    let _ = writeln!(text, "newmtl {}", material_name(index, &material.name));
+    // Old programs show no glow: what only glows is given its colour.
+    let glows = Vec3::new(x, y, z).max_element() < 1.0e-3;
+    let [r, g, b] = if glows {
+        look.glow_factor.to_array()
+    } else {
+        [x, y, z]
+    };
+    let _ = writeln!(text, "Kd {r} {g} {b}\nKs 0 0 0\nillum 1");
+    let e = look.glow_factor;
+    if e != Vec3::ZERO {
+        let _ = writeln!(text, "Ke {} {} {}", e.x, e.y, e.z);
+    }
+    let opacity = match look.dielectric {
+        Some(dielectric) => 1.0 - dielectric.transmission,
+        None => w,
+    };
+    if opacity < 1.0 {
+        let _ = writeln!(text, "d {opacity}");
+    }
+    if let Some(dielectric) = look.dielectric {
+        let _ = writeln!(text, "Ni {}", dielectric.index);
+    }
+    text.push_str(&map("map_Kd", &look.color)?);
+    if look.alpha != Alpha::Opaque {
+        text.push_str(&map("map_d", &look.color)?);
+    }
+    text.push_str(&map("map_Ke", &look.glow)?);
+    text.push('\n');
+    Ok(text)
+}

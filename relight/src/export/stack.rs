@@ -1,0 +1,216 @@
+//! A stack of stages as one picture, where all its images lie on the surface in the same way.
+
+use super::images::load;
+use crate::files::GameFiles;
+use crate::image::Image;
+use crate::overbright;
+use glam::{Vec2, Vec3, Vec4};
+use shaderscript::eval::{self, ColorContext};
+use shaderscript::light::{LightLinear, StageSample, compose};
+use shaderscript::{AlphaGen, RgbGen, Shader, Stage, StageImage, TcGen, TcMod};
+
+/// Longest side of a picture that is made from several.
+const LONGEST: u32 = 1024;
+
+/// Which of the two pictures of a stack.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Part {
+    /// What reflects light, and alpha.
+    Color,
+    /// What is seen without light.
+    Glow,
+}
+
+/// A stack as pictures of one size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Baked {
+    /// What reflects light; alpha is what hides the background.
+    pub color: Image,
+    /// What is seen without light; alpha as in `color`.
+    pub glow: Image,
+}
+
+/// Stages as they are put together: those that show surroundings are left out.
+pub fn without_reflections(shader: &Shader, stages: &[usize]) -> Vec<Stage> {
+    let mut kept: Vec<Stage> = stages
+        .iter()
+        .filter_map(|&i| shader.stages.get(i).cloned())
+        .collect();
+    // What hides all behind it still does when the reflection under it is gone.
+    let opaque = shader.stages.first().is_some_and(|s| s.blend.is_none());
+    if let Some(first) = kept.first_mut().filter(|_| opaque) {
+        first.blend = None;
+    }
+    kept
+}
+
+/// How often a stage's image fits into that of a stage with the coordinates `base`: whole times, at rest against it.
+/// `None` when it moves against it or does not fit.
+pub fn tiling(stage: &Stage, base: &[TcMod]) -> Option<Vec2> {
+    if stage.tc_gen != TcGen::Base || matches!(stage.image, StageImage::Video(_)) {
+        return None;
+    }
+    let rest = stage.tc_mods.strip_prefix(base)?;
+    let mut factor = Vec2::ONE;
+    for tc_mod in rest {
+        match tc_mod {
+            TcMod::Scale(scale) => factor *= *scale,
+            _ => return None,
+        }
+    }
+    // A scale before a movement scales the movement's pivot as well.
+    let whole = |v: f32| v.fract() == 0.0 && (1.0..=64.0).contains(&v);
+    (whole(factor.x) && whole(factor.y)).then_some(factor)
+}
+
+/// The colour that a stage multiplies its image with: the mean of what moves, white where it is light.
+pub fn mean_color(stage: &Stage) -> Vec4 {
+    const STEPS: u32 = 32;
+    let period = |frequency: f32| f64::from(frequency.abs().max(1.0e-3)).recip();
+    let length = match (&stage.rgb_gen, &stage.alpha_gen) {
+        (RgbGen::Wave(w), _) | (_, AlphaGen::Wave(w)) => period(w.frequency),
+        _ => 0.0,
+    };
+    let steps = if length > 0.0 { STEPS } else { 1 };
+    let mut sum = Vec4::ZERO;
+    for step in 0..steps {
+        let context = ColorContext {
+            time: length * f64::from(step) / f64::from(steps),
+            ..ColorContext::default()
+        };
+        let [r, g, b, a] = eval::vertex_color(stage, &context, Vec3::ZERO, Vec3::Z, [255; 4]);
+        let color = overbright::colour_to_linear(Vec3::new(
+            f32::from(r) / 255.0,
+            f32::from(g) / 255.0,
+            f32::from(b) / 255.0,
+        ));
+        sum += color.extend(f32::from(a) / 255.0);
+    }
+    sum / steps as f32
+}
+
+/// The mean of what a stack draws; `mean` gives the mean of an image, linear, with its alpha.
+pub fn mean_of(
+    stages: &[Stage],
+    vertex_light: bool,
+    mean: &mut dyn FnMut(&str) -> Option<Vec4>,
+) -> LightLinear {
+    let samples: Vec<StageSample> = stages
+        .iter()
+        .map(|stage| StageSample {
+            texture: match stage.image.names().first() {
+                Some(name) => mean(name).unwrap_or(Vec4::ONE),
+                None => Vec4::ONE,
+            },
+            color: mean_color(stage),
+        })
+        .collect();
+    // The test is on texels, not on their mean.
+    let untested: Vec<Stage> = stages
+        .iter()
+        .map(|stage| Stage {
+            alpha_func: None,
+            ..stage.clone()
+        })
+        .collect();
+    compose(&untested, &samples, vertex_light)
+}
+
+/// Puts stages together; `None` when one of their images is missing, or none has an image.
+pub fn bake(files: &dyn GameFiles, shader: &Shader, stages: &[usize]) -> Option<Baked> {
+    let kept = without_reflections(shader, stages);
+    let base = shader.stages.get(*stages.iter().find(|&&i| {
+        shader
+            .stages
+            .get(i)
+            .is_some_and(|s| !s.image.names().is_empty())
+    })?)?;
+    // Cut-outs keep the alpha that is tested.
+    let tested = kept
+        .iter()
+        .position(|s| s.alpha_func.is_some() && s.depth_write);
+    let mut pictures = Vec::with_capacity(kept.len());
+    let (mut width, mut height) = (1, 1);
+    for stage in &kept {
+        let picture = match stage.image.names().first() {
+            Some(name) => {
+                let image = load(files, name)?.0;
+                let tiles = tiling(stage, &base.tc_mods).unwrap_or(Vec2::ONE);
+                width = width.max((image.width as f32 * tiles.x) as u32);
+                height = height.max((image.height as f32 * tiles.y) as u32);
+                Some((image, tiles))
+            }
+            None => None,
+        };
+        pictures.push((picture, mean_color(stage)));
+    }
+    let (width, height) = (width.min(LONGEST), height.min(LONGEST));
+    let table = overbright::byte_table();
+    let untested: Vec<Stage> = kept
+        .iter()
+        .enumerate()
+        .map(|(i, stage)| Stage {
+            alpha_func: stage.alpha_func.filter(|_| tested != Some(i)),
+            ..stage.clone()
+        })
+        .collect();
+    let (mut color, mut glow) = (Vec::new(), Vec::new());
+    let mut samples = Vec::with_capacity(kept.len());
+    for y in 0..height {
+        for x in 0..width {
+            let st = Vec2::new(
+                (x as f32 + 0.5) / width as f32,
+                (y as f32 + 0.5) / height as f32,
+            );
+            samples.clear();
+            samples.extend(pictures.iter().map(|(picture, color)| StageSample {
+                texture: picture.as_ref().map_or(Vec4::ONE, |(image, tiles)| {
+                    texel(image, st * *tiles, &table)
+                }),
+                color: *color,
+            }));
+            let drawn = compose(&untested, &samples, true);
+            let through = drawn.through.clamp(Vec3::ZERO, Vec3::ONE);
+            let alpha = match tested.and_then(|i| samples.get(i)) {
+                Some(sample) => sample.texture.w * sample.color.w,
+                None => 1.0 - through.element_sum() / 3.0,
+            };
+            // Blending multiplies what is shown by alpha.
+            let shown = if tested.is_none() {
+                alpha.max(1.0 / 255.0)
+            } else {
+                1.0
+            };
+            push(&mut color, drawn.lit / shown, alpha);
+            push(&mut glow, drawn.emission / shown, alpha);
+        }
+    }
+    Some(Baked {
+        color: Image::from_rgba(width, height, color)?,
+        glow: Image::from_rgba(width, height, glow)?,
+    })
+}
+
+fn push(rgba: &mut Vec<u8>, color: Vec3, alpha: f32) {
+    let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+    let encoded = color.to_array().map(|v| byte(overbright::from_linear(v)));
+    rgba.extend(encoded);
+    rgba.push(byte(alpha));
+}
+
+/// What a repeating image shows at a place, linear.
+fn texel(image: &Image, st: Vec2, table: &[f32; 256]) -> Vec4 {
+    let column = |t: f32, side: u32| {
+        ((t.rem_euclid(1.0) * side as f32) as u32).min(side.saturating_sub(1)) as usize
+    };
+    let at = column(st.y, image.height) * image.width as usize + column(st.x, image.width);
+    let [r, g, b, a] = image
+        .rgba
+        .as_chunks::<4>()
+        .0
+        .get(at)
+        .copied()
+        .unwrap_or([0, 0, 0, 255]);
+    let linear = |byte: u8| table[usize::from(byte)];
+    Vec4::new(linear(r), linear(g), linear(b), f32::from(a) / 255.0)
+}
