@@ -24,6 +24,6 @@ pub mod world;
 pub use assets::is_texture_mode;
 pub use error::Error;
 pub use renderer::{CpuTimes, FrameStats, Renderer, RendererOptions, probe};
-pub use settings::{LightSelection, Settings, TracerChoice};
+pub use settings::{LightSelection, MapLightChoice, Settings, TracerChoice};
 pub use statistics::{Costs, MemoryPurpose, PassCost};
 pub use stereo::Eye;

@@ -420,10 +420,10 @@ impl Renderer {
 
     /// Makes the traced look when it is first asked for; `false` while there is no map.
     fn ready_to_trace(&mut self) -> Result<bool, Error> {
-        if self.trace.is_none()
-            && let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets)
+        if let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets)
+            && (world.light_by(self.settings.rt_lights, assets, self.calibrations.as_ref())
+                || self.trace.is_none())
         {
-            world.calibrate(assets, self.calibrations.as_ref());
             self.trace = Some(TraceLook::new(&self.device, world, assets, &self.settings)?);
         }
         Ok(self.trace.is_some())

@@ -25,6 +25,16 @@ pub enum TracerChoice {
     Compute,
 }
 
+/// Which lights of a map are traced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum MapLightChoice {
+    /// Those that the map's directives tell of, fitted to the light that its compiler stored, and those found there.
+    #[default]
+    Calibrated,
+    /// Those that the map's directives tell of, as strong as these say.
+    Prior,
+}
+
 /// All settings. Names follow the cvars.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs)] // each is documented with its cvar in `ffi`
@@ -33,6 +43,7 @@ pub struct Settings {
     pub rt: bool,
     /// Latched: what follows the rays.
     pub rt_tracer: TracerChoice,
+    pub rt_lights: MapLightChoice,
     /// Prints a line of statistics each second.
     pub rt_print_perf_stats: bool,
     /// Off: surfaces show their own colour, without light.
@@ -201,6 +212,7 @@ impl Default for Settings {
         Self {
             rt: false,
             rt_tracer: TracerChoice::Auto,
+            rt_lights: MapLightChoice::Calibrated,
             rt_print_perf_stats: false,
             rt_illumination: true,
             rt_cull_lights: true,

@@ -106,6 +106,7 @@ fn cvars_and_commands_come_and_go() {
         "rt_denoiser",
         "rt_taa",
         "rt_tracer",
+        "rt_lights",
         "rt_bounces",
         "rt_maxDepth",
         "rt_lightSelection",

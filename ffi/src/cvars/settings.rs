@@ -3,7 +3,7 @@
 use super::{Cvar, Cvars};
 use crate::ioq3::engine::Engine;
 use crate::session::WindowFacts;
-use renderer_vk::{LightSelection, Settings, TracerChoice, is_texture_mode};
+use renderer_vk::{LightSelection, MapLightChoice, Settings, TracerChoice, is_texture_mode};
 
 /// A count: negative is 0.
 fn count(cvars: &Cvars, cvar: Cvar) -> u32 {
@@ -30,13 +30,23 @@ fn tracer(name: &str) -> Option<TracerChoice> {
     found.map(|&(_, choice)| choice)
 }
 
-/// Reads what counts from registration on: `rt_tracer`. A name that is none is told and taken for `auto`.
+/// `rt_lights`, whatever its case: anything but `prior` is `calibrated`.
+fn map_lights(name: &str) -> MapLightChoice {
+    if name.eq_ignore_ascii_case("prior") {
+        MapLightChoice::Prior
+    } else {
+        MapLightChoice::Calibrated
+    }
+}
+
+/// Reads what counts from registration on, `rt_tracer`, and what is read later only when it changed. A name that is none is told and taken for `auto`.
 pub fn apply_at_registration(cvars: &Cvars, settings: &mut Settings) {
     let name = cvars.string(Cvar::RtTracer);
     settings.rt_tracer = tracer(&name).unwrap_or_else(|| {
         log::warn!("rt_tracer {name}: not one of auto, pipeline, query, compute; auto is used");
         TracerChoice::Auto
     });
+    settings.rt_lights = map_lights(&cvars.string(Cvar::RtLights));
 }
 
 /// Reads every other setting. Cheap: the variables are the engine's memory; text is copied when it changed.
@@ -87,6 +97,10 @@ pub fn apply(cvars: &Cvars, window: WindowFacts, settings: &mut Settings) {
     } else {
         0.0
     };
+    if cvars.modified(Cvar::RtLights) {
+        settings.rt_lights = map_lights(&cvars.string(Cvar::RtLights));
+        cvars.seen(Cvar::RtLights);
+    }
     if cvars.modified(Cvar::TextureMode) {
         let mode = cvars.string(Cvar::TextureMode);
         if is_texture_mode(&mode) {

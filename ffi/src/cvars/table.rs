@@ -151,6 +151,7 @@ cvars! {
     // ours
     RayTrace = c"r_rt", c"0", ARCHIVE, range(0.0, 1.0, true), c"1 traces light with rays, 0 draws the classic look. Switches at once.";
     RtTracer = c"rt_tracer", c"auto", ARCHIVE | LATCH, None, c"What follows the rays: auto, pipeline, query or compute. A device without it gets what auto picks.";
+    RtLights = c"rt_lights", c"calibrated", ARCHIVE, None, c"Lights of the map: calibrated, fitted to the light that its compiler stored, or prior, as its directives say. Switches at once.";
     RtPrintPerfStats = c"rt_printPerfStats", c"0", ARCHIVE, range(0.0, 1.0, true), c"1 prints times, rays and memory of the traced look each second.";
     RtIllumination = c"rt_illumination", c"1", ARCHIVE, range(0.0, 1.0, true), c"0 shows surfaces in their own colour, without light.";
     RtCullLights = c"rt_cullLights", c"1", ARCHIVE, range(0.0, 1.0, true), c"0 asks every light of the map at every point instead of those that may reach it. Same picture, slower.";

@@ -1,7 +1,7 @@
 //! What was found, written into the world.
 
 use super::{Solution, columns};
-use crate::light::{self, PointLight};
+use crate::light::{self, DEFAULT_SUN_RADIUS, PointLight, SunLight};
 use crate::world::RelitWorld;
 
 /// Radius of the balls that lights put in are drawn from, id units: they keep clear of surfaces by as much.
@@ -21,7 +21,23 @@ pub(super) fn apply(world: &mut RelitWorld, solution: &Solution) {
             spot: None,
         });
     world.point_lights.extend(placed);
-    if solution.placed.is_empty() {
+    let suns = solution
+        .suns
+        .iter()
+        .map(|&(direction, irradiance)| SunLight {
+            direction,
+            irradiance,
+            angular_radius: DEFAULT_SUN_RADIUS,
+            material: None,
+        });
+    world.suns.extend(suns);
+    world.report.suns = world.suns.len();
+    let dark = world.lights.iter().any(|l| l.radiance.max_element() <= 0.0);
+    if dark {
+        // What gives no light need not be looked at.
+        light::take_out(world, |_| false);
+    }
+    if solution.placed.is_empty() && !dark {
         return;
     }
     light::build_lists(world);

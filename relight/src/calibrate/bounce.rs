@@ -1,58 +1,158 @@
-//! Light that comes by way of other surfaces.
+//! Light that comes by way of other surfaces, as tracing adds it.
 //!
-//! Tracing adds bounced light to direct light, so that direct light must not explain all of a lightmap. What a surface
-//! throws back is its albedo times the light on it, and that light is known: it is in the lightmap. So bounced light
-//! at a sample is gathered from what rays hit, before any light is known.
+//! What a surface throws back is its albedo times the light on it, and the light on it is known at measurements: what
+//! a ray from a measurement hits is lit like the measurement nearest to there. So bounced light is a matrix times the
+//! light at all measurements, made once; each further bounce is the matrix once more. It is the tracer's own light
+//! that is thrown back, not the stored one: what is fitted is what will be seen.
+//!
+//! Bounced rays also find surfaces that shine without being in light lists: pictures of skies, faint glows.
 
 use super::bvh::{Hit, Occluders};
 use super::parallel;
 use super::random::Random;
-use super::samples::{STORED_UNIT, Sample, corners};
-use crate::world::RelitWorld;
-use glam::{Vec2, Vec3};
-use q3bsp::lightmap_index;
+use super::samples::Sample;
+use crate::world::{RelitWorld, WorldMaterial};
+use glam::{IVec3, Vec3};
+use std::collections::HashMap;
 use std::f32::consts::TAU;
 
 /// Rays per sample: a square of this many strata a side.
-const SIDE: u32 = 5;
+const SIDE: u32 = 6;
 
-/// Gives every sample its bounced light.
-pub(super) fn gather(world: &RelitWorld, occluders: &Occluders, samples: &mut [Sample]) {
-    let black = world.surfaces.iter().all(|s| {
-        let material = world.materials.get(s.material as usize);
-        material.is_none_or(|m| m.albedo == Vec3::ZERO)
-    });
-    if black {
-        return;
-    }
-    let of_triangle = surfaces_of_triangles(world);
-    let gathered = parallel::map(samples, |i, sample| {
-        let mut random = Random::new(0xB0_0000 + i as u64);
-        let (u, v) = sample.normal.any_orthonormal_pair();
-        let mut sum = Vec3::ZERO;
-        for stratum in 0..SIDE * SIDE {
-            let x = ((stratum % SIDE) as f32 + random.next()) / SIDE as f32;
-            let y = ((stratum / SIDE) as f32 + random.next()) / SIDE as f32;
-            // Density cosine / π: the mean of radiance is irradiance / π (Malley's method).
-            let (sin, cos) = (x * TAU).sin_cos();
-            let radius = y.sqrt();
-            let ray = u * (radius * cos) + v * (radius * sin) + sample.normal * (1.0 - y).sqrt();
-            if let Some(hit) = occluders.nearest(sample.position, ray, f32::INFINITY)
-                && hit.front
-                && !hit.sky
-            {
-                sum += thrown_back(world, &of_triangle, &hit).unwrap_or(Vec3::ZERO);
+/// Side of the cells that samples are looked up in, id units.
+const CELL: f32 = 96.0;
+
+/// How far off its plane a sample stands for a place, id units.
+const OFF_PLANE: f32 = 16.0;
+
+/// Least cosine between the normals of a place and of the sample that stands for it.
+const SAME_NORMAL: f32 = 0.7;
+
+/// From light at measurements to light that is thrown from there to measurements.
+pub(super) struct Transfer {
+    /// For each sample: samples that light what it sees, and which part of their light comes here.
+    rows: Vec<Vec<(u32, Vec3)>>,
+    /// Light from pictures of skies that are in no list.
+    skies: Vec<Vec3>,
+    /// Light from other surfaces that shine and are in no list.
+    glows: Vec<Vec3>,
+    /// Diffuse bounces.
+    bounces: u32,
+}
+
+/// What the rays of one sample found.
+type Found = (Vec<(u32, Vec3)>, Vec3, Vec3);
+
+impl Transfer {
+    /// Traces what each sample sees. `unlisted` tells of a sky's material whether tracing finds its picture.
+    pub fn new(
+        world: &RelitWorld,
+        occluders: &Occluders,
+        samples: &[Sample],
+        bounces: u32,
+        unlisted: impl Fn(u32) -> bool + Sync,
+    ) -> Transfer {
+        let of_triangle = surfaces_of_triangles(world);
+        let near = Near::new(samples);
+        let found = parallel::map(samples, |i, sample| {
+            let mut random = Random::new(0xB0_0000 + i as u64);
+            let (u, v) = sample.normal.any_orthonormal_pair();
+            let (mut sky, mut glow) = (Vec3::ZERO, Vec3::ZERO);
+            let mut row: Vec<(u32, Vec3)> = Vec::new();
+            let part = 1.0 / (SIDE * SIDE) as f32;
+            for stratum in 0..SIDE * SIDE {
+                let x = ((stratum % SIDE) as f32 + random.next()) / SIDE as f32;
+                let y = ((stratum / SIDE) as f32 + random.next()) / SIDE as f32;
+                // Density cosine / π: the mean of radiance is irradiance / π (Malley's method).
+                let (sin, cos) = (x * TAU).sin_cos();
+                let radius = y.sqrt();
+                let ray =
+                    u * (radius * cos) + v * (radius * sin) + sample.normal * (1.0 - y).sqrt();
+                let Some(hit) = occluders.nearest(sample.position, ray, f32::INFINITY) else {
+                    continue;
+                };
+                let Some((index, material)) = material_of(world, &of_triangle, &hit) else {
+                    continue;
+                };
+                if hit.sky {
+                    if unlisted(index) {
+                        sky += material.shown * part;
+                    }
+                    continue;
+                }
+                if !hit.front {
+                    continue;
+                }
+                if material.emission.is_none() {
+                    glow += material.shown * part;
+                }
+                let at = sample.position + ray * hit.t;
+                let weight = material.albedo * part;
+                if weight != Vec3::ZERO
+                    && let Some(lit) = near.find(samples, at, hit.normal)
+                {
+                    match row.iter_mut().find(|(other, _)| *other == lit) {
+                        Some((_, sum)) => *sum += weight,
+                        None => row.push((lit, weight)),
+                    }
+                }
             }
+            let found: Found = (row, sky, glow);
+            found
+        });
+        let mut transfer = Transfer {
+            rows: Vec::with_capacity(samples.len()),
+            skies: Vec::with_capacity(samples.len()),
+            glows: Vec::with_capacity(samples.len()),
+            bounces,
+        };
+        for (row, sky, glow) in found {
+            transfer.rows.push(row);
+            transfer.skies.push(sky);
+            transfer.glows.push(glow);
         }
-        sum / (SIDE * SIDE) as f32
-    });
-    for (sample, bounce) in samples.iter_mut().zip(gathered) {
-        sample.bounce = bounce;
+        if bounces == 0 {
+            transfer.skies.fill(Vec3::ZERO);
+            transfer.glows.fill(Vec3::ZERO);
+        }
+        transfer
+    }
+
+    /// Bounced light at each sample where lights give `direct`; `pictures`: and what pictures of skies give.
+    pub fn of(&self, direct: &[Vec3], pictures: bool) -> Vec<Vec3> {
+        let none = Vec3::ZERO;
+        let shown: Vec<Vec3> = (self.skies.iter().zip(&self.glows))
+            .map(|(sky, glow)| if pictures { *sky + *glow } else { *glow })
+            .collect();
+        let mut bounced = vec![none; self.rows.len()];
+        for bounce in 0..self.bounces {
+            let last = bounce == 0;
+            let next = |row: &Vec<(u32, Vec3)>, shown: &Vec3| {
+                let parts = row.iter().map(|&(i, weight)| {
+                    let i = i as usize;
+                    let light = direct.get(i).copied().unwrap_or(none);
+                    let more = if last {
+                        none
+                    } else {
+                        bounced.get(i).copied().unwrap_or(none)
+                    };
+                    weight * (light + more)
+                });
+                parts.sum::<Vec3>() + *shown
+            };
+            bounced = self
+                .rows
+                .iter()
+                .zip(&shown)
+                .map(|(r, s)| next(r, s))
+                .collect();
+        }
+        bounced
     }
 }
 
 /// For every triangle, the surface that it is of.
-fn surfaces_of_triangles(world: &RelitWorld) -> Vec<u32> {
+pub(super) fn surfaces_of_triangles(world: &RelitWorld) -> Vec<u32> {
     let mut of_triangle = vec![u32::MAX; world.indices.len() / 3];
     for (index, surface) in (0u32..).zip(&world.surfaces) {
         let first = surface.first_index as usize / 3;
@@ -62,32 +162,64 @@ fn surfaces_of_triangles(world: &RelitWorld) -> Vec<u32> {
     of_triangle
 }
 
-/// Radiance that leaves a surface where a ray met it, without its own emission.
-fn thrown_back(world: &RelitWorld, of_triangle: &[u32], hit: &Hit) -> Option<Vec3> {
+/// The material that a ray met, and its index.
+fn material_of<'a>(
+    world: &'a RelitWorld,
+    of_triangle: &[u32],
+    hit: &Hit,
+) -> Option<(u32, &'a WorldMaterial)> {
     let surface = *of_triangle.get(hit.tag as usize)?;
-    let surface = world.surfaces.get(surface as usize)?;
-    let albedo = world.materials.get(surface.material as usize)?.albedo;
-    let [a, b, c] = corners(world, hit.tag as usize)?;
-    let (u, v) = hit.at;
-    let light = match surface.lightmap {
-        page @ 0.. => {
-            let at: Vec2 = a.lightmap * (1.0 - u - v) + b.lightmap * u + c.lightmap * v;
-            let page = world.bsp.lightmaps.get(page as usize)?;
-            let at = at * page.size() as f32;
-            // Casts saturate.
-            let texel = page.texel(at.x as usize, at.y as usize);
-            Vec3::from_array(texel.map(f32::from)) * STORED_UNIT
+    let index = world.surfaces.get(surface as usize)?.material;
+    Some((index, world.materials.get(index as usize)?))
+}
+
+/// Samples by place.
+struct Near(HashMap<IVec3, Vec<u32>>);
+
+impl Near {
+    fn new(samples: &[Sample]) -> Near {
+        let mut cells: HashMap<IVec3, Vec<u32>> = HashMap::new();
+        for (i, sample) in (0u32..).zip(samples) {
+            cells.entry(cell(sample.position)).or_default().push(i);
         }
-        lightmap_index::BY_VERTEX => {
-            // Shifted already, by what may not be all of it.
-            let shifted = (1u32 << world.overbright_shift.min(8)) as f32;
-            let colour = |v: &crate::world::WorldVertex| {
-                let [r, g, b, _] = v.color;
-                Vec3::from_array([r, g, b].map(f32::from)) * (STORED_UNIT / shifted)
-            };
-            colour(a) * (1.0 - u - v) + colour(b) * u + colour(c) * v
+        Near(cells)
+    }
+
+    /// The sample that stands for a place: the nearest of nearly the same plane, or else of the same normal.
+    fn find(&self, samples: &[Sample], at: Vec3, normal: Vec3) -> Option<u32> {
+        let middle = cell(at);
+        let mut best = None;
+        let mut least = f32::INFINITY;
+        for z in -1..=1 {
+            for y in -1..=1 {
+                for x in -1..=1 {
+                    let Some(found) = self.0.get(&(middle + IVec3::new(x, y, z))) else {
+                        continue;
+                    };
+                    for &i in found {
+                        let Some(sample) = samples.get(i as usize) else {
+                            continue;
+                        };
+                        let offset = sample.position - at;
+                        if sample.normal.dot(normal) < SAME_NORMAL {
+                            continue;
+                        }
+                        let mut distance = offset.length_squared();
+                        if offset.dot(normal).abs() > OFF_PLANE {
+                            distance *= 4.0;
+                        }
+                        if distance < least {
+                            least = distance;
+                            best = Some(i);
+                        }
+                    }
+                }
+            }
         }
-        _ => return None,
-    };
-    Some(albedo * light)
+        best
+    }
+}
+
+fn cell(at: Vec3) -> IVec3 {
+    (at / CELL).floor().as_ivec3()
 }

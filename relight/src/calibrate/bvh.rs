@@ -23,8 +23,8 @@ pub(crate) struct Hit {
     pub front: bool,
     /// What the triangle was tagged with.
     pub tag: u32,
-    /// Barycentric coordinates of its second and third corner.
-    pub at: (f32, f32),
+    /// Unit normal of its front.
+    pub normal: Vec3,
 }
 
 #[derive(Clone, Copy)]
@@ -79,6 +79,11 @@ impl Occluders {
             nodes,
             triangles: triangles.into_iter().map(|(t, _)| t).collect(),
         }
+    }
+
+    /// Whether some triangle is sky.
+    pub fn any_sky(&self) -> bool {
+        self.triangles.iter().any(|t| t.sky)
     }
 
     /// Whether something lies on the way. `through_sky`: sky does not count.
@@ -179,7 +184,8 @@ fn meet(triangle: &Triangle, from: Vec3A, ray: Vec3A, limit: f32) -> Option<Hit>
         // The determinant is positive against the counter-clockwise side.
         front: determinant < 0.0,
         tag: triangle.tag,
-        at: (u, v),
+        // Clockwise corners: the front is the other way.
+        normal: triangle.e2.cross(triangle.e1).normalize_or_zero().into(),
     })
 }
 

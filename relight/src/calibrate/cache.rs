@@ -128,7 +128,10 @@ fn print(solution: &Solution) -> String {
     for (origin, intensity) in &solution.placed {
         let _ = writeln!(text, "placed {} {}", three(*origin), three(*intensity));
     }
-    let _ = writeln!(text, "end {}", solution.known.len() + solution.placed.len());
+    for (direction, irradiance) in &solution.suns {
+        let _ = writeln!(text, "sun {} {}", three(*direction), three(*irradiance));
+    }
+    let _ = writeln!(text, "end {}", solution.lights());
     text
 }
 
@@ -188,9 +191,19 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
                 };
                 solution.placed.push((origin, intensity));
             }
+            "sun" => {
+                let (direction, irradiance) = match numbers.split_at_checked(3) {
+                    Some((&[x, y, z], rest)) => (Vec3::new(x, y, z), light(rest)?),
+                    _ => return Err(wrong("not a direction")),
+                };
+                if !direction.is_normalized() {
+                    return Err(wrong("not a unit vector"));
+                }
+                solution.suns.push((direction, irradiance));
+            }
             "end" => {
                 let count = words.first().and_then(|w| w.parse().ok());
-                if count != Some(solution.known.len() + solution.placed.len()) {
+                if count != Some(solution.lights()) {
                     return Err(wrong("lights are missing"));
                 }
                 ended = true;
@@ -206,6 +219,7 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
     }
     solution.report.known = known;
     solution.report.placed = solution.placed.len();
+    solution.report.suns = solution.suns.len();
     Ok(solution)
 }
 
@@ -216,6 +230,7 @@ pub(super) fn key(world: &RelitWorld, options: &CalibrationOptions) -> u128 {
     hash.number(options.samples as u64);
     hash.number(options.candidates as u64);
     hash.number(options.seed);
+    hash.number(u64::from(options.bounces));
     hash.world(world);
     hash.finish()
 }
@@ -252,6 +267,7 @@ impl Hash {
             self.number(material.class.class as u64);
             self.number(u64::from(material.emission.is_some()));
             self.vector(material.albedo);
+            self.vector(material.shown);
         }
         for light in &world.lights {
             light.vertices.iter().for_each(|v| self.vector(*v));

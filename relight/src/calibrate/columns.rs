@@ -37,6 +37,8 @@ pub(super) enum Source {
     Sun(u32),
     /// A light put in by calibration.
     Placed(Vec3),
+    /// A sun put in by calibration: the direction to it.
+    FoundSun(Vec3),
 }
 
 /// What is believed of a strength before looking at samples.
@@ -59,7 +61,7 @@ pub(super) struct Column {
     pub rows: Vec<(u32, f32)>,
     /// Its strength: radiance of a group's brightest triangle, intensity of points, irradiance of suns.
     pub strength: Vec3,
-    /// `None` for lights put in.
+    /// `None` for lights put in, and for skies that nothing tells the light of.
     pub prior: Option<Prior>,
 }
 
@@ -111,8 +113,33 @@ pub(super) fn point_rows(
     rows
 }
 
-/// Columns of the lights that the map's directives tell of.
-pub(super) fn known(world: &RelitWorld, occluders: &Occluders, samples: &[Sample]) -> Vec<Column> {
+/// Light from a sun of irradiance 1 at a sample; `None` where it does not shine.
+pub(super) fn sun_at(occluders: &Occluders, sample: &Sample, direction: Vec3) -> Option<f32> {
+    let cosine = sample.normal.dot(direction);
+    let hit = || occluders.nearest(sample.position, direction, f32::INFINITY);
+    (cosine > 0.0 && hit().is_none_or(|hit| hit.sky)).then_some(cosine / PI)
+}
+
+/// The column of a sun.
+pub(super) fn sun_rows(
+    occluders: &Occluders,
+    samples: &[Sample],
+    direction: Vec3,
+) -> Vec<(u32, f32)> {
+    let reached = parallel::map(samples, |_, sample| sun_at(occluders, sample, direction));
+    (0u32..)
+        .zip(reached)
+        .filter_map(|(i, light)| Some((i, light?)))
+        .collect()
+}
+
+/// Columns of the lights that the map's directives tell of. `silent`: materials of skies that they tell nothing of.
+pub(super) fn known(
+    world: &RelitWorld,
+    occluders: &Occluders,
+    samples: &[Sample],
+    silent: &[u32],
+) -> Vec<Column> {
     let (groups, of_light) = group(world);
     let found = parallel::map(samples, |i, sample| {
         let mut random = Random::new(0x7121 + i as u64);
@@ -124,7 +151,7 @@ pub(super) fn known(world: &RelitWorld, occluders: &Occluders, samples: &[Sample
             source: Source::Group(g.material, g.evidence),
             rows: Vec::new(),
             strength: g.strength,
-            prior: Some(prior_of(g.strength, g.evidence)),
+            prior: (!silent.contains(&g.material)).then(|| prior_of(g.strength, g.evidence)),
         })
         .collect();
     for (i, sums) in (0u32..).zip(found) {
@@ -160,17 +187,9 @@ pub(super) fn known(world: &RelitWorld, occluders: &Occluders, samples: &[Sample
         });
     }
     for (index, sun) in (0u32..).zip(&world.suns) {
-        let reached = parallel::map(samples, |_, sample| {
-            let cosine = sample.normal.dot(sun.direction);
-            let hit = |s: &Sample| occluders.nearest(s.position, sun.direction, f32::INFINITY);
-            (cosine > 0.0 && hit(sample).is_none_or(|hit| hit.sky)).then_some(cosine / PI)
-        });
         columns.push(Column {
             source: Source::Sun(index),
-            rows: (0u32..)
-                .zip(reached)
-                .filter_map(|(i, light)| Some((i, light?)))
-                .collect(),
+            rows: sun_rows(occluders, samples, sun.direction),
             strength: sun.irradiance,
             prior: Some(prior_of(sun.irradiance, EmissionSource::SurfaceLight)),
         });
@@ -221,18 +240,18 @@ pub(super) fn set_known(world: &mut RelitWorld, strengths: &[Vec3]) {
     }
 }
 
-/// Directives are taken at their word within a factor of 4 up and 10 down; a glow or a flare, which the compiler took
-/// no light from, may fade further.
+/// Directives say what they mean up to the compiler's options, which scale all lights of a kind. A glow or a flare,
+/// which the compiler took no light from, may fade to nothing.
 fn prior_of(value: Vec3, evidence: EmissionSource) -> Prior {
-    let shrink = match evidence {
-        EmissionSource::Glow | EmissionSource::Flare => 0.02,
-        _ => 0.1,
+    let (low, high) = match evidence {
+        EmissionSource::Glow | EmissionSource::Flare => (0.0, 8.0),
+        _ => (0.02, 24.0),
     };
     let floor = Vec3::splat(value.max_element() * 0.1);
     Prior {
         value,
-        low: value * shrink,
-        high: value.max(floor) * 4.0,
+        low: value * low,
+        high: value.max(floor) * high,
     }
 }
 

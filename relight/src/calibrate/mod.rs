@@ -26,7 +26,9 @@ mod place;
 pub(crate) mod random;
 mod report;
 pub(crate) mod samples;
+mod skies;
 mod solve;
+mod suns;
 #[cfg(test)]
 mod tests;
 
@@ -42,7 +44,13 @@ use solve::Ambient;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
+
+/// Most times that lights are looked for.
+const ROUNDS: u32 = 4;
+
+/// Lights are looked for again while that leaves less than this part of the error at samples held out.
+const ENOUGH: f32 = 0.985;
 
 /// How a world is calibrated.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +61,8 @@ pub struct CalibrationOptions {
     pub candidates: usize,
     /// Seed of the choice of measurements.
     pub seed: u64,
+    /// Diffuse bounces that tracing will add.
+    pub bounces: u32,
     /// Where results are kept.
     pub cache: Option<CalibrationCache>,
 }
@@ -64,6 +74,7 @@ impl Default for CalibrationOptions {
             samples: 6000,
             candidates: 3000,
             seed: 1,
+            bounces: 1,
             cache: None,
         }
     }
@@ -76,8 +87,17 @@ struct Solution {
     known: Vec<Vec3>,
     /// Lights put in: origin, intensity.
     placed: Vec<(Vec3, Vec3)>,
+    /// Suns put in: direction to it, irradiance.
+    suns: Vec<(Vec3, Vec3)>,
     ambient: Vec3,
     report: CalibrationReport,
+}
+
+impl Solution {
+    /// Number of sources.
+    fn lights(&self) -> usize {
+        self.known.len() + self.placed.len() + self.suns.len()
+    }
 }
 
 /// Fits a world's lights to the light that its compiler stored, and puts in lights that the compiler threw away.
@@ -87,6 +107,8 @@ struct Solution {
 pub fn calibrate(world: &mut RelitWorld, options: &CalibrationOptions) -> CalibrationReport {
     let begin = Instant::now();
     let key = options.cache.as_ref().map(|_| cache::key(world, options));
+    let silent = skies::silent(world);
+    skies::open(world, &silent);
     let kept = match (&options.cache, key) {
         (Some(cache), Some(key)) => cache.read(key, columns::count(world)),
         _ => Ok(None),
@@ -100,7 +122,7 @@ pub fn calibrate(world: &mut RelitWorld, options: &CalibrationOptions) -> Calibr
             if let Err(problem) = missing {
                 world.warnings.push(problem.to_string());
             }
-            let solution = find(world, options);
+            let solution = find(world, &silent, options);
             if let (Some(cache), Some(key)) = (&options.cache, key)
                 && let Err(problem) = cache.write(key, &solution)
             {
@@ -109,21 +131,24 @@ pub fn calibrate(world: &mut RelitWorld, options: &CalibrationOptions) -> Calibr
             solution
         }
     };
-    apply::apply(world, &solution);
+    if solution.report.evidence == Evidence::Nothing {
+        skies::close(world, &silent);
+    } else {
+        apply::apply(world, &solution);
+    }
     solution.report.seconds = begin.elapsed().as_secs_f64();
     world.calibration = Some(solution.report.clone());
     solution.report
 }
 
-/// Solves for a world's light.
-fn find(world: &RelitWorld, options: &CalibrationOptions) -> Solution {
+/// Solves for a world's light. `silent`: skies of which directives tell nothing.
+fn find(world: &RelitWorld, silent: &[u32], options: &CalibrationOptions) -> Solution {
     let occluders = samples::occluders(world);
     let (mut samples, evidence) = samples::take(world, &occluders, options.samples, options.seed);
-    let mut columns = columns::known(world, &occluders, &samples);
+    let mut columns = columns::known(world, &occluders, &samples, silent);
     let known = columns.len();
     let mut solution = Solution {
         known: columns.iter().map(|c| c.strength).collect(),
-        placed: Vec::new(),
         ambient: world.ambient,
         report: CalibrationReport {
             evidence,
@@ -132,40 +157,114 @@ fn find(world: &RelitWorld, options: &CalibrationOptions) -> Solution {
             known,
             ..Default::default()
         },
+        ..Default::default()
     };
     if samples.is_empty() {
         return solution;
     }
+    let unlisted = |material| silent.contains(&material);
+    let transfer = bounce::Transfer::new(world, &occluders, &samples, options.bounces, unlisted);
+    for column in columns.iter_mut().filter(|c| c.prior.is_none()) {
+        column.strength = Vec3::ZERO;
+    }
+    let direct = solve::direct(&samples, &columns);
+    rebounce(&mut samples, transfer.of(&direct, true));
     let before = solve::predict(&samples, &columns, world.ambient);
     solution.report.before = Agreement::of(&samples, &before);
-    bounce::gather(world, &occluders, &mut samples);
+
+    // What was measured is a better first guess of what is thrown back than what is believed of lights.
+    let measured: Vec<Vec3> = samples.iter().map(|s| s.value).collect();
+    rebounce(&mut samples, transfer.of(&measured, false));
     let mut ambient = first_ambient(world, &samples);
     let effort = solve::Effort {
-        rounds: 4,
-        sweeps: 16,
+        rounds: 8,
+        sweeps: 12,
         sparsity: 0.0,
+        anew: true,
     };
     solve::solve(&samples, &mut columns, &mut ambient, effort);
+    if occluders.any_sky() {
+        suns::find(&occluders, &samples, &mut columns, &mut ambient, effort);
+    }
+    let fixed = columns.len();
     if options.candidates > 0 {
-        let scene = place::Scene {
-            world,
-            occluders: &occluders,
-            samples: &samples,
-            candidates: options.candidates,
-        };
-        place::place(&scene, &mut columns, &mut ambient);
+        let (mut spacing, mut best) = (0.0, f32::INFINITY);
+        for round in 0..ROUNDS {
+            let kept = (columns.clone(), ambient);
+            let scene = place::Scene {
+                world,
+                occluders: &occluders,
+                samples: &samples,
+                candidates: options.candidates,
+            };
+            if round == 0 {
+                spacing = place::over_space(&scene, &mut columns, fixed, &mut ambient);
+            } else {
+                place::in_front(&scene, &mut columns, fixed, &mut ambient, spacing);
+            }
+            settle(&mut samples, &mut columns, &mut ambient, &transfer);
+            let found = held_out_error(&samples, &columns, ambient.value);
+            if found > best * ENOUGH {
+                if found > best {
+                    (columns, ambient) = kept;
+                    settle(&mut samples, &mut columns, &mut ambient, &transfer);
+                }
+                break;
+            }
+            best = found;
+        }
+    } else {
+        settle(&mut samples, &mut columns, &mut ambient, &transfer);
     }
     let after = solve::predict(&samples, &columns, ambient.value);
     solution.report.after = Agreement::of(&samples, &after);
     solution.known = columns.iter().take(known).map(|c| c.strength).collect();
-    let placed = columns.iter().skip(known).filter_map(|c| match c.source {
-        Source::Placed(origin) => Some((origin, c.strength)),
-        _ => None,
-    });
-    solution.placed = placed.collect();
+    for column in columns.iter().skip(known) {
+        match column.source {
+            Source::Placed(origin) => solution.placed.push((origin, column.strength)),
+            Source::FoundSun(direction) if column.strength != Vec3::ZERO => {
+                solution.suns.push((direction, column.strength));
+            }
+            _ => {}
+        }
+    }
     solution.report.placed = solution.placed.len();
+    solution.report.suns = solution.suns.len();
     solution.ambient = ambient.value;
     solution
+}
+
+/// Fits strengths and the light that they throw back to each other, in turns.
+fn settle(
+    samples: &mut [Sample],
+    columns: &mut [columns::Column],
+    ambient: &mut Ambient,
+    transfer: &bounce::Transfer,
+) {
+    let effort = solve::Effort {
+        rounds: 3,
+        sweeps: 8,
+        sparsity: 0.0,
+        anew: false,
+    };
+    for _ in 0..3 {
+        let direct = solve::direct(samples, columns);
+        rebounce(samples, transfer.of(&direct, false));
+        solve::solve(samples, columns, ambient, effort);
+    }
+    let direct = solve::direct(samples, columns);
+    rebounce(samples, transfer.of(&direct, false));
+}
+
+fn rebounce(samples: &mut [Sample], bounced: Vec<Vec3>) {
+    for (sample, bounce) in samples.iter_mut().zip(bounced) {
+        sample.bounce = bounce;
+    }
+}
+
+/// Median error of what fitting does not see.
+fn held_out_error(samples: &[Sample], columns: &[columns::Column], ambient: Vec3) -> f32 {
+    Agreement::of(samples, &solve::predict(samples, columns, ambient)).median_stops
 }
 
 /// Where the ambient term starts, and how far it may go: what darker places have. More would hide lights.

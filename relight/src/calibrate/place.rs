@@ -180,14 +180,29 @@ impl Scene<'_> {
     }
 }
 
-/// Adds lights to `columns` until the samples are explained as well as they can be.
-pub(super) fn place(scene: &Scene<'_>, columns: &mut Vec<Column>, ambient: &mut Ambient) {
-    let known = columns.len();
+/// Adds lights out of a grid over open space to `columns`, of which the first `fixed` stay. Returns the grid's spacing.
+pub(super) fn over_space(
+    scene: &Scene<'_>,
+    columns: &mut Vec<Column>,
+    fixed: usize,
+    ambient: &mut Ambient,
+) -> f32 {
     let (nodes, spacing) = scene.grid();
-    choose(scene, columns, known, ambient, &nodes, spacing);
+    choose(scene, columns, fixed, ambient, &nodes, spacing);
+    spacing
+}
+
+/// Adds lights in front of what stays unexplained.
+pub(super) fn in_front(
+    scene: &Scene<'_>,
+    columns: &mut Vec<Column>,
+    fixed: usize,
+    ambient: &mut Ambient,
+    spacing: f32,
+) {
     let state = residual(scene.samples, columns, ambient.value);
     let fronts = scene.in_front(&state);
-    choose(scene, columns, known, ambient, &fronts, spacing * 0.5);
+    choose(scene, columns, fixed, ambient, &fronts, spacing * 0.5);
 }
 
 /// Tries candidates beside the lights placed so far; keeps the best, merged, moved and solved anew.
@@ -204,6 +219,7 @@ fn choose(
         rounds: 4,
         sweeps: 16,
         sparsity: 0.5,
+        anew: false,
     };
     let state = solve(scene.samples, columns, ambient, sparse);
     drop_useless(columns, known, &state, WORTH * 0.25);
@@ -212,6 +228,7 @@ fn choose(
         rounds: 2,
         sweeps: 16,
         sparsity: 0.2,
+        anew: false,
     };
     let mut state = solve(scene.samples, columns, ambient, refit);
     for step in [0.5, 0.25, 0.125] {
@@ -224,6 +241,7 @@ fn choose(
         rounds: 4,
         sweeps: 16,
         sparsity: 0.1,
+        anew: false,
     };
     let state = solve(scene.samples, columns, ambient, settle);
     drop_useless(columns, known, &state, WORTH);

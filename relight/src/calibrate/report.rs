@@ -66,7 +66,9 @@ pub struct CalibrationReport {
     pub known: usize,
     /// Lights put in.
     pub placed: usize,
-    /// Agreement of the light that directives tell of, direct and ambient.
+    /// Suns put in.
+    pub suns: usize,
+    /// Agreement of the light that directives tell of: direct, ambient and bounced.
     pub before: Agreement,
     /// Agreement of calibrated light: direct, ambient and bounced.
     pub after: Agreement,

@@ -110,6 +110,12 @@ fn stops_light(material: &WorldMaterial) -> bool {
     )
 }
 
+/// Whether a surface's first layer of light is the one that never changes (style 0).
+fn constant(world: &RelitWorld, surface: usize) -> bool {
+    let layers = world.bsp.layers.surfaces.get(surface);
+    layers.is_none_or(|l| l.lightmap_styles.first() == Some(&0))
+}
+
 /// Whether light on a surface tells of the lights around it.
 fn tells(world: &RelitWorld, surface: &WorldSurface) -> bool {
     let material = world.materials.get(surface.material as usize);
@@ -201,10 +207,10 @@ fn texels(
 ) -> Vec<Sample> {
     let mut triangles = Vec::new();
     let mut total = 0.0f64;
-    for surface in world.surfaces.iter().filter(|s| tells(world, s)) {
-        let Ok(_) = usize::try_from(surface.lightmap) else {
+    for (index, surface) in world.surfaces.iter().enumerate() {
+        if surface.lightmap < 0 || !tells(world, surface) || !constant(world, index) {
             continue;
-        };
+        }
         let first = surface.first_index as usize / 3;
         for triangle in first..first + surface.num_indices as usize / 3 {
             if let Some([a, b, c]) = world.triangle(triangle) {

@@ -1,7 +1,8 @@
 //! Non-negative least squares for the strengths of lights.
 //!
 //! Wanted is the smallest |log(computed / stored)| of most samples. Near the solution that is a least squares problem
-//! in which a sample weighs 1 / (computed × stored), and less when it is far off (Huber); weights and solution take
+//! in which a sample weighs so much that the slope of its square is that of its logarithm's square, and less when it
+//! is far off (Huber); weights and solution take
 //! turns (iteratively reweighted least squares), the solution by coordinate descent: with all other strengths held,
 //! the best of one is a quotient of two sums, cut at its bounds.
 //!
@@ -41,6 +42,8 @@ pub(super) struct Effort {
     pub sweeps: usize,
     /// Penalty on placed lights.
     pub sparsity: f32,
+    /// Whether what there is so far is a guess that weights should not come from.
+    pub anew: bool,
 }
 
 /// State of a solution: light not yet explained, and what each sample weighs.
@@ -54,6 +57,19 @@ pub(super) struct Residual {
 /// Computed light at every sample: ambient, bounced and direct.
 pub(super) fn predict(samples: &[Sample], columns: &[Column], ambient: Vec3) -> Vec<Vec3> {
     let mut light: Vec<Vec3> = samples.iter().map(|s| s.bounce + ambient).collect();
+    add(columns, &mut light);
+    light
+}
+
+/// Direct light alone, without ambient.
+pub(super) fn direct(samples: &[Sample], columns: &[Column]) -> Vec<Vec3> {
+    let mut light = vec![Vec3::ZERO; samples.len()];
+    add(columns, &mut light);
+    light
+}
+
+/// Adds what columns give.
+fn add(columns: &[Column], light: &mut [Vec3]) {
     for column in columns {
         if column.strength == Vec3::ZERO {
             continue;
@@ -64,7 +80,6 @@ pub(super) fn predict(samples: &[Sample], columns: &[Column], ambient: Vec3) -> 
             }
         }
     }
-    light
 }
 
 /// Residual and weights of what is there now.
@@ -83,8 +98,14 @@ fn weight(sample: &Sample, computed: f32) -> f32 {
         return 0.0;
     }
     let (c, s) = (computed.max(0.0) + FLOOR, stored + FLOOR);
-    let off = (c / s).ln().abs();
-    (HUBER / off.max(HUBER)) / (c * s)
+    let off = (c / s).ln();
+    // The slope of off² / 2 at c is off / c; that of w (c - s)² / 2 is the same with this w.
+    let slope = if off.abs() < 1e-3 {
+        1.0 / (c * s)
+    } else {
+        off / (c * (c - s))
+    };
+    slope * (HUBER / off.abs().max(HUBER))
 }
 
 /// Fits the strengths of `columns` and the ambient term.
@@ -98,12 +119,13 @@ pub(super) fn solve(
     for round in 0..effort.rounds {
         if round > 0 {
             state = residual(samples, columns, ambient.value);
-        } else {
-            // Nothing is known yet: every sample by its own level.
+        } else if effort.anew {
+            // Nothing is known yet: every sample by its own level. Not by its square: what lies in the dark for another
+            // reason than the lights' weakness would decide all.
+            let mean = samples.iter().map(Sample::level).sum::<f32>() / samples.len().max(1) as f32;
             for (weight, sample) in state.weights.iter_mut().zip(samples) {
                 if *weight > 0.0 {
-                    let level = sample.level() + FLOOR;
-                    *weight = 1.0 / (level * level);
+                    *weight = 1.0 / ((sample.level() + FLOOR) * (mean + FLOOR));
                 }
             }
         }

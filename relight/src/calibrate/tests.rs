@@ -182,17 +182,21 @@ fn bounced_light_in_an_even_room_is_albedo_times_light() {
         material.albedo = albedo;
     }
     let occluders = samples::occluders(&world);
-    let (mut samples, evidence) = samples::take(&world, &occluders, 500, 1);
+    let (samples, evidence) = samples::take(&world, &occluders, 500, 1);
     assert_eq!(evidence, Evidence::Lightmaps);
-    assert!(samples.iter().all(|s| s.bounce == Vec3::ZERO));
-    bounce::gather(&world, &occluders, &mut samples);
     assert!(samples.len() > 400);
-    for sample in &samples {
-        // Stored values are whole numbers.
-        assert!(
-            (sample.bounce - even(Vec3::ZERO, Vec3::Z) * albedo).length() < 0.01,
-            "{sample:?}"
-        );
+    let direct: Vec<Vec3> = samples.iter().map(|s| s.value).collect();
+    let light = even(Vec3::ZERO, Vec3::Z);
+    let once = light * albedo;
+    for (bounces, expected) in [(0, Vec3::ZERO), (1, once), (2, once + once * albedo)] {
+        let transfer = bounce::Transfer::new(&world, &occluders, &samples, bounces, |_| true);
+        for (sample, bounced) in samples.iter().zip(transfer.of(&direct, true)) {
+            // Stored values are whole numbers.
+            assert!(
+                (bounced - expected).length() < 0.015,
+                "{sample:?}: {bounced}"
+            );
+        }
     }
 }
 

@@ -69,7 +69,7 @@ pub struct Emission {
 impl Emission {
     /// Emission of a material, from the sides that are drawn. Sky emits to its front whatever its script says:
     /// it is only seen from inside.
-    pub(super) fn of(material: &WorldMaterial, source: EmissionSource, strength: Vec3) -> Emission {
+    pub(crate) fn of(material: &WorldMaterial, source: EmissionSource, strength: Vec3) -> Emission {
         let definition = material.resolved.definition();
         let sky = material.is_sky();
         let turns = |d: &Deform| matches!(d, Deform::AutoSprite | Deform::AutoSprite2);
@@ -153,7 +153,7 @@ impl<'a> Finder<'a> {
     }
 
     /// Mean radiance that a material's stages show where no light falls.
-    pub(super) fn shown(&mut self, material: &WorldMaterial) -> Vec3 {
+    pub fn shown(&mut self, material: &WorldMaterial) -> Vec3 {
         let shader = &material.resolved.shader;
         if material.resolved.fault.is_some() {
             return Vec3::ZERO;
@@ -179,7 +179,7 @@ impl<'a> Finder<'a> {
     }
 
     /// Mean radiance of what a sky shows: the sides of its box that exist, and its clouds.
-    pub(super) fn sky_radiance(&mut self, material: &WorldMaterial) -> Vec3 {
+    pub fn sky_radiance(&mut self, material: &WorldMaterial) -> Vec3 {
         let clouds = self.shown(material);
         let outer = material
             .resolved

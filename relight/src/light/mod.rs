@@ -67,7 +67,7 @@ pub(crate) use emission::Finder;
 pub(crate) use entities::{ambient, light_entities};
 pub(crate) use fallback::rescue;
 use lists::Clusters;
-pub(crate) use surfaces::{place, suns};
+pub(crate) use surfaces::{place, place_of, suns, take_out};
 
 use glam::Vec3;
 use std::f32::consts::PI;

@@ -53,12 +53,22 @@ pub(crate) fn suns(materials: &[WorldMaterial], surfaces: &[WorldSurface]) -> Ve
 
 /// Makes the triangle lights of a world whose materials know their emission, and the report of them.
 pub(crate) fn place(world: &mut RelitWorld) {
+    world.lights.clear();
+    world.report.emitters.clear();
+    place_of(world, |_| true);
+}
+
+/// Adds the triangle lights of some materials, chosen by their index, to those that are there.
+pub(crate) fn place_of(world: &mut RelitWorld, chosen: impl Fn(u32) -> bool) {
     let mut summaries: Vec<Option<EmitterSummary>> = vec![None; world.materials.len()];
-    let mut lights = Vec::new();
+    let mut lights = std::mem::take(&mut world.lights);
     for index in 0..world.surfaces.len() {
         let Some(surface) = world.surfaces.get(index).copied() else {
             continue;
         };
+        if !chosen(surface.material) {
+            continue;
+        }
         let material = world.materials.get(surface.material as usize);
         let Some((material, emission)) = material.and_then(|m| Some((m, m.emission?))) else {
             continue;
@@ -108,10 +118,40 @@ pub(crate) fn place(world: &mut RelitWorld) {
             .all(|&l| l == NO_LIGHT || (l as usize) < lights.len())
     );
     world.lights = lights;
-    world.report.emitters = summaries.into_iter().flatten().collect();
+    world
+        .report
+        .emitters
+        .extend(summaries.into_iter().flatten());
+    world.report.emitters.sort_by_key(|e| e.material);
     world.report.triangle_lights = world.lights.len();
     world.report.point_lights = world.point_lights.len();
     world.report.suns = world.suns.len();
+}
+
+/// Takes out triangle lights that do not shine, and those of some materials.
+pub(crate) fn take_out(world: &mut RelitWorld, dropped: impl Fn(u32) -> bool) {
+    let old = std::mem::take(&mut world.lights);
+    world.triangle_lights.fill(NO_LIGHT);
+    for surface in &mut world.surfaces {
+        let first = surface.first_light as usize;
+        let own = old.get(first..first + surface.num_lights as usize);
+        surface.first_light = world.lights.len() as u32;
+        surface.num_lights = 0;
+        if dropped(surface.material) {
+            continue;
+        }
+        for light in own.unwrap_or_default() {
+            if light.radiance.max_element() > 0.0 {
+                if let Some(slot) = world.triangle_lights.get_mut(light.triangle as usize) {
+                    *slot = world.lights.len() as u32;
+                }
+                world.lights.push(*light);
+                surface.num_lights += 1;
+            }
+        }
+    }
+    world.report.emitters.retain(|e| !dropped(e.material));
+    world.report.triangle_lights = world.lights.len();
 }
 
 /// Appends the lights of one surface; returns how many of its triangles are degenerate.

@@ -224,13 +224,28 @@ impl RelitWorld {
         light::build_lists(&mut world);
         if let Some(calibration) = &options.calibrate {
             begin(Stage::Calibration);
-            for material in &mut world.materials {
-                material.albedo = finder.albedo(material);
-            }
+            world.measure_materials_with(&mut finder);
             calibrate(&mut world, calibration);
         }
         begin(Stage::Done);
         world
+    }
+
+    /// Finds what calibration needs to know of materials: how much light they throw back, and what they show of their
+    /// own. Loading does this only when it is asked to calibrate.
+    pub fn measure_materials(&mut self, files: &dyn GameFiles) {
+        self.measure_materials_with(&mut light::Finder::new(files));
+    }
+
+    fn measure_materials_with(&mut self, finder: &mut light::Finder<'_>) {
+        for material in &mut self.materials {
+            material.albedo = finder.albedo(material);
+            material.shown = if material.is_sky() {
+                finder.sky_radiance(material)
+            } else {
+                finder.shown(material)
+            };
+        }
     }
 
     /// Material of the sky surfaces with the largest area together.
@@ -300,6 +315,7 @@ fn resolve_materials(
                 class: shaderscript::light::classify(&resolved.shader),
                 resolved,
                 albedo: Vec3::ZERO,
+                shown: Vec3::ZERO,
                 emission: None,
                 flicker: None,
             });

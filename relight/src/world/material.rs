@@ -26,6 +26,9 @@ pub struct WorldMaterial {
     /// Part of incident light that it throws back, diffuse, mean over its texture, linear. Zero unless the world
     /// was loaded to be calibrated.
     pub albedo: Vec3,
+    /// Mean radiance of what it shows of its own, linear: of a sky its picture. Bounced rays find it where it is in no
+    /// light list. Zero unless the world was loaded to be calibrated.
+    pub shown: Vec3,
     /// Light that it emits; `None` for most.
     pub emission: Option<Emission>,
     /// How that light changes in time; `None` for most.

@@ -2,6 +2,7 @@
 
 mod fog;
 mod geometry;
+mod lighting;
 mod load;
 mod material;
 #[cfg(test)]
@@ -9,6 +10,7 @@ mod tests;
 
 pub use fog::WorldFog;
 pub use geometry::{Flare, NO_LIGHT, WorldModel, WorldSurface, WorldVertex};
+pub use lighting::Lighting;
 pub use load::{LoadError, Options, Progress, Stage};
 pub use material::WorldMaterial;
 

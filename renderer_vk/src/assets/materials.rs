@@ -534,6 +534,15 @@ impl Materials {
         }
     }
 
+    /// Takes back every [`set_emitter`](Self::set_emitter).
+    pub fn forget_emitters(&mut self) {
+        for material in &mut self.list {
+            material.flags &= !types::constants::MATERIAL_EMITTER;
+        }
+        self.light_radiance.fill(Vec3::ZERO);
+        self.touch();
+    }
+
     /// Points every stage that shows texture `old` for a client at `new`.
     pub fn replace_scratch(&mut self, client: usize, new: u32) {
         let mut changed = false;

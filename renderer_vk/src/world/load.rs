@@ -197,13 +197,18 @@ pub(super) fn mark_emitter(
     material: u32,
     materials: &mut Materials,
 ) {
-    if let Some(light) = relit.lights.get(surface.first_light as usize)
-        && surface.num_lights > 0
-    {
-        // what glows or is sky shows its light by its stages
-        let hidden = light.source == relight::light::EmissionSource::SurfaceLight;
-        materials.set_emitter(material, if hidden { light.radiance } else { Vec3::ZERO });
+    let stored = relit.materials.get(surface.material as usize);
+    if surface.num_indices == 0 || stored.is_none_or(|m| m.emission.is_none()) {
+        return;
     }
+    // none of its own where calibration found that it gives no light
+    let light = relit
+        .lights
+        .get(surface.first_light as usize)
+        .filter(|_| surface.num_lights > 0);
+    // what glows or is sky shows its light by its stages
+    let hidden = light.filter(|l| l.source == relight::light::EmissionSource::SurfaceLight);
+    materials.set_emitter(material, hidden.map_or(Vec3::ZERO, |l| l.radiance));
 }
 
 /// Whether every triangle of a surface lies in its plane, within a unit, and faces as it does.

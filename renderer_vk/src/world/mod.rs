@@ -14,7 +14,7 @@ use shaders::types::{self, Vertex};
 
 use crate::assets::Assets;
 use crate::gpu::{self, Buffer, BufferUsage, Device};
-use crate::settings::Settings;
+use crate::settings::{MapLightChoice, Settings};
 
 pub use grid::GridLight;
 pub use load::{LightmapSink, WorldOptions};
@@ -239,6 +239,16 @@ pub struct World {
     pub index_buffer: Buffer,
     /// `types::Fog`; a surface's `fog` less one is the index.
     pub fog_buffer: Buffer,
+    /// The light that the map is in; `None` before it was traced.
+    lit: Option<Lit>,
+}
+
+/// The light that a map is in, and the one that it could be in.
+struct Lit {
+    choice: MapLightChoice,
+    other: relight::world::Lighting,
+    /// Whether the other one is ready; else it is as the map was loaded.
+    found: bool,
 }
 
 impl std::ops::Deref for World {
@@ -296,27 +306,69 @@ impl World {
             )?,
             fog_buffer: Buffer::with_data(device, "fogs", BufferUsage::STORAGE, &data.fogs)?,
             data,
+            lit: None,
         })
     }
 
-    /// Fits the map's lights to its lightmaps and sweeps its light lists, once; what the traced look needs, and what
-    /// takes a few seconds unless `cache` has it. To be done before light lists are copied to the GPU.
-    pub fn calibrate(&mut self, assets: &mut Assets, cache: Option<&relight::CalibrationCache>) {
-        let relit = &mut self.data.relit;
-        if relit.calibration.is_some() {
-            return;
+    /// Puts the map into the light that is wished for: `false` when it was in it before. What the traced look needs, to
+    /// be done before light lists are copied to the GPU. Each light is found once: the first time takes a few seconds
+    /// unless `cache` has it.
+    pub fn light_by(
+        &mut self,
+        choice: MapLightChoice,
+        assets: &mut Assets,
+        cache: Option<&relight::CalibrationCache>,
+    ) -> bool {
+        if self.lit.as_ref().is_some_and(|lit| lit.choice == choice) {
+            return false;
         }
-        let options = relight::CalibrationOptions {
-            cache: cache.cloned(),
-            ..relight::CalibrationOptions::default()
+        let other = self.data.relit.lighting();
+        let found = match self.lit.take() {
+            None => {
+                self.find_light(choice, assets, cache);
+                false
+            }
+            Some(lit) => {
+                self.data.relit.set_lighting(lit.other);
+                if lit.found {
+                    self.mark_emitters(assets);
+                } else {
+                    self.find_light(choice, assets, cache);
+                }
+                true
+            }
         };
+        self.lit = Some(Lit {
+            choice,
+            other,
+            found,
+        });
+        true
+    }
+
+    /// Fits the lights as they were loaded, if they are to be, and sweeps their lists.
+    fn find_light(
+        &mut self,
+        choice: MapLightChoice,
+        assets: &mut Assets,
+        cache: Option<&relight::CalibrationCache>,
+    ) {
+        let relit = &mut self.data.relit;
         let warned = relit.warnings.len();
-        let report = relight::calibrate(relit, &options);
-        log::info!(
-            "{}: lights fitted to the light that the map stores, in {:.1} s",
-            relit.name,
-            report.seconds
-        );
+        if choice == MapLightChoice::Calibrated {
+            let files = std::sync::Arc::clone(assets.textures.files());
+            relit.measure_materials(&*files);
+            let options = relight::CalibrationOptions {
+                cache: cache.cloned(),
+                ..relight::CalibrationOptions::default()
+            };
+            let report = relight::calibrate(relit, &options);
+            log::info!(
+                "{}: lights fitted to the light that the map stores, in {:.1} s",
+                relit.name,
+                report.seconds
+            );
+        }
         let swept = relight::light::sweep(relit, cache);
         for warning in relit.warnings.iter().skip(warned) {
             log::warn!("{}: {warning}", relit.name);
@@ -333,6 +385,12 @@ impl World {
             swept.entries[1],
             swept.entries[0]
         );
+        self.mark_emitters(assets);
+    }
+
+    /// Tells materials which of them are in the light lists.
+    fn mark_emitters(&self, assets: &mut Assets) {
+        assets.materials.forget_emitters();
         for (surface, stored) in self.data.surfaces.iter().zip(&self.data.relit.surfaces) {
             load::mark_emitter(
                 &self.data.relit,
