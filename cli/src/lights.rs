@@ -5,7 +5,9 @@ use std::time::Instant;
 
 use anyhow::Result;
 use clap::Args;
-use relight::light::{LightLists, judge, lists_by_geometry, lists_by_visibility, sweep};
+use relight::light::{
+    LightLists, ListJudgement, judge, lists_by_geometry, lists_by_visibility, sweep,
+};
 use relight::{CalibrationCache, CalibrationOptions, Materials, Options, RelitWorld};
 use serde_json::json;
 
@@ -14,11 +16,13 @@ use crate::view::{Maps, open};
 /// Judge the light lists of maps by rays
 ///
 /// A pair of a light and a visibility cluster is visible when a ray from some point of the cluster to some point of the
-/// light arrives. Prints for lists from the potentially visible sets alone, with geometry, and swept by rays: recall
-/// (visible pairs that are listed, of all visible ones, and of those that give more than a fifth of a percent of their
-/// cluster's light), precision (visible pairs, of those listed), the part of all
-/// arriving light that listed lights give, and the lists' lengths. The rays are others than those that the lists were
-/// swept with.
+/// light arrives: when it meets no opaque triangle, nor runs through the solid of the map (pairs that are visible through
+/// the solid alone, where nothing is drawn on a wall, are counted apart). Prints for lists from the potentially visible
+/// sets alone, with geometry, and swept by rays: recall (visible pairs that are listed, of all visible ones, and of those
+/// that give more than a fifth of a percent of their cluster's light: the bound below which lights are left out),
+/// precision (visible pairs, of those listed) and its ratio to that of the potentially visible sets, the part of all
+/// arriving light that lights give which are not listed, the largest such part of a cluster, and the lists' lengths. The
+/// rays are others than those that the lists were swept with.
 ///
 /// Example: relight lights oa_dm1 kaos2 --rays 256
 #[derive(Args, Debug)]
@@ -70,6 +74,7 @@ pub fn run(args: &LightsArgs) -> Result<()> {
         let clusters = world.light_lists.clusters();
         let step = clusters.div_ceil(args.clusters.max(1));
         let judged = judge(&world, &lists.map(|l| l.1), args.rays, step);
+        let plain = judged.first().map_or(0.0, ListJudgement::precision);
         for ((name, lists, seconds), judged) in lists.iter().zip(judged) {
             let line = json!({
                 "map": map,
@@ -79,12 +84,16 @@ pub fn run(args: &LightsArgs) -> Result<()> {
                 "recall": judged.recall(),
                 "recall_of_mattering": judged.recall_of_mattering(),
                 "precision": judged.precision(),
-                "light_found": judged.light_found,
+                "precision_over_pvs": judged.precision() / plain.max(1.0e-9),
+                "light_lost": 1.0 - judged.light_found,
+                "worst_cluster_lost": judged.worst_loss,
                 "mean_length": lists.mean_length(),
                 "longest": lists.longest(),
                 "seconds": seconds,
                 "pairs_judged": judged.pairs,
                 "pairs_visible": judged.visible,
+                "pairs_visible_through_solid": judged.through_solid,
+                "pairs_mattering": judged.mattering,
             });
             println!("{line}");
         }

@@ -25,6 +25,8 @@ pub(crate) struct Hit {
     pub tag: u32,
     /// Unit normal of its front.
     pub normal: Vec3,
+    /// Place of the triangle in the tree.
+    index: u32,
 }
 
 #[derive(Clone, Copy)]
@@ -92,6 +94,23 @@ impl Occluders {
             .is_some()
     }
 
+    /// As [`blocked`](Self::blocked) where sky counts; `last` is what stopped an earlier ray: it is asked first, for
+    /// rays from about one place to another are often stopped by the same triangle.
+    pub fn blocked_again(&self, from: Vec3, to: Vec3, last: &mut Option<u32>) -> bool {
+        let ray = to - from;
+        let known = last.and_then(|index| self.triangles.get(index as usize));
+        if known.is_some_and(|t| meet(t, from.into(), ray.into(), 0.9999).is_some()) {
+            return true;
+        }
+        match self.walk(from, ray, 0.9999, true, |_| true) {
+            Some(hit) => {
+                *last = Some(hit.index);
+                true
+            }
+            None => false,
+        }
+    }
+
     /// The nearest hit before `limit` lengths of `ray`.
     pub fn nearest(&self, from: Vec3, ray: Vec3, limit: f32) -> Option<Hit> {
         self.walk(from, ray, limit, false, |_| true)
@@ -132,10 +151,17 @@ impl Occluders {
                 }
                 let first = node.first as usize;
                 let range = first..first + usize::from(node.count);
-                for triangle in self.triangles.get(range).unwrap_or_default() {
+                for (triangle, index) in self
+                    .triangles
+                    .get(range)
+                    .unwrap_or_default()
+                    .iter()
+                    .zip(node.first..)
+                {
                     if counts(triangle.sky)
                         && let Some(hit) = meet(triangle, from, ray, limit)
                     {
+                        let hit = Hit { index, ..hit };
                         if any {
                             return Some(hit);
                         }
@@ -186,6 +212,7 @@ fn meet(triangle: &Triangle, from: Vec3A, ray: Vec3A, limit: f32) -> Option<Hit>
         tag: triangle.tag,
         // Clockwise corners: the front is the other way.
         normal: triangle.e2.cross(triangle.e1).normalize_or_zero().into(),
+        index: 0,
     })
 }
 

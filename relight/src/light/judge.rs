@@ -1,6 +1,15 @@
 //! Light lists against shadow rays: what they have of what is visible.
+//!
+//! # What is true
+//!
+//! A light is visible in a cluster when a ray from some point of the cluster, on a surface or in the open, to some point
+//! of the light meets no opaque triangle that is drawn and does not run through the solid of the map. (Where nothing is
+//! drawn on a wall, as behind panels and outside of the hull, rays that ask triangles alone come through it. Such pairs
+//! are counted apart.) A visible light matters when it gives the cluster more than [`DROPPED_PART`] of its light.
 
-use super::sweep::{DROPPED_PART, Target, receivers};
+use super::looks::DROPPED_PART;
+use super::receivers::{Target, receivers};
+use super::solid::through_solid;
 use super::{LightLists, lists_of};
 use crate::calibrate::random::Random;
 use crate::calibrate::{parallel, samples};
@@ -11,8 +20,10 @@ use crate::world::RelitWorld;
 pub struct ListJudgement {
     /// Pairs of light and cluster that were looked at.
     pub pairs: usize,
-    /// Those where some ray arrives.
+    /// Those where some ray arrives: see the head of this file's documentation for what is counted.
     pub visible: usize,
+    /// Pairs where rays arrive through the solid of the map alone; they are not visible.
+    pub through_solid: usize,
     /// Of these, those that the lists have.
     pub found: usize,
     /// Visible pairs that give more than [`DROPPED_PART`] of their cluster's light.
@@ -23,6 +34,8 @@ pub struct ListJudgement {
     pub listed: usize,
     /// Of all light that arrives, the part of lights that the lists have.
     pub light_found: f64,
+    /// The largest part of a cluster's light that comes from lights which its list does not have.
+    pub worst_loss: f64,
 }
 
 impl ListJudgement {
@@ -68,20 +81,28 @@ pub fn judge(
             row.binary_search(&entry).is_ok()
         };
         let mut found: Vec<(u32, f64)> = Vec::new();
+        let mut through = 0;
         for entry in 0..total {
             let Some(target) = Target::of(world, entry) else {
                 continue;
             };
             let mut arrived = 0.0f64;
+            let mut leaks = false;
             for i in 0..rays {
                 let Some(receiver) = receivers.get(i as usize % receivers.len()) else {
                     break;
                 };
                 let (point, bare) = target.sample(receiver, &mut random);
-                if bare > 0.0 && !occluders.blocked(receiver.position, point, false) {
+                if bare <= 0.0 || occluders.blocked(receiver.position, point, false) {
+                    continue;
+                }
+                if through_solid(&world.bsp, receiver.position, point) {
+                    leaks = true;
+                } else {
                     arrived += f64::from(bare) / f64::from(rays);
                 }
             }
+            through += usize::from(leaks && arrived <= 0.0);
             found.push((entry, arrived));
         }
         let all: f64 = found.iter().map(|(_, arrived)| arrived).sum();
@@ -102,6 +123,10 @@ pub fn judge(
                 *light += if listed { arrived } else { 0.0 };
             }
         }
+        for (judged, light) in judged.iter_mut().zip(&light) {
+            judged.through_solid = through;
+            judged.worst_loss = if all > 0.0 { 1.0 - light / all } else { 0.0 };
+        }
         (judged, light)
     });
     let mut sums = vec![ListJudgement::default(); lists.len()];
@@ -110,6 +135,8 @@ pub fn judge(
         for ((sum, one), light) in sums.iter_mut().zip(judged).zip(&light) {
             sum.pairs += one.pairs;
             sum.visible += one.visible;
+            sum.through_solid += one.through_solid;
+            sum.worst_loss = sum.worst_loss.max(one.worst_loss);
             sum.listed += one.listed;
             sum.mattering += one.mattering;
             sum.mattering_found += one.mattering_found;

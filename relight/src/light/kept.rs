@@ -16,7 +16,7 @@ use crate::calibrate::cache::{CacheError, Hash, read_file};
 use crate::world::RelitWorld;
 
 /// Number that changes whenever the same world would give other lists.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// First bytes of a file.
 const MAGIC: &[u8; 16] = b"relight-lists\r\n\0";

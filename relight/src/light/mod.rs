@@ -50,8 +50,11 @@ mod glow;
 mod judge;
 mod kept;
 mod lists;
+mod looks;
+mod receivers;
 mod report;
 mod sight;
+mod solid;
 mod surfaces;
 mod sweep;
 
@@ -59,9 +62,10 @@ pub use emission::{Emission, EmissionSource, GLOW_THRESHOLD};
 pub use flicker::Flicker;
 pub use judge::{ListJudgement, judge, lists_by_geometry, lists_by_visibility};
 pub use lists::{LightLists, LightRef, LightShare};
+pub use looks::{DROPPED_LEAST, DROPPED_PART};
 pub use report::{EmitterSummary, LightReport};
 pub use sight::{ClusterSet, Sight};
-pub use sweep::{DROPPED_LEAST, DROPPED_PART, SweepReport, sweep};
+pub use sweep::{SweepReport, sweep};
 
 pub(crate) use emission::Finder;
 pub(crate) use entities::{ambient, light_entities};

@@ -1,0 +1,236 @@
+//! Where light is gathered in clusters, and lights as rays from there see them.
+
+use super::{LightRef, PointLight, TriangleLight};
+use crate::calibrate::parallel;
+use crate::calibrate::random::Random;
+use crate::world::RelitWorld;
+use glam::Vec3;
+use std::f32::consts::PI;
+
+/// How far off its surface a point lies, id units.
+const LIFT: f32 = 0.5;
+
+/// A place where light is gathered.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Receiver {
+    pub position: Vec3,
+    /// Unit normal; zero in the open.
+    pub normal: Vec3,
+}
+
+/// Points of each cluster: random ones on what is drawn there, and in the open.
+pub(super) fn receivers(
+    world: &RelitWorld,
+    clusters: usize,
+    on_surfaces: usize,
+    in_the_open: usize,
+    seed: u64,
+) -> Vec<Vec<Receiver>> {
+    let bsp = &world.bsp;
+    let mut surfaces: Vec<Vec<u32>> = vec![Vec::new(); clusters];
+    let mut boxes: Vec<Vec<(Vec3, Vec3)>> = vec![Vec::new(); clusters];
+    for leaf in bsp.tree_leafs() {
+        let Some(leaf) = bsp.leafs.get(leaf) else {
+            continue;
+        };
+        let Ok(cluster) = usize::try_from(leaf.cluster) else {
+            continue;
+        };
+        let (Some(surfaces), Some(boxes)) = (surfaces.get_mut(cluster), boxes.get_mut(cluster))
+        else {
+            continue;
+        };
+        let corner = |c: [i32; 3]| Vec3::from_array(c.map(|v| v as f32));
+        boxes.push((corner(leaf.mins), corner(leaf.maxs)));
+        let listed = bsp.leaf_surface_indices(leaf).iter();
+        surfaces.extend(listed.filter_map(|&s| u32::try_from(s).ok()));
+    }
+    let rooms: Vec<_> = surfaces.into_iter().zip(boxes).collect();
+    parallel::map(&rooms, |cluster, (surfaces, boxes)| {
+        let mut random = Random::new(seed ^ (cluster as u64) << 8);
+        let inside = |p: Vec3| usize::try_from(bsp.cluster_at(p)).is_ok_and(|c| c == cluster);
+        let mut points = on_drawn(world, surfaces, boxes, on_surfaces, &mut random, inside);
+        // where nothing is drawn, more in the open
+        let open = in_the_open.max((on_surfaces + in_the_open - points.len()) / 2);
+        in_boxes(boxes, open, &mut random, inside, &mut points);
+        points
+    })
+}
+
+/// Points on the surfaces of a cluster, evenly over the area that lies in its leafs' boxes, as nearly as a few tries do.
+fn on_drawn(
+    world: &RelitWorld,
+    surfaces: &[u32],
+    boxes: &[(Vec3, Vec3)],
+    count: usize,
+    random: &mut Random,
+    inside: impl Fn(Vec3) -> bool,
+) -> Vec<Receiver> {
+    let mut listed = surfaces.to_vec();
+    listed.sort_unstable();
+    listed.dedup();
+    let mut triangles = Vec::new();
+    let mut total = 0.0f32;
+    for index in listed {
+        let Some(surface) = world.surfaces.get(index as usize) else {
+            continue;
+        };
+        let first = surface.first_index as usize / 3;
+        for triangle in first..first + surface.num_indices as usize / 3 {
+            let Some([a, b, c]) = world.triangle(triangle) else {
+                continue;
+            };
+            let (mins, maxs) = (a.min(b).min(c), a.max(b).max(c));
+            // only what may lie here
+            let touches = |(low, high): &(Vec3, Vec3)| {
+                mins.cmple(*high + 1.0).all() && maxs.cmpge(*low - 1.0).all()
+            };
+            let area = (b - a).cross(c - a).length() * 0.5;
+            if area > 0.0 && area.is_finite() && boxes.iter().any(touches) {
+                total += area;
+                triangles.push((total, [a, b, c]));
+            }
+        }
+    }
+    let mut points = Vec::with_capacity(count);
+    if triangles.is_empty() {
+        return points;
+    }
+    for _ in 0..count * 8 {
+        if points.len() == count {
+            break;
+        }
+        let at = random.next() * total;
+        let found = triangles
+            .partition_point(|(end, _)| *end <= at)
+            .min(triangles.len() - 1);
+        let Some(&(_, [a, b, c])) = triangles.get(found) else {
+            break;
+        };
+        let (u, v) = random.in_triangle();
+        // fronts are clockwise
+        let normal = (c - a).cross(b - a).normalize_or_zero();
+        let on = a + (b - a) * u + (c - a) * v;
+        // as the shaders look for it
+        if inside(on + normal) {
+            points.push(Receiver {
+                position: on + normal * LIFT,
+                normal,
+            });
+        }
+    }
+    points
+}
+
+/// Points in the open.
+fn in_boxes(
+    boxes: &[(Vec3, Vec3)],
+    count: usize,
+    random: &mut Random,
+    inside: impl Fn(Vec3) -> bool,
+    points: &mut Vec<Receiver>,
+) {
+    let wanted = points.len() + count;
+    for attempt in 0..count * 8 {
+        if points.len() >= wanted || boxes.is_empty() {
+            break;
+        }
+        let Some(&(low, high)) = boxes.get(attempt % boxes.len()) else {
+            break;
+        };
+        let at = Vec3::new(random.next(), random.next(), random.next());
+        let position = low + (high - low) * at;
+        if inside(position) {
+            points.push(Receiver {
+                position,
+                normal: Vec3::ZERO,
+            });
+        }
+    }
+}
+
+/// Luminance of linear Rec. 709 colours.
+pub(super) fn luminance(color: Vec3) -> f32 {
+    super::emission::luminance(color).max(0.0)
+}
+
+/// A light as rays see it.
+pub(super) enum Target<'a> {
+    Triangle(&'a TriangleLight),
+    Point(&'a PointLight),
+}
+
+impl<'a> Target<'a> {
+    pub fn of(world: &'a RelitWorld, entry: u32) -> Option<Self> {
+        match world.light_lists.light(entry) {
+            LightRef::Triangle(i) => world.lights.get(i as usize).map(Target::Triangle),
+            LightRef::Point(i) => world.point_lights.get(i as usize).map(Target::Point),
+        }
+    }
+
+    /// A random point of it, and what it would give to a receiver if all of it were there, without shadows: irradiance
+    /// / π, luminance.
+    pub fn sample(&self, receiver: &Receiver, random: &mut Random) -> (Vec3, f32) {
+        let cosine = |to: Vec3| {
+            if receiver.normal == Vec3::ZERO {
+                // a surface in the open may face any way
+                0.25
+            } else {
+                receiver.normal.dot(to).max(0.0)
+            }
+        };
+        match self {
+            Target::Triangle(light) => {
+                let [a, b, c] = light.vertices;
+                let (u, v) = random.in_triangle();
+                let point = a + (b - a) * u + (c - a) * v;
+                let offset = point - receiver.position;
+                let area = light.area();
+                let squared = offset.length_squared().max(area * 0.05).max(1.0);
+                let to = offset.normalize_or_zero();
+                let facing = -light.normal().dot(to);
+                let facing = if light.two_sided {
+                    facing.abs()
+                } else {
+                    facing.max(0.0)
+                };
+                let power = luminance(light.radiance) * area;
+                (point, power * facing * cosine(to) / (PI * squared))
+            }
+            Target::Point(light) => {
+                let around = Vec3::new(random.next(), random.next(), random.next()) * 2.0 - 1.0;
+                let point = light.origin + around.clamp_length_max(1.0) * light.radius;
+                let offset = light.origin - receiver.position;
+                let squared = offset
+                    .length_squared()
+                    .max(light.radius * light.radius)
+                    .max(1.0);
+                let to = offset.normalize_or_zero();
+                let in_cone = light.spot.is_none_or(|spot| {
+                    let along = -to.dot(spot.direction);
+                    along > 0.0
+                        && (1.0 - along * along).max(0.0).sqrt() <= along * spot.tan_half_angle
+                });
+                let power = if in_cone {
+                    luminance(light.intensity)
+                } else {
+                    0.0
+                };
+                (point, power * cosine(to) / (PI * squared))
+            }
+        }
+    }
+
+    /// Light that comes to a place about there from a light that faces it.
+    pub fn bare(&self, at: Vec3) -> f32 {
+        let (middle, power) = match self {
+            Target::Triangle(light) => {
+                let [a, b, c] = light.vertices;
+                let power = luminance(light.radiance) * light.area();
+                ((a + b + c) / 3.0, power)
+            }
+            Target::Point(light) => (light.origin, luminance(light.intensity)),
+        };
+        power / (PI * middle.distance_squared(at).max(64.0))
+    }
+}

@@ -1,0 +1,91 @@
+//! Where a ray runs through the solid of a map.
+//!
+//! Compilers draw no surface where nobody is meant to look from: behind panels, under the skins of curves, outside of
+//! the hull. A ray from there meets no triangle on its way through a wall. Light does not come that way; the tree knows,
+//! for the wall's leafs belong to no cluster.
+
+use glam::Vec3;
+use q3bsp::Bsp;
+
+/// Units of solid that a ray may run through and count as free: surfaces lie on the boundaries of solid, where the
+/// halves of units that the receivers are lifted by, and rounding, decide which side is met. No wall is as thin.
+const SLACK: f32 = 1.0;
+
+/// Whether the straight way between two points runs through the solid of a map. Never for a map without a visibility
+/// matrix, whose leafs need not tell.
+pub(super) fn through_solid(bsp: &Bsp, from: Vec3, to: Vec3) -> bool {
+    if bsp.visibility.is_none() || bsp.nodes.is_empty() {
+        return false;
+    }
+    let length = from.distance(to);
+    if !length.is_finite() || length <= SLACK {
+        return false;
+    }
+    let mut solid = 0.0f32;
+    // a damaged tree may share nodes or go in circles
+    let mut steps = bsp.nodes.len() * 2;
+    // pieces of the way, as parts of it, by the node or leaf that they lie in
+    let mut pending = vec![(0i32, 0.0f32, 1.0f32)];
+    while let Some((child, start, end)) = pending.pop() {
+        let Ok(index) = usize::try_from(child) else {
+            let leaf = usize::try_from(-1 - i64::from(child)).ok();
+            let leaf = leaf.and_then(|l| bsp.leafs.get(l));
+            if leaf.is_some_and(|l| l.cluster < 0) {
+                solid += (end - start) * length;
+                if solid > SLACK {
+                    return true;
+                }
+            }
+            continue;
+        };
+        let Some(node) = bsp.nodes.get(index).filter(|_| steps > 0) else {
+            continue;
+        };
+        steps -= 1;
+        let plane = usize::try_from(node.plane).ok();
+        let Some(plane) = plane.and_then(|p| bsp.planes.get(p)) else {
+            continue;
+        };
+        let distance = |part: f32| plane.normal.dot(from.lerp(to, part)) - plane.dist;
+        let (a, b) = (distance(start), distance(end));
+        let [front, back] = node.children;
+        match (a >= 0.0, b >= 0.0) {
+            (true, true) => pending.push((front, start, end)),
+            (false, false) => pending.push((back, start, end)),
+            (starts_in_front, _) => {
+                let middle = start + (end - start) * (a / (a - b)).clamp(0.0, 1.0);
+                let (near, far) = if starts_in_front {
+                    (front, back)
+                } else {
+                    (back, front)
+                };
+                pending.push((near, start, middle));
+                pending.push((far, middle, end));
+            }
+        }
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use q3bsp::builder::MapBuilder;
+
+    #[test]
+    fn walls_between_rooms_are_solid_and_doors_are_not() {
+        let mut map = MapBuilder::new();
+        for x in [0.0, 128.0] {
+            map.add_cell(Vec3::new(x, 0.0, 0.0), Vec3::new(x + 100.0, 100.0, 100.0));
+        }
+        map.set_sees(0, 1, true);
+        let bsp = map.build();
+        let at = |x: f32| Vec3::new(x, 50.0, 50.0);
+        assert!(!through_solid(&bsp, at(5.0), at(95.0)));
+        assert!(through_solid(&bsp, at(50.0), at(150.0)));
+        assert!(through_solid(&bsp, at(150.0), at(50.0)));
+        // a point that lies just inside of a wall
+        assert!(!through_solid(&bsp, at(50.0), at(100.5)));
+        assert!(!through_solid(&bsp, at(50.0), at(f32::NAN)));
+    }
+}
