@@ -1,0 +1,185 @@
+//! Finding suns that no directive tells of.
+//!
+//! A sun leaves a pattern that nothing else does: the cosine to one direction wherever that direction sees sky, and
+//! nothing in the shadows. So directions all over the upper half of the sphere are tried against what known lights
+//! leave unexplained, and the best is turned until it explains most.
+
+use super::bvh::Occluders;
+use super::columns::{Column, Source, sun_rows};
+use super::parallel;
+use super::samples::Sample;
+use super::solve::{Ambient, Effort, Residual, norm, residual, solve};
+use glam::Vec3;
+use std::f32::consts::TAU;
+
+/// Directions tried at first, evenly over the upper half of the sphere.
+const DIRECTIONS: u32 = 320;
+
+/// Samples that directions are judged by at first.
+const JUDGES: usize = 1200;
+
+/// Squared error (samples that are off by a factor e) that a sun must take away for each sample used for fitting.
+const WORTH: f32 = 0.004;
+
+/// Least height of a sun over the horizon, sine.
+const LOWEST: f32 = 0.03;
+
+/// Turns of the best direction, radians, one after the other.
+const TURNS: [f32; 4] = [0.07, 0.035, 0.016, 0.008];
+
+/// Adds a sun to `columns` where there is none that shines, if it is worth it. Each sun costs tracing a ray of its own,
+/// and what is left beside one is seldom another one.
+pub(super) fn find(
+    occluders: &Occluders,
+    samples: &[Sample],
+    columns: &mut Vec<Column>,
+    ambient: &mut Ambient,
+    effort: Effort,
+) {
+    let worthwhile = WORTH * samples.iter().filter(|s| !s.held_out).count() as f32;
+    let state = residual(samples, columns, ambient.value);
+    let shines = |c: &&Column| matches!(c.source, Source::Sun(_)) && worth(c, &state) >= worthwhile;
+    if columns.iter().any(|c| shines(&c)) {
+        return;
+    }
+    let judges = thinned(samples);
+    let Some(first) = best_of(occluders, samples, &judges, &state) else {
+        return;
+    };
+    let mut direction = turned(occluders, samples, &judges, &state, first);
+    let known = columns.len();
+    // All else gives way to what is found; then the direction can be told better.
+    for turns in [1, 0] {
+        columns.truncate(known);
+        columns.push(Column {
+            source: Source::FoundSun(direction),
+            rows: sun_rows(occluders, samples, direction),
+            strength: Vec3::ZERO,
+            prior: None,
+        });
+        let mut state = solve(samples, columns, ambient, effort);
+        let Some(sun) = columns.last() else {
+            return;
+        };
+        if worth(sun, &state) < worthwhile {
+            columns.truncate(known);
+            solve(samples, columns, ambient, effort);
+            return;
+        }
+        if turns == 0 {
+            return;
+        }
+        for &(i, a) in &sun.rows {
+            if let Some(rest) = state.rest.get_mut(i as usize) {
+                *rest += sun.strength * a;
+            }
+        }
+        direction = turned(occluders, samples, &judges, &state, direction);
+    }
+}
+
+/// Squared error that a source takes away.
+fn worth(column: &Column, state: &Residual) -> f32 {
+    norm(column, &state.weights) * column.strength.length_squared() / 3.0
+}
+
+/// Samples used for fitting, evenly thinned.
+fn thinned(samples: &[Sample]) -> Vec<u32> {
+    let all: Vec<u32> = (0u32..)
+        .zip(samples)
+        .filter(|(_, s)| !s.held_out)
+        .map(|(i, _)| i)
+        .collect();
+    let count = all.len().min(JUDGES);
+    (0..count)
+        .filter_map(|k| all.get(k * all.len() / count.max(1)).copied())
+        .collect()
+}
+
+/// Error that a sun of the best strength takes away at some samples.
+fn gain(
+    occluders: &Occluders,
+    samples: &[Sample],
+    judges: &[u32],
+    state: &Residual,
+    direction: Vec3,
+) -> f32 {
+    let mut gradient = Vec3::ZERO;
+    let mut norm = 0.0;
+    for &i in judges {
+        let at = i as usize;
+        let (Some(sample), Some(rest), Some(&weight)) =
+            (samples.get(at), state.rest.get(at), state.weights.get(at))
+        else {
+            continue;
+        };
+        if weight <= 0.0 {
+            continue;
+        }
+        if let Some(a) = super::columns::sun_at(occluders, sample, direction) {
+            gradient += *rest * (weight * a);
+            norm += weight * a * a;
+        }
+    }
+    if norm > 0.0 {
+        gradient.max(Vec3::ZERO).length_squared() / norm
+    } else {
+        0.0
+    }
+}
+
+/// The best of directions spread over the upper half of the sphere; `None` when none explains anything.
+fn best_of(
+    occluders: &Occluders,
+    samples: &[Sample],
+    judges: &[u32],
+    state: &Residual,
+) -> Option<Vec3> {
+    // A spiral with equal steps of height spreads points evenly over a sphere.
+    let golden = (5.0f32.sqrt() - 1.0) / 2.0;
+    let directions: Vec<Vec3> = (0..DIRECTIONS)
+        .map(|i| {
+            let z = (i as f32 + 0.5) / DIRECTIONS as f32;
+            let (sin, cos) = ((i as f32 * golden).fract() * TAU).sin_cos();
+            let radius = (1.0 - z * z).sqrt();
+            Vec3::new(radius * cos, radius * sin, z)
+        })
+        .collect();
+    let gains = parallel::map(&directions, |_, &d| {
+        gain(occluders, samples, judges, state, d)
+    });
+    let best = gains
+        .into_iter()
+        .zip(directions)
+        .max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (best.0 > 0.0).then_some(best.1)
+}
+
+/// A direction turned to where a sun explains most.
+fn turned(
+    occluders: &Occluders,
+    samples: &[Sample],
+    judges: &[u32],
+    state: &Residual,
+    first: Vec3,
+) -> Vec3 {
+    let mut best = (gain(occluders, samples, judges, state, first), first);
+    for turn in TURNS {
+        for _ in 0..4 {
+            let (u, v) = best.1.any_orthonormal_pair();
+            let around = [u, -u, v, -v, u + v, u - v, -u + v, -u - v]
+                .map(|d| (best.1 + d.normalize_or_zero() * turn).normalize_or(best.1));
+            let gains = parallel::map(&around, |_, &d| gain(occluders, samples, judges, state, d));
+            let found = gains
+                .into_iter()
+                .zip(around)
+                .filter(|(_, d)| d.z >= LOWEST)
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            match found {
+                Some(found) if found.0 > best.0 => best = found,
+                _ => break,
+            }
+        }
+    }
+    best.1
+}

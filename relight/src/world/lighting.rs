@@ -1,0 +1,63 @@
+//! All light of a world, to be kept and put back: a world can be seen in the light that its directives tell of, and in
+//! the light that calibration found.
+
+use super::RelitWorld;
+use crate::calibrate::CalibrationReport;
+use crate::light::{Emission, LightLists, LightReport, PointLight, SunLight, TriangleLight};
+use glam::Vec3;
+
+/// What light a world is in: everything that [`calibrate`](crate::calibrate()) and
+/// [`sweep`](crate::light::sweep()) change.
+#[derive(Debug, Clone)]
+pub struct Lighting {
+    lights: Vec<TriangleLight>,
+    triangle_lights: Vec<u32>,
+    /// First light and number of lights of each surface.
+    of_surfaces: Vec<(u32, u32)>,
+    /// Of each material.
+    emissions: Vec<Option<Emission>>,
+    point_lights: Vec<PointLight>,
+    suns: Vec<SunLight>,
+    light_lists: LightLists,
+    ambient: Vec3,
+    report: LightReport,
+    calibration: Option<CalibrationReport>,
+}
+
+impl RelitWorld {
+    /// A copy of the light that the world is in.
+    pub fn lighting(&self) -> Lighting {
+        Lighting {
+            lights: self.lights.clone(),
+            triangle_lights: self.triangle_lights.clone(),
+            of_surfaces: (self.surfaces.iter())
+                .map(|s| (s.first_light, s.num_lights))
+                .collect(),
+            emissions: self.materials.iter().map(|m| m.emission).collect(),
+            point_lights: self.point_lights.clone(),
+            suns: self.suns.clone(),
+            light_lists: self.light_lists.clone(),
+            ambient: self.ambient,
+            report: self.report.clone(),
+            calibration: self.calibration.clone(),
+        }
+    }
+
+    /// Puts the world into a light that it was in before.
+    pub fn set_lighting(&mut self, lighting: Lighting) {
+        self.lights = lighting.lights;
+        self.triangle_lights = lighting.triangle_lights;
+        for (surface, (first, count)) in self.surfaces.iter_mut().zip(lighting.of_surfaces) {
+            (surface.first_light, surface.num_lights) = (first, count);
+        }
+        for (material, emission) in self.materials.iter_mut().zip(lighting.emissions) {
+            material.emission = emission;
+        }
+        self.point_lights = lighting.point_lights;
+        self.suns = lighting.suns;
+        self.light_lists = lighting.light_lists;
+        self.ambient = lighting.ambient;
+        self.report = lighting.report;
+        self.calibration = lighting.calibration;
+    }
+}
