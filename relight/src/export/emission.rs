@@ -26,7 +26,7 @@ pub fn radiances(world: &RelitWorld) -> Vec<Vec3> {
 }
 
 /// Relative luminance of linear colours (Rec. 709).
-fn luminance(color: Vec3) -> f32 {
+pub fn luminance(color: Vec3) -> f32 {
     color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
@@ -53,7 +53,8 @@ impl Export<'_> {
         let mut look = look(material, &mut |name| {
             self.mean(material, &Picture::File(name.to_owned()))
         });
-        let Some(radiance) = radiance.filter(|r| r.max_element() > 0.0) else {
+        let Some(radiance) = radiance.filter(|r| self.options.lights && r.max_element() > 0.0)
+        else {
             return look;
         };
         if look.glow.is_none() {

@@ -2,7 +2,7 @@
 
 use super::ExportError;
 use super::look::{Edit, Picture};
-use super::stack;
+use super::{sky, stack};
 use crate::files::{GameFiles, normalise};
 use crate::image::{self, Image};
 use crate::overbright;
@@ -239,6 +239,9 @@ fn make(
                 };
                 Encoded::png(image, &format!("{name}_{label}"))
             })
+            .transpose(),
+        Picture::Sky { name, side } => sky::bake(files, shader, *side)
+            .map(|image| Encoded::png(&image, &format!("{name}_side{side}")))
             .transpose(),
     }
 }

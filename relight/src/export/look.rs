@@ -61,6 +61,13 @@ pub enum Picture {
         /// Which part of what they show.
         part: Part,
     },
+    /// A side of a sky with clouds.
+    Sky {
+        /// The material, lower case.
+        name: String,
+        /// Which side.
+        side: usize,
+    },
 }
 
 /// A picture and how it lies on the surface.
@@ -404,6 +411,10 @@ fn dielectric(shader: &Shader, drawn: &LightLinear, look: &mut Look) {
     });
     look.alpha = Alpha::Opaque;
     look.roughness = 0.0;
+    // The surface of a volume has an inside and an outside; its back is the way out.
+    if look.dielectric.is_some_and(|d| d.liquid.is_some()) {
+        look.two_sided = false;
+    }
     // What it shows of its own is seen with what it does not let pass.
     look.glow_factor *= 1.0 - transmission;
     look.factor = look.factor.max(Vec4::new(0.0, 0.0, 0.0, 1.0));

@@ -13,11 +13,15 @@
 //! written in reverse.
 
 mod emission;
+mod extras;
 mod geometry;
+mod gltf;
 mod images;
+mod lightmaps;
 mod look;
 mod obj;
 mod output;
+mod sky;
 mod stack;
 
 pub use images::{Encoded, ImageStore, Mime};
@@ -36,17 +40,23 @@ pub const METRES_PER_UNIT: f32 = 1.0 / 32.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Format {
+    /// glTF 2.0 in one binary file.
+    Glb,
+    /// glTF 2.0 as JSON, with its data beside it.
+    Gltf,
     /// Wavefront OBJ with its MTL.
     Obj,
 }
 
 impl Format {
     /// All formats.
-    pub const ALL: [Format; 1] = [Format::Obj];
+    pub const ALL: [Format; 3] = [Format::Glb, Format::Gltf, Format::Obj];
 
     /// Extension of its files, without the dot; also the name that users give.
     pub fn extension(self) -> &'static str {
         match self {
+            Format::Glb => "glb",
+            Format::Gltf => "gltf",
             Format::Obj => "obj",
         }
     }
@@ -195,6 +205,8 @@ pub fn export(
     }
     let mut output = Output::new(path);
     let mut report = match format {
+        Format::Glb => gltf::write(source, gltf::Container::Binary, &mut output)?,
+        Format::Gltf => gltf::write(source, gltf::Container::Text, &mut output)?,
         Format::Obj => obj::write(source, &mut output)?,
     };
     report.files = output.finish()?;

@@ -199,7 +199,7 @@ fn push(rgba: &mut Vec<u8>, color: Vec3, alpha: f32) {
 }
 
 /// What a repeating image shows at a place, linear.
-fn texel(image: &Image, st: Vec2, table: &[f32; 256]) -> Vec4 {
+pub fn texel(image: &Image, st: Vec2, table: &[f32; 256]) -> Vec4 {
     let column = |t: f32, side: u32| {
         ((t.rem_euclid(1.0) * side as f32) as u32).min(side.saturating_sub(1)) as usize
     };

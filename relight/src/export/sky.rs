@@ -1,0 +1,149 @@
+//! The sky as a box: the images of its script, or, where it has clouds, pictures of both together.
+//!
+//! Source: the axes of the box's sides and the dome of the clouds are the engine's; see the classic look.
+
+use super::images::load;
+use super::look::Picture;
+use super::stack::texel;
+use crate::files::GameFiles;
+use crate::image::Image;
+use crate::overbright;
+use crate::world::WorldMaterial;
+use glam::{Vec2, Vec3, Vec4};
+use shaderscript::eval;
+use shaderscript::light::{StageSample, compose};
+use shaderscript::{Shader, StageImage};
+
+/// Suffixes of the images of the sides, in the order of [`point`].
+const SIDES: [&str; 6] = ["rt", "bk", "lf", "ft", "up", "dn"];
+/// Side of the pictures of skies with clouds.
+const SIZE: u32 = 512;
+/// Radius of the planet under the clouds, id units.
+const PLANET: f32 = 4096.0;
+
+/// The point of side `side` of the cube [-1, 1]³ at `s` (right) and `t` (up) in [-1, 1], seen from inside.
+pub fn point(side: usize, s: f32, t: f32) -> Vec3 {
+    match side {
+        0 => Vec3::new(1.0, -s, t),
+        1 => Vec3::new(s, 1.0, t),
+        2 => Vec3::new(-1.0, s, t),
+        3 => Vec3::new(-s, -1.0, t),
+        4 => Vec3::new(-t, -s, 1.0),
+        _ => Vec3::new(t, -s, -1.0),
+    }
+}
+
+/// What is seen on a side of the box; `None` where nothing is.
+pub fn picture(files: &dyn GameFiles, material: &WorldMaterial, side: usize) -> Option<Picture> {
+    let shader = definition(material);
+    let outer = outer(shader, side).filter(|name| crate::image::find(files, name).is_some());
+    if shader.stages.is_empty() {
+        return outer.map(Picture::File);
+    }
+    Some(Picture::Sky {
+        name: material.name.to_ascii_lowercase(),
+        side,
+    })
+}
+
+/// What the script says, unless it is not drawn.
+pub fn definition(material: &WorldMaterial) -> &Shader {
+    let resolved = &material.resolved;
+    match &resolved.script {
+        // Sides of the box may be missing; stages may not.
+        Some(script) if resolved.fault.is_none() || script.stages.is_empty() => script,
+        _ => &resolved.shader,
+    }
+}
+
+fn outer(shader: &Shader, side: usize) -> Option<String> {
+    let outer = shader.sky.as_ref()?.outer.as_ref()?;
+    Some(format!("{outer}_{}", SIDES.get(side)?))
+}
+
+/// Coordinates on the cloud layer in a direction, clouds `height` above the ground: where the direction meets a
+/// sphere around the planet's middle, as arc cosines of the unit vector there.
+fn cloud_coordinates(direction: Vec3, height: f32) -> Vec2 {
+    let d = direction.normalize();
+    let along = -d.z * PLANET
+        + (d.z * d.z * PLANET * PLANET + 2.0 * PLANET * height + height * height)
+            .max(0.0)
+            .sqrt();
+    let v = (d * along + Vec3::Z * PLANET).normalize();
+    Vec2::new(v.x.clamp(-1.0, 1.0).acos(), v.y.clamp(-1.0, 1.0).acos())
+}
+
+/// The picture of a side, as it is when the map begins.
+pub fn bake(files: &dyn GameFiles, shader: &Shader, side: usize) -> Option<Image> {
+    let outer = outer(shader, side).and_then(|name| Some(load(files, &name)?.0));
+    let height = shader.sky.as_ref().map_or(512.0, |sky| sky.cloud_height);
+    let images: Vec<Option<Image>> = shader
+        .stages
+        .iter()
+        .map(|stage| Some(load(files, stage.image.names().first()?)?.0))
+        .collect();
+    let table = overbright::byte_table();
+    let colors: Vec<Vec4> = shader.stages.iter().map(super::stack::mean_color).collect();
+    let mut rgba = Vec::with_capacity((SIZE * SIZE * 4) as usize);
+    let mut samples = Vec::with_capacity(images.len());
+    let at = |i: u32| (i as f32 + 0.5) / SIZE as f32;
+    for y in 0..SIZE {
+        for x in 0..SIZE {
+            let (u, v) = (at(x), at(y));
+            let behind = outer
+                .as_ref()
+                .map_or(Vec4::ZERO, |image| texel(image, Vec2::new(u, v), &table));
+            let direction = point(side, u * 2.0 - 1.0, 1.0 - v * 2.0);
+            let mut color = behind.truncate();
+            // The clouds' dome has no floor.
+            if side != 5 {
+                let st = cloud_coordinates(direction, height);
+                samples.clear();
+                for ((stage, image), color) in shader.stages.iter().zip(&images).zip(&colors) {
+                    let st = eval::apply_tc_mods(&stage.tc_mods, st, direction, 0.0, Vec2::ZERO);
+                    let texture = match (&stage.image, image) {
+                        (_, Some(image)) => texel(image, st, &table),
+                        (StageImage::White | StageImage::Lightmap, None) => Vec4::ONE,
+                        _ => Vec4::W,
+                    };
+                    samples.push(StageSample {
+                        texture,
+                        color: *color,
+                    });
+                }
+                let drawn = compose(&shader.stages, &samples, false);
+                color = drawn.evaluate(Vec3::ONE, color);
+            }
+            let byte = |v: f32| (overbright::from_linear(v.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8;
+            rgba.extend(color.to_array().map(byte));
+            rgba.push(255);
+        }
+    }
+    Image::from_rgba(SIZE, SIZE, rgba)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sides_meet_and_look_inward() {
+        // the right edge of a side is the left edge of the next, going round to the right
+        for (side, next) in [(0, 3), (3, 2), (2, 1), (1, 0)] {
+            assert_eq!(point(side, 1.0, 0.5), point(next, -1.0, 0.5), "{side}");
+        }
+        assert_eq!(point(0, 0.0, 1.0), point(4, 0.0, -1.0));
+        for side in 0..6 {
+            let right = point(side, 1.0, 0.0) - point(side, -1.0, 0.0);
+            let up = point(side, 0.0, 1.0) - point(side, 0.0, -1.0);
+            // right × up points to the viewer in the middle
+            assert!(right.cross(up).dot(point(side, 0.0, 0.0)) < 0.0, "{side}");
+        }
+    }
+
+    #[test]
+    fn clouds_overhead_are_at_a_quarter_turn() {
+        let uv = cloud_coordinates(Vec3::Z, 512.0);
+        assert!((uv - Vec2::splat(std::f32::consts::FRAC_PI_2)).length() < 1.0e-6);
+    }
+}
