@@ -33,6 +33,10 @@ impl<'a> Fields<'a> {
         u16::from_le_bytes(self.bytes())
     }
 
+    pub(crate) fn i16(&mut self) -> i16 {
+        i16::from_le_bytes(self.bytes())
+    }
+
     pub(crate) fn i32(&mut self) -> i32 {
         i32::from_le_bytes(self.bytes())
     }

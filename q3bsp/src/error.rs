@@ -27,6 +27,28 @@ pub enum Lump {
     LightArray,
     /// Lump 17 of Quake Live.
     Advertisements,
+    /// Quake: pictures of textures.
+    Textures,
+    /// Quake and Quake II: corners of faces.
+    Vertices,
+    /// How textures lie on faces.
+    Texinfo,
+    /// Polygons.
+    Faces,
+    /// Lightmaps of faces.
+    Lighting,
+    /// Quake: collision trees.
+    Clipnodes,
+    /// Pairs of vertices.
+    Edges,
+    /// Edges in the order of faces.
+    Surfedges,
+    /// Quake II: unused.
+    Pop,
+    /// Quake II: areas.
+    Areas,
+    /// Quake II: doors between areas.
+    AreaPortals,
 }
 
 impl Lump {
@@ -51,7 +73,7 @@ impl Lump {
         Lump::Visibility,
     ];
 
-    /// Place in the directory, 0 to 17.
+    /// Place in the directory, 0 to 17; larger for the lumps that only Quake and Quake II have.
     pub fn index(self) -> usize {
         match self {
             Lump::Advertisements => Lump::LightArray as usize,
@@ -81,6 +103,17 @@ impl Lump {
             Lump::Visibility => "visibility",
             Lump::LightArray => "lightarray",
             Lump::Advertisements => "advertisements",
+            Lump::Textures => "textures",
+            Lump::Vertices => "vertices",
+            Lump::Texinfo => "texinfo",
+            Lump::Faces => "faces",
+            Lump::Lighting => "lighting",
+            Lump::Clipnodes => "clipnodes",
+            Lump::Edges => "edges",
+            Lump::Surfedges => "surfedges",
+            Lump::Pop => "pop",
+            Lump::Areas => "areas",
+            Lump::AreaPortals => "areaportals",
         }
     }
 }

@@ -19,9 +19,44 @@ pub enum Format {
     Rbsp,
     /// `FBSP` version 1: QFusion (Warsow, Warfork). As `RBSP` with lightmap pages of 512 × 512 texels.
     Fbsp,
+    /// `IBSP` version 38: Quake II. Written as `FBSP`, as are all that follow: see [`crate::quake::QuakeMap`].
+    Quake2,
+    /// `QBSP` version 38: Quake II with 32-bit indices.
+    Qbism,
+    /// Version 29: Quake.
+    Quake,
+    /// `BSP2`: Quake with 32-bit indices.
+    Bsp2,
+    /// `2PSB`: Quake with 32-bit indices and 16-bit bounds.
+    TwoPsb,
+    /// Version 30: GoldSrc (Half-Life).
+    GoldSrc,
 }
 
 impl Format {
+    /// Whether the file holds faces with edges instead of surfaces: the formats of [`crate::quake`].
+    pub fn is_quake(self) -> bool {
+        matches!(
+            self,
+            Format::Quake2
+                | Format::Qbism
+                | Format::Quake
+                | Format::Bsp2
+                | Format::TwoPsb
+                | Format::GoldSrc
+        )
+    }
+
+    /// Whether it is Quake II's or its extension.
+    pub(crate) fn is_quake2(self) -> bool {
+        matches!(self, Format::Quake2 | Format::Qbism)
+    }
+
+    /// The format that [`crate::Bsp::write`] gives a map of this one.
+    pub fn written(self) -> Format {
+        if self.is_quake() { Format::Fbsp } else { self }
+    }
+
     /// Name for people: identification, version and games.
     pub fn name(self) -> &'static str {
         match self {
@@ -30,20 +65,26 @@ impl Format {
             Format::QuakeLive => "IBSP 47 (Quake Live)",
             Format::Rbsp => "RBSP 1 (Raven)",
             Format::Fbsp => "FBSP 1 (QFusion)",
+            Format::Quake2 => "IBSP 38 (Quake II)",
+            Format::Qbism => "QBSP 38 (Quake II, extended)",
+            Format::Quake => "BSP 29 (Quake)",
+            Format::Bsp2 => "BSP2 (Quake, extended)",
+            Format::TwoPsb => "2PSB (Quake, extended)",
+            Format::GoldSrc => "BSP 30 (GoldSrc)",
         }
     }
 
     /// Texels per side of a lightmap page.
     pub fn lightmap_size(self) -> usize {
         match self {
-            Format::Fbsp => 512,
-            _ => 128,
+            Format::Ibsp46 | Format::Ibsp47 | Format::QuakeLive | Format::Rbsp => 128,
+            _ => 512,
         }
     }
 
     /// Whether surfaces, vertices and grid points have up to four layers of light ([`crate::Layers`]).
     pub fn has_layers(self) -> bool {
-        matches!(self, Format::Rbsp | Format::Fbsp)
+        !matches!(self, Format::Ibsp46 | Format::Ibsp47 | Format::QuakeLive)
     }
 
     /// Whether a fog may have no brush and fill the world.
@@ -51,12 +92,12 @@ impl Format {
         !matches!(self, Format::Ibsp46)
     }
 
-    /// The lumps in directory order.
+    /// The lumps in directory order, as written.
     pub fn lumps(self) -> &'static [Lump] {
         match self {
             Format::Ibsp46 | Format::Ibsp47 => &Lump::ALL,
             Format::QuakeLive => &QUAKE_LIVE_LUMPS,
-            Format::Rbsp | Format::Fbsp => &RAVEN_LUMPS,
+            _ => &RAVEN_LUMPS,
         }
     }
 
@@ -71,7 +112,7 @@ impl Format {
             Format::Ibsp46 => (b"IBSP", 46),
             Format::Ibsp47 | Format::QuakeLive => (b"IBSP", 47),
             Format::Rbsp => (b"RBSP", 1),
-            Format::Fbsp => (b"FBSP", 1),
+            _ => (b"FBSP", 1),
         }
     }
 }
@@ -119,7 +160,8 @@ pub(crate) fn announced(bytes: &[u8]) -> Announced {
         (b"IBSP", 47) => return Announced::Known(Format::Ibsp47),
         (b"RBSP", 1) => return Announced::Known(Format::Rbsp),
         (b"FBSP", 1) => return Announced::Known(Format::Fbsp),
-        (b"IBSP", 38) => "Quake II",
+        (b"IBSP", 38) => return Announced::Known(Format::Quake2),
+        (b"QBSP", 38) => return Announced::Known(Format::Qbism),
         (b"IBSP", 43..=45) => "a Quake III test version",
         (b"IBSP", 48) => "Iron Grip: Warlord",
         (b"IBSP", 666) => "Dark Salvation",
@@ -127,9 +169,10 @@ pub(crate) fn announced(bytes: &[u8]) -> Announced {
         (b"PSBI", _) => "big-endian",
         (b"FAKK" | b"2015" | b"EF2!", _) => "Ritual's format",
         (b"VBSP", _) => "Source",
-        (b"BSP2" | b"2PSB", _) => "extended Quake",
-        ([29, 0, 0, 0], _) => "Quake",
-        ([30, 0, 0, 0], _) => "GoldSrc",
+        (b"BSP2", _) => return Announced::Known(Format::Bsp2),
+        (b"2PSB", _) => return Announced::Known(Format::TwoPsb),
+        ([29, 0, 0, 0], _) => return Announced::Known(Format::Quake),
+        ([30, 0, 0, 0], _) => return Announced::Known(Format::GoldSrc),
         (b"PK\x03\x04", _) => "a zip archive",
         _ => "unknown",
     };

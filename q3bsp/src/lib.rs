@@ -1,7 +1,8 @@
 //! id Tech 3 maps: bytes to typed, validated data and back.
 //!
-//! Read are `IBSP` 46 (Quake III and its mods), `IBSP` 47 (RTCW, Enemy Territory, Quake Live), `RBSP` 1 (Raven's games)
-//! and `FBSP` 1 (QFusion), all into the same [`Bsp`]; [`Bsp::format`] tells which it was.
+//! Read are `IBSP` 46 (Quake III and its mods), `IBSP` 47 (RTCW, Enemy Territory, Quake Live), `RBSP` 1 (Raven's games),
+//! `FBSP` 1 (QFusion), and, converted, the maps of Quake, GoldSrc and Quake II ([`quake`]), all into the same [`Bsp`];
+//! [`Bsp::format`] tells which it was.
 //!
 //! [`Bsp::parse`] checks everything that a reader would otherwise have to check again: the directory,
 //! the record sizes and every index of every lump. What the engine refuses is a typed [`Error`] that
@@ -45,6 +46,7 @@ mod layers;
 mod lumps;
 mod parse;
 mod patch;
+pub mod quake;
 mod surface;
 mod tree;
 mod validate;
@@ -112,6 +114,13 @@ pub struct Bsp {
     pub layers: Layers,
     /// Lump 17 of Quake Live.
     pub advertisements: Vec<Advertisement>,
+    /// How a map of Quake's formats draws its textures; see [`Bsp::material_script`]. Empty in other formats.
+    pub texture_uses: Vec<quake::TextureUse>,
+    /// Textures that a map of Quake's formats holds.
+    pub embedded_textures: Vec<quake::EmbeddedTexture>,
+    /// Whether the texture coordinates of vertices are in texels, because the format does not store the sizes of
+    /// textures (Quake II): see [`Bsp::resolve_texture_sizes`].
+    pub texel_coordinates: bool,
     /// What the file looked like around the data.
     pub container: Container,
     /// Tolerated oddities found by [`Bsp::parse`], in the order found.

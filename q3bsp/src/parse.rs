@@ -6,6 +6,7 @@ use crate::error::{Error, Lump, Warning};
 use crate::format::{Announced, Format, announced};
 use crate::layers::{GridLayers, LayeredSide, LayeredSurface, LayeredVertex};
 use crate::lumps::{GridPoint, Lightmap, Record, ShaderRef};
+use crate::quake::QuakeMap;
 use crate::{Bsp, Visibility};
 
 impl Bsp {
@@ -17,6 +18,9 @@ impl Bsp {
     /// are in [`Bsp::warnings`].
     pub fn parse(bytes: &[u8]) -> Result<Bsp, Error> {
         let format = match announced(bytes) {
+            Announced::Known(format) if format.is_quake() => {
+                return QuakeMap::parse(bytes)?.to_bsp();
+            }
             Announced::Known(format) => format,
             Announced::Foreign(found) => return Err(Error::WrongFormat { found }),
             Announced::Nothing => {

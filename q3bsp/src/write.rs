@@ -175,6 +175,8 @@ impl Bsp {
                 }
                 out
             }
+            // The lumps that only Quake's formats have.
+            _ => Vec::new(),
         };
         if let Some(trailing) = self.container.trailing.get(lump.index()) {
             out.extend_from_slice(trailing);
@@ -243,7 +245,7 @@ impl Format {
             Lump::LightGrid => GridPoint::STRIDE,
             Lump::LightArray => u16::STRIDE,
             Lump::Advertisements => Advertisement::STRIDE,
-            Lump::Entities | Lump::Lightmaps | Lump::Visibility => 1,
+            _ => 1,
         }
     }
 }

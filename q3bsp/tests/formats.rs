@@ -10,6 +10,8 @@ use q3bsp::{
 };
 use sample::{sample, survive, vert};
 
+#[path = "common/exercise.rs"]
+mod exercise;
 #[path = "common/sample.rs"]
 mod sample;
 

@@ -5,6 +5,8 @@ use q3bsp::{Bsp, DrawVert, Error, Lump, tessellate_patch};
 use sample::{sample, survive, vert};
 use std::sync::LazyLock;
 
+#[path = "common/exercise.rs"]
+mod exercise;
 #[path = "common/sample.rs"]
 mod sample;
 
@@ -293,7 +295,7 @@ fn foreign_formats_are_named() {
         (&b"IBSP\x30\0\0\0"[..], "\"IBSP\" version 48 (Iron Grip"),
         (b"VBSP\x14\0\0\0", "\"VBSP\" version 20 (Source"),
         (b"PSBI\0\0\0\x2e", "big-endian"),
-        (b"\x1d\0\0\0\0\0\0\0", "Quake"),
+        (b"FAKK\x0c\0\0\0", "Ritual"),
         (b"PK\x03\x04....", "zip"),
     ] {
         let error = Bsp::parse(bytes).unwrap_err().to_string();
