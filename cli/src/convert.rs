@@ -16,9 +16,12 @@ use relight::export::{
     Export, ExportOptions, ExportReport, Format, ImagePlace, ImageStore, Lightmaps,
     METRES_PER_UNIT, export,
 };
-use relight::{CalibrationCache, CalibrationOptions, Materials, Options, RelitWorld, SearchPath};
+use relight::{
+    CalibrationCache, CalibrationOptions, GameFiles, Materials, Options, RelitWorld, SearchPath,
+};
 use serde::Serialize;
 
+use crate::brought::Brought;
 use inputs::Input;
 
 /// Exit code for maps that cannot be read.
@@ -248,10 +251,17 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
         .map_err(failure(true))?;
     drop(bytes);
     let name = input.to_string();
-    let world = RelitWorld::from_bsp(shared.files, shared.materials, &name, bsp, options);
+    let brought = Brought::new(shared.files, &bsp);
+    let (files, materials) = match &brought {
+        Some(own) => (&own.files as &dyn GameFiles, &own.materials),
+        None => (shared.files as &dyn GameFiles, shared.materials),
+    };
+    let mut world = RelitWorld::from_bsp(files, materials, &name, bsp, options);
+    let warnings = brought.iter().flat_map(|own| own.warnings.iter());
+    world.warnings.extend(warnings.cloned());
     let source = Export {
         world: &world,
-        files: shared.files,
+        files,
         images: shared.images,
         options: ExportOptions {
             scale: args.scale,

@@ -2,6 +2,7 @@
 
 #![forbid(unsafe_code)]
 
+mod brought;
 mod calibration;
 mod cameras;
 mod compare;

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use anyhow::{Context, bail};
 use clap::Args;
 use glam::Vec3;
-use relight::{FileError, GameFiles, MemoryFiles, Pk3, SearchPath};
+use q3bsp::{Bsp, Format};
+use relight::{GameFiles, MemoryFiles, Overlay, Pk3, SearchPath, map_files};
 use renderer_vk::Renderer;
 use renderer_vk::api::{EntityKind, RefDef, RefEntity};
 
@@ -23,29 +24,6 @@ pub struct Maps {
         default_value = "/usr/share/games/openarena/baseoa"
     )]
     pub games: Vec<PathBuf>,
-}
-
-/// A loose file over a game's files.
-struct Layered {
-    front: MemoryFiles,
-    back: SearchPath,
-}
-
-impl GameFiles for Layered {
-    fn read(&self, path: &str) -> Result<Option<Vec<u8>>, FileError> {
-        match self.front.read(path)? {
-            Some(bytes) => Ok(Some(bytes)),
-            None => self.back.read(path),
-        }
-    }
-
-    fn list(&self, dir: &str, extension: &str) -> Vec<String> {
-        self.back.list(dir, extension)
-    }
-
-    fn exists(&self, path: &str) -> bool {
-        self.front.exists(path) || self.back.exists(path)
-    }
 }
 
 /// Where the game's files and the map come from.
@@ -80,12 +58,33 @@ pub fn open(map: &str, games: &[PathBuf]) -> anyhow::Result<(Arc<dyn GameFiles>,
                 &name,
                 std::fs::read(&file).with_context(|| format!("{map}: cannot be read"))?,
             )?;
-            return Ok((Arc::new(Layered { front, back: path }), name));
+            return Ok((with_map_files(path, front, &name)?, name));
         }
         _ if map.starts_with("maps/") => map,
         _ => format!("maps/{map}.bsp"),
     };
-    Ok((Arc::new(path), name))
+    Ok((with_map_files(path, MemoryFiles::new(), &name)?, name))
+}
+
+/// The game's files with `front` before them, and what the map brings along where its format has no scripts.
+fn with_map_files(
+    back: SearchPath,
+    front: MemoryFiles,
+    name: &str,
+) -> anyhow::Result<Arc<dyn GameFiles>> {
+    let files = Overlay { front, back };
+    let bytes = files.read(name)?.unwrap_or_default();
+    if !Format::of(&bytes).is_some_and(Format::is_quake) {
+        return Ok(Arc::new(files));
+    }
+    let bsp = Bsp::parse(&bytes).with_context(|| name.to_owned())?;
+    let Some((front, warnings)) = map_files(&bsp, &files) else {
+        return Ok(Arc::new(files));
+    };
+    for warning in warnings {
+        log::warn!("{name}: {warning}");
+    }
+    Ok(Arc::new(Overlay { front, back: files }))
 }
 
 /// A place to look from.
@@ -128,7 +127,7 @@ impl Camera {
     }
 
     /// The intermission's view, or that of the first spawn point, eyes 26 units above it.
-    pub fn of_map(bsp: &q3bsp::Bsp) -> Option<Self> {
+    pub fn of_map(bsp: &Bsp) -> Option<Self> {
         let entities = bsp.entities();
         let find = |class: &str| entities.iter().find(|e| e.classname() == class);
         let number =
@@ -168,7 +167,7 @@ impl Camera {
 }
 
 /// What the game would add to every view: the map's inline models at rest, and the marks of its mirrors.
-pub fn map_entities(renderer: &mut Renderer, bsp: &q3bsp::Bsp) -> Vec<RefEntity> {
+pub fn map_entities(renderer: &mut Renderer, bsp: &Bsp) -> Vec<RefEntity> {
     let mut entities = Vec::new();
     let axis = [Vec3::X, Vec3::Y, Vec3::Z];
     for entity in bsp.entities() {

@@ -57,6 +57,14 @@ impl Format {
         if self.is_quake() { Format::Fbsp } else { self }
     }
 
+    /// The format that a file announces; `None` when it is none of those that are read.
+    pub fn of(bytes: &[u8]) -> Option<Format> {
+        match announced(bytes) {
+            Announced::Known(format) => Some(format),
+            _ => None,
+        }
+    }
+
     /// Name for people: identification, version and games.
     pub fn name(self) -> &'static str {
         match self {

@@ -35,6 +35,7 @@ pub mod exposure;
 pub mod files;
 pub mod image;
 pub mod light;
+mod map_files;
 pub mod materials;
 pub mod overbright;
 pub mod sample;
@@ -43,7 +44,8 @@ mod test_data;
 pub mod world;
 
 pub use calibrate::{CalibrationCache, CalibrationOptions, CalibrationReport, calibrate};
-pub use files::{FileError, GameFiles, MemoryFiles, Pk3, SearchPath};
+pub use files::{FileError, GameFiles, MemoryFiles, Overlay, Pak, Pk3, SearchPath};
 pub use light::{LightLists, LightReport, PointLight, SunLight, TriangleLight};
+pub use map_files::map_files;
 pub use materials::{Materials, Resolved};
 pub use world::{LoadError, Options, RelitWorld, WorldMaterial, WorldSurface, WorldVertex};

@@ -6,11 +6,15 @@
 
 mod folder;
 mod memory;
+mod overlay;
+mod pak;
 mod pk3;
 mod search_path;
 
 pub use folder::Folder;
 pub use memory::MemoryFiles;
+pub use overlay::Overlay;
+pub use pak::Pak;
 pub use pk3::Pk3;
 pub use search_path::{SearchPath, compare_pack_names};
 
@@ -91,6 +95,20 @@ pub trait GameFiles {
     /// Whether [`read`](Self::read) would find the file.
     fn exists(&self, path: &str) -> bool {
         matches!(self.read(path), Ok(Some(_)))
+    }
+}
+
+impl<T: GameFiles + ?Sized> GameFiles for &T {
+    fn read(&self, path: &str) -> Result<Option<Vec<u8>>, FileError> {
+        (**self).read(path)
+    }
+
+    fn list(&self, dir: &str, extension: &str) -> Vec<String> {
+        (**self).list(dir, extension)
+    }
+
+    fn exists(&self, path: &str) -> bool {
+        (**self).exists(path)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The engine's search path: game folders with their packs, in order of priority.
 
-use super::{FileError, Folder, GameFiles, Pk3, normalise};
+use super::{FileError, Folder, GameFiles, Pak, Pk3, normalise};
 use std::cmp::Ordering;
 use std::collections::HashSet;
 use std::fs;
@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 /// * Game folders are added in rising priority: what a later folder has hides what an earlier one has.
 /// * Inside a game folder, `*.pk3` files and `*.pk3dir` folders are sorted by name (see
 ///   [`compare_pack_names`]); a later name has priority.
+/// * `*.pak` files, those of Quake and Quake II, are below them, sorted in the same way.
 /// * The folder's own loose files have priority over its packs.
 #[derive(Debug, Default)]
 pub struct SearchPath {
@@ -23,6 +24,7 @@ pub struct SearchPath {
 #[derive(Debug)]
 enum Source {
     Pk3(Box<Pk3>),
+    Pak(Box<Pak>),
     Folder(Folder),
 }
 
@@ -30,6 +32,7 @@ impl Source {
     fn files(&self) -> &dyn GameFiles {
         match self {
             Source::Pk3(pk3) => pk3.as_ref(),
+            Source::Pak(pak) => pak.as_ref(),
             Source::Folder(folder) => folder,
         }
     }
@@ -79,14 +82,21 @@ impl SearchPath {
                 if path.is_dir() {
                     lower.ends_with(".pk3dir")
                 } else {
-                    lower.ends_with(".pk3")
+                    lower.ends_with(".pk3") || lower.ends_with(".pak")
                 }
             })
             .collect();
-        packs.sort_by(|a, b| compare_pack_names(&a.0, &b.0).then_with(|| a.0.cmp(&b.0)));
-        for (_, path) in packs {
+        let is_pak = |name: &str| name.to_ascii_lowercase().ends_with(".pak");
+        packs.sort_by(|a, b| {
+            let kinds = is_pak(&b.0).cmp(&is_pak(&a.0));
+            let names = compare_pack_names(&a.0, &b.0).then_with(|| a.0.cmp(&b.0));
+            kinds.then(names)
+        });
+        for (name, path) in packs {
             let added = if path.is_dir() {
                 self.add_folder(&path)
+            } else if is_pak(&name) {
+                Pak::open(&path).map(|pak| self.sources.push(Source::Pak(Box::new(pak))))
             } else {
                 self.add_pk3(&path)
             };

@@ -8,6 +8,7 @@ mod bmp;
 mod pcx;
 mod resample;
 mod tga;
+mod wal;
 
 use crate::files::{FileError, GameFiles};
 use crate::overbright;
@@ -21,6 +22,14 @@ pub const MAX_PIXELS: u64 = 1 << 26;
 
 /// Extensions that the engine tries, in its order.
 pub const EXTENSIONS: [&str; 6] = ["tga", "jpg", "jpeg", "png", "pcx", "bmp"];
+
+/// Extension of the textures of Quake II, tried after those of the engine.
+const WAL: &str = "wal";
+
+/// All extensions in the order tried.
+fn extensions() -> impl Iterator<Item = &'static str> {
+    EXTENSIONS.into_iter().chain([WAL])
+}
 
 /// Why an image file could not be used.
 #[derive(Debug, thiserror::Error)]
@@ -149,7 +158,7 @@ pub fn load(files: &dyn GameFiles, name: &str) -> Result<Option<(Image, String)>
     {
         return Ok(Some((image, name.to_owned())));
     }
-    for ext in EXTENSIONS {
+    for ext in extensions() {
         if written.as_deref() == Some(ext) {
             continue;
         }
@@ -175,8 +184,7 @@ pub fn find(files: &dyn GameFiles, name: &str) -> Option<String> {
         }
         _ => name,
     };
-    EXTENSIONS
-        .iter()
+    extensions()
         .map(|ext| format!("{stem}.{ext}"))
         .find(|file| files.exists(file))
 }
@@ -228,7 +236,11 @@ fn load_one(
     let Some(bytes) = files.read(file)? else {
         return Ok(None);
     };
-    match decode(file, extension, &bytes) {
+    let decoded = match extension {
+        WAL => decode_wal(files, file, &bytes),
+        _ => decode(file, extension, &bytes),
+    };
+    match decoded {
         Ok(image) => Ok(Some(image)),
         // The engine treats these three formats as absent when they cannot be decoded.
         Err(problem @ ImageError::Malformed { .. }) if !matches!(extension, "tga" | "bmp") => {
@@ -244,10 +256,6 @@ fn load_one(
 /// # Errors
 /// [`ImageError::Malformed`] and [`ImageError::Size`].
 pub fn decode(file: &str, extension: &str, bytes: &[u8]) -> Result<Image, ImageError> {
-    let malformed = |reason: String| ImageError::Malformed {
-        file: file.to_owned(),
-        reason,
-    };
     let decoded = match extension {
         "tga" => tga::decode(bytes),
         "bmp" => bmp::decode(bytes),
@@ -258,14 +266,32 @@ pub fn decode(file: &str, extension: &str, bytes: &[u8]) -> Result<Image, ImageE
             "no reader for extension {other:?}"
         ))),
     };
-    decoded.map_err(|fault| match fault {
-        Fault::Malformed(reason) => malformed(reason),
-        Fault::Size(width, height) => ImageError::Size {
-            file: file.to_owned(),
-            width,
-            height,
-        },
-    })
+    decoded.map_err(|fault| fault.of(file))
+}
+
+/// Decodes a texture of Quake II with the palette of its game.
+fn decode_wal(files: &dyn GameFiles, file: &str, bytes: &[u8]) -> Result<Image, ImageError> {
+    let pcx = files.read(wal::PALETTE_FILE)?;
+    let palette = pcx.as_deref().and_then(wal::palette_of_pcx);
+    let decoded = match palette {
+        Some(palette) => wal::decode(bytes, palette),
+        None => Err(Fault::Malformed(format!(
+            "there is no palette for it, {}",
+            wal::PALETTE_FILE
+        ))),
+    };
+    decoded.map_err(|fault| fault.of(file))
+}
+
+/// Width and height of the picture that a map's texture coordinates are made for: the texture of Quake II when there
+/// is one, else whatever [`load`] finds. `None` when there is none that can be read.
+pub fn texture_size(files: &dyn GameFiles, name: &str) -> Option<(u32, u32)> {
+    let wal = files.read(&format!("{name}.{WAL}")).ok().flatten();
+    if let Some(size) = wal.as_deref().and_then(wal::size) {
+        return Some(size);
+    }
+    let (picture, _) = load(files, name).ok()??;
+    Some((picture.width, picture.height))
 }
 
 /// What a reader complains about, before the file's name is known.
@@ -273,6 +299,20 @@ pub fn decode(file: &str, extension: &str, bytes: &[u8]) -> Result<Image, ImageE
 enum Fault {
     Malformed(String),
     Size(u32, u32),
+}
+
+impl Fault {
+    fn of(self, file: &str) -> ImageError {
+        let file = file.to_owned();
+        match self {
+            Fault::Malformed(reason) => ImageError::Malformed { file, reason },
+            Fault::Size(width, height) => ImageError::Size {
+                file,
+                width,
+                height,
+            },
+        }
+    }
 }
 
 impl From<&str> for Fault {

@@ -300,3 +300,25 @@ fn openarena_images_decode() {
     assert_eq!(count["tga"], 1439);
     assert_eq!(count["png"], 7);
 }
+
+#[test]
+fn wal_takes_the_palette_of_its_game() {
+    let mut wal = vec![0; 100];
+    wal[32..36].copy_from_slice(&2u32.to_le_bytes());
+    wal[36..40].copy_from_slice(&1u32.to_le_bytes());
+    wal[40..44].copy_from_slice(&100u32.to_le_bytes());
+    wal.extend([3, 200]);
+    let mut files = MemoryFiles::new();
+    files.insert("textures/e1/stone.wal", wal.clone()).unwrap();
+    assert!(load(&files, "textures/e1/stone").unwrap().is_none());
+    let palette: Vec<u8> = (0..=255u8).flat_map(|i| [i, 0, 9]).collect();
+    files.insert("pics/colormap.pcx", palette).unwrap();
+    let (image, path) = load(&files, "textures/e1/stone").unwrap().unwrap();
+    assert_eq!(path, "textures/e1/stone.wal");
+    assert_eq!(image.rgba, [3, 0, 9, 255, 200, 0, 9, 255]);
+    assert_eq!(texture_size(&files, "textures/e1/stone"), Some((2, 1)));
+    assert_eq!(texture_size(&files, "textures/e1/none"), None);
+    for length in 0..wal.len() {
+        assert!(wal::decode(&wal[..length], &[0; 768]).is_err());
+    }
+}

@@ -5,6 +5,7 @@ use super::material::{WorldMaterial, lighting_of, lightmap_of};
 use super::{RelitWorld, fog};
 use crate::calibrate::{CalibrationOptions, calibrate};
 use crate::files::{FileError, GameFiles};
+use crate::image;
 use crate::light::{self, LightReport, TriangleLight};
 use crate::materials::Materials;
 use crate::overbright::MAP_OVERBRIGHT_BITS;
@@ -108,9 +109,10 @@ impl RelitWorld {
         files: &dyn GameFiles,
         materials: &Materials,
         map: &str,
-        bsp: Bsp,
+        mut bsp: Bsp,
         mut options: Options<'_>,
     ) -> RelitWorld {
+        bsp.resolve_texture_sizes(|name| image::texture_size(files, name));
         let mut begin = |stage: Stage| {
             if let Some(progress) = options.progress.as_mut() {
                 progress(stage);
