@@ -21,11 +21,9 @@ use relight::{
 };
 use serde::Serialize;
 
+use crate::BAD_INPUT;
 use crate::brought::Brought;
 use inputs::Input;
-
-/// Exit code for maps that cannot be read.
-const BAD_INPUT: u8 = 2;
 
 /// Write maps for other programs
 ///

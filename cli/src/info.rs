@@ -1,19 +1,32 @@
 //! `relight info`: what is in maps, and where their light comes from.
 
-use std::collections::BTreeMap;
+mod describe;
+mod table;
+
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use relight::{
-    CalibrationCache, CalibrationOptions, CalibrationReport, GameFiles, Materials, Options, Pk3,
-    RelitWorld, SearchPath,
+    CalibrationCache, CalibrationOptions, GameFiles, Materials, Options, Pk3, RelitWorld,
+    SearchPath,
 };
 use serde::Serialize;
 
-/// Options of `relight info`.
+use crate::BAD_INPUT;
+use crate::brought::Brought;
+use describe::MapInfo;
+
+/// Tell what is in maps, and where their light comes from
+///
+/// One map in full, several as a table: format, lumps, bounds, entities, materials and which are missing, lightmaps,
+/// fogs, clusters and how much they see, lights by their evidence, warnings. Exit code: 0, or 2 when some map cannot be
+/// read.
+///
+/// Examples: relight info oa_dm1; relight info pak1-maps.pk3; relight info my.bsp --json
 #[derive(Args, Debug)]
 pub struct InfoArgs {
     /// Game folder with packs; give several in rising priority (the base game first, the mod after it)
@@ -26,6 +39,9 @@ pub struct InfoArgs {
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
+    /// A table also for a single map
+    #[arg(long)]
+    short: bool,
     /// List the emitting materials of each map
     #[arg(long)]
     emitters: bool,
@@ -49,88 +65,6 @@ enum Source {
     File(PathBuf),
 }
 
-/// What is told about a map.
-#[derive(Serialize)]
-struct MapInfo {
-    map: String,
-    surfaces: usize,
-    triangles: usize,
-    materials: usize,
-    /// Materials without script and image, or that the engine rejects: drawn with the default.
-    missing: Vec<String>,
-    triangle_lights: usize,
-    /// Triangle lights by the evidence for them.
-    lights_by_source: BTreeMap<&'static str, usize>,
-    point_lights: usize,
-    suns: usize,
-    ambient: [f32; 3],
-    clusters: usize,
-    mean_list_length: f64,
-    longest_list: usize,
-    degenerate_triangles: usize,
-    emitters: Vec<Emitter>,
-    /// Light against the map's lightmaps; absent unless asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    calibration: Option<Calibration>,
-    warnings: Vec<String>,
-    milliseconds: u128,
-}
-
-/// How well light agrees with the map's lightmaps, over measurements that fitting did not see.
-#[derive(Serialize)]
-struct Calibration {
-    /// What told of light.
-    evidence: &'static str,
-    samples: usize,
-    held_out: usize,
-    known_sources: usize,
-    placed_lights: usize,
-    before: Agreement,
-    after: Agreement,
-    cached: bool,
-    seconds: f64,
-}
-
-/// Computed light against stored light.
-#[derive(Serialize)]
-struct Agreement {
-    median_stops: f32,
-    worst_tenth_stops: f32,
-    sum_ratio: f32,
-}
-
-impl Calibration {
-    fn new(report: &CalibrationReport) -> Calibration {
-        let agreement = |a: &relight::calibrate::Agreement| Agreement {
-            median_stops: a.median_stops,
-            worst_tenth_stops: a.worst_tenth_stops,
-            sum_ratio: a.sum_ratio,
-        };
-        Calibration {
-            evidence: report.evidence.label(),
-            samples: report.samples,
-            held_out: report.held_out,
-            known_sources: report.known,
-            placed_lights: report.placed,
-            before: agreement(&report.before),
-            after: agreement(&report.after),
-            cached: report.cached,
-            seconds: report.seconds,
-        }
-    }
-}
-
-/// One emitting material.
-#[derive(Serialize)]
-struct Emitter {
-    material: String,
-    source: &'static str,
-    radiance: [f32; 3],
-    surfaces: usize,
-    triangles: usize,
-    area: f64,
-}
-
 /// What is told about a map that cannot be loaded.
 #[derive(Serialize)]
 struct Failure {
@@ -138,8 +72,8 @@ struct Failure {
     error: String,
 }
 
-/// Loads the maps and prints what is in them; fails when one of them cannot be loaded.
-pub fn run(args: &InfoArgs) -> Result<()> {
+/// Loads the maps and prints what is in them. Exit code 2 when one of them cannot be read.
+pub fn run(args: &InfoArgs) -> Result<ExitCode> {
     let mut files = SearchPath::open(&args.games)?;
     let sources = find_maps(&mut files, &args.maps)?;
     if sources.is_empty() {
@@ -163,9 +97,8 @@ pub fn run(args: &InfoArgs) -> Result<()> {
             Source::File(path) => path.display().to_string(),
         };
         bar.set_message(name.clone());
-        let begin = Instant::now();
         match load(&files, &materials, &source, args) {
-            Ok(world) => infos.push(describe(&world, begin.elapsed().as_millis())),
+            Ok(info) => infos.push(info),
             Err(error) => failures.push(Failure {
                 map: name,
                 error: format!("{error:#}"),
@@ -178,16 +111,19 @@ pub fn run(args: &InfoArgs) -> Result<()> {
         let all = serde_json::json!({ "maps": infos, "failures": failures });
         println!("{}", serde_json::to_string_pretty(&all)?);
     } else {
-        print_table(&infos, args.emitters);
+        match infos.as_slice() {
+            // A single map in full, several as a table.
+            [one] if !args.short => table::print_map(one, args.emitters),
+            many => table::print_table(many, args.emitters),
+        }
         for failure in &failures {
             eprintln!("{}: {}", failure.map, failure.error);
         }
     }
-    match failures.len() {
-        0 => Ok(()),
-        1 => bail!("1 map cannot be loaded"),
-        count => bail!("{count} maps cannot be loaded"),
-    }
+    Ok(match failures.len() {
+        0 => ExitCode::SUCCESS,
+        _ => ExitCode::from(BAD_INPUT),
+    })
 }
 
 fn find_maps(files: &mut SearchPath, asked: &[String]) -> Result<Vec<Source>> {
@@ -231,7 +167,8 @@ fn load(
     materials: &Materials,
     source: &Source,
     args: &InfoArgs,
-) -> Result<RelitWorld> {
+) -> Result<MapInfo> {
+    let begin = Instant::now();
     let calibrate = args.calibrate.then(|| CalibrationOptions {
         cache: args.cache.as_ref().map(CalibrationCache::new),
         ..CalibrationOptions::default()
@@ -240,132 +177,29 @@ fn load(
         calibrate,
         ..Options::default()
     };
-    match source {
-        Source::Game(map) => Ok(RelitWorld::load(files, materials, map, options)?),
+    let (name, bytes) = match source {
+        Source::Game(map) => {
+            let bytes = files.read(map)?;
+            let absent = || format!("{map}: no such file in the game folders");
+            (map.clone(), bytes.with_context(absent)?)
+        }
         Source::File(path) => {
             let name = path.display().to_string();
             let bytes = std::fs::read(path).with_context(|| name.clone())?;
-            let bsp = q3bsp::Bsp::parse(&bytes).with_context(|| name.clone())?;
-            Ok(RelitWorld::from_bsp(files, materials, &name, bsp, options))
+            (name, bytes)
         }
-    }
-}
-
-fn describe(world: &RelitWorld, milliseconds: u128) -> MapInfo {
-    let report = &world.report;
-    let mut missing: Vec<_> = world
-        .materials
-        .iter()
-        .filter(|m| m.resolved.fault.is_some())
-        .map(|m| m.name.clone())
-        .collect();
-    missing.sort();
-    missing.dedup();
-    let mut lights_by_source = BTreeMap::new();
-    for emitter in &report.emitters {
-        *lights_by_source.entry(emitter.source.label()).or_default() += emitter.triangles;
-    }
-    MapInfo {
-        map: world.name.clone(),
-        surfaces: world.surfaces.len(),
-        triangles: world.indices.len() / 3,
-        materials: world.materials.len(),
-        missing,
-        triangle_lights: report.triangle_lights,
-        lights_by_source,
-        point_lights: report.point_lights,
-        suns: report.suns,
-        ambient: world.ambient.to_array(),
-        clusters: report.clusters,
-        mean_list_length: report.mean_list_length,
-        longest_list: report.longest_list,
-        degenerate_triangles: report.degenerate_triangles,
-        emitters: report
-            .emitters
-            .iter()
-            .map(|e| Emitter {
-                material: e.name.clone(),
-                source: e.source.label(),
-                radiance: e.radiance.to_array(),
-                surfaces: e.surfaces,
-                triangles: e.triangles,
-                area: e.area,
-            })
-            .collect(),
-        calibration: world.calibration.as_ref().map(Calibration::new),
-        warnings: world.warnings.clone(),
-        milliseconds,
-    }
-}
-
-fn print_table(infos: &[MapInfo], emitters: bool) {
-    let width = infos.iter().map(|i| i.map.len()).max().unwrap_or(0).max(3);
-    println!(
-        "{:width$} {:>8} {:>9} {:>9} {:>7} {:>6} {:>6} {:>4} {:>8} {:>9} {:>7} {:>6}",
-        "map",
-        "surfaces",
-        "triangles",
-        "materials",
-        "missing",
-        "lights",
-        "points",
-        "suns",
-        "clusters",
-        "mean list",
-        "longest",
-        "ms"
-    );
-    for info in infos {
-        println!(
-            "{:width$} {:>8} {:>9} {:>9} {:>7} {:>6} {:>6} {:>4} {:>8} {:>9.1} {:>7} {:>6}",
-            info.map,
-            info.surfaces,
-            info.triangles,
-            info.materials,
-            info.missing.len(),
-            info.triangle_lights,
-            info.point_lights,
-            info.suns,
-            info.clusters,
-            info.mean_list_length,
-            info.longest_list,
-            info.milliseconds
-        );
-        if !info.missing.is_empty() {
-            println!("    missing: {}", info.missing.join(", "));
+    };
+    let lumps = q3bsp::lump_entries(&bytes).with_context(|| name.clone())?;
+    let bsp = q3bsp::Bsp::parse(&bytes).with_context(|| name.clone())?;
+    let brought = Brought::new(files, &bsp);
+    let world = match &brought {
+        Some(own) => {
+            let mut world = RelitWorld::from_bsp(&own.files, &own.materials, &name, bsp, options);
+            world.warnings.extend(own.warnings.iter().cloned());
+            world
         }
-        if let Some(c) = &info.calibration {
-            println!(
-                "    {}: {} samples ({} held out), {} known sources, {} lights placed; stops off in the median {:.3} -> {:.3}, \
-                 in the worst tenth {:.3} -> {:.3}; sum {:.3} -> {:.3} of stored; {:.2} s{}",
-                c.evidence,
-                c.samples,
-                c.held_out,
-                c.known_sources,
-                c.placed_lights,
-                c.before.median_stops,
-                c.after.median_stops,
-                c.before.worst_tenth_stops,
-                c.after.worst_tenth_stops,
-                c.before.sum_ratio,
-                c.after.sum_ratio,
-                c.seconds,
-                if c.cached { ", from the cache" } else { "" }
-            );
-        }
-        if emitters {
-            for e in &info.emitters {
-                let [r, g, b] = e.radiance;
-                println!(
-                    "    {:12} {:5} triangles, area {:10.0}, radiance {r:.3} {g:.3} {b:.3}  {}",
-                    e.source, e.triangles, e.area, e.material
-                );
-            }
-        }
-    }
-    let dark = infos
-        .iter()
-        .filter(|i| i.triangle_lights + i.point_lights + i.suns == 0)
-        .count();
-    println!("{} maps, {dark} without any light", infos.len());
+        None => RelitWorld::from_bsp(files, materials, &name, bsp, options),
+    };
+    let milliseconds = begin.elapsed().as_millis();
+    Ok(MapInfo::new(&world, bytes.len(), &lumps, milliseconds))
 }

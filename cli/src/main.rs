@@ -51,14 +51,57 @@ enum Command {
     Render(render::RenderArgs),
 }
 
-fn main() -> anyhow::Result<ExitCode> {
-    match Cli::parse().command {
+/// Exit code for input that cannot be read: a file that is cut off, of another kind, or damaged.
+const BAD_INPUT: u8 = 2;
+
+fn main() -> ExitCode {
+    match run(Cli::parse().command) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("{}", one_sentence(&error));
+            match is_bad_input(&error) {
+                true => ExitCode::from(BAD_INPUT),
+                false => ExitCode::FAILURE,
+            }
+        }
+    }
+}
+
+/// An error with its causes, each once: some of them repeat what caused them.
+fn one_sentence(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if text.ends_with(&cause) {
+            continue;
+        }
+        if !text.is_empty() {
+            text.push_str(": ");
+        }
+        text.push_str(&cause);
+    }
+    text
+}
+
+/// Whether a file was read that is not what it should be.
+fn is_bad_input(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause.is::<q3bsp::Error>()
+            || matches!(cause.downcast_ref(), Some(relight::LoadError::Map { .. }))
+            || matches!(
+                cause.downcast_ref(),
+                Some(relight::FileError::Pack { .. } | relight::FileError::Entry { .. })
+            )
+    })
+}
+
+fn run(command: Command) -> anyhow::Result<ExitCode> {
+    match command {
         Command::Calibration(args) => calibration::run(&args),
         Command::Cameras(args) => cameras::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Convert(args) => return convert::run(&args),
         Command::Estimators(args) => estimators::run(&args),
-        Command::Info(args) => info::run(&args),
+        Command::Info(args) => return info::run(&args),
         Command::Lights(args) => lights::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Render(args) => render::run(&args),

@@ -65,6 +65,7 @@ pub use lumps::{
     Brush, BrushSide, DrawVert, Fog, GridPoint, LIGHTMAP_BYTES, LIGHTMAP_SIZE, Leaf, Lightmap,
     Model, Node, Plane, ShaderRef,
 };
+pub use parse::{LumpEntry, lump_entries};
 pub use patch::{MAX_GRID_SIZE, PatchMesh, tessellate_patch};
 pub use surface::{Surface, SurfaceKind, lightmap_index};
 pub use visibility::Visibility;

@@ -208,6 +208,44 @@ impl Bsp {
     }
 }
 
+/// A lump as the directory of a file has it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LumpEntry {
+    /// The lump.
+    pub lump: Lump,
+    /// Where it lies.
+    pub range: LumpRange,
+    /// Bytes per record; 1 for text, pictures and compressed data.
+    pub stride: usize,
+}
+
+/// The directory of a map file of any [`Format`], in its order.
+///
+/// # Errors
+/// Another format, or a lump outside the file.
+pub fn lump_entries(bytes: &[u8]) -> Result<Vec<LumpEntry>, Error> {
+    let format = match announced(bytes) {
+        Announced::Known(format) => format,
+        Announced::Foreign(found) => return Err(Error::WrongFormat { found }),
+        Announced::Nothing => {
+            return Err(Error::TooShort {
+                found: bytes.len(),
+                needed: Format::Ibsp46.header_bytes(),
+            });
+        }
+    };
+    if format.is_quake() {
+        return Ok(QuakeMap::parse(bytes)?.lump_entries());
+    }
+    let ranges = directory(bytes, format)?;
+    let entry = |(&lump, range)| LumpEntry {
+        lump,
+        range,
+        stride: format.stride(lump),
+    };
+    Ok(format.lumps().iter().zip(ranges).map(entry).collect())
+}
+
 /// Reads the header and checks that every lump lies inside the file.
 fn directory(bytes: &[u8], format: Format) -> Result<[LumpRange; SLOTS], Error> {
     let needed = format.header_bytes();

@@ -8,6 +8,7 @@ use crate::bytes::Fields;
 use crate::container::LumpRange;
 use crate::error::{Error, Lump};
 use crate::format::Format;
+use crate::parse::LumpEntry;
 use glam::Vec3;
 
 /// Lumps of Quake and GoldSrc in directory order.
@@ -221,6 +222,18 @@ impl QuakeMap {
                 stored.map(|(_, data)| data.clone()).unwrap_or_default()
             }
         }
+    }
+
+    /// The directory with the sizes of records.
+    pub(crate) fn lump_entries(&self) -> Vec<LumpEntry> {
+        let lumps = self.lumps().iter().zip(&self.directory);
+        lumps
+            .map(|(&lump, &range)| LumpEntry {
+                lump,
+                range,
+                stride: stride(lump, self.format),
+            })
+            .collect()
     }
 
     /// An error about a record, with its place in the file.
