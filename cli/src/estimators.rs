@@ -190,6 +190,7 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
             validation: false,
             device: args.device.clone(),
             vsync: false,
+            pipeline_cache: None,
         })
         .context("no picture without a Vulkan device")?;
         renderer.begin_registration(files, &base)?;

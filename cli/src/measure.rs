@@ -348,6 +348,7 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
             validation: false,
             device: args.device.clone(),
             vsync: false,
+            pipeline_cache: None,
         })
         .context("nothing to measure without a Vulkan device")?;
         let base = Settings {

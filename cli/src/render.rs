@@ -160,6 +160,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         validation: args.validate,
         device: args.device.clone(),
         vsync: false,
+        pipeline_cache: None,
     })
     .context("no picture without a Vulkan device")?;
     let info = renderer.device_info().clone();

@@ -10,12 +10,24 @@ pub struct Cinematics {
     /// By the renderer's client number: the engine's handle, or `None` for a video that cannot be played, so that it
     /// is asked for once and not every frame.
     playing: HashMap<usize, Option<i32>>,
+    /// An empty list of clients, for its memory.
+    list: Vec<usize>,
 }
 
 impl Cinematics {
     /// Forgets all; the engine closes them itself when the map ends.
     pub fn clear(&mut self) {
         self.playing.clear();
+    }
+
+    /// An empty list to be given back.
+    pub fn take_list(&mut self) -> Vec<usize> {
+        std::mem::take(&mut self.list)
+    }
+
+    /// Takes an empty list back.
+    pub fn keep_list(&mut self, list: Vec<usize>) {
+        self.list = list;
     }
 
     /// What is known of a client's video: not asked yet, unplayable, or its handle.

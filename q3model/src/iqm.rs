@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec2, Vec3};
 
-use crate::{BoneMatrix, Tag};
+use crate::{BoneMatrix, TagPose};
 
 /// Joints that a vertex may hang on.
 pub const IQM_WEIGHTS: usize = 4;
@@ -327,14 +327,13 @@ impl Iqm {
     /// A joint between two frames; `frac` is the weight of `end`. Its axes have the length that the joints give them,
     /// as in the engine, which looks for frames beyond those that exist where there are none; here the nearest ones
     /// count. `None` when there is no such joint.
-    pub fn lerp_tag(&self, name: &str, start: i32, end: i32, frac: f32) -> Option<Tag> {
+    pub fn lerp_tag(&self, name: &str, start: i32, end: i32, frac: f32) -> Option<TagPose> {
         let joint = self.joints.iter().position(|joint| joint.name == name)?;
         let frame = |frame: i32| usize::try_from(frame).unwrap_or(0);
         let mut matrices = Vec::with_capacity(self.joints.len());
         self.joint_matrices(frame(start), frame(end), frac, &mut matrices);
         let matrix = matrices.get(joint)?;
-        Some(Tag {
-            name: name.to_owned(),
+        Some(TagPose {
             origin: matrix.translation(),
             axis: matrix.axes(),
         })

@@ -35,6 +35,6 @@ pub use iqm::{
     IQM_CHANNELS, IQM_WEIGHTS, Iqm, IqmChannels, IqmJoint, IqmPose, IqmSkeleton, IqmSurface,
     IqmVertex,
 };
-pub use md3::{Frame, Md3, PackedVertex, Surface, Tag};
+pub use md3::{Frame, Md3, PackedVertex, Surface, Tag, TagPose};
 pub use mdr::{Mdr, MdrSurface, MdrTag, MdrVertex, MdrWeight};
 pub use skin::{Skin, SkinSurface};

@@ -43,6 +43,15 @@ pub struct Tag {
     pub axis: [Vec3; 3],
 }
 
+/// Where a tag is between two frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TagPose {
+    /// Position, id units.
+    pub origin: Vec3,
+    /// Forward, left and up in model space.
+    pub axis: [Vec3; 3],
+}
+
 /// Triangles that share a shader.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
@@ -129,15 +138,14 @@ impl Md3 {
     /// A tag between two frames; `frac` is the weight of `end`. Frames are clamped to those that exist
     /// (the engine clamps only to the last; negative ones count as the first here). Origin and axes are
     /// mixed linearly and each axis normalised, as the engine does. `None` when there is no such tag.
-    pub fn lerp_tag(&self, name: &str, start: i32, end: i32, frac: f32) -> Option<Tag> {
+    pub fn lerp_tag(&self, name: &str, start: i32, end: i32, frac: f32) -> Option<TagPose> {
         let frame = |frame: i32| usize::try_from(frame).unwrap_or(0);
         let from = self.tag(frame(start), name)?;
         let to = self.tag(frame(end), name)?;
         let mix = |a: Vec3, b: Vec3| a * (1.0 - frac) + b * frac;
         let [a, b, c] = from.axis;
         let [d, e, f] = to.axis;
-        Some(Tag {
-            name: from.name.clone(),
+        Some(TagPose {
             origin: mix(from.origin, to.origin),
             axis: [mix(a, d), mix(b, e), mix(c, f)].map(Vec3::normalize_or_zero),
         })

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::{BoneMatrix, Frame, Tag};
+use crate::{BoneMatrix, Frame, TagPose};
 
 /// A model with all its levels of detail.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -112,7 +112,7 @@ impl Mdr {
     }
 
     /// A tag between two frames, by the rules of [`crate::Md3::lerp_tag`]. `None` when there is no such tag.
-    pub fn lerp_tag(&self, name: &str, start: i32, end: i32, frac: f32) -> Option<Tag> {
+    pub fn lerp_tag(&self, name: &str, start: i32, end: i32, frac: f32) -> Option<TagPose> {
         let tag = self.tags.iter().find(|tag| tag.name == name)?;
         let last = self.frames.len().saturating_sub(1);
         let bone = |frame: i32| {
@@ -120,8 +120,7 @@ impl Mdr {
             self.frame_bones(frame).get(tag.bone)
         };
         let between = bone(start)?.mix(1.0 - frac, bone(end)?, frac);
-        Some(Tag {
-            name: tag.name.clone(),
+        Some(TagPose {
             origin: between.translation(),
             axis: between.axes().map(Vec3::normalize_or_zero),
         })

@@ -1,6 +1,7 @@
 //! The renderer as a front end sees it: made, filled with what is registered, told what a frame shows.
 
 mod held;
+mod kept_pipelines;
 mod output;
 mod queries;
 mod still;
@@ -25,9 +26,10 @@ use crate::settings::Settings;
 use crate::stereo::Eye;
 use crate::targets::FrameTargets;
 use crate::trace::TraceLook;
-use crate::world::{EntityTokens, World};
+use crate::world::{EntityTokens, Marker, World};
 
 use held::HeldViews;
+use kept_pipelines::KeptPipelines;
 use output::milliseconds;
 pub use output::{CpuTimes, FrameStats};
 use still::StillRequest;
@@ -46,6 +48,8 @@ pub struct RendererOptions {
     pub device: Option<String>,
     /// Wait for the display's refresh.
     pub vsync: bool,
+    /// File that the driver's compiled pipelines are kept in from one start to the next; `None` keeps nothing.
+    pub pipeline_cache: Option<std::path::PathBuf>,
 }
 
 /// The renderer: one device, one window or none, and what the game has registered.
@@ -66,12 +70,14 @@ pub struct Renderer {
     swapchain: Option<Swapchain>,
     ring: FrameRing,
     device: Device,
+    kept_pipelines: KeptPipelines,
 
     settings: Settings,
     /// Rays of traced views are counted.
     counts_rays: bool,
     /// The last frame's picture is not shown yet.
     unshown: bool,
+    marker: Marker,
     /// With the channels that each is drawn in.
     queue: Vec<(Item, ColorMask)>,
     eye: Eye,
@@ -106,7 +112,11 @@ impl Renderer {
     /// # Errors
     /// There is no Vulkan, no device that fits, or it is out of memory.
     pub fn new(options: RendererOptions) -> Result<Self, Error> {
-        let device_options = device_options(options.device.as_deref(), options.validation);
+        let (kept_pipelines, pipeline_cache) = KeptPipelines::read(options.pipeline_cache);
+        let device_options = DeviceOptions {
+            pipeline_cache,
+            ..device_options(options.device.as_deref(), options.validation)
+        };
         let (device, swapchain) = match options.window {
             Some(window) => {
                 let device = window.source(|source| Device::new(&device_options, source))?;
@@ -143,7 +153,9 @@ impl Renderer {
             swapchain,
             ring: FrameRing::new(&device, 2)?,
             device,
+            kept_pipelines,
             settings: Settings::default(),
+            marker: Marker::default(),
             queue: Vec::new(),
             unshown: false,
             counts_rays: false,
@@ -254,6 +266,7 @@ impl Renderer {
         if let Err(e) = fits.and(made.map_err(Error::from)) {
             log::warn!("pipelines are not made ahead: {e}");
         }
+        self.kept_pipelines.write(&self.device);
     }
 
     /// Forgets every model, texture, material and the map. May be called again and again.
@@ -400,6 +413,7 @@ impl Renderer {
             Look::Classic => Item::Classic(scenes),
             Look::Traced => match scenes.pop() {
                 Some(scene) => {
+                    self.scene.recycle(scenes);
                     if pause {
                         self.held.hold(&scene);
                     }
@@ -522,6 +536,12 @@ impl Renderer {
             Some(assets) => Ok(assets.update_scratch(client, cols, rows, rgba, dirty)?),
             None => Ok(()),
         }
+    }
+}
+
+impl Drop for Renderer {
+    fn drop(&mut self) {
+        self.kept_pipelines.write(&self.device);
     }
 }
 

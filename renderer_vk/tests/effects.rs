@@ -44,6 +44,7 @@ impl Stage {
             validation: true,
             device: None,
             vsync: false,
+            pipeline_cache: None,
         };
         let mut renderer = match Renderer::new(options) {
             Ok(renderer) => renderer,

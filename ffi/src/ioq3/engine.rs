@@ -4,6 +4,7 @@
 //! stack that needs a destructor for correctness; what can leak in such a case is memory alone.
 
 use super::abi::{self, cvar_t, print, refimport_t};
+use std::borrow::Cow;
 use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_int, c_uchar, c_void};
 use std::ptr;
@@ -351,13 +352,20 @@ impl Engine {
 /// # Safety
 /// `text` must be null or point at a NUL-terminated string.
 pub unsafe fn string_from(text: *const c_char) -> String {
+    // SAFETY: by the caller's promise; copied at once.
+    unsafe { text_of(text) }.into_owned()
+}
+
+/// A C string where it lies; null is empty. Bytes that are not UTF-8 are replaced, in a copy.
+///
+/// # Safety
+/// `text` must be null or point at a NUL-terminated string, which must stay as it is for as long as the answer is used.
+pub unsafe fn text_of<'a>(text: *const c_char) -> Cow<'a, str> {
     if text.is_null() {
-        return String::new();
+        return Cow::Borrowed("");
     }
     // SAFETY: by the caller's promise.
-    unsafe { CStr::from_ptr(text) }
-        .to_string_lossy()
-        .into_owned()
+    unsafe { CStr::from_ptr(text) }.to_string_lossy()
 }
 
 /// A name that can be handed to the engine's file functions: not empty, shorter than the engine's limit for game

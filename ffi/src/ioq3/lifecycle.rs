@@ -12,7 +12,7 @@ use crate::{commands, config};
 use renderer_vk::api::Picture;
 use renderer_vk::{Error, Eye, Renderer, RendererOptions, gpu};
 use std::ffi::c_int;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -46,7 +46,8 @@ pub fn failure(error: Error) -> Failure {
     }
 }
 
-/// Where the game writes its own files: what was found out about a map is kept in a folder of ours below it.
+/// Where the game writes its own files: what was found out about a map, and compiled pipelines, are kept in a folder of
+/// ours below it.
 fn cache_folder(engine: Engine) -> Option<PathBuf> {
     let home = engine.cvar_text(c"fs_homepath");
     let game = [c"fs_game", c"com_basegame"]
@@ -70,9 +71,10 @@ pub extern "C" fn begin_registration(out: *mut glconfig_t) {
         cvars::write_back_clamps(engine, &cvars);
         commands::add(engine);
 
+        let cache_folder = cache_folder(engine);
         let has_renderer = session::with(|session| session.renderer.is_some()).unwrap_or(false);
         if !has_renderer {
-            start_renderer(engine, &cvars)?;
+            start_renderer(engine, &cvars, cache_folder.as_deref())?;
         }
         let info = session::with(|session| {
             describe(session.renderer.as_ref()?, &mut session.front).into()
@@ -84,7 +86,6 @@ pub extern "C" fn begin_registration(out: *mut glconfig_t) {
         }
         // The input code reads nothing of ours, but it is the engine's: no state is held.
         window::give_to_input_once(engine);
-        let cache_folder = cache_folder(engine);
 
         session::with(|session| {
             let front = &mut session.front;
@@ -111,7 +112,11 @@ pub extern "C" fn begin_registration(out: *mut glconfig_t) {
 }
 
 /// Opens the window, unless there is one or none is wanted, and makes a renderer for it.
-fn start_renderer(engine: Engine, cvars: &Cvars) -> Result<(), Failure> {
+fn start_renderer(
+    engine: Engine,
+    cvars: &Cvars,
+    cache_folder: Option<&Path>,
+) -> Result<(), Failure> {
     if window::current().is_some_and(|window| window.stale) {
         window::close(engine, false);
     }
@@ -119,7 +124,7 @@ fn start_renderer(engine: Engine, cvars: &Cvars) -> Result<(), Failure> {
     let made = if headless {
         let size =
             window::headless_mode(cvars).map_or((640, 480), |mode| (mode.width, mode.height));
-        make_renderer(cvars, size, None)
+        make_renderer(cvars, size, None, cache_folder)
     } else {
         window::refresh_size();
         let window = match window::current() {
@@ -128,7 +133,7 @@ fn start_renderer(engine: Engine, cvars: &Cvars) -> Result<(), Failure> {
         };
         window
             .map_err(|e| e.to_string())
-            .and_then(|window| make_renderer(cvars, window.size, Some(window)))
+            .and_then(|window| make_renderer(cvars, window.size, Some(window), cache_folder))
     };
     match made {
         Ok(renderer) => {
@@ -164,6 +169,7 @@ fn make_renderer(
     cvars: &Cvars,
     (width, height): (u32, u32),
     window: Option<Window>,
+    cache_folder: Option<&Path>,
 ) -> Result<Renderer, String> {
     let window = window
         .map(|window| window.source())
@@ -176,6 +182,7 @@ fn make_renderer(
         validation: cvars.flag(Cvar::VkValidation),
         device: wanted_device(cvars),
         vsync: cvars.flag(Cvar::SwapInterval),
+        pipeline_cache: cache_folder.map(|folder| folder.join("pipelines.cache")),
     };
     Renderer::new(options).map_err(|e| e.to_string())
 }
@@ -455,14 +462,22 @@ fn deliver(engine: Engine, outbox: Outbox) {
 /// Lets the engine decode the videos that are in view. It calls `UploadCinematic` from inside, so the state is in its
 /// cell meanwhile.
 fn run_videos(engine: Engine) -> Result<(), Failure> {
-    let wanted = with_renderer(|renderer, front| {
-        let state = |(name, client)| (name, client, front.cinematics.state(client));
-        Ok(renderer.videos().into_iter().map(state).collect::<Vec<_>>())
+    let mut wanted = with_renderer(|renderer, front| {
+        let mut wanted = front.cinematics.take_list();
+        wanted.extend(renderer.videos().map(|(_, client)| client));
+        Ok(wanted)
     })?;
-    for (name, client, state) in wanted {
+    for &client in &wanted {
+        let (state, name) = with_renderer(|renderer, front| {
+            let state = front.cinematics.state(client);
+            let mut unknown = renderer.videos().filter(|_| state.is_none());
+            let name = unknown.find(|(_, known)| *known == client);
+            Ok((state, name.map(|(name, _)| name.to_owned())))
+        })?;
         let handle = match state {
             Some(handle) => handle,
             None => {
+                let name = name.unwrap_or_default();
                 let handle = valid_game_path(&name).and_then(|name| engine.play_cinematic(&name));
                 with_renderer(|renderer, front| {
                     front.cinematics.remember(client, handle);
@@ -478,6 +493,8 @@ fn run_videos(engine: Engine) -> Result<(), Failure> {
             engine.run_cinematic(handle);
         }
     }
+    wanted.clear();
+    session::with(|session| session.front.cinematics.keep_list(wanted));
     Ok(())
 }
 

@@ -4,7 +4,7 @@ use super::abi::{
     QBool, Vec3C, fontInfo_t, markFragment_t, orientation_t, polyVert_t, refEntity_t, refdef_t,
 };
 use super::convert;
-use super::engine::{Engine, string_from};
+use super::engine::{Engine, string_from, text_of};
 use super::lifecycle::failure;
 use crate::boundary::{Failure, entry};
 use crate::cvars::{self, Cvar};
@@ -340,16 +340,16 @@ pub extern "C" fn mark_fragments(num_points: c_int, points: *const Vec3C, projec
         if points.is_null() || point_buffer.is_null() || fragment_buffer.is_null() {
             return Ok(0);
         }
-        let polygon: Vec<Vec3> = (0..count.min(MAX_MARK_POINTS))
-            .map(|i| {
-                // SAFETY: the engine promises `num_points` vectors.
-                unsafe { convert::vector(points.add(i)) }
-            })
-            .collect();
+        let mut polygon = [Vec3::ZERO; MAX_MARK_POINTS];
+        for (i, place) in polygon.iter_mut().enumerate().take(count) {
+            // SAFETY: the engine promises `num_points` vectors.
+            *place = unsafe { convert::vector(points.add(i)) };
+        }
+        let polygon = polygon.get(..count).unwrap_or(&polygon);
         // SAFETY: the engine passes a vector.
         let projection = unsafe { convert::vector(projection) };
         with_renderer(|renderer, _| {
-            let (points, fragments) = renderer.mark_fragments(&polygon, projection, max_points, max_fragments);
+            let (points, fragments) = renderer.mark_fragments(polygon, projection, max_points, max_fragments);
             for (i, point) in points.iter().take(max_points).enumerate() {
                 // SAFETY: the engine's buffer has room for `max_points`.
                 unsafe { convert::write_vector(point_buffer.add(i), *point) };
@@ -379,7 +379,7 @@ pub extern "C" fn lerp_tag(
 ) -> c_int {
     entry(|| {
         // SAFETY: the engine passes a C string.
-        let name = unsafe { string_from(name) };
+        let name = unsafe { text_of(name) };
         let tag =
             with_renderer(|renderer, _| Ok(renderer.lerp_tag(model, start, end, frac, &name)))?;
         if !out.is_null() {

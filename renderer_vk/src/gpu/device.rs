@@ -136,11 +136,22 @@ pub(crate) struct RenderPassKey {
     pub clear_depth: bool,
 }
 
+/// What a framebuffer is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FramebufferKey {
+    pub render_pass: vk::RenderPass,
+    /// The attachments, then null.
+    pub views: [vk::ImageView; 2],
+    pub extent: vk::Extent2D,
+}
+
 /// The shared part of a [`Device`]. Field order is destruction order.
 pub(crate) struct DeviceInner {
     pub allocator: Mutex<Option<Allocator>>,
     pub state: Mutex<SyncState>,
     pub pending: Mutex<Pending>,
+    /// A handful: one for each set of images that is drawn to.
+    pub framebuffers: Mutex<Vec<(FramebufferKey, vk::Framebuffer)>>,
     pub bindless: Bindless,
     pub render_passes: Mutex<HashMap<RenderPassKey, vk::RenderPass>>,
     pub pipeline_cache: vk::PipelineCache,
@@ -197,6 +208,7 @@ impl Device {
             allocator: Mutex::new(None),
             state: Mutex::new(SyncState::default()),
             pending: Mutex::new(Pending::default()),
+            framebuffers: Mutex::new(Vec::new()),
             bindless: Bindless::default(),
             render_passes: Mutex::new(HashMap::new()),
             pipeline_cache: vk::PipelineCache::null(),
@@ -277,7 +289,12 @@ impl Device {
             // SAFETY: the queue is held, so nothing is submitted meanwhile.
             unsafe { self.0.core.raw.device_wait_idle() }.context("vkDeviceWaitIdle")?;
         }
-        self.0.collect()
+        self.0.collect()?;
+        let spare = lock(&self.0.pending).take_spare();
+        for (buffer, memory) in spare {
+            self.0.destroy(Garbage::Buffer(buffer, memory));
+        }
+        Ok(())
     }
 
     /// The driver's compiled pipelines, to be given to a later run in [`DeviceOptions::pipeline_cache`].
@@ -547,6 +564,28 @@ impl DeviceInner {
         Ok(pass)
     }
 
+    /// The framebuffer for `key`. It lives as long as its views.
+    pub fn framebuffer(&self, key: FramebufferKey) -> Result<vk::Framebuffer, Error> {
+        let mut framebuffers = lock(&self.framebuffers);
+        if let Some((_, made)) = framebuffers.iter().find(|(known, _)| *known == key) {
+            return Ok(*made);
+        }
+        let count = (key.views.iter())
+            .take_while(|view| **view != vk::ImageView::null())
+            .count();
+        let info = vk::FramebufferCreateInfo::default()
+            .render_pass(key.render_pass)
+            .attachments(&key.views[..count])
+            .width(key.extent.width)
+            .height(key.extent.height)
+            .layers(1);
+        // SAFETY: the views match the render pass, which is made for their formats, and are alive.
+        let made = unsafe { self.core.raw.create_framebuffer(&info, None) }
+            .context("vkCreateFramebuffer")?;
+        framebuffers.push((key, made));
+        Ok(made)
+    }
+
     /// Puts an object to rest until no frame uses it.
     pub fn bury(&self, garbage: Garbage) {
         let pending = !lock(&self.pending).is_empty();
@@ -560,10 +599,11 @@ impl DeviceInner {
         // SAFETY: the timeline belongs to this device.
         let done = unsafe { self.core.raw.get_semaphore_counter_value(self.timeline) }
             .context("vkGetSemaphoreCounterValue")?;
-        let dead = lock(&self.state).take_dead(done);
-        for garbage in dead {
+        let mut dead = lock(&self.state).take_dead(done);
+        for garbage in dead.drain(..) {
             self.destroy(garbage);
         }
+        lock(&self.state).dead = dead;
         Ok(())
     }
 
@@ -578,15 +618,26 @@ impl DeviceInner {
                 unsafe { raw.destroy_buffer(buffer, None) };
                 self.free(memory);
             }
+            Garbage::Staging(buffer, memory) => {
+                if let Some((buffer, memory)) = lock(&self.pending).keep_spare(buffer, memory) {
+                    self.destroy(Garbage::Buffer(buffer, memory));
+                }
+            }
             Garbage::Image(image, memory) => {
                 // SAFETY: see above.
                 unsafe { raw.destroy_image(image, None) };
                 self.free(memory);
             }
-            // SAFETY: see above.
-            Garbage::View(view) => unsafe { raw.destroy_image_view(view, None) },
-            // SAFETY: see above.
-            Garbage::Framebuffer(f) => unsafe { raw.destroy_framebuffer(f, None) },
+            Garbage::View(view) => {
+                // frames that could use them could use the view
+                let mut framebuffers = lock(&self.framebuffers);
+                for (_, made) in framebuffers.extract_if(.., |(key, _)| key.views.contains(&view)) {
+                    // SAFETY: see above.
+                    unsafe { raw.destroy_framebuffer(made, None) };
+                }
+                // SAFETY: see above.
+                unsafe { raw.destroy_image_view(view, None) };
+            }
             // SAFETY: see above.
             Garbage::Pipeline(p) => unsafe { raw.destroy_pipeline(p, None) },
             // SAFETY: see above.
@@ -617,12 +668,16 @@ impl Drop for DeviceInner {
         for (_, garbage) in dead {
             self.destroy(garbage);
         }
-        let staging = lock(&self.pending).take_staging();
+        let staging: Vec<_> = lock(&self.pending).take_staging().collect();
         for (buffer, memory) in staging {
             self.destroy(Garbage::Buffer(buffer, memory));
         }
         self.bindless.destroy(&self.core.raw);
         let raw = &self.core.raw;
+        for (_, framebuffer) in lock(&self.framebuffers).drain(..) {
+            // SAFETY: made from this idle device.
+            unsafe { raw.destroy_framebuffer(framebuffer, None) };
+        }
         for (_, pass) in lock(&self.render_passes).drain() {
             // SAFETY: made from this idle device.
             unsafe { raw.destroy_render_pass(pass, None) };

@@ -3,9 +3,8 @@
 use ash::vk;
 
 use super::buffer::Buffer;
-use super::device::RenderPassKey;
-use super::error::{Context, Error};
-use super::graveyard::Garbage;
+use super::device::{FramebufferKey, RenderPassKey};
+use super::error::Error;
 use super::image::{Image, ImageUsage};
 use super::pass::Pass;
 
@@ -121,18 +120,12 @@ impl Pass<'_> {
             clear_color: target.color.is_some() && target.clear_color.is_some(),
             clear_depth: target.depth.is_some() && target.clear_depth.is_some(),
         })?;
-        let info = vk::FramebufferCreateInfo::default()
-            .render_pass(pass)
-            .attachments(&views[..count])
-            .width(width)
-            .height(height)
-            .layers(1);
-        // SAFETY: the views match the render pass by construction and are alive.
-        let framebuffer = unsafe { device.vk().create_framebuffer(&info, None) }
-            .context("vkCreateFramebuffer")?;
-        // Only this frame uses it.
-        device.0.bury(Garbage::Framebuffer(framebuffer));
         let extent = vk::Extent2D { width, height };
+        let framebuffer = device.0.framebuffer(FramebufferKey {
+            render_pass: pass,
+            views,
+            extent,
+        })?;
         let info = vk::RenderPassBeginInfo::default()
             .render_pass(pass)
             .framebuffer(framebuffer)

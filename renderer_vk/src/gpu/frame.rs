@@ -104,7 +104,7 @@ impl FrameRing {
         // SAFETY: the value is 0 or was submitted.
         unsafe { device.vk().wait_semaphores(&info, u64::MAX) }.context("vkWaitSemaphores")?;
         let mut resources = match slot.resources.take() {
-            Some(resources) => {
+            Some(mut resources) => {
                 resources.timers.publish();
                 resources
             }
@@ -171,7 +171,7 @@ impl FrameRing {
         slot.finish(host_reads)?;
         let mut pending = std::mem::take(&mut *lock(&device.0.pending));
         let value = lock(&device.0.state).submitted + 1;
-        let before = slot.record_before(&pending);
+        let before = slot.record_before(&mut pending);
         let submitted = before.and_then(|()| {
             let first = [slot.before];
             let main = [slot.main];
@@ -216,9 +216,7 @@ impl FrameRing {
         if submitted.is_ok() {
             lock(&device.0.state).submitted = value;
         }
-        for (buffer, memory) in pending.take_staging() {
-            device.0.bury(Garbage::Buffer(buffer, memory));
-        }
+        device.0.put_back(pending);
         if submitted.is_ok()
             && let Some(place) = ring_slot.and_then(|i| self.slots.get_mut(i))
         {

@@ -10,9 +10,10 @@ use gpu_allocator::vulkan::Allocation;
 /// A raw object that waits for its end.
 pub(crate) enum Garbage {
     Buffer(vk::Buffer, Allocation),
+    /// A staging buffer, which uploads may use again.
+    Staging(vk::Buffer, Allocation),
     Image(vk::Image, Allocation),
     View(vk::ImageView),
-    Framebuffer(vk::Framebuffer),
     Pipeline(vk::Pipeline),
     CommandPool(vk::CommandPool),
     QueryPool(vk::QueryPool),
@@ -39,6 +40,8 @@ pub(crate) struct SyncState {
     pub ring: bool,
     /// Tag and object.
     pub graveyard: Vec<(u64, Garbage)>,
+    /// Memory for [`Self::take_dead`].
+    pub dead: Vec<Garbage>,
 }
 
 impl SyncState {
@@ -51,18 +54,12 @@ impl SyncState {
         }
     }
 
-    /// Takes out the objects that no frame can use, given the value that the timeline has reached.
+    /// Takes out the objects that no frame can use, given the value that the timeline has reached. To be handed back
+    /// in [`Self::dead`], emptied.
     pub fn take_dead(&mut self, done: u64) -> Vec<Garbage> {
-        let mut dead = Vec::new();
-        let mut kept = Vec::new();
-        for (tag, garbage) in self.graveyard.drain(..) {
-            if tag <= done {
-                dead.push(garbage);
-            } else {
-                kept.push((tag, garbage));
-            }
-        }
-        self.graveyard = kept;
+        let mut dead = std::mem::take(&mut self.dead);
+        let over = self.graveyard.extract_if(.., |(tag, _)| *tag <= done);
+        dead.extend(over.map(|(_, garbage)| garbage));
         dead
     }
 

@@ -54,9 +54,10 @@ pub use frame::FrameRing;
 pub use image::{Format, Image, ImageDesc, ImageUsage, NO_INDEX};
 pub use instance::{SurfaceSource, WindowSource};
 pub use pass::Pass;
+pub(crate) use pipeline::hash;
 pub use pipeline::{
     BlendFactor, ColorMask, ComputePipeline, Cull, DepthTest, GraphicsDesc, GraphicsPipeline,
-    Stencil, Topology,
+    Stencil, Topology, is_pipeline_cache,
 };
 pub use ray_tracing::{HitGroup, RayTracingDesc, RayTracingPipeline};
 pub use recorder::Recorder;

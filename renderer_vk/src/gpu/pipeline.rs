@@ -506,7 +506,7 @@ pub(crate) fn one(
 const CACHE_MAGIC: &[u8; 8] = b"RLPCACH1";
 
 /// FNV-1a.
-fn hash(bytes: &[u8]) -> u64 {
+pub fn hash(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| {
         (h ^ u64::from(*b)).wrapping_mul(0x0000_0100_0000_01b3)
     })
@@ -525,6 +525,11 @@ pub(crate) fn cache_from_bytes(bytes: &[u8]) -> Option<&[u8]> {
     let rest = bytes.strip_prefix(CACHE_MAGIC)?;
     let (sum, data) = rest.split_at_checked(8)?;
     (sum == hash(data).to_le_bytes()).then_some(data)
+}
+
+/// Whether bytes are a whole cache as [`Device::pipeline_cache_data`] gives it. Whose it is, the driver knows.
+pub fn is_pipeline_cache(bytes: &[u8]) -> bool {
+    cache_from_bytes(bytes).is_some()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Recording: command buffers, and passes as the only way to put work into them.
 
-use std::ffi::CString;
+use std::ffi::CStr;
 
 use ash::vk;
 
@@ -15,6 +15,18 @@ use super::image::Image;
 use super::pass::Pass;
 use super::timers::Timers;
 use super::upload;
+
+/// Bytes of a pass's name in a capture, with the one that ends it.
+const LABEL: usize = 64;
+
+/// A name as C has it, cut to the place that it is written to; `None` with a NUL inside.
+fn label<'a>(name: &str, place: &'a mut [u8; LABEL]) -> Option<&'a CStr> {
+    let length = name.floor_char_boundary(LABEL - 1);
+    let (text, end) = place.split_at_mut_checked(length)?;
+    text.copy_from_slice(name.as_bytes().get(..length)?);
+    *end.first_mut()? = 0;
+    CStr::from_bytes_with_nul(place.get(..=length)?).ok()
+}
 
 /// What one command buffer at a time needs and keeps for its next use.
 pub(crate) struct SlotResources {
@@ -70,7 +82,7 @@ impl SlotResources {
     }
 
     /// Records uploads and query resets into the command buffer that runs before the main one.
-    pub fn record_before(&self, pending: &upload::Pending) -> Result<(), Error> {
+    pub fn record_before(&self, pending: &mut upload::Pending) -> Result<(), Error> {
         begin(&self.device, self.before)?;
         self.timers.reset(self.before);
         if !pending.is_empty() {
@@ -231,10 +243,11 @@ impl Recorder {
             Some(_) => self.slot.timers.begin(name)?,
             None => None,
         };
+        let mut place = [0; LABEL];
         if let Some(debug) = &self.device.0.debug
-            && let Ok(label) = CString::new(name)
+            && let Some(label) = label(name, &mut place)
         {
-            let info = vk::DebugUtilsLabelEXT::default().label_name(&label);
+            let info = vk::DebugUtilsLabelEXT::default().label_name(label);
             // SAFETY: the command buffer is being recorded.
             unsafe { debug.cmd_begin_debug_utils_label(self.cmd, &info) };
         }
@@ -336,11 +349,9 @@ impl Device {
         slot.finish(true)?;
         let mut pending = std::mem::take(&mut *lock(&self.0.pending));
         let done = slot
-            .record_before(&pending)
+            .record_before(&mut pending)
             .and_then(|()| self.submit_and_wait(&[slot.before, slot.main]));
-        for (buffer, memory) in pending.take_staging() {
-            self.0.bury(Garbage::Buffer(buffer, memory));
-        }
+        self.0.put_back(pending);
         done?;
         Ok(value)
     }

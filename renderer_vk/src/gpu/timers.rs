@@ -15,7 +15,11 @@ const PASSES: u32 = 64;
 pub(crate) struct Timers {
     device: Device,
     pools: Vec<vk::QueryPool>,
+    /// Names of passes; those behind `used` are left from earlier frames, for their memory.
     names: Vec<String>,
+    used: usize,
+    /// What queries answered.
+    ticks: Vec<u64>,
 }
 
 impl Timers {
@@ -24,12 +28,14 @@ impl Timers {
             device: device.clone(),
             pools: Vec::new(),
             names: Vec::new(),
+            used: 0,
+            ticks: Vec::new(),
         }
     }
 
     /// Forgets the passes of the last use.
     pub fn clear(&mut self) {
-        self.names.clear();
+        self.used = 0;
     }
 
     /// Enters a pass: the pool and the first of its two queries. `None` without timestamps.
@@ -37,7 +43,7 @@ impl Timers {
         if !self.device.0.info.timestamps || !self.device.0.measuring.load(Ordering::Relaxed) {
             return Ok(None);
         }
-        let index = self.names.len();
+        let index = self.used;
         let per_pool = PASSES as usize;
         if index / per_pool >= self.pools.len() {
             let info = vk::QueryPoolCreateInfo::default()
@@ -48,7 +54,14 @@ impl Timers {
                 .context("vkCreateQueryPool")?;
             self.pools.push(pool);
         }
-        self.names.push(name.to_owned());
+        match self.names.get_mut(index) {
+            Some(known) => {
+                known.clear();
+                known.push_str(name);
+            }
+            None => self.names.push(name.to_owned()),
+        }
+        self.used += 1;
         let query = u32::try_from(index % per_pool).unwrap_or(0) * 2;
         Ok(self.pools.get(index / per_pool).map(|pool| (*pool, query)))
     }
@@ -66,49 +79,47 @@ impl Timers {
     }
 
     /// Publishes the times of a frame that is over.
-    pub fn publish(&self) {
-        if self.names.is_empty() {
+    pub fn publish(&mut self) {
+        if self.used == 0 {
             return;
         }
         let inner = &self.device.0;
-        let mut ticks: Vec<u64> = Vec::new();
-        let mut left = self.names.len() * 2;
-        for pool in &self.pools {
-            let mut values = vec![0u64; left.min(PASSES as usize * 2)];
-            if values.is_empty() {
-                break;
-            }
+        self.ticks.clear();
+        self.ticks.resize(self.used * 2, 0);
+        let pieces = self.ticks.chunks_mut(PASSES as usize * 2);
+        for (pool, values) in self.pools.iter().zip(pieces) {
             // SAFETY: these queries were written by a frame that is over.
             let read = unsafe {
                 inner.core.raw.get_query_pool_results(
                     *pool,
                     0,
-                    &mut values,
+                    values,
                     vk::QueryResultFlags::TYPE_64,
                 )
             };
             if read.is_err() {
                 return;
             }
-            left -= values.len();
-            ticks.extend(values);
         }
-        let times = self
-            .names
-            .iter()
-            .zip(ticks.chunks_exact(2))
-            .map(|(name, t)| {
-                let mask = inner.timestamp_mask;
-                let passed = match t {
-                    [begin, end] => (end & mask).wrapping_sub(begin & mask) & mask,
-                    _ => 0,
-                };
-                #[allow(clippy::cast_precision_loss)]
-                let ms = passed as f32 * inner.timestamp_period * 1e-6;
-                (name.clone(), ms)
-            })
-            .collect();
-        *lock(&inner.timings) = times;
+        let mut times = lock(&inner.timings);
+        times.truncate(self.used);
+        let names = self.names.iter().take(self.used);
+        for (i, (name, t)) in names.zip(self.ticks.chunks_exact(2)).enumerate() {
+            let mask = inner.timestamp_mask;
+            let passed = match t {
+                [begin, end] => (end & mask).wrapping_sub(begin & mask) & mask,
+                _ => 0,
+            };
+            #[allow(clippy::cast_precision_loss)]
+            let ms = passed as f32 * inner.timestamp_period * 1e-6;
+            match times.get_mut(i) {
+                Some((known, time)) => {
+                    known.clone_from(name);
+                    *time = ms;
+                }
+                None => times.push((name.clone(), ms)),
+            }
+        }
     }
 }
 

@@ -10,12 +10,15 @@ use ash::vk;
 use gpu_allocator::vulkan::Allocation;
 
 use super::buffer::{Buffer, BufferDesc, BufferUsage, Memory};
-use super::device::{Device, lock};
+use super::device::{Device, DeviceInner, lock};
 use super::error::Error;
+use super::graveyard::Garbage;
 use super::image::{Image, whole};
 
 /// Size of a staging buffer; larger data get one of their own size.
 const CHUNK: u64 = 4 << 20;
+/// Staging buffers that are kept between frames, for pictures that move.
+const SPARE: usize = 3;
 /// Staged bytes after which uploads are submitted without waiting for a frame.
 const FLUSH: u64 = 96 << 20;
 
@@ -74,9 +77,24 @@ pub(crate) struct Pending {
     targets: HashMap<vk::Image, Target>,
     copies: Vec<Copy>,
     staging: Vec<(vk::Buffer, Allocation)>,
+    /// Staging buffers that no frame uses any more.
+    spare: Vec<(vk::Buffer, Allocation)>,
+    /// What is known of the work while it is recorded.
+    seen: Seen,
     /// Taken bytes of the last staging buffer.
     used: u64,
     staged: u64,
+}
+
+/// What has been recorded of a [`Pending`]; its memory is used again.
+#[derive(Default)]
+struct Seen {
+    /// Images that are new.
+    fresh: HashSet<vk::Image>,
+    /// Range of a buffer that was written.
+    buffers: HashMap<vk::Buffer, (u64, u64)>,
+    /// Image, level and layer that were written.
+    levels: HashSet<(vk::Image, u32, u32)>,
 }
 
 impl Pending {
@@ -84,9 +102,28 @@ impl Pending {
         self.inits.is_empty() && self.copies.is_empty()
     }
 
-    /// Takes the staging buffers out, to be buried.
-    pub fn take_staging(&mut self) -> Vec<(vk::Buffer, Allocation)> {
-        std::mem::take(&mut self.staging)
+    /// Takes the staging buffers out, those in use and the spare ones.
+    pub fn take_staging(&mut self) -> impl Iterator<Item = (vk::Buffer, Allocation)> {
+        self.staging.drain(..).chain(self.spare.drain(..))
+    }
+
+    /// Takes the spare staging buffers out, to be destroyed.
+    pub fn take_spare(&mut self) -> Vec<(vk::Buffer, Allocation)> {
+        std::mem::take(&mut self.spare)
+    }
+
+    /// Keeps a staging buffer that no frame uses any more for the next uploads, or hands it back.
+    pub fn keep_spare(
+        &mut self,
+        buffer: vk::Buffer,
+        memory: Allocation,
+    ) -> Option<(vk::Buffer, Allocation)> {
+        // larger ones are for single large uploads
+        if self.spare.len() >= SPARE || memory.size() != CHUNK {
+            return Some((buffer, memory));
+        }
+        self.spare.push((buffer, memory));
+        None
     }
 
     /// Copies `bytes` into staging memory.
@@ -97,7 +134,15 @@ impl Pending {
                 .checked_add(size)
                 .is_some_and(|end| end <= memory.size())
         });
-        if !fits {
+        let spare = if fits {
+            None
+        } else {
+            self.spare.pop_if(|(_, memory)| memory.size() >= size)
+        };
+        if let Some(spare) = spare {
+            self.staging.push(spare);
+            self.used = 0;
+        } else if !fits {
             let desc = BufferDesc {
                 name: "staging",
                 size: size.max(CHUNK),
@@ -132,9 +177,16 @@ impl Pending {
 }
 
 /// Records everything that waits, between two full barriers.
-pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &Pending) {
+pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &mut Pending) {
     let vk = device.vk();
-    let barrier = |images: &[vk::ImageMemoryBarrier<'_>], to_all: bool| {
+    let Pending {
+        inits,
+        targets,
+        copies,
+        seen,
+        ..
+    } = pending;
+    let part = |images: &[vk::ImageMemoryBarrier<'_>], to_all: bool| {
         let all = vk::PipelineStageFlags::ALL_COMMANDS;
         let transfer = vk::PipelineStageFlags::TRANSFER;
         let memory = [vk::MemoryBarrier::default()
@@ -153,30 +205,41 @@ pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &Pending)
             );
         }
     };
+    // A piece at a time, which needs no memory; without images the memory barrier alone.
+    let barrier = |images: &mut dyn Iterator<Item = vk::ImageMemoryBarrier<'static>>, to_all| {
+        let mut piece = [vk::ImageMemoryBarrier::default(); 16];
+        loop {
+            let mut count = 0;
+            for (place, image) in piece.iter_mut().zip(&mut *images) {
+                *place = image;
+                count += 1;
+            }
+            part(piece.get(..count).unwrap_or_default(), to_all);
+            if count < piece.len() {
+                break;
+            }
+        }
+    };
     let dst = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
     // A new image that is written now goes straight to the layout for that.
-    let mut images: Vec<_> = Vec::new();
-    let mut fresh = HashSet::new();
-    for target in &pending.inits {
-        fresh.insert(target.image);
-        let to = if pending.targets.contains_key(&target.image) {
-            dst
-        } else {
-            target.layout
-        };
-        images.push(target.barrier(vk::ImageLayout::UNDEFINED, to));
-    }
-    for target in pending.targets.values() {
-        if !fresh.contains(&target.image) {
-            images.push(target.barrier(target.layout, dst));
-        }
-    }
-    barrier(&images, false);
+    let fresh = &mut seen.fresh;
+    fresh.clear();
+    fresh.extend(inits.iter().map(|target| target.image));
+    let new = inits.iter().map(|target| {
+        let written = targets.contains_key(&target.image);
+        let to = if written { dst } else { target.layout };
+        target.barrier(vk::ImageLayout::UNDEFINED, to)
+    });
+    let old = (targets.values())
+        .filter(|target| !fresh.contains(&target.image))
+        .map(|target| target.barrier(target.layout, dst));
+    barrier(&mut new.chain(old), false);
 
     // Two copies to the same place must keep their order.
-    let mut buffers: HashMap<vk::Buffer, (u64, u64)> = HashMap::new();
-    let mut levels: HashSet<(vk::Image, u32, u32)> = HashSet::new();
-    for copy in &pending.copies {
+    let (buffers, levels) = (&mut seen.buffers, &mut seen.levels);
+    buffers.clear();
+    levels.clear();
+    for copy in &*copies {
         let again = match copy {
             Copy::Buffer { target, region, .. } => {
                 let (start, end) = (region.dst_offset, region.dst_offset + region.size);
@@ -231,12 +294,29 @@ pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &Pending)
             }
         }
     }
-    let back: Vec<_> = pending
-        .targets
-        .values()
-        .map(|t| t.barrier(dst, t.layout))
-        .collect();
-    barrier(&back, true);
+    let mut back = targets.values().map(|t| t.barrier(dst, t.layout));
+    barrier(&mut back, true);
+}
+
+impl DeviceInner {
+    /// Takes back what was recorded, for its memory: its staging buffers are buried.
+    pub fn put_back(&self, mut recorded: Pending) {
+        for (buffer, memory) in recorded.staging.drain(..) {
+            self.bury(Garbage::Staging(buffer, memory));
+        }
+        recorded.inits.clear();
+        recorded.targets.clear();
+        recorded.copies.clear();
+        (recorded.used, recorded.staged) = (0, 0);
+        let mut pending = lock(&self.pending);
+        // what was asked for meanwhile stays
+        if pending.is_empty() && pending.staging.is_empty() {
+            recorded.spare.append(&mut pending.spare);
+            *pending = recorded;
+        } else {
+            pending.spare.append(&mut recorded.spare);
+        }
+    }
 }
 
 impl Device {

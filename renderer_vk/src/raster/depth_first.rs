@@ -26,6 +26,23 @@ pub(super) fn covers(material: &Material) -> bool {
     all_of_it && material.sort <= sort::OPAQUE && !material.polygon_offset
 }
 
+/// Whether it cannot be seen when a material's surfaces are drawn before or after others of which that is true: of all of
+/// them the nearest one is left in each pixel, with nothing of those behind it.
+pub(super) fn order_free(material: &Material) -> bool {
+    let Some((first, rest)) = material.passes.split_first() else {
+        return material.sort <= sort::OPAQUE;
+    };
+    let hides = first.blend.is_none()
+        && first.depth_write
+        && first.depth_test
+        && !first.depth_equal
+        && material.sort <= sort::OPAQUE
+        && !material.polygon_offset;
+    // in the holes of the first pass the others would show, over what is drawn so far
+    let holes = first.alpha_func != c::ALPHAFUNC_NONE;
+    hides && (rest.iter()).all(|pass| pass.depth_test && (pass.depth_equal || !holes))
+}
+
 /// How the depth of a material's surfaces is drawn first, if it may be; `plain` is how they are drawn later on.
 pub(super) fn state(material: &Material, plain: State) -> Option<State> {
     covers(material).then_some(State {

@@ -5,7 +5,8 @@
 //! calls of the same state are brought together. Surfaces whose first stage covers all behind them
 //! ([`depth_first::covers`]) end up one in each pixel, whatever the order: of neighbouring groups of one such material
 //! every stage is drawn for all of them before the next stage, and the lights and the fog of all such groups are put off
-//! until something else is drawn. They pass the depth test only on the surface that is in sight.
+//! until something else is drawn. They pass the depth test only on the surface that is in sight. For the same reason
+//! entities are drawn before the map where they are between such surfaces: what they hide is not textured.
 
 use shaders::types::constants as c;
 use shaders::types::{Draw, Instance};
@@ -47,6 +48,20 @@ impl Common {
             lightmap: surface.lightmap,
             dynamic: matches!(surface.geometry, Geometry::Dynamic { .. }),
         }
+    }
+
+    /// How many of the first of some surfaces have everything in common.
+    fn run(surfaces: &[DrawSurface]) -> usize {
+        let common = surfaces.first().map(Self::of);
+        surfaces
+            .iter()
+            .take_while(|s| Some(Self::of(s)) == common)
+            .count()
+    }
+
+    /// It belongs to an entity and is no part of the map.
+    fn moves(&self) -> bool {
+        self.dynamic && self.instance != 0
     }
 }
 
@@ -101,18 +116,53 @@ fn plain_draw(group: &Group) -> Draw {
 impl DrawList {
     /// Adds the calls of `context.surfaces`.
     pub(super) fn add_surfaces(&mut self, context: &GroupContext<'_>) {
+        let order_free = |surface: &&DrawSurface| {
+            depth_first::order_free(context.stages.materials.get(surface.material))
+        };
+        let mut rest = context.surfaces;
+        while !rest.is_empty() {
+            let run = rest.iter().take_while(order_free).count();
+            let others = rest.iter().skip(run).take_while(|s| !order_free(s)).count();
+            let (these, those) = rest.split_at(run);
+            // what moves hides the map more often than the other way round, and is not in the depth drawn first
+            self.add_groups(these, context, |common| common.moves());
+            self.add_groups(these, context, |common| !common.moves());
+            self.draw_put_off();
+            let (those, after) = those.split_at(others);
+            self.add_groups(those, context, |_| true);
+            rest = after;
+        }
+    }
+
+    /// Adds the calls of those groups of some of the view's surfaces that are wanted.
+    fn add_groups(
+        &mut self,
+        surfaces: &[DrawSurface],
+        context: &GroupContext<'_>,
+        wanted: impl Fn(&Common) -> bool,
+    ) {
+        let context = &GroupContext {
+            surfaces,
+            ..*context
+        };
         let mut groups = std::mem::take(&mut self.groups);
         let mut next = 0;
-        while let Some(first) = context.surfaces.get(next) {
+        while let Some(first) = surfaces.get(next) {
             let material = context.stages.materials.get(first.material);
             let covers = depth_first::covers(material);
+            let order_free = depth_first::order_free(material);
             groups.clear();
             loop {
-                let group = self.gather_group(next, context);
-                next += group.surfaces.1;
-                groups.push(group);
-                let goes_on = (context.surfaces.get(next))
-                    .is_some_and(|s| s.material == first.material && covers);
+                let begin = surfaces.get(next..).unwrap_or_default();
+                if begin.first().is_some_and(|s| wanted(&Common::of(s))) {
+                    let group = self.gather_group(next, context);
+                    next += group.surfaces.1;
+                    groups.push(group);
+                } else {
+                    next += Common::run(begin).max(1);
+                }
+                let goes_on =
+                    (surfaces.get(next)).is_some_and(|s| s.material == first.material && covers);
                 if !goes_on {
                     break;
                 }
@@ -121,15 +171,12 @@ impl DrawList {
                 continue;
             }
             groups.retain(|group| group.span.1 > 0 && context.instance(group).is_some());
-            if !covers {
-                self.draw_put_off();
-            }
             self.add_stages(material, &groups, context);
             for group in &groups {
                 self.add_lights(material, group, context);
                 self.add_fog(material, group, context);
             }
-            if !covers {
+            if !order_free {
                 self.draw_put_off();
             }
             for group in &groups {
@@ -143,7 +190,6 @@ impl DrawList {
                 }
             }
         }
-        self.draw_put_off();
         self.groups = groups;
     }
 
@@ -151,13 +197,9 @@ impl DrawList {
     fn gather_group(&mut self, first: usize, context: &GroupContext<'_>) -> Group {
         let surfaces = context.surfaces.get(first..).unwrap_or_default();
         let common = surfaces.first().map(Common::of);
-        let these = || {
-            surfaces
-                .iter()
-                .take_while(|s| Some(Common::of(s)) == common)
-        };
+        let count = Common::run(surfaces);
         let first_index = self.indices.len() as u32;
-        for surface in these() {
+        for surface in surfaces.iter().take(count) {
             let indices = context.scene.indices_of(surface, context.statics.indices);
             self.indices.extend_from_slice(indices);
         }
@@ -177,7 +219,7 @@ impl DrawList {
         };
         Group {
             common,
-            surfaces: (first, these().count().max(1)),
+            surfaces: (first, count.max(1)),
             span: (first_index, self.indices.len() as u32 - first_index),
             range,
         }

@@ -103,7 +103,7 @@ impl Renderer {
                 Item::Classic(scenes) => self.scene.recycle(scenes),
                 // held views are copies: to keep their memory too would let it grow with each frame
                 Item::Traced(_) if self.settings.rt_pause => {}
-                Item::Traced(scene) => self.scene.recycle([*scene]),
+                Item::Traced(scene) => self.scene.recycle_view(*scene),
             }
         }
     }

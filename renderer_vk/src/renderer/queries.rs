@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::Renderer;
 use crate::api::{MarkFragment, Orientation, PointLighting};
 use crate::statistics::Costs;
-use crate::world::{World, mark_fragments};
+use crate::world::{Marked, World};
 
 impl Renderer {
     /// Light of the map's grid at a point; `None` without a map or grid.
@@ -20,26 +20,22 @@ impl Renderer {
 
     /// The pieces of the map that a decal's polygon covers, projected along `projection`.
     pub fn mark_fragments(
-        &self,
+        &mut self,
         points: &[Vec3],
         projection: Vec3,
         max_points: usize,
         max_fragments: usize,
-    ) -> (Vec<Vec3>, Vec<MarkFragment>) {
+    ) -> (&[Vec3], &[MarkFragment]) {
         match (&self.world, &self.assets) {
             (Some(world), Some(assets)) => {
-                let meshes = self.settings.marks_on_triangle_meshes;
-                mark_fragments(
+                let marked = Marked {
                     world,
-                    &assets.materials,
-                    points,
-                    projection,
-                    max_points,
-                    max_fragments,
-                    meshes,
-                )
+                    materials: &assets.materials,
+                    on_meshes: self.settings.marks_on_triangle_meshes,
+                };
+                (self.marker).mark(marked, points, projection, max_points, max_fragments)
             }
-            _ => (Vec::new(), Vec::new()),
+            _ => (&[], &[]),
         }
     }
 
@@ -119,13 +115,9 @@ impl Renderer {
 
     /// The `videoMap` files of registered materials with the client number that
     /// [`upload_cinematic`](Self::upload_cinematic) takes their pictures under.
-    pub fn videos(&self) -> Vec<(String, usize)> {
-        self.assets.as_ref().map_or_else(Vec::new, |a| {
-            a.materials
-                .videos()
-                .map(|(name, client)| (name.to_owned(), client))
-                .collect()
-        })
+    pub fn videos(&self) -> impl Iterator<Item = (&str, usize)> {
+        let assets = self.assets.iter();
+        assets.flat_map(|assets| assets.materials.videos())
     }
 
     /// Says that a video of [`videos`](Self::videos) cannot be played: the stages that show it, and those above them,

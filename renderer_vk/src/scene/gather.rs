@@ -62,7 +62,7 @@ pub(super) fn views(
     def: &RefDef,
     look: Look,
 ) -> Vec<ViewScene> {
-    let mut out = Vec::with_capacity(2);
+    let mut out = scene.lists.pop().unwrap_or_default();
     let mut view = View::new(def, input.settings.znear, FAR_WITHOUT_WORLD);
     if look == Look::Classic {
         view.stereo = scene.eye.stereo(input.settings);

@@ -365,6 +365,8 @@ pub struct Scene {
     visible: VisibleSet,
     portal_visible: VisibleSet,
     pool: Vec<ViewScene>,
+    /// Empty lists of views, for their memory.
+    lists: Vec<Vec<ViewScene>>,
     scratch: gather::Scratch,
     warned_not_finite: bool,
     eye: Eye,
@@ -480,8 +482,14 @@ impl Scene {
     }
 
     /// Takes back views that are drawn, so that the next ones need no new memory.
-    pub fn recycle(&mut self, views: impl IntoIterator<Item = ViewScene>) {
-        self.pool.extend(views);
+    pub fn recycle(&mut self, mut views: Vec<ViewScene>) {
+        self.pool.append(&mut views);
+        self.lists.push(views);
+    }
+
+    /// Takes back one view.
+    pub fn recycle_view(&mut self, view: ViewScene) {
+        self.pool.push(view);
     }
 
     /// The frame is over: what was added and never drawn is forgotten.

@@ -31,7 +31,16 @@ struct ClipPlane {
     dist: f32,
 }
 
+/// Finds the parts of surfaces under marks. Kept, so that nothing is allocated anew.
+#[derive(Debug, Default)]
+pub struct Marker {
+    out: Output,
+    planes: Vec<ClipPlane>,
+    found: Vec<u32>,
+}
+
 /// The answer while it grows.
+#[derive(Debug, Default)]
 struct Output {
     points: Vec<Vec3>,
     fragments: Vec<MarkFragment>,
@@ -70,70 +79,77 @@ impl Output {
     }
 }
 
-/// The pieces of the world's surfaces that lie under a polygon projected along `projection`: their corners and where
-/// each piece's corners begin. At most `max_points` and `max_fragments` are returned. `on_meshes`: triangle meshes take
-/// marks too.
-pub fn mark_fragments(
-    world: &WorldData,
-    materials: &Materials,
-    points: &[Vec3],
-    projection: Vec3,
-    max_points: usize,
-    max_fragments: usize,
-    on_meshes: bool,
-) -> (Vec<Vec3>, Vec<MarkFragment>) {
-    let mut out = Output {
-        points: Vec::new(),
-        fragments: Vec::new(),
-        max_points,
-        max_fragments,
-        piece: Vec::new(),
-        clipped: Vec::new(),
-    };
-    let points = points
-        .get(..points.len().min(MAX_POINTS))
-        .unwrap_or_default();
-    let Some(&first) = points.first() else {
-        return (out.points, out.fragments);
-    };
-    if max_fragments == 0 || !points.iter().all(|p| p.is_finite()) || !projection.is_finite() {
-        return (out.points, out.fragments);
-    }
-    let direction = projection.normalize_or_zero();
-    let mut bounds = Bounds::EMPTY;
-    for &point in points {
-        bounds = bounds
-            .with(point)
-            .with(point + projection)
-            .with(point - BEHIND * direction);
-    }
-    let planes = clip_planes(points, projection, direction, first);
-    for index in candidates(world, materials, &bounds, direction) {
-        let Some(surface) = world.surfaces.get(index as usize) else {
-            continue;
-        };
-        mark_surface(world, surface, direction, on_meshes, &planes, &mut out);
-        if out.full() {
-            break;
+/// What takes marks.
+#[derive(Clone, Copy)]
+pub struct Marked<'a> {
+    /// The map.
+    pub world: &'a WorldData,
+    /// Its materials.
+    pub materials: &'a Materials,
+    /// Triangle meshes take marks too.
+    pub on_meshes: bool,
+}
+
+impl Marker {
+    /// The pieces of the world's surfaces that lie under a polygon projected along `projection`: their corners and
+    /// where each piece's corners begin. At most `max_points` and `max_fragments` are returned.
+    pub fn mark(
+        &mut self,
+        marked: Marked<'_>,
+        points: &[Vec3],
+        projection: Vec3,
+        max_points: usize,
+        max_fragments: usize,
+    ) -> (&[Vec3], &[MarkFragment]) {
+        let out = &mut self.out;
+        out.points.clear();
+        out.fragments.clear();
+        (out.max_points, out.max_fragments) = (max_points, max_fragments);
+        let points = points
+            .get(..points.len().min(MAX_POINTS))
+            .unwrap_or_default();
+        let finite = projection.is_finite() && points.iter().all(|p| p.is_finite());
+        if let Some(&first) = points.first().filter(|_| finite && max_fragments > 0) {
+            let direction = projection.normalize_or_zero();
+            let bounds = points.iter().fold(Bounds::EMPTY, |bounds, &point| {
+                bounds
+                    .with(point)
+                    .with(point + projection)
+                    .with(point - BEHIND * direction)
+            });
+            clip_planes(points, projection, direction, first, &mut self.planes);
+            candidates(&marked, &bounds, direction, &mut self.found);
+            for &index in &self.found {
+                let Some(surface) = marked.world.surfaces.get(index as usize) else {
+                    continue;
+                };
+                mark_surface(marked, surface, direction, &self.planes, out);
+                if out.full() {
+                    break;
+                }
+            }
         }
+        (&out.points, &out.fragments)
     }
-    (out.points, out.fragments)
 }
 
 /// One plane for each side of the polygon, and the two ends of the sweep.
-fn clip_planes(points: &[Vec3], projection: Vec3, direction: Vec3, first: Vec3) -> Vec<ClipPlane> {
+fn clip_planes(
+    points: &[Vec3],
+    projection: Vec3,
+    direction: Vec3,
+    first: Vec3,
+    planes: &mut Vec<ClipPlane>,
+) {
     let next = points.iter().cycle().skip(1);
-    let mut planes: Vec<_> = points
-        .iter()
-        .zip(next)
-        .map(|(&a, &b)| {
-            let normal = (b - a).cross(-projection).normalize_or_zero();
-            ClipPlane {
-                normal,
-                dist: normal.dot(a),
-            }
-        })
-        .collect();
+    planes.clear();
+    planes.extend(points.iter().zip(next).map(|(&a, &b)| {
+        let normal = (b - a).cross(-projection).normalize_or_zero();
+        ClipPlane {
+            normal,
+            dist: normal.dot(a),
+        }
+    }));
     let at = direction.dot(first);
     planes.push(ClipPlane {
         normal: direction,
@@ -143,18 +159,13 @@ fn clip_planes(points: &[Vec3], projection: Vec3, direction: Vec3, first: Vec3) 
         normal: -direction,
         dist: -at - BEHIND,
     });
-    planes
 }
 
 /// Surfaces of the leafs that the box touches and that can take the mark, each once.
-fn candidates(
-    world: &WorldData,
-    materials: &Materials,
-    bounds: &Bounds,
-    direction: Vec3,
-) -> Vec<u32> {
+fn candidates(marked: &Marked<'_>, bounds: &Bounds, direction: Vec3, found: &mut Vec<u32>) {
+    let (world, materials) = (marked.world, marked.materials);
     let bsp = &world.relit.bsp;
-    let mut found: Vec<u32> = Vec::new();
+    found.clear();
     world.tree.leafs_in_box(bsp, bounds, |leaf| {
         let Some(leaf) = bsp.leafs.get(leaf as usize) else {
             return;
@@ -191,7 +202,6 @@ fn candidates(
             }
         }
     });
-    found
 }
 
 /// The plane as the map stores it. Compilers leave it zero on surfaces that they merge, and the engine then marks
@@ -206,13 +216,15 @@ fn stored_plane(world: &WorldData, index: u32) -> Option<Plane> {
 }
 
 fn mark_surface(
-    world: &WorldData,
+    marked: Marked<'_>,
     surface: &WorldSurface,
     direction: Vec3,
-    on_meshes: bool,
     planes: &[ClipPlane],
     out: &mut Output,
 ) {
+    let Marked {
+        world, on_meshes, ..
+    } = marked;
     match surface.kind {
         SurfaceKind::Patch => mark_curve(world, surface, direction, planes, out),
         SurfaceKind::Planar => {

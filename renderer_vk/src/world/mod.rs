@@ -18,7 +18,7 @@ use crate::settings::{MapLightChoice, Settings};
 
 pub use grid::GridLight;
 pub use load::{LightmapSink, WorldOptions};
-pub use marks::mark_fragments;
+pub use marks::{Marked, Marker};
 pub use patch_lod::PatchLod;
 pub use tokens::EntityTokens;
 pub(crate) use visible::outside;

@@ -4,7 +4,8 @@ use glam::{Vec2, Vec3};
 use q3bsp::builder::MapBuilder;
 use q3bsp::{DrawVert, GridPoint};
 
-use super::{VisibleQuery, VisibleSet, WorldData, mark_fragments};
+use super::{Marked, Marker};
+use super::{VisibleQuery, VisibleSet, WorldData};
 use crate::settings::Settings;
 use crate::test_support::{PIXEL, Registration, openarena};
 
@@ -131,17 +132,15 @@ fn mark(
     limits: (usize, usize),
 ) -> (f32, usize) {
     let projection = Vec3::new(0.0, 0.0, -20.0);
-    let (corners, fragments) = mark_fragments(
+    let marked = Marked {
         world,
-        &game.materials,
-        points,
-        projection,
-        limits.0,
-        limits.1,
-        false,
-    );
+        materials: &game.materials,
+        on_meshes: false,
+    };
+    let mut marker = Marker::default();
+    let (corners, fragments) = marker.mark(marked, points, projection, limits.0, limits.1);
     let mut area = 0.0;
-    for fragment in &fragments {
+    for fragment in fragments {
         let piece = &corners[fragment.first_point..][..fragment.num_points];
         for pair in piece[1..].windows(2) {
             area += (pair[0] - piece[0]).cross(pair[1] - piece[0]).length() * 0.5;

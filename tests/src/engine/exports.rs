@@ -338,6 +338,35 @@ impl Engine {
         Ok((buffer.into_iter().map(Vec3::from).collect(), fragments))
     }
 
+    /// [`Self::mark_fragments`] of a square below a place, as a game asks each frame: how many pieces there are.
+    pub fn ask_mark(&mut self, place: Vec3, side: f32) -> Result<i32, Raised> {
+        let re = self.exports();
+        let half = side / 2.0;
+        let corners = [[-half, -half], [-half, half], [half, half], [half, -half]]
+            .map(|[x, y]| [place.x + x, place.y + y, place.z]);
+        let direction = [0.0, 0.0, -2.0 * place.z.abs() - 20.0];
+        let mut points = [[0.0f32; 3]; 384];
+        let mut fragments = [markFragment_t {
+            firstPoint: 0,
+            numPoints: 0,
+        }; 128];
+        let (input, direction) = (corners.as_ptr(), &raw const direction);
+        let (out, found) = (points.as_mut_ptr().cast::<f32>(), fragments.as_mut_ptr());
+        // SAFETY: buffers of the sizes that are passed.
+        call(move || unsafe {
+            (re.MarkFragments)(4, input, direction.cast(), 384, out, 128, found)
+        })
+    }
+
+    /// [`Self::lerp_tag`] at a third of the way: whether the model has the tag.
+    pub fn ask_tag(&mut self, model: i32, tag: &CStr) -> Result<bool, Raised> {
+        let re = self.exports();
+        let mut place = orientation_t::default();
+        let (tag, out) = (tag.as_ptr(), &raw mut place);
+        // SAFETY: as in `register_model`.
+        Ok(call(move || unsafe { (re.LerpTag)(out, model, 0, 1, 0.3, tag) })? != 0)
+    }
+
     /// The tag's place, if the model has it.
     pub fn lerp_tag(
         &mut self,

@@ -7,6 +7,7 @@ use std::collections::hash_map::Entry;
 use std::collections::{HashMap, VecDeque};
 use std::ffi::{CStr, CString, c_char, c_int, c_long, c_uchar, c_uint, c_void};
 use std::ptr;
+use std::rc::Rc;
 use std::time::Instant;
 
 use super::abi::{ERR_FATAL, cvar_t, glconfig_t, refexport_t, refimport_t};
@@ -46,7 +47,7 @@ pub struct Message {
 pub(super) struct Film {
     /// Pixels.
     pub side: c_int,
-    pub rgba: Vec<u8>,
+    pub rgba: Rc<[u8]>,
 }
 
 impl Default for Film {
@@ -54,7 +55,7 @@ impl Default for Film {
     fn default() -> Self {
         Self {
             side: 64,
-            rgba: [255u8, 0, 255, 255].repeat(64 * 64),
+            rgba: [255u8, 0, 255, 255].repeat(64 * 64).into(),
         }
     }
 }

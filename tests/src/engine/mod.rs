@@ -7,6 +7,7 @@
 //! restart. It is stricter where the real one would corrupt itself silently: see [`Engine::violations`].
 
 pub mod abi;
+pub mod allocations;
 pub mod cvars;
 mod exports;
 pub mod files;
@@ -76,9 +77,18 @@ static PROCESS: Mutex<()> = Mutex::new(());
 /// The running stand-in. Shut down when dropped.
 pub struct Engine {
     library: Option<Library>,
-    path: PathBuf,
+    source: Source,
     home: TempDir,
     _process: MutexGuard<'static, ()>,
+}
+
+/// Where the renderer comes from.
+#[derive(Clone)]
+enum Source {
+    /// A library to be loaded.
+    Library(PathBuf),
+    /// The test itself.
+    Linked(GetRefAPI),
 }
 
 /// Whether a line comes from Vulkan's validation layers.
@@ -185,8 +195,24 @@ impl Engine {
         Ok(engine)
     }
 
+    /// The same with the library linked into the test, so that both share an allocator.
+    ///
+    /// # Safety
+    /// `entry` must be a renderer's `GetRefAPI`.
+    pub unsafe fn start_linked(entry: *const (), options: Options) -> Result<Self, LoadError> {
+        // SAFETY: the caller's promise.
+        let entry = unsafe { std::mem::transmute::<*const (), GetRefAPI>(entry) };
+        let mut engine = Self::load_from(Source::Linked(entry), options)?;
+        engine.begin_registration()?;
+        Ok(engine)
+    }
+
     /// Loads the library and calls `GetRefAPI`; nothing is registered yet.
     pub fn load(library: &Path, options: Options) -> Result<Self, LoadError> {
+        Self::load_from(Source::Library(library.to_path_buf()), options)
+    }
+
+    fn load_from(source: Source, options: Options) -> Result<Self, LoadError> {
         let process = PROCESS.lock().unwrap_or_else(PoisonError::into_inner);
         let home = tempfile::tempdir()?;
         let mut state = State {
@@ -231,7 +257,7 @@ impl Engine {
         imports::install(Some(state));
         let mut engine = Self {
             library: None,
-            path: library.to_path_buf(),
+            source,
             home,
             _process: process,
         };
@@ -240,13 +266,19 @@ impl Engine {
     }
 
     fn load_library(&mut self) -> Result<(), LoadError> {
-        let failed = |e| LoadError::Library(self.path.clone(), e);
-        // SAFETY: the library's initializers are those of a Rust cdylib; the linker flags are the engine's.
-        let library =
-            unsafe { Library::open(Some(&self.path), RTLD_NOW | RTLD_LOCAL) }.map_err(failed)?;
-        // SAFETY: the symbol has this signature by the engine's interface.
-        let get_ref_api = *unsafe { library.get::<GetRefAPI>(b"GetRefAPI\0") }.map_err(failed)?;
-        self.library = Some(library);
+        let get_ref_api = match &self.source {
+            Source::Linked(entry) => *entry,
+            Source::Library(path) => {
+                let failed = |e| LoadError::Library(path.clone(), e);
+                // SAFETY: the library's initializers are those of a Rust cdylib; the linker flags are the engine's.
+                let library =
+                    unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }.map_err(failed)?;
+                // SAFETY: the symbol has this signature by the engine's interface.
+                let entry = *unsafe { library.get::<GetRefAPI>(b"GetRefAPI\0") }.map_err(failed)?;
+                self.library = Some(library);
+                entry
+            }
+        };
         // The engine passes a structure on its stack and the renderer has to copy it; ours is overwritten below.
         let mut table = imports::table();
         let place = &raw mut table;
@@ -357,6 +389,7 @@ impl Engine {
     /// When `rgba` is no such picture.
     pub fn set_film(&mut self, side: i32, rgba: Vec<u8>) {
         assert_eq!(rgba.len(), (side * side * 4) as usize);
+        let rgba = rgba.into();
         imports::with(|s| s.film = Film { side, rgba });
     }
 
