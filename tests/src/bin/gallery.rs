@@ -14,7 +14,8 @@ const USAGE: &str = "usage: gallery [--list] [--out DIR] [SCENE...]
 Draws scenes (all, or those whose names begin so) on opengl1 and on Relight, and leaves the contact sheet in DIR/index.html
 (default: out/gallery). Fails if one of them differs.
 
-  gallery --play opengl1|vk DIR SCENE...   draws on one renderer, named by RELIGHT_LIBRARY, in this process";
+  gallery --play opengl1|vk|traced DIR SCENE...   draws on one renderer, named by RELIGHT_LIBRARY, in this process;
+                                                   traced: Relight's traced look, which has nothing to be compared with";
 
 fn chosen(names: &[String]) -> Vec<Scene> {
     let mut all = scenes();
@@ -28,7 +29,7 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     if let ["--play", player, folder, ..] = words.as_slice() {
-        let Some(_) = Player::from_name(player) else {
+        let Some(player) = Player::from_name(player) else {
             eprintln!("{USAGE}");
             return ExitCode::FAILURE;
         };
@@ -36,7 +37,7 @@ fn main() -> ExitCode {
             .into_iter()
             .filter(|s| arguments.iter().skip(3).any(|n| n == s.name))
             .collect();
-        return match run::play(&data::library(), &exact, Path::new(folder)) {
+        return match run::play(player, &data::library(), &exact, Path::new(folder)) {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => {
                 eprintln!("{folder}: {error}");

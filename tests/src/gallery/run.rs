@@ -16,10 +16,12 @@ pub enum Player {
     Reference,
     /// Relight.
     Ours,
+    /// Relight in the traced look, to be looked at: nothing is equal to it.
+    Traced,
 }
 
 impl Player {
-    /// Both, the reference first.
+    /// Those that are compared, the reference first.
     pub const BOTH: [Self; 2] = [Self::Reference, Self::Ours];
 
     /// The name that the program takes.
@@ -27,30 +29,47 @@ impl Player {
         match self {
             Self::Reference => "opengl1",
             Self::Ours => "vk",
+            Self::Traced => "traced",
         }
     }
 
     /// The player of that name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::BOTH.into_iter().find(|p| p.name() == name)
+        [Self::Reference, Self::Ours, Self::Traced]
+            .into_iter()
+            .find(|p| p.name() == name)
+    }
+
+    /// Console variables that it wants beside those of a scene.
+    pub fn cvars(self) -> &'static [(&'static str, &'static str)] {
+        match self {
+            Self::Traced => &[("r_rt", "1")],
+            _ => &[],
+        }
     }
 
     /// Its library, if it is there.
     fn library(self) -> Option<PathBuf> {
         match self {
             Self::Reference => data::engine_renderer("opengl1"),
-            Self::Ours => Some(data::library()),
+            Self::Ours | Self::Traced => Some(data::library()),
         }
     }
 }
 
 /// Plays scenes in this process and leaves `SCENE.NAME.png` and `SCENE.txt` in `folder`. A scene that fails leaves
 /// `SCENE.failed` with the reason; the next one is played all the same.
-pub fn play(library: &Path, scenes: &[Scene], folder: &Path) -> std::io::Result<()> {
+pub fn play(
+    player: Player,
+    library: &Path,
+    scenes: &[Scene],
+    folder: &Path,
+) -> std::io::Result<()> {
     std::fs::create_dir_all(folder)?;
     for scene in scenes {
         let played = std::panic::catch_unwind(|| {
-            let mut stage = Stage::start(library, scene, folder).map_err(|e| e.to_string())?;
+            let mut stage =
+                Stage::start(player.cvars(), library, scene, folder).map_err(|e| e.to_string())?;
             (scene.play)(&mut stage).map_err(|e| e.to_string())?;
             let bad = [stage.violations(), stage.validation_messages()].concat();
             stage.finish().map_err(|e| e.to_string())?;

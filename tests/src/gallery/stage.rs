@@ -28,8 +28,14 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Starts the renderer in `library` for a scene; outcomes go to `folder`, which exists.
-    pub fn start(library: &Path, scene: &Scene, folder: &Path) -> Result<Self, LoadError> {
+    /// Starts the renderer in `library` for a scene, with console variables beside the scene's own; outcomes go to
+    /// `folder`, which exists.
+    pub fn start(
+        beside: &[(&str, &str)],
+        library: &Path,
+        scene: &Scene,
+        folder: &Path,
+    ) -> Result<Self, LoadError> {
         let (width, height) = scene.size;
         let text = |(name, value): (&str, &str)| (name.to_string(), value.to_string());
         let mut cvars: Vec<(String, String)> = vec![
@@ -39,7 +45,7 @@ impl Stage {
         // As the engine has them, where the stand-in's own tests want them otherwise.
         cvars.push(text(("r_ignorehwgamma", "0")));
         cvars.push(text(("r_picmip", "0")));
-        cvars.extend(scene.cvars.iter().copied().map(text));
+        cvars.extend(scene.cvars.iter().chain(beside).copied().map(text));
         let mut files = textures::files();
         files.extend((scene.files)());
         let packs = match data::game_data() {
