@@ -5,8 +5,8 @@ use glam::{Mat4, Vec3, Vec4};
 use crate::assets::Assets;
 use crate::gpu::{self, ColorMask, Image, Recorder};
 use crate::raster::{
-    Aids, DrawList, Flares, Overlay, Raster, StageContext, Statics, Target, ViewParameters,
-    overlay_instance, window_to_clip,
+    Aids, DrawList, FlareTest, Flares, Overlay, Raster, StageContext, Statics, Target,
+    ViewParameters, overlay_instance, window_to_clip,
 };
 use crate::scene::ViewScene;
 use crate::settings::Settings;
@@ -41,7 +41,7 @@ pub struct FrameContext<'a> {
     pub settings: &'a Settings,
     /// The classic look.
     pub raster: &'a mut Raster,
-    /// Flares of the classic look.
+    /// Flares of both looks.
     pub flares: &'a mut Flares,
     /// The traced look, where the device traces rays.
     pub trace: Option<&'a mut TraceLook>,
@@ -60,18 +60,34 @@ impl<'a> FrameContext<'a> {
             Item::Classic(scenes) => scenes
                 .iter()
                 .try_for_each(|scene| self.classic(recorder, scene)),
-            Item::Traced(scene) => match (self.trace.as_deref_mut(), self.world) {
-                (Some(trace), Some(world)) => trace.record(
-                    recorder,
-                    scene,
-                    world,
-                    self.assets,
-                    self.settings,
-                    self.color,
-                ),
-                _ => Ok(()),
-            },
+            Item::Traced(scene) => self.traced(recorder, scene),
         }
+    }
+
+    fn traced(&mut self, recorder: &mut Recorder, scene: &ViewScene) -> Result<(), gpu::Error> {
+        let (Some(trace), Some(world)) = (self.trace.as_deref_mut(), self.world) else {
+            return Ok(());
+        };
+        let test = self.flares.begin(recorder, scene)?;
+        trace.record(
+            recorder,
+            scene,
+            world,
+            self.assets,
+            self.settings,
+            self.color,
+            test,
+        )?;
+        if test.count == 0 {
+            return Ok(());
+        }
+        let target = Target {
+            color: self.color,
+            depth: self.depth,
+            mask: self.mask,
+        };
+        // no depth was drawn
+        self.flares(recorder, target, scene, test, true)
     }
 
     /// What stages are evaluated with in this frame.
@@ -184,15 +200,21 @@ impl<'a> FrameContext<'a> {
         };
         self.raster
             .record(recorder, "classic", target, self.list, &parameters)?;
-        self.flares(recorder, target, scene)
+        let test = self.flares.begin(recorder, scene)?;
+        if test.count == 0 || !self.flares.test_depth(recorder, target, test)? {
+            return Ok(());
+        }
+        self.flares(recorder, target, scene, test, false)
     }
 
-    /// Draws the flares of a view that was just drawn.
+    /// Draws the tested flares of a view that was just drawn.
     fn flares(
         &mut self,
         recorder: &mut Recorder,
         target: Target<'_>,
         scene: &ViewScene,
+        test: FlareTest,
+        clear_depth: bool,
     ) -> Result<(), gpu::Error> {
         let Some(material) = self.assets.materials.internal().flare else {
             return Ok(());
@@ -200,12 +222,7 @@ impl<'a> FrameContext<'a> {
         let material = self.assets.materials.resolve(material);
         let speed = self.settings.flare_fade;
         let stages = self.stages();
-        let evaluated = self
-            .flares
-            .evaluate(recorder, target, scene, material, speed)?;
-        let Some((vertices, quads)) = evaluated else {
-            return Ok(());
-        };
+        let (vertices, quads) = self.flares.finish(recorder, test, scene, material, speed)?;
         self.list.clear();
         self.list
             .add_view(quads, stages, Statics::default(), Aids::default());
@@ -224,7 +241,7 @@ impl<'a> FrameContext<'a> {
             lights: &[],
             light_backs: true,
             viewport: quads.view.viewport,
-            clear_depth: false,
+            clear_depth,
             clear_color: None,
             shadows: None,
         };

@@ -47,7 +47,7 @@ struct Draw {
     uint dynamic_vertices;
 };
 
-struct Flare { vec3 color; float size; vec2 center; uint pixel[2]; float depth; uint slot; uint fresh; };
+struct Flare { vec3 color; float size; vec2 center; uint pixel[2]; float depth; uint slot; uint fresh; vec3 at; float reach; };
 
 struct FlareState { uint seen; uint visible; int since; };
 

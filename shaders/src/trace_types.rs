@@ -389,6 +389,46 @@ pub struct TransportView {
     pub filter_count: u32,
 }
 
+/// The flares of a view.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct FlareView {
+    /// [`Flare`](crate::types::Flare)s.
+    pub flares: u64,
+    /// [`FlareState`](crate::types::FlareState)s, by slot.
+    pub states: u64,
+    /// Number of `flares`.
+    pub count: u32,
+    /// Nothing.
+    pub padding: u32,
+}
+
+/// Light in fog: bindless image indices.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct FogView {
+    /// What light in fog is multiplied by to be seen, of each pixel.
+    pub weight: u32,
+    /// A point in the fog along the way of a pixel and its distance on the way, of each cell.
+    pub point: u32,
+    /// Light at such points, with the number of frames that it is the mean of.
+    pub fresh: u32,
+    /// The last frame's.
+    pub last: u32,
+    /// The light that is shown.
+    pub filtered: u32,
+    /// Pixels to the edge of a cell.
+    pub cell: u32,
+    /// Cells.
+    pub width: u32,
+    /// Cells.
+    pub height: u32,
+    /// `FOG_*` bits.
+    pub flags: u32,
+    /// Nothing.
+    pub padding: u32,
+}
+
 /// All that the passes of one traced view read: camera, arrays, images, settings.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -410,6 +450,8 @@ pub struct TraceView {
     pub post: PostView,
     pub lights: LightView,
     pub transport: TransportView,
+    pub flares: FlareView,
+    pub fog: FogView,
     pub eye: Vec3,
     pub forward: Vec3,
     /// Scaled by the tangent of half the horizontal angle.
@@ -519,6 +561,9 @@ pub mod constants {
     pub const DENOISE_HISTORY: u32 = 1;
     pub const DENOISE_GRADIENTS: u32 = 2;
     pub const DENOISE_SPARSE: u32 = 4;
+    pub const FOG_LIT: u32 = 1;
+    pub const FOG_FILTERED: u32 = 2;
+    pub const FOG_HISTORY: u32 = 4;
     pub const SELECT_UNIFORM: u32 = 0;
     pub const SELECT_RESAMPLED: u32 = 1;
     pub const SELECT_ALL: u32 = 2;

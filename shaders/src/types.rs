@@ -287,7 +287,7 @@ pub struct RasterLight {
     pub color: Vec3,
 }
 
-/// A flare of the classic look: where it is tested, and what is drawn where it shows.
+/// A flare: where it is tested, and what is drawn where it shows.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Flare {
@@ -305,6 +305,10 @@ pub struct Flare {
     pub slot: u32,
     /// 1: the state is another flare's, or none.
     pub fresh: u32,
+    /// World space.
+    pub at: Vec3,
+    /// Units from the eye towards it that have to be free.
+    pub reach: f32,
 }
 
 /// What is known of a flare from frame to frame.

@@ -7,6 +7,26 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
+// The light of the fog that a pixel shows, between its cells.
+vec3 light_in_fog(ivec2 pixel) {
+    if (VIEW.fog.cell == 1) return imageLoad(images_rgba16f[VIEW.fog.filtered], pixel).rgb;
+    vec2 at = (vec2(pixel) + 0.5) / float(VIEW.fog.cell) - 0.5;
+    ivec2 low = ivec2(floor(at));
+    vec2 part = at - vec2(low);
+    vec3 sum = vec3(0.0);
+    float total = 0.0;
+    for (int i = 0; i < 4; i++) {
+        ivec2 corner = ivec2(i & 1, i >> 1);
+        ivec2 cell = clamp(low + corner, ivec2(0), ivec2(VIEW.fog.width, VIEW.fog.height) - 1);
+        vec4 light = imageLoad(images_rgba16f[VIEW.fog.filtered], cell);
+        if (!(light.a > 0.0)) continue;
+        vec2 share = mix(1.0 - part, part, vec2(corner)) + 1.0e-3;
+        sum += light.rgb * (share.x * share.y);
+        total += share.x * share.y;
+    }
+    return total > 0.0 ? sum / total : vec3(0.0);
+}
+
 // What a pixel shows by itself. `front`: what the primary rays have composed there.
 vec3 shown(ivec2 pixel, vec3 front) {
     // what glows by itself, sky and fog show as the engine shows them when the map is exposed to look as bright as there
@@ -21,6 +41,7 @@ vec3 shown(ivec2 pixel, vec3 front) {
         }
         radiance += g.albedo * light;
     }
+    if ((VIEW.fog.flags & FOG_LIT) != 0) radiance += light_read(VIEW.fog.weight, pixel) * light_in_fog(pixel);
     return radiance;
 }
 
@@ -33,17 +54,37 @@ void main() {
     // its alpha is the field: 0 none, 1 or 2
     if (front.a > 0.0) {
         const ivec2 beside[4] = ivec2[](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1));
-        vec3 others = vec3(0.0);
-        float count = 0.0;
+        vec3 others[2] = vec3[](vec3(0.0), vec3(0.0)); // to the sides, above and below
+        float counts[2] = float[](0.0, 0.0), contrast[2] = float[](0.0, 0.0);
+        vec3 whole = vec3(0.0);
+        float whole_count = 0.0;
         for (int i = 0; i < 4; i++) {
             ivec2 at = pixel + beside[i];
             if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
             vec4 other = imageLoad(images_rgba16f[VIEW.image_front], at);
-            if (other.a != 3.0 - front.a) continue;
-            others += shown(at, other.rgb);
-            count += 1.0;
+            if (other.a == front.a) continue;
+            vec3 value = shown(at, other.rgb);
+            if (other.a == 0.0) {
+                whole += value;
+                whole_count += 1.0;
+                continue;
+            }
+            others[i >> 1] += value;
+            counts[i >> 1] += 1.0;
+            contrast[i >> 1] += (i & 1) == 0 ? luminance(value) : -luminance(value);
         }
-        if (count > 0.0) radiance = 0.5 * (radiance + others / count);
+        if (counts[0] + counts[1] == 0.0) {
+            // alone, at an edge or where a reflection begins to be worth following: what is behind the surface counts
+            // once, and is taken from beside it where it is not this pixel's own
+            radiance *= 0.5;
+            if (front.a == 2.0 && whole_count > 0.0) radiance += whole / whole_count;
+        } else {
+            // along an edge rather than across it, so that a line of the texture is not seen in every other pixel alone
+            vec2 weight = vec2(1.0);
+            if (counts[0] == 2.0 && counts[1] == 2.0) weight = abs(vec2(contrast[1], contrast[0])) + 1.0e-4;
+            vec3 other = (others[0] * weight.x + others[1] * weight.y) / (counts[0] * weight.x + counts[1] * weight.y);
+            radiance = 0.5 * (radiance + other);
+        }
     }
     // one broken number must not spread through exposure and accumulation
     if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);

@@ -5,6 +5,7 @@
 
 #include "trace/color.glsl"
 #include "trace/geometry.glsl"
+#include "trace/fog_keep.glsl"
 
 // Where the ray is inside the volume: x < y, or an empty range.
 vec2 fog_range(Fog fog, vec3 origin, vec3 direction) {
@@ -38,8 +39,9 @@ float fog_transmittance(Fog fog, vec2 range, float t) {
 }
 
 // Composes the fog between two distances on a ray behind what is in front (`transmittance`, `radiance`). Volumes do not
-// overlap, so each is taken whole, nearest first.
-void fog_segment(vec3 origin, vec3 direction, float from, float to, inout vec3 transmittance, inout vec3 radiance) {
+// overlap, so each is taken whole, nearest first. The fog's colour stands for light that was scattered often; what comes
+// straight from lights is found at the points that are kept. `travelled`: length of the path before the ray.
+void fog_segment(vec3 origin, vec3 direction, float from, float to, float travelled, inout vec3 transmittance, inout vec3 radiance) {
     uint count = VIEW.fog_count;
     float last_enter = -1.0;
     uint last_index = 0;
@@ -59,7 +61,13 @@ void fog_segment(vec3 origin, vec3 direction, float from, float to, inout vec3 t
         vec2 range = fog_range(fog, origin, direction);
         float before = fog_transmittance(fog, range, from);
         float ratio = before > 0.0 ? clamp(fog_transmittance(fog, range, to) / before, 0.0, 1.0) : 0.0;
-        radiance += transmittance * decode_display(fog.color) * (1.0 - ratio);
+        vec3 scattered = transmittance * decode_display(fog.color) * (1.0 - ratio);
+        radiance += scattered;
+        if (LIT_FOG != 0) {
+            float depth = max(fog.depth, 1.0);
+            vec2 place = clamp((min(vec2(from, to), range.y) - range.x) / depth, 0.0, 1.0);
+            fog_keep(scattered, depth, place, range.x, origin, direction, travelled);
+        }
         transmittance *= ratio;
         last_enter = best;
         last_index = chosen;

@@ -68,6 +68,13 @@ struct DenoiseView {
 
 struct TransportView { uint64_t filters; vec3 eye_absorption; uint filter_count; };
 
+struct FlareView { uint64_t flares; uint64_t states; uint count; uint padding; };
+
+struct FogView {
+    uint weight; uint point; uint fresh; uint last; uint filtered; uint cell; uint width; uint height;
+    uint flags; uint padding;
+};
+
 struct TraceView {
     uint64_t geometries; uint64_t instances; uint64_t fogs; uint64_t portals; uint64_t skies; uint64_t exposure;
     uint64_t bvh_nodes; uint64_t bvh_instances;
@@ -77,6 +84,8 @@ struct TraceView {
     PostView post;
     LightView lights;
     TransportView transport;
+    FlareView flares;
+    FogView fog;
     vec3 eye; vec3 forward; vec3 left; vec3 up;
     uint width; uint height; int target_x; int target_y;
     uint scene; uint flags; uint seed; uint accumulated;
@@ -116,6 +125,8 @@ const uint NO_IMAGE = 0xFFFFFFFFu;
 // Bits of DenoiseView.flags: the last frame's light is there; its samples are lit again; the cheap
 // filter.
 const uint DENOISE_HISTORY = 1, DENOISE_GRADIENTS = 2, DENOISE_SPARSE = 4;
+// Bits of FogView.flags: fog is lit; its light is filtered; the last frame's is there.
+const uint FOG_LIT = 1, FOG_FILTERED = 2, FOG_HISTORY = 4;
 // How a light is chosen: LightView.selection.
 const uint SELECT_UNIFORM = 0, SELECT_RESAMPLED = 1, SELECT_ALL = 2;
 // Bits of LightView.flags.

@@ -9,12 +9,22 @@ use q3bsp::{DrawVert, GridPoint};
 pub const ROOMS: &str = "maps/rooms.bsp";
 /// A place in the lit room, and one in the other, which cannot be seen from it.
 pub const HERE: Vec3 = Vec3::new(-100.0, 0.0, 40.0);
+/// A green flare in sight of [`HERE`].
+pub const FLARE: Vec3 = Vec3::new(100.0, 0.0, 40.0);
 /// See [`HERE`].
 pub const ELSEWHERE: Vec3 = Vec3::new(1100.0, 0.0, 40.0);
 /// What the light grid holds everywhere: ambient and directed.
 pub const GRID: ([u8; 3], [u8; 3]) = ([40, 60, 80], [100, 50, 25]);
 
 const SCRIPT: &str = "
+flareShader
+{
+    {
+        map textures/test/white.tga
+        blendFunc add
+        rgbGen vertex
+    }
+}
 textures/test/lamp
 {
     surfaceparm nomarks
@@ -171,6 +181,8 @@ fn rooms() -> Vec<u8> {
         .collect();
     let patch = map.add_patch(wall, 3, 3, &curve);
     map.set_lightmap(patch, page);
+    // seen with r_flares alone
+    map.add_flare(lamp, FLARE, Vec3::ZERO, Vec3::new(0.2, 1.0, 0.2));
     map.build_with_grid(Vec3::new(64.0, 64.0, 128.0), |_| GridPoint {
         ambient: GRID.0,
         directed: GRID.1,

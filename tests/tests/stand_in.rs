@@ -292,6 +292,46 @@ fn a_paused_view_stays_and_adds_up_while_the_game_goes_on() {
 }
 
 #[test]
+fn flares_show_where_nothing_hides_them_in_both_looks() {
+    let mut engine = engine_in_map();
+    let model = engine.register_model("models/test.md3").unwrap();
+    engine.set("r_flares", "1");
+    let mut view = View {
+        width: 160,
+        height: 120,
+        ..View::new(HERE, 0.0)
+    };
+    let screen = refEntity_t {
+        hModel: model,
+        origin: [-40.0, 0.0, 40.0],
+        ..refEntity_t::default()
+    };
+    for look in ["0", "1"] {
+        engine.set("r_rt", look);
+        // how green the middle is, long enough after a change
+        let mut green = |engine: &mut Engine, hidden: bool| {
+            let mut last = [0; 3];
+            for _ in 0..3 {
+                view.time += 1000;
+                let picture = engine.picture_of(|e| {
+                    e.clear_scene()?;
+                    if hidden {
+                        e.add_entity(&screen)?;
+                    }
+                    e.render_scene(&view)
+                });
+                last = pixel(&picture.unwrap(), 88, 62);
+            }
+            i32::from(last[1]) - i32::from(last[0])
+        };
+        let (shown, hidden) = (green(&mut engine, false), green(&mut engine, true));
+        assert!(shown > hidden + 20, "r_rt {look}: {shown} {hidden}");
+        assert_eq!(green(&mut engine, false), shown, "r_rt {look}");
+    }
+    engine.assert_clean();
+}
+
+#[test]
 fn scenes_hold_what_was_added() {
     let mut engine = engine_in_map();
     let model = engine.register_model("models/test.md3").unwrap();

@@ -1,5 +1,5 @@
-//! Flares of the classic look (`r_flares`): tested against the depth of the view that was just drawn, faded in and out,
-//! and drawn over it, all on the GPU, so that nothing waits for the answer.
+//! Flares (`r_flares`): tested against the depth of the view that was just drawn, or in the traced look by rays, faded in
+//! and out, and drawn over it, all on the GPU, so that nothing waits for the answer.
 //!
 //! Source: engine behaviour of `renderer_opengl1` (flares).
 
@@ -66,14 +66,24 @@ pub struct Flares {
     views: u32,
     flares: Vec<Flare>,
     quads: Option<ViewScene>,
+    /// The lack of what the depth test needs was told.
+    warned: bool,
+}
+
+/// The flares of a view, to be tested: whoever sees one sets the `seen` of its state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FlareTest {
+    /// Device address of the [`Flare`]s.
+    pub flares: u64,
+    /// Device address of the [`FlareState`]s, by slot.
+    pub states: u64,
+    /// Number of flares.
+    pub count: u32,
 }
 
 impl Flares {
     /// Nothing is known yet.
     pub fn new(device: &Device) -> Self {
-        if !device.fragment_stores() {
-            log::warn!("flares are not drawn: the device cannot write from fragment shaders");
-        }
         Self {
             device: device.clone(),
             test: HashMap::new(),
@@ -87,6 +97,7 @@ impl Flares {
             views: 0,
             flares: Vec::new(),
             quads: None,
+            warned: false,
         }
     }
 
@@ -105,32 +116,48 @@ impl Flares {
         self.views = 0;
     }
 
-    /// Tests the flares of a view that was just drawn to `target`, and makes their squares: returns the address of
-    /// their vertices, four for each flare, and what to draw of them. `None`: there are none.
+    /// Makes the flares of the frame's next view ready to be tested; without `count` there are none.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn begin(
+        &mut self,
+        recorder: &mut Recorder,
+        scene: &ViewScene,
+    ) -> Result<FlareTest, gpu::Error> {
+        let view = self.views;
+        self.views += 1;
+        self.flares.clear();
+        if scene.flares.is_empty() {
+            return Ok(FlareTest::default());
+        }
+        self.place(scene, view);
+        Ok(FlareTest {
+            flares: recorder.arena().push(&self.flares)?,
+            states: self.fit_states(recorder)?.address(),
+            count: u32::try_from(self.flares.len()).unwrap_or(u32::MAX),
+        })
+    }
+
+    /// Tests flares against the depth of a view that was just drawn to `target`; `false`: the device cannot.
     ///
     /// # Errors
     /// The device is out of memory or cannot make a pipeline.
-    pub fn evaluate(
+    pub fn test_depth(
         &mut self,
         recorder: &mut Recorder,
         target: Target<'_>,
-        scene: &ViewScene,
-        material: u32,
-        speed: f32,
-    ) -> Result<Option<(u64, &ViewScene)>, gpu::Error> {
-        let view = self.views;
-        self.views += 1;
-        if scene.flares.is_empty() || !self.device.fragment_stores() {
-            return Ok(None);
+        test: FlareTest,
+    ) -> Result<bool, gpu::Error> {
+        if !self.device.fragment_stores() {
+            if !self.warned {
+                log::warn!("flares are not drawn: the device cannot write from fragment shaders");
+                self.warned = true;
+            }
+            return Ok(false);
         }
-        self.place(scene, view);
-        let count = u32::try_from(self.flares.len()).unwrap_or(u32::MAX);
-        let states = self.fit_states(recorder)?;
-        let vertices = self.fit_vertices()?;
-        let flares = recorder.arena().push(&self.flares)?;
-
         let kind = target.kind();
-        let test = match self.test.entry(kind) {
+        let pipeline = match self.test.entry(kind) {
             Entry::Occupied(made) => made.into_mut(),
             Entry::Vacant(place) => place.insert(test_pipeline(&self.device, kind)?),
         };
@@ -141,15 +168,30 @@ impl Flares {
             clear_color: None,
             clear_depth: None,
         })?;
-        pass.bind_graphics(test);
+        pass.bind_graphics(pipeline);
         pass.push(&TestParameters {
-            flares,
-            states: states.address(),
+            flares: test.flares,
+            states: test.states,
             size: [target.color.width() as f32, target.color.height() as f32],
         });
-        pass.draw(count, 1, 0, 0);
-        drop(pass);
+        pass.draw(test.count, 1, 0, 0);
+        Ok(true)
+    }
 
+    /// Fades flares that were tested, and makes their squares: returns the address of their vertices, four for each
+    /// flare, and what to draw of them.
+    ///
+    /// # Errors
+    /// The device is out of memory or cannot make a pipeline.
+    pub fn finish(
+        &mut self,
+        recorder: &mut Recorder,
+        test: FlareTest,
+        scene: &ViewScene,
+        material: u32,
+        speed: f32,
+    ) -> Result<(u64, &ViewScene), gpu::Error> {
+        let vertices = self.fit_vertices()?;
         let fade = match &mut self.fade {
             Some(fade) => fade,
             none => none.insert(ComputePipeline::new(
@@ -162,27 +204,26 @@ impl Flares {
         let mut pass = recorder.pass("flare fade", Access::COMPUTE, Access::COMPUTE)?;
         pass.bind_compute(fade);
         pass.push(&FadeParameters {
-            flares,
-            states: states.address(),
+            flares: test.flares,
+            states: test.states,
             vertices: vertices.address(),
-            count,
+            count: test.count,
             time: scene.def.time_ms,
             speed,
             padding: 0,
         });
-        pass.dispatch(count.div_ceil(GROUP), 1, 1);
+        pass.dispatch(test.count.div_ceil(GROUP), 1, 1);
         drop(pass);
 
         let quads = self
             .quads
             .get_or_insert_with(|| ViewScene::empty(&scene.def, scene.view));
-        list_quads(quads, scene, material, count);
-        Ok(Some((vertices.address(), quads)))
+        list_quads(quads, scene, material, test.count);
+        Ok((vertices.address(), quads))
     }
 
-    /// Fills `flares` with those of the view, each with its slot.
+    /// Adds to `flares` those of the view, each with its slot.
     fn place(&mut self, scene: &ViewScene, view: u32) {
-        self.flares.clear();
         for found in &scene.flares {
             let key = (found.surface, found.instance, view, scene.view.is_portal);
             let (slot, fresh) = match self.slots.entry(key) {

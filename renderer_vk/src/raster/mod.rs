@@ -24,7 +24,7 @@ use glam::{Mat4, Vec3};
 use shaders::types::{Instance, MaterialBuffers, RasterLight, RasterView};
 
 pub use aids::{Aids, image_sheet};
-pub use flares::{Flares, window_to_clip};
+pub use flares::{FlareTest, Flares, window_to_clip};
 pub use list::{DrawList, Statics};
 pub use overlay::{Overlay, Picture2d, overlay_instance};
 pub use present::Present;

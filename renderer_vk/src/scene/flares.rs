@@ -1,7 +1,7 @@
 //! Flares in sight: what the engine draws where a lamp can be seen.
 //!
 //! Source: engine behaviour of `renderer_opengl1` (flares). Whether a lamp can be seen is found on the GPU, from the
-//! depth of the view that was just drawn.
+//! depth of the view that was just drawn or by a ray.
 
 use glam::{Vec2, Vec3};
 use q3bsp::SurfaceKind;
@@ -108,6 +108,8 @@ impl FlareView<'_> {
             depth: view.depth_at(depth - SLACK),
             slot: 0,
             fresh: 0,
+            at,
+            reach: at.distance(view.origin) - SLACK,
         })
     }
 

@@ -316,7 +316,7 @@ impl<'a> Gatherer<'a> {
         instance: u32,
         out: &mut ViewScene,
     ) {
-        let shown = self.look == Look::Classic && self.input.settings.flares;
+        let shown = self.input.settings.flares;
         let Some(placed) = out.instances.get(instance as usize).filter(|_| shown) else {
             return;
         };

@@ -237,7 +237,7 @@ pub struct ViewScene {
     pub skies: Vec<VisibleSky>,
     /// The sun's disc, when it is to be drawn wherever a sky is in sight.
     pub sun: Option<Sun>,
-    /// Flares in sight (classic look, `r_flares`).
+    /// Flares in sight (`r_flares`).
     pub flares: Vec<ViewFlare>,
 }
 

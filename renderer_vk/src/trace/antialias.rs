@@ -35,7 +35,8 @@ impl Method {
     fn of(settings: &Settings, output: [u32; 2]) -> Self {
         if settings.rt_accumulate {
             Self::Plain
-        } else if settings.rt_taa {
+        } else if settings.rt_taa || settings.multisample > 1 {
+            // several samples a pixel, the rasterizer's way to smooth edges, come one a frame here
             Self::Temporal
         } else if traced_size(settings, output) != output {
             Self::Upscale

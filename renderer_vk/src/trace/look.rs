@@ -20,6 +20,7 @@ use relight::exposure::display_exposure;
 use crate::assets::compile::sampler;
 use crate::assets::{Assets, Materials};
 use crate::gpu::{Device, Error, Image, Recorder};
+use crate::raster::FlareTest;
 use crate::scene::ViewScene;
 use crate::settings::Settings;
 use crate::world::World;
@@ -152,10 +153,12 @@ impl TraceLook {
         })
     }
 
-    /// Records all passes of a view into its rectangle of `target` (RGBA8, usable as storage image).
+    /// Records all passes of a view into its rectangle of `target` (RGBA8, usable as storage image), and finds which of
+    /// its flares are seen.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
+    #[allow(clippy::too_many_arguments)] // what a view depends on
     pub fn record(
         &mut self,
         rec: &mut Recorder,
@@ -164,6 +167,7 @@ impl TraceLook {
         assets: &Assets,
         settings: &Settings,
         target: &Image,
+        flares: FlareTest,
     ) -> Result<(), Error> {
         let remapping = remapping(&assets.materials);
         if remapping != self.remapping {
@@ -174,6 +178,7 @@ impl TraceLook {
         let map = TracedMap {
             geometry: &self.geometry,
             lights: &self.lights,
+            flares,
         };
         self.tracer
             .record_view(rec, view, Some(map), assets, settings, target)
@@ -195,6 +200,7 @@ impl TraceLook {
         let map = TracedMap {
             geometry: &self.geometry,
             lights: &self.lights,
+            flares: FlareTest::default(),
         };
         tracer.record_view(rec, view, Some(map), assets, settings, target)
     }

@@ -9,7 +9,12 @@ use crate::gpu::{
 };
 
 /// A ray tracing pipeline with the hit shaders that all passes share.
-fn ray_pipeline(device: &Device, name: &str, raygen: &Spirv) -> Result<RayTracingPipeline, Error> {
+fn ray_pipeline(
+    device: &Device,
+    name: &str,
+    raygen: &Spirv,
+    constants: &[(u32, u32)],
+) -> Result<RayTracingPipeline, Error> {
     RayTracingPipeline::new(
         device,
         &RayTracingDesc {
@@ -26,7 +31,7 @@ fn ray_pipeline(device: &Device, name: &str, raygen: &Spirv) -> Result<RayTracin
                     any_hit: Some(&shaders::TRACE_TRANSLUCENT_RAHIT),
                 },
             ],
-            constants: &[],
+            constants,
         },
     )
 }
@@ -94,10 +99,15 @@ macro_rules! ray_pass {
             /// # Errors
             /// The driver refuses the pipeline.
             pub fn new(device: &Device, tracer: Tracer) -> Result<Self, Error> {
+                Self::with(device, tracer, &[])
+            }
+
+            /// Compiles the pipeline with specialization constants, id and value.
+            fn with(device: &Device, tracer: Tracer, constants: &[(u32, u32)]) -> Result<Self, Error> {
                 Ok(Self(match tracer {
-                    Tracer::Pipeline => RayPass::Pipeline(ray_pipeline(device, $name, &shaders::$raygen)?),
-                    Tracer::Compute => RayPass::Compute(ComputePipeline::new(device, $name, &shaders::$compute, &[])?),
-                    Tracer::Query => RayPass::Compute(ComputePipeline::new(device, $name, &shaders::$query, &[])?),
+                    Tracer::Pipeline => RayPass::Pipeline(ray_pipeline(device, $name, &shaders::$raygen, constants)?),
+                    Tracer::Compute => RayPass::Compute(ComputePipeline::new(device, $name, &shaders::$compute, constants)?),
+                    Tracer::Query => RayPass::Compute(ComputePipeline::new(device, $name, &shaders::$query, constants)?),
                 }))
             }
 
@@ -143,6 +153,22 @@ ray_pass!(
     Primary, "trace_primary", TRACE_PRIMARY_RGEN,
     TRACE_PRIMARY_RGEN_COMPUTE, TRACE_PRIMARY_RGEN_QUERY
 );
+impl Primary {
+    /// The same pass, which in addition leaves the points where fog is to be lit.
+    ///
+    /// # Errors
+    /// The driver refuses the pipeline.
+    pub fn with_lit_fog(device: &Device, tracer: Tracer) -> Result<Self, Error> {
+        // LIT_FOG in fog_keep.glsl
+        Self::with(device, tracer, &[(0, 1)])
+    }
+}
+
+ray_pass!(
+    /// Reads the points in fog and the light lists; writes the light there. `size`: cells of the fog.
+    FogLight, "trace_fog", TRACE_FOG_LIGHT_RGEN,
+    TRACE_FOG_LIGHT_RGEN_COMPUTE, TRACE_FOG_LIGHT_RGEN_QUERY
+);
 ray_pass!(
     /// Reads the G-buffer and the light lists; writes `direct`.
     Direct, "trace_direct", TRACE_DIRECT_RGEN,
@@ -153,6 +179,12 @@ ray_pass!(
     /// `size` is half as wide then.
     Indirect, "trace_indirect", TRACE_INDIRECT_RGEN,
     TRACE_INDIRECT_RGEN_COMPUTE, TRACE_INDIRECT_RGEN_QUERY
+);
+ray_pass!(
+    /// Reads the acceleration structures and the flares of the view; writes which of them are seen. `size`: their number
+    /// and 1.
+    FlareRays, "trace_flares", TRACE_FLARES_RGEN,
+    TRACE_FLARES_RGEN_COMPUTE, TRACE_FLARES_RGEN_QUERY
 );
 pixel_pass!(
     /// Reads the G-buffer and `indirect`; writes `indirect` where it was not gathered. `size`: half as wide as the view.

@@ -4,7 +4,9 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use glam::Vec3;
 use shaders::trace_types::constants as t;
-use shaders::trace_types::{AntialiasView, MotionView, PortalRecord, PostView, TraceView};
+use shaders::trace_types::{
+    AntialiasView, FlareView, MotionView, PortalRecord, PostView, TraceView,
+};
 
 use super::accel::{Accel, AccelOutput};
 use super::antialias::{Antialias, traced_size};
@@ -12,13 +14,15 @@ use super::bloom::Bloom;
 use super::counters::{COUNTED, RayCounters};
 use super::debug::DebugView;
 use super::denoise::Denoiser;
+use super::fog::LitFog;
 use super::geometry::StaticGeometry;
 use super::input::{MaterialTable, Tracer};
 use super::lights::MapLights;
 use super::motion::Motion;
-use super::passes::{Composite, Direct, Exposure, Fill, Indirect, Primary, ToneMap};
+use super::passes::{Composite, Direct, Exposure, Fill, FlareRays, Indirect, Primary, ToneMap};
 use super::targets::Targets;
 use crate::gpu::{Buffer, BufferUsage, Device, Error, Image, Recorder};
+use crate::raster::FlareTest;
 use crate::scene::ViewScene;
 use crate::settings::Settings;
 
@@ -29,6 +33,8 @@ pub struct TracedMap<'a> {
     pub geometry: &'a StaticGeometry,
     /// Its lights.
     pub lights: &'a MapLights,
+    /// Flares of the view that rays are to test.
+    pub flares: FlareTest,
 }
 
 /// Draws views by tracing rays.
@@ -36,9 +42,15 @@ pub struct ViewTracer {
     pub(super) device: Device,
     pub(super) accel: Accel,
     primary: Primary,
+    /// The same with lit fog, made when there is some.
+    fog_primary: Option<Primary>,
+    fog: LitFog,
     direct: Direct,
     indirect: Indirect,
     fill: Fill,
+    /// Made when a view has flares.
+    flare_rays: Option<FlareRays>,
+    tracer: Tracer,
     pub(super) denoiser: Denoiser,
     composite: Composite,
     antialias: Antialias,
@@ -79,9 +91,13 @@ impl ViewTracer {
             device: device.clone(),
             accel: Accel::new(device, tracer),
             primary: Primary::new(device, tracer)?,
+            fog_primary: None,
+            fog: LitFog::new(device, tracer),
             direct: Direct::new(device, tracer)?,
             indirect: Indirect::new(device, tracer)?,
             fill: Fill::new(device)?,
+            flare_rays: None,
+            tracer,
             denoiser: Denoiser::new(device)?,
             composite: Composite::new(device)?,
             antialias: Antialias::new(device)?,
@@ -134,6 +150,7 @@ impl ViewTracer {
         self.history = None;
         self.motion = Motion::default();
         self.antialias.reset();
+        self.fog.reset();
         self.exposure_started = false;
     }
 
@@ -188,6 +205,13 @@ impl ViewTracer {
         self.denoiser
             .prepare(denoiser, size, self.history.is_some())?;
         let map = map.filter(|_| view.has_world);
+        let has_fog = map.is_some_and(|m| m.geometry.fog_count > 0);
+        let goes_on = self.history.is_some();
+        self.fog
+            .prepare(has_fog && is_lit(settings), denoiser > 0, size, goes_on)?;
+        if self.fog.is_on() && self.fog_primary.is_none() {
+            self.fog_primary = Some(Primary::with_lit_fog(&self.device, self.tracer)?);
+        }
         let accumulated = self.accumulated_before(view, materials, settings);
         let accel = self
             .accel
@@ -236,7 +260,17 @@ impl ViewTracer {
         };
         let address = rec.arena().push(&[params])?;
 
-        self.primary.record(rec, address, size)?;
+        let primary = self.fog_primary.as_ref().filter(|_| self.fog.is_on());
+        primary
+            .unwrap_or(&self.primary)
+            .record(rec, address, size)?;
+        if params.flares.count > 0 {
+            let flare_rays = match &mut self.flare_rays {
+                Some(made) => made,
+                none => none.insert(FlareRays::new(&self.device, self.tracer)?),
+            };
+            flare_rays.record(rec, address, [params.flares.count, 1])?;
+        }
         self.denoiser.choose_gradient_samples(rec, address)?;
         self.direct.record(rec, address, size)?;
         if sparse_bounce(settings) {
@@ -246,6 +280,7 @@ impl ViewTracer {
         } else {
             self.indirect.record(rec, address, size)?;
         }
+        self.fog.record(rec, address)?;
         self.counters.end(rec)?;
         self.denoiser.filter(rec, address)?;
         self.composite.record(rec, address, size)?;
@@ -260,6 +295,7 @@ impl ViewTracer {
         self.last_time = view.time;
         self.history = (!settings.rt_accumulate).then(|| camera_frame(view));
         self.denoiser.advance();
+        self.fog.advance();
         if let Some(targets) = &mut self.targets {
             targets.advance();
         }
@@ -324,6 +360,7 @@ impl ViewTracer {
         };
         let camera = &view.view;
         let lights = map.map_or(&self.no_lights, |m| m.lights);
+        let flares = map.map_or_else(FlareTest::default, |m| m.flares);
         let mut flags = 0;
         let mut set = |bit: u32, on: bool| flags |= if on { bit } else { 0 };
         set(
@@ -332,7 +369,7 @@ impl ViewTracer {
         );
         set(t::VIEW_ACCUMULATE, settings.rt_accumulate);
         set(t::VIEW_FIRST_PERSON, accel.first_person);
-        let is_lit = settings.rt_illumination && !settings.fullbright;
+        let is_lit = is_lit(settings);
         set(t::VIEW_AUTO_EXPOSURE, settings.rt_auto_exposure && is_lit);
         set(t::VIEW_EXPOSURE_RESET, !self.exposure_started);
         set(t::VIEW_FAST_SKY, settings.fast_sky);
@@ -351,6 +388,12 @@ impl ViewTracer {
             exposure: self.exposure_state.address(),
             bvh_nodes: accel.nodes,
             bvh_instances: accel.placed,
+            flares: FlareView {
+                flares: flares.flares,
+                states: flares.states,
+                count: flares.count,
+                padding: 0,
+            },
             materials: materials.buffers(),
             post: PostView::default(), // filled in by the caller
             motion: MotionView {
@@ -384,6 +427,7 @@ impl ViewTracer {
             }),
             fog_count: map.map_or(0, |m| m.geometry.fog_count),
             portal_count: u32::try_from(portals.len()).unwrap_or(u32::MAX),
+            fog: self.fog.view(&targets.direct, &targets.front),
             max_depth: settings.rt_max_depth,
             bounces: settings.rt_bounces.min(2),
             image_position: targets.position.storage_index(),
@@ -440,6 +484,11 @@ fn portal_record(portal: &crate::scene::Portal) -> PortalRecord {
         camera_origin: portal.camera_origin,
         camera_axis: portal.camera_axis,
     }
+}
+
+/// Whether surfaces show light; otherwise they show their own colour.
+fn is_lit(settings: &Settings) -> bool {
+    settings.rt_illumination && !settings.fullbright
 }
 
 /// Whether bounced light is gathered for half of the pixels: in a picture that is denoised nobody can tell, and it is the

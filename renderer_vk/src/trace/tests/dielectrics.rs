@@ -241,6 +241,53 @@ fn an_environment_stage_shows_what_is_around_with(gpu: &mut Gpu) {
 }
 
 #[test]
+fn a_shiny_pixel_alone_is_as_bright_as_its_surface() {
+    Gpu::each(a_shiny_pixel_alone_is_as_bright_as_its_surface_with);
+}
+
+fn a_shiny_pixel_alone_is_as_bright_as_its_surface_with(gpu: &mut Gpu) {
+    let image = Image::new(
+        &gpu.device,
+        &ImageDesc::new("environment", 1, 1, Format::Rgba8, ImageUsage::SAMPLED),
+    )
+    .expect("image");
+    // hardly more than what is worth following
+    gpu.device
+        .upload_image(&image, 0, 0, &[20, 20, 20, 255])
+        .expect("upload");
+    let body = stage::constant([0.5; 3]);
+    let shine = Stage {
+        flags: c::STAGE_REFLECTION,
+        tc_gen: c::TCGEN_ENVIRONMENT,
+        blend_src: c::BLEND_ONE,
+        blend_dst: c::BLEND_ONE,
+        ..stage::image(0)
+    };
+    let (eye, target) = (Vec3::new(0.0, 0.0, 60.0), Vec3::new(100.0, 10.0, 0.0));
+    let mut scene = scene(eye, target, &[body], 0, Dielectric::default());
+    scene.images.push(image.texture_index());
+    let patch = scene.material(&[body, shine], c::MATERIAL_TWO_SIDED);
+    let [_, left, up] = scene.def.view_axis;
+    // pixels that follow the reflection, and such that follow what is behind it
+    let alone = [(5, 5), (9, 8), (15, 15), (18, 5)].map(|(x, y)| y * SIDE + x);
+    for i in alone {
+        let size = 0.5;
+        let corner = eye + direction(&scene, i) * 20.0 - (left + up) * (size * 0.5);
+        scene.quad(rectangle(corner, left * size, up * size), patch);
+    }
+    let one = Settings {
+        rt_accumulate: false,
+        ..middles()
+    };
+    let (pixels, _) = gpu.render(&scene, &one, 1);
+    let exact = through_byte(0.5);
+    for i in alone {
+        let ratio = pixels[i].x / exact;
+        assert!((ratio - 1.0).abs() < 0.03, "{i}: {ratio}");
+    }
+}
+
+#[test]
 fn light_takes_on_the_colour_of_what_it_passes() {
     Gpu::each(light_takes_on_the_colour_of_what_it_passes_with);
 }

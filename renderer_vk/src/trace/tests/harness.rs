@@ -13,6 +13,7 @@ use crate::gpu::{
     Buffer, BufferUsage, Device, DeviceOptions, Filter, Format, FrameRing, Image, ImageDesc,
     ImageUsage, MipFilter, SamplerDesc, SurfaceSource, Wrap,
 };
+use crate::raster::FlareTest;
 use crate::scene::{
     DynamicMesh, Portal, RigidMesh, ShadowVolumes, Shape, Submodel, View, ViewEntity, ViewScene,
 };
@@ -150,6 +151,7 @@ impl Gpu {
             let map = TracedMap {
                 geometry: &uploaded.geometry,
                 lights: &uploaded.lights,
+                flares: FlareTest::default(),
             };
             self.look
                 .record_view(

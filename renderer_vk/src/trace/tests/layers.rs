@@ -6,6 +6,7 @@ use shaders::types::constants as c;
 
 use super::harness::{Gpu, Scene, identity, rectangle, reference, stage, through_byte};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
+use crate::settings::Settings;
 
 const TRANSLUCENT: u32 = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
 
@@ -260,6 +261,74 @@ fn cut_outs_have_holes_for_eyes_and_shadows_with(gpu: &mut Gpu) {
             assert!((pixel.x - exact).abs() < 0.002, "{p} {pixel}");
         }
     }
+}
+
+#[test]
+fn fog_is_lit_by_what_lights_each_place_of_it() {
+    Gpu::each(fog_is_lit_by_what_lights_each_place_of_it_with);
+}
+
+fn fog_is_lit_by_what_lights_each_place_of_it_with(gpu: &mut Gpu) {
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 1.0, 16);
+    let black = scene.material(&[stage::constant([0.0; 3])], 0);
+    scene.quad(screen(300.0), black);
+    let depth = 400.0;
+    scene.fogs.push(Fog {
+        mins: Vec3::new(100.0, -500.0, -500.0),
+        maxs: Vec3::new(200.0, 500.0, 500.0),
+        plane: [0.0; 4],
+        has_surface: 0,
+        color: Vec3::new(0.2, 0.4, 0.6),
+        depth,
+    });
+    let color = crate::trace::frame_lights::decode(Vec3::new(0.2, 0.4, 0.6));
+    let ambient = color * (100.0f32 / depth).sqrt();
+    let (origin, radius, intensity) = (Vec3::new(130.0, 0.0, 30.0), 4.0f32, 9000.0f32);
+    scene.points.push(relight::light::PointLight {
+        origin,
+        intensity: Vec3::splat(intensity),
+        radius,
+        spot: None,
+    });
+    // the mean radiance over the sphere of directions, over what scatters at each place
+    let steps = 4000;
+    let mut lit = 0.0;
+    for i in 0..steps {
+        let root = (i as f32 + 0.5) / steps as f32 * (100.0 / depth).sqrt();
+        let place = Vec3::X * (100.0 + root * root * depth);
+        let squared = (origin - place).length_squared();
+        let sine_squared = radius * radius / squared;
+        let cosine = (1.0 - sine_squared).sqrt();
+        // 1 - cos without its cancellation
+        let share = 0.5 * sine_squared / (1.0 + cosine);
+        let radiance = intensity / (std::f32::consts::PI * radius * radius);
+        lit += radiance * share / steps as f32;
+    }
+    let exact = color * ((100.0f32 / depth).sqrt() * lit);
+    assert!(exact.y > 0.3 * ambient.y, "a test of nothing: {exact}");
+    let filtered = Settings {
+        rt_accumulate: false,
+        rt_denoiser: 1,
+        rt_taa: false,
+        ..reference()
+    };
+    for (settings, frames, tolerance) in [(reference(), 64, 0.04), (filtered, 24, 0.1)] {
+        let mean = gpu.mean(&scene, &settings, frames) - ambient;
+        let error = ((mean - exact) / exact).abs().max_element();
+        assert!(error < tolerance, "{mean} {exact}");
+    }
+    // a screen between the light and the fog's nearer half; what glows is not lit
+    let wall = scene.material(&[stage::constant([0.0; 3])], 0);
+    scene.quad(
+        rectangle(
+            Vec3::new(0.0, -400.0, 10.0),
+            Vec3::X * 400.0,
+            Vec3::Y * 800.0,
+        ),
+        wall,
+    );
+    let dark = gpu.mean(&scene, &reference(), 2);
+    assert!(close(dark, ambient), "{dark} {ambient}");
 }
 
 #[test]

@@ -12,6 +12,7 @@ use super::harness::Gpu;
 use crate::api::RefDef;
 use crate::assets::Assets;
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
+use crate::raster::FlareTest;
 use crate::scene::{Look, Scene};
 use crate::settings::{Settings, TracerChoice};
 use crate::trace::TraceLook;
@@ -117,8 +118,16 @@ fn maps_are_lit() {
         .expect("image");
         for _ in 0..frames {
             let mut rec = gpu.ring.begin().expect("frame");
-            look.record(&mut rec, &view, &world, &assets, &settings, &target)
-                .expect("recorded");
+            look.record(
+                &mut rec,
+                &view,
+                &world,
+                &assets,
+                &settings,
+                &target,
+                FlareTest::default(),
+            )
+            .expect("recorded");
             gpu.ring.end(rec).expect("submitted");
         }
         device.wait_idle().expect("done");
@@ -208,8 +217,16 @@ fn tracers_agree_on_maps() {
             .expect("image");
             for _ in 0..2 {
                 let mut rec = gpu.ring.begin().expect("frame");
-                look.record(&mut rec, &view, &world, &assets, &settings, &target)
-                    .expect("recorded");
+                look.record(
+                    &mut rec,
+                    &view,
+                    &world,
+                    &assets,
+                    &settings,
+                    &target,
+                    FlareTest::default(),
+                )
+                .expect("recorded");
                 gpu.ring.end(rec).expect("submitted");
             }
             device.wait_idle().expect("done");

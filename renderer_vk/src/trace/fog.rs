@@ -1,0 +1,218 @@
+//! Light in fog: single scattering at one point of each cell of pixels, found by rays to lights.
+//!
+//! The primary rays leave for each pixel what light in its fog is multiplied by, and for each cell a point in that fog,
+//! chosen by how much each place scatters. A pass lights the points. In a denoised picture a cell is 2 × 2 pixels, its
+//! light joins that of earlier frames, and neighbours are evened out; otherwise each pixel is a cell, and the mean over
+//! frames is exact.
+
+use shaders::trace_types::FogView;
+use shaders::trace_types::constants as t;
+
+use super::input::Tracer;
+use super::passes::{FogLight, TILE};
+use crate::gpu::{
+    Access, ComputePipeline, Device, Error, Format, Image, ImageDesc, ImageUsage, Recorder,
+};
+
+/// Pixels to the edge of a cell of filtered light.
+const CELL: u32 = 2;
+/// Distances between the taps of the filter's steps, cells; an odd number of steps.
+const SPACINGS: [u32; 3] = [1, 2, 4];
+
+/// Push constants of a step of the filter.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Step {
+    view: u64,
+    source: u32,
+    target: u32,
+    spacing: u32,
+    padding: u32,
+}
+
+struct Images {
+    /// Of the view, pixels.
+    size: [u32; 2],
+    cell: u32,
+    cells: [u32; 2],
+    weight: Image,
+    point: Image,
+    /// Light at the points: of this frame and the last.
+    light: [Image; 2],
+    /// What the filter makes of it.
+    filtered: Option<Image>,
+}
+
+impl Images {
+    fn new(device: &Device, size: [u32; 2], filtered: bool) -> Result<Self, Error> {
+        let cell = if filtered { CELL } else { 1 };
+        let cells = size.map(|s| s.div_ceil(cell));
+        let make = |name, [width, height]: [u32; 2], format| {
+            let usage = ImageUsage::STORAGE;
+            Image::new(device, &ImageDesc::new(name, width, height, format, usage))
+        };
+        let filtered = filtered.then(|| make("trace fog filtered", cells, Format::Rgba16F));
+        Ok(Self {
+            size,
+            cell,
+            cells,
+            weight: make("trace fog weight", size, Format::R32Uint)?,
+            point: make("trace fog point", cells, Format::Rgba32F)?,
+            light: [
+                make("trace fog light", cells, Format::Rgba16F)?,
+                make("trace last fog light", cells, Format::Rgba16F)?,
+            ],
+            filtered: filtered.transpose()?,
+        })
+    }
+}
+
+struct Passes {
+    light: FogLight,
+    filter: ComputePipeline,
+}
+
+/// Lights fog; nothing is held while there is none.
+pub struct LitFog {
+    device: Device,
+    tracer: Tracer,
+    passes: Option<Passes>,
+    images: Option<Images>,
+    /// The images hold the light of the last frame.
+    history: bool,
+}
+
+impl LitFog {
+    /// Nothing is made before there is fog.
+    pub fn new(device: &Device, tracer: Tracer) -> Self {
+        Self {
+            device: device.clone(),
+            tracer,
+            passes: None,
+            images: None,
+            history: false,
+        }
+    }
+
+    /// To be called before a frame's parameters are gathered. `wanted`: the view has fog that is lit; `filtered`: its
+    /// light is to be free of noise; `size`: of the view, pixels; `goes_on`: the frame follows the last one that was
+    /// drawn, whose camera is known.
+    ///
+    /// # Errors
+    /// Out of memory, or the driver refuses a pipeline.
+    pub fn prepare(
+        &mut self,
+        wanted: bool,
+        filtered: bool,
+        size: [u32; 2],
+        goes_on: bool,
+    ) -> Result<(), Error> {
+        let had = self.images.as_ref().map(|i| (i.size, i.filtered.is_some()));
+        if had != wanted.then_some((size, filtered)) {
+            // the old ones go first: there may not be room for both
+            self.images = None;
+            self.history = false;
+            if wanted {
+                self.images = Some(Images::new(&self.device, size, filtered)?);
+            }
+        }
+        self.history &= goes_on;
+        if wanted && self.passes.is_none() {
+            let (name, code) = ("trace_fog_filter", &shaders::TRACE_FOG_FILTER_COMP);
+            self.passes = Some(Passes {
+                light: FogLight::new(&self.device, self.tracer)?,
+                filter: ComputePipeline::new(&self.device, name, code, &[])?,
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether this frame's fog is lit.
+    pub fn is_on(&self) -> bool {
+        self.images.is_some()
+    }
+
+    /// What the passes read. `packed` and `half`: images of packed light and of half floats that stand for those that
+    /// are not there, since software drivers look at the images of branches that are not taken.
+    pub fn view(&self, packed: &Image, half: &Image) -> FogView {
+        let half = half.storage_index();
+        let Some(images) = &self.images else {
+            return FogView {
+                weight: packed.storage_index(),
+                point: half,
+                fresh: half,
+                last: half,
+                filtered: half,
+                cell: 1,
+                ..FogView::default()
+            };
+        };
+        let flag = |on: bool, bit: u32| if on { bit } else { 0 };
+        let [fresh, last] = [0, 1].map(|i| images.light[i].storage_index());
+        FogView {
+            weight: images.weight.storage_index(),
+            point: images.point.storage_index(),
+            fresh,
+            last,
+            filtered: images.filtered.as_ref().map_or(fresh, Image::storage_index),
+            cell: images.cell,
+            width: images.cells[0],
+            height: images.cells[1],
+            flags: t::FOG_LIT
+                | flag(images.filtered.is_some(), t::FOG_FILTERED)
+                | flag(self.history && images.filtered.is_some(), t::FOG_HISTORY),
+            padding: 0,
+        }
+    }
+
+    /// Reads what the primary rays left and the light lists; writes the light that fog shows. `view`: device address of
+    /// the `TraceView`.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn record(&self, rec: &mut Recorder, view: u64) -> Result<(), Error> {
+        let (Some(images), Some(passes)) = (&self.images, &self.passes) else {
+            return Ok(());
+        };
+        passes.light.record(rec, view, images.cells)?;
+        let Some(filtered) = &images.filtered else {
+            return Ok(());
+        };
+        let [fresh, last] = [0, 1].map(|i| images.light[i].storage_index());
+        let mut pass = rec.pass("trace_fog_filter", Access::COMPUTE, Access::COMPUTE)?;
+        pass.bind_compute(&passes.filter);
+        let [x, y] = images.cells.map(|s| s.div_ceil(TILE));
+        let filtered = filtered.storage_index();
+        // the fresh light is what the next frame goes on from; the last frame's is free
+        let mut source = fresh;
+        for (step, spacing) in SPACINGS.into_iter().enumerate() {
+            let target = if step % 2 == 0 { filtered } else { last };
+            if step > 0 {
+                pass.barrier();
+            }
+            pass.push(&Step {
+                view,
+                source,
+                target,
+                spacing,
+                padding: 0,
+            });
+            pass.dispatch(x, y, 1);
+            source = target;
+        }
+        Ok(())
+    }
+
+    /// The frame is recorded: what it wrote becomes what the last one wrote.
+    pub fn advance(&mut self) {
+        self.history = self.images.is_some();
+        if let Some(images) = &mut self.images {
+            images.light.swap(0, 1);
+        }
+    }
+
+    /// Forgets the last frame.
+    pub fn reset(&mut self) {
+        self.history = false;
+    }
+}

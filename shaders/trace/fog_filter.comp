@@ -1,0 +1,38 @@
+#version 460
+// Evens out the light in fog over cells that show as much of it: light in the air changes slowly, what cuts off the
+// stretch that is seen does not.
+#define OWN_PUSH
+#include "trace/color.glsl"
+#include "trace/light_image.glsl"
+#include "trace/view.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+// How much fog a cell shows, as logarithm.
+float amount(ivec2 cell) {
+    ivec2 pixel = min(cell * int(VIEW.fog.cell), ivec2(VIEW.width, VIEW.height) - 1);
+    return log2(max(max_component(light_read(VIEW.fog.weight, pixel)), 1.0e-4));
+}
+
+void main() {
+    ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 size = ivec2(VIEW.fog.width, VIEW.fog.height);
+    if (any(greaterThanEqual(cell, size))) return;
+    float here = amount(cell);
+    vec4 sum = vec4(0.0);
+    float total = 0.0;
+    for (int y = -2; y <= 2; y++) {
+        for (int x = -2; x <= 2; x++) {
+            ivec2 at = cell + ivec2(x, y) * int(push.spacing);
+            if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
+            vec4 light = imageLoad(images_rgba16f[push.source], at);
+            if (!(light.a > 0.0)) continue;
+            // a binomial's weights, and less for a different amount; what has more frames counts more
+            const float binomial[3] = float[](6.0, 4.0, 1.0);
+            float weight = binomial[abs(x)] * binomial[abs(y)] * exp2(-2.0 * abs(amount(at) - here)) * light.a;
+            sum += light * weight;
+            total += weight;
+        }
+    }
+    imageStore(images_rgba16f[push.target], cell, total > 0.0 ? sum / total : vec4(0.0));
+}

@@ -1,0 +1,48 @@
+// The point of fog whose light a pixel asks for. A path can pass fog in several places; one of them is kept, with a chance
+// that grows with what it contributes (reservoir sampling), and on it a distance with the density of the scattering
+// itself, so that what is left to know is the light there.
+#ifndef RELIGHT_TRACE_FOG_KEEP_GLSL
+#define RELIGHT_TRACE_FOG_KEEP_GLSL
+
+#include "trace/random.glsl"
+#include "trace/light_image.glsl"
+
+// Fog of this map is lit: without, nothing of this is compiled in.
+layout(constant_id = 0) const uint LIT_FOG = 0;
+
+vec3 fog_weight = vec3(0.0);  // of all fog on the way
+float fog_weight_sum = 0.0;
+vec3 fog_tint = vec3(0.0);    // of the kept place, as a multiple of its chance
+vec3 fog_point = vec3(0.0);
+float fog_distance = -1.0;    // from the eye along the way
+
+// `weight`: what the light of a stretch is multiplied by; `place`: where on its volume's range the stretch begins and
+// ends, as parts of the depth at which the fog is opaque; `enter`: where the range begins; `travelled`: before this ray.
+void fog_keep(vec3 weight, float depth, vec2 place, float enter, vec3 origin, vec3 direction, float travelled) {
+    float chance = max(weight.r, max(weight.g, weight.b));
+    if (!(chance > 0.0)) return;
+    fog_weight += weight;
+    fog_weight_sum += chance;
+    if (fog_weight_sum > chance && rng_next() * fog_weight_sum >= chance) return;
+    fog_tint = weight / chance;
+    // transmittance is 1 - sqrt(length / depth): even steps of it are squares of even steps
+    float root = mix(sqrt(place.x), sqrt(place.y), rng_next());
+    float t = enter + root * root * depth;
+    fog_point = origin + direction * t;
+    fog_distance = travelled + t;
+}
+
+// Leaves what was kept for the passes that light it.
+void fog_write(ivec2 pixel) {
+    bool filtered = (VIEW.fog.flags & FOG_FILTERED) != 0;
+    // filtered light has no colour of its own: the sum over the way is free of noise
+    vec3 weight = filtered ? fog_weight : fog_tint * fog_weight_sum;
+    light_write(VIEW.fog.weight, pixel, weight, rng_next());
+    int cell = int(VIEW.fog.cell);
+    ivec2 at = pixel / cell;
+    // each pixel of a cell in turn
+    ivec2 chosen = min(at * cell + ivec2(VIEW.seed, VIEW.seed >> 1) % cell, ivec2(VIEW.width, VIEW.height) - 1);
+    if (pixel == chosen) imageStore(images_rgba32f[VIEW.fog.point], at, vec4(fog_point, fog_distance));
+}
+
+#endif
