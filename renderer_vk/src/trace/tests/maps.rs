@@ -97,7 +97,7 @@ fn maps_are_lit() {
             .expect("assets");
         let mut world =
             World::load(device, &mut assets, &format!("maps/{map}"), &settings).expect("map");
-        world.calibrate(&mut assets, None);
+        world.light_by(settings.rt_lights, &mut assets, None);
         let mut look = TraceLook::new(device, &world, &assets, &settings).expect("structures");
         assets
             .materials
