@@ -66,6 +66,9 @@ pub struct ConvertArgs {
     /// Write no point lights and suns
     #[arg(long)]
     no_lights: bool,
+    /// Let the sky shine as strongly as its light in the map; it then looks brighter than in the game
+    #[arg(long)]
+    sky_light: bool,
     /// Largest distance of a curve from its mesh, id units
     #[arg(long, default_value_t = 4.0)]
     subdivisions: f32,
@@ -273,6 +276,7 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
                 ImageChoice::Beside => ImagePlace::Beside,
             },
             lights: !args.no_lights,
+            sky_light: args.sky_light,
             animate: args.animate,
         },
     };

@@ -7,7 +7,9 @@
 use super::stack::{self, Part, tiling};
 use crate::world::WorldMaterial;
 use glam::{Vec2, Vec3, Vec4};
-use shaderscript::light::{LightLinear, SurfaceClass, base_stage, cut_out_stage, refraction_index};
+use shaderscript::light::{
+    LightLinear, SurfaceClass, base_stage, cut_out_stage, glow_stages, refraction_index,
+};
 use shaderscript::surface_params::{CONTENTS_FOG, CONTENTS_SLIME};
 use shaderscript::{
     AlphaFunc, AlphaGen, BlendFactor, Cull, Deform, ImplicitKind, RgbGen, Shader, Stage,
@@ -149,7 +151,9 @@ pub enum VertexColor {
 pub fn look(material: &WorldMaterial, mean: &mut dyn FnMut(&str) -> Option<Vec4>) -> Look {
     let shader = &material.resolved.shader;
     let class = material.class;
-    let vertex_light = material.lighting != ImplicitKind::Lightmapped;
+    let lightmapped = material.lighting == ImplicitKind::Lightmapped && shader.has_lightmap_stage();
+    // Compilers write light into vertices whether there are lightmaps or not.
+    let vertex_light = !lightmapped;
     let mut look = Look {
         color: None,
         factor: Vec4::ONE,
@@ -160,7 +164,7 @@ pub fn look(material: &WorldMaterial, mean: &mut dyn FnMut(&str) -> Option<Vec4>
         reversed: shader.cull == Cull::Back,
         vertex_color: None,
         vertex_alpha: false,
-        lightmapped: !vertex_light && shader.has_lightmap_stage(),
+        lightmapped,
         dielectric: None,
         mirror: class.class == SurfaceClass::Mirror,
         roughness: if class.environment { SHINY } else { 1.0 },
@@ -179,7 +183,7 @@ pub fn look(material: &WorldMaterial, mean: &mut dyn FnMut(&str) -> Option<Vec4>
         return look;
     };
     let group = group_of(shader, base, stage, &mut look.lost);
-    colors_of_vertices(material, shader, &group, &mut look);
+    colors_of_vertices(shader, &group, &mut look);
     let slot = |picture: Picture, stage: &Stage| Slot {
         picture,
         clamp: matches!(stage.image, StageImage::ClampMap(_)),
@@ -274,7 +278,7 @@ pub fn look(material: &WorldMaterial, mean: &mut dyn FnMut(&str) -> Option<Vec4>
         }
     }
     if look.glow.is_none() {
-        add_moving_glow(shader, &group, &mut look);
+        add_moving_glow(shader, vertex_light, &group, &mut look);
     }
     dielectric(shader, &drawn, &mut look);
     look
@@ -334,7 +338,7 @@ fn plain_blend(stage: &Stage) -> Option<(Alpha, Option<Edit>)> {
 }
 
 /// Whether and how colours of vertices multiply the group.
-fn colors_of_vertices(material: &WorldMaterial, shader: &Shader, group: &[usize], look: &mut Look) {
+fn colors_of_vertices(shader: &Shader, group: &[usize], look: &mut Look) {
     let stages = || group.iter().filter_map(|&i| shader.stages.get(i));
     let from_vertex = |s: &Stage| {
         matches!(
@@ -343,9 +347,10 @@ fn colors_of_vertices(material: &WorldMaterial, shader: &Shader, group: &[usize]
         )
     };
     if stages().any(from_vertex) {
-        look.vertex_color = Some(match material.lighting {
-            ImplicitKind::Lightmapped => VertexColor::Paint,
-            _ => VertexColor::Light,
+        look.vertex_color = Some(if look.lightmapped {
+            VertexColor::Paint
+        } else {
+            VertexColor::Light
         });
     }
     if stages().any(|s| matches!(s.rgb_gen, RgbGen::OneMinusVertex)) {
@@ -358,12 +363,15 @@ fn colors_of_vertices(material: &WorldMaterial, shader: &Shader, group: &[usize]
 }
 
 /// Of what moves against the colour, or lies on it in another way, the first stage that adds light becomes the glow.
-fn add_moving_glow(shader: &Shader, group: &[usize], look: &mut Look) {
+fn add_moving_glow(shader: &Shader, vertex_light: bool, group: &[usize], look: &mut Look) {
     if look.alpha != Alpha::Opaque {
         return;
     }
+    // What is added under a lightmap is lit.
+    let glowing = glow_stages(shader, vertex_light);
     let found = shader.stages.iter().enumerate().find(|(i, stage)| {
         !group.contains(i)
+            && glowing.contains(i)
             && stage.tc_gen == TcGen::Base
             && matches!(
                 stage.blend,

@@ -104,18 +104,21 @@ pub struct ExportOptions {
     pub images: ImagePlace,
     /// Whether lights that the format knows (points, spots, suns) are written.
     pub lights: bool,
+    /// Whether the sky shines as strongly as its light in the map, instead of as bright as the game shows it.
+    pub sky_light: bool,
     /// Whether moving textures are written as animations, which strict readers of glTF refuse.
     pub animate: bool,
 }
 
 impl Default for ExportOptions {
-    /// Metres, lightmaps kept, lights written, nothing animated.
+    /// Metres, lightmaps kept, lights written, the sky as bright as in the game, nothing animated.
     fn default() -> Self {
         ExportOptions {
             scale: METRES_PER_UNIT,
             lightmaps: Lightmaps::default(),
             images: ImagePlace::default(),
             lights: true,
+            sky_light: false,
             animate: false,
         }
     }

@@ -138,7 +138,7 @@ impl Document<'_> {
             let name = if model == 0 {
                 "world".to_owned()
             } else {
-                format!("model_{model}")
+                format!("model.{model}")
             };
             self.meshes
                 .push(json!({"name": name, "primitives": primitives}));
@@ -208,10 +208,10 @@ impl Document<'_> {
         let radiance = world
             .sky
             .and_then(|m| emission::radiances(world).get(m as usize).copied())
-            .filter(|r| source.options.lights && r.max_element() > 0.0);
+            .filter(|r| r.max_element() > 0.0);
         let shown = (mean.w > 0.0).then(|| mean.truncate() / mean.w);
         let strength = match (radiance, shown) {
-            (Some(radiance), Some(shown)) => {
+            (Some(radiance), Some(shown)) if source.options.sky_light => {
                 emission::luminance(radiance) / emission::luminance(shown).max(1.0e-3)
             }
             _ => 1.0,
@@ -237,9 +237,11 @@ impl Document<'_> {
             .push(json!({"name": "sky", "primitives": primitives}));
         let mesh = self.meshes.len() - 1;
         let told = super::extras::material(material);
-        Ok(Some(self.nodes.add(
-            json!({"name": "sky", "mesh": mesh, "extras": {"material": told}}),
-        )))
+        Ok(Some(self.nodes.add(json!({
+            "name": "sky",
+            "mesh": mesh,
+            "extras": {"material": told, "radiance": radiance.map(|r| r.to_array())},
+        }))))
     }
 
     fn sky_material(

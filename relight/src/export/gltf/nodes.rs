@@ -85,7 +85,7 @@ impl Nodes {
                 let name = if model == 0 {
                     "worldspawn".to_owned()
                 } else {
-                    format!("model_{model}")
+                    format!("model.{model}")
                 };
                 top.push(self.add(json!({"name": name, "mesh": mesh})));
             }
@@ -161,7 +161,7 @@ impl Nodes {
     fn add_point(&mut self, number: usize, light: &PointLight, scale: f32) -> Option<usize> {
         let (color, strength) = color_and_strength(light.intensity)?;
         let mut node = Map::new();
-        let name = format!("light_{number}");
+        let name = format!("light.{number}");
         let mut out = json!({
             "name": name,
             "color": color,
@@ -187,7 +187,7 @@ impl Nodes {
 
     fn add_sun(&mut self, number: usize, sun: &SunLight) -> Option<usize> {
         let (color, strength) = color_and_strength(sun.irradiance)?;
-        let name = format!("sun_{number}");
+        let name = format!("sun.{number}");
         let mut node = Map::new();
         let out = json!({
             "name": name,
@@ -221,7 +221,7 @@ impl Nodes {
         fogs.map(|(number, fog)| {
             let volume = &fog.volume;
             let mut node = Map::new();
-            node.insert("name".into(), json!(format!("fog_{number}")));
+            node.insert("name".into(), json!(format!("fog.{number}")));
             put_translation(&mut node, turn((volume.mins + volume.maxs) * 0.5) * scale);
             node.insert(
                 "extras".into(),

@@ -1,0 +1,325 @@
+//! What is exported is the map: counted and measured against the map's own lumps, and read by the `gltf` crate, which
+//! nobody here wrote.
+
+use glam::{Vec2, Vec3};
+use q3bsp::{Bsp, SurfaceKind, surface_flags};
+use relight::export::{
+    Export, ExportOptions, ExportReport, Format, ImagePlace, ImageStore, Lightmaps, export,
+};
+use relight::{GameFiles, Materials, Options, RelitWorld, SearchPath};
+use std::collections::{BTreeMap, HashSet};
+use std::path::{Path, PathBuf};
+
+/// A map written to a folder of its own.
+struct Written {
+    folder: tempfile::TempDir,
+    path: PathBuf,
+    world: RelitWorld,
+    report: ExportReport,
+}
+
+fn write(files: &dyn GameFiles, map: &str, format: Format, options: ExportOptions) -> Written {
+    let (materials, _) = Materials::load(files);
+    let world = RelitWorld::load(
+        files,
+        &materials,
+        map,
+        Options {
+            calibrate: None,
+            ..Options::default()
+        },
+    )
+    .unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(format!("map.{}", format.extension()));
+    let source = Export {
+        world: &world,
+        files,
+        images: &ImageStore::default(),
+        options,
+    };
+    let report = export(&source, format, &path).unwrap();
+    Written {
+        folder,
+        path,
+        world,
+        report,
+    }
+}
+
+/// Triangles of one material: number, area in square id units, bounds, ranges of texture coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Measure {
+    triangles: usize,
+    area: f64,
+    mins: Vec3,
+    maxs: Vec3,
+    st: [Vec2; 2],
+}
+
+impl Default for Measure {
+    fn default() -> Self {
+        Measure {
+            triangles: 0,
+            area: 0.0,
+            mins: Vec3::MAX,
+            maxs: Vec3::MIN,
+            st: [Vec2::MAX, Vec2::MIN],
+        }
+    }
+}
+
+impl Measure {
+    fn add(&mut self, corners: [Vec3; 3], st: [Vec2; 3]) {
+        let [a, b, c] = corners;
+        self.triangles += 1;
+        self.area += 0.5 * f64::from((b - a).cross(c - a).length());
+        for p in corners {
+            (self.mins, self.maxs) = (self.mins.min(p), self.maxs.max(p));
+        }
+        for p in st {
+            self.st = [self.st[0].min(p), self.st[1].max(p)];
+        }
+    }
+}
+
+/// What the map's own lumps say, without what they mark as not drawn, sky, and what has no area.
+fn measure_lumps(bsp: &Bsp, hidden: &dyn Fn(&str) -> bool) -> BTreeMap<String, Measure> {
+    let mut out: BTreeMap<String, Measure> = BTreeMap::new();
+    let patches = bsp.patch_meshes(4.0);
+    for (index, surface) in bsp.surfaces.iter().enumerate() {
+        let shader = &bsp.shaders[surface.shader as usize];
+        let flags =
+            surface_flags::NODRAW | surface_flags::HINT | surface_flags::SKIP | surface_flags::SKY;
+        if shader.surface_flags & flags != 0 || hidden(&shader.name) {
+            continue;
+        }
+        let (vertices, corners) = match (surface.kind, &patches[index]) {
+            (SurfaceKind::Patch, Some(mesh)) => (mesh.vertices.clone(), mesh.indices()),
+            (SurfaceKind::Planar | SurfaceKind::TriangleSoup, _) => (
+                bsp.surface_vertices(surface).to_vec(),
+                bsp.surface_indices(surface)
+                    .iter()
+                    .map(|&i| i as u32)
+                    .collect(),
+            ),
+            _ => continue,
+        };
+        for corners in corners.as_chunks::<3>().0 {
+            let v = corners.map(|i| vertices[i as usize]);
+            let [a, b, c] = v.map(|v| v.position);
+            if (b - a).cross(c - a) != Vec3::ZERO {
+                let measure = out.entry(shader.name.to_ascii_lowercase()).or_default();
+                measure.add([a, b, c], v.map(|v| v.st));
+            }
+        }
+    }
+    out
+}
+
+/// What a glTF holds, back in id units; and how many triangles face away from their normals.
+fn measure_gltf(path: &Path, scale: f32) -> (BTreeMap<String, Measure>, usize) {
+    let (document, buffers, images) = gltf::import(path).unwrap();
+    assert!(images.len() <= document.images().count());
+    let mut out: BTreeMap<String, Measure> = BTreeMap::new();
+    let mut away = 0;
+    let mut meshes = HashSet::new();
+    for node in document.nodes() {
+        let Some(mesh) = node.mesh().filter(|_| node.name() != Some("sky")) else {
+            continue;
+        };
+        if !meshes.insert(mesh.index()) {
+            continue;
+        }
+        for primitive in mesh.primitives() {
+            let reader = primitive.reader(|b| Some(&buffers[b.index()]));
+            let back = |p: [f32; 3]| Vec3::new(p[0], -p[2], p[1]);
+            let positions: Vec<Vec3> = reader
+                .read_positions()
+                .unwrap()
+                .map(|p| back(p) / scale)
+                .collect();
+            let normals: Vec<Vec3> = reader.read_normals().unwrap().map(back).collect();
+            let st: Vec<Vec2> = match reader.read_tex_coords(0) {
+                Some(st) => st.into_f32().map(Vec2::from).collect(),
+                None => vec![Vec2::ZERO; positions.len()],
+            };
+            assert!(normals.iter().all(|n| (n.length() - 1.0).abs() < 1.0e-3));
+            let indices: Vec<u32> = reader.read_indices().unwrap().into_u32().collect();
+            let name = primitive.material().name().unwrap().to_ascii_lowercase();
+            let measure = out.entry(name).or_default();
+            for corners in indices.as_chunks::<3>().0 {
+                let at = corners.map(|i| i as usize);
+                let [a, b, c] = at.map(|i| positions[i]);
+                measure.add([a, b, c], at.map(|i| st[i]));
+                let front = (b - a).cross(c - a);
+                let normal: Vec3 = at.iter().map(|&i| normals[i]).sum();
+                // slivers have no direction to speak of
+                if front.length() > 1.0 && front.normalize().dot(normal) < -0.1 {
+                    away += 1;
+                }
+            }
+        }
+    }
+    (out, away)
+}
+
+/// Materials that are not drawn whatever the map's flags say.
+fn hidden(world: &RelitWorld) -> HashSet<String> {
+    use shaderscript::light::SurfaceClass::{Fog, Invisible};
+    let unseen = world
+        .materials
+        .iter()
+        .filter(|m| m.is_sky() || matches!(m.class.class, Invisible | Fog));
+    unseen.map(|m| m.name.to_ascii_lowercase()).collect()
+}
+
+#[track_caller]
+fn agree(written: &Written, name: &str) {
+    let unseen = hidden(&written.world);
+    let lumps = measure_lumps(&written.world.bsp, &|n| {
+        unseen.contains(&n.to_ascii_lowercase())
+    });
+    let scale = ExportOptions::default().scale;
+    let (found, away) = measure_gltf(&written.path, scale);
+    let names = |m: &BTreeMap<String, Measure>| m.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&found), names(&lumps), "{name}");
+    let mut triangles = 0;
+    for (material, lump) in &lumps {
+        let one = &found[material];
+        triangles += one.triangles;
+        assert_eq!(one.triangles, lump.triangles, "{name}: {material}");
+        assert!(
+            (one.area - lump.area).abs() <= 1.0e-4 * lump.area.max(1.0),
+            "{name}: {material}: {} {}",
+            one.area,
+            lump.area
+        );
+        assert!((one.mins - lump.mins).length() < 0.01, "{name}: {material}");
+        assert!((one.maxs - lump.maxs).length() < 0.01, "{name}: {material}");
+        // far out, coordinates are moved by whole repetitions
+        if lump.st[0].abs().max(lump.st[1].abs()).max_element() < 200.0 {
+            assert_eq!(one.st, lump.st, "{name}: {material}");
+        }
+    }
+    assert_eq!(triangles, written.report.triangles, "{name}");
+    // compilers leave a few triangles whose vertices' normals point elsewhere
+    assert!(
+        away * 200 <= triangles,
+        "{name}: {away} of {triangles} face away"
+    );
+}
+
+#[test]
+fn the_sample_is_the_map() {
+    let files = relight::sample::files().unwrap();
+    let written = write(
+        &files,
+        relight::sample::MAP,
+        Format::Glb,
+        ExportOptions::default(),
+    );
+    agree(&written, "sample");
+    let (document, ..) = gltf::import(&written.path).unwrap();
+    let material = |name: &str| {
+        document
+            .materials()
+            .find(|m| m.name() == Some(name))
+            .unwrap()
+    };
+    let grate = material("sample/grate");
+    assert_eq!(grate.alpha_mode(), gltf::material::AlphaMode::Mask);
+    assert!(grate.double_sided());
+    let lamp = material("sample/lamp_warm");
+    assert!(lamp.emissive_strength().unwrap() > 1.0);
+    assert!(lamp.emissive_texture().is_some());
+    let entities = written.world.bsp.entities().len();
+    let kept = document.nodes().filter(|n| {
+        n.extras()
+            .as_ref()
+            .is_some_and(|e| e.get().contains("\"classname\""))
+    });
+    assert_eq!(kept.count(), entities);
+}
+
+#[test]
+fn images_are_stored_once_and_lightmaps_can_be_left_out() {
+    let files = relight::sample::files().unwrap();
+    let options = ExportOptions {
+        images: ImagePlace::Beside,
+        ..ExportOptions::default()
+    };
+    let written = write(&files, relight::sample::MAP, Format::Gltf, options);
+    let mut contents = HashSet::new();
+    let images = |path: &Path| path.extension().is_some_and(|e| e == "png" || e == "jpg");
+    let mut count = 0;
+    for (path, size) in &written.report.files {
+        let bytes = std::fs::read(path).unwrap();
+        assert_eq!(bytes.len() as u64, *size);
+        if images(path) {
+            count += 1;
+            assert!(contents.insert(bytes), "{} twice", path.display());
+        }
+    }
+    assert_eq!(count, written.report.images);
+    assert!(written.folder.path().join("map.bin").is_file());
+    gltf::import(&written.path).unwrap();
+
+    let stripped = ExportOptions {
+        lightmaps: Lightmaps::Strip,
+        ..options
+    };
+    let bare = write(&files, relight::sample::MAP, Format::Gltf, stripped);
+    assert_eq!(bare.report.images + 1, written.report.images);
+    let text = std::fs::read_to_string(&bare.path).unwrap();
+    assert!(!text.contains("MOZ_lightmap") && !text.contains("TEXCOORD_1"));
+}
+
+#[test]
+fn obj_has_every_triangle() {
+    let files = relight::sample::files().unwrap();
+    let written = write(
+        &files,
+        relight::sample::MAP,
+        Format::Obj,
+        ExportOptions::default(),
+    );
+    let text = std::fs::read_to_string(&written.path).unwrap();
+    let lines = |keyword: &str| text.lines().filter(|l| l.starts_with(keyword)).count();
+    assert_eq!(lines("f "), written.report.triangles);
+    assert_eq!(lines("v "), written.report.vertices);
+    assert_eq!(lines("vt "), lines("v "));
+    let mtl = std::fs::read_to_string(written.path.with_extension("mtl")).unwrap();
+    for line in mtl.lines().filter(|l| l.starts_with("map_")) {
+        let file = line.rsplit(' ').next().unwrap();
+        assert!(written.folder.path().join(file).is_file(), "{line}");
+    }
+}
+
+/// Maps that together have what maps have: patches drawn and hidden, soups, coordinates that are no numbers, the same
+/// name with different flags.
+const MAPS: [&str; 3] = ["aggressor", "am_lavaarena", "oa_dm3"];
+
+#[test]
+fn real_maps_are_exported_as_they_are() {
+    let folder = std::env::var_os("OPENARENA_DATA").map_or_else(
+        || PathBuf::from("/usr/share/games/openarena/baseoa"),
+        PathBuf::from,
+    );
+    if !folder.is_dir() {
+        let required = std::env::var("RELIGHT_REQUIRE_DATA").is_ok_and(|v| v == "1");
+        assert!(
+            !required,
+            "{}: OpenArena's data is required",
+            folder.display()
+        );
+        println!("skipped: no OpenArena data in {}", folder.display());
+        return;
+    }
+    let files = SearchPath::open(&[folder]).unwrap();
+    for name in MAPS {
+        let map = format!("maps/{name}.bsp");
+        let written = write(&files, &map, Format::Glb, ExportOptions::default());
+        agree(&written, name);
+    }
+}
