@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use relight::calibrate::{Agreement, CalibrationReport};
+use relight::calibrate::{
+    Agreement, CalibrationReport, FOUND_WITHIN, POWER_WITHIN, Recovery, hide_entities, recovery,
+};
 use relight::{CalibrationCache, CalibrationOptions, Materials, Options, RelitWorld};
 use serde_json::{Value, json};
 
@@ -30,6 +32,9 @@ pub struct CalibrationArgs {
     /// Folder to keep results in
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
+    /// Hide the light entities that maps kept, and tell how many of them are found again
+    #[arg(long)]
+    hide_entities: bool,
     /// One JSON object a map, in place of a table
     #[arg(long)]
     json: bool,
@@ -61,16 +66,22 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
         let (files, path) = open(map, &args.chosen.games)?;
         let (materials, _) = Materials::load(&*files);
         let default = CalibrationOptions::default();
+        let calibrate = CalibrationOptions {
+            samples: args.samples.unwrap_or(default.samples),
+            seed: args.seed.unwrap_or(default.seed),
+            cache: args.cache.as_ref().map(CalibrationCache::new),
+            ..default
+        };
         let options = Options {
-            calibrate: Some(CalibrationOptions {
-                samples: args.samples.unwrap_or(default.samples),
-                seed: args.seed.unwrap_or(default.seed),
-                cache: args.cache.as_ref().map(CalibrationCache::new),
-                ..default
-            }),
+            calibrate: None,
+            by_hand: false,
             ..Options::default()
         };
-        let world = RelitWorld::load(&*files, &materials, &path, options)?;
+        let mut world = RelitWorld::load(&*files, &materials, &path, options)?;
+        let hidden = args.hide_entities.then(|| hide_entities(&mut world));
+        world.measure_materials(&*files);
+        relight::calibrate(&mut world, &calibrate);
+        let found = hidden.map(|hidden| recovery(&hidden, &world));
         for warning in &world.warnings {
             log::warn!("{path}: {warning}");
         }
@@ -78,7 +89,7 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
             continue;
         };
         if args.json {
-            println!("{}", as_json(map, report));
+            println!("{}", as_json(map, report, found.as_ref()));
         } else {
             println!(
                 "{map:20} {:>9} {:7} {:5} {:6} {:7.3} {:7.3} {:6.2} {:7.3} {:7.3} {:8.2}",
@@ -93,6 +104,9 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
                 report.after.sum_ratio,
                 report.seconds
             );
+        }
+        if let Some(found) = found.filter(|_| !args.json) {
+            println!("    {}", in_words(&found));
         }
         reports.push(report.clone());
     }
@@ -124,7 +138,23 @@ fn ratio(report: &CalibrationReport) -> f32 {
     report.before.median_stops / report.after.median_stops.max(1e-4)
 }
 
-fn as_json(map: &str, report: &CalibrationReport) -> Value {
+fn in_words(found: &Recovery) -> String {
+    format!(
+        "{} light entities hidden: {} found within {FOUND_WITHIN} units ({:.1} in the median), {} of them also within {:.0} % of their power; \
+         those found had {:.0} % of the power. All lights put in have {:.2} of the power hidden; {} of them, with {:.0} % of their power, are near none.",
+        found.hidden,
+        found.found,
+        found.median_distance,
+        found.found_well,
+        POWER_WITHIN * 100.0,
+        found.power_found * 100.0,
+        found.power_ratio,
+        found.invented,
+        found.power_invented * 100.0
+    )
+}
+
+fn as_json(map: &str, report: &CalibrationReport, found: Option<&Recovery>) -> Value {
     let agreement = |a: &Agreement| {
         json!({
             "median_stops": a.median_stops,
@@ -142,6 +172,17 @@ fn as_json(map: &str, report: &CalibrationReport) -> Value {
         "before": agreement(&report.before),
         "after": agreement(&report.after),
         "ratio": ratio(report),
+        "suns": report.suns,
+        "hidden": found.map(|f| json!({
+            "lights": f.hidden,
+            "found": f.found,
+            "found_well": f.found_well,
+            "median_distance": f.median_distance,
+            "power_found": f.power_found,
+            "power_ratio": f.power_ratio,
+            "invented": f.invented,
+            "power_invented": f.power_invented,
+        })),
         "cached": report.cached,
         "seconds": report.seconds,
     })

@@ -38,6 +38,10 @@ pub struct LightsArgs {
     /// Do not fit lights to the map's lightmaps first (the game does)
     #[arg(long)]
     no_calibration: bool,
+    /// Draw the map from above instead, .svg or .png: its lights, how many each cluster lists, and where traced light
+    /// differs from stored light
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
     /// Folder to keep what calibration and rays find in
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
@@ -58,6 +62,13 @@ pub fn run(args: &LightsArgs) -> Result<()> {
             ..Options::default()
         };
         let mut world = RelitWorld::load(&*files, &materials, &map, options)?;
+        if let Some(picture) = &args.picture {
+            world.measure_materials(&*files);
+            sweep(&mut world, cache.as_ref());
+            crate::lights_picture::draw(&world, picture)?;
+            println!("{}", picture.display());
+            continue;
+        }
         let begin = Instant::now();
         let visible = lists_by_visibility(&world);
         let visible_seconds = begin.elapsed().as_secs_f64();

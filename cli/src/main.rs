@@ -10,6 +10,8 @@ mod convert;
 mod estimators;
 mod info;
 mod lights;
+mod lights_picture;
+mod looks;
 mod measure;
 mod render;
 mod statistics;
@@ -45,6 +47,8 @@ enum Command {
     Info(info::InfoArgs),
     /// Judge the light lists of maps by rays
     Lights(lights::LightsArgs),
+    /// Draw views in the classic look and traced, side by side, and compare how bright they are
+    Looks(looks::LooksArgs),
     /// Measure the traced look in real time against its reference
     Measure(measure::MeasureArgs),
     /// Make a picture of a map, without an engine or a display
@@ -103,6 +107,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Estimators(args) => estimators::run(&args),
         Command::Info(args) => return info::run(&args),
         Command::Lights(args) => lights::run(&args),
+        Command::Looks(args) => looks::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Render(args) => render::run(&args),
     }?;

@@ -4,13 +4,17 @@
 //! lightmaps. Light is linear in the strengths of lights, so that finding them is a linear problem: *inverse lighting*.
 //!
 //! 1. `samples`: measurements, spread over the map's area. Some are held out, to judge by.
-//! 2. `bounce`: the part of each that other surfaces throw there, which tracing will add.
-//! 3. `columns`: shadow rays tell what each known light gives to each sample.
-//! 4. `place`: candidates for lost lights all over open space, then in front of what stays unexplained;
-//!    `solve` chooses among them by sparse non-negative least squares of logarithmic error. What directives say
-//!    is a prior, and what is the same everywhere is ambient, within limits.
-//! 5. The world's lights get their strengths, lost lights are added to
+//! 2. `columns`: shadow rays tell what each known light gives to each sample. Skies that no directive tells the light of
+//!    count as known lights of unknown strength (`skies`).
+//! 3. `bounce`: which part of the light at samples others throw there, as tracing will.
+//! 4. `solve` fits strengths by sparse non-negative least squares of logarithmic error. What directives say is a prior,
+//!    and what is the same everywhere is ambient, within limits. `suns` looks for a sun where none is known.
+//! 5. `place`: candidates for lost lights all over open space, then in front of what stays unexplained, for as long as
+//!    that makes light agree better at what is held out. `fit` holds these steps together.
+//! 6. The world's lights get their strengths, lost lights are added to
 //!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
+//!
+//! `docs/calibration.md` has the equations and how well it does. [`residuals`] tells how well any world's light agrees.
 //!
 //! Results can be kept ([`CalibrationCache`]): they depend on the world alone, on no clock and no thread.
 //!
@@ -21,10 +25,13 @@ mod bounce;
 pub(crate) mod bvh;
 pub(crate) mod cache;
 mod columns;
+mod fit;
 pub(crate) mod parallel;
 mod place;
 pub(crate) mod random;
+mod recovery;
 mod report;
+mod residuals;
 pub(crate) mod samples;
 mod skies;
 mod solve;
@@ -33,24 +40,20 @@ mod suns;
 mod tests;
 
 pub use cache::CalibrationCache;
+pub use recovery::{FOUND_WITHIN, POWER_WITHIN, Recovery, hide_entities, recovery};
 pub use report::{Agreement, CalibrationReport};
+pub use residuals::{Residual, residuals};
 pub use samples::Evidence;
 
 use crate::world::RelitWorld;
+use bvh::Occluders;
 use columns::Source;
+use fit::Fit;
 use glam::Vec3;
-use samples::Sample;
-use solve::Ambient;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 4;
-
-/// Most times that lights are looked for.
-const ROUNDS: u32 = 4;
-
-/// Lights are looked for again while that leaves less than this part of the error at samples held out.
-const ENOUGH: f32 = 0.985;
+const VERSION: u32 = 5;
 
 /// How a world is calibrated.
 #[derive(Debug, Clone, PartialEq)]
@@ -144,7 +147,7 @@ pub fn calibrate(world: &mut RelitWorld, options: &CalibrationOptions) -> Calibr
 /// Solves for a world's light. `silent`: skies of which directives tell nothing.
 fn find(world: &RelitWorld, silent: &[u32], options: &CalibrationOptions) -> Solution {
     let occluders = samples::occluders(world);
-    let (mut samples, evidence) = samples::take(world, &occluders, options.samples, options.seed);
+    let (samples, evidence) = samples::take(world, &occluders, options.samples, options.seed);
     let mut columns = columns::known(world, &occluders, &samples, silent);
     let known = columns.len();
     let mut solution = Solution {
@@ -167,57 +170,27 @@ fn find(world: &RelitWorld, silent: &[u32], options: &CalibrationOptions) -> Sol
     for column in columns.iter_mut().filter(|c| c.prior.is_none()) {
         column.strength = Vec3::ZERO;
     }
-    let direct = solve::direct(&samples, &columns);
-    rebounce(&mut samples, transfer.of(&direct, true));
-    let before = solve::predict(&samples, &columns, world.ambient);
-    solution.report.before = Agreement::of(&samples, &before);
-
-    // What was measured is a better first guess of what is thrown back than what is believed of lights.
-    let measured: Vec<Vec3> = samples.iter().map(|s| s.value).collect();
-    rebounce(&mut samples, transfer.of(&measured, false));
-    let mut ambient = first_ambient(world, &samples);
-    let effort = solve::Effort {
-        rounds: 8,
-        sweeps: 12,
-        sparsity: 0.0,
-        anew: true,
+    let mut fit = Fit {
+        world,
+        occluders: &occluders,
+        ambient: fit::first_ambient(world, &samples),
+        samples,
+        transfer,
+        columns,
     };
-    solve::solve(&samples, &mut columns, &mut ambient, effort);
-    if occluders.any_sky() {
-        suns::find(&occluders, &samples, &mut columns, &mut ambient, effort);
-    }
-    let fixed = columns.len();
+    let first = std::mem::replace(&mut fit.ambient.value, world.ambient);
+    fit.rebounce(true);
+    solution.report.before = fit.agreement();
+    fit.ambient.value = first;
+    fit.known();
     if options.candidates > 0 {
-        let (mut spacing, mut best) = (0.0, f32::INFINITY);
-        for round in 0..ROUNDS {
-            let kept = (columns.clone(), ambient);
-            let scene = place::Scene {
-                world,
-                occluders: &occluders,
-                samples: &samples,
-                candidates: options.candidates,
-            };
-            if round == 0 {
-                spacing = place::over_space(&scene, &mut columns, fixed, &mut ambient);
-            } else {
-                place::in_front(&scene, &mut columns, fixed, &mut ambient, spacing);
-            }
-            settle(&mut samples, &mut columns, &mut ambient, &transfer);
-            let found = held_out_error(&samples, &columns, ambient.value);
-            if found > best * ENOUGH {
-                if found > best {
-                    (columns, ambient) = kept;
-                    settle(&mut samples, &mut columns, &mut ambient, &transfer);
-                }
-                break;
-            }
-            best = found;
-        }
+        fit.place(options.candidates);
     } else {
-        settle(&mut samples, &mut columns, &mut ambient, &transfer);
+        fit.settle();
     }
-    let after = solve::predict(&samples, &columns, ambient.value);
-    solution.report.after = Agreement::of(&samples, &after);
+    fit.more_ambient();
+    solution.report.after = fit.agreement();
+    let columns = fit.columns;
     solution.known = columns.iter().take(known).map(|c| c.strength).collect();
     for column in columns.iter().skip(known) {
         match column.source {
@@ -230,63 +203,6 @@ fn find(world: &RelitWorld, silent: &[u32], options: &CalibrationOptions) -> Sol
     }
     solution.report.placed = solution.placed.len();
     solution.report.suns = solution.suns.len();
-    solution.ambient = ambient.value;
+    solution.ambient = fit.ambient.value;
     solution
-}
-
-/// Fits strengths and the light that they throw back to each other, in turns.
-fn settle(
-    samples: &mut [Sample],
-    columns: &mut [columns::Column],
-    ambient: &mut Ambient,
-    transfer: &bounce::Transfer,
-) {
-    let effort = solve::Effort {
-        rounds: 3,
-        sweeps: 8,
-        sparsity: 0.0,
-        anew: false,
-    };
-    for _ in 0..3 {
-        let direct = solve::direct(samples, columns);
-        rebounce(samples, transfer.of(&direct, false));
-        solve::solve(samples, columns, ambient, effort);
-    }
-    let direct = solve::direct(samples, columns);
-    rebounce(samples, transfer.of(&direct, false));
-}
-
-fn rebounce(samples: &mut [Sample], bounced: Vec<Vec3>) {
-    for (sample, bounce) in samples.iter_mut().zip(bounced) {
-        sample.bounce = bounce;
-    }
-}
-
-/// Median error of what fitting does not see.
-fn held_out_error(samples: &[Sample], columns: &[columns::Column], ambient: Vec3) -> f32 {
-    Agreement::of(samples, &solve::predict(samples, columns, ambient)).median_stops
-}
-
-/// Where the ambient term starts, and how far it may go: what darker places have. More would hide lights.
-fn first_ambient(world: &RelitWorld, samples: &[Sample]) -> Ambient {
-    let channel = |k: usize| {
-        let mut values: Vec<f32> = samples
-            .iter()
-            .filter(|s| !s.held_out)
-            .map(|s| s.value[k])
-            .collect();
-        values.sort_by(f32::total_cmp);
-        values.get(values.len() / 5).copied().unwrap_or(0.0)
-    };
-    let dark = Vec3::new(channel(0), channel(1), channel(2));
-    // Without any light, loading took the mean of all light for ambient.
-    let start = if world.light_count() == 0 {
-        Vec3::ZERO
-    } else {
-        world.ambient.min(dark)
-    };
-    Ambient {
-        value: start,
-        limit: dark,
-    }
 }

@@ -18,11 +18,17 @@ use glam::Vec3;
 /// Light that is too little to tell apart: added to both sides of a ratio, irradiance / π.
 pub(super) const FLOOR: f32 = 2.0 * STORED_UNIT;
 
+/// Stored light below which a sample is black, irradiance / π.
+pub(super) const BLACK: f32 = STORED_UNIT;
+
+/// Weight of black samples.
+const TRUST_IN_BLACK: f32 = 0.2;
+
 /// |log ratio| up to which a sample counts in full.
 const HUBER: f32 = 0.3;
 
 /// Weight of what directives say, counted in samples that are off by a factor e.
-const PRIOR_WEIGHT: f32 = 4.0;
+const PRIOR_WEIGHT: f32 = 0.5;
 
 /// The constant part of all samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,7 +111,17 @@ fn weight(sample: &Sample, computed: f32) -> f32 {
     } else {
         off / (c * (c - s))
     };
-    slope * (HUBER / off.abs().max(HUBER))
+    slope * (HUBER / off.abs().max(HUBER)) * trust(sample)
+}
+
+/// How much a sample tells. Compilers leave texels black where the point that they measured at lay inside of something,
+/// and some maps are full of them.
+fn trust(sample: &Sample) -> f32 {
+    if sample.level() < BLACK {
+        TRUST_IN_BLACK
+    } else {
+        1.0
+    }
 }
 
 /// Fits the strengths of `columns` and the ambient term.
@@ -125,7 +141,8 @@ pub(super) fn solve(
             let mean = samples.iter().map(Sample::level).sum::<f32>() / samples.len().max(1) as f32;
             for (weight, sample) in state.weights.iter_mut().zip(samples) {
                 if *weight > 0.0 {
-                    *weight = 1.0 / ((sample.level() + FLOOR) * (mean + FLOOR));
+                    let level = (sample.level() + FLOOR) * (mean + FLOOR);
+                    *weight = trust(sample) / level;
                 }
             }
         }

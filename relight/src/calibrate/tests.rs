@@ -1,3 +1,5 @@
+mod known_truth;
+
 use super::*;
 use crate::files::{MemoryFiles, SearchPath};
 use crate::light::{PointLight, SURFACE_LIGHT_RADIANCE};
@@ -262,6 +264,31 @@ fn a_lamp_of_another_strength_gets_it_back() {
     let placed: f32 = world.point_lights.iter().map(|l| l.intensity.x).sum();
     let lamp: f32 = world.lights.iter().map(|l| l.radiance.x * l.area()).sum();
     assert!(placed < 0.05 * lamp, "{placed} beside {lamp}");
+}
+
+#[test]
+fn lights_stand_for_the_nearest_hidden_one() {
+    let at = |x: f32, power: f32| PointLight {
+        origin: Vec3::new(x, 0.0, 0.0),
+        intensity: Vec3::splat(power),
+        radius: 4.0,
+        spot: None,
+    };
+    let mut world = room(false, None);
+    world.point_lights = vec![
+        at(-8.0, 60.0),
+        at(8.0, 50.0),
+        at(520.0, 30.0),
+        at(990.0, 20.0),
+    ];
+    let hidden = [at(0.0, 100.0), at(500.0, 60.0), at(2000.0, 40.0)];
+    let found = recovery(&hidden, &world);
+    assert_eq!((found.hidden, found.found, found.found_well), (3, 2, 1));
+    assert_eq!(found.invented, 1);
+    assert!((found.power_found - 0.8).abs() < 1e-5 && (found.power_ratio - 0.8).abs() < 1e-5);
+    assert!((found.power_invented - 0.125).abs() < 1e-5, "{found:?}");
+    assert!((found.median_distance - 20.0).abs() < 1e-3, "{found:?}");
+    assert_eq!(recovery(&[], &world).invented, 4);
 }
 
 /// What calibration may change.

@@ -42,6 +42,7 @@
 //! Source: the constants are the defaults of q3map2 (area scale 0.25, point scale 7500, sky scale 1); the
 //! units are written out here.
 
+mod by_hand;
 mod emission;
 mod entities;
 mod fallback;
@@ -58,6 +59,7 @@ mod solid;
 mod surfaces;
 mod sweep;
 
+pub use by_hand::{LightsByHand, LightsLineError};
 pub use emission::{Emission, EmissionSource, GLOW_THRESHOLD};
 pub use flicker::Flicker;
 pub use judge::{ListJudgement, judge, lists_by_geometry, lists_by_visibility};

@@ -66,6 +66,9 @@ pub struct Options<'a> {
     pub overbright_shift: u32,
     /// How lights are fitted to the map's lightmaps; `None` leaves them as directives say.
     pub calibrate: Option<CalibrationOptions>,
+    /// Whether the file of lights beside the map, if there is one, changes them at the end; see
+    /// [`LightsByHand`](crate::light::LightsByHand).
+    pub by_hand: bool,
     /// Told of progress.
     pub progress: Option<Progress<'a>>,
 }
@@ -77,6 +80,7 @@ impl Default for Options<'_> {
             subdivisions: 4.0,
             overbright_shift: MAP_OVERBRIGHT_BITS,
             calibrate: Some(CalibrationOptions::default()),
+            by_hand: true,
             progress: None,
         }
     }
@@ -228,6 +232,9 @@ impl RelitWorld {
             begin(Stage::Calibration);
             world.measure_materials_with(&mut finder);
             calibrate(&mut world, calibration);
+        }
+        if options.by_hand {
+            world.light_by_hand(files);
         }
         begin(Stage::Done);
         world

@@ -57,6 +57,7 @@ impl WorldOptions {
             subdivisions: self.subdivisions,
             overbright_shift: self.overbright_shift,
             calibrate: None,
+            by_hand: false,
             ..relight::Options::default()
         }
     }

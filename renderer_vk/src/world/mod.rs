@@ -353,10 +353,10 @@ impl World {
         assets: &mut Assets,
         cache: Option<&relight::CalibrationCache>,
     ) {
+        let files = std::sync::Arc::clone(assets.textures.files());
         let relit = &mut self.data.relit;
         let warned = relit.warnings.len();
         if choice == MapLightChoice::Calibrated {
-            let files = std::sync::Arc::clone(assets.textures.files());
             relit.measure_materials(&*files);
             let options = relight::CalibrationOptions {
                 cache: cache.cloned(),
@@ -369,6 +369,7 @@ impl World {
                 report.seconds
             );
         }
+        relit.light_by_hand(&*files);
         let swept = relight::light::sweep(relit, cache);
         for warning in relit.warnings.iter().skip(warned) {
             log::warn!("{}: {warning}", relit.name);

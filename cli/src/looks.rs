@@ -1,0 +1,173 @@
+//! `relight looks`: one view in the classic look and traced, with lights as directives say and calibrated, side by side.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use relight::compare::Rgb8;
+use renderer_vk::api::RefDef;
+use renderer_vk::{MapLightChoice, Renderer, RendererOptions, Settings};
+
+use crate::cameras::{EYES, places};
+use crate::render::parse_size;
+use crate::statistics::luminance;
+use crate::view::{Camera, Maps, map_entities, open};
+
+/// Draw views in the classic look and traced, side by side, and compare how bright they are
+///
+/// Views are the camera of the intermission and spawn points. Prints for each map the mean luminance of the traced
+/// pictures over that of the classic ones: with lights as directives say, and calibrated.
+///
+/// Example: relight looks oa_dm1 fan --views 4 --output out
+#[derive(Args, Debug)]
+pub struct LooksArgs {
+    #[command(flatten)]
+    chosen: Maps,
+    /// Views of each map; those that the map has no places for are left out
+    #[arg(long, default_value_t = 6)]
+    views: usize,
+    /// Size of a picture in pixels
+    #[arg(long, default_value = "320x240", value_parser = parse_size)]
+    size: (u32, u32),
+    /// Frames accumulated for a traced picture
+    #[arg(long, default_value_t = 32)]
+    frames: u32,
+    /// Folder for pictures: classic, traced by directives, traced calibrated, from left to right
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Folder to keep what calibration finds in
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
+}
+
+/// The looks, from left to right.
+const LOOKS: [Option<MapLightChoice>; 3] = [
+    None,
+    Some(MapLightChoice::Prior),
+    Some(MapLightChoice::Calibrated),
+];
+
+/// Runs the command.
+///
+/// # Errors
+/// A map cannot be loaded, there is no Vulkan device, a picture cannot be written.
+pub fn run(args: &LooksArgs) -> Result<()> {
+    if let Some(folder) = &args.output {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("{}: cannot be made", folder.display()))?;
+    }
+    println!(
+        "{:20} {:>5} {:>9} {:>11}",
+        "map", "views", "by prior", "calibrated"
+    );
+    let mut all = [0.0f64; 3];
+    let mut views = 0;
+    for map in &args.chosen.maps {
+        let (sums, count) = one(args, map)?;
+        print_line(map, count, sums);
+        for (all, sum) in all.iter_mut().zip(sums) {
+            *all += sum;
+        }
+        views += count;
+    }
+    print_line("all", views, all);
+    Ok(())
+}
+
+fn print_line(map: &str, views: usize, [classic, prior, calibrated]: [f64; 3]) {
+    let over = |sum: f64| sum / classic.max(1e-9);
+    println!(
+        "{map:20} {views:5} {:9.3} {:11.3}",
+        over(prior),
+        over(calibrated)
+    );
+}
+
+/// The views of one map: sums of their mean luminances in each look, and their number.
+fn one(args: &LooksArgs, map: &str) -> Result<([f64; 3], usize)> {
+    let (files, path) = open(map, &args.chosen.games)?;
+    let (width, height) = args.size;
+    let mut renderer = Renderer::new(RendererOptions {
+        width,
+        height,
+        window: None,
+        validation: false,
+        device: None,
+        vsync: false,
+        pipeline_cache: None,
+    })
+    .context("no picture without a Vulkan device")?;
+    renderer.keep_calibrations(args.cache.clone());
+    let settings = |look: Option<MapLightChoice>| Settings {
+        rt: look.is_some(),
+        rt_lights: look.unwrap_or_default(),
+        rt_accumulate: true,
+        ..Settings::default()
+    };
+    renderer.begin_registration(files, &settings(None))?;
+    renderer.load_world(&path)?;
+    renderer.end_registration();
+    let bsp = renderer
+        .world()
+        .map(|w| w.relit.bsp.clone())
+        .context("no map")?;
+    let entities = map_entities(&mut renderer, &bsp);
+    let cameras: Vec<Camera> = places(&bsp.entities(), args.views)
+        .iter()
+        .map(|place| Camera {
+            origin: place.origin + glam::Vec3::Z * EYES,
+            yaw: place.yaw,
+            pitch: 0.0,
+        })
+        .collect();
+    let mut pictures: Vec<Vec<Rgb8>> = cameras.iter().map(|_| Vec::new()).collect();
+    let mut sums = [0.0; 3];
+    for (look, sum) in LOOKS.into_iter().zip(&mut sums) {
+        renderer.set_settings(&settings(look));
+        for (camera, pictures) in cameras.iter().zip(&mut pictures) {
+            let def: RefDef = camera.ref_def(args.size, 90.0);
+            let frames = if look.is_some() {
+                args.frames.max(1)
+            } else {
+                1
+            };
+            for _ in 0..frames {
+                renderer.begin_frame(def.time_ms);
+                renderer.clear_scene();
+                for entity in &entities {
+                    renderer.add_entity(entity);
+                }
+                renderer.render_scene(&def)?;
+                renderer.end_frame()?;
+            }
+            let picture = renderer.read_pixels()?;
+            let picture = Rgb8::new(width as usize, height as usize, picture.rgb)?;
+            let shown = luminance(&picture);
+            let whole: f64 = shown.iter().copied().map(f64::from).sum();
+            *sum += whole / shown.len().max(1) as f64;
+            pictures.push(picture);
+        }
+    }
+    if let Some(folder) = &args.output {
+        for (number, pictures) in pictures.iter().enumerate() {
+            let file = folder.join(format!("{map}_{number}.png"));
+            save(&file, pictures, args.size)?;
+        }
+    }
+    Ok((sums, cameras.len()))
+}
+
+/// Writes pictures of one size side by side.
+fn save(file: &std::path::Path, pictures: &[Rgb8], (width, height): (u32, u32)) -> Result<()> {
+    let mut rows = Vec::with_capacity((width * height * 3) as usize * pictures.len());
+    for row in 0..height as usize {
+        for picture in pictures {
+            let bytes = width as usize * 3;
+            let row = picture.pixels().get(row * bytes..(row + 1) * bytes);
+            rows.extend_from_slice(row.unwrap_or_default());
+        }
+    }
+    let whole = width * pictures.len() as u32;
+    image::save_buffer(file, &rows, whole, height, image::ColorType::Rgb8)
+        .with_context(|| format!("{}: cannot be written", file.display()))
+}

@@ -1,0 +1,166 @@
+//! The state of a fit, and its steps: strengths, ambient and bounced light, which depend on each other.
+
+use super::bounce::Transfer;
+use super::columns::Column;
+use super::place::{self, Scene};
+use super::report::Agreement;
+use super::samples::{Sample, mean};
+use super::solve::{self, Ambient, BLACK, Effort};
+use super::{Occluders, suns};
+use crate::world::RelitWorld;
+use glam::Vec3;
+
+/// Most times that lights are looked for.
+const ROUNDS: u32 = 4;
+
+/// Lights are looked for again while that leaves less than this part of the error at samples held out.
+const ENOUGH: f32 = 0.985;
+
+/// More ambient light than the darkest texels have is believed when it leaves less than this part of the error at
+/// samples held out: then these texels are dark for another reason.
+const MORE_AMBIENT: f32 = 0.93;
+
+/// Strengths from a rough guess.
+const FIRST: Effort = Effort {
+    rounds: 8,
+    sweeps: 12,
+    sparsity: 0.0,
+    anew: true,
+};
+
+/// Strengths from nearly right ones.
+const NEXT: Effort = Effort {
+    rounds: 3,
+    sweeps: 8,
+    sparsity: 0.0,
+    anew: false,
+};
+
+/// A fit in progress.
+pub(super) struct Fit<'a> {
+    pub world: &'a RelitWorld,
+    pub occluders: &'a Occluders,
+    pub samples: Vec<Sample>,
+    pub transfer: Transfer,
+    /// Known sources first.
+    pub columns: Vec<Column>,
+    pub ambient: Ambient,
+}
+
+impl Fit<'_> {
+    /// Light at the samples as it is computed now.
+    pub fn agreement(&self) -> Agreement {
+        let computed = solve::predict(&self.samples, &self.columns, self.ambient.value);
+        Agreement::of(&self.samples, &computed)
+    }
+
+    /// Takes bounced light from the strengths as they are. `pictures`: with what pictures of skies give.
+    pub fn rebounce(&mut self, pictures: bool) {
+        let direct = solve::direct(&self.samples, &self.columns);
+        self.bounce_of(&direct, pictures);
+    }
+
+    fn bounce_of(&mut self, light: &[Vec3], pictures: bool) {
+        let bounced = self.transfer.of(light, pictures);
+        for (sample, bounce) in self.samples.iter_mut().zip(bounced) {
+            sample.bounce = bounce;
+        }
+    }
+
+    /// Fits known sources, and a sun where none is known.
+    pub fn known(&mut self) {
+        // What was measured is a better first guess of what is thrown back than what is believed of lights.
+        let measured: Vec<Vec3> = self.samples.iter().map(|s| s.value).collect();
+        self.bounce_of(&measured, false);
+        let (columns, ambient) = (&mut self.columns, &mut self.ambient);
+        solve::solve(&self.samples, columns, ambient, FIRST);
+        if self.occluders.any_sky() {
+            suns::find(self.occluders, &self.samples, columns, ambient, FIRST);
+        }
+    }
+
+    /// Fits strengths and the light that they throw back to each other, in turns.
+    pub fn settle(&mut self) {
+        for _ in 0..3 {
+            self.rebounce(false);
+            solve::solve(&self.samples, &mut self.columns, &mut self.ambient, NEXT);
+        }
+        self.rebounce(false);
+    }
+
+    /// Puts in point lights for as long as samples that are held out get better by it.
+    pub fn place(&mut self, candidates: usize) {
+        let fixed = self.columns.len();
+        let mut spacing = 0.0;
+        let mut best = f32::INFINITY;
+        for round in 0..ROUNDS {
+            let kept = (self.columns.clone(), self.ambient);
+            let scene = Scene {
+                world: self.world,
+                occluders: self.occluders,
+                samples: &self.samples,
+                candidates,
+            };
+            let (columns, ambient) = (&mut self.columns, &mut self.ambient);
+            if round == 0 {
+                spacing = place::over_space(&scene, columns, fixed, ambient);
+            } else {
+                place::in_front(&scene, columns, fixed, ambient, spacing);
+            }
+            self.settle();
+            let found = self.agreement().median_stops;
+            if found > best {
+                (self.columns, self.ambient) = kept;
+                self.rebounce(false);
+            }
+            if found > best * ENOUGH {
+                return;
+            }
+            best = found;
+        }
+    }
+
+    /// Lets the ambient term grow to what the darker of the lit texels have, where that explains much more.
+    pub fn more_ambient(&mut self) {
+        let kept = (self.columns.clone(), self.ambient);
+        let before = self.agreement().median_stops;
+        self.ambient.limit = quantile(&self.samples, 0.2, BLACK);
+        self.settle();
+        if self.agreement().median_stops > before * MORE_AMBIENT {
+            (self.columns, self.ambient) = kept;
+            self.rebounce(false);
+        }
+    }
+}
+
+/// Where the ambient term starts, and how far it may go: what the darkest twentieth has, for no texel has less than the
+/// compiler's ambient and minimum light. More would hide lights, and fill shadows.
+pub(super) fn first_ambient(world: &RelitWorld, samples: &[Sample]) -> Ambient {
+    let dark = quantile(samples, 0.05, 0.0);
+    // Without any light, loading took the mean of all light for ambient.
+    let start = if world.light_count() == 0 {
+        Vec3::ZERO
+    } else {
+        world.ambient.min(dark)
+    };
+    Ambient {
+        value: start,
+        limit: dark,
+    }
+}
+
+/// What a part of the samples that are fitted and not below `least` are darker than, channel by channel.
+fn quantile(samples: &[Sample], part: f32, least: f32) -> Vec3 {
+    let chosen: Vec<Vec3> = samples
+        .iter()
+        .filter(|s| !s.held_out && mean(s.value) >= least)
+        .map(|s| s.value)
+        .collect();
+    let channel = |k: usize| {
+        let mut values: Vec<f32> = chosen.iter().map(|v| v[k]).collect();
+        values.sort_by(f32::total_cmp);
+        let at = (values.len() as f32 * part) as usize;
+        values.get(at).copied().unwrap_or(0.0)
+    };
+    Vec3::new(channel(0), channel(1), channel(2))
+}

@@ -1,0 +1,398 @@
+//! Lights written by hand: a file beside the map that adds lights, changes them, or takes them away.
+//!
+//! `maps/NAME.lights` belongs to `maps/NAME.bsp`. It is text; `//` and `#` begin a comment, and each line is a word and
+//! numbers:
+//!
+//! | line | meaning |
+//! |---|---|
+//! | `point X Y Z LIGHT R G B [RADIUS]` | a point light, as an entity with `light` and `_color`; the radius is that of the ball that shines |
+//! | `spot X Y Z LIGHT R G B TX TY TZ ANGLE` | a point light that shines towards a place, in a cone of this half angle, degrees |
+//! | `sun R G B INTENSITY DEGREES ELEVATION [DEVIANCE]` | as `q3map_sun` |
+//! | `ambient LIGHT R G B` | light from everywhere, in place of what there is |
+//! | `material NAME LIGHT R G B` | surfaces of a material shine as with `q3map_surfacelight LIGHT` and this colour; 0 puts them out |
+//! | `scale WHAT FACTOR` | `points`, `suns` or `surfaces` that there were before, stronger or weaker |
+//! | `without WHAT` | none of the `points`, `suns` or `surfaces` that there were before |
+//!
+//! Lines take effect in the order: `without`, `scale`, `material`, then what is added. Colours are as in an entity's
+//! `_color`: the largest channel counts as 1.
+
+use super::entities::normalise;
+use super::{
+    AMBIENT_RADIANCE, DEFAULT_POINT_LIGHT_RADIUS, DEFAULT_SUN_RADIUS, Emission, EmissionSource,
+    POINT_LIGHT_INTENSITY, PointLight, SUN_IRRADIANCE, SURFACE_LIGHT_RADIANCE, Spot, SunLight,
+};
+use crate::files::GameFiles;
+use crate::world::RelitWorld;
+use glam::Vec3;
+
+/// What of a world's lights a line speaks of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Points,
+    Suns,
+    Surfaces,
+}
+
+/// A file of lights written by hand.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LightsByHand {
+    without: Vec<Kind>,
+    scale: Vec<(Kind, f32)>,
+    /// Name, radiance.
+    materials: Vec<(String, Vec3)>,
+    points: Vec<PointLight>,
+    suns: Vec<SunLight>,
+    ambient: Option<Vec3>,
+}
+
+/// A line that cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {what}")]
+pub struct LightsLineError {
+    /// Number of the line, from 1.
+    pub line: usize,
+    /// What is wrong with it.
+    pub what: String,
+}
+
+impl LightsByHand {
+    /// Reads the text of such a file. Lines that are wrong are left out and told of.
+    pub fn parse(text: &str) -> (LightsByHand, Vec<LightsLineError>) {
+        let mut file = LightsByHand::default();
+        let mut wrong = Vec::new();
+        for (number, line) in text.lines().enumerate() {
+            let line = line.split("//").next().unwrap_or("");
+            let line = line.split('#').next().unwrap_or("");
+            let words: Vec<&str> = line.split_whitespace().collect();
+            if let Some((key, rest)) = words.split_first()
+                && let Err(what) = file.line(key, rest)
+            {
+                wrong.push(LightsLineError {
+                    line: number + 1,
+                    what,
+                });
+            }
+        }
+        (file, wrong)
+    }
+
+    fn line(&mut self, key: &str, rest: &[&str]) -> Result<(), String> {
+        match key.to_ascii_lowercase().as_str() {
+            "point" => {
+                let n = numbers(rest, 7, 8)?;
+                let mut light = point(&n)?;
+                if let Some(&radius) = n.get(7) {
+                    light.radius = above_zero(radius, "the radius")?;
+                }
+                self.points.push(light);
+            }
+            "spot" => {
+                let n = numbers(rest, 11, 11)?;
+                let mut light = point(&n)?;
+                let aim = vector(&n, 7) - light.origin;
+                let angle = n.get(10).copied().unwrap_or(0.0);
+                if aim.length_squared() == 0.0 || !(angle > 0.0 && angle < 90.0) {
+                    return Err(
+                        "a spot needs a target elsewhere and an angle between 0 and 90".to_owned(),
+                    );
+                }
+                light.spot = Some(Spot {
+                    direction: aim.normalize(),
+                    tan_half_angle: angle.to_radians().tan(),
+                });
+                self.points.push(light);
+            }
+            "sun" => {
+                let n = numbers(rest, 6, 7)?;
+                let [intensity, degrees, elevation] = vector(&n, 3).to_array();
+                let color = normalise(not_below_zero(vector(&n, 0))?);
+                let (sin, cos) = degrees.to_radians().sin_cos();
+                let (up, flat) = elevation.to_radians().sin_cos();
+                self.suns.push(SunLight {
+                    direction: Vec3::new(cos * flat, sin * flat, up).normalize_or(Vec3::Z),
+                    irradiance: color * (above_zero(intensity, "the intensity")? * SUN_IRRADIANCE),
+                    angular_radius: match n.get(6) {
+                        Some(&deviance) if deviance > 0.0 => deviance.min(90.0).to_radians(),
+                        _ => DEFAULT_SUN_RADIUS,
+                    },
+                    material: None,
+                });
+            }
+            "ambient" => self.ambient = Some(colored(&numbers(rest, 4, 4)?)? * AMBIENT_RADIANCE),
+            "material" => {
+                let (name, rest) = rest.split_first().ok_or("a material's name is missing")?;
+                let radiance = colored(&numbers(rest, 4, 4)?)? * SURFACE_LIGHT_RADIANCE;
+                self.materials.push(((*name).to_owned(), radiance));
+            }
+            "scale" => {
+                let (what, rest) = rest.split_first().ok_or("points, suns or surfaces?")?;
+                let factor = *numbers(rest, 1, 1)?.first().unwrap_or(&1.0);
+                if factor < 0.0 {
+                    return Err("a factor cannot be below 0".to_owned());
+                }
+                self.scale.push((kind(what)?, factor));
+            }
+            "without" => match rest {
+                [what] => self.without.push(kind(what)?),
+                _ => return Err("points, suns or surfaces?".to_owned()),
+            },
+            _ => return Err(format!("unknown word {key:?}")),
+        }
+        Ok(())
+    }
+
+    /// Changes a world's lights, and lists them anew. Names of materials that the world does not have are returned.
+    pub fn apply(&self, world: &mut RelitWorld) -> Vec<String> {
+        let without = |kind: Kind| self.without.contains(&kind);
+        let scale = |kind: Kind| {
+            let factors = self.scale.iter().filter(|(of, _)| *of == kind);
+            let all: f32 = factors.map(|(_, factor)| factor).product();
+            if without(kind) { 0.0 } else { all }
+        };
+        let (points, suns, surfaces) = (
+            scale(Kind::Points),
+            scale(Kind::Suns),
+            scale(Kind::Surfaces),
+        );
+        for light in &mut world.point_lights {
+            light.intensity *= points;
+        }
+        for sun in &mut world.suns {
+            sun.irradiance *= suns;
+        }
+        for light in &mut world.lights {
+            light.radiance *= surfaces;
+        }
+        for emission in world
+            .materials
+            .iter_mut()
+            .filter_map(|m| m.emission.as_mut())
+        {
+            emission.strength *= surfaces;
+        }
+        for summary in &mut world.report.emitters {
+            summary.radiance *= surfaces;
+        }
+        let mut unknown = Vec::new();
+        for (name, radiance) in &self.materials {
+            if !set_material(world, name, *radiance) {
+                unknown.push(name.clone());
+            }
+        }
+        super::take_out(world, |_| false);
+        world
+            .point_lights
+            .retain(|l| l.intensity.max_element() > 0.0);
+        world.suns.retain(|s| s.irradiance.max_element() > 0.0);
+        world.point_lights.extend(&self.points);
+        world.suns.extend(&self.suns);
+        world.ambient = self.ambient.unwrap_or(world.ambient);
+        world.report.point_lights = world.point_lights.len();
+        world.report.suns = world.suns.len();
+        super::build_lists(world);
+        unknown
+    }
+}
+
+impl RelitWorld {
+    /// Game path of the file of lights that belongs to the map: its own with the ending `.lights`.
+    pub fn lights_file(&self) -> String {
+        let stem = self.name.strip_suffix(".bsp").unwrap_or(&self.name);
+        format!("{stem}.lights")
+    }
+
+    /// Changes the lights as the [file](LightsByHand) beside the map says; nothing without one. What is wrong with it is
+    /// warnings of the world's.
+    pub fn light_by_hand(&mut self, files: &dyn GameFiles) {
+        let path = self.lights_file();
+        let bytes = match files.read(&path) {
+            Ok(Some(bytes)) => bytes,
+            Ok(None) => return,
+            Err(problem) => {
+                self.warnings.push(problem.to_string());
+                return;
+            }
+        };
+        let (file, wrong) = LightsByHand::parse(&String::from_utf8_lossy(&bytes));
+        let unknown = file.apply(self);
+        let wrong = wrong.iter().map(|problem| format!("{path}: {problem}"));
+        self.warnings.extend(wrong);
+        let unknown = unknown
+            .iter()
+            .map(|name| format!("{path}: material {name} is not in the map"));
+        self.warnings.extend(unknown);
+    }
+}
+
+/// Makes the surfaces of a material shine, or not; `false` when there is none of that name.
+fn set_material(world: &mut RelitWorld, name: &str, radiance: Vec3) -> bool {
+    let chosen: Vec<u32> = (0u32..)
+        .zip(&world.materials)
+        .filter(|(_, m)| m.name.eq_ignore_ascii_case(name))
+        .map(|(i, _)| i)
+        .collect();
+    super::take_out(world, |material| chosen.contains(&material));
+    for &index in &chosen {
+        if let Some(material) = world.materials.get_mut(index as usize) {
+            let source = if material.is_sky() {
+                EmissionSource::Sky
+            } else {
+                EmissionSource::SurfaceLight
+            };
+            material.emission = Some(Emission::of(material, source, radiance));
+        }
+    }
+    super::place_of(world, |material| chosen.contains(&material));
+    !chosen.is_empty()
+}
+
+fn kind(word: &str) -> Result<Kind, String> {
+    match word.to_ascii_lowercase().as_str() {
+        "points" => Ok(Kind::Points),
+        "suns" => Ok(Kind::Suns),
+        "surfaces" => Ok(Kind::Surfaces),
+        _ => Err(format!("{word:?} is none of points, suns, surfaces")),
+    }
+}
+
+/// Finite numbers, at least and at most so many.
+fn numbers(words: &[&str], least: usize, most: usize) -> Result<Vec<f32>, String> {
+    if words.len() < least || words.len() > most {
+        return Err(if least == most {
+            format!("{least} numbers belong here, not {}", words.len())
+        } else {
+            format!("{least} to {most} numbers belong here, not {}", words.len())
+        });
+    }
+    let number = |word: &&str| {
+        let parsed = word.parse().ok().filter(|n: &f32| n.is_finite());
+        parsed.ok_or_else(|| format!("{word:?} is not a number"))
+    };
+    words.iter().map(number).collect()
+}
+
+/// The three numbers from a place on; 0 for what is not there.
+fn vector(numbers: &[f32], first: usize) -> Vec3 {
+    let number = |i: usize| numbers.get(first + i).copied().unwrap_or(0.0);
+    Vec3::new(number(0), number(1), number(2))
+}
+
+fn above_zero(number: f32, what: &str) -> Result<f32, String> {
+    let good = number > 0.0;
+    good.then_some(number)
+        .ok_or_else(|| format!("{what} must be above 0"))
+}
+
+fn not_below_zero(color: Vec3) -> Result<Vec3, String> {
+    let good = color.min_element() >= 0.0;
+    good.then_some(color)
+        .ok_or_else(|| "colours cannot be below 0".to_owned())
+}
+
+/// `LIGHT R G B`.
+fn colored(numbers: &[f32]) -> Result<Vec3, String> {
+    let value = numbers.first().copied().unwrap_or(0.0);
+    if value < 0.0 {
+        return Err("light cannot be below 0".to_owned());
+    }
+    Ok(normalise(not_below_zero(vector(numbers, 1))?) * value)
+}
+
+/// `X Y Z LIGHT R G B`.
+fn point(numbers: &[f32]) -> Result<PointLight, String> {
+    let strength = colored(numbers.get(3..).unwrap_or_default())?;
+    if strength == Vec3::ZERO {
+        return Err("the light must be above 0".to_owned());
+    }
+    Ok(PointLight {
+        origin: vector(numbers, 0),
+        intensity: strength * POINT_LIGHT_INTENSITY,
+        radius: DEFAULT_POINT_LIGHT_RADIUS,
+        spot: None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::TriangleLight;
+    use super::*;
+    use crate::materials::Materials;
+    use crate::sample;
+    use crate::world::Options;
+
+    const TEXT: &str = "# lamps of the hall
+point 8 16 24  300  1 0.5 0   6   // above the door
+SPOT 0 0 100 200 1 1 1  0 0 0 30
+sun 1 1 0.5 100 90 45
+without points
+scale surfaces 0.5
+ambient 10 1 1 1
+material no/such 100 1 1 1
+point 1 2 3
+point 1 2 3 x 1 1 1
+sparkle 7
+scale stars 2
+sun 1 -1 1 100 0 0
+spot 1 2 3 100 1 1 1 1 2 3 30
+";
+
+    #[test]
+    fn lines_are_read_and_wrong_ones_told() {
+        let (file, wrong) = LightsByHand::parse(TEXT);
+        assert_eq!(file.points.len(), 2);
+        let first = file.points[0];
+        assert_eq!(first.origin, Vec3::new(8.0, 16.0, 24.0));
+        assert_eq!(first.radius, 6.0);
+        let expected = Vec3::new(1.0, 0.5, 0.0) * 300.0 * POINT_LIGHT_INTENSITY;
+        assert!((first.intensity - expected).length() < 1.0);
+        let spot = file.points[1].spot.unwrap();
+        assert_eq!(spot.direction, Vec3::NEG_Z);
+        assert!((spot.tan_half_angle - 30f32.to_radians().tan()).abs() < 1e-6);
+        let sun = file.suns[0];
+        assert!((sun.direction - Vec3::new(0.0, 0.5f32.sqrt(), 0.5f32.sqrt())).length() < 1e-6);
+        assert!((sun.irradiance.x - 100.0 * SUN_IRRADIANCE).abs() < 1e-3);
+        let lines: Vec<usize> = wrong.iter().map(|w| w.line).collect();
+        assert_eq!(lines, [9, 10, 11, 12, 13, 14], "{wrong:?}");
+        assert_eq!(
+            wrong[0].to_string(),
+            "line 9: 7 to 8 numbers belong here, not 3"
+        );
+    }
+
+    #[test]
+    fn a_file_beside_the_map_changes_its_lights() {
+        let mut files = sample::files().unwrap();
+        let load = |files: &crate::files::MemoryFiles| {
+            let (materials, _) = Materials::load(files);
+            let options = Options {
+                calibrate: None,
+                ..Options::default()
+            };
+            RelitWorld::load(files, &materials, sample::MAP, options).unwrap()
+        };
+        let plain = load(&files);
+        assert!(plain.lights.len() > 1 && plain.warnings.is_empty());
+        let lamp = plain.surfaces[plain.lights[0].surface as usize].material;
+        let name = plain.materials[lamp as usize].name.clone();
+        let text = format!("{TEXT}\nmaterial {name} 0 1 1 1\n");
+        files.insert(&plain.lights_file(), text).unwrap();
+        let lit = load(&files);
+        assert_eq!(lit.point_lights.len(), 2);
+        assert!(lit.warnings.iter().any(|w| w.contains(".lights: line 9")));
+        assert!(lit.warnings.iter().any(|w| w.contains("no/such")));
+        let out = |l: &TriangleLight| lit.surfaces[l.surface as usize].material == lamp;
+        assert!(!lit.lights.iter().any(out));
+        assert!((lit.ambient - 10.0 * AMBIENT_RADIANCE).length() < 1e-5);
+        // What is left shines half as bright, and is listed.
+        for light in &lit.lights {
+            let before = plain
+                .lights
+                .iter()
+                .find(|l| l.surface == light.surface)
+                .unwrap();
+            assert!((light.radiance - before.radiance * 0.5).length() < 1e-5);
+        }
+        let all = lit.light_lists.row(-1);
+        assert_eq!(all.len(), lit.lights.len() + 2);
+    }
+}
