@@ -12,6 +12,7 @@ mod info;
 mod lights;
 mod lights_picture;
 mod looks;
+mod material;
 mod measure;
 mod render;
 mod statistics;
@@ -49,6 +50,8 @@ enum Command {
     Lights(lights::LightsArgs),
     /// Draw views in the classic look and traced, side by side, and compare how bright they are
     Looks(looks::LooksArgs),
+    /// Tell how a material is understood
+    Material(material::MaterialArgs),
     /// Measure the traced look in real time against its reference
     Measure(measure::MeasureArgs),
     /// Make a picture of a map, without an engine or a display
@@ -108,6 +111,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Info(args) => return info::run(&args),
         Command::Lights(args) => lights::run(&args),
         Command::Looks(args) => looks::run(&args),
+        Command::Material(args) => return material::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Render(args) => render::run(&args),
     }?;

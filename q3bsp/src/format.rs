@@ -34,6 +34,21 @@ pub enum Format {
 }
 
 impl Format {
+    /// All formats.
+    pub const ALL: [Format; 11] = [
+        Format::Ibsp46,
+        Format::Ibsp47,
+        Format::QuakeLive,
+        Format::Rbsp,
+        Format::Fbsp,
+        Format::Quake2,
+        Format::Qbism,
+        Format::Quake,
+        Format::Bsp2,
+        Format::TwoPsb,
+        Format::GoldSrc,
+    ];
+
     /// Whether the file holds faces with edges instead of surfaces: the formats of [`crate::quake`].
     pub fn is_quake(self) -> bool {
         matches!(

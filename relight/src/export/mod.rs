@@ -17,6 +17,7 @@ mod extras;
 mod geometry;
 mod gltf;
 mod images;
+pub mod json;
 mod lightmaps;
 mod look;
 mod obj;
@@ -24,6 +25,7 @@ mod output;
 mod sky;
 mod stack;
 
+pub use extras::material as material_json;
 pub use images::{Encoded, ImageStore, Mime};
 pub use output::Output;
 
@@ -46,11 +48,13 @@ pub enum Format {
     Gltf,
     /// Wavefront OBJ with its MTL.
     Obj,
+    /// Everything, as [`json`].
+    Json,
 }
 
 impl Format {
     /// All formats.
-    pub const ALL: [Format; 3] = [Format::Glb, Format::Gltf, Format::Obj];
+    pub const ALL: [Format; 4] = [Format::Glb, Format::Gltf, Format::Obj, Format::Json];
 
     /// Extension of its files, without the dot; also the name that users give.
     pub fn extension(self) -> &'static str {
@@ -58,6 +62,7 @@ impl Format {
             Format::Glb => "glb",
             Format::Gltf => "gltf",
             Format::Obj => "obj",
+            Format::Json => "json",
         }
     }
 
@@ -211,6 +216,7 @@ pub fn export(
         Format::Glb => gltf::write(source, gltf::Container::Binary, &mut output)?,
         Format::Gltf => gltf::write(source, gltf::Container::Text, &mut output)?,
         Format::Obj => obj::write(source, &mut output)?,
+        Format::Json => json::write(source, &mut output)?,
     };
     report.files = output.finish()?;
     report

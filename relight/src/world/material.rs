@@ -1,11 +1,12 @@
 //! Materials of a world: each combination of name, flags and lighting that its surfaces use.
 
-use crate::light::{Emission, Flicker};
-use crate::materials::Resolved;
+use crate::files::GameFiles;
+use crate::light::{Emission, Finder, Flicker};
+use crate::materials::{Materials, Resolved};
 use glam::Vec3;
 use q3bsp::{Bsp, SurfaceKind, lightmap_index};
 use shaderscript::ImplicitKind;
-use shaderscript::light::LightClass;
+use shaderscript::light::{LightClass, classify};
 
 /// A material of a world.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +37,36 @@ pub struct WorldMaterial {
 }
 
 impl WorldMaterial {
+    /// A material by itself, understood as a map's would be: with the flags that its script gives, what it emits, what
+    /// it throws back.
+    pub fn by_name(
+        files: &dyn GameFiles,
+        materials: &Materials,
+        name: &str,
+        lighting: ImplicitKind,
+    ) -> WorldMaterial {
+        let resolved = materials.resolve(files, name, lighting);
+        let definition = resolved.definition();
+        let mut material = WorldMaterial {
+            name: name.to_owned(),
+            surface_flags: definition.surface_flags,
+            content_flags: definition.content_flags,
+            lighting,
+            class: classify(&resolved.shader),
+            resolved,
+            albedo: Vec3::ZERO,
+            shown: Vec3::ZERO,
+            emission: None,
+            flicker: None,
+        };
+        let mut finder = Finder::new(files);
+        material.emission = finder.emission(&material);
+        material.flicker = finder.flicker(&material);
+        material.albedo = finder.albedo(&material);
+        material.shown = finder.shown(&material);
+        material
+    }
+
     /// Whether it is sky, for the map or for its script.
     pub fn is_sky(&self) -> bool {
         self.surface_flags & q3bsp::surface_flags::SKY != 0 || self.resolved.shader.sky.is_some()

@@ -1,0 +1,296 @@
+//! `relight material`: how a material is understood.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use relight::export::material_json;
+use relight::{GameFiles, Materials, SearchPath, WorldMaterial};
+use serde::Serialize;
+use serde_json::Value;
+use shaderscript::{Diagnostic, ImplicitKind};
+
+/// Tell how a material is understood
+///
+/// Where it is defined, its stages as they are drawn, what it is to light, what it emits, and every warning with the
+/// script's line. Exit code: 0, or 1 when the default is drawn instead of some material.
+///
+/// Examples: relight material textures/gothic_light/ironcrosslt2_10000; relight material sfx/beam --json
+#[derive(Args, Debug)]
+pub struct MaterialArgs {
+    /// Names as maps and models write them
+    #[arg(required = true, value_name = "NAME")]
+    names: Vec<String>,
+    /// Game folder with packs; give several in rising priority
+    #[arg(
+        long = "game",
+        value_name = "DIR",
+        default_value = "/usr/share/games/openarena/baseoa"
+    )]
+    games: Vec<PathBuf>,
+    /// How the surface is lit that it is used on, which decides what a bare image becomes
+    #[arg(long, value_enum, default_value_t = Lighting::Lightmap)]
+    lighting: Lighting,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What a surface is lit by.
+#[derive(ValueEnum, Clone, Copy, Debug)]
+enum Lighting {
+    /// A lightmap.
+    Lightmap,
+    /// Colours of its vertices.
+    Vertex,
+    /// The light grid, like models.
+    Entity,
+    /// Nothing: it is bright.
+    White,
+    /// Nothing: it is part of the overlay.
+    Overlay,
+}
+
+impl From<Lighting> for ImplicitKind {
+    fn from(lighting: Lighting) -> Self {
+        match lighting {
+            Lighting::Lightmap => ImplicitKind::Lightmapped,
+            Lighting::Vertex => ImplicitKind::Vertex,
+            Lighting::Entity => ImplicitKind::EntityLit,
+            Lighting::White => ImplicitKind::White,
+            Lighting::Overlay => ImplicitKind::TwoD,
+        }
+    }
+}
+
+/// What is told about a material.
+#[derive(Serialize)]
+struct Told {
+    /// Everything that its script says, and its stages as drawn.
+    material: Value,
+    /// What it is to light.
+    light: Light,
+    warnings: Vec<Warning>,
+    /// Its definition, line by line; empty for a bare image.
+    source: Vec<Line>,
+}
+
+/// What a material is to light.
+#[derive(Serialize)]
+struct Light {
+    class: String,
+    two_sided: bool,
+    liquid: bool,
+    glowing: bool,
+    additive: bool,
+    filter: bool,
+    environment: bool,
+    /// Part of light that it throws back, linear.
+    albedo: [f32; 3],
+    emission: Option<Emits>,
+}
+
+/// What it emits.
+#[derive(Serialize)]
+struct Emits {
+    source: &'static str,
+    /// Radiance, in units of display white; of sprites radiant intensity.
+    strength: [f32; 3],
+    two_sided: bool,
+    /// Whether it changes in time.
+    flickers: bool,
+}
+
+#[derive(Serialize)]
+struct Warning {
+    place: String,
+    line: u32,
+    severity: String,
+    message: String,
+}
+
+#[derive(Serialize)]
+struct Line {
+    number: u32,
+    text: String,
+}
+
+/// Prints what is known of each material.
+pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
+    let files = SearchPath::open(&args.games)?;
+    let (materials, diagnostics) = Materials::load(&files);
+    let mut told = Vec::new();
+    let mut faults = 0;
+    for name in &args.names {
+        let material = WorldMaterial::by_name(&files, &materials, name, args.lighting.into());
+        faults += usize::from(material.resolved.fault.is_some());
+        told.push(Told::new(&files, &material, &diagnostics));
+    }
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&told)?);
+    } else {
+        told.iter().for_each(Told::print);
+    }
+    Ok(match faults {
+        0 => ExitCode::SUCCESS,
+        _ => ExitCode::FAILURE,
+    })
+}
+
+impl Told {
+    fn new(files: &dyn GameFiles, material: &WorldMaterial, all: &[Diagnostic]) -> Told {
+        let class = &material.class;
+        let about = |d: &&Diagnostic| {
+            let definition = material.resolved.script.as_ref();
+            definition.is_some_and(|script| {
+                let same = |name: &String| name.eq_ignore_ascii_case(&script.name);
+                d.shader.as_ref().is_some_and(same)
+            })
+        };
+        Told {
+            material: material_json(material),
+            light: Light {
+                class: format!("{:?}", class.class),
+                two_sided: class.two_sided,
+                liquid: class.liquid,
+                glowing: class.glowing,
+                additive: class.additive,
+                filter: class.filter,
+                environment: class.environment,
+                albedo: material.albedo.to_array(),
+                emission: material.emission.map(|e| Emits {
+                    source: e.source.label(),
+                    strength: e.strength.to_array(),
+                    two_sided: e.two_sided,
+                    flickers: material.flicker.is_some(),
+                }),
+            },
+            warnings: all
+                .iter()
+                .filter(about)
+                .map(|d| Warning {
+                    place: d.file.clone(),
+                    line: d.line,
+                    severity: d.severity.to_string(),
+                    message: d.message.clone(),
+                })
+                .collect(),
+            source: source(files, material),
+        }
+    }
+
+    fn print(&self) {
+        let text = |value: &Value| match value {
+            Value::String(text) => text.clone(),
+            other => other.to_string(),
+        };
+        let empty = serde_json::Map::new();
+        let material = self.material.as_object().unwrap_or(&empty);
+        println!("{}", material.get("name").map(text).unwrap_or_default());
+        let row = |name: &str, value: String| println!("  {name:12} {value}");
+        match material.get("script") {
+            Some(script) => row("defined in", text(script)),
+            None => row("defined by", "no script; a bare image".to_owned()),
+        }
+        if let Some(fault) = material.get("fault") {
+            row("not drawn", format!("{}; the default is", text(fault)));
+        }
+        row("kind", self.light.words());
+        let [r, g, b] = self.light.albedo;
+        row("albedo", format!("{r:.3} {g:.3} {b:.3}"));
+        match &self.light.emission {
+            Some(e) => {
+                let [r, g, b] = e.strength;
+                let sides = if e.two_sided { ", both sides" } else { "" };
+                let time = if e.flickers { ", changing in time" } else { "" };
+                row(
+                    "emits",
+                    format!("{r:.3} {g:.3} {b:.3} by {}{sides}{time}", e.source),
+                );
+            }
+            None => row("emits", "nothing".to_owned()),
+        }
+        for (key, value) in material {
+            if !matches!(
+                key.as_str(),
+                "name" | "script" | "fault" | "stages" | "class"
+            ) {
+                row(key, text(value));
+            }
+        }
+        let stages = material.get("stages").and_then(Value::as_array);
+        let stages = stages.map(Vec::as_slice).unwrap_or_default();
+        row("stages", stages.len().to_string());
+        for (at, stage) in stages.iter().enumerate() {
+            let fields = stage.as_object().into_iter().flatten();
+            let fields: Vec<String> = fields.map(|(k, v)| format!("{k} {}", text(v))).collect();
+            println!("    {}  {}", at + 1, fields.join(", "));
+        }
+        row("warnings", self.warnings.len().to_string());
+        for w in &self.warnings {
+            println!("    {}:{}: {}: {}", w.place, w.line, w.severity, w.message);
+            if let Some(line) = self.source.iter().find(|line| line.number == w.line) {
+                println!("        {}", line.text.trim());
+            }
+        }
+        if !self.source.is_empty() {
+            row("source", String::new());
+        }
+        for line in &self.source {
+            let told = self.warnings.iter().any(|w| w.line == line.number);
+            let mark = if told { '>' } else { ' ' };
+            println!("  {mark} {:5}  {}", line.number, line.text);
+        }
+    }
+}
+
+impl Light {
+    /// `opaque, both sides drawn`.
+    fn words(&self) -> String {
+        let mut words = vec![self.class.to_lowercase()];
+        for (holds, word) in [
+            (self.two_sided, "both sides drawn"),
+            (self.liquid, "a liquid"),
+            (self.glowing, "partly independent of light"),
+            (self.additive, "only adds light"),
+            (self.filter, "only filters light"),
+            (self.environment, "shiny"),
+        ] {
+            if holds {
+                words.push(word.to_owned());
+            }
+        }
+        words.join(", ")
+    }
+}
+
+/// The lines of a material's definition, to the brace that closes it.
+fn source(files: &dyn GameFiles, material: &WorldMaterial) -> Vec<Line> {
+    let Some(script) = &material.resolved.script else {
+        return Vec::new();
+    };
+    let Ok(Some(bytes)) = files.read(&script.location.file) else {
+        return Vec::new();
+    };
+    let text = String::from_utf8_lossy(&bytes);
+    // As the parser counts them: CR, LF and CR LF each end a line.
+    let text = text.replace("\r\n", "\n").replace('\r', "\n");
+    let first = script.location.line.max(1);
+    let mut depth = 0i64;
+    let mut lines = Vec::new();
+    for (number, line) in (1u32..).zip(text.lines()).skip(first as usize - 1) {
+        let code = line.split("//").next().unwrap_or_default();
+        let count = |brace| code.matches(brace).count() as i64;
+        let opened = depth > 0 || count('{') > 0;
+        depth += count('{') - count('}');
+        lines.push(Line {
+            number,
+            text: line.replace('\t', "    "),
+        });
+        if opened && depth <= 0 {
+            break;
+        }
+    }
+    lines
+}

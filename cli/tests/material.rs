@@ -1,0 +1,62 @@
+//! `relight material` on a made-up game folder.
+
+use std::process::{Command, Output};
+
+const SCRIPT: &str = "t/other\n{\n}\nt/lamp\n{\n\tsurfaceparm nolightmap\n\tq3map_surfacelight 255\n\tq3map_lightRGB 1 0 0\n\tcull nonsense\n\t{\n\t\tmap $whiteimage\n\t\tblendFunc add\n\t}\n}\nt/last\n{\n}\n";
+
+fn material(arguments: &[&str]) -> Output {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(folder.path().join("scripts")).unwrap();
+    std::fs::write(folder.path().join("scripts/a.shader"), SCRIPT).unwrap();
+    Command::new(env!("CARGO_BIN_EXE_relight"))
+        .args(["material", "--game"])
+        .arg(folder.path())
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn json_tells_stages_light_and_warnings_with_their_lines() {
+    let output = material(&["T/Lamp", "--json"]);
+    assert!(output.status.success(), "{output:?}");
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let lamp = &json[0];
+    assert_eq!(lamp["material"]["script"], "scripts/a.shader:4");
+    assert_eq!(lamp["material"]["stages"].as_array().unwrap().len(), 1);
+    assert_eq!(lamp["light"]["class"], "Translucent");
+    assert_eq!(lamp["light"]["emission"]["source"], "surfacelight");
+    let red = lamp["light"]["emission"]["strength"][0].as_f64().unwrap();
+    assert!((red - std::f64::consts::PI).abs() < 1e-5);
+    let warning = &lamp["warnings"][0];
+    assert_eq!(
+        (&warning["place"], &warning["line"]),
+        (&"scripts/a.shader".into(), &9.into())
+    );
+    let source = lamp["source"].as_array().unwrap();
+    assert_eq!(source.first().unwrap()["text"], "t/lamp");
+    assert_eq!(source.last().unwrap()["number"], 14);
+}
+
+#[test]
+fn people_see_the_line_that_is_warned_about() {
+    let output = material(&["t/lamp"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    for part in [
+        "translucent",
+        "surfacelight",
+        "> ",
+        "cull nonsense",
+        "scripts/a.shader:9",
+    ] {
+        assert!(text.contains(part), "{part} in\n{text}");
+    }
+}
+
+#[test]
+fn what_is_missing_is_told_and_fails() {
+    let output = material(&["t/nowhere"]);
+    assert_eq!(output.status.code(), Some(1));
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("neither a script nor an image"), "{text}");
+}
