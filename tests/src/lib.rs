@@ -16,3 +16,4 @@ pub mod engine;
 pub mod gallery;
 pub mod maps;
 pub mod real;
+pub mod roq;

@@ -19,6 +19,8 @@ pub struct Run {
     pub height: u32,
     /// Console variables that are set before the renderer starts, at most 8.
     pub cvars: Vec<(String, String)>,
+    /// Game files that lie above the game's packs.
+    pub files: Vec<(String, Vec<u8>)>,
     /// Console commands; `quit` is added.
     pub commands: Vec<String>,
     /// Seconds after which the run has failed.
@@ -110,6 +112,14 @@ impl Run {
         let mut commands = self.commands.join("\n");
         commands.push_str("\nquit\n");
         std::fs::write(&config, commands).expect("the configuration is written");
+        for (name, bytes) in &self.files {
+            let path = home.join(".openarena/baseoa").join(name);
+            let place = path
+                .parent()
+                .expect("a game file lies in the game's folder");
+            std::fs::create_dir_all(place).expect("a folder in the temporary one");
+            std::fs::write(&path, bytes).expect("a file in the temporary folder");
+        }
         let mut script = Command::new(data::repository().join("scripts/engine"));
         script
             .arg("--config")

@@ -5,6 +5,7 @@
 use relight::compare::{Rgb8, compare};
 use tests::data::{is_set, keep_picture};
 use tests::real::{self, Run, own_picture, picture, start_map};
+use tests::roq;
 
 /// Cameras: a map, its start as `x y z yaw`. Chosen for what they show: torches, sky, liquids, curves, models.
 const VIEWS: &[(&str, &str)] = &[
@@ -29,10 +30,20 @@ const CLASSIC_VIEWS: &[(&str, &str)] = &[
 const CLASSIC_SSIM: f64 = 0.993;
 
 fn run(renderer: &'static str, size: (u32, u32), commands: Vec<String>) -> real::Outcome {
+    run_with(renderer, size, commands, Vec::new())
+}
+
+fn run_with(
+    renderer: &'static str,
+    size: (u32, u32),
+    commands: Vec<String>,
+    files: Vec<(String, Vec<u8>)>,
+) -> real::Outcome {
     let cvars = [("r_rt", "0"), ("r_vkValidation", "1")]
         .map(|(n, v)| (n.to_string(), v.to_string()))
         .to_vec();
     Run {
+        files,
         cvars,
         renderer,
         width: size.0,
@@ -79,6 +90,69 @@ fn the_classic_look_is_the_engines_own() {
         let difference = compare(reference, picture).unwrap();
         println!("{map}: {difference:?}");
         assert!(difference.ssim >= CLASSIC_SSIM, "{map}: {difference:?}");
+    }
+}
+
+/// A film of 64 coloured squares, and a script that shows it behind the console.
+fn film_files() -> Vec<(String, Vec<u8>)> {
+    let picture: Vec<[u8; 3]> = (0..64u8)
+        .map(|i| [60 + i * 2, 60 + i % 8 * 18, 60 + i / 8 * 18])
+        .collect();
+    // the game's own file of this name, which has the console in it, gives way
+    let script = b"console { nopicmip nomipmaps { videoMap film.roq } }\n";
+    vec![
+        ("video/film.roq".into(), roq::film(64, &vec![picture; 90])),
+        ("scripts/oanew.shader".into(), script.to_vec()),
+    ]
+}
+
+#[test]
+fn films_that_the_engine_decodes_are_shown() {
+    if !real::available() {
+        return;
+    }
+    let whole = [
+        "cinematic film.roq 2",
+        "wait 60",
+        "screenshot shot",
+        "wait 6",
+    ];
+    let behind = [
+        "toggleconsole",
+        "wait 400",
+        "clear",
+        "wait 8",
+        "screenshot shot",
+        "wait 6",
+    ];
+    for (name, lines) in [("cinematic", &whole[..]), ("videoMap", &behind[..])] {
+        let [reference, ours] = ["opengl1", "vk"].map(|renderer| {
+            let mut commands = Vec::new();
+            set(
+                &mut commands,
+                &["set con_notifytime -1", "set r_ignorehwgamma 1", "wait 20"],
+            );
+            set(&mut commands, lines);
+            let outcome = run_with(renderer, (320, 240), commands, film_files());
+            outcome.assert_clean();
+            outcome.picture("shot").clone()
+        });
+        keep_picture(&reference, &format!("{name}-opengl1"));
+        keep_picture(&ours, &format!("{name}-vk"));
+        let difference = compare(&reference, &ours).unwrap();
+        println!("{name}: {difference:?}");
+        assert!(difference.ssim >= CLASSIC_SSIM, "{name}: {difference:?}");
+        // a square of the first row, which both show, whatever else lies over it
+        let place = if name == "cinematic" {
+            (100, 15)
+        } else {
+            (100, 7)
+        };
+        let at = (place.1 * 320 + place.0) * 3;
+        let seen = &ours.pixels()[at..at + 3];
+        let meant = roq::rgb([60 + 2 * 2, 60 + 2 * 18, 60]);
+        let near = seen.iter().zip(meant).all(|(&a, b)| a.abs_diff(b) <= 6);
+        assert!(near, "{name}: {seen:?} is not {meant:?}");
     }
 }
 

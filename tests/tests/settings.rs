@@ -14,6 +14,7 @@ fn run(renderer: &'static str, commands: &[String]) -> Outcome {
         .map(|(n, v)| (n.to_string(), v.to_string()))
         .to_vec();
     let outcome = Run {
+        files: Vec::new(),
         cvars,
         renderer,
         width: 640,
