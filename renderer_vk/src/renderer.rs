@@ -9,7 +9,7 @@ mod still;
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use relight::GameFiles;
 
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
@@ -427,6 +427,16 @@ impl Renderer {
         Ok(())
     }
 
+    /// Adds a polygon that the engine's collision code wants to see to the view that was queued last, unless that is a
+    /// traced one. Of `color` the lowest three bits are red, green and blue.
+    pub fn add_debug_polygon(&mut self, color: u32, corners: &[Vec3]) {
+        if let Some((Item::Classic(scenes), _)) = self.queue.last_mut()
+            && let Some(view) = scenes.last_mut()
+        {
+            view.debug.add(color, corners, view.view.origin);
+        }
+    }
+
     /// Keeps what is found about maps' lights in a folder, so that the traced look is ready at once the next time.
     pub fn keep_calibrations(&mut self, folder: Option<std::path::PathBuf>) {
         self.calibrations = folder.map(relight::CalibrationCache::new);
@@ -505,16 +515,15 @@ impl Renderer {
         let Some(texture) = (self.assets.as_mut()).map(|a| a.textures.queue_scratch(client)) else {
             return Ok(());
         };
-        let grey = (self.settings.identity_light() * 255.0) as u8;
         let half = Vec2::new(0.5 / cols as f32, 0.5 / rows as f32);
-        self.overlay.add_texture(
+        self.overlay.add_film(
             texture,
             &Picture2d {
                 position: Vec2::new(x as f32, y as f32),
                 size: Vec2::new(w as f32, h as f32),
                 st1: half,
                 st2: Vec2::ONE - half,
-                color: u32::from_le_bytes([grey, grey, grey, 255]),
+                color: u32::MAX,
             },
         );
         Ok(())

@@ -38,7 +38,7 @@ pub fn film(side: u16, pictures: &[Vec<[u8; 3]>]) -> Vec<u8> {
             book.extend([cell as u8; 4]);
         }
         // 256 cells are written as 0
-        let argument = ((count % 256) << 8 | count % 256) as u16;
+        let argument = (((count % 256) << 8) | (count % 256)) as u16;
         push(
             &mut file,
             chunk::CODE_BOOK,
@@ -67,7 +67,7 @@ fn squares(side: usize, picture: &[[u8; 3]], colors: &[[u8; 3]]) -> Vec<u8> {
         .collect();
     let mut data = Vec::new();
     for eight in cells.chunks(8) {
-        let kinds = (0..eight.len()).fold(0u16, |word, i| word | 2 << (14 - 2 * i));
+        let kinds = (0..eight.len()).fold(0u16, |word, i| word | (2 << (14 - 2 * i)));
         data.extend(kinds.to_le_bytes());
         data.extend(eight);
     }

@@ -8,6 +8,8 @@ use tests::engine::allocations::{Counting, count};
 use tests::engine::{Engine, Options, Raised, View};
 use tests::maps::{self, HERE, ROOMS};
 
+/// Near the floor.
+const FEET: Vec3 = Vec3::new(HERE.x, HERE.y, HERE.z - 30.0);
 /// A tag of the model.
 const TAG: &CStr = c"tag_top";
 /// A view without the map.
@@ -87,7 +89,7 @@ impl Things {
             engine.add_poly(self.mark_shader, &self.mark, 4)?;
         }
         // what a game asks for the shadow below a player, and where his head is
-        engine.ask_mark(HERE, 24.0)?;
+        engine.ask_mark(FEET, 24.0)?;
         engine.ask_tag(self.model, TAG)?;
         engine.add_light(HERE + Vec3::new(100.0, 0.0, 0.0), 200.0, Vec3::ONE)?;
         engine.render_scene(&View::new(HERE, number as f32))?;
@@ -117,7 +119,7 @@ fn a_steady_frame_allocates_nothing() {
     let mut engine = unsafe { Engine::start_linked(entry, options) }.expect("the library starts");
     engine.start_map(ROOMS).expect("the map loads");
     let things = Things::register(&mut engine).expect("everything is there");
-    assert!(engine.ask_mark(HERE, 24.0).expect("an answer") > 0);
+    assert!(engine.ask_mark(FEET, 24.0).expect("an answer") > 0);
     assert!(engine.ask_tag(things.model, TAG).expect("an answer"));
     // passes are timed from now on; shadows are volumes
     engine.command("rt_timings").expect("a command");

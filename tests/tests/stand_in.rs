@@ -1052,3 +1052,25 @@ fn spawn(engine: &mut Engine) -> Vec3 {
         .collect();
     Vec3::from_slice(&numbers) + Vec3::Z * 40.0
 }
+
+#[test]
+fn collision_surfaces_are_added_to_the_picture() {
+    let mut engine = engine_in_map();
+    let view = View::new(HERE, 0.0);
+    let plain = engine.picture(&view).unwrap();
+    engine.set("r_debugSurface", "1");
+    let shown = engine.picture(&view).unwrap();
+    dump(&shown, "debug-surface");
+    let [before, after] = [&plain, &shown].map(|picture| pixel(picture, 160, 120));
+    assert_eq!(
+        after,
+        [255, before[1], before[2]],
+        "red is added to {before:?}"
+    );
+    // 10 of 50 units are 32 pixels; the outline is white
+    let aside = pixel(&shown, 160 + 40, 120);
+    assert_eq!(aside, pixel(&plain, 160 + 40, 120));
+    let edge = (188..196).any(|x| pixel(&shown, x, 120) == [255; 3]);
+    assert!(edge, "there is no outline");
+    engine.assert_clean();
+}

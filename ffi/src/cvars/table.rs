@@ -139,7 +139,7 @@ cvars! {
     ShowImages = c"r_showImages", c"0", TEMP, None, c"1 shows all images on a grid, 2 in proportion to their sizes.";
     Debuglight = c"r_debuglight", c"0", TEMP, None, c"1 prints the light on the first-person weapon.";
     DebugSort = c"r_debugSort", c"0", CHEAT, None, c"Leaves out materials of a greater sort value; 0 draws all.";
-    DebugSurface = c"r_debugSurface", c"0", CHEAT, None, c"Shows collision surfaces that traces hit. Kept for old configurations; not drawn here.";
+    DebugSurface = c"r_debugSurface", c"0", CHEAT, None, c"1 shows collision surfaces that traces hit, higher values what bots know of the map. In the classic look.";
     LogFile = c"r_logFile", c"0", CHEAT, None, c"Logs OpenGL calls. Kept for old configurations and menus; has no effect here.";
     Speeds = c"r_speeds", c"0", CHEAT, None, c"1 to 6 print counts of each frame: surfaces, culling, cluster, dynamic lights, far plane, flares.";
     LockPvs = c"r_lockpvs", c"0", CHEAT, None, c"1 keeps the visible part of the map as it is.";

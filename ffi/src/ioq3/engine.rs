@@ -6,7 +6,7 @@
 use super::abi::{self, cvar_t, print, refimport_t};
 use std::borrow::Cow;
 use std::cell::UnsafeCell;
-use std::ffi::{CStr, CString, c_char, c_int, c_uchar, c_void};
+use std::ffi::{CStr, CString, c_char, c_float, c_int, c_uchar, c_void};
 use std::ptr;
 
 /// Where `GetRefAPI` puts its copy of the engine's table.
@@ -291,6 +291,14 @@ impl Engine {
                 run(handle);
                 upload(handle);
             }
+        }
+    }
+
+    /// Lets the collision code show what it wants to; it calls `polygon` from inside, for each.
+    pub fn draw_debug_surface(self, polygon: unsafe extern "C" fn(c_int, c_int, *mut c_float)) {
+        if let Some(f) = self.get(|t| t.CM_DrawDebugSurface) {
+            // SAFETY: the function has the type that the engine calls.
+            unsafe { f(Some(polygon)) }
         }
     }
 

@@ -7,7 +7,7 @@ use super::convert;
 use super::engine::{Engine, string_from, text_of};
 use super::lifecycle::failure;
 use crate::boundary::{Failure, entry};
-use crate::cvars::{self, Cvar};
+use crate::cvars::{self, Cvar, Cvars};
 use crate::session::{draw, with_renderer};
 use glam::Vec3;
 use renderer_vk::Renderer;
@@ -220,6 +220,33 @@ pub extern "C" fn render_scene(from: *const refdef_t) {
                 lines.push_str(&PathPoint::of(&view).line());
             }
             renderer.render_scene(&view).map_err(failure)
+        })?;
+        // it calls back for each polygon, so the state is in its cell meanwhile
+        let debugs = |cvars: &Cvars| cvars.flag(Cvar::DebugSurface);
+        let wanted = with_renderer(|_, front| Ok(front.cvars.as_ref().is_some_and(debugs)))?;
+        if let Some(engine) = Engine::current().filter(|_| wanted) {
+            engine.draw_debug_surface(debug_polygon);
+        }
+        Ok(())
+    });
+}
+
+/// A polygon of the engine's collision code.
+unsafe extern "C" fn debug_polygon(color: c_int, count: c_int, points: *mut c_float) {
+    entry(|| {
+        let count = usize::try_from(count).unwrap_or(0).min(MAX_MARK_POINTS);
+        if points.is_null() {
+            return Ok(());
+        }
+        let mut corners = [Vec3::ZERO; MAX_MARK_POINTS];
+        for (i, corner) in corners.iter_mut().enumerate().take(count) {
+            // SAFETY: the engine passes `count` vectors.
+            *corner = unsafe { convert::vector(points.cast::<Vec3C>().add(i)) };
+        }
+        draw(|renderer, _| {
+            let corners = corners.get(..count).unwrap_or_default();
+            renderer.add_debug_polygon(color.cast_unsigned(), corners);
+            Ok(())
         })
     });
 }

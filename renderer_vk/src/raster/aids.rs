@@ -1,12 +1,14 @@
 //! Debugging aids of the classic look: what they add to a view, and the sheet of all images.
 
 use glam::Vec2;
+use shaders::types::constants as c;
 use shaders::types::{Draw, Vertex};
 
 use super::list::{DepthRange, DrawList};
 use super::overlay::{Overlay, Picture2d};
 use super::pipelines::{CullFaces, Depth, State};
 use super::shading::Shading;
+use crate::scene::DebugPolygons;
 
 /// Length of a shown normal, units.
 const NORMAL_LENGTH: f32 = 2.0;
@@ -83,6 +85,59 @@ impl DrawList {
                 ..draw
             };
             self.push(outlines(CullFaces::None), DepthRange::Front, span, draw);
+        }
+    }
+}
+
+impl DrawList {
+    /// Draws what the collision code wants to see, added to the picture, each polygon with a white outline in front of
+    /// everything. The vertices are in the space of instance 0.
+    pub(super) fn push_debug_polygons(&mut self, polygons: &DebugPolygons) {
+        let add = Some((c::BLEND_ONE, c::BLEND_ONE));
+        let filled = State {
+            blend: add,
+            wireframe: false,
+            shading: Shading::VERTEX_COLOR,
+            ..outlines(CullFaces::None)
+        };
+        let edges = State {
+            blend: add,
+            ..outlines(CullFaces::None)
+        };
+        let draw = Draw {
+            dynamic_vertices: 1,
+            ..Draw::default()
+        };
+        let mut first = 0;
+        for &size in &polygons.sizes {
+            let corners = first..first + size as usize;
+            first = corners.end;
+            let Some(corners) = polygons.vertices.get(corners) else {
+                return;
+            };
+            let base = self.vertices.len() as u32;
+            let start = self.indices.len() as u32;
+            self.vertices.extend_from_slice(corners);
+            let fan = (2..size).flat_map(|i| [base, base + i - 1, base + i]);
+            self.indices.extend(fan);
+            let span = (start, self.indices.len() as u32 - start);
+            self.push(filled, DepthRange::Normal, span, draw);
+            let start = self.indices.len() as u32;
+            // an edge is the outline of a sliver
+            let next = corners.iter().cycle().skip(1);
+            for (&a, &b) in corners.iter().zip(next) {
+                let aside = (b.position - a.position).any_orthogonal_vector();
+                let aside = aside.normalize_or_zero() * SLIVER;
+                let tip = Vertex {
+                    position: b.position + aside,
+                    ..b
+                };
+                let base = self.vertices.len() as u32;
+                self.vertices.extend([a, b, tip]);
+                self.indices.extend([base, base + 1, base + 2]);
+            }
+            let span = (start, self.indices.len() as u32 - start);
+            self.push(edges, DepthRange::Front, span, draw);
         }
     }
 }

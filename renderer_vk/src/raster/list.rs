@@ -117,6 +117,7 @@ impl DrawList {
         if let Some(sun) = scene.sun.filter(|_| !scene.skies.is_empty()) {
             self.add_sun(&sun, scene, stages, aids);
         }
+        self.push_debug_polygons(&scene.debug);
         let clip = scene.view.clip_plane.is_some();
         if clip {
             self.depth_first.clear();
@@ -156,7 +157,7 @@ impl DrawList {
                 let span = self
                     .mesh()
                     .append_face(face, cells, view, color, sky::Coordinates::Box);
-                let (shading, draw) = stages.image(image, sampler::CLAMP_MIP, draw);
+                let (shading, draw) = stages.plain_image(image, sampler::CLAMP_MIP, draw);
                 let state = sky_state(None, false, CullFaces::None, shading);
                 self.push(state, aids.sky_range(), span, draw);
             }

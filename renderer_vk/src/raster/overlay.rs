@@ -15,8 +15,10 @@ use crate::assets::compile::sampler;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Content {
     Material(u32),
-    /// A bindless texture (cinematics), clamped and without mip levels.
+    /// A bindless texture, clamped and without mip levels, times the pictures' colours.
     Texture(u32),
+    /// The same as bright as white is before overbright bits (cinematics).
+    Film(u32),
     /// The same, blended by its alpha.
     Transparent(u32),
 }
@@ -73,6 +75,11 @@ impl Overlay {
         self.push(Content::Texture(texture), picture);
     }
 
+    /// Queues a picture of a film; its colour is of no account.
+    pub fn add_film(&mut self, texture: u32, picture: &Picture2d) {
+        self.push(Content::Film(texture), picture);
+    }
+
     /// Queues a plain texture that is blended by its alpha.
     pub fn add_transparent_texture(&mut self, texture: u32, picture: &Picture2d) {
         self.push(Content::Transparent(texture), picture);
@@ -112,7 +119,7 @@ impl Overlay {
         let indices = quads.flat_map(|v| [v, v + 1, v + 2, v, v + 2, v + 3]);
         let material = match run.content {
             Content::Material(index) => Some(stages.materials.get(index)),
-            Content::Texture(_) | Content::Transparent(_) => None,
+            Content::Texture(_) | Content::Film(_) | Content::Transparent(_) => None,
         };
         let Some(material) = material.filter(|m| m.deforms()) else {
             list.vertices.extend_from_slice(vertices);
@@ -192,6 +199,10 @@ impl Overlay {
             match run.content {
                 Content::Texture(texture) => {
                     let (shading, draw) = stages.image(texture, sampler::CLAMP, draw);
+                    push(State { shading, ..plain }, draw);
+                }
+                Content::Film(texture) => {
+                    let (shading, draw) = stages.plain_image(texture, sampler::CLAMP, draw);
                     push(State { shading, ..plain }, draw);
                 }
                 Content::Transparent(texture) => {

@@ -201,6 +201,26 @@ impl StageContext<'_> {
         (shading, self.textured(texture, kind, draw))
     }
 
+    /// The draw of one texture, by a sampler, as bright as white is before overbright bits. Not the byte of that: the
+    /// engine hands this colour over as a number.
+    pub fn plain_image(&self, texture: u32, kind: u32, draw: Draw) -> (Shading, Draw) {
+        let light = self.identity_light;
+        let shading = Shading {
+            textures: 1,
+            color: if light >= 1.0 {
+                c::COLOR_WHITE
+            } else {
+                c::COLOR_FLAT
+            },
+            ..Shading::WHITE
+        };
+        let draw = Draw {
+            color: [light, light, light, 1.0],
+            ..draw
+        };
+        (shading, self.textured(texture, kind, draw))
+    }
+
     /// The draw of a dynamic light on a surface.
     pub fn light(&self, draw: Draw) -> (Shading, Draw) {
         (

@@ -216,6 +216,7 @@ impl<'a> Gatherer<'a> {
         out.has_world = self.world.is_some();
         out.skies.clear();
         out.shadows.clear();
+        out.debug.clear();
         out.statistics = Statistics::default();
         out.sun = self.sun();
         out.flares.clear();

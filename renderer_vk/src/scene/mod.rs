@@ -4,6 +4,7 @@
 //! instances, the vertices of everything that moves or deforms (evaluated on the CPU, in the space of their
 //! instance), and the sorted list of visible surfaces that the classic look draws.
 
+mod debug_polygons;
 mod entities;
 mod entity;
 mod flares;
@@ -33,6 +34,7 @@ use crate::assets::{Assets, Materials, Models, Skins};
 use crate::settings::Settings;
 use crate::stereo::Eye;
 use crate::world::{VisibleSet, World, WorldData};
+pub use debug_polygons::DebugPolygons;
 pub use flares::ViewFlare;
 pub use lighting::light_for_point;
 pub use rigid::{MeshId, RigidMesh, Shape};
@@ -231,6 +233,8 @@ pub struct ViewScene {
     pub has_world: bool,
     /// Shadow volumes of models (classic look, `cg_shadows 2`).
     pub shadows: ShadowVolumes,
+    /// What the engine's collision code wants to see.
+    pub debug: DebugPolygons,
     /// Counts, when `r_speeds` asks for them.
     pub statistics: Statistics,
     /// The skies in sight, each material once (classic look only).
@@ -302,6 +306,7 @@ impl ViewScene {
             has_world: false,
             skies: Vec::new(),
             shadows: ShadowVolumes::default(),
+            debug: DebugPolygons::default(),
             statistics: Statistics::default(),
             sun: None,
             flares: Vec::new(),

@@ -305,7 +305,22 @@ extern "C" fn cm_cluster_pvs(cluster: c_int) -> *mut c_uchar {
     .unwrap_or(ptr::null_mut())
 }
 
-extern "C" fn cm_draw_debug_surface(_draw: Option<extern "C" fn(c_int, c_int, *mut f32)>) {}
+/// Collision code that wants to see a red square 50 units before [`crate::maps::HERE`], facing it.
+extern "C" fn cm_draw_debug_surface(draw: Option<extern "C" fn(c_int, c_int, *mut f32)>) {
+    let corner = |side: f32, up: f32| {
+        let place = crate::maps::HERE + glam::Vec3::new(50.0, side, up);
+        place.to_array()
+    };
+    let mut corners = [
+        corner(10.0, 10.0),
+        corner(-10.0, 10.0),
+        corner(-10.0, -10.0),
+        corner(10.0, -10.0),
+    ];
+    if let Some(draw) = draw {
+        draw(1, 4, corners.as_mut_ptr().cast());
+    }
+}
 
 extern "C" fn fs_file_is_in_pak(name: *const c_char, checksum: *mut c_int) -> c_int {
     let name = text(name);

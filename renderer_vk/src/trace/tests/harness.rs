@@ -596,6 +596,7 @@ impl Scene {
             has_world: true,
             skies: Vec::new(),
             shadows: ShadowVolumes::default(),
+            debug: Default::default(),
             statistics: Default::default(),
             sun: None,
             flares: Vec::new(),
