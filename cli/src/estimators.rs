@@ -15,7 +15,10 @@ use crate::view::{Camera, Maps, map_entities, open};
 /// Renders a view with every light of the list for each point (the reference), with one light chosen uniformly, with
 /// one chosen by importance, and with every light of the map; then prints for each the relative difference of the whole
 /// picture and of the worst square of 16 x 16 pixels from the reference, how many standard errors these are (noise
-/// stays below 4 or 5, bias grows with the frames), and the noise of a frame. A square darker than a hundredth of the picture is measured against that.
+/// stays below 4 or 5, bias grows with the frames), and the noise of a frame: the mean squared error over the squared
+/// mean of the picture, and the mean over the pixels of the squared error over the squared pixel (a bright pixel counts
+/// for no more than a dark one; up to a hundredth of the picture's mean). A square darker than a hundredth of the
+/// picture is measured against that.
 ///
 /// Example: relight estimators oa_dm1 --frames 4096 --size 512x384
 #[derive(Args, Debug)]
@@ -46,6 +49,9 @@ pub struct EstimatorsArgs {
     /// Vulkan device: part of its name
     #[arg(long)]
     device: Option<String>,
+    /// Print a JSON object for each map and estimator
+    #[arg(long)]
+    json: bool,
 }
 
 /// Side of the squares that are compared.
@@ -167,7 +173,37 @@ fn noise(early: &Picture, truth: &Picture, frames: u32) -> f64 {
     squares.sum::<f64>() / truth.len().max(1) as f64 * f64::from(frames) / (mean * mean).max(1e-18)
 }
 
-/// Runs the command: one JSON object a map and estimator.
+/// Mean over the pixels of the squared error of a frame over the squared pixel, from the mean of some frames.
+fn relative_noise(early: &Picture, truth: &Picture, frames: u32) -> f64 {
+    let count = truth.len().max(1) as f64;
+    let floor = truth.iter().map(level).sum::<f64>() / count * 0.01;
+    let squares = early
+        .iter()
+        .zip(truth)
+        .map(|(a, b)| ((level(a) - level(b)) / (level(b) + floor).max(1e-9)).powi(2));
+    squares.sum::<f64>() / count * f64::from(frames)
+}
+
+/// Prints what JSON says of an estimator as a row of a table.
+fn row(line: &Value) {
+    let number = |key: &str| line.get(key).and_then(Value::as_f64).unwrap_or(0.0);
+    println!(
+        "{:<18} {:>6} {:>9.3} % {:>7.1} {:>9.2} % {:>7.1} {:>9.3} {:>9.3} {:>9.2}",
+        line.get("estimator")
+            .and_then(Value::as_str)
+            .unwrap_or_default(),
+        number("frames"),
+        number("difference") * 100.0,
+        number("standard_errors"),
+        number("worst_tile_difference") * 100.0,
+        number("worst_tile_standard_errors"),
+        number("noise_of_a_frame"),
+        number("relative_noise_of_a_frame"),
+        number("direct_ms"),
+    );
+}
+
+/// Runs the command: a table for each map, or one JSON object a map and estimator.
 pub fn run(args: &EstimatorsArgs) -> Result<()> {
     for map in &args.chosen.maps {
         let (files, map) = open(map, &args.chosen.games)?;
@@ -227,8 +263,29 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
             line["frames"] = json!(frames);
             line["direct_ms"] = json!(time);
             line["noise_of_a_frame"] = json!(noise(early, &truth, NOISE_FRAMES.min(frames)));
-            println!("{line}");
+            line["relative_noise_of_a_frame"] =
+                json!(relative_noise(early, &truth, NOISE_FRAMES.min(frames)));
+            if args.json {
+                println!("{line}");
+            } else {
+                row(&line);
+            }
         };
+        if !args.json {
+            println!("{map}");
+            println!(
+                "{:<18} {:>6} {:>11} {:>7} {:>11} {:>7} {:>9} {:>9} {:>9}",
+                "estimator",
+                "frames",
+                "difference",
+                "errors",
+                "worst tile",
+                "errors",
+                "noise",
+                "relative",
+                "direct ms"
+            );
+        }
         print("all", time, reference, &truth, &early);
         let with = |selection, cull, lights| Settings {
             rt_light_selection: selection,

@@ -108,10 +108,14 @@ pub struct LightSlot {
 pub struct LightRow {
     /// First slot.
     pub first: u32,
-    /// Number of slots.
+    /// Number of slots: strong lights first.
     pub count: u32,
-    /// 1 if suns can reach the cluster.
+    /// Number of strong lights. The others have slots of their own after those of the row, to pick among them alone.
+    pub strong: u32,
+    /// 1 if suns can reach the cell.
     pub suns: u32,
+    /// The cluster that the cell is a piece of; more than there are: none.
+    pub cluster: u32,
 }
 
 /// The list of a cluster among the lights of this frame: entries of `LightView::dynamic_lights`.
@@ -136,7 +140,7 @@ pub struct LightView {
     pub spheres: [u64; 2],
     /// [`SunLight`]s.
     pub suns: u64,
-    /// [`LightRow`] of each cluster; the last is for points in none, and holds all lights.
+    /// [`LightRow`] of each cell (a piece of a cluster); the last is for points in none, and holds all lights.
     pub rows: u64,
     /// [`LightSlot`]s.
     pub slots: u64,
@@ -146,8 +150,8 @@ pub struct LightView {
     pub dynamic_lights: u64,
     /// [`BspNode`]s.
     pub nodes: u64,
-    /// Cluster of each leaf (`i32`).
-    pub leaf_clusters: u64,
+    /// Cell of each leaf (`i32`).
+    pub leaf_cells: u64,
     /// Number of nodes; 0: every point lies in no cluster.
     pub node_count: u32,
     /// Number of rows.
@@ -566,6 +570,7 @@ pub mod constants {
     pub const FOG_HISTORY: u32 = 4;
     pub const SELECT_UNIFORM: u32 = 0;
     pub const SELECT_RESAMPLED: u32 = 1;
+    pub const WEAK_RAYS: u32 = 4;
     pub const SELECT_ALL: u32 = 2;
     pub const LIGHTS_SOFT: u32 = 1;
     pub const LIGHT_KIND_SHIFT: u32 = 29;

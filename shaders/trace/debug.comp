@@ -53,7 +53,7 @@ vec3 debug_color(ivec2 pixel) {
         // to the right is red; 64 pixels a frame and more are of full strength
         return size > 0.01 ? hue(atan(-m.offset.y, m.offset.x)) * clamp(log2(1.0 + size) / 6.0, 0.05, 1.0) : vec3(0.0);
     }
-    case DEBUG_CLUSTERS: return is_lit ? cluster_color(cluster_at(g.position + g.face_normal), g.normal) : NOTHING;
+    case DEBUG_CLUSTERS: return is_lit ? cluster_color(cell_at(g.position + g.face_normal), g.normal) : NOTHING;
     case DEBUG_LIGHTS: return is_lit ? heat_count(float(set_count(lights_at(g.position, g.face_normal))), 10.0) : NOTHING;
     case DEBUG_SAMPLES: {
         if (!is_lit) return NOTHING;

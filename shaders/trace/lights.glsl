@@ -16,6 +16,7 @@ const uint MASK_SHADOW = MASK_SOLID | MASK_THIRD_SOLID;
 struct LightSet {
     uint first;
     uint listed;
+    uint strong; // of the listed ones, which come first
     uint suns;
     uint dynamic_first;
     uint dynamic_count;
@@ -23,8 +24,8 @@ struct LightSet {
 
 uint set_count(LightSet set) { return set.listed + set.suns + set.dynamic_count; }
 
-// Cluster of a point by a walk through the map's tree; the row of "all lights" for a point in no cluster.
-uint cluster_at(vec3 position) {
+// Cell of a point, a piece of a cluster, by a walk through the map's tree; the row of "all lights" for a point in none.
+uint cell_at(vec3 position) {
     uint all = VIEW.lights.row_count - 1;
     uint node_count = VIEW.lights.node_count;
     if (node_count == 0) return all;
@@ -36,18 +37,17 @@ uint cluster_at(vec3 position) {
         index = node.children[dot(node.plane.xyz, position) >= node.plane.w ? 0 : 1];
     }
     if (index >= 0) return all;
-    int cluster = Integers(VIEW.lights.leaf_clusters).at[-1 - index];
-    return cluster >= 0 && uint(cluster) < all ? uint(cluster) : all;
+    int cell = Integers(VIEW.lights.leaf_cells).at[-1 - index];
+    return cell >= 0 && uint(cell) < all ? uint(cell) : all;
 }
 
 LightSet lights_at(vec3 position, vec3 normal) {
     // a point of a surface lies on the boundary of leaves: step into the room that it faces
-    uint cluster = cluster_at(position + normal);
-    LightRow row = LightRows(VIEW.lights.rows).at[cluster];
-    LightSet set = LightSet(row.first, row.count, row.suns != 0 ? VIEW.lights.sun_count : 0, 0, 0);
+    LightRow row = LightRows(VIEW.lights.rows).at[cell_at(position + normal)];
+    LightSet set = LightSet(row.first, row.count, row.strong, row.suns != 0 ? VIEW.lights.sun_count : 0, 0, 0);
     uint dynamic_rows = VIEW.lights.dynamic_row_count;
     if (dynamic_rows > 0) {
-        DynamicRow moving = DynamicRows(VIEW.lights.dynamic_rows).at[min(cluster, dynamic_rows - 1)];
+        DynamicRow moving = DynamicRows(VIEW.lights.dynamic_rows).at[min(row.cluster, dynamic_rows - 1)];
         set.dynamic_first = moving.first;
         set.dynamic_count = moving.count;
     }
@@ -352,17 +352,29 @@ vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint selection, 
     vec3 origin = offset_ray(position, face_normal);
     vec3 sum = vec3(0.0);
     samples = max(samples, 1);
-    // rays of one estimate
-    uint rays = 1;
-    if (selection == SELECT_ALL) rays = count;
-    else if (selection == SELECT_RESAMPLED && set.suns > 0) rays = 2;
+    // rays of one estimate, and those of them that pick a light
+    uint rays = 1, picks = 1;
+    LightSet from = set;
+    if (selection == SELECT_ALL) {
+        // each light has its ray, but of the weak ones, which give little together, some are picked by what they give
+        uint weak = set.listed - set.strong;
+        from = LightSet(set.first + set.listed, weak, 0, 0, 0, 0);
+        picks = min(weak, WEAK_RAYS);
+        rays = picks + count - weak;
+    } else if (selection == SELECT_RESAMPLED && set.suns > 0) rays = 2;
     for (uint i = 0; i < samples * rays; i++) {
         uint ray = i % rays;
         LightChoice choice;
         if (selection == SELECT_UNIFORM) choice = choose_uniform(set);
-        else if (selection == SELECT_ALL) choice = LightChoice(light_of_member(set, ray), 1.0);
-        else if (ray == 1) choice = choose_sun(set.suns);
-        else choice = choose_resampled(set, position, normal);
+        else if (ray >= picks && selection == SELECT_ALL) {
+            uint member = ray - picks;
+            if (member >= set.strong) member += from.listed;
+            choice = LightChoice(light_of_member(set, member), 1.0);
+        } else if (ray >= picks) choice = choose_sun(set.suns);
+        else {
+            choice = choose_resampled(from, position, normal);
+            choice.weight /= float(picks);
+        }
         if (!(choice.weight > 0.0)) continue;
         LightSample s = sample_light(choice.light, position, normal, rng_next2());
         if (max_component(s.light) > 0.0 && light_arrives(s, origin)) sum += s.light * choice.weight * filtered(origin, s.direction, s.distance);

@@ -19,13 +19,13 @@ struct LightSlot {
     uint light; uint alias; float threshold; float chance; float alias_chance; float visibility; float alias_visibility; uint padding;
 };
 
-struct LightRow { uint first; uint count; uint suns; };
+struct LightRow { uint first; uint count; uint strong; uint suns; uint cluster; };
 
 struct DynamicRow { uint first; uint count; };
 
 struct LightView {
     uint64_t bounds[4]; uint64_t triangles[2]; uint64_t spheres[2]; uint64_t suns; uint64_t rows; uint64_t slots;
-    uint64_t dynamic_rows; uint64_t dynamic_lights; uint64_t nodes; uint64_t leaf_clusters;
+    uint64_t dynamic_rows; uint64_t dynamic_lights; uint64_t nodes; uint64_t leaf_cells;
     uint node_count; uint row_count; uint dynamic_row_count; uint sun_count;
     uint flags; uint selection; uint samples; uint candidates;
     float scale; uint padding;
@@ -130,6 +130,8 @@ const uint FOG_LIT = 1, FOG_FILTERED = 2, FOG_HISTORY = 4;
 // How a light is chosen: LightView.selection.
 const uint SELECT_UNIFORM = 0, SELECT_RESAMPLED = 1, SELECT_ALL = 2;
 // Bits of LightView.flags.
+// rays of an estimate by all lights for the weak ones of a list
+const uint WEAK_RAYS = 4;
 const uint LIGHTS_SOFT = 1;
 // The upper bits of a light's number say what it is, the others which one.
 const uint LIGHT_KIND_SHIFT = 29;

@@ -13,20 +13,29 @@ const EVEN_PART: f64 = 0.1;
 pub struct Entry {
     /// Number of the light.
     pub light: u32,
-    /// About how much light it brings to the row's cluster; any unit.
+    /// About how much light it brings to the row's cell; any unit.
     pub weight: f32,
     /// About which part of that arrives, above 0.
     pub visibility: f32,
+}
+
+impl Entry {
+    /// About how much light of it arrives.
+    pub fn given(&self) -> f32 {
+        let given = self.weight * self.visibility;
+        if given.is_finite() {
+            given.max(0.0)
+        } else {
+            0.0
+        }
+    }
 }
 
 /// Appends the slots of a row. Each light's chance is above 0.
 ///
 /// Source: Walker's alias method (ACM TOMS 3(3), 1977), built as by Vose (IEEE TSE 17(9), 1991).
 pub fn append_slots(slots: &mut Vec<LightSlot>, entries: &[Entry]) {
-    let weight = |e: &Entry| {
-        let w = f64::from(e.weight * e.visibility);
-        if w.is_finite() { w.max(0.0) } else { 0.0 }
-    };
+    let weight = |e: &Entry| f64::from(e.given());
     let total: f64 = entries.iter().map(weight).sum();
     #[allow(clippy::cast_precision_loss)] // a row's length
     let even = 1.0 / entries.len().max(1) as f64;

@@ -10,6 +10,7 @@ use relight::light::{
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
 
+use super::light_cells::{Cell, Cells};
 use super::light_tables::{
     Entry, append_slots, cluster_balls, luminance, point_weight, triangle_weight,
 };
@@ -23,7 +24,7 @@ pub struct MapLights {
     sphere_bounds: Buffer,
     suns: Buffer,
     nodes: Buffer,
-    leaf_clusters: Buffer,
+    leaf_cells: Buffer,
     rows: Buffer,
     slots: Buffer,
     /// What does not change from view to view: counts and addresses.
@@ -214,8 +215,14 @@ impl MapLights {
                 irradiance: sun.irradiance / PI,
             })
             .collect();
-        let (nodes, leaf_clusters) = source.bsp.map(tree).unwrap_or_default();
-        let (rows, slots) = tables(source, &numbers);
+        let lists = source.lists;
+        let length = |cluster| i32::try_from(cluster).map_or(0, |c| lists.row(c).len());
+        let cells = source
+            .bsp
+            .map(|bsp| Cells::new(bsp, lists.clusters(), length));
+        let cells = cells.unwrap_or_default();
+        let (rows, slots) = tables(source, &numbers, &cells);
+        let (nodes, leaf_cells) = (&cells.nodes, &cells.leaf_cells);
         let triangle_bounds: Vec<_> = triangles.iter().map(triangle_bounds).collect();
         let sphere_bounds: Vec<_> = spheres.iter().map(sphere_bounds).collect();
         let mut lights = Self {
@@ -234,8 +241,8 @@ impl MapLights {
                 &sphere_bounds,
             )?,
             suns: Buffer::with_data(device, "trace suns", storage, &suns)?,
-            nodes: Buffer::with_data(device, "trace nodes", storage, &nodes)?,
-            leaf_clusters: Buffer::with_data(device, "trace leafs", storage, &leaf_clusters)?,
+            nodes: Buffer::with_data(device, "trace nodes", storage, nodes)?,
+            leaf_cells: Buffer::with_data(device, "trace leafs", storage, leaf_cells)?,
             rows: Buffer::with_data(device, "trace light rows", storage, &rows)?,
             slots: Buffer::with_data(device, "trace light lists", storage, &slots)?,
             fixed: t::LightView {
@@ -260,7 +267,7 @@ impl MapLights {
         ];
         lights.fixed.suns = lights.suns.address();
         lights.fixed.nodes = lights.nodes.address();
-        lights.fixed.leaf_clusters = lights.leaf_clusters.address();
+        lights.fixed.leaf_cells = lights.leaf_cells.address();
         lights.fixed.rows = lights.rows.address();
         lights.fixed.slots = lights.slots.address();
         Ok(lights)
@@ -290,65 +297,99 @@ impl MapLights {
     }
 }
 
-/// Rows and slots of the lists. The last row, which is always there, holds all lights.
+/// Part of a list's light that its weak lights may give together, by what is known of them. Where all lights are used,
+/// some of these are picked at random.
+const WEAK_PART: f32 = 0.05;
+
+/// Fewest strong lights of a list that has weak ones: shorter lists are used whole.
+const LEAST_STRONG: usize = 12;
+
+/// How many of the entries, which fall by what they give, are strong.
+fn strong(entries: &[Entry]) -> usize {
+    let all: f32 = entries.iter().map(Entry::given).sum();
+    let mut weak = 0.0;
+    let few = entries.iter().rev().take_while(|entry| {
+        weak += entry.given();
+        weak <= all * WEAK_PART
+    });
+    let strong = entries.len() - few.count();
+    if all.is_finite() && strong.max(LEAST_STRONG) + WEAK_RAYS < entries.len() {
+        strong.max(LEAST_STRONG)
+    } else {
+        entries.len()
+    }
+}
+
+/// Rays for the weak lights of a list, as the shaders send them.
+const WEAK_RAYS: usize = c::WEAK_RAYS as usize;
+
+/// Rows and slots of the lists, a row for each cell. The last row, which is always there, holds all lights.
 fn tables(
     source: &MapLightSource<'_>,
     numbers: &[Option<u32>],
+    cells: &Cells,
 ) -> (Vec<t::LightRow>, Vec<t::LightSlot>) {
     let lists = source.lists;
-    let clusters = lists.clusters();
-    let balls = source.bsp.map(|bsp| cluster_balls(bsp, clusters));
-    let mut rows = Vec::with_capacity(clusters + 1);
+    let balls = source.bsp.map(|bsp| cluster_balls(bsp, lists.clusters()));
+    let mut rows = Vec::with_capacity(cells.cells.len() + 1);
     let mut slots = Vec::new();
     let mut entries = Vec::new();
-    for row in 0..=clusters {
-        let cluster = i32::try_from(row).ok().filter(|_| row < clusters);
-        let ball = balls.as_ref().and_then(|b| b.get(row).copied().flatten());
+    for cell in cells.cells.iter().map(Some).chain([None]) {
+        let cluster = cell.and_then(|c| i32::try_from(c.cluster).ok());
+        let whole = cell.and_then(|c| balls.as_ref()?.get(c.cluster).copied().flatten());
+        let ball = cell.map(Cell::ball);
         entries.clear();
         let listed = lists.row(cluster.unwrap_or(-1)).iter();
         let shares = lists.shares(cluster.unwrap_or(-1));
         entries.extend(listed.enumerate().filter_map(|(i, &entry)| {
-            let (light, guess) = match lists.light(entry) {
-                LightRef::Triangle(i) => (
-                    numbers.get(i as usize).copied().flatten()?,
-                    triangle_weight(source.triangles.get(i as usize)?, ball),
-                ),
-                LightRef::Point(i) => (
-                    number(c::LIGHT_SPHERE, i as usize),
-                    point_weight(source.points.get(i as usize)?, ball),
-                ),
+            let (light, guess, guess_of_all) = match lists.light(entry) {
+                LightRef::Triangle(i) => {
+                    let number = numbers.get(i as usize).copied().flatten()?;
+                    let light = source.triangles.get(i as usize)?;
+                    if cell.is_some_and(|c| c.behind(light)) {
+                        return None;
+                    }
+                    let guess = |ball| triangle_weight(light, ball);
+                    (number, guess(ball), guess(whole))
+                }
+                LightRef::Point(i) => {
+                    let light = source.points.get(i as usize)?;
+                    let guess = |ball| point_weight(light, ball);
+                    (
+                        number(c::LIGHT_SPHERE, i as usize),
+                        guess(ball),
+                        guess(whole),
+                    )
+                }
             };
             let share = shares.get(i).copied().unwrap_or(LightShare::UNKNOWN);
+            // what rays found for the whole cluster, and by how much the cell is nearer or further
+            let weight = if share.bare > 0.0 && guess_of_all > 0.0 {
+                share.bare * (guess / guess_of_all)
+            } else {
+                guess
+            };
             Some(Entry {
                 light,
-                weight: if share.bare > 0.0 { share.bare } else { guess },
+                weight,
                 visibility: share.visible,
             })
         }));
+        entries.sort_by(|a, b| b.given().total_cmp(&a.given()).then(a.light.cmp(&b.light)));
+        let strong = if shares.is_empty() || cell.is_none() {
+            entries.len()
+        } else {
+            strong(&entries)
+        };
         rows.push(t::LightRow {
             first: count(slots.len()),
             count: count(entries.len()),
+            strong: count(strong),
             suns: u32::from(cluster.is_none_or(|c| lists.sees_sky(c))),
+            cluster: cluster.map_or(u32::MAX, i32::unsigned_abs),
         });
         append_slots(&mut slots, &entries);
+        append_slots(&mut slots, entries.get(strong..).unwrap_or_default());
     }
     (rows, slots)
-}
-
-/// Nodes with their planes beside them, and the cluster of each leaf.
-fn tree(bsp: &Bsp) -> (Vec<t::BspNode>, Vec<i32>) {
-    let nodes = bsp
-        .nodes
-        .iter()
-        .map(|node| {
-            let plane = usize::try_from(node.plane)
-                .ok()
-                .and_then(|i| bsp.planes.get(i));
-            t::BspNode {
-                plane: plane.map_or([0.0; 4], |p| [p.normal.x, p.normal.y, p.normal.z, p.dist]),
-                children: node.children,
-            }
-        })
-        .collect();
-    (nodes, bsp.leafs.iter().map(|leaf| leaf.cluster).collect())
 }

@@ -21,6 +21,7 @@ pub mod fog;
 mod frame_lights;
 pub mod geometry;
 pub mod input;
+pub mod light_cells;
 pub mod light_tables;
 pub mod lights;
 pub mod look;

@@ -1,0 +1,334 @@
+//! Clusters cut into cells, each with a list of lights of its own.
+//!
+//! What a light gives changes within a large cluster: chances of picking it that are right at one end are wrong at the
+//! other. So the leafs of the map's tree are cut along a grid, as fine as the memory for the lists allows, and the tree
+//! that shaders walk goes on to the pieces: a few more steps of a walk find a list that fits better.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+use q3bsp::Bsp;
+use relight::light::TriangleLight;
+use shaders::trace_types::BspNode;
+
+/// Sides of the grid that are tried, units, from the finest; after these clusters stay whole.
+const SIDES: [f32; 6] = [192.0, 256.0, 384.0, 512.0, 1024.0, 2048.0];
+
+/// Entries of all lists, at the most, for which clusters are cut: 16 MiB of slots.
+const MOST_ENTRIES: f64 = 524_288.0;
+
+/// How far behind a light's plane a cell must lie for its list to do without the light, units: the list of a point is
+/// that of the cell one unit before it.
+const BEHIND: f32 = 1.5;
+
+/// A piece of a cluster.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    /// The cluster.
+    pub cluster: usize,
+    /// Bounds.
+    pub mins: Vec3,
+    /// Bounds.
+    pub maxs: Vec3,
+}
+
+impl Cell {
+    /// Middle and half diagonal.
+    pub fn ball(&self) -> (Vec3, f32) {
+        let size = self.maxs - self.mins;
+        (self.mins + size * 0.5, size.length() * 0.5)
+    }
+
+    /// Whether all of it lies behind a light that shines to its front alone.
+    pub fn behind(&self, light: &TriangleLight) -> bool {
+        let normal = light.normal();
+        let furthest = Vec3::select(normal.cmpge(Vec3::ZERO), self.maxs, self.mins);
+        let in_front = (furthest - light.vertices[0]).dot(normal);
+        !light.two_sided && in_front < -BEHIND
+    }
+}
+
+/// Cells of a map, and the tree that finds them.
+#[derive(Debug, Default)]
+pub struct Cells {
+    /// The map's nodes, and after them those that cut leafs.
+    pub nodes: Vec<BspNode>,
+    /// Index of the cell of each leaf of the tree; -1: none.
+    pub leaf_cells: Vec<i32>,
+    /// The cells.
+    pub cells: Vec<Cell>,
+}
+
+/// A leaf of the map that is to be cut.
+#[derive(Clone, Copy)]
+struct Piece {
+    cluster: usize,
+    mins: Vec3,
+    maxs: Vec3,
+    /// Cells of the grid that it lies in: from, to (excluded).
+    from: [i32; 3],
+    to: [i32; 3],
+}
+
+impl Piece {
+    fn new(cluster: usize, mins: Vec3, maxs: Vec3, side: f32) -> Self {
+        #[allow(clippy::cast_possible_truncation)] // saturates, for damaged maps
+        let index = |v: f32| v as i32;
+        let from = (mins / side).floor().to_array().map(index);
+        let mut to = (maxs / side).ceil().to_array().map(index);
+        for (to, from) in to.iter_mut().zip(from) {
+            *to = (*to).max(from.saturating_add(1));
+        }
+        Self {
+            cluster,
+            mins,
+            maxs,
+            from,
+            to,
+        }
+    }
+
+    fn sizes(&self) -> [f64; 3] {
+        let [a, b, c] = self.from;
+        let [d, e, f] = self.to;
+        [(d, a), (e, b), (f, c)].map(|(to, from)| f64::from(to) - f64::from(from))
+    }
+}
+
+/// What cutting has made.
+struct Cutter {
+    side: f32,
+    made: Cells,
+    /// Cells by cluster and place in the grid.
+    known: HashMap<(usize, [i32; 3]), usize>,
+}
+
+impl Cutter {
+    /// Index of the cell of a piece that lies in one cell of the grid; grown by the piece's bounds.
+    fn cell(&mut self, piece: &Piece) -> i32 {
+        let cells = &mut self.made.cells;
+        let index = *self
+            .known
+            .entry((piece.cluster, piece.from))
+            .or_insert_with(|| {
+                cells.push(Cell {
+                    cluster: piece.cluster,
+                    mins: piece.mins,
+                    maxs: piece.maxs,
+                });
+                cells.len() - 1
+            });
+        if let Some(cell) = cells.get_mut(index) {
+            cell.mins = cell.mins.min(piece.mins);
+            cell.maxs = cell.maxs.max(piece.maxs);
+        }
+        i32::try_from(index).unwrap_or(-1)
+    }
+
+    /// Cuts a piece; returns what a node has for its child.
+    fn cut(&mut self, piece: Piece) -> i32 {
+        let sizes = piece.sizes();
+        let axis = (0..3).fold(0, |a, b| if sizes.get(b) > sizes.get(a) { b } else { a });
+        let (Some(&from), Some(&to)) = (piece.from.get(axis), piece.to.get(axis)) else {
+            return -1;
+        };
+        if to - from <= 1 {
+            let cell = self.cell(&piece);
+            self.made.leaf_cells.push(cell);
+            return i32::try_from(self.made.leaf_cells.len()).map_or(-1, |n| -n);
+        }
+        let middle = from + (to - from) / 2;
+        #[allow(clippy::cast_precision_loss)] // lies between the piece's bounds
+        let dist = middle as f32 * self.side;
+        let index = self.made.nodes.len();
+        self.made.nodes.push(BspNode::default());
+        let (mut front, mut back) = (piece, piece);
+        for (part, bound) in [(&mut front.mins, dist), (&mut back.maxs, dist)] {
+            if let Some(v) = part.as_mut().get_mut(axis) {
+                *v = bound;
+            }
+        }
+        for (part, bound) in [(&mut front.from, middle), (&mut back.to, middle)] {
+            if let Some(v) = part.get_mut(axis) {
+                *v = bound;
+            }
+        }
+        let children = [self.cut(front), self.cut(back)];
+        let normal = Vec3::AXES.get(axis).copied().unwrap_or(Vec3::X);
+        if let Some(node) = self.made.nodes.get_mut(index) {
+            *node = BspNode {
+                plane: normal.extend(dist).to_array(),
+                children,
+            };
+        }
+        i32::try_from(index).unwrap_or(-1)
+    }
+}
+
+impl Cells {
+    /// Of a map of so many clusters; `length`: entries of a cluster's list.
+    pub fn new(bsp: &Bsp, clusters: usize, length: impl Fn(usize) -> usize) -> Self {
+        let leafs: Vec<(usize, usize, Vec3, Vec3)> = bsp
+            .tree_leafs()
+            .into_iter()
+            .filter_map(|index| {
+                let leaf = bsp.leafs.get(index)?;
+                let cluster = usize::try_from(leaf.cluster).ok()?;
+                #[allow(clippy::cast_precision_loss)] // map coordinates
+                let [a, b] = [leaf.mins, leaf.maxs].map(|v| Vec3::from(v.map(|x| x as f32)));
+                (cluster < clusters).then_some((index, cluster, a.min(b), a.max(b)))
+            })
+            .collect();
+        #[allow(clippy::cast_precision_loss)] // lengths of lists
+        let entries = |side: f32| -> f64 {
+            let of = |&(_, cluster, mins, maxs): &(usize, usize, Vec3, Vec3)| {
+                let sizes = Piece::new(cluster, mins, maxs, side).sizes();
+                sizes.iter().product::<f64>() * length(cluster) as f64
+            };
+            leafs.iter().map(of).sum()
+        };
+        let fits = SIDES
+            .into_iter()
+            .find(|&side| entries(side) <= MOST_ENTRIES);
+        let plane = |index: i32| {
+            let plane = usize::try_from(index).ok().and_then(|i| bsp.planes.get(i));
+            plane.map_or([0.0; 4], |p| p.normal.extend(p.dist).to_array())
+        };
+        let nodes = bsp.nodes.iter().map(|node| BspNode {
+            plane: plane(node.plane),
+            children: node.children,
+        });
+        let mut cutter = Cutter {
+            side: fits.unwrap_or(1.0),
+            made: Cells {
+                nodes: nodes.collect(),
+                leaf_cells: vec![-1; bsp.leafs.len()],
+                cells: Vec::new(),
+            },
+            known: HashMap::new(),
+        };
+        // what takes the place of each leaf as a child
+        let mut instead: Vec<Option<i32>> = vec![None; bsp.leafs.len()];
+        for &(index, cluster, mins, maxs) in &leafs {
+            let piece = match fits {
+                Some(side) => Piece::new(cluster, mins, maxs, side),
+                None => Piece {
+                    cluster,
+                    mins,
+                    maxs,
+                    from: [0; 3],
+                    to: [1; 3],
+                },
+            };
+            if piece.sizes() == [1.0; 3] {
+                let cell = cutter.cell(&piece);
+                if let Some(slot) = cutter.made.leaf_cells.get_mut(index) {
+                    *slot = cell;
+                }
+            } else if let Some(slot) = instead.get_mut(index) {
+                *slot = Some(cutter.cut(piece));
+            }
+        }
+        let mut made = cutter.made;
+        for node in made.nodes.iter_mut().take(bsp.nodes.len()) {
+            for child in &mut node.children {
+                let leaf = usize::try_from(-1 - i64::from(*child)).ok();
+                if let Some(Some(other)) = leaf.and_then(|l| instead.get(l)) {
+                    *child = *other;
+                }
+            }
+        }
+        made
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use q3bsp::builder::MapBuilder;
+
+    /// Walks as the shaders do.
+    fn cell_at(cells: &Cells, p: Vec3) -> i32 {
+        let mut index = 0i32;
+        while index >= 0 {
+            let node = cells.nodes[index as usize];
+            let [x, y, z, dist] = node.plane;
+            let front = Vec3::new(x, y, z).dot(p) >= dist;
+            index = node.children[usize::from(!front)];
+        }
+        cells.leaf_cells[(-1 - index) as usize]
+    }
+
+    fn halls() -> Bsp {
+        let mut map = MapBuilder::new();
+        map.add_cell(Vec3::ZERO, Vec3::new(2000.0, 300.0, 100.0));
+        map.add_cell(Vec3::new(2100.0, 0.0, 0.0), Vec3::new(2200.0, 100.0, 100.0));
+        map.set_sees(0, 1, true);
+        map.build()
+    }
+
+    #[test]
+    fn points_find_the_cell_of_their_cluster_that_they_lie_in() {
+        let bsp = halls();
+        let cells = Cells::new(&bsp, 2, |_| 10);
+        assert!(cells.cells.len() > 10, "{}", cells.cells.len());
+        let mut seed = 1u32;
+        let mut random = |most: f32| {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 8) as f32 / (1 << 24) as f32 * most
+        };
+        for _ in 0..2000 {
+            let p = Vec3::new(random(2300.0), random(320.0), random(110.0)) - 5.0;
+            let (cluster, cell) = (bsp.cluster_at(p), cell_at(&cells, p));
+            let Ok(index) = usize::try_from(cell) else {
+                assert_eq!(cluster, -1, "{p}");
+                continue;
+            };
+            let cell = &cells.cells[index];
+            assert_eq!(cell.cluster as i32, cluster, "{p}");
+            assert!((cell.mins - 1.0).cmple(p).all() && (cell.maxs + 1.0).cmpge(p).all());
+            assert!((cell.maxs - cell.mins).max_element() <= SIDES[0]);
+        }
+    }
+
+    #[test]
+    fn long_lists_leave_clusters_whole() {
+        let bsp = halls();
+        let cells = Cells::new(&bsp, 2, |_| 1 << 22);
+        assert_eq!(cells.cells.len(), 2);
+        assert_eq!(cells.nodes.len(), bsp.nodes.len());
+        // clusters that the lists do not know have no cell
+        assert_eq!(
+            Cells::new(&bsp, 1, |_| 1)
+                .cells
+                .iter()
+                .map(|c| c.cluster)
+                .max(),
+            Some(0)
+        );
+    }
+
+    #[test]
+    fn a_cell_is_behind_a_light_only_with_all_of_it() {
+        let cell = Cell {
+            cluster: 0,
+            mins: Vec3::ZERO,
+            maxs: Vec3::splat(10.0),
+        };
+        let light = |z: f32, up: f32, two_sided| TriangleLight {
+            vertices: [Vec3::Z * z, Vec3::new(1.0, 0.0, z), Vec3::new(0.0, up, z)],
+            radiance: Vec3::ONE,
+            two_sided,
+            surface: 0,
+            triangle: 0,
+            model: 0,
+            is_sky: false,
+            source: relight::light::EmissionSource::SurfaceLight,
+        };
+        assert!(cell.behind(&light(12.0, 1.0, false)));
+        assert!(!cell.behind(&light(12.0, -1.0, false)));
+        assert!(!cell.behind(&light(12.0, 1.0, true)));
+        assert!(!cell.behind(&light(11.0, 1.0, false)));
+        assert!(!cell.behind(&light(5.0, 1.0, false)));
+    }
+}
