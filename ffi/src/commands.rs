@@ -125,7 +125,13 @@ extern "C" fn stats() {
     });
 }
 
+/// With a word: sets the variable of the same name, which a command hides from the console. Without: what lights there are.
 extern "C" fn lights() {
+    let word = Engine::current().and_then(|engine| Some((engine, engine.arguments().pop()?)));
+    if let Some((engine, word)) = word.filter(|(engine, _)| engine.arguments().len() == 2) {
+        engine.cvar_set(c"rt_lights", &word);
+        return;
+    }
     print_lines(|renderer, _, _| {
         let Some(world) = renderer.world() else {
             return vec!["no map is loaded".into()];

@@ -822,6 +822,38 @@ fn costs_are_told_in_lines_and_as_json() {
     engine.assert_clean();
 }
 
+#[test]
+fn lights_of_the_map_can_be_chosen_while_playing() {
+    let mut engine = engine_in_map();
+    engine.set("r_rt", "1");
+    engine.set("rt_accumulate", "1");
+    let view = View::new(HERE, 30.0);
+    let mut shown = Vec::new();
+    engine.take_messages();
+    let mut fitted = 0;
+    for choice in ["prior", "calibrated", "prior", "calibrated"] {
+        engine.command(&format!("rt_lights {choice}")).unwrap();
+        assert_eq!(engine.cvar("rt_lights").as_deref(), Some(choice));
+        for _ in 0..7 {
+            engine.picture(&view).unwrap();
+        }
+        shown.push(engine.picture(&view).unwrap());
+        let said = text_of(&engine.take_messages());
+        fitted += said.matches("lights fitted").count();
+    }
+    // each light is found once, and then put back
+    assert_eq!(fitted, 1);
+    for (first, again) in [(0, 2), (1, 3)] {
+        let alike = relight::compare::compare(&shown[first], &shown[again]).unwrap();
+        assert!(alike.ssim > 0.9, "{first}: {alike:?}");
+    }
+    engine.take_messages();
+    engine.command("rt_lights").unwrap();
+    let said = text_of(&engine.take_messages());
+    assert!(said.contains("triangle lights"), "{said}");
+    engine.assert_clean();
+}
+
 fn text_of(messages: &[Message]) -> String {
     messages
         .iter()
