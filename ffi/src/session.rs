@@ -58,8 +58,6 @@ pub struct Front {
     pub size: (u32, u32),
     /// As of when the window was opened.
     pub window: WindowFacts,
-    /// The second eye's commands of a stereo frame are left out.
-    pub skip_eye: bool,
     /// When the frame's first `BeginFrame` came.
     pub frame_start: Option<Instant>,
     /// An entity without a place was reported already.
@@ -148,17 +146,11 @@ pub fn with_renderer<R: Default>(
     .unwrap_or_else(|| Ok(R::default()))
 }
 
-/// Like [`with_renderer`], for what draws: left out as well for the second eye of a stereo frame.
+/// Like [`with_renderer`], for what draws.
 pub fn draw(
     f: impl FnOnce(&mut Renderer, &mut Front) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    with_renderer(|renderer, front| {
-        if front.skip_eye {
-            Ok(())
-        } else {
-            f(renderer, front)
-        }
-    })
+    with_renderer(f)
 }
 
 /// Gives up a state that a call further up has taken and will never put back.

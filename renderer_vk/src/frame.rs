@@ -77,6 +77,7 @@ impl<'a> FrameContext<'a> {
             self.settings,
             self.color,
             test,
+            self.mask,
         )?;
         if test.count == 0 {
             return Ok(());

@@ -395,7 +395,10 @@ impl Renderer {
         };
         let mask = self.eye.mask(self.settings.anaglyph);
         let pause = self.settings.rt_pause && look == Look::Traced;
-        if pause && let Some(view) = self.held.next(def) {
+        if pause && let Some(mut view) = self.held.next(def) {
+            // held for one eye, shown to both
+            view.view.stereo = self.eye.stereo(&self.settings);
+            view.view.update();
             self.scene.clear();
             self.keep_for_still(&view);
             self.queue.push((Item::Traced(Box::new(view)), mask));

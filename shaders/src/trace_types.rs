@@ -481,6 +481,11 @@ pub struct TraceView {
     pub pixel_spread: f32,
     /// Light everywhere, as radiance of a white diffuse surface.
     pub ambient: Vec3,
+    /// Of one eye of two: what is added to the horizontal coordinate of the picture (-1 to 1, left to right) for the
+    /// direction of a ray.
+    pub eye_shift: f32,
+    /// Channels of the target that are written: 1 red, 2 green, 4 blue.
+    pub channels: u32,
     pub fog_count: u32,
     pub portal_count: u32,
     /// Mirrors and portals on a path.

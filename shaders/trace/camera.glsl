@@ -21,6 +21,7 @@ CameraRay camera_ray(ivec2 pixel) {
     vec2 place = (VIEW.flags & VIEW_JITTER) != 0 ? rng_next2() : vec2(0.5) + VIEW.antialias.jitter;
     ray.seen = vec2(pixel) + place;
     vec2 ndc = ray.seen / vec2(VIEW.width, VIEW.height) * 2.0 - 1.0;
+    ndc.x += VIEW.eye_shift;
     // one unit deep
     vec3 direction = VIEW.forward - VIEW.left * ndc.x - VIEW.up * ndc.y;
     ray.through_middle = normalize(direction);

@@ -87,5 +87,5 @@ void main() {
     if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target_width) || target.y >= int(VIEW.target_height)) return;
     // each traced pixel as a block, where fewer are traced than shown
     ivec2 traced = min(ivec2((vec2(pixel) + 0.5) * vec2(VIEW.width, VIEW.height) / vec2(picture_size())), ivec2(VIEW.width, VIEW.height) - 1);
-    imageStore(images_rgba8[VIEW.image_target], target, vec4(debug_color(traced), 1.0));
+    target_store(target, debug_color(traced));
 }

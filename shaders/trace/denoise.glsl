@@ -81,6 +81,7 @@ uvec4 pack_texel(LightTexel t, float dither) {
 // Coordinates of a pixel's middle on the plane at distance 1, to the left and up.
 vec2 tangent_of(vec2 pixel) {
     vec2 ndc = 1.0 - (pixel + 0.5) / vec2(VIEW.width, VIEW.height) * 2.0;
+    ndc.x -= VIEW.eye_shift;
     return ndc * vec2(length(VIEW.left), length(VIEW.up));
 }
 

@@ -101,6 +101,7 @@ vec4 motion_of(CameraRay ray, LastPlace place) {
     if (depth <= 0.0) return vec4(0.0, 0.0, -1.0, path);
     vec2 ndc = -vec2(dot(v, VIEW.last_left) / dot(VIEW.last_left, VIEW.last_left),
         dot(v, VIEW.last_up) / dot(VIEW.last_up, VIEW.last_up)) / depth;
+    ndc.x -= VIEW.eye_shift;
     vec2 offset = (ndc * 0.5 + 0.5) * vec2(VIEW.width, VIEW.height) - ray.seen;
     float last_path = place.at.w > 0.0 ? min(length(v), SKY_PATH) : SKY_PATH;
     return vec4(clamp(offset, -60000.0, 60000.0), last_path, path);

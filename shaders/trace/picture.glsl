@@ -12,4 +12,13 @@ vec3 picture_load(ivec2 pixel) {
     return (VIEW.flags & VIEW_ACCUMULATE) != 0 ? imageLoad(images_rgba32f[image], pixel).rgb : imageLoad(images_rgba16f[image], pixel).rgb;
 }
 
+// Writes a display-encoded colour to the picture that is shown; where each eye has channels of its own, to those alone.
+void target_store(ivec2 target, vec3 color) {
+    if (VIEW.channels != 7u) {
+        bvec3 written = notEqual(uvec3(VIEW.channels) & uvec3(1, 2, 4), uvec3(0));
+        color = mix(imageLoad(images_rgba8[VIEW.image_target], target).rgb, color, written);
+    }
+    imageStore(images_rgba8[VIEW.image_target], target, vec4(color, 1.0));
+}
+
 #endif

@@ -39,5 +39,5 @@ void main() {
     vec3 radiance = picture_load(pixel);
     if (VIEW.post.bloom != 0) radiance = mix(radiance, spread_light(pixel), VIEW.post.bloom_strength);
     radiance = max(radiance * exposure, 0.0);
-    imageStore(images_rgba8[VIEW.image_target], target, vec4(encode_display(tone_curve(radiance)), 1.0));
+    target_store(target, encode_display(tone_curve(radiance)));
 }

@@ -90,6 +90,7 @@ struct TraceView {
     uint width; uint height; int target_x; int target_y;
     uint scene; uint flags; uint seed; uint accumulated;
     float time; float pixel_spread; vec3 ambient;
+    float eye_shift; uint channels;
     uint fog_count; uint portal_count;
     uint max_depth; uint bounces;
     uint image_position; uint image_surface; uint image_albedo; uint image_front; uint image_direct; uint image_indirect; uint image_composite;

@@ -99,7 +99,6 @@ pub extern "C" fn begin_registration(out: *mut glconfig_t) {
                 front.settings.texture_mode = mode;
             }
             front.cvars = Some(cvars);
-            front.skip_eye = false;
             front.registered = true;
             let files = Arc::new(EngineFiles::new(engine));
             renderer.keep_calibrations(cache_folder);
@@ -260,18 +259,15 @@ pub extern "C" fn begin_frame(stereo: c_int) {
             return Ok(());
         };
         with_renderer(|renderer, front| {
-            // With r_anaglyphMode the engine sends every frame twice. The traced look shows the first eye's picture.
+            // with r_anaglyphMode the engine sends every frame twice
             let eye = match stereo {
                 super::abi::STEREO_LEFT => Eye::Left,
                 super::abi::STEREO_RIGHT => Eye::Right,
                 _ => Eye::Both,
             };
-            front.skip_eye = eye == Eye::Right && front.settings.rt;
             if eye == Eye::Right {
-                if !front.skip_eye {
-                    renderer.begin_frame(engine.milliseconds());
-                    renderer.set_eye(eye);
-                }
+                renderer.begin_frame(engine.milliseconds());
+                renderer.set_eye(eye);
                 return Ok(());
             }
             if let Some(cvars) = &front.cvars {
@@ -335,7 +331,6 @@ fn milliseconds(duration: std::time::Duration) -> c_int {
 /// Ends the frame on the GPU, and takes the pictures that were asked for before it is shown.
 fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Failure> {
     let mut outbox = Outbox::default();
-    front.skip_eye = false;
     let start = Instant::now();
     outbox.front_end_ms = front
         .frame_start

@@ -54,9 +54,8 @@ impl Renderer {
     }
 
     /// Says whose picture the calls that follow are for, after [`begin_frame`](Self::begin_frame). A frame begins with
-    /// both eyes'. The traced look has one picture: with `rt` this is without effect.
+    /// both eyes'.
     pub fn set_eye(&mut self, eye: Eye) {
-        let eye = if self.settings.rt { Eye::Both } else { eye };
         self.queue_overlay();
         self.eye = eye;
         self.scene.set_eye(eye);

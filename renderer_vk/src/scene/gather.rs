@@ -8,6 +8,7 @@ use shaders::types::constants::NO_TEXTURE;
 use super::entity;
 use super::flares::FlareView;
 use super::mesh::{self, DeformScratch, RawMesh};
+use super::painted_shadows::{is_painted_shadow, only_darkens};
 use super::portal;
 use super::rigid::RigidMeshes;
 use super::surfaces::{
@@ -64,10 +65,8 @@ pub(super) fn views(
 ) -> Vec<ViewScene> {
     let mut out = scene.lists.pop().unwrap_or_default();
     let mut view = View::new(def, input.settings.znear, FAR_WITHOUT_WORLD);
-    if look == Look::Classic {
-        view.stereo = scene.eye.stereo(input.settings);
-        view.update();
-    }
+    view.stereo = scene.eye.stereo(input.settings);
+    view.update();
     let mut main = scene
         .pool
         .pop()
@@ -452,6 +451,10 @@ impl<'a> Gatherer<'a> {
         for poly in polys {
             let range = poly.first_vertex..poly.first_vertex + poly.vertex_count;
             let corners = self.poly_vertices.get(range).unwrap_or_default();
+            let darkens = || only_darkens(&self.input.materials.get(poly.material).shader);
+            if self.look == Look::Traced && darkens() && is_painted_shadow(corners, self.entities) {
+                continue;
+            }
             let bounds = corners
                 .iter()
                 .fold(Bounds::EMPTY, |b, v| b.with(v.position));

@@ -14,6 +14,7 @@ mod key_frames;
 mod lighting;
 mod mesh;
 mod models;
+mod painted_shadows;
 mod portal;
 mod rigid;
 mod shadow_volumes;

@@ -44,6 +44,10 @@ pub fn coverage(assets: &Assets, material: u32, corners: [Vec2; 3]) -> Coverage 
     let Some(index) = light::cut_out_stage(&material.shader) else {
         return Coverage::Mixed;
     };
+    // what is deformed may change its coordinates with its shape
+    if !material.shader.deforms.is_empty() {
+        return Coverage::Mixed;
+    }
     // of several stages that write depth each cuts its own holes
     let writes = material.shader.stages.iter().filter(|s| s.depth_write);
     if writes.count() != 1 {

@@ -19,7 +19,7 @@ use relight::exposure::display_exposure;
 
 use crate::assets::compile::sampler;
 use crate::assets::{Assets, Materials};
-use crate::gpu::{Device, Error, Image, Recorder};
+use crate::gpu::{ColorMask, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::ViewScene;
 use crate::settings::Settings;
@@ -110,6 +110,8 @@ fn geometry(
 /// The traced look of one map.
 pub struct TraceLook {
     pub(super) tracer: ViewTracer,
+    /// Draws for the right eye, while there are two: what is kept from frame to frame is each eye's own.
+    right: Option<Box<ViewTracer>>,
     kind: Tracer,
     geometry: StaticGeometry,
     lights: MapLights,
@@ -146,6 +148,7 @@ impl TraceLook {
         view_tracer.exposure_base = display_exposure(relit).log2();
         Ok(Self {
             tracer: view_tracer,
+            right: None,
             kind: tracer,
             geometry: geometry(device, tracer, world, assets)?,
             lights: MapLights::new(device, &source)?,
@@ -154,7 +157,7 @@ impl TraceLook {
     }
 
     /// Records all passes of a view into its rectangle of `target` (RGBA8, usable as storage image), and finds which of
-    /// its flares are seen.
+    /// its flares are seen. `mask`: channels of the target that are written.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
@@ -168,6 +171,7 @@ impl TraceLook {
         settings: &Settings,
         target: &Image,
         flares: FlareTest,
+        mask: ColorMask,
     ) -> Result<(), Error> {
         let remapping = remapping(&assets.materials);
         if remapping != self.remapping {
@@ -180,8 +184,25 @@ impl TraceLook {
             lights: &self.lights,
             flares,
         };
-        self.tracer
-            .record_view(rec, view, Some(map), assets, settings, target)
+        let slope = view.view.stereo.slope;
+        let tracer = if slope < 0.0 {
+            match &mut self.right {
+                Some(made) => made,
+                none => {
+                    let mut made = ViewTracer::new(rec.device(), self.kind)?;
+                    made.exposure_base = self.tracer.exposure_base;
+                    none.insert(Box::new(made))
+                }
+            }
+        } else {
+            if slope == 0.0 {
+                self.right = None;
+            }
+            &mut self.tracer
+        };
+        let bit = |on: bool, bit: u32| if on { bit } else { 0 };
+        tracer.channels = bit(mask.red, 1) | bit(mask.green, 2) | bit(mask.blue, 4);
+        tracer.record_view(rec, view, Some(map), assets, settings, target)
     }
 
     /// Records all passes of a view by another tracer than the one whose picture is shown.

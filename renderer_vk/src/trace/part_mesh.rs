@@ -3,8 +3,9 @@
 use glam::Vec3;
 use shaders::types::Vertex;
 
+use super::cutout::Coverage;
 use super::input::Kind;
-use super::parts::{Part, Parts};
+use super::parts::{Part, Parts, Share};
 use crate::gpu::BlasGeometry;
 use crate::scene::{MeshGeometry, ViewScene};
 
@@ -14,33 +15,48 @@ pub struct MeshPart<'a> {
     pub mesh: MeshGeometry<'a>,
     /// First vertex, counted from the part's first.
     pub offset: u32,
+    /// The triangles that it takes, with the coverage of all; `None`: all of them.
+    pub taken: Option<(Coverage, &'a [Coverage])>,
 }
 
 impl MeshPart<'_> {
     /// Triangles that count from the part's first vertex.
     pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         let offset = self.offset;
-        self.mesh.triangles().map(move |t| t.map(|i| i + offset))
+        let takes = |place: usize| match self.taken {
+            Some((wanted, all)) => all.get(place) == Some(&wanted),
+            None => true,
+        };
+        (self.mesh.triangles().enumerate())
+            .filter(move |(place, _)| takes(*place))
+            .map(move |(_, t)| t.map(|i| i + offset))
     }
 }
 
 /// The meshes of a part.
-pub fn members<'a>(view: &'a ViewScene, parts: &Parts, part: &Part) -> Vec<MeshPart<'a>> {
+pub fn members<'a>(view: &'a ViewScene, parts: &'a Parts, part: &Part) -> Vec<MeshPart<'a>> {
     let members = part.members.clone();
     let meshes = parts.meshes.get(members.clone()).unwrap_or_default();
-    let shapes = parts.shapes.get(members).unwrap_or_default();
+    let skins = parts.skins.get(members).unwrap_or_default();
     // one that is not there is an empty one, so that members and skins stay side by side
     const NOTHING: MeshGeometry<'_> = MeshGeometry {
         vertices: &[],
         indices: &[],
         base: 0,
     };
-    let found = meshes.iter().zip(shapes).map(|(&mesh, shape)| MeshPart {
+    let found = meshes.iter().zip(skins).map(|(&mesh, skin)| MeshPart {
         mesh: view
             .meshes
             .get(mesh)
             .map_or(NOTHING, |mesh| view.mesh_geometry(mesh)),
-        offset: shape.first_vertex,
+        offset: skin.shape.first_vertex,
+        taken: parts.coverages(skin).map(|all| {
+            let wanted = match skin.shape.share {
+                Share::Solid(_) => Coverage::Solid,
+                Share::Whole | Share::Mixed(_) => Coverage::Mixed,
+            };
+            (wanted, all)
+        }),
     });
     found.collect()
 }

@@ -1,5 +1,6 @@
 //! The meshes of a view, sorted by what rays do with them and by how much of them outlives the frame.
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use glam::{Mat3, Vec3};
@@ -10,6 +11,7 @@ use shaders::trace_types::constants::{
 use shaders::types::constants as c;
 use shaders::types::{Instance, Triangle};
 
+use super::cutout::Coverage;
 use super::geometry::rank_bits;
 use super::input::{Kind, MaterialInfo, MaterialTable};
 use crate::scene::{DynamicMesh, MeshId, Shape, ViewScene};
@@ -92,7 +94,28 @@ pub struct ShapeMesh {
     pub vertices: u32,
     /// Number of indices.
     pub indices: u32,
+    /// Which of its triangles.
+    pub share: Share,
 }
+
+/// The triangles of a mesh that a part takes; which these are depends on the material, by whose index shares are told
+/// apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Share {
+    /// All.
+    #[default]
+    Whole,
+    /// Of a cut-out those without holes.
+    Solid(u32),
+    /// Of a cut-out those that have to be tested.
+    Mixed(u32),
+}
+
+/// A skin of a shape: what the coverage of triangles is known by.
+type SkinnedShape = (Source, u32, u32);
+
+/// Coverages that are kept at most; beyond that they are found anew, which takes a while and changes nothing.
+const KEPT_COVERAGES: usize = 4096;
 
 /// What a part's triangles are known by, beside their shape: the skin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -173,6 +196,10 @@ pub struct Parts {
     pub positions: Vec<Vec3>,
     members: Vec<Member>,
     order: Vec<(f32, u32, usize)>,
+    /// Of cut-outs with triangles that need no test.
+    coverages: HashMap<SkinnedShape, Option<Box<[Coverage]>>>,
+    /// Of the materials, when `coverages` was last emptied.
+    generation: u64,
 }
 
 impl Default for Parts {
@@ -195,6 +222,8 @@ impl Default for Parts {
             positions: Vec::new(),
             members: Vec::new(),
             order: Vec::new(),
+            coverages: HashMap::new(),
+            generation: 0,
         }
     }
 }
@@ -220,6 +249,10 @@ impl Parts {
         }
         self.positions.clear();
         self.members.clear();
+        if self.generation != materials.generation() || self.coverages.len() > KEPT_COVERAGES {
+            self.coverages.clear();
+            self.generation = materials.generation();
+        }
         // in drawing order, so that of two translucent layers in one plane the later primitive is drawn later
         let mut order = std::mem::take(&mut self.order);
         order.clear();
@@ -231,7 +264,7 @@ impl Parts {
         for (place, &(_, _, index)) in order.iter().enumerate() {
             if let Some(mesh) = view.meshes.get(index) {
                 let (material, info) = materials.info(mesh.material);
-                self.add(view, mesh, (place, index), material, &info);
+                self.add(view, mesh, (place, index), material, &info, materials);
             }
         }
         self.order = order;
@@ -245,6 +278,7 @@ impl Parts {
         (order, index): (usize, usize),
         material: u32,
         info: &MaterialInfo,
+        materials: &dyn MaterialTable,
     ) {
         let (Some(instance), Some(kind)) = (
             view.instances.get(mesh.instance as usize),
@@ -280,6 +314,53 @@ impl Parts {
                 return;
             }
         };
+        if kind == Kind::Tested && mesh.world_surface.is_none() {
+            let key = (source, material, indices);
+            let known = self.coverages.entry(key).or_insert_with(|| {
+                let found = triangle_coverages(view, mesh, material, materials);
+                found
+                    .iter()
+                    .any(|c| *c != Coverage::Mixed)
+                    .then(|| found.into())
+            });
+            if let Some(known) = known {
+                let (solid, mixed) = (
+                    known.contains(&Coverage::Solid),
+                    known.contains(&Coverage::Mixed),
+                );
+                let shares = [
+                    (Kind::Opaque, Share::Solid(material), solid),
+                    (Kind::Tested, Share::Mixed(material), mixed),
+                ];
+                for (kind, share, _) in shares.into_iter().filter(|s| s.2) {
+                    self.members.push(Member {
+                        key: PartKey {
+                            instance: mesh.instance,
+                            kind,
+                            animated: matches!(source, Source::Animated(_)),
+                            material: 0,
+                            world_surface: u32::MAX,
+                        },
+                        order,
+                        mesh: index,
+                        skin: SkinMesh {
+                            shape: ShapeMesh {
+                                kind,
+                                source,
+                                first_vertex: mesh.first_vertex,
+                                vertices,
+                                indices,
+                                share,
+                            },
+                            material,
+                            fog: mesh.fog,
+                            flags,
+                        },
+                    });
+                }
+                return;
+            }
+        }
         self.members.push(Member {
             key: PartKey {
                 instance: mesh.instance,
@@ -301,12 +382,22 @@ impl Parts {
                     first_vertex: mesh.first_vertex,
                     vertices,
                     indices,
+                    share: Share::Whole,
                 },
                 material,
                 fog: mesh.fog,
                 flags,
             },
         });
+    }
+
+    /// The coverages of a skin's triangles, where it takes a share of them.
+    pub fn coverages(&self, skin: &SkinMesh) -> Option<&[Coverage]> {
+        if skin.shape.share == Share::Whole {
+            return None;
+        }
+        let key = (skin.shape.source, skin.material, skin.shape.indices);
+        self.coverages.get(&key)?.as_deref()
     }
 
     /// Puts the members of each part side by side.
@@ -408,6 +499,24 @@ impl Parts {
             });
         }
     }
+}
+
+/// Coverage of each triangle of a model's surface in a material.
+fn triangle_coverages(
+    view: &ViewScene,
+    mesh: &DynamicMesh,
+    material: u32,
+    materials: &dyn MaterialTable,
+) -> Vec<Coverage> {
+    let geometry = view.mesh_geometry(mesh);
+    let st = |i: u32| geometry.vertices.get(i as usize).map(|v| v.st);
+    geometry
+        .triangles()
+        .map(|t| match t.map(st) {
+            [Some(a), Some(b), Some(c)] => materials.coverage(material, [a, b, c]),
+            _ => Coverage::Mixed,
+        })
+        .collect()
 }
 
 /// Whether a deformed surface of the map is so small that it is better built together with all others of its sort:

@@ -60,6 +60,8 @@ pub struct ViewTracer {
     bloom: Bloom,
     debug: DebugView,
     counters: RayCounters,
+    /// Channels of the target that are written: 1 red, 2 green, 4 blue.
+    pub(super) channels: u32,
     /// Rays are counted.
     pub(super) count_rays: bool,
     pub(super) targets: Option<Targets>,
@@ -107,6 +109,7 @@ impl ViewTracer {
             bloom: Bloom::default(),
             debug: DebugView::default(),
             counters: RayCounters::default(),
+            channels: 7,
             count_rays: false,
             targets: None,
             // zeros: the first frame counts into the histogram before any pass has emptied it
@@ -425,6 +428,8 @@ impl ViewTracer {
             transport: map.map_or_else(Default::default, |m| {
                 m.geometry.surroundings.view(camera.origin)
             }),
+            eye_shift: camera.stereo.slope / camera.tan_x,
+            channels: self.channels,
             fog_count: map.map_or(0, |m| m.geometry.fog_count),
             portal_count: u32::try_from(portals.len()).unwrap_or(u32::MAX),
             fog: self.fog.view(&targets.direct, &targets.front),
@@ -462,7 +467,7 @@ fn camera_frame(view: &ViewScene) -> [Vec3; 4] {
     let camera = &view.view;
     let [forward, left, up] = camera.axis;
     [
-        camera.origin,
+        camera.origin + left * camera.stereo.offset(),
         forward,
         left * camera.tan_x,
         up * camera.tan_y,
@@ -512,6 +517,7 @@ fn content_hash(view: &ViewScene, materials: &dyn MaterialTable, settings: &Sett
         floats(&vector(axis));
     }
     floats(&[camera.tan_x, camera.tan_y, view.time]);
+    floats(&[camera.stereo.slope, camera.stereo.distance]);
     floats(&[settings.rt_light_scale, settings.rt_dlight_scale]);
     for light in &view.dlights {
         floats(&vector(light.origin));

@@ -11,6 +11,7 @@ use relight::{GameFiles, SearchPath};
 use super::harness::Gpu;
 use crate::api::RefDef;
 use crate::assets::Assets;
+use crate::gpu::ColorMask;
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::raster::FlareTest;
 use crate::scene::{Look, Scene};
@@ -126,6 +127,7 @@ fn maps_are_lit() {
                 &settings,
                 &target,
                 FlareTest::default(),
+                ColorMask::ALL,
             )
             .expect("recorded");
             gpu.ring.end(rec).expect("submitted");
@@ -225,6 +227,7 @@ fn tracers_agree_on_maps() {
                     &settings,
                     &target,
                     FlareTest::default(),
+                    ColorMask::ALL,
                 )
                 .expect("recorded");
                 gpu.ring.end(rec).expect("submitted");

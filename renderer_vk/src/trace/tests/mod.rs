@@ -13,5 +13,6 @@ mod lighting;
 mod lights;
 mod maps;
 mod motion;
+mod parts;
 mod structures;
 mod views;
