@@ -299,7 +299,7 @@ impl MapLights {
 
 /// Part of a list's light that its weak lights may give together, by what is known of them. Where all lights are used,
 /// some of these are picked at random.
-const WEAK_PART: f32 = 0.05;
+const WEAK_PART: f32 = 0.1;
 
 /// Fewest strong lights of a list that has weak ones: shorter lists are used whole.
 const LEAST_STRONG: usize = 12;
