@@ -20,6 +20,7 @@ mod images;
 pub mod json;
 mod lightmaps;
 mod look;
+mod map;
 mod obj;
 mod output;
 mod sky;
@@ -48,13 +49,21 @@ pub enum Format {
     Gltf,
     /// Wavefront OBJ with its MTL.
     Obj,
+    /// Brushes, patches and entities, for level editors and compilers.
+    Map,
     /// Everything, as [`json`].
     Json,
 }
 
 impl Format {
     /// All formats.
-    pub const ALL: [Format; 4] = [Format::Glb, Format::Gltf, Format::Obj, Format::Json];
+    pub const ALL: [Format; 5] = [
+        Format::Glb,
+        Format::Gltf,
+        Format::Obj,
+        Format::Map,
+        Format::Json,
+    ];
 
     /// Extension of its files, without the dot; also the name that users give.
     pub fn extension(self) -> &'static str {
@@ -62,6 +71,7 @@ impl Format {
             Format::Glb => "glb",
             Format::Gltf => "gltf",
             Format::Obj => "obj",
+            Format::Map => "map",
             Format::Json => "json",
         }
     }
@@ -216,6 +226,7 @@ pub fn export(
         Format::Glb => gltf::write(source, gltf::Container::Binary, &mut output)?,
         Format::Gltf => gltf::write(source, gltf::Container::Text, &mut output)?,
         Format::Obj => obj::write(source, &mut output)?,
+        Format::Map => map::write(source, &mut output)?,
         Format::Json => json::write(source, &mut output)?,
     };
     report.files = output.finish()?;

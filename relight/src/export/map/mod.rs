@@ -1,0 +1,283 @@
+//! Maps as level editors and map compilers read them: brushes from their planes, patches, entities.
+//!
+//! Brushes are written in the Valve 220 form, in which a side names the axes of its texture: whatever way the compiler
+//! laid a texture can be said so. The axes come from the surfaces drawn on a side; sides on which nothing was drawn get
+//! the editors' default. Patches are `patchDef2` with their control points and coordinates. Numbers are id units,
+//! whatever the scale asked for is.
+//!
+//! Source of the form: the map files of Quake III's editors, and Valve's extension of Quake's form of 1998.
+
+mod texture;
+mod winding;
+
+use super::{Export, ExportError, ExportReport, Output};
+use crate::world::RelitWorld;
+use glam::{DVec3, Vec3};
+use q3bsp::{Bsp, Entity, Model, Surface, SurfaceKind};
+use std::fmt::Write;
+use texture::{Drawn, Projection, Sizes, default_projection};
+use winding::{Side, sides, three_points};
+
+/// The folder that compilers put before every name.
+const FOLDER: &str = "textures/";
+
+/// Name for sides whose shader has none that the form could say.
+const NO_NAME: &str = "common/caulk";
+
+/// What was written and what could not be.
+#[derive(Default)]
+struct Tally {
+    brushes: usize,
+    sides: usize,
+    /// Sides with the texture of a drawn surface.
+    aligned: usize,
+    open: usize,
+    patches: usize,
+    meshes: usize,
+    foreign_names: usize,
+}
+
+/// Writes a map.
+///
+/// # Errors
+/// [`ExportError::Write`].
+pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportReport, ExportError> {
+    let (text, tally) = document(source);
+    output.write_main(text.as_bytes())?;
+    let mut warnings = Vec::new();
+    for (count, what) in [
+        (tally.open, "brushes are not closed, and left out"),
+        (
+            tally.meshes,
+            "meshes of triangles have no place in a .map: models, or surfaces whose brushes are there",
+        ),
+        (
+            tally.foreign_names,
+            "names are not below textures/, where compilers look for them",
+        ),
+    ] {
+        if count > 0 {
+            warnings.push(format!("{count} {what}"));
+        }
+    }
+    let bsp = &source.world.bsp;
+    if bsp.brushes.is_empty() && !bsp.surfaces.is_empty() {
+        let format = bsp.format;
+        warnings.push(format!(
+            "{format}: the file has no brushes; walls are missing"
+        ));
+    }
+    Ok(ExportReport {
+        triangles: tally.sides,
+        vertices: tally.brushes,
+        materials: bsp.shaders.len(),
+        warnings,
+        ..ExportReport::default()
+    })
+}
+
+/// The file of a map.
+fn document(source: &Export<'_>) -> (String, Tally) {
+    let mut writer = Writer {
+        world: source.world,
+        drawn: Drawn::new(source.world),
+        sizes: Sizes::new(source.files, source.world),
+        out: String::new(),
+        tally: Tally::default(),
+    };
+    let entities = source.world.bsp.entities();
+    if entities.is_empty() {
+        // Compilers want a world.
+        let pairs = vec![("classname".to_owned(), "worldspawn".to_owned())];
+        writer.entity(0, &Entity { pairs });
+    }
+    for (number, entity) in entities.iter().enumerate() {
+        writer.entity(number, entity);
+    }
+    (writer.out, writer.tally)
+}
+
+struct Writer<'a> {
+    world: &'a RelitWorld,
+    drawn: Drawn,
+    sizes: Sizes<'a>,
+    out: String,
+    tally: Tally,
+}
+
+impl Writer<'_> {
+    fn line(&mut self, text: std::fmt::Arguments<'_>) {
+        // Writing to a string does not fail.
+        let _ = writeln!(self.out, "{text}");
+    }
+
+    fn entity(&mut self, number: usize, entity: &Entity) {
+        let bsp = &self.world.bsp;
+        let model = match number {
+            0 => Some(0),
+            _ => entity.brush_model().filter(|&n| n < bsp.models.len()),
+        };
+        self.line(format_args!("// entity {number}\n{{"));
+        if number == 0 && entity.get("mapversion").is_none() {
+            self.line(format_args!("\"mapversion\" \"220\""));
+        }
+        for (key, value) in &entity.pairs {
+            // The number of its model is the compiler's.
+            let of_compiler = model.is_some_and(|n| n > 0) && key.eq_ignore_ascii_case("model");
+            if !of_compiler && !key.is_empty() && !value.is_empty() {
+                let clean = |text: &str| text.replace(['"', '\n', '\r'], " ");
+                self.line(format_args!("\"{}\" \"{}\"", clean(key), clean(value)));
+            }
+        }
+        if let Some((number, model)) = model.and_then(|n| Some((n, bsp.models.get(n)?))) {
+            let origin = match number {
+                0 => Vec3::ZERO,
+                // The compiler takes it off again.
+                _ => entity.vec3("origin").unwrap_or(Vec3::ZERO),
+            };
+            self.model(number, model, origin);
+        }
+        self.line(format_args!("}}"));
+    }
+
+    fn model(&mut self, number: usize, model: &Model, origin: Vec3) {
+        let bsp = &self.world.bsp;
+        let of_model = u32::try_from(number).unwrap_or(u32::MAX);
+        let first = usize::try_from(model.first_brush).unwrap_or(0);
+        let count = usize::try_from(model.num_brushes).unwrap_or(0);
+        let brushes = bsp.brushes.get(first..first + count).unwrap_or_default();
+        let mut written = 0;
+        for brush in brushes {
+            match sides(bsp, brush) {
+                Some(sides) => {
+                    self.line(format_args!("// brush {written}\n{{"));
+                    for side in &sides {
+                        self.side(of_model, side, origin);
+                    }
+                    self.line(format_args!("}}"));
+                    self.tally.brushes += 1;
+                    written += 1;
+                }
+                None => self.tally.open += 1,
+            }
+        }
+        let surfaces = bsp.surfaces.get(bsp.model_surfaces(model));
+        for surface in surfaces.unwrap_or_default() {
+            match surface.kind {
+                SurfaceKind::Patch => self.patch(surface, origin),
+                SurfaceKind::TriangleSoup | SurfaceKind::Foliage => self.tally.meshes += 1,
+                _ => {}
+            }
+        }
+    }
+
+    /// A shader's name as the form has it: without the folder, which compilers put before it.
+    fn name(&mut self, shader: i32) -> String {
+        let name = shader_name(&self.world.bsp, shader);
+        let stem = match name.get(..FOLDER.len()) {
+            Some(folder) if folder.eq_ignore_ascii_case(FOLDER) => name.get(FOLDER.len()..),
+            _ => {
+                self.tally.foreign_names += usize::from(!name.is_empty());
+                Some(name)
+            }
+        };
+        // A name ends at white space, and brackets begin other things.
+        let stem = stem.unwrap_or_default();
+        match stem.is_empty() || stem.contains(|c: char| c <= ' ' || "\"()[]{}".contains(c)) {
+            true => NO_NAME.to_owned(),
+            false => stem.to_owned(),
+        }
+    }
+
+    fn side(&mut self, model: u32, side: &Side, origin: Vec3) {
+        let shader = shader_name(&self.world.bsp, side.shader).to_owned();
+        let size = self.sizes.of(&shader);
+        let found = self
+            .drawn
+            .projection(model, &shader, side.normal, &side.winding, size);
+        self.tally.sides += 1;
+        self.tally.aligned += usize::from(found.is_some());
+        let Projection {
+            axes: [s, t],
+            offsets,
+            scales,
+        } = found.unwrap_or_else(|| default_projection(side.normal));
+        let origin = origin.as_dvec3();
+        let moved = |axis: DVec3, at: usize| offsets[at] - axis.dot(origin) / scales[at];
+        let (s_offset, t_offset) = (moved(s, 0), moved(t, 1));
+        let [a, b, c] = three_points(&side.winding).map(|p| point(p + origin));
+        let name = self.name(side.shader);
+        self.line(format_args!(
+            "( {a} ) ( {b} ) ( {c} ) {name} [ {} {} ] [ {} {} ] 0 {} {} 0 0 0",
+            axis(s),
+            number(s_offset),
+            axis(t),
+            number(t_offset),
+            number(scales[0]),
+            number(scales[1]),
+        ));
+    }
+
+    fn patch(&mut self, surface: &Surface, origin: Vec3) {
+        let bsp = &self.world.bsp;
+        let points = bsp.surface_vertices(surface);
+        let (Ok(width), Ok(height)) = (
+            usize::try_from(surface.patch_width),
+            usize::try_from(surface.patch_height),
+        ) else {
+            return;
+        };
+        let name = self.name(surface.shader);
+        self.tally.patches += 1;
+        self.line(format_args!(
+            "{{\npatchDef2\n{{\n{name}\n( {width} {height} 0 0 0 )\n("
+        ));
+        for column in 0..width {
+            let mut row = String::from("(");
+            for at in 0..height {
+                let vertex = points.get(at * width + column).map(q3bsp::DrawVert::finite);
+                if let Some(vertex) = vertex {
+                    let place = point((vertex.position + origin).as_dvec3());
+                    let [s, t] = vertex.st.to_array().map(|v| number(f64::from(v)));
+                    row += &format!(" ( {place} {s} {t} )");
+                }
+            }
+            self.line(format_args!("{row} )"));
+        }
+        self.line(format_args!(")\n}}\n}}"));
+    }
+}
+
+fn shader_name(bsp: &Bsp, shader: i32) -> &str {
+    let shader = usize::try_from(shader)
+        .ok()
+        .and_then(|at| bsp.shaders.get(at));
+    let name = shader.map_or("", |s| s.name.as_str());
+    // Of a converted map the picture, not the way that it is drawn.
+    let texture = bsp.texture_uses.iter().find(|t| t.material == name);
+    let picture = texture.and_then(|t| t.frames.first());
+    picture.map_or(name, String::as_str)
+}
+
+/// A number without needless digits.
+fn number(value: f64) -> String {
+    let rounded = (value * 1e6).round() / 1e6;
+    // No negative zero.
+    format!("{}", rounded + 0.0)
+}
+
+/// A point; what is nearly whole is whole, as it was in the editor.
+fn point(p: DVec3) -> String {
+    let snap = |v: f64| {
+        let whole = v.round();
+        number(if (v - whole).abs() < 0.01 { whole } else { v })
+    };
+    format!("{} {} {}", snap(p.x), snap(p.y), snap(p.z))
+}
+
+fn axis(v: DVec3) -> String {
+    format!("{} {} {}", number(v.x), number(v.y), number(v.z))
+}
+
+#[cfg(test)]
+mod tests;
