@@ -152,6 +152,8 @@ pub struct LightView {
     pub nodes: u64,
     /// Cell of each leaf (`i32`).
     pub leaf_cells: u64,
+    /// Where the walk to a cell begins, for each box of a grid over the map (`i32`: a node, or `-1 - leaf`).
+    pub grid: u64,
     /// Number of nodes; 0: every point lies in no cluster.
     pub node_count: u32,
     /// Number of rows.
@@ -170,8 +172,12 @@ pub struct LightView {
     pub candidates: u32,
     /// Scale of the map's lights.
     pub scale: f32,
-    /// Makes the size a multiple of eight without hidden bytes.
-    pub padding: u32,
+    /// Least corner of that grid.
+    pub grid_origin: Vec3,
+    /// Boxes per unit of length.
+    pub grid_scale: f32,
+    /// Boxes along each axis; zero: no grid.
+    pub grid_size: [u32; 3],
 }
 
 /// A node of the map's tree.
@@ -293,12 +299,12 @@ pub struct MotionView {
     /// RGBA16F: how far the pixel's surface was from here in the last frame (pixels, right and down), length of the way
     /// to it then (negative: it was not in the picture, or nobody knows where), length of the way now.
     pub image: u32,
+    /// R16F: length of the way now once more, which the next frame reads.
+    pub path: u32,
     /// The same image of the last frame.
-    pub image_last: u32,
+    pub last_path: u32,
     /// 1: camera, mirrors and portals are where they were.
     pub still: u32,
-    /// Makes the size a multiple of eight without hidden bytes.
-    pub padding: u32,
 }
 
 /// What the passes after the light read, and what they count with.
@@ -347,10 +353,20 @@ pub struct AntialiasView {
     pub texture_scale: f32,
 }
 
-/// What the denoiser's passes read: bindless indices of their images.
+/// What the denoiser's passes read: addresses of their texels, bindless indices of their images.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DenoiseView {
+    /// Light of the frames before, filtered a little.
+    pub history: u64,
+    /// Light of this frame and those before.
+    pub fresh: u64,
+    /// The light that the picture is made with, once filtered.
+    pub lit: u64,
+    /// Number of frames and variance of each pixel.
+    pub past: u64,
+    /// The same of the last frame.
+    pub last_past: u64,
     /// `DENOISE_*` bits.
     pub flags: u32,
     /// Seed of the last frame's random numbers.
@@ -367,18 +383,10 @@ pub struct DenoiseView {
     pub gradient_sums: u32,
     /// The part of direct and indirect light that has changed, of each stratum.
     pub gradient: u32,
-    /// Depth, normal, number of frames and variance.
-    pub guide: u32,
-    /// The same of the last frame.
-    pub last_guide: u32,
-    /// Light of the frames before, filtered a little.
-    pub history: u32,
-    /// Light of this frame and those before.
-    pub fresh: u32,
-    /// The light that the picture is made with, once filtered.
-    pub lit: u32,
     /// Change of the inverse of depth from pixel to pixel.
     pub slope: u32,
+    /// Makes the size a multiple of eight without hidden bytes.
+    pub padding: u32,
 }
 
 /// What lies in the way of light.
@@ -550,7 +558,7 @@ pub mod constants {
     pub const VIEW_FULLBRIGHT: u32 = 64;
     pub const VIEW_HISTORY: u32 = 128;
     pub const VIEW_DENOISE: u32 = 256;
-    /// Bounced light is gathered for every other pixel, as on a chess board whose colours change places each frame.
+    /// Bounced light is gathered for one of each 2 × 2 pixels, which take turns.
     pub const VIEW_SPARSE_BOUNCE: u32 = 512;
     pub const DEBUG_ALBEDO: u32 = 1;
     pub const DEBUG_NORMALS: u32 = 2;
@@ -577,6 +585,7 @@ pub mod constants {
     pub const SELECT_RESAMPLED: u32 = 1;
     pub const WEAK_RAYS: u32 = 4;
     pub const SELECT_ALL: u32 = 2;
+    pub const SELECT_ONE: u32 = 3;
     pub const LIGHTS_SOFT: u32 = 1;
     pub const LIGHT_KIND_SHIFT: u32 = 29;
     pub const LIGHT_TRIANGLE: u32 = 0;

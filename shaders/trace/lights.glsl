@@ -26,19 +26,26 @@ uint set_count(LightSet set) { return set.listed + set.suns + set.dynamic_count;
 
 // Cell of a point, a piece of a cluster, by a walk through the map's tree; the row of "all lights" for a point in none.
 uint cell_at(vec3 position) {
-    uint all = VIEW.lights.row_count - 1;
+    uint no_cell = VIEW.lights.row_count - 1;
     uint node_count = VIEW.lights.node_count;
-    if (node_count == 0) return all;
+    if (node_count == 0) return no_cell;
     BspNodes nodes = BspNodes(VIEW.lights.nodes);
     int index = 0;
+    uvec3 size = uvec3(VIEW.lights.grid_size[0], VIEW.lights.grid_size[1], VIEW.lights.grid_size[2]);
+    // negative numbers become 0 or are undefined, so they are looked at as floats
+    vec3 at = (position - VIEW.lights.grid_origin) * VIEW.lights.grid_scale;
+    if (all(greaterThanEqual(at, vec3(0.0))) && all(lessThan(at, vec3(size)))) {
+        uvec3 box = uvec3(at);
+        index = Integers(VIEW.lights.grid).at[(box.z * size.y + box.y) * size.x + box.x];
+    }
     // a tree is never deeper than it has nodes; this also ends on a cyclic one
     for (uint i = 0; i <= node_count && index >= 0; i++) {
         BspNode node = nodes.at[index];
         index = node.children[dot(node.plane.xyz, position) >= node.plane.w ? 0 : 1];
     }
-    if (index >= 0) return all;
+    if (index >= 0) return no_cell;
     int cell = Integers(VIEW.lights.leaf_cells).at[-1 - index];
-    return cell >= 0 && uint(cell) < all ? uint(cell) : all;
+    return cell >= 0 && uint(cell) < no_cell ? uint(cell) : no_cell;
 }
 
 LightSet lights_at(vec3 position, vec3 normal) {
@@ -281,19 +288,20 @@ bool light_arrives(LightSample s, vec3 origin) {
 struct LightChoice {
     uint light;
     float weight;
+    float total; // what all that it was chosen from would give without shadows, about; of resampled ones alone
 };
 
 // One light, each with the same probability.
 LightChoice choose_uniform(LightSet set) {
     uint count = set_count(set);
     uint member = min(uint(rng_next() * float(count)), count - 1);
-    return LightChoice(light_of_member(set, member), float(count));
+    return LightChoice(light_of_member(set, member), float(count), 0.0);
 }
 
 // One of the suns; a map has one as a rule.
 LightChoice choose_sun(uint count) {
     uint index = count > 1 ? min(uint(rng_next() * float(count)), count - 1) : 0;
-    return LightChoice((LIGHT_SUN << LIGHT_KIND_SHIFT) | index, float(count));
+    return LightChoice((LIGHT_SUN << LIGHT_KIND_SHIFT) | index, float(count), 0.0);
 }
 
 // Resampled importance sampling (Talbot et al. 2005): some candidates, one of them chosen by its target, weighed by
@@ -341,7 +349,24 @@ LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal) {
             chosen_target = target;
         }
     }
-    return LightChoice(chosen, chosen_target > 0.0 ? sum / chosen_target : 0.0);
+    return LightChoice(chosen, chosen_target > 0.0 ? sum / chosen_target : 0.0, sum);
+}
+
+// A light of the list or a sun, for points that get one ray: about by what each would give without shadows, neither of
+// them rarely, as nobody knows here what is in the way.
+LightChoice choose_one(LightSet set, vec3 position, vec3 normal) {
+    LightChoice listed = choose_resampled(set, position, normal);
+    if (set.suns == 0) return listed;
+    LightChoice sun = choose_sun(set.suns);
+    SunLight light = SunLights(VIEW.lights.suns).at[light_index(sun.light)];
+    // the disc's edge may be up where its middle is not
+    float aloft = dot(normal, light.direction) + sqrt(max(1.0 - light.cos_angle * light.cos_angle, 0.0));
+    if (aloft <= 0.0) return listed;
+    if (!(listed.weight > 0.0)) return sun;
+    float sun_target = luminance(light.irradiance) * VIEW.lights.scale * min(aloft, 1.0) * sun.weight;
+    float chance = clamp(sun_target / (sun_target + listed.total), 0.25, 0.75);
+    if (rng_next() < chance) return LightChoice(sun.light, sun.weight / chance, sun.total);
+    return LightChoice(listed.light, listed.weight / (1.0 - chance), listed.total);
 }
 
 // Direct light on a point whose surface faces `face_normal`, with `samples` independent estimates.
@@ -369,8 +394,9 @@ vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint selection, 
         else if (ray >= picks && selection == SELECT_ALL) {
             uint member = ray - picks;
             if (member >= set.strong) member += from.listed;
-            choice = LightChoice(light_of_member(set, member), 1.0);
+            choice = LightChoice(light_of_member(set, member), 1.0, 0.0);
         } else if (ray >= picks) choice = choose_sun(set.suns);
+        else if (selection == SELECT_ONE) choice = choose_one(set, position, normal);
         else {
             choice = choose_resampled(from, position, normal);
             choice.weight /= float(picks);

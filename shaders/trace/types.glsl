@@ -25,10 +25,10 @@ struct DynamicRow { uint first; uint count; };
 
 struct LightView {
     uint64_t bounds[4]; uint64_t triangles[2]; uint64_t spheres[2]; uint64_t suns; uint64_t rows; uint64_t slots;
-    uint64_t dynamic_rows; uint64_t dynamic_lights; uint64_t nodes; uint64_t leaf_cells;
+    uint64_t dynamic_rows; uint64_t dynamic_lights; uint64_t nodes; uint64_t leaf_cells; uint64_t grid;
     uint node_count; uint row_count; uint dynamic_row_count; uint sun_count;
     uint flags; uint selection; uint samples; uint candidates;
-    float scale; uint padding;
+    float scale; vec3 grid_origin; float grid_scale; uint grid_size[3];
 };
 
 struct BspNode { vec4 plane; int children[2]; };
@@ -49,7 +49,7 @@ struct LastInstance { vec3 axis[3]; vec3 origin; uint known; };
 
 struct MotionView {
     uint64_t vertices; uint64_t vertex_bytes; uint64_t last_positions; uint64_t last_instances; uint64_t last_portals;
-    uint image; uint image_last; uint still; uint padding;
+    uint image; uint path; uint last_path; uint still;
 };
 
 struct PostView {
@@ -62,8 +62,9 @@ struct AntialiasView {
 };
 
 struct DenoiseView {
+    uint64_t history; uint64_t fresh; uint64_t lit; uint64_t past; uint64_t last_past;
     uint flags; uint last_seed; uint samples; uint sample_surfaces; uint carried; uint stratum_guide; uint gradient_sums; uint gradient;
-    uint guide; uint last_guide; uint history; uint fresh; uint lit; uint slope;
+    uint slope; uint padding;
 };
 
 struct TransportView { uint64_t filters; vec3 eye_absorption; uint filter_count; };
@@ -128,8 +129,8 @@ const uint NO_IMAGE = 0xFFFFFFFFu;
 const uint DENOISE_HISTORY = 1, DENOISE_GRADIENTS = 2, DENOISE_SPARSE = 4;
 // Bits of FogView.flags: fog is lit; its light is filtered; the last frame's is there.
 const uint FOG_LIT = 1, FOG_FILTERED = 2, FOG_HISTORY = 4;
-// How a light is chosen: LightView.selection.
-const uint SELECT_UNIFORM = 0, SELECT_RESAMPLED = 1, SELECT_ALL = 2;
+// How a light is chosen: LightView.selection; the last one is for bounces: as resampled, with one ray for lights and suns.
+const uint SELECT_UNIFORM = 0, SELECT_RESAMPLED = 1, SELECT_ALL = 2, SELECT_ONE = 3;
 // Bits of LightView.flags.
 // rays of an estimate by all lights for the weak ones of a list
 const uint WEAK_RAYS = 4;

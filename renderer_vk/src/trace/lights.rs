@@ -10,6 +10,7 @@ use relight::light::{
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
 
+use super::cell_grid::CellGrid;
 use super::light_cells::{Cell, Cells};
 use super::light_tables::{
     Entry, append_slots, cluster_balls, luminance, point_weight, triangle_weight,
@@ -25,6 +26,7 @@ pub struct MapLights {
     suns: Buffer,
     nodes: Buffer,
     leaf_cells: Buffer,
+    grid: Buffer,
     rows: Buffer,
     slots: Buffer,
     /// What does not change from view to view: counts and addresses.
@@ -223,6 +225,11 @@ impl MapLights {
         let cells = cells.unwrap_or_default();
         let (rows, slots) = tables(source, &numbers, &cells);
         let (nodes, leaf_cells) = (&cells.nodes, &cells.leaf_cells);
+        let bounds = source.bsp.and_then(|bsp| bsp.models.first());
+        let (low, high) = bounds
+            .map(|world| (world.mins, world.maxs))
+            .unwrap_or_default();
+        let grid = CellGrid::new(nodes, low, high);
         let triangle_bounds: Vec<_> = triangles.iter().map(triangle_bounds).collect();
         let sphere_bounds: Vec<_> = spheres.iter().map(sphere_bounds).collect();
         let mut lights = Self {
@@ -243,10 +250,14 @@ impl MapLights {
             suns: Buffer::with_data(device, "trace suns", storage, &suns)?,
             nodes: Buffer::with_data(device, "trace nodes", storage, nodes)?,
             leaf_cells: Buffer::with_data(device, "trace leafs", storage, leaf_cells)?,
+            grid: Buffer::with_data(device, "trace cell grid", storage, &grid.starts)?,
             rows: Buffer::with_data(device, "trace light rows", storage, &rows)?,
             slots: Buffer::with_data(device, "trace light lists", storage, &slots)?,
             fixed: t::LightView {
                 node_count: count(nodes.len()),
+                grid_origin: grid.origin,
+                grid_scale: grid.scale,
+                grid_size: grid.size.to_array(),
                 row_count: count(rows.len()),
                 sun_count: count(suns.len()),
                 ..t::LightView::default()
@@ -268,6 +279,7 @@ impl MapLights {
         lights.fixed.suns = lights.suns.address();
         lights.fixed.nodes = lights.nodes.address();
         lights.fixed.leaf_cells = lights.leaf_cells.address();
+        lights.fixed.grid = lights.grid.address();
         lights.fixed.rows = lights.rows.address();
         lights.fixed.slots = lights.slots.address();
         Ok(lights)

@@ -13,6 +13,7 @@ pub mod accel;
 pub mod antialias;
 pub mod bloom;
 pub mod bvh;
+mod cell_grid;
 pub mod counters;
 pub mod cutout;
 pub mod debug;

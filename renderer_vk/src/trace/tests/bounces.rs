@@ -98,6 +98,60 @@ fn a_red_wall_colours_the_floor_with(gpu: &mut Gpu) {
 }
 
 #[test]
+fn a_bounce_has_one_ray_for_lamps_and_sun() {
+    Gpu::each(a_bounce_has_one_ray_for_lamps_and_sun_with);
+}
+
+fn a_bounce_has_one_ray_for_lamps_and_sun_with(gpu: &mut Gpu) {
+    // what sees the sun, what only sees lamps, what sees both: a sunlit floor, part of it under a roof with lamps below
+    let mut scene = Scene::new(
+        Vec3::new(-150.0, 0.0, 40.0),
+        Vec3::new(0.0, 0.0, 10.0),
+        80.0,
+        32,
+    );
+    let grey = scene.diffuse(0.7);
+    let floor = Vec3::new(-200.0, -200.0, 0.0);
+    scene.quad(rectangle(floor, Vec3::X * 400.0, Vec3::Y * 400.0), grey);
+    let roof = Vec3::new(0.0, -100.0, 80.0);
+    scene.quad(rectangle(roof, Vec3::Y * 200.0, Vec3::X * 150.0), grey);
+    let wall = Vec3::new(150.0, -100.0, 0.0);
+    scene.quad(rectangle(wall, Vec3::Z * 80.0, Vec3::Y * 200.0), grey);
+    for y in [-60.0, 0.0, 60.0] {
+        scene.points.push(PointLight {
+            origin: Vec3::new(60.0, y, 60.0),
+            intensity: Vec3::splat(3000.0 + 10.0 * y),
+            radius: 4.0,
+            spot: None,
+        });
+    }
+    scene.suns.push(SunLight {
+        direction: Vec3::new(-0.5, 0.2, 0.8).normalize(),
+        irradiance: Vec3::splat(4.0),
+        angular_radius: 0.02,
+        material: None,
+    });
+    let [uniform, resampled] =
+        [LightSelection::Uniform, LightSelection::Resampled].map(|selection| {
+            let settings = Settings {
+                rt_light_selection: selection,
+                ..bounced(1)
+            };
+            let direct = Settings {
+                rt_bounces: 0,
+                ..settings.clone()
+            };
+            gpu.mean(&scene, &settings, 256).x - gpu.mean(&scene, &direct, 256).x
+        });
+    println!("bounced: {uniform} with one of all, {resampled} with the better choice");
+    assert!(uniform > 0.01, "{uniform}");
+    assert!(
+        (resampled / uniform - 1.0).abs() < 0.03,
+        "{uniform} {resampled}"
+    );
+}
+
+#[test]
 fn no_light_leaks_through_walls() {
     Gpu::each(no_light_leaks_through_walls_with);
 }

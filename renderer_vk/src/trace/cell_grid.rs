@@ -1,0 +1,167 @@
+//! A grid over the map that spares shaders most of the walk through the tree to a point's cell of lights: each box knows
+//! the last node that all of its points pass.
+
+use glam::{UVec3, Vec3};
+use shaders::trace_types::BspNode;
+
+/// Boxes, about, at most: 1 MB.
+const MOST_BOXES: f32 = 262_144.0;
+/// Boxes are at least this long, units: rooms are larger.
+const LEAST_SIDE: f32 = 32.0;
+/// Points this near to a plane, units, are taken to be on both of its sides, as shaders round otherwise.
+const MARGIN: f32 = 0.25;
+
+/// The grid.
+#[derive(Default)]
+pub struct CellGrid {
+    /// Least corner.
+    pub origin: Vec3,
+    /// Boxes per unit of length.
+    pub scale: f32,
+    /// Boxes along each axis; zero: no grid.
+    pub size: UVec3,
+    /// For each box, x fastest, where the walk begins: a node, or `-1 - leaf`.
+    pub starts: Vec<i32>,
+}
+
+impl CellGrid {
+    /// The grid between two corners of a tree's space; none where that has no volume, or there is no tree.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a bounded number of boxes
+    pub fn new(nodes: &[BspNode], low: Vec3, high: Vec3) -> Self {
+        let extent = high - low;
+        if nodes.is_empty() || !extent.is_finite() || extent.min_element() <= 0.0 {
+            return Self::default();
+        }
+        let side = (extent.element_product() / MOST_BOXES).cbrt();
+        // however flat or long the map is, rounding up adds a layer of boxes, not many times their number
+        let side = side.max(extent.max_element() / MOST_BOXES.sqrt());
+        let side = side.max(LEAST_SIDE);
+        let size = (extent / side).ceil().max(Vec3::ONE).as_uvec3();
+        let mut fill = Fill {
+            nodes,
+            origin: low,
+            side,
+            size: size.to_array().map(|n| n as usize),
+            starts: vec![0; size.to_array().map(|n| n as usize).iter().product()],
+        };
+        fill.boxes(UVec3::ZERO, size, 0);
+        Self {
+            origin: low,
+            scale: side.recip(),
+            size,
+            starts: fill.starts,
+        }
+    }
+}
+
+/// A grid that is being filled.
+struct Fill<'a> {
+    nodes: &'a [BspNode],
+    origin: Vec3,
+    side: f32,
+    size: [usize; 3],
+    starts: Vec<i32>,
+}
+
+impl Fill<'_> {
+    /// Fills the boxes from `low` to before `high`, all of whose points come by `start`.
+    fn boxes(&mut self, low: UVec3, high: UVec3, start: i32) {
+        let start = self.descend(low, high, start);
+        let count = high - low;
+        if start < 0 || count == UVec3::ONE {
+            let [width, height, _] = self.size;
+            for z in low.z as usize..high.z as usize {
+                for y in low.y as usize..high.y as usize {
+                    let row = (z * height + y) * width;
+                    let row = row + low.x as usize..row + high.x as usize;
+                    self.starts.get_mut(row).unwrap_or_default().fill(start);
+                }
+            }
+            return;
+        }
+        // the longest side in half
+        let axis = count.max_position();
+        let (mut low_end, mut high_start) = (high, low);
+        low_end[axis] = low[axis] + count[axis] / 2;
+        high_start[axis] = low_end[axis];
+        self.boxes(low, low_end, start);
+        self.boxes(high_start, high, start);
+    }
+
+    /// The last node, from `start` on, that all points of a block of boxes pass.
+    fn descend(&self, low: UVec3, high: UVec3, start: i32) -> i32 {
+        let half = (high - low).as_vec3() * (self.side * 0.5);
+        let centre = self.origin + low.as_vec3() * self.side + half;
+        let mut index = start;
+        // a tree is never deeper than it has nodes; this also ends on a cyclic one
+        for _ in 0..=self.nodes.len() {
+            let Some(node) = usize::try_from(index).ok().and_then(|i| self.nodes.get(i)) else {
+                break;
+            };
+            let [x, y, z, distance] = node.plane;
+            let normal = Vec3::new(x, y, z);
+            let middle = normal.dot(centre) - distance;
+            let reach = normal.abs().dot(half) + MARGIN;
+            if middle.abs() < reach || !middle.is_finite() {
+                break;
+            }
+            index = node.children[usize::from(middle < 0.0)];
+        }
+        index
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A walk from a start, as the shader walks.
+    fn leaf_from(nodes: &[BspNode], point: Vec3, start: i32) -> i32 {
+        let mut index = start;
+        while index >= 0 {
+            let node = nodes[index as usize];
+            let [x, y, z, distance] = node.plane;
+            let front = Vec3::new(x, y, z).dot(point) >= distance;
+            index = node.children[usize::from(!front)];
+        }
+        index
+    }
+
+    #[test]
+    fn a_walk_from_the_grid_ends_where_one_from_the_root_does() {
+        let node = |plane, children| BspNode { plane, children };
+        let nodes = [
+            node([1.0, 0.0, 0.0, 100.0], [1, 2]),
+            node([0.6, 0.8, 0.0, 300.0], [-1, -2]),
+            node([0.0, 0.0, 1.0, -50.0], [-3, -4]),
+        ];
+        let low = Vec3::new(-400.0, -300.0, -200.0);
+        let extent = Vec3::new(1000.0, 700.0, 333.0);
+        let grid = CellGrid::new(&nodes, low, low + extent);
+        assert_eq!(grid.starts.len() as u32, grid.size.element_product());
+        // most of the way is spared, and where two leafs meet a walk is left
+        assert!(grid.starts.iter().filter(|s| **s < 0).count() * 2 > grid.starts.len());
+        assert!(grid.starts.iter().any(|s| *s > 0));
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 16_777_216.0
+        };
+        for _ in 0..20_000 {
+            let point = low + Vec3::new(random(), random(), random()) * extent;
+            let at = ((point - grid.origin) * grid.scale).as_uvec3();
+            let index = (at.z * grid.size.y + at.y) * grid.size.x + at.x;
+            let start = grid.starts[index as usize];
+            assert_eq!(leaf_from(&nodes, point, start), leaf_from(&nodes, point, 0));
+        }
+    }
+
+    #[test]
+    fn what_has_no_volume_has_no_grid() {
+        let nodes = [BspNode::default()];
+        for high in [Vec3::ZERO, Vec3::new(1.0, 1.0, f32::NAN), -Vec3::ONE] {
+            assert_eq!(CellGrid::new(&nodes, Vec3::ZERO, high).size, UVec3::ZERO);
+        }
+        assert!(CellGrid::new(&[], Vec3::ZERO, Vec3::ONE).starts.is_empty());
+    }
+}
