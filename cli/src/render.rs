@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use relight::GameFiles;
 use renderer_vk::api::RefDef;
 use renderer_vk::path::{self, PathPoint};
-use renderer_vk::{Renderer, RendererOptions, Settings};
+use renderer_vk::{Renderer, RendererOptions, Settings, TracerChoice};
 
 /// How the picture is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -32,6 +32,19 @@ pub enum Sampling {
     Resampled,
     /// Every light of the list.
     All,
+}
+
+/// What follows the rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Tracer {
+    /// The best for the device.
+    Auto,
+    /// Ray tracing pipelines.
+    Pipeline,
+    /// Ray queries in compute shaders.
+    Query,
+    /// A hierarchy of our own in compute shaders.
+    Compute,
 }
 
 /// Make a picture of a map, without an engine or a display
@@ -69,6 +82,12 @@ pub struct RenderArgs {
     /// How traced light chooses lights
     #[arg(long, value_enum, default_value = "resampled")]
     sampling: Sampling,
+    /// Lights looked at for each one that is chosen
+    #[arg(long, default_value_t = Settings::default().rt_candidates)]
+    candidates: u32,
+    /// What follows the rays
+    #[arg(long, value_enum, default_value = "auto")]
+    tracer: Tracer,
     /// Diffuse bounces of the traced look
     #[arg(long, default_value_t = 1)]
     bounces: u32,
@@ -168,6 +187,13 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         rt: args.look == Look::Traced,
         rt_accumulate: !args.no_accumulation,
         rt_bounces: args.bounces,
+        rt_candidates: args.candidates.max(1),
+        rt_tracer: match args.tracer {
+            Tracer::Auto => TracerChoice::Auto,
+            Tracer::Pipeline => TracerChoice::Pipeline,
+            Tracer::Query => TracerChoice::Query,
+            Tracer::Compute => TracerChoice::Compute,
+        },
         rt_debug: args.debug,
         rt_exposure: args.exposure,
         rt_denoiser: args.denoiser,

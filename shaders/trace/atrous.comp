@@ -10,23 +10,26 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 // Differences of luminance that count as noise, in standard deviations: of direct and indirect light.
 const vec2 LUMINANCE_SIGMA = vec2(4.0, 6.0);
+const float LOG2_E = 1.44269504;
 
-// x to the power 64
-float narrow(float x) {
-    x *= x; x *= x; x *= x;
-    x *= x; x *= x; x *= x;
-    return x;
-}
+// The exponents to which normals of guides go with the square of their differences: of normals of unit length those of
+// about the 64th power of their cosine; of each component, whose bits are where they are in the guide.
+const float NORMAL_SCALE = 0.4528; // root of 32 log2(e) / 15^2
+const vec3 COMPONENT_SCALE = NORMAL_SCALE / vec3(1.0, 32.0, 1024.0);
+const uvec3 COMPONENTS = uvec3(31u, 31u << 5, 31u << 10);
+
+// The components as they stand in the guide, times one, 32 and 1024.
+vec3 components(uint guide) { return uintBitsToFloat(0x4B000000u | guide & COMPONENTS); }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (!inside(pixel)) return;
-    LightTexel middle = unpack_texel(imageLoad(uimages_rgba32ui[push.source], pixel));
+    LightTexel middle = unpack_texel(LightTexels(push.source).at[place_of(pixel)]);
     if (middle.guide == 0) {
-        imageStore(uimages_rgba32ui[push.target], pixel, uvec4(0));
+        LightTexels(push.target).at[place_of(pixel)] = uvec4(0);
         return;
     }
-    vec3 normal = guide_normal(middle.guide);
+    vec3 normal = components(middle.guide);
     float depth = guide_depth(middle.guide);
     vec2 slope = imageLoad(images_rg16f[DENOISE.slope], pixel).xy * float(push.spacing);
     vec2 value = vec2(luminance(middle.direct), luminance(middle.indirect));
@@ -36,11 +39,11 @@ void main() {
     vec2 tangent = tangent_of(vec2(pixel));
     vec2 rate = -slope / (float(spacing) * VIEW.pixel_spread * depth);
     vec3 plane = vec3(rate, 1.0 / depth - dot(rate, tangent));
-    float plane_scale = inversesqrt(dot(plane, plane)) / (0.1 + depth * (0.5 * float(spacing) * VIEW.pixel_spread + 3.0e-4));
+    // the logarithm makes a power of e one of 2
+    float plane_scale = LOG2_E * inversesqrt(dot(plane, plane)) / (0.1 + depth * (0.5 * float(spacing) * VIEW.pixel_spread + 3.0e-4));
 
     // how much of the same surface a tap is; the variance of the middle is itself noisy, that around it is less so.
     // Taps are kept packed, 16 bytes each: unpacked ones would take so many registers that few pixels run at a time
-    float inverse_depth = 1.0 / depth;
     uvec4 taps[8];
     float alike[8];
     vec2 deviation = middle.variance * 4.0;
@@ -49,24 +52,24 @@ void main() {
         const int place = i < 4 ? i : i + 1;
         const ivec2 offset = ivec2(place % 3, place / 3) - 1;
         ivec2 tap = pixel + offset * spacing;
-        taps[i] = inside(tap) ? imageLoad(uimages_rgba32ui[push.source], tap) : uvec4(0);
+        taps[i] = inside(tap) ? LightTexels(push.source).at[place_of(tap)] : uvec4(0);
         uint guide = taps[i].w;
-        float off_plane = abs((1.0 + dot(slope, vec2(offset))) * guide_depth(guide) * inverse_depth - 1.0) * plane_scale;
-        float same = narrow(max(dot(normal, guide_normal(guide)), 0.0)) * exp(-off_plane)
-            * (offset.x == 0 ? 2.0 : 1.0) * (offset.y == 0 ? 2.0 : 1.0);
+        float off_plane = abs((1.0 + dot(slope, vec2(offset))) * exp2(depth_change(middle.guide, guide)) - 1.0);
+        vec3 bend = (components(guide) - normal) * COMPONENT_SCALE;
+        float same = exp2(-off_plane * plane_scale - dot(bend, bend)) * (offset.x == 0 ? 2.0 : 1.0) * (offset.y == 0 ? 2.0 : 1.0);
         alike[i] = guide == 0 ? 0.0 : same;
         deviation += unpackHalf2x16(taps[i].z) * alike[i];
         count += alike[i];
     }
     deviation = sqrt(deviation / count);
-    vec2 light_scale = 1.0 / (LUMINANCE_SIGMA * deviation + 1.0e-3 * value + 1.0e-6);
+    vec2 light_scale = LOG2_E / (LUMINANCE_SIGMA * deviation + 1.0e-3 * value + 1.0e-6);
 
     vec3 direct = middle.direct * 4.0, indirect = middle.indirect * 4.0;
     vec2 variance = middle.variance * 16.0, total = vec2(4.0);
     [[unroll]] for (int i = 0; i < 8; i++) {
         vec3 tap_direct = unpack_light(taps[i].x), tap_indirect = unpack_light(taps[i].y);
         vec2 away = abs(vec2(luminance(tap_direct), luminance(tap_indirect)) - value) * light_scale;
-        vec2 weight = alike[i] * exp(-away);
+        vec2 weight = alike[i] * exp2(-away);
         direct += tap_direct * weight.x;
         indirect += tap_indirect * weight.y;
         variance += unpackHalf2x16(taps[i].z) * weight * weight;
@@ -75,5 +78,5 @@ void main() {
     middle.direct = direct / total.x;
     middle.indirect = indirect / total.y;
     middle.variance = variance / (total * total);
-    imageStore(uimages_rgba32ui[push.target], pixel, pack_texel(middle, dither(pixel, 2)));
+    LightTexels(push.target).at[place_of(pixel)] = pack_texel(middle, dither(pixel, 2));
 }

@@ -1,7 +1,8 @@
 // What the passes of the denoiser share: its packed images, and where a pixel was in the last frame.
 //
 // The light of a pixel, with all that decides whether it is alike its neighbour's, is one texel of 16 bytes, so that a
-// tap of a filter is one read.
+// tap of a filter is one read. Texels lie in buffers, row by row: texture units read images of such wide texels a
+// quarter as fast as narrow ones, while a buffer is read as fast as its bytes come.
 #ifndef RELIGHT_TRACE_DENOISE_GLSL
 #define RELIGHT_TRACE_DENOISE_GLSL
 
@@ -10,6 +11,13 @@
 #include "trace/light_image.glsl"
 
 #define DENOISE VIEW.denoise
+
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer LightTexels { uvec4 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer SparseTexels { uvec2 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Pasts { uint at[]; };
+
+// Where a pixel's texel is.
+uint place_of(ivec2 pixel) { return uint(pixel.y) * VIEW.width + uint(pixel.x); }
 
 // Pixels to the edge of a stratum: each has one gradient sample (Schied et al. 2018, section 4.2).
 const int STRATUM = 3;
@@ -28,23 +36,32 @@ float dither(ivec2 pixel, uint stream) {
     return float(x >> 8) * (1.0 / 16777216.0);
 }
 
-// The guide of a pixel in 32 bits: depth as logarithm, steps of 0.025 %, and a normal of 2 x 8 bits. 0: nothing to light.
+// The guide of a pixel in 32 bits: from above depth as logarithm, steps of 0.025 %, and a normal of 3 x 5 bits, which
+// are compared as they are. 0: nothing to light.
 const float DEPTH_STEP = 24.0 / 65535.0, DEPTH_FIRST = -4.0;
 
-uint pack_guide(float depth, vec3 normal) {
+uint pack_depth(float depth) {
     float code = (log2(max(depth, 1.0e-3)) - DEPTH_FIRST) / DEPTH_STEP;
-    vec2 p = normal.xy / max(abs(normal.x) + abs(normal.y) + abs(normal.z), 1.0e-20);
-    if (normal.z < 0.0) p = (1.0 - abs(p.yx)) * vec2(p.x >= 0.0 ? 1.0 : -1.0, p.y >= 0.0 ? 1.0 : -1.0);
-    return uint(clamp(code + 0.5, 1.0, 65535.0)) | packSnorm4x8(vec4(0.0, 0.0, p)) & 0xFFFF0000u;
+    return uint(clamp(code + 0.5, 1.0, 65535.0));
 }
 
-float guide_depth(uint guide) { return exp2(float(guide & 0xFFFFu) * DEPTH_STEP + DEPTH_FIRST); }
+uint pack_guide(float depth, vec3 normal) {
+    uvec3 n = uvec3(round(clamp(normal, -1.0, 1.0) * 15.0) + 16.0);
+    return pack_depth(depth) << 16 | n.z << 10 | n.y << 5 | n.x;
+}
+
+// A small whole number as float: its bits in the mantissa of 2^23, several times faster than a conversion.
+float small_float(uint number) { return uintBitsToFloat(0x4B000000u | number) - 8388608.0; }
+
+float unpack_depth(uint code) { return exp2(small_float(code) * DEPTH_STEP + DEPTH_FIRST); }
+
+float guide_depth(uint guide) { return unpack_depth(guide >> 16); }
+
+// Difference of the logarithms (base 2) of two depths.
+float depth_change(uint guide, uint other) { return (small_float(other >> 16) - small_float(guide >> 16)) * DEPTH_STEP; }
 
 vec3 guide_normal(uint guide) {
-    vec2 p = unpackSnorm4x8(guide).zw;
-    vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
-    if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
-    return normalize(n);
+    return normalize(vec3(small_float(guide & 31u), small_float(guide >> 5 & 31u), small_float(guide >> 10 & 31u)) - 16.0);
 }
 
 // What a pixel's history is: how many frames direct and indirect light were gathered over, and the variance of the
@@ -109,8 +126,8 @@ Before before_of(ivec2 pixel) {
 
 // The light that a picture is made with.
 vec3 filtered_light(ivec2 pixel) {
-    if ((DENOISE.flags & DENOISE_SPARSE) != 0) return unpack_light(imageLoad(uimages_rg32ui[DENOISE.lit], pixel).x);
-    LightTexel lit = unpack_texel(imageLoad(uimages_rgba32ui[DENOISE.lit], pixel));
+    if ((DENOISE.flags & DENOISE_SPARSE) != 0) return unpack_light(SparseTexels(DENOISE.lit).at[place_of(pixel)].x);
+    LightTexel lit = unpack_texel(LightTexels(DENOISE.lit).at[place_of(pixel)]);
     return lit.direct + lit.indirect;
 }
 

@@ -1,39 +1,63 @@
 #version 460
-// Bounced light of the pixels that it was not gathered for: the mean of the four beside them that lie on the same
-// surface. Bounced light changes slowly over a surface, and the denoiser smooths it over far more than a pixel.
+// Bounced light of the pixels that it was not gathered for: the mean of the gathered ones around that lie on the same
+// surface, the nearer the more. Bounced light changes slowly over a surface, and the denoiser smooths it over far more
+// than a pixel.
 #include "trace/sparse.glsl"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+const int TILE = 8, WIDE = TILE + 2;
+layout(local_size_x = TILE, local_size_y = TILE) in;
+
+// Of the cells of the group and those around: the pixel that was gathered for (x, y in 16 bits each), its light and
+// normal; its position and path, negative where there is nothing.
+shared uvec3 gathered[WIDE * WIDE];
+shared vec4 places[WIDE * WIDE];
 
 void main() {
-    ivec2 pixel = skipped_pixel(ivec2(gl_GlobalInvocationID.xy));
-    if (pixel.x >= int(VIEW.width) || pixel.y >= int(VIEW.height)) return;
-    vec4 position = imageLoad(images_rgba32f[VIEW.image_position], pixel);
-    vec3 light = vec3(0.0);
-    if (position.w >= 0.0) {
-        vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).x);
-        float tolerance = 0.1 + 4.0 * position.w * VIEW.pixel_spread;
-        // where no neighbour fits, as on a wire, what is nearest around is better than black
-        vec3 any_light = vec3(0.0);
-        float weight = 0.0, any_weight = 0.0;
-        const ivec2 beside[4] = ivec2[](ivec2(-1, 0), ivec2(1, 0), ivec2(0, -1), ivec2(0, 1));
-        for (int i = 0; i < 4; i++) {
-            ivec2 tap = pixel + beside[i];
-            if (any(lessThan(tap, ivec2(0))) || tap.x >= int(VIEW.width) || tap.y >= int(VIEW.height)) continue;
-            // a gradient sample has taken its turn
-            if (!is_gathered(tap)) continue;
-            vec4 other = imageLoad(images_rgba32f[VIEW.image_position], tap);
-            if (other.w < 0.0) continue;
-            vec3 found = light_read(VIEW.image_indirect, tap);
-            any_light += found;
-            any_weight += 1.0;
-            vec3 other_normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], tap).x);
-            if (dot(normal, other_normal) < 0.9 || abs(dot(other.xyz - position.xyz, normal)) > tolerance) continue;
-            light += found;
-            weight += 1.0;
-        }
-        if (weight > 0.0) light /= weight;
-        else if (any_weight > 0.0) light = any_light / any_weight;
+    ivec2 size = ivec2(VIEW.width, VIEW.height), cells = (size + CELL - 1) / CELL;
+    ivec2 corner = ivec2(gl_WorkGroupID.xy) * TILE - 1;
+    for (int i = int(gl_LocalInvocationIndex); i < WIDE * WIDE; i += TILE * TILE) {
+        ivec2 cell = corner + ivec2(i % WIDE, i / WIDE);
+        places[i] = vec4(-1.0);
+        if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, cells))) continue;
+        ivec2 pixel = sparse_pixel(cell);
+        places[i] = imageLoad(images_rgba32f[VIEW.image_position], pixel);
+        gathered[i] = uvec3(uint(pixel.x) | uint(pixel.y) << 16, imageLoad(uimages_r32ui[VIEW.image_indirect], pixel).x,
+            imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).x);
     }
-    light_write(VIEW.image_indirect, pixel, light, dither(pixel, 5));
+    barrier();
+    ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(cell, cells))) return;
+    int own = (int(gl_LocalInvocationID.y) + 1) * WIDE + int(gl_LocalInvocationID.x) + 1;
+    for (int i = 0; i < CELL * CELL; i++) {
+        ivec2 in_cell = ivec2(i & 1, i >> 1), pixel = cell * CELL + in_cell;
+        bool is_own = gathered[own].x == (uint(pixel.x) | uint(pixel.y) << 16);
+        if (is_own || any(greaterThanEqual(pixel, size))) continue;
+        vec4 position = imageLoad(images_rgba32f[VIEW.image_position], pixel);
+        vec3 light = vec3(0.0);
+        if (position.w >= 0.0) {
+            vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).x);
+            float tolerance = 0.1 + 6.0 * position.w * VIEW.pixel_spread;
+            // where no neighbour fits, as on a wire, what is around is better than black
+            vec3 any_light = vec3(0.0);
+            float weight = 0.0, any_weight = 0.0;
+            for (int j = 0; j < 9; j++) {
+                int at = own + (j / 3 - 1) * WIDE + j % 3 - 1;
+                vec4 other = places[at];
+                if (other.w < 0.0) continue;
+                uvec3 tap = gathered[at];
+                vec2 off = vec2(pixel - ivec2(tap.x & 0xFFFFu, tap.x >> 16));
+                float near = max(3.0 - 0.75 * dot(off, off), 0.0);
+                if (near == 0.0) continue;
+                vec3 found = unpack_light(tap.y);
+                any_light += found * near;
+                any_weight += near;
+                if (dot(normal, unpack_normal(tap.z)) < 0.9 || abs(dot(other.xyz - position.xyz, normal)) > tolerance) continue;
+                light += found * near;
+                weight += near;
+            }
+            if (weight > 0.0) light /= weight;
+            else if (any_weight > 0.0) light = any_light / any_weight;
+        }
+        light_write(VIEW.image_indirect, pixel, light, dither(pixel, 5));
+    }
 }

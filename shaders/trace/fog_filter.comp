@@ -25,7 +25,7 @@ void main() {
         for (int x = -2; x <= 2; x++) {
             ivec2 at = cell + ivec2(x, y) * int(push.spacing);
             if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
-            vec4 light = imageLoad(images_rgba16f[push.source], at);
+            vec4 light = imageLoad(images_rgba16f[uint(push.source)], at);
             if (!(light.a > 0.0)) continue;
             // a binomial's weights, and less for a different amount; what has more frames counts more
             const float binomial[3] = float[](6.0, 4.0, 1.0);
@@ -34,5 +34,5 @@ void main() {
             total += weight;
         }
     }
-    imageStore(images_rgba16f[push.target], cell, total > 0.0 ? sum / total : vec4(0.0));
+    imageStore(images_rgba16f[uint(push.target)], cell, total > 0.0 ? sum / total : vec4(0.0));
 }

@@ -16,7 +16,7 @@ shared uint guides[WIDE * WIDE];
 shared uint levels[WIDE * WIDE];
 
 uint level_of(Carried c) {
-    LightTexel light = unpack_texel(imageLoad(uimages_rgba32ui[DENOISE.history], c.last));
+    LightTexel light = unpack_texel(LightTexels(DENOISE.history).at[place_of(c.last)]);
     return packHalf2x16(log2(vec2(luminance(light.direct), luminance(light.indirect)) + 1.0e-5));
 }
 
@@ -33,7 +33,6 @@ uvec2 gradient_at(ivec2 stratum, Carried c) {
 
 uvec2 filtered(ivec2 at, int spacing) {
     uint guide = guides[at.y * WIDE + at.x];
-    float depth = guide_depth(guide);
     vec3 normal = guide_normal(guide);
     uint own = levels[at.y * WIDE + at.x];
     vec4 sum = vec4(0.0);
@@ -44,7 +43,7 @@ uvec2 filtered(ivec2 at, int spacing) {
             if (other == 0) continue;
             float weight = (x == 0 ? 2.0 : 1.0) * (y == 0 ? 2.0 : 1.0);
             // wide for slanted surfaces: a gradient that leaks costs noise, not light
-            weight *= exp(-8.0 * abs(log(guide_depth(other) / depth)) / float(spacing)) * max(dot(normal, guide_normal(other)), 0.0);
+            weight *= exp2(-8.0 * abs(depth_change(guide, other)) / float(spacing)) * max(dot(normal, guide_normal(other)), 0.0);
             vec2 weights = vec2(weight);
             // a stratum without a sample takes from all around
             if (own != 0 && levels[tap] != 0) weights *= exp2(-abs(unpackHalf2x16(own) - unpackHalf2x16(levels[tap])));

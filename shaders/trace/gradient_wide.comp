@@ -20,7 +20,6 @@ void main() {
     vec4 own = imageLoad(images_rgba16f[DENOISE.gradient_sums], stratum);
     vec2 part = part_of(own);
     if (guide != 0) {
-        float depth = guide_depth(guide);
         vec3 normal = guide_normal(guide);
         const float kernel[3] = float[](6.0, 4.0, 1.0);
         vec4 sum = own * 36.0;
@@ -32,7 +31,7 @@ void main() {
                 if (other == 0) continue;
                 vec4 sums = imageLoad(images_rgba16f[DENOISE.gradient_sums], tap);
                 float weight = kernel[abs(x)] * kernel[abs(y)] * max(dot(normal, guide_normal(other)), 0.0)
-                    * exp(-abs(log(guide_depth(other) / depth)));
+                    * exp2(-abs(depth_change(guide, other)));
                 // as in the steps before: what is much brighter is another thing
                 vec2 alike = exp2(-abs(log2((sums.yw + 1.0e-5) / (own.yw + 1.0e-5))));
                 sum += sums * (weight * alike).xxyy;

@@ -27,7 +27,7 @@ Motion motion_read(ivec2 pixel) {
 }
 
 // The way to what a pixel showed in the last frame.
-float last_path_read(ivec2 pixel) { return imageLoad(images_rgba16f[VIEW.motion.image_last], pixel).w; }
+float last_path_read(ivec2 pixel) { return imageLoad(images_r16f[VIEW.motion.last_path], pixel).x; }
 
 // Where the eye of the last frame took points to be: x is seen at turn * x + shift.
 struct LastSpace {
@@ -108,7 +108,9 @@ vec4 motion_of(CameraRay ray, LastPlace place) {
 }
 
 void motion_write(ivec2 pixel, CameraRay ray, LastPlace place) {
-    imageStore(images_rgba16f[VIEW.motion.image], pixel, motion_of(ray, place));
+    vec4 motion = motion_of(ray, place);
+    imageStore(images_rgba16f[VIEW.motion.image], pixel, motion);
+    imageStore(images_r16f[VIEW.motion.path], pixel, motion.wwww);
 }
 
 #endif

@@ -14,7 +14,7 @@ void main() {
     if (!inside(pixel)) return;
     SparseTexel middle = sparse_read(push.source, pixel);
     if (middle.guide == 0) {
-        imageStore(uimages_rg32ui[push.target], pixel, uvec4(0));
+        SparseTexels(push.target).at[place_of(pixel)] = uvec2(0);
         return;
     }
     float depth = sparse_depth(middle.guide), value = luminance(middle.light);

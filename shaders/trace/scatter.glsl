@@ -13,22 +13,23 @@ struct SparseTexel {
 const uint SPARSE_FRAMES = 15;
 
 uint pack_sparse_guide(float depth, vec3 normal, uint frames) {
-    uint guide = pack_guide(depth, normal);
-    // of the two bytes of the normal the upper six bits
-    return guide & 0xFFFFu | (guide >> 18 & 0x3Fu) << 16 | (guide >> 26 & 0x3Fu) << 22 | min(frames, SPARSE_FRAMES) << 28;
+    uvec2 n = uvec2(round((unpackSnorm2x16(pack_normal(normal)) * 0.5 + 0.5) * 63.0));
+    return pack_depth(depth) | n.x << 16 | n.y << 22 | min(frames, SPARSE_FRAMES) << 28;
 }
 
-float sparse_depth(uint guide) { return guide_depth(guide); }
-vec3 sparse_normal(uint guide) { return guide_normal((guide >> 16 & 0x3Fu) << 18 | (guide >> 22 & 0x3Fu) << 26); }
+float sparse_depth(uint guide) { return unpack_depth(guide & 0xFFFFu); }
+vec3 sparse_normal(uint guide) {
+    return unpack_normal(packSnorm2x16(vec2(guide >> 16 & 63u, guide >> 22 & 63u) * (2.0 / 63.0) - 1.0));
+}
 float sparse_frames(uint guide) { return float(guide >> 28); }
 
-SparseTexel sparse_read(uint image, ivec2 pixel) {
-    uvec2 t = imageLoad(uimages_rg32ui[image], pixel).xy;
+SparseTexel sparse_read(uint64_t texels, ivec2 pixel) {
+    uvec2 t = SparseTexels(texels).at[place_of(pixel)];
     return SparseTexel(unpack_light(t.x), t.y);
 }
 
-void sparse_write(uint image, ivec2 pixel, SparseTexel t, float dither) {
-    imageStore(uimages_rg32ui[image], pixel, uvec4(pack_light(t.light, dither), t.guide, 0, 0));
+void sparse_write(uint64_t texels, ivec2 pixel, SparseTexel t, float dither) {
+    SparseTexels(texels).at[place_of(pixel)] = uvec2(pack_light(t.light, dither), t.guide);
 }
 
 #endif

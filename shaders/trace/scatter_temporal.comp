@@ -12,7 +12,7 @@ void main() {
     if (!inside(pixel)) return;
     float depth = own_depth();
     if (depth == 0.0) {
-        imageStore(uimages_rg32ui[DENOISE.fresh], pixel, uvec4(0));
+        SparseTexels(DENOISE.fresh).at[place_of(pixel)] = uvec2(0);
         return;
     }
     vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).y);

@@ -1,27 +1,34 @@
-// Every other pixel, as on a chess board: the colours change places each frame. Where the other pixel of a cell is a
-// gradient sample, it takes the turn of the first: it has to be traced to be compared.
+// Bounced light is gathered for one of each 2 x 2 pixels, and in four frames for all. Where another pixel of a cell is a
+// gradient sample, it takes the turn: it has to be traced to be compared.
 #ifndef RELIGHT_TRACE_SPARSE_GLSL
 #define RELIGHT_TRACE_SPARSE_GLSL
 
 #include "trace/carry.glsl"
 
-// Whose turn it is in a cell of two pixels side by side.
-ivec2 turn_of(ivec2 cell) { return ivec2(cell.x * 2 + ((cell.y + int(VIEW.seed)) & 1), cell.y); }
+// Pixels to the edge of a cell.
+const int CELL = 2;
 
-ivec2 other_of(ivec2 cell, ivec2 pixel) { return ivec2(cell.x * 4 + 1 - pixel.x, cell.y); }
-
-// The pixel that is traced.
-ivec2 sparse_pixel(ivec2 cell) {
-    ivec2 pixel = turn_of(cell), other = other_of(cell, pixel);
-    return !is_carried(pixel) && inside(other) && is_carried(other) ? other : pixel;
+// Where in a cell the pixel is whose turn it is.
+ivec2 turn() {
+    uint frame = VIEW.seed & 3u;
+    // across, then the other two, so that two frames make a chessboard
+    return ivec2(frame == 1u || frame == 2u, frame == 1u || frame == 3u);
 }
 
-// The other pixel of the cell.
-ivec2 skipped_pixel(ivec2 cell) { return other_of(cell, sparse_pixel(cell)); }
+// The pixel of a cell that is traced.
+ivec2 sparse_pixel(ivec2 cell) {
+    ivec2 end = ivec2(VIEW.width, VIEW.height) - 1, pixel = min(cell * CELL + turn(), end);
+    if ((DENOISE.flags & DENOISE_GRADIENTS) == 0) return pixel;
+    for (int i = 0; i < 4; i++) {
+        ivec2 other = min(cell * CELL + (turn() ^ ivec2(i & 1, i >> 1)), end);
+        if (is_carried(other)) return other;
+    }
+    return pixel;
+}
 
 // Whether bounced light was gathered for the pixel itself.
 bool is_gathered(ivec2 pixel) {
-    return (VIEW.flags & VIEW_SPARSE_BOUNCE) == 0 || sparse_pixel(ivec2(pixel.x / 2, pixel.y)) == pixel;
+    return (VIEW.flags & VIEW_SPARSE_BOUNCE) == 0 || sparse_pixel(pixel / CELL) == pixel;
 }
 
 #endif

@@ -14,8 +14,8 @@ const float MIN_VARIANCE_WEIGHT = 0.1;
 const float NOISE = 0.2;
 // Frames before the variance over time can be trusted; until then it is taken over space.
 const float TRUSTED_FRAMES = 4.0;
-// How far around.
-const int AROUND = 3;
+// How far around; of the rows every other one is enough.
+const ivec2 AROUND = ivec2(3, 2);
 
 // What the last frame left.
 struct History {
@@ -26,19 +26,20 @@ struct History {
     float weight;
 };
 
-void add_tap(inout History h, ivec2 tap, Before before, vec3 face_normal, float tolerance, float weight) {
+void add_tap(inout History h, ivec2 tap, Before before, vec3 normal, float tolerance, float weight) {
     if (!inside(tap) || !(weight > 0.0)) return;
-    uvec2 guide = imageLoad(uimages_rg32ui[DENOISE.last_guide], tap).xy;
-    if (guide.x == 0 || abs(guide_depth(guide.x) - before.depth) > tolerance || dot(guide_normal(guide.x), face_normal) < 0.85) return;
-    LightTexel light = unpack_texel(imageLoad(uimages_rgba32ui[DENOISE.history], tap));
+    uint place = place_of(tap);
+    LightTexel light = unpack_texel(LightTexels(DENOISE.history).at[place]);
+    if (light.guide == 0 || abs(guide_depth(light.guide) - before.depth) > tolerance || dot(guide_normal(light.guide), normal) < 0.85) return;
+    uint past = Pasts(DENOISE.last_past).at[place];
     h.direct += light.direct * weight;
     h.indirect += light.indirect * weight;
-    h.variance += past_variance(guide.y) * weight;
-    h.frames += past_frames(guide.y) * weight;
+    h.variance += past_variance(past) * weight;
+    h.frames += past_frames(past) * weight;
     h.weight += weight;
 }
 
-History history_at(ivec2 pixel, vec3 face_normal, vec2 slope) {
+History history_at(ivec2 pixel, vec3 normal, vec2 slope) {
     History h = History(vec3(0.0), vec3(0.0), vec2(0.0), vec2(0.0), 0.0);
     if ((DENOISE.flags & DENOISE_HISTORY) == 0) return h;
     Before before = before_of(pixel);
@@ -50,7 +51,7 @@ History history_at(ivec2 pixel, vec3 face_normal, vec2 slope) {
         ivec2 offset = ivec2(i & 1, i >> 1);
         float weight = (offset.x == 1 ? part.x : 1.0 - part.x) * (offset.y == 1 ? part.y : 1.0 - part.y);
         // a place that is a rounding error off a pixel's middle is there
-        add_tap(h, ivec2(low) + offset, before, face_normal, tolerance, weight < 1.0e-3 ? 0.0 : weight);
+        add_tap(h, ivec2(low) + offset, before, normal, tolerance, weight < 1.0e-3 ? 0.0 : weight);
     }
     if (h.weight < 0.01) return History(vec3(0.0), vec3(0.0), vec2(0.0), vec2(0.0), 0.0);
     float scale = 1.0 / h.weight;
@@ -61,8 +62,8 @@ History history_at(ivec2 pixel, vec3 face_normal, vec2 slope) {
 vec2 variance_around(ivec2 pixel, float depth, vec2 slope) {
     vec4 moments = vec4(0.0);
     float count = 0.0;
-    for (int y = -AROUND; y <= AROUND; y++) {
-        for (int x = -AROUND; x <= AROUND; x++) {
+    for (int y = -AROUND.y; y <= AROUND.y; y += 2) {
+        for (int x = -AROUND.x; x <= AROUND.x; x++) {
             ivec2 tap = pixel + ivec2(x, y);
             float other = depth_at(tap);
             if (other == 0.0 || abs(depth / other - 1.0 - dot(slope, vec2(x, y))) > 0.02) continue;
@@ -81,10 +82,18 @@ bool is_kept(ivec2 pixel, ivec2 stratum, out bool again) {
     again = false;
     Carried c = Carried(false, false, 0, ivec2(0));
     if ((DENOISE.flags & DENOISE_GRADIENTS) != 0) c = carried_at(stratum);
-    // every other pixel, from the first or the second on: where bounced light is gathered if it is not everywhere
-    int first = (stratum.x + stratum.y + int(VIEW.seed)) & 1, count = 5 - first;
-    int index = first + 2 * min(int(float(count) * dither(stratum, 3)), count - 1);
-    if (c.valid && c.index == index) index = index < 2 ? index + 2 : index - 2;
+    // one whose turn it is where bounced light is not gathered everywhere: in each direction there are one or two
+    ivec2 first = (turn() + stratum * STRATUM) & 1;
+    int random = int(4.0 * dither(stratum, 3));
+    if ((VIEW.flags & VIEW_SPARSE_BOUNCE) == 0) first = ivec2(dither(stratum, 6) < 0.5, dither(stratum, 7) < 0.5);
+    ivec2 choice = first + 2 * ivec2(first.x == 0 && (random & 1) != 0, first.y == 0 && (random & 2) != 0);
+    int index = choice.y * STRATUM + choice.x;
+    if (c.valid && c.index == index) {
+        // another of the same turn, or any other
+        if (first.x == 0) index += choice.x == 0 ? 2 : -2;
+        else if (first.y == 0) index += choice.y == 0 ? 2 * STRATUM : -2 * STRATUM;
+        else index = 0;
+    }
     // at the right and the lower edge strata are cut off
     if (pixel != min(pixel_of(stratum, index), ivec2(VIEW.width, VIEW.height) - 1)) return false;
     again = c.valid && pixel == pixel_of(stratum, c.index);
@@ -103,24 +112,22 @@ void main() {
         kept = false;
     }
     if (depth == 0.0) {
-        imageStore(uimages_rg32ui[DENOISE.guide], pixel, uvec4(0));
-        imageStore(uimages_rgba32ui[DENOISE.fresh], pixel, uvec4(0));
+        LightTexels(DENOISE.fresh).at[place_of(pixel)] = uvec4(0);
         return;
     }
-    vec4 position = imageLoad(images_rgba32f[VIEW.image_position], pixel);
     uvec2 surface = imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).xy;
-    vec3 face_normal = unpack_normal(surface.x);
+    vec3 normal = unpack_normal(surface.y);
     vec2 slope = slope_at(depth);
 
     LightTexel light;
     light.direct = light_read(VIEW.image_direct, pixel);
     light.indirect = light_read(VIEW.image_indirect, pixel);
-    light.guide = pack_guide(depth, unpack_normal(surface.y));
+    light.guide = pack_guide(depth, normal);
     vec2 value = vec2(luminance(light.direct), luminance(light.indirect));
 
-    if (kept) keep_sample(stratum, pixel, position, surface, is_gathered(pixel) ? value : vec2(value.x, -1.0));
+    if (kept) keep_sample(stratum, pixel, imageLoad(images_rgba32f[VIEW.image_position], pixel), surface, is_gathered(pixel) ? value : vec2(value.x, -1.0));
 
-    History h = history_at(pixel, face_normal, slope);
+    History h = history_at(pixel, normal, slope);
     vec2 frames = vec2(0.0), variance = vec2(0.0);
     if (h.weight > 0.0) {
         frames = h.frames;
@@ -151,9 +158,8 @@ void main() {
     // of the mean over the frames: what has settled is left as it is
     light.variance = variance / min(frames, 2.0 / MIN_WEIGHT - 1.0);
 
-    imageStore(uimages_rgba32ui[DENOISE.fresh], pixel, pack_texel(light, dither(pixel, 0)));
+    LightTexels(DENOISE.fresh).at[place_of(pixel)] = pack_texel(light, dither(pixel, 0));
     imageStore(images_rg16f[DENOISE.slope], pixel, vec4(slope, 0.0, 0.0));
     float random = dither(pixel, 1);
-    uint past = pack_past(frames, variance, fract(random + vec4(0.0, 0.25, 0.5, 0.75)));
-    imageStore(uimages_rg32ui[DENOISE.guide], pixel, uvec4(pack_guide(depth, face_normal), past, 0, 0));
+    Pasts(DENOISE.past).at[place_of(pixel)] = pack_past(frames, variance, fract(random + vec4(0.0, 0.25, 0.5, 0.75)));
 }

@@ -29,8 +29,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lig
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer DynamicRows { DynamicRow at[]; };
 
 #ifdef OWN_PUSH
-// the steps of the wavelet filter: bindless images, and the distance between taps in pixels
-layout(push_constant, scalar) uniform Push { uint64_t view; uint source; uint target; uint spacing; } push;
+// the steps of filters: addresses of texels or bindless indices of images, and the distance between taps in pixels
+layout(push_constant, scalar) uniform Push { uint64_t view; uint64_t source; uint64_t target; uint spacing; } push;
 #else
 layout(push_constant, scalar) uniform Push { uint64_t view; } push;
 #endif

@@ -29,6 +29,8 @@ impl BufferUsage {
     pub const ACCEL_INPUT: Self = Self(4);
     /// A shader binding table.
     pub const SBT: Self = Self(8);
+    /// As large as the screen: counted among the images of that size.
+    pub const SCREEN: Self = Self(32);
     /// Holds acceleration structures.
     pub(crate) const ACCEL_STORAGE: Self = Self(16);
 
@@ -133,6 +135,7 @@ impl Buffer {
             Memory::Device if desc.usage.has(BufferUsage::ACCEL_STORAGE) => {
                 MemoryKind::AccelerationStructure
             }
+            Memory::Device if desc.usage.has(BufferUsage::SCREEN) => MemoryKind::Target,
             Memory::Device => MemoryKind::Buffer,
             Memory::Upload | Memory::Readback => MemoryKind::Shared,
         };

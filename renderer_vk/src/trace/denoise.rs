@@ -6,7 +6,7 @@
 //! 1. [`Denoiser::choose_gradient_samples`], before anything is lit: in each stratum of 3 × 3 pixels one is to light a
 //!    surface of the last frame again, with the random numbers of then.
 //! 2. [`Denoiser::filter`], after: the change of light that those samples show is spread over their neighbourhood; the
-//!    light joins that of earlier frames, which keep less weight where it has changed; five wavelet steps, guided by
+//!    light joins that of earlier frames, which keep less weight where it has changed; four wavelet steps, guided by
 //!    the variance, even out what noise is left. The first of them is what the next frame starts from.
 //!
 //! `rt_denoiser 2` costs about a third: a running mean over frames, and three passes of few scattered taps.
@@ -16,7 +16,8 @@ use shaders::trace_types::constants as t;
 
 use super::passes::{TILE, dispatch};
 use crate::gpu::{
-    Access, ComputePipeline, Device, Error, Format, Image, ImageDesc, ImageUsage, Recorder,
+    Access, Buffer, BufferDesc, BufferUsage, ComputePipeline, Device, Error, Format, Image,
+    ImageDesc, ImageUsage, Memory, Recorder,
 };
 
 /// Pixels to the edge of a stratum, see `denoise.glsl`.
@@ -24,15 +25,15 @@ const STRATUM: u32 = 3;
 /// Strata to the edge of a group of the gradient's pass, see `gradient.comp`.
 const GRADIENT_TILE: u32 = 16;
 /// Distances between the taps of the wavelet steps, pixels.
-const WAVELET: [u32; 5] = [1, 2, 4, 8, 16];
+const WAVELET: [u32; 4] = [1, 2, 4, 8];
 /// Radii of the passes of the cheap filter, pixels.
 const SPARSE: [u32; 3] = [3, 9, 5];
 
 /// Index in [`Images::light`] of the last frame's light, and of the result.
 const RESULT: usize = 0;
-/// Index of the image that the temporal pass writes.
+/// Index of the texels that the temporal pass writes.
 const FRESH: usize = 1;
-/// Index of the image after the first step: what the next frame starts from.
+/// Index of the texels after the first step: what the next frame starts from.
 const HISTORY: usize = 2;
 
 /// Which filter.
@@ -42,20 +43,20 @@ enum Tier {
     Sparse,
 }
 
-/// What is kept for one size of view: 73 bytes a pixel, of the cheap filter 28.
+/// What is kept for one size of view: 66 bytes a pixel, of the cheap filter 28.
 struct Images {
     tier: Tier,
     size: [u32; 2],
     /// Light that is filtered, with its guide; of the adaptive filter with its variance.
-    light: [Image; 3],
+    light: [Buffer; 3],
     slope: Image,
     adaptive: Option<AdaptiveImages>,
 }
 
 /// What the adaptive filter keeps beside.
 struct AdaptiveImages {
-    /// Guide, number of frames and variance; of this frame and the last.
-    guide: [Image; 2],
+    /// Number of frames and variance; of this frame and the last.
+    past: [Buffer; 2],
     /// A pixel of each stratum as it was lit in the last frame.
     samples: Image,
     sample_surfaces: Image,
@@ -74,19 +75,33 @@ fn make(device: &Device, name: &str, size: [u32; 2], format: Format) -> Result<I
     )
 }
 
+/// Texels of a size in pixels, `bytes` each.
+fn texels(device: &Device, name: &str, size: [u32; 2], bytes: u64) -> Result<Buffer, Error> {
+    let [width, height] = size.map(u64::from);
+    Buffer::new(
+        device,
+        &BufferDesc {
+            name,
+            size: width * height * bytes,
+            usage: BufferUsage::SCREEN,
+            memory: Memory::Device,
+        },
+    )
+}
+
 impl Images {
     fn new(device: &Device, tier: Tier, size: [u32; 2]) -> Result<Self, Error> {
-        let format = match tier {
-            Tier::Adaptive => Format::Rgba32Uint,
-            Tier::Sparse => Format::Rg32Uint,
+        let bytes = match tier {
+            Tier::Adaptive => 16,
+            Tier::Sparse => 8,
         };
         Ok(Self {
             tier,
             size,
             light: [
-                make(device, "trace light 0", size, format)?,
-                make(device, "trace light 1", size, format)?,
-                make(device, "trace light 2", size, format)?,
+                texels(device, "trace light 0", size, bytes)?,
+                texels(device, "trace light 1", size, bytes)?,
+                texels(device, "trace light 2", size, bytes)?,
             ],
             slope: make(device, "trace slope", size, Format::Rg16F)?,
             adaptive: match tier {
@@ -102,9 +117,9 @@ impl AdaptiveImages {
         let strata = size.map(|s| s.div_ceil(STRATUM));
         let strata = |name, format| make(device, name, strata, format);
         Ok(Self {
-            guide: [
-                make(device, "trace guide", size, Format::Rg32Uint)?,
-                make(device, "trace last guide", size, Format::Rg32Uint)?,
+            past: [
+                texels(device, "trace past", size, 4)?,
+                texels(device, "trace last past", size, 4)?,
             ],
             samples: strata("trace samples", Format::Rgba32Uint)?,
             sample_surfaces: strata("trace sample surfaces", Format::Rgba32Uint)?,
@@ -121,8 +136,8 @@ impl AdaptiveImages {
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 struct Step {
     view: u64,
-    source: u32,
-    target: u32,
+    source: u64,
+    target: u64,
     spacing: u32,
     padding: u32,
 }
@@ -221,12 +236,8 @@ impl Denoiser {
             stratum_guide: nothing,
             gradient_sums: nothing,
             gradient: nothing,
-            guide: nothing,
-            last_guide: nothing,
-            history: nothing,
-            fresh: nothing,
-            lit: nothing,
             slope: nothing,
+            ..DenoiseView::default()
         };
         let Some(images) = &self.images else {
             return empty;
@@ -236,9 +247,9 @@ impl Denoiser {
             flags: flag(self.history, t::DENOISE_HISTORY)
                 | flag(self.carries().is_some(), t::DENOISE_GRADIENTS)
                 | flag(images.tier == Tier::Sparse, t::DENOISE_SPARSE),
-            history: images.light[RESULT].storage_index(),
-            fresh: images.light[FRESH].storage_index(),
-            lit: images.light[RESULT].storage_index(),
+            history: images.light[RESULT].address(),
+            fresh: images.light[FRESH].address(),
+            lit: images.light[RESULT].address(),
             slope: images.slope.storage_index(),
             ..empty
         };
@@ -252,8 +263,8 @@ impl Denoiser {
             stratum_guide: adaptive.stratum_guide.storage_index(),
             gradient_sums: adaptive.gradient_sums.storage_index(),
             gradient: adaptive.gradient.storage_index(),
-            guide: adaptive.guide[0].storage_index(),
-            last_guide: adaptive.guide[1].storage_index(),
+            past: adaptive.past[0].address(),
+            last_past: adaptive.past[1].address(),
             ..view
         }
     }
@@ -310,13 +321,13 @@ impl Denoiser {
         if let Some(images) = &mut self.images {
             images.light.swap(RESULT, HISTORY);
             if let Some(adaptive) = &mut images.adaptive {
-                adaptive.guide.swap(0, 1);
+                adaptive.past.swap(0, 1);
             }
         }
     }
 }
 
-/// Steps of a filter, an odd number of at least three, from the fresh image to the result; `spacings` is what differs.
+/// Steps of a filter, at least three, from the fresh texels to the result; `spacings` is what differs.
 fn steps(
     rec: &mut Recorder,
     name: &str,
@@ -329,14 +340,17 @@ fn steps(
     pass.bind_compute(pipeline);
     let [x, y] = images.size.map(|s| s.div_ceil(TILE));
     for (step, &spacing) in spacings.iter().enumerate() {
-        // the last frame's light is free by the third step
-        let (source, target) = match step {
-            0 => (FRESH, HISTORY),
-            1 => (HISTORY, FRESH),
-            s if s % 2 == 0 => (FRESH, RESULT),
-            _ => (RESULT, FRESH),
+        // The last frame's light, where the result goes, is free once the fresh light holds it too. The first step is
+        // kept; those after it take turns so that the last one ends where the result is looked for.
+        let to_result = (spacings.len() - step) % 2 == 1;
+        let (source, target) = match (step, to_result) {
+            (0, _) => (FRESH, HISTORY),
+            (1, true) => (HISTORY, RESULT),
+            (1, false) => (HISTORY, FRESH),
+            (_, true) => (FRESH, RESULT),
+            (_, false) => (RESULT, FRESH),
         };
-        let [source, target] = [source, target].map(|i| images.light[i].storage_index());
+        let [source, target] = [source, target].map(|i| images.light[i].address());
         if step > 0 {
             pass.barrier();
         }

@@ -24,8 +24,8 @@ const SPACINGS: [u32; 3] = [1, 2, 4];
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 struct Step {
     view: u64,
-    source: u32,
-    target: u32,
+    source: u64,
+    target: u64,
     spacing: u32,
     padding: u32,
 }
@@ -192,8 +192,8 @@ impl LitFog {
             }
             pass.push(&Step {
                 view,
-                source,
-                target,
+                source: source.into(),
+                target: target.into(),
                 spacing,
                 padding: 0,
             });

@@ -175,8 +175,8 @@ ray_pass!(
     TRACE_DIRECT_RGEN_COMPUTE, TRACE_DIRECT_RGEN_QUERY
 );
 ray_pass!(
-    /// Reads the G-buffer and the light lists; writes `indirect`: with `VIEW_SPARSE_BOUNCE` for half of the pixels, and
-    /// `size` is half as wide then.
+    /// Reads the G-buffer and the light lists; writes `indirect`: with `VIEW_SPARSE_BOUNCE` for one of 2 × 2
+    /// pixels, and `size` is half as large then.
     Indirect, "trace_indirect", TRACE_INDIRECT_RGEN,
     TRACE_INDIRECT_RGEN_COMPUTE, TRACE_INDIRECT_RGEN_QUERY
 );
@@ -187,7 +187,7 @@ ray_pass!(
     TRACE_FLARES_RGEN_COMPUTE, TRACE_FLARES_RGEN_QUERY
 );
 pixel_pass!(
-    /// Reads the G-buffer and `indirect`; writes `indirect` where it was not gathered. `size`: half as wide as the view.
+    /// Reads the G-buffer and `indirect`; writes `indirect` where it was not gathered. `size`: half of the view's.
     Fill, "trace_fill", TRACE_FILL_COMP
 );
 pixel_pass!(

@@ -14,8 +14,10 @@ pub struct Targets {
     pub surface: Image,
     /// Albedo, with all that lies between the eye and the surface.
     pub albedo: Image,
-    /// Where the surface was in the last frame and how far away, see [`super::motion`]; of this frame and the last.
-    pub motion: [Image; 2],
+    /// Where the surface was in the last frame and how far away, see [`super::motion`].
+    pub motion: Image,
+    /// How far away it is; of this frame and the last.
+    pub path: [Image; 2],
     /// Radiance of what is in front of the surface and of its own glow; alpha: the field of a pixel that shows either a
     /// reflection (2) or what lies behind it (1), otherwise 0.
     pub front: Image,
@@ -23,6 +25,8 @@ pub struct Targets {
     pub direct: Image,
     /// Bounced light, likewise.
     pub indirect: Image,
+    /// `indirect` holds zeros: nothing has to be written while nothing bounces.
+    pub indirect_is_black: bool,
     /// Linear picture of the traced size.
     pub composite: Image,
     /// Mean of the frames in reference mode, while that is on.
@@ -45,13 +49,15 @@ impl Targets {
             position: make("trace position", Format::Rgba32F)?,
             surface: make("trace surface", Format::Rg32Uint)?,
             albedo: make("trace albedo", Format::Rgba16F)?,
-            motion: [
-                make("trace motion", Format::Rgba16F)?,
-                make("trace last motion", Format::Rgba16F)?,
+            motion: make("trace motion", Format::Rgba16F)?,
+            path: [
+                make("trace path", Format::R16F)?,
+                make("trace last path", Format::R16F)?,
             ],
             front: make("trace front", Format::Rgba16F)?,
             direct: make("trace direct", Format::R32Uint)?,
             indirect: make("trace indirect", Format::R32Uint)?,
+            indirect_is_black: false,
             composite: make("trace composite", Format::Rgba16F)?,
             accumulation: None,
         })
@@ -79,6 +85,6 @@ impl Targets {
 
     /// What this frame has written becomes what the last one wrote.
     pub fn advance(&mut self) {
-        self.motion.swap(0, 1);
+        self.path.swap(0, 1);
     }
 }

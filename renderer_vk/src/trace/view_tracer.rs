@@ -21,7 +21,7 @@ use super::lights::MapLights;
 use super::motion::Motion;
 use super::passes::{Composite, Direct, Exposure, Fill, FlareRays, Indirect, Primary, ToneMap};
 use super::targets::Targets;
-use crate::gpu::{Buffer, BufferUsage, Device, Error, Image, Recorder};
+use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::ViewScene;
 use crate::settings::Settings;
@@ -263,6 +263,9 @@ impl ViewTracer {
         };
         let address = rec.arena().push(&[params])?;
 
+        if let Some(targets) = &mut self.targets {
+            targets.indirect_is_black &= settings.rt_bounces == 0;
+        }
         let primary = self.fog_primary.as_ref().filter(|_| self.fog.is_on());
         primary
             .unwrap_or(&self.primary)
@@ -276,8 +279,10 @@ impl ViewTracer {
         }
         self.denoiser.choose_gradient_samples(rec, address)?;
         self.direct.record(rec, address, size)?;
-        if sparse_bounce(settings) {
-            let cells = [width.div_ceil(2), height];
+        if settings.rt_bounces == 0 {
+            self.darken_indirect(rec)?;
+        } else if sparse_bounce(settings) {
+            let cells = [width.div_ceil(2), height.div_ceil(2)];
             self.indirect.record(rec, address, cells)?;
             self.fill.record(rec, address, cells)?;
         } else {
@@ -304,6 +309,18 @@ impl ViewTracer {
         }
         self.antialias.advance();
         self.exposure_started = true;
+        Ok(())
+    }
+
+    /// Bounced light becomes black, where it is not.
+    fn darken_indirect(&mut self, rec: &mut Recorder) -> Result<(), Error> {
+        if let Some(targets) = &mut self.targets
+            && !targets.indirect_is_black
+        {
+            let mut pass = rec.pass("trace_no_indirect", Access::TRANSFER, Access::TRANSFER)?;
+            pass.clear_image(&targets.indirect, [0.0; 4]);
+            targets.indirect_is_black = true;
+        }
         Ok(())
     }
 
@@ -400,8 +417,9 @@ impl ViewTracer {
             materials: materials.buffers(),
             post: PostView::default(), // filled in by the caller
             motion: MotionView {
-                image: targets.motion[0].storage_index(),
-                image_last: targets.motion[1].storage_index(),
+                image: targets.motion.storage_index(),
+                path: targets.path[0].storage_index(),
+                last_path: targets.path[1].storage_index(),
                 ..motion
             },
             antialias,
@@ -496,7 +514,7 @@ fn is_lit(settings: &Settings) -> bool {
     settings.rt_illumination && !settings.fullbright
 }
 
-/// Whether bounced light is gathered for half of the pixels: in a picture that is denoised nobody can tell, and it is the
+/// Whether bounced light is gathered for a quarter of the pixels: in a picture that is denoised nobody can tell, and it is the
 /// dearest pass. Reference mode and undenoised pictures get every pixel.
 fn sparse_bounce(settings: &Settings) -> bool {
     !settings.rt_accumulate && settings.rt_denoiser > 0 && settings.rt_bounces > 0

@@ -213,8 +213,7 @@ impl Gpu {
         let targets = self.look.targets.as_ref().expect("traced");
         let read = |image| self.device.read_image(image).expect("read");
         let places: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.position));
-        // they have changed places for the next frame
-        let halves: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.motion[1]));
+        let halves: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.motion));
         let motions = halves.iter().map(|m| m.map(half));
         places.into_iter().zip(motions).collect()
     }
