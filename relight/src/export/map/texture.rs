@@ -200,7 +200,8 @@ impl<'a> Sizes<'a> {
         }
         let mut materials = self.world.materials.iter();
         let material = materials.find(|m| m.name.eq_ignore_ascii_case(shader));
-        let definition = material.map(|m| m.resolved.definition());
+        // What is drawn for a material without a script is its image, or a stand-in whose size says nothing.
+        let definition = material.and_then(|m| m.resolved.script.as_ref());
         let editor = definition.and_then(|d| d.light.editor_image.as_deref());
         let stage = definition.and_then(|d| d.image_names().next());
         let mut names = [editor, Some(shader), stage].into_iter().flatten();
