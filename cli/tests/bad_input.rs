@@ -54,7 +54,10 @@ fn a_map_that_is_cut_off_names_lump_and_offset() {
         let bsp = Bsp::parse(&whole).unwrap();
         let vertices = bsp.container.lumps[Lump::DrawVerts.index()];
         let cut = told(&whole[..vertices.offset as usize + 10]);
-        assert!(cut.contains("offset") && cut.contains("outside the file of"), "{cut}");
+        assert!(
+            cut.contains("offset") && cut.contains("outside the file of"),
+            "{cut}"
+        );
     }
     assert!(told(&map(Format::Ibsp46)[..50]).contains("50 bytes"));
     assert!(told(b"").contains("0 bytes"));
@@ -67,8 +70,14 @@ fn a_wrong_reference_names_lump_and_offset() {
     let at = bsp.container.lumps[Lump::Surfaces.index()].offset as usize + 148;
     bytes[at..at + 4].copy_from_slice(&999i32.to_le_bytes());
     let text = told(&bytes);
-    assert!(text.contains("lump surfaces, element 1: shaderNum is 999"), "{text}");
-    assert!(text.contains(&format!("at byte {at} of the file")), "{text}");
+    assert!(
+        text.contains("lump surfaces, element 1: shaderNum is 999"),
+        "{text}"
+    );
+    assert!(
+        text.contains(&format!("at byte {at} of the file")),
+        "{text}"
+    );
 }
 
 #[test]
@@ -95,7 +104,10 @@ fn foreign_and_random_files_are_told() {
 fn maps_become_json_and_map_files() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("good.bsp"), map(Format::Ibsp47)).unwrap();
-    for (name, part) in [("out.json", "\"relight-map\""), ("out.map", "\"worldspawn\"")] {
+    for (name, part) in [
+        ("out.json", "\"relight-map\""),
+        ("out.map", "\"worldspawn\""),
+    ] {
         let output = relight(folder.path(), &["convert", "good.bsp", "-o", name]);
         assert!(output.status.success(), "{output:?}");
         let text = std::fs::read_to_string(folder.path().join(name)).unwrap();

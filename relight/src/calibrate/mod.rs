@@ -14,7 +14,7 @@
 //! 6. The world's lights get their strengths, lost lights are added to
 //!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
 //!
-//! `docs/calibration.md` has the equations and how well it does. [`residuals`] tells how well any world's light agrees.
+//! `docs/calibration.md` has the equations and how well it does. [`residuals()`] tells how well any world's light agrees.
 //!
 //! Results can be kept ([`CalibrationCache`]): they depend on the world alone, on no clock and no thread.
 //!

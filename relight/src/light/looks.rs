@@ -25,7 +25,7 @@ const MOST_AGAIN: u32 = 4096;
 /// Rays that should have arrived where none did, at the most, with a confidence of 95 %: -ln 0.05.
 const UNSEEN: f32 = 3.0;
 
-/// Fewest, on maps of so many pairs that [`BUDGET`] would leave less.
+/// Fewest, on maps of so many pairs that a bound on all rays would leave less.
 const FEWEST: u32 = 8;
 
 /// A light that no ray found, but that arrives in a cluster beside, is charged with so many times its light: points at

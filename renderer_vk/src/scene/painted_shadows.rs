@@ -93,7 +93,7 @@ mod tests {
         let below = piece(Vec3::new(100.0, 200.0, 26.0));
         assert!(is_painted_shadow(
             &below,
-            &[RefEntity::default(), entity.clone()]
+            &[RefEntity::default(), entity]
         ));
         for aside in [
             Vec3::new(101.0, 200.0, 26.0),
@@ -101,11 +101,11 @@ mod tests {
             Vec3::new(100.0, 200.0, -300.0),
         ] {
             assert!(
-                !is_painted_shadow(&piece(aside), &[entity.clone()]),
+                !is_painted_shadow(&piece(aside), std::slice::from_ref(&entity)),
                 "{aside}"
             );
         }
-        assert!(!is_painted_shadow(&below[..1], &[entity.clone()]));
+        assert!(!is_painted_shadow(&below[..1], std::slice::from_ref(&entity)));
         let sprite = RefEntity {
             kind: EntityKind::Sprite,
             ..entity

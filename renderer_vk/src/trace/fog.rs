@@ -18,6 +18,8 @@ use crate::gpu::{
 const CELL: u32 = 2;
 /// Distances between the taps of the filter's steps, cells; an odd number of steps.
 const SPACINGS: [u32; 3] = [1, 2, 4];
+/// Frames that the images are kept for after fog was last in sight: turning to and fro costs no memory to be taken anew.
+const KEPT_FRAMES: u32 = 300;
 
 /// Push constants of a step of the filter.
 #[repr(C)]
@@ -80,6 +82,8 @@ pub struct LitFog {
     images: Option<Images>,
     /// The images hold the light of the last frame.
     history: bool,
+    /// Frames since fog was in sight.
+    unseen: u32,
 }
 
 impl LitFog {
@@ -91,6 +95,7 @@ impl LitFog {
             passes: None,
             images: None,
             history: false,
+            unseen: 0,
         }
     }
 
@@ -108,15 +113,20 @@ impl LitFog {
         goes_on: bool,
     ) -> Result<(), Error> {
         let had = self.images.as_ref().map(|i| (i.size, i.filtered.is_some()));
-        if had != wanted.then_some((size, filtered)) {
+        self.unseen = if wanted {
+            0
+        } else {
+            self.unseen.saturating_add(1)
+        };
+        let fits = had == Some((size, filtered)) && self.unseen < KEPT_FRAMES;
+        if !fits {
             // the old ones go first: there may not be room for both
             self.images = None;
-            self.history = false;
             if wanted {
                 self.images = Some(Images::new(&self.device, size, filtered)?);
             }
         }
-        self.history &= goes_on;
+        self.history &= goes_on && fits && wanted;
         if wanted && self.passes.is_none() {
             let (name, code) = ("trace_fog_filter", &shaders::TRACE_FOG_FILTER_COMP);
             self.passes = Some(Passes {
@@ -129,14 +139,19 @@ impl LitFog {
 
     /// Whether this frame's fog is lit.
     pub fn is_on(&self) -> bool {
-        self.images.is_some()
+        self.seen().is_some()
+    }
+
+    /// The images, if there is fog in sight.
+    fn seen(&self) -> Option<&Images> {
+        self.images.as_ref().filter(|_| self.unseen == 0)
     }
 
     /// What the passes read. `packed` and `half`: images of packed light and of half floats that stand for those that
     /// are not there, since software drivers look at the images of branches that are not taken.
     pub fn view(&self, packed: &Image, half: &Image) -> FogView {
         let half = half.storage_index();
-        let Some(images) = &self.images else {
+        let Some(images) = self.seen() else {
             return FogView {
                 weight: packed.storage_index(),
                 point: half,
@@ -171,7 +186,7 @@ impl LitFog {
     /// # Errors
     /// Out of memory.
     pub fn record(&self, rec: &mut Recorder, view: u64) -> Result<(), Error> {
-        let (Some(images), Some(passes)) = (&self.images, &self.passes) else {
+        let (Some(images), Some(passes)) = (self.seen(), &self.passes) else {
             return Ok(());
         };
         passes.light.record(rec, view, images.cells)?;
@@ -205,7 +220,7 @@ impl LitFog {
 
     /// The frame is recorded: what it wrote becomes what the last one wrote.
     pub fn advance(&mut self) {
-        self.history = self.images.is_some();
+        self.history = self.is_on();
         if let Some(images) = &mut self.images {
             images.light.swap(0, 1);
         }

@@ -13,6 +13,7 @@ use super::cutout::Coverage;
 use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use super::surroundings::Surroundings;
 use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
+use crate::world::Bounds;
 
 /// One bottom-level structure of the map.
 pub struct StaticBlas {
@@ -56,6 +57,8 @@ pub struct StaticGeometry {
     pub fogs: Buffer,
     /// Number of fog volumes.
     pub fog_count: u32,
+    /// Their boxes.
+    pub fog_boxes: Vec<Bounds>,
     /// What lies in the way of light; nothing unless it is put here.
     pub surroundings: Surroundings,
     // kept alive for the structures' triangles
@@ -202,6 +205,12 @@ impl StaticGeometry {
             skies: Buffer::with_data(device, "trace skies", storage, &grouped.skies)?,
             fogs: Buffer::with_data(device, "trace fogs", storage, scene.fogs)?,
             fog_count: u32::try_from(scene.fogs.len()).unwrap_or(u32::MAX),
+            fog_boxes: (scene.fogs.iter())
+                .map(|fog| Bounds {
+                    mins: fog.mins,
+                    maxs: fog.maxs,
+                })
+                .collect(),
             surroundings: Surroundings::default(),
             triangle_records: triangles,
         })
