@@ -51,7 +51,7 @@ impl WorldOptions {
     }
 
     /// The same for the converter. Lights are not calibrated here: only the traced look needs that, see
-    /// [`World::calibrate`](super::World::calibrate).
+    /// [`World::light_by`](super::World::light_by).
     pub fn relight(&self) -> relight::Options<'static> {
         relight::Options {
             subdivisions: self.subdivisions,
