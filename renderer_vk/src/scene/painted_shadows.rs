@@ -91,10 +91,7 @@ mod tests {
             ..RefEntity::default()
         };
         let below = piece(Vec3::new(100.0, 200.0, 26.0));
-        assert!(is_painted_shadow(
-            &below,
-            &[RefEntity::default(), entity]
-        ));
+        assert!(is_painted_shadow(&below, &[RefEntity::default(), entity]));
         for aside in [
             Vec3::new(101.0, 200.0, 26.0),
             Vec3::new(100.0, 200.0, 60.0),
@@ -105,7 +102,10 @@ mod tests {
                 "{aside}"
             );
         }
-        assert!(!is_painted_shadow(&below[..1], std::slice::from_ref(&entity)));
+        assert!(!is_painted_shadow(
+            &below[..1],
+            std::slice::from_ref(&entity)
+        ));
         let sprite = RefEntity {
             kind: EntityKind::Sprite,
             ..entity
