@@ -122,6 +122,26 @@ impl Sight {
         self.count
     }
 
+    /// Cluster of a point; `None` where there is none, as in solid.
+    pub fn cluster_at(&self, point: Vec3) -> Option<usize> {
+        let mut child = 0i32;
+        // a damaged tree may go in circles
+        for _ in 0..=self.nodes.len() {
+            let Ok(index) = usize::try_from(child) else {
+                let leaf = usize::try_from(-1 - i64::from(child)).ok()?;
+                let cluster = usize::try_from(*self.leaf_clusters.get(leaf)?).ok()?;
+                return Some(cluster).filter(|c| *c < self.count);
+            };
+            let &(plane, [front, back]) = self.nodes.get(index)?;
+            child = if plane.truncate().dot(point) >= plane.w {
+                front
+            } else {
+                back
+            };
+        }
+        None
+    }
+
     /// Clusters of the leafs that touch a box, world space.
     pub fn touching(&self, mins: Vec3, maxs: Vec3) -> ClusterSet {
         let mut at = ClusterSet::none(self.count);
@@ -176,6 +196,26 @@ impl Sight {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_point_is_in_the_cluster_of_its_leaf() {
+        // leafs: 0 in solid, 1 above in cluster 0, 2 below in cluster 5, of which there are but two
+        let mut sight = Sight {
+            count: 2,
+            sees: vec![ClusterSet::all(2); 2],
+            nodes: vec![
+                (Vec4::new(0.0, 0.0, 1.0, 8.0), [-2, 1]),
+                (Vec4::new(1.0, 0.0, 0.0, 0.0), [-1, -3]),
+            ],
+            leaf_clusters: vec![-1, 0, 5],
+        };
+        assert_eq!(sight.cluster_at(Vec3::Z * 9.0), Some(0));
+        assert_eq!(sight.cluster_at(Vec3::X), None);
+        assert_eq!(sight.cluster_at(-Vec3::X), None);
+        sight.nodes[1].1 = [1, 1];
+        assert_eq!(sight.cluster_at(Vec3::X), None, "a tree in circles ends");
+        assert_eq!(Sight::default().cluster_at(Vec3::ZERO), None);
+    }
 
     #[test]
     fn sets_iterate_what_was_inserted() {

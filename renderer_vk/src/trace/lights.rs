@@ -5,7 +5,8 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use q3bsp::Bsp;
 use relight::light::{
-    Flicker, LightLists, LightRef, LightShare, PointLight, Sight, SunLight, TriangleLight,
+    ClusterSet, Flicker, LightLists, LightRef, LightShare, PointLight, Sight, SunLight,
+    TriangleLight,
 };
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
@@ -16,6 +17,7 @@ use super::light_tables::{
     Entry, append_slots, cluster_balls, luminance, point_weight, triangle_weight,
 };
 use crate::gpu::{Buffer, BufferUsage, Device, Error};
+use crate::world::Bounds;
 
 /// Lights of a map, its lists, and the tree that finds the list of a point.
 pub struct MapLights {
@@ -33,6 +35,8 @@ pub struct MapLights {
     fixed: t::LightView,
     /// Which cluster sees which.
     pub(super) sight: Sight,
+    /// For each fog volume the clusters that may see it.
+    fog_reach: Vec<ClusterSet>,
     /// Lights of the world that change in time.
     pub(super) changing: Vec<ChangingLight>,
     /// Lights of brush models, in the models' space, by model.
@@ -263,6 +267,7 @@ impl MapLights {
                 ..t::LightView::default()
             },
             sight: source.bsp.map(Sight::new).unwrap_or_default(),
+            fog_reach: Vec::new(),
             changing,
             moving,
             flickers,
@@ -301,6 +306,24 @@ impl MapLights {
             bsp: None,
         };
         Self::new(device, &source)
+    }
+
+    /// Finds from where each of the map's fog volumes may be seen.
+    pub fn find_fogs(&mut self, boxes: &[Bounds]) {
+        let reach = |fog: &Bounds| {
+            self.sight
+                .lit_from(&self.sight.touching(fog.mins, fog.maxs))
+        };
+        self.fog_reach = boxes.iter().map(reach).collect();
+    }
+
+    /// Which fog volumes may be seen from a point; all where nobody knows.
+    pub(super) fn fogs_seen_from(&self, eye: Vec3) -> impl Fn(usize) -> bool {
+        let cluster = self.sight.cluster_at(eye);
+        move |fog| {
+            let reach = self.fog_reach.get(fog).zip(cluster);
+            reach.is_none_or(|(reach, cluster)| reach.contains(cluster))
+        }
     }
 
     /// Counts and addresses that are the same in every view.

@@ -146,12 +146,15 @@ impl TraceLook {
         let tracer = Tracer::of(device.info(), settings.rt_tracer);
         let mut view_tracer = ViewTracer::new(device, tracer)?;
         view_tracer.exposure_base = display_exposure(relit).log2();
+        let geometry = geometry(device, tracer, world, assets)?;
+        let mut lights = MapLights::new(device, &source)?;
+        lights.find_fogs(&geometry.fog_boxes);
         Ok(Self {
             tracer: view_tracer,
             right: None,
             kind: tracer,
-            geometry: geometry(device, tracer, world, assets)?,
-            lights: MapLights::new(device, &source)?,
+            geometry,
+            lights,
             remapping: remapping(&assets.materials),
         })
     }

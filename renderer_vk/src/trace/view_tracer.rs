@@ -25,7 +25,7 @@ use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::ViewScene;
 use crate::settings::Settings;
-use crate::world::{Bounds, outside};
+use crate::world::outside;
 
 /// The map that a view shows.
 #[derive(Clone, Copy)]
@@ -209,7 +209,7 @@ impl ViewTracer {
         self.denoiser
             .prepare(denoiser, size, self.history.is_some())?;
         let map = map.filter(|_| view.has_world);
-        let has_fog = map.is_some_and(|m| fog_in_sight(&m.geometry.fog_boxes, view));
+        let has_fog = map.is_some_and(|m| fog_in_sight(&m, view));
         let goes_on = self.history.is_some();
         self.fog
             .prepare(has_fog && is_lit(settings), denoiser > 0, size, goes_on)?;
@@ -512,11 +512,11 @@ fn portal_record(portal: &crate::scene::Portal) -> PortalRecord {
 
 /// Whether a view may see into fog: straight on, or by a portal wherever that leads. In what glass and shiny surfaces
 /// reflect while no fog lies in the view itself, fog has its constant colour alone.
-fn fog_in_sight(boxes: &[Bounds], view: &ViewScene) -> bool {
+fn fog_in_sight(map: &TracedMap<'_>, view: &ViewScene) -> bool {
     let frustum = view.view.frustum();
-    boxes
-        .iter()
-        .any(|fog| !view.portals.is_empty() || !outside(fog, &frustum))
+    let may_see = map.lights.fogs_seen_from(view.view.origin);
+    let mut boxes = map.geometry.fog_boxes.iter().enumerate();
+    boxes.any(|(i, fog)| !view.portals.is_empty() || (may_see(i) && !outside(fog, &frustum)))
 }
 
 /// Whether surfaces show light; otherwise they show their own colour.
