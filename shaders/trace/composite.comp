@@ -41,7 +41,10 @@ vec3 shown(ivec2 pixel, vec3 front) {
         }
         radiance += g.albedo * light;
     }
-    if ((VIEW.fog.flags & FOG_LIT) != 0) radiance += light_read(VIEW.fog.weight, pixel) * light_in_fog(pixel);
+    if ((VIEW.fog.flags & FOG_LIT) != 0) {
+        vec3 weight = light_read(VIEW.fog.weight, pixel);
+        if (max_component(weight) > 0.0) radiance += weight * light_in_fog(pixel);
+    }
     return radiance;
 }
 

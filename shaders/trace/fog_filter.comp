@@ -14,10 +14,23 @@ float amount(ivec2 cell) {
     return log2(max(max_component(light_read(VIEW.fog.weight, pixel)), 1.0e-4));
 }
 
+bool shows_fog(ivec2 cell) {
+    ivec2 first = cell * int(VIEW.fog.cell), end = ivec2(VIEW.width, VIEW.height);
+    for (int y = first.y; y < min(first.y + int(VIEW.fog.cell), end.y); y++)
+        for (int x = first.x; x < min(first.x + int(VIEW.fog.cell), end.x); x++)
+            if (max_component(light_read(VIEW.fog.weight, ivec2(x, y))) > 0.0) return true;
+    return false;
+}
+
 void main() {
     ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
     ivec2 size = ivec2(VIEW.fog.width, VIEW.fog.height);
     if (any(greaterThanEqual(cell, size))) return;
+    // most of the picture shows no fog
+    if (!shows_fog(cell)) {
+        imageStore(images_rgba16f[uint(push.target)], cell, vec4(0.0));
+        return;
+    }
     float here = amount(cell);
     vec4 sum = vec4(0.0);
     float total = 0.0;
