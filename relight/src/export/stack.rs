@@ -200,17 +200,5 @@ fn push(rgba: &mut Vec<u8>, color: Vec3, alpha: f32) {
 
 /// What a repeating image shows at a place, linear.
 pub fn texel(image: &Image, st: Vec2, table: &[f32; 256]) -> Vec4 {
-    let column = |t: f32, side: u32| {
-        ((t.rem_euclid(1.0) * side as f32) as u32).min(side.saturating_sub(1)) as usize
-    };
-    let at = column(st.y, image.height) * image.width as usize + column(st.x, image.width);
-    let [r, g, b, a] = image
-        .rgba
-        .as_chunks::<4>()
-        .0
-        .get(at)
-        .copied()
-        .unwrap_or([0, 0, 0, 255]);
-    let linear = |byte: u8| table[usize::from(byte)];
-    Vec4::new(linear(r), linear(g), linear(b), f32::from(a) / 255.0)
+    image.linear_texel(st, false, table)
 }

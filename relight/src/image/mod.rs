@@ -12,7 +12,7 @@ mod wal;
 
 use crate::files::{FileError, GameFiles};
 use crate::overbright;
-use glam::Vec3;
+use glam::{Vec2, Vec3, Vec4};
 use image::{DynamicImage, ImageDecoder, ImageFormat};
 use std::io::Cursor;
 
@@ -82,6 +82,25 @@ impl std::fmt::Debug for Image {
 }
 
 impl Image {
+    /// The pixel at texture coordinates, linear, with its alpha as it is; beyond the edges the picture repeats, or its
+    /// edge goes on with `clamp`. `table`: [`byte_table`](crate::overbright::byte_table). Coordinates that are no numbers
+    /// are those of the first pixel.
+    pub fn linear_texel(&self, st: Vec2, clamp: bool, table: &[f32; 256]) -> Vec4 {
+        let column = |t: f32, side: u32| -> usize {
+            let t = if clamp {
+                t.clamp(0.0, 1.0)
+            } else {
+                t.rem_euclid(1.0)
+            };
+            ((t * side as f32) as u32).min(side.saturating_sub(1)) as usize
+        };
+        let at = column(st.y, self.height) * self.width as usize + column(st.x, self.width);
+        let pixels = self.rgba.as_chunks::<4>().0;
+        let [r, g, b, a] = pixels.get(at).copied().unwrap_or([0, 0, 0, 255]);
+        let linear = |byte: u8| table[usize::from(byte)];
+        Vec4::new(linear(r), linear(g), linear(b), f32::from(a) / 255.0)
+    }
+
     /// A picture from its pixels; `None` when the number of bytes does not fit the size, or the size
     /// is empty or above [`MAX_PIXELS`].
     pub fn from_rgba(width: u32, height: u32, rgba: Vec<u8>) -> Option<Image> {

@@ -110,23 +110,5 @@ fn texel(
     };
     let st = eval::apply_tc_mods(&stage.tc_mods, st, Vec3::ZERO, time, Vec2::ZERO);
     let clamp = matches!(stage.image, StageImage::ClampMap(_));
-    let column = |t: f32, side: u32| -> usize {
-        let t = if clamp {
-            t.clamp(0.0, 1.0)
-        } else {
-            t.rem_euclid(1.0)
-        };
-        // NaN and infinities become column 0.
-        ((t * side as f32) as u32).min(side.saturating_sub(1)) as usize
-    };
-    let at = column(st.y, picture.height) * picture.width as usize + column(st.x, picture.width);
-    let [r, g, b, a] = picture
-        .rgba
-        .as_chunks::<4>()
-        .0
-        .get(at)
-        .copied()
-        .unwrap_or([0, 0, 0, 255]);
-    let linear = |byte: u8| table[usize::from(byte)];
-    Vec4::new(linear(r), linear(g), linear(b), f32::from(a) / 255.0)
+    picture.linear_texel(st, clamp, table)
 }
