@@ -7,16 +7,19 @@ use clap::Args;
 use relight::compare::Rgb8;
 use renderer_vk::api::RefDef;
 use renderer_vk::{MapLightChoice, Renderer, RendererOptions, Settings};
+use serde_json::{Value, json};
 
 use crate::cameras::{EYES, places};
+use crate::chromaticity::ColorDifference;
 use crate::render::parse_size;
 use crate::statistics::luminance;
 use crate::view::{Camera, Maps, map_entities, open};
 
-/// Draw views in the classic look and traced, side by side, and compare how bright they are
+/// Draw views in the classic look and traced, side by side, and compare how bright and how coloured they are
 ///
-/// Views are the camera of the intermission and spawn points. Prints for each map the mean luminance of the traced
-/// pictures over that of the classic ones: with lights as directives say, and calibrated.
+/// Views are the camera of the intermission and spawn points. Prints for each map, with lights as directives say and
+/// calibrated: the mean luminance of the traced pictures over that of the classic ones; the mean distance of their
+/// colours in CIE 1976 (u', v'), times 1000; and their mean saturation over that of the classic ones.
 ///
 /// Example: relight looks oa_dm1 fan --views 4 --output out
 #[derive(Args, Debug)]
@@ -38,6 +41,9 @@ pub struct LooksArgs {
     /// Folder to keep what calibration finds in
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
+    /// One JSON object a map, in place of a table
+    #[arg(long)]
+    json: bool,
 }
 
 /// The looks, from left to right.
@@ -56,35 +62,100 @@ pub fn run(args: &LooksArgs) -> Result<()> {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("{}: cannot be made", folder.display()))?;
     }
-    println!(
-        "{:20} {:>5} {:>9} {:>11}",
-        "map", "views", "by prior", "calibrated"
-    );
-    let mut all = [0.0f64; 3];
-    let mut views = 0;
-    for map in &args.chosen.maps {
-        let (sums, count) = one(args, map)?;
-        print_line(map, count, sums);
-        for (all, sum) in all.iter_mut().zip(sums) {
-            *all += sum;
-        }
-        views += count;
+    if !args.json {
+        println!(
+            "{:20} {:>5} {:>9} {:>11} {:>9} {:>11} {:>10} {:>10}",
+            "", "", "luminance", "", "colour", "", "saturation", ""
+        );
+        println!(
+            "{:20} {:>5} {:>9} {:>11} {:>9} {:>11} {:>10} {:>10}",
+            "map",
+            "views",
+            "by prior",
+            "calibrated",
+            "by prior",
+            "calibrated",
+            "by prior",
+            "calibrated"
+        );
     }
-    print_line("all", views, all);
+    let mut all = Sums::default();
+    for map in &args.chosen.maps {
+        let sums = one(args, map)?;
+        if args.json {
+            println!("{}", sums.as_json(map));
+        } else {
+            sums.print_line(map);
+        }
+        all.join(&sums);
+    }
+    if !args.json {
+        all.print_line("all");
+    }
     Ok(())
 }
 
-fn print_line(map: &str, views: usize, [classic, prior, calibrated]: [f64; 3]) {
-    let over = |sum: f64| sum / classic.max(1e-9);
-    println!(
-        "{map:20} {views:5} {:9.3} {:11.3}",
-        over(prior),
-        over(calibrated)
-    );
+/// Sums over views.
+#[derive(Default)]
+struct Sums {
+    views: usize,
+    /// Mean luminances of the pictures in each look.
+    luminance: [f64; 3],
+    /// Colours of the traced looks beside the classic one.
+    color: [ColorDifference; 2],
 }
 
-/// The views of one map: sums of their mean luminances in each look, and their number.
-fn one(args: &LooksArgs, map: &str) -> Result<([f64; 3], usize)> {
+impl Sums {
+    fn join(&mut self, other: &Sums) {
+        self.views += other.views;
+        for (all, sum) in self.luminance.iter_mut().zip(other.luminance) {
+            *all += sum;
+        }
+        for (all, sum) in self.color.iter_mut().zip(&other.color) {
+            all.join(sum);
+        }
+    }
+
+    /// Luminance by prior and calibrated, over that of the classic look.
+    fn brightness(&self) -> [f64; 2] {
+        let [classic, prior, calibrated] = self.luminance;
+        [prior, calibrated].map(|sum| sum / classic.max(1e-9))
+    }
+
+    fn print_line(&self, name: &str) {
+        let [prior, calibrated] = self.brightness();
+        let [by_prior, by_calibrated] = &self.color;
+        println!(
+            "{name:20} {:5} {prior:9.3} {calibrated:11.3} {:9.1} {:11.1} {:10.3} {:10.3}",
+            self.views,
+            by_prior.mean() * 1000.0,
+            by_calibrated.mean() * 1000.0,
+            by_prior.saturation(),
+            by_calibrated.saturation(),
+        );
+    }
+
+    fn as_json(&self, map: &str) -> Value {
+        let [prior, calibrated] = self.brightness();
+        let [by_prior, by_calibrated] = &self.color;
+        let look = |luminance: f64, color: &ColorDifference| {
+            json!({
+                "luminance": luminance,
+                "color_distance": color.mean(),
+                "saturation": color.saturation(),
+            })
+        };
+        json!({
+            "map": map,
+            "views": self.views,
+            "prior": look(prior, by_prior),
+            "calibrated": look(calibrated, by_calibrated),
+        })
+    }
+}
+
+/// The views of one map in each look.
+fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
     let (files, path) = open(map, &args.chosen.games)?;
     let (width, height) = args.size;
     let mut renderer = Renderer::new(RendererOptions {
@@ -121,8 +192,11 @@ fn one(args: &LooksArgs, map: &str) -> Result<([f64; 3], usize)> {
         })
         .collect();
     let mut pictures: Vec<Vec<Rgb8>> = cameras.iter().map(|_| Vec::new()).collect();
-    let mut sums = [0.0; 3];
-    for (look, sum) in LOOKS.into_iter().zip(&mut sums) {
+    let mut sums = Sums {
+        views: cameras.len(),
+        ..Sums::default()
+    };
+    for (look, sum) in LOOKS.into_iter().zip(&mut sums.luminance) {
         renderer.set_settings(&settings(look));
         for (camera, pictures) in cameras.iter().zip(&mut pictures) {
             let def: RefDef = camera.ref_def(args.size, 90.0);
@@ -148,13 +222,21 @@ fn one(args: &LooksArgs, map: &str) -> Result<([f64; 3], usize)> {
             pictures.push(picture);
         }
     }
+    for pictures in &pictures {
+        let Some((classic, traced)) = pictures.split_first() else {
+            continue;
+        };
+        for (picture, color) in traced.iter().zip(&mut sums.color) {
+            color.add(picture, classic);
+        }
+    }
     if let Some(folder) = &args.output {
         for (number, pictures) in pictures.iter().enumerate() {
             let file = folder.join(format!("{map}_{number}.png"));
             save(&file, pictures, args.size)?;
         }
     }
-    Ok((sums, cameras.len()))
+    Ok(sums)
 }
 
 /// Writes pictures of one size side by side.

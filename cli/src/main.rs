@@ -5,6 +5,7 @@
 mod brought;
 mod calibration;
 mod cameras;
+mod chromaticity;
 mod compare;
 mod convert;
 mod estimators;
@@ -48,7 +49,7 @@ enum Command {
     Info(info::InfoArgs),
     /// Judge the light lists of maps by rays
     Lights(lights::LightsArgs),
-    /// Draw views in the classic look and traced, side by side, and compare how bright they are
+    /// Draw views in the classic look and traced, side by side, and compare how bright and how coloured they are
     Looks(looks::LooksArgs),
     /// Tell how a material is understood
     Material(material::MaterialArgs),
