@@ -1,0 +1,174 @@
+//! What leaves the renderer: screenshots, still pictures, frames of a video, costs.
+
+use super::support::{engine_in_map, image_of, text_of};
+use relight::compare::Rgb8;
+use tests::engine::{Engine, View};
+use tests::maps::HERE;
+
+#[test]
+fn screenshots_are_files() {
+    let mut engine = engine_in_map();
+    let view = View::new(HERE, 30.0);
+    let shown = engine.picture(&view).unwrap();
+    let frame = |engine: &mut Engine, command: &str| {
+        engine.begin_frame(0).unwrap();
+        engine.clear_scene().unwrap();
+        engine.render_scene(&view).unwrap();
+        engine.command(command).unwrap();
+        engine.end_frame().unwrap();
+    };
+    frame(&mut engine, "screenshot");
+    assert!(engine.read_file("screenshots/shot0000.tga").is_some());
+    frame(&mut engine, "screenshot");
+    assert!(engine.read_file("screenshots/shot0001.tga").is_some());
+    frame(&mut engine, "screenshotJPEG good");
+    let jpeg = engine.read_file("screenshots/good.jpg").unwrap();
+    let jpeg = image_of(&jpeg, "jpg");
+    let alike = relight::compare::compare(&shown, &jpeg).unwrap();
+    assert!(alike.ssim > 0.95, "{alike:?}");
+    frame(&mut engine, "screenshot levelshot");
+    let levelshot = engine.read_file("levelshots/rooms.tga").unwrap();
+    let levelshot = image_of(&levelshot, "tga");
+    assert_eq!((levelshot.width(), levelshot.height()), (128, 128));
+    engine.assert_clean();
+}
+
+#[test]
+fn a_still_picture_is_made_beside_the_game() {
+    let mut engine = engine_in_map();
+    let view = View::new(HERE, 30.0);
+    let frame = |engine: &mut Engine, command: &str, yaw: f32| {
+        engine.begin_frame(0).unwrap();
+        engine.clear_scene().unwrap();
+        engine.render_scene(&View::new(HERE, yaw)).unwrap();
+        if !command.is_empty() {
+            engine.command(command).unwrap();
+        }
+        engine.end_frame().unwrap();
+    };
+    let said = |engine: &mut Engine| text_of(&engine.take_messages());
+    engine.take_messages();
+    frame(&mut engine, "rt_screenshot 4", 30.0);
+    assert!(
+        said(&mut engine).contains("r_rt 0"),
+        "it needs the traced look"
+    );
+    engine.set("r_rt", "1");
+    engine.set("rt_accumulate", "1");
+    let mut shown = engine.picture(&view).unwrap();
+    for _ in 0..15 {
+        shown = engine.picture(&view).unwrap();
+    }
+    engine.set("rt_accumulate", "0");
+    for wrong in [
+        "rt_screenshot",
+        "rt_screenshot 0",
+        "rt_screenshot 2 big",
+        "rt_screenshot 2 0x9",
+    ] {
+        engine.take_messages();
+        frame(&mut engine, wrong, 30.0);
+        assert!(
+            said(&mut engine).contains("rt_screenshot"),
+            "{wrong} is taken"
+        );
+    }
+    engine.take_messages();
+    frame(&mut engine, "rt_screenshot 16 320x240", 30.0);
+    frame(&mut engine, "rt_screenshot 1", 30.0);
+    // the picture is of the view when it was asked for, whatever the game shows meanwhile
+    for _ in 0..20 {
+        frame(&mut engine, "", 120.0);
+    }
+    let lines = said(&mut engine);
+    assert!(
+        lines.contains("is being made") && lines.contains("of 16 samples"),
+        "{lines}"
+    );
+    let file = engine
+        .read_file("screenshots/shot0000.tga")
+        .expect("the picture");
+    let alike = relight::compare::compare(&shown, &image_of(&file, "tga")).unwrap();
+    assert!(alike.ssim > 0.9, "{alike:?}");
+    // larger than the window
+    frame(&mut engine, "rt_screenshot 1 400x300", 30.0);
+    frame(&mut engine, "", 30.0);
+    frame(&mut engine, "", 30.0);
+    let file = engine
+        .read_file("screenshots/shot0001.tga")
+        .expect("the picture");
+    let large = image_of(&file, "tga");
+    assert_eq!((large.width(), large.height()), (400, 300));
+    engine.assert_clean();
+}
+
+#[test]
+fn costs_are_told_in_lines_and_as_json() {
+    let mut engine = engine_in_map();
+    engine.set("r_rt", "1");
+    let view = View::new(HERE, 30.0);
+    engine.picture(&view).unwrap();
+    engine.command("rt_stats").unwrap();
+    engine.command("rt_stats json stats/frame").unwrap();
+    engine.take_messages();
+    for _ in 0..5 {
+        engine.picture(&view).unwrap();
+    }
+    let lines = text_of(&engine.take_messages());
+    for part in [
+        "trace_primary",
+        "rays",
+        "all passes",
+        "screen images",
+        "textures",
+    ] {
+        assert!(lines.contains(part), "no {part} in {lines}");
+    }
+    let json = engine.read_file("stats/frame.json").expect("the file");
+    let json = String::from_utf8(json).unwrap();
+    let primary = json.lines().find(|l| l.contains("\"trace_primary\""));
+    let primary = primary.expect("the pass");
+    let rays = primary
+        .split("\"rays\": ")
+        .nth(1)
+        .and_then(|t| t.split(',').next());
+    let rays: u64 = rays.and_then(|r| r.parse().ok()).expect("a number");
+    assert!(rays >= 320 * 240, "{rays}");
+    engine.assert_clean();
+}
+
+#[test]
+fn video_frames_reach_the_writer() {
+    let mut engine = engine_in_map();
+    let view = View::new(HERE, 30.0);
+    let shown = engine.picture(&view).unwrap();
+    let (mut capture, mut encode) = (vec![0; 320 * 240 * 8], vec![0; 320 * 240 * 8]);
+    for jpeg in [false, true] {
+        engine.begin_frame(0).unwrap();
+        engine.clear_scene().unwrap();
+        engine.render_scene(&view).unwrap();
+        engine
+            .take_video_frame(320, 240, &mut capture, &mut encode, jpeg)
+            .unwrap();
+        engine.end_frame().unwrap();
+    }
+    let frames = engine.take_video();
+    assert_eq!(frames.len(), 2);
+    // blue first, rows from the bottom
+    assert_eq!(frames[0].len(), 320 * 240 * 3);
+    let rgb: Vec<u8> = frames[0]
+        .chunks_exact(320 * 3)
+        .rev()
+        .flatten()
+        .copied()
+        .collect();
+    let rgb: Vec<u8> = rgb
+        .chunks_exact(3)
+        .flat_map(|p| [p[2], p[1], p[0]])
+        .collect();
+    assert_eq!(Rgb8::new(320, 240, rgb).unwrap(), shown);
+    assert_eq!(frames[1][..2], [0xFF, 0xD8]);
+    let alike = relight::compare::compare(&shown, &image_of(&frames[1], "jpg")).unwrap();
+    assert!(alike.ssim > 0.9, "{alike:?}");
+    engine.assert_clean();
+}

@@ -1,0 +1,11 @@
+//! The library in the stand-in engine: every entry point with its result checked, both looks, the life of a session.
+
+#![forbid(unsafe_code)]
+
+mod answers;
+mod captures;
+mod game;
+mod pictures;
+mod session;
+mod support;
+mod views;
