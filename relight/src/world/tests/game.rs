@@ -1,0 +1,114 @@
+//! Maps of the game itself, where its data is there.
+
+use crate::calibrate::CalibrationOptions;
+use crate::files::{GameFiles, SearchPath};
+use crate::materials::Materials;
+use crate::test_data;
+use crate::world::*;
+
+/// Every map of OpenArena has light, everything is finite, and no light is missing from a list: checked from the
+/// places where entities stand, against the visibility matrix itself.
+#[test]
+fn every_openarena_map_has_light() {
+    let Some(folder) = test_data::folder() else {
+        return;
+    };
+    let files = SearchPath::open(&[folder]).unwrap();
+    let (materials, _) = Materials::load(&files);
+    let maps = files.list("maps", ".bsp");
+    assert_eq!(maps.len(), 72);
+    let mut checked = 0;
+    for map in maps {
+        let world = RelitWorld::load(
+            &files,
+            &materials,
+            &format!("maps/{map}"),
+            Options {
+                calibrate: Some(CalibrationOptions {
+                    samples: 200,
+                    candidates: 100,
+                    ..Default::default()
+                }),
+                ..Options::default()
+            },
+        )
+        .unwrap();
+        assert!(world.light_count() > 0, "{map} is dark");
+        assert!(!world.report.fallback, "{map} needs the fallback");
+        for light in &world.lights {
+            assert!(
+                light.radiance.is_finite() && light.radiance.max_element() > 0.0,
+                "{map}: {light:?}"
+            );
+            assert!(
+                light.vertices.iter().all(|v| v.is_finite()),
+                "{map}: {light:?}"
+            );
+            assert!(
+                (light.normal().length() - 1.0).abs() < 1e-4,
+                "{map}: {light:?}"
+            );
+        }
+        for vertex in &world.vertices {
+            assert!(
+                vertex.position.is_finite() && vertex.st.is_finite() && vertex.lightmap.is_finite()
+            );
+            assert!(
+                (vertex.normal.length() - 1.0).abs() < 1e-4,
+                "{map}: {vertex:?}"
+            );
+        }
+        assert_eq!(world.indices.len() % 3, 0);
+        assert!(
+            world
+                .indices
+                .iter()
+                .all(|&i| (i as usize) < world.vertices.len())
+        );
+        checked += check_lists(&map, &world);
+    }
+    assert!(checked > 10_000, "only {checked} pairs of place and light");
+    println!("{checked} pairs of place and light");
+}
+
+fn check_lists(map: &str, world: &RelitWorld) -> usize {
+    let lists = &world.light_lists;
+    assert_eq!(lists.clusters(), world.bsp.num_clusters());
+    assert!(lists.offsets.is_sorted());
+    assert_eq!(
+        lists.row(-1).len(),
+        world.lights.len() + world.point_lights.len()
+    );
+    let of_cluster = world.bsp.cluster_surfaces();
+    let mut checked = 0;
+    for entity in world.bsp.entities().iter().step_by(7) {
+        let Some(place) = entity.vec3("origin") else {
+            continue;
+        };
+        let cluster = world.bsp.cluster_at(place);
+        if cluster < 0 {
+            continue;
+        }
+        let row = lists.row(cluster);
+        for (index, light) in (0u32..).zip(&world.lights).filter(|(_, l)| l.model == 0) {
+            let center = light.vertices.into_iter().sum::<Vec3>() / 3.0;
+            let from = world.bsp.cluster_at(center + light.normal());
+            let in_front = (place - center).dot(light.normal()) > 1.0 || light.two_sided;
+            if from >= 0 && in_front && world.bsp.cluster_sees(from, cluster) {
+                // Surfaces that no leaf of the cluster in front lists are never drawn from there.
+                let listed = of_cluster
+                    .get(from as usize)
+                    .is_some_and(|l| l.contains(&light.surface));
+                assert!(
+                    !listed || row.binary_search(&index).is_ok(),
+                    "{map}: light {index} at {center} is missing at {place}"
+                );
+                checked += 1;
+            }
+        }
+        if checked > 500 {
+            break;
+        }
+    }
+    checked
+}

@@ -1,0 +1,281 @@
+//! What becomes light: emissive surfaces, skies, sprites, glow, flares, and which clusters see it.
+
+use super::{ceiling_lamp, relight};
+use crate::light::{EmissionSource, LightRef, POINT_LIGHT_INTENSITY, SURFACE_LIGHT_RADIANCE};
+use crate::world::*;
+use q3bsp::builder::MapBuilder;
+use q3bsp::surface_flags;
+use std::f32::consts::PI;
+
+#[test]
+fn an_emissive_quad_in_a_room() {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 1);
+    let lamp = map.add_shader("t/lamp", 0, 1);
+    let here = map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
+    let there = map.add_room(
+        wall,
+        Vec3::new(200.0, -128.0, -128.0),
+        Vec3::new(400.0, 128.0, 128.0),
+    );
+    map.set_sees(here, there, false);
+    map.set_sees(there, here, false);
+    let quad = map.add_quad(lamp, ceiling_lamp(16.0, 127.0));
+    let page = map.add_lightmap([10, 100, 20]);
+    map.set_lightmap(quad, page);
+    let world = relight(map);
+
+    assert_eq!(world.lights.len(), 2);
+    let linear_half = overbright::to_linear(128.0 / 255.0);
+    let expected = Vec3::new(1.0, linear_half, 0.0) * (PI * 1000.0 / 255.0);
+    for light in &world.lights {
+        assert!(
+            (light.radiance - expected).length() < 1e-3,
+            "{:?}",
+            light.radiance
+        );
+        assert!(
+            (light.normal() - Vec3::NEG_Z).length() < 1e-6,
+            "lights point into the room"
+        );
+        assert_eq!(light.area(), 512.0);
+        assert!(!light.two_sided && !light.is_sky);
+        assert_eq!(light.source, EmissionSource::SurfaceLight);
+        assert_eq!(light.surface as usize, quad);
+        let corners = world.triangle(light.triangle as usize).unwrap();
+        assert!(light.vertices.iter().all(|v| corners.contains(v)));
+        assert_eq!(
+            world.light_of_triangle(light.triangle as usize),
+            Some(light)
+        );
+    }
+    let power: Vec3 = world.lights.iter().map(TriangleLight::power).sum();
+    assert!((power - expected * (PI * 1024.0)).length() < power.length() * 1e-5);
+    let surface = world.surfaces[quad];
+    assert_eq!((surface.first_light, surface.num_lights), (0, 2));
+    assert_eq!(world.light_lists.row(here), [0, 1]);
+    assert!(world.light_lists.row(there).is_empty());
+    assert_eq!(world.light_lists.row(-1), [0, 1]);
+    assert_eq!(world.report.triangles_by(EmissionSource::SurfaceLight), 2);
+    assert!(!world.report.fallback);
+    assert_eq!(world.lightmap(0).unwrap()[..3], [25, 255, 51]);
+    assert_eq!(world.lightmap(1), None);
+}
+
+#[test]
+fn one_way_visibility_lights_both_ways_and_backs_stay_dark() {
+    let mut map = MapBuilder::new();
+    let lamp = map.add_shader("t/lamp", 0, 1);
+    let both = map.add_shader("t/both", 0, 1);
+    let low = map.add_cell(Vec3::new(-64.0, -64.0, -64.0), Vec3::new(64.0, 64.0, 0.0));
+    let high = map.add_cell(Vec3::new(-64.0, -64.0, 64.0), Vec3::new(64.0, 64.0, 128.0));
+    let far = map.add_cell(
+        Vec3::new(-64.0, -64.0, -256.0),
+        Vec3::new(64.0, 64.0, -128.0),
+    );
+    map.set_sees(low, far, false); // far still sees low
+    // Both hang at the ceiling of `low`, facing down.
+    map.add_quad(lamp, ceiling_lamp(16.0, -1.0));
+    map.add_quad(both, ceiling_lamp(8.0, -2.0));
+    let world = relight(map);
+    let sources = |cluster| -> Vec<u32> {
+        let mut surfaces: Vec<_> = world
+            .light_lists
+            .row(cluster)
+            .iter()
+            .map(|&l| world.lights[l as usize].surface)
+            .collect();
+        surfaces.dedup();
+        surfaces
+    };
+    assert_eq!(sources(low), [0, 1]);
+    assert_eq!(sources(far), [0, 1]);
+    // Above the lamps: only the one with two sides reaches it.
+    assert_eq!(sources(high), [1]);
+    let blue = world.lights.iter().find(|l| l.surface == 1).unwrap();
+    assert!(blue.two_sided);
+    assert!((blue.radiance - Vec3::new(0.0, 0.0, 510.0 * SURFACE_LIGHT_RADIANCE)).length() < 1e-5);
+}
+
+#[test]
+fn no_visibility_means_everything() {
+    let mut map = MapBuilder::new();
+    let lamp = map.add_shader("t/lamp", 0, 1);
+    map.add_cell(Vec3::splat(-64.0), Vec3::splat(64.0));
+    map.add_quad(lamp, ceiling_lamp(16.0, 0.0));
+    map.without_visibility();
+    let world = relight(map);
+    assert_eq!(world.light_lists.clusters(), 0);
+    assert_eq!(world.light_lists.row(0), [0, 1]);
+}
+
+#[test]
+fn skies_shine_and_carry_the_sun() {
+    let mut map = MapBuilder::new();
+    let sky = map.add_shader("t/sky", surface_flags::SKY, 0);
+    let wall = map.add_shader("t/wall", 0, 1);
+    map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
+    let quad = map.add_quad(sky, ceiling_lamp(100.0, 127.0));
+    let world = relight(map);
+    assert_eq!(world.lights.len(), 2);
+    assert!(
+        world
+            .lights
+            .iter()
+            .all(|l| l.is_sky && l.source == EmissionSource::Sky)
+    );
+    let [sun] = world.suns[..] else {
+        panic!("{:?}", world.suns)
+    };
+    assert!((sun.direction - Vec3::Z).length() < 1e-5);
+    let irradiance = Vec3::new(1.0, 0.5, 0.0) * (PI * 100.0 * 4.0 / 255.0);
+    assert!((sun.irradiance - irradiance).length() < 1e-4);
+    assert_eq!(world.sky, Some(world.surfaces[quad].material));
+    assert_eq!(
+        world.materials[sun.material.unwrap() as usize].name,
+        "t/sky"
+    );
+}
+
+#[test]
+fn sprites_shine_as_strongly_as_the_compilers_point_light() {
+    let mut map = MapBuilder::new();
+    let sprite = map.add_shader("t/sprite", 0, 0);
+    map.add_cell(Vec3::splat(-64.0), Vec3::splat(64.0));
+    map.add_quad(sprite, ceiling_lamp(8.0, 0.0));
+    let world = relight(map);
+    assert_eq!(world.lights.len(), 2);
+    assert!(
+        world
+            .lights
+            .iter()
+            .all(|l| l.two_sided && l.triangle == u32::MAX)
+    );
+    assert!(world.triangle_lights.iter().all(|&l| l == NO_LIGHT));
+    // A point light of intensity I emits 4π I.
+    let power: Vec3 = world.lights.iter().map(TriangleLight::power).sum();
+    let expected = 4.0 * PI * 100.0 * POINT_LIGHT_INTENSITY;
+    assert!(
+        (power.x / expected - 1.0).abs() < 1e-5,
+        "{power} {expected}"
+    );
+}
+
+#[test]
+fn strong_glow_is_light_and_faint_glow_is_not() {
+    let mut map = MapBuilder::new();
+    let glow = map.add_shader("t/glow", 0, 1);
+    let faint = map.add_shader("t/faint", 0, 1);
+    map.add_cell(Vec3::splat(-64.0), Vec3::splat(64.0));
+    map.add_quad(glow, ceiling_lamp(16.0, 0.0));
+    map.add_quad(faint, ceiling_lamp(16.0, 8.0));
+    let world = relight(map);
+    assert!(
+        world
+            .lights
+            .iter()
+            .all(|l| l.surface == 0 && l.source == EmissionSource::Glow)
+    );
+    let shown = overbright::to_linear(127.0 / 255.0);
+    assert!(
+        (world.lights[0].radiance - Vec3::splat(shown)).length() < 1e-3,
+        "{}",
+        world.lights[0].radiance
+    );
+}
+
+#[test]
+fn directives_count_even_where_the_default_is_drawn() {
+    let mut map = MapBuilder::new();
+    let gone = map.add_shader("t/gone", 0, 1);
+    map.add_cell(Vec3::splat(-64.0), Vec3::splat(64.0));
+    map.add_quad(gone, ceiling_lamp(16.0, 0.0));
+    map.add_quad(gone, ceiling_lamp(16.0, 8.0));
+    let world = relight(map);
+    assert_eq!(world.lights.len(), 4);
+    assert!(
+        (world.lights[0].radiance - Vec3::splat(50.0 * SURFACE_LIGHT_RADIANCE)).length() < 1e-4
+    );
+    let told: Vec<_> = world
+        .warnings
+        .iter()
+        .filter(|w| w.contains("t/nowhere"))
+        .collect();
+    assert_eq!(told.len(), 1, "{:?}", world.warnings);
+}
+
+#[test]
+fn without_directives_flares_are_lamps_and_then_lightmaps_ambient() {
+    let dark = |flares: bool| {
+        let mut map = MapBuilder::new();
+        let wall = map.add_shader("t/wall", 0, 1);
+        map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
+        map.add_lightmap([51, 0, 0]);
+        if flares {
+            let flare = map.add_shader("flareShader", 0, 0);
+            map.add_flare(
+                flare,
+                Vec3::new(0.0, 0.0, 128.0),
+                Vec3::NEG_Z,
+                Vec3::new(1.0, 0.0, 0.0),
+            );
+        }
+        relight(map)
+    };
+    let world = dark(true);
+    assert!(world.report.fallback);
+    assert_eq!(world.flares.len(), 1);
+    assert_eq!(world.lights.len(), 2);
+    assert!((world.lights[0].normal() - Vec3::NEG_Z).length() < 1e-6);
+    assert!(world.lights[0].radiance.x > 1.0 && world.lights[0].radiance.y == 0.0);
+    assert_eq!(world.light_lists.row(0), [0, 1]);
+    assert_eq!(world.report.triangles_by(EmissionSource::Flare), 2);
+
+    let world = dark(false);
+    assert_eq!(world.light_count(), 0);
+    assert!((world.ambient - Vec3::new(51.0 * 4.0 / 255.0, 0.0, 0.0)).length() < 1e-5);
+}
+
+#[test]
+fn models_are_lit_from_where_their_entities_stand() {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 1);
+    let lamp = map.add_shader("t/lamp", 0, 1);
+    map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
+    let there = map.add_room(
+        wall,
+        Vec3::new(872.0, -128.0, -128.0),
+        Vec3::new(1128.0, 128.0, 128.0),
+    );
+    map.set_sees(0, there, false);
+    map.set_sees(there, 0, false);
+    let model = map.begin_model();
+    map.add_quad(lamp, ceiling_lamp(16.0, 100.0));
+    map.add_entity(&[
+        ("classname", "func_door"),
+        ("model", &format!("*{model}")),
+        ("origin", "1000 0 0"),
+    ]);
+    map.add_entity(&[
+        ("classname", "light"),
+        ("origin", "0 0 0"),
+        ("light", "100"),
+    ]);
+    let world = relight(map);
+    assert_eq!(world.models[model].origin, Vec3::new(1000.0, 0.0, 0.0));
+    assert!(
+        world
+            .lights
+            .iter()
+            .all(|l| l.model as usize == model && (l.vertices[0].x - 1000.0).abs() < 17.0)
+    );
+    assert_eq!(world.light_lists.row(there), [0, 1]);
+    // The point light of the first room comes after the triangles.
+    let row: Vec<_> = world
+        .light_lists
+        .row(0)
+        .iter()
+        .map(|&e| world.light_lists.light(e))
+        .collect();
+    assert_eq!(row, [LightRef::Point(0)]);
+}
