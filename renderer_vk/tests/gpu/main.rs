@@ -1,0 +1,9 @@
+//! The GPU layer on whatever Vulkan device there is, with the validation layer where it is installed.
+//!
+//! Without a device each test says so and passes, unless `RELIGHT_REQUIRE_GPU=1`.
+
+mod drawing;
+mod life;
+mod memory;
+mod rays;
+mod support;

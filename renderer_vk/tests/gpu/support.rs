@@ -1,0 +1,39 @@
+//! What these tests share: a device with the validation layer, and what must hold at the end.
+
+use bytemuck::Pod;
+use renderer_vk::gpu::*;
+
+/// A headless device, or `None` with a printed line.
+pub(super) fn device(allow_ray_tracing: bool) -> Option<Device> {
+    let options = DeviceOptions {
+        app_name: "gpu tests".to_owned(),
+        validation: true,
+        allow_ray_tracing,
+        ..DeviceOptions::default()
+    };
+    match Device::new(&options, SurfaceSource::Headless) {
+        Ok(device) => Some(device),
+        Err(e) => {
+            let required = std::env::var("RELIGHT_REQUIRE_GPU").is_ok_and(|v| v == "1");
+            assert!(!required, "a GPU is required: {e}");
+            println!("skipped: {e}");
+            None
+        }
+    }
+}
+
+/// Whatever a test did, the validation layer must have been silent and nothing may be left behind.
+pub(super) fn finish(device: Device) {
+    device.wait_idle().unwrap();
+    assert_eq!(device.graveyard_len(), 0, "objects that never died");
+    let messages = device.validation_messages();
+    assert!(messages.is_empty(), "validation: {messages:#?}");
+}
+
+/// Bytes as values, whatever their alignment.
+pub(super) fn collect<T: Pod>(bytes: &[u8]) -> Vec<T> {
+    bytes
+        .chunks_exact(size_of::<T>())
+        .map(bytemuck::pod_read_unaligned)
+        .collect()
+}
