@@ -1,0 +1,227 @@
+//! A device with the look under test, and the views that it draws.
+
+use glam::Vec3;
+
+use super::half;
+use super::scene::Scene;
+use crate::api::RefDef;
+use crate::gpu::{
+    Device, DeviceOptions, Filter, Format, FrameRing, Image, ImageDesc, ImageUsage, MipFilter,
+    SamplerDesc, SurfaceSource, Wrap,
+};
+use crate::raster::FlareTest;
+use crate::scene::{View, ViewScene};
+use crate::settings::Settings;
+use crate::trace::input::Tracer;
+use crate::trace::view_tracer::{TracedMap, ViewTracer};
+
+/// A device with its validation layer on and the look under test.
+pub struct Gpu {
+    pub device: Device,
+    pub tracer: Tracer,
+    pub look: ViewTracer,
+    pub ring: FrameRing,
+}
+
+impl Gpu {
+    /// Runs a test with every tracer that the device has.
+    pub fn each(test: fn(&mut Gpu)) {
+        for tracer in [Tracer::Pipeline, Tracer::Query, Tracer::Compute] {
+            if let Some(mut gpu) = Self::new(tracer) {
+                println!("{tracer:?}");
+                test(&mut gpu);
+            }
+        }
+    }
+
+    /// `None`, with a printed line, where there is no device for the tracer.
+    pub fn new(tracer: Tracer) -> Option<Self> {
+        let options = DeviceOptions {
+            validation: true,
+            // without the tracer's extensions, so that it is shown to need none
+            allow_ray_tracing: tracer != Tracer::Compute,
+            ..DeviceOptions::default()
+        };
+        let device = match Device::new(&options, SurfaceSource::Headless) {
+            Ok(device) if tracer.is_possible(device.info()) => device,
+            other => {
+                let name = |d: Device| format!("{} does not trace rays", d.info().name);
+                let why = other.map_or_else(|e| e.to_string(), name);
+                let required = std::env::var("RELIGHT_REQUIRE_GPU").as_deref() == Ok("1");
+                assert!(!required, "{why}");
+                println!("skipped: {why}");
+                return None;
+            }
+        };
+        for wrap in [Wrap::Repeat, Wrap::Clamp] {
+            device
+                .sampler(&SamplerDesc {
+                    filter: Filter::Linear,
+                    mip: MipFilter::Linear,
+                    wrap,
+                    anisotropy: 1.0,
+                    lod_bias: 0.0,
+                })
+                .expect("sampler");
+        }
+        Some(Self {
+            look: ViewTracer::new(&device, tracer).expect("pipelines"),
+            tracer,
+            ring: FrameRing::new(&device, 2).expect("frames"),
+            device,
+        })
+    }
+
+    /// Counts rays in what is rendered from now on, or no longer.
+    pub fn count_rays(&mut self, count: bool) {
+        self.look.count_rays = count;
+    }
+
+    /// Rays of each counted pass in the newest finished frame.
+    pub fn rays(&self) -> Option<[u64; 3]> {
+        self.look.rays()
+    }
+
+    /// The mean of `frames` frames before exposure, and the last picture.
+    pub fn render(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+        frames: u32,
+    ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
+        self.render_path(scene, settings, frames, |_, _| {})
+    }
+
+    /// As [`render`](Self::render), with a camera that `place` moves before each frame.
+    pub fn render_path(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+        frames: u32,
+        place: impl Fn(u32, &mut RefDef),
+    ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
+        self.render_views(scene, settings, frames, |frame, view| {
+            place(frame, &mut view.def);
+        })
+    }
+
+    /// As [`render`](Self::render), with a view that `change` changes before each frame.
+    pub fn render_views(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+        frames: u32,
+        change: impl Fn(u32, &mut ViewScene),
+    ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
+        self.render_watched(scene, settings, frames, change, None)
+    }
+
+    /// As [`render_views`](Self::render_views), and hands the picture before exposure to `watch` after each frame.
+    #[allow(clippy::type_complexity)] // of an optional closure
+    pub fn render_watched(
+        &mut self,
+        scene: &Scene,
+        settings: &Settings,
+        frames: u32,
+        change: impl Fn(u32, &mut ViewScene),
+        mut watch: Option<&mut dyn FnMut(u32, &[Vec3])>,
+    ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
+        let uploaded = scene.upload(&self.device, self.tracer);
+        let [width, height] = [scene.def.width as u32, scene.def.height as u32];
+        let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
+        let target = Image::new(
+            &self.device,
+            &ImageDesc::new("test target", width, height, Format::Rgba8, usage),
+        )
+        .expect("target");
+        let mut view = scene.view();
+        for frame in 0..frames {
+            change(frame, &mut view);
+            view.view = View::new(&view.def, 4.0, 10000.0);
+            let mut rec = self.ring.begin().expect("frame");
+            let map = TracedMap {
+                geometry: &uploaded.geometry,
+                lights: &uploaded.lights,
+                flares: FlareTest::default(),
+            };
+            self.look
+                .record_view(
+                    &mut rec,
+                    &view,
+                    Some(map),
+                    &uploaded.materials,
+                    settings,
+                    &target,
+                )
+                .expect("recorded");
+            self.ring.end(rec).expect("submitted");
+            if let Some(watch) = &mut watch {
+                self.device.wait_idle().expect("done");
+                watch(frame, &self.linear_picture());
+            }
+        }
+        self.device.wait_idle().expect("done");
+        if settings.rt_accumulate {
+            assert_eq!(
+                self.look.accumulated_frames(),
+                frames,
+                "nothing changed between the frames"
+            );
+        }
+        let linear = self.linear_picture();
+        let picture: Vec<[u8; 4]> =
+            bytemuck::pod_collect_to_vec(&self.device.read_image(&target).expect("read"));
+        self.check_messages();
+        self.look.reset();
+        (linear, picture)
+    }
+
+    /// The picture of the last frame before exposure.
+    fn linear_picture(&self) -> Vec<Vec3> {
+        let hdr = self.look.hdr().expect("traced");
+        let bytes = self.device.read_image(hdr).expect("read");
+        let floats: Vec<f32> = if hdr.format() == Format::Rgba32F {
+            bytemuck::pod_collect_to_vec(&bytes)
+        } else {
+            bytemuck::pod_collect_to_vec::<u8, u16>(&bytes)
+                .into_iter()
+                .map(half)
+                .collect()
+        };
+        floats
+            .chunks_exact(4)
+            .map(|p| Vec3::new(p[0], p[1], p[2]))
+            .collect()
+    }
+
+    /// Whether the denoiser looks at gradients; it does unless told otherwise.
+    pub fn use_gradients(&mut self, on: bool) {
+        self.look.denoiser.gradients = on;
+    }
+
+    /// Position and path of each pixel of the last frame, and its motion as the motion image has it.
+    pub fn motion(&self) -> Vec<([f32; 4], [f32; 4])> {
+        let targets = self.look.targets.as_ref().expect("traced");
+        let read = |image| self.device.read_image(image).expect("read");
+        let places: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.position));
+        let halves: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.motion));
+        let motions = halves.iter().map(|m| m.map(half));
+        places.into_iter().zip(motions).collect()
+    }
+
+    /// The validation layer has nothing to say.
+    pub fn check_messages(&self) {
+        let messages = self.device.validation_messages();
+        let short: Vec<String> = messages
+            .iter()
+            .map(|m| m.chars().take(600).collect())
+            .collect();
+        assert!(messages.is_empty(), "{short:#?}");
+    }
+
+    /// The mean over the picture of the mean of `frames` frames.
+    pub fn mean(&mut self, scene: &Scene, settings: &Settings, frames: u32) -> Vec3 {
+        let (pixels, _) = self.render(scene, settings, frames);
+        pixels.iter().sum::<Vec3>() / pixels.len() as f32
+    }
+}

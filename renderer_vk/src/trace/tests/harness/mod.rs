@@ -1,0 +1,100 @@
+//! Scenes made by hand, and what renders them.
+
+mod gpu;
+mod scene;
+pub mod stage;
+
+use glam::{Vec3, Vec4};
+use shaders::types::Instance;
+
+use crate::settings::Settings;
+
+pub use gpu::Gpu;
+pub use scene::Scene;
+
+/// The value of a half float.
+fn half(bits: u16) -> f32 {
+    let sign = if bits & 0x8000 != 0 { -1.0 } else { 1.0 };
+    let (exponent, mantissa) = (i32::from(bits >> 10 & 31), f32::from(bits & 0x3ff));
+    sign * match exponent {
+        0 => mantissa * 2f32.powi(-24),
+        31 => f32::INFINITY,
+        _ => (1.0 + mantissa / 1024.0) * 2f32.powi(exponent - 15),
+    }
+}
+
+/// Settings of a reference picture without bounced light.
+pub fn reference() -> Settings {
+    Settings {
+        rt: true,
+        rt_accumulate: true,
+        rt_bounces: 0,
+        rt_auto_exposure: false,
+        rt_bloom: 0.0,
+        ..Settings::default()
+    }
+}
+
+/// sRGB code of a linear value.
+pub fn encode(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 {
+        linear * 12.92
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+/// What the shaders make of a constant colour: it passes through a byte.
+pub fn through_byte(encoded: f32) -> f32 {
+    let byte = (encoded * 255.0 + 0.001).floor() / 255.0;
+    crate::trace::frame_lights::decode(Vec3::splat(byte)).x
+}
+
+/// Corners of a rectangle that faces `edge_u x edge_v`.
+pub fn rectangle(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> [Vec3; 4] {
+    [
+        corner,
+        corner + edge_u,
+        corner + edge_u + edge_v,
+        corner + edge_v,
+    ]
+}
+
+/// An entity in place.
+pub fn identity() -> Instance {
+    Instance {
+        axis: [Vec3::X, Vec3::Y, Vec3::Z],
+        color: [1.0; 4],
+        ..Instance::default()
+    }
+}
+
+/// L of a point that faces `normal` in the light of a triangle wholly above its horizon: Lambert's formula for the
+/// irradiance of a polygon, divided by pi.
+pub fn lambert(point: Vec3, normal: Vec3, triangle: [Vec3; 3], radiance: f32) -> f32 {
+    // in double precision: for small triangles the terms nearly cancel
+    let v = triangle.map(|p| (p.as_dvec3() - point.as_dvec3()).normalize());
+    let sum: f64 = (0..3)
+        .map(|i| {
+            let (a, b) = (v[i], v[(i + 1) % 3]);
+            let cross = a.cross(b);
+            cross.length().atan2(a.dot(b)) * cross.normalize().dot(normal.as_dvec3())
+        })
+        .sum();
+    (f64::from(radiance) * sum.abs() / (2.0 * std::f64::consts::PI)) as f32
+}
+
+/// Where a pixel's middle ray meets the plane z = 0.
+pub fn floor_point(scene: &Scene, x: usize, y: usize) -> Vec3 {
+    let def = &scene.def;
+    let tan = (def.fov_x.to_radians() * 0.5).tan();
+    let u = (x as f32 + 0.5) / def.width as f32 * 2.0 - 1.0;
+    let v = (y as f32 + 0.5) / def.height as f32 * 2.0 - 1.0;
+    let d = def.view_axis[0] - def.view_axis[1] * (u * tan) - def.view_axis[2] * (v * tan);
+    def.view_origin + d * (-def.view_origin.z / d.z)
+}
+
+/// The plane through a point, as `xyz.p = w`.
+pub fn plane(normal: Vec3, point: Vec3) -> Vec4 {
+    normal.extend(normal.dot(point))
+}

@@ -1,0 +1,347 @@
+//! Scenes made by hand: triangles, materials, lights, what moves, and their way to the GPU.
+
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+use relight::light::{EmissionSource, LightLists, PointLight, SunLight, TriangleLight};
+use shaders::trace_types::SkyRecord;
+use shaders::types::constants as c;
+use shaders::types::{Fog, Instance, Material, MaterialBuffers, Stage, TcMod, Vertex};
+
+use super::{encode, identity, rectangle, stage};
+use crate::api::{DynamicLight, EntityKind, RefDef};
+use crate::gpu::{Buffer, BufferUsage, Device};
+use crate::scene::{
+    DynamicMesh, Portal, RigidMesh, ShadowVolumes, Shape, Submodel, View, ViewEntity, ViewScene,
+};
+use crate::trace::geometry::StaticGeometry;
+use crate::trace::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
+use crate::trace::lights::{MapLightSource, MapLights};
+use crate::trace::surroundings::Surroundings;
+
+/// A scene made by hand.
+pub struct Scene {
+    pub materials: Vec<(Material, MaterialInfo)>,
+    pub stages: Vec<Stage>,
+    pub images: Vec<u32>,
+    pub vertices: Vec<Vertex>,
+    pub indices: Vec<u32>,
+    pub surfaces: Vec<StaticSurface>,
+    pub lights: Vec<TriangleLight>,
+    pub points: Vec<PointLight>,
+    pub suns: Vec<SunLight>,
+    pub ambient: Vec3,
+    pub fogs: Vec<Fog>,
+    /// Boxes around what colours light.
+    pub filters: Vec<[Vec3; 2]>,
+    pub instances: Vec<Instance>,
+    pub dynamic_vertices: Vec<Vertex>,
+    pub dynamic_indices: Vec<u32>,
+    pub meshes: Vec<DynamicMesh>,
+    pub rigid: Vec<Arc<RigidMesh>>,
+    pub submodels: Vec<Submodel>,
+    pub entities: Vec<ViewEntity>,
+    pub portals: Vec<Portal>,
+    pub dlights: Vec<DynamicLight>,
+    /// The map's tree with lists of its own; otherwise all lights are everywhere.
+    pub tree: Option<(q3bsp::Bsp, LightLists)>,
+    pub def: RefDef,
+}
+
+impl Scene {
+    /// Nothing but a camera: at `eye`, looking at `target`, `fov` degrees wide, square.
+    pub fn new(eye: Vec3, target: Vec3, fov: f32, size: i32) -> Self {
+        let forward = (target - eye).normalize();
+        let aside = if forward.z.abs() > 0.99 {
+            Vec3::Y
+        } else {
+            Vec3::Z.cross(forward).normalize()
+        };
+        Self {
+            materials: Vec::new(),
+            stages: Vec::new(),
+            images: Vec::new(),
+            vertices: Vec::new(),
+            indices: Vec::new(),
+            surfaces: Vec::new(),
+            lights: Vec::new(),
+            points: Vec::new(),
+            suns: Vec::new(),
+            ambient: Vec3::ZERO,
+            fogs: Vec::new(),
+            filters: Vec::new(),
+            instances: vec![Instance {
+                flags: c::INSTANCE_UNLIT,
+                ..identity()
+            }],
+            dynamic_vertices: Vec::new(),
+            dynamic_indices: Vec::new(),
+            meshes: Vec::new(),
+            rigid: Vec::new(),
+            submodels: Vec::new(),
+            entities: Vec::new(),
+            portals: Vec::new(),
+            dlights: Vec::new(),
+            tree: None,
+            def: RefDef {
+                width: size,
+                height: size,
+                fov_x: fov,
+                fov_y: fov,
+                view_origin: eye,
+                view_axis: [forward, aside, forward.cross(aside)],
+                ..RefDef::default()
+            },
+        }
+    }
+
+    pub fn material(&mut self, stages: &[Stage], flags: u32) -> u32 {
+        let first = self.stages.len() as u32;
+        self.stages.extend(stages);
+        let index = self.materials.len() as u32;
+        let sort = if flags & c::MATERIAL_TRANSLUCENT != 0 {
+            9.0
+        } else {
+            3.0
+        };
+        self.materials.push((
+            Material {
+                stage_first: first,
+                stage_count: stages.len() as u32,
+                flags,
+                clamp_time: 1.0e30,
+                plain_image: c::NO_TEXTURE,
+                ..Material::default()
+            },
+            MaterialInfo {
+                flags,
+                sort,
+                order: index,
+                sky: None,
+            },
+        ));
+        index
+    }
+
+    /// A lit, diffuse material of the given albedo (linear).
+    pub fn diffuse(&mut self, albedo: f32) -> u32 {
+        let code = encode(albedo);
+        self.material(&[stage::light(), stage::filter([code; 3])], 0)
+    }
+
+    pub fn sky(&mut self, stages: &[Stage], sky: SkyRecord) -> u32 {
+        let index = self.material(stages, c::MATERIAL_SKY);
+        self.materials[index as usize].1.sky = Some(sky);
+        index
+    }
+
+    fn corners(points: [Vec3; 4]) -> [Vertex; 4] {
+        let normal = (points[1] - points[0])
+            .cross(points[3] - points[0])
+            .normalize();
+        let st = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
+        std::array::from_fn(|i| Vertex {
+            position: points[i],
+            normal,
+            st: st[i],
+            lightmap: st[i],
+            color: u32::MAX,
+        })
+    }
+
+    /// A rectangle of the map.
+    pub fn quad(&mut self, points: [Vec3; 4], material: u32) {
+        let first = self.vertices.len() as u32;
+        self.vertices.extend(Self::corners(points));
+        let first_index = self.indices.len() as u32;
+        // clockwise from the front
+        self.indices.extend([0, 2, 1, 0, 3, 2].map(|i| first + i));
+        self.surfaces.push(StaticSurface {
+            first_index,
+            index_count: 6,
+            material,
+            fog: 0,
+            lightmap: c::NO_TEXTURE,
+            model: 0,
+        });
+    }
+
+    /// The six inner faces of a box.
+    pub fn room(&mut self, mins: Vec3, maxs: Vec3, material: u32) {
+        let (x, y, z) = (
+            (maxs - mins) * Vec3::X,
+            (maxs - mins) * Vec3::Y,
+            (maxs - mins) * Vec3::Z,
+        );
+        self.quad(rectangle(mins, x, y), material);
+        self.quad(rectangle(mins, y, z), material);
+        self.quad(rectangle(mins, z, x), material);
+        self.quad(rectangle(maxs, -y, -x), material);
+        self.quad(rectangle(maxs, -z, -y), material);
+        self.quad(rectangle(maxs, -x, -z), material);
+    }
+
+    /// A rectangle that moves.
+    pub fn mesh(&mut self, points: [Vec3; 4], material: u32, instance: Instance) {
+        let instance_index = self.instances.len() as u32;
+        self.instances.push(instance);
+        self.entities.push(ViewEntity {
+            kind: EntityKind::Model,
+            model: instance_index as i32,
+            skin: 0,
+            material: 0,
+            renderfx: 0,
+            frame: 0,
+            old_frame: 0,
+            origin: instance.origin,
+            first_instance: instance_index,
+            instance_count: 1,
+            first_mesh: self.meshes.len() as u32,
+            mesh_count: 1,
+        });
+        let first_vertex = self.dynamic_vertices.len() as u32;
+        self.dynamic_vertices.extend(Self::corners(points));
+        let first_index = self.dynamic_indices.len() as u32;
+        self.dynamic_indices
+            .extend([0, 2, 1, 0, 3, 2].map(|i| first_vertex + i));
+        self.meshes.push(DynamicMesh {
+            first_index,
+            index_count: 6,
+            first_vertex,
+            vertex_count: 4,
+            material,
+            instance: instance_index,
+            fog: 0,
+            world_surface: None,
+            shape: Shape::Changing,
+        });
+    }
+
+    /// A triangle that shines to the side from which a, b, c go round counter-clockwise.
+    pub fn light(&mut self, vertices: [Vec3; 3], radiance: Vec3) {
+        self.lights.push(TriangleLight {
+            vertices,
+            radiance,
+            two_sided: false,
+            surface: 0,
+            triangle: u32::MAX,
+            model: 0,
+            is_sky: false,
+            source: EmissionSource::SurfaceLight,
+        });
+    }
+
+    pub fn view(&self) -> ViewScene {
+        ViewScene {
+            def: self.def,
+            view: View::new(&self.def, 4.0, 10000.0),
+            time: self.def.time_ms as f32 * 0.001,
+            instances: self.instances.clone(),
+            vertices: self.dynamic_vertices.clone(),
+            indices: self.dynamic_indices.clone(),
+            meshes: self.meshes.clone(),
+            rigid: self.rigid.clone(),
+            submodels: self.submodels.clone(),
+            entities: self.entities.clone(),
+            surfaces: Vec::new(),
+            dlights: self.dlights.clone(),
+            portals: self.portals.clone(),
+            has_world: true,
+            skies: Vec::new(),
+            shadows: ShadowVolumes::default(),
+            debug: Default::default(),
+            statistics: Default::default(),
+            sun: None,
+            flares: Vec::new(),
+        }
+    }
+
+    pub fn upload(&self, device: &Device, tracer: Tracer) -> Uploaded {
+        let storage = BufferUsage::STORAGE;
+        let materials: Vec<Material> = self.materials.iter().map(|m| m.0).collect();
+        let no_mods: [TcMod; 0] = [];
+        let buffers = [
+            Buffer::with_data(device, "materials", storage, &materials).expect("buffer"),
+            Buffer::with_data(device, "stages", storage, &self.stages).expect("buffer"),
+            Buffer::with_data(device, "tc mods", storage, &no_mods).expect("buffer"),
+            Buffer::with_data(device, "images", storage, &self.images).expect("buffer"),
+        ];
+        let vertices =
+            Buffer::with_data(device, "vertices", storage, &self.vertices).expect("buffer");
+        let materials = Table {
+            infos: self.materials.iter().map(|m| m.1).collect(),
+            buffers,
+        };
+        let all: Vec<u32> = (0..(self.lights.len() + self.points.len()) as u32).collect();
+        let lists = LightLists {
+            offsets: vec![0, all.len() as u32],
+            lights: all,
+            triangle_lights: self.lights.len() as u32,
+            sky: Vec::new(),
+            shares: Vec::new(),
+        };
+        let source = MapLightSource {
+            triangles: &self.lights,
+            points: &self.points,
+            suns: &self.suns,
+            lists: self.tree.as_ref().map_or(&lists, |t| &t.1),
+            flickers: &[],
+            model_origins: &[],
+            ambient: self.ambient,
+            bsp: self.tree.as_ref().map(|t| &t.0),
+        };
+        let scene = StaticScene {
+            vertices: &self.vertices,
+            vertex_address: vertices.address(),
+            indices: &self.indices,
+            surfaces: self.surfaces.clone(),
+            fogs: &self.fogs,
+        };
+        let mut geometry =
+            StaticGeometry::new(device, tracer, &scene, &materials).expect("structures");
+        geometry.surroundings =
+            Surroundings::of_boxes(device, self.filters.clone()).expect("boxes");
+        Uploaded {
+            geometry,
+            lights: MapLights::new(device, &source).expect("lights"),
+            materials,
+            _vertices: vertices,
+        }
+    }
+}
+
+pub struct Uploaded {
+    pub geometry: StaticGeometry,
+    pub(super) lights: MapLights,
+    pub materials: Table,
+    pub(super) _vertices: Buffer,
+}
+
+pub struct Table {
+    infos: Vec<MaterialInfo>,
+    buffers: [Buffer; 4],
+}
+
+impl MaterialTable for Table {
+    fn info(&self, index: u32) -> (u32, MaterialInfo) {
+        (index, self.infos[index as usize])
+    }
+
+    fn buffers(&self) -> MaterialBuffers {
+        MaterialBuffers {
+            materials: self.buffers[0].address(),
+            stages: self.buffers[1].address(),
+            tc_mods: self.buffers[2].address(),
+            images: self.buffers[3].address(),
+            noise: 0,
+        }
+    }
+
+    fn sky_sampler(&self) -> u32 {
+        1
+    }
+
+    fn generation(&self) -> u64 {
+        0
+    }
+}

@@ -1,0 +1,72 @@
+//! Stages of materials.
+
+use shaders::types::Stage;
+use shaders::types::constants as c;
+
+fn plain() -> Stage {
+    Stage {
+        rgb_gen: c::RGBGEN_IDENTITY,
+        alpha_gen: c::ALPHAGEN_IDENTITY,
+        constant: [1.0; 4],
+        blend_src: c::BLEND_ONE,
+        blend_dst: c::BLEND_ZERO,
+        flags: c::STAGE_WHITE,
+        ..Stage::default()
+    }
+}
+
+/// The lightmap: light itself.
+pub fn light() -> Stage {
+    Stage {
+        flags: 0,
+        ..plain()
+    }
+}
+
+/// White times a constant colour (encoded).
+pub fn constant(color: [f32; 3]) -> Stage {
+    Stage {
+        rgb_gen: c::RGBGEN_CONST,
+        constant: [color[0], color[1], color[2], 1.0],
+        ..plain()
+    }
+}
+
+/// Multiplies what is below by a constant colour (encoded).
+pub fn filter(color: [f32; 3]) -> Stage {
+    Stage {
+        blend_src: c::BLEND_DST_COLOR,
+        blend_dst: c::BLEND_ZERO,
+        ..constant(color)
+    }
+}
+
+/// A constant colour (encoded) laid over what is below with some alpha.
+pub fn blend(color: [f32; 3], alpha: f32) -> Stage {
+    Stage {
+        alpha_gen: c::ALPHAGEN_CONST,
+        constant: [color[0], color[1], color[2], alpha],
+        blend_src: c::BLEND_SRC_ALPHA,
+        blend_dst: c::BLEND_ONE_MINUS_SRC_ALPHA,
+        ..constant(color)
+    }
+}
+
+/// A constant colour (encoded) added to what is below.
+pub fn add(color: [f32; 3]) -> Stage {
+    Stage {
+        blend_src: c::BLEND_ONE,
+        blend_dst: c::BLEND_ONE,
+        ..constant(color)
+    }
+}
+
+/// An image of the scene, by its bindless index.
+pub fn image(first: u32) -> Stage {
+    Stage {
+        image_first: first,
+        image_count: 1,
+        flags: c::STAGE_DEPTH_WRITE,
+        ..plain()
+    }
+}
