@@ -54,25 +54,29 @@ pub struct ConvertArgs {
     /// Length of an id unit in the output
     #[arg(long, default_value_t = METRES_PER_UNIT)]
     scale: f32,
-    /// What becomes of lightmaps and of light in vertex colours
-    #[arg(long, value_enum, default_value_t = LightmapChoice::Keep)]
-    lightmaps: LightmapChoice,
+    /// What becomes of lightmaps; by default vertices, and strip where lights are asked for
+    #[arg(long, value_enum)]
+    lightmaps: Option<LightmapChoice>,
+    /// Whether lights are written, and lamps shine as strongly as in the map; by default where lightmaps are stripped
+    #[arg(long, value_enum)]
+    lights: Option<LightChoice>,
+    /// What all light is multiplied by; by default so much that the map is as bright as in the game
+    #[arg(long)]
+    exposure: Option<f32>,
     /// Where images go: as usual for the format, inside the file, or into a folder beside it
     #[arg(long, value_enum, default_value_t = ImageChoice::Usual)]
     images: ImageChoice,
     /// Write moving textures as animations, which strict readers of glTF refuse
     #[arg(long)]
     animate: bool,
-    /// Write no point lights and suns
-    #[arg(long)]
-    no_lights: bool,
     /// Let the sky shine as strongly as its light in the map; it then looks brighter than in the game
     #[arg(long)]
     sky_light: bool,
     /// Largest distance of a curve from its mesh, id units
     #[arg(long, default_value_t = 4.0)]
     subdivisions: f32,
-    /// Fit lights to the lightmaps first, and find those again that the compiler left out (some seconds a map)
+    /// Fit lights to the lightmaps first, find those again that the compiler left out (some seconds a map), and write
+    /// them
     #[arg(long)]
     calibrate: bool,
     /// Keep what calibration finds in this folder, and take it from there
@@ -91,8 +95,34 @@ pub struct ConvertArgs {
 
 #[derive(ValueEnum, Clone, Copy, Debug)]
 enum LightmapChoice {
+    /// Into colours of vertices: every program shows the map lit
+    Vertices,
+    /// For programs that know MOZ_lightmap
+    Keep,
+    /// For programs that compute light
+    Strip,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum LightChoice {
     Keep,
     Strip,
+}
+
+/// What becomes of lightmaps and whether lights are written. Light is not written twice unless that is asked for.
+fn lighting(args: &ConvertArgs) -> (Lightmaps, bool) {
+    let lightmaps = match (args.lightmaps, args.lights) {
+        (Some(LightmapChoice::Vertices), _) => Lightmaps::Vertices,
+        (Some(LightmapChoice::Keep), _) => Lightmaps::Keep,
+        (Some(LightmapChoice::Strip), _) | (None, Some(LightChoice::Keep)) => Lightmaps::Strip,
+        (None, None) if args.calibrate => Lightmaps::Strip,
+        (None, _) => Lightmaps::Vertices,
+    };
+    let lights = match args.lights {
+        Some(choice) => choice == LightChoice::Keep,
+        None => args.calibrate || lightmaps == Lightmaps::Strip,
+    };
+    (lightmaps, lights)
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug)]
@@ -260,22 +290,21 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
     let mut world = RelitWorld::from_bsp(files, materials, &name, bsp, options);
     let warnings = brought.iter().flat_map(|own| own.warnings.iter());
     world.warnings.extend(warnings.cloned());
+    let (lightmaps, lights) = lighting(args);
     let source = Export {
         world: &world,
         files,
         images: shared.images,
         options: ExportOptions {
             scale: args.scale,
-            lightmaps: match args.lightmaps {
-                LightmapChoice::Keep => Lightmaps::Keep,
-                LightmapChoice::Strip => Lightmaps::Strip,
-            },
+            lightmaps,
             images: match args.images {
                 ImageChoice::Usual => ImagePlace::Usual,
                 ImageChoice::Embed => ImagePlace::Embed,
                 ImageChoice::Beside => ImagePlace::Beside,
             },
-            lights: !args.no_lights,
+            lights,
+            exposure: args.exposure,
             sky_light: args.sky_light,
             animate: args.animate,
         },

@@ -213,12 +213,12 @@ fn agree(written: &Written, name: &str) {
 #[test]
 fn the_sample_is_the_map() {
     let files = relight::sample::files().unwrap();
-    let written = write(
-        &files,
-        relight::sample::MAP,
-        Format::Glb,
-        ExportOptions::default(),
-    );
+    let lit = ExportOptions {
+        lightmaps: Lightmaps::Strip,
+        lights: true,
+        ..ExportOptions::default()
+    };
+    let written = write(&files, relight::sample::MAP, Format::Glb, lit);
     agree(&written, "sample");
     let (document, ..) = gltf::import(&written.path).unwrap();
     let material = |name: &str| {
@@ -265,14 +265,54 @@ fn images_are_stored_once_and_lightmaps_can_be_left_out() {
     assert!(written.folder.path().join("map.bin").is_file());
     gltf::import(&written.path).unwrap();
 
-    let stripped = ExportOptions {
-        lightmaps: Lightmaps::Strip,
-        ..options
+    let with = |lightmaps| {
+        let options = ExportOptions {
+            lightmaps,
+            ..options
+        };
+        let written = write(&files, relight::sample::MAP, Format::Gltf, options);
+        let text = std::fs::read_to_string(&written.path).unwrap();
+        (written.report.images, text)
     };
-    let bare = write(&files, relight::sample::MAP, Format::Gltf, stripped);
-    assert_eq!(bare.report.images + 1, written.report.images);
-    let text = std::fs::read_to_string(&bare.path).unwrap();
+    let (_, text) = with(Lightmaps::Vertices);
+    assert!(text.contains("KHR_materials_unlit") && !text.contains("MOZ_lightmap"));
+    let (kept, text) = with(Lightmaps::Keep);
+    assert!(text.contains("MOZ_lightmap") && text.contains("TEXCOORD_1"));
+    assert!(!text.contains("KHR_materials_unlit"));
+    let (stripped, text) = with(Lightmaps::Strip);
+    assert_eq!(stripped + 1, kept);
     assert!(!text.contains("MOZ_lightmap") && !text.contains("TEXCOORD_1"));
+}
+
+#[test]
+fn by_default_every_program_shows_the_light() {
+    let files = relight::sample::files().unwrap();
+    let options = ExportOptions::default();
+    let written = write(&files, relight::sample::MAP, Format::Glb, options);
+    agree(&written, "sample");
+    let (document, buffers, _) = gltf::import(&written.path).unwrap();
+    let (mut dark, mut bright, mut mean, mut count) = (0, 0, 0.0, 0.0);
+    for primitive in document.meshes().flat_map(|m| m.primitives()) {
+        // the sky has no light of its own
+        let Some(colors) = primitive
+            .reader(|b| buffers.get(b.index()).map(|d| &d.0[..]))
+            .read_colors(0)
+        else {
+            continue;
+        };
+        for [r, g, b, _] in colors.into_rgba_f32() {
+            let light = (r + g + b) / 3.0;
+            dark += usize::from(light < 0.01);
+            bright += usize::from(light > 0.99);
+            mean += light;
+            count += 1.0;
+        }
+    }
+    let mean = mean / count;
+    assert!((0.02..0.9).contains(&mean), "{mean}");
+    assert!(((dark + bright) as f32) < 0.9 * count, "{dark} {bright}");
+    // light is not there twice
+    assert!(document.lights().is_none_or(|lights| lights.count() == 0));
 }
 
 #[test]

@@ -48,15 +48,26 @@ impl Export<'_> {
         Some(found.mean.extend(found.mean_alpha))
     }
 
-    /// What other programs can say of a material whose lights have the mean radiance `radiance`.
-    pub(super) fn look(&self, material: &WorldMaterial, radiance: Option<Vec3>) -> Look {
-        let mut look = look(material, &mut |name| {
+    /// What other programs can say of a material whose lights have the mean radiance `radiance`; `clear`: whether glass
+    /// and liquids refract.
+    pub(super) fn look(
+        &self,
+        material: &WorldMaterial,
+        radiance: Option<Vec3>,
+        clear: bool,
+    ) -> Look {
+        let mut look = look(material, clear, &mut |name| {
             self.mean(material, &Picture::File(name.to_owned()))
         });
-        let Some(radiance) = radiance.filter(|r| self.options.lights && r.max_element() > 0.0)
-        else {
+        if !self.options.lights {
+            return look;
+        }
+        let exposure = self.exposure();
+        look.glow_factor *= exposure;
+        let Some(radiance) = radiance.filter(|r| r.max_element() > 0.0) else {
             return look;
         };
+        let radiance = radiance * exposure;
         if look.glow.is_none() {
             look.glow = look.color.clone();
         }

@@ -231,13 +231,14 @@ fn make(
                 Encoded::png(&edited(&image, *edit), &format!("{stem}_{}", edit.label()))
             })
             .transpose(),
-        Picture::Baked { name, stages, part } => stack::bake(files, shader, stages)
-            .map(|baked| {
-                let (image, label) = match part {
-                    stack::Part::Color => (&baked.color, "color"),
-                    stack::Part::Glow => (&baked.glow, "glow"),
+        Picture::Baked { name, stages, part } => stack::bake(files, shader, stages, *part)
+            .map(|image| {
+                let label = match part {
+                    stack::Part::Color => "color".to_owned(),
+                    stack::Part::Glow => "glow".to_owned(),
+                    stack::Part::Shown(level) => format!("shown_{level}"),
                 };
-                Encoded::png(image, &format!("{name}_{label}"))
+                Encoded::png(&image, &format!("{name}_{label}"))
             })
             .transpose(),
         Picture::Sky { name, side } => sky::bake(files, shader, *side)

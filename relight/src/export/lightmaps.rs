@@ -1,7 +1,6 @@
 //! All lightmap pages that are used, in one image.
 
 use super::ExportError;
-use super::images::Encoded;
 use crate::image::Image;
 use crate::world::{RelitWorld, WorldSurface};
 use glam::Vec2;
@@ -69,11 +68,11 @@ impl Atlas {
             / Vec2::new(width as f32, height as f32)
     }
 
-    /// The atlas as an image, over-bright shift applied; `name`: what it is called.
+    /// The atlas as an image, over-bright shift applied.
     ///
     /// # Errors
     /// [`ExportError`] when it is too large to be an image.
-    pub fn encode(&self, world: &RelitWorld, name: &str) -> Result<Encoded, ExportError> {
+    pub fn image(&self, world: &RelitWorld) -> Result<Image, ExportError> {
         let (width, height) = self.size();
         let step = self.side + 2 * GUTTER;
         let mut rgba = vec![255; width * height * 4];
@@ -94,7 +93,7 @@ impl Atlas {
                 }
             }
         }
-        let image = u32::try_from(width)
+        u32::try_from(width)
             .ok()
             .zip(u32::try_from(height).ok())
             .and_then(|(width, height)| Image::from_rgba(width, height, rgba))
@@ -102,8 +101,7 @@ impl Atlas {
                 what: "number of lightmap texels",
                 found: (width * height) as u64,
                 limit: crate::image::MAX_PIXELS,
-            })?;
-        Encoded::png(&image, name)
+            })
     }
 }
 

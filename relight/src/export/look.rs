@@ -148,7 +148,12 @@ pub enum VertexColor {
 }
 
 /// Reads a material. `mean` gives the mean colour of an image, linear, with its alpha; `None` for one that is missing.
-pub fn look(material: &WorldMaterial, mean: &mut dyn FnMut(&str) -> Option<Vec4>) -> Look {
+/// `clear`: whether glass and liquids let light pass and refract it; else they are what their stages show.
+pub fn look(
+    material: &WorldMaterial,
+    clear: bool,
+    mean: &mut dyn FnMut(&str) -> Option<Vec4>,
+) -> Look {
     let shader = &material.resolved.shader;
     let class = material.class;
     let lightmapped = material.lighting == ImplicitKind::Lightmapped && shader.has_lightmap_stage();
@@ -280,7 +285,9 @@ pub fn look(material: &WorldMaterial, mean: &mut dyn FnMut(&str) -> Option<Vec4>
     if look.glow.is_none() {
         add_moving_glow(shader, vertex_light, &group, &mut look);
     }
-    dielectric(shader, &drawn, &mut look);
+    if clear {
+        dielectric(shader, &drawn, &mut look);
+    }
     look
 }
 

@@ -23,8 +23,10 @@ mod look;
 mod map;
 mod obj;
 mod output;
+mod shown;
 mod sky;
 mod stack;
+mod vertex_light;
 
 pub use extras::material as material_json;
 pub use images::{Encoded, ImageStore, Mime};
@@ -87,8 +89,11 @@ impl Format {
 /// What becomes of a map's lightmaps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Lightmaps {
-    /// Written: one atlas, and the light in vertex colours.
+    /// Materials need no light, and colours of vertices hold that of the lightmaps: every program shows the map lit. The
+    /// lightmaps are there with their coordinates, unused.
     #[default]
+    Vertices,
+    /// Materials are lit by lightmaps, for programs that know these.
     Keep,
     /// Left out, for programs that compute light themselves.
     Strip,
@@ -117,22 +122,35 @@ pub struct ExportOptions {
     pub lightmaps: Lightmaps,
     /// Where images go.
     pub images: ImagePlace,
-    /// Whether lights that the format knows (points, spots, suns) are written.
+    /// Whether lights that the format knows (points, spots, suns) are written, and lamps glow as strongly as the light
+    /// that they are. With lightmaps all light is there twice.
     pub lights: bool,
+    /// What all light is multiplied by; the map's own [`display_exposure`](crate::exposure::display_exposure) where it
+    /// is `None`.
+    pub exposure: Option<f32>,
     /// Whether the sky shines as strongly as its light in the map, instead of as bright as the game shows it.
     pub sky_light: bool,
     /// Whether moving textures are written as animations, which strict readers of glTF refuse.
     pub animate: bool,
 }
 
+impl Export<'_> {
+    /// What all light is multiplied by.
+    fn exposure(&self) -> f32 {
+        let found = self.options.exposure;
+        found.unwrap_or_else(|| crate::exposure::display_exposure(self.world))
+    }
+}
+
 impl Default for ExportOptions {
-    /// Metres, lightmaps kept, lights written, the sky as bright as in the game, nothing animated.
+    /// Metres, light in vertices and none besides, the sky as bright as in the game, nothing animated.
     fn default() -> Self {
         ExportOptions {
             scale: METRES_PER_UNIT,
             lightmaps: Lightmaps::default(),
             images: ImagePlace::default(),
-            lights: true,
+            lights: false,
+            exposure: None,
             sky_light: false,
             animate: false,
         }
@@ -174,8 +192,13 @@ pub enum ExportError {
         limit: u64,
     },
     /// An option that makes no sense.
-    #[error("scale is {0}; it must be a positive number")]
-    Scale(f32),
+    #[error("{what} is {found}; it must be a positive number")]
+    Option {
+        /// Which one.
+        what: &'static str,
+        /// What it is.
+        found: f32,
+    },
     /// An image could not be encoded.
     #[error("image {name}: {reason}")]
     Image {
@@ -217,9 +240,13 @@ pub fn export(
     format: Format,
     path: &Path,
 ) -> Result<ExportReport, ExportError> {
-    let scale = source.options.scale;
-    if !(scale.is_finite() && scale > 0.0) {
-        return Err(ExportError::Scale(scale));
+    for (what, found) in [
+        ("scale", Some(source.options.scale)),
+        ("exposure", source.options.exposure),
+    ] {
+        if let Some(found) = found.filter(|v| !(v.is_finite() && *v > 0.0)) {
+            return Err(ExportError::Option { what, found });
+        }
     }
     let mut output = Output::new(path);
     let mut report = match format {

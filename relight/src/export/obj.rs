@@ -34,7 +34,7 @@ pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportRe
         let Some(material) = world.materials.get(index as usize) else {
             continue;
         };
-        let look = source.look(material, radiances.get(index as usize).copied());
+        let look = source.look(material, radiances.get(index as usize).copied(), true);
         let entry = material_entry(source, index, material, &look, &mut images)?;
         materials.push_str(&entry);
         for lost in &look.lost {

@@ -12,22 +12,15 @@ use shaderscript::{AlphaGen, RgbGen, Shader, Stage, StageImage, TcGen, TcMod};
 /// Longest side of a picture that is made from several.
 const LONGEST: u32 = 1024;
 
-/// Which of the two pictures of a stack.
+/// Which of the pictures of a stack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Part {
     /// What reflects light, and alpha.
     Color,
     /// What is seen without light.
     Glow,
-}
-
-/// A stack as pictures of one size.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Baked {
-    /// What reflects light; alpha is what hides the background.
-    pub color: Image,
-    /// What is seen without light; alpha as in `color`.
-    pub glow: Image,
+    /// What is seen under light of this brightness, sRGB-encoded.
+    Shown(u8),
 }
 
 /// Stages as they are put together: those that show surroundings are left out.
@@ -116,8 +109,9 @@ pub fn mean_of(
     compose(&untested, &samples, vertex_light)
 }
 
-/// Puts stages together; `None` when one of their images is missing, or none has an image.
-pub fn bake(files: &dyn GameFiles, shader: &Shader, stages: &[usize]) -> Option<Baked> {
+/// Puts stages together; `None` when one of their images is missing, or none has an image. Alpha is what hides the
+/// background.
+pub fn bake(files: &dyn GameFiles, shader: &Shader, stages: &[usize], part: Part) -> Option<Image> {
     let kept = without_reflections(shader, stages);
     let base = shader.stages.get(*stages.iter().find(|&&i| {
         shader
@@ -154,7 +148,7 @@ pub fn bake(files: &dyn GameFiles, shader: &Shader, stages: &[usize]) -> Option<
             ..stage.clone()
         })
         .collect();
-    let (mut color, mut glow) = (Vec::new(), Vec::new());
+    let mut rgba = Vec::new();
     let mut samples = Vec::with_capacity(kept.len());
     for y in 0..height {
         for x in 0..width {
@@ -181,14 +175,15 @@ pub fn bake(files: &dyn GameFiles, shader: &Shader, stages: &[usize]) -> Option<
             } else {
                 1.0
             };
-            push(&mut color, drawn.lit / shown, alpha);
-            push(&mut glow, drawn.emission / shown, alpha);
+            let seen = match part {
+                Part::Color => drawn.lit,
+                Part::Glow => drawn.emission,
+                Part::Shown(level) => drawn.lit * table[usize::from(level)] + drawn.emission,
+            };
+            push(&mut rgba, seen / shown, alpha);
         }
     }
-    Some(Baked {
-        color: Image::from_rgba(width, height, color)?,
-        glow: Image::from_rgba(width, height, glow)?,
-    })
+    Image::from_rgba(width, height, rgba)
 }
 
 fn push(rgba: &mut Vec<u8>, color: Vec3, alpha: f32) {

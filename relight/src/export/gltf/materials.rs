@@ -3,7 +3,7 @@
 use super::animation::Motion;
 use crate::export::images::Encoded;
 use crate::export::look::{Alpha, Look, Slot, affine};
-use crate::export::{Export, ExportError, extras};
+use crate::export::{Export, ExportError, Lightmaps, extras};
 use crate::world::WorldMaterial;
 use glam::Vec2;
 use serde_json::{Map, Value, json};
@@ -168,13 +168,16 @@ impl Maker<'_> {
         if look.two_sided {
             out.insert("doubleSided".into(), json!(true));
         }
-        if let Some(texture) = self.lightmap.filter(|_| look.lightmapped) {
-            // Light that a white surface shows as white is an irradiance of pi.
-            self.put(
-                &mut extensions,
-                "MOZ_lightmap",
-                json!({"index": texture, "texCoord": 1, "intensity": PI}),
-            );
+        let shown = self.source.options.lightmaps == Lightmaps::Vertices;
+        if shown {
+            self.put(&mut extensions, "KHR_materials_unlit", json!({}));
+        }
+        // Light that a white surface shows as white is an irradiance of pi.
+        let lightmap = self.lightmap.filter(|_| look.lightmapped);
+        let lightmap =
+            lightmap.map(|texture| json!({"index": texture, "texCoord": 1, "intensity": PI}));
+        if let Some(lightmap) = lightmap.clone().filter(|_| !shown) {
+            self.put(&mut extensions, "MOZ_lightmap", lightmap);
         }
         self.dielectric(look, &mut extensions);
         if !extensions.is_empty() {
@@ -184,7 +187,11 @@ impl Maker<'_> {
         if let (Value::Object(told), false) = (&mut told, look.lost.is_empty()) {
             told.insert("lost".into(), json!(look.lost));
         }
-        out.insert("extras".into(), json!({"material": told}));
+        let mut told = json!({"material": told});
+        if let (Value::Object(told), Some(lightmap), true) = (&mut told, lightmap, shown) {
+            told.insert("lightmap".into(), lightmap);
+        }
+        out.insert("extras".into(), told);
         Ok(Value::Object(out))
     }
 

@@ -1,25 +1,31 @@
 //! glTF 2.0, binary and text.
 //!
-//! Light is in the units of [`crate::light`]: a radiance of 1 is display white. glTF's photometric units are taken to be
-//! these: what is white here shines with one candela per square metre there, and lights keep their proportions to it.
+//! Light is in the units of [`crate::light`], times the map's exposure: a radiance of 1 is display white. glTF's
+//! photometric units are taken to be these: what is white here shines with one candela per square metre there, and lights
+//! keep their proportions to it. So a program that shows radiance as it is, as most do, shows the map as bright as the
+//! game does.
 
 mod animation;
 mod buffer;
 mod materials;
 mod nodes;
+mod primitive;
+mod sky;
 
 use super::geometry::{self, Geometry, Part};
 use super::images::Encoded;
 use super::lightmaps::Atlas;
-use super::look::{Look, VertexColor};
+use super::look::Look;
 use super::output::Output;
-use super::{Export, ExportError, ExportReport, ImagePlace, Lightmaps, emission, sky};
-use crate::overbright;
-use crate::world::WorldMaterial;
-use buffer::{Buffers, Kind};
-use glam::{Vec2, Vec3, Vec4};
+use super::shown::make_shown;
+use super::{Export, ExportError, ExportReport, ImagePlace, Lightmaps, emission, vertex_light};
+use crate::image::Image;
+use crate::world::{RelitWorld, WorldMaterial};
+use buffer::Buffers;
+use glam::{Vec2, Vec3};
 use materials::{Maker, Sampling, Textures};
-use nodes::{Nodes, turn};
+use nodes::Nodes;
+use primitive::primitive;
 use serde_json::{Map, Value, json};
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -48,6 +54,39 @@ struct Document<'a> {
     warnings: Vec<String>,
 }
 
+/// A material in the document.
+struct Made {
+    number: usize,
+    look: Look,
+    /// Whether light in colours of vertices multiplies it.
+    shaded: bool,
+}
+
+/// Light of vertices.
+struct Baked {
+    /// For every part in order, where it is lit by lightmaps, the colour of each vertex.
+    colors: Vec<Option<Vec<Vec3>>>,
+    /// For every material the mean light on it.
+    means: Vec<Option<Vec3>>,
+}
+
+impl Baked {
+    /// Finds the light; `atlas`: all lightmaps.
+    fn new(world: &RelitWorld, geometry: &Geometry, atlas: Option<&Image>) -> Baked {
+        let lit = |part: &Part| {
+            let material = world.materials.get(part.material as usize)?;
+            let atlas = atlas.filter(|_| vertex_light::is_lightmapped(material))?;
+            Some(vertex_light::fit(part, atlas))
+        };
+        let colors: Vec<Option<Vec<Vec3>>> = geometry.parts().map(lit).collect();
+        let means = vertex_light::means(
+            world,
+            geometry.parts().zip(colors.iter().map(Option::as_deref)),
+        );
+        Baked { colors, means }
+    }
+}
+
 /// Writes `NAME.glb`, or `NAME.gltf` with `NAME.bin`, and images where they are not inside.
 pub(super) fn write(
     source: &Export<'_>,
@@ -55,7 +94,7 @@ pub(super) fn write(
     output: &mut Output,
 ) -> Result<ExportReport, ExportError> {
     let world = source.world;
-    let keep = source.options.lightmaps == Lightmaps::Keep;
+    let keep = source.options.lightmaps != Lightmaps::Strip;
     let atlas = keep.then(|| Atlas::new(world)).flatten();
     let geometry = geometry::gather(world, &|surface, page| {
         atlas
@@ -74,11 +113,16 @@ pub(super) fn write(
         lightmap: None,
         warnings: Vec::new(),
     };
-    if let Some(atlas) = &atlas {
-        let image = Arc::new(atlas.encode(world, &format!("{}_lightmaps", output.stem()))?);
-        document.lightmap = Some(document.textures.add(&image, Sampling::Lightmap));
+    let pages = atlas.map(|atlas| atlas.image(world)).transpose()?;
+    if let Some(pages) = &pages {
+        let image = Encoded::png(pages, &format!("{}_lightmaps", output.stem()))?;
+        let texture = document.textures.add(&Arc::new(image), Sampling::Lightmap);
+        document.lightmap = Some(texture);
     }
-    let meshes = document.add_meshes(&geometry)?;
+    let baked = (source.options.lightmaps == Lightmaps::Vertices)
+        .then(|| Baked::new(world, &geometry, pages.as_ref()));
+    drop(pages);
+    let meshes = document.add_meshes(&geometry, baked.as_ref())?;
     let mut top = document.nodes.add_entities(source, &meshes);
     top.extend(document.nodes.add_fogs(source));
     top.extend(document.add_sky(&geometry)?);
@@ -99,36 +143,53 @@ pub(super) fn write(
 }
 
 impl Document<'_> {
-    /// Adds the meshes of all models with the materials that they need; for every model its mesh.
-    fn add_meshes(&mut self, geometry: &Geometry) -> Result<Vec<Option<usize>>, ExportError> {
+    /// Adds the meshes of all models with the materials that they need; for every model its mesh. `baked`: light for
+    /// materials that are to need none.
+    fn add_meshes(
+        &mut self,
+        geometry: &Geometry,
+        baked: Option<&Baked>,
+    ) -> Result<Vec<Option<usize>>, ExportError> {
         let world = self.source.world;
         let radiances = emission::radiances(world);
-        let mut numbers: BTreeMap<u32, (usize, Look)> = BTreeMap::new();
+        let mut numbers: BTreeMap<u32, Made> = BTreeMap::new();
         let mut out = Vec::with_capacity(geometry.models.len());
+        let mut lights = baked.iter().flat_map(|b| &b.colors);
         for (model, mesh) in geometry.models.iter().enumerate() {
             let mut primitives = Vec::with_capacity(mesh.parts.len());
             for part in &mesh.parts {
+                let light = lights.next().and_then(Option::as_deref);
                 let Some(material) = world.materials.get(part.material as usize) else {
                     continue;
                 };
-                let (number, look) = match numbers.entry(part.material) {
+                let made = match numbers.entry(part.material) {
                     Entry::Occupied(known) => known.into_mut(),
                     Entry::Vacant(place) => {
-                        let radiance = radiances.get(part.material as usize).copied();
-                        let look = self.source.look(material, radiance);
+                        let index = part.material as usize;
+                        let radiance = radiances.get(index).copied();
+                        let mut look = self.source.look(material, radiance, baked.is_none());
+                        let shaded = baked.is_none_or(|baked| {
+                            let mean = baked.means.get(index).copied().flatten();
+                            make_shown(&mut look, mean.unwrap_or(Vec3::ONE))
+                        });
                         let number = self.add_material(material, &look)?;
                         let lost = look.lost.iter();
                         self.warnings
                             .extend(lost.map(|l| format!("material {}: {l}", material.name)));
-                        place.insert((number, look))
+                        place.insert(Made {
+                            number,
+                            look,
+                            shaded,
+                        })
                     }
                 };
                 primitives.push(primitive(
                     &mut self.buffers,
                     self.source,
                     part,
-                    look,
-                    *number,
+                    light.filter(|_| made.shaded),
+                    &made.look,
+                    made.number,
                 ));
             }
             if primitives.is_empty() {
@@ -166,135 +227,6 @@ impl Document<'_> {
             lightmap: self.lightmap,
             motions: &mut self.motions,
         }
-    }
-
-    /// Adds the sky as a box around everything; `None` for a map without.
-    fn add_sky(&mut self, geometry: &Geometry) -> Result<Option<usize>, ExportError> {
-        let source = self.source;
-        let world = source.world;
-        let material = world.sky.and_then(|m| world.materials.get(m as usize));
-        let Some(material) = material else {
-            return Ok(None);
-        };
-        let places = geometry
-            .parts()
-            .chain(&geometry.sky)
-            .flat_map(|p| &p.vertices)
-            .map(|v| v.position);
-        let mut bounds: Option<(Vec3, Vec3)> = None;
-        for p in places {
-            let (least, most) = bounds.unwrap_or((p, p));
-            bounds = Some((least.min(p), most.max(p)));
-        }
-        let Some((least, most)) = bounds else {
-            return Ok(None);
-        };
-        let middle = (least + most) * 0.5;
-        let radius = (most - least).length() * 0.5;
-        let mut pictures = Vec::new();
-        let mut mean = Vec4::ZERO;
-        for side in 0..6 {
-            let picture = sky::picture(source.files, material, side);
-            let shader = sky::definition(material);
-            let image = match &picture {
-                Some(picture) => source.images.get(source.files, picture, shader)?,
-                None => None,
-            };
-            if let Some(image) = &image {
-                mean += image.mean.extend(1.0);
-            }
-            pictures.push(image);
-        }
-        let radiance = world
-            .sky
-            .and_then(|m| emission::radiances(world).get(m as usize).copied())
-            .filter(|r| r.max_element() > 0.0);
-        let shown = (mean.w > 0.0).then(|| mean.truncate() / mean.w);
-        let strength = match (radiance, shown) {
-            (Some(radiance), Some(shown)) if source.options.sky_light => {
-                emission::luminance(radiance) / emission::luminance(shown).max(1.0e-3)
-            }
-            _ => 1.0,
-        };
-        let mut primitives = Vec::new();
-        let mut plain = None;
-        for (side, image) in pictures.iter().enumerate() {
-            let number = match image {
-                Some(image) => self.sky_material(&material.name, side, image, strength),
-                None => *plain.get_or_insert_with(|| {
-                    let color = radiance.filter(|_| shown.is_none()).unwrap_or(Vec3::ZERO);
-                    self.plain_sky(&material.name, color)
-                }),
-            };
-            let corners = [(-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (1.0, 1.0)];
-            let scale = source.options.scale;
-            let positions =
-                corners.map(|(s, t)| turn(middle + sky::point(side, s, t) * radius) * scale);
-            let normal = turn(-sky::point(side, 0.0, 0.0));
-            primitives.push(quad(&mut self.buffers, positions, normal, number));
-        }
-        self.meshes
-            .push(json!({"name": "sky", "primitives": primitives}));
-        let mesh = self.meshes.len() - 1;
-        let told = super::extras::material(material);
-        Ok(Some(self.nodes.add(json!({
-            "name": "sky",
-            "mesh": mesh,
-            "extras": {"material": told, "radiance": radiance.map(|r| r.to_array())},
-        }))))
-    }
-
-    fn sky_material(
-        &mut self,
-        name: &str,
-        side: usize,
-        image: &Arc<Encoded>,
-        strength: f32,
-    ) -> usize {
-        let texture = self.textures.add(image, Sampling::Clamp);
-        let mut material = json!({
-            "name": format!("{name} side {side}"),
-            "pbrMetallicRoughness": {
-                "baseColorFactor": [0.0, 0.0, 0.0, 1.0],
-                "metallicFactor": 0.0,
-            },
-            "emissiveTexture": {"index": texture},
-            "emissiveFactor": Vec3::splat(strength.min(1.0)).to_array(),
-        });
-        if strength > 1.0
-            && let Value::Object(map) = &mut material
-        {
-            self.extensions.insert("KHR_materials_emissive_strength");
-            map.insert(
-                "extensions".into(),
-                json!({"KHR_materials_emissive_strength": {"emissiveStrength": strength}}),
-            );
-        }
-        self.materials.push(material);
-        self.materials.len() - 1
-    }
-
-    fn plain_sky(&mut self, name: &str, color: Vec3) -> usize {
-        let brightest = color.max_element().max(1.0);
-        let mut material = json!({
-            "name": name,
-            "pbrMetallicRoughness": {
-                "baseColorFactor": [0.0, 0.0, 0.0, 1.0],
-                "metallicFactor": 0.0,
-            },
-            "emissiveFactor": (color / brightest).to_array(),
-        });
-        if brightest > 1.0
-            && let Value::Object(map) = &mut material
-        {
-            self.extensions.insert("KHR_materials_emissive_strength");
-            map.insert(
-                "extensions".into(),
-                json!({"KHR_materials_emissive_strength": {"emissiveStrength": brightest}}),
-            );
-        }
-        self.materials.push(material);
-        self.materials.len() - 1
     }
 
     /// Puts everything together and writes it.
@@ -374,7 +306,7 @@ impl Document<'_> {
             "map": world.name,
             "scale": source.options.scale,
             "axes": "id units (x, y, z) are scale * (x, z, -y)",
-            "exposure": crate::exposure::display_exposure(world),
+            "exposure": source.exposure(),
             "ambient": world.ambient.to_array(),
         });
         if let (Value::Object(map), false) = (&mut told, flares.is_empty()) {
@@ -473,126 +405,4 @@ fn escaped(path: &str) -> String {
         }
     }
     out
-}
-
-/// A part of a mesh.
-fn primitive(
-    buffers: &mut Buffers,
-    source: &Export<'_>,
-    part: &Part,
-    look: &Look,
-    material: usize,
-) -> Value {
-    let scale = source.options.scale;
-    let vertices = &part.vertices;
-    let positions = || vertices.iter().map(|v| turn(v.position) * scale);
-    let position = buffers.add_floats(Kind::Vec3, positions().map(|p| p.to_array()));
-    let first = positions().next().unwrap_or(Vec3::ZERO);
-    let (least, most) = positions().fold((first, first), |(a, b), p| (a.min(p), b.max(p)));
-    buffers.bound(position, &least.to_array(), &most.to_array());
-    let side = if look.reversed { -1.0 } else { 1.0 };
-    let normals = vertices
-        .iter()
-        .map(|v| (turn(v.normal) * side).normalize_or(Vec3::Y).to_array());
-    let mut attributes = json!({
-        "POSITION": position,
-        "NORMAL": buffers.add_floats(Kind::Vec3, normals),
-    });
-    if let Value::Object(map) = &mut attributes {
-        if look.color.is_some() || look.glow.is_some() {
-            let st = buffers.add_floats(Kind::Vec2, vertices.iter().map(|v| v.st.to_array()));
-            map.insert("TEXCOORD_0".into(), json!(st));
-        }
-        if look.lightmapped && source.options.lightmaps == Lightmaps::Keep {
-            let st = vertices.iter().map(|v| v.lightmap.to_array());
-            // a second set needs a first
-            if !map.contains_key("TEXCOORD_0") {
-                let zero = buffers.add_floats(Kind::Vec2, vertices.iter().map(|_| [0.0; 2]));
-                map.insert("TEXCOORD_0".into(), json!(zero));
-            }
-            map.insert(
-                "TEXCOORD_1".into(),
-                json!(buffers.add_floats(Kind::Vec2, st)),
-            );
-        }
-        if let Some(colors) = colors(source, part, look) {
-            map.insert(
-                "COLOR_0".into(),
-                json!(buffers.add(Kind::Color, &colors, vertices.len())),
-            );
-        }
-    }
-    let corners = part.indices.as_chunks::<3>().0.iter();
-    let ordered = corners.flat_map(|&[a, b, c]| {
-        // the map's front is clockwise
-        if look.reversed { [a, b, c] } else { [a, c, b] }
-    });
-    // 65535 restarts a strip
-    let short = vertices.len() < 65_535;
-    let mut bytes = Vec::with_capacity(part.indices.len() * if short { 2 } else { 4 });
-    for index in ordered {
-        if short {
-            bytes.extend_from_slice(&(index as u16).to_le_bytes());
-        } else {
-            bytes.extend_from_slice(&index.to_le_bytes());
-        }
-    }
-    let kind = if short { Kind::Short } else { Kind::Long };
-    let indices = buffers.add(kind, &bytes, part.indices.len());
-    json!({"attributes": attributes, "indices": indices, "material": material})
-}
-
-/// Colours of vertices, linear, 16 bits a channel; `None` where the material uses none.
-fn colors(source: &Export<'_>, part: &Part, look: &Look) -> Option<Vec<u8>> {
-    let keep = source.options.lightmaps == Lightmaps::Keep;
-    let rgb = match look.vertex_color {
-        Some(VertexColor::Paint) => true,
-        Some(VertexColor::Light) => keep,
-        None => false,
-    };
-    if !rgb && !look.vertex_alpha {
-        return None;
-    }
-    let table = overbright::byte_table();
-    let fraction = |v: f32| (v.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16;
-    let mut out = Vec::with_capacity(part.vertices.len() * 8);
-    for v in &part.vertices {
-        let [r, g, b, a] = v.color;
-        let color = if rgb {
-            [r, g, b].map(|c| fraction(table[usize::from(c)]))
-        } else {
-            [u16::MAX; 3]
-        };
-        let alpha = if look.vertex_alpha {
-            u16::from(a) * 257
-        } else {
-            u16::MAX
-        };
-        out.extend(color.into_iter().chain([alpha]).flat_map(u16::to_le_bytes));
-    }
-    Some(out)
-}
-
-/// A side of the sky: corners from above left, counter-clockwise.
-fn quad(buffers: &mut Buffers, positions: [Vec3; 4], normal: Vec3, material: usize) -> Value {
-    let position = buffers.add_floats(Kind::Vec3, positions.iter().map(|p| p.to_array()));
-    let (least, most) = positions
-        .iter()
-        .fold((positions[0], positions[0]), |(a, b), p| {
-            (a.min(*p), b.max(*p))
-        });
-    buffers.bound(position, &least.to_array(), &most.to_array());
-    let normals = buffers.add_floats(Kind::Vec3, positions.iter().map(|_| normal.to_array()));
-    let corners = [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]];
-    let st = buffers.add_floats(Kind::Vec2, corners.into_iter());
-    let indices: Vec<u8> = [0u16, 1, 2, 0, 2, 3]
-        .into_iter()
-        .flat_map(u16::to_le_bytes)
-        .collect();
-    let indices = buffers.add(Kind::Short, &indices, 6);
-    json!({
-        "attributes": {"POSITION": position, "NORMAL": normals, "TEXCOORD_0": st},
-        "indices": indices,
-        "material": material,
-    })
 }

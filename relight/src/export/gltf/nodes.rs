@@ -147,19 +147,26 @@ impl Nodes {
     /// Adds a node with all lights below it; `None` when there are none.
     pub fn add_lights(&mut self, source: &Export<'_>) -> Option<usize> {
         let scale = source.options.scale;
+        let exposure = source.exposure();
         let world = source.world;
         let mut children = Vec::new();
         for (number, light) in world.point_lights.iter().enumerate() {
-            children.extend(self.add_point(number, light, scale));
+            children.extend(self.add_point(number, light, scale, exposure));
         }
         for (number, sun) in world.suns.iter().enumerate() {
-            children.extend(self.add_sun(number, sun));
+            children.extend(self.add_sun(number, sun, exposure));
         }
         (!children.is_empty()).then(|| self.add(json!({"name": "lights", "children": children})))
     }
 
-    fn add_point(&mut self, number: usize, light: &PointLight, scale: f32) -> Option<usize> {
-        let (color, strength) = color_and_strength(light.intensity)?;
+    fn add_point(
+        &mut self,
+        number: usize,
+        light: &PointLight,
+        scale: f32,
+        exposure: f32,
+    ) -> Option<usize> {
+        let (color, strength) = color_and_strength(light.intensity * exposure)?;
         let mut node = Map::new();
         let name = format!("light.{number}");
         let mut out = json!({
@@ -185,8 +192,8 @@ impl Nodes {
         Some(self.add_light(out, node, name))
     }
 
-    fn add_sun(&mut self, number: usize, sun: &SunLight) -> Option<usize> {
-        let (color, strength) = color_and_strength(sun.irradiance)?;
+    fn add_sun(&mut self, number: usize, sun: &SunLight, exposure: f32) -> Option<usize> {
+        let (color, strength) = color_and_strength(sun.irradiance * exposure)?;
         let name = format!("sun.{number}");
         let mut node = Map::new();
         let out = json!({
