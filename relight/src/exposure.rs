@@ -7,6 +7,8 @@
 
 use crate::overbright;
 use crate::world::RelitWorld;
+use glam::Vec3;
+use q3bsp::Bsp;
 
 /// Every so many texels of a page one is taken.
 const STRIDE: usize = 7;
@@ -17,36 +19,63 @@ const DEFAULT: f32 = 0.25;
 /// Bounds, so that a strange map stays visible.
 const LIMITS: (f32, f32) = (0.02, 1.0);
 
+/// Brightness of a texture that is neither dark nor bright, encoded.
+const TEXTURE: f32 = 0.45;
+/// Exponent of the display's curve on a map that has no light stored.
+pub(crate) const DEFAULT_EXPONENT: f32 = 1.8;
+
 /// The exposure of a map, a factor of radiance: from its lightmaps, else from the colours of its vertices.
 pub fn display_exposure(world: &RelitWorld) -> f32 {
-    let texels = world
-        .bsp
+    of_stored(&world.bsp, |light| ratio(light)).unwrap_or(DEFAULT)
+}
+
+/// The exponent of the power law that the display's curve D comes to where a map shows its light: the mean of
+/// d ln D / d ln x over the light of its lightmaps, else of its vertices, on a texture of middle brightness.
+pub fn display_exponent(bsp: &Bsp) -> f32 {
+    of_stored(bsp, |light| exponent(light)).unwrap_or(DEFAULT_EXPONENT)
+}
+
+/// What is found of light on lightmaps, encoded; else on vertices.
+fn of_stored(
+    bsp: &Bsp,
+    find: impl Fn(&mut dyn Iterator<Item = [u8; 3]>) -> Option<f32>,
+) -> Option<f32> {
+    let mut texels = bsp
         .lightmaps
         .iter()
         .flat_map(|page| page.0.as_chunks::<3>().0.iter().step_by(STRIDE))
         .map(|&texel| overbright::shift(texel, overbright::MAP_OVERBRIGHT_BITS));
-    if let Some(exposure) = ratio(texels) {
-        return exposure;
-    }
-    let vertices = world.bsp.vertices.iter().map(|v| {
+    let mut vertices = bsp.vertices.iter().map(|v| {
         let [r, g, b, _] = v.color;
         overbright::shift([r, g, b], overbright::MAP_OVERBRIGHT_BITS)
     });
-    ratio(vertices).unwrap_or(DEFAULT)
+    find(&mut texels).or_else(|| find(&mut vertices))
+}
+
+/// Luminance of a colour, encoded like its bytes (Rec. 709); `None` of what is dark.
+fn level(rgb: [u8; 3]) -> Option<f32> {
+    let value = Vec3::from_array(rgb.map(f32::from)).dot(Vec3::new(0.2126, 0.7152, 0.0722)) / 255.0;
+    (value > DARK).then_some(value)
 }
 
 /// Mean decoded brightness over mean brightness; `None` where all is dark.
 fn ratio(colors: impl Iterator<Item = [u8; 3]>) -> Option<f32> {
     let (mut decoded, mut stored) = (0.0_f64, 0.0_f64);
-    for [r, g, b] in colors {
-        // Rec. 709 luminance
-        let value = (0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b)) / 255.0;
-        if value > DARK {
-            decoded += f64::from(overbright::to_linear(value));
-            stored += f64::from(value);
-        }
+    for value in colors.filter_map(level) {
+        decoded += f64::from(overbright::to_linear(value));
+        stored += f64::from(value);
     }
     (stored > 0.0).then(|| ((decoded / stored) as f32).clamp(LIMITS.0, LIMITS.1))
+}
+
+/// Mean of the curve's exponent; `None` where all is dark.
+fn exponent(colors: impl Iterator<Item = [u8; 3]>) -> Option<f32> {
+    let (mut sum, mut count) = (0.0_f64, 0usize);
+    for value in colors.filter_map(level) {
+        sum += f64::from(overbright::exponent(value * TEXTURE));
+        count += 1;
+    }
+    (count > 0).then(|| (sum / count as f64) as f32)
 }
 
 #[cfg(test)]
@@ -65,5 +94,10 @@ mod tests {
         assert_eq!(ratio(std::iter::repeat_n([255; 3], 4)), Some(1.0));
         assert_eq!(ratio(std::iter::empty()), None);
         assert_eq!(ratio(std::iter::repeat_n([1, 0, 0], 4)), None);
+        let curve = exponent(std::iter::repeat_n([128; 3], 10)).unwrap();
+        let x = value * TEXTURE;
+        let step = (overbright::to_linear(x * 1.01) / overbright::to_linear(x)).ln() / 1.01f32.ln();
+        assert!((curve - step).abs() < 0.01, "{curve} {step}");
+        assert_eq!(exponent(std::iter::empty()), None);
     }
 }

@@ -41,6 +41,15 @@ pub fn to_linear(encoded: f32) -> f32 {
     }
 }
 
+/// Exponent of the power law that [`to_linear`] comes to around a value, d ln D / d ln x: 1 near black, up to 2.4.
+pub fn exponent(encoded: f32) -> f32 {
+    if encoded <= 0.040_45 {
+        1.0
+    } else {
+        2.4 * encoded / (encoded + 0.055)
+    }
+}
+
 /// sRGB-encoded value of a linear one: the inverse of [`to_linear`].
 pub fn from_linear(linear: f32) -> f32 {
     if linear <= 0.003_130_8 {

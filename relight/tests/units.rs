@@ -5,7 +5,7 @@
 //! light is not computed, so somewhat less is right for the second.
 
 use glam::Vec3;
-use relight::light::LightRef;
+use relight::light::{LightColor, LightRef};
 use relight::{Materials, RelitWorld, SearchPath, WorldSurface};
 use shaderscript::light::SurfaceClass;
 use std::f32::consts::PI;
@@ -155,6 +155,7 @@ fn median_ratio(map: &str) -> Option<f32> {
     let files = SearchPath::open(&[data()?]).unwrap();
     let (materials, _) = Materials::load(&files);
     let options = relight::Options {
+        light_color: LightColor::Stored,
         calibrate: None,
         ..Default::default()
     };

@@ -284,6 +284,7 @@ impl Hash {
             self.vector(sun.irradiance);
         }
         self.vector(world.ambient);
+        self.number(u64::from(world.color_exponent.to_bits()));
     }
 
     pub(crate) fn number(&mut self, number: u64) {

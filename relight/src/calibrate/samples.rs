@@ -1,10 +1,11 @@
 //! Measurements of light: what the map compiler stored, and where in space it did.
 //!
 //! Light is counted as the outgoing radiance of a white surface, irradiance / π: a stored byte v is v 4 / 255 (see
-//! [`light`](crate::light)).
+//! [`light`](crate::light)). Its colour is what the engine shows: [`LightColor`](crate::light::LightColor).
 
 use super::bvh::Occluders;
 use super::random::Random;
+use crate::light;
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
 use glam::{Vec2, Vec3};
 use q3bsp::SurfaceKind;
@@ -190,7 +191,10 @@ fn sample_at(
     Some(Sample {
         position,
         normal,
-        value: Vec3::from_array(stored.map(f32::from)) * STORED_UNIT,
+        value: light::raise(
+            Vec3::from_array(stored.map(f32::from)) * STORED_UNIT,
+            world.color_exponent,
+        ),
         bounce: Vec3::ZERO,
         cluster,
         saturated: stored.contains(&255),
@@ -352,7 +356,7 @@ fn grid(world: &RelitWorld, count: usize, random: &mut Random) -> Vec<Sample> {
             samples.push(Sample {
                 position,
                 normal,
-                value: value * STORED_UNIT,
+                value: light::raise(value * STORED_UNIT, world.color_exponent),
                 bounce: Vec3::ZERO,
                 cluster,
                 saturated: point.directed.contains(&255),

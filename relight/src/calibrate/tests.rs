@@ -2,7 +2,7 @@ mod known_truth;
 
 use super::*;
 use crate::files::{MemoryFiles, SearchPath};
-use crate::light::{PointLight, SURFACE_LIGHT_RADIANCE};
+use crate::light::{LightColor, PointLight, SURFACE_LIGHT_RADIANCE};
 use crate::materials::Materials;
 use crate::test_data;
 use crate::world::{Options, Stage};
@@ -89,7 +89,12 @@ fn room(lamp: bool, light: Option<&dyn Fn(Vec3, Vec3) -> Vec3>) -> RelitWorld {
     relit(&map.build())
 }
 
+/// A world whose stored light has the colours that it says.
 fn relit(bsp: &Bsp) -> RelitWorld {
+    relit_as(bsp, LightColor::Stored)
+}
+
+fn relit_as(bsp: &Bsp, light_color: LightColor) -> RelitWorld {
     let mut files = MemoryFiles::new();
     let script = SCRIPT.replace('{', "\n{\n").replace('}', "\n}\n");
     files.insert("scripts/test.shader", script).unwrap();
@@ -97,6 +102,7 @@ fn relit(bsp: &Bsp) -> RelitWorld {
     assert!(diagnostics.is_empty(), "{diagnostics:?}");
     let bsp = Bsp::parse(&bsp.write()).unwrap();
     let options = Options {
+        light_color,
         calibrate: None,
         ..Options::default()
     };

@@ -11,11 +11,13 @@
 //!
 //! Source: q3map2's choice of the light image; the stage algebra is [`shaderscript::light`]'s.
 
+use super::color::raise;
 use super::entities::normalise;
 use super::glow::{mean_albedo, mean_emission};
 use super::{POINT_LIGHT_INTENSITY, SKY_LIGHT_RADIANCE, SURFACE_LIGHT_RADIANCE};
 use crate::files::GameFiles;
 use crate::image::{self, Image};
+use crate::overbright;
 use crate::world::WorldMaterial;
 use glam::Vec3;
 use shaderscript::light::SurfaceClass;
@@ -99,13 +101,16 @@ const SAMPLE_SIDE: u32 = 64;
 pub(crate) struct Finder<'a> {
     files: &'a dyn GameFiles,
     images: HashMap<String, Option<Image>>,
+    /// What ratios of channels are raised to: see [`LightColor`](super::LightColor).
+    exponent: f32,
 }
 
 impl<'a> Finder<'a> {
-    pub fn new(files: &'a dyn GameFiles) -> Self {
+    pub fn new(files: &'a dyn GameFiles, exponent: f32) -> Self {
         Finder {
             files,
             images: HashMap::new(),
+            exponent,
         }
     }
 
@@ -121,7 +126,8 @@ impl<'a> Finder<'a> {
             0.0
         };
         if surface_light > 0.0 || dome > 0.0 {
-            let color = self.light_color(definition);
+            // A colour with the luminance that the compiler's has, which scales it to a largest channel of 1.
+            let color = raise(self.light_color(definition), self.exponent);
             let (source, strength) = if sky {
                 (
                     EmissionSource::Sky,
@@ -199,7 +205,8 @@ impl<'a> Finder<'a> {
         clouds + sum / sides.max(1.0)
     }
 
-    /// Colour of the light that directives ask for, its largest channel 1.
+    /// Colour of the light that directives ask for as the compiler takes it, its largest channel 1: of images the mean
+    /// of what they show, encoded.
     fn light_color(&mut self, definition: &Shader) -> Vec3 {
         let light = &definition.light;
         if let Some(rgb) = light.light_rgb {
@@ -218,7 +225,8 @@ impl<'a> Finder<'a> {
         let mean = names
             .into_iter()
             .find_map(|name| self.image(name).map(Image::mean_linear));
-        mean.map_or(Vec3::ONE, normalise)
+        let encode = |c: Vec3| Vec3::from_array(c.to_array().map(overbright::from_linear));
+        mean.map_or(Vec3::ONE, |mean| normalise(encode(mean)))
     }
 
     /// The small copy of an image that was asked for before.

@@ -44,7 +44,10 @@ pub(crate) fn rescue(world: &mut RelitWorld, finder: &mut Finder<'_>) {
     }
     world.report.triangle_lights = world.lights.len();
     if world.light_count() == 0 && world.ambient == Vec3::ZERO {
-        world.ambient = mean_lightmap(world) * AMBIENT_RADIANCE;
+        world.ambient = super::raise(
+            mean_lightmap(world) * AMBIENT_RADIANCE,
+            world.color_exponent,
+        );
     }
 }
 

@@ -37,12 +37,13 @@
 //! radiance.
 //!
 //! The numbers are a prior. Compilers have options (`-areascale`, `-pointscale`, gamma) that leave no trace
-//! in the map, and the display treats the sum in encoded space.
+//! in the map. Colours of directives are raised as [`LightColor`] says.
 //!
 //! Source: the constants are the defaults of q3map2 (area scale 0.25, point scale 7500, sky scale 1); the
 //! units are written out here.
 
 mod by_hand;
+mod color;
 mod emission;
 mod entities;
 mod fallback;
@@ -60,6 +61,7 @@ mod surfaces;
 mod sweep;
 
 pub use by_hand::{LightsByHand, LightsLineError};
+pub use color::LightColor;
 pub use emission::{Emission, EmissionSource, GLOW_THRESHOLD};
 pub use flicker::Flicker;
 pub use judge::{ListJudgement, judge, lists_by_geometry, lists_by_visibility};
@@ -69,6 +71,7 @@ pub use report::{EmitterSummary, LightReport};
 pub use sight::{ClusterSet, Sight};
 pub use sweep::{SweepReport, sweep};
 
+pub(crate) use color::raise;
 pub(crate) use emission::Finder;
 pub(crate) use entities::{ambient, light_entities};
 pub(crate) use fallback::rescue;

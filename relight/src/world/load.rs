@@ -4,9 +4,10 @@ use super::geometry::{Flare, Geometry, NO_LIGHT, WorldModel, WorldSurface};
 use super::material::{WorldMaterial, lighting_of, lightmap_of};
 use super::{RelitWorld, fog};
 use crate::calibrate::{CalibrationOptions, calibrate};
+use crate::exposure::display_exponent;
 use crate::files::{FileError, GameFiles};
 use crate::image;
-use crate::light::{self, LightReport, TriangleLight};
+use crate::light::{self, LightColor, LightReport, TriangleLight};
 use crate::materials::Materials;
 use crate::overbright::MAP_OVERBRIGHT_BITS;
 use glam::Vec3;
@@ -64,6 +65,8 @@ pub struct Options<'a> {
     pub subdivisions: f32,
     /// Left shift of lightmaps and vertex colours: `r_mapOverBrightBits` less what the display adds.
     pub overbright_shift: u32,
+    /// Which colours stored light and directives mean.
+    pub light_color: LightColor,
     /// How lights are fitted to the map's lightmaps; `None` leaves them as directives say.
     pub calibrate: Option<CalibrationOptions>,
     /// Whether the file of lights beside the map, if there is one, changes them at the end; see
@@ -79,6 +82,7 @@ impl Default for Options<'_> {
         Options {
             subdivisions: 4.0,
             overbright_shift: MAP_OVERBRIGHT_BITS,
+            light_color: LightColor::default(),
             calibrate: Some(CalibrationOptions::default()),
             by_hand: true,
             progress: None,
@@ -128,7 +132,11 @@ impl RelitWorld {
             bsp.warnings.iter().map(|w| format!("{map}: {w}")).collect();
 
         begin(Stage::Materials);
-        let mut finder = light::Finder::new(files);
+        let color_exponent = match options.light_color {
+            LightColor::Displayed => display_exponent(&bsp),
+            LightColor::Stored => 1.0,
+        };
+        let mut finder = light::Finder::new(files, color_exponent);
         let (mut world_materials, material_of) = resolve_materials(files, materials, &bsp);
         let mut faulty: Vec<_> = world_materials
             .iter()
@@ -193,8 +201,12 @@ impl RelitWorld {
         for material in &mut world_materials {
             material.emission = finder.emission(material);
         }
-        let (point_lights, mut suns) = light::light_entities(&entities);
+        let (mut point_lights, mut suns) = light::light_entities(&entities);
         suns.extend(light::suns(&world_materials, &surfaces));
+        let points = point_lights.iter_mut().map(|l| &mut l.intensity);
+        for strength in points.chain(suns.iter_mut().map(|s| &mut s.irradiance)) {
+            *strength = light::raise(*strength, color_exponent);
+        }
         let mut world = RelitWorld {
             name: map.to_owned(),
             materials: world_materials,
@@ -209,11 +221,12 @@ impl RelitWorld {
             point_lights,
             suns,
             light_lists: Default::default(),
-            ambient: light::ambient(&entities),
+            ambient: light::raise(light::ambient(&entities), color_exponent),
             sky: None,
             report: LightReport::default(),
             calibration: None,
             warnings,
+            color_exponent,
             overbright_shift: options.overbright_shift,
             bsp,
         };
@@ -243,7 +256,7 @@ impl RelitWorld {
     /// Finds what calibration needs to know of materials: how much light they throw back, and what they show of their
     /// own. Loading does this only when it is asked to calibrate.
     pub fn measure_materials(&mut self, files: &dyn GameFiles) {
-        self.measure_materials_with(&mut light::Finder::new(files));
+        self.measure_materials_with(&mut light::Finder::new(files, self.color_exponent));
     }
 
     fn measure_materials_with(&mut self, finder: &mut light::Finder<'_>) {

@@ -1,5 +1,6 @@
 //! Materials of a world: each combination of name, flags and lighting that its surfaces use.
 
+use crate::exposure::DEFAULT_EXPONENT;
 use crate::files::GameFiles;
 use crate::light::{Emission, Finder, Flicker};
 use crate::materials::{Materials, Resolved};
@@ -59,7 +60,7 @@ impl WorldMaterial {
             emission: None,
             flicker: None,
         };
-        let mut finder = Finder::new(files);
+        let mut finder = Finder::new(files, DEFAULT_EXPONENT);
         material.emission = finder.emission(&material);
         material.flicker = finder.flicker(&material);
         material.albedo = finder.albedo(&material);

@@ -63,6 +63,9 @@ pub struct RelitWorld {
     pub calibration: Option<CalibrationReport>,
     /// What was wrong and is made up for: missing materials, repaired values. Each thing once.
     pub warnings: Vec<String>,
+    /// What ratios of the channels of stored light were raised to, to get the colours of light: see
+    /// [`LightColor`](crate::light::LightColor).
+    pub color_exponent: f32,
     /// Shift that was applied to vertex colours; see [`overbright`].
     pub overbright_shift: u32,
 }

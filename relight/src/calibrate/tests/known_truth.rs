@@ -95,6 +95,16 @@ fn stored(at: Vec3, normal: Vec3, bounced: Vec3) -> Vec3 {
 
 #[test]
 fn a_hall_with_everything_is_taken_apart() {
+    taken_apart(LightColor::Stored);
+}
+
+#[test]
+fn the_same_hall_is_taken_apart_in_the_colours_that_the_engine_shows() {
+    taken_apart(LightColor::Displayed);
+}
+
+/// The map is one, but what its lights are is told by how colours are understood.
+fn taken_apart(light_color: LightColor) {
     let mut map = MapBuilder::new();
     let wall = map.add_shader("t/wall", 0, 1);
     let mut faces = map.add_box_faces(wall, ROOM[0], ROOM[1], true).to_vec();
@@ -147,7 +157,10 @@ fn a_hall_with_everything_is_taken_apart() {
         });
         map.set_lightmap(face, page);
     }
-    let mut world = relit(&map.build());
+    let mut world = relit_as(&map.build(), light_color);
+    let exponent = world.color_exponent;
+    assert_eq!(exponent > 1.2, light_color == LightColor::Displayed);
+    let color = |light: Vec3| crate::light::raise(light, exponent);
     for material in world.materials.iter_mut().filter(|m| !m.is_sky()) {
         material.albedo = Vec3::splat(ALBEDO);
     }
@@ -171,7 +184,7 @@ fn a_hall_with_everything_is_taken_apart() {
     println!("sun {angle} degrees off");
     assert!(angle < 2.0, "{angle}");
     assert!(
-        (sun.irradiance / SUN - 1.0).abs().max_element() < 0.15,
+        (sun.irradiance / color(SUN) - 1.0).abs().max_element() < 0.15,
         "{sun:?}"
     );
     assert!(
@@ -193,7 +206,7 @@ fn a_hall_with_everything_is_taken_apart() {
         .iter()
         .map(|&(origin, intensity)| PointLight {
             origin,
-            intensity,
+            intensity: color(intensity),
             radius: 4.0,
             spot: None,
         })

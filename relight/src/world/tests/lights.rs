@@ -26,8 +26,9 @@ fn an_emissive_quad_in_a_room() {
     let world = relight(map);
 
     assert_eq!(world.lights.len(), 2);
-    let linear_half = overbright::to_linear(128.0 / 255.0);
-    let expected = Vec3::new(1.0, linear_half, 0.0) * (PI * 1000.0 / 255.0);
+    // The compiler takes the mean of an image's bytes as they are.
+    let half = 128.0 / 255.0;
+    let expected = Vec3::new(1.0, half, 0.0) * (PI * 1000.0 / 255.0);
     for light in &world.lights {
         assert!(
             (light.radiance - expected).length() < 1e-3,
