@@ -215,7 +215,7 @@ impl Recorder {
     pub fn drawing(&mut self, name: &str, target: &Rendering<'_>) -> Result<Pass<'_>, Error> {
         let attachments = Attachments::of(target);
         let clears = target.clear_color.is_some() || target.clear_depth.is_some();
-        if clears || self.open != Some(attachments) {
+        if clears || !self.goes_on(target) {
             let mut pass = self.pass(name, Access::GRAPHICS, Access::GRAPHICS)?;
             pass.begin_rendering(target)?;
             pass.stays_open = Some(attachments);
@@ -224,6 +224,11 @@ impl Recorder {
         let mut pass = self.begin_pass(name, None)?;
         pass.go_on(attachments);
         Ok(pass)
+    }
+
+    /// Whether a [`drawing`](Self::drawing) to `target` that clears nothing goes on where the pass before stopped.
+    pub fn goes_on(&self, target: &Rendering<'_>) -> bool {
+        self.open == Some(Attachments::of(target))
     }
 
     /// Ends the drawing that a [`drawing`](Self::drawing) left open.

@@ -1,4 +1,5 @@
-//! One colour over the whole viewport, in some of its channels.
+//! One colour, in some of its channels, or one depth over a rectangle. What is drawn is cleared so in the middle of a
+//! frame: where a clear stands between draws, software drivers finish all drawing before it.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -7,27 +8,38 @@ use bytemuck::{Pod, Zeroable};
 
 use super::target::TargetKind;
 use crate::gpu::{
-    self, BlendFactor, DepthTest, Device, GraphicsDesc, GraphicsPipeline, Pass, Stencil,
+    self, BlendFactor, ColorMask, DepthTest, Device, GraphicsDesc, GraphicsPipeline, Pass, Stencil,
 };
 
 /// What `cover.vert` and `cover.frag` are given.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub struct CoverParameters {
-    /// Colour.
+    /// Colour, where any is drawn.
     pub color: [f32; 4],
     /// Depth of the triangle that covers the viewport.
     pub depth: f32,
 }
 
-/// A pipeline that covers the viewport; with a shade, what is there is multiplied where the stencil is not 0 and the
-/// depth is not nearer.
+/// What covers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// A colour.
+    Color,
+    /// A depth, in place of what is there.
+    Depth,
+    /// A colour that is multiplied where the stencil is not 0 and the depth is not nearer.
+    Shade,
+}
+
+/// A pipeline that covers the viewport.
 pub fn pipeline(
     device: &Device,
     target: TargetKind,
-    shade: bool,
+    kind: Kind,
 ) -> Result<GraphicsPipeline, gpu::Error> {
     let multiply = (BlendFactor::DstColor, BlendFactor::Zero);
+    let shade = kind == Kind::Shade;
     GraphicsPipeline::new(
         device,
         &GraphicsDesc {
@@ -40,9 +52,13 @@ pub fn pipeline(
             } else {
                 DepthTest::Always
             },
-            depth_write: shade,
+            depth_write: kind != Kind::Color,
             blend: shade.then_some(multiply),
-            color_write: target.mask,
+            color_write: match kind {
+                Kind::Depth => ColorMask::NONE,
+                _ => target.mask,
+            },
+            fragment: (kind != Kind::Depth).then_some(&shaders::RASTER_COVER_FRAG),
             ..GraphicsDesc::new(
                 "cover",
                 &shaders::RASTER_COVER_VERT,
@@ -52,29 +68,49 @@ pub fn pipeline(
     )
 }
 
-/// Fills viewports.
+/// Fills rectangles.
 #[derive(Default)]
 pub struct Cover {
-    made: HashMap<TargetKind, GraphicsPipeline>,
+    made: HashMap<(TargetKind, Kind), GraphicsPipeline>,
 }
 
 impl Cover {
-    /// Makes what [`draw`](Self::draw) needs.
+    /// Makes what drawing needs.
     ///
     /// # Errors
     /// The device is out of memory or cannot make a pipeline.
-    pub fn prepare(&mut self, device: &Device, target: TargetKind) -> Result<(), gpu::Error> {
-        if let Entry::Vacant(place) = self.made.entry(target) {
-            place.insert(pipeline(device, target, false)?);
+    pub fn prepare(
+        &mut self,
+        device: &Device,
+        target: TargetKind,
+        kind: Kind,
+    ) -> Result<(), gpu::Error> {
+        if let Entry::Vacant(place) = self.made.entry((target, kind)) {
+            place.insert(pipeline(device, target, kind)?);
         }
         Ok(())
     }
 
-    /// Fills the scissor's rectangle.
-    pub fn draw(&self, pass: &mut Pass<'_>, target: TargetKind, color: [f32; 4]) {
-        if let Some(pipeline) = self.made.get(&target) {
+    /// Fills the scissor's rectangle with a colour. The viewport must be the whole image.
+    pub fn color(&self, pass: &mut Pass<'_>, target: TargetKind, color: [f32; 4]) {
+        let parameters = CoverParameters { color, depth: 0.0 };
+        self.draw(pass, (target, Kind::Color), &parameters);
+    }
+
+    /// Fills the scissor's rectangle with a depth. The viewport must be the whole image.
+    pub fn depth(&self, pass: &mut Pass<'_>, target: TargetKind, depth: f32) {
+        let color = [0.0; 4];
+        self.draw(
+            pass,
+            (target, Kind::Depth),
+            &CoverParameters { color, depth },
+        );
+    }
+
+    fn draw(&self, pass: &mut Pass<'_>, key: (TargetKind, Kind), parameters: &CoverParameters) {
+        if let Some(pipeline) = self.made.get(&key) {
             pass.bind_graphics(pipeline);
-            pass.push(&CoverParameters { color, depth: 0.0 });
+            pass.push(parameters);
             pass.draw(3, 1, 0, 0);
         }
     }

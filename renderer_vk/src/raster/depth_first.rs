@@ -3,16 +3,18 @@
 //!
 //! The picture stays the same to the bit: positions are `invariant`, so such a surface still passes `LessEqual` wherever
 //! it is in sight at the end, and what it would have overwritten is not drawn at all. It costs a vertex pass without
-//! fragments. Left out are views with a clip plane, where fragments decide what is there.
+//! fragments, so curves and meshes, which hide little for their many triangles, are not drawn twice. Left out are views
+//! with a clip plane, where fragments decide what is there.
 
 use shaders::types::Draw;
 use shaders::types::constants as c;
 use shaderscript::sort;
 
 use super::list::{Call, DepthRange, DrawList};
-use super::pipelines::{Depth, State};
+use super::pipelines::{CullFaces, Depth, State};
 use super::shading::Shading;
 use crate::assets::Material;
+use crate::scene::{DrawSurface, Geometry};
 
 /// Whether the first pass of a material draws, and writes the depth of, everything that its surfaces cover.
 pub(super) fn covers(material: &Material) -> bool {
@@ -43,52 +45,87 @@ pub(super) fn order_free(material: &Material) -> bool {
     hides && (rest.iter()).all(|pass| pass.depth_test && (pass.depth_equal || !holes))
 }
 
-/// How the depth of a material's surfaces is drawn first, if it may be; `plain` is how they are drawn later on.
-pub(super) fn state(material: &Material, plain: State) -> Option<State> {
-    covers(material).then_some(State {
+/// How depth alone is drawn.
+pub(super) fn depth_alone(cull: CullFaces) -> State {
+    State {
         blend: None,
         depth: Depth::LessEqual,
         depth_write: true,
+        cull,
+        offset: false,
+        wireframe: false,
         shading: Shading {
             mode: c::DRAW_DEPTH,
             ..Shading::WHITE
         },
-        ..plain
-    })
+    }
+}
+
+/// A surface whose depth is drawn first.
+#[derive(Clone, Copy)]
+pub(super) struct Occluder {
+    cull: CullFaces,
+    instance: u32,
+    /// Of the map's indices.
+    first_index: u32,
+    index_count: u32,
 }
 
 impl DrawList {
-    /// Takes note of a group of unmoving surfaces with indices `span`. `plain` and `draw` are the group's.
+    /// Takes note of the surfaces of a group that hide much. `plain` is how the group is drawn.
     pub(super) fn note_depth(
         &mut self,
         material: &Material,
         plain: State,
-        span: (u32, u32),
-        draw: Draw,
+        surfaces: &[DrawSurface],
     ) {
-        let Some(state) = state(material, plain) else {
+        if !covers(material) {
             return;
-        };
-        if let Some(last) = self.depth_first.last_mut() {
-            let instance = self.draws.get(last.draw as usize).map(|d| d.instance);
-            let continues = last.first_index + last.index_count == span.0;
-            if continues && instance == Some(draw.instance) && last.state == state {
-                last.index_count += span.1;
-                return;
+        }
+        for surface in surfaces.iter().filter(|s| s.flat) {
+            if let Geometry::Static {
+                first_index,
+                index_count,
+            } = surface.geometry
+            {
+                self.occluders.push(Occluder {
+                    cull: plain.cull,
+                    instance: surface.instance,
+                    first_index,
+                    index_count,
+                });
             }
         }
-        self.depth_first.push(Call {
-            state,
-            range: DepthRange::Normal,
-            first_index: span.0,
-            index_count: span.1,
-            draw: self.draws.len() as u32,
-        });
-        self.draws.push(draw);
     }
 
-    /// Puts what was noted before all other calls.
-    pub(super) fn put_depth_first(&mut self) {
+    /// Puts the depth of what was noted before all other calls: one call for all surfaces of a model that are culled
+    /// alike, whatever their materials.
+    pub(super) fn put_depth_first(&mut self, indices: &[u32]) {
+        let alike = |o: &Occluder| (o.cull, o.instance);
+        self.occluders
+            .sort_unstable_by_key(|o| (alike(o), o.first_index));
+        for run in self.occluders.chunk_by(|a, b| alike(a) == alike(b)) {
+            let Some(&first) = run.first() else { continue };
+            let first_index = self.indices.len() as u32;
+            for occluder in run {
+                let from = occluder.first_index as usize;
+                let span = from..from.saturating_add(occluder.index_count as usize);
+                self.indices
+                    .extend_from_slice(indices.get(span).unwrap_or_default());
+            }
+            let draw = self.draws.len() as u32;
+            self.draws.push(Draw {
+                instance: first.instance,
+                ..Draw::default()
+            });
+            self.depth_first.push(Call {
+                state: depth_alone(first.cull),
+                range: DepthRange::Normal,
+                first_index,
+                index_count: self.indices.len() as u32 - first_index,
+                draw,
+            });
+        }
         self.calls.splice(0..0, self.depth_first.drain(..));
     }
 }

@@ -42,8 +42,8 @@ pub fn states(stages: &StageContext<'_>, material: &Material, mut found: impl Fn
         // pictures of the overlay are sprites and marks in views, too, unless no script says how
         if !flat || pass.depth_test {
             found(in_view);
-            if let Some(depth) = depth_first::state(material, in_view) {
-                found(depth);
+            if depth_first::covers(material) {
+                found(depth_first::depth_alone(in_view.cull));
             }
         }
         if flat {

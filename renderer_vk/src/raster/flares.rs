@@ -334,6 +334,7 @@ fn list_quads(quads: &mut ViewScene, scene: &ViewScene, material: u32, count: u3
             first_index: 0,
             index_count: count * 6,
         },
+        flat: false,
     });
 }
 

@@ -230,7 +230,9 @@ impl DrawList {
         let plain = context.plain_state(material);
         for group in groups {
             if !group.common.dynamic && group.range == DepthRange::Normal {
-                self.note_depth(material, plain, group.span, plain_draw(group));
+                let (first, count) = group.surfaces;
+                let surfaces = context.surfaces.get(first..first + count);
+                self.note_depth(material, plain, surfaces.unwrap_or_default());
             }
         }
         for pass in &material.passes {

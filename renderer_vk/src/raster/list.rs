@@ -4,6 +4,7 @@ use shaders::types::constants as c;
 use shaders::types::{Draw, Instance, Vertex};
 
 use super::aids::Aids;
+use super::depth_first::Occluder;
 use super::groups::{Group, GroupContext};
 use super::pipelines::{CullFaces, Depth, State};
 use super::shading::{Shading, StageContext};
@@ -66,6 +67,8 @@ pub struct DrawList {
     pub vertices: Vec<Vertex>,
     /// See [`super::depth_first`].
     pub(super) depth_first: Vec<Call>,
+    /// See [`super::depth_first`].
+    pub(super) occluders: Vec<Occluder>,
     /// Of the material at hand; see [`super::groups`].
     pub(super) groups: Vec<Group>,
     /// Lights that were put off.
@@ -82,6 +85,7 @@ impl DrawList {
         self.indices.clear();
         self.vertices.clear();
         self.depth_first.clear();
+        self.occluders.clear();
     }
 
     /// Adds everything that a view shows.
@@ -120,9 +124,10 @@ impl DrawList {
         self.push_debug_polygons(&scene.debug);
         let clip = scene.view.clip_plane.is_some();
         if clip {
-            self.depth_first.clear();
+            self.occluders.clear();
         }
-        self.put_depth_first();
+        self.put_depth_first(statics.indices);
+        self.occluders.clear();
         for call in &mut self.calls {
             call.state.shading.clip = clip;
         }

@@ -32,7 +32,7 @@ pub use shading::StageContext;
 pub use target::Target;
 
 use crate::api::DynamicLight;
-use crate::gpu::{self, ColorMask, Device, Format, Image, Recorder, Rendering, Viewport};
+use crate::gpu::{self, Device, Format, Image, Recorder, Rendering, Viewport};
 use crate::scene::{ShadowVolumes, View};
 use cover::Cover;
 use list::DepthRange;
@@ -158,9 +158,6 @@ impl Raster {
         for call in &list.calls {
             self.pipelines.prepare(kind, call.state)?;
         }
-        if p.clear_color.is_some() && target.mask != ColorMask::ALL {
-            self.cover.prepare(&self.device, kind)?;
-        }
         self.lights.clear();
         self.lights.extend(p.lights.iter().map(|l| RasterLight {
             origin: l.origin,
@@ -211,22 +208,30 @@ impl Raster {
             clear_color: None,
             clear_depth: None,
         };
-        let mut pass = recorder.drawing(name, &rendering)?;
         let [x, y, width, height] = clip_to(p.viewport, target.color);
         if width == 0 || height == 0 {
             return Ok(());
         }
-        pass.set_scissor(x, y, width as u32, height as u32);
-        match p.clear_color {
-            Some(color) if target.mask == ColorMask::ALL => {
-                pass.clear_color_rect([x, y, width, height], color);
-            }
-            // clears heed no mask
-            Some(color) => self.cover.draw(&mut pass, kind, color),
-            None => {}
+        // depth is kept for no later view, so that of the whole image may go where drawing begins
+        let begins = !recorder.goes_on(&rendering);
+        let cover_depth = p.clear_depth && !begins;
+        if cover_depth {
+            self.cover.prepare(&self.device, kind, cover::Kind::Depth)?;
         }
-        if p.clear_depth {
-            pass.clear_depth_rect([x, y, width, height], 1.0);
+        if p.clear_color.is_some() {
+            self.cover.prepare(&self.device, kind, cover::Kind::Color)?;
+        }
+        let rendering = Rendering {
+            clear_depth: (p.clear_depth && begins).then_some(1.0),
+            ..rendering
+        };
+        let mut pass = recorder.drawing(name, &rendering)?;
+        pass.set_scissor(x, y, width as u32, height as u32);
+        if let Some(color) = p.clear_color {
+            self.cover.color(&mut pass, kind, color);
+        }
+        if cover_depth {
+            self.cover.depth(&mut pass, kind, 1.0);
         }
         if shadows.is_some() {
             pass.clear_stencil_rect([x, y, width, height]);

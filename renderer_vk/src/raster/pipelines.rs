@@ -41,7 +41,7 @@ pub enum Depth {
 }
 
 /// Which faces are dropped. The engine's front faces wind clockwise on the screen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum CullFaces {
     /// None.
     None,

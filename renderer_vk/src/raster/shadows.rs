@@ -68,7 +68,7 @@ impl Made {
                 volume(Stencil::Decrement, Cull::Front)?,
                 volume(Stencil::Decrement, Cull::Back)?,
             ],
-            shade: cover::pipeline(device, target, true)?,
+            shade: cover::pipeline(device, target, cover::Kind::Shade)?,
         })
     }
 }

@@ -83,6 +83,8 @@ pub struct DrawSurface {
     pub dlights: u32,
     /// Its triangles.
     pub geometry: Geometry,
+    /// A flat surface of the map, whose triangles tend to hide much.
+    pub flat: bool,
 }
 
 /// A mesh of this view that moves: an entity's surface, a polygon, a deformed surface of the world.

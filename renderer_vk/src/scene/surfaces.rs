@@ -178,6 +178,7 @@ impl SurfaceRun<'_> {
                 first_index,
                 index_count,
             },
+            flat: surface.flat,
         });
         None
     }
@@ -237,6 +238,7 @@ pub(super) fn push_mesh_surface(
             first_index: mesh.first_index,
             index_count: mesh.index_count,
         },
+        flat: false,
     });
 }
 
