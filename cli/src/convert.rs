@@ -1,6 +1,6 @@
 //! `relight convert`: maps for other programs.
 
-mod inputs;
+pub mod inputs;
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 mod describe;
 mod table;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -11,13 +11,13 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use relight::{
-    CalibrationCache, CalibrationOptions, GameFiles, Materials, Options, Pk3, RelitWorld,
-    SearchPath,
+    CalibrationCache, CalibrationOptions, GameFiles, Materials, Options, RelitWorld, SearchPath,
 };
 use serde::Serialize;
 
 use crate::BAD_INPUT;
 use crate::brought::Brought;
+use crate::convert::inputs::{self, Input};
 use describe::MapInfo;
 
 /// Tell what is in maps, and where their light comes from
@@ -52,17 +52,9 @@ pub struct InfoArgs {
     #[arg(long, value_name = "DIR", requires = "calibrate")]
     cache: Option<PathBuf>,
     /// Maps by name (oa_dm1), by game path (maps/oa_dm1.bsp) or by file; packs (.pk3) stand for all maps in
-    /// them. Without any: all maps of the game folders
+    /// them, pack.pk3:maps/x.bsp for one. Without any: all maps of the game folders
     #[arg(value_name = "MAP|PK3")]
     maps: Vec<String>,
-}
-
-/// Where a map is to be found.
-enum Source {
-    /// In the game folders and the packs given.
-    Game(String),
-    /// A file of its own.
-    File(PathBuf),
 }
 
 /// What is told about a map that cannot be loaded.
@@ -75,27 +67,32 @@ struct Failure {
 /// Loads the maps and prints what is in them. Exit code 2 when one of them cannot be read.
 pub fn run(args: &InfoArgs) -> Result<ExitCode> {
     let mut files = SearchPath::open(&args.games)?;
-    let sources = find_maps(&mut files, &args.maps)?;
-    if sources.is_empty() {
-        bail!(
-            "no maps in {}",
-            args.games
-                .iter()
-                .map(|g| g.display().to_string())
-                .collect::<Vec<_>>()
-                .join(", ")
-        );
+    let mut sources = Vec::new();
+    let mut failures = Vec::new();
+    for name in &args.maps {
+        match inputs::find(&mut files, &args.games, std::slice::from_ref(name)) {
+            Ok(found) => sources.extend(found),
+            Err(error) => failures.push(Failure {
+                map: name.clone(),
+                error: format!("{error:#}"),
+            }),
+        }
+    }
+    if args.maps.is_empty() {
+        let mut maps = files.list("maps", ".bsp");
+        maps.sort();
+        sources.extend(maps.iter().map(|map| Input::Game(format!("maps/{map}"))));
+        if sources.is_empty() {
+            let games = args.games.iter().map(|g| g.display().to_string());
+            bail!("no maps in {}", games.collect::<Vec<_>>().join(", "));
+        }
     }
     let (materials, _) = Materials::load(&files);
     let bar = ProgressBar::new(sources.len() as u64);
     bar.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}")?);
     let mut infos = Vec::new();
-    let mut failures = Vec::new();
     for source in sources {
-        let name = match &source {
-            Source::Game(map) => map.clone(),
-            Source::File(path) => path.display().to_string(),
-        };
+        let name = source.to_string();
         bar.set_message(name.clone());
         match load(&files, &materials, &source, args) {
             Ok(info) => infos.push(info),
@@ -112,12 +109,13 @@ pub fn run(args: &InfoArgs) -> Result<ExitCode> {
         println!("{}", serde_json::to_string_pretty(&all)?);
     } else {
         match infos.as_slice() {
+            [] => {}
             // A single map in full, several as a table.
             [one] if !args.short => table::print_map(one, args.emitters),
             many => table::print_table(many, args.emitters),
         }
         for failure in &failures {
-            eprintln!("{}: {}", failure.map, failure.error);
+            eprintln!("{}", failure.error);
         }
     }
     Ok(match failures.len() {
@@ -126,46 +124,10 @@ pub fn run(args: &InfoArgs) -> Result<ExitCode> {
     })
 }
 
-fn find_maps(files: &mut SearchPath, asked: &[String]) -> Result<Vec<Source>> {
-    let mut sources = Vec::new();
-    for name in asked {
-        let path = Path::new(name);
-        let extension = path
-            .extension()
-            .map(|e| e.to_string_lossy().to_lowercase())
-            .unwrap_or_default();
-        match extension.as_str() {
-            "pk3" => {
-                let maps = Pk3::open(path)?.list("maps", ".bsp");
-                if maps.is_empty() {
-                    bail!("{name}: no maps in it");
-                }
-                files.add_pk3(path)?;
-                sources.extend(
-                    maps.into_iter()
-                        .map(|map| Source::Game(format!("maps/{map}"))),
-                );
-            }
-            "bsp" if path.is_file() => sources.push(Source::File(path.to_owned())),
-            "bsp" => sources.push(Source::Game(name.clone())),
-            _ => sources.push(Source::Game(format!("maps/{name}.bsp"))),
-        }
-    }
-    if asked.is_empty() {
-        let mut maps = files.list("maps", ".bsp");
-        maps.sort();
-        sources.extend(
-            maps.into_iter()
-                .map(|map| Source::Game(format!("maps/{map}"))),
-        );
-    }
-    Ok(sources)
-}
-
 fn load(
     files: &SearchPath,
     materials: &Materials,
-    source: &Source,
+    source: &Input,
     args: &InfoArgs,
 ) -> Result<MapInfo> {
     let begin = Instant::now();
@@ -177,18 +139,8 @@ fn load(
         calibrate,
         ..Options::default()
     };
-    let (name, bytes) = match source {
-        Source::Game(map) => {
-            let bytes = files.read(map)?;
-            let absent = || format!("{map}: no such file in the game folders");
-            (map.clone(), bytes.with_context(absent)?)
-        }
-        Source::File(path) => {
-            let name = path.display().to_string();
-            let bytes = std::fs::read(path).with_context(|| name.clone())?;
-            (name, bytes)
-        }
-    };
+    let name = source.to_string();
+    let bytes = source.read(files)?;
     let lumps = q3bsp::lump_entries(&bytes).with_context(|| name.clone())?;
     let bsp = q3bsp::Bsp::parse(&bytes).with_context(|| name.clone())?;
     let brought = Brought::new(files, &bsp);

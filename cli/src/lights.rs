@@ -1,9 +1,9 @@
-//! `relight lights`: how good maps' light lists are, judged by rays.
+//! `relight lights`: maps' lights and light lists from above, and how good the lists are, judged by rays.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
 use relight::light::{
     LightLists, ListJudgement, judge, lists_by_geometry, lists_by_visibility, sweep,
@@ -13,22 +13,28 @@ use serde_json::json;
 
 use crate::view::{Maps, open};
 
-/// Judge the light lists of maps by rays
+/// Draw a map's lights from above, or judge its light lists by rays
 ///
-/// A pair of a light and a visibility cluster is visible when a ray from some point of the cluster to some point of the
-/// light arrives: when it meets no opaque triangle, nor runs through the solid of the map (pairs that are visible through
-/// the solid alone, where nothing is drawn on a wall, are counted apart). Prints for lists from the potentially visible
-/// sets alone, with geometry, and swept by rays: recall (visible pairs that are listed, of all visible ones, and of those
-/// that give more than a fifth of a percent of their cluster's light: the bound below which lights are left out),
-/// precision (visible pairs, of those listed) and its ratio to that of the potentially visible sets, the part of all
-/// arriving light that lights give which are not listed, the largest such part of a cluster, and the lists' lengths. The
-/// rays are others than those that the lists were swept with.
+/// The picture shows the clusters by how many lights they list, the lights, and where traced light differs from stored
+/// light. Without --output it is written as NAME_lights.png and NAME_lights.svg into the current folder.
 ///
-/// Example: relight lights oa_dm1 kaos2 --rays 256
+/// With --judge: a pair of a light and a visibility cluster is visible when a ray from some point of the cluster to some
+/// point of the light arrives: when it meets no opaque triangle, nor runs through the solid of the map (pairs that are
+/// visible through the solid alone, where nothing is drawn on a wall, are counted apart). Prints for lists from the
+/// potentially visible sets alone, with geometry, and swept by rays: recall (visible pairs that are listed, of all visible
+/// ones, and of those that give more than a fifth of a percent of their cluster's light: the bound below which lights are
+/// left out), precision (visible pairs, of those listed) and its ratio to that of the potentially visible sets, the part of
+/// all arriving light that lights give which are not listed, the largest such part of a cluster, and the lists' lengths.
+/// The rays are others than those that the lists were swept with.
+///
+/// Examples: relight lights oa_dm1; relight lights kaos2 -o kaos2.svg; relight lights oa_dm1 kaos2 --judge --rays 256
 #[derive(Args, Debug)]
 pub struct LightsArgs {
     #[command(flatten)]
     chosen: Maps,
+    /// Judge the light lists by rays, and print JSON: one object a map and kind of list
+    #[arg(long, conflicts_with = "output")]
+    judge: bool,
     /// Rays for a pair of light and cluster
     #[arg(long, default_value_t = 128)]
     rays: u32,
@@ -38,17 +44,31 @@ pub struct LightsArgs {
     /// Do not fit lights to the map's lightmaps first (the game does)
     #[arg(long)]
     no_calibration: bool,
-    /// Draw the map from above instead, .svg or .png: its lights, how many each cluster lists, and where traced light
-    /// differs from stored light
-    #[arg(long, value_name = "FILE")]
-    picture: Option<PathBuf>,
+    /// Where the picture goes, .svg or .png; may be given for both
+    #[arg(short, long, visible_alias = "picture", value_name = "FILE")]
+    output: Vec<PathBuf>,
     /// Folder to keep what calibration and rays find in
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
 }
 
-/// Runs the command: one JSON object a map and kind of list.
+/// Where the pictures of a map go: where the command line says, else beside each other in the current folder.
+fn pictures(args: &LightsArgs, map: &str) -> Vec<PathBuf> {
+    if !args.output.is_empty() {
+        return args.output.clone();
+    }
+    let stem = Path::new(map).file_stem().unwrap_or_default();
+    let stem = stem.to_string_lossy();
+    ["png", "svg"]
+        .map(|kind| PathBuf::from(format!("{stem}_lights.{kind}")))
+        .to_vec()
+}
+
+/// Runs the command.
 pub fn run(args: &LightsArgs) -> Result<()> {
+    if args.chosen.maps.len() > 1 && !args.output.is_empty() {
+        bail!("--output is for one map");
+    }
     for map in &args.chosen.maps {
         let (files, map) = open(map, &args.chosen.games)?;
         let (materials, _) = Materials::load(&*files);
@@ -62,11 +82,14 @@ pub fn run(args: &LightsArgs) -> Result<()> {
             ..Options::default()
         };
         let mut world = RelitWorld::load(&*files, &materials, &map, options)?;
-        if let Some(picture) = &args.picture {
+        if !args.judge {
             world.measure_materials(&*files);
             sweep(&mut world, cache.as_ref());
-            crate::lights_picture::draw(&world, picture)?;
-            println!("{}", picture.display());
+            let pictures = pictures(args, &map);
+            crate::lights_picture::draw(&world, &pictures)?;
+            for picture in pictures {
+                println!("{}", picture.display());
+            }
             continue;
         }
         let begin = Instant::now();

@@ -1,13 +1,15 @@
 //! A picture of a map from above: its lights, how many each cluster lists, and how well light agrees with stored light.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use glam::{Vec2, Vec3};
 use relight::calibrate::{Residual, residuals};
 use relight::light::EmissionSource;
 use relight::{CalibrationOptions, RelitWorld};
+
+use crate::pictures::{write_png, write_whole};
 
 /// Longest side of the picture, pixels.
 const SIDE: f32 = 1400.0;
@@ -28,29 +30,37 @@ enum Shape {
     Line(Vec2, Vec2, Color),
 }
 
-/// Draws a map's lights into a file, SVG or PNG by its name.
+/// Draws a map's lights into files, SVG or PNG by their names.
 ///
 /// # Errors
-/// The name ends otherwise, the map has no leaf that can be seen, or the file cannot be written.
-pub fn draw(world: &RelitWorld, path: &Path) -> Result<()> {
+/// A name ends otherwise, the map has no leaf that can be seen, or a file cannot be written.
+pub fn draw(world: &RelitWorld, paths: &[PathBuf]) -> Result<()> {
+    let is = |path: &Path, kind: &str| {
+        path.extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case(kind))
+    };
+    for path in paths {
+        if !is(path, "svg") && !is(path, "png") {
+            bail!("{}: a picture is .svg or .png", path.display());
+        }
+    }
     let options = CalibrationOptions {
         seed: 2,
         ..CalibrationOptions::default()
     };
     let residuals = residuals(world, &options);
     let (shapes, size) = shapes(world, &residuals)?;
-    let written = match path.extension().and_then(|e| e.to_str()) {
-        Some("svg") => std::fs::write(path, svg(&shapes, size, &legend(world, &residuals))),
-        Some("png") => {
+    for path in paths {
+        if is(path, "svg") {
+            let text = svg(&shapes, size, &legend(world, &residuals));
+            write_whole(path, text.as_bytes())?;
+        } else {
             let (width, height) = (size.x as u32, size.y as u32);
             let pixels = raster(&shapes, width as usize, height as usize);
-            let kind = image::ColorType::Rgb8;
-            return image::save_buffer(path, &pixels, width, height, kind)
-                .with_context(|| format!("{}: cannot be written", path.display()));
+            write_png(path, &pixels, width, height)?;
         }
-        _ => bail!("{}: a picture is .svg or .png", path.display()),
-    };
-    written.with_context(|| format!("{}: cannot be written", path.display()))
+    }
+    Ok(())
 }
 
 /// What the colours mean, and the figures beside the picture.
@@ -280,9 +290,9 @@ mod tests {
         .unwrap();
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
-        draw(&world, &at("a.svg")).unwrap();
-        draw(&world, &at("a.png")).unwrap();
-        assert!(draw(&world, &at("a.txt")).is_err());
+        draw(&world, &[at("a.svg")]).unwrap();
+        draw(&world, &[at("a.png")]).unwrap();
+        assert!(draw(&world, &[at("a.txt")]).is_err());
         let text = std::fs::read_to_string(at("a.svg")).unwrap();
         assert!(text.starts_with("<svg") && text.trim_end().ends_with("</svg>"));
         assert!(text.contains("<rect") && text.contains("triangle lights"));

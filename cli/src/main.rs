@@ -15,6 +15,7 @@ mod lights_picture;
 mod looks;
 mod material;
 mod measure;
+mod pictures;
 mod render;
 mod statistics;
 mod table;
@@ -47,7 +48,7 @@ enum Command {
     Estimators(estimators::EstimatorsArgs),
     /// Tell what is in maps, and where their light comes from
     Info(info::InfoArgs),
-    /// Judge the light lists of maps by rays
+    /// Draw a map's lights from above, or judge its light lists by rays
     Lights(lights::LightsArgs),
     /// Draw views in the classic look and traced, side by side, and compare how bright and how coloured they are
     Looks(looks::LooksArgs),

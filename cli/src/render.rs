@@ -1,8 +1,9 @@
 //! `relight render`: a picture of a map, without an engine and without a display.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::pictures::write_png;
 use crate::timings::Timings;
 use crate::view::{Camera, map_entities, open};
 use anyhow::{Context, bail};
@@ -47,38 +48,67 @@ pub enum Tracer {
     Compute,
 }
 
-/// Make a picture of a map, without an engine or a display
+/// Make a picture of a map, or a series of pictures, without an engine or a display
 ///
-/// Example: relight render --game /usr/share/games/openarena/baseoa oa_dm1 -o oa_dm1.png
+/// A picture appears whole or not at all. Exit code: 0, or 2 when the map cannot be read, or 1 for everything else.
+///
+/// Examples: relight render oa_dm1 -o oa_dm1.png; relight render my.bsp --spawn 2 --classic -o spawn.png;
+/// relight render oa_dm1 --view 100,-50,80,90,10 --spp 256 --size 640x480 -o view.png;
+/// relight render oa_dm1 --path flight.txt --frames 120 --spp 16 -o flight.png (flight_0000.png, flight_0001.png, …)
 #[derive(Args, Debug)]
 pub struct RenderArgs {
-    /// The map: a name (oa_dm1), maps/oa_dm1.bsp, or a .bsp or .pk3 file
+    /// The map: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp or .pk3 file, or pack.pk3:maps/x.bsp
     #[arg(required_unless_present = "sample")]
     map: Option<String>,
     /// Render the built-in sample map
     #[arg(long, conflicts_with = "map")]
     sample: bool,
     /// Game folder with pk3s; may be given more than once, the last has precedence
-    #[arg(long, value_name = "DIR")]
+    #[arg(
+        long,
+        value_name = "DIR",
+        default_value = "/usr/share/games/openarena/baseoa"
+    )]
     game: Vec<PathBuf>,
     /// Where the picture goes (PNG)
     #[arg(short, long)]
     output: PathBuf,
-    /// How the picture is made
-    #[arg(long, value_enum, default_value = "traced")]
-    look: Look,
+    /// How the picture is made; traced where nothing is said
+    #[arg(long, value_enum)]
+    look: Option<Look>,
+    /// The same as --look classic
+    #[arg(long, conflicts_with_all = ["look", "traced"])]
+    classic: bool,
+    /// The same as --look traced
+    #[arg(long, conflicts_with = "look")]
+    traced: bool,
     /// Size in pixels
     #[arg(long, default_value = "1280x720", value_parser = parse_size)]
     size: (u32, u32),
-    /// Camera: X Y Z YAW PITCH; default: the map's intermission or first spawn point
-    #[arg(long, num_args = 4..=5, allow_negative_numbers = true, value_names = ["X", "Y", "Z", "YAW", "PITCH"])]
+    /// Where to look from, units and degrees: x,y,z, and yaw and pitch (down) where they are not 0; by default from the
+    /// map's intermission or first spawn point
+    #[arg(long, value_parser = parse_view, allow_hyphen_values = true, value_name = "X,Y,Z,YAW,PITCH")]
+    view: Option<Camera>,
+    /// Look from a place where players appear, counted from 0 in the map's order
+    #[arg(long, value_name = "N", conflicts_with = "view")]
+    spawn: Option<usize>,
+    /// Look at the whole map from above one of its corners; classic where the look is not said. Traced, from the first
+    /// place on the way there that is inside, under the sky
+    #[arg(long, conflicts_with_all = ["view", "spawn"])]
+    overview: bool,
+    /// The same as --view, as words: X Y Z YAW PITCH
+    #[arg(long, num_args = 4..=5, allow_negative_numbers = true, conflicts_with_all = ["view", "spawn", "overview"],
+        value_names = ["X", "Y", "Z", "YAW", "PITCH"])]
     camera: Option<Vec<f32>>,
     /// Horizontal field of view, degrees
     #[arg(long, default_value_t = 90.0)]
     fov: f32,
-    /// Frames accumulated by the traced look
-    #[arg(long, default_value_t = 64)]
-    frames: u32,
+    /// Samples that the traced look takes for each pixel: 64, where --frames says no other number
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Option<u32>,
+    /// With --path: pictures, evenly along the path, --spp samples each. Without: frames that are drawn for one picture
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: Option<u32>,
     /// How traced light chooses lights
     #[arg(long, value_enum, default_value = "resampled")]
     sampling: Sampling,
@@ -110,8 +140,9 @@ pub struct RenderArgs {
     /// of GPU memory by purpose
     #[arg(long)]
     stats: bool,
-    /// Camera path, a frame a line, as the console command rt_path records it; in place of --camera and --frames
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["camera", "turn"])]
+    /// Camera path, a frame a line, as the console command rt_path records it: a series of pictures with --frames;
+    /// without, its frames are drawn one after the other, as a game would, and the last is the picture
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["camera", "view", "spawn", "overview", "turn"])]
     path: Option<PathBuf>,
     /// Turn the camera once round over the frames, so that they show different things
     #[arg(long)]
@@ -151,7 +182,7 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
 }
 
 /// The frames of a camera path.
-fn read_path(file: &std::path::Path) -> anyhow::Result<Vec<PathPoint>> {
+fn read_path(file: &Path) -> anyhow::Result<Vec<PathPoint>> {
     let text = std::fs::read_to_string(file)
         .with_context(|| format!("{}: cannot be read", file.display()))?;
     let points = path::parse(&text).with_context(|| file.display().to_string())?;
@@ -161,8 +192,202 @@ fn read_path(file: &std::path::Path) -> anyhow::Result<Vec<PathPoint>> {
     Ok(points)
 }
 
+/// `X,Y,Z[,YAW[,PITCH]]`, or with spaces between.
+fn parse_view(text: &str) -> Result<Camera, String> {
+    let words = text
+        .split(|c: char| c == ',' || c.is_whitespace())
+        .filter(|word| !word.is_empty());
+    let numbers: Option<Vec<f32>> = words
+        .map(|word| word.parse().ok().filter(|n: &f32| n.is_finite()))
+        .collect();
+    match numbers.as_deref() {
+        Some([x, y, z, rest @ ..]) if rest.len() <= 2 => Ok(Camera {
+            origin: Vec3::new(*x, *y, *z),
+            yaw: rest.first().copied().unwrap_or(0.0),
+            pitch: rest.get(1).copied().unwrap_or(0.0),
+        }),
+        _ => Err("a view is X,Y,Z,YAW,PITCH, for example 100,-50,80,90,10".into()),
+    }
+}
+
+/// The frame that is drawn: where of what, and whether a picture is written after it.
+struct Shot {
+    def: RefDef,
+    written: Option<PathBuf>,
+}
+
+impl RenderArgs {
+    fn look(&self) -> Look {
+        let usual = match self.overview {
+            true => Look::Classic,
+            false => Look::Traced,
+        };
+        match (self.classic, self.traced) {
+            (true, _) => Look::Classic,
+            (false, true) => Look::Traced,
+            (false, false) => self.look.unwrap_or(usual),
+        }
+    }
+
+    fn settings(&self) -> Settings {
+        let mut settings = Settings {
+            rt: self.look() == Look::Traced,
+            rt_accumulate: !self.no_accumulation,
+            rt_bounces: self.bounces,
+            rt_candidates: self.candidates.max(1),
+            rt_tracer: match self.tracer {
+                Tracer::Auto => TracerChoice::Auto,
+                Tracer::Pipeline => TracerChoice::Pipeline,
+                Tracer::Query => TracerChoice::Query,
+                Tracer::Compute => TracerChoice::Compute,
+            },
+            rt_debug: self.debug,
+            rt_exposure: self.exposure,
+            rt_denoiser: self.denoiser,
+            rt_taa: !self.no_taa,
+            rt_scale: self.scale,
+            rt_dof: self.lens.is_some(),
+            rt_num_random_dl: match self.sampling {
+                Sampling::Uniform | Sampling::Resampled => 1,
+                Sampling::All => 0,
+            },
+            rt_light_selection: match self.sampling {
+                Sampling::Uniform => renderer_vk::LightSelection::Uniform,
+                Sampling::Resampled | Sampling::All => renderer_vk::LightSelection::Resampled,
+            },
+            ..Settings::default()
+        };
+        if let Some([diameter, distance]) = self.lens.as_deref() {
+            settings.rt_aperture = *diameter;
+            settings.rt_focal_length = *distance;
+        }
+        settings
+    }
+
+    fn camera(&self, world: &relight::RelitWorld) -> anyhow::Result<Camera> {
+        let bsp = &world.bsp;
+        if let Some(view) = self.view {
+            return Ok(view);
+        }
+        if let Some([x, y, z, yaw, rest @ ..]) = self.camera.as_deref() {
+            return Ok(Camera {
+                origin: Vec3::new(*x, *y, *z),
+                yaw: *yaw,
+                pitch: rest.first().copied().unwrap_or(0.0),
+            });
+        }
+        if self.overview {
+            let camera = Camera::overview(world, self.size, self.fov)
+                .context("the map has nothing that is drawn")?;
+            return Ok(match self.look() {
+                Look::Classic => camera,
+                // From outside, rays see the sky's other side and no map.
+                Look::Traced => camera.moved_inside(bsp),
+            });
+        }
+        if let Some(number) = self.spawn {
+            let spawns = Camera::spawns(bsp);
+            return spawns
+                .get(number)
+                .copied()
+                .with_context(|| match spawns.len() {
+                    0 => format!("no spawn point {number}: players cannot appear in this map"),
+                    count => format!("no spawn point {number}: the map has 0 to {}", count - 1),
+                });
+        }
+        Camera::of_map(bsp).context("the map has no place to look from; give one with --view")
+    }
+
+    /// Frames for one picture.
+    fn samples(&self) -> u32 {
+        let asked = self.spp.or(self.frames.filter(|_| self.path.is_none()));
+        match self.look() {
+            Look::Traced => asked.unwrap_or(64),
+            Look::Classic if self.timings || self.stats => asked.unwrap_or(64),
+            Look::Classic => 1,
+        }
+    }
+
+    /// All frames of the command, in order.
+    fn shots(&self, camera: Camera) -> anyhow::Result<Vec<Shot>> {
+        let (width, height) = self.size;
+        let last = |mut shots: Vec<Shot>| {
+            if let Some(shot) = shots.last_mut() {
+                shot.written = Some(self.output.clone());
+            }
+            shots
+        };
+        if let Some(path) = &self.path {
+            let points = read_path(path)?;
+            let shot = |point: &PathPoint| Shot {
+                def: point.ref_def(width, height),
+                written: None,
+            };
+            let Some(count) = self.frames else {
+                return Ok(last(points.iter().map(shot).collect()));
+            };
+            let count = count as usize;
+            let mut shots = Vec::new();
+            for number in 0..count {
+                let at = number * (points.len() - 1) / (count - 1).max(1);
+                let drawn = points.get(at).map(shot);
+                let Some(Shot { def, .. }) = drawn else {
+                    continue;
+                };
+                for sample in 1..=self.samples() {
+                    shots.push(Shot {
+                        def,
+                        written: (sample == self.samples()).then(|| self.numbered(number)),
+                    });
+                }
+            }
+            return Ok(shots);
+        }
+        let frames = self.samples();
+        let still = RefDef {
+            time_ms: (self.time * 1000.0) as i32,
+            ..camera.ref_def(self.size, self.fov)
+        };
+        let frame = |frame: u32| {
+            let mut def = still;
+            if self.turn {
+                let turned = Camera {
+                    yaw: camera.yaw + 360.0 * frame as f32 / frames as f32,
+                    ..camera
+                };
+                def.view_axis = turned.axis();
+            }
+            if let Some([x, y, z, yaw]) = self.step.as_deref() {
+                let before = (frames - 1 - frame) as f32;
+                def.view_origin -= Vec3::new(*x, *y, *z) * before;
+                let turned = Camera {
+                    yaw: camera.yaw - yaw * before,
+                    ..camera
+                };
+                def.view_axis = turned.axis();
+            }
+            Shot { def, written: None }
+        };
+        Ok(last((0..frames).map(frame).collect()))
+    }
+
+    /// Name of a picture of a series: the output's with its number.
+    fn numbered(&self, number: usize) -> PathBuf {
+        let stem = self.output.file_stem().unwrap_or_default();
+        let name = format!("{}_{number:04}.png", stem.to_string_lossy());
+        self.output.with_file_name(name)
+    }
+}
+
 /// Runs the command.
 pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
+    let png = args
+        .output
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("png"));
+    if !png {
+        bail!("{}: pictures are .png", args.output.display());
+    }
     let (files, map) = if args.sample {
         (
             Arc::new(relight::sample::files()?) as Arc<dyn GameFiles>,
@@ -183,118 +408,53 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     })
     .context("no picture without a Vulkan device")?;
     let info = renderer.device_info().clone();
-    let mut settings = Settings {
-        rt: args.look == Look::Traced,
-        rt_accumulate: !args.no_accumulation,
-        rt_bounces: args.bounces,
-        rt_candidates: args.candidates.max(1),
-        rt_tracer: match args.tracer {
-            Tracer::Auto => TracerChoice::Auto,
-            Tracer::Pipeline => TracerChoice::Pipeline,
-            Tracer::Query => TracerChoice::Query,
-            Tracer::Compute => TracerChoice::Compute,
-        },
-        rt_debug: args.debug,
-        rt_exposure: args.exposure,
-        rt_denoiser: args.denoiser,
-        rt_taa: !args.no_taa,
-        rt_scale: args.scale,
-        rt_dof: args.lens.is_some(),
-        rt_num_random_dl: match args.sampling {
-            Sampling::Uniform | Sampling::Resampled => 1,
-            Sampling::All => 0,
-        },
-        rt_light_selection: match args.sampling {
-            Sampling::Uniform => renderer_vk::LightSelection::Uniform,
-            Sampling::Resampled | Sampling::All => renderer_vk::LightSelection::Resampled,
-        },
-        ..Settings::default()
-    };
-    if let Some([diameter, distance]) = args.lens.as_deref() {
-        settings.rt_aperture = *diameter;
-        settings.rt_focal_length = *distance;
-    }
-    renderer.begin_registration(files, &settings)?;
+    renderer.begin_registration(files, &args.settings())?;
     renderer.load_world(&map)?;
     renderer.end_registration();
 
-    let bsp = renderer
-        .world()
-        .map(|w| w.relit.bsp.clone())
-        .context("no map")?;
+    let (bsp, camera) = {
+        let world = renderer.world().context("no map")?;
+        let camera = match args.path {
+            Some(_) => Camera::default(),
+            None => args.camera(&world.relit)?,
+        };
+        (world.relit.bsp.clone(), camera)
+    };
     let entities = map_entities(&mut renderer, &bsp);
-    let camera = match args.camera.as_deref() {
-        Some([x, y, z, yaw, rest @ ..]) => Camera {
-            origin: Vec3::new(*x, *y, *z),
-            yaw: *yaw,
-            pitch: rest.first().copied().unwrap_or(0.0),
-        },
-        _ => Camera::of_map(&bsp)
-            .context("the map has no place to look from; give one with --camera")?,
-    };
-    let def = RefDef {
-        time_ms: (args.time * 1000.0) as i32,
-        ..camera.ref_def(args.size, args.fov)
-    };
-
-    let points = args.path.as_deref().map(read_path).transpose()?;
-    let frames = match &points {
-        Some(points) => u32::try_from(points.len())?,
-        None if args.look == Look::Traced || args.timings || args.stats => args.frames.max(1),
-        None => 1,
-    };
-    let bar = ProgressBar::new(frames.into());
+    let shots = args.shots(camera)?;
+    let frames = shots.len();
+    let bar = ProgressBar::new(frames as u64);
     bar.set_style(ProgressStyle::with_template(
         "{msg} {bar:40} {pos}/{len} frames, {eta} left",
     )?);
     bar.set_message(format!("{map} on {}", info.name));
     let mut timings = Timings::default();
     renderer.count_rays(args.stats);
-    for frame in 0..frames {
-        let mut def = def;
-        if args.turn {
-            let turned = Camera {
-                yaw: camera.yaw + 360.0 * frame as f32 / frames as f32,
-                ..camera
-            };
-            def.view_axis = turned.axis();
-        }
-        if let Some([x, y, z, yaw]) = args.step.as_deref() {
-            let before = (frames - 1 - frame) as f32;
-            def.view_origin -= Vec3::new(*x, *y, *z) * before;
-            let turned = Camera {
-                yaw: camera.yaw - yaw * before,
-                ..camera
-            };
-            def.view_axis = turned.axis();
-        }
-        if let Some(point) = points.as_ref().and_then(|p| p.get(frame as usize)) {
-            def = point.ref_def(width, height);
-        }
+    // JSON has standard output for itself
+    let told = args.stats || args.timings;
+    for Shot { def, written } in &shots {
         renderer.begin_frame(def.time_ms);
         renderer.clear_scene();
         for entity in &entities {
             renderer.add_entity(entity);
         }
-        renderer.render_scene(&def)?;
+        renderer.render_scene(def)?;
         let stats = renderer.end_frame()?;
         timings.add(&renderer.timings(), &stats);
+        if let Some(path) = written {
+            let picture = renderer.read_pixels()?;
+            write_png(path, &picture.rgb, picture.width, picture.height)?;
+            if told {
+                eprintln!("{}", path.display());
+            } else {
+                bar.suspend(|| println!("{}", path.display()));
+            }
+        }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let costs = args.stats.then(|| renderer.costs());
-    let picture = renderer.read_pixels()?;
-    image::save_buffer(
-        &args.output,
-        &picture.rgb,
-        picture.width,
-        picture.height,
-        image::ColorType::Rgb8,
-    )
-    .with_context(|| format!("{}: cannot be written", args.output.display()))?;
-    println!("{}", args.output.display());
-    if let Some(costs) = costs {
-        print!("{}", costs.json());
+    if args.stats {
+        print!("{}", renderer.costs().json());
     }
     if args.timings {
         let mut report = timings.report();
@@ -310,12 +470,27 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         println!("{}", serde_json::Value::Object(report));
     }
     let messages = renderer.validation_messages();
-    if !messages.is_empty() {
+    if let Some(first) = messages.first() {
         bail!(
-            "the validation layer has {} messages, the first: {}",
+            "the validation layer has {} messages, the first: {first}",
             messages.len(),
-            messages[0]
         );
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn views_are_read_as_people_write_them() {
+        let view = parse_view("1,-2.5, 3,90,-10").unwrap();
+        assert_eq!(view.origin, Vec3::new(1.0, -2.5, 3.0));
+        assert_eq!((view.yaw, view.pitch), (90.0, -10.0));
+        assert_eq!(parse_view("1 2 3").unwrap().yaw, 0.0);
+        for wrong in ["", "1,2", "1,2,3,4,5,6", "a,b,c", "1,2,nan"] {
+            assert!(parse_view(wrong).is_err(), "{wrong}");
+        }
+    }
 }

@@ -1,13 +1,13 @@
 //! Maps from the command line, and places to look at them from.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use clap::Args;
 use glam::Vec3;
 use q3bsp::{Bsp, Format};
-use relight::{GameFiles, MemoryFiles, Overlay, Pk3, SearchPath, map_files};
+use relight::{GameFiles, MemoryFiles, Overlay, Pk3, RelitWorld, SearchPath, map_files};
 use renderer_vk::Renderer;
 use renderer_vk::api::{EntityKind, RefDef, RefEntity};
 
@@ -35,6 +35,11 @@ pub struct Maps {
 pub fn open(map: &str, games: &[PathBuf]) -> anyhow::Result<(Arc<dyn GameFiles>, String)> {
     let mut path = SearchPath::open(games)?;
     let map = map.to_owned();
+    if let Some((pack, inside)) = map.split_once(".pk3:") {
+        path.add_pk3(Path::new(&format!("{pack}.pk3")))?;
+        let name = inside.to_owned();
+        return Ok((with_map_files(path, MemoryFiles::new(), &name)?, name));
+    }
     let file = PathBuf::from(&map);
     let name = match file.extension().and_then(|e| e.to_str()) {
         Some("pk3") if file.is_file() => {
@@ -50,14 +55,14 @@ pub fn open(map: &str, games: &[PathBuf]) -> anyhow::Result<(Arc<dyn GameFiles>,
                 ),
             }
         }
-        Some("bsp") if file.is_file() => {
+        _ if file.is_file() => {
             let stem = file.file_stem().and_then(|s| s.to_str()).unwrap_or("map");
             let name = format!("maps/{stem}.bsp");
+            let bytes = std::fs::read(&file).with_context(|| format!("{map}: cannot be read"))?;
+            // said now, while the file's own name is known
+            Bsp::parse(&bytes).with_context(|| map.clone())?;
             let mut front = MemoryFiles::new();
-            front.insert(
-                &name,
-                std::fs::read(&file).with_context(|| format!("{map}: cannot be read"))?,
-            )?;
+            front.insert(&name, bytes)?;
             return Ok((with_map_files(path, front, &name)?, name));
         }
         _ if map.starts_with("maps/") => map,
@@ -87,8 +92,11 @@ fn with_map_files(
     Ok(Arc::new(Overlay { front, back: files }))
 }
 
+/// Yaw and pitch of an overview, degrees.
+const OVERVIEW: (f32, f32) = (45.0, 50.0);
+
 /// A place to look from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Camera {
     /// Units.
     pub origin: Vec3,
@@ -129,40 +137,109 @@ impl Camera {
     /// The intermission's view, or that of the first spawn point, eyes 26 units above it.
     pub fn of_map(bsp: &Bsp) -> Option<Self> {
         let entities = bsp.entities();
-        let find = |class: &str| entities.iter().find(|e| e.classname() == class);
-        let number =
-            |e: &q3bsp::Entity, key: &str| e.get(key).and_then(|v| v.trim().parse::<f32>().ok());
-        if let Some(view) = find("info_player_intermission") {
-            let origin = view.vec3("origin")?;
-            let target = view.get("target").and_then(|name| {
-                entities
-                    .iter()
-                    .find(|e| e.get("targetname") == Some(name))
-                    .and_then(|e| e.vec3("origin"))
-            });
-            let (mut yaw, mut pitch) = (number(view, "angle").unwrap_or(0.0), 0.0);
-            if let Some(angles) = view.vec3("angles") {
-                (pitch, yaw) = (angles.x, angles.y);
-            }
-            if let Some(to) = target.map(|t| t - origin).filter(|to| to.length() > 1.0) {
-                yaw = to.y.atan2(to.x).to_degrees();
-                pitch = -to.z.atan2(to.truncate().length()).to_degrees();
-            }
-            return Some(Self { origin, yaw, pitch });
+        let view = entities
+            .iter()
+            .find(|e| e.classname() == "info_player_intermission");
+        let Some(view) = view else {
+            return Camera::spawns(bsp).into_iter().next();
+        };
+        let origin = view.vec3("origin")?;
+        let target = view.get("target").and_then(|name| {
+            entities
+                .iter()
+                .find(|e| e.get("targetname") == Some(name))
+                .and_then(|e| e.vec3("origin"))
+        });
+        let (mut yaw, mut pitch) = (view.number("angle").unwrap_or(0.0), 0.0);
+        if let Some(angles) = view.vec3("angles") {
+            (pitch, yaw) = (angles.x, angles.y);
         }
-        let spawn = [
-            "info_player_deathmatch",
-            "info_player_start",
-            "team_CTF_redspawn",
-            "team_CTF_redplayer",
-        ]
-        .into_iter()
-        .find_map(find)?;
-        Some(Self {
-            origin: spawn.vec3("origin")? + Vec3::Z * 26.0,
-            yaw: number(spawn, "angle").unwrap_or(0.0),
-            pitch: 0.0,
-        })
+        if let Some(to) = target.map(|t| t - origin).filter(|to| to.length() > 1.0) {
+            yaw = to.y.atan2(to.x).to_degrees();
+            pitch = -to.z.atan2(to.truncate().length()).to_degrees();
+        }
+        Some(Self { origin, yaw, pitch })
+    }
+
+    /// What players see where they appear, eyes 26 units above the place, in the order of the map.
+    pub fn spawns(bsp: &Bsp) -> Vec<Self> {
+        let entities = bsp.entities();
+        let spawns = entities.iter().filter(|entity| {
+            let class = entity.classname().to_ascii_lowercase();
+            (class.starts_with("info_player_") && class != "info_player_intermission")
+                || (class.starts_with("team_")
+                    && (class.ends_with("spawn") || class.ends_with("player")))
+        });
+        spawns
+            .filter_map(|entity| {
+                let turned = entity.vec3("angles").map(|angles| angles.y);
+                Some(Self {
+                    origin: entity.vec3("origin")? + Vec3::Z * 26.0,
+                    yaw: turned.or(entity.number("angle")).unwrap_or(0.0),
+                    pitch: 0.0,
+                })
+            })
+            .collect()
+    }
+
+    /// The whole map from above one of its corners; `None` where nothing is drawn.
+    pub fn overview(world: &RelitWorld, size: (u32, u32), fov: f32) -> Option<Self> {
+        let sky = |material: u32| {
+            let material = world.materials.get(material as usize);
+            material.is_none_or(relight::WorldMaterial::is_sky)
+        };
+        let drawn = world
+            .surfaces
+            .iter()
+            .filter(|s| s.model == 0 && s.num_indices > 0 && !sky(s.material));
+        let vertices = drawn.flat_map(|s| {
+            let first = s.first_vertex as usize;
+            let range = first..first + s.num_vertices as usize;
+            world.vertices.get(range).unwrap_or_default()
+        });
+        let places = || {
+            vertices
+                .clone()
+                .map(|v| v.position)
+                .filter(|p| p.is_finite())
+        };
+        let least = places().reduce(Vec3::min)?;
+        let most = places().reduce(Vec3::max)?;
+        let middle = (least + most) * 0.5;
+        let mut camera = Self {
+            origin: middle,
+            yaw: OVERVIEW.0,
+            pitch: OVERVIEW.1,
+        };
+        // As far back as the corner needs that is furthest out of the picture.
+        let [forward, left, up] = camera.axis();
+        let def = camera.ref_def(size, fov);
+        let across = (def.fov_x.to_radians() * 0.5).tan();
+        let down = (def.fov_y.to_radians() * 0.5).tan();
+        let back = (0..8).map(|corner| {
+            let pick = |bit: u8| if corner >> bit & 1 == 0 { least } else { most };
+            let to = Vec3::new(pick(0).x, pick(1).y, pick(2).z) - middle;
+            (to.dot(left).abs() / across).max(to.dot(up).abs() / down) - to.dot(forward)
+        });
+        camera.origin -= forward * back.fold(0.0, f32::max);
+        Some(camera)
+    }
+
+    /// The first place on the way forward that is inside of the map; this one where there is none.
+    pub fn moved_inside(self, bsp: &Bsp) -> Self {
+        const STEP: f32 = 16.0;
+        const STEPS: u16 = 8192;
+        let [forward, ..] = self.axis();
+        let inside = |p: &Vec3| {
+            bsp.leafs
+                .get(bsp.leaf_at(*p))
+                .is_some_and(|l| l.cluster >= 0)
+        };
+        let origin = (0..STEPS)
+            .map(|step| self.origin + forward * (f32::from(step) * STEP))
+            .find(inside)
+            .unwrap_or(self.origin);
+        Self { origin, ..self }
     }
 }
 

@@ -33,6 +33,8 @@ fn told(bytes: &[u8]) -> String {
         &["info", "bad.bsp"][..],
         &["convert", "bad.bsp", "-o", "out.json"],
         &["convert", "bad.bsp", "-o", "out.glb"],
+        &["lights", "bad.bsp", "-o", "out.png"],
+        &["render", "bad.bsp", "-o", "out.png"],
     ] {
         let output = relight(folder.path(), arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {output:?}");

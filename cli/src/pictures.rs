@@ -1,0 +1,33 @@
+//! Pictures as files that appear whole or not at all.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use image::ImageEncoder;
+
+/// Writes a file beside its place first, so that nobody sees half of one.
+///
+/// # Errors
+/// It cannot be written; nothing is left behind.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut half = path.as_os_str().to_owned();
+    half.push(".part");
+    let half = PathBuf::from(half);
+    std::fs::write(&half, bytes)
+        .and_then(|()| std::fs::rename(&half, path))
+        .inspect_err(|_| {
+            let _ = std::fs::remove_file(&half);
+        })
+        .with_context(|| format!("{}: cannot be written", path.display()))
+}
+
+/// Writes a PNG of 8 bits a channel, rows from the top.
+///
+/// # Errors
+/// It cannot be written, or there are not three bytes a pixel.
+pub fn write_png(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()> {
+    let mut bytes = Vec::new();
+    let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
+    encoder.write_image(rgb, width, height, image::ExtendedColorType::Rgb8)?;
+    write_whole(path, &bytes)
+}
