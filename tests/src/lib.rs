@@ -5,10 +5,12 @@
 //! * [`real`]: Debian's ioquake3, run without a display.
 //! * [`data`]: where OpenArena's data, the library and the tools are, and when a test may be skipped.
 //! * [`maps`]: small maps made by the tests.
+//! * [`camera_path`]: a recorded path through the library, measured.
 //! * [`gallery`]: scenes that the engine's own renderer and ours draw alike, in a private [`display`].
 
 #![deny(unsafe_code)]
 
+pub mod camera_path;
 pub mod data;
 pub mod display;
 #[allow(unsafe_code)]
