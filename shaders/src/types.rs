@@ -350,6 +350,8 @@ pub mod constants {
         STAGE_DEPTH_EQUAL = 4;
         /// The stage's picture stands for a reflection of the surroundings.
         STAGE_REFLECTION = 8;
+        /// Covers what lies behind by an alpha that the game fades: smoke, blood. It does not glow.
+        STAGE_MATTER = 16;
         /// Seen from both sides.
         MATERIAL_TWO_SIDED = 1;
         /// Only the back side is seen.
@@ -378,6 +380,8 @@ pub mod constants {
         INSTANCE_UNLIT = 16;
         /// A crosshair: in stereo it stays where the view has it.
         INSTANCE_CROSSHAIR = 32;
+        /// Hangs in the air where the light is `ambient`; of the traced look alone.
+        INSTANCE_SUSPENDED = 64;
         /// A draw of a material's stage.
         DRAW_STAGE = 0;
         /// A dynamic light's blob over a surface.

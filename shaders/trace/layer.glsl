@@ -139,7 +139,15 @@ Layer evaluate_stages(SurfacePoint p, float width) {
                 source.lit = image;
                 alpha = texel.a * (stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE && stage.alpha_gen == ALPHAGEN_IDENTITY ? 1.0 : color.a);
             } else {
-                source.emission = image * decode_display(color.rgb);
+                vec3 shown = image * decode_display(color.rgb);
+                bool matter = !world && (stage.flags & STAGE_MATTER) != 0;
+                if (matter && (material.flags & MATERIAL_POLYGON_OFFSET) != 0) {
+                    source.lit = shown; // a mark on a surface is lit with it
+                } else {
+                    // what hangs in the air shows the light around it: as layers it can only glow
+                    if (matter && (instance.flags & INSTANCE_SUSPENDED) != 0) shown *= decode_display(instance.ambient);
+                    source.emission = shown;
+                }
                 alpha = texel.a * color.a;
             }
         }

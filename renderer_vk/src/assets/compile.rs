@@ -132,6 +132,20 @@ fn tc_mod(tc_mod: &TcMod) -> types::TcMod {
     out
 }
 
+/// Whether a stage covers what lies behind by an alpha that the game fades. What glows is added instead, and what is to
+/// be seen as it is (names, icons) is not faded.
+fn is_matter(stage: &Stage) -> bool {
+    let covers = Some((BlendFactor::SrcAlpha, BlendFactor::OneMinusSrcAlpha));
+    let alpha_of_game = matches!(
+        stage.alpha_gen,
+        AlphaGen::Entity | AlphaGen::OneMinusEntity | AlphaGen::Vertex | AlphaGen::OneMinusVertex
+    );
+    // these colours bring their alpha along
+    let color_of_game = matches!(stage.rgb_gen, RgbGen::Vertex | RgbGen::Entity)
+        && matches!(stage.alpha_gen, AlphaGen::Identity);
+    stage.blend == covers && stage.image != StageImage::Lightmap && (alpha_of_game || color_of_game)
+}
+
 /// The image of a stage, found.
 struct FoundImage {
     first: u32,
@@ -225,6 +239,9 @@ impl StageArrays {
         }
         if stage.depth_func == DepthFunc::Equal {
             out.flags |= c::STAGE_DEPTH_EQUAL;
+        }
+        if is_matter(stage) {
+            out.flags |= c::STAGE_MATTER;
         }
         let index = count(self.stages.len());
         self.stages.push(out);

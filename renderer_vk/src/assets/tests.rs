@@ -87,6 +87,20 @@ t/shiny
     blendFunc add
     tcGen environment }
 }
+t/smoke
+{
+  { map t/a.tga
+    blendFunc blend
+    alphaGen entity }
+  { map t/a.tga
+    blendFunc blend
+    rgbGen vertex }
+  { map t/a.tga
+    blendFunc blend }
+  { map t/a.tga
+    blendFunc add
+    alphaGen entity }
+}
 t/sky
 {
   skyParms t/box 300 -
@@ -208,6 +222,17 @@ fn liquids_and_reflections_come_from_directives() {
         .map(|stage| stage.flags & c::STAGE_REFLECTION != 0)
         .collect();
     assert_eq!(reflects, [false, true]);
+}
+
+#[test]
+fn what_the_game_fades_by_alpha_is_matter() {
+    let mut game = game();
+    let index = game.find("t/smoke", LightmapClass::Page, true);
+    let smoke = game.materials.get(index).clone();
+    let matter: Vec<bool> = (game.materials.stages(&smoke).iter())
+        .map(|stage| stage.flags & c::STAGE_MATTER != 0)
+        .collect();
+    assert_eq!(matter, [true, true, false, false]);
 }
 
 #[test]

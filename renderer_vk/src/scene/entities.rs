@@ -1,6 +1,7 @@
 //! Entities of a view: brush models and what is built on the spot; models of triangles are in `models`.
 
 use glam::Vec3;
+use shaders::types::constants as c;
 
 use super::entity;
 use super::gather::{Gatherer, count};
@@ -11,7 +12,7 @@ use super::surfaces::{self, LocalView};
 use super::{Look, Submodel, ViewScene};
 use crate::api::{EntityKind, RefEntity, renderfx};
 use crate::assets::Model;
-use crate::world::Bounds;
+use crate::world::{Bounds, GridLight};
 
 impl Gatherer<'_> {
     pub(super) fn add_entity(&mut self, number: u32, entity: &RefEntity, out: &mut ViewScene) {
@@ -47,8 +48,14 @@ impl Gatherer<'_> {
             .filter(|_| !no_fog)
             .map_or(0, |w| w.fog_of_sphere(entity.origin, entity.radius));
         let instance = count(out.instances.len());
-        out.instances
-            .push(entity::effect_instance(entity, &self.view, out.time));
+        let mut placed = entity::effect_instance(entity, &self.view, out.time);
+        if self.look == Look::Traced && entity.kind == EntityKind::Sprite {
+            // in the air light comes from all sides: half of what has a direction reaches what is seen
+            let light = self.light_at(entity.origin);
+            placed.ambient = ((light.ambient + light.directed * 0.5) / 255.0).min(Vec3::ONE);
+            placed.flags |= c::INSTANCE_SUSPENDED;
+        }
+        out.instances.push(placed);
         let raw = RawMesh::begin(out, material, instance, fog);
         let (view, settings) = (self.view, self.input.settings);
         let mut builder = MeshBuilder {
@@ -96,19 +103,24 @@ impl Gatherer<'_> {
         }
     }
 
+    /// The light that the engine gives to an entity at a place.
+    fn light_at(&self, at: Vec3) -> GridLight {
+        lighting::entity_light(
+            self.input.world,
+            self.world.is_some(),
+            at,
+            self.lights,
+            self.input.settings,
+        )
+    }
+
     pub(super) fn push_instance(&self, entity: &RefEntity, out: &mut ViewScene) -> u32 {
         let at = if entity.renderfx & renderfx::LIGHTING_ORIGIN != 0 {
             entity.lighting_origin
         } else {
             entity.origin
         };
-        let light = lighting::entity_light(
-            self.input.world,
-            self.world.is_some(),
-            at,
-            self.lights,
-            self.input.settings,
-        );
+        let light = self.light_at(at);
         if self.input.settings.debug_light && entity.renderfx & renderfx::FIRST_PERSON != 0 {
             let brightest = |light: Vec3| light.max_element() as i32;
             let (ambient, directed) = (brightest(light.ambient), brightest(light.directed));

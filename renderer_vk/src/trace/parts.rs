@@ -16,7 +16,7 @@ use super::geometry::rank_bits;
 use super::input::{Kind, MaterialInfo, MaterialTable};
 use crate::scene::{DynamicMesh, MeshId, Shape, ViewScene};
 
-/// Smallest volume of an entity's axes that an instance can be turned back from; flatter ones are placed on the CPU.
+/// Smallest volume of an entity's axes that an instance can be turned back from; flatter ones are left out.
 const FLAT: f32 = 1.0e-12;
 
 /// Triangles of a deformed surface of the map from which on it has a structure of its own.
@@ -293,10 +293,14 @@ impl Parts {
             0
         };
         let flags = world | rank_bits(info);
-        let solid = is_solid(axes(instance));
+        // Seen from anywhere, the faces of something pressed flat lie in one plane, and which of them a ray meets first
+        // is left to the last bits of its distance: it would flicker.
+        if !is_solid(axes(instance)) {
+            return;
+        }
         let (source, vertices, indices) = match mesh.shape {
             Shape::Rigid(rigid) => {
-                let Some(rigid) = view.rigid.get(rigid as usize).filter(|_| solid) else {
+                let Some(rigid) = view.rigid.get(rigid as usize) else {
                     return;
                 };
                 let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
@@ -306,7 +310,7 @@ impl Parts {
                     count(rigid.indices.len()),
                 )
             }
-            Shape::Animated(id) if solid && !is_scrap(mesh) && is_whole(view, mesh) => {
+            Shape::Animated(id) if !is_scrap(mesh) && is_whole(view, mesh) => {
                 (Source::Animated(id), mesh.vertex_count, mesh.index_count)
             }
             Shape::Animated(_) | Shape::Changing => {
@@ -314,6 +318,7 @@ impl Parts {
                 return;
             }
         };
+        let mut shares = [Some((kind, Share::Whole)), None];
         if kind == Kind::Tested && mesh.world_surface.is_none() {
             let key = (source, material, indices);
             let known = self.coverages.entry(key).or_insert_with(|| {
@@ -324,71 +329,44 @@ impl Parts {
                     .then(|| found.into())
             });
             if let Some(known) = known {
-                let (solid, mixed) = (
-                    known.contains(&Coverage::Solid),
-                    known.contains(&Coverage::Mixed),
-                );
-                let shares = [
-                    (Kind::Opaque, Share::Solid(material), solid),
-                    (Kind::Tested, Share::Mixed(material), mixed),
+                let some =
+                    |coverage, kind, share| known.contains(&coverage).then_some((kind, share));
+                shares = [
+                    some(Coverage::Solid, Kind::Opaque, Share::Solid(material)),
+                    some(Coverage::Mixed, Kind::Tested, Share::Mixed(material)),
                 ];
-                for (kind, share, _) in shares.into_iter().filter(|s| s.2) {
-                    self.members.push(Member {
-                        key: PartKey {
-                            instance: mesh.instance,
-                            kind,
-                            animated: matches!(source, Source::Animated(_)),
-                            material: 0,
-                            world_surface: u32::MAX,
-                        },
-                        order,
-                        mesh: index,
-                        skin: SkinMesh {
-                            shape: ShapeMesh {
-                                kind,
-                                source,
-                                first_vertex: mesh.first_vertex,
-                                vertices,
-                                indices,
-                                share,
-                            },
-                            material,
-                            fog: mesh.fog,
-                            flags,
-                        },
-                    });
-                }
-                return;
             }
         }
-        self.members.push(Member {
-            key: PartKey {
-                instance: mesh.instance,
-                kind,
-                animated: matches!(source, Source::Animated(_)),
-                material: if kind == Kind::Translucent {
-                    material
-                } else {
-                    0
-                },
-                world_surface: mesh.world_surface.unwrap_or(u32::MAX),
-            },
-            order,
-            mesh: index,
-            skin: SkinMesh {
-                shape: ShapeMesh {
+        for (kind, share) in shares.into_iter().flatten() {
+            self.members.push(Member {
+                key: PartKey {
+                    instance: mesh.instance,
                     kind,
-                    source,
-                    first_vertex: mesh.first_vertex,
-                    vertices,
-                    indices,
-                    share: Share::Whole,
+                    animated: matches!(source, Source::Animated(_)),
+                    material: if kind == Kind::Translucent {
+                        material
+                    } else {
+                        0
+                    },
+                    world_surface: mesh.world_surface.unwrap_or(u32::MAX),
                 },
-                material,
-                fog: mesh.fog,
-                flags,
-            },
-        });
+                order,
+                mesh: index,
+                skin: SkinMesh {
+                    shape: ShapeMesh {
+                        kind,
+                        source,
+                        first_vertex: mesh.first_vertex,
+                        vertices,
+                        indices,
+                        share,
+                    },
+                    material,
+                    fog: mesh.fog,
+                    flags,
+                },
+            });
+        }
     }
 
     /// The coverages of a skin's triangles, where it takes a share of them.

@@ -190,6 +190,85 @@ fn lit_layers_and_what_is_behind_them_are_all_lit_with(gpu: &mut Gpu) {
     assert!((mean / exact - 1.0).abs() < 0.005, "{mean} {exact}");
 }
 
+/// What the game fades by its alpha.
+fn matter(color: [f32; 3], alpha: f32) -> shaders::types::Stage {
+    shaders::types::Stage {
+        flags: c::STAGE_MATTER | c::STAGE_WHITE,
+        ..stage::blend(color, alpha)
+    }
+}
+
+#[test]
+fn a_mark_shares_the_light_of_its_wall_without_noise() {
+    Gpu::each(a_mark_shares_the_light_of_its_wall_without_noise_with);
+}
+
+fn a_mark_shares_the_light_of_its_wall_without_noise_with(gpu: &mut Gpu) {
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 16);
+    scene.ambient = Vec3::splat(0.8);
+    let wall = scene.diffuse(0.5);
+    scene.quad(screen(300.0), wall);
+    let blood = [0.8, 0.1, 0.3];
+    let mark = scene.material(
+        &[matter(blood, 0.5)],
+        TRANSLUCENT | c::MATERIAL_POLYGON_OFFSET,
+    );
+    scene.mesh(screen(299.9), mark, identity());
+    let alpha = 127.0 / 255.0;
+    let albedo = through_byte(super::harness::encode(0.5));
+    let linear = Vec3::from(blood.map(through_byte));
+    let exact = 0.8 * (linear * alpha + (1.0 - alpha) * albedo);
+    // what is behind counts by itself where it is no longer the same wall
+    for (place, noisy) in [(299.9, false), (200.0, true)] {
+        scene
+            .dynamic_vertices
+            .iter_mut()
+            .for_each(|v| v.position.x = place);
+        let (pixels, _) = gpu.render(&scene, &reference(), 1);
+        let off = pixels
+            .iter()
+            .filter(|p| (**p - exact).abs().max_element() > 2.0e-3);
+        assert_eq!(off.count() > 0, noisy, "{place}: {exact}");
+        let mean = gpu.mean(&scene, &reference(), 64);
+        assert!(
+            (mean - exact).abs().max_element() < 5.0e-3,
+            "{place}: {mean} {exact}"
+        );
+    }
+}
+
+#[test]
+fn smoke_is_as_bright_as_the_light_around_it() {
+    Gpu::each(smoke_is_as_bright_as_the_light_around_it_with);
+}
+
+fn smoke_is_as_bright_as_the_light_around_it_with(gpu: &mut Gpu) {
+    let back = [0.5, 0.6, 0.4];
+    let grey = [0.7, 0.7, 0.6];
+    let around = Vec3::new(0.6, 0.3, 0.1);
+    let alpha = 127.0 / 255.0;
+    let linear = |c: [f32; 3]| Vec3::from(c.map(through_byte));
+    let light = crate::trace::frame_lights::decode(around);
+    for (flags, factor) in [
+        (c::INSTANCE_UNLIT | c::INSTANCE_SUSPENDED, light),
+        (c::INSTANCE_UNLIT, Vec3::ONE),
+    ] {
+        let mut scene = scene();
+        let wall = scene.material(&[stage::constant(back)], 0);
+        scene.quad(screen(300.0), wall);
+        let puff = scene.material(&[matter(grey, 0.5)], TRANSLUCENT);
+        let instance = shaders::types::Instance {
+            ambient: around,
+            flags,
+            ..identity()
+        };
+        scene.mesh(screen(100.0), puff, instance);
+        let exact = linear(grey) * factor * alpha + linear(back) * (1.0 - alpha);
+        let mean = gpu.mean(&scene, &reference(), 2);
+        assert!(close(mean, exact), "{mean} {exact}");
+    }
+}
+
 #[test]
 fn cut_outs_have_holes_for_eyes_and_shadows() {
     Gpu::each(cut_outs_have_holes_for_eyes_and_shadows_with);

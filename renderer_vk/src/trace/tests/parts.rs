@@ -13,7 +13,8 @@ use crate::trace::input::{Kind, MaterialInfo, MaterialTable};
 use crate::trace::part_mesh;
 use crate::trace::parts::Parts;
 
-/// One cut-out: left of 0.5 it is there, right of 1 there is nothing.
+/// Cut-outs, by their number: left of 0.5 they are there, right of 1 there is nothing; all that further right, the
+/// higher the number.
 struct CutOut;
 
 impl MaterialTable for CutOut {
@@ -25,10 +26,11 @@ impl MaterialTable for CutOut {
         };
         (index, info)
     }
-    fn coverage(&self, _material: u32, corners: [Vec2; 3]) -> Coverage {
-        if corners.iter().all(|st| st.x < 0.5) {
+    fn coverage(&self, material: u32, corners: [Vec2; 3]) -> Coverage {
+        let moved = material as f32;
+        if corners.iter().all(|st| st.x < moved + 0.5) {
             Coverage::Solid
-        } else if corners.iter().all(|st| st.x > 1.0) {
+        } else if corners.iter().all(|st| st.x > moved + 1.0) {
             Coverage::Hole
         } else {
             Coverage::Mixed
@@ -62,6 +64,12 @@ fn strip(st: &[f32]) -> RigidMesh {
 }
 
 fn parts_of(mesh: RigidMesh) -> Vec<(Kind, Vec<[u32; 3]>)> {
+    let parts = parts_of_skins(mesh, &[0], Vec3::Z);
+    parts.into_iter().map(|(_, kind, of)| (kind, of)).collect()
+}
+
+/// The instances' numbers, kinds and triangles of entities of one model, one in each skin; `up`: their third axis.
+fn parts_of_skins(mesh: RigidMesh, skins: &[u32], up: Vec3) -> Vec<(u32, Kind, Vec<[u32; 3]>)> {
     let def = RefDef {
         width: 8,
         height: 8,
@@ -70,22 +78,24 @@ fn parts_of(mesh: RigidMesh) -> Vec<(Kind, Vec<[u32; 3]>)> {
         ..RefDef::default()
     };
     let mut view = ViewScene::empty(&def, View::new(&def, 4.0, 100.0));
-    view.instances.push(Instance {
-        axis: [Vec3::X, Vec3::Y, Vec3::Z],
-        ..Instance::default()
-    });
     view.rigid.push(Arc::new(mesh));
-    view.meshes.push(DynamicMesh {
-        first_index: 0,
-        index_count: 0,
-        first_vertex: 0,
-        vertex_count: 0,
-        material: 0,
-        instance: 0,
-        fog: 0,
-        world_surface: None,
-        shape: Shape::Rigid(0),
-    });
+    for (instance, &material) in skins.iter().enumerate() {
+        view.instances.push(Instance {
+            axis: [Vec3::X, Vec3::Y, up],
+            ..Instance::default()
+        });
+        view.meshes.push(DynamicMesh {
+            first_index: 0,
+            index_count: 0,
+            first_vertex: 0,
+            vertex_count: 0,
+            material,
+            instance: instance as u32,
+            fog: 0,
+            world_surface: None,
+            shape: Shape::Rigid(0),
+        });
+    }
     let mut parts = Parts::default();
     // known from the second time on
     for _ in 0..2 {
@@ -93,9 +103,36 @@ fn parts_of(mesh: RigidMesh) -> Vec<(Kind, Vec<[u32; 3]>)> {
     }
     let shown = parts.parts.iter().map(|part| {
         let members = part_mesh::members(&view, &parts, part);
-        (part.kind, part_mesh::part_indices(&members))
+        let indices = part_mesh::part_indices(&members);
+        (part.instance, part.kind, indices)
     });
     shown.collect()
+}
+
+#[test]
+fn skins_of_one_model_have_holes_of_their_own() {
+    let triangle = |i: u32| [3 * i, 3 * i + 1, 3 * i + 2];
+    let mut parts = parts_of_skins(strip(&[0.2, 0.7, 1.2, 1.7]), &[0, 1, 0], Vec3::Z);
+    parts.sort_by_key(|(instance, _, of)| (*instance, of.first().copied()));
+    let first = |instance| {
+        [
+            (instance, Kind::Opaque, vec![triangle(0)]),
+            (instance, Kind::Tested, vec![triangle(1)]),
+        ]
+    };
+    let second = [
+        (1, Kind::Opaque, vec![triangle(0), triangle(1), triangle(2)]),
+        (1, Kind::Tested, vec![triangle(3)]),
+    ];
+    assert_eq!(parts, [first(0), second, first(2)].concat());
+}
+
+#[test]
+fn what_is_pressed_flat_is_left_out() {
+    let mesh = || strip(&[0.2, 0.7]);
+    assert_eq!(parts_of_skins(mesh(), &[0], Vec3::Z * 0.01).len(), 2);
+    assert_eq!(parts_of_skins(mesh(), &[0], Vec3::ZERO), []);
+    assert_eq!(parts_of_skins(mesh(), &[0], Vec3::X), []);
 }
 
 #[test]
