@@ -91,13 +91,12 @@ impl LightsByHand {
                 let mut light = point(&n)?;
                 let aim = vector(&n, 7) - light.origin;
                 let angle = n.get(10).copied().unwrap_or(0.0);
-                if aim.length_squared() == 0.0 || !(angle > 0.0 && angle < 90.0) {
-                    return Err(
-                        "a spot needs a target elsewhere and an angle between 0 and 90".to_owned(),
-                    );
-                }
+                let direction = aim.try_normalize();
+                let direction = direction.filter(|_| angle > 0.0 && angle < 90.0);
+                let direction = direction
+                    .ok_or("a spot needs a target elsewhere and an angle between 0 and 90")?;
                 light.spot = Some(Spot {
-                    direction: aim.normalize(),
+                    direction,
                     tan_half_angle: angle.to_radians().tan(),
                 });
                 self.points.push(light);

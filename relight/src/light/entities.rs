@@ -52,7 +52,7 @@ pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLi
                 irradiance: color * (value * SUN_IRRADIANCE),
                 angular_radius: number(entity, &["_deviance", "_deviation", "_jitter"])
                     .filter(|d| *d > 0.0)
-                    .map_or(DEFAULT_SUN_RADIUS, f32::to_radians),
+                    .map_or(DEFAULT_SUN_RADIUS, |d| d.min(90.0).to_radians()),
                 material: None,
             });
             continue;

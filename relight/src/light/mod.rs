@@ -42,6 +42,7 @@
 //! Source: the constants are the defaults of q3map2 (area scale 0.25, point scale 7500, sky scale 1); the
 //! units are written out here.
 
+mod bounds;
 mod by_hand;
 mod color;
 mod emission;
@@ -92,8 +93,9 @@ fn lists_of(world: &crate::world::RelitWorld, facing: bool) -> LightLists {
     clusters.lists(lights, points, &world.surfaces, facing, sky)
 }
 
-/// Builds a world's light lists.
+/// Builds a world's light lists, of lights within bounds.
 pub(crate) fn build_lists(world: &mut crate::world::RelitWorld) {
+    bounds::bound_lights(world);
     world.light_lists = lists_of(world, true);
     world.report.clusters = world.light_lists.clusters();
     world.report.mean_list_length = world.light_lists.mean_length();

@@ -178,3 +178,55 @@ fn absent_and_broken_maps_are_errors() {
     assert!(matches!(load("maps/y.bsp"), LoadError::Absent { .. }));
     assert!(load("maps/x.bsp").to_string().starts_with("maps/x.bsp: "));
 }
+
+#[test]
+fn lights_beyond_arithmetic_are_brought_into_range() {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 0);
+    let lamp = map.add_shader("t/lamp", 0, 0);
+    map.add_room(wall, Vec3::splat(-64.0), Vec3::splat(64.0));
+    map.add_quad(lamp, ceiling_lamp(16.0, 60.0));
+    let red = ("_color", "1 0 0");
+    let place = ("origin", "0 0 8");
+    let light = ("classname", "light");
+    map.add_entity(&[light, place, red, ("light", "3e38")]);
+    map.add_entity(&[light, place, red, ("light", "1e30")]);
+    map.add_entity(&[
+        light,
+        place,
+        red,
+        ("light", "1e20"),
+        ("spawnflags", "1"),
+        ("fade", "1e-30"),
+    ]);
+    map.add_entity(&[light, place, red, ("light", "1e30"), ("_sun", "1")]);
+    map.add_entity(&[light, place, red, ("light", "300")]);
+    let mut world = relight(map);
+    assert_eq!((world.point_lights.len(), world.suns.len()), (4, 1));
+    assert_eq!(world.warnings.len(), 1, "{:?}", world.warnings);
+
+    let (file, wrong) = crate::light::LightsByHand::parse(
+        "scale surfaces 1e38\nambient 3e38 1 1 1\nspot 0 0 0 300 1 1 1 0 0 3e38 30",
+    );
+    assert_eq!(
+        wrong.len(),
+        1,
+        "a spot has no direction to a target that far: {wrong:?}"
+    );
+    file.apply(&mut world);
+    assert_eq!(world.warnings.len(), 2, "{:?}", world.warnings);
+    assert!(world.ambient.is_finite() && world.ambient.x > 0.0);
+    let strengths = (world.lights.iter().map(|l| l.power()))
+        .chain(world.point_lights.iter().map(|l| l.intensity))
+        .chain(world.suns.iter().map(|s| s.irradiance));
+    for strength in strengths {
+        assert!(
+            strength.length_squared().is_finite() && strength.x > 0.0,
+            "{strength}"
+        );
+    }
+    // what overflowed on the way is none; the weak one is as it was
+    let [strong, weak] = [0, 1].map(|at| world.point_lights[at].intensity);
+    assert!(strong.x > 1.0e9);
+    assert_eq!(weak, Vec3::X * 300.0 * crate::light::POINT_LIGHT_INTENSITY);
+}
