@@ -8,9 +8,10 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
 
-use super::device::{Device, MemoryKind, lock};
+use super::device::{Device, lock};
 use super::error::{Context, Error};
 use super::graveyard::Garbage;
+use super::memory::MemoryKind;
 
 /// What a buffer is for, beyond storage and copies, which every buffer allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]

@@ -5,10 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::{ext, khr, vk};
-use gpu_allocator::MemoryLocation;
-use gpu_allocator::vulkan::{
-    Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc,
-};
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::bindless::Bindless;
 use super::error::{Context, Error};
@@ -16,7 +13,8 @@ use super::graveyard::{Garbage, SyncState};
 use super::image::Format;
 use super::instance::{Instance, SurfaceSource};
 use super::pin::pin_drivers;
-use super::pipeline::{cache_from_bytes, cache_to_bytes};
+use super::pipeline_cache::{cache_from_bytes, cache_to_bytes};
+use super::render_pass::{FramebufferKey, RenderPassKey};
 use super::select::{self, Abilities, DeviceInfo};
 use super::upload::Pending;
 
@@ -47,72 +45,6 @@ impl Default for DeviceOptions {
     }
 }
 
-/// What a piece of memory is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MemoryKind {
-    /// An image that shaders write or that is drawn to.
-    Target,
-    /// An image that is only sampled.
-    Texture,
-    /// A buffer of acceleration structures.
-    AccelerationStructure,
-    /// Any other buffer of the device.
-    Buffer,
-    /// A buffer that the CPU sees.
-    Shared,
-}
-
-impl MemoryKind {
-    const ALL: [Self; 5] = [
-        Self::Target,
-        Self::Texture,
-        Self::AccelerationStructure,
-        Self::Buffer,
-        Self::Shared,
-    ];
-
-    /// What the allocator's name of the memory begins with: it knows names alone.
-    fn mark(self) -> &'static str {
-        match self {
-            Self::Target => "target: ",
-            Self::Texture => "texture: ",
-            Self::AccelerationStructure => "structure: ",
-            Self::Buffer => "buffer: ",
-            Self::Shared => "shared: ",
-        }
-    }
-
-    /// Back from the allocator's name: kind and label.
-    fn of(name: &str) -> (Self, &str) {
-        let found = Self::ALL
-            .iter()
-            .find_map(|kind| Some((*kind, name.strip_prefix(kind.mark())?)));
-        found.unwrap_or((Self::Buffer, name))
-    }
-}
-
-/// A piece of memory in use.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MemoryUse {
-    /// What for.
-    pub kind: MemoryKind,
-    /// Label of the object.
-    pub label: String,
-    /// Bytes.
-    pub bytes: u64,
-}
-
-/// GPU memory in use, for a console command.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct MemoryReport {
-    /// Bytes taken by live objects.
-    pub allocated: u64,
-    /// Bytes taken from the driver.
-    pub reserved: u64,
-    /// Number of live allocations.
-    pub allocations: usize,
-}
-
 /// Owner of the raw device; its only task is to outlive everything that is made from it.
 pub(crate) struct RawDevice {
     pub raw: ash::Device,
@@ -124,25 +56,6 @@ impl Drop for RawDevice {
         // SAFETY: every object of the device has been destroyed by `DeviceInner::drop`.
         unsafe { self.raw.destroy_device(None) };
     }
-}
-
-/// Key of a render pass: formats and whether the attachments are cleared.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) struct RenderPassKey {
-    pub color: Option<vk::Format>,
-    pub depth: Option<vk::Format>,
-    pub samples: u32,
-    pub clear_color: bool,
-    pub clear_depth: bool,
-}
-
-/// What a framebuffer is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct FramebufferKey {
-    pub render_pass: vk::RenderPass,
-    /// The attachments, then null.
-    pub views: [vk::ImageView; 2],
-    pub extent: vk::Extent2D,
 }
 
 /// The shared part of a [`Device`]. Field order is destruction order.
@@ -313,36 +226,6 @@ impl Device {
         Ok(cache_to_bytes(&data))
     }
 
-    /// Memory in use.
-    pub fn memory_report(&self) -> MemoryReport {
-        lock(&self.0.allocator)
-            .as_ref()
-            .map(|allocator| {
-                let report = allocator.generate_report();
-                MemoryReport {
-                    allocated: report.total_allocated_bytes,
-                    reserved: report.total_capacity_bytes,
-                    allocations: report.allocations.len(),
-                }
-            })
-            .unwrap_or_default()
-    }
-
-    /// Every piece of memory in use.
-    pub fn memory_uses(&self) -> Vec<MemoryUse> {
-        let allocator = lock(&self.0.allocator);
-        let allocations = allocator.as_ref().map(|a| a.generate_report().allocations);
-        let uses = allocations.unwrap_or_default().into_iter().map(|a| {
-            let (kind, label) = MemoryKind::of(&a.name);
-            MemoryUse {
-                kind,
-                label: label.to_owned(),
-                bytes: a.size,
-            }
-        });
-        uses.collect()
-    }
-
     /// How many dropped objects still wait for the frames that may use them.
     pub fn graveyard_len(&self) -> usize {
         lock(&self.0.state).graveyard.len()
@@ -468,122 +351,6 @@ impl DeviceInner {
             .object_name(&name);
         // SAFETY: the handle is a live object of this device. A failure only loses the name.
         let _ = unsafe { debug.set_debug_utils_object_name(&info) };
-    }
-
-    /// Takes memory for an object.
-    pub fn allocate(
-        &self,
-        name: &str,
-        kind: MemoryKind,
-        requirements: vk::MemoryRequirements,
-        location: MemoryLocation,
-        linear: bool,
-    ) -> Result<Allocation, Error> {
-        let mut guard = lock(&self.allocator);
-        let fail = |reason: String| Error::OutOfMemory {
-            what: name.to_owned(),
-            bytes: requirements.size,
-            reason,
-        };
-        guard
-            .as_mut()
-            .ok_or_else(|| fail("the allocator is gone".to_owned()))?
-            .allocate(&AllocationCreateDesc {
-                name: &format!("{}{name}", kind.mark()),
-                requirements,
-                location,
-                linear,
-                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-            })
-            .map_err(|e| fail(e.to_string()))
-    }
-
-    /// Gives memory back.
-    pub fn free(&self, allocation: Allocation) {
-        if let Some(allocator) = lock(&self.allocator).as_mut()
-            && let Err(e) = allocator.free(allocation)
-        {
-            log::error!("GPU memory could not be freed: {e}");
-        }
-    }
-
-    /// The render pass for `key`: attachments stay in the layout GENERAL.
-    pub fn render_pass(&self, key: RenderPassKey) -> Result<vk::RenderPass, Error> {
-        let mut passes = lock(&self.render_passes);
-        if let Some(pass) = passes.get(&key) {
-            return Ok(*pass);
-        }
-        let attachment = |format, clear: bool| {
-            vk::AttachmentDescription::default()
-                .format(format)
-                .samples(vk::SampleCountFlags::from_raw(key.samples.max(1)))
-                .load_op(if clear {
-                    vk::AttachmentLoadOp::CLEAR
-                } else {
-                    vk::AttachmentLoadOp::LOAD
-                })
-                .store_op(vk::AttachmentStoreOp::STORE)
-                // without effect where there is no stencil
-                .stencil_load_op(vk::AttachmentLoadOp::LOAD)
-                .stencil_store_op(vk::AttachmentStoreOp::STORE)
-                .initial_layout(vk::ImageLayout::GENERAL)
-                .final_layout(vk::ImageLayout::GENERAL)
-        };
-        let mut attachments = Vec::new();
-        let mut next = 0;
-        let mut reference = || {
-            next += 1;
-            vk::AttachmentReference {
-                attachment: next - 1,
-                layout: vk::ImageLayout::GENERAL,
-            }
-        };
-        let mut color = Vec::new();
-        if let Some(format) = key.color {
-            attachments.push(attachment(format, key.clear_color));
-            color.push(reference());
-        }
-        let depth = key.depth.map(|format| {
-            attachments.push(attachment(format, key.clear_depth));
-            reference()
-        });
-        let mut subpass = vk::SubpassDescription::default()
-            .pipeline_bind_point(vk::PipelineBindPoint::GRAPHICS)
-            .color_attachments(&color);
-        if let Some(depth) = &depth {
-            subpass = subpass.depth_stencil_attachment(depth);
-        }
-        let subpasses = [subpass];
-        let info = vk::RenderPassCreateInfo::default()
-            .attachments(&attachments)
-            .subpasses(&subpasses);
-        // SAFETY: references lie within the attachments; pointers live here.
-        let pass = unsafe { self.core.raw.create_render_pass(&info, None) }
-            .context("vkCreateRenderPass")?;
-        passes.insert(key, pass);
-        Ok(pass)
-    }
-
-    /// The framebuffer for `key`. It lives as long as its views.
-    pub fn framebuffer(&self, key: FramebufferKey) -> Result<vk::Framebuffer, Error> {
-        let mut framebuffers = lock(&self.framebuffers);
-        if let Some((_, made)) = framebuffers.iter().find(|(known, _)| *known == key) {
-            return Ok(*made);
-        }
-        let count = (key.views.iter())
-            .take_while(|view| **view != vk::ImageView::null())
-            .count();
-        let info = vk::FramebufferCreateInfo::default()
-            .render_pass(key.render_pass)
-            .attachments(&key.views[..count])
-            .width(key.extent.width)
-            .height(key.extent.height)
-            .layers(1);
-        // SAFETY: the views match the render pass, which is made for their formats, and are alive.
-        let made = unsafe { self.core.raw.create_framebuffer(&info, None) }
-            .context("vkCreateFramebuffer")?;
-        framebuffers.push((key, made));
-        Ok(made)
     }
 
     /// Puts an object to rest until no frame uses it.

@@ -3,10 +3,10 @@
 use ash::vk;
 
 use super::buffer::Buffer;
-use super::device::{FramebufferKey, RenderPassKey};
 use super::error::Error;
 use super::image::{Image, ImageUsage};
 use super::pass::Pass;
+use super::render_pass::{FramebufferKey, RenderPassKey};
 
 /// What [`Pass::begin_rendering`] draws to. The attachments keep their contents unless a clear value is given.
 #[derive(Clone, Copy, Debug, Default)]

@@ -11,9 +11,10 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
 
-use super::device::{Device, MemoryKind, lock};
+use super::device::{Device, lock};
 use super::error::{Context, Error};
 use super::graveyard::Garbage;
+use super::memory::MemoryKind;
 
 /// What [`Image::texture_index`] and [`Image::storage_index`] return for an image without that usage.
 pub const NO_INDEX: u32 = u32::MAX;
