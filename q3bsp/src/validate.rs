@@ -15,7 +15,11 @@ use crate::error::{Error, Lump, Warning};
 const MAX_REFERENCES: u64 = 1 << 26;
 
 /// Refuses a lump whose records refer to more than [`MAX_REFERENCES`] elements.
-fn check_sharing(lump: Lump, target: Lump, counts: impl Iterator<Item = i32>) -> Result<(), Error> {
+pub(crate) fn check_sharing(
+    lump: Lump,
+    target: Lump,
+    counts: impl Iterator<Item = i32>,
+) -> Result<(), Error> {
     let found = counts.map(|count| u64::try_from(count).unwrap_or(0)).sum();
     if found > MAX_REFERENCES {
         return Err(Error::TooMuchSharing {

@@ -49,6 +49,9 @@ impl QuakeMap {
     /// # Errors
     /// A reference that leads out of its lump, with its place in the file.
     pub fn to_bsp(&self) -> Result<Bsp, Error> {
+        // Before anybody walks the sides of all brushes.
+        let sides = self.brushes.iter().map(|brush| brush.num_sides);
+        crate::validate::check_sharing(Lump::Brushes, Lump::BrushSides, sides)?;
         let mut bsp = Bsp {
             format: self.format,
             entities: self.entities.clone(),

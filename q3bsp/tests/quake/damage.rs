@@ -4,8 +4,8 @@ use super::exercise::exercise;
 use super::room::{FORMATS, i32_at, room, two};
 use glam::Vec3;
 use proptest::prelude::*;
-use q3bsp::quake::{Edge, Face, QuakeMap};
-use q3bsp::{Bsp, Error, Format};
+use q3bsp::quake::{Edge, Face, QuakeBrush, QuakeMap};
+use q3bsp::{Bsp, Error, Format, Lump};
 
 #[test]
 fn errors_name_lump_record_and_byte() {
@@ -57,6 +57,29 @@ fn errors_name_lump_record_and_byte() {
 }
 
 /// Reads; a map must work.
+#[test]
+fn brushes_that_share_their_sides_without_end_are_refused() {
+    let mut map = room(Format::Quake2);
+    let brush = QuakeBrush {
+        first_side: 0,
+        num_sides: 60_000,
+        ..map.brushes[0]
+    };
+    map.brush_sides = vec![map.brush_sides[0]; 60_000];
+    map.brushes = vec![brush; 60_000];
+    let refused = Bsp::parse(&map.write()).unwrap_err();
+    assert!(
+        matches!(
+            refused,
+            Error::TooMuchSharing {
+                lump: Lump::Brushes,
+                ..
+            }
+        ),
+        "{refused}"
+    );
+}
+
 fn survive(bytes: &[u8]) {
     if let Ok(bsp) = Bsp::parse(bytes) {
         exercise(&bsp);
