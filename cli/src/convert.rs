@@ -180,7 +180,7 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
     let inputs = match inputs::find(&mut files, &args.games, &args.inputs) {
         Ok(inputs) => inputs,
         Err(problem) => {
-            eprintln!("{problem:#}");
+            eprintln!("{}", crate::one_sentence(&problem));
             return Ok(ExitCode::from(BAD_INPUT));
         }
     };
@@ -263,7 +263,7 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
     let failure = |bad_input: bool| {
         move |error: anyhow::Error| Failure {
             map: input.to_string(),
-            error: format!("{error:#}"),
+            error: crate::one_sentence(&error),
             bad_input,
         }
     };

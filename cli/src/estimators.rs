@@ -26,10 +26,10 @@ pub struct EstimatorsArgs {
     #[command(flatten)]
     chosen: Maps,
     /// Frames of each estimator
-    #[arg(long, default_value_t = 4096)]
+    #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
     /// Frames of the reference; default: a sixteenth of the others', at least 16
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     reference: Option<u32>,
     /// Size in pixels
     #[arg(long, default_value = "512x384", value_parser = parse_size)]

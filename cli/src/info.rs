@@ -74,7 +74,7 @@ pub fn run(args: &InfoArgs) -> Result<ExitCode> {
             Ok(found) => sources.extend(found),
             Err(error) => failures.push(Failure {
                 map: name.clone(),
-                error: format!("{error:#}"),
+                error: crate::one_sentence(&error),
             }),
         }
     }
@@ -98,7 +98,7 @@ pub fn run(args: &InfoArgs) -> Result<ExitCode> {
             Ok(info) => infos.push(info),
             Err(error) => failures.push(Failure {
                 map: name,
-                error: format!("{error:#}"),
+                error: crate::one_sentence(&error),
             }),
         }
         bar.inc(1);

@@ -77,7 +77,7 @@ fn main() -> ExitCode {
 }
 
 /// An error with its causes, each once: some of them repeat what caused them.
-fn one_sentence(error: &anyhow::Error) -> String {
+pub(crate) fn one_sentence(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain().map(ToString::to_string) {
         if text.ends_with(&cause) {
