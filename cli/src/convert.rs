@@ -14,10 +14,11 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use relight::export::{
     Export, ExportOptions, ExportReport, Format, ImagePlace, ImageStore, Lightmaps,
-    METRES_PER_UNIT, export,
+    METRES_PER_UNIT, Sky, export,
 };
 use relight::{
     CalibrationCache, CalibrationOptions, GameFiles, Materials, Options, RelitWorld, SearchPath,
+    external_lightmaps,
 };
 use serde::Serialize;
 
@@ -69,6 +70,9 @@ pub struct ConvertArgs {
     /// Write moving textures as animations, which strict readers of glTF refuse
     #[arg(long)]
     animate: bool,
+    /// The sky as a box, as a ball with one picture all round, or none
+    #[arg(long, value_enum, default_value_t = SkyChoice::Box)]
+    sky: SkyChoice,
     /// Let the sky shine as strongly as its light in the map; it then looks brighter than in the game
     #[arg(long)]
     sky_light: bool,
@@ -123,6 +127,13 @@ fn lighting(args: &ConvertArgs) -> (Lightmaps, bool) {
         None => args.calibrate || lightmaps == Lightmaps::Strip,
     };
     (lightmaps, lights)
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug)]
+enum SkyChoice {
+    Box,
+    Panorama,
+    Strip,
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug)]
@@ -277,7 +288,7 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
         ..Options::default()
     };
     let bytes = input.read(shared.files).map_err(failure(true))?;
-    let bsp = q3bsp::Bsp::parse(&bytes)
+    let mut bsp = q3bsp::Bsp::parse(&bytes)
         .with_context(|| input.to_string())
         .map_err(failure(true))?;
     drop(bytes);
@@ -287,7 +298,13 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
         Some(own) => (&own.files as &dyn GameFiles, &own.materials),
         None => (shared.files as &dyn GameFiles, shared.materials),
     };
-    let mut world = RelitWorld::from_bsp(files, materials, &name, bsp, options);
+    // JSON is the file as it is.
+    let external = match shared.format {
+        Format::Json => Ok(0),
+        _ => external_lightmaps(&mut bsp, files, &input.game_path()),
+    };
+    let mut world = RelitWorld::from_bsp(files, materials, &input.game_path(), bsp, options);
+    world.warnings.extend(external.err());
     let warnings = brought.iter().flat_map(|own| own.warnings.iter());
     world.warnings.extend(warnings.cloned());
     let (lightmaps, lights) = lighting(args);
@@ -305,6 +322,11 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
             },
             lights,
             exposure: args.exposure,
+            sky: match args.sky {
+                SkyChoice::Box => Sky::Box,
+                SkyChoice::Panorama => Sky::Panorama,
+                SkyChoice::Strip => Sky::Strip,
+            },
             sky_light: args.sky_light,
             animate: args.animate,
         },

@@ -146,11 +146,17 @@ fn load(
     let brought = Brought::new(files, &bsp);
     let world = match &brought {
         Some(own) => {
-            let mut world = RelitWorld::from_bsp(&own.files, &own.materials, &name, bsp, options);
+            let mut world = RelitWorld::from_bsp(
+                &own.files,
+                &own.materials,
+                &source.game_path(),
+                bsp,
+                options,
+            );
             world.warnings.extend(own.warnings.iter().cloned());
             world
         }
-        None => RelitWorld::from_bsp(files, materials, &name, bsp, options),
+        None => RelitWorld::from_bsp(files, materials, &source.game_path(), bsp, options),
     };
     let milliseconds = begin.elapsed().as_millis();
     Ok(MapInfo::new(&world, bytes.len(), &lumps, milliseconds))

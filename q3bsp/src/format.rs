@@ -110,11 +110,6 @@ impl Format {
         !matches!(self, Format::Ibsp46 | Format::Ibsp47 | Format::QuakeLive)
     }
 
-    /// Whether a fog may have no brush and fill the world.
-    pub fn has_global_fog(self) -> bool {
-        !matches!(self, Format::Ibsp46)
-    }
-
     /// The lumps in directory order, as written.
     pub fn lumps(self) -> &'static [Lump] {
         match self {

@@ -372,7 +372,7 @@ pub struct Fog {
     pub shader: String,
     /// The name field as stored.
     pub raw_shader: [u8; 64],
-    /// The brush, which has at least six sides; -1 for fog that fills the world (not in `IBSP` 46).
+    /// The brush, which has at least six sides; -1 for fog that fills the world.
     pub brush: i32,
     /// Side of the brush (relative to its first) through which one looks into the fog; -1 for none.
     pub visible_side: i32,

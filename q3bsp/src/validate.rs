@@ -368,7 +368,8 @@ impl Bsp {
             repairs: &mut self.container.repairs,
         };
         for (element, fog) in self.fogs.iter_mut().enumerate() {
-            if fog.brush == -1 && self.format.has_global_fog() {
+            // Quake III's own engine refuses these maps; engines of its mods do not.
+            if fog.brush == -1 {
                 continue;
             }
             let at = index(

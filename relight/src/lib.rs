@@ -32,6 +32,7 @@ pub mod calibrate;
 pub mod compare;
 pub mod export;
 pub mod exposure;
+mod external_lightmaps;
 pub mod files;
 pub mod image;
 pub mod light;
@@ -44,6 +45,7 @@ mod test_data;
 pub mod world;
 
 pub use calibrate::{CalibrationCache, CalibrationOptions, CalibrationReport, calibrate};
+pub use external_lightmaps::external_lightmaps;
 pub use files::{FileError, GameFiles, MemoryFiles, Overlay, Pak, Pk3, SearchPath};
 pub use light::{LightLists, LightReport, PointLight, SunLight, TriangleLight};
 pub use map_files::map_files;

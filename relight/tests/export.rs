@@ -6,7 +6,7 @@ use q3bsp::{Bsp, SurfaceKind, surface_flags};
 use relight::export::{
     Export, ExportOptions, ExportReport, Format, ImagePlace, ImageStore, Lightmaps, export,
 };
-use relight::{GameFiles, Materials, Options, RelitWorld, SearchPath};
+use relight::{GameFiles, Materials, Options, Pk3, RelitWorld, SearchPath};
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -121,6 +121,14 @@ fn measure_lumps(bsp: &Bsp, hidden: &dyn Fn(&str) -> bool) -> BTreeMap<String, M
 fn measure_gltf(path: &Path, scale: f32) -> (BTreeMap<String, Measure>, usize) {
     let (document, buffers, images) = gltf::import(path).unwrap();
     assert!(images.len() <= document.images().count());
+    let mut contents = HashSet::new();
+    for image in document.images() {
+        if let gltf::image::Source::View { view, .. } = image.source() {
+            let range = view.offset()..view.offset() + view.length();
+            let bytes = &buffers[view.buffer().index()].0[range];
+            assert!(contents.insert(bytes.to_vec()), "{:?} twice", image.name());
+        }
+    }
     let mut out: BTreeMap<String, Measure> = BTreeMap::new();
     let mut away = 0;
     let mut meshes = HashSet::new();
@@ -340,26 +348,63 @@ fn obj_has_every_triangle() {
 /// name with different flags.
 const MAPS: [&str; 3] = ["aggressor", "am_lavaarena", "oa_dm3"];
 
-#[test]
-fn real_maps_are_exported_as_they_are() {
+/// The game's folder; `None`, with a line that says so, where it is not installed.
+fn game() -> Option<PathBuf> {
     let folder = std::env::var_os("OPENARENA_DATA").map_or_else(
         || PathBuf::from("/usr/share/games/openarena/baseoa"),
         PathBuf::from,
     );
-    if !folder.is_dir() {
-        let required = std::env::var("RELIGHT_REQUIRE_DATA").is_ok_and(|v| v == "1");
-        assert!(
-            !required,
-            "{}: OpenArena's data is required",
-            folder.display()
-        );
-        println!("skipped: no OpenArena data in {}", folder.display());
-        return;
+    if folder.is_dir() {
+        return Some(folder);
     }
+    let required = std::env::var("RELIGHT_REQUIRE_DATA").is_ok_and(|v| v == "1");
+    assert!(
+        !required,
+        "{}: OpenArena's data is required",
+        folder.display()
+    );
+    println!("skipped: no OpenArena data in {}", folder.display());
+    None
+}
+
+#[test]
+fn real_maps_are_exported_as_they_are() {
+    let Some(folder) = game() else {
+        return;
+    };
     let files = SearchPath::open(&[folder]).unwrap();
     for name in MAPS {
         let map = format!("maps/{name}.bsp");
         let written = write(&files, &map, Format::Glb, ExportOptions::default());
         agree(&written, name);
     }
+}
+
+/// Minutes: `cargo test --release -p relight --test export -- --ignored`.
+#[test]
+#[ignore = "converts and reads back every map of every pack"]
+fn all_maps_are_exported_as_they_are() {
+    let Some(folder) = game() else {
+        return;
+    };
+    let mut packs: Vec<PathBuf> = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "pk3"))
+        .collect();
+    packs.sort();
+    let mut count = 0;
+    for pack in packs {
+        let mut files = SearchPath::open(std::slice::from_ref(&folder)).unwrap();
+        // later packs replace maps of earlier ones; here each has its own
+        files.add_pk3(&pack).unwrap();
+        for map in Pk3::open(&pack).unwrap().list("maps", ".bsp") {
+            let path = format!("maps/{map}");
+            let written = write(&files, &path, Format::Glb, ExportOptions::default());
+            agree(&written, &format!("{}:{path}", pack.display()));
+            count += 1;
+        }
+    }
+    println!("{count} maps");
+    assert!(count > 0);
 }

@@ -42,6 +42,14 @@ impl Input {
         found.with_context(|| format!("{self}: no such map"))
     }
 
+    /// Path that the map has in its game, or would have.
+    pub fn game_path(&self) -> String {
+        match self {
+            Input::File(_) => format!("maps/{}.bsp", self.name()),
+            Input::Game(path) | Input::Packed(_, path) => path.clone(),
+        }
+    }
+
     /// Name of the map: that of its file without folders and extension.
     fn name(&self) -> String {
         let path = match self {

@@ -241,6 +241,9 @@ fn make(
                 Encoded::png(&image, &format!("{name}_{label}"))
             })
             .transpose(),
+        Picture::Panorama(name) => sky::panorama(files, shader)
+            .map(|image| Encoded::png(&image, &format!("{name}_panorama")))
+            .transpose(),
         Picture::Sky { name, side } => sky::bake(files, shader, *side)
             .map(|image| Encoded::png(&image, &format!("{name}_side{side}")))
             .transpose(),

@@ -70,6 +70,8 @@ pub enum Picture {
         /// Which side.
         side: usize,
     },
+    /// A whole sky, all round.
+    Panorama(String),
 }
 
 /// A picture and how it lies on the surface.

@@ -99,6 +99,18 @@ pub enum Lightmaps {
     Strip,
 }
 
+/// What becomes of the sky.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Sky {
+    /// A box around the map, a picture a side.
+    #[default]
+    Box,
+    /// A ball around the map with one picture all round (equirectangular).
+    Panorama,
+    /// Left out.
+    Strip,
+}
+
 /// Where images go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ImagePlace {
@@ -128,6 +140,8 @@ pub struct ExportOptions {
     /// What all light is multiplied by; the map's own [`display_exposure`](crate::exposure::display_exposure) where it
     /// is `None`.
     pub exposure: Option<f32>,
+    /// What becomes of the sky.
+    pub sky: Sky,
     /// Whether the sky shines as strongly as its light in the map, instead of as bright as the game shows it.
     pub sky_light: bool,
     /// Whether moving textures are written as animations, which strict readers of glTF refuse.
@@ -151,6 +165,7 @@ impl Default for ExportOptions {
             images: ImagePlace::default(),
             lights: false,
             exposure: None,
+            sky: Sky::default(),
             sky_light: false,
             animate: false,
         }

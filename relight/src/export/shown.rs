@@ -66,7 +66,7 @@ pub fn make_shown(look: &mut Look, light: Vec3) -> bool {
 fn told(glow: &Slot) -> String {
     let what = match &glow.picture {
         Picture::File(name) | Picture::Edited(name, _) => format!(" of {name}"),
-        Picture::Baked { .. } | Picture::Sky { .. } => String::new(),
+        Picture::Baked { .. } | Picture::Sky { .. } | Picture::Panorama(_) => String::new(),
     };
     format!(
         "its glow{what} lies on the surface in another way than its colour; the colour is shown"

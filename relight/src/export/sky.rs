@@ -1,4 +1,5 @@
-//! The sky as a box: the images of its script, or, where it has clouds, pictures of both together.
+//! The sky as a box: the images of its script, or, where it has clouds, pictures of both together; and as one picture
+//! all round.
 //!
 //! Source: the axes of the box's sides and the dome of the clouds are the engine's; see the classic look.
 
@@ -122,6 +123,66 @@ pub fn bake(files: &dyn GameFiles, shader: &Shader, side: usize) -> Option<Image
     Image::from_rgba(SIZE, SIZE, rgba)
 }
 
+/// Widest picture all round.
+const WIDEST: u32 = 4096;
+
+/// Direction of a place of a picture all round, map space: its middle shows the map's x, its left half y; the upper edge
+/// is above.
+pub fn direction(u: f32, v: f32) -> Vec3 {
+    let azimuth = (0.5 - u) * std::f32::consts::TAU;
+    let elevation = (0.5 - v) * std::f32::consts::PI;
+    let (level, z) = (elevation.cos(), elevation.sin());
+    Vec3::new(level * azimuth.cos(), level * azimuth.sin(), z)
+}
+
+/// The side of the box in a direction, and where on it, from the left and from above in 0..1.
+fn side_of(direction: Vec3) -> (usize, Vec2) {
+    let mut found = (0, Vec2::splat(0.5));
+    let mut nearest = 0.0;
+    for side in 0..6 {
+        let middle = point(side, 0.0, 0.0);
+        let depth = direction.dot(middle);
+        if depth > nearest {
+            nearest = depth;
+            let right = point(side, 1.0, 0.0) - middle;
+            let up = point(side, 0.0, 1.0) - middle;
+            let (s, t) = (direction.dot(right) / depth, direction.dot(up) / depth);
+            found = (side, Vec2::new((s + 1.0) * 0.5, (1.0 - t) * 0.5));
+        }
+    }
+    found
+}
+
+/// The sky as one picture all round (equirectangular); `None` where no side has a picture.
+pub fn panorama(files: &dyn GameFiles, shader: &Shader) -> Option<Image> {
+    let sides: [Option<Image>; 6] = std::array::from_fn(|side| match shader.stages.is_empty() {
+        true => Some(load(files, &outer(shader, side)?)?.0),
+        false => bake(files, shader, side),
+    });
+    let largest = sides.iter().flatten().map(|side| side.width).max()?;
+    let width = largest.saturating_mul(4).clamp(16, WIDEST);
+    let height = width / 2;
+    let table = overbright::byte_table();
+    let byte = |v: f32| (overbright::from_linear(v.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8;
+    let mut rgba = Vec::with_capacity((width * height * 4) as usize);
+    for y in 0..height {
+        for x in 0..width {
+            let mut sum = Vec3::ZERO;
+            for (dx, dy) in [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)] {
+                let u = (x as f32 + dx) / width as f32;
+                let v = (y as f32 + dy) / height as f32;
+                let (side, place) = side_of(direction(u, v));
+                if let Some(Some(picture)) = sides.get(side) {
+                    sum += picture.linear_texel(place, true, &table).truncate();
+                }
+            }
+            rgba.extend((sum / 4.0).to_array().map(byte));
+            rgba.push(255);
+        }
+    }
+    Image::from_rgba(width, height, rgba)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -145,5 +206,20 @@ mod tests {
     fn clouds_overhead_are_at_a_quarter_turn() {
         let uv = cloud_coordinates(Vec3::Z, 512.0);
         assert!((uv - Vec2::splat(std::f32::consts::FRAC_PI_2)).length() < 1.0e-6);
+    }
+
+    #[test]
+    fn places_of_the_picture_all_round_are_on_the_side_that_shows_them() {
+        for side in 0..6 {
+            for (s, t) in [(0.0, 0.0), (0.5, -0.25), (-0.7, 0.9)] {
+                let (found, place) = side_of(point(side, s, t).normalize());
+                assert_eq!(found, side);
+                let want = Vec2::new((s + 1.0) * 0.5, (1.0 - t) * 0.5);
+                assert!((place - want).length() < 1.0e-5, "{side} {place} {want}");
+            }
+        }
+        assert!((direction(0.5, 0.5) - Vec3::X).length() < 1.0e-6);
+        assert!((direction(0.25, 0.5) - Vec3::Y).length() < 1.0e-6);
+        assert!((direction(0.1, 0.0) - Vec3::Z).length() < 1.0e-6);
     }
 }

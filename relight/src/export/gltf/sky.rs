@@ -6,18 +6,19 @@ use super::materials::Sampling;
 use super::nodes::turn;
 use crate::export::geometry::Geometry;
 use crate::export::images::Encoded;
-use crate::export::{ExportError, emission, extras, sky};
+use crate::export::look::Picture;
+use crate::export::{ExportError, Sky, emission, extras, sky};
 use glam::{Vec3, Vec4};
 use serde_json::{Value, json};
 use std::sync::Arc;
 
 impl Document<'_> {
-    /// Adds the sky as a box around everything; `None` for a map without.
+    /// Adds the sky around everything; `None` for a map without.
     pub(super) fn add_sky(&mut self, geometry: &Geometry) -> Result<Option<usize>, ExportError> {
         let source = self.source;
         let world = source.world;
         let material = world.sky.and_then(|m| world.materials.get(m as usize));
-        let Some(material) = material else {
+        let Some(material) = material.filter(|_| source.options.sky != Sky::Strip) else {
             return Ok(None);
         };
         let places = geometry
@@ -35,12 +36,18 @@ impl Document<'_> {
         };
         let middle = (least + most) * 0.5;
         let radius = (most - least).length() * 0.5;
+        let shader = sky::definition(material);
+        let mut wanted: Vec<Option<Picture>> = (0..6)
+            .map(|side| sky::picture(source.files, material, side))
+            .collect();
+        let round = source.options.sky == Sky::Panorama && wanted.iter().any(Option::is_some);
+        if round {
+            wanted = vec![Some(Picture::Panorama(material.name.to_ascii_lowercase()))];
+        }
         let mut pictures = Vec::new();
         let mut mean = Vec4::ZERO;
-        for side in 0..6 {
-            let picture = sky::picture(source.files, material, side);
-            let shader = sky::definition(material);
-            let image = match &picture {
+        for picture in &wanted {
+            let image = match picture {
                 Some(picture) => source.images.get(source.files, picture, shader)?,
                 None => None,
             };
@@ -65,14 +72,25 @@ impl Document<'_> {
         let mut plain = None;
         for (side, image) in pictures.iter().enumerate() {
             let number = match image {
-                Some(image) => self.sky_material(&material.name, side, image, strength),
+                Some(image) => {
+                    let name = match round {
+                        true => material.name.clone(),
+                        false => format!("{} side {side}", material.name),
+                    };
+                    self.sky_material(&name, image, strength)
+                }
                 None => *plain.get_or_insert_with(|| {
                     let color = radiance.filter(|_| shown.is_none()).unwrap_or(Vec3::ZERO);
                     self.plain_sky(&material.name, color)
                 }),
             };
-            let corners = [(-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (1.0, 1.0)];
             let scale = source.options.scale;
+            if round {
+                let place = |p: Vec3| turn(middle + p * radius) * scale;
+                primitives.push(ball(&mut self.buffers, place, number));
+                continue;
+            }
+            let corners = [(-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (1.0, 1.0)];
             let positions =
                 corners.map(|(s, t)| turn(middle + sky::point(side, s, t) * radius) * scale);
             let normal = turn(-sky::point(side, 0.0, 0.0));
@@ -89,16 +107,10 @@ impl Document<'_> {
         }))))
     }
 
-    fn sky_material(
-        &mut self,
-        name: &str,
-        side: usize,
-        image: &Arc<Encoded>,
-        strength: f32,
-    ) -> usize {
+    fn sky_material(&mut self, name: &str, image: &Arc<Encoded>, strength: f32) -> usize {
         let texture = self.textures.add(image, Sampling::Clamp);
         let mut material = json!({
-            "name": format!("{name} side {side}"),
+            "name": name,
             "pbrMetallicRoughness": {
                 "baseColorFactor": [0.0, 0.0, 0.0, 1.0],
                 "metallicFactor": 0.0,
@@ -162,6 +174,57 @@ fn quad(buffers: &mut Buffers, positions: [Vec3; 4], normal: Vec3, material: usi
     let indices = buffers.add(Kind::Short, &indices, 6);
     json!({
         "attributes": {"POSITION": position, "NORMAL": normals, "TEXCOORD_0": st},
+        "indices": indices,
+        "material": material,
+    })
+}
+
+/// The sky as a ball with one picture all round, seen from inside. `place`: where a point of the unit ball goes.
+fn ball(buffers: &mut Buffers, place: impl Fn(Vec3) -> Vec3, material: usize) -> Value {
+    const COLUMNS: u16 = 64;
+    const ROWS: u16 = 32;
+    // the flat parts of the ball are nearer than its corners
+    const WIDER: f32 = 1.01;
+    let (mut positions, mut normals, mut st) = (Vec::new(), Vec::new(), Vec::new());
+    for row in 0..=ROWS {
+        for column in 0..=COLUMNS {
+            let u = f32::from(column) / f32::from(COLUMNS);
+            let v = f32::from(row) / f32::from(ROWS);
+            let direction = sky::direction(u, v);
+            positions.push(place(direction * WIDER).to_array());
+            normals.push(turn(-direction).normalize().to_array());
+            st.push([u, v]);
+        }
+    }
+    let mut indices: Vec<u8> = Vec::new();
+    for row in 0..ROWS {
+        for column in 0..COLUMNS {
+            let above = row * (COLUMNS + 1) + column;
+            let below = above + COLUMNS + 1;
+            // counter-clockwise from inside; at the poles one of the two has no area
+            let upper = [above, below + 1, above + 1].map(|i| (i, row > 0));
+            let lower = [above, below, below + 1].map(|i| (i, row + 1 < ROWS));
+            for (index, there) in upper.into_iter().chain(lower) {
+                if there {
+                    indices.extend(index.to_le_bytes());
+                }
+            }
+        }
+    }
+    let (least, most) = positions
+        .iter()
+        .map(|p| Vec3::from_array(*p))
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), p| {
+            (a.min(p), b.max(p))
+        });
+    let count = indices.len() / 2;
+    let position = buffers.add_floats(Kind::Vec3, positions.into_iter());
+    buffers.bound(position, &least.to_array(), &most.to_array());
+    let normal = buffers.add_floats(Kind::Vec3, normals.into_iter());
+    let st = buffers.add_floats(Kind::Vec2, st.into_iter());
+    let indices = buffers.add(Kind::Short, &indices, count);
+    json!({
+        "attributes": {"POSITION": position, "NORMAL": normal, "TEXCOORD_0": st},
         "indices": indices,
         "material": material,
     })
