@@ -351,6 +351,10 @@ pub struct AntialiasView {
     pub focal_distance: f32,
     /// Size of what a ray sees of a texture, over that of a traced pixel: less where many rays make a pixel.
     pub texture_scale: f32,
+    /// How much longer than wide the part of a texture may be that one look-up takes in; 1 and below: no longer.
+    pub anisotropy: f32,
+    /// Nothing.
+    pub padding: u32,
 }
 
 /// What the denoiser's passes read: addresses of their texels, bindless indices of their images.

@@ -380,7 +380,7 @@ pub mod constants {
         INSTANCE_UNLIT = 16;
         /// A crosshair: in stereo it stays where the view has it.
         INSTANCE_CROSSHAIR = 32;
-        /// Hangs in the air where the light is `ambient`; of the traced look alone.
+        /// A sprite: hangs in the air where the light is `ambient`. Of the traced look alone.
         INSTANCE_SUSPENDED = 64;
         /// A draw of a material's stage.
         DRAW_STAGE = 0;
@@ -397,5 +397,7 @@ pub mod constants {
         FOG_ADJUST_NONE = 0; FOG_ADJUST_RGB = 1; FOG_ADJUST_ALPHA = 2; FOG_ADJUST_RGBA = 3;
         /// The triangle belongs to the world (its vertex colours and lightmap are baked light).
         TRIANGLE_WORLD = 1;
+        /// The triangle is turned to the eye: mirrors see it from behind, and see it all the same.
+        TRIANGLE_FACES_EYE = 2;
     }
 }

@@ -24,7 +24,7 @@ bool is_next_layer(Hit hit, vec3 direction, LayerOrder last, LayerOrder best, ou
     key = layer_key(p.triangle.flags, hit.t);
     bool behind = layer_before(last.key, last.geometry, last.primitive, key, hit.geometry, hit.primitive);
     bool before = best.key >= LAYER_NONE || layer_before(key, hit.geometry, hit.primitive, best.key, best.geometry, best.primitive);
-    return behind && before && !is_culled(material_of(p.triangle.material).flags, p.face_normal, direction);
+    return behind && before && !is_culled(p, direction);
 }
 
 // From where on layers behind `last` are found: a layer lies at its key or a bias behind it.

@@ -77,9 +77,10 @@ SurfacePoint surface_point(Hit hit) {
 }
 
 // The side that the material does not show.
-bool is_culled(uint material_flags, vec3 face_normal, vec3 direction) {
-    if ((material_flags & MATERIAL_TWO_SIDED) != 0) return false;
-    bool from_front = dot(face_normal, direction) < 0.0;
+bool is_culled(SurfacePoint p, vec3 direction) {
+    uint material_flags = material_of(p.triangle.material).flags;
+    if ((material_flags & MATERIAL_TWO_SIDED) != 0 || (p.triangle.flags & TRIANGLE_FACES_EYE) != 0) return false;
+    bool from_front = dot(p.face_normal, direction) < 0.0;
     return from_front == ((material_flags & MATERIAL_CULL_BACK) != 0);
 }
 

@@ -16,6 +16,16 @@ struct Layer {
 
 Layer layer_nothing() { return Layer(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)); }
 
+// What a ray sees of a texture.
+struct Footprint {
+    float width; // of the ray's cone at the hit, units; on slanted surfaces the geometric mean of the ellipse's axes
+    // The axes of the ellipse that the cone cuts from the surface, texture coordinates; 0: not known.
+    vec2 along;
+    vec2 across;
+};
+
+Footprint round_footprint(float width) { return Footprint(width, vec2(0.0), vec2(0.0)); }
+
 // Level of detail for a texture whose coordinates change by `scale` per unit where the ray's cone is `width` wide.
 float texture_lod(uint image, float scale, float width) {
     vec2 size = vec2(textureSize(textures[nonuniformEXT(image)], 0));
@@ -23,11 +33,73 @@ float texture_lod(uint image, float scale, float width) {
     return max(log2(max(texels, 1.0e-6)), 0.0);
 }
 
-// The stage's image at the point; white where there is none. `width`: of the ray's cone at the hit, units.
-vec4 stage_texel(Stage stage, SurfacePoint p, Instance instance, float width) {
+// The ellipse of a cone that is `width` units wide where it meets the surface, in texture coordinates: the cone's
+// section with the plane (Akenine-Möller et al., Improved Shader and Texture Level of Detail Using Ray Cones, JCGT 2021,
+// section 5), by the triangle's gradients.
+Footprint ellipse_footprint(SurfacePoint p, vec3 direction, float cosine, float width) {
+    Footprint f = round_footprint(width * inversesqrt(cosine));
+    TraceVertices vertices = TraceVertices(p.vertices);
+    Vertex a = vertices.at[p.triangle.indices[0]], b = vertices.at[p.triangle.indices[1]], c = vertices.at[p.triangle.indices[2]];
+    Instance instance = instance_of(p.instance);
+    mat3 axis = mat3(instance.axis[0], instance.axis[1], instance.axis[2]);
+    vec3 ab = axis * (b.position - a.position), ac = axis * (c.position - a.position);
+    vec3 n = cross(ab, ac);
+    float area_squared = dot(n, n);
+    vec3 slope = direction - p.face_normal * dot(p.face_normal, direction);
+    float slant = length(slope);
+    if (!(area_squared > 0.0) || slant < 0.1) return f; // seen from straight above it is round
+    vec3 along = slope * (width / (cosine * slant));
+    vec3 across = cross(p.face_normal, slope) * (width / slant);
+    vec2 sb = b.st - a.st, sc = c.st - a.st;
+    f.along = (dot(cross(along, ac), n) * sb + dot(cross(ab, along), n) * sc) / area_squared;
+    f.across = (dot(cross(across, ac), n) * sb + dot(cross(ab, across), n) * sc) / area_squared;
+    return f;
+}
+
+// The mean of the image over an ellipse: look-ups of the width of the shorter axis side by side along the longer one,
+// as samplers take them, but the same with every driver. Where as many as are allowed do not cover it a part is taken,
+// so that it is never less sharp than the round footprint.
+vec4 texel_in_ellipse(uint image, uint sampler_index, vec2 uv, vec2 along, vec2 across) {
+    vec2 size = vec2(textureSize(textures[nonuniformEXT(image)], 0));
+    float longer = length(along * size), shorter = length(across * size);
+    vec2 axis = along;
+    if (longer < shorter) {
+        axis = across;
+        float other = longer;
+        longer = shorter;
+        shorter = other;
+    }
+    float most = min(VIEW.antialias.anisotropy, 16.0);
+    float covered = min(longer, most * sqrt(longer * shorter));
+    axis *= covered / max(longer, 1.0e-12);
+    // where the image is magnified one look-up is enough
+    float count = clamp(ceil(covered / max(shorter, 1.0)), 1.0, floor(most));
+    float lod = max(log2(max(covered / count, 1.0e-6)), 0.0);
+    vec4 sum = vec4(0.0);
+    for (float i = 0.5; i < count; i += 1.0)
+        sum += textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(sampler_index)]), uv + axis * (i / count - 0.5), lod);
+    return sum / count;
+}
+
+bool has_ellipse(Footprint f) { return VIEW.antialias.anisotropy > 1.0 && f.along != vec2(0.0); }
+
+// The stage's image at the point; white where there is none.
+vec4 stage_texel(Stage stage, SurfacePoint p, Instance instance, Footprint footprint) {
     uint image = stage_image(VIEW.materials, stage, p.triangle.lightmap, p.stage.time);
     if ((stage.flags & STAGE_WHITE) != 0 || image == NO_TEXTURE) return vec4(1.0);
     vec2 uv = stage_texcoord(VIEW.materials, stage, instance, p.stage);
+    if (stage.tc_gen == TCGEN_BASE && has_ellipse(footprint)) {
+        vec2 along = footprint.along, across = footprint.across;
+        if (stage.tc_mod_count > 0) {
+            // what the modifiers make of the axes: all but turbulence are linear in the coordinates, and that is slow
+            SurfacePoint q = p;
+            q.stage.st = p.stage.st + along;
+            along = stage_texcoord(VIEW.materials, stage, instance, q.stage) - uv;
+            q.stage.st = p.stage.st + across;
+            across = stage_texcoord(VIEW.materials, stage, instance, q.stage) - uv;
+        }
+        return texel_in_ellipse(image, stage.sampler_index, uv, along, across);
+    }
     float scale = p.texel_scale;
     if (stage.tc_gen == TCGEN_ENVIRONMENT) {
         scale = 0.0;
@@ -43,7 +115,7 @@ vec4 stage_texel(Stage stage, SurfacePoint p, Instance instance, float width) {
         vec2 dt = stage_texcoord(VIEW.materials, stage, instance, q.stage) - uv;
         scale *= sqrt(abs(ds.x * dt.y - ds.y * dt.x)) / step_st;
     }
-    float lod = texture_lod(image, scale, width);
+    float lod = texture_lod(image, scale, footprint.width);
     return textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), uv, lod);
 }
 
@@ -57,7 +129,7 @@ bool is_solid_at(SurfacePoint p, float width) {
         Stage stage = stages.at[material.stage_first + i];
         if (stage.alpha_func == ALPHAFUNC_NONE || (stage.flags & STAGE_DEPTH_WRITE) == 0) continue;
         tested = true;
-        float alpha = stage_texel(stage, p, instance, width).a * stage_color(VIEW.materials, stage, instance, p.stage).a;
+        float alpha = stage_texel(stage, p, instance, round_footprint(width)).a * stage_color(VIEW.materials, stage, instance, p.stage).a;
         if (alpha_passes(stage.alpha_func, alpha)) return true;
     }
     return !tested;
@@ -102,12 +174,16 @@ Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, flo
 const float DOUBLE_PRODUCT = 1.0 / 0.21404114;
 
 // Runs the stages of the point's material over the background.
-Layer evaluate_stages(SurfacePoint p, float width) {
+Layer evaluate_stages(SurfacePoint p, Footprint footprint) {
     Material material = material_of(p.triangle.material);
     bool world = (p.triangle.flags & TRIANGLE_WORLD) != 0;
     if (material.plain_image != NO_TEXTURE && (world || (material.flags & MATERIAL_VERTEX_LIGHT) == 0)) {
         // what the stages below come to, for the many materials that are an image under light
-        float lod = texture_lod(material.plain_image, p.texel_scale, width);
+        if (has_ellipse(footprint)) {
+            vec4 texel = texel_in_ellipse(material.plain_image, material.plain_sampler, p.stage.st, footprint.along, footprint.across);
+            return Layer(decode_display(texel.rgb), vec3(0.0), vec3(0.0), vec3(0.0));
+        }
+        float lod = texture_lod(material.plain_image, p.texel_scale, footprint.width);
         vec3 texel = textureLod(sampler2D(textures[nonuniformEXT(material.plain_image)],
             samplers[nonuniformEXT(material.plain_sampler)]), p.stage.st, lod).rgb;
         return Layer(decode_display(texel), vec3(0.0), vec3(0.0), vec3(0.0));
@@ -131,7 +207,7 @@ Layer evaluate_stages(SurfacePoint p, float width) {
             source.reflected = decode_display(mean.rgb) * decode_display(color.rgb);
             alpha = mean.a * color.a;
         } else {
-            vec4 texel = stage_texel(stage, p, instance, width);
+            vec4 texel = stage_texel(stage, p, instance, footprint);
             vec3 image = decode_display(texel.rgb);
             bool baked = world && (material.flags & MATERIAL_VERTEX_LIGHT) != 0
                 && (stage.rgb_gen == RGBGEN_VERTEX || stage.rgb_gen == RGBGEN_EXACT_VERTEX);
@@ -170,8 +246,8 @@ vec3 shown_glow(Material material) {
 }
 
 // The layer as an eye sees it: an emitter's surface glows with its own texture.
-Layer evaluate_layer(SurfacePoint p, float width) {
-    Layer layer = evaluate_stages(p, width);
+Layer evaluate_layer(SurfacePoint p, Footprint footprint) {
+    Layer layer = evaluate_stages(p, footprint);
     Material material = material_of(p.triangle.material);
     layer.emission += layer.lit * shown_glow(material);
     layer.lit = max(layer.lit, 0.0);

@@ -50,7 +50,7 @@ vec3 sky_radiance(SurfacePoint p, vec3 d, float spread) {
         p.triangle.lightmap = NO_TEXTURE;
         // one unit of direction moves the coordinates by about radius over height of the sphere's cap, at most
         p.texel_scale = 1.0;
-        Layer clouds = evaluate_stages(p, spread);
+        Layer clouds = evaluate_stages(p, round_footprint(spread));
         radiance = max(clouds.emission + clouds.lit + clouds.through * radiance, 0.0);
     }
     return radiance;

@@ -1,8 +1,8 @@
 //! What a material is to light, as `MATERIAL_*` bits.
 
 use shaders::types::constants as c;
-use shaderscript::Shader;
 use shaderscript::light::{self, SurfaceClass};
+use shaderscript::{Deform, Shader};
 
 use super::material::LightmapClass;
 
@@ -37,6 +37,11 @@ pub fn material_flags(shader: &Shader, class: LightmapClass) -> u32 {
         shaderscript::Cull::Front => {}
         shaderscript::Cull::Back => flags |= c::MATERIAL_CULL_BACK,
         shaderscript::Cull::None => flags |= c::MATERIAL_TWO_SIDED,
+    }
+    // what turns to the eye shows mirrors its back
+    let turns = |deform: &Deform| matches!(deform, Deform::AutoSprite | Deform::AutoSprite2);
+    if shader.deforms.iter().any(turns) {
+        flags |= c::MATERIAL_TWO_SIDED;
     }
     if shader.polygon_offset {
         flags |= c::MATERIAL_POLYGON_OFFSET;

@@ -157,12 +157,13 @@ impl MapLights {
             }
         }
         if settings.dynamic_light {
-            for light in dynamic_lights(&view.dlights, settings.rt_dlight_scale) {
+            let scale = settings.rt_dlight_scale.max(0.0) * self.white;
+            for light in dynamic_lights(&view.dlights, scale) {
                 frame.add_sphere(light, &self.sight);
             }
         }
         if settings.rt_flashlight {
-            frame.add_sphere(flashlight(&view.view), &self.sight);
+            frame.add_sphere(flashlight(&view.view, self.white), &self.sight);
         }
         let mut lights = self.fixed();
         let arena = rec.arena();
@@ -212,7 +213,7 @@ const DYNAMIC_LIGHT_CLEARANCE: f32 = 20.0;
 /// The engine gives a light a reach `r` and a colour; its classic look adds about the whole colour up to half the reach
 /// and fades to nothing at `r`. Here light falls off with the square of the distance, strong enough that a white
 /// surface that faces it at half the reach shows the light's colour: intensity = colour * pi * (r / 2)². Colours are as
-/// displayed, so they are decoded.
+/// displayed, so they are decoded. `scale`: the radiance that shows as white.
 pub fn dynamic_lights(lights: &[DynamicLight], scale: f32) -> Vec<t::SphereLight> {
     lights
         .iter()
@@ -230,7 +231,7 @@ pub fn dynamic_lights(lights: &[DynamicLight], scale: f32) -> Vec<t::SphereLight
             sphere(
                 light.origin,
                 radius,
-                color * (PI * half * half * scale.max(0.0)),
+                color * (PI * half * half * scale),
                 DYNAMIC_LIGHT_CLEARANCE,
             )
         })
@@ -256,12 +257,12 @@ const FLASHLIGHT_ANGLES: (f32, f32) = (9.0, 24.0);
 /// What lies this near to it casts no shadow: the player who holds it, whose own model is there for mirrors.
 const FLASHLIGHT_CLEARANCE: f32 = 40.0;
 
-/// The lamp that goes with the eye.
-fn flashlight(view: &View) -> t::SphereLight {
+/// The lamp that goes with the eye. `white`: the radiance that shows as white.
+fn flashlight(view: &View, white: f32) -> t::SphereLight {
     let [forward, left, up] = view.axis;
     let (right, down) = FLASHLIGHT_PLACE;
     let origin = view.origin - left * right - up * down;
-    let intensity = FLASHLIGHT_COLOR * (PI * FLASHLIGHT_REACH * FLASHLIGHT_REACH);
+    let intensity = FLASHLIGHT_COLOR * (white * PI * FLASHLIGHT_REACH * FLASHLIGHT_REACH);
     let (inner, outer) = FLASHLIGHT_ANGLES;
     t::SphereLight {
         axis: forward,

@@ -45,6 +45,8 @@ pub struct MapLights {
     pub(super) flickers: Vec<Flicker>,
     /// Radiance of a white diffuse surface in the light that is everywhere.
     pub ambient: Vec3,
+    /// Radiance that the map's exposure shows as white: what is given as displayed is that much brighter.
+    pub white: f32,
 }
 
 /// A light that each view has in its own form.
@@ -272,6 +274,7 @@ impl MapLights {
             moving,
             flickers,
             ambient: source.ambient,
+            white: 1.0,
         };
         lights.fixed.triangles = [lights.triangles.address(), 0];
         lights.fixed.spheres = [lights.spheres.address(), 0];

@@ -145,9 +145,11 @@ impl TraceLook {
         };
         let tracer = Tracer::of(device.info(), settings.rt_tracer);
         let mut view_tracer = ViewTracer::new(device, tracer)?;
-        view_tracer.exposure_base = display_exposure(relit).log2();
+        let exposure = display_exposure(relit);
+        view_tracer.exposure_base = exposure.log2();
         let geometry = geometry(device, tracer, world, assets)?;
         let mut lights = MapLights::new(device, &source)?;
+        lights.white = exposure.recip();
         lights.find_fogs(&geometry.fog_boxes);
         Ok(Self {
             tracer: view_tracer,

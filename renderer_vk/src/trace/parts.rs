@@ -292,7 +292,12 @@ impl Parts {
         } else {
             0
         };
-        let flags = world | rank_bits(info);
+        let faces_eye = if instance.flags & c::INSTANCE_SUSPENDED != 0 {
+            c::TRIANGLE_FACES_EYE
+        } else {
+            0
+        };
+        let flags = world | faces_eye | rank_bits(info);
         // Seen from anywhere, the faces of something pressed flat lie in one plane, and which of them a ray meets first
         // is left to the last bits of its distance: it would flicker.
         if !is_solid(axes(instance)) {

@@ -270,6 +270,40 @@ fn smoke_is_as_bright_as_the_light_around_it_with(gpu: &mut Gpu) {
 }
 
 #[test]
+fn sprites_are_seen_from_behind() {
+    Gpu::each(sprites_are_seen_from_behind_with);
+}
+
+fn sprites_are_seen_from_behind_with(gpu: &mut Gpu) {
+    let [back, front] = [[0.2, 0.3, 0.1], [0.6, 0.2, 0.4]];
+    let linear = |c: [f32; 3]| Vec3::from(c.map(through_byte));
+    for (flags, seen) in [
+        (c::INSTANCE_UNLIT | c::INSTANCE_SUSPENDED, linear(front)),
+        (c::INSTANCE_UNLIT, Vec3::ZERO),
+    ] {
+        let mut scene = scene();
+        let wall = scene.material(&[stage::constant(back)], 0);
+        scene.quad(screen(300.0), wall);
+        let sprite = scene.material(&[stage::add(front)], c::MATERIAL_TRANSLUCENT);
+        let away = rectangle(
+            Vec3::new(100.0, -200.0, -200.0),
+            Vec3::Y * 400.0,
+            Vec3::Z * 400.0,
+        );
+        scene.mesh(
+            away,
+            sprite,
+            shaders::types::Instance {
+                flags,
+                ..identity()
+            },
+        );
+        let mean = gpu.mean(&scene, &reference(), 2);
+        assert!(close(mean, linear(back) + seen), "{mean}");
+    }
+}
+
+#[test]
 fn cut_outs_have_holes_for_eyes_and_shadows() {
     Gpu::each(cut_outs_have_holes_for_eyes_and_shadows_with);
 }

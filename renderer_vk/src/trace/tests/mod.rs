@@ -15,4 +15,5 @@ mod maps;
 mod motion;
 mod parts;
 mod structures;
+mod texture_filter;
 mod views;

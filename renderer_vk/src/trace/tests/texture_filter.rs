@@ -1,0 +1,95 @@
+//! Textures on slanted surfaces against the mean of many samples.
+
+use glam::Vec3;
+
+use super::harness::{Gpu, Scene, rectangle, reference, stage};
+use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
+use crate::settings::Settings;
+use crate::trace::input::Tracer;
+
+/// Texels on each side of the picture.
+const SIDE: u32 = 256;
+
+/// Stripes of four texels along s, light or dark without a pattern, and if asked all smaller levels.
+fn image(gpu: &Gpu, levels: bool) -> Image {
+    let mut state = 1u32;
+    let stripes: Vec<u8> = (0..SIDE / 4)
+        .map(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            // little contrast: means of what is displayed are then nearly those of light
+            if state >> 31 == 0 { 110 } else { 145 }
+        })
+        .collect();
+    let mut level: Vec<u8> = (0..SIDE * SIDE)
+        .map(|i| stripes[(i / SIDE / 4) as usize])
+        .collect();
+    let mut desc = ImageDesc::new("stripes", SIDE, SIDE, Format::Rgba8, ImageUsage::SAMPLED);
+    desc.mips = if levels { SIDE.ilog2() + 1 } else { 1 };
+    let image = Image::new(&gpu.device, &desc).expect("image");
+    let mut side = SIDE as usize;
+    for mip in 0..desc.mips {
+        let rgba: Vec<u8> = level.iter().flat_map(|&g| [g, g, g, 255]).collect();
+        gpu.device
+            .upload_image(&image, mip, 0, &rgba)
+            .expect("upload");
+        let half = (side / 2).max(1);
+        let texel = |x: usize, y: usize| u32::from(level[y * side + x]);
+        level = (0..half * half)
+            .map(|i| {
+                let (x, y) = (2 * (i % half), 2 * (i / half));
+                let (right, below) = ((x + 1).min(side - 1), (y + 1).min(side - 1));
+                let sum = texel(x, y) + texel(right, y) + texel(x, below) + texel(right, below);
+                u8::try_from((sum + 2) / 4).expect("a mean of bytes")
+            })
+            .collect();
+        side = half;
+    }
+    image
+}
+
+/// A floor that glows with the picture, seen along the stripes.
+fn floor(image: &Image) -> Scene {
+    let mut scene = Scene::new(
+        Vec3::new(-60.0, 0.0, 12.0),
+        Vec3::new(60.0, 0.0, 0.0),
+        50.0,
+        64,
+    );
+    scene.images.push(image.texture_index());
+    let material = scene.material(&[stage::image(0)], 0);
+    scene.quad(
+        rectangle(
+            Vec3::new(-64.0, -64.0, 0.0),
+            Vec3::X * 128.0,
+            Vec3::Y * 128.0,
+        ),
+        material,
+    );
+    scene
+}
+
+#[test]
+fn anisotropy_comes_nearer_to_the_mean_of_many_samples() {
+    // what is seen of a texture does not depend on what follows the rays
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    let gpu = &mut gpu;
+    let (whole, levels) = (image(gpu, false), image(gpu, true));
+    let (truth, _) = gpu.render(&floor(&whole), &reference(), 128);
+    let mut error = |anisotropy: f32| {
+        let scene = floor(&levels);
+        let settings = Settings {
+            anisotropy,
+            rt_antialiasing: false,
+            ..reference()
+        };
+        let (pixels, _) = gpu.render(&scene, &settings, 1);
+        let squares = pixels.iter().zip(&truth).map(|(p, t)| (p.x - t.x).powi(2));
+        squares.sum::<f32>() / truth.len() as f32
+    };
+    let (none, two, eight) = (error(1.0), error(2.0), error(8.0));
+    println!("mean squared error {none} without, {two} with 2, {eight} with 8");
+    assert!(eight < 0.7 * none, "{eight} {none}");
+    assert!(two < 1.1 * none, "{two} {none}");
+}
