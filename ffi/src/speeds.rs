@@ -22,14 +22,15 @@ fn classic(speeds: i32, stats: &FrameStats) -> Vec<String> {
     let scene = &stats.scene;
     match speeds {
         1 => vec![format!(
-            "{}/{} shaders/surfs {} leafs {} verts {}/{} tris {} draws",
+            "{}/{} shaders/surfs {} leafs {} verts {}/{} tris {} draws {:.2} dc",
             scene.shaders,
             scene.surfaces,
             scene.leafs,
             scene.vertices,
             scene.triangles,
             scene.drawn_triangles,
-            stats.draws
+            stats.draws,
+            stats.overdraw
         )],
         2 => [("patch", scene.patches), ("md3", scene.models)]
             .map(|(what, counts)| {

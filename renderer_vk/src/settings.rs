@@ -153,6 +153,7 @@ pub struct Settings {
     pub debug_sort: i32,
     pub show_cluster: i32,
     pub no_bind: bool,
+    pub measure_overdraw: bool,
     pub show_normals: bool,
     pub show_sky: bool,
     /// 1: all images on a grid; 2: in proportion to their sizes.
@@ -290,6 +291,7 @@ impl Default for Settings {
             debug_sort: 0,
             show_cluster: 0,
             no_bind: false,
+            measure_overdraw: false,
             show_normals: false,
             show_sky: false,
             show_images: 0,

@@ -1,5 +1,6 @@
 #version 460
 // One draw of the classic look: texture times colour, one or two textures, alpha test, a light's blob, or fog.
+// variants: COUNT=-DCOUNT_FRAGMENTS
 // The constants of draw.glsl leave only what the draw needs; without `discard`, depth is tested first.
 #include "raster/draw.glsl"
 
@@ -10,6 +11,10 @@ layout(location = 3) in flat vec4 in_flat_color;
 layout(location = 4) in flat uvec2 in_textures; // see `Draw`
 
 layout(location = 0) out vec4 out_color;
+
+#ifdef COUNT_FRAGMENTS
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counter { uint fragments; };
+#endif
 
 // The indices are the same for the whole draw, so they need no nonuniformEXT.
 vec4 sample_stage(uint stage, uint handle, vec2 uv) {
@@ -35,4 +40,8 @@ void main() {
         if (ALPHA_FUNC != ALPHAFUNC_NONE && !alpha_passes(ALPHA_FUNC, color.a)) discard;
         out_color = color;
     }
+#ifdef COUNT_FRAGMENTS
+    // nothing asks for early tests, so that what is hidden is counted, too
+    atomicAdd(Counter(push.overdraw).fragments, 1);
+#endif
 }

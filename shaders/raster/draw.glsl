@@ -24,7 +24,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Fog
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RasterLights { RasterLight at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Views { RasterView view; };
 
-layout(push_constant, scalar) uniform Push { uint64_t view; } push;
+// `overdraw`: where fragments are counted, if they are.
+layout(push_constant, scalar) uniform Push { uint64_t view; uint64_t overdraw; } push;
 
 // How much of what is seen is fog; s: distance in the fog, t: how deep. The engine takes the root from a table of 256
 // values. Fog over opaque surfaces is a picture of this instead (`fog_picture` in assets/prepare.rs).

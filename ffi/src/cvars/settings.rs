@@ -159,6 +159,7 @@ pub fn apply(cvars: &Cvars, window: WindowFacts, settings: &mut Settings) {
     settings.clear = flag(Cvar::Clear);
     settings.show_tris = flag(Cvar::ShowTris);
     settings.lightmap = flag(Cvar::Lightmap);
+    settings.measure_overdraw = flag(Cvar::MeasureOverdraw);
     settings.speeds = integer(Cvar::Speeds);
     settings.ambient_scale = value(Cvar::AmbientScale);
     settings.directed_scale = value(Cvar::DirectedScale);

@@ -130,7 +130,7 @@ cvars! {
     NoPortals = c"r_noportals", c"0", CHEAT, None, c"1 draws no portals and mirrors.";
     SkipBackEnd = c"r_skipBackEnd", c"0", CHEAT, None, c"1 draws nothing and takes no pictures.";
     NoRefresh = c"r_norefresh", c"0", CHEAT, None, c"1 leaves out 3D views.";
-    MeasureOverdraw = c"r_measureOverdraw", c"0", CHEAT, None, c"Counts overdraw by stencil. Kept for old configurations and menus; has no effect here.";
+    MeasureOverdraw = c"r_measureOverdraw", c"0", CHEAT, None, c"1 counts how often a pixel is drawn in the classic look: the last number of r_speeds 1.";
     Nobind = c"r_nobind", c"0", CHEAT, None, c"1 draws everything with one texture, the spot of dynamic lights.";
     ShowTris = c"r_showtris", c"0", CHEAT, None, c"1 shows triangle edges in the classic look.";
     Shownormals = c"r_shownormals", c"0", CHEAT, None, c"1 shows the normals of vertices in the classic look.";

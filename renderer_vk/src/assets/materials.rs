@@ -7,11 +7,14 @@ use glam::Vec3;
 use shaders::types;
 use shaderscript::{ImplicitKind, Shader, StageImage, strip_extension};
 
+mod changes;
+mod listing;
+
 use super::bind::{internal_shader, passes, sky_faces};
 use super::compile::{FOG_IMAGE, StageArrays, VideoClients, sampler};
 use super::dielectric;
 use super::flags;
-use super::material::{Combine, LightmapClass, Material, SkyBox, VideoStage};
+use super::material::{LightmapClass, Material, SkyBox, VideoStage};
 use super::material_buffers::Uploaded;
 use super::source::{ImageFlags, ImageSource};
 use crate::settings::Settings;
@@ -453,133 +456,6 @@ impl Materials {
         self.videos.iter()
     }
 
-    /// A material that only `RemapShader` names. The engine gives it the map's first lightmap page, wherever it shows.
-    fn find_with_first_page(&mut self, source: &mut dyn ImageSource, name: &str) -> u32 {
-        let Some(page) = source.lightmap(0) else {
-            return self.find(source, name, LightmapClass::None, true);
-        };
-        let index = self.find(source, name, LightmapClass::Page, true);
-        let material = self.get(index);
-        let first = material.stage_first as usize;
-        let stages = first..first + material.stage_count as usize;
-        for stage in self.arrays.stages.get_mut(stages).unwrap_or_default() {
-            if stage.image_count == 0 {
-                stage.image_first = u32::try_from(self.arrays.images.len()).unwrap_or(u32::MAX);
-                stage.image_count = 1;
-                self.arrays.images.push(page);
-            }
-        }
-        index
-    }
-
-    /// Draws `new` wherever `old` is asked for, in every class (`RemapShader`); equal names cancel. `time_offset` is
-    /// subtracted from the new material's time.
-    pub fn remap(
-        &mut self,
-        source: &mut dyn ImageSource,
-        old: &str,
-        new: &str,
-        time_offset: Option<f32>,
-    ) {
-        let stripped = |name: &str| strip_extension(name).to_ascii_lowercase();
-        let any_class = |materials: &Self, name: &str| {
-            let name = stripped(name);
-            materials
-                .list
-                .iter()
-                .find(|m| m.name.eq_ignore_ascii_case(&name))
-                .map(|m| m.order)
-        };
-        let mut usable = |materials: &mut Self, name: &str| {
-            let index = match any_class(materials, name) {
-                Some(index) => index,
-                None => materials.find_with_first_page(source, name),
-            };
-            if index == 0 || materials.get(index).defaulted {
-                log::warn!("remap of {old} to {new}: no material {name}");
-                return None;
-            }
-            Some(index)
-        };
-        if usable(self, old).is_none() {
-            return;
-        }
-        let Some(target) = usable(self, new) else {
-            return;
-        };
-        let old = stripped(old);
-        let cancels = old == stripped(new);
-        for material in &mut self.list {
-            if material.name.eq_ignore_ascii_case(&old) {
-                material.remapped = (!cancels && material.order != target).then_some(target);
-            }
-        }
-        if let (Some(offset), Some(material)) = (time_offset, self.list.get_mut(target as usize)) {
-            material.time_offset = offset;
-        }
-        self.touch();
-    }
-
-    /// Says that surfaces of a material are in the light list, and which radiance (display-white units) they have
-    /// beyond what their stages show.
-    pub fn set_emitter(&mut self, index: u32, radiance: Vec3) {
-        let slots = (
-            self.list.get_mut(index as usize),
-            self.light_radiance.get_mut(index as usize),
-        );
-        if let (Some(material), Some(light)) = slots {
-            material.flags |= types::constants::MATERIAL_EMITTER;
-            *light = radiance;
-            self.touch();
-        }
-    }
-
-    /// Takes back every [`set_emitter`](Self::set_emitter).
-    pub fn forget_emitters(&mut self) {
-        for material in &mut self.list {
-            material.flags &= !types::constants::MATERIAL_EMITTER;
-        }
-        self.light_radiance.fill(Vec3::ZERO);
-        self.touch();
-    }
-
-    /// Points every stage that shows texture `old` for a client at `new`.
-    pub fn replace_scratch(&mut self, client: usize, new: u32) {
-        let mut changed = false;
-        for material in &self.list {
-            for video in material.videos.iter().filter(|v| v.client == client) {
-                let first = self
-                    .arrays
-                    .stages
-                    .get(video.stage as usize)
-                    .map(|stage| stage.image_first as usize);
-                if let Some(image) = first.and_then(|first| self.arrays.images.get_mut(first)) {
-                    *image = new;
-                    changed = true;
-                }
-            }
-        }
-        if changed {
-            self.touch();
-        }
-    }
-
-    /// Takes away the stages of a video that cannot be played, and with each all stages after it, as the engine does.
-    pub fn drop_video(&mut self, client: usize) {
-        for material in &mut self.list {
-            let Some(at) = material.videos.iter().position(|v| v.client == client) else {
-                continue;
-            };
-            let stage = material.videos.get(at).map_or(0, |v| v.stage);
-            let kept = stage.saturating_sub(material.stage_first);
-            material.videos.truncate(at);
-            material.stage_count = kept;
-            material.shader.stages.truncate(kept as usize);
-            material.passes = passes(&material.shader, material.stage_first);
-        }
-        self.touch();
-    }
-
     /// The stages, on the CPU; samplers are kinds, not bindless indices.
     pub fn stages(&self, material: &Material) -> &[types::Stage] {
         let first = material.stage_first as usize;
@@ -623,52 +499,4 @@ impl Materials {
             self.pages.insert((material, page));
         }
     }
-
-    /// Lines for `shaderlist`, one for each material and lightmap page: passes, `L` under a lightmap, `E` from a
-    /// script, how two textures of the first pass combine, kind, name.
-    pub fn list(&self, in_drawing_order: bool) -> Vec<String> {
-        let order: Vec<u32> = if in_drawing_order {
-            self.sorted.clone()
-        } else {
-            (0u32..).take(self.list.len()).collect()
-        };
-        let mut lines = vec!["-".repeat(23)];
-        for index in order {
-            let material = self.get(index);
-            let pages = self.pages.range((index, i32::MIN)..=(index, i32::MAX));
-            let times = pages.count().max(1);
-            lines.extend(std::iter::repeat_n(list_line(material), times));
-        }
-        lines.push(format!("{} total shaders", lines.len() - 1));
-        lines.push("-".repeat(18));
-        lines
-    }
-}
-
-/// A material's line in `shaderlist`.
-fn list_line(material: &Material) -> String {
-    let combined = match material.passes.first() {
-        Some(pass) if pass.stage_count == 2 => match pass.combine {
-            Combine::Modulate => "MT(m) ",
-            Combine::Add => "MT(a) ",
-        },
-        _ => "      ",
-    };
-    format!(
-        "{} {}{combined}{}{}: {}{}",
-        material.passes.len(),
-        if material.lightmap_class == LightmapClass::Page {
-            "L "
-        } else {
-            "  "
-        },
-        if material.explicit { "E " } else { "  " },
-        if material.is_sky() { "sky " } else { "gen " },
-        material.shown_name(),
-        if material.defaulted {
-            " (DEFAULTED)"
-        } else {
-            ""
-        }
-    )
 }

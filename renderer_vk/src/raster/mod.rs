@@ -12,6 +12,7 @@ mod flares;
 mod groups;
 mod light_reach;
 mod list;
+mod overdraw;
 mod overlay;
 mod pipelines;
 mod present;
@@ -36,6 +37,7 @@ use crate::gpu::{self, Device, Format, Image, Recorder, Rendering, Viewport};
 use crate::scene::{ShadowVolumes, View};
 use cover::Cover;
 use list::DepthRange;
+use overdraw::Overdraw;
 use pipelines::Pipelines;
 use shadows::Shadows;
 use target::TargetKind;
@@ -94,6 +96,7 @@ pub struct Raster {
     pipelines: Pipelines,
     shadows: Shadows,
     cover: Cover,
+    overdraw: Overdraw,
     /// The view's dynamic lights on their way to the GPU; kept so that nothing is allocated anew.
     lights: Vec<RasterLight>,
 }
@@ -106,6 +109,7 @@ impl Raster {
             pipelines: Pipelines::new(device, (-1.0, -2.0)),
             shadows: Shadows::default(),
             cover: Cover::default(),
+            overdraw: Overdraw::default(),
             lights: Vec::new(),
         }
     }
@@ -118,6 +122,23 @@ impl Raster {
     /// The decals' depth offset.
     pub fn set_offset(&mut self, factor: f32, units: f32) {
         self.pipelines.set_offset((factor, units));
+    }
+
+    /// Begins a frame; `measure`: fragments are counted (`r_measureOverdraw`).
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn begin_frame(
+        &mut self,
+        recorder: &mut Recorder,
+        measure: bool,
+    ) -> Result<(), gpu::Error> {
+        self.overdraw.begin(recorder, measure)
+    }
+
+    /// Fragments of the newest frame that is over and was measured.
+    pub fn fragments(&self) -> u32 {
+        self.overdraw.fragments()
     }
 
     /// Makes the pipelines that the registered materials will need on a target.
@@ -154,7 +175,11 @@ impl Raster {
         list: &DrawList,
         p: &ViewParameters<'_>,
     ) -> Result<(), gpu::Error> {
-        let kind = target.kind();
+        let overdraw = self.overdraw.address();
+        let kind = TargetKind {
+            counted: overdraw != 0,
+            ..target.kind()
+        };
         for call in &list.calls {
             self.pipelines.prepare(kind, call.state)?;
         }
@@ -247,6 +272,10 @@ impl Raster {
                 };
                 pass.bind_graphics(pipeline);
                 state = Some(call.state);
+                // Mesa's software driver forgets what was pushed for fragments when a pipeline without any was used
+                if overdraw != 0 {
+                    pushed = 0;
+                }
             }
             // every pipeline has the same layout, so what was pushed stays
             let wanted = match call.range {
@@ -254,7 +283,7 @@ impl Raster {
                 _ => view,
             };
             if pushed != wanted {
-                pass.push(&wanted);
+                pass.push(&[wanted, overdraw]);
                 pushed = wanted;
             }
             if range != Some(call.range) {

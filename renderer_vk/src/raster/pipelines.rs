@@ -101,6 +101,11 @@ impl Pipelines {
             return Ok(());
         }
         let depth_alone = state.shading.mode == c::DRAW_DEPTH;
+        let fragment = if target.counted {
+            &shaders::RASTER_DRAW_FRAG_COUNT
+        } else {
+            &shaders::RASTER_DRAW_FRAG
+        };
         let pipeline = GraphicsPipeline::new(
             &self.device,
             &GraphicsDesc {
@@ -128,12 +133,8 @@ impl Pipelines {
                 polygon_offset: state.offset.then_some(self.offset),
                 wireframe: state.wireframe && self.device.info().wireframe,
                 constants: &state.shading.constants(),
-                fragment: (!depth_alone).then_some(&shaders::RASTER_DRAW_FRAG),
-                ..GraphicsDesc::new(
-                    "raster",
-                    &shaders::RASTER_DRAW_VERT,
-                    &shaders::RASTER_DRAW_FRAG,
-                )
+                fragment: (!depth_alone).then_some(fragment),
+                ..GraphicsDesc::new("raster", &shaders::RASTER_DRAW_VERT, fragment)
             },
         )?;
         self.made.insert((target, state), pipeline);

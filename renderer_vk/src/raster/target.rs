@@ -24,6 +24,8 @@ pub struct TargetKind {
     pub samples: u32,
     /// Channels that are drawn.
     pub mask: ColorMask,
+    /// Fragments are counted (`r_measureOverdraw`).
+    pub counted: bool,
 }
 
 impl Target<'_> {
@@ -34,6 +36,7 @@ impl Target<'_> {
             depth: self.depth.format(),
             samples: self.color.samples(),
             mask: self.mask,
+            counted: false,
         }
     }
 }

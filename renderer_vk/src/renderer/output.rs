@@ -22,6 +22,8 @@ pub struct FrameStats {
     pub views: u32,
     /// Draw calls of the classic look and the overlay.
     pub draws: u32,
+    /// How often a pixel of the newest finished frame was drawn; 0 without `r_measureOverdraw`.
+    pub overdraw: f32,
     /// What the views of the classic look show; counted only with `r_speeds`.
     pub scene: Statistics,
     /// Milliseconds of the CPU on the frame.
@@ -145,6 +147,10 @@ impl Renderer {
             self.shown_anaglyph = self.settings.anaglyph;
             self.targets.clear(&mut recorder)?;
         }
+        let measure = self.settings.measure_overdraw && !self.settings.rt;
+        self.raster.begin_frame(&mut recorder, measure)?;
+        let pixels = self.targets.color().width() as f32 * self.targets.color().height() as f32;
+        stats.overdraw = self.raster.fragments() as f32 / pixels;
         if let Some(trace) = &mut self.trace {
             trace.count_rays(self.counts_rays);
         }

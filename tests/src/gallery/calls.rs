@@ -6,7 +6,7 @@ use relight::compare::Rgb8;
 use super::board::{Board, MAP, Shape};
 use super::{File, Scene, Stage, model};
 use crate::engine::Raised;
-use crate::engine::abi::{fontInfo_t, refEntity_t};
+use crate::engine::abi::{fontInfo_t, polyVert_t, refEntity_t};
 use crate::maps;
 
 const WHOLE: [f32; 4] = [0.0, 0.0, 1.0, 1.0];
@@ -58,6 +58,15 @@ pub(super) fn scenes() -> Vec<Scene> {
             },
             quick: true,
             ..Scene::new("queries", "Answers about the map and models.", queries)
+        },
+        Scene {
+            files: || marked().files(),
+            ..Scene::new("marks", "Marks where the map takes them.", marks)
+        },
+        Scene {
+            files: || marked().files(),
+            cvars: &[("r_marksOnTriangleMeshes", "1")],
+            ..Scene::new("marks-meshes", "Marks on triangle meshes, too.", marks)
         },
         Scene {
             files: || board().files(),
@@ -588,6 +597,63 @@ fn queries(stage: &mut Stage) -> Result<(), Raised> {
         }
     }
     Ok(())
+}
+
+fn marked() -> Board {
+    let mut board = Board::new(4, Shape::Face, ["{\nmap g/base.tga\n}", ""])
+        .and(Shape::Squares(1), [WALL])
+        .and(Shape::Squares(4), [WALL])
+        .and(Shape::Dome(1), [WALL])
+        .and(Shape::Dome(6), [WALL, WALL])
+        .and(Shape::Patch, [WALL]);
+    board.script =
+        "t/mark\n{\npolygonOffset\n{\nmap g/alpha.tga\nblendFunc blend\nrgbGen vertex\n}\n}\n"
+            .to_string();
+    board
+}
+
+/// Body of a shader that is lit by vertex.
+const WALL: &str = "{\nmap g/base.tga\nrgbGen vertex\n}";
+
+/// Asks for a mark on each tile, as a shot from the camera would leave one, and draws what is answered.
+fn marks(stage: &mut Stage) -> Result<(), Raised> {
+    let board = marked();
+    stage.start_map(MAP)?;
+    let shader = stage.register_shader("t/mark")?;
+    let view = board.view(stage);
+    let mut polygons: Vec<Vec<polyVert_t>> = Vec::new();
+    for tile in 0..board.tiles.len() {
+        // those of the second row fall in aslant
+        let aslant = if tile < 4 { 0.0 } else { 0.4 };
+        let direction = Vec3::new(1.0, aslant, 0.0).normalize();
+        let (right, up) = (Vec3::new(aslant, -1.0, 0.0).normalize(), Vec3::Z);
+        let center = board.center(tile) - Vec3::X * 4.0 + Vec3::new(0.0, 9.0, 6.0);
+        let corner = |a: f32, b: f32| center + right * a * 16.0 + up * b * 16.0;
+        let square =
+            [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)].map(|(a, b)| corner(a, b));
+        let (points, fragments) = stage.mark_fragments(&square, direction * 32.0, 384, 128)?;
+        let sizes: Vec<i32> = fragments.iter().map(|f| f.numPoints).collect();
+        stage.fact(&format!("mark {tile}"), format!("{sizes:?}"));
+        for fragment in fragments {
+            let (first, count) = (fragment.firstPoint as usize, fragment.numPoints as usize);
+            let corners = points.iter().skip(first).take(count);
+            polygons.push(
+                corners
+                    .map(|p| polyVert_t {
+                        xyz: p.to_array(),
+                        st: [right, up].map(|axis| 0.5 + (*p - center).dot(axis) / 32.0),
+                        modulate: [255, 60, 20, 255],
+                    })
+                    .collect(),
+            );
+        }
+    }
+    stage.keep_view("marked", &view, |engine| {
+        for polygon in &polygons {
+            engine.add_poly(shader, polygon, polygon.len())?;
+        }
+        Ok(())
+    })
 }
 
 fn views(stage: &mut Stage) -> Result<(), Raised> {
