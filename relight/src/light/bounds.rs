@@ -5,7 +5,7 @@ use glam::Vec3;
 
 /// Strongest radiance, intensity or irradiance of a light. Its square, and its product with the area of the largest
 /// surface that fits into a map, are still finite; lights of real maps stay below a millionth of it.
-const STRONGEST: f32 = 1.0e12;
+pub const STRONGEST: f32 = 1.0e12;
 
 /// Brings a strength into range; what is left of an overflow, no number, becomes none. Whether it had to.
 fn bound(strength: &mut Vec3) -> bool {

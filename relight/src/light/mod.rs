@@ -61,6 +61,7 @@ mod solid;
 mod surfaces;
 mod sweep;
 
+pub use bounds::STRONGEST;
 pub use by_hand::{LightsByHand, LightsLineError};
 pub use color::LightColor;
 pub use emission::{Emission, EmissionSource, GLOW_THRESHOLD};

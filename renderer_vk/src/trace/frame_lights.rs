@@ -4,7 +4,7 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
-use relight::light::{ClusterSet, Sight};
+use relight::light::{ClusterSet, STRONGEST, Sight};
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
 use shaders::types::Instance;
@@ -228,10 +228,11 @@ pub fn dynamic_lights(lights: &[DynamicLight], scale: f32) -> Vec<t::SphereLight
             let color = decode(light.color.max(Vec3::ZERO));
             let (part, min, max) = DYNAMIC_LIGHT_SIZE;
             let radius = (light.radius * part).clamp(min, max);
+            let strength = (PI * half * half * scale).min(STRONGEST);
             sphere(
                 light.origin,
                 radius,
-                color * (PI * half * half * scale),
+                (color * strength).min(Vec3::splat(STRONGEST)),
                 DYNAMIC_LIGHT_CLEARANCE,
             )
         })
@@ -282,4 +283,33 @@ pub fn decode(c: Vec3) -> Vec3 {
         }
     };
     Vec3::new(channel(c.x), channel(c.y), channel(c.z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_the_game_asks_for_a_dynamic_light_can_be_computed_with() {
+        let light = |radius, color| DynamicLight {
+            radius,
+            color,
+            ..DynamicLight::default()
+        };
+        let asked = [
+            light(200.0, Vec3::ONE),
+            light(1.0e30, Vec3::new(1.0, 0.0, 0.0)),
+            light(200.0, Vec3::splat(1.0e30)),
+            light(f32::INFINITY, Vec3::ONE),
+            light(200.0, Vec3::NAN),
+            light(-1.0, Vec3::ONE),
+        ];
+        let made = dynamic_lights(&asked, 100.0);
+        assert_eq!(made.len(), 3);
+        for light in made {
+            let strength = light.radiance;
+            assert!(strength.length_squared().is_finite(), "{strength}");
+            assert!(strength.x > 0.0, "{strength}");
+        }
+    }
 }
