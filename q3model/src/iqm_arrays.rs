@@ -68,6 +68,9 @@ impl Fours<'_> {
 
 impl<'a> Arrays<'a> {
     /// Finds them; those of a kind that is not known are left out.
+    ///
+    /// # Errors
+    /// An array that is not in the file, or has another form than its kind must have.
     pub fn read(bytes: &'a [u8], header: &Header) -> Result<Arrays<'a>, Error> {
         let mut arrays = Arrays::default();
         let records = list(

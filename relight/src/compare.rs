@@ -78,6 +78,9 @@ pub fn flip(a: &Rgb8, b: &Rgb8) -> Result<f64, CompareError> {
 
 impl Rgb8 {
     /// Takes over `pixels`, which have to be `width * height * 3` bytes.
+    ///
+    /// # Errors
+    /// [`CompareError::Length`] when there are more or fewer bytes.
     pub fn new(width: usize, height: usize, pixels: Vec<u8>) -> Result<Self, CompareError> {
         let wanted = width.checked_mul(height).and_then(|n| n.checked_mul(3));
         if wanted != Some(pixels.len()) {
@@ -186,6 +189,9 @@ impl Rgb8 {
 /// visibility to structural similarity" (2004), equation 13, with its constants (K1 0.01, K2 0.03), over a
 /// uniform window of 7x7 pixels with sample covariances, each channel alone, averaged over channels and over
 /// the windows that lie fully in the picture: the defaults of scikit-image, so figures compare with its.
+///
+/// # Errors
+/// Pictures of different sizes, or with a side shorter than the window.
 pub fn compare(a: &Rgb8, b: &Rgb8) -> Result<Difference, CompareError> {
     if (a.width, a.height) != (b.width, b.height) {
         return Err(CompareError::Size((a.width, a.height), (b.width, b.height)));

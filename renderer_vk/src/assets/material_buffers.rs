@@ -21,6 +21,9 @@ pub(super) struct Uploaded {
 
 impl Materials {
     /// Copies the arrays to the GPU if anything changed. `samplers` translates sampler kinds to bindless indices.
+    ///
+    /// # Errors
+    /// The device has no memory for the buffers.
     pub fn upload(&mut self, device: &Device, samplers: &Samplers) -> Result<(), gpu::Error> {
         if !self.dirty && self.uploaded.is_some() {
             return Ok(());

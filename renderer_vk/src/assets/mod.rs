@@ -56,6 +56,9 @@ pub struct Assets {
 
 impl Assets {
     /// Nothing but the built-in images and materials. `scripts` are the game's.
+    ///
+    /// # Errors
+    /// The device has no memory, or no room in its tables, for the built-in images and the samplers.
     pub fn new(
         device: &Device,
         files: Arc<dyn GameFiles>,
@@ -129,6 +132,9 @@ impl Assets {
     }
 
     /// Shows new pixels of a cinematic, see [`Textures::update_scratch`].
+    ///
+    /// # Errors
+    /// The device has no memory for a texture of another size, or for the upload.
     pub fn update_scratch(
         &mut self,
         client: usize,
@@ -147,6 +153,9 @@ impl Assets {
     }
 
     /// Once a frame, before anything is recorded: takes over a changed texture mode and copies changed materials.
+    ///
+    /// # Errors
+    /// The device has no memory for the copies, or no room for more samplers.
     pub fn prepare_frame(&mut self, settings: &Settings) -> Result<(), gpu::Error> {
         if settings.texture_mode != self.texture_mode {
             self.texture_mode.clone_from(&settings.texture_mode);

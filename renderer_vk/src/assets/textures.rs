@@ -23,6 +23,9 @@ pub struct Samplers(pub [u32; 5]);
 
 impl Samplers {
     /// Makes or finds them for an `r_textureMode` and an anisotropy (1 and below: none).
+    ///
+    /// # Errors
+    /// The device has no room for more samplers.
     pub fn new(device: &Device, texture_mode: &str, anisotropy: f32) -> Result<Self, gpu::Error> {
         let (filter, mip) = texture_filter(texture_mode);
         let anisotropy = if anisotropy.is_finite() {
@@ -130,6 +133,9 @@ pub struct Textures {
 
 impl Textures {
     /// No textures but the built-in ones.
+    ///
+    /// # Errors
+    /// The device has no memory for them.
     pub fn new(
         device: &Device,
         files: Arc<dyn GameFiles>,
@@ -219,6 +225,9 @@ impl Textures {
     }
 
     /// Uploads a lightmap page (`side` x `side` RGB) whose bytes are final and returns its bindless index.
+    ///
+    /// # Errors
+    /// The device has no memory for it, or no room in its tables.
     pub fn create_lightmap(&mut self, name: &str, page: &Image) -> Result<u32, gpu::Error> {
         let image = self.create(name, std::slice::from_ref(page))?;
         let index = image.texture_index();
@@ -229,6 +238,9 @@ impl Textures {
 
     /// Shows new pixels (RGBA rows from the top) under a client number. Returns `(old, new)` when the texture had to be
     /// made anew, so that stages that show it can be pointed at the new one.
+    ///
+    /// # Errors
+    /// The device has no memory for a texture of another size, or for the upload.
     pub fn update_scratch(
         &mut self,
         client: usize,
