@@ -9,6 +9,10 @@ use glam::Vec3;
 /// Square id units.
 const LEAST_AREA: f32 = 1.0 / 64.0;
 
+/// Largest area of a triangle that emits, square id units: no map that an engine plays is a million units wide. What is
+/// larger counts as degenerate, as its power might not be a number.
+const MOST_AREA: f32 = 1.0e12;
+
 /// Suns of the sky materials that drawn surfaces use. The same sun written twice counts once.
 pub(crate) fn suns(materials: &[WorldMaterial], surfaces: &[WorldSurface]) -> Vec<SunLight> {
     let mut used = vec![false; materials.len()];
@@ -206,7 +210,7 @@ fn cut(
             source: emission.source,
         };
         let area = light.area();
-        if area.is_finite() && area >= LEAST_AREA {
+        if (LEAST_AREA..=MOST_AREA).contains(&area) {
             lights.push(light);
         } else {
             degenerate += 1;

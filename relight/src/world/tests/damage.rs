@@ -1,6 +1,7 @@
 //! Damaged maps.
 
 use super::{ceiling_lamp, game, relight};
+use crate::light::TriangleLight;
 use crate::materials::Materials;
 use crate::world::*;
 use glam::Vec2;
@@ -186,6 +187,7 @@ fn lights_beyond_arithmetic_are_brought_into_range() {
     let lamp = map.add_shader("t/lamp", 0, 0);
     map.add_room(wall, Vec3::splat(-64.0), Vec3::splat(64.0));
     map.add_quad(lamp, ceiling_lamp(16.0, 60.0));
+    map.add_quad(lamp, ceiling_lamp(1.0e18, 60.0));
     let red = ("_color", "1 0 0");
     let place = ("origin", "0 0 8");
     let light = ("classname", "light");
@@ -203,6 +205,8 @@ fn lights_beyond_arithmetic_are_brought_into_range() {
     map.add_entity(&[light, place, red, ("light", "300")]);
     let mut world = relight(map);
     assert_eq!((world.point_lights.len(), world.suns.len()), (4, 1));
+    // those of the quad that no map has room for are left out
+    assert_eq!(world.lights.len(), 2);
     assert_eq!(world.warnings.len(), 1, "{:?}", world.warnings);
 
     let (file, wrong) = crate::light::LightsByHand::parse(
@@ -216,7 +220,7 @@ fn lights_beyond_arithmetic_are_brought_into_range() {
     file.apply(&mut world);
     assert_eq!(world.warnings.len(), 2, "{:?}", world.warnings);
     assert!(world.ambient.is_finite() && world.ambient.x > 0.0);
-    let strengths = (world.lights.iter().map(|l| l.power()))
+    let strengths = (world.lights.iter().map(TriangleLight::power))
         .chain(world.point_lights.iter().map(|l| l.intensity))
         .chain(world.suns.iter().map(|s| s.irradiance));
     for strength in strengths {
