@@ -210,7 +210,8 @@ impl Cells {
         // what takes the place of each leaf as a child
         let mut instead: Vec<Option<i32>> = vec![None; bsp.leafs.len()];
         for &(index, cluster, mins, maxs) in &leafs {
-            let piece = match fits {
+            // Where there is no light, there is nothing to tell apart: such a leaf may be as large as the map.
+            let piece = match fits.filter(|_| length(cluster) > 0) {
                 Some(side) => Piece::new(cluster, mins, maxs, side),
                 None => Piece {
                     cluster,
@@ -289,6 +290,18 @@ mod tests {
             assert!((cell.mins - 1.0).cmple(p).all() && (cell.maxs + 1.0).cmpge(p).all());
             assert!((cell.maxs - cell.mins).max_element() <= SIDES[0]);
         }
+    }
+
+    #[test]
+    fn clusters_without_lights_stay_whole_however_large_they_are() {
+        let mut bsp = halls();
+        for leaf in bsp.leafs.iter_mut().filter(|leaf| leaf.cluster == 0) {
+            (leaf.mins, leaf.maxs) = ([i32::MIN; 3], [i32::MAX; 3]);
+        }
+        let cells = Cells::new(&bsp, 2, |cluster| cluster * 10);
+        let of_first = cells.cells.iter().filter(|cell| cell.cluster == 0);
+        assert_eq!(of_first.count(), 1);
+        assert!(cell_at(&cells, Vec3::splat(50.0)) >= 0);
     }
 
     #[test]
