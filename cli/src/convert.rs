@@ -387,3 +387,39 @@ fn tell(args: &ConvertArgs, converted: &[Converted], failures: &[Failure]) -> Re
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: ConvertArgs,
+    }
+
+    fn lit(options: &str) -> (Lightmaps, bool) {
+        let words = ["convert", "map", "-o", "out.glb"];
+        let line = Line::try_parse_from(words.into_iter().chain(options.split_whitespace()));
+        lighting(&line.unwrap().args)
+    }
+
+    #[test]
+    fn light_is_written_twice_only_where_that_is_asked_for() {
+        assert_eq!(lit(""), (Lightmaps::Vertices, false));
+        assert_eq!(lit("--lightmaps keep"), (Lightmaps::Keep, false));
+        assert_eq!(lit("--lightmaps strip"), (Lightmaps::Strip, true));
+        assert_eq!(lit("--calibrate"), (Lightmaps::Strip, true));
+        assert_eq!(lit("--lights keep"), (Lightmaps::Strip, true));
+        assert_eq!(
+            lit("--lightmaps keep --lights keep"),
+            (Lightmaps::Keep, true)
+        );
+        assert_eq!(
+            lit("--lightmaps strip --lights strip"),
+            (Lightmaps::Strip, false)
+        );
+        assert_eq!(lit("--lightmaps keep --calibrate"), (Lightmaps::Keep, true));
+    }
+}
