@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
 use relight::calibrate::{
     Agreement, CalibrationReport, FOUND_WITHIN, POWER_WITHIN, Recovery, hide_entities, recovery,
 };
@@ -80,7 +81,12 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
         let mut world = RelitWorld::load(&*files, &materials, &path, options)?;
         let hidden = args.hide_entities.then(|| hide_entities(&mut world));
         world.measure_materials(&*files);
-        relight::calibrate(&mut world, &calibrate);
+        let bar = ProgressBar::new(100).with_message(map.clone());
+        bar.set_style(ProgressStyle::with_template("{bar:40} {pos} % {msg}")?);
+        relight::calibrate_with(&mut world, &calibrate, &mut |done| {
+            bar.set_position((done * 100.0) as u64);
+        });
+        bar.finish_and_clear();
         let found = hidden.map(|hidden| recovery(&hidden, &world));
         for warning in &world.warnings {
             log::warn!("{path}: {warning}");

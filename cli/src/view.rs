@@ -17,7 +17,7 @@ pub struct Maps {
     /// Maps by name
     #[arg(required = true)]
     pub maps: Vec<String>,
-    /// Game folder with packs; give several in rising priority
+    /// Game folder with packs, or one pack (.pk3); give several in rising priority
     #[arg(
         long = "game",
         value_name = "DIR",
@@ -28,12 +28,20 @@ pub struct Maps {
 
 /// Where the game's files and the map come from.
 ///
-/// `map`: a name (oa_dm1), maps/oa_dm1.bsp, or a .bsp or .pk3 file; `games`: folders with packs, the last has precedence.
+/// `map`: a name (oa_dm1), maps/oa_dm1.bsp, or a .bsp or .pk3 file; `games`: folders with packs and single packs, the last has
+/// precedence. With a .bsp file come the lights beside it, if there are any.
 ///
 /// # Errors
 /// A folder or the file cannot be read, or a pack has not exactly one map.
 pub fn open(map: &str, games: &[PathBuf]) -> anyhow::Result<(Arc<dyn GameFiles>, String)> {
-    let mut path = SearchPath::open(games)?;
+    let mut path = SearchPath::new();
+    for game in games {
+        if game.is_file() {
+            path.add_pk3(game)?;
+        } else {
+            path.add_game_folder(game)?;
+        }
+    }
     let map = map.to_owned();
     if let Some((pack, inside)) = map.split_once(".pk3:") {
         path.add_pk3(Path::new(&format!("{pack}.pk3")))?;
@@ -63,6 +71,14 @@ pub fn open(map: &str, games: &[PathBuf]) -> anyhow::Result<(Arc<dyn GameFiles>,
             Bsp::parse(&bytes).with_context(|| map.clone())?;
             let mut front = MemoryFiles::new();
             front.insert(&name, bytes)?;
+            let lights = file.with_extension("lights");
+            if lights.is_file() {
+                front.insert(
+                    &format!("maps/{stem}.lights"),
+                    std::fs::read(&lights)
+                        .with_context(|| format!("{}: cannot be read", lights.display()))?,
+                )?;
+            }
             return Ok((with_map_files(path, front, &name)?, name));
         }
         _ if map.starts_with("maps/") => map,

@@ -19,10 +19,10 @@ const DEFAULT: f32 = 0.25;
 /// Bounds, so that a strange map stays visible.
 const LIMITS: (f32, f32) = (0.02, 1.0);
 
-/// Brightness of a texture that is neither dark nor bright, encoded.
-const TEXTURE: f32 = 0.45;
+/// Brightness of a texture, encoded: about the mean of lit surfaces in OpenArena's maps (0.13 to 0.33).
+const TEXTURE: f32 = 0.2;
 /// Exponent of the display's curve on a map that has no light stored.
-pub(crate) const DEFAULT_EXPONENT: f32 = 1.8;
+pub(crate) const DEFAULT_EXPONENT: f32 = 1.4;
 
 /// The exposure of a map, a factor of radiance: from its lightmaps, else from the colours of its vertices.
 pub fn display_exposure(world: &RelitWorld) -> f32 {
@@ -30,7 +30,7 @@ pub fn display_exposure(world: &RelitWorld) -> f32 {
 }
 
 /// The exponent of the power law that the display's curve D comes to where a map shows its light: the mean of
-/// d ln D / d ln x over the light of its lightmaps, else of its vertices, on a texture of middle brightness.
+/// d ln D / d ln x over the light of its lightmaps, else of its vertices, on a texture of usual brightness.
 pub fn display_exponent(bsp: &Bsp) -> f32 {
     of_stored(bsp, |light| exponent(light)).unwrap_or(DEFAULT_EXPONENT)
 }

@@ -44,7 +44,9 @@ pub mod sample;
 mod test_data;
 pub mod world;
 
-pub use calibrate::{CalibrationCache, CalibrationOptions, CalibrationReport, calibrate};
+pub use calibrate::{
+    CalibrationCache, CalibrationOptions, CalibrationReport, calibrate, calibrate_with,
+};
 pub use external_lightmaps::external_lightmaps;
 pub use files::{FileError, GameFiles, MemoryFiles, Overlay, Pak, Pk3, SearchPath};
 pub use light::{LightLists, LightReport, PointLight, SunLight, TriangleLight};

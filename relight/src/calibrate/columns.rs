@@ -61,6 +61,8 @@ pub(super) struct Column {
     pub rows: Vec<(u32, f32)>,
     /// Its strength: radiance of a group's brightest triangle, intensity of points, irradiance of suns.
     pub strength: Vec3,
+    /// The most it may be.
+    pub limit: Vec3,
     /// `None` for lights put in, and for skies that nothing tells the light of.
     pub prior: Option<Prior>,
 }
@@ -151,6 +153,7 @@ pub(super) fn known(
             source: Source::Group(g.material, g.evidence),
             rows: Vec::new(),
             strength: g.strength,
+            limit: Vec3::INFINITY,
             prior: (!silent.contains(&g.material)).then(|| prior_of(g.strength, g.evidence)),
         })
         .collect();
@@ -183,6 +186,7 @@ pub(super) fn known(
             source: Source::Entity(index),
             rows,
             strength: light.intensity,
+            limit: Vec3::INFINITY,
             prior: Some(prior_of(light.intensity, EmissionSource::SurfaceLight)),
         });
     }
@@ -191,6 +195,7 @@ pub(super) fn known(
             source: Source::Sun(index),
             rows: sun_rows(occluders, samples, sun.direction),
             strength: sun.irradiance,
+            limit: Vec3::INFINITY,
             prior: Some(prior_of(sun.irradiance, EmissionSource::SurfaceLight)),
         });
     }
@@ -460,6 +465,7 @@ mod tests {
             bounce: Vec3::ZERO,
             cluster: 0,
             saturated: false,
+            trust: 1.0,
             held_out: false,
         };
         // Facing down; one partly below the horizon, one far away, one seen from behind.

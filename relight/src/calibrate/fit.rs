@@ -1,6 +1,6 @@
 //! The state of a fit, and its steps: strengths, ambient and bounced light, which depend on each other.
 
-use super::bounce::Transfer;
+use super::bounce::{Transfer, surfaces_of_triangles};
 use super::columns::Column;
 use super::place::{self, Scene};
 use super::report::Agreement;
@@ -89,8 +89,10 @@ impl Fit<'_> {
     }
 
     /// Puts in point lights for as long as samples that are held out get better by it.
-    pub fn place(&mut self, candidates: usize) {
+    /// `progress` gets the part of the most rounds that are done.
+    pub fn place(&mut self, candidates: usize, progress: &mut dyn FnMut(f32)) {
         let fixed = self.columns.len();
+        let of_triangle = surfaces_of_triangles(self.world);
         let mut spacing = 0.0;
         let mut best = f32::INFINITY;
         for round in 0..ROUNDS {
@@ -99,6 +101,7 @@ impl Fit<'_> {
                 world: self.world,
                 occluders: self.occluders,
                 samples: &self.samples,
+                of_triangle: &of_triangle,
                 candidates,
             };
             let (columns, ambient) = (&mut self.columns, &mut self.ambient);
@@ -108,6 +111,8 @@ impl Fit<'_> {
                 place::in_front(&scene, columns, fixed, ambient, spacing);
             }
             self.settle();
+            // The first round, over all space, takes as long as the others together.
+            progress(0.5 + 0.5 * round as f32 / (ROUNDS - 1) as f32);
             let found = self.agreement().median_stops;
             if found > best {
                 (self.columns, self.ambient) = kept;

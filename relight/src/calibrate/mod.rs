@@ -53,7 +53,7 @@ use glam::Vec3;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 
 /// How a world is calibrated.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,6 +108,16 @@ impl Solution {
 /// Without lightmaps, vertex colours of lit surfaces tell, then the light grid; without those the world stays as it
 /// is. What goes wrong with the cache is a warning of the world's.
 pub fn calibrate(world: &mut RelitWorld, options: &CalibrationOptions) -> CalibrationReport {
+    calibrate_with(world, options, &mut |_| ())
+}
+
+/// [`calibrate`] that tells how far it is: `progress` gets the part that is done, 0 to 1, now and then, on this thread;
+/// nothing when the result was kept.
+pub fn calibrate_with(
+    world: &mut RelitWorld,
+    options: &CalibrationOptions,
+    progress: &mut dyn FnMut(f32),
+) -> CalibrationReport {
     let begin = Instant::now();
     let key = options.cache.as_ref().map(|_| cache::key(world, options));
     let silent = skies::silent(world);
@@ -125,7 +135,7 @@ pub fn calibrate(world: &mut RelitWorld, options: &CalibrationOptions) -> Calibr
             if let Err(problem) = missing {
                 world.warnings.push(problem.to_string());
             }
-            let solution = find(world, &silent, options);
+            let solution = find(world, &silent, options, progress);
             if let (Some(cache), Some(key)) = (&options.cache, key)
                 && let Err(problem) = cache.write(key, &solution)
             {
@@ -145,9 +155,16 @@ pub fn calibrate(world: &mut RelitWorld, options: &CalibrationOptions) -> Calibr
 }
 
 /// Solves for a world's light. `silent`: skies of which directives tell nothing.
-fn find(world: &RelitWorld, silent: &[u32], options: &CalibrationOptions) -> Solution {
+fn find(
+    world: &RelitWorld,
+    silent: &[u32],
+    options: &CalibrationOptions,
+    progress: &mut dyn FnMut(f32),
+) -> Solution {
+    progress(0.0);
     let occluders = samples::occluders(world);
     let (samples, evidence) = samples::take(world, &occluders, options.samples, options.seed);
+    progress(0.05);
     let mut columns = columns::known(world, &occluders, &samples, silent);
     let known = columns.len();
     let mut solution = Solution {
@@ -166,6 +183,7 @@ fn find(world: &RelitWorld, silent: &[u32], options: &CalibrationOptions) -> Sol
         return solution;
     }
     let unlisted = |material| silent.contains(&material);
+    progress(0.15);
     let transfer = bounce::Transfer::new(world, &occluders, &samples, options.bounces, unlisted);
     for column in columns.iter_mut().filter(|c| c.prior.is_none()) {
         column.strength = Vec3::ZERO;
@@ -182,13 +200,17 @@ fn find(world: &RelitWorld, silent: &[u32], options: &CalibrationOptions) -> Sol
     fit.rebounce(true);
     solution.report.before = fit.agreement();
     fit.ambient.value = first;
+    progress(0.25);
     fit.known();
+    progress(0.35);
     if options.candidates > 0 {
-        fit.place(options.candidates);
+        fit.place(options.candidates, &mut |part| progress(0.35 + 0.55 * part));
     } else {
         fit.settle();
     }
+    progress(0.9);
     fit.more_ambient();
+    progress(1.0);
     solution.report.after = fit.agreement();
     let columns = fit.columns;
     solution.known = columns.iter().take(known).map(|c| c.strength).collect();

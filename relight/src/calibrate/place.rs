@@ -8,7 +8,7 @@
 use super::bvh::Occluders;
 use super::columns::{Column, Source, point_rows};
 use super::parallel;
-use super::samples::{Sample, mean};
+use super::samples::{self, Sample, mean};
 use super::solve::{Ambient, Effort, FLOOR, Residual, norm, residual, solve};
 use crate::world::RelitWorld;
 use glam::Vec3;
@@ -44,11 +44,20 @@ const AROUND: [Vec3; 6] = [
     Vec3::NEG_Z,
 ];
 
+/// How far around a light surfaces are asked how bright it may be, id units: farther off there are measurements enough.
+const NEAR: f32 = 64.0;
+
+/// How much more light than is stored there a light may give to the surface beside it: texels are wide, and where
+/// exactly it was is not known.
+const EXCESS: f32 = 1.5;
+
 /// What placing lights needs to know.
 pub(super) struct Scene<'a> {
     pub world: &'a RelitWorld,
     pub occluders: &'a Occluders,
     pub samples: &'a [Sample],
+    /// For every triangle, the surface that it is of.
+    pub of_triangle: &'a [u32],
     /// Most candidates at a time.
     pub candidates: usize,
 }
@@ -88,6 +97,34 @@ impl Scene<'_> {
             .collect()
     }
 
+    /// The most that a light at a place may be, by the light that lightmaps store on the surfaces right beside it. There it
+    /// is brightest, and measurements are too sparse to tell of such spots.
+    fn limit(&self, origin: Vec3) -> Vec3 {
+        let mut limit = Vec3::INFINITY;
+        let corners = (0..8u8).map(|k| {
+            let side = |bit: u8| if k & bit == 0 { -1.0 } else { 1.0 };
+            Vec3::new(side(1), side(2), side(4)).normalize()
+        });
+        for ray in AROUND.into_iter().chain(corners) {
+            let Some(hit) = self.occluders.nearest(origin, ray, NEAR) else {
+                continue;
+            };
+            let triangle = hit.tag as usize;
+            let surface = self.of_triangle.get(triangle).map(|s| *s as usize);
+            let at = origin + ray * hit.t;
+            let stored = surface.and_then(|s| samples::stored_at(self.world, s, triangle, at));
+            let cosine = -hit.normal.dot(ray);
+            if let Some(stored) = stored
+                && hit.front
+                && cosine > 0.1
+            {
+                let most = (stored + FLOOR) * (EXCESS * PI * hit.t * hit.t / cosine);
+                limit = limit.min(most);
+            }
+        }
+        limit
+    }
+
     /// Columns of lights at places, in order; such as reach nothing are left out.
     fn columns(&self, places: &[Vec3], range: f32) -> Vec<Column> {
         let rows = parallel::map(places, |_, &origin| self.rows(origin, range));
@@ -97,6 +134,7 @@ impl Scene<'_> {
                 source: Source::Placed(origin),
                 rows,
                 strength: Vec3::ZERO,
+                limit: self.limit(origin),
                 prior: None,
             })
             .collect()
@@ -305,6 +343,7 @@ fn merge(scene: &Scene<'_>, columns: &mut Vec<Column>, known: usize, radius: f32
             source: Source::Placed(origin),
             rows,
             strength,
+            limit: scene.limit(origin),
             prior: None,
         });
     }
@@ -365,9 +404,10 @@ fn better_place(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32)
                 norm += *weight * a * a;
             }
         }
-        let gradient = gradient.max(Vec3::ZERO);
         if norm > 0.0 {
-            (gradient.length_squared() / norm, gradient / norm)
+            let strength = (gradient / norm).max(Vec3::ZERO).min(scene.limit(origin));
+            let taken = (gradient * 2.0 - strength * norm).dot(strength);
+            (taken, strength)
         } else {
             (0.0, Vec3::ZERO)
         }
@@ -394,6 +434,7 @@ fn better_place(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32)
         source: Source::Placed(origin),
         rows: scene.rows(origin, f32::INFINITY),
         strength,
+        limit: scene.limit(origin),
         prior: None,
     })
 }

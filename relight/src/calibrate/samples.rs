@@ -8,7 +8,7 @@ use super::random::Random;
 use crate::light;
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
 use glam::{Vec2, Vec3};
-use q3bsp::SurfaceKind;
+use q3bsp::{Lightmap, SurfaceKind};
 use shaderscript::light::SurfaceClass;
 
 /// Radiance of white for a stored value of 1.
@@ -16,6 +16,17 @@ pub(super) const STORED_UNIT: f32 = 4.0 / 255.0;
 
 /// How far off its surface light is gathered, id units.
 const LIFT: f32 = 1.0;
+
+/// How far around a black texel others are black as well where no light falls, texels.
+const BLACK_AROUND: i32 = 2;
+
+/// How much a black texel tells that may be black for another reason than the lack of light: compilers leave texels
+/// black where the point that they measured at lay inside of something, and some maps are full of them.
+const TRUST_IN_BLACK: f32 = 0.2;
+
+/// What all black measurements together may weigh beside those that are lit. Where most of a map is black, its lights had
+/// an end (linear falloff, spots), which lights of the square of the distance have not: then black would put them out.
+const BLACK_OVER_LIT: f32 = 0.1;
 
 /// Points tried in each stratum before it is given up.
 const TRIES: usize = 8;
@@ -35,6 +46,8 @@ pub(super) struct Sample {
     pub cluster: i32,
     /// Some channel is at its end: there was at least that much light.
     pub saturated: bool,
+    /// How much it tells, at most 1.
+    pub trust: f32,
     /// Kept out of fitting, to judge by.
     pub held_out: bool,
 }
@@ -137,9 +150,10 @@ pub(super) fn take(
     seed: u64,
 ) -> (Vec<Sample>, Evidence) {
     let mut random = Random::new(seed);
-    let lightmaps = texels(world, occluders, count, &mut random);
+    let mut lightmaps = texels(world, occluders, count, &mut random);
     // A few lightmapped scraps say nothing about the rest.
     if lightmaps.len() >= 16 {
+        balance(&mut lightmaps);
         return (hold_out(lightmaps, &mut random), Evidence::Lightmaps);
     }
     let lit = |s: &[Sample]| s.iter().any(|s| s.level() > 0.0 && !s.saturated);
@@ -152,6 +166,17 @@ pub(super) fn take(
         return (hold_out(grid, &mut random), Evidence::Grid);
     }
     (Vec::new(), Evidence::Nothing)
+}
+
+/// Bounds what black measurements weigh together.
+fn balance(samples: &mut [Sample]) {
+    let black = |s: &Sample| s.value == Vec3::ZERO;
+    let dark = samples.iter().filter(|s| black(s)).count() as f32;
+    let lit = samples.len() as f32 - dark;
+    let most = (BLACK_OVER_LIT * lit / dark.max(1.0)).clamp(TRUST_IN_BLACK, 1.0);
+    for sample in samples.iter_mut().filter(|s| black(s)) {
+        sample.trust = sample.trust.min(most);
+    }
 }
 
 /// Keeps every fifth or so out of fitting.
@@ -171,7 +196,7 @@ fn sample_at(
     occluders: &Occluders,
     on: Vec3,
     normal: Vec3,
-    stored: [u8; 3],
+    stored: Stored,
 ) -> Option<Sample> {
     let position = on + normal * LIFT;
     let cluster = world.bsp.cluster_at(position);
@@ -188,18 +213,69 @@ fn sample_at(
     if backs.count() > around.len() / 2 {
         return None;
     }
+    let value = Vec3::from_array(stored.rgb.map(f32::from)) * STORED_UNIT;
     Some(Sample {
         position,
         normal,
-        value: light::raise(
-            Vec3::from_array(stored.map(f32::from)) * STORED_UNIT,
-            world.color_exponent,
-        ),
+        value: light::raise(value, world.color_exponent),
         bounce: Vec3::ZERO,
         cluster,
-        saturated: stored.contains(&255),
+        saturated: stored.rgb.contains(&255),
+        trust: if stored.lone_black {
+            TRUST_IN_BLACK
+        } else {
+            1.0
+        },
         held_out: false,
     })
+}
+
+/// What is stored at a place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Stored {
+    rgb: [u8; 3],
+    /// Black, and not all around it is.
+    lone_black: bool,
+}
+
+impl Stored {
+    /// A value that tells nothing of what is around it.
+    fn alone(rgb: [u8; 3]) -> Stored {
+        Stored {
+            rgb,
+            lone_black: black(rgb),
+        }
+    }
+
+    /// A texel of a page.
+    fn texel(page: &Lightmap, x: usize, y: usize) -> Stored {
+        let rgb = page.texel(x, y);
+        let around = || {
+            let sides = -BLACK_AROUND..=BLACK_AROUND;
+            sides
+                .clone()
+                .flat_map(move |dy| sides.clone().map(move |dx| (dx, dy)))
+        };
+        let lit = |(dx, dy): (i32, i32)| {
+            let inside = |at: usize, by: i32| {
+                let at = at.checked_add_signed(by as isize)?;
+                (at < page.size()).then_some(at)
+            };
+            match (inside(x, dx), inside(y, dy)) {
+                (Some(x), Some(y)) => !black(page.texel(x, y)),
+                _ => false,
+            }
+        };
+        Stored {
+            rgb,
+            lone_black: black(rgb) && around().any(lit),
+        }
+    }
+}
+
+/// Whether a stored colour is less than a step of all its channels.
+fn black(rgb: [u8; 3]) -> bool {
+    rgb.map(u32::from).iter().sum::<u32>() < 3
 }
 
 /// Texels of lightmaps, stratified by area.
@@ -252,7 +328,7 @@ fn texel(
     triangle: usize,
     surface: &WorldSurface,
     random: &mut Random,
-) -> Option<(Vec3, Vec3, [u8; 3])> {
+) -> Option<(Vec3, Vec3, Stored)> {
     let page = usize::try_from(surface.lightmap).ok()?;
     let page = world.bsp.lightmaps.get(page)?;
     let size = page.size() as f32;
@@ -268,8 +344,48 @@ fn texel(
     let (on, normal) = std::iter::once(triangle)
         .chain(others)
         .find_map(|t| place_of(corners(world, t)?, middle, size))?;
-    let stored = page.texel(cell.x as usize, cell.y as usize);
+    let stored = Stored::texel(page, cell.x as usize, cell.y as usize);
     Some((on, normal, stored))
+}
+
+/// Light that the lightmap stores where a ray met a triangle; `None` where it tells nothing: of other surfaces, of texels
+/// at their end and of black ones that are alone.
+pub(super) fn stored_at(
+    world: &RelitWorld,
+    surface: usize,
+    triangle: usize,
+    at: Vec3,
+) -> Option<Vec3> {
+    let own = world.surfaces.get(surface)?;
+    if !tells(world, own) || !constant(world, surface) {
+        return None;
+    }
+    let page = world
+        .bsp
+        .lightmaps
+        .get(usize::try_from(own.lightmap).ok()?)?;
+    let [a, b, c] = corners(world, triangle)?;
+    let (e1, e2, offset) = (
+        b.position - a.position,
+        c.position - a.position,
+        at - a.position,
+    );
+    let normal = e1.cross(e2);
+    let squared = normal.length_squared();
+    if squared <= 0.0 {
+        return None;
+    }
+    let u = offset.cross(e2).dot(normal) / squared;
+    let v = e1.cross(offset).dot(normal) / squared;
+    let place = a.lightmap + (b.lightmap - a.lightmap) * u + (c.lightmap - a.lightmap) * v;
+    let cell = (place * page.size() as f32).floor();
+    if !(cell.min_element() >= 0.0 && cell.max_element() < page.size() as f32) {
+        return None;
+    }
+    let stored = Stored::texel(page, cell.x as usize, cell.y as usize);
+    let value = Vec3::from_array(stored.rgb.map(f32::from)) * STORED_UNIT;
+    (!stored.lone_black && !stored.rgb.contains(&255))
+        .then(|| light::raise(value, world.color_exponent))
 }
 
 /// Vertices of a triangle.
@@ -324,7 +440,7 @@ fn vertices(
         let made = world.vertices.get(first..).unwrap_or_default();
         all.extend(stored.iter().zip(made).map(|(raw, vertex)| {
             let [r, g, b, _] = raw.color;
-            (vertex.position, vertex.normal, [r, g, b])
+            (vertex.position, vertex.normal, Stored::alone([r, g, b]))
         }));
     }
     pick(all.len(), count, random)
@@ -360,6 +476,7 @@ fn grid(world: &RelitWorld, count: usize, random: &mut Random) -> Vec<Sample> {
                 bounce: Vec3::ZERO,
                 cluster,
                 saturated: point.directed.contains(&255),
+                trust: 1.0,
                 held_out: false,
             });
         }
@@ -375,4 +492,50 @@ fn pick(len: usize, count: usize, random: &mut Random) -> impl Iterator<Item = u
         let high = (i + 1) * len / count.max(1);
         low + (((high - low) as f32 * random.next()) as usize).min(high.saturating_sub(low + 1))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(value: f32, trust: f32) -> Sample {
+        Sample {
+            position: Vec3::ZERO,
+            normal: Vec3::Z,
+            value: Vec3::splat(value),
+            bounce: Vec3::ZERO,
+            cluster: 0,
+            saturated: false,
+            trust,
+            held_out: false,
+        }
+    }
+
+    #[test]
+    fn black_counts_where_all_around_is_black() {
+        let side = q3bsp::LIGHTMAP_SIZE;
+        let mut texels = vec![0u8; side * side * 3].into_boxed_slice();
+        // One lit texel, in the middle of the first row.
+        texels[10 * 3..10 * 3 + 3].fill(90);
+        let page = Lightmap(texels);
+        let lone = |x, y| Stored::texel(&page, x, y).lone_black;
+        assert!(!lone(10, 0) && lone(9, 0) && lone(8, 2) && lone(12, 0));
+        assert!(!lone(7, 0) && !lone(10, 3) && !lone(0, 0) && !lone(side - 1, side - 1));
+    }
+
+    #[test]
+    fn black_never_outweighs_what_is_lit() {
+        let lit = || std::iter::repeat_n(sample(0.5, 1.0), 100);
+        let trusts = |black: usize, trust: f32| {
+            let mut samples: Vec<Sample> = lit().collect();
+            samples.extend(std::iter::repeat_n(sample(0.0, trust), black));
+            balance(&mut samples);
+            assert!(samples.iter().take(100).all(|s| s.trust == 1.0));
+            samples[100].trust
+        };
+        assert_eq!(trusts(5, 1.0), 1.0);
+        assert!((trusts(20, 1.0) - 0.5).abs() < 1e-6);
+        assert_eq!(trusts(20, TRUST_IN_BLACK), TRUST_IN_BLACK);
+        assert_eq!(trusts(2000, 1.0), TRUST_IN_BLACK);
+    }
 }

@@ -21,9 +21,6 @@ pub(super) const FLOOR: f32 = 2.0 * STORED_UNIT;
 /// Stored light below which a sample is black, irradiance / π.
 pub(super) const BLACK: f32 = STORED_UNIT;
 
-/// Weight of black samples.
-const TRUST_IN_BLACK: f32 = 0.2;
-
 /// |log ratio| up to which a sample counts in full.
 const HUBER: f32 = 0.3;
 
@@ -111,17 +108,7 @@ fn weight(sample: &Sample, computed: f32) -> f32 {
     } else {
         off / (c * (c - s))
     };
-    slope * (HUBER / off.abs().max(HUBER)) * trust(sample)
-}
-
-/// How much a sample tells. Compilers leave texels black where the point that they measured at lay inside of something,
-/// and some maps are full of them.
-fn trust(sample: &Sample) -> f32 {
-    if sample.level() < BLACK {
-        TRUST_IN_BLACK
-    } else {
-        1.0
-    }
+    slope * (HUBER / off.abs().max(HUBER)) * sample.trust
 }
 
 /// Fits the strengths of `columns` and the ambient term.
@@ -142,7 +129,7 @@ pub(super) fn solve(
             for (weight, sample) in state.weights.iter_mut().zip(samples) {
                 if *weight > 0.0 {
                     let level = (sample.level() + FLOOR) * (mean + FLOOR);
-                    *weight = trust(sample) / level;
+                    *weight = sample.trust / level;
                 }
             }
         }
@@ -191,7 +178,9 @@ fn improve(column: &mut Column, norm: f32, state: &mut Residual, sparsity: f32) 
         }
         None => {
             let penalty = sparsity * norm.sqrt();
-            ((gradient + column.strength * norm - penalty) / norm).max(Vec3::ZERO)
+            ((gradient + column.strength * norm - penalty) / norm)
+                .max(Vec3::ZERO)
+                .min(column.limit)
         }
     };
     let change = best - column.strength;

@@ -55,6 +55,7 @@ pub(super) fn find(
             source: Source::FoundSun(direction),
             rows: sun_rows(occluders, samples, direction),
             strength: Vec3::ZERO,
+            limit: Vec3::INFINITY,
             prior: None,
         });
         let mut state = solve(samples, columns, ambient, effort);

