@@ -6,6 +6,16 @@ use super::buffer::Buffer;
 use super::image::{Image, whole};
 use super::pass::Pass;
 
+/// Level 0 of an image's first layer.
+fn first_level(image: &Image) -> vk::ImageSubresourceLayers {
+    vk::ImageSubresourceLayers {
+        aspect_mask: image.0.copied(),
+        mip_level: 0,
+        base_array_layer: 0,
+        layer_count: 1,
+    }
+}
+
 impl Pass<'_> {
     /// Copies bytes between buffers, or between parts of one that do not overlap.
     pub fn copy_buffer(
@@ -87,7 +97,7 @@ impl Pass<'_> {
 
     /// Runs a copy with an image in a layout that allows it.
     fn with_layout(
-        &mut self,
+        &self,
         image: &Image,
         layout: vk::ImageLayout,
         copy: impl FnOnce(&Self, vk::ImageLayout),
@@ -103,6 +113,22 @@ impl Pass<'_> {
         self.change_layout(image, during, own);
     }
 
+    /// Runs a copy between two images with both in layouts that allow it.
+    fn between(
+        &self,
+        source: &Image,
+        target: &Image,
+        copy: impl FnOnce(&Self, vk::ImageLayout, vk::ImageLayout),
+    ) {
+        let (read, written) = (
+            vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+        );
+        self.with_layout(source, read, |pass, from| {
+            pass.with_layout(target, written, |pass, to| copy(pass, from, to));
+        });
+    }
+
     /// Copies level 0, as much as both images have.
     pub fn copy_image(&mut self, source: &Image, target: &Image) {
         self.end_rendering();
@@ -114,15 +140,9 @@ impl Pass<'_> {
             self.refuse("a copy between images whose texels differ, or of an image to itself");
             return;
         }
-        let layers = |i: &Image| vk::ImageSubresourceLayers {
-            aspect_mask: i.0.copied(),
-            mip_level: 0,
-            base_array_layer: 0,
-            layer_count: 1,
-        };
         let region = vk::ImageCopy {
-            src_subresource: layers(source),
-            dst_subresource: layers(target),
+            src_subresource: first_level(source),
+            dst_subresource: first_level(target),
             extent: vk::Extent3D {
                 width: source.width().min(target.width()),
                 height: source.height().min(target.height()),
@@ -130,31 +150,19 @@ impl Pass<'_> {
             },
             ..Default::default()
         };
-        self.with_layout(
-            source,
-            vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
-            |pass, from| {
-                let own = target.0.layout;
-                let to = if own == vk::ImageLayout::GENERAL {
-                    own
-                } else {
-                    vk::ImageLayout::TRANSFER_DST_OPTIMAL
-                };
-                pass.change_layout(target, own, to);
-                // SAFETY: the region lies inside both images, which are in these layouts.
-                unsafe {
-                    pass.vk().cmd_copy_image(
-                        pass.cmd(),
-                        source.0.raw,
-                        from,
-                        target.0.raw,
-                        to,
-                        &[region],
-                    );
-                }
-                pass.change_layout(target, to, own);
-            },
-        );
+        self.between(source, target, |pass, from, to| {
+            // SAFETY: the region lies inside both images, which are in these layouts.
+            unsafe {
+                pass.vk().cmd_copy_image(
+                    pass.cmd(),
+                    source.0.raw,
+                    from,
+                    target.0.raw,
+                    to,
+                    &[region],
+                );
+            }
+        });
     }
 
     /// Averages the samples of each texel of a colour image into one of another image of the same size and format.
@@ -170,15 +178,9 @@ impl Pass<'_> {
             self.refuse("a resolve between images that do not fit each other");
             return;
         }
-        let layers = vk::ImageSubresourceLayers {
-            aspect_mask: vk::ImageAspectFlags::COLOR,
-            mip_level: 0,
-            base_array_layer: 0,
-            layer_count: 1,
-        };
         let region = vk::ImageResolve {
-            src_subresource: layers,
-            dst_subresource: layers,
+            src_subresource: first_level(source),
+            dst_subresource: first_level(target),
             extent: vk::Extent3D {
                 width: source.width(),
                 height: source.height(),
@@ -235,16 +237,10 @@ impl Pass<'_> {
             self.refuse("a blit of an image to itself or with several samples");
             return;
         }
-        let layers = |i: &Image| vk::ImageSubresourceLayers {
-            aspect_mask: i.0.copied(),
-            mip_level: 0,
-            base_array_layer: 0,
-            layer_count: 1,
-        };
         let region = vk::ImageBlit {
-            src_subresource: layers(source),
+            src_subresource: first_level(source),
             src_offsets: from_corners,
-            dst_subresource: layers(target),
+            dst_subresource: first_level(target),
             dst_offsets: to_corners,
         };
         let filter = if linear {
@@ -252,32 +248,20 @@ impl Pass<'_> {
         } else {
             vk::Filter::NEAREST
         };
-        self.with_layout(
-            source,
-            vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
-            |pass, from| {
-                let own = target.0.layout;
-                let to = if own == vk::ImageLayout::GENERAL {
-                    own
-                } else {
-                    vk::ImageLayout::TRANSFER_DST_OPTIMAL
-                };
-                pass.change_layout(target, own, to);
-                // SAFETY: the corners lie inside the images, which are in these layouts.
-                unsafe {
-                    pass.vk().cmd_blit_image(
-                        pass.cmd(),
-                        source.0.raw,
-                        from,
-                        target.0.raw,
-                        to,
-                        &[region],
-                        filter,
-                    );
-                }
-                pass.change_layout(target, to, own);
-            },
-        );
+        self.between(source, target, |pass, from, to| {
+            // SAFETY: the corners lie inside the images, which are in these layouts.
+            unsafe {
+                pass.vk().cmd_blit_image(
+                    pass.cmd(),
+                    source.0.raw,
+                    from,
+                    target.0.raw,
+                    to,
+                    &[region],
+                    filter,
+                );
+            }
+        });
     }
 
     /// Copies a rectangle (x, y, width, height) of level 0 into a buffer, rows without padding.
@@ -303,12 +287,7 @@ impl Pass<'_> {
         }
         let region = vk::BufferImageCopy {
             buffer_offset: offset,
-            image_subresource: vk::ImageSubresourceLayers {
-                aspect_mask: source.0.copied(),
-                mip_level: 0,
-                base_array_layer: 0,
-                layer_count: 1,
-            },
+            image_subresource: first_level(source),
             image_offset: vk::Offset3D {
                 x: x.cast_signed(),
                 y: y.cast_signed(),
