@@ -88,33 +88,26 @@ float solid_angle(vec3 a, vec3 b, vec3 c) {
     return 2.0 * atan(numerator, denominator);
 }
 
-float angle_between(vec3 a, vec3 b) {
-    // exact near 0 and pi too, unlike the arc cosine
-    if (dot(a, b) < 0.0) return PI - 2.0 * asin(min(length(a + b) * 0.5, 1.0));
-    return 2.0 * asin(min(length(b - a) * 0.5, 1.0));
-}
-
-// A direction to a spherical triangle, uniform in solid angle (Arvo, Stratified Sampling of Spherical Triangles, 1995).
-// a, b, c: unit vectors. The triangle must not be degenerate.
-vec3 sample_spherical_triangle(vec3 a, vec3 b, vec3 c, vec2 u) {
-    vec3 n_ab = normalize(cross(a, b)), n_bc = normalize(cross(b, c)), n_ca = normalize(cross(c, a));
-    float alpha = angle_between(n_ab, -n_ca), beta = angle_between(n_bc, -n_ab), gamma = angle_between(n_ca, -n_bc);
-    // the angle sum of the part-triangle that holds the fraction u.x of the area
-    float part = mix(PI, alpha + beta + gamma, u.x);
-    float cos_alpha = cos(alpha), sin_alpha = sin(alpha);
-    float sin_phi = sin(part) * cos_alpha - cos(part) * sin_alpha;
-    float cos_phi = cos(part) * cos_alpha + sin(part) * sin_alpha;
-    float k1 = cos_phi + cos_alpha;
-    float k2 = sin_phi - sin_alpha * dot(a, b);
-    float denominator = (k2 * sin_phi + k1 * cos_phi) * sin_alpha;
-    float cos_side = denominator != 0.0 ? (k2 + (k2 * cos_phi - k1 * sin_phi) * cos_alpha) / denominator : 1.0;
-    cos_side = clamp(cos_side, -1.0, 1.0);
-    vec3 along = normalize(c - a * dot(c, a));
-    vec3 c_part = cos_side * a + sqrt(max(1.0 - cos_side * cos_side, 0.0)) * along;
+// A direction to a spherical triangle of unit vectors, uniform in its solid angle `omega`, which must not be 0 (Arvo,
+// Stratified Sampling of Spherical Triangles, 1995): a corner is moved from a towards c until the part-triangle has the
+// fraction u.x of the area, then a point is taken on the arc from b to there. That the tangent of half a solid angle is
+// a quotient of products of its corners (Van Oosterom and Strackee) gives the tangent of half the arc from a without
+// the triangle's angles.
+vec3 sample_spherical_triangle(vec3 a, vec3 b, vec3 c, float omega, vec2 u) {
+    vec3 along = c - a * dot(a, c);
+    float side = length(along);
+    float part = 0.5 * omega * u.x;
+    float sin_part = sin(part);
+    float p = side * (1.0 + dot(a, b)) * sin_part;
+    float q = abs(dot(a, cross(b, c))) * cos(part) - dot(b, along) * sin_part;
+    // the arc's cosine and sine from the tangent p / q of its half
+    float scale = p * p + q * q;
+    if (!(scale > 0.0 && side > 0.0)) return a;
+    vec3 c_part = a * ((q * q - p * p) / scale) + along * (2.0 * p * q / (scale * side));
     float z = 1.0 - u.y * (1.0 - dot(c_part, b));
     vec3 across = c_part - b * dot(c_part, b);
-    float len = length(across);
-    across = len > 1.0e-9 ? across / len : vec3(0.0);
+    float squared = dot(across, across);
+    across *= squared > 1.0e-18 ? inversesqrt(squared) : 0.0;
     return z * b + sqrt(max(1.0 - z * z, 0.0)) * across;
 }
 
@@ -177,7 +170,7 @@ LightSample sample_triangle(TriangleLight light, vec3 position, vec3 normal, vec
         s.direction = safe_normalize(to, normal);
         s.light = light.radiance * (omega / PI);
     } else if (omega > MIN_SOLID_ANGLE) {
-        s.direction = sample_spherical_triangle(ua, ub, uc, u);
+        s.direction = sample_spherical_triangle(ua, ub, uc, omega, u);
         float rate = dot(s.direction, face);
         if (abs(rate) < 1.0e-7) return no_light();
         s.distance = height / rate;
