@@ -7,8 +7,11 @@
 // luminance (as in Krawczyk et al. 2005, section 3.1; here by a constant part of the difference in stops). The exposure
 // follows exponentially, faster into the light than into the dark (their section 3.2).
 #include "trace/exposure.glsl"
+#include "trace/picture.glsl"
 
-layout(local_size_x = 1) in;
+layout(local_size_x = EXPOSURE_BINS) in;
+
+shared uint bins[EXPOSURE_BINS];
 
 // Mean of a usual picture of the engine, linear.
 const float MIDDLE = 0.02;
@@ -21,17 +24,21 @@ const float DARK_PART = 0.2, BRIGHT_PART = 0.05;
 
 void main() {
     ExposureState state = ExposureState(VIEW.exposure);
-    float total = float(VIEW.antialias.output_width) * float(VIEW.antialias.output_height);
+    uint own = gl_LocalInvocationIndex;
+    bins[own] = state.bins[own];
+    state.bins[own] = 0;
+    barrier();
+    if (own != 0) return;
+    float total = float(histogram_size().x) * float(histogram_size().y);
     float from = total * DARK_PART, to = total * (1.0 - BRIGHT_PART);
     float below = 0.0, sum = 0.0, weight = 0.0;
     for (uint i = 0; i < EXPOSURE_BINS; i++) {
-        float count = float(state.bins[i]);
+        float count = float(bins[i]);
         float inside = max(min(below + count, to) - max(below, from), 0.0);
         float middle = EXPOSURE_MIN_LOG + (float(i) + 0.5) / float(EXPOSURE_BINS) * (EXPOSURE_MAX_LOG - EXPOSURE_MIN_LOG);
         sum += inside * middle;
         weight += inside;
         below += count;
-        state.bins[i] = 0;
     }
     float stops = 0.0;
     if ((VIEW.flags & VIEW_AUTO_EXPOSURE) != 0 && weight > 0.0)

@@ -1,5 +1,5 @@
 #version 460
-// Counts the picture's pixels by the logarithm of their luminance.
+// Counts one of each 2 x 2 of the picture's pixels by the logarithm of its luminance.
 #include "trace/exposure.glsl"
 #include "trace/picture.glsl"
 
@@ -11,8 +11,10 @@ void main() {
     uint local_index = gl_LocalInvocationIndex;
     if (local_index < EXPOSURE_BINS) counts[local_index] = 0;
     barrier();
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (all(lessThan(pixel, picture_size()))) {
+    ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
+    if (all(lessThan(cell, histogram_size()))) {
+        // each of the four in turn, so that no row or column of a pattern is left out
+        ivec2 pixel = min(cell * 2 + (cell.yx & 1), picture_size() - 1);
         float value = log2(max(luminance(picture_load(pixel)), 1.0e-6));
         float place = (value - EXPOSURE_MIN_LOG) / (EXPOSURE_MAX_LOG - EXPOSURE_MIN_LOG);
         atomicAdd(counts[uint(clamp(place, 0.0, 0.9999) * float(EXPOSURE_BINS))], 1u);

@@ -7,6 +7,9 @@
 
 ivec2 picture_size() { return ivec2(VIEW.antialias.output_width, VIEW.antialias.output_height); }
 
+// Pixels that are counted for the exposure.
+ivec2 histogram_size() { return (picture_size() + 1) / 2; }
+
 vec3 picture_load(ivec2 pixel) {
     uint image = VIEW.antialias.image_picture;
     return (VIEW.flags & VIEW_ACCUMULATE) != 0 ? imageLoad(images_rgba32f[image], pixel).rgb : imageLoad(images_rgba16f[image], pixel).rgb;

@@ -239,11 +239,9 @@ impl Exposure {
         let mut pass = rec.pass("trace_exposure", Access::COMPUTE, Access::COMPUTE)?;
         pass.bind_compute(&self.histogram);
         pass.push(&view);
-        pass.dispatch(
-            size[0].div_ceil(HISTOGRAM_TILE),
-            size[1].div_ceil(HISTOGRAM_TILE),
-            1,
-        );
+        // one of each 2 × 2 pixels
+        let [x, y] = size.map(|s| s.div_ceil(2).div_ceil(HISTOGRAM_TILE));
+        pass.dispatch(x, y, 1);
         pass.barrier();
         pass.bind_compute(&self.adapt);
         pass.push(&view);
