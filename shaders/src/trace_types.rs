@@ -403,6 +403,12 @@ pub struct TransportView {
     pub eye_absorption: Vec3,
     /// Number of `filters`.
     pub filter_count: u32,
+    /// Boxes around what is translucent in sight of the eye, likewise.
+    pub layers: u64,
+    /// Number of `layers`; all ones: anything may be anywhere.
+    pub layer_count: u32,
+    /// Makes the size a multiple of eight without hidden bytes.
+    pub padding: u32,
 }
 
 /// The flares of a view.

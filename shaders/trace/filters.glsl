@@ -5,6 +5,7 @@
 #ifndef RELIGHT_TRACE_FILTERS_GLSL
 #define RELIGHT_TRACE_FILTERS_GLSL
 
+#include "trace/boxes.glsl"
 #include "trace/trace.glsl"
 #include "trace/dielectric.glsl"
 
@@ -15,15 +16,7 @@ const float FILTER_CLEARANCE = 0.25;
 
 // Whether the ray comes near such a surface at all.
 bool meets_filter(vec3 origin, vec3 direction, float distance) {
-    vec3 inverse = 1.0 / mix(direction, vec3(1.0e-20), lessThan(abs(direction), vec3(1.0e-20)));
-    FilterBoxes boxes = FilterBoxes(VIEW.transport.filters);
-    for (uint i = 0; i < VIEW.transport.filter_count; i++) {
-        vec3 a = (boxes.at[2 * i] - origin) * inverse, b = (boxes.at[2 * i + 1] - origin) * inverse;
-        vec3 near = min(a, b), far = max(a, b);
-        float enter = max(max(near.x, near.y), max(near.z, 0.0));
-        if (enter <= min(min(far.x, far.y), min(far.z, distance))) return true;
-    }
-    return false;
+    return meets_box(Boxes(VIEW.transport.filters), VIEW.transport.filter_count, origin, direction, distance);
 }
 
 // What light that comes along the ray is multiplied by.

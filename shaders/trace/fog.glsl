@@ -3,22 +3,15 @@
 #ifndef RELIGHT_TRACE_FOG_GLSL
 #define RELIGHT_TRACE_FOG_GLSL
 
+#include "trace/boxes.glsl"
 #include "trace/color.glsl"
 #include "trace/geometry.glsl"
 #include "trace/fog_keep.glsl"
 
 // Where the ray is inside the volume: x < y, or an empty range.
 vec2 fog_range(Fog fog, vec3 origin, vec3 direction) {
-    float enter = 0.0, leave = FAR;
-    for (int i = 0; i < 3; i++) {
-        if (abs(direction[i]) < 1.0e-12) {
-            if (origin[i] < fog.mins[i] || origin[i] > fog.maxs[i]) return vec2(1.0, 0.0);
-            continue;
-        }
-        float a = (fog.mins[i] - origin[i]) / direction[i], b = (fog.maxs[i] - origin[i]) / direction[i];
-        enter = max(enter, min(a, b));
-        leave = min(leave, max(a, b));
-    }
+    vec2 range = box_range(fog.mins, fog.maxs, origin, inverse_direction(direction), FAR);
+    float enter = range.x, leave = range.y;
     if (fog.has_surface != 0) {
         float below = dot(fog.plane.xyz, origin) - fog.plane.w;
         float rate = dot(fog.plane.xyz, direction);

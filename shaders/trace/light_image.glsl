@@ -11,7 +11,9 @@ uint pack_light(vec3 light, float dither) {
     int exponent = clamp(int(floatBitsToUint(largest) >> 23) - 127, -16, 15);
     // the largest becomes 256..511; what a rounding up makes of 511.x is cut, a thousandth of the values at most
     float scale = uintBitsToFloat(uint(8 - exponent + 127) << 23);
-    uvec3 mantissas = uvec3(min(light * scale + dither, 511.0));
+    // rounded by adding 2^23, whose mantissa counts ones: several times faster than a conversion
+    vec3 rounded = clamp(light * scale + (dither - 0.5), 0.0, 511.0) + 8388608.0;
+    uvec3 mantissas = floatBitsToUint(rounded) & 511u;
     return mantissas.r | mantissas.g << 9 | mantissas.b << 18 | uint(exponent + 16) << 27;
 }
 

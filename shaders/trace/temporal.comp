@@ -7,6 +7,9 @@
 #include "trace/sparse.glsl"
 #include "trace/slope.glsl"
 
+// Whether there is bounced light at all.
+layout(constant_id = 0) const uint BOUNCES = 1;
+
 // Least weight of a new frame, of direct and indirect light.
 const vec2 MIN_WEIGHT = vec2(0.05, 0.035);
 const float MIN_VARIANCE_WEIGHT = 0.1;
@@ -33,7 +36,7 @@ void add_tap(inout History h, ivec2 tap, Before before, vec3 normal, float toler
     if (light.guide == 0 || abs(guide_depth(light.guide) - before.depth) > tolerance || dot(guide_normal(light.guide), normal) < 0.85) return;
     uint past = Pasts(DENOISE.last_past).at[place];
     h.direct += light.direct * weight;
-    h.indirect += light.indirect * weight;
+    if (BOUNCES != 0) h.indirect += light.indirect * weight;
     h.variance += past_variance(past) * weight;
     h.frames += past_frames(past) * weight;
     h.weight += weight;
@@ -67,7 +70,7 @@ vec2 variance_around(ivec2 pixel, float depth, vec2 slope) {
             ivec2 tap = pixel + ivec2(x, y);
             float other = depth_at(tap);
             if (other == 0.0 || abs(depth / other - 1.0 - dot(slope, vec2(x, y))) > 0.02) continue;
-            vec2 l = vec2(luminance(light_read(VIEW.image_direct, tap)), luminance(light_read(VIEW.image_indirect, tap)));
+            vec2 l = vec2(luminance(light_read(VIEW.image_direct, tap)), BOUNCES != 0 ? luminance(light_read(VIEW.image_indirect, tap)) : 0.0);
             moments += vec4(l, l * l);
             count += 1.0;
         }
@@ -121,7 +124,7 @@ void main() {
 
     LightTexel light;
     light.direct = light_read(VIEW.image_direct, pixel);
-    light.indirect = light_read(VIEW.image_indirect, pixel);
+    light.indirect = BOUNCES != 0 ? light_read(VIEW.image_indirect, pixel) : vec3(0.0);
     light.guide = pack_guide(depth, normal);
     vec2 value = vec2(luminance(light.direct), luminance(light.indirect));
 

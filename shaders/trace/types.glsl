@@ -67,7 +67,7 @@ struct DenoiseView {
     uint slope; uint padding;
 };
 
-struct TransportView { uint64_t filters; vec3 eye_absorption; uint filter_count; };
+struct TransportView { uint64_t filters; vec3 eye_absorption; uint filter_count; uint64_t layers; uint layer_count; uint padding; };
 
 struct FlareView { uint64_t flares; uint64_t states; uint count; uint padding; };
 

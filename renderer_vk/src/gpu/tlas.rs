@@ -9,7 +9,7 @@ use super::graveyard::Garbage;
 use super::pass::Pass;
 
 /// An instance of a bottom-level structure.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instance {
     /// Object to world, three rows.
     pub transform: [[f32; 4]; 3],

@@ -86,6 +86,8 @@ struct DriverStructures {
     /// One for each slot.
     slots: Vec<Blas>,
     tlas: Tlas,
+    /// What `tlas` was built from, once it is: the serial of the map's geometry, and all instances.
+    placed: Option<(u64, Vec<gpu::Instance>)>,
 }
 
 /// Builds the structures of each frame in storage that stays.
@@ -111,6 +113,7 @@ impl Accel {
             driver: (tracer != Tracer::Compute).then(|| DriverStructures {
                 slots: parts.slots.iter().map(blas).collect(),
                 tlas: Tlas::new(device, "trace scene"),
+                placed: None,
             }),
             parts,
             shapes: Shapes::new(device, tracer),
@@ -237,7 +240,7 @@ impl Accel {
         }
         output.geometries = rec.arena().push(&records)?;
         if self.driver.is_some() {
-            output.scene = self.build_driver(rec, &placed)?;
+            output.scene = self.build_driver(rec, geometry.map_or(0, |g| g.serial), &placed)?;
         } else {
             (output.nodes, output.placed) = self.build_own(rec, &placed)?;
         }
@@ -254,7 +257,13 @@ impl Accel {
     }
 
     /// Builds what the driver's tracers walk: the bottom level in one batch, then the top level, whose index it returns.
-    fn build_driver(&mut self, rec: &mut Recorder, placed: &[Placement<'_>]) -> Result<u32, Error> {
+    /// `serial`: of the map's geometry.
+    fn build_driver(
+        &mut self,
+        rec: &mut Recorder,
+        serial: u64,
+        placed: &[Placement<'_>],
+    ) -> Result<u32, Error> {
         let Some(driver) = &mut self.driver else {
             return Ok(gpu::NO_INDEX);
         };
@@ -272,15 +281,19 @@ impl Accel {
                 no_duplicate_any_hit: slot.kind == Kind::Translucent,
             }]);
         }
-        let mut pass = rec.pass("trace_accel", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
-        let changing = (driver.slots.iter_mut().zip(&geometries))
+        let changing: Vec<BlasBuild<'_>> = (driver.slots.iter_mut().zip(&geometries))
             .filter(|(_, geometries)| geometries[0].triangle_count > 0)
             .map(|(blas, geometries)| BlasBuild {
                 blas,
                 geometries,
                 refit: false,
-            });
-        self.shapes.build(&mut pass, changing.collect())?;
+            })
+            .collect();
+        let rests = changing.is_empty() && !self.shapes.has_work();
+        if !rests {
+            let mut pass = rec.pass("trace_accel", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
+            self.shapes.build(&mut pass, changing)?;
+        }
         let address = |part: &Part<'_>| match part {
             Part::Static(Structure::Driver(blas)) => blas.address(),
             Part::Slot(index) => driver.slots.get(*index).map_or(0, Blas::address),
@@ -306,7 +319,15 @@ impl Accel {
                 blas: address(&p.part),
             })
             .collect();
+        // while nothing moves, what was built shows it
+        let same = |(of, built): &(u64, Vec<gpu::Instance>)| *of == serial && *built == instances;
+        if rests && driver.placed.as_ref().is_some_and(same) {
+            return Ok(driver.tlas.index());
+        }
+        let mut pass = rec.pass("trace_scene", Access::ACCEL_BUILD, Access::ACCEL_BUILD)?;
+        driver.placed = None;
         pass.build_tlas(&mut driver.tlas, &instances)?;
+        driver.placed = Some((serial, instances));
         Ok(driver.tlas.index())
     }
 

@@ -148,8 +148,10 @@ pub struct Denoiser {
     carry: ComputePipeline,
     gradient: ComputePipeline,
     gradient_wide: ComputePipeline,
-    temporal: ComputePipeline,
-    wavelet: ComputePipeline,
+    /// Without and with bounced light.
+    temporal: [ComputePipeline; 2],
+    /// Likewise; the first step, and those after it.
+    wavelet: [[ComputePipeline; 2]; 2],
     sparse_temporal: ComputePipeline,
     sparse: ComputePipeline,
     images: Option<Images>,
@@ -168,13 +170,29 @@ impl Denoiser {
     /// The driver refuses a pipeline.
     pub fn new(device: &Device) -> Result<Self, Error> {
         let compute = |name, code| ComputePipeline::new(device, name, code, &[]);
+        let temporal = |bounces| {
+            let code = &shaders::TRACE_TEMPORAL_COMP;
+            ComputePipeline::new(device, "trace_temporal", code, &[(0, bounces)])
+        };
+        let wavelet = |bounces, noisy| {
+            let constants = [(0, bounces), (1, noisy)];
+            ComputePipeline::new(
+                device,
+                "trace_wavelet",
+                &shaders::TRACE_ATROUS_COMP,
+                &constants,
+            )
+        };
         Ok(Self {
             device: device.clone(),
             carry: compute("trace_carry", &shaders::TRACE_CARRY_COMP)?,
             gradient: compute("trace_gradient", &shaders::TRACE_GRADIENT_COMP)?,
             gradient_wide: compute("trace_gradient_wide", &shaders::TRACE_GRADIENT_WIDE_COMP)?,
-            temporal: compute("trace_temporal", &shaders::TRACE_TEMPORAL_COMP)?,
-            wavelet: compute("trace_wavelet", &shaders::TRACE_ATROUS_COMP)?,
+            temporal: [temporal(0)?, temporal(1)?],
+            wavelet: [
+                [wavelet(0, 1)?, wavelet(0, 0)?],
+                [wavelet(1, 1)?, wavelet(1, 0)?],
+            ],
             sparse_temporal: compute(
                 "trace_sparse_temporal",
                 &shaders::TRACE_SCATTER_TEMPORAL_COMP,
@@ -285,11 +303,11 @@ impl Denoiser {
     }
 
     /// Reads the G-buffer, the light of the rays and what the last frame left; writes the filtered light. `view`:
-    /// device address of the `TraceView`.
+    /// device address of the `TraceView`; `bounces`: there is bounced light.
     ///
     /// # Errors
     /// Out of memory.
-    pub fn filter(&self, rec: &mut Recorder, view: u64) -> Result<(), Error> {
+    pub fn filter(&self, rec: &mut Recorder, view: u64, bounces: bool) -> Result<(), Error> {
         let Some(images) = &self.images else {
             return Ok(());
         };
@@ -304,13 +322,16 @@ impl Denoiser {
         match images.tier {
             Tier::Adaptive => {
                 let tile = [TILE; 2];
-                dispatch(rec, "trace_temporal", &self.temporal, view, size, tile)?;
-                steps(rec, "trace_wavelet", &self.wavelet, view, images, &WAVELET)
+                let temporal = &self.temporal[usize::from(bounces)];
+                dispatch(rec, "trace_temporal", temporal, view, size, tile)?;
+                let [first, rest] = &self.wavelet[usize::from(bounces)];
+                steps(rec, "trace_wavelet", [first, rest], view, images, &WAVELET)
             }
             Tier::Sparse => {
                 let name = "trace_sparse_temporal";
                 dispatch(rec, name, &self.sparse_temporal, view, size, [TILE; 2])?;
-                steps(rec, "trace_sparse", &self.sparse, view, images, &SPARSE)
+                let pipelines = [&self.sparse; 2];
+                steps(rec, "trace_sparse", pipelines, view, images, &SPARSE)
             }
         }
     }
@@ -327,17 +348,17 @@ impl Denoiser {
     }
 }
 
-/// Steps of a filter, at least three, from the fresh texels to the result; `spacings` is what differs.
+/// Steps of a filter, at least three, from the fresh texels to the result; `spacings` is what differs. `pipelines`: of
+/// the first step, and of those after it.
 fn steps(
     rec: &mut Recorder,
     name: &str,
-    pipeline: &ComputePipeline,
+    pipelines: [&ComputePipeline; 2],
     view: u64,
     images: &Images,
     spacings: &[u32],
 ) -> Result<(), Error> {
     let mut pass = rec.pass(name, Access::COMPUTE, Access::COMPUTE)?;
-    pass.bind_compute(pipeline);
     let [x, y] = images.size.map(|s| s.div_ceil(TILE));
     for (step, &spacing) in spacings.iter().enumerate() {
         // The last frame's light, where the result goes, is free once the fresh light holds it too. The first step is
@@ -354,6 +375,7 @@ fn steps(
         if step > 0 {
             pass.barrier();
         }
+        pass.bind_compute(pipelines[step.min(1)]);
         pass.push(&Step {
             view,
             source,

@@ -2,6 +2,7 @@
 //! map.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{Vec2, Vec3};
 use shaders::trace_types::SkyRecord;
@@ -11,6 +12,7 @@ use shaders::types::constants::{NO_TEXTURE, TRIANGLE_WORLD};
 use super::bvh::{Aabb, build_triangles};
 use super::cutout::Coverage;
 use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
+use super::layer_boxes::{StaticLayer, bounds_of};
 use super::surroundings::Surroundings;
 use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
 use crate::world::Bounds;
@@ -47,6 +49,8 @@ pub struct OwnStructure {
 
 /// A map's geometry as rays see it.
 pub struct StaticGeometry {
+    /// Tells it from every other one, whose memory it may have taken over.
+    pub serial: u64,
     /// Its bottom-level structures.
     pub structures: Vec<StaticBlas>,
     /// Device address of the vertices that their triangles index.
@@ -59,6 +63,8 @@ pub struct StaticGeometry {
     pub fog_count: u32,
     /// Their boxes.
     pub fog_boxes: Vec<Bounds>,
+    /// What of it is translucent.
+    pub layers: Vec<StaticLayer>,
     /// What lies in the way of light; nothing unless it is put here.
     pub surroundings: Surroundings,
     // kept alive for the structures' triangles
@@ -165,6 +171,27 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
     grouped
 }
 
+/// The boxes of translucent surfaces.
+fn layers(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Vec<StaticLayer> {
+    let is_layer = |s: &&StaticSurface| {
+        let (_, info) = materials.info(s.material);
+        Kind::of(info.flags) == Some(Kind::Translucent)
+    };
+    let layer = |s: &StaticSurface| {
+        let first = s.first_index as usize;
+        let corners = first..first.saturating_add(s.index_count as usize);
+        let corners = scene.indices.get(corners).unwrap_or_default();
+        let vertices = corners
+            .iter()
+            .filter_map(|&i| scene.vertices.get(i as usize));
+        StaticLayer {
+            model: s.model,
+            bounds: bounds_of(vertices),
+        }
+    };
+    scene.surfaces.iter().filter(is_layer).map(layer).collect()
+}
+
 impl StaticGeometry {
     /// Bytes of the structures and of the triangle records.
     pub fn bytes(&self) -> u64 {
@@ -199,7 +226,9 @@ impl StaticGeometry {
             }
             Tracer::Compute => own_structures(device, scene, &grouped, &triangles)?,
         };
+        static SERIALS: AtomicU64 = AtomicU64::new(1);
         Ok(Self {
+            serial: SERIALS.fetch_add(1, Ordering::Relaxed),
             structures,
             vertices: scene.vertex_address,
             skies: Buffer::with_data(device, "trace skies", storage, &grouped.skies)?,
@@ -211,6 +240,7 @@ impl StaticGeometry {
                     maxs: fog.maxs,
                 })
                 .collect(),
+            layers: layers(scene, materials),
             surroundings: Surroundings::default(),
             triangle_records: triangles,
         })

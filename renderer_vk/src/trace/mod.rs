@@ -22,6 +22,7 @@ pub mod fog;
 mod frame_lights;
 pub mod geometry;
 pub mod input;
+pub mod layer_boxes;
 pub mod light_cells;
 pub mod light_tables;
 pub mod lights;

@@ -274,6 +274,24 @@ impl Shapes {
         }
     }
 
+    /// Whether [`build`](Self::build) has anything to do.
+    pub fn has_work(&self) -> bool {
+        let rigid = |shape: &RigidShape| {
+            let RigidBottom::Driver { pending, .. } = &shape.bottom else {
+                return false;
+            };
+            pending.is_some()
+        };
+        let pose = |pose: &Pose| {
+            let PoseBottom::Driver { pending, .. } = &pose.bottom else {
+                return false;
+            };
+            pending.is_some()
+        };
+        let mut poses = self.animated.values().flat_map(|s| &s.poses);
+        !self.asked.is_empty() || self.rigid.values().any(rigid) || poses.any(pose)
+    }
+
     /// Builds what is new and fits what has moved, together with `changing`, in one batch.
     ///
     /// # Errors

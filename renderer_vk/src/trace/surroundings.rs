@@ -14,7 +14,7 @@ const MAX_BOXES: usize = 16;
 const DEFORMATION: f32 = 16.0;
 
 /// A box by its smallest and largest corner.
-type Corners = [Vec3; 2];
+pub type Corners = [Vec3; 2];
 
 /// A brush of liquid.
 struct Liquid {
@@ -93,6 +93,7 @@ impl Surroundings {
             filters: self.boxes.as_ref().map_or(0, Buffer::address),
             eye_absorption: (self.liquids.iter().find(around)).map_or(Vec3::ZERO, |l| l.absorption),
             filter_count: self.count,
+            ..TransportView::default()
         }
     }
 }
@@ -128,7 +129,7 @@ fn brushes(bsp: &Bsp, name: &str, absorption: Vec3) -> Vec<Liquid> {
 }
 
 /// At most `limit` boxes that hold all of these: neighbours along the longest axis are put together.
-fn merged(mut boxes: Vec<Corners>, limit: usize) -> Vec<Corners> {
+pub fn merged(mut boxes: Vec<Corners>, limit: usize) -> Vec<Corners> {
     boxes.retain(|b| b[0].is_finite() && b[1].is_finite());
     if boxes.len() <= limit {
         return boxes;

@@ -5,7 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use glam::Vec3;
 use shaders::trace_types::constants as t;
 use shaders::trace_types::{
-    AntialiasView, FlareView, MotionView, PortalRecord, PostView, TraceView,
+    AntialiasView, FlareView, MotionView, PortalRecord, PostView, TraceView, TransportView,
 };
 
 use super::accel::{Accel, AccelOutput};
@@ -17,6 +17,7 @@ use super::denoise::Denoiser;
 use super::fog::LitFog;
 use super::geometry::StaticGeometry;
 use super::input::{MaterialTable, Tracer};
+use super::layer_boxes::in_sight;
 use super::lights::MapLights;
 use super::motion::Motion;
 use super::passes::{Composite, Direct, Exposure, Fill, FlareRays, Indirect, Primary, ToneMap};
@@ -291,7 +292,8 @@ impl ViewTracer {
         }
         self.fog.record(rec, address)?;
         self.counters.end(rec)?;
-        self.denoiser.filter(rec, address)?;
+        self.denoiser
+            .filter(rec, address, settings.rt_bounces > 0)?;
         self.composite.record(rec, address, size)?;
         self.antialias.record(rec, address)?;
         self.exposure.record(rec, address, output)?;
@@ -400,6 +402,14 @@ impl ViewTracer {
         set(t::VIEW_HISTORY, self.history.is_some());
         let [last_eye, last_forward, last_left, last_up] = self.history.unwrap_or([Vec3::ZERO; 4]);
         let [eye, forward, left, up] = camera_frame(view);
+        let boxes = in_sight(view, map.map(|m| m.geometry), materials);
+        let (layers, layer_count) = if settings.rt_dof {
+            // rays start beside the eye
+            (0, u32::MAX)
+        } else {
+            let count = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
+            (rec.arena().push(&boxes)?, count)
+        };
         Ok(TraceView {
             geometries: accel.geometries,
             instances: accel.instances,
@@ -444,9 +454,13 @@ impl ViewTracer {
             time: view.time,
             pixel_spread: pixel_spread(camera.tan_y, targets.height),
             ambient: lights.ambient * settings.rt_light_scale.max(0.0),
-            transport: map.map_or_else(Default::default, |m| {
-                m.geometry.surroundings.view(camera.origin)
-            }),
+            transport: TransportView {
+                layers,
+                layer_count,
+                ..map.map_or_else(Default::default, |m| {
+                    m.geometry.surroundings.view(camera.origin)
+                })
+            },
             eye_shift: camera.stereo.slope / camera.tan_x,
             channels: self.channels,
             fog_count: map.map_or(0, |m| m.geometry.fog_count),

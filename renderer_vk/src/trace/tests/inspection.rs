@@ -1,8 +1,9 @@
 //! What the traced look tells about itself: counted rays, views of its steps.
 
 use glam::Vec3;
+use shaders::types::constants as c;
 
-use super::harness::{Gpu, Scene, rectangle, reference};
+use super::harness::{Gpu, Scene, identity, rectangle, reference, stage};
 use crate::settings::Settings;
 
 const SIZE: u32 = 32;
@@ -40,8 +41,8 @@ fn rays_are_counted_exactly_and_only_when_asked() {
         gpu.render(&scene, &settings(0), 4);
         let [primary, direct, indirect] = gpu.rays().expect("counted");
         let pixels = u64::from(SIZE * SIZE);
-        // for each pixel one for the floor, one for layers in front of it, one to the light
-        assert_eq!([primary, direct, indirect], [2 * pixels, pixels, 0]);
+        // for each pixel one for the floor and one to the light; nothing translucent is there to ask for
+        assert_eq!([primary, direct, indirect], [pixels, pixels, 0]);
         gpu.render(&scene, &settings(1), 4);
         let [_, _, bounced] = gpu.rays().expect("counted");
         // the floor sees nothing but emptiness
@@ -49,6 +50,39 @@ fn rays_are_counted_exactly_and_only_when_asked() {
         gpu.count_rays(false);
         gpu.render(&scene, &settings(0), 1);
         assert_eq!(gpu.rays(), None);
+    });
+}
+
+#[test]
+fn only_rays_near_something_translucent_ask_for_layers() {
+    Gpu::each(|gpu| {
+        gpu.count_rays(true);
+        let settings = Settings {
+            rt_num_random_dl: 0,
+            rt_bounces: 0,
+            ..reference()
+        };
+        let pixels = u64::from(SIZE * SIZE);
+        let mut asked = |moves: bool, side: f32, below: bool| {
+            let mut scene = lit_floor();
+            let flags = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
+            let pane = scene.material(&[stage::blend([0.5; 3], 0.5)], flags);
+            let corner = Vec3::new(0.0, 0.0, if below { -10.0 } else { 10.0 });
+            let points = rectangle(corner, Vec3::X * side, Vec3::Y * side);
+            if moves {
+                scene.mesh(points, pane, identity());
+            } else {
+                scene.quad(points, pane);
+            }
+            gpu.render(&scene, &settings, 1);
+            gpu.rays().expect("counted")[0]
+        };
+        for moves in [false, true] {
+            // a part of the picture: there a ray for the layer, and one for the next that there may be
+            let some = asked(moves, 5.0, false);
+            assert!(some > pixels && some < 2 * pixels, "{some} of {pixels}");
+            assert_eq!(asked(moves, 5.0, true), pixels, "behind the floor");
+        }
     });
 }
 
@@ -84,8 +118,8 @@ fn debug_views_show_what_they_say() {
     // one light: a tenth of the way, three fifths of the way to blue
     assert!(near(lights, [15, 23, 138]), "{lights:?}");
     let rays = view(10);
-    // three rays: a quarter of the way, half from blue to cyan
-    assert!(near(rays, [13, 115, 230]), "{rays:?}");
+    // two rays: an eighth of the binary logarithm of three of the way, a fifth from blue to cyan
+    assert!(near(rays, [21, 67, 230]), "{rays:?}");
     // one that does not exist shows nothing
     assert_eq!(view(999), view(1000));
 }
