@@ -311,6 +311,7 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
     let source = Export {
         world: &world,
         files,
+        materials,
         images: shared.images,
         options: ExportOptions {
             scale: args.scale,

@@ -198,6 +198,24 @@ pub fn gather(world: &RelitWorld, place: &dyn Fn(&WorldSurface, Vec2) -> Vec2) -
     geometry
 }
 
+/// Joins triangles that are no map's, without those that have no area or coordinates that are no numbers, and tells how
+/// many these are. The part's material is 0.
+pub fn join(triangles: impl Iterator<Item = [WorldVertex; 3]>) -> (Part, usize) {
+    let mut joiner = Joiner::default();
+    let mut degenerate = 0;
+    for corners in triangles {
+        let [a, b, c] = corners.map(|v| v.position);
+        let front = (b - a).cross(c - a);
+        if front == glam::Vec3::ZERO || !front.is_finite() {
+            degenerate += 1;
+            continue;
+        }
+        let corners = corners.map(|v| joiner.index(v));
+        joiner.indices.extend(corners);
+    }
+    (joiner.finish(0), degenerate)
+}
+
 /// Whole repetitions that a surface's texture coordinates are moved back by: none unless they are far out.
 fn far_shift(world: &RelitWorld, surface: &WorldSurface, material: &WorldMaterial) -> Vec2 {
     let first = surface.first_vertex as usize;

@@ -3,6 +3,7 @@
 //! * [`Export`]: what is written: a relit world, and where its images come from.
 //! * [`export`]: writes one map in a [`Format`]; a file appears whole or not at all.
 //! * `geometry`: what is drawn, joined by material, without what other programs stumble over.
+//! * `model_file`: models that entities name besides brushes.
 //! * `look`: a material's stages as far as other programs can say them.
 //! * [`ImageStore`]: images as files, each made once for all maps.
 //!
@@ -21,6 +22,7 @@ pub mod json;
 mod lightmaps;
 mod look;
 mod map;
+mod model_file;
 mod obj;
 mod output;
 mod shown;
@@ -33,6 +35,7 @@ pub use images::{Encoded, ImageStore, Mime};
 pub use output::Output;
 
 use crate::files::GameFiles;
+use crate::materials::Materials;
 use crate::world::RelitWorld;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -176,8 +179,10 @@ impl Default for ExportOptions {
 pub struct Export<'a> {
     /// The map with its materials and lights.
     pub world: &'a RelitWorld,
-    /// Where images come from.
+    /// Where images and models of entities come from.
     pub files: &'a dyn GameFiles,
+    /// What models of entities are drawn with.
+    pub materials: &'a Materials,
     /// Images as files; shared between maps.
     pub images: &'a ImageStore,
     /// How it is written.

@@ -7,6 +7,7 @@
 
 mod animation;
 mod buffer;
+mod entity_models;
 mod materials;
 mod nodes;
 mod primitive;
@@ -123,7 +124,8 @@ pub(super) fn write(
         .then(|| Baked::new(world, &geometry, pages.as_ref()));
     drop(pages);
     let meshes = document.add_meshes(&geometry, baked.as_ref())?;
-    let mut top = document.nodes.add_entities(source, &meshes);
+    let models = document.add_entity_models(baked.is_some())?;
+    let mut top = document.nodes.add_entities(source, &meshes, &models.meshes);
     top.extend(document.nodes.add_fogs(source));
     top.extend(document.add_sky(&geometry)?);
     if source.options.lights {
@@ -131,9 +133,9 @@ pub(super) fn write(
     }
     let report = ExportReport {
         files: Vec::new(),
-        triangles: geometry.triangles(),
-        degenerate: geometry.degenerate,
-        vertices: geometry.vertices(),
+        triangles: geometry.triangles() + models.triangles,
+        degenerate: geometry.degenerate + models.degenerate,
+        vertices: geometry.vertices() + models.vertices,
         materials: document.materials.len(),
         images: document.textures.images.len(),
         warnings: std::mem::take(&mut document.warnings),

@@ -1,10 +1,11 @@
 //! Nodes of a glTF: models, entities, cameras, lights, fog.
 
-use crate::export::{Export, extras};
+use crate::export::{Export, extras, model_file};
 use crate::light::{PointLight, SunLight};
 use glam::{EulerRot, Quat, Vec3};
 use q3bsp::Entity;
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 use std::f32::consts::FRAC_PI_2;
 
 /// Height of a player's eyes above a place where players appear, id units.
@@ -36,8 +37,13 @@ impl Nodes {
     }
 
     /// Adds a node for every entity, and one for every model with a mesh that no entity has; `meshes` gives the mesh of
-    /// a model. Returns the numbers of those without a parent.
-    pub fn add_entities(&mut self, source: &Export<'_>, meshes: &[Option<usize>]) -> Vec<usize> {
+    /// a brush model, `files` that of a model file. Returns the numbers of those without a parent.
+    pub fn add_entities(
+        &mut self,
+        source: &Export<'_>,
+        meshes: &[Option<usize>],
+        files: &BTreeMap<String, usize>,
+    ) -> Vec<usize> {
         let scale = source.options.scale;
         let entities = source.world.bsp.entities();
         let mut top = Vec::new();
@@ -77,6 +83,9 @@ impl Nodes {
                     node.insert("children".into(), json!([camera]));
                 }
             }
+            if number > 0 {
+                self.put_models(&mut node, entity, files, &name);
+            }
             let node = self.add(Value::Object(node));
             top.push(node);
         }
@@ -91,6 +100,39 @@ impl Nodes {
             }
         }
         top
+    }
+
+    /// Gives an entity's node the models of files that the entity names: the node itself the first, where nothing else
+    /// would be stretched with it, else nodes below it.
+    fn put_models(
+        &mut self,
+        node: &mut Map<String, Value>,
+        entity: &Entity,
+        files: &BTreeMap<String, usize>,
+        name: &str,
+    ) {
+        for (key, path) in model_file::named(entity) {
+            let Some(mesh) = files.get(&model_file::canonical(path)) else {
+                continue;
+            };
+            let scale = stretch(entity);
+            if !node.contains_key("mesh") && !node.contains_key("children") {
+                node.insert("mesh".into(), json!(mesh));
+                put_scale(node, scale);
+                continue;
+            }
+            let mut below = Map::new();
+            below.insert("name".into(), json!(format!("{name}_{key}")));
+            below.insert("mesh".into(), json!(mesh));
+            // two models of one entity are stretched alike
+            if !node.contains_key("scale") {
+                put_scale(&mut below, scale);
+            }
+            let below = self.add(Value::Object(below));
+            if let Value::Array(children) = node.entry("children").or_insert(json!([])) {
+                children.push(json!(below));
+            }
+        }
     }
 
     /// The camera of an entity that one looks from, as a child of its node.
@@ -257,7 +299,7 @@ fn color_and_strength(light: Vec3) -> Option<([f32; 3], f32)> {
 }
 
 /// How an entity is turned: `angles`, or `angle`, where -1 is up and -2 down.
-fn facing(entity: &Entity) -> Quat {
+pub fn facing(entity: &Entity) -> Quat {
     let angles = match (entity.vec3("angles"), entity.number("angle")) {
         (Some(angles), _) => angles,
         (None, Some(-1.0)) => Vec3::new(-90.0, 0.0, 0.0),
@@ -271,6 +313,21 @@ fn facing(entity: &Entity) -> Quat {
     let [pitch, yaw, roll] = angles.to_array().map(|a| (a % 360.0).to_radians());
     // pitch is down: about the map's y, which is glTF's -z
     Quat::from_rotation_y(yaw) * Quat::from_rotation_z(-pitch) * Quat::from_rotation_x(roll)
+}
+
+/// How an entity's model is stretched, in glTF's axes: `modelscale_vec`, or `modelscale`.
+fn stretch(entity: &Entity) -> Vec3 {
+    let all = entity.number("modelscale").map(Vec3::splat);
+    let usable = |v: &Vec3| v.is_finite() && v.abs().min_element() > 0.0;
+    let scale = entity.vec3("modelscale_vec").filter(usable);
+    let scale = scale.or(all.filter(usable)).unwrap_or(Vec3::ONE);
+    Vec3::new(scale.x, scale.z, scale.y)
+}
+
+fn put_scale(node: &mut Map<String, Value>, v: Vec3) {
+    if v != Vec3::ONE {
+        node.insert("scale".into(), json!(v.to_array()));
+    }
 }
 
 fn put_translation(node: &mut Map<String, Value>, v: Vec3) {

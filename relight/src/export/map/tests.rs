@@ -9,9 +9,11 @@ use q3bsp::DrawVert;
 use q3bsp::builder::MapBuilder;
 
 fn written(world: &RelitWorld, files: &dyn crate::GameFiles) -> (String, Tally) {
+    let (materials, _) = Materials::load(files);
     document(&Export {
         world,
         files,
+        materials: &materials,
         images: &ImageStore::default(),
         options: ExportOptions::default(),
     })
