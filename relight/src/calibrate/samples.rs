@@ -1,7 +1,7 @@
 //! Measurements of light: what the map compiler stored, and where in space it did.
 //!
 //! Light is counted as the outgoing radiance of a white surface, irradiance / π: a stored byte v is v 4 / 255 (see
-//! [`light`](crate::light)). Its colour is what the engine shows: [`LightColor`](crate::light::LightColor).
+//! [`light`](mod@crate::light)). Its colour is what the engine shows: [`LightColor`](crate::light::LightColor).
 
 use super::bvh::Occluders;
 use super::random::Random;

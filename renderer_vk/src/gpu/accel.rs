@@ -150,7 +150,7 @@ impl Blas {
         }
     }
 
-    /// The device address for [`Instance::blas`]; 0 before the first build. Building anew may change it.
+    /// The device address for [`Instance::blas`](super::tlas::Instance::blas); 0 before the first build. Building anew may change it.
     pub fn address(&self) -> u64 {
         self.storage.as_ref().map_or(0, |s| s.address)
     }

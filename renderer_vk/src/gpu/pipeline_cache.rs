@@ -25,7 +25,7 @@ pub(crate) fn cache_from_bytes(bytes: &[u8]) -> Option<&[u8]> {
     (sum == hash(data).to_le_bytes()).then_some(data)
 }
 
-/// Whether bytes are a whole cache as [`Device::pipeline_cache_data`] gives it. Whose it is, the driver knows.
+/// Whether bytes are a whole cache as [`Device::pipeline_cache_data`](super::Device::pipeline_cache_data) gives it. Whose it is, the driver knows.
 pub fn is_pipeline_cache(bytes: &[u8]) -> bool {
     cache_from_bytes(bytes).is_some()
 }

@@ -150,7 +150,7 @@ impl Drop for Tlas {
 }
 
 impl Pass<'_> {
-    /// Builds the top-level structure from `instances`. The pass declares [`Access::ACCEL_BUILD`]; structures built in
+    /// Builds the top-level structure from `instances`. The pass declares [`Access::ACCEL_BUILD`](super::Access::ACCEL_BUILD); structures built in
     /// the same pass are waited for.
     ///
     /// # Errors

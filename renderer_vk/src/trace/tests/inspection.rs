@@ -74,7 +74,7 @@ fn only_rays_near_something_translucent_ask_for_layers() {
             } else {
                 scene.quad(points, pane);
             }
-            gpu.render(&scene, &settings, 1);
+            gpu.render(&scene, &settings, 4);
             gpu.rays().expect("counted")[0]
         };
         for moves in [false, true] {
