@@ -30,6 +30,36 @@ vec2 cloud_uv(vec3 d, float height) {
     return acos(clamp(v.xy, -1.0, 1.0));
 }
 
+// What a blend factor multiplies by, of colours as they are displayed. The frame buffer's alpha reads as one.
+vec3 displayed_factor(uint factor, vec4 source, vec3 destination) {
+    switch (factor) {
+    case BLEND_ONE: case BLEND_DST_ALPHA: return vec3(1.0);
+    case BLEND_DST_COLOR: return destination;
+    case BLEND_ONE_MINUS_DST_COLOR: return 1.0 - destination;
+    case BLEND_SRC_COLOR: return source.rgb;
+    case BLEND_ONE_MINUS_SRC_COLOR: return 1.0 - source.rgb;
+    case BLEND_SRC_ALPHA: return vec3(source.a);
+    case BLEND_ONE_MINUS_SRC_ALPHA: return vec3(1.0 - source.a);
+    default: return vec3(0.0); // ZERO, ONE_MINUS_DST_ALPHA, SRC_ALPHA_SATURATE
+    }
+}
+
+// The cloud stages over what lies behind them. No light falls on a sky: it is a picture, and put together as the engine
+// does it, in displayed colours.
+vec3 displayed_clouds(SurfacePoint p, Footprint width, vec3 below) {
+    Material material = material_of(p.triangle.material);
+    Instance instance = instance_of(p.instance);
+    Stages stages = Stages(VIEW.materials.stages);
+    for (uint i = 0; i < material.stage_count; i++) {
+        Stage stage = stages.at[material.stage_first + i];
+        vec4 source = clamp(stage_color(VIEW.materials, stage, instance, p.stage) * stage_texel(stage, p, instance, width), 0.0, 1.0);
+        if (stage.alpha_func != ALPHAFUNC_NONE && !alpha_passes(stage.alpha_func, source.a)) continue;
+        below = clamp(source.rgb * displayed_factor(stage.blend_src, source, below)
+            + below * displayed_factor(stage.blend_dst, source, below), 0.0, 1.0);
+    }
+    return below;
+}
+
 // Displayed radiance of the sky in direction d. `p`: the sky surface that was hit; its lightmap index is the sky's.
 vec3 sky_radiance(SurfacePoint p, vec3 d, float spread) {
     if ((VIEW.flags & VIEW_FAST_SKY) != 0) return vec3(0.0);
@@ -37,12 +67,12 @@ vec3 sky_radiance(SurfacePoint p, vec3 d, float spread) {
     uint face;
     vec2 uv;
     sky_face(d, face, uv);
-    vec3 radiance = vec3(0.0);
+    vec3 color = vec3(0.0);
     uint image = sky.faces[face];
     if (image != NO_TEXTURE) {
         vec2 size = vec2(textureSize(textures[nonuniformEXT(image)], 0));
         float lod = max(log2(max(spread * 0.5 * max(size.x, size.y), 1.0e-6)), 0.0);
-        radiance = decode_display(textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[VIEW.sky_sampler]), uv, lod).rgb);
+        color = textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[VIEW.sky_sampler]), uv, lod).rgb;
     }
     if (face != 5u) {
         p.stage.st = cloud_uv(d, sky.cloud_height);
@@ -50,10 +80,9 @@ vec3 sky_radiance(SurfacePoint p, vec3 d, float spread) {
         p.triangle.lightmap = NO_TEXTURE;
         // one unit of direction moves the coordinates by about radius over height of the sphere's cap, at most
         p.texel_scale = 1.0;
-        Layer clouds = evaluate_stages(p, round_footprint(spread));
-        radiance = max(clouds.emission + clouds.lit + clouds.through * radiance, 0.0);
+        color = displayed_clouds(p, round_footprint(spread), color);
     }
-    return radiance;
+    return decode_display(color);
 }
 
 #endif
