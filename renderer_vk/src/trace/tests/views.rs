@@ -175,8 +175,11 @@ fn the_sky_is_where_its_stages_say_and_lets_the_sun_in_with(gpu: &mut Gpu) {
         90.0,
         32,
     );
+    // what is added to the sky is added as displayed
+    let haze = [0.2, 0.4, 0.6];
+    let shown: [f32; 3] = std::array::from_fn(|i| (BLUE[i] + haze[i]).min(1.0));
     let sky = scene.sky(
-        &[stage::constant(BLUE)],
+        &[stage::constant(BLUE), stage::add(haze)],
         SkyRecord {
             faces: [c::NO_TEXTURE; 6],
             cloud_height: 512.0,
@@ -205,7 +208,7 @@ fn the_sky_is_where_its_stages_say_and_lets_the_sun_in_with(gpu: &mut Gpu) {
     });
     let (pixels, _) = gpu.render(&scene, &reference(), 2);
     assert!(
-        close(pixels[4 * 32 + 16], linear(BLUE)),
+        close(pixels[4 * 32 + 16], linear(shown)),
         "{}",
         pixels[4 * 32 + 16]
     );
