@@ -9,9 +9,12 @@ pub const STRONGEST: f32 = 1.0e12;
 
 /// Brings a strength into range; what is left of an overflow, no number, becomes none. Whether it had to.
 fn bound(strength: &mut Vec3) -> bool {
-    let good = strength.is_finite() && strength.max_element() <= STRONGEST;
+    let good = strength.is_finite() && strength.abs().max_element() <= STRONGEST;
     if !good {
-        let channel = |v: f32| if v.is_nan() { 0.0 } else { v.min(STRONGEST) };
+        let channel = |v: f32| match v {
+            v if v.is_nan() => 0.0,
+            v => v.clamp(-STRONGEST, STRONGEST),
+        };
         *strength = strength.to_array().map(channel).into();
     }
     !good
