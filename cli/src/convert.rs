@@ -293,10 +293,11 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
         .map_err(failure(true))?;
     drop(bytes);
     let name = input.to_string();
-    let brought = Brought::new(shared.files, &bsp);
+    let found = input.files(shared.files).map_err(failure(false))?;
+    let brought = Brought::new(&found, &bsp);
     let (files, materials) = match &brought {
         Some(own) => (&own.files as &dyn GameFiles, &own.materials),
-        None => (shared.files as &dyn GameFiles, shared.materials),
+        None => (&found as &dyn GameFiles, shared.materials),
     };
     // JSON is the file as it is.
     let external = match shared.format {

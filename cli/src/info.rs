@@ -12,6 +12,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use relight::{
     CalibrationCache, CalibrationOptions, GameFiles, Materials, Options, RelitWorld, SearchPath,
+    external_lightmaps,
 };
 use serde::Serialize;
 
@@ -142,22 +143,21 @@ fn load(
     let name = source.to_string();
     let bytes = source.read(files)?;
     let lumps = q3bsp::lump_entries(&bytes).with_context(|| name.clone())?;
-    let bsp = q3bsp::Bsp::parse(&bytes).with_context(|| name.clone())?;
-    let brought = Brought::new(files, &bsp);
-    let world = match &brought {
-        Some(own) => {
-            let mut world = RelitWorld::from_bsp(
-                &own.files,
-                &own.materials,
-                &source.game_path(),
-                bsp,
-                options,
-            );
-            world.warnings.extend(own.warnings.iter().cloned());
-            world
-        }
-        None => RelitWorld::from_bsp(files, materials, &source.game_path(), bsp, options),
+    let mut bsp = q3bsp::Bsp::parse(&bytes).with_context(|| name.clone())?;
+    let found = source.files(files)?;
+    let brought = Brought::new(&found, &bsp);
+    let (files, materials) = match &brought {
+        Some(own) => (&own.files as &dyn GameFiles, &own.materials),
+        None => (&found as &dyn GameFiles, materials),
     };
+    let external = external_lightmaps(&mut bsp, files, &source.game_path());
+    let beside = external.as_ref().is_ok_and(|pages| *pages > 0);
+    let mut world = RelitWorld::from_bsp(files, materials, &source.game_path(), bsp, options);
+    world.warnings.extend(external.err());
+    let warnings = brought.iter().flat_map(|own| own.warnings.iter());
+    world.warnings.extend(warnings.cloned());
     let milliseconds = begin.elapsed().as_millis();
-    Ok(MapInfo::new(&world, bytes.len(), &lumps, milliseconds))
+    let mut info = MapInfo::new(&world, bytes.len(), &lumps, milliseconds);
+    info.lightmaps.beside = beside;
+    Ok(info)
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::beside::beside;
 use anyhow::{Context, bail};
 use clap::Args;
 use glam::Vec3;
@@ -29,7 +30,7 @@ pub struct Maps {
 /// Where the game's files and the map come from.
 ///
 /// `map`: a name (oa_dm1), maps/oa_dm1.bsp, or a .bsp or .pk3 file; `games`: folders with packs and single packs, the last has
-/// precedence. With a .bsp file come the lights beside it, if there are any.
+/// precedence. With a .bsp file come the lights and lightmaps beside it, if there are any.
 ///
 /// # Errors
 /// A folder or the file cannot be read, or a pack has not exactly one map.
@@ -69,16 +70,8 @@ pub fn open(map: &str, games: &[PathBuf]) -> anyhow::Result<(Arc<dyn GameFiles>,
             let bytes = std::fs::read(&file).with_context(|| format!("{map}: cannot be read"))?;
             // said now, while the file's own name is known
             Bsp::parse(&bytes).with_context(|| map.clone())?;
-            let mut front = MemoryFiles::new();
+            let mut front = beside(&file)?;
             front.insert(&name, bytes)?;
-            let lights = file.with_extension("lights");
-            if lights.is_file() {
-                front.insert(
-                    &format!("maps/{stem}.lights"),
-                    std::fs::read(&lights)
-                        .with_context(|| format!("{}: cannot be read", lights.display()))?,
-                )?;
-            }
             return Ok((with_map_files(path, front, &name)?, name));
         }
         _ if map.starts_with("maps/") => map,

@@ -88,3 +88,43 @@ fn no_game_folder_is_one_sentence() {
             .contains("/nonexistent/game")
     );
 }
+
+/// A picture of `side` texels of one grey.
+fn tga(side: u8, grey: u8) -> Vec<u8> {
+    let header = [
+        0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, side, 0, side, 0, 24, 0x20,
+    ];
+    let texels = vec![grey; usize::from(side) * usize::from(side) * 3];
+    [header.to_vec(), texels].concat()
+}
+
+#[test]
+fn lightmaps_beside_a_map_are_its_lightmaps() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bsp = q3bsp::Bsp::parse(&map()).unwrap();
+    bsp.lightmaps.clear();
+    bsp.surfaces.iter_mut().for_each(|s| s.lightmap = 0);
+    // in the game, and as a file of its own elsewhere
+    let (game, own) = (folder.path().join("game"), folder.path().join("own"));
+    let stems = [game.join("maps/room"), own.join("room")];
+    for stem in &stems {
+        std::fs::create_dir_all(stem).unwrap();
+        std::fs::write(stem.with_extension("bsp"), bsp.write()).unwrap();
+        std::fs::write(stem.join("lm_0000.tga"), tga(16, 90)).unwrap();
+    }
+    let file = stems[1].with_extension("bsp");
+    std::fs::create_dir_all(folder.path().join("empty")).unwrap();
+    for (game, name) in [
+        (game.as_path(), "room"),
+        (&folder.path().join("empty"), file.to_str().unwrap()),
+    ] {
+        let output = info(game, &[name, "--json"]);
+        assert!(output.status.success(), "{output:?}");
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let lightmaps = &json["maps"][0]["lightmaps"];
+        assert_eq!(lightmaps["beside"], true, "{name}");
+        assert_eq!(lightmaps["pages"], 1);
+        assert_eq!(lightmaps["size"], 16);
+        assert!(lightmaps["surfaces_with_page"].as_u64().unwrap() > 0);
+    }
+}

@@ -129,8 +129,9 @@ pub struct Bsp {
 }
 
 impl Bsp {
-    /// Texels per side of each of [`Bsp::lightmaps`].
+    /// Texels per side of each of [`Bsp::lightmaps`]: that of the format, but for pages that lay beside the map.
     pub fn lightmap_size(&self) -> usize {
-        self.format.lightmap_size()
+        let first = self.lightmaps.first().map(Lightmap::size);
+        first.unwrap_or_else(|| self.format.lightmap_size())
     }
 }

@@ -85,7 +85,7 @@ impl Bsp {
             self.advertisements = records(Lump::Advertisements, data(Lump::Advertisements))?;
         }
 
-        let page_bytes = self.lightmap_size() * self.lightmap_size() * 3;
+        let page_bytes = self.format.lightmap_size() * self.format.lightmap_size() * 3;
         let (pages, rest) = split_records(data(Lump::Lightmaps), page_bytes);
         self.lightmaps = pages
             .chunks_exact(page_bytes)

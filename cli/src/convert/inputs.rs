@@ -7,7 +7,9 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
 use relight::export::Format;
-use relight::{GameFiles, Pk3, SearchPath};
+use relight::{GameFiles, MemoryFiles, Overlay, Pk3, SearchPath};
+
+use crate::beside::beside;
 
 /// A map.
 pub enum Input {
@@ -40,6 +42,18 @@ impl Input {
             Input::Packed(pack, path) => pack.read(path)?,
         };
         found.with_context(|| format!("{self}: no such map"))
+    }
+
+    /// The game's files, with what lies beside the map's own file before them.
+    ///
+    /// # Errors
+    /// A file beside it is there and cannot be read.
+    pub fn files<'a>(&self, game: &'a SearchPath) -> Result<Overlay<&'a SearchPath>> {
+        let front = match self {
+            Input::File(path) => beside(path)?,
+            Input::Game(_) | Input::Packed(..) => MemoryFiles::new(),
+        };
+        Ok(Overlay { front, back: game })
     }
 
     /// Path that the map has in its game, or would have.

@@ -68,6 +68,8 @@ pub struct Lightmaps {
     pub pages: usize,
     /// Texels per side of a page.
     pub size: usize,
+    /// Whether they lie beside the map instead of in it.
+    pub beside: bool,
     pub surfaces_with_page: usize,
     pub surfaces_by_vertex: usize,
     /// Neither: bright, or lit like entities.
@@ -298,6 +300,7 @@ impl Lightmaps {
         let by_vertex = |page| page == lightmap_index::BY_VERTEX;
         Lightmaps {
             pages: bsp.lightmaps.len(),
+            beside: false,
             size: bsp.lightmap_size(),
             surfaces_with_page: count(&|page| page >= 0),
             surfaces_by_vertex: count(&by_vertex),

@@ -120,8 +120,14 @@ fn print_lumps(info: &MapInfo) {
 fn lightmaps(info: &MapInfo) -> String {
     let l = &info.lightmaps;
     let mut text = format!(
-        "{} of {} x {} texels; {} surfaces with one, {} lit by vertex, {} without either",
-        l.pages, l.size, l.size, l.surfaces_with_page, l.surfaces_by_vertex, l.surfaces_without
+        "{} of {} x {} texels{}; {} surfaces with one, {} lit by vertex, {} without either",
+        l.pages,
+        l.size,
+        l.size,
+        if l.beside { ", beside the map" } else { "" },
+        l.surfaces_with_page,
+        l.surfaces_by_vertex,
+        l.surfaces_without
     );
     if !l.styles.is_empty() {
         let styles: Vec<String> = l.styles.iter().map(u8::to_string).collect();

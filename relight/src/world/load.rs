@@ -5,6 +5,7 @@ use super::material::{WorldMaterial, lighting_of, lightmap_of};
 use super::{RelitWorld, fog};
 use crate::calibrate::{CalibrationOptions, calibrate};
 use crate::exposure::display_exponent;
+use crate::external_lightmaps::external_lightmaps;
 use crate::files::{FileError, GameFiles};
 use crate::image;
 use crate::light::{self, LightColor, LightReport, TriangleLight};
@@ -91,7 +92,7 @@ impl Default for Options<'_> {
 }
 
 impl RelitWorld {
-    /// Loads and relights a map.
+    /// Loads and relights a map, with the lightmaps beside it where it has none inside.
     ///
     /// # Errors
     /// [`LoadError`] when the map is absent, cannot be read or is damaged. Missing materials and images are
@@ -105,14 +106,18 @@ impl RelitWorld {
         let bytes = files.read(map)?.ok_or_else(|| LoadError::Absent {
             map: map.to_owned(),
         })?;
-        let bsp = Bsp::parse(&bytes).map_err(|source| LoadError::Map {
+        let mut bsp = Bsp::parse(&bytes).map_err(|source| LoadError::Map {
             map: map.to_owned(),
             source,
         })?;
-        Ok(RelitWorld::from_bsp(files, materials, map, bsp, options))
+        let external = external_lightmaps(&mut bsp, files, map);
+        let mut world = RelitWorld::from_bsp(files, materials, map, bsp, options);
+        world.warnings.extend(external.err());
+        Ok(world)
     }
 
-    /// Relights a map that was read elsewhere.
+    /// Relights a map that was read elsewhere. Lightmaps beside the map are not looked for: see
+    /// [`external_lightmaps`].
     pub fn from_bsp(
         files: &dyn GameFiles,
         materials: &Materials,

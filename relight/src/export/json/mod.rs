@@ -184,7 +184,7 @@ pub fn read_map(text: &str) -> Result<Bsp, JsonError> {
     let missing = || JsonError::new("the key \"map\"");
     let map = document.get("map").ok_or_else(missing)?;
     let mut bsp = model::get_map(map).map_err(|problem| problem.inside("map"))?;
-    let page = bsp.lightmap_size() * bsp.lightmap_size() * 3;
+    let page = bsp.format.lightmap_size() * bsp.format.lightmap_size() * 3;
     if bsp
         .lightmaps
         .iter()

@@ -1,0 +1,59 @@
+//! What lies beside a map's own file, where it is in no game folder.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use relight::MemoryFiles;
+
+/// The files beside `file` that belong to it, under the paths that they would have in a game folder: lights given by
+/// hand (`NAME.lights`) and lightmaps (`NAME/lm_0000.tga` and so on).
+///
+/// # Errors
+/// One of them is there and cannot be read.
+pub fn beside(file: &Path) -> Result<MemoryFiles> {
+    let mut found = MemoryFiles::new();
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    let mut take = |path: &Path, game_path: String| -> Result<()> {
+        let bytes =
+            std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+        Ok(found.insert(&game_path, bytes)?)
+    };
+    let lights = file.with_extension("lights");
+    if lights.is_file() {
+        take(&lights, format!("maps/{stem}.lights"))?;
+    }
+    let folder = file.with_extension("");
+    if folder.is_dir() {
+        let listed = std::fs::read_dir(&folder)
+            .with_context(|| format!("{}: cannot be read", folder.display()))?;
+        for entry in listed.flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let path = entry.path();
+            if name.to_ascii_lowercase().starts_with("lm_") && path.is_file() {
+                take(&path, format!("maps/{stem}/{name}"))?;
+            }
+        }
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use relight::GameFiles;
+
+    #[test]
+    fn lights_and_lightmaps_are_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let map = folder.path().join("room.bsp");
+        assert!(beside(&map).unwrap().list("maps", ".lights").is_empty());
+        std::fs::write(folder.path().join("room.lights"), "x").unwrap();
+        std::fs::create_dir(folder.path().join("room")).unwrap();
+        std::fs::write(folder.path().join("room/lm_0000.tga"), "y").unwrap();
+        std::fs::write(folder.path().join("room/notes.txt"), "z").unwrap();
+        let found = beside(&map).unwrap();
+        assert!(found.exists("maps/room.lights"));
+        assert!(found.exists("maps/room/lm_0000.tga"));
+        assert!(!found.exists("maps/room/notes.txt"));
+    }
+}
