@@ -23,7 +23,7 @@ struct Dielectric { float index; float ripple; float scale; uint filters; vec3 f
 
 struct Material {
     uint stage_first; uint stage_count; uint flags; float time_offset; float clamp_time;
-    uint plain_image; uint plain_sampler; vec3 light_radiance; Dielectric dielectric;
+    uint plain_image; uint plain_sampler; vec3 light_radiance; float lit_scale; Dielectric dielectric;
 };
 
 struct Instance {

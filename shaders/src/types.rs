@@ -136,6 +136,8 @@ pub struct Material {
     pub plain_sampler: u32,
     /// Extra radiance of the surface as a light, display-white units, shown as its glow (0 if none).
     pub light_radiance: Vec3,
+    /// Factor on what it throws back of the light that falls on it, beside its stages (`q3map_lightmapBrightness`).
+    pub lit_scale: f32,
     /// How rays pass it.
     pub dielectric: Dielectric,
 }

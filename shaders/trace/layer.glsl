@@ -173,9 +173,8 @@ Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, flo
 // One over the linear value of half the display's range.
 const float DOUBLE_PRODUCT = 1.0 / 0.21404114;
 
-// Runs the stages of the point's material over the background.
-Layer evaluate_stages(SurfacePoint p, Footprint footprint) {
-    Material material = material_of(p.triangle.material);
+// Runs the stages of a material over the background.
+Layer run_stages(Material material, SurfacePoint p, Footprint footprint) {
     bool world = (p.triangle.flags & TRIANGLE_WORLD) != 0;
     if (material.plain_image != NO_TEXTURE && (world || (material.flags & MATERIAL_VERTEX_LIGHT) == 0)) {
         // what the stages below come to, for the many materials that are an image under light
@@ -236,6 +235,15 @@ Layer evaluate_stages(SurfacePoint p, Footprint footprint) {
         layer = layer_add(layer_blend(stage.blend_src, source, source, layer, alpha),
             layer_blend(stage.blend_dst, layer, source, layer, alpha));
     }
+    return layer;
+}
+
+// The stages of the point's material over the background, and how much of what light shows of them is thrown back: never
+// more than all of it, unless the stages themselves do.
+Layer evaluate_stages(SurfacePoint p, Footprint footprint) {
+    Material material = material_of(p.triangle.material);
+    Layer layer = run_stages(material, p, footprint);
+    if (material.lit_scale != 1.0) layer.lit = min(layer.lit * material.lit_scale, max(layer.lit, 1.0));
     return layer;
 }
 

@@ -286,6 +286,9 @@ pub struct LightDirectives {
     pub backsplash: Option<(f32, f32)>,
     /// `q3map_bounceScale` or `q3map_bounce`: factor on bounced light.
     pub bounce_scale: Option<f32>,
+    /// `q3map_lightmapBrightness`, or `q3map_lightmapGamma` as it was called first: factor on the light that lightmaps store
+    /// on these surfaces. Such lines multiply; what is not above zero counts as 1.
+    pub lightmap_brightness: Option<f32>,
     /// `qer_editorimage`: what the editor shows, and the compiler's second choice for the colour of emission.
     pub editor_image: Option<String>,
     /// `q3map_flare` or `q3map_flareShader`: material of flares at the surface.

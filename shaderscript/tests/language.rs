@@ -477,6 +477,12 @@ fn directives_of_other_programs() {
     assert_eq!((last.keyword.as_str(), last.line), ("q3map_whatever", 12));
     assert_eq!(last.arguments, ["a", "b c"]);
     assert_eq!(light.unknown.len(), 10);
+    let brightness = |lines: &str| shader(&format!("{lines}{STAGE}")).light.lightmap_brightness;
+    assert_eq!(brightness(""), None);
+    assert_eq!(brightness("q3map_lightmapBrightness 0.25\n"), Some(0.25));
+    let twice = "q3map_lightmapGamma 0.5\nq3map_lightmapBrightness 0.5\n";
+    assert_eq!(brightness(twice), Some(0.25));
+    assert_eq!(brightness("q3map_lightmapBrightness -2\n"), Some(1.0));
 }
 
 #[test]

@@ -464,6 +464,7 @@ mod tests {
             value: Vec3::ZERO,
             bounce: Vec3::ZERO,
             cluster: 0,
+            material: u32::MAX,
             saturated: false,
             trust: 1.0,
             held_out: false,

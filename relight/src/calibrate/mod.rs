@@ -53,7 +53,7 @@ use glam::Vec3;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 
 /// How a world is calibrated.
 #[derive(Debug, Clone, PartialEq)]

@@ -13,6 +13,8 @@ pub struct Residual {
     pub position: Vec3,
     /// Unit normal.
     pub normal: Vec3,
+    /// Material of the surface, index into [`RelitWorld::materials`]; `u32::MAX` for points of the light grid.
+    pub material: u32,
     /// Light that the map stores.
     pub stored: Vec3,
     /// Light that comes straight from lights.
@@ -56,6 +58,7 @@ pub fn residuals(world: &RelitWorld, options: &CalibrationOptions) -> Vec<Residu
     let residuals = places.map(|(sample, (direct, bounced))| Residual {
         position: sample.position,
         normal: sample.normal,
+        material: sample.material,
         stored: sample.value,
         direct,
         bounced,

@@ -44,6 +44,8 @@ pub(super) struct Sample {
     pub bounce: Vec3,
     /// Visibility cluster that it lies in.
     pub cluster: i32,
+    /// Material of the surface; `u32::MAX` for none.
+    pub material: u32,
     /// Some channel is at its end: there was at least that much light.
     pub saturated: bool,
     /// How much it tells, at most 1.
@@ -194,8 +196,8 @@ fn hold_out(mut samples: Vec<Sample>, random: &mut Random) -> Vec<Sample> {
 fn sample_at(
     world: &RelitWorld,
     occluders: &Occluders,
-    on: Vec3,
-    normal: Vec3,
+    (on, normal): (Vec3, Vec3),
+    material: u32,
     stored: Stored,
 ) -> Option<Sample> {
     let position = on + normal * LIFT;
@@ -213,13 +215,13 @@ fn sample_at(
     if backs.count() > around.len() / 2 {
         return None;
     }
-    let value = Vec3::from_array(stored.rgb.map(f32::from)) * STORED_UNIT;
     Some(Sample {
         position,
         normal,
-        value: light::raise(value, world.color_exponent),
+        value: stored.light(world),
         bounce: Vec3::ZERO,
         cluster,
+        material,
         saturated: stored.rgb.contains(&255),
         trust: if stored.lone_black {
             TRUST_IN_BLACK
@@ -231,11 +233,13 @@ fn sample_at(
 }
 
 /// What is stored at a place.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Stored {
     rgb: [u8; 3],
     /// Black, and not all around it is.
     lone_black: bool,
+    /// What the compiler multiplied light by before it stored it.
+    scale: f32,
 }
 
 impl Stored {
@@ -244,11 +248,18 @@ impl Stored {
         Stored {
             rgb,
             lone_black: black(rgb),
+            scale: 1.0,
         }
     }
 
-    /// A texel of a page.
-    fn texel(page: &Lightmap, x: usize, y: usize) -> Stored {
+    /// The light that it stands for, irradiance / π.
+    fn light(&self, world: &RelitWorld) -> Vec3 {
+        let value = Vec3::from_array(self.rgb.map(f32::from)) * (STORED_UNIT / self.scale);
+        light::raise(value, world.color_exponent)
+    }
+
+    /// A texel of a page, of a surface whose light was multiplied by `scale`.
+    fn texel(page: &Lightmap, x: usize, y: usize, scale: f32) -> Stored {
         let rgb = page.texel(x, y);
         let around = || {
             let sides = -BLACK_AROUND..=BLACK_AROUND;
@@ -269,6 +280,7 @@ impl Stored {
         Stored {
             rgb,
             lone_black: black(rgb) && around().any(lit),
+            scale,
         }
     }
 }
@@ -310,8 +322,9 @@ fn texels(
             let Some(&(_, triangle, surface)) = triangles.get(found) else {
                 break;
             };
-            let sample = texel(world, triangle, surface, random)
-                .and_then(|(on, normal, stored)| sample_at(world, occluders, on, normal, stored));
+            let sample = texel(world, triangle, surface, random).and_then(|(place, stored)| {
+                sample_at(world, occluders, place, surface.material, stored)
+            });
             if let Some(sample) = sample {
                 samples.push(sample);
                 break;
@@ -328,7 +341,7 @@ fn texel(
     triangle: usize,
     surface: &WorldSurface,
     random: &mut Random,
-) -> Option<(Vec3, Vec3, Stored)> {
+) -> Option<((Vec3, Vec3), Stored)> {
     let page = usize::try_from(surface.lightmap).ok()?;
     let page = world.bsp.lightmaps.get(page)?;
     let size = page.size() as f32;
@@ -341,11 +354,12 @@ fn texel(
     let middle = cell + Vec2::splat(0.5);
     let first = surface.first_index as usize / 3;
     let others = first..first + surface.num_indices as usize / 3;
-    let (on, normal) = std::iter::once(triangle)
+    let place = std::iter::once(triangle)
         .chain(others)
         .find_map(|t| place_of(corners(world, t)?, middle, size))?;
-    let stored = Stored::texel(page, cell.x as usize, cell.y as usize);
-    Some((on, normal, stored))
+    let scale = stored_scale(world, surface);
+    let stored = Stored::texel(page, cell.x as usize, cell.y as usize, scale);
+    Some((place, stored))
 }
 
 /// Light that the lightmap stores where a ray met a triangle; `None` where it tells nothing: of other surfaces, of texels
@@ -382,10 +396,15 @@ pub(super) fn stored_at(
     if !(cell.min_element() >= 0.0 && cell.max_element() < page.size() as f32) {
         return None;
     }
-    let stored = Stored::texel(page, cell.x as usize, cell.y as usize);
-    let value = Vec3::from_array(stored.rgb.map(f32::from)) * STORED_UNIT;
-    (!stored.lone_black && !stored.rgb.contains(&255))
-        .then(|| light::raise(value, world.color_exponent))
+    let scale = stored_scale(world, own);
+    let stored = Stored::texel(page, cell.x as usize, cell.y as usize, scale);
+    (!stored.lone_black && !stored.rgb.contains(&255)).then(|| stored.light(world))
+}
+
+/// What the compiler multiplied a surface's light by before it stored it.
+fn stored_scale(world: &RelitWorld, surface: &WorldSurface) -> f32 {
+    let material = world.materials.get(surface.material as usize);
+    material.map_or(1.0, WorldMaterial::stored_scale)
 }
 
 /// Vertices of a triangle.
@@ -440,12 +459,15 @@ fn vertices(
         let made = world.vertices.get(first..).unwrap_or_default();
         all.extend(stored.iter().zip(made).map(|(raw, vertex)| {
             let [r, g, b, _] = raw.color;
-            (vertex.position, vertex.normal, Stored::alone([r, g, b]))
+            let place = (vertex.position, vertex.normal);
+            (place, surface.material, Stored::alone([r, g, b]))
         }));
     }
     pick(all.len(), count, random)
         .filter_map(|i| all.get(i))
-        .filter_map(|&(on, normal, stored)| sample_at(world, occluders, on, normal, stored))
+        .filter_map(|&(place, material, stored)| {
+            sample_at(world, occluders, place, material, stored)
+        })
         .collect()
 }
 
@@ -475,6 +497,7 @@ fn grid(world: &RelitWorld, count: usize, random: &mut Random) -> Vec<Sample> {
                 value: light::raise(value * STORED_UNIT, world.color_exponent),
                 bounce: Vec3::ZERO,
                 cluster,
+                material: u32::MAX,
                 saturated: point.directed.contains(&255),
                 trust: 1.0,
                 held_out: false,
@@ -505,6 +528,7 @@ mod tests {
             value: Vec3::splat(value),
             bounce: Vec3::ZERO,
             cluster: 0,
+            material: u32::MAX,
             saturated: false,
             trust,
             held_out: false,
@@ -518,7 +542,7 @@ mod tests {
         // One lit texel, in the middle of the first row.
         texels[10 * 3..10 * 3 + 3].fill(90);
         let page = Lightmap(texels);
-        let lone = |x, y| Stored::texel(&page, x, y).lone_black;
+        let lone = |x, y| Stored::texel(&page, x, y, 1.0).lone_black;
         assert!(!lone(10, 0) && lone(9, 0) && lone(8, 2) && lone(12, 0));
         assert!(!lone(7, 0) && !lone(10, 3) && !lone(0, 0) && !lone(side - 1, side - 1));
     }

@@ -20,6 +20,13 @@ t/wall
     { map *white
       blendFunc filter }
 }
+t/dim
+{
+    q3map_lightmapBrightness 0.25
+    { map $lightmap }
+    { map *white
+      blendFunc filter }
+}
 t/lamp
 {
     q3map_lightRGB 1 1 1
@@ -53,8 +60,13 @@ fn in_pillar(from: Vec3, to: Vec3) -> bool {
 
 /// A room with a pillar. `light` gives irradiance / π at a point of a wall; without it there are no lightmaps.
 fn room(lamp: bool, light: Option<&dyn Fn(Vec3, Vec3) -> Vec3>) -> RelitWorld {
+    room_of("t/wall", lamp, light)
+}
+
+/// The room with walls of a material.
+fn room_of(material: &str, lamp: bool, light: Option<&dyn Fn(Vec3, Vec3) -> Vec3>) -> RelitWorld {
     let mut map = MapBuilder::new();
-    let wall = map.add_shader("t/wall", 0, 1);
+    let wall = map.add_shader(material, 0, 1);
     let mut faces = map.add_box_faces(wall, ROOM[0], ROOM[1], true).to_vec();
     faces.extend(map.add_box_faces(wall, PILLAR[0], PILLAR[1], false));
     map.add_cell(ROOM[0], ROOM[1]);
@@ -295,6 +307,24 @@ fn lights_stand_for_the_nearest_hidden_one() {
     assert!((found.power_invented - 0.125).abs() < 1e-5, "{found:?}");
     assert!((found.median_distance - 20.0).abs() < 1e-3, "{found:?}");
     assert_eq!(recovery(&[], &world).invented, 4);
+}
+
+#[test]
+fn walls_that_store_less_than_their_light_tell_all_of_it() {
+    let mut world = room_of("t/dim", false, Some(&from_hidden));
+    world.measure_materials(&MemoryFiles::new());
+    let wall = world.materials.iter().find(|m| m.name == "t/dim").unwrap();
+    // What they do not store they do not throw back either: white walls are grey.
+    assert_eq!(wall.stored_scale(), 0.25);
+    assert!((wall.albedo - 0.25).length() < 1e-3, "{}", wall.albedo);
+    for material in &mut world.materials {
+        material.albedo = Vec3::ZERO;
+    }
+    let report = calibrate(&mut world, &small());
+    assert!(report.after.median_stops < 0.05, "{report:?}");
+    let total: Vec3 = world.point_lights.iter().map(|l| l.intensity).sum();
+    let hidden: Vec3 = HIDDEN.iter().map(|(_, i)| *i).sum();
+    assert!((total / hidden - 4.0).abs().max_element() < 0.4, "{total}");
 }
 
 /// What calibration may change.

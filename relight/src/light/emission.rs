@@ -181,7 +181,8 @@ impl<'a> Finder<'a> {
         for name in shader.image_names() {
             self.image(name);
         }
-        mean_albedo(shader, |name| self.images.get(name)?.as_ref())
+        let albedo = mean_albedo(shader, |name| self.images.get(name)?.as_ref());
+        (albedo * material.stored_scale()).min(Vec3::ONE)
     }
 
     /// Mean radiance of what a sky shows: the sides of its box that exist, and its clouds.

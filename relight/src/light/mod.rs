@@ -114,6 +114,13 @@ pub const SKY_LIGHT_RADIANCE: f32 = 4.0 / 255.0 / 2.0;
 /// Radiance of the uniform surroundings of `ambient 1`.
 pub const AMBIENT_RADIANCE: f32 = 4.0 / 255.0;
 
+/// What light was multiplied by before it was stored in lightmaps, of what `q3map_lightmapBrightness` says: nothing is 1,
+/// and bytes cannot tell what lies beyond 1/64 and 64.
+pub fn stored_scale(says: Option<f32>) -> f32 {
+    says.filter(|scale| *scale > 0.0 && scale.is_finite())
+        .map_or(1.0, |scale| scale.clamp(1.0 / 64.0, 64.0))
+}
+
 /// A triangle that emits light: the same radiance at every point and into every direction of its side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TriangleLight {

@@ -68,6 +68,17 @@ impl WorldMaterial {
         material
     }
 
+    /// What the compiler multiplied light by before it stored it in lightmaps of this material: by so much less than the
+    /// light that falls on them lightmapped surfaces show.
+    ///
+    /// Such surfaces are meant to look darker, or brighter, than light and texture make them: it is part of what they
+    /// throw back (their [`albedo`](Self::albedo) has it), not of the light.
+    pub fn stored_scale(&self) -> f32 {
+        let says = self.resolved.definition().light.lightmap_brightness;
+        let lightmapped = self.lighting == ImplicitKind::Lightmapped;
+        crate::light::stored_scale(says.filter(|_| lightmapped))
+    }
+
     /// Whether it is sky, for the map or for its script.
     pub fn is_sky(&self) -> bool {
         self.surface_flags & q3bsp::surface_flags::SKY != 0 || self.resolved.shader.sky.is_some()

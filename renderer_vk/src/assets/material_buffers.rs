@@ -4,7 +4,7 @@ use glam::Vec3;
 use shaders::types::constants as c;
 use shaders::types::{self, MaterialBuffers};
 
-use super::{Material, Materials, Samplers};
+use super::{LightmapClass, Material, Materials, Samplers};
 use crate::gpu::{self, Buffer, BufferUsage, Device};
 
 /// `clamp_time` of a material that never stops.
@@ -17,6 +17,14 @@ pub(super) struct Uploaded {
     tc_mods: Buffer,
     images: Buffer,
     noise: Buffer,
+}
+
+/// What the map's compiler multiplied the light on a material by before it stored it: traced, it is the surface that
+/// throws back so much less, or more.
+fn lit_scale(material: &Material) -> f32 {
+    let says = material.shader.light.lightmap_brightness;
+    let lightmapped = material.lightmap_class == LightmapClass::Page;
+    relight::light::stored_scale(says.filter(|_| lightmapped))
 }
 
 impl Materials {
@@ -98,6 +106,7 @@ impl Materials {
             plain_image,
             plain_sampler,
             light_radiance: light,
+            lit_scale: lit_scale(material),
             dielectric: material.dielectric,
         }
     }

@@ -466,6 +466,13 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
                 light.backsplash = (|| Some((read(0)?, read(1)?)))();
             }
             "q3map_bouncescale" | "q3map_bounce" => light.bounce_scale = read(0),
+            "q3map_lightmapbrightness" | "q3map_lightmapgamma" => {
+                let so_far = light.lightmap_brightness.unwrap_or(1.0);
+                let factor = read(0).map(|value| so_far * value);
+                light.lightmap_brightness = factor
+                    .map(|f| if f > 0.0 { f } else { 1.0 })
+                    .or(light.lightmap_brightness);
+            }
             "q3map_flare" | "q3map_flareshader" => light.flare = arguments.first().cloned(),
             "qer_editorimage" => light.editor_image = arguments.first().cloned(),
             _ => {}

@@ -111,6 +111,7 @@ impl Scene {
                 flags,
                 clamp_time: 1.0e30,
                 plain_image: c::NO_TEXTURE,
+                lit_scale: 1.0,
                 ..Material::default()
             },
             MaterialInfo {
