@@ -51,6 +51,9 @@ pub struct SphereLight {
     pub cos_inner: f32,
     /// Cosine of the angle to `axis` from which on it is dark; -2 for no spot.
     pub cos_outer: f32,
+    /// Radius of the ball of glowing gas that the sphere stands for: nearer to the centre than this it gives no more
+    /// light than here. 0: there is none.
+    pub core: f32,
 }
 
 /// A far disc of light.

@@ -5,6 +5,9 @@
 // Temporal Antialiasing Techniques (Eurographics 2020), sections 4 and 5, for weighing samples of a coarser grid by their
 // distance from the pixel.
 //
+// What glows in front of a surface and moves otherwise than it does has no history there: of it the newest frame alone is
+// shown, as far as it is a part of the colour (as a mask of reactive pixels does it in AMD's FidelityFX Super Resolution 2).
+//
 // Colours are blended compressed, so that a bright sample does not outweigh all others at an edge, and clipped in YCoCg.
 #include "trace/color.glsl"
 #include "trace/exposure.glsl"
@@ -18,6 +21,8 @@ layout(local_size_x = GROUP, local_size_y = GROUP) in;
 
 // Compressed colour (YCoCg), and length of the way to what is seen there.
 shared vec4 tile[TILE][TILE];
+// How much of each colour is of what has moved in front of the surface, whose history knows nothing of it.
+shared float fresh_parts[TILE][TILE];
 
 // Standard deviation of a pixel's filter, output pixels: nearly that of its square.
 const float NARROW = 0.3;
@@ -91,8 +96,9 @@ void main() {
     for (int i = int(gl_LocalInvocationIndex); i < TILE * TILE; i += GROUP * GROUP) {
         ivec2 at = ivec2(i % TILE, i / TILE);
         ivec2 pixel = clamp(first + at, ivec2(0), traced_size - 1);
-        vec3 color = imageLoad(images_rgba16f[VIEW.image_composite], pixel).rgb;
-        tile[at.y][at.x] = vec4(to_ycocg(compress(color, exposure)), motion_read(pixel).path);
+        vec4 color = imageLoad(images_rgba16f[VIEW.image_composite], pixel);
+        tile[at.y][at.x] = vec4(to_ycocg(compress(color.rgb, exposure)), motion_read(pixel).path);
+        fresh_parts[at.y][at.x] = color.a;
     }
     barrier();
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
@@ -106,6 +112,7 @@ void main() {
     // an edge moves with what is in front; on one surface the pixel's own motion is the right one
     float nearest = tile[middle.y - first.y][middle.x - first.x].w * IN_FRONT;
     ivec2 nearest_at = ivec2(0);
+    float fresh = 0.0;
     for (int y = -1; y <= 1; y++) {
         for (int x = -1; x <= 1; x++) {
             ivec2 at = middle + ivec2(x, y) - first;
@@ -116,6 +123,8 @@ void main() {
             wide += vec4(s.rgb, 1.0) * exp(dot(away, away) * (-0.5 / (WIDE * WIDE)));
             sum += s.rgb;
             squares += s.rgb * s.rgb;
+            // next to it, too: the samples of an edge's pixels meet it in one frame and miss it in the next
+            fresh = max(fresh, fresh_parts[at.y][at.x]);
             if (s.w < nearest) {
                 nearest = s.w;
                 nearest_at = ivec2(x, y);
@@ -140,13 +149,14 @@ void main() {
         vec3 off = old - mean;
         vec3 parts = abs(off) / (deviation * range + 1.0e-4);
         old = mean + off / max(max_component(parts), 1.0);
-        frames = min(history.a, rests ? REST_FRAMES : MOVING_FRAMES);
+        // in the sum with what is new, history is to have the part that is not
+        frames = min(min(history.a, rests ? REST_FRAMES : MOVING_FRAMES), (1.0 - fresh) / max(fresh, 1.0e-3));
     }
     vec3 now = wide.rgb / wide.w;
     float confidence = 1.0;
     if (frames > 0.0) {
-        confidence = min(narrow.w, 1.0);
-        if (narrow.w > 1.0e-3) now = narrow.rgb / narrow.w;
+        confidence = mix(min(narrow.w, 1.0), 1.0, fresh);
+        if (narrow.w > 1.0e-3) now = mix(narrow.rgb / narrow.w, now, fresh);
     }
     float total = frames + confidence;
     vec3 color = mix(old, now, confidence / total);

@@ -27,6 +27,10 @@ vec3 light_in_fog(ivec2 pixel) {
     return total > 0.0 ? sum / total : vec3(0.0);
 }
 
+// The kind of field, and the part of the front that is new, as primary rays leave them in one number.
+float field_of(vec4 front) { return floor(front.a); }
+float new_part(vec4 front) { return front.a - floor(front.a); }
+
 // What a pixel shows by itself. `front`: what the primary rays have composed there.
 vec3 shown(ivec2 pixel, vec3 front) {
     // what glows by itself, sky and fog show as the engine shows them when the map is exposed to look as bright as there
@@ -54,8 +58,9 @@ void main() {
     if (pixel.x >= size.x || pixel.y >= size.y) return;
     vec4 front = imageLoad(images_rgba16f[VIEW.image_front], pixel);
     vec3 radiance = shown(pixel, front.rgb);
-    // its alpha is the field: 0 none, 1 or 2
-    if (front.a > 0.0) {
+    // 0 none, 1 or 2
+    float field = field_of(front);
+    if (field > 0.0) {
         const ivec2 beside[4] = ivec2[](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1));
         vec3 others[2] = vec3[](vec3(0.0), vec3(0.0)); // to the sides, above and below
         float counts[2] = float[](0.0, 0.0), contrast[2] = float[](0.0, 0.0);
@@ -65,9 +70,9 @@ void main() {
             ivec2 at = pixel + beside[i];
             if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
             vec4 other = imageLoad(images_rgba16f[VIEW.image_front], at);
-            if (other.a == front.a) continue;
+            if (field_of(other) == field) continue;
             vec3 value = shown(at, other.rgb);
-            if (other.a == 0.0) {
+            if (field_of(other) == 0.0) {
                 whole += value;
                 whole_count += 1.0;
                 continue;
@@ -80,7 +85,7 @@ void main() {
             // alone, at an edge or where a reflection begins to be worth following: what is behind the surface counts
             // once, and is taken from beside it where it is not this pixel's own
             radiance *= 0.5;
-            if (front.a == 2.0 && whole_count > 0.0) radiance += whole / whole_count;
+            if (field == 2.0 && whole_count > 0.0) radiance += whole / whole_count;
         } else {
             // along an edge rather than across it, so that a line of the texture is not seen in every other pixel alone
             vec2 weight = vec2(1.0);
@@ -92,7 +97,10 @@ void main() {
     // one broken number must not spread through exposure and accumulation
     if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
     if ((VIEW.flags & VIEW_ACCUMULATE) == 0) {
-        imageStore(images_rgba16f[VIEW.image_composite], pixel, vec4(min(radiance, vec3(60000.0)), 1.0));
+        // alpha: how much of the colour is of what has come here since the last frame
+        float fresh = new_part(front) * min(max_component(front.rgb) * exp2(-VIEW.exposure_base) / max(max_component(radiance), 1.0e-6), 0.99);
+        if (!(fresh > 0.0)) fresh = 0.0;
+        imageStore(images_rgba16f[VIEW.image_composite], pixel, vec4(min(radiance, vec3(60000.0)), fresh));
         return;
     }
     if (VIEW.accumulated > 0) {

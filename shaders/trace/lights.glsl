@@ -203,6 +203,7 @@ LightSample sample_sphere(SphereLight light, vec3 position, vec3 normal, vec2 u)
     s.direction = soft_shadows() ? sample_cone(axis, cos_angle, u) : axis;
     float omega = 2.0 * PI * (sine * sine) / (1.0 + cos_angle); // 2 pi (1 - cos) without its cancellation
     s.light = light.radiance * (omega / PI * max(dot(normal, s.direction), 0.0) * spot_factor(light, -axis));
+    if (squared < light.core * light.core) s.light *= squared / (light.core * light.core);
     s.distance = d - max(light.clearance, light.radius);
     return s;
 }

@@ -107,10 +107,11 @@ vec4 motion_of(CameraRay ray, LastPlace place) {
     return vec4(clamp(offset, -60000.0, 60000.0), last_path, path);
 }
 
-void motion_write(ivec2 pixel, CameraRay ray, LastPlace place) {
+vec4 motion_write(ivec2 pixel, CameraRay ray, LastPlace place) {
     vec4 motion = motion_of(ray, place);
     imageStore(images_rgba16f[VIEW.motion.image], pixel, motion);
     imageStore(images_r16f[VIEW.motion.path], pixel, motion.wwww);
+    return motion;
 }
 
 #endif

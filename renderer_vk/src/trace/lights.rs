@@ -109,6 +109,7 @@ pub(super) fn sphere(origin: Vec3, radius: f32, intensity: Vec3, clearance: f32)
         axis: Vec3::Z,
         cos_inner: -1.0,
         cos_outer: -2.0,
+        core: 0.0,
     }
 }
 

@@ -19,7 +19,8 @@ pub struct Targets {
     /// How far away it is; of this frame and the last.
     pub path: [Image; 2],
     /// Radiance of what is in front of the surface and of its own glow; alpha: the field of a pixel that shows either a
-    /// reflection (2) or what lies behind it (1), otherwise 0.
+    /// reflection (2) or what lies behind it (1), otherwise 0; its fraction is the part of the radiance that moves
+    /// otherwise than the surface does.
     pub front: Image,
     /// Direct light as it comes from the rays, packed as in `light_image.glsl`.
     pub direct: Image,

@@ -2,6 +2,7 @@
 
 use glam::{Mat3, Vec3};
 use relight::compare::{Rgb8, compare};
+use shaders::types::constants as c;
 
 use super::harness::{Gpu, Scene, identity, rectangle, reference, stage};
 use crate::settings::Settings;
@@ -78,6 +79,7 @@ fn temporal_antialiasing() {
     at_rest_it_comes_to_the_mean_of_many_samples(&mut gpu);
     in_motion_it_stays_sharp(&mut gpu);
     what_moves_leaves_nothing_behind(&mut gpu);
+    what_glows_and_moves_is_as_bright_as_it_is(&mut gpu);
     a_smaller_traced_picture_comes_to_the_full_one(&mut gpu);
     the_lens_blurs_by_its_circle_of_confusion(&mut gpu);
 }
@@ -150,6 +152,41 @@ fn what_moves_leaves_nothing_behind(gpu: &mut Gpu) {
     let counts = [wrong(&jagged), wrong(&moved)];
     println!("pixels of the wrong colour: {counts:?}");
     assert!(counts[1] <= counts[0], "{counts:?}");
+}
+
+fn what_glows_and_moves_is_as_bright_as_it_is(gpu: &mut Gpu) {
+    // a thin bright line in the air, before a wall that rests: the wall's history must not swallow it
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, SIZE);
+    let wall = scene.material(&[stage::constant([0.2; 3])], 0);
+    scene.room(Vec3::splat(-300.0), Vec3::splat(300.0), wall);
+    let glow = scene.material(
+        &[stage::add([0.9, 0.2, 0.1])],
+        c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED,
+    );
+    let shape = rectangle(Vec3::new(100.0, -1.2, -45.0), Vec3::Z * 90.0, Vec3::Y * 2.4);
+    scene.mesh(shape, glow, identity());
+    let (still, _) = gpu.render(&scene, &reference(), 64);
+    let line = |pixels: &[Vec3]| -> f32 { pixels.iter().map(|p| p.x - p.z).sum() };
+    let (frames, first) = (24, 8);
+    for speed in [0.0, 2.3, -7.1] {
+        let place = |frame: u32, view: &mut crate::scene::ViewScene| {
+            let at = Vec3::Y * (speed * (frame as f32 - 16.0));
+            view.time = frame as f32 * 0.02;
+            view.instances.last_mut().expect("placed").origin = at;
+            view.entities[0].origin = at;
+        };
+        // one frame's samples meet more or less of it than there is
+        let mut sum = 0.0;
+        let mut watch = |frame: u32, pixels: &[Vec3]| {
+            if frame >= first {
+                sum += line(pixels);
+            }
+        };
+        gpu.render_watched(&scene, &live(), frames, place, Some(&mut watch));
+        let ratio = sum / ((frames - first) as f32 * line(&still));
+        println!("a line that moves {speed} units a frame: {ratio} of its light");
+        assert!((ratio - 1.0).abs() < 0.15, "{speed}: {ratio}");
+    }
 }
 
 fn a_smaller_traced_picture_comes_to_the_full_one(gpu: &mut Gpu) {

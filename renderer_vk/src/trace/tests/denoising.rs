@@ -3,7 +3,7 @@
 use glam::Vec3;
 use relight::light::PointLight;
 
-use super::harness::{Gpu, Scene, rectangle, reference};
+use super::harness::{Gpu, Scene, identity, rectangle, reference};
 use crate::api::DynamicLight;
 use crate::scene::ViewScene;
 use crate::settings::Settings;
@@ -273,6 +273,61 @@ fn a_moving_light_leaves_no_trail() {
     assert!(error < 0.2, "{error}");
     assert!(error < 0.6 * error_without, "{error} {error_without}");
     assert!((mean - 1.0).abs() < 0.04, "{mean}");
+}
+
+#[test]
+fn a_broken_number_does_not_spread() {
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    for bad in [f32::INFINITY, f32::NAN] {
+        // a lamp that is there in one frame alone, and gives what is no number
+        let mut scene = room();
+        let at = Vec3::new(0.0, -60.0, 60.0);
+        scene.light(
+            [at, at + Vec3::Y * 40.0, at + Vec3::X * 40.0],
+            Vec3::new(bad, 1.0, 1.0),
+        );
+        scene.lights.last_mut().expect("added").model = 1;
+        let instance = scene.instances.len() as u32;
+        scene.instances.push(identity());
+        let lamp = crate::scene::Submodel { model: 1, instance };
+        let with_lamp = |at: u32| {
+            move |frame: u32, view: &mut ViewScene| {
+                view.submodels.clear();
+                if frame == at {
+                    view.submodels.push(lamp);
+                }
+            }
+        };
+        for settings in [
+            live(),
+            Settings {
+                rt_taa: true,
+                ..live()
+            },
+            Settings {
+                rt_denoiser: 2,
+                ..live()
+            },
+        ] {
+            let (sound, _) = gpu.render_views(&scene, &settings, 40, with_lamp(1000));
+            let brightest = sound.iter().map(|p| p.max_element()).fold(0.0, f32::max);
+            let mut worst = 0.0f32;
+            let mut watch = |_: u32, pixels: &[Vec3]| {
+                for p in pixels {
+                    assert!(p.is_finite(), "{p}");
+                    worst = worst.max(p.max_element());
+                }
+            };
+            let (after, _) =
+                gpu.render_watched(&scene, &settings, 40, with_lamp(24), Some(&mut watch));
+            let (mean, error) = compare(&after, &sound);
+            println!("{bad}: brightest {brightest}, at worst {worst}; after it {mean}, {error}");
+            assert!(worst < 3.0 * brightest, "{worst} {brightest}");
+            assert!((mean - 1.0).abs() < 0.05 && error < 0.2, "{mean} {error}");
+        }
+    }
 }
 
 #[test]
