@@ -1,7 +1,8 @@
 //! How strongly materials glow: as strongly as the lights that they are.
 
 use super::Export;
-use super::look::{Look, Picture, look};
+use super::look::{Look, Picture, look as read_look, ratio};
+use super::stack::Moment;
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::{Vec3, Vec4};
 
@@ -49,16 +50,21 @@ impl Export<'_> {
     }
 
     /// What other programs can say of a material whose lights have the mean radiance `radiance`; `clear`: whether glass
-    /// and liquids refract.
+    /// and liquids refract; `moment`: when.
     pub(super) fn look(
         &self,
         material: &WorldMaterial,
         radiance: Option<Vec3>,
         clear: bool,
+        moment: Moment,
     ) -> Look {
-        let mut look = look(material, clear, &mut |name| {
-            self.mean(material, &Picture::File(name.to_owned()))
-        });
+        let mut mean = |name: &str| self.mean(material, &Picture::File(name.to_owned()));
+        let mut look = read_look(material, clear, Moment::Mean, &mut mean);
+        let usual = look.glow_factor;
+        if moment != Moment::Mean {
+            look.take_factors(&read_look(material, clear, moment, &mut mean));
+        }
+        let pulse = ratio(look.glow_factor, usual);
         if !self.options.lights {
             return look;
         }
@@ -75,10 +81,11 @@ impl Export<'_> {
             .glow
             .as_ref()
             .and_then(|slot| self.mean(material, &slot.picture));
-        look.glow_factor = match mean {
-            Some(mean) => factor(radiance, mean.truncate()),
-            None => radiance,
-        };
+        look.glow_factor = pulse
+            * match mean {
+                Some(mean) => factor(radiance, mean.truncate()),
+                None => radiance,
+            };
         look
     }
 }

@@ -78,6 +78,14 @@ impl Geometry {
         self.parts().map(|part| part.vertices.len()).sum()
     }
 
+    /// Least and largest texture coordinates of a material, sky apart; `None` where nothing has it.
+    pub fn coordinates(&self, material: u32) -> Option<(Vec2, Vec2)> {
+        let parts = self.parts().filter(|part| part.material == material);
+        let all = parts.flat_map(|part| &part.vertices).map(|v| v.st);
+        all.map(|st| (st, st))
+            .reduce(|(least, most), (st, _)| (least.min(st), most.max(st)))
+    }
+
     /// All parts, sky apart.
     pub fn parts(&self) -> impl Iterator<Item = &Part> {
         self.models.iter().flat_map(|model| &model.parts)

@@ -241,6 +241,14 @@ fn make(
                 Encoded::png(&image, &format!("{name}_{label}"))
             })
             .transpose(),
+        Picture::Film(film) => film
+            .image(files, edited)
+            .map(|image| {
+                let first = film.images.first().map_or("", |name| stem(name));
+                let label = film.edit.map_or("", Edit::label);
+                Encoded::png(&image, &format!("{first}_film{label}"))
+            })
+            .transpose(),
         Picture::Panorama(name) => sky::panorama(files, shader)
             .map(|image| Encoded::png(&image, &format!("{name}_panorama")))
             .transpose(),

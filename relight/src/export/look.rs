@@ -4,7 +4,9 @@
 //! surface in the same way become one picture; of what moves against that, the brightest addition is kept as glow and
 //! the rest is told in [`Look::lost`].
 
-use super::stack::{self, Part, tiling};
+use super::film::Film;
+use super::losses::told_losses;
+use super::stack::{self, Moment, Part, tiling};
 use crate::world::WorldMaterial;
 use glam::{Vec2, Vec3, Vec4};
 use shaderscript::light::{
@@ -12,8 +14,8 @@ use shaderscript::light::{
 };
 use shaderscript::surface_params::{CONTENTS_FOG, CONTENTS_SLIME};
 use shaderscript::{
-    AlphaFunc, AlphaGen, BlendFactor, Cull, Deform, ImplicitKind, RgbGen, Shader, Stage,
-    StageImage, TcGen, TcMod, eval,
+    AlphaFunc, AlphaGen, BlendFactor, Cull, ImplicitKind, RgbGen, Shader, Stage, StageImage, TcGen,
+    TcMod, eval,
 };
 
 /// Distance in a liquid after which white light has the colour that its surface shows, id units; as the traced look.
@@ -63,6 +65,8 @@ pub enum Picture {
         /// Which part of what they show.
         part: Part,
     },
+    /// Images that follow each other, side by side or one below the other.
+    Film(Film),
     /// A side of a sky with clouds.
     Sky {
         /// The material, lower case.
@@ -140,6 +144,17 @@ pub struct Look {
     pub lost: Vec<String>,
 }
 
+impl Look {
+    /// Takes what changes from the look of another moment.
+    pub fn take_factors(&mut self, now: &Look) {
+        self.glow_factor = now.glow_factor;
+        let color = self.color.as_ref().map(|slot| &slot.picture);
+        if self.dielectric.is_none() && !matches!(color, Some(Picture::Baked { .. })) {
+            self.factor = now.factor;
+        }
+    }
+}
+
 /// What colours of vertices are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VertexColor {
@@ -150,10 +165,12 @@ pub enum VertexColor {
 }
 
 /// Reads a material. `mean` gives the mean colour of an image, linear, with its alpha; `None` for one that is missing.
-/// `clear`: whether glass and liquids let light pass and refract it; else they are what their stages show.
+/// `clear`: whether glass and liquids let light pass and refract it; else they are what their stages show. At a `moment`
+/// pictures are those of the mean, and what changes is in the factors.
 pub fn look(
     material: &WorldMaterial,
     clear: bool,
+    moment: Moment,
     mean: &mut dyn FnMut(&str) -> Option<Vec4>,
 ) -> Look {
     let shader = &material.resolved.shader;
@@ -186,7 +203,7 @@ pub fn look(
         _ => base_stage(shader),
     };
     let Some((base, stage)) = base.and_then(|i| Some((i, shader.stages.get(i)?))) else {
-        bare(shader, vertex_light, &mut look);
+        bare(shader, vertex_light, moment, &mut look);
         return look;
     };
     let group = group_of(shader, base, stage, &mut look.lost);
@@ -206,12 +223,9 @@ pub fn look(
         };
         group.iter().filter(has).count()
     };
-    let drawn = stack::mean_of(
-        &stack::without_reflections(shader, &group),
-        vertex_light,
-        mean,
-    );
-    let color = stack::mean_color(stage);
+    let kept = stack::without_reflections(shader, &group);
+    let drawn = stack::mean_of(&kept, vertex_light, moment, mean);
+    let color = stack::color_of(stage, moment);
     if class.additive && group.len() == 1 {
         look.alpha = Alpha::Blend;
         look.factor = Vec4::new(0.0, 0.0, 0.0, 1.0);
@@ -281,11 +295,12 @@ pub fn look(
         }
         if drawn.emission.max_element() > 1.0e-3 {
             look.glow = Some(slot(baked(Part::Glow), stage));
-            look.glow_factor = Vec3::ONE;
+            let usual = stack::mean_of(&kept, vertex_light, Moment::Mean, mean).emission;
+            look.glow_factor = ratio(drawn.emission, usual);
         }
     }
     if look.glow.is_none() {
-        add_moving_glow(shader, vertex_light, &group, &mut look);
+        add_moving_glow(shader, vertex_light, &group, moment, &mut look);
     }
     if clear {
         dielectric(shader, &drawn, &mut look);
@@ -317,10 +332,10 @@ fn group_of(shader: &Shader, base: usize, stage: &Stage, lost: &mut Vec<String>)
 }
 
 /// A material without an image of its own: one colour.
-fn bare(shader: &Shader, vertex_light: bool, look: &mut Look) {
+fn bare(shader: &Shader, vertex_light: bool, moment: Moment, look: &mut Look) {
     let all: Vec<usize> = (0..shader.stages.len()).collect();
     let stages = stack::without_reflections(shader, &all);
-    let drawn = stack::mean_of(&stages, vertex_light, &mut |_| None);
+    let drawn = stack::mean_of(&stages, vertex_light, moment, &mut |_| None);
     look.factor = drawn.lit.clamp(Vec3::ZERO, Vec3::ONE).extend(1.0);
     look.glow_factor = drawn.emission.clamp(Vec3::ZERO, Vec3::ONE);
     let through = drawn.through.element_sum() / 3.0;
@@ -328,6 +343,13 @@ fn bare(shader: &Shader, vertex_light: bool, look: &mut Look) {
         look.alpha = Alpha::Blend;
         look.factor.w = (1.0 - through).clamp(0.0, 1.0);
     }
+}
+
+/// How often `usual` goes into `now`; once where there is none.
+pub fn ratio(now: Vec3, usual: Vec3) -> Vec3 {
+    let part = now / usual;
+    let known = usual.cmpgt(Vec3::splat(1.0e-4)) & part.is_finite_mask();
+    Vec3::select(known, part, Vec3::ONE)
 }
 
 /// How a stage by itself hides what is behind it, and the change of its alpha that this needs; `None` for what only
@@ -372,7 +394,13 @@ fn colors_of_vertices(shader: &Shader, group: &[usize], look: &mut Look) {
 }
 
 /// Of what moves against the colour, or lies on it in another way, the first stage that adds light becomes the glow.
-fn add_moving_glow(shader: &Shader, vertex_light: bool, group: &[usize], look: &mut Look) {
+fn add_moving_glow(
+    shader: &Shader,
+    vertex_light: bool,
+    group: &[usize],
+    moment: Moment,
+    look: &mut Look,
+) {
     if look.alpha != Alpha::Opaque {
         return;
     }
@@ -396,7 +424,7 @@ fn add_moving_glow(shader: &Shader, vertex_light: bool, group: &[usize], look: &
             clamp: matches!(stage.image, StageImage::ClampMap(_)),
             tc_mods: stage.tc_mods.clone(),
         });
-        look.glow_factor = stack::mean_color(stage).truncate();
+        look.glow_factor = stack::color_of(stage, moment).truncate();
         let told = format!("stage {i}: ");
         look.lost.retain(|l| !l.starts_with(&told));
     }
@@ -438,48 +466,6 @@ fn dielectric(shader: &Shader, drawn: &LightLinear, look: &mut Look) {
     if look.factor.truncate().max_element() < 1.0e-3 {
         look.factor = Vec4::ONE;
     }
-}
-
-/// What no format here can say.
-fn told_losses(shader: &Shader, lost: &mut Vec<String>) {
-    for deform in &shader.deforms {
-        lost.push(
-            match deform {
-                Deform::AutoSprite | Deform::AutoSprite2 => "turns to the viewer",
-                Deform::Text(_) => "shows text",
-                Deform::ProjectionShadow => "is a flat shadow",
-                Deform::Normal { .. } => "its normals move",
-                Deform::Wave { .. } | Deform::Bulge { .. } | Deform::Move { .. } => {
-                    "its vertices move"
-                }
-            }
-            .to_owned(),
-        );
-    }
-    for (i, stage) in shader.stages.iter().enumerate() {
-        if stage
-            .tc_mods
-            .iter()
-            .any(|m| matches!(m, TcMod::Turbulent { .. }))
-        {
-            lost.push(format!("stage {i}: its texture wobbles"));
-        }
-        if stage.image.names().len() > 1 {
-            lost.push(format!(
-                "stage {i}: its images follow each other; the first is shown"
-            ));
-        }
-        if matches!(stage.image, StageImage::Video(_)) {
-            lost.push(format!("stage {i}: a film"));
-        }
-        if matches!(stage.rgb_gen, RgbGen::Wave(_)) || matches!(stage.alpha_gen, AlphaGen::Wave(_))
-        {
-            lost.push(format!(
-                "stage {i}: its brightness changes; the mean is shown"
-            ));
-        }
-    }
-    lost.dedup();
 }
 
 /// `st * matrix + translate`: what changes of texture coordinates come to at a time, wobbles left out.

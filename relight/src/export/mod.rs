@@ -15,12 +15,14 @@
 
 mod emission;
 mod extras;
+mod film;
 mod geometry;
 mod gltf;
 mod images;
 pub mod json;
 mod lightmaps;
 mod look;
+mod losses;
 mod map;
 mod model_file;
 mod obj;
@@ -147,7 +149,8 @@ pub struct ExportOptions {
     pub sky: Sky,
     /// Whether the sky shines as strongly as its light in the map, instead of as bright as the game shows it.
     pub sky_light: bool,
-    /// Whether moving textures are written as animations, which strict readers of glTF refuse.
+    /// Whether moving textures, pulsing colours and images that follow each other are written as animations, which strict
+    /// readers of glTF refuse.
     pub animate: bool,
 }
 

@@ -5,6 +5,7 @@ use super::geometry::{self, Part};
 use super::images::Encoded;
 use super::look::{Alpha, Look, Slot, affine};
 use super::output::Output;
+use super::stack::Moment;
 use super::{Export, ExportError, ExportReport};
 use crate::world::WorldMaterial;
 use glam::Vec3;
@@ -34,7 +35,12 @@ pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportRe
         let Some(material) = world.materials.get(index as usize) else {
             continue;
         };
-        let look = source.look(material, radiances.get(index as usize).copied(), true);
+        let look = source.look(
+            material,
+            radiances.get(index as usize).copied(),
+            true,
+            Moment::Mean,
+        );
         let entry = material_entry(source, index, material, &look, &mut images)?;
         materials.push_str(&entry);
         for lost in &look.lost {

@@ -17,15 +17,27 @@ fn level(light: Vec3) -> u8 {
     ((encoded / STEP).round() * STEP).clamp(0.0, 255.0) as u8
 }
 
+#[cfg(test)]
+fn make_shown(look: &mut Look, light: Vec3) -> bool {
+    let glows = glows(look);
+    make_shown_as(look, light, glows)
+}
+
+/// Whether a material shows something that does not depend on light.
+pub fn glows(look: &Look) -> bool {
+    look.glow_factor.max_element() > LEAST && look.glow_factor.is_finite()
+}
+
 /// Makes a material one that needs no light. `light`: the mean of that on its surfaces, linear. Where a part of what
 /// the material shows does not depend on light, its colour is that under the mean light, and light in colours of vertices
-/// must not multiply it: the answer is whether it does.
-pub fn make_shown(look: &mut Look, light: Vec3) -> bool {
+/// must not multiply it: the answer is whether it does. `glows`: whether it shows
+/// anything of its own, at this moment or another ([`glows()`]).
+pub fn make_shown_as(look: &mut Look, light: Vec3, glows: bool) -> bool {
     look.dielectric = None;
     look.mirror = false;
     let glow = std::mem::replace(&mut look.glow_factor, Vec3::ZERO);
     let picture = look.glow.take();
-    if !(glow.max_element() > LEAST && glow.is_finite()) {
+    if !glows {
         return true;
     }
     let lit = look.factor.truncate();
@@ -66,7 +78,9 @@ pub fn make_shown(look: &mut Look, light: Vec3) -> bool {
 fn told(glow: &Slot) -> String {
     let what = match &glow.picture {
         Picture::File(name) | Picture::Edited(name, _) => format!(" of {name}"),
-        Picture::Baked { .. } | Picture::Sky { .. } | Picture::Panorama(_) => String::new(),
+        Picture::Baked { .. } | Picture::Film(_) | Picture::Sky { .. } | Picture::Panorama(_) => {
+            String::new()
+        }
     };
     format!(
         "its glow{what} lies on the surface in another way than its colour; the colour is shown"

@@ -56,19 +56,31 @@ pub fn tiling(stage: &Stage, base: &[TcMod]) -> Option<Vec2> {
     (whole(factor.x) && whole(factor.y)).then_some(factor)
 }
 
-/// The colour that a stage multiplies its image with: the mean of what moves, white where it is light.
-pub fn mean_color(stage: &Stage) -> Vec4 {
+/// When a stage is looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Moment {
+    /// Always: the mean of what changes.
+    Mean,
+    /// At a time, seconds.
+    At(f64),
+}
+
+/// The colour that a stage multiplies its image with, white where it is light.
+pub fn color_of(stage: &Stage, moment: Moment) -> Vec4 {
     const STEPS: u32 = 32;
     let period = |frequency: f32| f64::from(frequency.abs().max(1.0e-3)).recip();
-    let length = match (&stage.rgb_gen, &stage.alpha_gen) {
-        (RgbGen::Wave(w), _) | (_, AlphaGen::Wave(w)) => period(w.frequency),
-        _ => 0.0,
+    let (begin, length) = match (moment, &stage.rgb_gen, &stage.alpha_gen) {
+        (Moment::At(time), ..) => (time, 0.0),
+        (Moment::Mean, RgbGen::Wave(w), _) | (Moment::Mean, _, AlphaGen::Wave(w)) => {
+            (0.0, period(w.frequency))
+        }
+        _ => (0.0, 0.0),
     };
     let steps = if length > 0.0 { STEPS } else { 1 };
     let mut sum = Vec4::ZERO;
     for step in 0..steps {
         let context = ColorContext {
-            time: length * f64::from(step) / f64::from(steps),
+            time: begin + length * f64::from(step) / f64::from(steps),
             ..ColorContext::default()
         };
         let [r, g, b, a] = eval::vertex_color(stage, &context, Vec3::ZERO, Vec3::Z, [255; 4]);
@@ -82,10 +94,16 @@ pub fn mean_color(stage: &Stage) -> Vec4 {
     sum / steps as f32
 }
 
+/// [`color_of`], the mean of what changes.
+pub fn mean_color(stage: &Stage) -> Vec4 {
+    color_of(stage, Moment::Mean)
+}
+
 /// The mean of what a stack draws; `mean` gives the mean of an image, linear, with its alpha.
 pub fn mean_of(
     stages: &[Stage],
     vertex_light: bool,
+    moment: Moment,
     mean: &mut dyn FnMut(&str) -> Option<Vec4>,
 ) -> LightLinear {
     let samples: Vec<StageSample> = stages
@@ -95,7 +113,7 @@ pub fn mean_of(
                 Some(name) => mean(name).unwrap_or(Vec4::ONE),
                 None => Vec4::ONE,
             },
-            color: mean_color(stage),
+            color: color_of(stage, moment),
         })
         .collect();
     // The test is on texels, not on their mean.

@@ -1,19 +1,89 @@
-//! Moving textures as animations of `KHR_texture_transform` (`KHR_animation_pointer`).
+//! Moving textures and films as animations of `KHR_texture_transform` (`KHR_animation_pointer`).
+//!
+//! A wobble moves each vertex in its own time, which no texture transform can; the whole texture sways as that of one
+//! vertex does.
 
 use super::buffer::{Buffers, Kind};
 use super::materials::turn_and_size;
+use crate::export::film::Film;
 use crate::export::look::affine;
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use serde_json::{Value, json};
 use shaderscript::TcMod;
+use shaderscript::eval::apply_tc_mods;
 use std::f32::consts::TAU;
 
 /// Keys per turn or wave.
 const KEYS: f64 = 32.0;
 /// Longest animation, seconds: what does not repeat by then jumps.
 const LONGEST: f64 = 120.0;
+/// The vertex whose wobble the whole texture has: its two directions are a quarter of a wave apart.
+const SWAYING: Vec3 = Vec3::new(0.0, 256.0, 0.0);
 
-/// Something that moves.
+/// What changes, as an animation says it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// Times of the keys, seconds.
+    pub times: Vec<f32>,
+    /// Whether values stay until the next key.
+    pub step: bool,
+    /// Where each value is in the document, what kind it is, and it at each key.
+    pub parts: Vec<(String, Kind, Vec<f32>)>,
+}
+
+impl Track {
+    /// The animation.
+    pub fn animation(&self, buffers: &mut Buffers, name: &str) -> Value {
+        let input = buffers.add_floats(Kind::Float, self.times.iter().map(|&t| [t]));
+        let last = self.times.last().copied().unwrap_or(0.0);
+        buffers.bound(input, &[0.0], &[last]);
+        let (mut samplers, mut channels) = (Vec::new(), Vec::new());
+        for (pointer, kind, values) in &self.parts {
+            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            let output = buffers.add(*kind, &bytes, self.times.len());
+            let mut sampler = json!({"input": input, "output": output});
+            if let (true, Value::Object(map)) = (self.step, &mut sampler) {
+                map.insert("interpolation".into(), json!("STEP"));
+            }
+            channels.push(json!({
+                "sampler": samplers.len(),
+                "target": {
+                    "path": "pointer",
+                    "extensions": {"KHR_animation_pointer": {"pointer": pointer}},
+                },
+            }));
+            samplers.push(sampler);
+        }
+        json!({"name": name, "samplers": samplers, "channels": channels})
+    }
+}
+
+/// Times of keys for what repeats after each of `periods`: from 0 to the time after which everything repeats, or
+/// nearly. `straight`: whether it moves evenly in between.
+pub fn key_times(periods: &[f64], straight: bool) -> Vec<f32> {
+    let longest = periods.iter().copied().fold(0.0, f64::max).min(LONGEST);
+    let shortest = periods.iter().copied().fold(LONGEST, f64::min);
+    let repeats = |n: &f64| {
+        let length = n * longest;
+        periods.iter().all(|p| {
+            let turns = length / p;
+            (turns - turns.round()).abs() < 0.01
+        })
+    };
+    let most = (LONGEST / longest).floor().max(1.0) as u32;
+    let times = (1..=most).map(f64::from).find(repeats).unwrap_or(1.0);
+    let length = longest * times;
+    let keys = if straight {
+        1
+    } else {
+        ((length / shortest) * KEYS).ceil().clamp(1.0, 4096.0) as u32
+    };
+    (0..=keys)
+        .map(|key| (length * f64::from(key) / f64::from(keys)) as f32)
+        .collect()
+}
+
+/// A texture that moves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
     tc_mods: Vec<TcMod>,
@@ -49,6 +119,7 @@ impl Motion {
                 }
                 TcMod::Rotate(degrees) => push(degrees / 360.0),
                 TcMod::Stretch(wave) => push(wave.frequency),
+                TcMod::Turbulent { frequency, .. } => push(*frequency),
                 _ => {}
             }
         }
@@ -64,6 +135,16 @@ impl Motion {
                 offset += *speed * time as f32;
                 continue;
             }
+            if let TcMod::Turbulent { .. } = tc_mod {
+                offset += apply_tc_mods(
+                    std::slice::from_ref(tc_mod),
+                    Vec2::ZERO,
+                    SWAYING,
+                    time,
+                    Vec2::ZERO,
+                );
+                continue;
+            }
             let ([s, t], moved) = affine(std::slice::from_ref(tc_mod), time);
             let apply = |v: Vec2| s * v.x + t * v.y;
             matrix = matrix.map(apply);
@@ -72,37 +153,18 @@ impl Motion {
         (matrix, offset)
     }
 
-    /// Times of the keys: from 0 to the time after which everything repeats, or nearly.
     fn times(&self) -> Vec<f32> {
-        let periods = self.periods();
-        let longest = periods.iter().copied().fold(0.0, f64::max).min(LONGEST);
-        let shortest = periods.iter().copied().fold(LONGEST, f64::min);
-        let repeats = |n: &f64| {
-            let length = n * longest;
-            periods.iter().all(|p| {
-                let turns = length / p;
-                (turns - turns.round()).abs() < 0.01
-            })
+        let bent = |m: &TcMod| {
+            matches!(
+                m,
+                TcMod::Rotate(_) | TcMod::Stretch(_) | TcMod::Turbulent { .. }
+            )
         };
-        let most = (LONGEST / longest).floor().max(1.0) as u32;
-        let times = (1..=most).map(f64::from).find(repeats).unwrap_or(1.0);
-        let length = longest * times;
-        let straight = self
-            .tc_mods
-            .iter()
-            .all(|m| !matches!(m, TcMod::Rotate(_) | TcMod::Stretch(_)));
-        let keys = if straight {
-            1
-        } else {
-            ((length / shortest) * KEYS).ceil().clamp(1.0, 4096.0) as u32
-        };
-        (0..=keys)
-            .map(|key| (length * f64::from(key) / f64::from(keys)) as f32)
-            .collect()
+        key_times(&self.periods(), !self.tc_mods.iter().any(bent))
     }
 
-    /// The animation.
-    pub fn animation(&self, buffers: &mut Buffers, name: &str) -> Value {
+    /// The motion as an animation says it.
+    pub fn track(&self) -> Track {
         let times = self.times();
         let mut values = Vec::with_capacity(times.len());
         let mut before = 0.0f32;
@@ -114,45 +176,48 @@ impl Motion {
             before = angle;
             values.push((offset, angle, size));
         }
-        let input = buffers.add_floats(Kind::Float, times.iter().map(|&t| [t]));
-        let last = times.last().copied().unwrap_or(0.0);
-        buffers.bound(input, &[0.0], &[last]);
-        let mut parts = vec![(
-            "offset",
-            buffers.add_floats(Kind::Pair, values.iter().map(|v| v.0.to_array())),
-        )];
+        let part =
+            |name: &str, kind, values: Vec<f32>| (format!("{}/{name}", self.place), kind, values);
+        let pairs =
+            |values: &mut dyn Iterator<Item = Vec2>| values.flat_map(|v| v.to_array()).collect();
+        let offsets = pairs(&mut values.iter().map(|v| v.0));
+        let mut parts = vec![part("offset", Kind::Pair, offsets)];
         let first = values.first().copied().unwrap_or_default();
         if values.iter().any(|v| (v.1 - first.1).abs() > 1.0e-4) {
-            let rotation = buffers.add_floats(Kind::Float, values.iter().map(|v| [v.1]));
-            parts.push(("rotation", rotation));
+            parts.push(part(
+                "rotation",
+                Kind::Float,
+                values.iter().map(|v| v.1).collect(),
+            ));
         }
         // The engine's table of sines is a little off the circle.
         if values
             .iter()
             .any(|v| (v.2 - first.2).abs().max_element() > 0.02)
         {
-            let scale = buffers.add_floats(Kind::Pair, values.iter().map(|v| v.2.to_array()));
-            parts.push(("scale", scale));
+            parts.push(part(
+                "scale",
+                Kind::Pair,
+                pairs(&mut values.iter().map(|v| v.2)),
+            ));
         }
-        let samplers: Vec<Value> = parts
-            .iter()
-            .map(|(_, output)| json!({"input": input, "output": output}))
-            .collect();
-        let channels: Vec<Value> = parts
-            .iter()
-            .enumerate()
-            .map(|(sampler, (part, _))| {
-                let pointer = format!("{}/{part}", self.place);
-                json!({
-                    "sampler": sampler,
-                    "target": {
-                        "path": "pointer",
-                        "extensions": {"KHR_animation_pointer": {"pointer": pointer}},
-                    },
-                })
-            })
-            .collect();
-        json!({"name": name, "samplers": samplers, "channels": channels})
+        Track {
+            times,
+            step: false,
+            parts,
+        }
+    }
+}
+
+/// The film of a texture whose transform is at `place`; `side`: texels of all its images together.
+pub fn film_track(film: &Film, side: u32, place: &str) -> Track {
+    let count = film.images.len();
+    let times = (0..=count).map(|k| k as f32 / film.frequency());
+    let offsets = (0..=count).flat_map(|k| film.transform(k % count, side).1.to_array());
+    Track {
+        times: times.collect(),
+        step: true,
+        parts: vec![(format!("{place}/offset"), Kind::Pair, offsets.collect())],
     }
 }
 
@@ -173,7 +238,7 @@ mod tests {
         let motion = Motion::of(&[TcMod::Rotate(90.0)], "/x".into()).unwrap();
         assert_eq!(motion.times().len(), 33);
         let mut buffers = Buffers::default();
-        let animation = motion.animation(&mut buffers, "a");
+        let animation = motion.track().animation(&mut buffers, "a");
         assert_eq!(animation["channels"].as_array().unwrap().len(), 2);
         let (matrix, offset) = motion.at(0.7);
         let (angle, size) = turn_and_size(matrix).unwrap();
@@ -185,13 +250,7 @@ mod tests {
         let middle = Vec2::splat(0.5);
         assert!((turned(middle) - middle).length() < 1.0e-3);
         let st = Vec2::new(0.2, 0.9);
-        let engine = shaderscript::eval::apply_tc_mods(
-            &[TcMod::Rotate(90.0)],
-            st,
-            glam::Vec3::ZERO,
-            0.7,
-            Vec2::ZERO,
-        );
+        let engine = apply_tc_mods(&[TcMod::Rotate(90.0)], st, Vec3::ZERO, 0.7, Vec2::ZERO);
         assert!((turned(st) - engine).length() < 1.0e-3);
     }
 

@@ -21,10 +21,12 @@ pub enum Kind {
     Pair,
     /// Floats of colours that are no vertices.
     Triple,
+    /// Four floats of colours that are no vertices.
+    Quad,
 }
 
 impl Kind {
-    const ALL: [Kind; 8] = [
+    const ALL: [Kind; 9] = [
         Kind::Vec3,
         Kind::Vec2,
         Kind::Color,
@@ -33,6 +35,7 @@ impl Kind {
         Kind::Float,
         Kind::Pair,
         Kind::Triple,
+        Kind::Quad,
     ];
 
     /// Bytes per element; `None` for what is no vertex.
@@ -58,6 +61,7 @@ impl Kind {
             Kind::Vec3 | Kind::Triple => (5126, "VEC3"),
             Kind::Vec2 | Kind::Pair => (5126, "VEC2"),
             Kind::Color => (5123, "VEC4"),
+            Kind::Quad => (5126, "VEC4"),
             Kind::Short => (5123, "SCALAR"),
             Kind::Long => (5125, "SCALAR"),
             Kind::Float => (5126, "SCALAR"),
@@ -68,7 +72,7 @@ impl Kind {
 /// Data being gathered.
 #[derive(Debug, Default)]
 pub struct Buffers {
-    data: [Vec<u8>; 8],
+    data: [Vec<u8>; 9],
     /// Kind of each accessor's view; the number of the view is known at the end.
     accessors: Vec<(Kind, Value)>,
 }
@@ -124,7 +128,7 @@ impl Buffers {
     pub fn finish(self) -> (Vec<u8>, Vec<Value>, Vec<Value>) {
         let mut bytes = Vec::with_capacity(self.data.iter().map(|d| d.len() + 4).sum());
         let mut views = Vec::new();
-        let mut numbers = [0; 8];
+        let mut numbers = [0; 9];
         for ((kind, data), number) in Kind::ALL.into_iter().zip(&self.data).zip(&mut numbers) {
             if data.is_empty() {
                 continue;

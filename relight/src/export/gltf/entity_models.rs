@@ -1,12 +1,12 @@
 //! Models that entities name: each a mesh, once, however many nodes refer to it.
 
+use super::moving::{Lighting, look_in, make_moving};
 use super::nodes::{facing, turn};
 use super::primitive::primitive;
 use super::{Document, Made};
 use crate::export::ExportError;
 use crate::export::geometry::{Drawn, drawn};
 use crate::export::model_file::{self, ModelSurface};
-use crate::export::shown::make_shown;
 use crate::overbright;
 use crate::world::{RelitWorld, WorldMaterial, WorldVertex};
 use glam::{Quat, Vec3};
@@ -121,18 +121,21 @@ impl Document<'_> {
         if let Some(fault) = &material.resolved.fault {
             self.warnings.push(format!("material {name}: {fault}"));
         }
-        let mut look = source.look(&material, None, !shown);
         let mut stages = material.resolved.shader.stages.iter();
         let lit = stages.any(|stage| stage.rgb_gen == RgbGen::LightingDiffuse);
-        let shaded = if shown {
+        let mean = shown.then(|| {
             let light = light.filter(|_| lit).unwrap_or_default();
             let mean = light.iter().sum::<Vec3>() / light.len() as f32;
-            let mean = if mean.is_finite() { mean } else { Vec3::ONE };
-            make_shown(&mut look, mean) && lit
-        } else {
-            false
+            if mean.is_finite() { mean } else { Vec3::ONE }
+        });
+        let lighting = Lighting {
+            radiance: None,
+            shown: mean,
         };
-        let number = self.add_material(&material, &look)?;
+        let (mut look, multiplied) = look_in(source, &material, lighting);
+        let shaded = shown && multiplied && lit;
+        let pulse = make_moving(source, &material, lighting, &mut look, None);
+        let number = self.add_material(&material, &look, pulse.as_ref())?;
         let lost = look.lost.iter();
         self.warnings
             .extend(lost.map(|l| format!("material {name}: {l}")));

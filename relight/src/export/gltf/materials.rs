@@ -1,8 +1,9 @@
 //! Materials, textures and images of a glTF.
 
-use super::animation::Motion;
+use super::animation::{Motion, Track, film_track};
+use super::pulse::Pulse;
 use crate::export::images::Encoded;
-use crate::export::look::{Alpha, Look, Slot, affine};
+use crate::export::look::{Alpha, Look, Picture, Slot, affine};
 use crate::export::{Export, ExportError, Lightmaps, extras};
 use crate::world::WorldMaterial;
 use glam::Vec2;
@@ -102,11 +103,11 @@ pub struct Maker<'a> {
     /// The lightmaps' texture.
     pub lightmap: Option<usize>,
     /// What moves, by where it is in the document.
-    pub motions: &'a mut Vec<Motion>,
+    pub tracks: &'a mut Vec<Track>,
 }
 
 impl Maker<'_> {
-    /// A material; `number`: its place in the document.
+    /// A material; `number`: its place in the document, `pulse`: how its factors change.
     ///
     /// # Errors
     /// [`ExportError`] when an image cannot be encoded.
@@ -115,6 +116,7 @@ impl Maker<'_> {
         number: usize,
         material: &WorldMaterial,
         look: &Look,
+        pulse: Option<&Pulse>,
     ) -> Result<Value, ExportError> {
         let mut base = json!({
             "metallicFactor": f32::from(u8::from(look.mirror)),
@@ -129,13 +131,19 @@ impl Maker<'_> {
             if let Some(texture) = self.texture(material, look.color.as_ref(), &slot)? {
                 base.insert("baseColorTexture".into(), texture);
             }
-            if look.factor != glam::Vec4::ONE {
+            if look.factor != glam::Vec4::ONE || pulse.is_some_and(Pulse::factor_varies) {
                 base.insert("baseColorFactor".into(), json!(look.factor.to_array()));
             }
         }
         out.insert("pbrMetallicRoughness".into(), base);
-        let brightest = look.glow_factor.max_element();
-        if brightest > 0.0 && brightest.is_finite() {
+        let peak = pulse.map_or(0.0, Pulse::brightest);
+        let brightest = look.glow_factor.max_element().max(peak);
+        let glows = brightest > 0.0 && brightest.is_finite();
+        if let Some(pulse) = pulse {
+            let strength = glows.then(|| brightest.max(1.0));
+            self.tracks.push(pulse.track(&place, strength));
+        }
+        if glows {
             let slot = format!("{place}/emissiveTexture");
             if let Some(texture) = self.texture(material, look.glow.as_ref(), &slot)? {
                 out.insert("emissiveTexture".into(), texture);
@@ -249,6 +257,19 @@ impl Maker<'_> {
             Sampling::Repeat
         };
         let mut reference = json!({"index": self.textures.add(&image, sampling)});
+        if let (Picture::Film(film), Value::Object(map)) = (&slot.picture, &mut reference) {
+            let side = if film.down { image.height } else { image.width };
+            let (size, offset) = film.transform(0, side);
+            self.extensions.insert("KHR_texture_transform");
+            let transform = json!({"offset": offset.to_array(), "scale": size.to_array()});
+            map.insert(
+                "extensions".into(),
+                json!({"KHR_texture_transform": transform}),
+            );
+            let place = format!("{place}/extensions/KHR_texture_transform");
+            self.tracks.push(film_track(film, side, &place));
+            return Ok(Some(reference));
+        }
         if let Some(transform) = transform(slot)
             && let Value::Object(map) = &mut reference
         {
@@ -258,10 +279,9 @@ impl Maker<'_> {
                 json!({"KHR_texture_transform": transform}),
             );
             if self.source.options.animate {
-                self.motions.extend(Motion::of(
-                    &slot.tc_mods,
-                    format!("{place}/extensions/KHR_texture_transform"),
-                ));
+                let place = format!("{place}/extensions/KHR_texture_transform");
+                let motion = Motion::of(&slot.tc_mods, place);
+                self.tracks.extend(motion.map(|motion| motion.track()));
             }
         }
         Ok(Some(reference))

@@ -9,8 +9,10 @@ mod animation;
 mod buffer;
 mod entity_models;
 mod materials;
+mod moving;
 mod nodes;
 mod primitive;
+mod pulse;
 mod sky;
 
 use super::geometry::{self, Geometry, Part};
@@ -18,15 +20,16 @@ use super::images::Encoded;
 use super::lightmaps::Atlas;
 use super::look::Look;
 use super::output::Output;
-use super::shown::make_shown;
 use super::{Export, ExportError, ExportReport, ImagePlace, Lightmaps, emission, vertex_light};
 use crate::image::Image;
 use crate::world::{RelitWorld, WorldMaterial};
 use buffer::Buffers;
 use glam::{Vec2, Vec3};
 use materials::{Maker, Sampling, Textures};
+use moving::{Lighting, look_in, make_moving};
 use nodes::Nodes;
 use primitive::primitive;
+use pulse::Pulse;
 use serde_json::{Map, Value, json};
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -47,7 +50,7 @@ struct Document<'a> {
     buffers: Buffers,
     textures: Textures,
     extensions: BTreeSet<&'static str>,
-    motions: Vec<animation::Motion>,
+    tracks: Vec<animation::Track>,
     materials: Vec<Value>,
     meshes: Vec<Value>,
     nodes: Nodes,
@@ -107,7 +110,7 @@ pub(super) fn write(
         buffers: Buffers::default(),
         textures: Textures::default(),
         extensions: BTreeSet::new(),
-        motions: Vec::new(),
+        tracks: Vec::new(),
         materials: Vec::new(),
         meshes: Vec::new(),
         nodes: Nodes::default(),
@@ -169,12 +172,15 @@ impl Document<'_> {
                     Entry::Vacant(place) => {
                         let index = part.material as usize;
                         let radiance = radiances.get(index).copied();
-                        let mut look = self.source.look(material, radiance, baked.is_none());
-                        let shaded = baked.is_none_or(|baked| {
+                        let shown = baked.map(|baked| {
                             let mean = baked.means.get(index).copied().flatten();
-                            make_shown(&mut look, mean.unwrap_or(Vec3::ONE))
+                            mean.unwrap_or(Vec3::ONE)
                         });
-                        let number = self.add_material(material, &look)?;
+                        let lighting = Lighting { radiance, shown };
+                        let (mut look, shaded) = look_in(self.source, material, lighting);
+                        let bounds = geometry.coordinates(part.material);
+                        let pulse = make_moving(self.source, material, lighting, &mut look, bounds);
+                        let number = self.add_material(material, &look, pulse.as_ref())?;
                         let lost = look.lost.iter();
                         self.warnings
                             .extend(lost.map(|l| format!("material {}: {l}", material.name)));
@@ -214,9 +220,10 @@ impl Document<'_> {
         &mut self,
         material: &WorldMaterial,
         look: &Look,
+        pulse: Option<&Pulse>,
     ) -> Result<usize, ExportError> {
         let number = self.materials.len();
-        let made = self.maker().material(number, material, look)?;
+        let made = self.maker().material(number, material, look, pulse)?;
         self.materials.push(made);
         Ok(number)
     }
@@ -227,7 +234,7 @@ impl Document<'_> {
             textures: &mut self.textures,
             extensions: &mut self.extensions,
             lightmap: self.lightmap,
-            motions: &mut self.motions,
+            tracks: &mut self.tracks,
         }
     }
 
@@ -242,11 +249,11 @@ impl Document<'_> {
         let world = source.world;
         let mut root = Map::new();
         let stem = output.stem();
-        let animations: Vec<Value> = std::mem::take(&mut self.motions)
+        let animations: Vec<Value> = std::mem::take(&mut self.tracks)
             .iter()
             .enumerate()
-            .map(|(number, motion)| {
-                motion.animation(&mut self.buffers, &format!("texture_{number}"))
+            .map(|(number, track)| {
+                track.animation(&mut self.buffers, &format!("material_{number}"))
             })
             .collect();
         if !animations.is_empty() {
