@@ -81,12 +81,28 @@ fn changes_with_time(tc_mod: &TcMod) -> bool {
     }
 }
 
+/// Degrees a second up to which a picture of an environment may turn and still stand for the surroundings.
+const SLOW_TURN: f32 = 10.0;
+
+/// Pictures a second, likewise, that it may move by.
+const SLOW_SCROLL: f32 = 0.05;
+
+/// Whether a picture of an environment moves so that nobody would take it for the surroundings.
+fn moves_as_effect(tc_mod: &TcMod) -> bool {
+    match tc_mod {
+        TcMod::Rotate(degrees) => degrees.abs() > SLOW_TURN,
+        TcMod::Scroll(speed) => speed.length() > SLOW_SCROLL,
+        other => changes_with_time(other),
+    }
+}
+
 /// Whether a stage stands for a reflection of the surroundings: a picture of an environment, placed by the reflected
-/// view direction, on a body that is drawn by another stage. A picture that moves or pulses by itself is an effect (the
-/// glow of a power-up), and so is one that nothing lies under: they show what they show.
+/// view direction, on a body that is drawn by another stage. One that turns or drifts slowly imitates a shine that
+/// wanders as its bearer moves, and real surroundings do that by themselves. A picture that moves faster or pulses is an
+/// effect (the glow of a power-up), and so is one that nothing lies under: they show what they show.
 pub fn is_reflection(shader: &Shader, stage: &Stage) -> bool {
     let is_picture = |s: &Stage| s.tc_gen == TcGen::Environment && !s.image.names().is_empty();
-    let rests = !stage.tc_mods.iter().any(changes_with_time)
+    let rests = !stage.tc_mods.iter().any(moves_as_effect)
         && !matches!(stage.rgb_gen, RgbGen::Wave(_))
         && !matches!(stage.alpha_gen, AlphaGen::Wave(_));
     let has_body = shader.stages.iter().any(|s| s.tc_gen != TcGen::Environment);
@@ -158,9 +174,16 @@ mod tests {
         assert!(reflects(&format!("{add}\n{BODY}")));
         assert!(!reflects(add));
         assert!(!reflects(BODY));
-        assert!(!reflects(&format!(
-            "{{\nmap e\ntcGen environment\ntcMod rotate 30\nblendFunc add\n}}\n{BODY}"
-        )));
+        let moving = |mods: &str| {
+            let stage = format!("{{\nmap e\ntcGen environment\n{mods}\nblendFunc add\n}}");
+            reflects(&format!("{stage}\n{BODY}"))
+        };
+        assert!(moving("tcMod scale .5 .5"));
+        assert!(moving("tcMod rotate -4"));
+        assert!(moving("tcMod scroll 0 .02"));
+        assert!(!moving("tcMod rotate 30"));
+        assert!(!moving("tcMod rotate 4\ntcMod scroll 1 .1"));
+        assert!(!moving("tcMod turb 0 .1 0 .1"));
         assert!(!reflects(&format!(
             "{{\nmap e\ntcGen environment\nblendFunc add\nrgbGen wave sin 0 1 0 1\n}}\n{BODY}"
         )));
