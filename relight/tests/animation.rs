@@ -39,6 +39,14 @@ blendFunc add
 rgbGen wave square 0.5 0.5 0 1
 }
 }
+t/wheel
+{
+surfaceparm nolightmap
+{
+map t/a.tga
+tcMod rotate 90
+}
+}
 t/rest
 {
 surfaceparm nolightmap
@@ -61,7 +69,7 @@ fn write(animate: bool, lightmaps: Lightmaps) -> (Value, Vec<u8>, ExportReport) 
         files.insert(&format!("t/{name}.tga"), tga(grey)).unwrap();
     }
     let mut map = MapBuilder::new();
-    for (i, name) in ["t/flame", "t/water", "t/lamp", "t/rest"]
+    for (i, name) in ["t/flame", "t/water", "t/lamp", "t/wheel", "t/rest"]
         .iter()
         .enumerate()
     {
@@ -198,6 +206,7 @@ fn films_waves_and_wobbles_are_animated() {
     assert_eq!(sway.times.last(), Some(&2.0));
     assert!(sway.values.iter().all(|v| v.abs() < 0.11), "{sway:?}");
     assert!(sway.values.iter().any(|v| *v > 0.09), "{sway:?}");
+    assert_eq!(find("t/wheel", "rotation").times.last(), Some(&4.0));
     assert!(all.iter().all(|a| a.material != "t/rest"));
     let told = report.warnings.join("\n");
     assert!(!told.contains("flame: stage 0"), "{told}");

@@ -270,19 +270,25 @@ impl Maker<'_> {
             self.tracks.push(film_track(film, side, &place));
             return Ok(Some(reference));
         }
-        if let Some(transform) = transform(slot)
+        if let Some(mut transform) = transform(slot)
             && let Value::Object(map) = &mut reference
         {
             self.extensions.insert("KHR_texture_transform");
+            if self.source.options.animate {
+                let place = format!("{place}/extensions/KHR_texture_transform");
+                let motion = Motion::of(&slot.tc_mods, place);
+                let track = motion.map(|motion| motion.track());
+                let mut parts = track.iter().flat_map(|track| &track.parts);
+                // what is animated is there to be animated
+                if parts.any(|(pointer, ..)| pointer.ends_with("/rotation")) {
+                    transform.entry("rotation").or_insert(json!(0.0));
+                }
+                self.tracks.extend(track);
+            }
             map.insert(
                 "extensions".into(),
                 json!({"KHR_texture_transform": transform}),
             );
-            if self.source.options.animate {
-                let place = format!("{place}/extensions/KHR_texture_transform");
-                let motion = Motion::of(&slot.tc_mods, place);
-                self.tracks.extend(motion.map(|motion| motion.track()));
-            }
         }
         Ok(Some(reference))
     }
@@ -301,7 +307,7 @@ pub fn turn_and_size(matrix: [Vec2; 2]) -> Option<(f32, Vec2)> {
 }
 
 /// The texture transform of a slot; `None` where there is none, or none that glTF knows.
-fn transform(slot: &Slot) -> Option<Value> {
+fn transform(slot: &Slot) -> Option<Map<String, Value>> {
     if slot.tc_mods.is_empty() {
         return None;
     }
@@ -313,5 +319,5 @@ fn transform(slot: &Slot) -> Option<Value> {
     if angle.abs() > 1.0e-6 {
         map.insert("rotation".into(), json!(angle));
     }
-    offset.is_finite().then_some(Value::Object(map))
+    offset.is_finite().then_some(map)
 }
