@@ -34,9 +34,15 @@ fn classic(speeds: i32, stats: &FrameStats) -> Vec<String> {
         )],
         2 => [("patch", scene.patches), ("md3", scene.models)]
             .map(|(what, counts)| {
+                let (spheres, boxes) = (counts.spheres, counts.boxes);
                 format!(
-                    "({what}) {} bin {} bclip {} bout",
-                    counts.inside, counts.clipped, counts.outside
+                    "({what}) {} sin {} sclip  {} sout {} bin {} bclip {} bout",
+                    spheres.inside,
+                    spheres.clipped,
+                    spheres.outside,
+                    boxes.inside,
+                    boxes.clipped,
+                    boxes.outside
                 )
             })
             .to_vec(),

@@ -15,6 +15,7 @@ pub struct Materials {
     images: Mutex<HashMap<String, bool>>,
     /// Materials whose fault was told.
     told: Mutex<HashSet<String>>,
+    unusable: Vec<Diagnostic>,
 }
 
 /// A material as it is drawn, and as the map compiler read it.
@@ -64,14 +65,16 @@ impl Materials {
                 }),
             }
         }
-        let library = Library::new(scripts);
-        unreadable.extend_from_slice(library.diagnostics());
-        (Materials::from_library(library), unreadable)
+        let mut materials = Materials::from_library(Library::new(scripts));
+        materials.unusable.extend_from_slice(&unreadable);
+        unreadable.extend_from_slice(materials.library.diagnostics());
+        (materials, unreadable)
     }
 
     /// Materials of scripts that were read elsewhere.
     pub fn from_library(library: Library) -> Materials {
         Materials {
+            unusable: library.dropped().to_vec(),
             library,
             images: Mutex::default(),
             told: Mutex::default(),
@@ -95,10 +98,8 @@ impl Materials {
             None if self.image_exists(files, name) => None,
             None => Some("neither a script nor an image has this name".to_owned()),
         };
-        if let Some(fault) = &fault
-            && lock(&self.told).insert(name.to_ascii_lowercase())
-        {
-            log::warn!("material {name}: {fault}; the default is drawn");
+        if let Some(fault) = &fault {
+            self.tell_fault(name, fault);
         }
         let shader = match (&script, &fault) {
             (_, Some(_)) => Shader::default_material(name),
@@ -110,6 +111,19 @@ impl Materials {
             script,
             fault,
         }
+    }
+
+    /// Warns that the default is drawn instead of a material; once for each name, whoever finds out first.
+    pub fn tell_fault(&self, name: &str, fault: &str) {
+        let name = shaderscript::strip_extension(name);
+        if lock(&self.told).insert(name.to_ascii_lowercase()) {
+            log::warn!("material {name}: {fault}; the default is drawn");
+        }
+    }
+
+    /// Script files of which nothing is used, with the reason: they cannot be read, or their braces do not match.
+    pub fn unusable_files(&self) -> &[Diagnostic] {
+        &self.unusable
     }
 
     /// Why the engine would not draw a script's definition.

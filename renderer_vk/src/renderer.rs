@@ -235,6 +235,9 @@ impl Renderer {
         for diagnostic in diagnostics {
             log::debug!("{diagnostic}");
         }
+        for fault in scripts.unusable_files() {
+            log::warn!("{fault}");
+        }
         self.assets = Some(Assets::new(
             &self.device,
             files,

@@ -19,6 +19,7 @@ pub struct Library {
     /// Winning definition of each name in lower case.
     by_name: HashMap<String, usize>,
     diagnostics: Vec<Diagnostic>,
+    dropped: Vec<Diagnostic>,
 }
 
 impl Library {
@@ -29,6 +30,10 @@ impl Library {
         let mut library = Library::default();
         for (file, text) in files.into_iter().rev() {
             let script = parse_script(file.as_ref(), text.as_ref());
+            if script.dropped.is_some() {
+                // what the file is dropped for is found before anything else
+                library.dropped.extend(script.diagnostics.first().cloned());
+            }
             library.diagnostics.extend(script.diagnostics);
             if script.dropped.is_some() {
                 continue;
@@ -80,6 +85,21 @@ impl Library {
         self.shaders.iter().enumerate().filter_map(|(i, shader)| {
             (self.by_name.get(&shader.name.to_ascii_lowercase()) == Some(&i)).then_some(shader)
         })
+    }
+
+    /// Of each file that contributes nothing, the fault that is the reason.
+    pub fn dropped(&self) -> &[Diagnostic] {
+        &self.dropped
+    }
+
+    /// What the engine would warn about in a definition; why it rejects one is in [`Shader::rejected`].
+    pub fn warnings_of(&self, shader: &Shader) -> impl Iterator<Item = &Diagnostic> {
+        let of = |diagnostic: &&Diagnostic| {
+            diagnostic.severity == Severity::Warning
+                && diagnostic.file == shader.location.file
+                && diagnostic.shader.as_deref() == Some(shader.name.as_str())
+        };
+        self.diagnostics.iter().filter(of)
     }
 
     /// All faults of all files, and a note for every definition that another one hides.
@@ -145,6 +165,30 @@ mod tests {
         ]);
         assert_eq!(images(&library, "a"), ["x"]);
         assert!(library.find("b").is_none());
-        assert!(!library.diagnostics().is_empty());
+        let dropped: Vec<_> = library.dropped().iter().map(|d| d.to_string()).collect();
+        assert_eq!(
+            dropped,
+            [
+                "bad:6:1: error: a: braces are not balanced up to the end of the file; the engine ignores the whole file"
+            ]
+        );
+    }
+
+    #[test]
+    fn warnings_belong_to_their_definition() {
+        let library = Library::new([
+            (
+                "one",
+                "a {\n{\nmap x\nrgbGen nothing\n}\n}\nb {\n{\nmap x\n}\n}\n",
+            ),
+            ("two", "c {\ncull sideways\n{\nmap x\n}\n}\n"),
+        ]);
+        let lines = |name: &str| -> Vec<u32> {
+            let shader = library.find(name).unwrap();
+            library.warnings_of(shader).map(|d| d.line).collect()
+        };
+        assert_eq!(lines("a"), [4]);
+        assert_eq!(lines("b"), [0; 0]);
+        assert_eq!(lines("c"), [2]);
     }
 }

@@ -354,7 +354,12 @@ fn finish(width: u32, height: u32, rgba: Vec<u8>) -> Result<Image, Fault> {
 }
 
 fn foreign(format: ImageFormat, bytes: &[u8]) -> Result<Image, Fault> {
-    let fault = |e: image::ImageError| Fault::Malformed(e.to_string());
+    // some of these messages end in a line break
+    let fault = |e: image::ImageError| {
+        let message = e.to_string();
+        let words: Vec<&str> = message.split_whitespace().collect();
+        Fault::Malformed(words.join(" "))
+    };
     let mut reader = image::ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(MAX_PIXELS * 16);

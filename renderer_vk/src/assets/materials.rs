@@ -199,6 +199,7 @@ impl Materials {
             if self.settings.print {
                 log::info!("*SHADER* {name}");
             }
+            self.tell_warnings(&shader);
             self.add(strip_extension(name), shader, class, true, None, source)
         } else {
             let kind = match class {
@@ -224,6 +225,18 @@ impl Materials {
         };
         self.by_key.insert(key, index);
         index
+    }
+
+    /// Tells what the engine would warn about in a script, when the first material is made of it.
+    fn tell_warnings(&self, shader: &Shader) {
+        let class = |class| (shader.name.to_ascii_lowercase(), class);
+        let told = |c: &LightmapClass| self.by_key.contains_key(&class(*c));
+        if LightmapClass::ALL.iter().any(told) {
+            return;
+        }
+        for warning in self.scripts.library().warnings_of(shader) {
+            log::warn!("{warning}");
+        }
     }
 
     fn known(&self, stripped: &str, class: LightmapClass) -> Option<u32> {
@@ -259,8 +272,9 @@ impl Materials {
         source: &mut dyn ImageSource,
     ) -> u32 {
         let mut defaulted = shader.rejected.is_some();
+        let place = format!("{}:{}", shader.location.file, shader.location.line);
         if let Some(reason) = &shader.rejected {
-            log::warn!("{name}: {reason}; the default material is drawn instead");
+            self.scripts.tell_fault(name, &format!("{place}: {reason}"));
         }
         if !self.settings.detail_textures {
             shader.stages.retain(|stage| !stage.detail);
@@ -298,9 +312,8 @@ impl Materials {
                 Err(image) => {
                     // menus and mods ask for pictures that do not exist all the time: only scripts are worth a warning
                     if explicit {
-                        log::warn!(
-                            "{name}: image {image} is missing; the default material is drawn instead"
-                        );
+                        let fault = format!("{place}: image {image} is missing");
+                        self.scripts.tell_fault(name, &fault);
                     } else {
                         log::debug!("{name}: no script and no image of that name");
                     }

@@ -57,6 +57,7 @@ impl TextureSettings {
 /// The levels of a texture, the largest first; at least one.
 pub fn prepare(image: &Image, flags: ImageFlags, settings: &TextureSettings) -> Vec<Image> {
     let mut base = image.to_power_of_two(settings.round_down);
+    let whole = (base.width, base.height);
     if settings.greyscale > 0.0 {
         desaturate(&mut base.rgba, settings.greyscale);
     }
@@ -73,9 +74,9 @@ pub fn prepare(image: &Image, flags: ImageFlags, settings: &TextureSettings) -> 
     if flags.mipmap && settings.intensity > 1.0 {
         brighten(&mut base.rgba, settings.intensity);
     }
-    // the engine hands small plain pictures on as they are
-    let resized = (base.width, base.height) != (image.width, image.height);
-    if settings.gamma != 1.0 && (flags.mipmap || resized) {
+    // the engine hands pictures without smaller levels on as they are, unless it had to halve them
+    let halved = (base.width, base.height) != whole;
+    if settings.gamma != 1.0 && (flags.mipmap || halved) {
         apply_gamma(&mut base.rgba, settings.gamma);
     }
     if !flags.mipmap {
@@ -325,16 +326,19 @@ mod tests {
     }
 
     #[test]
-    fn gamma_is_for_images_that_are_scaled() {
+    fn gamma_is_for_images_that_are_halved_or_mipmapped() {
         let brighter = TextureSettings {
             gamma: 2.0,
+            max_size: 64,
             ..settings()
         };
         let first = |side, flags| prepare(&grey(side, side, 64), flags, &brighter)[0].rgba[0];
         // 255 * (64 / 255) ^ 0.5
         assert_eq!(first(2, ImageFlags::WORLD), 128);
-        assert_eq!(first(3, ImageFlags::NO_MIP), 128);
+        assert_eq!(first(128, ImageFlags::NO_MIP), 128);
+        // a power of two or made one
         assert_eq!(first(2, ImageFlags::NO_MIP), 64);
+        assert_eq!(first(3, ImageFlags::NO_MIP), 64);
         // only where the display does none
         let player = Settings {
             gamma: 2.0,

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use shaders::types::constants as c;
 
+use super::cull;
 use super::entity;
 use super::gather::{Gatherer, count};
 use super::lighting;
@@ -133,14 +134,7 @@ impl Gatherer<'_> {
     }
 
     pub(super) fn culls_box(&self, entity: &RefEntity, bounds: &Bounds) -> bool {
-        let corners = bounds.corners().map(|c| {
-            entity.origin + entity.axis[0] * c.x + entity.axis[1] * c.y + entity.axis[2] * c.z
-        });
-        self.planes().iter().any(|plane| {
-            corners
-                .iter()
-                .all(|corner| plane.truncate().dot(*corner) < plane.w)
-        })
+        cull::corners(&cull::placed(entity, bounds), self.planes()) == cull::Lies::Outside
     }
 
     fn add_brush_model(

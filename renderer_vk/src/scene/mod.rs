@@ -4,6 +4,7 @@
 //! instances, the vertices of everything that moves or deforms (evaluated on the CPU, in the space of their
 //! instance), and the sorted list of visible surfaces that the classic look draws.
 
+mod cull;
 mod debug_polygons;
 mod entities;
 mod entity;
@@ -42,7 +43,7 @@ pub use rigid::{MeshId, RigidMesh, Shape};
 pub use shadow_volumes::ShadowVolumes;
 pub(crate) use shapes::perpendicular;
 pub use sky::{CELLS as SKY_CELLS, Cells, FACES as SKY_FACES, SkyCoverage, VisibleSky, cube_point};
-pub use statistics::{CullCounts, Statistics};
+pub use statistics::{CullCounts, Lying, Statistics};
 pub use view::View;
 
 /// Where a surface's triangles are.

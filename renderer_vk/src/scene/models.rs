@@ -8,6 +8,7 @@ use glam::Vec3;
 use q3model::{BoneMatrix, Frame, Iqm, IqmSurface, MdrSurface};
 use shaders::types::Vertex;
 
+use super::cull;
 use super::gather::{Gatherer, count};
 use super::key_frames::{self, Frames};
 use super::mesh::RawMesh;
@@ -107,11 +108,11 @@ impl Gatherer<'_> {
         let Some(finest) = lods.first() else {
             return;
         };
-        let Some((frames, level)) = self.frames_in_sight(&placed, &finest.md3.frames, lods.len())
-        else {
+        let frames = Frames::of(placed.entity, finest.md3.frames.len());
+        let Some(level) = self.level(&placed, &finest.md3.frames, frames, lods.len()) else {
             return;
         };
-        let (Some(lod), Some(frame)) = (lods.get(level), finest.md3.frames.get(frames.new)) else {
+        let Some(lod) = lods.get(level) else {
             return;
         };
         // a coarser level may have fewer frames
@@ -119,6 +120,9 @@ impl Gatherer<'_> {
             frames
         } else {
             Frames::of(&RefEntity::default(), 1)
+        };
+        let Some(frame) = self.frame_in_sight(&placed, &lod.md3.frames, frames) else {
+            return;
         };
         let placed = self.place(placed, frame.local_origin, frame.radius, out);
         let still = (frames.backlerp == 0.0).then_some(StillFrame {
@@ -137,15 +141,15 @@ impl Gatherer<'_> {
 
     fn add_mdr(&mut self, placed: Placed<'_>, model: &MdrModel, out: &mut ViewScene) {
         let mdr = &model.mdr;
-        let Some((frames, level)) = self.frames_in_sight(&placed, &mdr.frames, mdr.lods.len())
-        else {
+        let frames = Frames::of(placed.entity, mdr.frames.len());
+        let Some(level) = self.level(&placed, &mdr.frames, frames, mdr.lods.len()) else {
             return;
         };
         let (Some(surfaces), Some(materials)) = (mdr.lods.get(level), model.materials.get(level))
         else {
             return;
         };
-        let Some(frame) = mdr.frames.get(frames.new) else {
+        let Some(frame) = self.frame_in_sight(&placed, &mdr.frames, frames) else {
             return;
         };
         let placed = self.place(placed, frame.local_origin, frame.radius, out);
@@ -201,27 +205,32 @@ impl Gatherer<'_> {
         self.scratch.bones = pose;
     }
 
-    /// The frames and the level of detail of a model in sight; `None` for one that is out of sight.
-    fn frames_in_sight(
+    /// The level of detail of a model, by the size of its frame in the finest one.
+    fn level(
         &self,
         placed: &Placed<'_>,
-        list: &[Frame],
+        finest: &[Frame],
+        frames: Frames,
         levels: usize,
-    ) -> Option<(Frames, usize)> {
-        let entity = placed.entity;
-        let frames = Frames::of(entity, list.len());
-        let frame = list.get(frames.new)?;
-        let old = list.get(frames.old).unwrap_or(frame);
-        let both = Bounds {
-            mins: frame.mins.min(old.mins),
-            maxs: frame.maxs.max(old.maxs),
-        };
-        if self.culls_box(entity, &both) {
-            return None;
-        }
+    ) -> Option<usize> {
+        let (frame, at) = (finest.get(frames.new)?, placed.entity.origin);
         let settings = self.input.settings;
-        let level = key_frames::level_of_detail(levels, frame, entity.origin, &self.view, settings);
-        Some((frames, level))
+        Some(key_frames::level_of_detail(
+            levels, frame, at, &self.view, settings,
+        ))
+    }
+
+    /// The newer of the frames that a model is drawn between, of those of its level of detail; `None` out of sight.
+    fn frame_in_sight<'m>(
+        &self,
+        placed: &Placed<'_>,
+        list: &'m [Frame],
+        frames: Frames,
+    ) -> Option<&'m Frame> {
+        let new = list.get(frames.new)?;
+        let old = list.get(frames.old).unwrap_or(new);
+        let lies = cull::model(placed.entity, new, old, self.planes());
+        (!lies.is_outside()).then_some(new)
     }
 
     /// Lights a model and finds the fog that it is in, by the sphere around it: `middle` is in the model's space but

@@ -1,16 +1,20 @@
 //! Counts of a view for `r_speeds`: what the engine's own renderer counts, of this one's work.
 
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 use q3bsp::SurfaceKind;
+use q3model::Frame;
 
+use super::cull::{self, Lies, ModelLies};
 use super::gather::Gatherer;
+use super::key_frames::Frames;
 use super::{DrawSurface, ViewScene};
+use crate::api::{RefEntity, renderfx};
 use crate::assets::Model;
 use crate::world::{Bounds, WorldData};
 
-/// How boxes lie to the view's pyramid.
+/// How what was tested against the view's pyramid lies to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CullCounts {
+pub struct Lying {
     /// Wholly within.
     pub inside: u32,
     /// Cut by it.
@@ -54,30 +58,44 @@ pub struct Statistics {
     pub far: f32,
 }
 
+/// What was tested of curves or models: spheres, and boxes where these did not decide.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CullCounts {
+    /// Spheres.
+    pub spheres: Lying,
+    /// Boxes.
+    pub boxes: Lying,
+}
+
+impl Lying {
+    fn count(&mut self, lies: Lies) {
+        *match lies {
+            Lies::Inside => &mut self.inside,
+            Lies::Across => &mut self.clipped,
+            Lies::Outside => &mut self.outside,
+        } += 1;
+    }
+
+    fn add(&mut self, other: Self) {
+        self.inside += other.inside;
+        self.clipped += other.clipped;
+        self.outside += other.outside;
+    }
+}
+
 impl CullCounts {
-    fn add(&mut self, corners: &[Vec3; 8], planes: &[Vec4]) {
-        let behind = |plane: &Vec4| {
-            corners
-                .iter()
-                .filter(|corner| plane.truncate().dot(**corner) < plane.w)
-                .count()
-        };
-        let mut cut = false;
-        for plane in planes {
-            match behind(plane) {
-                0 => {}
-                8 => {
-                    self.outside += 1;
-                    return;
-                }
-                _ => cut = true,
-            }
+    fn count(&mut self, lies: ModelLies) {
+        if let Some(lies) = lies.by_sphere {
+            self.spheres.count(lies);
         }
-        if cut {
-            self.clipped += 1;
-        } else {
-            self.inside += 1;
+        if let Some(lies) = lies.by_box {
+            self.boxes.count(lies);
         }
+    }
+
+    fn add(&mut self, other: Self) {
+        self.spheres.add(other.spheres);
+        self.boxes.add(other.boxes);
     }
 }
 
@@ -107,11 +125,8 @@ impl Statistics {
         self.vertices += vertices;
         self.triangles += triangles;
         self.drawn_triangles += drawn_triangles;
-        for (sum, counts) in [(&mut self.patches, patches), (&mut self.models, models)] {
-            sum.inside += counts.inside;
-            sum.clipped += counts.clipped;
-            sum.outside += counts.outside;
-        }
+        self.patches.add(patches);
+        self.models.add(models);
         self.cluster = cluster;
         self.lit_surfaces += lit_surfaces;
         self.unlit_surfaces += unlit_surfaces;
@@ -186,7 +201,7 @@ impl Gatherer<'_> {
                 continue;
             };
             if surface.kind == SurfaceKind::Patch {
-                counts.patches.add(&surface.bounds.corners(), &self.frustum);
+                counts.patches.count(self.curve_lies(&surface.bounds));
             }
             let near = super::surfaces::lights_at(&lights, &surface.bounds);
             let reached = surface.plane.filter(|_| surface.flat).is_none_or(|plane| {
@@ -200,34 +215,62 @@ impl Gatherer<'_> {
         }
     }
 
+    /// A curve of the map: by the sphere around its box, then by the box.
+    fn curve_lies(&self, bounds: &Bounds) -> ModelLies {
+        let half = (bounds.maxs - bounds.mins) * 0.5;
+        let by_sphere = cull::sphere(bounds.mins + half, half.length(), &self.frustum);
+        ModelLies {
+            by_sphere: Some(by_sphere),
+            by_box: (by_sphere == Lies::Across)
+                .then(|| cull::corners(&bounds.corners(), &self.frustum)),
+        }
+    }
+
     fn count_models(&self, counts: &mut Statistics) {
         for entity in self.entities {
             let model = self.input.models.get(entity.model);
             let Some(model) = model.filter(|_| entity.kind == crate::api::EntityKind::Model) else {
                 continue;
             };
-            let frame = usize::try_from(entity.frame).ok();
-            let Some((mins, maxs)) = frame.and_then(|frame| frame_bounds(model, frame)) else {
+            if entity.renderfx & renderfx::FIRST_PERSON != 0 && self.view.is_portal {
                 continue;
+            }
+            let of_frames = |list: &[Frame]| {
+                let frames = Frames::of(entity, list.len());
+                let (new, old) = (list.get(frames.new)?, list.get(frames.old)?);
+                Some(cull::model(entity, new, old, &self.frustum))
             };
-            let bounds = Bounds { mins, maxs };
-            let corners = bounds.corners().map(|c| {
-                entity.origin + entity.axis[0] * c.x + entity.axis[1] * c.y + entity.axis[2] * c.z
-            });
-            counts.models.add(&corners, &self.frustum);
+            let lies = match model {
+                Model::Mesh { lods } => lods.first().and_then(|lod| of_frames(&lod.md3.frames)),
+                Model::Mdr(model) => of_frames(&model.mdr.frames),
+                Model::Iqm(model) => Some(self.skeleton_lies(entity, &model.iqm)),
+                Model::Inline { .. } => None,
+            };
+            if let Some(lies) = lies {
+                counts.models.count(lies);
+            }
         }
     }
-}
 
-/// The box around a frame of a model of triangles.
-fn frame_bounds(model: &Model, frame: usize) -> Option<(Vec3, Vec3)> {
-    let frames = match model {
-        Model::Mesh { lods } => &lods.first()?.md3.frames,
-        Model::Mdr(model) => &model.mdr.frames,
-        Model::Iqm(model) => return model.iqm.bounds.get(frame).copied(),
-        Model::Inline { .. } => return None,
-    };
-    frames.get(frame).map(|frame| (frame.mins, frame.maxs))
+    fn skeleton_lies(&self, entity: &RefEntity, iqm: &q3model::Iqm) -> ModelLies {
+        let frames = Frames::of(entity, iqm.num_frames.max(iqm.bounds.len()));
+        let of = |frame: usize| iqm.bounds.get(frame).copied();
+        let by_box = match (of(frames.new), of(frames.old)) {
+            (Some((mins, maxs)), Some((old_mins, old_maxs))) => {
+                let both = Bounds {
+                    mins: mins.min(old_mins),
+                    maxs: maxs.max(old_maxs),
+                };
+                cull::corners(&cull::placed(entity, &both), &self.frustum)
+            }
+            // one that tells no bounds may be anywhere
+            _ => Lies::Across,
+        };
+        ModelLies {
+            by_sphere: None,
+            by_box: Some(by_box),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -235,23 +278,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn boxes_are_inside_cut_or_outside() {
-        let plane = Vec3::X.extend(0.0);
-        let corners = |x: f32| {
-            Bounds {
-                mins: Vec3::new(x, 0.0, 0.0),
-                maxs: Vec3::new(x + 2.0, 1.0, 1.0),
-            }
-            .corners()
-        };
+    fn each_test_that_was_made_counts() {
         let mut counts = CullCounts::default();
-        for x in [1.0, 5.0, -1.0, -9.0] {
-            counts.add(&corners(x), &[plane]);
-        }
+        let lies = |by_sphere, by_box| ModelLies { by_sphere, by_box };
+        counts.count(lies(Some(Lies::Inside), None));
+        counts.count(lies(Some(Lies::Across), Some(Lies::Outside)));
+        counts.count(lies(None, Some(Lies::Across)));
+        let lying = |inside, clipped, outside| Lying {
+            inside,
+            clipped,
+            outside,
+        };
         let expected = CullCounts {
-            inside: 2,
-            clipped: 1,
-            outside: 1,
+            spheres: lying(1, 1, 0),
+            boxes: lying(0, 1, 1),
         };
         assert_eq!(counts, expected);
     }

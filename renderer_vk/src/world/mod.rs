@@ -274,6 +274,15 @@ impl World {
         let files = std::sync::Arc::clone(assets.textures.files());
         let options = WorldOptions::new(settings);
         let relit = RelitWorld::load(&*files, &assets.scripts, name, options.relight())?;
+        for warning in &relit.bsp.warnings {
+            log::warn!("{name}: {warning}");
+        }
+        if !relit.bsp.light_grid.is_empty() && relit.bsp.light_grid().is_none() {
+            log::warn!(
+                "{name}: lump lightgrid: its {} points are not those of the map's bounds; models are lit evenly",
+                relit.bsp.light_grid.len()
+            );
+        }
         let mut failure = None;
         let data = WorldData::new(
             relit,

@@ -28,6 +28,8 @@ mod coordinates;
 mod deforms;
 mod effects;
 mod entities;
+mod image_files;
+mod images;
 mod materials;
 mod models;
 mod stages;
@@ -115,6 +117,7 @@ pub fn scenes() -> Vec<Scene> {
     all.extend(coordinates::scenes());
     all.extend(deforms::scenes());
     all.extend(stages::scenes());
+    all.extend(images::scenes());
     all.extend(materials::scenes());
     all
 }
