@@ -17,7 +17,7 @@ use crate::view::{Maps, open};
 ///
 /// Compared is the irradiance that tracing gives (direct, bounced and ambient) with stored light, at measurements that
 /// fitting did not see: the median of |log2(traced / stored)| in stops, before (what directives say) and after. `sum` is
-/// all traced light over all stored light.
+/// all traced light over all stored light; `gamma` what the map's compiler encoded light with, 1 for nothing.
 ///
 /// Example: relight calibration oa_dm1 fan --cache ~/.cache/relight
 #[derive(Args, Debug)]
@@ -48,9 +48,10 @@ pub struct CalibrationArgs {
 pub fn run(args: &CalibrationArgs) -> Result<()> {
     if !args.json {
         println!(
-            "{:20} {:>9} {:>7} {:>5} {:>6} {:>7} {:>7} {:>6} {:>7} {:>7} {:>8}",
+            "{:20} {:>9} {:>5} {:>7} {:>5} {:>6} {:>7} {:>7} {:>6} {:>7} {:>7} {:>8}",
             "map",
             "evidence",
+            "gamma",
             "samples",
             "known",
             "placed",
@@ -98,8 +99,9 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
             println!("{}", as_json(map, report, found.as_ref()));
         } else {
             println!(
-                "{map:20} {:>9} {:7} {:5} {:6} {:7.3} {:7.3} {:6.2} {:7.3} {:7.3} {:8.2}",
+                "{map:20} {:>9} {:5.1} {:7} {:5} {:6} {:7.3} {:7.3} {:6.2} {:7.3} {:7.3} {:8.2}",
                 report.evidence.label(),
+                report.gamma,
                 report.samples,
                 report.known,
                 report.placed,
@@ -171,6 +173,7 @@ fn as_json(map: &str, report: &CalibrationReport, found: Option<&Recovery>) -> V
     json!({
         "map": map,
         "evidence": report.evidence.label(),
+        "gamma": report.gamma,
         "samples": report.samples,
         "held_out": report.held_out,
         "known": report.known,

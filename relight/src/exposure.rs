@@ -3,7 +3,8 @@
 //!
 //! The engine multiplies display-encoded colours by lightmap values `v` (1 shows a texture as it is); so on the screen
 //! a texture of linear albedo ρ has the linear brightness ρ · decode(v). A tracer finds the light itself, ρ · v. Over
-//! a map's texels, the mean of decode(v) over the mean of v is the factor between the two.
+//! a map's texels, the mean of decode(v) over the mean of v is the factor between the two; where the map's compiler
+//! stored light with a gamma g, that light is ρ · v^g, and the mean is over that.
 
 use crate::overbright;
 use crate::world::RelitWorld;
@@ -26,7 +27,7 @@ pub(crate) const DEFAULT_EXPONENT: f32 = 1.4;
 
 /// The exposure of a map, a factor of radiance: from its lightmaps, else from the colours of its vertices.
 pub fn display_exposure(world: &RelitWorld) -> f32 {
-    of_stored(&world.bsp, |light| ratio(light)).unwrap_or(DEFAULT)
+    of_stored(&world.bsp, |light| ratio(light, world.stored_gamma)).unwrap_or(DEFAULT)
 }
 
 /// The exponent of the power law that the display's curve D comes to where a map shows its light: the mean of
@@ -58,12 +59,12 @@ fn level(rgb: [u8; 3]) -> Option<f32> {
     (value > DARK).then_some(value)
 }
 
-/// Mean decoded brightness over mean brightness; `None` where all is dark.
-fn ratio(colors: impl Iterator<Item = [u8; 3]>) -> Option<f32> {
+/// Mean decoded brightness over mean light, which is brightness to the power of `gamma`; `None` where all is dark.
+fn ratio(colors: impl Iterator<Item = [u8; 3]>, gamma: f32) -> Option<f32> {
     let (mut decoded, mut stored) = (0.0_f64, 0.0_f64);
     for value in colors.filter_map(level) {
         decoded += f64::from(overbright::to_linear(value));
-        stored += f64::from(value);
+        stored += f64::from(value.powf(gamma));
     }
     (stored > 0.0).then(|| ((decoded / stored) as f32).clamp(LIMITS.0, LIMITS.1))
 }
@@ -86,14 +87,17 @@ mod tests {
     fn even_light_is_exposed_to_what_the_engine_shows() {
         // half of full brightness everywhere: shown as decode(0.5) instead of 0.5
         let value = 128.0_f32 / 255.0;
-        let found = ratio(std::iter::repeat_n([128; 3], 10)).unwrap();
+        let found = ratio(std::iter::repeat_n([128; 3], 10), 1.0).unwrap();
         assert!(
             (found - overbright::to_linear(value) / value).abs() < 1e-5,
             "{found}"
         );
-        assert_eq!(ratio(std::iter::repeat_n([255; 3], 4)), Some(1.0));
-        assert_eq!(ratio(std::iter::empty()), None);
-        assert_eq!(ratio(std::iter::repeat_n([1, 0, 0], 4)), None);
+        // light that was stored encoded as the display decodes it is shown as it is
+        let encoded = ratio(std::iter::repeat_n([128; 3], 10), 2.2).unwrap();
+        assert!((encoded - 1.0).abs() < 0.03, "{encoded}");
+        assert_eq!(ratio(std::iter::repeat_n([255; 3], 4), 1.0), Some(1.0));
+        assert_eq!(ratio(std::iter::empty(), 1.0), None);
+        assert_eq!(ratio(std::iter::repeat_n([1, 0, 0], 4), 1.0), None);
         let curve = exponent(std::iter::repeat_n([128; 3], 10)).unwrap();
         let x = value * TEXTURE;
         let step = (overbright::to_linear(x * 1.01) / overbright::to_linear(x)).ln() / 1.01f32.ln();

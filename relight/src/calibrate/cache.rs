@@ -121,6 +121,7 @@ fn print(solution: &Solution) -> String {
     );
     let _ = writeln!(text, "before {}", agreement(&report.before));
     let _ = writeln!(text, "after {}", agreement(&report.after));
+    let _ = writeln!(text, "gamma {}", report.gamma);
     let _ = writeln!(text, "ambient {}", three(solution.ambient));
     for strength in &solution.known {
         let _ = writeln!(text, "known {}", three(*strength));
@@ -182,6 +183,10 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
             }
             "before" => solution.report.before = agreement.ok_or(wrong("not three numbers"))?,
             "after" => solution.report.after = agreement.ok_or(wrong("not three numbers"))?,
+            "gamma" => match numbers[..] {
+                [gamma] if finite && super::gamma::possible(gamma) => solution.report.gamma = gamma,
+                _ => return Err(wrong("not a gamma")),
+            },
             "ambient" => solution.ambient = light(&numbers)?,
             "known" => solution.known.push(light(&numbers)?),
             "placed" => {

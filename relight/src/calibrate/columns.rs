@@ -17,9 +17,6 @@ use std::f32::consts::{PI, TAU};
 /// Contributions below this part of a sample are traced only sometimes, and then count for more (Russian roulette).
 const ROULETTE: f32 = 0.02;
 
-/// Least light that a contribution is measured against, irradiance / π: two steps of a stored byte.
-const LEAST: f32 = 2.0 * super::samples::STORED_UNIT;
-
 /// Shadow rays to a triangle that is large as seen from a sample.
 const RAYS: u32 = 6;
 
@@ -199,6 +196,20 @@ pub(super) fn known(
             prior: Some(prior_of(sun.irradiance, EmissionSource::SurfaceLight)),
         });
     }
+    // Directives tell of light before the compiler's gamma: of less of the display's curve than was taken for granted.
+    if world.stored_gamma != 1.0 {
+        let color = |light| crate::light::raise(light, world.stored_gamma.recip());
+        for column in &mut columns {
+            column.strength = color(column.strength);
+            if let Some(prior) = &mut column.prior {
+                prior.value = color(prior.value);
+                let floor = Vec3::splat(prior.value.max_element() * 0.1);
+                let loosest = prior.high.max_element() / prior.value.max_element().max(1e-30);
+                prior.high = prior.high.max(prior.value.max(floor) * loosest.min(24.0));
+                prior.low = prior.low.min(prior.value);
+            }
+        }
+    }
     columns
 }
 
@@ -317,7 +328,7 @@ fn triangles_at(
     random: &mut Random,
 ) -> Vec<(u32, f32)> {
     let mut sums: Vec<f32> = vec![0.0; groups.len()];
-    let scale = sample.level() + LEAST;
+    let scale = sample.level() + sample.floor;
     for &entry in world.light_lists.row(sample.cluster) {
         let LightRef::Triangle(index) = world.light_lists.light(entry) else {
             continue;
@@ -466,6 +477,7 @@ mod tests {
             cluster: 0,
             material: u32::MAX,
             saturated: false,
+            floor: 0.0,
             trust: 1.0,
             held_out: false,
         };

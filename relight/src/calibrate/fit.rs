@@ -4,8 +4,8 @@ use super::bounce::{Transfer, surfaces_of_triangles};
 use super::columns::Column;
 use super::place::{self, Scene};
 use super::report::Agreement;
-use super::samples::{Sample, mean};
-use super::solve::{self, Ambient, BLACK, Effort};
+use super::samples::{Sample, light_of, mean};
+use super::solve::{self, Ambient, Effort};
 use super::{Occluders, suns};
 use crate::world::RelitWorld;
 use glam::Vec3;
@@ -51,7 +51,7 @@ impl Fit<'_> {
     /// Light at the samples as it is computed now.
     pub fn agreement(&self) -> Agreement {
         let computed = solve::predict(&self.samples, &self.columns, self.ambient.value);
-        Agreement::of(&self.samples, &computed)
+        Agreement::of(self.world, &self.samples, &computed)
     }
 
     /// Takes bounced light from the strengths as they are. `pictures`: with what pictures of skies give.
@@ -129,7 +129,7 @@ impl Fit<'_> {
     pub fn more_ambient(&mut self) {
         let kept = (self.columns.clone(), self.ambient);
         let before = self.agreement().median_stops;
-        self.ambient.limit = quantile(&self.samples, 0.2, BLACK);
+        self.ambient.limit = quantile(&self.samples, 0.2, light_of(self.world, 1.0));
         self.settle();
         if self.agreement().median_stops > before * MORE_AMBIENT {
             (self.columns, self.ambient) = kept;

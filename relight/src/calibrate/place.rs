@@ -9,7 +9,7 @@ use super::bvh::Occluders;
 use super::columns::{Column, Source, point_rows};
 use super::parallel;
 use super::samples::{self, Sample, mean};
-use super::solve::{Ambient, Effort, FLOOR, Residual, norm, residual, solve};
+use super::solve::{Ambient, Effort, Residual, norm, residual, solve};
 use crate::world::RelitWorld;
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -84,7 +84,7 @@ impl Scene<'_> {
         let all: Vec<u32> = (0u32..)
             .zip(self.samples)
             .filter(|(_, s)| {
-                let least = (s.level() + FLOOR) * (INFLUENCE * PI);
+                let least = (s.level() + s.floor) * (INFLUENCE * PI);
                 let distance = (s.position.distance(origin) - margin).max(1.0);
                 let before = (origin - s.position).dot(s.normal) > -margin;
                 !s.held_out && before && intensity > least * distance * distance
@@ -101,6 +101,7 @@ impl Scene<'_> {
     /// is brightest, and measurements are too sparse to tell of such spots.
     fn limit(&self, origin: Vec3) -> Vec3 {
         let mut limit = Vec3::INFINITY;
+        let floor = samples::floor(self.world);
         let corners = (0..8u8).map(|k| {
             let side = |bit: u8| if k & bit == 0 { -1.0 } else { 1.0 };
             Vec3::new(side(1), side(2), side(4)).normalize()
@@ -118,7 +119,7 @@ impl Scene<'_> {
                 && hit.front
                 && cosine > 0.1
             {
-                let most = (stored + FLOOR) * (EXCESS * PI * hit.t * hit.t / cosine);
+                let most = (stored + floor) * (EXCESS * PI * hit.t * hit.t / cosine);
                 limit = limit.min(most);
             }
         }
@@ -199,7 +200,7 @@ impl Scene<'_> {
             .zip(&state.rest)
             .enumerate()
             .filter(|(_, (s, _))| !s.held_out)
-            .map(|(i, (s, rest))| (mean(*rest) / (s.level() + FLOOR), i))
+            .map(|(i, (s, rest))| (mean(*rest) / (s.level() + s.floor), i))
             .filter(|(missing, _)| *missing > 0.25)
             .collect();
         worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));

@@ -1,15 +1,19 @@
 //! How well traced light agrees with stored light.
 
-use super::samples::{Evidence, STORED_UNIT, Sample, mean};
+use super::samples::{Evidence, Sample, light_of, mean};
+use crate::world::RelitWorld;
 use glam::Vec3;
 
-/// Stored light below which ratios mean nothing, irradiance / π.
-const DARK: f32 = 2.0 * STORED_UNIT;
+/// Stored light below which ratios mean nothing, steps of a byte.
+const DARK: f32 = 2.0;
 
-/// Least computed light in a ratio, irradiance / π: black counts as this.
-const BLACK: f32 = 0.25 * STORED_UNIT;
+/// Least computed light in a ratio, steps of a byte: black counts as this.
+const BLACK: f32 = 0.25;
 
 /// Computed light against stored light, over measurements that fitting did not see.
+///
+/// Stops are those of what is stored: where a map's compiler encoded light with a gamma, computed light is encoded so,
+/// too.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Agreement {
     /// Median of |log2(computed / stored)|, stops: 0 is perfect, 1 is a factor of two.
@@ -22,16 +26,19 @@ pub struct Agreement {
 
 impl Agreement {
     /// Of samples that are held out, not cut off and not all dark.
-    pub(super) fn of(samples: &[Sample], computed: &[Vec3]) -> Agreement {
+    pub(super) fn of(world: &RelitWorld, samples: &[Sample], computed: &[Vec3]) -> Agreement {
+        let (dark, black) = (light_of(world, DARK), light_of(world, BLACK));
         let judged = || {
             samples
                 .iter()
                 .zip(computed)
-                .filter(|(s, _)| s.held_out && !s.saturated && s.level() >= DARK)
+                .filter(|(s, _)| s.held_out && !s.saturated && s.level() >= dark)
                 .map(|(s, c)| (s.level(), mean(*c)))
         };
         let mut stops: Vec<f32> = judged()
-            .map(|(stored, computed)| (computed.max(BLACK) / stored).log2().abs())
+            .map(|(stored, computed)| {
+                (computed.max(black) / stored).log2().abs() / world.stored_gamma
+            })
             .collect();
         stops.sort_by(f32::total_cmp);
         let quantile = |q: f32| {
@@ -54,7 +61,7 @@ impl Agreement {
 }
 
 /// What calibration did.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationReport {
     /// What told of light.
     pub evidence: Evidence,
@@ -68,6 +75,9 @@ pub struct CalibrationReport {
     pub placed: usize,
     /// Suns put in.
     pub suns: usize,
+    /// Gamma that the compiler encoded light with before it stored it: see
+    /// [`RelitWorld::stored_gamma`](crate::RelitWorld::stored_gamma).
+    pub gamma: f32,
     /// Agreement of the light that directives tell of: direct, ambient and bounced.
     pub before: Agreement,
     /// Agreement of calibrated light: direct, ambient and bounced.
@@ -76,4 +86,23 @@ pub struct CalibrationReport {
     pub cached: bool,
     /// Time that it took.
     pub seconds: f64,
+}
+
+impl Default for CalibrationReport {
+    /// Nothing done, of a map that stores light as it is.
+    fn default() -> Self {
+        CalibrationReport {
+            evidence: Evidence::Nothing,
+            samples: 0,
+            held_out: 0,
+            known: 0,
+            placed: 0,
+            suns: 0,
+            gamma: 1.0,
+            before: Agreement::default(),
+            after: Agreement::default(),
+            cached: false,
+            seconds: 0.0,
+        }
+    }
 }

@@ -23,6 +23,8 @@ pub struct Residual {
     pub bounced: Vec3,
     /// Light that is the same everywhere.
     pub ambient: Vec3,
+    /// Light of one step of a stored byte.
+    pub step: f32,
     /// Some channel of the stored light is at its end: there was at least that much.
     pub saturated: bool,
 }
@@ -36,7 +38,7 @@ impl Residual {
     /// Stops that computed light is above stored light, means of the channels; light of less than one step of a stored
     /// byte counts as one.
     pub fn stops(&self) -> f32 {
-        let level = |v: Vec3| samples::mean(v).max(samples::STORED_UNIT);
+        let level = |v: Vec3| samples::mean(v).max(self.step);
         (level(self.computed()) / level(self.stored)).log2()
     }
 }
@@ -63,6 +65,7 @@ pub fn residuals(world: &RelitWorld, options: &CalibrationOptions) -> Vec<Residu
         direct,
         bounced,
         ambient: world.ambient,
+        step: samples::light_of(world, 1.0),
         saturated: sample.saturated,
     });
     residuals.collect()

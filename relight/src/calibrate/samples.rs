@@ -1,7 +1,7 @@
 //! Measurements of light: what the map compiler stored, and where in space it did.
 //!
 //! Light is counted as the outgoing radiance of a white surface, irradiance / π: a stored byte v is v 4 / 255 (see
-//! [`light`](mod@crate::light)). Its colour is what the engine shows: [`LightColor`](crate::light::LightColor).
+//! [`light`](mod@crate::light)), to the power of the compiler's gamma. Its colour is what the engine shows: [`LightColor`](crate::light::LightColor).
 
 use super::bvh::Occluders;
 use super::random::Random;
@@ -11,8 +11,11 @@ use glam::{Vec2, Vec3};
 use q3bsp::{Lightmap, SurfaceKind};
 use shaderscript::light::SurfaceClass;
 
-/// Radiance of white for a stored value of 1.
+/// Radiance of white for a stored value of 1, where light is stored as it is.
 pub(super) const STORED_UNIT: f32 = 4.0 / 255.0;
+
+/// Steps of a stored byte that are too few to tell apart.
+const FLOOR: f32 = 2.0;
 
 /// How far off its surface light is gathered, id units.
 const LIFT: f32 = 1.0;
@@ -48,6 +51,8 @@ pub(super) struct Sample {
     pub material: u32,
     /// Some channel is at its end: there was at least that much light.
     pub saturated: bool,
+    /// Light that is too little to tell apart, added to both sides of a ratio, irradiance / π.
+    pub floor: f32,
     /// How much it tells, at most 1.
     pub trust: f32,
     /// Kept out of fitting, to judge by.
@@ -64,6 +69,24 @@ impl Sample {
 /// Mean of the channels.
 pub(super) fn mean(value: Vec3) -> f32 {
     value.element_sum() / 3.0
+}
+
+/// Light, irradiance / π, of so many steps of a stored byte.
+pub(super) fn light_of(world: &RelitWorld, steps: f32) -> f32 {
+    (steps * STORED_UNIT).powf(world.stored_gamma)
+}
+
+/// Light that is too little to tell apart: two steps of a stored byte, and more where steps in the dark are finer than
+/// their light is known.
+pub(super) fn floor(world: &RelitWorld) -> f32 {
+    light_of(world, FLOOR * world.stored_gamma)
+}
+
+/// Light of a stored colour: bytes were gamma-encoded by the compiler, and it was multiplied by `scale` before that. Its
+/// colour is what the engine shows of the stored one.
+fn decode(world: &RelitWorld, stored: Vec3, scale: f32) -> Vec3 {
+    let light = stored.map(|channel| light_of(world, channel)) / scale;
+    light::raise(light, world.color_exponent / world.stored_gamma)
 }
 
 /// What measurements were taken from.
@@ -223,6 +246,7 @@ fn sample_at(
         cluster,
         material,
         saturated: stored.rgb.contains(&255),
+        floor: floor(world),
         trust: if stored.lone_black {
             TRUST_IN_BLACK
         } else {
@@ -254,8 +278,7 @@ impl Stored {
 
     /// The light that it stands for, irradiance / π.
     fn light(&self, world: &RelitWorld) -> Vec3 {
-        let value = Vec3::from_array(self.rgb.map(f32::from)) * (STORED_UNIT / self.scale);
-        light::raise(value, world.color_exponent)
+        decode(world, Vec3::from_array(self.rgb.map(f32::from)), self.scale)
     }
 
     /// A texel of a page, of a surface whose light was multiplied by `scale`.
@@ -494,11 +517,12 @@ fn grid(world: &RelitWorld, count: usize, random: &mut Random) -> Vec<Sample> {
             samples.push(Sample {
                 position,
                 normal,
-                value: light::raise(value * STORED_UNIT, world.color_exponent),
+                value: decode(world, value, 1.0),
                 bounce: Vec3::ZERO,
                 cluster,
                 material: u32::MAX,
                 saturated: point.directed.contains(&255),
+                floor: floor(world),
                 trust: 1.0,
                 held_out: false,
             });
@@ -530,6 +554,7 @@ mod tests {
             cluster: 0,
             material: u32::MAX,
             saturated: false,
+            floor: FLOOR * STORED_UNIT,
             trust,
             held_out: false,
         }

@@ -12,14 +12,8 @@
 //! descent with an L1 penalty.
 
 use super::columns::Column;
-use super::samples::{STORED_UNIT, Sample, mean};
+use super::samples::{Sample, mean};
 use glam::Vec3;
-
-/// Light that is too little to tell apart: added to both sides of a ratio, irradiance / π.
-pub(super) const FLOOR: f32 = 2.0 * STORED_UNIT;
-
-/// Stored light below which a sample is black, irradiance / π.
-pub(super) const BLACK: f32 = STORED_UNIT;
 
 /// |log ratio| up to which a sample counts in full.
 const HUBER: f32 = 0.3;
@@ -100,7 +94,7 @@ fn weight(sample: &Sample, computed: f32) -> f32 {
     if sample.held_out || (sample.saturated && computed >= stored) {
         return 0.0;
     }
-    let (c, s) = (computed.max(0.0) + FLOOR, stored + FLOOR);
+    let (c, s) = (computed.max(0.0) + sample.floor, stored + sample.floor);
     let off = (c / s).ln();
     // The slope of off² / 2 at c is off / c; that of w (c - s)² / 2 is the same with this w.
     let slope = if off.abs() < 1e-3 {
@@ -128,7 +122,7 @@ pub(super) fn solve(
             let mean = samples.iter().map(Sample::level).sum::<f32>() / samples.len().max(1) as f32;
             for (weight, sample) in state.weights.iter_mut().zip(samples) {
                 if *weight > 0.0 {
-                    let level = (sample.level() + FLOOR) * (mean + FLOOR);
+                    let level = (sample.level() + sample.floor) * (mean + sample.floor);
                     *weight = sample.trust / level;
                 }
             }

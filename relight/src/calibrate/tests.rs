@@ -327,6 +327,33 @@ fn walls_that_store_less_than_their_light_tell_all_of_it() {
     assert!((total / hidden - 4.0).abs().max_element() < 0.4, "{total}");
 }
 
+#[test]
+fn light_that_was_stored_encoded_is_decoded_again() {
+    // Stored is what the engine shows of it: v, of which v^g is the light.
+    for gamma in [1.0f32, 2.2] {
+        let encoded = |at: Vec3, n: Vec3| from_hidden(at, n).powf(gamma.recip());
+        let mut world = room(false, Some(&encoded));
+        let options = CalibrationOptions {
+            samples: 3000,
+            candidates: 1500,
+            ..Default::default()
+        };
+        let report = calibrate(&mut world, &options);
+        println!("{report:?}");
+        assert_eq!((world.stored_gamma, report.gamma), (gamma, gamma));
+        assert!(report.after.median_stops < 0.05, "{report:?}");
+        let total: Vec3 = world.point_lights.iter().map(|l| l.intensity).sum();
+        let hidden: Vec3 = HIDDEN.iter().map(|(_, i)| *i).sum();
+        let off = (total / hidden - 1.0).abs().max_element();
+        assert!(off < 0.1, "{gamma}: {total}");
+        // The light that directives tell of is counted as it is stored.
+        let there_and_back = world.lighting();
+        world.stored_gamma = 5.0;
+        world.set_lighting(there_and_back);
+        assert_eq!(world.stored_gamma, gamma);
+    }
+}
+
 /// What calibration may change.
 fn lights(world: &RelitWorld) -> String {
     format!(

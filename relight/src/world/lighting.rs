@@ -22,6 +22,7 @@ pub struct Lighting {
     ambient: Vec3,
     report: LightReport,
     calibration: Option<CalibrationReport>,
+    stored_gamma: f32,
 }
 
 impl RelitWorld {
@@ -40,6 +41,7 @@ impl RelitWorld {
             ambient: self.ambient,
             report: self.report.clone(),
             calibration: self.calibration.clone(),
+            stored_gamma: self.stored_gamma,
         }
     }
 
@@ -59,5 +61,6 @@ impl RelitWorld {
         self.ambient = lighting.ambient;
         self.report = lighting.report;
         self.calibration = lighting.calibration;
+        self.stored_gamma = lighting.stored_gamma;
     }
 }

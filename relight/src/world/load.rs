@@ -232,6 +232,7 @@ impl RelitWorld {
             calibration: None,
             warnings,
             color_exponent,
+            stored_gamma: 1.0,
             overbright_shift: options.overbright_shift,
             bsp,
         };

@@ -66,6 +66,10 @@ pub struct RelitWorld {
     /// What ratios of the channels of stored light were raised to, to get the colours of light: see
     /// [`LightColor`](crate::light::LightColor).
     pub color_exponent: f32,
+    /// Gamma g that the map's compiler encoded light with before it stored it, L^(1 / g); 1 where it stored light as it is,
+    /// and where nobody [calibrated](crate::calibrate()) to find out. Light is counted in a unit in which what the engine
+    /// shows as white is 1 with any gamma.
+    pub stored_gamma: f32,
     /// Shift that was applied to vertex colours; see [`overbright`].
     pub overbright_shift: u32,
 }
