@@ -1,6 +1,6 @@
 // A stack of stages as light sees it: what reaches the eye is lit * L + emission + through * background + reflected * R,
 // where L is the light that a white diffuse surface would show here, and R what the mirrored ray sees.
-// shaderscript::light has the same algebra (without reflections) on the CPU and its tests.
+// shaderscript::light has the same algebra (without reflections, and with alpha in linear light) on the CPU and its tests.
 #ifndef RELIGHT_TRACE_LAYER_GLSL
 #define RELIGHT_TRACE_LAYER_GLSL
 
@@ -170,6 +170,19 @@ Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, flo
     }
 }
 
+Layer layer_tint(Layer a, vec3 c) { return Layer(a.lit * c, a.emission * c, a.through * c, a.reflected * c); }
+
+// A stage laid over an opaque body with some alpha. The two are paints of one surface, whose sum its author chose as it is
+// displayed; in linear light the brighter one would count for more than he saw. So the parts are mixed in linear light, and
+// brought to the colour that the mixed display values have where all of them are lit in full.
+Layer layer_paint(Layer body, Layer paint, float alpha) {
+    Layer mixed = layer_add(layer_scale(paint, alpha), layer_scale(body, 1.0 - alpha));
+    vec3 below = max(body.lit + body.emission + body.reflected, 0.0), above = max(paint.lit + paint.emission + paint.reflected, 0.0);
+    vec3 sum = mix(below, above, alpha);
+    vec3 chosen = decode_display(mix(encode_display(below), encode_display(above), alpha));
+    return layer_tint(mixed, mix(vec3(1.0), chosen / max(sum, 1.0e-6), greaterThan(sum, vec3(1.0e-6))));
+}
+
 // One over the linear value of half the display's range.
 const float DOUBLE_PRODUCT = 1.0 / 0.21404114;
 
@@ -230,6 +243,11 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint) {
         if (stage.blend_src == BLEND_DST_COLOR && stage.blend_dst == BLEND_SRC_COLOR) {
             // twice the product, as displayed: half grey leaves what is below as it is, so it has to here too
             layer = layer_scale(layer_product(layer, source), DOUBLE_PRODUCT);
+            continue;
+        }
+        bool painted = stage.blend_src == BLEND_SRC_ALPHA && stage.blend_dst == BLEND_ONE_MINUS_SRC_ALPHA;
+        if (painted && layer.through == vec3(0.0) && alpha > 0.0 && alpha < 1.0) {
+            layer = layer_paint(layer, source, alpha);
             continue;
         }
         layer = layer_add(layer_blend(stage.blend_src, source, source, layer, alpha),

@@ -1,8 +1,8 @@
 //! Translucent layers, cut-outs and fog.
 
 use glam::Vec3;
-use shaders::types::Fog;
 use shaders::types::constants as c;
+use shaders::types::{Fog, Stage};
 
 use super::harness::{Gpu, Scene, identity, rectangle, reference, stage, through_byte};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
@@ -79,6 +79,35 @@ fn layers_are_composed_in_order_however_many_there_are_with(gpu: &mut Gpu) {
     let exact = over(&[(red, 0.05); 40], back);
     let mean = gpu.mean(&scene, &reference(), 1);
     assert!(close(mean, exact), "{mean} {exact}");
+}
+
+#[test]
+fn paints_of_one_body_are_mixed_as_displayed() {
+    Gpu::each(paints_of_one_body_are_mixed_as_displayed_with);
+}
+
+fn paints_of_one_body_are_mixed_as_displayed_with(gpu: &mut Gpu) {
+    let (below, above, alpha) = ([0.2, 0.6, 0.1], [0.9, 0.1, 0.1], 63.0 / 255.0);
+    let byte = |v: f32| (v * 255.0 + 0.001).floor() / 255.0;
+    let mixed = |i: usize| byte(below[i]) * (1.0 - alpha) + byte(above[i]) * alpha;
+    let exact = crate::trace::frame_lights::decode(Vec3::from_array([0, 1, 2].map(mixed)));
+    let stages = [stage::constant(below), stage::blend(above, 0.25)];
+    // as a glow, and lit by half
+    let mut glowing = scene();
+    let wall = glowing.material(&stages, 0);
+    glowing.quad(screen(100.0), wall);
+    let mut lit = scene();
+    lit.ambient = Vec3::splat(0.5);
+    let light = Stage {
+        blend_src: c::BLEND_DST_COLOR,
+        ..stage::light()
+    };
+    let wall = lit.material(&[stages[0], stages[1], light], 0);
+    lit.quad(screen(100.0), wall);
+    for (scene, wanted) in [(glowing, exact), (lit, exact * 0.5)] {
+        let mean = gpu.mean(&scene, &reference(), 1);
+        assert!(close(mean, wanted), "{mean} {wanted}");
+    }
 }
 
 #[test]
@@ -191,8 +220,8 @@ fn lit_layers_and_what_is_behind_them_are_all_lit_with(gpu: &mut Gpu) {
 }
 
 /// What the game fades by its alpha.
-fn matter(color: [f32; 3], alpha: f32) -> shaders::types::Stage {
-    shaders::types::Stage {
+fn matter(color: [f32; 3], alpha: f32) -> Stage {
+    Stage {
         flags: c::STAGE_MATTER | c::STAGE_WHITE,
         ..stage::blend(color, alpha)
     }
