@@ -145,7 +145,7 @@ impl Renderer {
             scene: Scene::default(),
             held: HeldViews::default(),
             assets: None,
-            list: DrawList::default(),
+            list: DrawList::new(!device.info().software),
             raster: Raster::new(&device),
             flares: Flares::new(&device),
             present,

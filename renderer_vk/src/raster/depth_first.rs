@@ -3,8 +3,8 @@
 //!
 //! The picture stays the same to the bit: positions are `invariant`, so such a surface still passes `LessEqual` wherever
 //! it is in sight at the end, and what it would have overwritten is not drawn at all. It costs a vertex pass without
-//! fragments, so curves and meshes, which hide little for their many triangles, are not drawn twice. Left out are views
-//! with a clip plane, where fragments decide what is there.
+//! fragments: where those are shaded in software, curves, which hide little for their many triangles, are left out. So are
+//! views with a clip plane, where fragments decide what is there.
 
 use shaders::types::Draw;
 use shaders::types::constants as c;
@@ -66,6 +66,7 @@ pub(super) fn depth_alone(cull: CullFaces) -> State {
 pub(super) struct Occluder {
     cull: CullFaces,
     instance: u32,
+    distance_squared: f32,
     /// Of the map's indices.
     first_index: u32,
     index_count: u32,
@@ -82,7 +83,7 @@ impl DrawList {
         if !covers(material) {
             return;
         }
-        for surface in surfaces.iter().filter(|s| s.flat) {
+        for surface in surfaces.iter().filter(|s| s.flat || self.curves_hide) {
             if let Geometry::Static {
                 first_index,
                 index_count,
@@ -91,6 +92,7 @@ impl DrawList {
                 self.occluders.push(Occluder {
                     cull: plain.cull,
                     instance: surface.instance,
+                    distance_squared: surface.distance_squared,
                     first_index,
                     index_count,
                 });
@@ -99,11 +101,12 @@ impl DrawList {
     }
 
     /// Puts the depth of what was noted before all other calls: one call for all surfaces of a model that are culled
-    /// alike, whatever their materials.
+    /// alike, whatever their materials. The nearest come first, because GPUs reject whole blocks behind them at once.
     pub(super) fn put_depth_first(&mut self, indices: &[u32]) {
         let alike = |o: &Occluder| (o.cull, o.instance);
+        // squares are not negative, so their bits have their order
         self.occluders
-            .sort_unstable_by_key(|o| (alike(o), o.first_index));
+            .sort_unstable_by_key(|o| (alike(o), o.distance_squared.to_bits(), o.first_index));
         for run in self.occluders.chunk_by(|a, b| alike(a) == alike(b)) {
             let Some(&first) = run.first() else { continue };
             let first_index = self.indices.len() as u32;
@@ -127,5 +130,33 @@ impl DrawList {
             });
         }
         self.calls.splice(0..0, self.depth_first.drain(..));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_is_drawn_first() {
+        let mut list = DrawList::new(true);
+        for (instance, distance_squared, first_index) in
+            [(0, 9.0, 0), (1, 0.0, 3), (0, 0.0, 6), (0, 4.0, 9)]
+        {
+            list.occluders.push(Occluder {
+                cull: CullFaces::None,
+                instance,
+                distance_squared,
+                first_index,
+                index_count: 3,
+            });
+        }
+        let indices: Vec<u32> = (100..112).collect();
+        list.put_depth_first(&indices);
+        let drawn: Vec<&[u32]> = (list.calls.iter())
+            .map(|c| &list.indices[c.first_index as usize..][..c.index_count as usize])
+            .collect();
+        let near_to_far = [106, 107, 108, 109, 110, 111, 100, 101, 102];
+        assert_eq!(drawn, [&near_to_far[..], &[103, 104, 105]]);
     }
 }

@@ -335,6 +335,7 @@ fn list_quads(quads: &mut ViewScene, scene: &ViewScene, material: u32, count: u3
             index_count: count * 6,
         },
         flat: false,
+        distance_squared: 0.0,
     });
 }
 

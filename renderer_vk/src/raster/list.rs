@@ -67,6 +67,8 @@ pub struct DrawList {
     pub vertices: Vec<Vertex>,
     /// See [`super::depth_first`].
     pub(super) depth_first: Vec<Call>,
+    /// Whether curves are among what is drawn by depth first; see [`super::depth_first`].
+    pub(super) curves_hide: bool,
     /// See [`super::depth_first`].
     pub(super) occluders: Vec<Occluder>,
     /// Of the material at hand; see [`super::groups`].
@@ -78,6 +80,14 @@ pub struct DrawList {
 }
 
 impl DrawList {
+    /// An empty list. `curves_hide`: vertices are cheap, so that depth is drawn first of curves, too.
+    pub fn new(curves_hide: bool) -> Self {
+        Self {
+            curves_hide,
+            ..Self::default()
+        }
+    }
+
     /// Empties the list.
     pub fn clear(&mut self) {
         self.calls.clear();

@@ -86,6 +86,8 @@ pub struct DrawSurface {
     pub geometry: Geometry,
     /// A flat surface of the map, whose triangles tend to hide much.
     pub flat: bool,
+    /// Square of how near a surface of the map comes to the eye, by its box, units²; of others 0.
+    pub distance_squared: f32,
 }
 
 /// A mesh of this view that moves: an entity's surface, a polygon, a deformed surface of the world.

@@ -179,6 +179,7 @@ impl SurfaceRun<'_> {
                 index_count,
             },
             flat: surface.flat,
+            distance_squared: surface.bounds.distance_squared(self.local.eye),
         });
         None
     }
@@ -239,6 +240,7 @@ pub(super) fn push_mesh_surface(
             index_count: mesh.index_count,
         },
         flat: false,
+        distance_squared: 0.0,
     });
 }
 

@@ -60,6 +60,14 @@ impl Bounds {
         }
     }
 
+    /// Square of the distance from a point to the nearest point inside, units²; infinite when empty.
+    pub fn distance_squared(&self, point: Vec3) -> f32 {
+        (self.mins - point)
+            .max(point - self.maxs)
+            .max(Vec3::ZERO)
+            .length_squared()
+    }
+
     /// The eight corners.
     pub fn corners(&self) -> [Vec3; 8] {
         std::array::from_fn(|i| {
