@@ -208,3 +208,127 @@ fn models_are_lit_by_the_grid() {
         assert!(off < 0.02, "{color:?} {expected:?}");
     }
 }
+
+/// The same triangle in one level of an MDR, hung on a bone that is 100 units up.
+fn mdr() -> Vec<u8> {
+    let vertex = |number: u32, st| q3model::MdrVertex {
+        normal: Vec3::Z,
+        st,
+        first_weight: number,
+        num_weights: 1,
+    };
+    let weight = |offset| q3model::MdrWeight {
+        bone: 0,
+        weight: 1.0,
+        offset,
+    };
+    let surface = q3model::MdrSurface {
+        name: "body".to_owned(),
+        shader: "models/t/skin".to_owned(),
+        triangles: vec![[0, 1, 2]],
+        vertices: vec![
+            vertex(0, Vec2::ZERO),
+            vertex(1, Vec2::Y),
+            vertex(2, Vec2::X),
+        ],
+        weights: vec![
+            weight(Vec3::ZERO),
+            weight(Vec3::Y * 16.0),
+            weight(Vec3::X * 8.0),
+        ],
+    };
+    let mut up = q3model::BoneMatrix::IDENTITY;
+    up.rows[2].w = 100.0;
+    let model = q3model::Mdr {
+        name: "m".to_owned(),
+        frames: vec![Frame {
+            mins: Vec3::ZERO,
+            maxs: Vec3::splat(116.0),
+            local_origin: Vec3::ZERO,
+            radius: 116.0,
+            name: "f".to_owned(),
+        }],
+        bones: vec![up],
+        num_bones: 1,
+        lods: vec![vec![surface]],
+        tags: Vec::new(),
+    };
+    model.write(false)
+}
+
+/// The same in an IQM without a skeleton.
+fn iqm() -> Vec<u8> {
+    let vertex = |position, st| q3model::IqmVertex {
+        position,
+        normal: Vec3::Z,
+        st,
+        color: [255; 4],
+        joints: [0; 4],
+        weights: [0.0; 4],
+    };
+    let model = q3model::Iqm {
+        surfaces: vec![q3model::IqmSurface {
+            name: "Body".to_owned(),
+            material: "models/t/skin".to_owned(),
+            first_vertex: 0,
+            num_vertices: 3,
+            triangles: vec![[0, 1, 2]],
+        }],
+        vertices: vec![
+            vertex(Vec3::Z * 100.0, Vec2::ZERO),
+            vertex(Vec3::new(0.0, 16.0, 100.0), Vec2::Y),
+            vertex(Vec3::new(8.0, 0.0, 100.0), Vec2::X),
+        ],
+        ..q3model::Iqm::default()
+    };
+    model.write()
+}
+
+#[test]
+fn models_of_all_kinds_are_written_in_the_skin_that_the_entity_names() {
+    let mut files = files(
+        r#"
+{ "classname" "misc_a" "model" "models/t/a.mdr" }
+{ "classname" "misc_b" "model" "models/t/b.iqm" }
+{ "classname" "misc_c" "model" "models/t/a.mdr" "skin" "2" }
+{ "classname" "misc_d" "model" "models/t/b.iqm" "_skin" "models/t/a_2.skin" }
+{ "classname" "misc_e" "model" "models/t/b.iqm" "skin" "9" }
+"#,
+    );
+    files.insert("models/t/a.mdr", mdr()).unwrap();
+    files.insert("models/t/b.iqm", iqm()).unwrap();
+    let skin = "tag_head,\nbody,textures/sample/lamp_warm\n";
+    files.insert("models/t/a_2.skin", skin).unwrap();
+    let (folder, report, _) = write(&files);
+    let (document, buffers, _) = gltf::import(folder.path().join("map.glb")).unwrap();
+    let shown = |class: &str| {
+        let node = document
+            .nodes()
+            .find(|n| n.name().is_some_and(|name| name.starts_with(class)))
+            .unwrap();
+        let mesh = node.mesh().unwrap();
+        let part = mesh.primitives().next().unwrap();
+        let reader = part.reader(|b| Some(&buffers[b.index()]));
+        let places: Vec<[f32; 3]> = reader.read_positions().unwrap().collect();
+        assert_eq!(places.len(), 3, "{class}");
+        // 100 units up in metres
+        assert!(
+            places.iter().all(|p| (p[1] - 3.125).abs() < 1e-4),
+            "{class}: {places:?}"
+        );
+        (mesh.index(), part.material().name().unwrap().to_owned())
+    };
+    let all: Vec<_> = ["misc_a", "misc_b", "misc_c", "misc_d", "misc_e"]
+        .map(shown)
+        .into_iter()
+        .collect();
+    let materials: Vec<&str> = all.iter().map(|(_, m)| m.as_str()).collect();
+    let (own, skin) = ("models/t/skin", "textures/sample/lamp_warm");
+    assert_eq!(materials, [own, own, skin, skin, own]);
+    assert!(all[0].0 != all[2].0);
+    let told = report.warnings.join("\n");
+    assert!(
+        told.contains("models/t/b_9.skin: there is no such skin"),
+        "{told}"
+    );
+}

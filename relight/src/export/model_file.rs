@@ -6,7 +6,7 @@ use crate::files::{GameFiles, normalise};
 use crate::world::WorldVertex;
 use glam::{Vec2, Vec3};
 use q3bsp::Entity;
-use q3model::{Iqm, Md3, Mdr};
+use q3model::{Iqm, Md3, Mdr, Skin};
 
 /// Class of the models that a map's compiler made part of the map's surfaces.
 const COMPILED: &str = "misc_model";
@@ -17,6 +17,8 @@ const IQM: &[u8] = b"INTERQUAKEMODEL\0";
 
 /// Triangles of a model that share a material.
 pub struct ModelSurface {
+    /// Its name, lower case, as skins name it.
+    name: String,
     /// Name of the material.
     pub shader: String,
     /// The triangles, in the model's own space; winding as in maps. The material's number means nothing.
@@ -38,20 +40,51 @@ pub fn named(entity: &Entity) -> impl Iterator<Item = (&'static str, &str)> {
     })
 }
 
+/// A model as an entity shows it.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ModelName {
+    /// The file, in its one spelling.
+    pub path: String,
+    /// The skin's file, in its one spelling; `None` where the model has its own materials.
+    pub skin: Option<String>,
+}
+
+impl ModelName {
+    /// The model `path` of an entity, with the skin that its key `skin` or `_skin` names: a file, or the number of one
+    /// beside the model (`NAME_2.skin`).
+    pub fn of(entity: &Entity, path: &str) -> ModelName {
+        let path = canonical(path);
+        let value = entity.get("skin").or_else(|| entity.get("_skin"));
+        let skin = value.map(str::trim).filter(|v| !v.is_empty()).map(|value| {
+            let stem = path
+                .rsplit_once('.')
+                .map_or(path.as_str(), |(stem, _)| stem);
+            match value.parse::<u32>() {
+                Ok(number) => format!("{stem}_{number}.skin"),
+                Err(_) => canonical(value),
+            }
+        });
+        ModelName { path, skin }
+    }
+}
+
 /// One spelling of a model file's path; the path itself where it is none inside the game folder.
 pub fn canonical(path: &str) -> String {
     normalise(path).unwrap_or_else(|_| path.to_owned())
 }
 
-/// Reads a model.
+/// Reads a model, and what is wrong with its skin, where that is not used.
 ///
 /// # Errors
 /// What is wrong with the file, as the end of a sentence that begins with its name.
-pub fn read(files: &dyn GameFiles, path: &str) -> Result<Vec<ModelSurface>, String> {
-    let bytes = files.read(path).map_err(|e| e.to_string())?;
+pub fn read(
+    files: &dyn GameFiles,
+    model: &ModelName,
+) -> Result<(Vec<ModelSurface>, Option<String>), String> {
+    let bytes = files.read(&model.path).map_err(|e| e.to_string())?;
     let bytes = bytes.ok_or("there is no such file")?;
     let damaged = |e: q3model::Error| e.to_string();
-    let surfaces: Vec<ModelSurface> = if bytes.starts_with(MD3) {
+    let mut surfaces: Vec<ModelSurface> = if bytes.starts_with(MD3) {
         md3(&Md3::parse(&bytes).map_err(damaged)?)
     } else if bytes.starts_with(MDR) {
         mdr(&Mdr::parse(&bytes).map_err(damaged)?)
@@ -60,7 +93,21 @@ pub fn read(files: &dyn GameFiles, path: &str) -> Result<Vec<ModelSurface>, Stri
     } else {
         return Err("it is no MD3, MDR or IQM".to_owned());
     };
-    Ok(surfaces)
+    let Some(skin) = &model.skin else {
+        return Ok((surfaces, None));
+    };
+    let text = match files.read(skin) {
+        Ok(Some(text)) => text,
+        Ok(None) => return Ok((surfaces, Some(format!("{skin}: there is no such skin")))),
+        Err(problem) => return Ok((surfaces, Some(problem.to_string()))),
+    };
+    let skin = Skin::parse(&text);
+    for surface in &mut surfaces {
+        if let Some(shader) = skin.shader_for(&surface.name) {
+            shader.clone_into(&mut surface.shader);
+        }
+    }
+    Ok((surfaces, None))
 }
 
 fn md3(model: &Md3) -> Vec<ModelSurface> {
@@ -68,7 +115,12 @@ fn md3(model: &Md3) -> Vec<ModelSurface> {
         let vertices = surface.frame_vertices(0).iter().zip(&surface.st);
         let vertices = vertices.map(|(v, st)| vertex(v.position(), v.normal(), *st));
         let shader = surface.shaders.first().cloned().unwrap_or_default();
-        joined(shader, vertices.collect(), &surface.triangles)
+        joined(
+            &surface.name,
+            shader,
+            vertices.collect(),
+            &surface.triangles,
+        )
     };
     model.surfaces.iter().map(one).collect()
 }
@@ -81,6 +133,7 @@ fn mdr(model: &Mdr) -> Vec<ModelSurface> {
             vertex(position, normal, v.st)
         });
         joined(
+            &surface.name,
             surface.shader.clone(),
             vertices.collect(),
             &surface.triangles,
@@ -101,6 +154,7 @@ fn iqm(model: &Iqm) -> Vec<ModelSurface> {
             }
         });
         joined(
+            &surface.name,
             surface.material.clone(),
             vertices.collect(),
             &surface.triangles,
@@ -119,7 +173,12 @@ fn vertex(position: Vec3, normal: Vec3, st: Vec2) -> WorldVertex {
     }
 }
 
-fn joined(shader: String, vertices: Vec<WorldVertex>, triangles: &[[u32; 3]]) -> ModelSurface {
+fn joined(
+    name: &str,
+    shader: String,
+    vertices: Vec<WorldVertex>,
+    triangles: &[[u32; 3]],
+) -> ModelSurface {
     let corners = triangles.iter().filter_map(|corners| {
         let [Some(a), Some(b), Some(c)] = corners.map(|i| vertices.get(i as usize)) else {
             return None;
@@ -128,6 +187,7 @@ fn joined(shader: String, vertices: Vec<WorldVertex>, triangles: &[[u32; 3]]) ->
     });
     let (part, degenerate) = geometry::join(corners);
     ModelSurface {
+        name: name.to_ascii_lowercase(),
         shader,
         part,
         degenerate,

@@ -6,7 +6,7 @@ use super::primitive::primitive;
 use super::{Document, Made};
 use crate::export::ExportError;
 use crate::export::geometry::{Drawn, drawn};
-use crate::export::model_file::{self, ModelSurface};
+use crate::export::model_file::{self, ModelName, ModelSurface};
 use crate::overbright;
 use crate::world::{RelitWorld, WorldMaterial, WorldVertex};
 use glam::{Quat, Vec3};
@@ -24,8 +24,8 @@ const LEAST: f32 = 32.0;
 /// What was added.
 #[derive(Default)]
 pub struct EntityModels {
-    /// The mesh of each file, by its canonical path.
-    pub meshes: BTreeMap<String, usize>,
+    /// The mesh of each file with each skin.
+    pub meshes: BTreeMap<ModelName, usize>,
     /// Triangles of all meshes, each once.
     pub triangles: usize,
     /// Triangles left out.
@@ -49,9 +49,14 @@ impl Document<'_> {
         let mut out = EntityModels::default();
         let mut made: BTreeMap<String, Option<Made>> = BTreeMap::new();
         let grid = shown.then(|| Grid::new(self.source.world)).flatten();
-        for (path, used) in uses(self.source.world) {
-            let surfaces = match model_file::read(self.source.files, &path) {
-                Ok(surfaces) => surfaces,
+        for (model, used) in uses(self.source.world) {
+            let path = &model.path;
+            let surfaces = match model_file::read(self.source.files, &model) {
+                Ok((surfaces, trouble)) => {
+                    let told = trouble.map(|t| format!("{path}: the skin of {}: {t}", used.first));
+                    self.warnings.extend(told);
+                    surfaces
+                }
                 Err(problem) => {
                     let others = match used.places.len() - 1 {
                         0 => String::new(),
@@ -96,10 +101,13 @@ impl Document<'_> {
                 ));
             }
             if !primitives.is_empty() {
-                self.meshes.push(
-                    json!({"name": path, "primitives": primitives, "extras": {"file": path}}),
-                );
-                out.meshes.insert(path, self.meshes.len() - 1);
+                let told = match &model.skin {
+                    Some(skin) => json!({"file": path, "skin": skin}),
+                    None => json!({"file": path}),
+                };
+                self.meshes
+                    .push(json!({"name": path, "primitives": primitives, "extras": told}));
+                out.meshes.insert(model, self.meshes.len() - 1);
             }
         }
         Ok(out)
@@ -148,14 +156,14 @@ impl Document<'_> {
 }
 
 /// Which entities name which file.
-fn uses(world: &RelitWorld) -> BTreeMap<String, Use> {
-    let mut out: BTreeMap<String, Use> = BTreeMap::new();
+fn uses(world: &RelitWorld) -> BTreeMap<ModelName, Use> {
+    let mut out: BTreeMap<ModelName, Use> = BTreeMap::new();
     for (number, entity) in world.bsp.entities().iter().enumerate().skip(1) {
-        let paths: BTreeSet<String> = model_file::named(entity)
-            .map(|(_, path)| model_file::canonical(path))
+        let models: BTreeSet<ModelName> = model_file::named(entity)
+            .map(|(_, path)| ModelName::of(entity, path))
             .collect();
-        for path in paths {
-            let used = out.entry(path).or_insert_with(|| Use {
+        for model in models {
+            let used = out.entry(model).or_insert_with(|| Use {
                 first: format!("entity {number} ({})", entity.classname()),
                 places: Vec::new(),
             });

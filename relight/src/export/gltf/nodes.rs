@@ -1,6 +1,7 @@
 //! Nodes of a glTF: models, entities, cameras, lights, fog.
 
-use crate::export::{Export, extras, model_file};
+use crate::export::model_file::{self, ModelName};
+use crate::export::{Export, extras};
 use crate::light::{PointLight, SunLight};
 use glam::{EulerRot, Quat, Vec3};
 use q3bsp::Entity;
@@ -42,7 +43,7 @@ impl Nodes {
         &mut self,
         source: &Export<'_>,
         meshes: &[Option<usize>],
-        files: &BTreeMap<String, usize>,
+        files: &BTreeMap<ModelName, usize>,
     ) -> Vec<usize> {
         let scale = source.options.scale;
         let entities = source.world.bsp.entities();
@@ -108,11 +109,11 @@ impl Nodes {
         &mut self,
         node: &mut Map<String, Value>,
         entity: &Entity,
-        files: &BTreeMap<String, usize>,
+        files: &BTreeMap<ModelName, usize>,
         name: &str,
     ) {
         for (key, path) in model_file::named(entity) {
-            let Some(mesh) = files.get(&model_file::canonical(path)) else {
+            let Some(mesh) = files.get(&ModelName::of(entity, path)) else {
                 continue;
             };
             let scale = stretch(entity);
