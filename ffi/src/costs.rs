@@ -158,4 +158,15 @@ mod tests {
         assert_eq!(at(&mut questions, 1500), None);
         assert_eq!(at(&mut questions, 2000), Some(2.0));
     }
+
+    #[test]
+    fn each_second_has_a_line_with_its_mean_rate() {
+        let mut questions = Questions::default();
+        let start = Instant::now();
+        let rates: Vec<f32> = (0..=250)
+            .filter_map(|frame| questions.frame_rate(start + Duration::from_millis(10 * frame)))
+            .collect();
+        assert_eq!(rates.len(), 2, "{rates:?}");
+        assert!(rates.iter().all(|r| (r - 100.0).abs() < 0.1), "{rates:?}");
+    }
 }

@@ -85,11 +85,23 @@ fn anisotropy_comes_nearer_to_the_mean_of_many_samples() {
             ..reference()
         };
         let (pixels, _) = gpu.render(&scene, &settings, 1);
-        let squares = pixels.iter().zip(&truth).map(|(p, t)| (p.x - t.x).powi(2));
-        squares.sum::<f32>() / truth.len() as f32
+        let squares: Vec<f32> = pixels
+            .iter()
+            .zip(&truth)
+            .map(|(p, t)| (p.x - t.x).powi(2))
+            .collect();
+        // of all, and of the lower quarter, where the ellipse is less than four times as long as wide
+        let near = squares.len() * 3 / 4;
+        [&squares[..], &squares[near..]].map(|s| s.iter().sum::<f32>() / truth.len() as f32)
     };
     let (none, two, eight) = (error(1.0), error(2.0), error(8.0));
-    println!("mean squared error {none} without, {two} with 2, {eight} with 8");
-    assert!(eight < 0.7 * none, "{eight} {none}");
-    assert!(two < 1.1 * none, "{two} {none}");
+    println!(
+        "mean squared error, all and near: {none:?} without, {two:?} with 2, {eight:?} with 8"
+    );
+    assert!(eight[0] < 0.5 * none[0], "{eight:?} {none:?}");
+    // Near, two look-ups are narrower than the one of the round footprint. Farther away each is as wide as that, so that
+    // they reach along more of the ellipse, and as they stand side by side, stripes that lie aslant to it (at the sides
+    // of the picture) are blurred a little more than by one: 2 % in the sum.
+    assert!(two[1] < 0.85 * none[1], "{two:?} {none:?}");
+    assert!(two[0] < 1.04 * none[0], "{two:?} {none:?}");
 }
