@@ -82,6 +82,9 @@ pub fn run(args: &LightsArgs) -> Result<()> {
             ..Options::default()
         };
         let mut world = RelitWorld::load(&*files, &materials, &map, options)?;
+        for warning in &world.warnings {
+            log::warn!("{map}: {warning}");
+        }
         if !args.judge {
             world.measure_materials(&*files);
             sweep(&mut world, cache.as_ref());

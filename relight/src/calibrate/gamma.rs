@@ -3,8 +3,8 @@
 //! Compilers store light as it is unless told otherwise; told so (`-gamma`), they store (L / 255)^(1 / g). Nothing in a
 //! map says so, but light is linear in its sources only as it was before: taken for linear, bright light is too weak
 //! beside dim light, suns are turned down, and lights are put in to fill what is left. So a map is fitted with less effort
-//! for some gammas, and one of them is believed where it leaves much less unexplained *of what is stored*, and its
-//! neighbours leave less as well.
+//! for some gammas, and one of them is believed where it leaves much less unexplained *of what is stored*, another leaves
+//! less as well, and the light that directives tell of does not speak against it.
 
 use super::{CalibrationCache, CalibrationOptions, Evidence};
 use crate::world::RelitWorld;
@@ -20,6 +20,9 @@ const BELIEVED: f32 = 0.8;
 
 /// Part that one more of them may leave, and the first, for the others to be tried.
 const SUPPORTED: f32 = 0.92;
+
+/// How many times as far off as without gamma what directives say may be: it was the compiler that read them.
+const CONTRADICTED: f32 = 1.5;
 
 /// Error that leaves nothing to be explained, stops.
 const NOTHING: f32 = 0.01;
@@ -53,10 +56,17 @@ pub(super) fn find(
         world.stored_gamma = gamma;
         let report = super::find(world, silent, &less, &mut |_| ()).report;
         world.stored_gamma = 1.0;
-        (report.evidence != Evidence::Nothing).then_some(report.after.median_stops)
+        let found = [report.before.median_stops, report.after.median_stops];
+        (report.evidence != Evidence::Nothing).then_some(found)
     };
-    let Some(none) = error(world, 1.0).filter(|e| *e > NOTHING) else {
+    let Some([said, none]) = error(world, 1.0).filter(|[_, e]| *e > NOTHING) else {
         return 1.0;
+    };
+    let fallback = world.report.fallback;
+    let mut error = |world: &mut RelitWorld, gamma: f32| {
+        let [before, after] = error(world, gamma)?;
+        // A map without any light has what loading put there in its place.
+        (fallback || before <= said * CONTRADICTED).then_some(after)
     };
     let Some(first) = error(world, FIRST).filter(|e| *e < none * SUPPORTED) else {
         return 1.0;

@@ -55,7 +55,7 @@ use glam::Vec3;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 
 /// Part of the time that looking for the compiler's gamma takes, about.
 const GAMMA_PART: f32 = 0.25;
