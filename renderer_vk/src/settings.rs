@@ -111,6 +111,8 @@ pub struct Settings {
     pub map_overbright_bits: u32,
     pub overbright_bits: u32,
     pub vertex_light: bool,
+    /// A menu covers the game: what is registered meanwhile keeps its stages with `vertex_light`.
+    pub ui_fullscreen: bool,
     pub fullbright: bool,
     pub subdivisions: f32,
     // polled
@@ -255,6 +257,7 @@ impl Default for Settings {
             map_overbright_bits: 2,
             overbright_bits: 0,
             vertex_light: false,
+            ui_fullscreen: false,
             fullbright: false,
             subdivisions: 4.0,
             gamma: 1.0,

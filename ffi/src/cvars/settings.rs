@@ -115,6 +115,7 @@ pub fn apply(cvars: &Cvars, window: WindowFacts, settings: &mut Settings) {
     settings.fullscreen = window.fullscreen;
     settings.overbright_bits = count(cvars, Cvar::OverBrightBits);
     settings.vertex_light = flag(Cvar::VertexLight);
+    settings.ui_fullscreen = flag(Cvar::UiFullscreen);
     settings.fullbright = flag(Cvar::FullBright);
     settings.subdivisions = value(Cvar::Subdivisions);
 

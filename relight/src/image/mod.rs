@@ -260,7 +260,15 @@ fn load_one(
         _ => decode(file, extension, &bytes),
     };
     match decoded {
-        Ok(image) => Ok(Some(image)),
+        Ok(image) => {
+            if is_cut_jpeg(extension, &bytes) {
+                log::warn!(
+                    "{file}: JPEG cut short after {} bytes; what is missing is grey",
+                    bytes.len()
+                );
+            }
+            Ok(Some(image))
+        }
         // The engine treats these three formats as absent when they cannot be decoded.
         Err(problem @ ImageError::Malformed { .. }) if !matches!(extension, "tga" | "bmp") => {
             log::warn!("{problem}; trying other extensions");
@@ -268,6 +276,11 @@ fn load_one(
         }
         Err(problem) => Err(problem),
     }
+}
+
+/// Whether a file is a JPEG without an end (ITU-T T.81, table B.1, `EOI`), which is shown as far as it goes.
+fn is_cut_jpeg(extension: &str, bytes: &[u8]) -> bool {
+    matches!(extension, "jpg" | "jpeg") && !bytes.windows(2).rev().any(|pair| pair == [0xff, 0xd9])
 }
 
 /// Decodes an image by its extension (lower case, one of [`EXTENSIONS`]); `file` is for messages.

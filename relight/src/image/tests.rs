@@ -185,6 +185,20 @@ fn no_input_panics() {
 }
 
 #[test]
+fn jpegs_without_an_end_are_shown_as_far_as_they_go() {
+    let picture = DynamicImage::from(DynamicImage::from(pattern(64, 64)).to_rgb8());
+    let whole = encode(&picture, ImageFormat::Jpeg);
+    let cut = &whole[..whole.len() * 3 / 4];
+    assert!(!is_cut_jpeg("jpg", &whole));
+    assert!(is_cut_jpeg("jpg", cut) && !is_cut_jpeg("tga", cut));
+    let [whole, cut] = [&whole[..], cut].map(|bytes| decode("x.jpg", "jpg", bytes).unwrap());
+    assert_eq!((cut.width, cut.height), (64, 64));
+    // the first rows of blocks are there
+    assert_eq!(whole.rgba[..64 * 4 * 8], cut.rgba[..64 * 4 * 8]);
+    assert_ne!(whole, cut);
+}
+
+#[test]
 fn extensions_fall_back_as_in_the_engine() {
     let picture =
         |shade: u8| DynamicImage::from(RgbaImage::from_pixel(1, 1, Rgba([shade, 0, 0, 255])));

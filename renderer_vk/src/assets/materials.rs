@@ -29,6 +29,8 @@ pub struct MaterialSettings {
     pub detail_textures: bool,
     /// One stage with vertex light instead of lightmaps.
     pub vertex_light: bool,
+    /// Stages stay as they are even so: a menu covers the game.
+    pub menu: bool,
     /// Scripts that are used are named in the log.
     pub print: bool,
 }
@@ -39,6 +41,7 @@ impl MaterialSettings {
         Self {
             detail_textures: settings.detail_textures,
             vertex_light: settings.vertex_light,
+            menu: settings.ui_fullscreen,
             print: settings.print_shaders,
         }
     }
@@ -284,7 +287,7 @@ impl Materials {
         }
         // the order value is decided before anything is taken away
         let sort = shader.sort_value();
-        if self.settings.vertex_light && shader.stages.len() > 1 {
+        if self.settings.vertex_light && !self.settings.menu && shader.stages.len() > 1 {
             shader = shaderscript::collapse_vertex_light(&shader, class == LightmapClass::None);
         }
         let stage_first = self.arrays.stages.len();

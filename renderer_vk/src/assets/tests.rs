@@ -324,6 +324,14 @@ fn settings_change_stages() {
     files.insert("scripts/t.shader", SCRIPT).unwrap();
     files.insert("t/a.tga", PIXEL).unwrap();
     files.insert("t/b.tga", PIXEL).unwrap();
+    let menu = crate::settings::Settings {
+        ui_fullscreen: true,
+        detail_textures: true,
+        ..plain.clone()
+    };
+    let mut covered = Registration::with(files.clone(), menu);
+    let kept = covered.find("t/detail", LightmapClass::None, true);
+    assert_eq!(covered.materials.get(kept).stage_count, 2);
     let mut game = Registration::with(files, plain);
     let one = game.find("t/detail", LightmapClass::None, true);
     assert_eq!(game.materials.get(one).stage_count, 1);

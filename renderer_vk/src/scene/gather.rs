@@ -192,6 +192,9 @@ impl<'a> Gatherer<'a> {
         }
         // equal keys keep the order of submission
         self.scratch.sort(&mut out.surfaces);
+        // of skies that lie behind each other the one that is drawn last shows: they write no depth
+        let materials = self.input.materials;
+        (out.skies).sort_unstable_by_key(|sky| materials.rank(sky.material));
         if self.input.settings.speeds != 0 && self.look == Look::Classic {
             out.statistics = self.count_view(out);
         }

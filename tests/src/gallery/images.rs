@@ -209,7 +209,7 @@ fn format_files(extension: &str) -> Vec<File> {
 }
 
 /// Names as scripts write them, of files that are there with other extensions.
-const WRITTEN: [&str; 16] = [
+const WRITTEN: [&str; 17] = [
     "all",
     "all.tga",
     "all.jpg",
@@ -226,6 +226,7 @@ const WRITTEN: [&str; 16] = [
     "fall.png",
     "fall",
     "cut.png",
+    "half.jpg",
 ];
 
 fn found() -> Vec<(&'static str, Vec<u8>)> {
@@ -239,6 +240,9 @@ fn found() -> Vec<(&'static str, Vec<u8>)> {
         transparency: &[],
     };
     let whole = png.write([16, 16], of(9));
+    // a JPEG is shown as far as it goes
+    let mut half = jpeg(SIDES, false, color);
+    half.truncate(half.len() * 3 / 4);
     vec![
         ("all.tga", tga(2, 3, [16, 16], 0, b"", one(1))),
         ("all.jpg", jpeg([16, 16], false, one(2))),
@@ -255,6 +259,7 @@ fn found() -> Vec<(&'static str, Vec<u8>)> {
             bmp(24, [16, 16], &[], |_, _| vec![20, 190, 110]),
         ),
         ("cut.png", whole[..whole.len() / 2].to_vec()),
+        ("half.jpg", half),
     ]
 }
 

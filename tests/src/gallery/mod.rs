@@ -19,6 +19,7 @@ pub mod board;
 pub mod model;
 pub mod run;
 pub mod sheet;
+mod skies;
 mod stage;
 pub mod textures;
 
@@ -118,6 +119,7 @@ pub fn scenes() -> Vec<Scene> {
     all.extend(deforms::scenes());
     all.extend(stages::scenes());
     all.extend(images::scenes());
+    all.extend(skies::scenes());
     all.extend(materials::scenes());
     all
 }

@@ -314,6 +314,15 @@ pub(super) fn scenes() -> Vec<Scene> {
             &[0]
         ),
         Scene {
+            cvars: &[("r_vertexLight", "1"), ("r_uifullscreen", "1")],
+            ..board_scene!(
+                "collapse-vertex-menu",
+                "With r_vertexLight while a menu covers the game.",
+                collapse(Shape::Face),
+                &[0]
+            )
+        },
+        Scene {
             cvars: &[("r_vertexLight", "1")],
             ..board_scene!(
                 "collapse-vertex",
