@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
@@ -11,12 +12,15 @@ use serde::Serialize;
 use serde_json::Value;
 use shaderscript::{Diagnostic, ImplicitKind};
 
+use crate::view::open;
+
 /// Tell how a material is understood
 ///
 /// Where it is defined, its stages as they are drawn, what it is to light, what it emits, and every warning with the
 /// script's line. Exit code: 0, or 1 when the default is drawn instead of some material.
 ///
-/// Examples: relight material textures/gothic_light/ironcrosslt2_10000; relight material sfx/beam --json
+/// Examples: relight material textures/gothic_light/ironcrosslt2_10000; relight material sfx/beam --json;
+/// relight material --map e1m1.bsp --game id1 textures/wizwood1_5
 #[derive(Args, Debug)]
 pub struct MaterialArgs {
     /// Names as maps and models write them
@@ -29,6 +33,9 @@ pub struct MaterialArgs {
         default_value = "/usr/share/games/openarena/baseoa"
     )]
     games: Vec<PathBuf>,
+    /// A map that brings materials along: of a format that has its own (Quake, Quake II), or in a pack of its own
+    #[arg(long, value_name = "MAP")]
+    map: Option<String>,
     /// How the surface is lit that it is used on, which decides what a bare image becomes
     #[arg(long, value_enum, default_value_t = Lighting::Lightmap)]
     lighting: Lighting,
@@ -118,14 +125,18 @@ struct Line {
 
 /// Prints what is known of each material.
 pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
-    let files = SearchPath::open(&args.games)?;
-    let (materials, diagnostics) = Materials::load(&files);
+    let files: Arc<dyn GameFiles> = match &args.map {
+        Some(map) => open(map, &args.games)?.0,
+        None => Arc::new(SearchPath::open(&args.games)?),
+    };
+    let files = &*files;
+    let (materials, diagnostics) = Materials::load(files);
     let mut told = Vec::new();
     let mut faults = 0;
     for name in &args.names {
-        let material = WorldMaterial::by_name(&files, &materials, name, args.lighting.into());
+        let material = WorldMaterial::by_name(files, &materials, name, args.lighting.into());
         faults += usize::from(material.resolved.fault.is_some());
-        told.push(Told::new(&files, &material, &diagnostics));
+        told.push(Told::new(files, &material, &diagnostics));
     }
     if args.json {
         println!("{}", serde_json::to_string_pretty(&told)?);

@@ -78,6 +78,16 @@ fn every_command_takes_every_format() {
                 assert!(size > 40, "{name} {written}: {size} bytes");
             }
         }
+        if name == "Quake" {
+            let of_map = ["material", "--map", "m.bsp", "textures/*lava1", "--json"];
+            let output = relight(folder.path(), &of_map);
+            assert!(output.status.success(), "{output:?}");
+            let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+            let stage = &told[0]["material"]["stages"][1];
+            assert_eq!(stage["map"], "textures/*lava1", "{told}");
+            let alone = relight(folder.path(), &["material", "textures/*lava1"]);
+            assert_eq!(alone.status.code(), Some(1), "{alone:?}");
+        }
         let output = relight(
             folder.path(),
             &["convert", "m.bsp", "-o", "m.glb", "--json"],
