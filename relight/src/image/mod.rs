@@ -278,9 +278,26 @@ fn load_one(
     }
 }
 
-/// Whether a file is a JPEG without an end (ITU-T T.81, table B.1, `EOI`), which is shown as far as it goes.
+/// Whether a file is a JPEG without an end (ITU-T T.81, table B.1, `EOI`), which is shown as far as it goes. What stands
+/// before the first scan may hold a small picture with an end of its own.
 fn is_cut_jpeg(extension: &str, bytes: &[u8]) -> bool {
-    matches!(extension, "jpg" | "jpeg") && !bytes.windows(2).rev().any(|pair| pair == [0xff, 0xd9])
+    if !matches!(extension, "jpg" | "jpeg") {
+        return false;
+    }
+    let mut rest = bytes.get(2..).unwrap_or_default();
+    loop {
+        rest = match rest {
+            [0xff, 0xda, scan @ ..] => {
+                return !scan.windows(2).rev().any(|pair| pair == [0xff, 0xd9]);
+            }
+            [0xff, 0xff, ..] => rest.get(1..).unwrap_or_default(),
+            [0xff, _, high, low, ..] => {
+                let length = usize::from(u16::from_be_bytes([*high, *low]));
+                rest.get(2 + length..).unwrap_or_default()
+            }
+            _ => return true,
+        };
+    }
 }
 
 /// Decodes an image by its extension (lower case, one of [`EXTENSIONS`]); `file` is for messages.

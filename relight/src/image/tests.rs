@@ -191,6 +191,9 @@ fn jpegs_without_an_end_are_shown_as_far_as_they_go() {
     let cut = &whole[..whole.len() * 3 / 4];
     assert!(!is_cut_jpeg("jpg", &whole));
     assert!(is_cut_jpeg("jpg", cut) && !is_cut_jpeg("tga", cut));
+    // an end in what stands before the picture is not the picture's
+    let titled = [&whole[..2], &[0xff, 0xe1, 0, 4, 0xff, 0xd9], &whole[2..]].concat();
+    assert!(!is_cut_jpeg("jpg", &titled) && is_cut_jpeg("jpg", &titled[..titled.len() - 2]));
     let [whole, cut] = [&whole[..], cut].map(|bytes| decode("x.jpg", "jpg", bytes).unwrap());
     assert_eq!((cut.width, cut.height), (64, 64));
     // the first rows of blocks are there
