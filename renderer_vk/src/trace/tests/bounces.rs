@@ -57,6 +57,35 @@ fn a_furnace_sums_its_bounces_with(gpu: &mut Gpu) {
 }
 
 #[test]
+fn what_stores_a_part_of_its_light_throws_back_that_part() {
+    Gpu::each(what_stores_a_part_of_its_light_throws_back_that_part_with);
+}
+
+fn what_stores_a_part_of_its_light_throws_back_that_part_with(gpu: &mut Gpu) {
+    // the furnace with an albedo of a half: of light come back that part of it, but never more than all; what glows stays
+    for (scale, part) in [(1.0, 0.5), (0.25, 0.125), (64.0, 1.0)] {
+        let mut scene = Scene::new(
+            Vec3::new(-20.0, 10.0, 5.0),
+            Vec3::new(50.0, 20.0, -30.0),
+            90.0,
+            32,
+        );
+        let stages = [
+            stage::light(),
+            stage::filter([encode(0.5); 3]),
+            stage::add([encode(0.25); 3]),
+        ];
+        let wall = scene.material(&stages, 0);
+        scene.materials[wall as usize].0.lit_scale = scale;
+        scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), wall);
+        let exact = through_byte(encode(0.25)) * (1.0 + part);
+        let mean = gpu.mean(&scene, &bounced(1), 16).x;
+        println!("{scale}: {mean} {exact}");
+        assert!((mean / exact - 1.0).abs() < 0.01, "{scale}: {mean} {exact}");
+    }
+}
+
+#[test]
 fn a_red_wall_colours_the_floor() {
     Gpu::each(a_red_wall_colours_the_floor_with);
 }
