@@ -64,7 +64,20 @@ enum Command {
 /// Exit code for input that cannot be read: a file that is cut off, of another kind, or damaged.
 const BAD_INPUT: u8 = 2;
 
+/// Ends quietly where whoever reads the output has had enough of it (`relight info | head`).
+fn end_with_the_reader() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let text = panic.payload().downcast_ref::<String>();
+        if text.is_some_and(|t| t.starts_with("failed printing to stdout: Broken pipe")) {
+            std::process::exit(0);
+        }
+        usual(panic);
+    }));
+}
+
 fn main() -> ExitCode {
+    end_with_the_reader();
     match run(Cli::parse().command) {
         Ok(code) => code,
         Err(error) => {
@@ -92,11 +105,14 @@ pub(crate) fn one_sentence(error: &anyhow::Error) -> String {
     text
 }
 
-/// Whether a file was read that is not what it should be.
+/// Whether a file was read that is not what it should be, or a map is nowhere.
 fn is_bad_input(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.is::<q3bsp::Error>()
-            || matches!(cause.downcast_ref(), Some(relight::LoadError::Map { .. }))
+            || matches!(
+                cause.downcast_ref(),
+                Some(relight::LoadError::Map { .. } | relight::LoadError::Absent { .. })
+            )
             || matches!(
                 cause.downcast_ref(),
                 Some(relight::FileError::Pack { .. } | relight::FileError::Entry { .. })

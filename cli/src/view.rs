@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use glam::Vec3;
 use q3bsp::{Bsp, Format};
-use relight::{GameFiles, MemoryFiles, Overlay, Pk3, RelitWorld, SearchPath, map_files};
+use relight::{GameFiles, LoadError, MemoryFiles, Overlay, Pk3, RelitWorld, SearchPath, map_files};
 use renderer_vk::Renderer;
 use renderer_vk::api::{EntityKind, RefDef, RefEntity};
 
@@ -87,7 +87,10 @@ fn with_map_files(
     name: &str,
 ) -> anyhow::Result<Arc<dyn GameFiles>> {
     let files = Overlay { front, back };
-    let bytes = files.read(name)?.unwrap_or_default();
+    let absent = || LoadError::Absent {
+        map: name.to_owned(),
+    };
+    let bytes = files.read(name)?.ok_or_else(absent)?;
     if !Format::of(&bytes).is_some_and(Format::is_quake) {
         return Ok(Arc::new(files));
     }

@@ -125,3 +125,18 @@ fn what_is_no_map_is_refused_by_every_command() {
         }
     }
 }
+
+#[test]
+fn a_map_that_is_nowhere_is_refused_by_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in COMMANDS {
+        let named: Vec<&str> = arguments
+            .iter()
+            .map(|a| if *a == "bad.bsp" { "nowhere" } else { a })
+            .collect();
+        let output = relight(folder.path(), &named);
+        assert_eq!(output.status.code(), Some(2), "{named:?}: {output:?}");
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(text.trim_end().lines().count(), 1, "{named:?}: {text}");
+    }
+}
