@@ -163,7 +163,10 @@ fn what_glows_and_moves_is_as_bright_as_it_is(gpu: &mut Gpu) {
         &[stage::add([0.9, 0.2, 0.1])],
         c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED,
     );
-    let shape = rectangle(Vec3::new(100.0, -1.2, -45.0), Vec3::Z * 90.0, Vec3::Y * 2.4);
+    // two pixels wide, so that in each frame as many samples meet it, wherever it is
+    let width = 2.0 * 2.0 * 100.0 * 30f32.to_radians().tan() / SIZE as f32;
+    let corner = Vec3::new(100.0, -0.5 * width, -45.0);
+    let shape = rectangle(corner, Vec3::Z * 90.0, Vec3::Y * width);
     scene.mesh(shape, glow, identity());
     let (still, _) = gpu.render(&scene, &reference(), 64);
     let line = |pixels: &[Vec3]| -> f32 { pixels.iter().map(|p| p.x - p.z).sum() };
@@ -175,7 +178,6 @@ fn what_glows_and_moves_is_as_bright_as_it_is(gpu: &mut Gpu) {
             view.instances.last_mut().expect("placed").origin = at;
             view.entities[0].origin = at;
         };
-        // one frame's samples meet more or less of it than there is
         let mut sum = 0.0;
         let mut watch = |frame: u32, pixels: &[Vec3]| {
             if frame >= first {
