@@ -1,28 +1,9 @@
 //! Files that are no maps, or damaged ones: one sentence that says where, exit code 2, nothing written.
 
-use glam::Vec3;
-use q3bsp::builder::MapBuilder;
+mod common;
+
+use common::{map, relight};
 use q3bsp::{Bsp, Format, Lump};
-use std::path::Path;
-use std::process::{Command, Output};
-
-fn map(format: Format) -> Vec<u8> {
-    let mut map = MapBuilder::new();
-    let wall = map.add_shader("t/wall", 0, 1);
-    map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
-    let mut bsp = map.build();
-    bsp.format = format;
-    bsp.write()
-}
-
-fn relight(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_relight"))
-        .current_dir(folder)
-        .args(arguments)
-        .args(["--game", "."])
-        .output()
-        .unwrap()
-}
 
 /// Every command that reads maps, on one file: the code, and the one line about it.
 fn told(bytes: &[u8]) -> String {

@@ -4,18 +4,14 @@
 #[path = "../../q3bsp/tests/quake/room.rs"]
 mod room;
 
-use glam::Vec3;
+mod common;
+
+use common::{map, relight};
 use q3bsp::Format;
-use q3bsp::builder::MapBuilder;
 use std::path::Path;
-use std::process::{Command, Output};
 
 /// A map of each format, by its name.
 fn maps() -> Vec<(String, Vec<u8>)> {
-    let mut map = MapBuilder::new();
-    let wall = map.add_shader("t/wall", 0, 1);
-    map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
-    let mut bsp = map.build();
     let own = [
         Format::Ibsp46,
         Format::Ibsp47,
@@ -23,10 +19,7 @@ fn maps() -> Vec<(String, Vec<u8>)> {
         Format::Rbsp,
         Format::Fbsp,
     ];
-    let own = own.map(|format| {
-        bsp.format = format;
-        (format!("{format:?}"), bsp.write())
-    });
+    let own = own.map(|format| (format!("{format:?}"), map(format)));
     let quake = room::FORMATS.map(|format| (format!("{format:?}"), room::room(format).write()));
     own.into_iter().chain(quake).collect()
 }
@@ -36,15 +29,6 @@ fn game(folder: &Path) {
     std::fs::create_dir_all(folder.join("gfx")).unwrap();
     let palette: Vec<u8> = (0..768).map(|at| (at / 3) as u8).collect();
     std::fs::write(folder.join("gfx/palette.lmp"), palette).unwrap();
-}
-
-fn relight(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_relight"))
-        .current_dir(folder)
-        .args(arguments)
-        .args(["--game", "."])
-        .output()
-        .unwrap()
 }
 
 #[test]

@@ -1,11 +1,10 @@
 //! Maps of all formats, cut off at many places and filled with noise, through every command that reads maps: exit code 2
 //! and one sentence, or 0 where what is missing is not needed; never a file half written.
 
-use glam::Vec3;
+mod common;
+
+use common::{map, relight};
 use q3bsp::Format;
-use q3bsp::builder::MapBuilder;
-use std::path::Path;
-use std::process::{Command, Output};
 
 const COMMANDS: [&[&str]; 8] = [
     &["info", "bad.bsp"],
@@ -17,24 +16,6 @@ const COMMANDS: [&[&str]; 8] = [
     &["lights", "bad.bsp", "-o", "out.png"],
     &["render", "bad.bsp", "-o", "out.png"],
 ];
-
-fn map(format: Format) -> Vec<u8> {
-    let mut map = MapBuilder::new();
-    let wall = map.add_shader("t/wall", 0, 1);
-    map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
-    let mut bsp = map.build();
-    bsp.format = format;
-    bsp.write()
-}
-
-fn relight(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_relight"))
-        .current_dir(folder)
-        .args(arguments)
-        .args(["--game", "."])
-        .output()
-        .unwrap()
-}
 
 /// The sentence of a command about a file that it refuses; `None` where it takes it.
 fn refusal(bytes: &[u8], arguments: &[&str], what: &str) -> Option<String> {
