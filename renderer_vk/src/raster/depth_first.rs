@@ -3,8 +3,8 @@
 //!
 //! The picture stays the same to the bit: positions are `invariant`, so such a surface still passes `LessEqual` wherever
 //! it is in sight at the end, and what it would have overwritten is not drawn at all. It costs a vertex pass without
-//! fragments: where those are shaded in software, curves, which hide little for their many triangles, are left out. So are
-//! views with a clip plane, where fragments decide what is there.
+//! fragments: where vertices are processed in software, curves, which hide little for their many triangles, are left out.
+//! So are views with a clip plane, where fragments decide what is there.
 
 use shaders::types::Draw;
 use shaders::types::constants as c;
