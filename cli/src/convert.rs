@@ -13,7 +13,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use relight::export::{
-    Export, ExportOptions, ExportReport, Format, ImagePlace, ImageStore, Lightmaps,
+    Brushes, Export, ExportOptions, ExportReport, Format, ImagePlace, ImageStore, Lightmaps,
     METRES_PER_UNIT, Sky, export,
 };
 use relight::{
@@ -67,6 +67,10 @@ pub struct ConvertArgs {
     /// Where images go: as usual for the format, inside the file, or into a folder beside it
     #[arg(long, value_enum, default_value_t = ImageChoice::Usual)]
     images: ImageChoice,
+    /// How sides of brushes in a .map say how their textures lie: as the editors of the map's game have it, as brush
+    /// primitives (brushDef), or as Valve 220
+    #[arg(long, value_enum, default_value_t = BrushChoice::Usual)]
+    brushes: BrushChoice,
     /// Write moving textures as animations, which strict readers of glTF refuse
     #[arg(long)]
     animate: bool,
@@ -141,6 +145,13 @@ enum ImageChoice {
     Usual,
     Embed,
     Beside,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug)]
+enum BrushChoice {
+    Usual,
+    Primitives,
+    Valve,
 }
 
 fn parse_format(text: &str) -> Result<Format, String> {
@@ -321,6 +332,11 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
                 ImageChoice::Usual => ImagePlace::Usual,
                 ImageChoice::Embed => ImagePlace::Embed,
                 ImageChoice::Beside => ImagePlace::Beside,
+            },
+            brushes: match args.brushes {
+                BrushChoice::Usual => Brushes::Usual,
+                BrushChoice::Primitives => Brushes::Primitives,
+                BrushChoice::Valve => Brushes::Valve,
             },
             lights,
             exposure: args.exposure,

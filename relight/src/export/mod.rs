@@ -128,6 +128,19 @@ pub enum ImagePlace {
     Beside,
 }
 
+/// How sides of brushes say how their textures lie, in [`Format::Map`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Brushes {
+    /// As the editors of the map's game have it: [`Brushes::Valve`] for Quake, Quake II and Half-Life, else
+    /// [`Brushes::Primitives`].
+    #[default]
+    Usual,
+    /// Brush primitives (`brushDef`).
+    Primitives,
+    /// Valve 220.
+    Valve,
+}
+
 /// How a map is written. Patches were tessellated when the world was loaded ([`Options::subdivisions`]).
 ///
 /// [`Options::subdivisions`]: crate::Options::subdivisions
@@ -139,6 +152,8 @@ pub struct ExportOptions {
     pub lightmaps: Lightmaps,
     /// Where images go.
     pub images: ImagePlace,
+    /// How sides of brushes say how their textures lie.
+    pub brushes: Brushes,
     /// Whether lights that the format knows (points, spots, suns) are written, and lamps glow as strongly as the light
     /// that they are. With lightmaps all light is there twice.
     pub lights: bool,
@@ -169,6 +184,7 @@ impl Default for ExportOptions {
             scale: METRES_PER_UNIT,
             lightmaps: Lightmaps::default(),
             images: ImagePlace::default(),
+            brushes: Brushes::default(),
             lights: false,
             exposure: None,
             sky: Sky::default(),

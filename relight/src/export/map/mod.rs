@@ -1,22 +1,27 @@
 //! Maps as level editors and map compilers read them: brushes from their planes, patches, entities.
 //!
-//! Brushes are written in the Valve 220 form, in which a side names the axes of its texture: whatever way the compiler
-//! laid a texture can be said so. The axes come from the surfaces drawn on a side; sides on which nothing was drawn get
-//! the editors' default. Patches are `patchDef2` with their control points and coordinates. Numbers are id units,
-//! whatever the scale asked for is.
+//! Brushes are written with their planes, and with the textures that the compiler drew on them: the way they lie comes
+//! from the surfaces drawn on a side; sides on which nothing was drawn get the editors' default. [`form`] has the two
+//! ways to say it. Patches are `patchDef2` with their control points and coordinates. Numbers are id units, whatever
+//! the scale asked for is.
 //!
-//! Source of the form: the map files of Quake III's editors, and Valve's extension of Quake's form of 1998.
+//! Brushes that the compiler did not divide the world by are marked as detail: solid ones in whose middle the tree has
+//! an open leaf.
+//!
+//! Source of the forms: the map files of Quake III's editors, and Valve's extension of Quake's form of 1998.
 
+mod form;
 mod texture;
 mod winding;
 
 use super::{Export, ExportError, ExportReport, Output};
 use crate::world::RelitWorld;
+use form::{Form, numbers};
 use glam::{DVec3, Vec3};
-use q3bsp::{Bsp, Entity, Model, Surface, SurfaceKind};
+use q3bsp::{Brush, Bsp, Entity, Model, Surface, SurfaceKind, content_flags};
 use std::fmt::Write;
-use texture::{Drawn, Projection, Sizes, default_projection};
-use winding::{Side, sides, three_points};
+use texture::{Drawn, Sizes, default_projection};
+use winding::{Side, plane_points, sides};
 
 /// The folder that compilers put before every name.
 const FOLDER: &str = "textures/";
@@ -32,6 +37,8 @@ struct Tally {
     /// Sides with the texture of a drawn surface.
     aligned: usize,
     open: usize,
+    /// Brushes marked as detail.
+    detail: usize,
     patches: usize,
     meshes: usize,
     foreign_names: usize,
@@ -79,6 +86,7 @@ pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportRe
 /// The file of a map.
 fn document(source: &Export<'_>) -> (String, Tally) {
     let mut writer = Writer {
+        form: Form::of(source.options.brushes, source.world.bsp.format),
         world: source.world,
         drawn: Drawn::new(source.world),
         sizes: Sizes::new(source.files, source.world),
@@ -98,6 +106,7 @@ fn document(source: &Export<'_>) -> (String, Tally) {
 }
 
 struct Writer<'a> {
+    form: Form,
     world: &'a RelitWorld,
     drawn: Drawn,
     sizes: Sizes<'a>,
@@ -118,7 +127,7 @@ impl Writer<'_> {
             _ => entity.brush_model().filter(|&n| n < bsp.models.len()),
         };
         self.line(format_args!("// entity {number}\n{{"));
-        if number == 0 && entity.get("mapversion").is_none() {
+        if number == 0 && self.form == Form::Valve && entity.get("mapversion").is_none() {
             self.line(format_args!("\"mapversion\" \"220\""));
         }
         for (key, value) in &entity.pairs {
@@ -150,11 +159,20 @@ impl Writer<'_> {
         for brush in brushes {
             match sides(bsp, brush) {
                 Some(sides) => {
-                    self.line(format_args!("// brush {written}\n{{"));
+                    let contents = match number == 0 && is_detail(bsp, brush, &sides) {
+                        true => content_flags::DETAIL,
+                        false => 0,
+                    };
+                    self.tally.detail += usize::from(contents != 0);
+                    let (begin, end) = match self.form {
+                        Form::Primitives => ("{\nbrushDef\n{", "}\n}"),
+                        Form::Valve => ("{", "}"),
+                    };
+                    self.line(format_args!("// brush {written}\n{begin}"));
                     for side in &sides {
-                        self.side(of_model, side, origin);
+                        self.side(of_model, side, origin, contents);
                     }
-                    self.line(format_args!("}}"));
+                    self.line(format_args!("{end}"));
                     self.tally.brushes += 1;
                     written += 1;
                 }
@@ -189,33 +207,25 @@ impl Writer<'_> {
         }
     }
 
-    fn side(&mut self, model: u32, side: &Side, origin: Vec3) {
+    fn side(&mut self, model: u32, side: &Side, origin: Vec3, contents: u32) {
         let shader = shader_name(&self.world.bsp, side.shader).to_owned();
-        let size = self.sizes.of(&shader);
         let found = self
             .drawn
-            .projection(model, &shader, side.normal, &side.winding, size);
+            .projection(model, &shader, side.normal, &side.winding);
         self.tally.sides += 1;
         self.tally.aligned += usize::from(found.is_some());
-        let Projection {
-            axes: [s, t],
-            offsets,
-            scales,
-        } = found.unwrap_or_else(|| default_projection(side.normal));
+        let size = match (found, self.form) {
+            // The matrix needs none.
+            (Some(_), Form::Primitives) => (1, 1),
+            _ => self.sizes.of(&shader),
+        };
         let origin = origin.as_dvec3();
-        let moved = |axis: DVec3, at: usize| offsets[at] - axis.dot(origin) / scales[at];
-        let (s_offset, t_offset) = (moved(s, 0), moved(t, 1));
-        let [a, b, c] = three_points(&side.winding).map(|p| point(p + origin));
+        let texture = found.unwrap_or_else(|| default_projection(side.normal, size));
+        let texture = texture.moved(origin);
+        let points = plane_points(side, origin);
         let name = self.name(side.shader);
-        self.line(format_args!(
-            "( {a} ) ( {b} ) ( {c} ) {name} [ {} {} ] [ {} {} ] 0 {} {} 0 0 0",
-            axis(s),
-            number(s_offset),
-            axis(t),
-            number(t_offset),
-            number(scales[0]),
-            number(scales[1]),
-        ));
+        let line = self.form.side(points, &name, &texture, size, contents);
+        self.line(format_args!("{line}"));
     }
 
     fn patch(&mut self, surface: &Surface, origin: Vec3) {
@@ -237,7 +247,7 @@ impl Writer<'_> {
             for at in 0..height {
                 let vertex = points.get(at * width + column).map(q3bsp::DrawVert::finite);
                 if let Some(vertex) = vertex {
-                    let place = point((vertex.position + origin).as_dvec3());
+                    let place = numbers((vertex.position + origin).as_dvec3());
                     let [s, t] = vertex.st.to_array().map(|v| number(f64::from(v)));
                     row += &format!(" ( {place} {s} {t} )");
                 }
@@ -266,17 +276,22 @@ fn number(value: f64) -> String {
     format!("{}", rounded + 0.0)
 }
 
-/// A point; what is nearly whole is whole, as it was in the editor.
-fn point(p: DVec3) -> String {
-    let snap = |v: f64| {
-        let whole = v.round();
-        number(if (v - whole).abs() < 0.01 { whole } else { v })
+/// Whether the compiler did not divide the world by a solid brush: leaves in those that it did are closed.
+fn is_detail(bsp: &Bsp, brush: &Brush, sides: &[Side]) -> bool {
+    let shader = usize::try_from(brush.shader).ok();
+    let Some(shader) = shader.and_then(|at| bsp.shaders.get(at)) else {
+        return false;
     };
-    format!("{} {} {}", snap(p.x), snap(p.y), snap(p.z))
-}
-
-fn axis(v: DVec3) -> String {
-    format!("{} {} {}", number(v.x), number(v.y), number(v.z))
+    let (solid, keeps) = (content_flags::SOLID, content_flags::AREAPORTAL);
+    if shader.content_flags & solid == 0
+        || shader.content_flags & keeps != 0
+        || bsp.leafs.is_empty()
+    {
+        return false;
+    }
+    let corners = sides.iter().flat_map(|side| &side.winding);
+    let (sum, count) = corners.fold((DVec3::ZERO, 0.0), |(sum, n), p| (sum + *p, n + 1.0));
+    bsp.cluster_at((sum / count).as_vec3()) >= 0
 }
 
 #[cfg(test)]

@@ -15,7 +15,11 @@ fn written(world: &RelitWorld, files: &dyn crate::GameFiles) -> (String, Tally) 
         files,
         materials: &materials,
         images: &ImageStore::default(),
-        options: ExportOptions::default(),
+        options: ExportOptions {
+            // What the foreign parser knows.
+            brushes: crate::export::Brushes::Valve,
+            ..ExportOptions::default()
+        },
     })
 }
 

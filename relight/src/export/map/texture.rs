@@ -13,21 +13,30 @@ const PARALLEL: f64 = 0.999;
 /// Largest distance between them, id units.
 const NEAR: f64 = 0.25;
 
-/// Texels per id unit where nothing tells, the editors' default.
+/// Id units per texel where nothing tells, the editors' default.
 const DEFAULT_SCALE: f64 = 0.5;
 
 /// Width and height of a texture that cannot be read: the editors' stand-in.
 const UNKNOWN_SIZE: (u32, u32) = (64, 64);
 
-/// A texture on a plane: each coordinate, in texels, is `axis · p / scale + offset`.
+/// A texture on a plane: each coordinate, in repetitions of the image, is `gradient · p + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Projection {
-    /// Unit vectors along the texture.
-    pub axes: [DVec3; 2],
-    /// Texels at the origin.
+    /// Change of each coordinate in space; neither is zero.
+    pub gradients: [DVec3; 2],
+    /// Coordinates at the origin.
     pub offsets: [f64; 2],
-    /// Units per texel.
-    pub scales: [f64; 2],
+}
+
+impl Projection {
+    /// The same texture on a plane that was moved.
+    pub(super) fn moved(self, by: DVec3) -> Projection {
+        let [s, t] = self.gradients;
+        let [s0, t0] = self.offsets;
+        // An image repeats: small offsets read better.
+        let offsets = [s0 - s.dot(by), t0 - t.dot(by)].map(|v| v - v.floor());
+        Projection { offsets, ..self }
+    }
 }
 
 /// A drawn triangle with its texture.
@@ -81,20 +90,18 @@ impl Drawn {
         Drawn { triangles }
     }
 
-    /// The projection of the texture of `size` texels on a side, from the largest triangle drawn on it; `None` when
-    /// none was.
+    /// The projection of the texture on a side, from the largest triangle drawn on it; `None` when none was.
     pub(super) fn projection(
         &self,
         model: u32,
         shader: &str,
         normal: DVec3,
         winding: &[DVec3],
-        size: (u32, u32),
     ) -> Option<Projection> {
         let on = *winding.first()?;
         let list = self.triangles.get(&(model, shader.to_ascii_lowercase()))?;
         let fits = |t: &&Triangle| {
-            t.normal.dot(normal) > PARALLEL
+            t.normal.dot(normal).abs() > PARALLEL
                 && t.corners.iter().all(|c| (*c - on).dot(normal).abs() < NEAR)
                 && overlaps(winding, normal, t)
         };
@@ -102,9 +109,14 @@ impl Drawn {
             let [a, b, c] = t.corners;
             (b - a).cross(c - a).length()
         };
-        let found = list.iter().filter(fits);
-        let largest = found.max_by(|a, b| area(a).total_cmp(&area(b)))?;
-        projection_of(largest, size)
+        let in_front = |t: &Triangle| t.normal.dot(normal) > 0.0;
+        // Where only the back was drawn, as of a fog or a liquid seen from inside, that tells.
+        let better = |a: &&Triangle, b: &&Triangle| {
+            let sides = in_front(a).cmp(&in_front(b));
+            sides.then(area(a).total_cmp(&area(b)))
+        };
+        let largest = list.iter().filter(fits).max_by(better)?;
+        projection_of(largest)
     }
 }
 
@@ -125,7 +137,7 @@ fn inside(polygon: &[DVec3], normal: DVec3, point: DVec3) -> bool {
 }
 
 /// The projection that gives a triangle's corners their coordinates, along the triangle's own plane.
-fn projection_of(triangle: &Triangle, (width, height): (u32, u32)) -> Option<Projection> {
+fn projection_of(triangle: &Triangle) -> Option<Projection> {
     let [a, b, c] = triangle.corners;
     let (e, f) = (b - a, c - a);
     // Dual basis of the edges in the plane.
@@ -137,30 +149,21 @@ fn projection_of(triangle: &Triangle, (width, height): (u32, u32)) -> Option<Pro
     let dual_e = (e * ff - f * ef) / determinant;
     let dual_f = (f * ee - e * ef) / determinant;
     let [sa, sb, sc] = triangle.st;
-    let size = DVec2::new(f64::from(width), f64::from(height));
-    let mut projection = Projection {
-        axes: [DVec3::ZERO; 2],
-        offsets: [0.0; 2],
-        scales: [1.0; 2],
+    let coordinate = |a_at: f64, b_at: f64, c_at: f64| {
+        let gradient = dual_e * (b_at - a_at) + dual_f * (c_at - a_at);
+        let plausible = gradient.length() > 1e-8 && gradient.length() < 1e4;
+        plausible.then(|| (gradient, a_at - gradient.dot(a)))
     };
-    for at in 0..2 {
-        let gradient = (dual_e * (sb[at] - sa[at]) + dual_f * (sc[at] - sa[at])) * size[at];
-        let length = gradient.length();
-        if !(length > 1e-6 && length < 1e6) {
-            return None;
-        }
-        projection.axes[at] = gradient / length;
-        projection.scales[at] = 1.0 / length;
-        projection.offsets[at] = sa[at] * size[at] - gradient.dot(a);
-    }
-    // An image repeats: small offsets read better.
-    projection.offsets[0] = projection.offsets[0].rem_euclid(size.x);
-    projection.offsets[1] = projection.offsets[1].rem_euclid(size.y);
-    Some(projection)
+    let (s, s0) = coordinate(sa.x, sb.x, sc.x)?;
+    let (t, t0) = coordinate(sa.y, sb.y, sc.y)?;
+    Some(Projection {
+        gradients: [s, t],
+        offsets: [s0, t0],
+    })
 }
 
 /// A texture laid on along the axes that the plane faces least, where nothing tells.
-pub(super) fn default_projection(normal: DVec3) -> Projection {
+pub(super) fn default_projection(normal: DVec3, (width, height): (u32, u32)) -> Projection {
     let n = normal.abs();
     let axes = if n.z >= n.x && n.z >= n.y {
         [DVec3::X, -DVec3::Y]
@@ -169,10 +172,11 @@ pub(super) fn default_projection(normal: DVec3) -> Projection {
     } else {
         [DVec3::X, -DVec3::Z]
     };
+    let [s, t] = axes;
+    let size = [width, height].map(|texels| f64::from(texels.max(1)) * DEFAULT_SCALE);
     Projection {
-        axes,
+        gradients: [s / size[0], t / size[1]],
         offsets: [0.0; 2],
-        scales: [DEFAULT_SCALE; 2],
     }
 }
 
