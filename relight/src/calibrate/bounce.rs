@@ -174,10 +174,10 @@ fn material_of<'a>(
 }
 
 /// Samples by place.
-struct Near(HashMap<IVec3, Vec<u32>>);
+pub(super) struct Near(HashMap<IVec3, Vec<u32>>);
 
 impl Near {
-    fn new(samples: &[Sample]) -> Near {
+    pub fn new(samples: &[Sample]) -> Near {
         let mut cells: HashMap<IVec3, Vec<u32>> = HashMap::new();
         for (i, sample) in (0u32..).zip(samples) {
             cells.entry(cell(sample.position)).or_default().push(i);
@@ -186,7 +186,7 @@ impl Near {
     }
 
     /// The sample that stands for a place: the nearest of nearly the same plane, or else of the same normal.
-    fn find(&self, samples: &[Sample], at: Vec3, normal: Vec3) -> Option<u32> {
+    pub fn find(&self, samples: &[Sample], at: Vec3, normal: Vec3) -> Option<u32> {
         let middle = cell(at);
         let mut best = None;
         let mut least = f32::INFINITY;

@@ -123,6 +123,9 @@ fn print(solution: &Solution) -> String {
     let _ = writeln!(text, "after {}", agreement(&report.after));
     let _ = writeln!(text, "gamma {}", report.gamma);
     let _ = writeln!(text, "ambient {}", three(solution.ambient));
+    if let Some(exposure) = solution.exposure {
+        let _ = writeln!(text, "exposure {exposure}");
+    }
     for strength in &solution.known {
         let _ = writeln!(text, "known {}", three(*strength));
     }
@@ -186,6 +189,12 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
             "gamma" => match numbers[..] {
                 [gamma] if finite && super::gamma::possible(gamma) => solution.report.gamma = gamma,
                 _ => return Err(wrong("not a gamma")),
+            },
+            "exposure" => match numbers[..] {
+                [exposure] if crate::exposure::possible(exposure) => {
+                    solution.exposure = Some(exposure);
+                }
+                _ => return Err(wrong("not an exposure")),
             },
             "ambient" => solution.ambient = light(&numbers)?,
             "known" => solution.known.push(light(&numbers)?),
@@ -272,6 +281,10 @@ impl Hash {
             self.number(material.class.class as u64);
             self.number(u64::from(material.emission.is_some()));
             self.vector(material.albedo);
+            for shade in &material.shades {
+                self.vector(shade.linear);
+                self.vector(shade.encoded);
+            }
             self.vector(material.shown);
         }
         for light in &world.lights {

@@ -473,6 +473,7 @@ mod tests {
             position: Vec3::ZERO,
             normal: Vec3::new(0.6, 0.0, 0.8),
             value: Vec3::ZERO,
+            shown: Vec3::ZERO,
             bounce: Vec3::ZERO,
             cluster: 0,
             material: u32::MAX,

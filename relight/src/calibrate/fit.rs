@@ -6,8 +6,9 @@ use super::place::{self, Scene};
 use super::report::Agreement;
 use super::samples::{Sample, light_of, mean};
 use super::solve::{self, Ambient, Effort};
-use super::{Occluders, suns};
-use crate::world::RelitWorld;
+use super::{Occluders, suns, views};
+use crate::exposure::{self, Place};
+use crate::world::{RelitWorld, WorldMaterial};
 use glam::Vec3;
 
 /// Most times that lights are looked for.
@@ -52,6 +53,29 @@ impl Fit<'_> {
     pub fn agreement(&self) -> Agreement {
         let computed = solve::predict(&self.samples, &self.columns, self.ambient.value);
         Agreement::of(self.world, &self.samples, &computed)
+    }
+
+    /// Exposure at which light as it is now is as bright as the engine shows the map, in the mean of what players see where
+    /// they are set; over the map's area where nothing tells where that is.
+    pub fn exposure(&self) -> Option<f32> {
+        let computed = solve::predict(&self.samples, &self.columns, self.ambient.value);
+        let place = |sample: usize, material: u32| {
+            let stored = self.samples.get(sample)?.shown;
+            let light = *computed.get(sample)?;
+            let material = self.world.materials.get(material as usize);
+            Some(Place {
+                stored,
+                light: light * material.map_or(1.0, WorldMaterial::stored_scale),
+                shades: material.map_or(&[], |m| &m.shades),
+            })
+        };
+        let seen = views::seen(self.world, self.occluders, &self.samples);
+        let seen = seen.into_iter();
+        exposure::matching(seen.filter_map(|(sample, material)| place(sample as usize, material)))
+            .or_else(|| {
+                let all = self.samples.iter().enumerate();
+                exposure::matching(all.filter_map(|(i, sample)| place(i, sample.material)))
+            })
     }
 
     /// Takes bounced light from the strengths as they are. `pictures`: with what pictures of skies give.

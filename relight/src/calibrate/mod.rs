@@ -40,6 +40,7 @@ mod solve;
 mod suns;
 #[cfg(test)]
 mod tests;
+mod views;
 
 pub use cache::CalibrationCache;
 pub use recovery::{FOUND_WITHIN, POWER_WITHIN, Recovery, hide_entities, recovery};
@@ -55,7 +56,7 @@ use glam::Vec3;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 10;
+const VERSION: u32 = 11;
 
 /// Part of the time that looking for the compiler's gamma takes, about.
 const GAMMA_PART: f32 = 0.25;
@@ -98,6 +99,8 @@ struct Solution {
     /// Suns put in: direction to it, irradiance.
     suns: Vec<(Vec3, Vec3)>,
     ambient: Vec3,
+    /// How bright this light is to be shown: see [`RelitWorld::exposure`].
+    exposure: Option<f32>,
     report: CalibrationReport,
 }
 
@@ -155,6 +158,7 @@ pub fn calibrate_with(
         }
     };
     world.stored_gamma = solution.report.gamma;
+    world.exposure = solution.exposure;
     if solution.report.evidence == Evidence::Nothing {
         skies::close(world, &silent);
     } else {
@@ -224,6 +228,7 @@ fn find(
     fit.more_ambient();
     progress(1.0);
     solution.report.after = fit.agreement();
+    solution.exposure = fit.exposure();
     let columns = fit.columns;
     solution.known = columns.iter().take(known).map(|c| c.strength).collect();
     for column in columns.iter().skip(known) {

@@ -43,6 +43,8 @@ pub(super) struct Sample {
     pub normal: Vec3,
     /// Light, irradiance / π.
     pub value: Vec3,
+    /// What the engine shows of it on a white surface, encoded for the display, at most 1.
+    pub shown: Vec3,
     /// Part of it that comes by way of other surfaces, irradiance / π: see [`bounce`](super::bounce).
     pub bounce: Vec3,
     /// Visibility cluster that it lies in.
@@ -87,6 +89,12 @@ pub(super) fn floor(world: &RelitWorld) -> f32 {
 fn decode(world: &RelitWorld, stored: Vec3, scale: f32) -> Vec3 {
     let light = stored.map(|channel| light_of(world, channel)) / scale;
     light::raise(light, world.color_exponent / world.stored_gamma)
+}
+
+/// What the engine shows of stored bytes: four times as much, less where a channel would run over.
+fn shown(stored: Vec3) -> Vec3 {
+    let light = stored * STORED_UNIT;
+    light / light.max_element().max(1.0)
 }
 
 /// What measurements were taken from.
@@ -242,6 +250,7 @@ fn sample_at(
         position,
         normal,
         value: stored.light(world),
+        shown: shown(Vec3::from_array(stored.rgb.map(f32::from))),
         bounce: Vec3::ZERO,
         cluster,
         material,
@@ -518,6 +527,7 @@ fn grid(world: &RelitWorld, count: usize, random: &mut Random) -> Vec<Sample> {
                 position,
                 normal,
                 value: decode(world, value, 1.0),
+                shown: shown(value),
                 bounce: Vec3::ZERO,
                 cluster,
                 material: u32::MAX,
@@ -550,6 +560,7 @@ mod tests {
             position: Vec3::ZERO,
             normal: Vec3::Z,
             value: Vec3::splat(value),
+            shown: Vec3::splat(value.min(1.0)),
             bounce: Vec3::ZERO,
             cluster: 0,
             material: u32::MAX,

@@ -13,7 +13,7 @@
 
 use super::color::raise;
 use super::entities::normalise;
-use super::glow::{mean_albedo, mean_emission};
+use super::glow::{Shade, mean_emission, shades};
 use super::{POINT_LIGHT_INTENSITY, SKY_LIGHT_RADIANCE, SURFACE_LIGHT_RADIANCE};
 use crate::files::GameFiles;
 use crate::image::{self, Image};
@@ -172,17 +172,16 @@ impl<'a> Finder<'a> {
         mean_emission(shader, |name| self.images.get(name)?.as_ref())
     }
 
-    /// Mean diffuse albedo of a material: the part of light that it throws back. Black for skies.
-    pub fn albedo(&mut self, material: &WorldMaterial) -> Vec3 {
+    /// What a material throws back of light all over its texture. Nothing for skies.
+    pub fn shades(&mut self, material: &WorldMaterial) -> Vec<Shade> {
         let shader = &material.resolved.shader;
         if material.is_sky() {
-            return Vec3::ZERO;
+            return Vec::new();
         }
         for name in shader.image_names() {
             self.image(name);
         }
-        let albedo = mean_albedo(shader, |name| self.images.get(name)?.as_ref());
-        (albedo * material.stored_scale()).min(Vec3::ONE)
+        shades(shader, |name| self.images.get(name)?.as_ref())
     }
 
     /// Mean radiance of what a sky shows: the sides of its box that exist, and its clouds.

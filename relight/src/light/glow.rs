@@ -1,20 +1,33 @@
-//! The mean light that a stack of stages shows of its own, without any light falling on it.
+//! What a stack of stages shows of its own, without any light falling on it, and what it shows of the light that does.
 
+use super::emission::luminance;
 use crate::image::Image;
 use crate::overbright;
 use glam::{Vec2, Vec3, Vec4};
 use shaderscript::eval::{self, ColorContext};
-use shaderscript::light::{LightLinear, StageSample, compose, glow_stages};
+use shaderscript::light::{LightLinear, StageSample, compose, compose_encoded, glow_stages};
 use shaderscript::{Shader, Stage, StageImage, TcGen};
 
 /// Samples per side of a texture.
 const GRID: u32 = 16;
+
+/// Brightnesses that a texture is told apart into.
+const SHADES: usize = 16;
 
 /// Times at which a material that moves is looked at, seconds: spread unevenly, so that no common period hides a
 /// blinking lamp.
 const TIMES: [f64; 12] = [
     0.0, 0.31, 0.73, 1.07, 1.39, 1.83, 2.21, 2.69, 3.17, 3.71, 4.33, 5.09,
 ];
+
+/// One of the brightnesses of a material's texture: what it shows of the light that falls on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shade {
+    /// Part of the light that is thrown back, linear: the albedo.
+    pub linear: Vec3,
+    /// What the engine multiplies stored light by, as encoded for the display.
+    pub encoded: Vec3,
+}
 
 /// Mean emission of a material's stages over texture and time, linear; zero for stages that only reflect.
 ///
@@ -31,30 +44,75 @@ pub(super) fn mean_emission<'a>(
     mean(shader, &TIMES, image, |drawn| drawn.emission)
 }
 
-/// Mean diffuse albedo of a material's stages over texture, linear, as they are at the start: what they show of the
-/// light that falls on them.
-pub(super) fn mean_albedo<'a>(
+/// What a material's stages show of the light that falls on them, as they are at the start: the brightnesses of its
+/// texture, from dark to bright, each standing for the same part of it.
+pub(super) fn shades<'a>(
     shader: &Shader,
-    image: impl FnMut(&str) -> Option<&'a Image>,
-) -> Vec3 {
+    mut image: impl FnMut(&str) -> Option<&'a Image>,
+) -> Vec<Shade> {
     let start = TIMES.get(..1).unwrap_or_default();
-    mean(shader, start, image, |drawn| drawn.lit).min(Vec3::ONE)
+    let mut of = |table: &[f32; 256], compose: Compose| {
+        drawn(shader, start, (table, compose), &mut image)
+            .into_iter()
+            .map(|drawn| {
+                let lit = drawn.lit.max(Vec3::ZERO);
+                if lit.is_finite() { lit } else { Vec3::ZERO }
+            })
+    };
+    // The same stack in both kinds of numbers: stages that double or add do not come to the same.
+    let linear = of(&overbright::byte_table(), compose);
+    let encoded = of(
+        &std::array::from_fn(|byte| byte as f32 / 255.0),
+        compose_encoded,
+    );
+    let mut all: Vec<Shade> = linear
+        .zip(encoded)
+        .map(|(linear, encoded)| Shade { linear, encoded })
+        .collect();
+    all.sort_by(|a, b| luminance(a.linear).total_cmp(&luminance(b.linear)));
+    let mean = |group: &[Shade]| {
+        let part = 1.0 / group.len().max(1) as f32;
+        Shade {
+            linear: group.iter().map(|s| s.linear).sum::<Vec3>() * part,
+            encoded: group.iter().map(|s| s.encoded).sum::<Vec3>() * part,
+        }
+    };
+    all.chunks(all.len().div_ceil(SHADES).max(1))
+        .map(mean)
+        .collect()
 }
 
 /// Mean over texture and times of a part of what is drawn.
 fn mean<'a>(
     shader: &Shader,
     times: &[f64],
-    mut image: impl FnMut(&str) -> Option<&'a Image>,
+    image: impl FnMut(&str) -> Option<&'a Image>,
     part: impl Fn(LightLinear) -> Vec3,
 ) -> Vec3 {
+    let table = overbright::byte_table();
+    let drawn = drawn(shader, times, (&table, compose), image);
+    let count = drawn.len().max(1) as f32;
+    let sum: Vec3 = drawn.into_iter().map(|d| part(d).max(Vec3::ZERO)).sum();
+    let mean = sum / count;
+    if mean.is_finite() { mean } else { Vec3::ZERO }
+}
+
+/// Puts the stages of a stack together.
+type Compose = fn(&[Stage], &[StageSample], bool) -> LightLinear;
+
+/// What is drawn all over the texture, at some times. `table`: the numbers that bytes stand for.
+fn drawn<'a>(
+    shader: &Shader,
+    times: &[f64],
+    (table, compose): (&[f32; 256], Compose),
+    mut image: impl FnMut(&str) -> Option<&'a Image>,
+) -> Vec<LightLinear> {
     let stages = &shader.stages;
     let pictures: Vec<Vec<Option<&Image>>> = stages
         .iter()
         .map(|s| s.image.names().iter().map(|name| image(name)).collect())
         .collect();
-    let table = overbright::byte_table();
-    let mut sum = Vec3::ZERO;
+    let mut drawn = Vec::with_capacity((GRID * GRID) as usize * times.len());
     let mut samples = Vec::with_capacity(stages.len());
     for &time in times {
         let context = ColorContext {
@@ -75,20 +133,19 @@ fn mean<'a>(
                 Vec2::new((cell % GRID) as f32 + 0.5, (cell / GRID) as f32 + 0.5) / GRID as f32;
             samples.clear();
             for ((stage, color), pictures) in stages.iter().zip(&colors).zip(&pictures) {
-                let texture = texel(stage, pictures, st, time, &table);
+                let texture = texel(stage, pictures, st, time, table);
                 samples.push(StageSample {
                     texture,
                     color: *color,
                 });
             }
-            sum += part(compose(stages, &samples, true)).max(Vec3::ZERO);
+            drawn.push(compose(stages, &samples, true));
         }
     }
-    let mean = sum / (GRID * GRID * times.len() as u32) as f32;
-    if mean.is_finite() { mean } else { Vec3::ZERO }
+    drawn
 }
 
-/// What a stage's image shows at a place, linear.
+/// What a stage's image shows at a place.
 fn texel(
     stage: &Stage,
     pictures: &[Option<&Image>],

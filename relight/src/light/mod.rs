@@ -66,6 +66,7 @@ pub use by_hand::{LightsByHand, LightsLineError};
 pub use color::LightColor;
 pub use emission::{Emission, EmissionSource, GLOW_THRESHOLD};
 pub use flicker::Flicker;
+pub use glow::Shade;
 pub use judge::{ListJudgement, judge, lists_by_geometry, lists_by_visibility};
 pub use lists::{LightLists, LightRef, LightShare};
 pub use looks::{DROPPED_LEAST, DROPPED_PART};

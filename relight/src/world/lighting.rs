@@ -23,6 +23,7 @@ pub struct Lighting {
     report: LightReport,
     calibration: Option<CalibrationReport>,
     stored_gamma: f32,
+    exposure: Option<f32>,
 }
 
 impl RelitWorld {
@@ -42,6 +43,7 @@ impl RelitWorld {
             report: self.report.clone(),
             calibration: self.calibration.clone(),
             stored_gamma: self.stored_gamma,
+            exposure: self.exposure,
         }
     }
 
@@ -62,5 +64,6 @@ impl RelitWorld {
         self.report = lighting.report;
         self.calibration = lighting.calibration;
         self.stored_gamma = lighting.stored_gamma;
+        self.exposure = lighting.exposure;
     }
 }

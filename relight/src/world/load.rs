@@ -233,6 +233,7 @@ impl RelitWorld {
             warnings,
             color_exponent,
             stored_gamma: 1.0,
+            exposure: None,
             overbright_shift: options.overbright_shift,
             bsp,
         };
@@ -267,7 +268,7 @@ impl RelitWorld {
 
     fn measure_materials_with(&mut self, finder: &mut light::Finder<'_>) {
         for material in &mut self.materials {
-            material.albedo = finder.albedo(material);
+            material.throw_back(finder);
             material.shown = if material.is_sky() {
                 finder.sky_radiance(material)
             } else {
@@ -343,6 +344,7 @@ fn resolve_materials(
                 class: shaderscript::light::classify(&resolved.shader),
                 resolved,
                 albedo: Vec3::ZERO,
+                shades: Vec::new(),
                 shown: Vec3::ZERO,
                 emission: None,
                 flicker: None,

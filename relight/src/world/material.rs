@@ -2,7 +2,7 @@
 
 use crate::exposure::DEFAULT_EXPONENT;
 use crate::files::GameFiles;
-use crate::light::{Emission, Finder, Flicker};
+use crate::light::{Emission, Finder, Flicker, Shade};
 use crate::materials::{Materials, Resolved};
 use glam::Vec3;
 use q3bsp::{Bsp, SurfaceKind, lightmap_index};
@@ -28,6 +28,9 @@ pub struct WorldMaterial {
     /// Part of incident light that it throws back, diffuse, mean over its texture, linear. Zero unless the world
     /// was loaded to be calibrated.
     pub albedo: Vec3,
+    /// What it throws back of light all over its texture, from dark to bright, equal parts of it each; without
+    /// [`stored_scale`](Self::stored_scale). Empty of skies, and unless the world was loaded to be calibrated.
+    pub shades: Vec<Shade>,
     /// Mean radiance of what it shows of its own, linear: of a sky its picture. Bounced rays find it where it is in no
     /// light list. Zero unless the world was loaded to be calibrated.
     pub shown: Vec3,
@@ -56,6 +59,7 @@ impl WorldMaterial {
             class: classify(&resolved.shader),
             resolved,
             albedo: Vec3::ZERO,
+            shades: Vec::new(),
             shown: Vec3::ZERO,
             emission: None,
             flicker: None,
@@ -63,9 +67,17 @@ impl WorldMaterial {
         let mut finder = Finder::new(files, DEFAULT_EXPONENT);
         material.emission = finder.emission(&material);
         material.flicker = finder.flicker(&material);
-        material.albedo = finder.albedo(&material);
+        material.throw_back(&mut finder);
         material.shown = finder.shown(&material);
         material
+    }
+
+    /// Finds what it throws back of light.
+    pub(super) fn throw_back(&mut self, finder: &mut Finder<'_>) {
+        self.shades = finder.shades(self);
+        let count = self.shades.len().max(1) as f32;
+        let mean = self.shades.iter().map(|s| s.linear).sum::<Vec3>() / count;
+        self.albedo = (mean.min(Vec3::ONE) * self.stored_scale()).min(Vec3::ONE);
     }
 
     /// What the compiler multiplied light by before it stored it in lightmaps of this material: by so much less than the

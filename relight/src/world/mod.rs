@@ -70,6 +70,9 @@ pub struct RelitWorld {
     /// and where nobody [calibrated](crate::calibrate()) to find out. Light is counted in a unit in which what the engine
     /// shows as white is 1 with any gamma.
     pub stored_gamma: f32,
+    /// Exposure at which the world's light, on the map's textures, is as bright in the mean as the engine shows the map:
+    /// found by [calibration](crate::calibrate()). `None`: see [`display_exposure`](crate::exposure::display_exposure).
+    pub exposure: Option<f32>,
     /// Shift that was applied to vertex colours; see [`overbright`].
     pub overbright_shift: u32,
 }

@@ -8,7 +8,12 @@
 //! * L^2 counts as L: a surface that was multiplied by its light twice is still lit once.
 //! * L B counts as B: the background brings its own light.
 //!
-//! All colours are linear; nothing is clamped. Alphas and blend factors made of them are plain numbers.
+//! All colours are linear; nothing is clamped. Alphas and blend factors made of them are plain numbers. The engine blends
+//! colours that are encoded for the display, though. Where that comes to something else than the same sum in linear light
+//! would, linear light is brought to what the engine shows, as `trace/layer.glsl` does:
+//!
+//! * twice the product (`GL_DST_COLOR GL_SRC_COLOR`): half grey, encoded, leaves what is below as it is;
+//! * a paint over an opaque body (`blend`): it has the colour that the mixed display values have where all is lit in full.
 
 use crate::{
     shader::Shader,
@@ -97,6 +102,71 @@ impl LightLinear {
 /// The background starts with coefficient 1 when the first stage blends, else with 0. Destination alpha counts as
 /// 1: the engine asks for a frame buffer without alpha, where OpenGL defines it so.
 pub fn compose(stages: &[Stage], samples: &[StageSample], vertex_light: bool) -> LightLinear {
+    compose_in(stages, samples, vertex_light, Numbers::Linear)
+}
+
+/// [`compose`] of samples that are encoded for the display, by the engine's own sums: with L the stored light, encoded as
+/// well, `evaluate` gives what the engine shows, encoded.
+pub fn compose_encoded(
+    stages: &[Stage],
+    samples: &[StageSample],
+    vertex_light: bool,
+) -> LightLinear {
+    compose_in(stages, samples, vertex_light, Numbers::Encoded)
+}
+
+/// What colours are numbers of.
+#[derive(Clone, Copy, PartialEq)]
+enum Numbers {
+    Linear,
+    Encoded,
+}
+
+/// Linear value of half the display's range (IEC 61966-2-1).
+const HALF: f32 = 0.214_041_14;
+
+/// Linear value of an encoded one.
+fn decode(encoded: f32) -> f32 {
+    if encoded <= 0.040_45 {
+        encoded / 12.92
+    } else {
+        ((encoded + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+/// Encoded value of a linear one.
+fn encode(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 {
+        linear * 12.92
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+/// A paint over an opaque body: both mixed in linear light, with the colour of the mixed display values.
+fn paint(body: LightLinear, paint: LightLinear, alpha: f32) -> LightLinear {
+    let mut mixed = paint.scale(alpha).plus(body.scale(1.0 - alpha));
+    let full = |l: LightLinear| (l.lit + l.emission).max(Vec3::ZERO);
+    let (below, above) = (full(body), full(paint));
+    let sum = below.lerp(above, alpha);
+    let chosen = below.map(encode).lerp(above.map(encode), alpha).map(decode);
+    let tint = |sum: f32, chosen: f32| if sum > 1e-6 { chosen / sum } else { 1.0 };
+    let tint = Vec3::new(
+        tint(sum.x, chosen.x),
+        tint(sum.y, chosen.y),
+        tint(sum.z, chosen.z),
+    );
+    mixed.lit *= tint;
+    mixed.emission *= tint;
+    mixed
+}
+
+fn compose_in(
+    stages: &[Stage],
+    samples: &[StageSample],
+    vertex_light: bool,
+    numbers: Numbers,
+) -> LightLinear {
     let mut drawn = LightLinear::default();
     if stages.first().is_none_or(|first| first.blend.is_some()) {
         drawn = LightLinear::BACKGROUND;
@@ -107,8 +177,17 @@ pub fn compose(stages: &[Stage], samples: &[StageSample], vertex_light: bool) ->
         if stage.alpha_func.is_some_and(|func| !func.passes(alpha)) {
             continue;
         }
+        let part = alpha > 0.0 && alpha < 1.0;
         drawn = match stage.blend {
             None => source,
+            Some((BlendFactor::DstColor, BlendFactor::SrcColor)) if numbers == Numbers::Linear => {
+                source.filter(drawn).scale(HALF.recip())
+            }
+            Some((BlendFactor::SrcAlpha, BlendFactor::OneMinusSrcAlpha))
+                if numbers == Numbers::Linear && part && drawn.through == Vec3::ZERO =>
+            {
+                paint(drawn, source, alpha)
+            }
             Some((source_factor, destination_factor)) => {
                 let product = source.filter(drawn);
                 let from_source = match source_factor {
@@ -256,6 +335,11 @@ mod tests {
         compose(&shader(stages).stages, samples, false)
     }
 
+    /// As the engine mixes them.
+    fn mixed(below: Vec3, above: Vec3, alpha: f32) -> Vec3 {
+        below.map(encode).lerp(above.map(encode), alpha).map(decode)
+    }
+
     #[track_caller]
     fn near(found: LightLinear, lit: Vec3, emission: Vec3, through: Vec3) {
         assert!(
@@ -293,12 +377,12 @@ mod tests {
             );
             near(found, RED, Vec3::ZERO, Vec3::ZERO);
         }
-        // The doubling blend shows the lightmap twice as bright.
+        // The doubling blend leaves what is below half grey as it is.
         let found = run(
             "{\nmap a\n}\n{\nmap $lightmap\nblendFunc GL_DST_COLOR GL_SRC_COLOR\n}",
             &[texel(RED, 1.0), StageSample::WHITE],
         );
-        near(found, 2.0 * RED, Vec3::ZERO, Vec3::ZERO);
+        near(found, RED / HALF, Vec3::ZERO, Vec3::ZERO);
     }
 
     #[test]
@@ -329,7 +413,37 @@ mod tests {
             ),
             &[StageSample::WHITE, texel(RED, 1.0), texel(BLUE, 0.25)],
         );
+        let tint = mixed(RED, BLUE, 0.25) / RED.lerp(BLUE, 0.25);
+        near(found, 0.75 * RED * tint, 0.25 * BLUE * tint, Vec3::ZERO);
+    }
+
+    #[test]
+    fn encoded_samples_add_up_as_the_engine_adds_them() {
+        let stages = shader(&format!(
+            "{LIGHTMAP}\n{{\nmap a\nblendFunc filter\n}}\n{{\nmap detail\nblendFunc GL_DST_COLOR GL_SRC_COLOR\n}}\n{{\nmap b\nblendFunc blend\n}}"
+        ))
+        .stages;
+        let samples = |decal: f32| {
+            let grey = texel(Vec3::splat(0.5), 1.0);
+            [
+                StageSample::WHITE,
+                texel(RED, 1.0),
+                grey,
+                texel(BLUE, decal),
+            ]
+        };
+        let found = compose_encoded(&stages, &samples(0.0), false);
+        near(found, RED, Vec3::ZERO, Vec3::ZERO);
+        let found = compose_encoded(&stages, &samples(0.25), false);
         near(found, 0.75 * RED, 0.25 * BLUE, Vec3::ZERO);
+        // In linear light the same stack shows the same where it is lit in full.
+        let linear = samples(0.25).map(|s| StageSample {
+            texture: s.texture.truncate().map(decode).extend(s.texture.w),
+            ..s
+        });
+        let shown = compose(&stages, &linear, false).evaluate(Vec3::ONE, Vec3::ONE);
+        let meant = found.evaluate(Vec3::ONE, Vec3::ONE).map(decode);
+        assert!(shown.abs_diff_eq(meant, 1e-5), "{shown} {meant}");
     }
 
     #[test]
@@ -338,7 +452,7 @@ mod tests {
             "{\nmap e\ntcGen environment\n}\n{\nmap a\nblendFunc blend\n}\n{\nmap $lightmap\nblendFunc filter\n}",
             &[texel(BLUE, 1.0), texel(RED, 0.75), StageSample::WHITE],
         );
-        near(found, 0.25 * BLUE + 0.75 * RED, Vec3::ZERO, Vec3::ZERO);
+        near(found, mixed(BLUE, RED, 0.75), Vec3::ZERO, Vec3::ZERO);
     }
 
     #[test]
@@ -418,7 +532,7 @@ mod tests {
             (
                 "GL_SRC_ALPHA",
                 "GL_ONE_MINUS_SRC_ALPHA",
-                0.25 * BLUE + 0.75 * RED,
+                mixed(RED, BLUE, 0.25),
             ),
             (
                 "GL_ONE_MINUS_SRC_ALPHA",

@@ -8,7 +8,8 @@ mod algebra;
 mod dielectric;
 
 pub use algebra::{
-    LightLinear, StageSample, compose, glow_stages, is_glowing, stage_samples_white,
+    LightLinear, StageSample, compose, compose_encoded, glow_stages, is_glowing,
+    stage_samples_white,
 };
 pub use dielectric::{
     INDEX_GLASS, INDEX_SLIME, INDEX_WATER, filters_light, is_reflection, refraction_index,

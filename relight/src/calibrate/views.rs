@@ -1,0 +1,85 @@
+//! What players see of a map, at measurements: these are spread over the map's area, of which some parts fill the screen
+//! and others are never seen.
+
+use super::bounce::{Near, surfaces_of_triangles};
+use super::bvh::Occluders;
+use super::parallel;
+use super::random::Random;
+use super::samples::Sample;
+use crate::world::RelitWorld;
+use glam::Vec3;
+use q3bsp::Entity;
+
+/// Most places that are looked from.
+const VIEWS: usize = 128;
+
+/// Rays from all places together.
+const RAYS: usize = 16_384;
+
+/// Height of the eyes above where a player is set, id units.
+const EYES: f32 = 35.0;
+
+/// Half the height of a picture of 4 : 3 that is 90 degrees wide, at distance 1.
+const HALF_HEIGHT: f32 = 0.75;
+
+/// A place where the game sets players, and the way that they look.
+struct View {
+    eye: Vec3,
+    forward: Vec3,
+}
+
+/// The views of the players' places.
+fn views(entities: &[Entity]) -> Vec<View> {
+    let all: Vec<View> = entities
+        .iter()
+        .filter(|entity| {
+            let class = entity.classname();
+            class == "info_player_deathmatch"
+                || class == "info_player_start"
+                || (class.starts_with("team_CTF_") && class.ends_with("spawn"))
+        })
+        .filter_map(|entity| {
+            let eye = entity.vec3("origin")? + Vec3::Z * EYES;
+            let turned = entity.vec3("angles").map(|angles| angles.y);
+            let yaw = turned.or(entity.number("angle")).unwrap_or(0.0);
+            let (sin, cos) = yaw.to_radians().sin_cos();
+            let forward = Vec3::new(cos, sin, 0.0);
+            (eye.is_finite() && forward.is_finite()).then_some(View { eye, forward })
+        })
+        .collect();
+    let step = all.len().div_ceil(VIEWS).max(1);
+    all.into_iter().step_by(step).collect()
+}
+
+/// What players see where they are set: (measurement, material) for each of many pixels of such pictures that show a
+/// surface which light falls on. Empty for maps without such places.
+pub(super) fn seen(
+    world: &RelitWorld,
+    occluders: &Occluders,
+    samples: &[Sample],
+) -> Vec<(u32, u32)> {
+    let views = views(&world.bsp.entities());
+    let of_triangle = surfaces_of_triangles(world);
+    let near = Near::new(samples);
+    let rays = RAYS / views.len().max(1);
+    let found = parallel::map(&views, |i, view| {
+        let mut random = Random::new(0x5EE0_0000 + i as u64);
+        let aside = view.forward.cross(Vec3::Z);
+        let pixel = |ray: usize| {
+            let x = (ray as f32 + random.next()) / rays as f32 * 2.0 - 1.0;
+            let y = (random.next() * 2.0 - 1.0) * HALF_HEIGHT;
+            let ray = view.forward + aside * x + Vec3::Z * y;
+            let hit = occluders.nearest(view.eye, ray, f32::INFINITY);
+            let hit = hit.filter(|hit| hit.front && !hit.sky)?;
+            let surface = *of_triangle.get(hit.tag as usize)?;
+            let index = world.surfaces.get(surface as usize)?.material;
+            if world.materials.get(index as usize)?.emission.is_some() {
+                return None;
+            }
+            let sample = near.find(samples, view.eye + ray * hit.t, hit.normal)?;
+            Some((sample, index))
+        };
+        (0..rays).filter_map(pixel).collect::<Vec<_>>()
+    });
+    found.into_iter().flatten().collect()
+}
