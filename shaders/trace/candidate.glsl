@@ -20,11 +20,12 @@ LayerOrder layer_begin() { return LayerOrder(-LAYER_NONE, NO_HIT, NO_HIT); }
 // A search for the next translucent layer: it lies behind `last`, and before `best` (key LAYER_NONE: none yet).
 // Returns whether the hit is a better one, with its key.
 bool is_next_layer(Hit hit, vec3 direction, LayerOrder last, LayerOrder best, out float key) {
-    SurfacePoint p = surface_point(hit);
-    key = layer_key(p.triangle.flags, hit.t);
-    bool behind = layer_before(last.key, last.geometry, last.primitive, key, hit.geometry, hit.primitive);
-    bool before = best.key >= LAYER_NONE || layer_before(key, hit.geometry, hit.primitive, best.key, best.geometry, best.primitive);
-    return behind && before && !is_culled(p, direction);
+    // the order first: of many layers on a ray, each is looked at for every other one
+    GeometryRecord record = Geometries(VIEW.geometries).at[hit.geometry];
+    key = layer_key(Triangles(record.triangles).at[hit.primitive].flags, hit.t);
+    if (!layer_before(last.key, last.geometry, last.primitive, key, hit.geometry, hit.primitive)) return false;
+    if (best.key < LAYER_NONE && !layer_before(key, hit.geometry, hit.primitive, best.key, best.geometry, best.primitive)) return false;
+    return !is_culled(surface_point(hit), direction);
 }
 
 // From where on layers behind `last` are found: a layer lies at its key or a bias behind it.

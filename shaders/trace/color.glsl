@@ -19,6 +19,13 @@ vec3 encode_display(vec3 c) {
     return mix(high, low, lessThanEqual(c, vec3(0.0031308)));
 }
 
+// Linear value of what is displayed over the displayed value; from display white on 1, so that sums beyond it do not
+// blaze. Parts that add up to a displayed sum share its linear value as they share the sum.
+vec3 display_slope(vec3 c) {
+    vec3 bounded = clamp(c, 1.0e-4, 1.0);
+    return decode_display(bounded) / bounded;
+}
+
 // Relative luminance of linear Rec. 709 primaries.
 float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
 

@@ -1,6 +1,12 @@
 // A stack of stages as light sees it: what reaches the eye is lit * L + emission + through * background + reflected * R,
 // where L is the light that a white diffuse surface would show here, and R what the mirrored ray sees.
-// shaderscript::light has the same algebra (without reflections, and with alpha in linear light) on the CPU and its tests.
+//
+// Stages are put together as they are displayed, because that is where their authors saw the sums and mixtures that they
+// chose; products are the same in linear light, but a sum of two linear values is darker than that of the two displayed
+// ones. So the algebra runs on displayed values. `evaluate_stages` tells what each part comes to by itself in linear light;
+// primary.rgen weighs the parts of what a pixel shows by their shares of what is displayed.
+// shaderscript::light has the same algebra (without reflections) on the CPU and its tests, in linear light but for what
+// the display mixes on an opaque body.
 #ifndef RELIGHT_TRACE_LAYER_GLSL
 #define RELIGHT_TRACE_LAYER_GLSL
 
@@ -170,35 +176,22 @@ Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, flo
     }
 }
 
-Layer layer_tint(Layer a, vec3 c) { return Layer(a.lit * c, a.emission * c, a.through * c, a.reflected * c); }
+// One part of displayed values in linear light. Most parts of most layers are nothing.
+vec3 linear_part(vec3 displayed) { return displayed == vec3(0.0) ? vec3(0.0) : decode_display(max(displayed, 0.0)); }
 
-// A stage laid over an opaque body with some alpha. The two are paints of one surface, whose sum its author chose as it is
-// displayed; in linear light the brighter one would count for more than he saw. So the parts are mixed in linear light, and
-// brought to the colour that the mixed display values have where all of them are lit in full.
-Layer layer_paint(Layer body, Layer paint, float alpha) {
-    Layer mixed = layer_add(layer_scale(paint, alpha), layer_scale(body, 1.0 - alpha));
-    vec3 below = max(body.lit + body.emission + body.reflected, 0.0), above = max(paint.lit + paint.emission + paint.reflected, 0.0);
-    vec3 sum = mix(below, above, alpha);
-    vec3 chosen = decode_display(mix(encode_display(below), encode_display(above), alpha));
-    return layer_tint(mixed, mix(vec3(1.0), chosen / max(sum, 1.0e-6), greaterThan(sum, vec3(1.0e-6))));
-}
-
-// One over the linear value of half the display's range.
-const float DOUBLE_PRODUCT = 1.0 / 0.21404114;
-
-// Runs the stages of a material over the background.
+// Runs the stages of a material over the background, in displayed values.
 Layer run_stages(Material material, SurfacePoint p, Footprint footprint) {
     bool world = (p.triangle.flags & TRIANGLE_WORLD) != 0;
     if (material.plain_image != NO_TEXTURE && (world || (material.flags & MATERIAL_VERTEX_LIGHT) == 0)) {
         // what the stages below come to, for the many materials that are an image under light
         if (has_ellipse(footprint)) {
             vec4 texel = texel_in_ellipse(material.plain_image, material.plain_sampler, p.stage.st, footprint.along, footprint.across);
-            return Layer(decode_display(texel.rgb), vec3(0.0), vec3(0.0), vec3(0.0));
+            return Layer(texel.rgb, vec3(0.0), vec3(0.0), vec3(0.0));
         }
         float lod = texture_lod(material.plain_image, p.texel_scale, footprint.width);
         vec3 texel = textureLod(sampler2D(textures[nonuniformEXT(material.plain_image)],
             samplers[nonuniformEXT(material.plain_sampler)]), p.stage.st, lod).rgb;
-        return Layer(decode_display(texel), vec3(0.0), vec3(0.0), vec3(0.0));
+        return Layer(texel, vec3(0.0), vec3(0.0), vec3(0.0));
     }
     Instance instance = instance_of(p.instance);
     Stages stages = Stages(VIEW.materials.stages);
@@ -210,59 +203,53 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint) {
         float alpha;
         if (stage.image_count == 0 && (stage.flags & STAGE_WHITE) == 0) {
             // the lightmap: the light itself, as bright as the stage lets it through
-            source.lit = decode_display(color.rgb);
+            source.lit = color.rgb;
             alpha = color.a;
         } else if ((stage.flags & STAGE_REFLECTION) != 0) {
             // the picture of an environment in the mean: its smallest level. What it shows, the mirrored ray finds
             uint image = stage_image(VIEW.materials, stage, NO_TEXTURE, p.stage.time);
             vec4 mean = textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), vec2(0.5), 32.0);
-            source.reflected = decode_display(mean.rgb) * decode_display(color.rgb);
+            source.reflected = mean.rgb * color.rgb;
             alpha = mean.a * color.a;
         } else {
             vec4 texel = stage_texel(stage, p, instance, footprint);
-            vec3 image = decode_display(texel.rgb);
+            vec3 image = texel.rgb;
             bool baked = world && (material.flags & MATERIAL_VERTEX_LIGHT) != 0
                 && (stage.rgb_gen == RGBGEN_VERTEX || stage.rgb_gen == RGBGEN_EXACT_VERTEX);
             if (stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE || baked) {
                 source.lit = image;
                 alpha = texel.a * (stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE && stage.alpha_gen == ALPHAGEN_IDENTITY ? 1.0 : color.a);
             } else {
-                vec3 shown = image * decode_display(color.rgb);
+                vec3 shown = image * color.rgb;
                 bool matter = !world && (stage.flags & STAGE_MATTER) != 0;
                 if (matter && (material.flags & MATERIAL_POLYGON_OFFSET) != 0) {
                     source.lit = shown; // a mark on a surface is lit with it
                 } else {
                     // what hangs in the air shows the light around it: as layers it can only glow
-                    if (matter && (instance.flags & INSTANCE_SUSPENDED) != 0) shown *= decode_display(instance.ambient);
+                    if (matter && (instance.flags & INSTANCE_SUSPENDED) != 0) shown *= instance.ambient;
                     source.emission = shown;
                 }
                 alpha = texel.a * color.a;
             }
         }
         if (stage.alpha_func != ALPHAFUNC_NONE && !alpha_passes(stage.alpha_func, alpha)) continue;
-        if (stage.blend_src == BLEND_DST_COLOR && stage.blend_dst == BLEND_SRC_COLOR) {
-            // twice the product, as displayed: half grey leaves what is below as it is, so it has to here too
-            layer = layer_scale(layer_product(layer, source), DOUBLE_PRODUCT);
-            continue;
-        }
-        bool painted = stage.blend_src == BLEND_SRC_ALPHA && stage.blend_dst == BLEND_ONE_MINUS_SRC_ALPHA;
-        if (painted && layer.through == vec3(0.0) && alpha > 0.0 && alpha < 1.0) {
-            layer = layer_paint(layer, source, alpha);
-            continue;
-        }
         layer = layer_add(layer_blend(stage.blend_src, source, source, layer, alpha),
             layer_blend(stage.blend_dst, layer, source, layer, alpha));
     }
     return layer;
 }
 
-// The stages of the point's material over the background, and how much of what light shows of them is thrown back: never
-// more than all of it, unless the stages themselves do.
+// How much of what light shows of a material is thrown back: never more than all of it, unless the stages themselves do.
+vec3 bounded_albedo(Material material, vec3 lit) {
+    return material.lit_scale != 1.0 ? min(lit * material.lit_scale, max(lit, 1.0)) : lit;
+}
+
+// Each part of the point's stages as it is by itself, in linear light.
 Layer evaluate_stages(SurfacePoint p, Footprint footprint) {
     Material material = material_of(p.triangle.material);
-    Layer layer = run_stages(material, p, footprint);
-    if (material.lit_scale != 1.0) layer.lit = min(layer.lit * material.lit_scale, max(layer.lit, 1.0));
-    return layer;
+    Layer shown = run_stages(material, p, footprint);
+    return Layer(bounded_albedo(material, linear_part(shown.lit)), linear_part(shown.emission), linear_part(shown.through),
+        linear_part(shown.reflected));
 }
 
 // What a lamp shows of the light that it gives: its texture at up to full brightness.
@@ -271,16 +258,17 @@ vec3 shown_glow(Material material) {
     return radiance / (1.0 + max_component(radiance));
 }
 
-// The layer as an eye sees it: an emitter's surface glows with its own texture.
-Layer evaluate_layer(SurfacePoint p, Footprint footprint) {
-    Layer layer = evaluate_stages(p, footprint);
-    Material material = material_of(p.triangle.material);
-    layer.emission += layer.lit * shown_glow(material);
-    layer.lit = max(layer.lit, 0.0);
-    layer.emission = max(layer.emission, 0.0);
-    layer.through = max(layer.through, 0.0);
-    layer.reflected = max(layer.reflected, 0.0);
-    return layer;
+// The light that the engine shows at a surface, as displayed: its lightmap, the colours of its corners, or what the light
+// grid gives a model. Nothing is lit by it: it tells how much of the displayed sum of layers each of them is.
+vec3 displayed_light(SurfacePoint p) {
+    if ((p.triangle.flags & TRIANGLE_WORLD) != 0) {
+        uint page = p.triangle.lightmap;
+        if (page == NO_TEXTURE) return p.stage.color.rgb;
+        return textureLod(sampler2D(textures[nonuniformEXT(page)], samplers[VIEW.sky_sampler]), p.stage.lightmap, 0.0).rgb;
+    }
+    Instance instance = instance_of(p.instance);
+    if ((instance.flags & INSTANCE_UNLIT) != 0) return vec3(1.0);
+    return min(instance.ambient + max(dot(p.stage.normal, instance.light_direction), 0.0) * instance.directed, vec3(1.0));
 }
 
 #endif

@@ -77,8 +77,9 @@ impl Materials {
         self.touch();
     }
 
-    /// Says that surfaces of a material are in the light list, and which radiance (display-white units) they have
-    /// beyond what their stages show.
+    /// Says that surfaces of a material are in the light list, and which radiance (display-white units) they have. Where
+    /// a stage glows by itself it shows that, on the parts of the image that its author drew as a lamp; else the whole
+    /// texture is shown as bright as its light.
     pub fn set_emitter(&mut self, index: u32, radiance: Vec3) {
         let slots = (
             self.list.get_mut(index as usize),
@@ -86,7 +87,11 @@ impl Materials {
         );
         if let (Some(material), Some(light)) = slots {
             material.flags |= types::constants::MATERIAL_EMITTER;
-            *light = radiance;
+            *light = if shaderscript::light::is_glowing(&material.shader) {
+                Vec3::ZERO
+            } else {
+                radiance
+            };
             self.touch();
         }
     }

@@ -4,9 +4,10 @@ use glam::Vec3;
 use shaders::types::constants as c;
 use shaders::types::{Fog, Stage};
 
-use super::harness::{Gpu, Scene, identity, rectangle, reference, stage, through_byte};
+use super::harness::{Gpu, Scene, encode, identity, rectangle, reference, stage, through_byte};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::settings::Settings;
+use crate::trace::frame_lights::decode;
 
 const TRANSLUCENT: u32 = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
 
@@ -24,16 +25,25 @@ fn scene() -> Scene {
     Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 32)
 }
 
-/// What constant layers (encoded colour, alpha), nearest first, show over a background (encoded).
+/// What shaders keep of a constant that passes through a byte.
+fn byte(value: f32) -> f32 {
+    (value * 255.0 + 0.001).floor() / 255.0
+}
+
+/// A constant colour as it is displayed.
+fn displayed(color: [f32; 3]) -> Vec3 {
+    Vec3::from(color.map(byte))
+}
+
+/// What constant layers (encoded colour, alpha), nearest first, show over a background (encoded): mixed as displayed.
 fn over(layers: &[([f32; 3], f32)], background: [f32; 3]) -> Vec3 {
-    let linear = |c: [f32; 3]| Vec3::from(c.map(through_byte));
-    layers
+    let mixed = layers
         .iter()
         .rev()
-        .fold(linear(background), |below, (color, alpha)| {
-            let alpha = (alpha * 255.0 + 0.001).floor() / 255.0;
-            linear(*color) * alpha + below * (1.0 - alpha)
-        })
+        .fold(displayed(background), |below, (color, alpha)| {
+            displayed(*color) * byte(*alpha) + below * (1.0 - byte(*alpha))
+        });
+    decode(mixed)
 }
 
 fn close(a: Vec3, b: Vec3) -> bool {
@@ -88,9 +98,8 @@ fn paints_of_one_body_are_mixed_as_displayed() {
 
 fn paints_of_one_body_are_mixed_as_displayed_with(gpu: &mut Gpu) {
     let (below, above, alpha) = ([0.2, 0.6, 0.1], [0.9, 0.1, 0.1], 63.0 / 255.0);
-    let byte = |v: f32| (v * 255.0 + 0.001).floor() / 255.0;
     let mixed = |i: usize| byte(below[i]) * (1.0 - alpha) + byte(above[i]) * alpha;
-    let exact = crate::trace::frame_lights::decode(Vec3::from_array([0, 1, 2].map(mixed)));
+    let exact = decode(Vec3::from_array([0, 1, 2].map(mixed)));
     let stages = [stage::constant(below), stage::blend(above, 0.25)];
     // as a glow, and lit by half
     let mut glowing = scene();
@@ -115,18 +124,55 @@ fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass() {
     Gpu::each(one_to_eight_mixed_layers_are_exact_before_and_behind_glass_with);
 }
 
+/// What lies on a path, from the eye on: the displayed sum of the layers so far.
+#[derive(Clone, Copy)]
+struct Displayed {
+    /// Sum of all, and each weighed by one over the chance that its branch is seen.
+    sum: Vec3,
+    weighed: Vec3,
+    /// Part of the display that is left to what lies behind.
+    cover: Vec3,
+    /// Part of the light that a branch of a pane passes on, and the weight of the branch.
+    passed: f32,
+    weight: f32,
+}
+
+impl Displayed {
+    const NOTHING: Displayed = Displayed {
+        sum: Vec3::ZERO,
+        weighed: Vec3::ZERO,
+        cover: Vec3::ONE,
+        passed: 1.0,
+        weight: 1.0,
+    };
+
+    fn behind(self, own: Vec3, cover: Vec3) -> Displayed {
+        let own = Vec3::from((decode(own) * self.passed).to_array().map(encode));
+        Displayed {
+            sum: self.sum + self.cover * own,
+            weighed: self.weighed + self.cover * own * self.weight,
+            cover: self.cover * cover,
+            ..self
+        }
+    }
+
+    /// Light of the whole: the sum's, shared as the sum is.
+    fn light(self) -> Vec3 {
+        let bounded = self.sum.min(Vec3::ONE);
+        decode(bounded) / bounded * self.weighed
+    }
+}
+
 fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass_with(gpu: &mut Gpu) {
     let back = [0.5, 0.6, 0.4];
     let color = |i: usize| [0.2 + 0.08 * i as f32, 0.9 - 0.1 * i as f32, 0.5];
-    let linear = |c: [f32; 3]| Vec3::from(c.map(through_byte));
-    // a layer over what is below it
-    let over_one = |i: usize, below: Vec3| match i % 3 {
-        0 => {
-            let alpha = 127.0 / 255.0;
-            linear(color(i)) * alpha + below * (1.0 - alpha)
+    let one = |path: Displayed, i: usize| {
+        let (own, alpha) = (displayed(color(i)), Vec3::splat(127.0 / 255.0));
+        match i % 3 {
+            0 => path.behind(own * alpha, 1.0 - alpha),
+            1 => path.behind(own, Vec3::ONE),
+            _ => path.behind(Vec3::ZERO, own),
         }
-        1 => linear(color(i)) + below,
-        _ => linear(color(i)) * below,
     };
     // every other count with a pane of glass in the middle, which mirrors the layers before it and the black behind the
     // eye
@@ -134,10 +180,23 @@ fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass_with(gpu: &mut Gp
         let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 2.0, 8);
         let wall = scene.material(&[stage::constant(back)], 0);
         scene.quad(screen(300.0), wall);
-        let mut exact = linear(back);
-        // from behind, so that the exact picture is composed as it grows
-        for i in (0..count).rev() {
+        let mut path = Displayed::NOTHING;
+        let mut mirrored = None;
+        for i in 0..count {
             let x = 50.0 + 20.0 * i as f32;
+            let c = color(i);
+            let stage = match i % 3 {
+                0 => stage::blend(c, 0.5),
+                1 => stage::add(c),
+                _ => stage::filter(c),
+            };
+            let material = scene.material(&[stage], TRANSLUCENT);
+            if i % 2 == 0 {
+                scene.quad(screen(x), material);
+            } else {
+                scene.mesh(screen(x), material, identity());
+            }
+            path = one(path, i);
             if count % 2 == 0 && i == count / 2 {
                 let pane =
                     scene.material(&[stage::filter([1.0; 3])], TRANSLUCENT | c::MATERIAL_GLASS);
@@ -147,28 +206,54 @@ fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass_with(gpu: &mut Gp
                     ..Default::default()
                 };
                 scene.quad(screen(x + 10.0), pane);
-                // at right angles a face reflects ((n - 1) / (n + 1))²; a sheet of two sides counts as one face
-                let mirrored = (0..=i).fold(Vec3::ZERO, |below, i| over_one(i, below));
-                exact = exact * 0.96 + mirrored * 0.04;
+                // at right angles a face reflects ((n - 1) / (n + 1))²; a sheet of two sides counts as one face. A
+                // picture shows either branch in every other frame
+                path.weight = 2.0;
+                let back = Displayed {
+                    passed: 0.04,
+                    ..path
+                };
+                mirrored = Some((0..=i).rev().fold(back, one).light());
+                path.passed = 0.96;
             }
-            let c = color(i);
-            let stage = match i % 3 {
-                0 => stage::blend(c, 0.5),
-                1 => stage::add(c),
-                _ => stage::filter(c),
-            };
-            exact = over_one(i, exact);
-            let material = scene.material(&[stage], TRANSLUCENT);
-            if i % 2 == 0 {
-                scene.quad(screen(x), material);
-            } else {
-                scene.mesh(screen(x), material, identity());
-            }
+        }
+        let mut exact = path.behind(displayed(back), Vec3::ZERO).light();
+        if let Some(mirrored) = mirrored {
+            exact = (exact + mirrored) * 0.5;
         }
         let mean = gpu.mean(&scene, &reference(), 2);
         let difference = (mean / exact - 1.0).abs().max_element();
         assert!(difference < 1.0e-3, "{count} layers: {mean} {exact}");
     }
+}
+
+#[test]
+fn light_behind_a_veil_counts_in_proportion() {
+    Gpu::each(light_behind_a_veil_counts_in_proportion_with);
+}
+
+fn light_behind_a_veil_counts_in_proportion_with(gpu: &mut Gpu) {
+    // a lit wall behind a veil that glows: as bright as the display mixes both where the light is the engine's, and linear
+    // in light whatever that is, so that means of noisy frames are means of the picture
+    let (veil, alpha) = ([0.3, 0.2, 0.5], 0.25);
+    let picture = |gpu: &mut Gpu, light: f32| {
+        let mut scene = scene();
+        scene.ambient = Vec3::splat(light);
+        let wall = scene.diffuse(0.5);
+        scene.quad(screen(300.0), wall);
+        let veil = scene.material(&[stage::blend(veil, alpha)], TRANSLUCENT);
+        scene.quad(screen(100.0), veil);
+        gpu.mean(&scene, &reference(), 1)
+    };
+    let [dark, half, full] = [0.0, 0.5, 1.0].map(|light| picture(gpu, light));
+    // the harness' surfaces have white corners: there the engine shows full light
+    let exact = over(&[(veil, alpha)], [encode(0.5); 3]);
+    assert!(close(full, exact), "{full} {exact}");
+    assert!(close(half, (dark + full) * 0.5), "{dark} {half} {full}");
+    assert!(
+        dark.max_element() < full.max_element() * 0.5,
+        "{dark} {full}"
+    );
 }
 
 #[test]
@@ -199,7 +284,7 @@ fn lit_layers_and_what_is_behind_them_are_all_lit() {
 }
 
 fn lit_layers_and_what_is_behind_them_are_all_lit_with(gpu: &mut Gpu) {
-    // two lit layers of one half over a lit wall: 0.5 * albedo * L each, in the mean
+    // two lit layers of one half over a lit wall: all of them share the light of what the display shows, in the mean
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 16);
     scene.ambient = Vec3::splat(0.8);
     let wall = scene.diffuse(0.5);
@@ -213,8 +298,9 @@ fn lit_layers_and_what_is_behind_them_are_all_lit_with(gpu: &mut Gpu) {
     scene.quad(screen(100.0), veil);
     scene.quad(screen(150.0), veil);
     let alpha = 127.0 / 255.0;
-    let albedo = through_byte(super::harness::encode(0.5));
-    let exact = 0.8 * (alpha + (1.0 - alpha) * alpha + (1.0 - alpha) * (1.0 - alpha) * albedo);
+    let albedo = byte(encode(0.5));
+    let shown = alpha + (1.0 - alpha) * alpha + (1.0 - alpha) * (1.0 - alpha) * albedo;
+    let exact = 0.8 * decode(Vec3::splat(shown)).x;
     let mean = gpu.mean(&scene, &reference(), 64).x;
     assert!((mean / exact - 1.0).abs() < 0.005, "{mean} {exact}");
 }
@@ -244,9 +330,8 @@ fn a_mark_shares_the_light_of_its_wall_without_noise_with(gpu: &mut Gpu) {
     );
     scene.mesh(screen(299.9), mark, identity());
     let alpha = 127.0 / 255.0;
-    let albedo = through_byte(super::harness::encode(0.5));
-    let linear = Vec3::from(blood.map(through_byte));
-    let exact = 0.8 * (linear * alpha + (1.0 - alpha) * albedo);
+    let albedo = byte(encode(0.5));
+    let exact = 0.8 * decode(displayed(blood) * alpha + (1.0 - alpha) * albedo);
     // what is behind counts by itself where it is no longer the same wall
     for (place, noisy) in [(299.9, false), (200.0, true)] {
         scene
@@ -276,10 +361,8 @@ fn smoke_is_as_bright_as_the_light_around_it_with(gpu: &mut Gpu) {
     let grey = [0.7, 0.7, 0.6];
     let around = Vec3::new(0.6, 0.3, 0.1);
     let alpha = 127.0 / 255.0;
-    let linear = |c: [f32; 3]| Vec3::from(c.map(through_byte));
-    let light = crate::trace::frame_lights::decode(around);
     for (flags, factor) in [
-        (c::INSTANCE_UNLIT | c::INSTANCE_SUSPENDED, light),
+        (c::INSTANCE_UNLIT | c::INSTANCE_SUSPENDED, around),
         (c::INSTANCE_UNLIT, Vec3::ONE),
     ] {
         let mut scene = scene();
@@ -292,7 +375,7 @@ fn smoke_is_as_bright_as_the_light_around_it_with(gpu: &mut Gpu) {
             ..identity()
         };
         scene.mesh(screen(100.0), puff, instance);
-        let exact = linear(grey) * factor * alpha + linear(back) * (1.0 - alpha);
+        let exact = decode(displayed(grey) * factor * alpha + displayed(back) * (1.0 - alpha));
         let mean = gpu.mean(&scene, &reference(), 2);
         assert!(close(mean, exact), "{mean} {exact}");
     }
@@ -305,9 +388,8 @@ fn sprites_are_seen_from_behind() {
 
 fn sprites_are_seen_from_behind_with(gpu: &mut Gpu) {
     let [back, front] = [[0.2, 0.3, 0.1], [0.6, 0.2, 0.4]];
-    let linear = |c: [f32; 3]| Vec3::from(c.map(through_byte));
     for (flags, seen) in [
-        (c::INSTANCE_UNLIT | c::INSTANCE_SUSPENDED, linear(front)),
+        (c::INSTANCE_UNLIT | c::INSTANCE_SUSPENDED, displayed(front)),
         (c::INSTANCE_UNLIT, Vec3::ZERO),
     ] {
         let mut scene = scene();
@@ -328,7 +410,7 @@ fn sprites_are_seen_from_behind_with(gpu: &mut Gpu) {
             },
         );
         let mean = gpu.mean(&scene, &reference(), 2);
-        assert!(close(mean, linear(back) + seen), "{mean}");
+        assert!(close(mean, decode(displayed(back) + seen)), "{mean}");
     }
 }
 
@@ -505,15 +587,18 @@ fn fog_follows_the_way_through_its_volume_with(gpu: &mut Gpu) {
     };
     let mean = gpu.mean(&scene, &reference(), 1);
     assert!(close(mean, behind(100.0, back_color)), "{mean}");
-    // a layer in the middle: what is in front of it and behind it together are the fog of the whole way
+    // a layer in the middle: it is mixed with the wall as displayed, and leaves of the light of the fog behind it what
+    // the display shows of white
     let veil = [0.1, 0.9, 0.1];
     let layer = scene.material(&[stage::blend(veil, 0.5)], TRANSLUCENT);
     scene.quad(screen(125.0), layer);
     let alpha = 127.0 / 255.0;
     let (front, whole) = ((25.0f32 / 400.0).sqrt(), (100.0f32 / 400.0).sqrt());
-    let exact = fog_color * front
-        + Vec3::from(veil.map(through_byte)) * ((1.0 - front) * alpha)
-        + (fog_color * (whole - front) + back_color * (1.0 - whole)) * (1.0 - alpha);
+    let dimmed = |light: Vec3, part: f32| Vec3::from((light * part).to_array().map(encode));
+    let mixed = dimmed(decode(displayed(veil) * alpha), 1.0 - front)
+        + dimmed(back_color, 1.0 - whole) * (1.0 - alpha);
+    let left = decode(Vec3::splat(1.0 - alpha)).x;
+    let exact = fog_color * (front + (whole - front) * left) + decode(mixed);
     let mean = gpu.mean(&scene, &reference(), 1);
     assert!(close(mean, exact), "{mean} {exact}");
     // above its surface there is none

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use relight::light::{PointLight, SunLight};
 
+use super::bounces::seen;
 use super::harness::{Gpu, Scene, floor_point, lambert, rectangle, reference};
 use crate::api::DynamicLight;
 use crate::settings::{LightSelection, Settings};
@@ -334,9 +335,9 @@ fn a_white_room_bounces_what_its_walls_give_with(gpu: &mut Gpu) {
     );
     scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), wall);
     for (bounces, exact) in [
-        (0, glow),
-        (1, glow * (1.0 + albedo)),
-        (2, glow * (1.0 + albedo + albedo * albedo)),
+        (0, seen(glow, albedo, 0.0)),
+        (1, seen(glow, albedo, glow)),
+        (2, seen(glow, albedo, glow * (1.0 + albedo))),
     ] {
         let settings = Settings {
             rt_bounces: bounces,
