@@ -168,13 +168,14 @@ fn a_pane_reflects_from_both_faces_with(gpu: &mut Gpu) {
     let target = Vec3::new(60.0, 10.0, 0.0);
     // tinted: what is seen through it is multiplied, what it reflects is not
     let flags = c::MATERIAL_GLASS | c::MATERIAL_TRANSLUCENT;
-    let tint = through_byte(encode(0.6));
+    let tint = (encode(0.6) * 255.0 + 0.001).floor() / 255.0;
+    let decode = |v: f32| crate::trace::frame_lights::decode(Vec3::splat(v)).x;
     let stages = [stage::filter([encode(0.6); 3])];
     let scene = scene(eye, target, &stages, flags, glass);
     compare(gpu, &scene, &middles(), |incident| {
         let face = fresnel(incident, 1.5).unwrap_or(1.0);
         let pane = 2.0 * face / (1.0 + face);
-        pane * above + (1.0 - pane) * tint * below
+        pane * above + decode(tint * encode((1.0 - pane) * below))
     });
 }
 
@@ -232,12 +233,14 @@ fn an_environment_stage_shows_what_is_around_with(gpu: &mut Gpu) {
     let weight = crate::trace::frame_lights::decode(Vec3::splat(128.0 / 255.0)).x;
     let exact = through_byte(0.5) + weight * above;
     compare(gpu, &scene, &middles(), |_| exact);
-    // at the depth where rays end the picture itself stands for the reflection
+    // at the depth where rays end the picture itself stands for the reflection, and is added as it is displayed
     let ended = Settings {
         rt_max_depth: 0,
         ..reference()
     };
-    compare(gpu, &scene, &ended, |_| through_byte(0.5) + weight);
+    let shown = (127.0 + 128.0) / 255.0;
+    let shown = crate::trace::frame_lights::decode(Vec3::splat(shown)).x;
+    compare(gpu, &scene, &ended, |_| shown);
 }
 
 #[test]

@@ -505,7 +505,7 @@ fn fog_is_lit_by_what_lights_each_place_of_it_with(gpu: &mut Gpu) {
         color: Vec3::new(0.2, 0.4, 0.6),
         depth,
     });
-    let color = crate::trace::frame_lights::decode(Vec3::new(0.2, 0.4, 0.6));
+    let color = decode(Vec3::new(0.2, 0.4, 0.6));
     let ambient = color * (100.0f32 / depth).sqrt();
     let (origin, radius, intensity) = (Vec3::new(130.0, 0.0, 30.0), 4.0f32, 9000.0f32);
     scene.points.push(relight::light::PointLight {
@@ -579,7 +579,7 @@ fn fog_follows_the_way_through_its_volume_with(gpu: &mut Gpu) {
         color: Vec3::new(0.2, 0.4, 0.6),
         depth: 400.0,
     });
-    let fog_color = crate::trace::frame_lights::decode(Vec3::new(0.2, 0.4, 0.6));
+    let fog_color = decode(Vec3::new(0.2, 0.4, 0.6));
     let back_color = Vec3::from(back.map(through_byte));
     let behind = |length: f32, far: Vec3| {
         let factor = (length / 400.0).min(1.0).sqrt();
