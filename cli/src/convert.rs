@@ -68,7 +68,7 @@ pub struct ConvertArgs {
     #[arg(long, value_enum, default_value_t = ImageChoice::Usual)]
     images: ImageChoice,
     /// How sides of brushes in a .map say how their textures lie: as the editors of the map's game have it, as brush
-    /// primitives (brushDef), or as Valve 220
+    /// primitives (brushDef), as Valve 220, or in Quake's first form
     #[arg(long, value_enum, default_value_t = BrushChoice::Usual)]
     brushes: BrushChoice,
     /// Write moving textures as animations, which strict readers of glTF refuse
@@ -152,6 +152,7 @@ enum BrushChoice {
     Usual,
     Primitives,
     Valve,
+    Classic,
 }
 
 fn parse_format(text: &str) -> Result<Format, String> {
@@ -337,6 +338,7 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
                 BrushChoice::Usual => Brushes::Usual,
                 BrushChoice::Primitives => Brushes::Primitives,
                 BrushChoice::Valve => Brushes::Valve,
+                BrushChoice::Classic => Brushes::Classic,
             },
             lights,
             exposure: args.exposure,

@@ -139,6 +139,8 @@ pub enum Brushes {
     Primitives,
     /// Valve 220.
     Valve,
+    /// Quake's first form: every editor and compiler reads it, but it cannot say all ways to lay a texture.
+    Classic,
 }
 
 /// How a map is written. Patches were tessellated when the world was loaded ([`Options::subdivisions`]).

@@ -278,11 +278,12 @@ fn triangle(corners: [DrawVert; 3], list: &[Made<'_>], origin: DVec3, out: &mut 
 #[test]
 fn the_sample_map_comes_back() {
     let files: MemoryFiles = relight::sample::files().unwrap();
-    for brushes in [Brushes::Usual, Brushes::Valve] {
+    for brushes in [Brushes::Usual, Brushes::Valve, Brushes::Classic] {
         let (text, world) = write(&files, relight::sample::MAP, brushes);
         let found = agreement(&text, &world);
         println!("{found:?}");
         assert!(found.open == 0 && found.brushes > 0 && found.patches > 0);
+        assert!(found.on_faces > 0 && found.aligned == found.on_faces);
     }
 }
 

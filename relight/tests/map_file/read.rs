@@ -40,16 +40,33 @@ enum Texture {
     Matrix([[f64; 3]; 2]),
     /// Axis, offset and scale of each coordinate, in texels.
     Valve([(DVec3, f64, f64); 2]),
+    /// Shifts, angle in degrees, scales.
+    Classic([f64; 5]),
 }
 
 impl Face {
-    /// The texture's coordinates at a place; those of a Valve line with images of 64 texels.
+    /// The texture's coordinates at a place; those of lines in texels with images of 64.
     pub fn st(&self, p: DVec3) -> DVec2 {
         match &self.texture {
             Texture::Matrix([s, t]) => {
                 let [u, v] = axes_of(self.normal);
                 let at = DVec3::new(p.dot(u), p.dot(v), 1.0);
                 DVec2::new(DVec3::from_array(*s).dot(at), DVec3::from_array(*t).dot(at))
+            }
+            Texture::Classic([s0, t0, angle, s_scale, t_scale]) => {
+                // Axes of floors, walls along y, walls along x; the one faced most.
+                let n = self.normal.abs();
+                let (u, v) = if n.z + 1e-4 >= n.x && n.z + 1e-4 >= n.y {
+                    (DVec2::new(1.0, 0.0), p.truncate())
+                } else if n.x + 1e-4 >= n.y {
+                    (DVec2::new(1.0, 0.0), DVec2::new(p.y, p.z))
+                } else {
+                    (DVec2::new(1.0, 0.0), DVec2::new(p.x, p.z))
+                };
+                let turn = |w: DVec2| DVec2::from_angle(angle.to_radians()).rotate(w);
+                let s = turn(u).dot(v) / s_scale + s0;
+                let t = turn(DVec2::new(0.0, -1.0)).dot(v) / t_scale + t0;
+                DVec2::new(s, t) / 64.0
             }
             Texture::Valve([s, t]) => {
                 let at = |(axis, offset, scale): &(DVec3, f64, f64)| axis.dot(p) / scale + offset;
@@ -186,14 +203,19 @@ fn faces(words: &mut Words<'_>) -> Vec<Face> {
             (words.next().to_owned(), Texture::Matrix([s, t]))
         } else {
             let name = words.next().to_owned();
-            let rows = [(); 2].map(|()| words.row("[", "]"));
-            assert_eq!(words.number(), 0.0);
-            let scales = [words.number(), words.number()];
-            let axis = |k: usize| {
-                let row = &rows[k];
-                (DVec3::new(row[0], row[1], row[2]), row[3], scales[k])
-            };
-            (name, Texture::Valve([axis(0), axis(1)]))
+            match words.peek() {
+                Some("[") => {
+                    let rows = [(); 2].map(|()| words.row("[", "]"));
+                    assert_eq!(words.number(), 0.0);
+                    let scales = [words.number(), words.number()];
+                    let axis = |k: usize| {
+                        let row = &rows[k];
+                        (DVec3::new(row[0], row[1], row[2]), row[3], scales[k])
+                    };
+                    (name, Texture::Valve([axis(0), axis(1)]))
+                }
+                _ => (name, Texture::Classic([(); 5].map(|()| words.number()))),
+            }
         };
         let contents = words.number() as u32;
         words.expect("0");

@@ -1,16 +1,20 @@
-//! The two forms in which a side of a brush says how its texture lies.
+//! The forms in which a side of a brush says how its texture lies.
 //!
 //! * Brush primitives (`brushDef`): the texture as a matrix over two axes in the side's plane that follow from its
 //!   normal, in repetitions of the image. What Quake III's editors and compilers read; no size of an image is needed.
 //! * Valve 220: the axes in space, in texels of the image. What the editors and compilers of Quake, Quake II and
 //!   Half-Life read.
 //!
-//! Both can say every affine way of laying an image on a plane.
+//! * Classic: the image is thrown on the plane along one of the map's axes, turned and stretched, in texels. What every
+//!   editor and compiler since Quake's reads.
+//!
+//! The first two can say every affine way of laying an image on a plane, classic lines none that shears the image where
+//! it is thrown from.
 
 use super::number;
 use super::texture::Projection;
 use crate::export::Brushes;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use q3bsp::Format;
 
 /// Components of a normal below this are zero where the axes of a side are found.
@@ -23,6 +27,16 @@ pub(super) enum Form {
     Primitives,
     /// Valve 220.
     Valve,
+    /// Quake's first form.
+    Classic,
+}
+
+/// A side as a line.
+pub(super) struct Line {
+    /// The line.
+    pub text: String,
+    /// Whether the texture lies as asked for.
+    pub exact: bool,
 }
 
 impl Form {
@@ -31,6 +45,7 @@ impl Form {
         match choice {
             Brushes::Primitives => Form::Primitives,
             Brushes::Valve => Form::Valve,
+            Brushes::Classic => Form::Classic,
             Brushes::Usual if format.is_quake() => Form::Valve,
             Brushes::Usual => Form::Primitives,
         }
@@ -45,23 +60,85 @@ impl Form {
         texture: &Projection,
         size: (u32, u32),
         contents: u32,
-    ) -> String {
+    ) -> Line {
         let plane = points.map(|p| format!("( {} )", numbers(p))).join(" ");
-        match self {
+        let (laid, exact) = match self {
             Form::Primitives => {
                 let [s, t] =
                     matrix(points, texture).map(|row| format!("( {} )", row.map(fine).join(" ")));
-                format!("{plane} ( {s} {t} ) {name} {contents} 0 0")
+                let text = format!("{plane} ( {s} {t} ) {name} {contents} 0 0");
+                return Line { text, exact: true };
             }
             Form::Valve => {
                 let (s, t) = (valve(texture, 0, size.0), valve(texture, 1, size.1));
                 let axes =
                     [&s, &t].map(|v| format!("[ {} {} ]", numbers(v.axis), number(v.offset)));
                 let scales = [s.scale, t.scale].map(number);
-                let (axes, scales) = (axes.join(" "), scales.join(" "));
-                format!("{plane} {name} {axes} 0 {scales} {contents} 0 0")
+                (format!("{} 0 {}", axes.join(" "), scales.join(" ")), true)
             }
+            Form::Classic => {
+                let laid = classic(points, texture, size);
+                (laid.numbers.map(number).join(" "), laid.exact)
+            }
+        };
+        let text = format!("{plane} {name} {laid} {contents} 0 0");
+        Line { text, exact }
+    }
+}
+
+/// A texture as classic lines say it.
+struct Classic {
+    /// Shift along both coordinates in texels, degrees turned, units per texel along both.
+    numbers: [f64; 5],
+    exact: bool,
+}
+
+/// How far from a right angle the axes of a texture may be, cosine.
+const RIGHT_ANGLE: f64 = 1e-3;
+
+/// A texture thrown along the axis that a side faces most; of axes that it faces as much the first of z, x, y.
+fn classic(points: [DVec3; 3], texture: &Projection, size: (u32, u32)) -> Classic {
+    let [a, b, c] = points;
+    let normal = (a - b).cross(c - b).normalize_or_zero();
+    let facing = |axis: DVec3| normal.dot(axis).abs();
+    let mut along = DVec3::Z;
+    for axis in [DVec3::X, DVec3::Y] {
+        if facing(axis) > facing(along) + 1e-4 {
+            along = axis;
         }
+    }
+    // The axes that an image which is not turned lies along.
+    let (first, second) = match along {
+        DVec3::Z => (DVec3::X, DVec3::NEG_Y),
+        DVec3::X => (DVec3::Y, DVec3::NEG_Z),
+        _ => (DVec3::X, DVec3::NEG_Z),
+    };
+    let size = [f64::from(size.0), f64::from(size.1)];
+    // On the plane a change along the normal is none: so much of it is added that none is left along the axis.
+    let thrown = |gradient: DVec3, offset: f64| {
+        let part = gradient.dot(along) / normal.dot(along);
+        (gradient - normal * part, offset + part * normal.dot(a))
+    };
+    let (s, s0) = thrown(texture.gradients[0] * size[0], texture.offsets[0] * size[0]);
+    let (t, t0) = thrown(texture.gradients[1] * size[1], texture.offsets[1] * size[1]);
+    let flat = |v: DVec3| DVec2::new(v.dot(first.abs()), v.dot(second.abs()));
+    let (s, t) = (flat(s), flat(t));
+    // Turned by an angle, the first axis is (cos, sin) and the second (sin, -cos).
+    let (cos, sin) = s.normalize_or(DVec2::X).into();
+    let down = DVec2::new(sin, -cos);
+    let across = t.dot(down);
+    let exact = t.normalize_or_zero().dot(s.normalize_or_zero()).abs() < RIGHT_ANGLE;
+    let stretch = |length: f64| 1.0 / if length.abs() < 1e-9 { 1.0 } else { length };
+    let shift = |v: f64, width: f64| v - (v / width).floor() * width;
+    Classic {
+        numbers: [
+            shift(s0, size[0]),
+            shift(t0, size[1]),
+            sin.atan2(cos).to_degrees(),
+            stretch(s.length()),
+            stretch(across),
+        ],
+        exact,
     }
 }
 

@@ -1,7 +1,7 @@
 //! Maps as level editors and map compilers read them: brushes from their planes, patches, entities.
 //!
 //! Brushes are written with their planes, and with the textures that the compiler drew on them: the way they lie comes
-//! from the surfaces drawn on a side; sides on which nothing was drawn get the editors' default. [`form`] has the two
+//! from the surfaces drawn on a side; sides on which nothing was drawn get the editors' default. [`form`] has the
 //! ways to say it. Patches are `patchDef2` with their control points and coordinates. Numbers are id units, whatever
 //! the scale asked for is.
 //!
@@ -37,6 +37,8 @@ struct Tally {
     /// Sides with the texture of a drawn surface.
     aligned: usize,
     open: usize,
+    /// Sides whose texture the form cannot say.
+    sheared: usize,
     /// Brushes marked as detail.
     detail: usize,
     patches: usize,
@@ -57,6 +59,10 @@ pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportRe
         (
             tally.meshes,
             "meshes of triangles have no place in a .map: models, or surfaces whose brushes are there",
+        ),
+        (
+            tally.sheared,
+            "sides have textures that are sheared, which classic lines cannot say",
         ),
         (
             tally.foreign_names,
@@ -166,7 +172,7 @@ impl Writer<'_> {
                     self.tally.detail += usize::from(contents != 0);
                     let (begin, end) = match self.form {
                         Form::Primitives => ("{\nbrushDef\n{", "}\n}"),
-                        Form::Valve => ("{", "}"),
+                        Form::Valve | Form::Classic => ("{", "}"),
                     };
                     self.line(format_args!("// brush {written}\n{begin}"));
                     for side in &sides {
@@ -225,7 +231,8 @@ impl Writer<'_> {
         let points = plane_points(side, origin);
         let name = self.name(side.shader);
         let line = self.form.side(points, &name, &texture, size, contents);
-        self.line(format_args!("{line}"));
+        self.tally.sheared += usize::from(!line.exact);
+        self.line(format_args!("{}", line.text));
     }
 
     fn patch(&mut self, surface: &Surface, origin: Vec3) {
