@@ -64,7 +64,7 @@ pub struct ConvertArgs {
     /// What all light is multiplied by; by default so much that the map is as bright as in the game
     #[arg(long)]
     exposure: Option<f32>,
-    /// Where images go: as usual for the format, inside the file, or into a folder beside it
+    /// Where images go: as usual for the format, inside the file, into a folder beside it, or nowhere
     #[arg(long, value_enum, default_value_t = ImageChoice::Usual)]
     images: ImageChoice,
     /// How sides of brushes in a .map say how their textures lie: as the editors of the map's game have it, as brush
@@ -145,6 +145,7 @@ enum ImageChoice {
     Usual,
     Embed,
     Beside,
+    None,
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug)]
@@ -333,6 +334,7 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
                 ImageChoice::Usual => ImagePlace::Usual,
                 ImageChoice::Embed => ImagePlace::Embed,
                 ImageChoice::Beside => ImagePlace::Beside,
+                ImageChoice::None => ImagePlace::None,
             },
             brushes: match args.brushes {
                 BrushChoice::Usual => Brushes::Usual,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use relight::export::material_json;
-use relight::{GameFiles, Materials, SearchPath, WorldMaterial};
+use relight::{GameFiles, Materials, Options, RelitWorld, SearchPath, WorldMaterial};
 use serde::Serialize;
 use serde_json::Value;
 use shaderscript::{Diagnostic, ImplicitKind};
@@ -33,10 +33,11 @@ pub struct MaterialArgs {
         default_value = "/usr/share/games/openarena/baseoa"
     )]
     games: Vec<PathBuf>,
-    /// A map that brings materials along: of a format that has its own (Quake, Quake II), or in a pack of its own
+    /// A map that uses the materials: with its flags and the way that it lights them. Of formats that have materials
+    /// of their own (Quake, Quake II) it brings these along; so does a pack
     #[arg(long, value_name = "MAP")]
     map: Option<String>,
-    /// How the surface is lit that it is used on, which decides what a bare image becomes
+    /// How the surface is lit that it is used on, which decides what a bare image becomes; not asked where the map tells
     #[arg(long, value_enum, default_value_t = Lighting::Lightmap)]
     lighting: Lighting,
     /// Print JSON
@@ -125,18 +126,33 @@ struct Line {
 
 /// Prints what is known of each material.
 pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
-    let files: Arc<dyn GameFiles> = match &args.map {
-        Some(map) => open(map, &args.games)?.0,
-        None => Arc::new(SearchPath::open(&args.games)?),
+    let (files, map): (Arc<dyn GameFiles>, _) = match &args.map {
+        Some(map) => {
+            let (files, name) = open(map, &args.games)?;
+            (files, Some(name))
+        }
+        None => (Arc::new(SearchPath::open(&args.games)?), None),
     };
     let files = &*files;
     let (materials, diagnostics) = Materials::load(files);
+    let options = Options {
+        calibrate: None,
+        ..Options::default()
+    };
+    let world = map.map(|map| RelitWorld::load(files, &materials, &map, options));
+    let world = world.transpose()?;
     let mut told = Vec::new();
     let mut faults = 0;
     for name in &args.names {
-        let material = WorldMaterial::by_name(files, &materials, name, args.lighting.into());
-        faults += usize::from(material.resolved.fault.is_some());
-        told.push(Told::new(files, &material, &diagnostics));
+        let used = world.as_ref().map_or(Vec::new(), |w| used_in(w, name));
+        let own = used.is_empty().then(|| {
+            let lighting = args.lighting.into();
+            WorldMaterial::by_name(files, &materials, name, lighting)
+        });
+        for material in used.into_iter().chain(&own) {
+            faults += usize::from(material.resolved.fault.is_some());
+            told.push(Told::new(files, material, &diagnostics));
+        }
     }
     if args.json {
         println!("{}", serde_json::to_string_pretty(&told)?);
@@ -147,6 +163,24 @@ pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
         0 => ExitCode::SUCCESS,
         _ => ExitCode::FAILURE,
     })
+}
+
+/// The materials of a map that have a name, or whose picture has it: one for each set of flags and way to be lit.
+fn used_in<'a>(world: &'a RelitWorld, name: &str) -> Vec<&'a WorldMaterial> {
+    let uses = world.bsp.texture_uses.iter();
+    let pictured: Vec<&str> = uses
+        .filter(|t| {
+            t.frames
+                .first()
+                .is_some_and(|f| f.eq_ignore_ascii_case(name))
+        })
+        .map(|t| t.material.as_str())
+        .collect();
+    let wanted = |m: &&WorldMaterial| {
+        let same = |other: &str| m.name.eq_ignore_ascii_case(other);
+        same(name) || pictured.iter().any(|other| same(other))
+    };
+    world.materials.iter().filter(wanted).collect()
 }
 
 impl Told {

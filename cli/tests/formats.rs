@@ -62,6 +62,20 @@ fn every_command_takes_every_format() {
                 assert!(size > 40, "{name} {written}: {size} bytes");
             }
         }
+        if let Some((sky, flags)) = match name.as_str() {
+            "Quake" => Some(("textures/sky4", 4)),
+            "Quake2" => Some(("textures/e1/sky", 4)),
+            _ => None,
+        } {
+            // No script says what the map does.
+            let output = relight(
+                folder.path(),
+                &["material", "--map", "m.bsp", sky, "--json"],
+            );
+            let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+            let found = told[0]["material"]["surfaceFlags"].as_u64().unwrap();
+            assert_eq!(found & 4, flags, "{name}: {told}");
+        }
         if name == "Quake" {
             let of_map = ["material", "--map", "m.bsp", "textures/*lava1", "--json"];
             let output = relight(folder.path(), &of_map);

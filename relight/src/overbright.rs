@@ -72,6 +72,51 @@ pub fn byte_table() -> [f32; 256] {
     std::array::from_fn(|i| to_linear(i as f32 / 255.0))
 }
 
+/// Linear values to sRGB-encoded bytes, without a power for each: the byte nearest to [`from_linear`].
+pub struct ByteEncoder {
+    /// For each of equal parts of 0..=1 the byte of its least value.
+    first: Vec<u8>,
+    /// The least value of each byte.
+    least: [f32; 256],
+}
+
+impl ByteEncoder {
+    /// Parts of 0..=1: few bytes begin in one.
+    const PARTS: usize = 4096;
+
+    /// The tables.
+    pub fn new() -> ByteEncoder {
+        let least = std::array::from_fn(|byte| to_linear((byte as f32 - 0.5) / 255.0));
+        let byte_of = |v: f32| least.partition_point(|&l| l <= v).saturating_sub(1) as u8;
+        let part = |i: usize| byte_of(i as f32 / Self::PARTS as f32);
+        ByteEncoder {
+            first: (0..=Self::PARTS).map(part).collect(),
+            least,
+        }
+    }
+
+    /// The byte of a value, which is limited to 0..=1; 0 for what is no number.
+    pub fn byte(&self, linear: f32) -> u8 {
+        let v = linear.clamp(0.0, 1.0);
+        let first = self.first.get((v * Self::PARTS as f32) as usize);
+        let mut byte = first.copied().unwrap_or(0);
+        while self
+            .least
+            .get(usize::from(byte) + 1)
+            .is_some_and(|&l| v >= l)
+        {
+            byte += 1;
+        }
+        byte
+    }
+}
+
+impl Default for ByteEncoder {
+    fn default() -> Self {
+        ByteEncoder::new()
+    }
+}
+
 /// Linear colour of an sRGB-encoded one, channel by channel.
 pub fn colour_to_linear(encoded: Vec3) -> Vec3 {
     Vec3::new(
@@ -84,6 +129,19 @@ pub fn colour_to_linear(encoded: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bytes_are_the_nearest() {
+        let encoder = ByteEncoder::new();
+        for step in 0..=100_000u32 {
+            let v = step as f32 / 100_000.0;
+            let exact = from_linear(v) * 255.0;
+            let off = (exact - f32::from(encoder.byte(v))).abs();
+            assert!(off <= 0.5001, "{v}: {exact} {}", encoder.byte(v));
+        }
+        assert_eq!(encoder.byte(-1.0), 0);
+        assert_eq!((encoder.byte(2.0), encoder.byte(f32::NAN)), (255, 0));
+    }
 
     #[test]
     fn shift_keeps_hue() {

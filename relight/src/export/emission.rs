@@ -1,10 +1,13 @@
 //! How strongly materials glow: as strongly as the lights that they are.
 
-use super::Export;
+use super::images::Encoded;
 use super::look::{Look, Picture, look as read_look, ratio};
 use super::stack::Moment;
+use super::{Export, ExportError, ImagePlace};
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::{Vec3, Vec4};
+use shaderscript::Shader;
+use std::sync::Arc;
 
 /// For every material the mean radiance of its lights, by area; zero where it has none.
 pub fn radiances(world: &RelitWorld) -> Vec<Vec3> {
@@ -44,9 +47,23 @@ fn factor(radiance: Vec3, mean: Vec3) -> Vec3 {
 impl Export<'_> {
     /// The mean of a picture, linear, with its alpha; `None` for one that is missing.
     pub(super) fn mean(&self, material: &WorldMaterial, picture: &Picture) -> Option<Vec4> {
+        if self.options.images == ImagePlace::None {
+            return None;
+        }
         let shader = &material.resolved.shader;
-        let found = self.images.get(self.files, picture, shader).ok()??;
-        Some(found.mean.extend(found.mean_alpha))
+        self.images.mean(self.files, picture, shader).ok()?
+    }
+
+    /// A picture as a file; `None` when there is no such image, or none are asked for.
+    pub(super) fn picture(
+        &self,
+        picture: &Picture,
+        shader: &Shader,
+    ) -> Result<Option<Arc<Encoded>>, ExportError> {
+        match self.options.images {
+            ImagePlace::None => Ok(None),
+            _ => self.images.get(self.files, picture, shader),
+        }
     }
 
     /// What other programs can say of a material whose lights have the mean radiance `radiance`; `clear`: whether glass

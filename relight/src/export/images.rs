@@ -5,10 +5,10 @@ use super::look::{Edit, Picture};
 use super::{sky, stack};
 use crate::files::{GameFiles, normalise};
 use crate::image::{self, Image};
-use crate::overbright;
+use crate::overbright::{self, ByteEncoder};
 use ::image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use ::image::{ExtendedColorType, ImageEncoder};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use shaderscript::Shader;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -126,6 +126,8 @@ type Found = Option<Arc<Encoded>>;
 
 #[derive(Default)]
 struct Kept {
+    /// Means of images that nobody has asked for as files.
+    means: HashMap<String, Option<Vec4>>,
     /// Image, and when it was last asked for.
     images: HashMap<Picture, (Found, u64)>,
     bytes: usize,
@@ -172,6 +174,44 @@ impl ImageStore {
         let found = make(files, picture, shader)?.map(Arc::new);
         self.keep(picture, &found);
         Ok(found)
+    }
+
+    /// The mean of a picture, linear, with that of its alpha; `None` as for [`ImageStore::get`]. An image that would have
+    /// to be encoded is only looked at.
+    ///
+    /// # Errors
+    /// [`ExportError::Image`] when it cannot be encoded.
+    pub(super) fn mean(
+        &self,
+        files: &dyn GameFiles,
+        picture: &Picture,
+        shader: &Shader,
+    ) -> Result<Option<Vec4>, ExportError> {
+        let of = |found: Found| found.map(|e| e.mean.extend(e.mean_alpha));
+        if let Some(found) = self.kept(picture) {
+            return Ok(of(found));
+        }
+        let Picture::File(name) = picture else {
+            return Ok(of(self.get(files, picture, shader)?));
+        };
+        let known = {
+            let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+            kept.means.get(name).copied()
+        };
+        if let Some(mean) = known {
+            return Ok(mean);
+        }
+        let mean = match load(files, name) {
+            Some((image, path)) if mime_of(&path).is_some() => {
+                let found = Some(Arc::new(as_stored(files, &image, &path)?));
+                self.keep(picture, &found);
+                of(found)
+            }
+            found => found.map(|(image, _)| image.mean_linear().extend(image.mean_alpha())),
+        };
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.means.insert(name.clone(), mean);
+        Ok(mean)
     }
 
     fn kept(&self, picture: &Picture) -> Option<Found> {
@@ -265,19 +305,23 @@ fn stem(path: &str) -> &str {
 
 /// An image's own file where other programs read it, else a PNG.
 fn as_stored(files: &dyn GameFiles, image: &Image, path: &str) -> Result<Encoded, ExportError> {
-    let extension = image::split_extension(path).map(|(_, ext)| ext.to_ascii_lowercase());
-    let mime = match extension.as_deref() {
-        Some("jpg" | "jpeg") => Some(Mime::Jpeg),
-        Some("png") => Some(Mime::Png),
-        _ => None,
-    };
-    if let Some(mime) = mime
+    if let Some(mime) = mime_of(path)
         && let Ok(Some(bytes)) = files.read(path)
         && is_plain(&bytes, mime)
     {
         return Ok(Encoded::new(bytes, mime, stem(path), image));
     }
     Encoded::png(image, stem(path))
+}
+
+/// What a file of a name is, if other programs read it.
+fn mime_of(path: &str) -> Option<Mime> {
+    let extension = image::split_extension(path).map(|(_, ext)| ext.to_ascii_lowercase());
+    match extension.as_deref() {
+        Some("jpg" | "jpeg") => Some(Mime::Jpeg),
+        Some("png") => Some(Mime::Png),
+        _ => None,
+    }
 }
 
 /// Whether a file is what its extension says and has 8 bits a channel of grey, RGB or RGBA, which every program reads.
@@ -301,7 +345,8 @@ fn is_plain(bytes: &[u8], mime: Mime) -> bool {
 fn edited(image: &Image, edit: Edit) -> Image {
     let table = overbright::byte_table();
     let linear = |c: [u8; 3]| Vec3::from_array(c.map(|b| table[usize::from(b)]));
-    let encode = |v: f32| (overbright::from_linear(v.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8;
+    let encoder = ByteEncoder::new();
+    let encode = |v: f32| encoder.byte(v);
     let texel = |[r, g, b, a]: [u8; 4]| -> [u8; 4] {
         match edit {
             Edit::Inverted => [r, g, b, 255 - a],

@@ -126,6 +126,8 @@ pub enum ImagePlace {
     Embed,
     /// As files of their own, in a folder that all maps of one output folder share.
     Beside,
+    /// Nowhere: geometry, materials by name and colour, lights and entities alone. No image is read.
+    None,
 }
 
 /// How sides of brushes say how their textures lie, in [`Format::Map`].

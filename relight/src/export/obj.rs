@@ -155,9 +155,7 @@ fn material_entry(
         let Some(slot) = slot else {
             return Ok(String::new());
         };
-        let found = source
-            .images
-            .get(source.files, &slot.picture, &material.resolved.shader)?;
+        let found = source.picture(&slot.picture, &material.resolved.shader)?;
         let Some(image) = found else {
             return Ok(String::new());
         };

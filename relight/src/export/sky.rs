@@ -8,7 +8,7 @@ use super::look::Picture;
 use super::stack::texel;
 use crate::files::GameFiles;
 use crate::image::Image;
-use crate::overbright;
+use crate::overbright::{self, ByteEncoder};
 use crate::world::WorldMaterial;
 use glam::{Vec2, Vec3, Vec4};
 use shaderscript::eval;
@@ -83,7 +83,7 @@ pub fn bake(files: &dyn GameFiles, shader: &Shader, side: usize) -> Option<Image
         .iter()
         .map(|stage| Some(load(files, stage.image.names().first()?)?.0))
         .collect();
-    let table = overbright::byte_table();
+    let (table, encoder) = (overbright::byte_table(), ByteEncoder::new());
     let colors: Vec<Vec4> = shader.stages.iter().map(super::stack::mean_color).collect();
     let mut rgba = Vec::with_capacity((SIZE * SIZE * 4) as usize);
     let mut samples = Vec::with_capacity(images.len());
@@ -115,7 +115,7 @@ pub fn bake(files: &dyn GameFiles, shader: &Shader, side: usize) -> Option<Image
                 let drawn = compose(&shader.stages, &samples, false);
                 color = drawn.evaluate(Vec3::ONE, color);
             }
-            let byte = |v: f32| (overbright::from_linear(v.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8;
+            let byte = |v: f32| encoder.byte(v);
             rgba.extend(color.to_array().map(byte));
             rgba.push(255);
         }
@@ -163,7 +163,8 @@ pub fn panorama(files: &dyn GameFiles, shader: &Shader) -> Option<Image> {
     let width = largest.saturating_mul(4).clamp(16, WIDEST);
     let height = width / 2;
     let table = overbright::byte_table();
-    let byte = |v: f32| (overbright::from_linear(v.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8;
+    let encoder = ByteEncoder::new();
+    let byte = |v: f32| encoder.byte(v);
     let mut rgba = Vec::with_capacity((width * height * 4) as usize);
     for y in 0..height {
         for x in 0..width {

@@ -3,11 +3,12 @@
 use super::images::load;
 use crate::files::GameFiles;
 use crate::image::Image;
-use crate::overbright;
+use crate::overbright::{self, ByteEncoder};
 use glam::{Vec2, Vec3, Vec4};
 use shaderscript::eval::{self, ColorContext};
 use shaderscript::light::{LightLinear, StageSample, compose};
 use shaderscript::{AlphaGen, RgbGen, Shader, Stage, StageImage, TcGen, TcMod};
+use std::num::NonZeroUsize;
 
 /// Longest side of a picture that is made from several.
 const LONGEST: u32 = 1024;
@@ -157,7 +158,17 @@ pub fn bake(files: &dyn GameFiles, shader: &Shader, stages: &[usize], part: Part
         pictures.push((picture, mean_color(stage)));
     }
     let (width, height) = (width.min(LONGEST), height.min(LONGEST));
-    let table = overbright::byte_table();
+    let pictures: Vec<Laid> = pictures
+        .into_iter()
+        .map(|(picture, color)| Laid {
+            picture: picture.map(|(image, tiles)| {
+                let columns = places(width, tiles.x, image.width);
+                let rows = places(height, tiles.y, image.height);
+                (image, columns, rows)
+            }),
+            color,
+        })
+        .collect();
     let untested: Vec<Stage> = kept
         .iter()
         .enumerate()
@@ -166,49 +177,110 @@ pub fn bake(files: &dyn GameFiles, shader: &Shader, stages: &[usize], part: Part
             ..stage.clone()
         })
         .collect();
-    let mut rgba = Vec::new();
-    let mut samples = Vec::with_capacity(kept.len());
-    for y in 0..height {
-        for x in 0..width {
-            let st = Vec2::new(
-                (x as f32 + 0.5) / width as f32,
-                (y as f32 + 0.5) / height as f32,
-            );
-            samples.clear();
-            samples.extend(pictures.iter().map(|(picture, color)| StageSample {
-                texture: picture.as_ref().map_or(Vec4::ONE, |(image, tiles)| {
-                    texel(image, st * *tiles, &table)
-                }),
-                color: *color,
-            }));
-            let drawn = compose(&untested, &samples, true);
-            let through = drawn.through.clamp(Vec3::ZERO, Vec3::ONE);
-            let alpha = match tested.and_then(|i| samples.get(i)) {
-                Some(sample) => sample.texture.w * sample.color.w,
-                None => 1.0 - through.element_sum() / 3.0,
-            };
-            // Blending multiplies what is shown by alpha.
-            let shown = if tested.is_none() {
-                alpha.max(1.0 / 255.0)
-            } else {
-                1.0
-            };
-            let seen = match part {
-                Part::Color => drawn.lit,
-                Part::Glow => drawn.emission,
-                Part::Shown(level) => drawn.lit * table[usize::from(level)] + drawn.emission,
-            };
-            push(&mut rgba, seen / shown, alpha);
+    let baking = Baking {
+        pictures,
+        stages: untested,
+        tested,
+        part,
+        table: overbright::byte_table(),
+        encoder: ByteEncoder::new(),
+    };
+    let mut rgba = vec![0; width as usize * height as usize * 4];
+    // Rows are independent of each other.
+    let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let band = (height as usize).div_ceil(threads).max(MIN_BAND);
+    std::thread::scope(|scope| {
+        let bands = rgba.chunks_mut(band * width as usize * 4);
+        let mut first_rows = (0..).step_by(band).zip(bands);
+        let own = first_rows.next();
+        for (first, rows) in first_rows {
+            let baking = &baking;
+            scope.spawn(move || baking.rows(first, width, rows));
         }
-    }
+        if let Some((first, rows)) = own {
+            baking.rows(first, width, rows);
+        }
+    });
     Image::from_rgba(width, height, rgba)
 }
 
-fn push(rgba: &mut Vec<u8>, color: Vec3, alpha: f32) {
-    let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
-    let encoded = color.to_array().map(|v| byte(overbright::from_linear(v)));
-    rgba.extend(encoded);
-    rgba.push(byte(alpha));
+/// Fewest rows that are worth a thread.
+const MIN_BAND: usize = 64;
+
+/// A stage's picture as it lies on what is baked.
+struct Laid {
+    /// With the pixel for each column and each row.
+    picture: Option<(Image, Vec<u32>, Vec<u32>)>,
+    color: Vec4,
+}
+
+/// Which pixel of `side` in a row lies at each of `count` places, where an image repeats `tiles` times.
+fn places(count: u32, tiles: f32, side: u32) -> Vec<u32> {
+    let place = |i: u32| {
+        let t = ((i as f32 + 0.5) / count as f32 * tiles).rem_euclid(1.0);
+        ((t * side as f32) as u32).min(side.saturating_sub(1))
+    };
+    (0..count).map(place).collect()
+}
+
+/// What all rows of a baked picture need.
+struct Baking {
+    pictures: Vec<Laid>,
+    stages: Vec<Stage>,
+    tested: Option<usize>,
+    part: Part,
+    table: [f32; 256],
+    encoder: ByteEncoder,
+}
+
+impl Baking {
+    /// Fills rows from the one numbered `first`.
+    fn rows(&self, first: usize, width: u32, rgba: &mut [u8]) {
+        let mut samples = Vec::with_capacity(self.pictures.len());
+        for (y, row) in rgba.chunks_mut(width as usize * 4).enumerate() {
+            for (x, out) in row.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+                samples.clear();
+                samples.extend(self.pictures.iter().map(|laid| StageSample {
+                    texture: self.texel(laid, x, first + y),
+                    color: laid.color,
+                }));
+                *out = self.pixel(&samples);
+            }
+        }
+    }
+
+    fn texel(&self, laid: &Laid, x: usize, y: usize) -> Vec4 {
+        let Some((image, columns, rows)) = &laid.picture else {
+            return Vec4::ONE;
+        };
+        let at = columns.get(x).zip(rows.get(y));
+        let at = at.map_or(0, |(&x, &y)| y as usize * image.width as usize + x as usize);
+        let pixels = image.rgba.as_chunks::<4>().0;
+        let [r, g, b, a] = pixels.get(at).copied().unwrap_or([0, 0, 0, 255]);
+        let linear = |byte: u8| self.table[usize::from(byte)];
+        Vec4::new(linear(r), linear(g), linear(b), f32::from(a) / 255.0)
+    }
+
+    fn pixel(&self, samples: &[StageSample]) -> [u8; 4] {
+        let drawn = compose(&self.stages, samples, true);
+        let through = drawn.through.clamp(Vec3::ZERO, Vec3::ONE);
+        let alpha = match self.tested.and_then(|i| samples.get(i)) {
+            Some(sample) => sample.texture.w * sample.color.w,
+            None => 1.0 - through.element_sum() / 3.0,
+        };
+        // Blending multiplies what is shown by alpha.
+        let shown = match self.tested {
+            None => alpha.max(1.0 / 255.0),
+            Some(_) => 1.0,
+        };
+        let seen = match self.part {
+            Part::Color => drawn.lit,
+            Part::Glow => drawn.emission,
+            Part::Shown(level) => drawn.lit * self.table[usize::from(level)] + drawn.emission,
+        };
+        let [r, g, b] = (seen / shown).to_array().map(|v| self.encoder.byte(v));
+        [r, g, b, (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
+    }
 }
 
 /// What a repeating image shows at a place, linear.

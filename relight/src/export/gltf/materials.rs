@@ -248,7 +248,7 @@ impl Maker<'_> {
         };
         let shader = &material.resolved.shader;
         let source = self.source;
-        let Some(image) = source.images.get(source.files, &slot.picture, shader)? else {
+        let Some(image) = source.picture(&slot.picture, shader)? else {
             return Ok(None);
         };
         let sampling = if slot.clamp {

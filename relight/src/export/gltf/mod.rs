@@ -118,7 +118,8 @@ pub(super) fn write(
         warnings: Vec::new(),
     };
     let pages = atlas.map(|atlas| atlas.image(world)).transpose()?;
-    if let Some(pages) = &pages {
+    let seen = source.options.images != ImagePlace::None;
+    if let Some(pages) = pages.as_ref().filter(|_| seen) {
         let image = Encoded::png(pages, &format!("{}_lightmaps", output.stem()))?;
         let texture = document.textures.add(&Arc::new(image), Sampling::Lightmap);
         document.lightmap = Some(texture);
@@ -272,7 +273,7 @@ impl Document<'_> {
         let inside = match source.options.images {
             ImagePlace::Usual => container == Container::Binary,
             ImagePlace::Embed => true,
-            ImagePlace::Beside => false,
+            ImagePlace::Beside | ImagePlace::None => false,
         };
         let mut images = Vec::with_capacity(self.textures.images.len());
         for image in &self.textures.images {

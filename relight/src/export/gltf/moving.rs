@@ -54,9 +54,7 @@ pub fn make_moving(
             continue;
         };
         let picture = Picture::Film(film);
-        if let (Ok(Some(_)), Picture::Film(film)) =
-            (source.images.get(source.files, &picture, shader), &picture)
-        {
+        if let (Ok(Some(_)), Picture::Film(film)) = (source.picture(&picture, shader), &picture) {
             let shows = |s: &Stage| matches!(&s.image, StageImage::Animation { images, .. } if *images == film.images);
             not_lost(shader, &mut look.lost, FILM, shows);
             slot.picture = picture;

@@ -7,7 +7,7 @@ use super::nodes::turn;
 use crate::export::geometry::Geometry;
 use crate::export::images::Encoded;
 use crate::export::look::Picture;
-use crate::export::{ExportError, Sky, emission, extras, sky};
+use crate::export::{ExportError, ImagePlace, Sky, emission, extras, sky};
 use glam::{Vec3, Vec4};
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -36,6 +36,9 @@ impl Document<'_> {
         };
         let middle = (least + most) * 0.5;
         let radius = (most - least).length() * 0.5;
+        if source.options.images == ImagePlace::None {
+            return Ok(None);
+        }
         let shader = sky::definition(material);
         let mut wanted: Vec<Option<Picture>> = (0..6)
             .map(|side| sky::picture(source.files, material, side))
@@ -48,7 +51,7 @@ impl Document<'_> {
         let mut mean = Vec4::ZERO;
         for picture in &wanted {
             let image = match picture {
-                Some(picture) => source.images.get(source.files, picture, shader)?,
+                Some(picture) => source.picture(picture, shader)?,
                 None => None,
             };
             if let Some(image) = &image {
