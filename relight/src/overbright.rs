@@ -82,7 +82,7 @@ pub struct ByteEncoder {
 
 impl ByteEncoder {
     /// Parts of 0..=1: few bytes begin in one.
-    const PARTS: usize = 4096;
+    const PARTS: usize = 16_384;
 
     /// The tables.
     pub fn new() -> ByteEncoder {
@@ -98,7 +98,7 @@ impl ByteEncoder {
     /// The byte of a value, which is limited to 0..=1; 0 for what is no number.
     pub fn byte(&self, linear: f32) -> u8 {
         let v = linear.clamp(0.0, 1.0);
-        let first = self.first.get((v * Self::PARTS as f32) as usize);
+        let first = self.first.get((v * Self::PARTS as f32) as u32 as usize);
         let mut byte = first.copied().unwrap_or(0);
         while self
             .least
