@@ -28,9 +28,9 @@ const LIMITS: (f32, f32) = (0.02, 1.0);
 /// Bounds of an exposure that light and textures tell.
 const MATCHED: (f32, f32) = (0.005, 8.0);
 /// Steps in which it is found, at most.
-const STEPS: u32 = 24;
+const STEPS: u32 = 32;
 /// How near the means must come.
-const NEAR: f32 = 1e-4;
+const NEAR: f32 = 1e-3;
 /// Below this the picture is linear: the knee of the tone curve, as in `tonemap.comp`.
 const KNEE: f32 = 0.6;
 
@@ -105,10 +105,11 @@ pub(crate) fn matching<'a>(places: impl Iterator<Item = Place<'a>>) -> Option<f3
         }
         exposure = (exposure * ratio).clamp(MATCHED.0, MATCHED.1);
         if (ratio - 1.0).abs() < NEAR {
-            break;
+            return Some(exposure);
         }
     }
-    Some(exposure)
+    // No exposure does: most of what is lit has no light.
+    None
 }
 
 /// The exposure of a map, a factor of radiance: what calibration found; else from its lightmaps, or from the colours of

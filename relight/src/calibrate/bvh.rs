@@ -4,7 +4,9 @@
 //! the surface area heuristic over bins along the longest
 //! axis.
 
-use glam::{Vec3, Vec3A};
+use crate::world::Holes;
+use glam::{Vec2, Vec3, Vec3A};
+use std::sync::Arc;
 
 /// Triangles of a leaf.
 const LEAF: usize = 4;
@@ -27,6 +29,8 @@ pub(crate) struct Hit {
     pub normal: Vec3,
     /// Place of the triangle in the tree.
     index: u32,
+    /// Barycentric coordinates of the second and third corner.
+    at: [f32; 2],
 }
 
 #[derive(Clone, Copy)]
@@ -36,6 +40,16 @@ struct Triangle {
     e2: Vec3A,
     sky: bool,
     tag: u32,
+    /// Index of its [`CutOut`]; `u32::MAX` for triangles without holes.
+    cut_out: u32,
+}
+
+/// A triangle with holes.
+pub(crate) struct CutOut {
+    /// Texture coordinates of its corners.
+    pub st: [Vec2; 3],
+    /// Where its material is there.
+    pub holes: Arc<Holes>,
 }
 
 #[derive(Clone, Copy)]
@@ -54,6 +68,7 @@ struct Node {
 pub(crate) struct Occluders {
     nodes: Vec<Node>,
     triangles: Vec<Triangle>,
+    cut_outs: Vec<CutOut>,
 }
 
 impl Occluders {
@@ -69,6 +84,7 @@ impl Occluders {
                     e2: c - a,
                     sky,
                     tag,
+                    cut_out: u32::MAX,
                 };
                 (triangle, a.min(b).min(c) + a.max(b).max(c))
             })
@@ -80,7 +96,36 @@ impl Occluders {
         Occluders {
             nodes,
             triangles: triangles.into_iter().map(|(t, _)| t).collect(),
+            cut_outs: Vec::new(),
         }
+    }
+
+    /// Cuts holes: `cut_out` tells of a triangle's tag whether it has some.
+    pub fn cut(mut self, cut_out: impl Fn(u32) -> Option<CutOut>) -> Occluders {
+        for triangle in self.triangles.iter_mut().filter(|t| !t.sky) {
+            if let Some(found) = cut_out(triangle.tag) {
+                triangle.cut_out = self.cut_outs.len() as u32;
+                self.cut_outs.push(found);
+            }
+        }
+        self
+    }
+
+    /// Where a ray meets a triangle, unless it is a hole there. Of what is drawn from both sides both are fronts.
+    fn meet(&self, triangle: &Triangle, from: Vec3A, ray: Vec3A, limit: f32) -> Option<Hit> {
+        let mut hit = meet(triangle, from, ray, limit)?;
+        if let Some(CutOut { st, holes }) = self.cut_outs.get(triangle.cut_out as usize) {
+            let [a, b, c] = *st;
+            let [u, v] = hit.at;
+            if !holes.is_solid(a + (b - a) * u + (c - a) * v) {
+                return None;
+            }
+            if holes.two_sided && !hit.front {
+                hit.front = true;
+                hit.normal = -hit.normal;
+            }
+        }
+        Some(hit)
     }
 
     /// Whether some triangle is sky.
@@ -99,7 +144,10 @@ impl Occluders {
     pub fn blocked_again(&self, from: Vec3, to: Vec3, last: &mut Option<u32>) -> bool {
         let ray = to - from;
         let known = last.and_then(|index| self.triangles.get(index as usize));
-        if known.is_some_and(|t| meet(t, from.into(), ray.into(), 0.9999).is_some()) {
+        if known.is_some_and(|t| {
+            let hit = self.meet(t, from.into(), ray.into(), 0.9999);
+            hit.is_some()
+        }) {
             return true;
         }
         match self.walk(from, ray, 0.9999, true, |_| true) {
@@ -159,7 +207,7 @@ impl Occluders {
                     .zip(node.first..)
                 {
                     if counts(triangle.sky)
-                        && let Some(hit) = meet(triangle, from, ray, limit)
+                        && let Some(hit) = self.meet(triangle, from, ray, limit)
                     {
                         let hit = Hit { index, ..hit };
                         if any {
@@ -213,6 +261,7 @@ fn meet(triangle: &Triangle, from: Vec3A, ray: Vec3A, limit: f32) -> Option<Hit>
         // Clockwise corners: the front is the other way.
         normal: triangle.e2.cross(triangle.e1).normalize_or_zero().into(),
         index: 0,
+        at: [u, v],
     })
 }
 
@@ -365,6 +414,7 @@ mod tests {
                             e2: c - a,
                             sky,
                             tag,
+                            cut_out: u32::MAX,
                         };
                         meet(&triangle, from.into(), (to - from).into(), 0.9999)
                     })
@@ -380,6 +430,44 @@ mod tests {
         }
         assert!(found > 50, "{found}");
         assert!(!Occluders::new(std::iter::empty()).blocked(Vec3::ZERO, Vec3::ONE, false));
+    }
+
+    #[test]
+    fn light_passes_holes() {
+        // Texture coordinates are places; the right half of the picture is a hole.
+        let corners = [Vec3::ZERO, Vec3::Y * 4.0, Vec3::X * 4.0];
+        let script = "t\n{\ncull none\n{\nmap a\nalphaFunc GE128\n}\n}\n";
+        let shader = shaderscript::parse_script("test", script.as_bytes());
+        let mut rgba = vec![255; 16];
+        (rgba[7], rgba[15]) = (0, 0);
+        let picture = crate::image::Image::from_rgba(2, 2, rgba).unwrap();
+        for two_sided in [true, false] {
+            let holes =
+                Holes::of(&shader.shaders[0], two_sided, |_| Some(picture.clone())).unwrap();
+            let holes = Arc::new(holes);
+            let tree = Occluders::new(std::iter::once((corners, false, 7))).cut(|tag| {
+                (tag == 7).then(|| CutOut {
+                    st: corners.map(|c| c.truncate()),
+                    holes: Arc::clone(&holes),
+                })
+            });
+            let through = |x: f32| {
+                let (above, below) = (Vec3::new(x, 0.3, 1.0), Vec3::new(x, 0.3, -1.0));
+                let mut last = Some(0);
+                let open = !tree.blocked(above, below, false);
+                assert_eq!(open, !tree.blocked_again(above, below, &mut last));
+                open
+            };
+            assert_eq!(
+                [0.2, 0.7, 1.2, 1.7].map(through),
+                [false, true, false, true]
+            );
+            let under = tree
+                .nearest(Vec3::new(0.2, 0.3, -1.0), Vec3::Z, 9.0)
+                .unwrap();
+            assert_eq!(under.front, two_sided);
+            assert!(!two_sided || under.normal.z < -0.9);
+        }
     }
 
     #[test]

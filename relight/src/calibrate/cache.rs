@@ -281,6 +281,9 @@ impl Hash {
             self.number(material.class.class as u64);
             self.number(u64::from(material.emission.is_some()));
             self.vector(material.albedo);
+            if let Some(holes) = &material.holes {
+                self.bytes(&holes.bytes());
+            }
             for shade in &material.shades {
                 self.vector(shade.linear);
                 self.vector(shade.encoded);

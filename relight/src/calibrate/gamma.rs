@@ -36,7 +36,24 @@ pub(super) fn possible(gamma: f32) -> bool {
 }
 
 /// Looks for the gamma of a world's compiler; 1 for none. `progress` gets the part that is done.
+///
+/// Cut-outs let all light through here: that single rays are let through by a grate or not is noise, which a wrong gamma
+/// would seem to explain.
 pub(super) fn find(
+    world: &mut RelitWorld,
+    silent: &[u32],
+    options: &CalibrationOptions,
+    progress: &mut dyn FnMut(f32),
+) -> f32 {
+    let holes: Vec<_> = (world.materials.iter_mut().map(|m| m.holes.take())).collect();
+    let found = without_cut_outs(world, silent, options, progress);
+    for (material, holes) in world.materials.iter_mut().zip(holes) {
+        material.holes = holes;
+    }
+    found
+}
+
+fn without_cut_outs(
     world: &mut RelitWorld,
     silent: &[u32],
     options: &CalibrationOptions,

@@ -56,7 +56,7 @@ use glam::Vec3;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 11;
+const VERSION: u32 = 12;
 
 /// Part of the time that looking for the compiler's gamma takes, about.
 const GAMMA_PART: f32 = 0.25;

@@ -18,7 +18,7 @@ use super::{POINT_LIGHT_INTENSITY, SKY_LIGHT_RADIANCE, SURFACE_LIGHT_RADIANCE};
 use crate::files::GameFiles;
 use crate::image::{self, Image};
 use crate::overbright;
-use crate::world::WorldMaterial;
+use crate::world::{Holes, WorldMaterial};
 use glam::Vec3;
 use shaderscript::light::SurfaceClass;
 use shaderscript::{Cull, Deform, Shader};
@@ -182,6 +182,17 @@ impl<'a> Finder<'a> {
             self.image(name);
         }
         shades(shader, |name| self.images.get(name)?.as_ref())
+    }
+
+    /// Where a cut-out lets light through.
+    pub fn holes(&self, material: &WorldMaterial) -> Option<Holes> {
+        if material.class.class != SurfaceClass::CutOut {
+            return None;
+        }
+        let shader = &material.resolved.shader;
+        // Not of the small copy: alpha that is tested against 0 would fill small holes there.
+        let load = |name: &str| image::load(self.files, name).ok().flatten();
+        Holes::of(shader, material.class.two_sided, |name| Some(load(name)?.0))
     }
 
     /// Mean radiance of what a sky shows: the sides of its box that exist, and its clouds.

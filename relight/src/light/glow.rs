@@ -51,23 +51,19 @@ pub(super) fn shades<'a>(
     mut image: impl FnMut(&str) -> Option<&'a Image>,
 ) -> Vec<Shade> {
     let start = TIMES.get(..1).unwrap_or_default();
-    let mut of = |table: &[f32; 256], compose: Compose| {
-        drawn(shader, start, (table, compose), &mut image)
-            .into_iter()
-            .map(|drawn| {
-                let lit = drawn.lit.max(Vec3::ZERO);
-                if lit.is_finite() { lit } else { Vec3::ZERO }
-            })
-    };
-    // The same stack in both kinds of numbers: stages that double or add do not come to the same.
-    let linear = of(&overbright::byte_table(), compose);
-    let encoded = of(
-        &std::array::from_fn(|byte| byte as f32 / 255.0),
-        compose_encoded,
-    );
-    let mut all: Vec<Shade> = linear
-        .zip(encoded)
-        .map(|(linear, encoded)| Shade { linear, encoded })
+    // Stages are put together as they are displayed, as the shaders do it.
+    let bytes = std::array::from_fn(|byte| byte as f32 / 255.0);
+    let drawn = drawn(shader, start, (&bytes, compose_encoded), &mut image);
+    let mut all: Vec<Shade> = drawn
+        .into_iter()
+        .map(|drawn| {
+            let lit = drawn.lit.max(Vec3::ZERO);
+            let encoded = if lit.is_finite() { lit } else { Vec3::ZERO };
+            Shade {
+                linear: overbright::colour_to_linear(encoded),
+                encoded,
+            }
+        })
         .collect();
     all.sort_by(|a, b| luminance(a.linear).total_cmp(&luminance(b.linear)));
     let mean = |group: &[Shade]| {

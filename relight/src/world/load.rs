@@ -345,6 +345,7 @@ fn resolve_materials(
                 resolved,
                 albedo: Vec3::ZERO,
                 shades: Vec::new(),
+                holes: None,
                 shown: Vec3::ZERO,
                 emission: None,
                 flicker: None,

@@ -1,5 +1,6 @@
 //! Materials of a world: each combination of name, flags and lighting that its surfaces use.
 
+use super::holes::Holes;
 use crate::exposure::DEFAULT_EXPONENT;
 use crate::files::GameFiles;
 use crate::light::{Emission, Finder, Flicker, Shade};
@@ -8,6 +9,7 @@ use glam::Vec3;
 use q3bsp::{Bsp, SurfaceKind, lightmap_index};
 use shaderscript::ImplicitKind;
 use shaderscript::light::{LightClass, classify};
+use std::sync::Arc;
 
 /// A material of a world.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +33,9 @@ pub struct WorldMaterial {
     /// What it throws back of light all over its texture, from dark to bright, equal parts of it each; without
     /// [`stored_scale`](Self::stored_scale). Empty of skies, and unless the world was loaded to be calibrated.
     pub shades: Vec<Shade>,
+    /// Where light passes a cut-out; `None` of other materials, where nobody knows, and unless the world was loaded to be
+    /// calibrated.
+    pub holes: Option<Arc<Holes>>,
     /// Mean radiance of what it shows of its own, linear: of a sky its picture. Bounced rays find it where it is in no
     /// light list. Zero unless the world was loaded to be calibrated.
     pub shown: Vec3,
@@ -60,6 +65,7 @@ impl WorldMaterial {
             resolved,
             albedo: Vec3::ZERO,
             shades: Vec::new(),
+            holes: None,
             shown: Vec3::ZERO,
             emission: None,
             flicker: None,
@@ -72,9 +78,10 @@ impl WorldMaterial {
         material
     }
 
-    /// Finds what it throws back of light.
+    /// Finds what it throws back of light, and where it lets it through.
     pub(super) fn throw_back(&mut self, finder: &mut Finder<'_>) {
         self.shades = finder.shades(self);
+        self.holes = finder.holes(self).map(Arc::new);
         let count = self.shades.len().max(1) as f32;
         let mean = self.shades.iter().map(|s| s.linear).sum::<Vec3>() / count;
         self.albedo = (mean.min(Vec3::ONE) * self.stored_scale()).min(Vec3::ONE);

@@ -2,6 +2,7 @@
 
 mod fog;
 mod geometry;
+mod holes;
 mod lighting;
 mod load;
 mod material;
@@ -10,6 +11,7 @@ mod tests;
 
 pub use fog::WorldFog;
 pub use geometry::{Flare, NO_LIGHT, WorldModel, WorldSurface, WorldVertex};
+pub use holes::Holes;
 pub use lighting::Lighting;
 pub use load::{LoadError, Options, Progress, Stage};
 pub use material::WorldMaterial;
