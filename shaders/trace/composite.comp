@@ -27,9 +27,9 @@ vec3 light_in_fog(ivec2 pixel) {
     return total > 0.0 ? sum / total : vec3(0.0);
 }
 
-// The kind of field, and the part of the front that is new, as primary rays leave them in one number.
+// The kind of field, and how much light is new over that of the front, as primary rays leave them in one number.
 float field_of(vec4 front) { return floor(front.a); }
-float new_part(vec4 front) { return front.a - floor(front.a); }
+float new_part(vec4 front) { return (front.a - floor(front.a)) * MOST_FRESH; }
 
 // What a pixel shows by itself. `front`: what the primary rays have composed there.
 vec3 shown(ivec2 pixel, vec3 front) {
@@ -98,7 +98,7 @@ void main() {
     if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
     if ((VIEW.flags & VIEW_ACCUMULATE) == 0) {
         // alpha: how much of the colour is of what has come here since the last frame
-        float fresh = new_part(front) * min(max_component(front.rgb) * exp2(-VIEW.exposure_base) / max(max_component(radiance), 1.0e-6), 0.99);
+        float fresh = min(new_part(front) * max_component(front.rgb) * exp2(-VIEW.exposure_base) / max(max_component(radiance), 1.0e-6), 0.99);
         if (!(fresh > 0.0)) fresh = 0.0;
         imageStore(images_rgba16f[VIEW.image_composite], pixel, vec4(min(radiance, vec3(60000.0)), fresh));
         return;

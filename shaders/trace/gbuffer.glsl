@@ -6,6 +6,9 @@
 
 #include "trace/view.glsl"
 
+// Most new light that a pixel tells of, times the light of its front: the unit of the fraction beside the field.
+const float MOST_FRESH = 8.0;
+
 struct GBufferPixel {
     vec3 position;
     float path; // length of the way from the eye; negative: nothing to light
