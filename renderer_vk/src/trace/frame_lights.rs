@@ -209,7 +209,7 @@ const DYNAMIC_LIGHT_SIZE: (f32, f32, f32) = (0.02, 2.0, 8.0);
 const DYNAMIC_LIGHT_CLEARANCE: f32 = 20.0;
 
 /// Radius of the gas that glows, as a part of a light's reach.
-const DYNAMIC_LIGHT_CORE: f32 = 0.25;
+const DYNAMIC_LIGHT_CORE: f32 = 0.35;
 
 /// The game's dynamic lights as small spheres.
 ///
@@ -221,8 +221,9 @@ const DYNAMIC_LIGHT_CORE: f32 = 0.25;
 /// What gives this light in the game is gas: muzzle flashes, explosions, the tails of missiles. Of a ball of radius `a`
 /// that glows evenly and lets light through, what faces it receives intensity / d² from outside, as from a point
 /// (Gauss's theorem; all of the ball is above the horizon), and inside at most about intensity / a², for the gas behind a
-/// surface gives it nothing. So inside of a quarter of the reach it is as bright as there: four times the light's colour.
-/// In the sum of displayed values that the classic look makes, a colour added in full is two to four times its light.
+/// surface gives it nothing. So inside of 0.35 of the reach it is as bright as there: twice the light's colour. The classic
+/// look multiplies what is displayed by up to one more than the colour: dark walls at a muzzle flash get less light by
+/// that than here, lit floors more.
 pub fn dynamic_lights(lights: &[DynamicLight], scale: f32) -> Vec<t::SphereLight> {
     lights
         .iter()

@@ -279,7 +279,7 @@ fn spheres_and_suns_give_their_irradiance_with(gpu: &mut Gpu) {
         additive: false,
     });
     check(gpu, &scene, &|p| 100.0 * 100.0 * falloff(p));
-    // nearer than a quarter of its reach it is no stronger than there
+    // nearer than 0.35 of its reach it is no stronger than there
     let near = Vec3::new(20.0, 10.0, 24.0);
     let mut scene = floor();
     scene.dlights.push(DynamicLight {
@@ -291,7 +291,7 @@ fn spheres_and_suns_give_their_irradiance_with(gpu: &mut Gpu) {
     check(gpu, &scene, &|p| {
         let distance = (near - p).length();
         let colour = crate::trace::frame_lights::decode(Vec3::splat(0.5)).x;
-        colour * near.z / distance * (120.0 / distance.max(60.0)).powi(2)
+        colour * near.z / distance * (120.0 / distance.max(84.0)).powi(2)
     });
     let mut scene = floor();
     let direction = Vec3::new(0.3, 0.2, 0.8).normalize();
