@@ -10,7 +10,7 @@
 use super::bvh::{Hit, Occluders};
 use super::parallel;
 use super::random::Random;
-use super::samples::Sample;
+use super::samples::{Place, Sample};
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::{IVec3, Vec3};
 use std::collections::HashMap;
@@ -55,6 +55,9 @@ impl Transfer {
         let of_triangle = surfaces_of_triangles(world);
         let near = Near::new(samples);
         let found = parallel::map(samples, |i, sample| {
+            if sample.place == Place::Air {
+                return (Vec::new(), Vec3::ZERO, Vec3::ZERO);
+            }
             let mut random = Random::new(0xB0_0000 + i as u64);
             let (u, v) = sample.normal.any_orthonormal_pair();
             let (mut sky, mut glow) = (Vec3::ZERO, Vec3::ZERO);
@@ -179,7 +182,8 @@ pub(super) struct Near(HashMap<IVec3, Vec<u32>>);
 impl Near {
     pub fn new(samples: &[Sample]) -> Near {
         let mut cells: HashMap<IVec3, Vec<u32>> = HashMap::new();
-        for (i, sample) in (0u32..).zip(samples) {
+        let surface = |s: &(u32, &Sample)| s.1.place == Place::Surface;
+        for (i, sample) in (0u32..).zip(samples).filter(surface) {
             cells.entry(cell(sample.position)).or_default().push(i);
         }
         Near(cells)

@@ -470,6 +470,7 @@ mod tests {
     #[test]
     fn irradiance_agrees_with_adding_up_small_pieces() {
         let sample = Sample {
+            place: crate::calibrate::samples::Place::Surface,
             position: Vec3::ZERO,
             normal: Vec3::new(0.6, 0.0, 0.8),
             value: Vec3::ZERO,

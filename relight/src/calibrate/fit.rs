@@ -1,10 +1,12 @@
 //! The state of a fit, and its steps: strengths, ambient and bounced light, which depend on each other.
 
+use super::air;
 use super::bounce::{Transfer, surfaces_of_triangles};
 use super::columns::Column;
+use super::crossings::Crossing;
 use super::place::{self, Scene};
 use super::report::Agreement;
-use super::samples::{Sample, light_of, mean};
+use super::samples::{Place, Sample, light_of, mean};
 use super::solve::{self, Ambient, Effort};
 use super::{Occluders, suns, views};
 use crate::exposure::{self, Place};
@@ -46,6 +48,8 @@ pub(super) struct Fit<'a> {
     /// Known sources first.
     pub columns: Vec<Column>,
     pub ambient: Ambient,
+    /// Places that the light grid's directions meet at.
+    pub crossings: Vec<Crossing>,
 }
 
 impl Fit<'_> {
@@ -130,11 +134,15 @@ impl Fit<'_> {
             };
             let (columns, ambient) = (&mut self.columns, &mut self.ambient);
             if round == 0 {
-                spacing = place::over_space(&scene, columns, fixed, ambient);
+                spacing = place::over_space(&scene, &self.crossings, columns, fixed, ambient);
             } else {
                 place::in_front(&scene, columns, fixed, ambient, spacing);
             }
             self.settle();
+            let direct = solve::direct(&self.samples, &self.columns);
+            if round == 0 && air::believe(self.world, &mut self.samples, &direct) {
+                self.settle();
+            }
             // The first round, over all space, takes as long as the others together.
             progress(0.5 + 0.5 * round as f32 / (ROUNDS - 1) as f32);
             let found = self.agreement().median_stops;
@@ -182,7 +190,7 @@ pub(super) fn first_ambient(world: &RelitWorld, samples: &[Sample]) -> Ambient {
 fn quantile(samples: &[Sample], part: f32, least: f32) -> Vec3 {
     let chosen: Vec<Vec3> = samples
         .iter()
-        .filter(|s| !s.held_out && mean(s.value) >= least)
+        .filter(|s| s.place == Place::Surface && !s.held_out && mean(s.value) >= least)
         .map(|s| s.value)
         .collect();
     let channel = |k: usize| {

@@ -3,13 +3,15 @@
 //! Compilers strip light entities, and leave their scale factors nowhere; what they computed is still there, as
 //! lightmaps. Light is linear in the strengths of lights, so that finding them is a linear problem: *inverse lighting*.
 //!
-//! 1. `samples`: measurements, spread over the map's area. Some are held out, to judge by.
+//! 1. `samples`: measurements, spread over the map's area. Some are held out, to judge by. `air`: and the light in the
+//!    air, from the light grid.
 //! 2. `columns`: shadow rays tell what each known light gives to each sample. Skies that no directive tells the light of
 //!    count as known lights of unknown strength (`skies`).
 //! 3. `bounce`: which part of the light at samples others throw there, as tracing will.
 //! 4. `solve` fits strengths by sparse non-negative least squares of logarithmic error. What directives say is a prior,
 //!    and what is the same everywhere is ambient, within limits. `suns` looks for a sun where none is known.
-//! 5. `place`: candidates for lost lights all over open space, then in front of what stays unexplained, for as long as
+//! 5. `place`: candidates for lost lights all over open space, and where the directions of the light grid meet
+//!    (`crossings`), then in front of what stays unexplained, for as long as
 //!    that makes light agree better at what is held out. `fit` holds these steps together.
 //! 6. `gamma`: all of that with less effort for light that was stored encoded, to see whether it explains more.
 //! 7. The world's lights get their strengths, lost lights are added to
@@ -21,11 +23,13 @@
 //!
 //! Source: the idea is that of Schoeneman et al., *Painting with Light*, SIGGRAPH 1993.
 
+mod air;
 mod apply;
 mod bounce;
 pub(crate) mod bvh;
 pub(crate) mod cache;
 mod columns;
+mod crossings;
 mod fit;
 mod gamma;
 pub(crate) mod parallel;
@@ -56,7 +60,10 @@ use glam::Vec3;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 12;
+const VERSION: u32 = 13;
+
+/// One in so many candidates comes from the directions of the light grid.
+const CROSSINGS: usize = 5;
 
 /// Part of the time that looking for the compiler's gamma takes, about.
 const GAMMA_PART: f32 = 0.25;
@@ -146,7 +153,7 @@ pub fn calibrate_with(
             world.stored_gamma = gamma::find(world, &silent, options, &mut |part| {
                 progress(part * GAMMA_PART);
             });
-            let solution = find(world, &silent, options, &mut |part| {
+            let solution = find(world, &silent, options, true, &mut |part| {
                 progress(GAMMA_PART + part * (1.0 - GAMMA_PART));
             });
             if let (Some(cache), Some(key)) = (&options.cache, key)
@@ -170,15 +177,25 @@ pub fn calibrate_with(
 }
 
 /// Solves for a world's light. `silent`: skies of which directives tell nothing.
+///
+/// `grid`: whether the light grid is measured beside lightmaps.
 fn find(
     world: &RelitWorld,
     silent: &[u32],
     options: &CalibrationOptions,
+    grid: bool,
     progress: &mut dyn FnMut(f32),
 ) -> Solution {
     progress(0.0);
     let occluders = samples::occluders(world);
-    let (samples, evidence) = samples::take(world, &occluders, options.samples, options.seed);
+    let (mut samples, evidence) = samples::take(world, &occluders, options.samples, options.seed);
+    let texels = samples.len();
+    let mut crossings = Vec::new();
+    if grid && evidence == Evidence::Lightmaps {
+        let points = air::points(world, &occluders);
+        crossings = crossings::find(world, &points, &occluders, options.candidates / CROSSINGS);
+        samples.extend(air::more_samples(world, &points, options));
+    }
     progress(0.05);
     let mut columns = columns::known(world, &occluders, &samples, silent);
     let known = columns.len();
@@ -187,7 +204,7 @@ fn find(
         ambient: world.ambient,
         report: CalibrationReport {
             evidence,
-            samples: samples.len(),
+            samples: texels,
             held_out: samples.iter().filter(|s| s.held_out).count(),
             known,
             gamma: world.stored_gamma,
@@ -211,6 +228,7 @@ fn find(
         samples,
         transfer,
         columns,
+        crossings,
     };
     let first = std::mem::replace(&mut fit.ambient.value, world.ambient);
     fit.rebounce(true);

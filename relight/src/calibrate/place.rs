@@ -7,6 +7,7 @@
 
 use super::bvh::Occluders;
 use super::columns::{Column, Source, point_rows};
+use super::crossings::Crossing;
 use super::parallel;
 use super::samples::{self, Sample, mean};
 use super::solve::{Ambient, Effort, Residual, norm, residual, solve};
@@ -199,7 +200,7 @@ impl Scene<'_> {
             .iter()
             .zip(&state.rest)
             .enumerate()
-            .filter(|(_, (s, _))| !s.held_out)
+            .filter(|(_, (s, _))| !s.held_out && s.place == samples::Place::Surface)
             .map(|(i, (s, rest))| (mean(*rest) / (s.level() + s.floor), i))
             .filter(|(missing, _)| *missing > 0.25)
             .collect();
@@ -222,11 +223,18 @@ impl Scene<'_> {
 /// Adds lights out of a grid over open space to `columns`, of which the first `fixed` stay. Returns the grid's spacing.
 pub(super) fn over_space(
     scene: &Scene<'_>,
+    crossings: &[Crossing],
     columns: &mut Vec<Column>,
     fixed: usize,
     ambient: &mut Ambient,
 ) -> f32 {
-    let (nodes, spacing) = scene.grid();
+    let (mut nodes, spacing) = scene.grid();
+    nodes.extend(
+        crossings
+            .iter()
+            .map(|c| c.origin)
+            .filter(|&at| scene.open(at)),
+    );
     choose(scene, columns, fixed, ambient, &nodes, spacing);
     spacing
 }

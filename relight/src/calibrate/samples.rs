@@ -3,6 +3,7 @@
 //! Light is counted as the outgoing radiance of a white surface, irradiance / π: a stored byte v is v 4 / 255 (see
 //! [`light`](mod@crate::light)), to the power of the compiler's gamma. Its colour is what the engine shows: [`LightColor`](crate::light::LightColor).
 
+use super::air;
 use super::bvh::{CutOut, Occluders};
 use super::random::Random;
 use crate::light;
@@ -36,9 +37,20 @@ const BLACK_OVER_LIT: f32 = 0.1;
 /// Points tried in each stratum before it is given up.
 const TRIES: usize = 8;
 
+/// Where a measurement was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    /// On a surface, which all light falls on.
+    Surface,
+    /// In the open, at a point of the light grid: only light that comes straight from lights ([`air`](super::air)).
+    Air,
+}
+
 /// One measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sample {
+    /// Where it was taken.
+    pub place: Place,
     /// A little off the surface.
     pub position: Vec3,
     /// Unit normal.
@@ -68,6 +80,14 @@ impl Sample {
     pub fn level(&self) -> f32 {
         mean(self.value)
     }
+
+    /// The part of light from everywhere that is in it.
+    pub fn ambient(&self) -> f32 {
+        match self.place {
+            Place::Surface => 1.0,
+            Place::Air => 0.0,
+        }
+    }
 }
 
 /// Mean of the channels.
@@ -88,13 +108,13 @@ pub(super) fn floor(world: &RelitWorld) -> f32 {
 
 /// Light of a stored colour: bytes were gamma-encoded by the compiler, and it was multiplied by `scale` before that. Its
 /// colour is what the engine shows of the stored one.
-fn decode(world: &RelitWorld, stored: Vec3, scale: f32) -> Vec3 {
+pub(super) fn decode(world: &RelitWorld, stored: Vec3, scale: f32) -> Vec3 {
     let light = stored.map(|channel| light_of(world, channel)) / scale;
     light::raise(light, world.color_exponent / world.stored_gamma)
 }
 
 /// What the engine shows of stored bytes: four times as much, less where a channel would run over.
-fn shown(stored: Vec3) -> Vec3 {
+pub(super) fn shown(stored: Vec3) -> Vec3 {
     let light = stored * STORED_UNIT;
     light / light.max_element().max(1.0)
 }
@@ -212,7 +232,7 @@ pub(super) fn take(
     if vertices.len() >= 16 && lit(&vertices) {
         return (hold_out(vertices, &mut random), Evidence::Vertices);
     }
-    let grid = grid(world, count, &mut random);
+    let grid = air::samples(world, &air::points(world, occluders), count, &mut random);
     if grid.len() >= 16 && lit(&grid) {
         return (hold_out(grid, &mut random), Evidence::Grid);
     }
@@ -265,6 +285,7 @@ fn sample_at(
         return None;
     }
     Some(Sample {
+        place: Place::Surface,
         position,
         normal,
         value: stored.light(world),
@@ -521,46 +542,8 @@ fn vertices(
         .collect()
 }
 
-/// Points of the light grid: what comes from the bright side and what comes from the other.
-fn grid(world: &RelitWorld, count: usize, random: &mut Random) -> Vec<Sample> {
-    let Some(layout) = world.bsp.light_grid() else {
-        return Vec::new();
-    };
-    let [nx, ny, _] = layout.counts;
-    let mut samples = Vec::new();
-    for i in pick(world.bsp.light_grid.len(), count.div_ceil(2), random) {
-        let Some(point) = world.bsp.light_grid.get(i) else {
-            continue;
-        };
-        let position = layout.position(i % nx, i / nx % ny, i / nx / ny);
-        let cluster = world.bsp.cluster_at(position);
-        let normal = point.direction().normalize_or_zero();
-        if cluster < 0 || normal == Vec3::ZERO || point.ambient == [0; 3] {
-            continue;
-        }
-        let ambient = Vec3::from_array(point.ambient.map(f32::from));
-        let directed = Vec3::from_array(point.directed.map(f32::from));
-        for (normal, value) in [(normal, ambient + directed), (-normal, ambient)] {
-            samples.push(Sample {
-                position,
-                normal,
-                value: decode(world, value, 1.0),
-                shown: shown(value),
-                bounce: Vec3::ZERO,
-                cluster,
-                material: u32::MAX,
-                saturated: point.directed.contains(&255),
-                floor: floor(world),
-                trust: 1.0,
-                held_out: false,
-            });
-        }
-    }
-    samples
-}
-
 /// Indices below `len`, in order: all, or one of each of `count` equal stretches.
-fn pick(len: usize, count: usize, random: &mut Random) -> impl Iterator<Item = usize> {
+pub(super) fn pick(len: usize, count: usize, random: &mut Random) -> impl Iterator<Item = usize> {
     let count = count.min(len);
     (0..count).map(move |i| {
         let low = i * len / count.max(1);
@@ -575,6 +558,7 @@ mod tests {
 
     fn sample(value: f32, trust: f32) -> Sample {
         Sample {
+            place: Place::Surface,
             position: Vec3::ZERO,
             normal: Vec3::Z,
             value: Vec3::splat(value),

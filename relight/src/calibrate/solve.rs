@@ -53,7 +53,10 @@ pub(super) struct Residual {
 
 /// Computed light at every sample: ambient, bounced and direct.
 pub(super) fn predict(samples: &[Sample], columns: &[Column], ambient: Vec3) -> Vec<Vec3> {
-    let mut light: Vec<Vec3> = samples.iter().map(|s| s.bounce + ambient).collect();
+    let mut light: Vec<Vec3> = samples
+        .iter()
+        .map(|s| s.bounce + ambient * s.ambient())
+        .collect();
     add(columns, &mut light);
     light
 }
@@ -119,7 +122,8 @@ pub(super) fn solve(
         } else if effort.anew {
             // Nothing is known yet: every sample by its own level. Not by its square: what lies in the dark for another
             // reason than the lights' weakness would decide all.
-            let mean = samples.iter().map(Sample::level).sum::<f32>() / samples.len().max(1) as f32;
+            let known = || samples.iter().filter(|s| s.trust > 0.0).map(Sample::level);
+            let mean = known().sum::<f32>() / known().count().max(1) as f32;
             for (weight, sample) in state.weights.iter_mut().zip(samples) {
                 if *weight > 0.0 {
                     let level = (sample.level() + sample.floor) * (mean + sample.floor);
@@ -139,7 +143,7 @@ pub(super) fn solve(
                     improve(column, norm, &mut state, effort.sparsity);
                 }
             }
-            improve_ambient(ambient, &mut state);
+            improve_ambient(samples, ambient, &mut state);
         }
     }
     residual(samples, columns, ambient.value)
@@ -189,10 +193,11 @@ fn improve(column: &mut Column, norm: f32, state: &mut Residual, sparsity: f32) 
     }
 }
 
-fn improve_ambient(ambient: &mut Ambient, state: &mut Residual) {
+fn improve_ambient(samples: &[Sample], ambient: &mut Ambient, state: &mut Residual) {
     let mut gradient = Vec3::ZERO;
     let mut norm = 0.0;
-    for (rest, &weight) in state.rest.iter().zip(&state.weights) {
+    for (sample, (rest, &weight)) in samples.iter().zip(state.rest.iter().zip(&state.weights)) {
+        let weight = weight * sample.ambient();
         gradient += *rest * weight;
         norm += weight;
     }
@@ -203,8 +208,8 @@ fn improve_ambient(ambient: &mut Ambient, state: &mut Residual) {
     let change = best - ambient.value;
     if change.is_finite() && change != Vec3::ZERO {
         ambient.value = best;
-        for rest in &mut state.rest {
-            *rest -= change;
+        for (rest, sample) in state.rest.iter_mut().zip(samples) {
+            *rest -= change * sample.ambient();
         }
     }
 }

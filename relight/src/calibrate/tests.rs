@@ -1,3 +1,4 @@
+mod grid;
 mod known_truth;
 
 use super::*;
@@ -65,6 +66,16 @@ fn room(lamp: bool, light: Option<&dyn Fn(Vec3, Vec3) -> Vec3>) -> RelitWorld {
 
 /// The room with walls of a material.
 fn room_of(material: &str, lamp: bool, light: Option<&dyn Fn(Vec3, Vec3) -> Vec3>) -> RelitWorld {
+    relit(&room_map(material, lamp, usize::MAX, light).build())
+}
+
+/// Its map, of which the first so many faces are lightmapped.
+fn room_map(
+    material: &str,
+    lamp: bool,
+    lightmapped: usize,
+    light: Option<&dyn Fn(Vec3, Vec3) -> Vec3>,
+) -> MapBuilder {
     let mut map = MapBuilder::new();
     let wall = map.add_shader(material, 0, 1);
     let mut faces = map.add_box_faces(wall, ROOM[0], ROOM[1], true).to_vec();
@@ -74,7 +85,7 @@ fn room_of(material: &str, lamp: bool, light: Option<&dyn Fn(Vec3, Vec3) -> Vec3
         let shader = map.add_shader("t/lamp", 0, 1);
         map.add_quad(shader, LAMP_CORNERS);
     }
-    for face in faces {
+    for face in faces.into_iter().take(lightmapped) {
         let Some(light) = light else { continue };
         let corners = map.vertices_mut(face);
         let (a, b, d) = (corners[0], corners[1], corners[3]);
@@ -98,7 +109,7 @@ fn room_of(material: &str, lamp: bool, light: Option<&dyn Fn(Vec3, Vec3) -> Vec3
         });
         map.set_lightmap(face, page);
     }
-    relit(&map.build())
+    map
 }
 
 /// A world whose stored light has the colours that it says.

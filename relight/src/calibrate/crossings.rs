@@ -1,0 +1,271 @@
+//! Places where the directions of the light grid meet: where lights probably are.
+//!
+//! A point of the grid tells where its light comes from. Where one light outshines all others, that is the way to it, and
+//! the ways of points near each other meet there (triangulation). Pairs of neighbouring points whose ways nearly meet, and
+//! whose light is as bright as the distances say, vote for the middle between the ways; places with many votes whose voters
+//! see them are candidates.
+
+use super::air::AirPoint;
+use super::bvh::Occluders;
+use super::parallel;
+use crate::world::RelitWorld;
+use glam::{IVec3, Vec3};
+use std::collections::{BTreeMap, HashMap};
+
+/// How far apart points of a pair are, in spacings of the grid, about: as many as make a cell of the lookup.
+const NEIGHBOURS: f32 = 2.0;
+
+/// Least sine of the angle between two ways that tell where they meet.
+const APART: f32 = 0.08;
+
+/// How near two ways must come to each other, id units, and as a part of the longer one: directions are bytes.
+const MISS: (f32, f32) = (6.0, 0.03);
+
+/// Ways that are believed, id units.
+const WAY: (f32, f32) = (16.0, 1024.0);
+
+/// How unlike an inverse square the light of two points may be: a factor.
+const UNLIKE: f32 = 1.6;
+
+/// Side of the cells that votes are counted in, id units.
+const CELL: f32 = 24.0;
+
+/// Least votes of a candidate.
+const VOTES: usize = 4;
+
+/// Votes of a candidate that are asked whether they see it.
+const ASKED: usize = 16;
+
+/// How far apart the middle half of what points tell of a light's intensity may lie, a factor: light from far away is
+/// the same at all of them, and then what they tell is not.
+const TOLD: f32 = 1.5;
+
+/// A place that ways meet at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Crossing {
+    pub origin: Vec3,
+    /// Intensity that points around tell of, their median.
+    pub intensity: Vec3,
+}
+
+/// A vote: the place, its weight, and the two points. What is near tells more: other lights are weaker there.
+type Vote = (Vec3, f32, [u32; 2]);
+
+/// Where votes are in the mean.
+fn middle(votes: &[Vote]) -> Vec3 {
+    let weight: f32 = votes.iter().map(|v| v.1).sum();
+    votes.iter().map(|v| v.0 * v.1).sum::<Vec3>() / weight.max(f32::MIN_POSITIVE)
+}
+
+/// The places with most votes, best first, at most `most`.
+pub(super) fn find(
+    world: &RelitWorld,
+    points: &[AirPoint],
+    occluders: &Occluders,
+    most: usize,
+) -> Vec<Crossing> {
+    let spacing = world.bsp.light_grid().map_or(Vec3::ONE, |l| l.size);
+    triangulate(points, spacing, occluders, most)
+}
+
+/// [`find`] for points of a grid of some spacing, id units.
+fn triangulate(
+    points: &[AirPoint],
+    spacing: Vec3,
+    occluders: &Occluders,
+    most: usize,
+) -> Vec<Crossing> {
+    let lookup = (spacing.min_element() * NEIGHBOURS).max(spacing.max_element());
+    let mut cells: HashMap<IVec3, Vec<u32>> = HashMap::new();
+    let cell_of = |at: Vec3, side: f32| (at / side).floor().as_ivec3();
+    for (i, point) in (0u32..).zip(points) {
+        cells
+            .entry(cell_of(point.position, lookup))
+            .or_default()
+            .push(i);
+    }
+    let votes = parallel::map(points, |i, point| {
+        let middle = cell_of(point.position, lookup);
+        let side = -1..=1;
+        let mut votes: Vec<Vote> = Vec::new();
+        for z in side.clone() {
+            for y in side.clone() {
+                for x in side.clone() {
+                    let Some(near) = cells.get(&(middle + IVec3::new(x, y, z))) else {
+                        continue;
+                    };
+                    let later = near.iter().filter(|&&j| j as usize > i);
+                    votes.extend(later.filter_map(|&j| {
+                        let (meeting, weight) = meet(point, points.get(j as usize)?)?;
+                        Some((meeting, weight, [i as u32, j]))
+                    }));
+                }
+            }
+        }
+        votes
+    });
+    // Sorted cells, so that the result depends on nothing but the points.
+    let mut counted: BTreeMap<[i32; 3], Vec<Vote>> = BTreeMap::new();
+    for vote in votes.into_iter().flatten() {
+        let cell = cell_of(vote.0, CELL).to_array();
+        counted.entry(cell).or_default().push(vote);
+    }
+    // A light between cells has its votes in several: neighbours count with each.
+    let around = |[x, y, z]: [i32; 3]| {
+        (0..27).map(move |k| [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1])
+    };
+    let mut cells: Vec<(usize, [i32; 3])> = counted
+        .iter()
+        .map(|(&cell, votes)| (votes.len(), cell))
+        .filter(|(votes, _)| *votes >= VOTES)
+        .collect();
+    cells.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+    let mut found: Vec<Crossing> = Vec::new();
+    for (_, cell) in cells {
+        if found.len() >= most {
+            break;
+        }
+        let start = middle(counted.get(&cell).map_or(&[][..], Vec::as_slice));
+        let near: Vec<Vote> = around(cell)
+            .filter_map(|c| counted.get(&c))
+            .flatten()
+            .filter(|v| v.0.distance(start) <= CELL)
+            .copied()
+            .collect();
+        let origin = middle(&near);
+        if found.iter().any(|f| f.origin.distance(origin) < CELL) {
+            continue;
+        }
+        let asked = near.len().min(ASKED);
+        let some = (0..asked).filter_map(|k| near.get(k * near.len() / asked.max(1)));
+        let seen = some
+            .filter(|(_, _, pair)| {
+                pair.iter().all(|&i| {
+                    let point = points.get(i as usize);
+                    point.is_some_and(|p| !occluders.blocked(p.position, origin, false))
+                })
+            })
+            .count();
+        if seen * 2 < asked || asked == 0 {
+            continue;
+        }
+        let mut told: Vec<Vec3> = near
+            .iter()
+            .filter_map(|(_, _, [i, _])| points.get(*i as usize))
+            .map(|p| intensity(p, origin))
+            .collect();
+        told.sort_by(|a, b| a.element_sum().total_cmp(&b.element_sum()));
+        let quarter = |k: usize| {
+            told.get(told.len() * k / 4)
+                .map_or(0.0, |t| t.element_sum())
+        };
+        if quarter(3) > quarter(1) * TOLD {
+            continue;
+        }
+        found.push(Crossing {
+            origin,
+            intensity: told.get(told.len() / 2).copied().unwrap_or(Vec3::ZERO),
+        });
+    }
+    found
+}
+
+/// What a point tells of the intensity of a light at a place.
+fn intensity(point: &AirPoint, origin: Vec3) -> Vec3 {
+    point.light * (std::f32::consts::PI * point.position.distance_squared(origin))
+}
+
+/// The middle between the ways of two points where they come nearest to each other, if they are of one light.
+/// And what that weighs.
+fn meet(a: &AirPoint, b: &AirPoint) -> Option<(Vec3, f32)> {
+    let offset = b.position - a.position;
+    let cosine = a.direction.dot(b.direction);
+    let squared = 1.0 - cosine * cosine;
+    if squared < APART * APART {
+        return None;
+    }
+    let (along_a, along_b) = (offset.dot(a.direction), offset.dot(b.direction));
+    let far_a = (along_a - along_b * cosine) / squared;
+    let far_b = (along_a * cosine - along_b) / squared;
+    let within = |t: f32| t > WAY.0 && t < WAY.1;
+    if !within(far_a) || !within(far_b) {
+        return None;
+    }
+    let (at_a, at_b) = (
+        a.position + a.direction * far_a,
+        b.position + b.direction * far_b,
+    );
+    if at_a.distance(at_b) > MISS.0 + MISS.1 * far_a.max(far_b) {
+        return None;
+    }
+    let middle = (at_a + at_b) * 0.5;
+    let (told_a, told_b) = (intensity(a, middle), intensity(b, middle));
+    let alike = |x: f32, y: f32| x <= y * UNLIKE && y <= x * UNLIKE;
+    alike(told_a.element_sum(), told_b.element_sum()).then_some((middle, (far_a * far_b).recip()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts::PI;
+
+    /// Points of a grid in the open that point lights of one intensity shine on, and a sun.
+    fn points(lights: &[(Vec3, f32)], sun: f32) -> Vec<AirPoint> {
+        let mut points = Vec::new();
+        for k in 0..10 * 10 * 4 {
+            let cell = Vec3::new((k % 10) as f32, (k / 10 % 10) as f32, (k / 100) as f32);
+            let position = cell * Vec3::new(64.0, 64.0, 128.0);
+            let mut parts = vec![(Vec3::new(0.6, 0.0, 0.8), sun)];
+            for (origin, intensity) in lights {
+                let offset = *origin - position;
+                let light = intensity / offset.length_squared() / PI;
+                parts.push((offset.normalize(), light));
+            }
+            let sum: Vec3 = parts.iter().map(|(way, light)| *way * *light).sum();
+            // A byte for each angle.
+            let turn = std::f32::consts::TAU / 256.0;
+            let byte = |angle: f32| (angle / turn).round() * turn;
+            let way = sum.normalize_or(Vec3::Z);
+            let (down, round) = (byte(way.z.acos()), byte(way.y.atan2(way.x)));
+            let (out, up) = down.sin_cos();
+            let direction = Vec3::new(round.cos() * out, round.sin() * out, up);
+            let directed: f32 = parts
+                .iter()
+                .map(|(way, light)| light * way.dot(direction).max(0.0))
+                .sum();
+            points.push(AirPoint {
+                position,
+                cluster: 0,
+                direction,
+                light: Vec3::splat(directed),
+                shown: Vec3::splat(directed.min(1.0)),
+                saturated: false,
+            });
+        }
+        points
+    }
+
+    fn found(points: &[AirPoint]) -> Vec<Crossing> {
+        let nothing = Occluders::new(std::iter::empty());
+        triangulate(points, Vec3::new(64.0, 64.0, 128.0), &nothing, 100)
+    }
+
+    #[test]
+    fn lights_are_where_ways_meet() {
+        let lights = [
+            (Vec3::new(101.0, 83.0, 209.0), 40_000.0),
+            (Vec3::new(470.0, 493.0, 77.0), 60_000.0),
+        ];
+        let found = found(&points(&lights, 0.0));
+        for (origin, intensity) in lights {
+            let near = found.iter().find(|c| c.origin.distance(origin) < 12.0);
+            let near = near.unwrap_or_else(|| panic!("{origin}: {found:?}"));
+            assert!((near.intensity.x / intensity - 1.0).abs() < 0.1, "{near:?}");
+        }
+    }
+
+    #[test]
+    fn a_sun_is_nowhere() {
+        assert_eq!(found(&points(&[], 1.0)), []);
+    }
+}
