@@ -54,6 +54,8 @@ pub struct SphereLight {
     /// Radius of the ball of glowing gas that the sphere stands for: nearer to the centre than this it gives no more
     /// light than here. 0: there is none.
     pub core: f32,
+    /// Where light that falls off linearly ends; 0 for light that falls off with the square of the distance.
+    pub reach: f32,
 }
 
 /// A far disc of light.

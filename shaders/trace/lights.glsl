@@ -202,7 +202,13 @@ LightSample sample_sphere(SphereLight light, vec3 position, vec3 normal, vec2 u)
     vec3 axis = d > 1.0e-6 ? to / d : normal;
     s.direction = soft_shadows() ? sample_cone(axis, cos_angle, u) : axis;
     float omega = 2.0 * PI * (sine * sine) / (1.0 + cos_angle); // 2 pi (1 - cos) without its cancellation
-    s.light = light.radiance * (omega / PI * max(dot(normal, s.direction), 0.0) * spot_factor(light, -axis));
+    float cosine = max(dot(normal, s.direction), 0.0);
+    s.light = light.radiance * (omega / PI * cosine * spot_factor(light, -axis));
+    if (light.reach > 0.0) {
+        // 8 I / R^2 (cos - d / R) in place of I cos / d^2
+        float part = d / light.reach;
+        s.light *= 8.0 * part * part * max(1.0 - part / max(cosine, 1.0e-4), 0.0);
+    }
     if (squared < light.core * light.core) s.light *= squared / (light.core * light.core);
     s.distance = d - max(light.clearance, light.radius);
     return s;

@@ -9,7 +9,7 @@ struct GeometryRecord { uint64_t triangles; uint64_t vertices; uint instance; ui
 
 struct TriangleLight { vec3 corners[3]; vec3 radiance; uint flags; };
 
-struct SphereLight { vec3 origin; float radius; vec3 radiance; float clearance; vec3 axis; float cos_inner; float cos_outer; float core; };
+struct SphereLight { vec3 origin; float radius; vec3 radiance; float clearance; vec3 axis; float cos_inner; float cos_outer; float core; float reach; };
 
 struct SunLight { vec3 direction; float cos_angle; vec3 irradiance; };
 

@@ -150,7 +150,17 @@ pub(super) fn believe(world: &RelitWorld, samples: &mut [Sample], direct: &[Vec3
     }
     for sample in samples.iter_mut().filter(|s| s.place == Place::Air) {
         sample.value /= scale;
-        sample.trust = TRUST;
     }
+    trust(samples, TRUST);
     true
+}
+
+/// Sets how much measurements in the air tell. Whether they told anything before.
+pub(super) fn trust(samples: &mut [Sample], trust: f32) -> bool {
+    let mut told = false;
+    for sample in samples.iter_mut().filter(|s| s.place == Place::Air) {
+        told |= sample.trust > 0.0;
+        sample.trust = trust;
+    }
+    told
 }

@@ -11,15 +11,13 @@ const PLACED_RADIUS: f32 = super::place::CLEARANCE;
 pub(super) fn apply(world: &mut RelitWorld, solution: &Solution) {
     columns::set_known(world, &solution.known);
     world.ambient = solution.ambient;
-    let placed = solution
-        .placed
-        .iter()
-        .map(|&(origin, intensity)| PointLight {
-            origin,
-            intensity,
-            radius: PLACED_RADIUS,
-            spot: None,
-        });
+    let placed = solution.placed.iter().map(|&(lamp, intensity)| PointLight {
+        origin: lamp.origin,
+        intensity,
+        radius: PLACED_RADIUS,
+        spot: None,
+        falloff: lamp.falloff,
+    });
     world.point_lights.extend(placed);
     let suns = solution
         .suns

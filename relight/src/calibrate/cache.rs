@@ -3,9 +3,11 @@
 //! A file's name is the hash of all that its result depends on, so that a file is right or not there. Its text is
 //! checked as any input is: a damaged one counts as absent, with a warning.
 
+use super::columns::Lamp;
 use super::report::Agreement;
 use super::samples::Evidence;
 use super::{CalibrationOptions, Solution, VERSION};
+use crate::light::Falloff;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use std::fmt::Write as _;
@@ -129,8 +131,17 @@ fn print(solution: &Solution) -> String {
     for strength in &solution.known {
         let _ = writeln!(text, "known {}", three(*strength));
     }
-    for (origin, intensity) in &solution.placed {
-        let _ = writeln!(text, "placed {} {}", three(*origin), three(*intensity));
+    for (lamp, intensity) in &solution.placed {
+        let reach = lamp
+            .falloff
+            .reach()
+            .map_or(String::new(), |r| format!(" {r}"));
+        let _ = writeln!(
+            text,
+            "placed {} {}{reach}",
+            three(lamp.origin),
+            three(*intensity)
+        );
     }
     for (direction, irradiance) in &solution.suns {
         let _ = writeln!(text, "sun {} {}", three(*direction), three(*irradiance));
@@ -199,11 +210,17 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
             "ambient" => solution.ambient = light(&numbers)?,
             "known" => solution.known.push(light(&numbers)?),
             "placed" => {
-                let (origin, intensity) = match numbers.split_at_checked(3) {
+                let (numbers, falloff) = match numbers[..] {
+                    [.., reach] if numbers.len() == 7 && reach > 0.0 => {
+                        (numbers.get(..6), Falloff::Linear { reach })
+                    }
+                    _ => (numbers.get(..), Falloff::InverseSquare),
+                };
+                let (origin, intensity) = match numbers.and_then(|n| n.split_at_checked(3)) {
                     Some((&[x, y, z], rest)) => (Vec3::new(x, y, z), light(rest)?),
                     _ => return Err(wrong("not a place")),
                 };
-                solution.placed.push((origin, intensity));
+                solution.placed.push((Lamp { origin, falloff }, intensity));
             }
             "sun" => {
                 let (direction, irradiance) = match numbers.split_at_checked(3) {
@@ -299,6 +316,7 @@ impl Hash {
         for light in &world.point_lights {
             self.vector(light.origin);
             self.vector(light.intensity);
+            self.number(u64::from(light.falloff.reach().unwrap_or(0.0).to_bits()));
         }
         for sun in &world.suns {
             self.vector(sun.direction);

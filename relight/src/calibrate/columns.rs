@@ -6,8 +6,8 @@
 use super::bvh::Occluders;
 use super::parallel;
 use super::random::Random;
-use super::samples::Sample;
-use crate::light::{EmissionSource, EmitterSummary, LightRef, Spot, TriangleLight};
+use super::samples::{Place, Sample};
+use crate::light::{EmissionSource, EmitterSummary, Falloff, LightRef, Spot, TriangleLight};
 use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::Bsp;
@@ -33,9 +33,16 @@ pub(super) enum Source {
     /// A sun.
     Sun(u32),
     /// A light put in by calibration.
-    Placed(Vec3),
+    Placed(Lamp),
     /// A sun put in by calibration: the direction to it.
     FoundSun(Vec3),
+}
+
+/// A point that light comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Lamp {
+    pub origin: Vec3,
+    pub falloff: Falloff,
 }
 
 /// What is believed of a strength before looking at samples.
@@ -65,8 +72,8 @@ pub(super) struct Column {
 }
 
 /// Light per intensity at a sample, and 0 where the light is behind it or out of a spot's cone. No shadows.
-fn unshadowed(sample: &Sample, origin: Vec3, spot: Option<&Spot>) -> f32 {
-    let offset = origin - sample.position;
+pub(super) fn unshadowed(sample: &Sample, lamp: Lamp, spot: Option<&Spot>) -> f32 {
+    let offset = lamp.origin - sample.position;
     let squared = offset.length_squared();
     let cosine = sample.normal.dot(offset);
     if cosine <= 0.0 || squared < 1.0 {
@@ -82,7 +89,13 @@ fn unshadowed(sample: &Sample, origin: Vec3, spot: Option<&Spot>) -> f32 {
             ((reach - aside) / 32.0).clamp(0.0, 1.0)
         }
     });
-    cosine / (squared * squared.sqrt()) * cone / PI
+    let distance = squared.sqrt();
+    let mut given = lamp.falloff.irradiance(distance, cosine / distance);
+    if sample.place == Place::Air && lamp.falloff != Falloff::InverseSquare {
+        // The grid's light is what comes, then weighted by the cosine: not the other way around.
+        given = lamp.falloff.irradiance(distance, 1.0) * cosine / distance;
+    }
+    given * cone / PI
 }
 
 /// The column of a point light, as far as it reaches.
@@ -90,17 +103,18 @@ pub(super) fn point_rows(
     bsp: &Bsp,
     occluders: &Occluders,
     samples: &[Sample],
-    origin: Vec3,
+    lamp: Lamp,
     spot: Option<&Spot>,
     range: f32,
 ) -> Vec<(u32, f32)> {
+    let origin = lamp.origin;
     let cluster = bsp.cluster_at(origin);
     let mut rows = Vec::new();
     for (i, sample) in (0u32..).zip(samples) {
         if sample.position.distance_squared(origin) > range * range {
             continue;
         }
-        let light = unshadowed(sample, origin, spot);
+        let light = unshadowed(sample, lamp, spot);
         if light > 0.0
             && (bsp.cluster_sees(cluster, sample.cluster)
                 || bsp.cluster_sees(sample.cluster, cluster))
@@ -172,7 +186,10 @@ pub(super) fn known(
                     &world.bsp,
                     occluders,
                     samples,
-                    light.origin,
+                    Lamp {
+                        origin: light.origin,
+                        falloff: light.falloff,
+                    },
                     spot,
                     f32::INFINITY,
                 )
@@ -470,7 +487,7 @@ mod tests {
     #[test]
     fn irradiance_agrees_with_adding_up_small_pieces() {
         let sample = Sample {
-            place: crate::calibrate::samples::Place::Surface,
+            place: Place::Surface,
             position: Vec3::ZERO,
             normal: Vec3::new(0.6, 0.0, 0.8),
             value: Vec3::ZERO,

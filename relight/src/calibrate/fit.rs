@@ -19,6 +19,12 @@ const ROUNDS: u32 = 4;
 /// Lights are looked for again while that leaves less than this part of the error at samples held out.
 const ENOUGH: f32 = 0.985;
 
+/// Linear falloff is believed when it leaves less than this part of the error at samples held out.
+const LINEAR: f32 = 0.97;
+
+/// Error, stops, of lights that fall off with the square of the distance, from which on linear ones are tried.
+const MUCH: f32 = 0.25;
+
 /// More ambient light than the darkest texels have is believed when it leaves less than this part of the error at
 /// samples held out: then these texels are dark for another reason.
 const MORE_AMBIENT: f32 = 0.93;
@@ -38,6 +44,9 @@ const NEXT: Effort = Effort {
     sparsity: 0.0,
     anew: false,
 };
+
+/// A state to come back to: sources, ambient, measurements.
+pub(super) type Start = (Vec<Column>, Ambient, Vec<Sample>);
 
 /// A fit in progress.
 pub(super) struct Fit<'a> {
@@ -117,8 +126,8 @@ impl Fit<'_> {
     }
 
     /// Puts in point lights for as long as samples that are held out get better by it.
-    /// `progress` gets the part of the most rounds that are done.
-    pub fn place(&mut self, candidates: usize, progress: &mut dyn FnMut(f32)) {
+    /// `linear`: such that may fall off linearly, too. `progress` gets the part of the most rounds that are done.
+    pub fn place(&mut self, candidates: usize, linear: bool, progress: &mut dyn FnMut(f32)) {
         let fixed = self.columns.len();
         let of_triangle = surfaces_of_triangles(self.world);
         let mut spacing = 0.0;
@@ -131,6 +140,7 @@ impl Fit<'_> {
                 samples: &self.samples,
                 of_triangle: &of_triangle,
                 candidates,
+                linear,
             };
             let (columns, ambient) = (&mut self.columns, &mut self.ambient);
             if round == 0 {
@@ -154,6 +164,43 @@ impl Fit<'_> {
                 return;
             }
             best = found;
+        }
+    }
+
+    /// Puts in lights that may fall off linearly, as compilers can have it, in place of those of [`place`](Self::place),
+    /// where these leave much and samples that are held out get better by it. `start`: the state before them.
+    pub fn place_linear(&mut self, start: Start, candidates: usize) {
+        let before = self.agreement().median_stops;
+        if before < MUCH {
+            return;
+        }
+        let kept = std::mem::replace(&mut self.columns, start.0);
+        let kept = (kept, std::mem::replace(&mut self.ambient, start.1));
+        let samples = std::mem::replace(&mut self.samples, start.2);
+        self.place(candidates, true, &mut |_| ());
+        if self.agreement().median_stops > before * LINEAR {
+            (self.columns, self.ambient) = kept;
+            self.samples = samples;
+        }
+    }
+
+    /// What [`place`](Self::place) begins with.
+    pub fn start(&self) -> Start {
+        (self.columns.clone(), self.ambient, self.samples.clone())
+    }
+
+    /// Leaves the measurements in the air out again where samples held out say so.
+    pub fn with_or_without_air(&mut self) {
+        let kept = (self.columns.clone(), self.ambient);
+        let before = self.agreement().median_stops;
+        let trusted = air::trust(&mut self.samples, 0.0);
+        if !trusted {
+            return;
+        }
+        self.settle();
+        if self.agreement().median_stops >= before {
+            (self.columns, self.ambient) = kept;
+            self.rebounce(false);
         }
     }
 

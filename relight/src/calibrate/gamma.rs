@@ -71,7 +71,7 @@ fn without_cut_outs(
         progress(done / steps);
         done += 1.0;
         world.stored_gamma = gamma;
-        // Without the light grid: what is stored on surfaces decides.
+        // What is stored on surfaces decides, with lights that fall off as light does.
         let report = super::find(world, silent, &less, false, &mut |_| ()).report;
         world.stored_gamma = 1.0;
         let found = [report.before.median_stops, report.after.median_stops];

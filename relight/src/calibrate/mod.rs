@@ -13,6 +13,7 @@
 //! 5. `place`: candidates for lost lights all over open space, and where the directions of the light grid meet
 //!    (`crossings`), then in front of what stays unexplained, for as long as
 //!    that makes light agree better at what is held out. `fit` holds these steps together.
+//!    Where lights that fall off with the square of the distance leave much, once more with linear ones.
 //! 6. `gamma`: all of that with less effort for light that was stored encoded, to see whether it explains more.
 //! 7. The world's lights get their strengths, lost lights are added to
 //!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
@@ -54,7 +55,7 @@ pub use samples::Evidence;
 
 use crate::world::RelitWorld;
 use bvh::Occluders;
-use columns::Source;
+use columns::{Lamp, Source};
 use fit::Fit;
 use glam::Vec3;
 use std::time::Instant;
@@ -101,8 +102,8 @@ impl Default for CalibrationOptions {
 struct Solution {
     /// Strength of each known light source, in the order of [`columns::known`].
     known: Vec<Vec3>,
-    /// Lights put in: origin, intensity.
-    placed: Vec<(Vec3, Vec3)>,
+    /// Lights put in: where and how, intensity.
+    placed: Vec<(Lamp, Vec3)>,
     /// Suns put in: direction to it, irradiance.
     suns: Vec<(Vec3, Vec3)>,
     ambient: Vec3,
@@ -178,12 +179,12 @@ pub fn calibrate_with(
 
 /// Solves for a world's light. `silent`: skies of which directives tell nothing.
 ///
-/// `grid`: whether the light grid is measured beside lightmaps.
+/// `thorough`: whether the light grid is measured beside lightmaps, and linear falloff tried.
 fn find(
     world: &RelitWorld,
     silent: &[u32],
     options: &CalibrationOptions,
-    grid: bool,
+    thorough: bool,
     progress: &mut dyn FnMut(f32),
 ) -> Solution {
     progress(0.0);
@@ -191,7 +192,7 @@ fn find(
     let (mut samples, evidence) = samples::take(world, &occluders, options.samples, options.seed);
     let texels = samples.len();
     let mut crossings = Vec::new();
-    if grid && evidence == Evidence::Lightmaps {
+    if thorough && evidence == Evidence::Lightmaps {
         let points = air::points(world, &occluders);
         crossings = crossings::find(world, &points, &occluders, options.candidates / CROSSINGS);
         samples.extend(air::more_samples(world, &points, options));
@@ -238,11 +239,21 @@ fn find(
     fit.known();
     progress(0.35);
     if options.candidates > 0 {
-        fit.place(options.candidates, &mut |part| progress(0.35 + 0.55 * part));
+        let start = fit.start();
+        let part_of = if thorough { 0.4 } else { 0.55 };
+        fit.place(options.candidates, false, &mut |part| {
+            progress(0.35 + part_of * part);
+        });
+        if thorough {
+            fit.place_linear(start, options.candidates);
+        }
     } else {
         fit.settle();
     }
     progress(0.9);
+    if thorough && options.candidates > 0 {
+        fit.with_or_without_air();
+    }
     fit.more_ambient();
     progress(1.0);
     solution.report.after = fit.agreement();
@@ -251,7 +262,7 @@ fn find(
     solution.known = columns.iter().take(known).map(|c| c.strength).collect();
     for column in columns.iter().skip(known) {
         match column.source {
-            Source::Placed(origin) => solution.placed.push((origin, column.strength)),
+            Source::Placed(lamp) => solution.placed.push((lamp, column.strength)),
             Source::FoundSun(direction) if column.strength != Vec3::ZERO => {
                 solution.suns.push((direction, column.strength));
             }

@@ -6,11 +6,12 @@
 //! is done once more.
 
 use super::bvh::Occluders;
-use super::columns::{Column, Source, point_rows};
+use super::columns::{Column, Lamp, Source, point_rows, unshadowed};
 use super::crossings::Crossing;
 use super::parallel;
 use super::samples::{self, Sample, mean};
 use super::solve::{Ambient, Effort, Residual, norm, residual, solve};
+use crate::light::Falloff;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -36,6 +37,12 @@ const JUDGES: usize = 240;
 /// Part of a sample's light that a light must be able to give, to be moved by it.
 const INFLUENCE: f32 = 0.05;
 
+/// Reaches of lights with linear falloff that are tried, id units: the least, the largest, and by what factor they grow.
+const REACHES: (f32, f32, f32) = (128.0, 2048.0, 1.4);
+
+/// How much more error than with an inverse square linear falloff must take away to be believed, a factor.
+const LINEAR_WORTH: f32 = 1.15;
+
 const AROUND: [Vec3; 6] = [
     Vec3::X,
     Vec3::NEG_X,
@@ -52,6 +59,14 @@ const NEAR: f32 = 64.0;
 /// exactly it was is not known.
 const EXCESS: f32 = 1.5;
 
+/// A light as light is.
+fn lamp(origin: Vec3) -> Lamp {
+    Lamp {
+        origin,
+        falloff: Falloff::InverseSquare,
+    }
+}
+
 /// What placing lights needs to know.
 pub(super) struct Scene<'a> {
     pub world: &'a RelitWorld,
@@ -61,22 +76,17 @@ pub(super) struct Scene<'a> {
     pub of_triangle: &'a [u32],
     /// Most candidates at a time.
     pub candidates: usize,
+    /// Whether lights may fall off linearly, too.
+    pub linear: bool,
 }
 
 impl Scene<'_> {
-    fn rows(&self, origin: Vec3, range: f32) -> Vec<(u32, f32)> {
-        self.rows_of(self.samples, origin, range)
+    fn rows(&self, lamp: Lamp, range: f32) -> Vec<(u32, f32)> {
+        self.rows_of(self.samples, lamp, range)
     }
 
-    fn rows_of(&self, samples: &[Sample], origin: Vec3, range: f32) -> Vec<(u32, f32)> {
-        point_rows(
-            &self.world.bsp,
-            self.occluders,
-            samples,
-            origin,
-            None,
-            range,
-        )
+    fn rows_of(&self, samples: &[Sample], lamp: Lamp, range: f32) -> Vec<(u32, f32)> {
+        point_rows(&self.world.bsp, self.occluders, samples, lamp, None, range)
     }
 
     /// Samples used for fitting that a light of this intensity may matter to when it moves by up to `margin`; evenly
@@ -100,7 +110,8 @@ impl Scene<'_> {
 
     /// The most that a light at a place may be, by the light that lightmaps store on the surfaces right beside it. There it
     /// is brightest, and measurements are too sparse to tell of such spots.
-    fn limit(&self, origin: Vec3) -> Vec3 {
+    fn limit(&self, lamp: Lamp) -> Vec3 {
+        let origin = lamp.origin;
         let mut limit = Vec3::INFINITY;
         let floor = samples::floor(self.world);
         let corners = (0..8u8).map(|k| {
@@ -120,8 +131,10 @@ impl Scene<'_> {
                 && hit.front
                 && cosine > 0.1
             {
-                let most = (stored + floor) * (EXCESS * PI * hit.t * hit.t / cosine);
-                limit = limit.min(most);
+                let given = lamp.falloff.irradiance(hit.t, cosine);
+                if given > 0.0 {
+                    limit = limit.min((stored + floor) * (EXCESS * PI / given));
+                }
             }
         }
         limit
@@ -129,17 +142,22 @@ impl Scene<'_> {
 
     /// Columns of lights at places, in order; such as reach nothing are left out.
     fn columns(&self, places: &[Vec3], range: f32) -> Vec<Column> {
-        let rows = parallel::map(places, |_, &origin| self.rows(origin, range));
-        let with_rows = places.iter().zip(rows).filter(|(_, r)| !r.is_empty());
+        let lamps: Vec<Lamp> = places.iter().copied().map(lamp).collect();
+        let rows = parallel::map(&lamps, |_, &lamp| self.rows(lamp, range));
+        let with_rows = lamps.into_iter().zip(rows).filter(|(_, r)| !r.is_empty());
         with_rows
-            .map(|(&origin, rows)| Column {
-                source: Source::Placed(origin),
-                rows,
-                strength: Vec3::ZERO,
-                limit: self.limit(origin),
-                prior: None,
-            })
+            .map(|(lamp, rows)| self.column(lamp, rows, Vec3::ZERO))
             .collect()
+    }
+
+    fn column(&self, lamp: Lamp, rows: Vec<(u32, f32)>, strength: Vec3) -> Column {
+        Column {
+            source: Source::Placed(lamp),
+            rows,
+            strength,
+            limit: self.limit(lamp),
+            prior: None,
+        }
     }
 
     /// Whether a light fits at a place: in the map, and clear of surfaces.
@@ -308,10 +326,10 @@ fn drop_useless(columns: &mut Vec<Column>, known: usize, state: &Residual, worth
 
 /// Makes one light of those that are near to each other and see each other, strongest first.
 fn merge(scene: &Scene<'_>, columns: &mut Vec<Column>, known: usize, radius: f32) {
-    let mut placed: Vec<(Vec3, Vec3)> = columns
+    let mut placed: Vec<(Lamp, Vec3)> = columns
         .drain(known..)
         .filter_map(|c| match c.source {
-            Source::Placed(origin) => Some((origin, c.strength)),
+            Source::Placed(lamp) => Some((lamp, c.strength)),
             _ => None,
         })
         .collect();
@@ -319,7 +337,8 @@ fn merge(scene: &Scene<'_>, columns: &mut Vec<Column>, known: usize, radius: f32
     let mut taken = vec![false; placed.len()];
     let mut places = Vec::new();
     let mut strengths = Vec::new();
-    for (i, &(origin, strength)) in placed.iter().enumerate() {
+    for (i, &(lamp, strength)) in placed.iter().enumerate() {
+        let origin = lamp.origin;
         if taken.get(i).copied().unwrap_or(true) {
             continue;
         }
@@ -328,34 +347,38 @@ fn merge(scene: &Scene<'_>, columns: &mut Vec<Column>, known: usize, radius: f32
         let mut sum = Vec3::ZERO;
         for (other, taken) in placed.iter().zip(&mut taken).skip(i) {
             if !*taken
-                && other.0.distance(origin) <= radius
-                && (other.0 == origin || scene.sees(origin, other.0))
+                && other.0.origin.distance(origin) <= radius
+                && (other.0.origin == origin || scene.sees(origin, other.0.origin))
             {
                 *taken = true;
-                centre += other.0 * mean(other.1);
+                centre += other.0.origin * mean(other.1);
                 total += mean(other.1);
                 sum += other.1;
             }
         }
         let centre = if total > 0.0 { centre / total } else { origin };
         if centre.distance(origin) > 1e-3 && scene.open(centre) && scene.sees(origin, centre) {
-            places.push(centre);
+            // It falls off as the strongest of them does.
+            places.push(Lamp {
+                origin: centre,
+                ..lamp
+            });
             strengths.push(sum);
         } else {
-            places.push(origin);
+            places.push(lamp);
             strengths.push(if sum == Vec3::ZERO { strength } else { sum });
         }
     }
-    let rows = parallel::map(&places, |_, &origin| scene.rows(origin, f32::INFINITY));
-    for ((origin, strength), rows) in places.into_iter().zip(strengths).zip(rows) {
-        columns.push(Column {
-            source: Source::Placed(origin),
-            rows,
-            strength,
-            limit: scene.limit(origin),
-            prior: None,
-        });
+    let rows = parallel::map(&places, |_, &lamp| scene.rows(lamp, f32::INFINITY));
+    for ((lamp, strength), rows) in places.into_iter().zip(strengths).zip(rows) {
+        columns.push(scene.column(lamp, rows, strength));
     }
+}
+
+/// Reaches that are tried.
+fn reaches() -> impl Iterator<Item = f32> {
+    let next = |reach: &f32| Some(reach * REACHES.2).filter(|r| *r <= REACHES.1);
+    std::iter::successors(Some(REACHES.0), next)
 }
 
 /// Moves every placed light by up to two steps to where it would explain more, all others held.
@@ -369,7 +392,7 @@ fn look_around(
     let Some(placed) = columns.get_mut(known..) else {
         return;
     };
-    let moved = parallel::map(placed, |_, column| better_place(scene, column, state, step));
+    let moved = parallel::map(placed, |_, column| better(scene, column, state, step));
     for (column, moved) in placed.iter_mut().zip(moved) {
         if let Some(moved) = moved {
             *column = moved;
@@ -377,11 +400,11 @@ fn look_around(
     }
 }
 
-fn better_place(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Option<Column> {
+fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Option<Column> {
     let Source::Placed(start) = column.source else {
         return None;
     };
-    let around = scene.influenced(start, mean(column.strength), step * 2.0);
+    let around = scene.influenced(start.origin, mean(column.strength), step * 2.0);
     let judged: Vec<Sample> = around
         .iter()
         .filter_map(|&i| scene.samples.get(i as usize).copied())
@@ -404,46 +427,58 @@ fn better_place(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32)
         })
         .collect();
     // Error taken away by a light at a place with the strength that is best there, and that strength.
-    let gain = |origin: Vec3| {
+    let worth = |lamp: Lamp, rows: &[(u32, f32)]| {
         let mut gradient = Vec3::ZERO;
         let mut norm = 0.0;
-        for (i, a) in scene.rows_of(&judged, origin, f32::INFINITY) {
+        for &(i, a) in rows {
             if let Some((wanted, weight)) = wanted.get(i as usize) {
                 gradient += *wanted * (*weight * a);
                 norm += *weight * a * a;
             }
         }
         if norm > 0.0 {
-            let strength = (gradient / norm).max(Vec3::ZERO).min(scene.limit(origin));
+            let strength = (gradient / norm).max(Vec3::ZERO).min(scene.limit(lamp));
             let taken = (gradient * 2.0 - strength * norm).dot(strength);
             (taken, strength)
         } else {
             (0.0, Vec3::ZERO)
         }
     };
-    let mut best = (start, gain(start));
+    let seen = |lamp: Lamp| scene.rows_of(&judged, lamp, f32::INFINITY);
+    let mut best = (start, worth(start, &seen(start)));
     for _ in 0..2 {
         let from = best.0;
         for direction in AROUND {
-            let at = from + direction * step;
-            if !scene.open(at) || !scene.sees(from, at) {
+            let at = from.origin + direction * step;
+            if !scene.open(at) || !scene.sees(from.origin, at) {
                 continue;
             }
-            let found = gain(at);
+            let moved = Lamp { origin: at, ..from };
+            let found = worth(moved, &seen(moved));
             if found.0 > best.1.0 * 1.001 {
-                best = (at, found);
+                best = (moved, found);
             }
         }
         if best.0 == from {
             break;
         }
     }
-    let (origin, (_, strength)) = best;
-    (origin != start).then(|| Column {
-        source: Source::Placed(origin),
-        rows: scene.rows(origin, f32::INFINITY),
-        strength,
-        limit: scene.limit(origin),
-        prior: None,
-    })
+    if scene.linear {
+        // What it sees does not depend on how its light falls off.
+        let square = lamp(best.0.origin);
+        let seen = seen(square);
+        let linear = reaches().map(|reach| (Falloff::Linear { reach }, LINEAR_WORTH));
+        for (falloff, more) in std::iter::once((Falloff::InverseSquare, 1.0)).chain(linear) {
+            let kind = Lamp { falloff, ..square };
+            let given =
+                |&(i, _): &(u32, f32)| Some((i, unshadowed(judged.get(i as usize)?, kind, None)));
+            let rows: Vec<(u32, f32)> = seen.iter().filter_map(given).collect();
+            let found = worth(kind, &rows);
+            if found.0 > best.1.0 * more {
+                best = (kind, found);
+            }
+        }
+    }
+    let (lamp, (_, strength)) = best;
+    (lamp != start).then(|| scene.column(lamp, scene.rows(lamp, f32::INFINITY), strength))
 }

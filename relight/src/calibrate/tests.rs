@@ -1,5 +1,6 @@
 mod grid;
 mod known_truth;
+mod linear;
 
 use super::*;
 use crate::files::{MemoryFiles, SearchPath};
@@ -302,6 +303,7 @@ fn lights_stand_for_the_nearest_hidden_one() {
         intensity: Vec3::splat(power),
         radius: 4.0,
         spot: None,
+        falloff: crate::light::Falloff::InverseSquare,
     };
     let mut world = room(false, None);
     world.point_lights = vec![

@@ -6,6 +6,7 @@
 //! | line | meaning |
 //! |---|---|
 //! | `point X Y Z LIGHT R G B [RADIUS]` | a point light, as an entity with `light` and `_color`; the radius is that of the ball that shines |
+//! | `linear X Y Z LIGHT R G B FADE [RADIUS]` | a point light that falls off linearly, as an entity with `spawnflags` 1 and `fade` |
 //! | `spot X Y Z LIGHT R G B TX TY TZ ANGLE` | a point light that shines towards a place, in a cone of this half angle, degrees |
 //! | `sun R G B INTENSITY DEGREES ELEVATION [DEVIANCE]` | as `q3map_sun` |
 //! | `ambient LIGHT R G B` | light from everywhere, in place of what there is |
@@ -19,7 +20,8 @@
 use super::entities::normalise;
 use super::{
     AMBIENT_RADIANCE, DEFAULT_POINT_LIGHT_RADIUS, DEFAULT_SUN_RADIUS, Emission, EmissionSource,
-    POINT_LIGHT_INTENSITY, PointLight, SUN_IRRADIANCE, SURFACE_LIGHT_RADIANCE, Spot, SunLight,
+    Falloff, POINT_LIGHT_INTENSITY, PointLight, SUN_IRRADIANCE, SURFACE_LIGHT_RADIANCE, Spot,
+    SunLight,
 };
 use crate::files::GameFiles;
 use crate::world::RelitWorld;
@@ -82,6 +84,19 @@ impl LightsByHand {
                 let n = numbers(rest, 7, 8)?;
                 let mut light = point(&n)?;
                 if let Some(&radius) = n.get(7) {
+                    light.radius = above_zero(radius, "the radius")?;
+                }
+                self.points.push(light);
+            }
+            "linear" => {
+                let n = numbers(rest, 8, 9)?;
+                let mut light = point(&n)?;
+                let fade = above_zero(n.get(7).copied().unwrap_or(0.0), "the fade")?;
+                let value = n.get(3).copied().unwrap_or(0.0);
+                let (intensity, falloff) = super::entities::linear(value, fade);
+                light.intensity *= intensity / (value * POINT_LIGHT_INTENSITY);
+                light.falloff = falloff;
+                if let Some(&radius) = n.get(8) {
                     light.radius = above_zero(radius, "the radius")?;
                 }
                 self.points.push(light);
@@ -308,6 +323,7 @@ fn point(numbers: &[f32]) -> Result<PointLight, String> {
         intensity: strength * POINT_LIGHT_INTENSITY,
         radius: DEFAULT_POINT_LIGHT_RADIUS,
         spot: None,
+        falloff: Falloff::InverseSquare,
     })
 }
 
@@ -356,6 +372,22 @@ spot 1 2 3 100 1 1 1 1 2 3 30
             wrong[0].to_string(),
             "line 9: 7 to 8 numbers belong here, not 3"
         );
+    }
+
+    #[test]
+    fn linear_lights_are_those_of_entities() {
+        let (file, wrong) =
+            LightsByHand::parse("linear 1 2 3 300 1 0.5 0 2\nlinear 1 2 3 300 1 1 1 0");
+        assert_eq!(wrong.len(), 1, "{wrong:?}");
+        let [light] = file.points[..] else {
+            panic!("{:?}", file.points)
+        };
+        let reach = 7500.0 * 300.0 / 8000.0 / 2.0;
+        assert_eq!(light.falloff, Falloff::Linear { reach });
+        // Up close it stores 7500 · 300 / 8000.
+        let near = light.intensity * light.falloff.irradiance(1e-3, 1.0) / SUN_IRRADIANCE;
+        let expected = Vec3::new(1.0, 0.5, 0.0) * (7500.0 * 300.0 / 8000.0);
+        assert!((near - expected).length() < 0.1, "{near}");
     }
 
     #[test]

@@ -5,8 +5,8 @@
 //! Source: meaning and defaults of the keys are q3map2's.
 
 use super::{
-    AMBIENT_RADIANCE, DEFAULT_POINT_LIGHT_RADIUS, DEFAULT_SUN_RADIUS, POINT_LIGHT_INTENSITY,
-    PointLight, SUN_IRRADIANCE, Spot, SunLight,
+    AMBIENT_RADIANCE, DEFAULT_POINT_LIGHT_RADIUS, DEFAULT_SUN_RADIUS, Falloff,
+    POINT_LIGHT_INTENSITY, PointLight, SUN_IRRADIANCE, Spot, SunLight,
 };
 use glam::Vec3;
 use q3bsp::Entity;
@@ -58,15 +58,11 @@ pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLi
             continue;
         }
         let flags = number(entity, &["spawnflags"]).map_or(0, |f| f as i64);
-        let intensity = if flags & LINEAR_FALLOFF != 0 {
-            linear_intensity(
-                value,
-                number(entity, &["fade"])
-                    .filter(|f| *f > 0.0)
-                    .unwrap_or(1.0),
-            )
+        let (intensity, falloff) = if flags & LINEAR_FALLOFF != 0 {
+            let fade = number(entity, &["fade"]).filter(|f| *f > 0.0);
+            linear(value, fade.unwrap_or(1.0))
         } else {
-            value * POINT_LIGHT_INTENSITY
+            (value * POINT_LIGHT_INTENSITY, Falloff::InverseSquare)
         };
         let spot = target.map(|offset| Spot {
             direction: offset.normalize_or(Vec3::NEG_Z),
@@ -81,19 +77,21 @@ pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLi
             intensity: color * intensity,
             radius: DEFAULT_POINT_LIGHT_RADIUS,
             spot,
+            falloff,
         });
     }
     (points, suns)
 }
 
-/// Intensity of an inverse-square light that is as bright as a linear one at half the linear one's reach.
+/// Intensity and falloff of a linear light of a value and a `fade`.
 ///
-/// A linear light gives v(d) = 7500 l / 8000 - fade d, so it reaches R = 7500 l / (8000 fade) and gives half its
-/// strength at R / 2; with E = π v 4 / 255 the equal inverse-square light has I = E (R / 2)².
-fn linear_intensity(value: f32, fade: f32) -> f32 {
+/// It gives v(d) = N cosθ − fade d with N = 7500 l / 8000, so it reaches R = N / fade and gives a surface that faces it
+/// half its strength at R / 2; with E = π v 4 / 255 the inverse-square light that is equal there has I = E (R / 2)².
+pub(super) fn linear(value: f32, fade: f32) -> (f32, Falloff) {
     let near = 7500.0 * value * LINEAR_SCALE;
-    let half_reach = near / fade * 0.5;
-    SUN_IRRADIANCE * near * 0.5 * half_reach * half_reach
+    let reach = near / fade;
+    let intensity = SUN_IRRADIANCE * near * 0.5 * (reach * 0.5) * (reach * 0.5);
+    (intensity, Falloff::Linear { reach })
 }
 
 /// Radiance from everywhere: the compiler adds `ambient` to every texel, and lifts texels to `_minlight`.
@@ -190,10 +188,31 @@ mod tests {
     }
 
     #[test]
-    fn linear_lights_agree_half_way() {
-        let intensity = linear_intensity(300.0, 2.0);
-        let reach = 7500.0 * 300.0 / 8000.0 / 2.0;
-        let linear = SUN_IRRADIANCE * (7500.0 * 300.0 / 8000.0 - 2.0 * reach / 2.0);
-        assert!((intensity / (reach / 2.0).powi(2) - linear).abs() < 1e-4 * linear);
+    fn linear_lights_give_what_the_compiler_computes() {
+        let text = r#"{ "classname" "worldspawn" }
+            { "classname" "light" "origin" "0 0 0" "light" "300" "spawnflags" "1" "fade" "2" }"#;
+        let (points, _) = light_entities(&entities(text));
+        let [light] = points[..] else {
+            panic!("{points:?}")
+        };
+        let near = 7500.0 * 300.0 / 8000.0;
+        for (distance, cosine) in [
+            (1.0f32, 1.0f32),
+            (50.0, 0.8),
+            (100.0, 1.0),
+            (140.0, 1.0),
+            (150.0, 1.0),
+        ] {
+            let stored = (near * cosine - 2.0 * distance).max(0.0);
+            let found = light.intensity.x * light.falloff.irradiance(distance, cosine);
+            assert!(
+                (found - SUN_IRRADIANCE * stored).abs() < 1e-3,
+                "{distance}: {found}"
+            );
+        }
+        // Half way it is as bright as one of the same intensity that falls off with the square.
+        let half = near / 4.0;
+        let square = Falloff::InverseSquare.irradiance(half, 1.0);
+        assert!((light.falloff.irradiance(half, 1.0) / square - 1.0).abs() < 1e-4);
     }
 }

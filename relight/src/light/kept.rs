@@ -38,6 +38,7 @@ fn key(world: &RelitWorld) -> u128 {
     }
     for light in &world.point_lights {
         hash.number(u64::from(light.radius.to_bits()));
+        hash.number(u64::from(light.falloff.reach().unwrap_or(0.0).to_bits()));
         if let Some(spot) = light.spot {
             hash.vector(spot.direction);
             hash.number(u64::from(spot.tan_half_angle.to_bits()));

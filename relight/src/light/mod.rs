@@ -21,6 +21,7 @@
 //! |---|---|---|
 //! | `q3map_surfacelight s`, area A | 0.25 s A cosθ cosθ' / d² | L = π s / 255 |
 //! | light entity of value `light` | 7500 light cosθ / d² | I = π 7500 light 4 / 255 |
+//! | the same with `spawnflags` 1 (linear), N = 7500 light / 8000 | N cosθ − fade d | reach R = N / fade, I = π N R² / 8 · 4 / 255 |
 //! | `q3map_sun` of intensity i | i cosθ | E = π i 4 / 255 |
 //! | `q3map_skylight s` | s spread evenly over the sky's directions (suns of value s / N each) | A uniform dome of radiance s 4 / 255 / 2 |
 //! | `ambient a` | a | A = a 4 / 255 |
@@ -180,6 +181,45 @@ pub struct PointLight {
     pub radius: f32,
     /// The cone that it shines into; `None` for all directions.
     pub spot: Option<Spot>,
+    /// How its light falls off with distance.
+    pub falloff: Falloff,
+}
+
+/// How the light of a point falls off with distance.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Falloff {
+    /// With the square of the distance, as light does.
+    #[default]
+    InverseSquare,
+    /// As the compiler's linear lights do, which no real light does: it gives a surface that faces it as much as an
+    /// inverse-square light of the same intensity at half its reach, and no more than twice that up close.
+    Linear {
+        /// Where a surface that faces it gets none any more, id units.
+        reach: f32,
+    },
+}
+
+impl Falloff {
+    /// Irradiance for an intensity of 1, of a surface that sees the light at a distance (id units) and under a cosine.
+    ///
+    /// A linear light gives N cosθ − f d, with N its light up close: with the reach R = N / f and the intensity
+    /// I = N R² / 8 that is 8 I / R² (cosθ − d / R). Source: what q3map2's documentation calls `spawnflags 1` and `fade`.
+    pub fn irradiance(self, distance: f32, cosine: f32) -> f32 {
+        match self {
+            Falloff::InverseSquare => cosine.max(0.0) / (distance * distance),
+            Falloff::Linear { reach } => {
+                8.0 / (reach * reach) * (cosine - distance / reach).max(0.0)
+            }
+        }
+    }
+
+    /// The reach of linear light.
+    pub fn reach(self) -> Option<f32> {
+        match self {
+            Falloff::InverseSquare => None,
+            Falloff::Linear { reach } => Some(reach),
+        }
+    }
 }
 
 /// Radius of point lights, id units: about that of a lamp's bulb.

@@ -216,7 +216,8 @@ impl<'a> Target<'a> {
                 } else {
                     0.0
                 };
-                (point, power * cosine(to) / (PI * squared))
+                let given = light.falloff.irradiance(squared.sqrt(), cosine(to));
+                (point, power * given / PI)
             }
         }
     }

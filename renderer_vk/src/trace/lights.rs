@@ -110,6 +110,7 @@ pub(super) fn sphere(origin: Vec3, radius: f32, intensity: Vec3, clearance: f32)
         cos_inner: -1.0,
         cos_outer: -2.0,
         core: 0.0,
+        reach: 0.0,
     }
 }
 
@@ -159,6 +160,7 @@ fn triangle_light(light: &TriangleLight, origin: Vec3) -> t::TriangleLight {
 
 fn point_light(light: &PointLight) -> t::SphereLight {
     let mut s = sphere(light.origin, light.radius, light.intensity, light.radius);
+    s.reach = light.falloff.reach().unwrap_or(0.0);
     if let Some(spot) = light.spot {
         s.axis = spot.direction.normalize_or(Vec3::NEG_Z);
         (s.cos_inner, s.cos_outer) = spot_cosines(spot.tan_half_angle);

@@ -53,6 +53,7 @@ fn found(world: &RelitWorld) -> Vec<(f32, f32)> {
             intensity,
             radius: 4.0,
             spot: None,
+            falloff: crate::light::Falloff::InverseSquare,
         })
         .collect();
     let found = hidden.iter().map(|h| {

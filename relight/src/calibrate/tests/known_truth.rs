@@ -214,6 +214,7 @@ fn taken_apart(light_color: LightColor) {
             intensity: color(intensity),
             radius: 4.0,
             spot: None,
+            falloff: crate::light::Falloff::InverseSquare,
         })
         .collect();
     let found = recovery(&hidden, &world);

@@ -220,6 +220,10 @@ impl Nodes {
             "type": "point",
         });
         put_translation(&mut node, turn(light.origin) * scale);
+        if let (Some(reach), Value::Object(map)) = (light.falloff.reach(), &mut out) {
+            // the format has no linear falloff, but an end
+            map.insert("range".into(), json!(reach * scale));
+        }
         if let (Some(spot), Value::Object(map)) = (light.spot, &mut out) {
             let outer = spot.tan_half_angle.atan().clamp(1.0e-3, FRAC_PI_2);
             map.insert("type".into(), json!("spot"));

@@ -107,6 +107,7 @@ fn put_lights(world: &RelitWorld, out: &mut String) {
     put_list(out, &world.point_lights, |light, out| {
         let direction = light.spot.as_ref().map(|spot| spot.direction);
         let tangent = light.spot.as_ref().map(|spot| spot.tan_half_angle);
+        let reach = light.falloff.reach();
         put_object(
             out,
             &[
@@ -115,6 +116,7 @@ fn put_lights(world: &RelitWorld, out: &mut String) {
                 ("radius", &|out| light.radius.put(out)),
                 ("spot_direction", &|out| direction.put(out)),
                 ("spot_tan_half_angle", &|out| tangent.put(out)),
+                ("linear_reach", &|out| reach.put(out)),
             ],
         );
     });

@@ -168,6 +168,7 @@ fn a_bounce_has_one_ray_for_lamps_and_sun_with(gpu: &mut Gpu) {
             intensity: Vec3::splat(3000.0 + 10.0 * y),
             radius: 4.0,
             spot: None,
+            falloff: relight::light::Falloff::InverseSquare,
         });
     }
     scene.suns.push(SunLight {
@@ -219,6 +220,7 @@ fn no_light_leaks_through_walls_with(gpu: &mut Gpu) {
             intensity: Vec3::splat(50_000.0),
             radius: 4.0,
             spot: None,
+            falloff: relight::light::Falloff::InverseSquare,
         });
         scene.suns.push(SunLight {
             direction: Vec3::new(-0.4, 0.3, 0.6).normalize(),

@@ -39,6 +39,7 @@ fn room() -> Scene {
         intensity: Vec3::splat(6000.0),
         radius: 4.0,
         spot: None,
+        falloff: relight::light::Falloff::InverseSquare,
     });
     scene
 }

@@ -513,6 +513,7 @@ fn fog_is_lit_by_what_lights_each_place_of_it_with(gpu: &mut Gpu) {
         intensity: Vec3::splat(intensity),
         radius,
         spot: None,
+        falloff: relight::light::Falloff::InverseSquare,
     });
     // the mean radiance over the sphere of directions, over what scatters at each place
     let steps = 4000;

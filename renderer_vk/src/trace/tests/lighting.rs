@@ -149,6 +149,7 @@ fn all_estimators_have_the_same_mean_with(gpu: &mut Gpu) {
         intensity: Vec3::splat(2000.0),
         radius: 4.0,
         spot: None,
+        falloff: relight::light::Falloff::InverseSquare,
     });
     scene.dlights.push(DynamicLight {
         origin: Vec3::new(-60.0, -80.0, 0.0),
@@ -268,8 +269,16 @@ fn spheres_and_suns_give_their_irradiance_with(gpu: &mut Gpu) {
         intensity: Vec3::splat(7000.0),
         radius: 4.0,
         spot: None,
+        falloff: relight::light::Falloff::InverseSquare,
     });
     check(gpu, &scene, &|p| 7000.0 * falloff(p) / std::f32::consts::PI);
+    // a linear one: E = 8 I / R² (cos - d / R)
+    let linear = relight::light::Falloff::Linear { reach: 160.0 };
+    scene.points[0].falloff = linear;
+    check(gpu, &scene, &|p| {
+        let distance = (at - p).length();
+        7000.0 * linear.irradiance(distance, at.z / distance) / std::f32::consts::PI
+    });
     // facing it at half its reach a white surface shows the colour of a dynamic light
     let mut scene = floor();
     scene.dlights.push(DynamicLight {

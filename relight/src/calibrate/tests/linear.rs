@@ -1,0 +1,45 @@
+//! A room lit by lights that fall off linearly, as the compiler computes them.
+
+use super::*;
+use crate::light::Falloff;
+
+/// How far the hidden lights reach, id units.
+const REACH: [f32; 3] = [330.0, 260.0, 300.0];
+
+/// Strength beside that of the lights with the same places that fall off with the square.
+const STRONGER: f32 = 3.0;
+
+/// E / π = 8 I / (π R²) (cosθ − d / R).
+fn from_linear(at: Vec3, normal: Vec3) -> Vec3 {
+    let lights = HIDDEN.iter().zip(REACH);
+    let seen = lights.filter(|((origin, _), _)| !in_pillar(at, *origin));
+    seen.map(|((origin, intensity), reach)| {
+        let offset = *origin - at;
+        let distance = offset.length();
+        let part = (normal.dot(offset) / distance - distance / reach).max(0.0);
+        *intensity * (STRONGER * 8.0 * part / (reach * reach * PI))
+    })
+    .sum()
+}
+
+#[test]
+fn lights_that_end_are_told_from_those_that_do_not() {
+    let mut world = room(false, Some(&from_linear));
+    let report = calibrate(&mut world, &small());
+    println!("{report:?}");
+    for ((origin, intensity), reach) in HIDDEN.into_iter().zip(REACH) {
+        let near = world
+            .point_lights
+            .iter()
+            .filter(|l| l.origin.distance(origin) < 32.0);
+        let strongest = near
+            .max_by(|a, b| a.intensity.x.total_cmp(&b.intensity.x))
+            .unwrap_or_else(|| panic!("none at {origin}"));
+        println!("{origin} {intensity} {reach}: {strongest:?}");
+        let Falloff::Linear { reach: found } = strongest.falloff else {
+            panic!("{strongest:?}")
+        };
+        assert!((found / reach - 1.0).abs() < 0.25, "{found} for {reach}");
+    }
+    assert!(report.after.median_stops < 0.15, "{report:?}");
+}
