@@ -10,7 +10,7 @@ use super::CalibrationOptions;
 use super::bvh::Occluders;
 use super::parallel;
 use super::random::Random;
-use super::samples::{Place, Sample, decode, floor, light_of, mean, pick, shown};
+use super::samples::{Sample, Site, decode, floor, light_of, mean, pick, shown};
 use crate::world::RelitWorld;
 use glam::Vec3;
 
@@ -100,7 +100,7 @@ pub(super) fn samples(
     pick(points.len(), count, random)
         .filter_map(|i| points.get(i))
         .map(|point| Sample {
-            place: Place::Air,
+            site: Site::Air,
             position: point.position,
             normal: point.direction,
             value: point.light,
@@ -139,7 +139,7 @@ pub(super) fn believe(world: &RelitWorld, samples: &mut [Sample], direct: &[Vec3
     let mut ratios: Vec<f32> = samples
         .iter()
         .zip(direct)
-        .filter(|(s, _)| s.place == Place::Air && !s.saturated && s.level() > dark)
+        .filter(|(s, _)| s.site == Site::Air && !s.saturated && s.level() > dark)
         .map(|(s, light)| s.level() / mean(*light).max(dark * 0.1))
         .collect();
     ratios.sort_by(f32::total_cmp);
@@ -148,7 +148,7 @@ pub(super) fn believe(world: &RelitWorld, samples: &mut [Sample], direct: &[Vec3
     if !(low > 0.0 && high <= low * SPREAD) {
         return false;
     }
-    for sample in samples.iter_mut().filter(|s| s.place == Place::Air) {
+    for sample in samples.iter_mut().filter(|s| s.site == Site::Air) {
         sample.value /= scale;
     }
     trust(samples, TRUST);
@@ -158,7 +158,7 @@ pub(super) fn believe(world: &RelitWorld, samples: &mut [Sample], direct: &[Vec3
 /// Sets how much measurements in the air tell. Whether they told anything before.
 pub(super) fn trust(samples: &mut [Sample], trust: f32) -> bool {
     let mut told = false;
-    for sample in samples.iter_mut().filter(|s| s.place == Place::Air) {
+    for sample in samples.iter_mut().filter(|s| s.site == Site::Air) {
         told |= sample.trust > 0.0;
         sample.trust = trust;
     }

@@ -10,7 +10,7 @@
 use super::bvh::{Hit, Occluders};
 use super::parallel;
 use super::random::Random;
-use super::samples::{Place, Sample};
+use super::samples::{Sample, Site};
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::{IVec3, Vec3};
 use std::collections::HashMap;
@@ -55,7 +55,7 @@ impl Transfer {
         let of_triangle = surfaces_of_triangles(world);
         let near = Near::new(samples);
         let found = parallel::map(samples, |i, sample| {
-            if sample.place == Place::Air {
+            if sample.site == Site::Air {
                 return (Vec::new(), Vec3::ZERO, Vec3::ZERO);
             }
             let mut random = Random::new(0xB0_0000 + i as u64);
@@ -182,7 +182,7 @@ pub(super) struct Near(HashMap<IVec3, Vec<u32>>);
 impl Near {
     pub fn new(samples: &[Sample]) -> Near {
         let mut cells: HashMap<IVec3, Vec<u32>> = HashMap::new();
-        let surface = |s: &(u32, &Sample)| s.1.place == Place::Surface;
+        let surface = |s: &(u32, &Sample)| s.1.site == Site::Surface;
         for (i, sample) in (0u32..).zip(samples).filter(surface) {
             cells.entry(cell(sample.position)).or_default().push(i);
         }

@@ -6,7 +6,7 @@
 use super::bvh::Occluders;
 use super::parallel;
 use super::random::Random;
-use super::samples::{Place, Sample};
+use super::samples::{Sample, Site};
 use crate::light::{EmissionSource, EmitterSummary, Falloff, LightRef, Spot, TriangleLight};
 use crate::world::RelitWorld;
 use glam::Vec3;
@@ -91,7 +91,7 @@ pub(super) fn unshadowed(sample: &Sample, lamp: Lamp, spot: Option<&Spot>) -> f3
     });
     let distance = squared.sqrt();
     let mut given = lamp.falloff.irradiance(distance, cosine / distance);
-    if sample.place == Place::Air && lamp.falloff != Falloff::InverseSquare {
+    if sample.site == Site::Air && lamp.falloff != Falloff::InverseSquare {
         // The grid's light is what comes, then weighted by the cosine: not the other way around.
         given = lamp.falloff.irradiance(distance, 1.0) * cosine / distance;
     }
@@ -487,7 +487,7 @@ mod tests {
     #[test]
     fn irradiance_agrees_with_adding_up_small_pieces() {
         let sample = Sample {
-            place: Place::Surface,
+            site: Site::Surface,
             position: Vec3::ZERO,
             normal: Vec3::new(0.6, 0.0, 0.8),
             value: Vec3::ZERO,

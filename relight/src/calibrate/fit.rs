@@ -6,7 +6,7 @@ use super::columns::Column;
 use super::crossings::Crossing;
 use super::place::{self, Scene};
 use super::report::Agreement;
-use super::samples::{Place, Sample, light_of, mean};
+use super::samples::{Sample, Site, light_of, mean};
 use super::solve::{self, Ambient, Effort};
 use super::{Occluders, suns, views};
 use crate::exposure::{self, Place};
@@ -237,7 +237,7 @@ pub(super) fn first_ambient(world: &RelitWorld, samples: &[Sample]) -> Ambient {
 fn quantile(samples: &[Sample], part: f32, least: f32) -> Vec3 {
     let chosen: Vec<Vec3> = samples
         .iter()
-        .filter(|s| s.place == Place::Surface && !s.held_out && mean(s.value) >= least)
+        .filter(|s| s.site == Site::Surface && !s.held_out && mean(s.value) >= least)
         .map(|s| s.value)
         .collect();
     let channel = |k: usize| {

@@ -218,7 +218,7 @@ impl Scene<'_> {
             .iter()
             .zip(&state.rest)
             .enumerate()
-            .filter(|(_, (s, _))| !s.held_out && s.place == samples::Place::Surface)
+            .filter(|(_, (s, _))| !s.held_out && s.site == samples::Site::Surface)
             .map(|(i, (s, rest))| (mean(*rest) / (s.level() + s.floor), i))
             .filter(|(missing, _)| *missing > 0.25)
             .collect();

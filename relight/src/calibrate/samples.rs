@@ -39,7 +39,7 @@ const TRIES: usize = 8;
 
 /// Where a measurement was taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum Site {
     /// On a surface, which all light falls on.
     Surface,
     /// In the open, at a point of the light grid: only light that comes straight from lights ([`air`](super::air)).
@@ -50,7 +50,7 @@ pub(super) enum Place {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sample {
     /// Where it was taken.
-    pub place: Place,
+    pub site: Site,
     /// A little off the surface.
     pub position: Vec3,
     /// Unit normal.
@@ -83,9 +83,9 @@ impl Sample {
 
     /// The part of light from everywhere that is in it.
     pub fn ambient(&self) -> f32 {
-        match self.place {
-            Place::Surface => 1.0,
-            Place::Air => 0.0,
+        match self.site {
+            Site::Surface => 1.0,
+            Site::Air => 0.0,
         }
     }
 }
@@ -285,7 +285,7 @@ fn sample_at(
         return None;
     }
     Some(Sample {
-        place: Place::Surface,
+        site: Site::Surface,
         position,
         normal,
         value: stored.light(world),
@@ -558,7 +558,7 @@ mod tests {
 
     fn sample(value: f32, trust: f32) -> Sample {
         Sample {
-            place: Place::Surface,
+            site: Site::Surface,
             position: Vec3::ZERO,
             normal: Vec3::Z,
             value: Vec3::splat(value),
