@@ -228,6 +228,12 @@ fn agree(written: &Written, name: &str) {
         }
     }
     let document = gltf::Gltf::open(&written.path).unwrap();
+    // What several entities name is there once.
+    let mut models = HashSet::new();
+    for mesh in document.meshes().filter(is_file) {
+        let told = mesh.extras().as_ref().map(|e| e.get().to_owned());
+        assert!(models.insert(told), "{name}: {:?} twice", mesh.name());
+    }
     let files = document.meshes().filter(is_file);
     let of_files = files.flat_map(|m| m.primitives().collect::<Vec<_>>());
     let of_files: usize = of_files.map(|p| p.indices().unwrap().count() / 3).sum();

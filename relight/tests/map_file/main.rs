@@ -117,8 +117,12 @@ fn same_keys(pairs: &[(String, String)], found: &Entity, model: Option<usize>) {
         .filter(|(key, value)| !of_compiler(key) && !key.is_empty() && !value.is_empty())
         .map(|(key, value)| (clean(key), clean(value)));
     let found = found.pairs.iter().filter(|(key, _)| key != "mapversion");
-    let found: Vec<_> = found.cloned().collect();
-    let expected: Vec<_> = expected.filter(|(key, _)| key != "mapversion").collect();
+    let mut found: Vec<_> = found.cloned().collect();
+    let mut expected: Vec<_> = expected.filter(|(key, _)| key != "mapversion").collect();
+    // Some editors give names to entities, and sort keys.
+    found.retain(|pair| pair.0 != "name" || expected.contains(pair));
+    found.sort();
+    expected.sort();
     assert_eq!(expected, found);
 }
 
@@ -339,10 +343,13 @@ fn a_file_saved_by_an_editor_is_the_map() {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();
-    let (_, world) = write(&files, &format!("maps/{map}.bsp"), Brushes::Usual);
+    let (text, world) = write(&files, &format!("maps/{map}.bsp"), Brushes::Usual);
+    let ours = agreement(&text, &world);
     let found = agreement(&std::fs::read_to_string(file).unwrap(), &world);
     println!("{map}: {found:?}");
-    assert!(found.aligned * 100 > found.on_faces * 94);
+    // Editors write textures in texels, which says nothing without the images.
+    let without = |a: Agreement| Agreement { aligned: 0, ..a };
+    assert_eq!(without(found), without(ours));
 }
 
 /// `cargo test --release -p relight --test map_file -- --ignored --nocapture all_maps`.

@@ -176,7 +176,7 @@ impl Writer<'_> {
                     };
                     self.line(format_args!("// brush {written}\n{begin}"));
                     for side in &sides {
-                        self.side(of_model, side, origin, contents);
+                        self.side(of_model, brush, side, origin, contents);
                     }
                     self.line(format_args!("{end}"));
                     self.tally.brushes += 1;
@@ -213,11 +213,19 @@ impl Writer<'_> {
         }
     }
 
-    fn side(&mut self, model: u32, side: &Side, origin: Vec3, contents: u32) {
-        let shader = shader_name(&self.world.bsp, side.shader).to_owned();
+    fn side(&mut self, model: u32, brush: &Brush, side: &Side, origin: Vec3, contents: u32) {
+        let bsp = &self.world.bsp;
+        let shader = shader_name(bsp, side.shader).to_owned();
         let found = self
             .drawn
             .projection(model, &shader, side.normal, &side.winding);
+        // What a brush is comes from all its sides: one of a fog on a wall, which shows nothing there, would let the
+        // world leak.
+        let shown = found.is_some_and(|(_, in_front)| in_front);
+        let solid = |shader| flags(bsp, shader) & content_flags::SOLID != 0;
+        let foreign = !shown && solid(brush.shader) && !solid(side.shader);
+        let named = if foreign { brush.shader } else { side.shader };
+        let found = found.map(|(texture, _)| texture).filter(|_| !foreign);
         self.tally.sides += 1;
         self.tally.aligned += usize::from(found.is_some());
         let size = match (found, self.form) {
@@ -229,7 +237,7 @@ impl Writer<'_> {
         let texture = found.unwrap_or_else(|| default_projection(side.normal, size));
         let texture = texture.moved(origin);
         let points = plane_points(side, origin);
-        let name = self.name(side.shader);
+        let name = self.name(named);
         let line = self.form.side(points, &name, &texture, size, contents);
         self.tally.sheared += usize::from(!line.exact);
         self.line(format_args!("{}", line.text));
@@ -283,17 +291,18 @@ fn number(value: f64) -> String {
     format!("{}", rounded + 0.0)
 }
 
+/// The content flags of a shader; none for one that is not there.
+fn flags(bsp: &Bsp, shader: i32) -> u32 {
+    let shader = usize::try_from(shader).ok();
+    let shader = shader.and_then(|at| bsp.shaders.get(at));
+    shader.map_or(0, |s| s.content_flags)
+}
+
 /// Whether the compiler did not divide the world by a solid brush: leaves in those that it did are closed.
 fn is_detail(bsp: &Bsp, brush: &Brush, sides: &[Side]) -> bool {
-    let shader = usize::try_from(brush.shader).ok();
-    let Some(shader) = shader.and_then(|at| bsp.shaders.get(at)) else {
-        return false;
-    };
+    let contents = flags(bsp, brush.shader);
     let (solid, keeps) = (content_flags::SOLID, content_flags::AREAPORTAL);
-    if shader.content_flags & solid == 0
-        || shader.content_flags & keeps != 0
-        || bsp.leafs.is_empty()
-    {
+    if contents & solid == 0 || contents & keeps != 0 || bsp.leafs.is_empty() {
         return false;
     }
     let corners = sides.iter().flat_map(|side| &side.winding);

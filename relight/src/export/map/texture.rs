@@ -90,14 +90,15 @@ impl Drawn {
         Drawn { triangles }
     }
 
-    /// The projection of the texture on a side, from the largest triangle drawn on it; `None` when none was.
+    /// The projection of the texture on a side, from the largest triangle drawn on it, and whether that shows the side's
+    /// front; `None` when none was.
     pub(super) fn projection(
         &self,
         model: u32,
         shader: &str,
         normal: DVec3,
         winding: &[DVec3],
-    ) -> Option<Projection> {
+    ) -> Option<(Projection, bool)> {
         let on = *winding.first()?;
         let list = self.triangles.get(&(model, shader.to_ascii_lowercase()))?;
         let fits = |t: &&Triangle| {
@@ -116,7 +117,7 @@ impl Drawn {
             sides.then(area(a).total_cmp(&area(b)))
         };
         let largest = list.iter().filter(fits).max_by(better)?;
-        projection_of(largest)
+        Some((projection_of(largest)?, in_front(largest)))
     }
 }
 
