@@ -71,7 +71,7 @@ fn found(world: &RelitWorld) -> Vec<(f32, f32)> {
 
 #[test]
 fn the_grid_places_lights_that_few_texels_see() {
-    // Two of eleven faces are lightmapped, and the grid is stored half as bright as it should be.
+    // Two of twelve faces are lightmapped, and the grid is stored half as bright as it should be.
     let light = |gridded: bool| {
         let map = room_map("t/wall", false, 2, Some(&from_hidden));
         let bsp = if gridded {
