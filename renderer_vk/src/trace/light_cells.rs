@@ -12,10 +12,10 @@ use relight::light::TriangleLight;
 use shaders::trace_types::BspNode;
 
 /// Sides of the grid that are tried, units, from the finest; after these clusters stay whole.
-const SIDES: [f32; 6] = [192.0, 256.0, 384.0, 512.0, 1024.0, 2048.0];
+const SIDES: [f32; 7] = [128.0, 192.0, 256.0, 384.0, 512.0, 1024.0, 2048.0];
 
-/// Entries of all lists, at the most, for which clusters are cut: 16 MiB of slots.
-const MOST_ENTRIES: f64 = 524_288.0;
+/// Entries of all lists, at the most, for which clusters are cut: 32 MiB of slots.
+const MOST_ENTRIES: f64 = 1_048_576.0;
 
 /// How far behind a light's plane a cell must lie for its list to do without the light, units: the list of a point is
 /// that of the cell one unit before it.
