@@ -369,6 +369,32 @@ LightChoice choose_one(LightSet set, vec3 position, vec3 normal) {
     return LightChoice(listed.light, listed.weight / (1.0 - chance), listed.total);
 }
 
+// What arrives of a sample's light.
+vec3 arriving(LightSample s, vec3 origin) {
+    if (!(max_component(s.light) > 0.0) || !light_arrives(s, origin)) return vec3(0.0);
+    return s.light * filtered(origin, s.direction, s.distance);
+}
+
+// One resampled estimate of direct light, with the choices of `direct_light`. All is chosen before the first ray,
+// so that little has to be kept over the rays.
+vec3 direct_light_once(vec3 position, vec3 face_normal, vec3 normal) {
+    LightSet set = lights_at(position, face_normal);
+    if (set_count(set) == 0) return vec3(0.0);
+    vec3 origin = offset_ray(position, face_normal);
+    LightChoice choice = choose_resampled(set, position, normal);
+    LightSample chosen = no_light();
+    if (choice.weight > 0.0) chosen = sample_light(choice.light, position, normal, rng_next2());
+    chosen.light *= choice.weight;
+    vec3 from_sun = vec3(0.0);
+    if (set.suns > 0) {
+        LightChoice sun = choose_sun(set.suns);
+        LightSample s = sample_light(sun.light, position, normal, rng_next2());
+        s.light *= sun.weight;
+        from_sun = arriving(s, origin);
+    }
+    return from_sun + arriving(chosen, origin);
+}
+
 // Direct light on a point whose surface faces `face_normal`, with `samples` independent estimates.
 vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint selection, uint samples) {
     LightSet set = lights_at(position, face_normal);
@@ -403,7 +429,8 @@ vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint selection, 
         }
         if (!(choice.weight > 0.0)) continue;
         LightSample s = sample_light(choice.light, position, normal, rng_next2());
-        if (max_component(s.light) > 0.0 && light_arrives(s, origin)) sum += s.light * choice.weight * filtered(origin, s.direction, s.distance);
+        s.light *= choice.weight;
+        sum += arriving(s, origin);
     }
     return sum / float(samples);
 }
