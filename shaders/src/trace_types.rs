@@ -302,9 +302,9 @@ pub struct MotionView {
     /// For each portal of the view the [`PortalRecord`] of the last frame.
     pub last_portals: u64,
     /// RGBA16F: how far the pixel's surface was from here in the last frame (pixels, right and down), length of the way
-    /// to it then (negative: it was not in the picture, or nobody knows where), length of the way now.
+    /// to it then (negative: it was not in the picture, or nobody knows where), and the pixel's mark (`motion.glsl`).
     pub image: u32,
-    /// R16F: length of the way now once more, which the next frame reads.
+    /// R16F: length of the way now, which the next frame reads, too.
     pub path: u32,
     /// The same image of the last frame.
     pub last_path: u32,
@@ -516,8 +516,8 @@ pub struct TraceView {
     pub bounces: u32,
     pub image_position: u32,
     pub image_surface: u32,
-    pub image_albedo: u32,
-    pub image_front: u32,
+    /// RG32UI: what the light of the surface is multiplied by, and what is in front of it.
+    pub image_shown: u32,
     pub image_direct: u32,
     pub image_indirect: u32,
     /// RGBA16F, of the traced size; not written while frames are accumulated.
@@ -534,6 +534,7 @@ pub struct TraceView {
     pub target_height: u32,
     /// Clamped, with mip levels: for the images of sky boxes.
     pub sky_sampler: u32,
+    pub padding: u32,
     /// Camera of the last frame.
     pub last_eye: Vec3,
     pub last_forward: Vec3,

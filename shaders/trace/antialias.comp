@@ -97,7 +97,7 @@ void main() {
         ivec2 at = ivec2(i % TILE, i / TILE);
         ivec2 pixel = clamp(first + at, ivec2(0), traced_size - 1);
         vec4 color = imageLoad(images_rgba16f[VIEW.image_composite], pixel);
-        tile[at.y][at.x] = vec4(to_ycocg(compress(color.rgb, exposure)), motion_read(pixel).path);
+        tile[at.y][at.x] = vec4(to_ycocg(compress(color.rgb, exposure)), path_read(pixel));
         fresh_parts[at.y][at.x] = color.a;
     }
     barrier();

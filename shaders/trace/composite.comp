@@ -4,6 +4,7 @@
 // turns, like the fields of a chessboard: there a pixel is the mean of what it shows and what its neighbours of the
 // other field show.
 #include "trace/denoise.glsl"
+#include "trace/motion.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -27,15 +28,17 @@ vec3 light_in_fog(ivec2 pixel) {
     return total > 0.0 ? sum / total : vec3(0.0);
 }
 
-// The kind of field, and how much light is new over that of the front, as primary rays leave them in one number.
-float field_of(vec4 front) { return floor(front.a); }
-float new_part(vec4 front) { return (front.a - floor(front.a)) * MOST_FRESH; }
+// What a pixel shows by itself, and the part of it that is in front of the surface.
+struct Shown {
+    vec3 radiance;
+    vec3 front;
+};
 
-// What a pixel shows by itself. `front`: what the primary rays have composed there.
-vec3 shown(ivec2 pixel, vec3 front) {
-    // what glows by itself, sky and fog show as the engine shows them when the map is exposed to look as bright as there
-    vec3 radiance = front * exp2(-VIEW.exposure_base);
+Shown shown(ivec2 pixel) {
     GBufferPixel g = gbuffer_read(pixel);
+    // what glows by itself, sky and fog show as the engine shows them when the map is exposed to look as bright as there
+    vec3 front = g.front * exp2(-VIEW.exposure_base);
+    vec3 radiance = front;
     if (g.path >= 0.0) {
         vec3 light;
         if ((VIEW.flags & VIEW_DENOISE) != 0) {
@@ -49,17 +52,17 @@ vec3 shown(ivec2 pixel, vec3 front) {
         vec3 weight = light_read(VIEW.fog.weight, pixel);
         if (max_component(weight) > 0.0) radiance += weight * light_in_fog(pixel);
     }
-    return radiance;
+    return Shown(radiance, front);
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     ivec2 size = ivec2(VIEW.width, VIEW.height);
     if (pixel.x >= size.x || pixel.y >= size.y) return;
-    vec4 front = imageLoad(images_rgba16f[VIEW.image_front], pixel);
-    vec3 radiance = shown(pixel, front.rgb);
-    // 0 none, 1 or 2
-    float field = field_of(front);
+    Shown own = shown(pixel);
+    vec3 radiance = own.radiance;
+    float mark = mark_read(pixel);
+    float field = mark_field(mark);
     if (field > 0.0) {
         const ivec2 beside[4] = ivec2[](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1));
         vec3 others[2] = vec3[](vec3(0.0), vec3(0.0)); // to the sides, above and below
@@ -69,10 +72,10 @@ void main() {
         for (int i = 0; i < 4; i++) {
             ivec2 at = pixel + beside[i];
             if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
-            vec4 other = imageLoad(images_rgba16f[VIEW.image_front], at);
-            if (field_of(other) == field) continue;
-            vec3 value = shown(at, other.rgb);
-            if (field_of(other) == 0.0) {
+            float other_field = mark_field(mark_read(at));
+            if (other_field == field) continue;
+            vec3 value = shown(at).radiance;
+            if (other_field == 0.0) {
                 whole += value;
                 whole_count += 1.0;
                 continue;
@@ -98,7 +101,7 @@ void main() {
     if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
     if ((VIEW.flags & VIEW_ACCUMULATE) == 0) {
         // alpha: how much of the colour is of what has come here since the last frame
-        float fresh = min(new_part(front) * max_component(front.rgb) * exp2(-VIEW.exposure_base) / max(max_component(radiance), 1.0e-6), 0.99);
+        float fresh = min(mark_new_part(mark) * max_component(own.front) / max(max_component(radiance), 1.0e-6), 0.99);
         if (!(fresh > 0.0)) fresh = 0.0;
         imageStore(images_rgba16f[VIEW.image_composite], pixel, vec4(min(radiance, vec3(60000.0)), fresh));
         return;

@@ -1,13 +1,11 @@
-// The G-buffer: position and path (16 bytes a pixel), normals (8), albedo (8) and motion (8, see motion.glsl). The motion is kept for the
-// next frame. `albedo` holds everything between the eye and the surface: the light L of the point
-// is shown as albedo * L + front.
+// The G-buffer: position and path (16 bytes a pixel), normals (8), what is shown (8), motion (8) and path (2, see
+// motion.glsl). `albedo` holds everything between the eye and the surface: the light L of the point is shown as
+// albedo * L + front. Both are packed as light is, in 4 bytes each.
 #ifndef RELIGHT_TRACE_GBUFFER_GLSL
 #define RELIGHT_TRACE_GBUFFER_GLSL
 
+#include "trace/light_image.glsl"
 #include "trace/view.glsl"
-
-// Most new light that a pixel tells of, times the light of its front: the unit of the fraction beside the field.
-const float MOST_FRESH = 8.0;
 
 struct GBufferPixel {
     vec3 position;
@@ -15,6 +13,7 @@ struct GBufferPixel {
     vec3 face_normal;
     vec3 normal;
     vec3 albedo;
+    vec3 front; // radiance of what is in front of the surface, and of its own glow
 };
 
 // Octahedral normals (Cigolle et al., A Survey of Efficient Representations for Independent Unit Vectors, 2014).
@@ -31,10 +30,11 @@ vec3 unpack_normal(uint packed) {
     return normalize(n);
 }
 
-void gbuffer_write(ivec2 pixel, GBufferPixel g) {
+// `dither`: see pack_light.
+void gbuffer_write(ivec2 pixel, GBufferPixel g, vec2 dither) {
     imageStore(images_rgba32f[VIEW.image_position], pixel, vec4(g.position, g.path));
     imageStore(uimages_rg32ui[VIEW.image_surface], pixel, uvec4(pack_normal(g.face_normal), pack_normal(g.normal), 0, 0));
-    imageStore(images_rgba16f[VIEW.image_albedo], pixel, vec4(min(g.albedo, vec3(60000.0)), 0.0));
+    imageStore(uimages_rg32ui[VIEW.image_shown], pixel, uvec4(pack_light(g.albedo, dither.x), pack_light(g.front, dither.y), 0, 0));
 }
 
 GBufferPixel gbuffer_read(ivec2 pixel) {
@@ -45,7 +45,9 @@ GBufferPixel gbuffer_read(ivec2 pixel) {
     g.path = position.w;
     g.face_normal = unpack_normal(surface.x);
     g.normal = unpack_normal(surface.y);
-    g.albedo = imageLoad(images_rgba16f[VIEW.image_albedo], pixel).rgb;
+    uvec2 shown = imageLoad(uimages_rg32ui[VIEW.image_shown], pixel).xy;
+    g.albedo = unpack_light(shown.x);
+    g.front = unpack_light(shown.y);
     return g;
 }
 

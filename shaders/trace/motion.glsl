@@ -18,13 +18,24 @@ const float SKY_PATH = 60000.0;
 struct Motion {
     vec2 offset;     // from the pixel to where its surface was in the last frame, pixels
     float last_path; // length of the way to it then; negative: unknown
-    float path;      // length of the way now; SKY_PATH: the sky
 };
 
 Motion motion_read(ivec2 pixel) {
     vec4 v = imageLoad(images_rgba16f[VIEW.motion.image], pixel);
-    return Motion(v.xy, v.z, v.w);
+    return Motion(v.xy, v.z);
 }
+
+// Most new light that a pixel tells of, times the light of its front: the unit of the fraction beside the field.
+const float MOST_FRESH = 8.0;
+
+// The pixel's mark, which the motion image has room for: the field of a pixel that shows either a reflection (2) or what
+// lies behind it (1), otherwise 0; its fraction tells how much light of what is in front moves otherwise than the surface.
+float mark_read(ivec2 pixel) { return imageLoad(images_rgba16f[VIEW.motion.image], pixel).w; }
+float mark_field(float mark) { return floor(mark); }
+float mark_new_part(float mark) { return (mark - floor(mark)) * MOST_FRESH; }
+
+// Length of the way to what a pixel shows; SKY_PATH: the sky.
+float path_read(ivec2 pixel) { return imageLoad(images_r16f[VIEW.motion.path], pixel).x; }
 
 // The way to what a pixel showed in the last frame.
 float last_path_read(ivec2 pixel) { return imageLoad(images_r16f[VIEW.motion.last_path], pixel).x; }
@@ -88,7 +99,7 @@ LastPlace last_sky(LastSpace space, vec3 direction) {
     return LastPlace(vec4(space.turn * direction, 0.0), SKY_PATH, true);
 }
 
-// What the motion image holds for a surface that a ray of the camera met.
+// Offset, last path and path of a surface that a ray of the camera met.
 vec4 motion_of(CameraRay ray, LastPlace place) {
     float path = min(place.path, SKY_PATH);
     if (place.at.w < 0.0 || (VIEW.flags & VIEW_HISTORY) == 0) return vec4(0.0, 0.0, -1.0, path);
@@ -107,11 +118,10 @@ vec4 motion_of(CameraRay ray, LastPlace place) {
     return vec4(clamp(offset, -60000.0, 60000.0), last_path, path);
 }
 
-vec4 motion_write(ivec2 pixel, CameraRay ray, LastPlace place) {
-    vec4 motion = motion_of(ray, place);
-    imageStore(images_rgba16f[VIEW.motion.image], pixel, motion);
+// `motion`: as `motion_of` makes it.
+void motion_write(ivec2 pixel, vec4 motion, float mark) {
+    imageStore(images_rgba16f[VIEW.motion.image], pixel, vec4(motion.xyz, mark));
     imageStore(images_r16f[VIEW.motion.path], pixel, motion.wwww);
-    return motion;
 }
 
 #endif

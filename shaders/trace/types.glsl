@@ -94,10 +94,10 @@ struct TraceView {
     float eye_shift; uint channels;
     uint fog_count; uint portal_count;
     uint max_depth; uint bounces;
-    uint image_position; uint image_surface; uint image_albedo; uint image_front; uint image_direct; uint image_indirect; uint image_composite;
+    uint image_position; uint image_surface; uint image_shown; uint image_direct; uint image_indirect; uint image_composite;
     uint image_accumulation; uint image_target;
     float exposure_bias; float exposure_base; float exposure_blend;
-    uint target_width; uint target_height; uint sky_sampler;
+    uint target_width; uint target_height; uint sky_sampler; uint padding;
     vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up;
     DenoiseView denoise;
 };

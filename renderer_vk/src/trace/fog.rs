@@ -38,7 +38,6 @@ struct Images {
     cell: u32,
     cells: [u32; 2],
     weight: Image,
-    point: Image,
     /// Light at the points: of this frame and the last.
     light: [Image; 2],
     /// What the filter makes of it.
@@ -59,7 +58,6 @@ impl Images {
             cell,
             cells,
             weight: make("trace fog weight", size, Format::R32Uint)?,
-            point: make("trace fog point", cells, Format::Rgba32F)?,
             light: [
                 make("trace fog light", cells, Format::Rgba16F)?,
                 make("trace last fog light", cells, Format::Rgba16F)?,
@@ -147,8 +145,9 @@ impl LitFog {
         self.images.as_ref().filter(|_| self.unseen == 0)
     }
 
-    /// What the passes read. `packed` and `half`: images of packed light and of half floats that stand for those that
-    /// are not there, since software drivers look at the images of branches that are not taken.
+    /// What the passes read. `half`: the image of half floats that the picture is put together in; until then it holds
+    /// the points in fog. It and `packed`, an image of packed light, stand for images that are not there, since software
+    /// drivers look at the images of branches that are not taken.
     pub fn view(&self, packed: &Image, half: &Image) -> FogView {
         let half = half.storage_index();
         let Some(images) = self.seen() else {
@@ -166,7 +165,7 @@ impl LitFog {
         let [fresh, last] = [0, 1].map(|i| images.light[i].storage_index());
         FogView {
             weight: images.weight.storage_index(),
-            point: images.point.storage_index(),
+            point: half,
             fresh,
             last,
             filtered: images.filtered.as_ref().map_or(fresh, Image::storage_index),

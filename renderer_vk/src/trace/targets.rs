@@ -12,16 +12,13 @@ pub struct Targets {
     pub position: Image,
     /// Packed normals.
     pub surface: Image,
-    /// Albedo, with all that lies between the eye and the surface.
-    pub albedo: Image,
-    /// Where the surface was in the last frame and how far away, see [`super::motion`].
+    /// Albedo, with all that lies between the eye and the surface, and the radiance of what is in front of the surface and
+    /// of its own glow; packed as in `light_image.glsl`.
+    pub shown: Image,
+    /// Where the surface was in the last frame and how far away, see [`super::motion`], and the mark of the pixel.
     pub motion: Image,
     /// How far away it is; of this frame and the last.
     pub path: [Image; 2],
-    /// Radiance of what is in front of the surface and of its own glow; alpha: the field of a pixel that shows either a
-    /// reflection (2) or what lies behind it (1), otherwise 0; its fraction is the part of the radiance that moves
-    /// otherwise than the surface does.
-    pub front: Image,
     /// Direct light as it comes from the rays, packed as in `light_image.glsl`.
     pub direct: Image,
     /// Bounced light, likewise.
@@ -49,13 +46,12 @@ impl Targets {
             height,
             position: make("trace position", Format::Rgba32F)?,
             surface: make("trace surface", Format::Rg32Uint)?,
-            albedo: make("trace albedo", Format::Rgba16F)?,
+            shown: make("trace shown", Format::Rg32Uint)?,
             motion: make("trace motion", Format::Rgba16F)?,
             path: [
                 make("trace path", Format::R16F)?,
                 make("trace last path", Format::R16F)?,
             ],
-            front: make("trace front", Format::Rgba16F)?,
             direct: make("trace direct", Format::R32Uint)?,
             indirect: make("trace indirect", Format::R32Uint)?,
             indirect_is_black: false,
