@@ -394,8 +394,8 @@ pub struct DenoiseView {
     pub gradient: u32,
     /// Change of the inverse of depth from pixel to pixel.
     pub slope: u32,
-    /// Makes the size a multiple of eight without hidden bytes.
-    pub padding: u32,
+    /// Change and size of the light of each stratum's own sample.
+    pub gradient_samples: u32,
 }
 
 /// What lies in the way of light.

@@ -1,9 +1,8 @@
 #version 460
-// The temporal gradient of each stratum: how much the light of its sample differs from the light that the same sample
-// had in the last frame, spread over the neighbourhood by three edge-avoiding a-trous steps in shared memory (Schied et
-// al. 2018, section 4.3: the change and the size of the light are filtered apart, and divided at the end, which
-// gradient_wide.comp does).
-#include "trace/sparse.glsl"
+// The gradients of the strata's samples (gradient_sample.comp), spread over the neighbourhood by three edge-avoiding
+// a-trous steps in shared memory (Schied et al. 2018, section 4.3: the change and the size of the light are filtered
+// apart, and divided at the end, which gradient_wide.comp does).
+#include "trace/denoise.glsl"
 
 const int TILE = 16, BORDER = 7, WIDE = TILE + 2 * BORDER; // steps of 1, 2 and 4 strata reach 7 far
 layout(local_size_x = TILE, local_size_y = TILE) in;
@@ -14,22 +13,6 @@ shared uint guides[WIDE * WIDE];
 // logarithms of the luminance that the last frame was left with, of both, as halfs: bright light that has not changed
 // must not hide that dim light beside it has
 shared uint levels[WIDE * WIDE];
-
-uint level_of(Carried c) {
-    LightTexel light = unpack_texel(LightTexels(DENOISE.history).at[place_of(c.last)]);
-    return packHalf2x16(log2(vec2(luminance(light.direct), luminance(light.indirect)) + 1.0e-5));
-}
-
-uvec2 gradient_at(ivec2 stratum, Carried c) {
-    ivec2 pixel = pixel_of(stratum, c.index);
-    vec2 now = vec2(luminance(light_read(VIEW.image_direct, pixel)), luminance(light_read(VIEW.image_indirect, pixel)));
-    // as the sample was rounded
-    now = unpackHalf2x16(packHalf2x16(now));
-    vec2 then = unpackHalf2x16(imageLoad(uimages_rgba32ui[DENOISE.sample_surfaces], c.last / STRATUM).z);
-    vec2 change = now - then, size = max(now, then);
-    if (then.y < 0.0 || !is_gathered(pixel)) change.y = size.y = 0.0;
-    return uvec2(packHalf2x16(vec2(change.x, size.x)), packHalf2x16(vec2(change.y, size.y)));
-}
 
 uvec2 filtered(ivec2 at, int spacing) {
     uint guide = guides[at.y * WIDE + at.x];
@@ -62,15 +45,10 @@ void main() {
     for (int i = index; i < WIDE * WIDE; i += TILE * TILE) {
         ivec2 stratum = corner + ivec2(i % WIDE, i / WIDE);
         bool there = all(greaterThanEqual(stratum, ivec2(0))) && all(lessThan(stratum, strata));
-        uint guide = there ? imageLoad(uimages_r32ui[DENOISE.stratum_guide], stratum).x : 0;
-        guides[i] = guide;
-        levels[i] = 0;
-        tile[i] = uvec2(0);
-        if (guide == 0) continue;
-        Carried c = carried_at(stratum);
-        if (!c.valid) continue;
-        levels[i] = level_of(c);
-        tile[i] = gradient_at(stratum, c);
+        uvec4 own = there ? imageLoad(uimages_rgba32ui[DENOISE.gradient_samples], stratum) : uvec4(0);
+        tile[i] = own.xy;
+        levels[i] = own.z;
+        guides[i] = own.w;
     }
     int border = 0;
     for (int spacing = 1; spacing <= 4; spacing *= 2) {

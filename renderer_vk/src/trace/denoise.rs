@@ -6,7 +6,7 @@
 //! 1. [`Denoiser::choose_gradient_samples`], before anything is lit: in each stratum of 3 × 3 pixels one is to light a
 //!    surface of the last frame again, with the random numbers of then.
 //! 2. [`Denoiser::filter`], after: the change of light that those samples show is spread over their neighbourhood; the
-//!    light joins that of earlier frames, which keep less weight where it has changed; four wavelet steps, guided by
+//!    light joins that of earlier frames, which keep less weight where it has changed; three wavelet steps, guided by
 //!    the variance, even out what noise is left. The first of them is what the next frame starts from.
 //!
 //! `rt_denoiser 2` costs about a third: a running mean over frames, and three passes of few scattered taps.
@@ -24,8 +24,8 @@ use crate::gpu::{
 const STRATUM: u32 = 3;
 /// Strata to the edge of a group of the gradient's pass, see `gradient.comp`.
 const GRADIENT_TILE: u32 = 16;
-/// Distances between the taps of the wavelet steps, pixels.
-const WAVELET: [u32; 4] = [1, 2, 4, 8];
+/// Distances between the taps of the wavelet steps, pixels: a fourth step between them changes no measure of quality.
+const WAVELET: [u32; 3] = [1, 3, 8];
 /// Radii of the passes of the cheap filter, pixels.
 const SPARSE: [u32; 3] = [3, 9, 5];
 
@@ -43,7 +43,7 @@ enum Tier {
     Sparse,
 }
 
-/// What is kept for one size of view: 66 bytes a pixel, of the cheap filter 28.
+/// What is kept for one size of view: 68 bytes a pixel, of the cheap filter 28.
 struct Images {
     tier: Tier,
     size: [u32; 2],
@@ -63,6 +63,8 @@ struct AdaptiveImages {
     /// The gradient samples of this frame.
     carried: Image,
     stratum_guide: Image,
+    /// Their gradients, spread over some and over many strata.
+    gradient_samples: Image,
     gradient_sums: Image,
     gradient: Image,
 }
@@ -125,6 +127,7 @@ impl AdaptiveImages {
             sample_surfaces: strata("trace sample surfaces", Format::Rgba32Uint)?,
             carried: strata("trace carried", Format::R32Uint)?,
             stratum_guide: strata("trace stratum guide", Format::R32Uint)?,
+            gradient_samples: strata("trace gradient samples", Format::Rgba32Uint)?,
             gradient_sums: strata("trace gradient sums", Format::Rgba16F)?,
             gradient: strata("trace gradient", Format::Rg16F)?,
         })
@@ -146,6 +149,7 @@ struct Step {
 pub struct Denoiser {
     device: Device,
     carry: ComputePipeline,
+    gradient_sample: ComputePipeline,
     gradient: ComputePipeline,
     gradient_wide: ComputePipeline,
     /// Without and with bounced light.
@@ -186,6 +190,10 @@ impl Denoiser {
         Ok(Self {
             device: device.clone(),
             carry: compute("trace_carry", &shaders::TRACE_CARRY_COMP)?,
+            gradient_sample: compute(
+                "trace_gradient_sample",
+                &shaders::TRACE_GRADIENT_SAMPLE_COMP,
+            )?,
             gradient: compute("trace_gradient", &shaders::TRACE_GRADIENT_COMP)?,
             gradient_wide: compute("trace_gradient_wide", &shaders::TRACE_GRADIENT_WIDE_COMP)?,
             temporal: [temporal(0)?, temporal(1)?],
@@ -252,6 +260,7 @@ impl Denoiser {
             sample_surfaces: nothing,
             carried: nothing,
             stratum_guide: nothing,
+            gradient_samples: nothing,
             gradient_sums: nothing,
             gradient: nothing,
             slope: nothing,
@@ -279,6 +288,7 @@ impl Denoiser {
             sample_surfaces: adaptive.sample_surfaces.storage_index(),
             carried: adaptive.carried.storage_index(),
             stratum_guide: adaptive.stratum_guide.storage_index(),
+            gradient_samples: adaptive.gradient_samples.storage_index(),
             gradient_sums: adaptive.gradient_sums.storage_index(),
             gradient: adaptive.gradient.storage_index(),
             past: adaptive.past[0].address(),
@@ -314,6 +324,8 @@ impl Denoiser {
         let size = images.size;
         if self.carries().is_some() {
             let strata = size.map(|s| s.div_ceil(STRATUM));
+            let name = "trace_gradient_sample";
+            dispatch(rec, name, &self.gradient_sample, view, strata, [TILE; 2])?;
             let tile = [GRADIENT_TILE; 2];
             dispatch(rec, "trace_gradient", &self.gradient, view, strata, tile)?;
             let name = "trace_gradient_wide";

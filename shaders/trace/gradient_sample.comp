@@ -1,0 +1,34 @@
+#version 460
+// The temporal gradient of each stratum's own sample: how much its light differs from the light that the same sample had
+// in the last frame (Schied et al. 2018, section 4.2). What gradient.comp spreads, in one texel: change and size of direct
+// light, of indirect light, and the logarithms of the luminance that the last frame was left with, as halfs; the guide.
+#include "trace/sparse.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+uint level_of(Carried c) {
+    LightTexel light = unpack_texel(LightTexels(DENOISE.history).at[place_of(c.last)]);
+    return packHalf2x16(log2(vec2(luminance(light.direct), luminance(light.indirect)) + 1.0e-5));
+}
+
+uvec2 gradient_at(ivec2 stratum, Carried c) {
+    ivec2 pixel = pixel_of(stratum, c.index);
+    vec2 now = vec2(luminance(light_read(VIEW.image_direct, pixel)), luminance(light_read(VIEW.image_indirect, pixel)));
+    // as the sample was rounded
+    now = unpackHalf2x16(packHalf2x16(now));
+    vec2 then = unpackHalf2x16(imageLoad(uimages_rgba32ui[DENOISE.sample_surfaces], c.last / STRATUM).z);
+    vec2 change = now - then, size = max(now, then);
+    if (then.y < 0.0 || !is_gathered(pixel)) change.y = size.y = 0.0;
+    return uvec2(packHalf2x16(vec2(change.x, size.x)), packHalf2x16(vec2(change.y, size.y)));
+}
+
+void main() {
+    ivec2 stratum = ivec2(gl_GlobalInvocationID.xy);
+    if (!inside(stratum * STRATUM)) return;
+    uvec4 texel = uvec4(0, 0, 0, imageLoad(uimages_r32ui[DENOISE.stratum_guide], stratum).x);
+    if (texel.w != 0) {
+        Carried c = carried_at(stratum);
+        if (c.valid) texel.xyz = uvec3(gradient_at(stratum, c), level_of(c));
+    }
+    imageStore(uimages_rgba32ui[DENOISE.gradient_samples], stratum, texel);
+}
