@@ -199,13 +199,17 @@ impl Gpu {
         self.look.denoiser.gradients = on;
     }
 
-    /// Position and path of each pixel of the last frame, and its motion as the motion image has it.
+    /// Position and path of each pixel of the last frame, and its motion: offset, length of the way then and now.
     pub fn motion(&self) -> Vec<([f32; 4], [f32; 4])> {
         let targets = self.look.targets.as_ref().expect("traced");
         let read = |image| self.device.read_image(image).expect("read");
         let places: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.position));
         let halves: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.motion));
-        let motions = halves.iter().map(|m| m.map(half));
+        let paths: Vec<u16> = bytemuck::pod_collect_to_vec(&read(&targets.path[1]));
+        let motions = halves.iter().zip(paths).map(|(motion, path)| {
+            let [x, y, last, _mark] = motion.map(half);
+            [x, y, last, half(path)]
+        });
         places.into_iter().zip(motions).collect()
     }
 
