@@ -42,7 +42,7 @@ const TRIES: usize = 8;
 pub(super) enum Site {
     /// On a surface, which all light falls on.
     Surface,
-    /// In the open, at a point of the light grid: only light that comes straight from lights ([`air`](super::air)).
+    /// In the open, at a point of the light grid: only light that comes straight from lights ([`super::air`]).
     Air,
 }
 
@@ -213,6 +213,34 @@ fn tells(world: &RelitWorld, surface: &WorldSurface) -> bool {
         })
 }
 
+/// Whether a surface stores its light in a lightmap.
+fn lit_by_texel(surface: &WorldSurface) -> bool {
+    surface.lightmap >= 0
+}
+
+/// Whether it stores it at its vertices, which are the map's own.
+fn lit_by_vertex(surface: &WorldSurface) -> bool {
+    surface.lightmap == q3bsp::lightmap_index::BY_VERTEX
+        && matches!(
+            surface.kind,
+            SurfaceKind::Planar | SurfaceKind::TriangleSoup
+        )
+}
+
+/// Area of surfaces that tell of light.
+fn area(world: &RelitWorld, is: fn(&WorldSurface) -> bool) -> f64 {
+    let told = world.surfaces.iter().filter(|s| is(s) && tells(world, s));
+    let triangles = told.flat_map(|surface| {
+        let first = surface.first_index as usize / 3;
+        first..first + surface.num_indices as usize / 3
+    });
+    let areas = triangles.filter_map(|triangle| {
+        let [a, b, c] = world.triangle(triangle)?;
+        Some(f64::from((b - a).cross(c - a).length() * 0.5)).filter(|area| area.is_finite())
+    });
+    areas.sum()
+}
+
 /// About `count` measurements, spread evenly over the map's area.
 pub(super) fn take(
     world: &RelitWorld,
@@ -225,7 +253,14 @@ pub(super) fn take(
     // A few lightmapped scraps say nothing about the rest.
     if lightmaps.len() >= 16 {
         balance(&mut lightmaps);
-        return (hold_out(lightmaps, &mut random), Evidence::Lightmaps);
+        let mut samples = hold_out(lightmaps, &mut random);
+        // What the map lights by vertex tells as much of its light as texels of the same area; agreement is told by
+        // texels alone.
+        let [by_vertex, by_texel] = [lit_by_vertex, lit_by_texel].map(|is| area(world, is));
+        let share = by_vertex / (by_vertex + by_texel).max(1.0);
+        let beside = (count as f64 * share) as usize;
+        samples.extend(vertices(world, occluders, beside, &mut random));
+        return (samples, Evidence::Lightmaps);
     }
     let lit = |s: &[Sample]| s.iter().any(|s| s.level() > 0.0 && !s.saturated);
     let vertices = vertices(world, occluders, count, &mut random);
@@ -371,7 +406,7 @@ fn texels(
     let mut triangles = Vec::new();
     let mut total = 0.0f64;
     for (index, surface) in world.surfaces.iter().enumerate() {
-        if surface.lightmap < 0 || !tells(world, surface) || !constant(world, index) {
+        if !lit_by_texel(surface) || !tells(world, surface) || !constant(world, index) {
             continue;
         }
         let first = surface.first_index as usize / 3;
@@ -516,12 +551,7 @@ fn vertices(
 ) -> Vec<Sample> {
     let mut all = Vec::new();
     for (index, surface) in world.surfaces.iter().enumerate() {
-        let by_vertex = surface.lightmap == q3bsp::lightmap_index::BY_VERTEX;
-        let own = matches!(
-            surface.kind,
-            SurfaceKind::Planar | SurfaceKind::TriangleSoup
-        );
-        if !by_vertex || !own || !tells(world, surface) {
+        if !lit_by_vertex(surface) || !tells(world, surface) {
             continue;
         }
         let stored = world.bsp.surfaces.get(index);

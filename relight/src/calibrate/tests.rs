@@ -86,8 +86,15 @@ fn room_map(
         let shader = map.add_shader("t/lamp", 0, 1);
         map.add_quad(shader, LAMP_CORNERS);
     }
-    for face in faces.into_iter().take(lightmapped) {
+    for (index, face) in faces.into_iter().enumerate() {
         let Some(light) = light else { continue };
+        if index >= lightmapped {
+            // they store no light, which is not the same as being dark
+            if lightmapped > 0 {
+                map.set_lightmap(face, q3bsp::lightmap_index::NONE);
+            }
+            continue;
+        }
         let corners = map.vertices_mut(face);
         let (a, b, d) = (corners[0], corners[1], corners[3]);
         let normal = a.normal;

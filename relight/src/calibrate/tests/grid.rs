@@ -96,3 +96,33 @@ fn the_grid_places_lights_that_few_texels_see() {
     let worst = |found: &[(f32, f32)]| found.iter().map(|f| f.0).fold(0.0, f32::max);
     assert!(worst(&with) < worst(&without), "{with:?} {without:?}");
 }
+
+#[test]
+fn what_is_lit_by_vertex_is_measured_beside_texels() {
+    let mut map = room_map("t/wall", false, 2, Some(&from_hidden));
+    let wall = map.add_shader("t/wall", 0, 1);
+    // A pane in the open, lit at its corners as the lights have it.
+    let corners = [[-40.0, 0.0], [-40.0, 60.0], [40.0, 60.0], [40.0, 0.0]];
+    let pane = map.add_quad(wall, corners.map(|[x, y]| Vec3::new(x, y, 40.0)));
+    map.set_lightmap(pane, q3bsp::lightmap_index::BY_VERTEX);
+    let normal = map.vertices_mut(pane)[0].normal;
+    for vertex in map.vertices_mut(pane) {
+        let stored = from_hidden(vertex.position + normal * 0.1, normal) * 255.0 / 4.0;
+        let [r, g, b] = stored.to_array().map(|c| c.round() as u8);
+        vertex.color = [r, g, b, 255];
+    }
+    let world = relit(&map.build());
+    let occluders = samples::occluders(&world);
+    let (samples, evidence) = samples::take(&world, &occluders, 4000, 1);
+    assert_eq!(evidence, Evidence::Lightmaps);
+    let on_pane =
+        |s: &&samples::Sample| (s.position.z - 40.0).abs() < 2.0 && s.position.x.abs() < 41.0;
+    let on_pane: Vec<_> = samples.iter().filter(on_pane).collect();
+    assert_eq!(on_pane.len(), 4);
+    for sample in on_pane {
+        let truth = from_hidden(sample.position, sample.normal);
+        assert!(!sample.held_out && sample.trust == 1.0);
+        let off = (sample.value - truth).abs().max_element();
+        assert!(off < 0.05, "{} {truth}", sample.value);
+    }
+}
