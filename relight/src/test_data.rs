@@ -21,12 +21,3 @@ pub(crate) fn folder() -> Option<PathBuf> {
     println!("skipped: no OpenArena data in {}", folder.display());
     None
 }
-
-/// Its packs.
-pub(crate) fn packs() -> Option<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder()?).ok()?;
-    let mut packs: Vec<_> = entries.flatten().map(|e| e.path()).collect();
-    packs.retain(|p| p.extension().is_some_and(|e| e == "pk3"));
-    packs.sort();
-    Some(packs)
-}

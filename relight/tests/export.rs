@@ -1,6 +1,9 @@
 //! What is exported is the map: counted and measured against the map's own lumps, and read by the `gltf` crate, which
 //! nobody here wrote.
 
+#[path = "../src/test_data.rs"]
+mod test_data;
+
 use glam::{Vec2, Vec3};
 use q3bsp::{Bsp, SurfaceKind, surface_flags};
 use relight::export::{
@@ -375,28 +378,9 @@ fn obj_has_every_triangle() {
 /// name with different flags.
 const MAPS: [&str; 3] = ["aggressor", "am_lavaarena", "oa_dm3"];
 
-/// The game's folder; `None`, with a line that says so, where it is not installed.
-fn game() -> Option<PathBuf> {
-    let folder = std::env::var_os("OPENARENA_DATA").map_or_else(
-        || PathBuf::from("/usr/share/games/openarena/baseoa"),
-        PathBuf::from,
-    );
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    let required = std::env::var("RELIGHT_REQUIRE_DATA").is_ok_and(|v| v == "1");
-    assert!(
-        !required,
-        "{}: OpenArena's data is required",
-        folder.display()
-    );
-    println!("skipped: no OpenArena data in {}", folder.display());
-    None
-}
-
 #[test]
 fn real_maps_are_exported_as_they_are() {
-    let Some(folder) = game() else {
+    let Some(folder) = test_data::folder() else {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();
@@ -411,7 +395,7 @@ fn real_maps_are_exported_as_they_are() {
 #[test]
 #[ignore = "converts and reads back every map of every pack"]
 fn all_maps_are_exported_as_they_are() {
-    let Some(folder) = game() else {
+    let Some(folder) = test_data::folder() else {
         return;
     };
     let mut packs: Vec<PathBuf> = std::fs::read_dir(&folder)

@@ -1,5 +1,8 @@
 //! Light lists against rays, on made-up maps whose matrix says that everything sees everything.
 
+#[path = "../src/test_data.rs"]
+mod test_data;
+
 use glam::Vec3;
 use q3bsp::builder::MapBuilder;
 use relight::light::{DROPPED_PART, judge, lists_by_geometry, lists_by_visibility, sweep};
@@ -164,28 +167,9 @@ fn what_rays_find_stays_in_the_lists() {
     }
 }
 
-/// OpenArena's game folder, or `None` with a line that says so; a failure when `RELIGHT_REQUIRE_DATA=1`.
-fn data() -> Option<std::path::PathBuf> {
-    let folder = std::env::var_os("OPENARENA_DATA").map_or_else(
-        || std::path::PathBuf::from("/usr/share/games/openarena/baseoa"),
-        std::path::PathBuf::from,
-    );
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    let required = std::env::var("RELIGHT_REQUIRE_DATA").is_ok_and(|v| v == "1");
-    assert!(
-        !required,
-        "{}: OpenArena's data is required",
-        folder.display()
-    );
-    println!("skipped: no OpenArena data in {}", folder.display());
-    None
-}
-
 #[test]
 fn on_a_real_map_lists_are_short_and_whole() {
-    let Some(folder) = data() else {
+    let Some(folder) = test_data::folder() else {
         return;
     };
     let files = relight::SearchPath::open(&[folder]).expect("packs");

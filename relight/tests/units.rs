@@ -4,31 +4,14 @@
 //! lightmap's texels: of a map with its light entities kept, and of one that is lit by surfaces alone. Bounced
 //! light is not computed, so somewhat less is right for the second.
 
+#[path = "../src/test_data.rs"]
+mod test_data;
+
 use glam::Vec3;
 use relight::light::{LightColor, LightRef};
 use relight::{Materials, RelitWorld, SearchPath, WorldSurface};
 use shaderscript::light::SurfaceClass;
 use std::f32::consts::PI;
-use std::path::PathBuf;
-
-/// OpenArena's game folder, or `None` with a line that says so; a failure when `RELIGHT_REQUIRE_DATA=1`.
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("OPENARENA_DATA").map_or_else(
-        || PathBuf::from("/usr/share/games/openarena/baseoa"),
-        PathBuf::from,
-    );
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    let required = std::env::var("RELIGHT_REQUIRE_DATA").is_ok_and(|v| v == "1");
-    assert!(
-        !required,
-        "{}: OpenArena's data is required",
-        folder.display()
-    );
-    println!("skipped: no OpenArena data in {}", folder.display());
-    None
-}
 
 /// Triangles that stop light, tried one after the other.
 struct Occluders(Vec<([Vec3; 3], bool)>);
@@ -152,7 +135,7 @@ fn direct(
 
 /// Median of computed over stored light, at texels that are neither black nor cut off.
 fn median_ratio(map: &str) -> Option<f32> {
-    let files = SearchPath::open(&[data()?]).unwrap();
+    let files = SearchPath::open(&[test_data::folder()?]).unwrap();
     let (materials, _) = Materials::load(&files);
     let options = relight::Options {
         light_color: LightColor::Stored,

@@ -1,9 +1,8 @@
 // The one place of the tracer that knows how displayed colours are encoded.
 //
 // Textures, vertex colours, entity colours and the colours of waves and constants are what the classic look would put
-// on the screen: sRGB (IEC 61966-2-1). Each factor is decoded on its own and products are taken of linear values; for
-// a pure power law that is the same as decoding the product, for sRGB it is nearly so, and a texture that is
-// multiplied by white comes out of the tone curve exactly as it went in. Alpha is linear already.
+// on the screen: sRGB (IEC 61966-2-1). Stages are put together as they are displayed (layer.glsl) and decoded then; what
+// is multiplied by white comes out of the tone curve exactly as it went in. Alpha is linear already.
 #ifndef RELIGHT_TRACE_COLOR_GLSL
 #define RELIGHT_TRACE_COLOR_GLSL
 

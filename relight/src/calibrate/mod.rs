@@ -45,6 +45,7 @@ mod solve;
 mod suns;
 #[cfg(test)]
 mod tests;
+mod vertices;
 mod views;
 
 pub use cache::CalibrationCache;

@@ -6,10 +6,11 @@
 use super::air;
 use super::bvh::{CutOut, Occluders};
 use super::random::Random;
+use super::vertices;
 use crate::light;
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
 use glam::{Vec2, Vec3};
-use q3bsp::{Lightmap, SurfaceKind};
+use q3bsp::Lightmap;
 use shaderscript::light::SurfaceClass;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -202,7 +203,7 @@ fn constant(world: &RelitWorld, surface: usize) -> bool {
 }
 
 /// Whether light on a surface tells of the lights around it.
-fn tells(world: &RelitWorld, surface: &WorldSurface) -> bool {
+pub(super) fn tells(world: &RelitWorld, surface: &WorldSurface) -> bool {
     let material = world.materials.get(surface.material as usize);
     surface.model == 0
         && surface.num_indices > 0
@@ -216,15 +217,6 @@ fn tells(world: &RelitWorld, surface: &WorldSurface) -> bool {
 /// Whether a surface stores its light in a lightmap.
 fn lit_by_texel(surface: &WorldSurface) -> bool {
     surface.lightmap >= 0
-}
-
-/// Whether it stores it at its vertices, which are the map's own.
-fn lit_by_vertex(surface: &WorldSurface) -> bool {
-    surface.lightmap == q3bsp::lightmap_index::BY_VERTEX
-        && matches!(
-            surface.kind,
-            SurfaceKind::Planar | SurfaceKind::TriangleSoup
-        )
 }
 
 /// Area of surfaces that tell of light.
@@ -256,14 +248,14 @@ pub(super) fn take(
         let mut samples = hold_out(lightmaps, &mut random);
         // What the map lights by vertex tells as much of its light as texels of the same area; agreement is told by
         // texels alone.
-        let [by_vertex, by_texel] = [lit_by_vertex, lit_by_texel].map(|is| area(world, is));
+        let [by_vertex, by_texel] = [vertices::lit, lit_by_texel].map(|is| area(world, is));
         let share = by_vertex / (by_vertex + by_texel).max(1.0);
         let beside = (count as f64 * share) as usize;
-        samples.extend(vertices(world, occluders, beside, &mut random));
+        samples.extend(vertices::take(world, occluders, beside, &mut random));
         return (samples, Evidence::Lightmaps);
     }
     let lit = |s: &[Sample]| s.iter().any(|s| s.level() > 0.0 && !s.saturated);
-    let vertices = vertices(world, occluders, count, &mut random);
+    let vertices = vertices::take(world, occluders, count, &mut random);
     if vertices.len() >= 16 && lit(&vertices) {
         return (hold_out(vertices, &mut random), Evidence::Vertices);
     }
@@ -297,7 +289,7 @@ fn hold_out(mut samples: Vec<Sample>, random: &mut Random) -> Vec<Sample> {
 }
 
 /// A measurement at a place, unless the place is outside of the map or inside of something.
-fn sample_at(
+pub(super) fn sample_at(
     world: &RelitWorld,
     occluders: &Occluders,
     (on, normal): (Vec3, Vec3),
@@ -341,7 +333,7 @@ fn sample_at(
 
 /// What is stored at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Stored {
+pub(super) struct Stored {
     rgb: [u8; 3],
     /// Black, and not all around it is.
     lone_black: bool,
@@ -351,7 +343,7 @@ struct Stored {
 
 impl Stored {
     /// A value that tells nothing of what is around it.
-    fn alone(rgb: [u8; 3]) -> Stored {
+    pub(super) fn alone(rgb: [u8; 3]) -> Stored {
         Stored {
             rgb,
             lone_black: black(rgb),
@@ -540,36 +532,6 @@ fn place_of([a, b, c]: [&WorldVertex; 3], at: Vec2, size: f32) -> Option<(Vec3, 
         let normal = a.normal + (b.normal - a.normal) * u + (c.normal - a.normal) * v;
         (on, normal.normalize_or_zero())
     })
-}
-
-/// Lit vertices of surfaces without a page. Each stands for itself, however large its surface is.
-fn vertices(
-    world: &RelitWorld,
-    occluders: &Occluders,
-    count: usize,
-    random: &mut Random,
-) -> Vec<Sample> {
-    let mut all = Vec::new();
-    for (index, surface) in world.surfaces.iter().enumerate() {
-        if !lit_by_vertex(surface) || !tells(world, surface) {
-            continue;
-        }
-        let stored = world.bsp.surfaces.get(index);
-        let stored = stored.map_or(&[][..], |s| world.bsp.surface_vertices(s));
-        let first = surface.first_vertex as usize;
-        let made = world.vertices.get(first..).unwrap_or_default();
-        all.extend(stored.iter().zip(made).map(|(raw, vertex)| {
-            let [r, g, b, _] = raw.color;
-            let place = (vertex.position, vertex.normal);
-            (place, surface.material, Stored::alone([r, g, b]))
-        }));
-    }
-    pick(all.len(), count, random)
-        .filter_map(|i| all.get(i))
-        .filter_map(|&(place, material, stored)| {
-            sample_at(world, occluders, place, material, stored)
-        })
-        .collect()
 }
 
 /// Indices below `len`, in order: all, or one of each of `count` equal stretches.

@@ -1,6 +1,9 @@
 //! A `.map` is the compiled map again: its brushes are made into solids as a compiler does it, and compared with the
 //! compiled map's own lumps.
 
+#[path = "../../src/test_data.rs"]
+mod test_data;
+
 mod read;
 mod solid;
 
@@ -291,27 +294,9 @@ fn the_sample_map_comes_back() {
     }
 }
 
-fn game() -> Option<PathBuf> {
-    let folder = std::env::var_os("OPENARENA_DATA").map_or_else(
-        || PathBuf::from("/usr/share/games/openarena/baseoa"),
-        PathBuf::from,
-    );
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    let required = std::env::var("RELIGHT_REQUIRE_DATA").is_ok_and(|v| v == "1");
-    assert!(
-        !required,
-        "{}: OpenArena's data is required",
-        folder.display()
-    );
-    println!("skipped: no OpenArena data in {}", folder.display());
-    None
-}
-
 #[test]
 fn real_maps_come_back() {
-    let Some(folder) = game() else {
+    let Some(folder) = test_data::folder() else {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();
@@ -336,9 +321,11 @@ fn real_maps_come_back() {
 #[test]
 #[ignore = "needs a file saved by an editor"]
 fn a_file_saved_by_an_editor_is_the_map() {
-    let (Some(folder), Ok(file), Ok(map)) =
-        (game(), std::env::var("MAP_FILE"), std::env::var("MAP"))
-    else {
+    let (Some(folder), Ok(file), Ok(map)) = (
+        test_data::folder(),
+        std::env::var("MAP_FILE"),
+        std::env::var("MAP"),
+    ) else {
         println!("skipped: MAP_FILE and MAP name the file and its map");
         return;
     };
@@ -356,7 +343,7 @@ fn a_file_saved_by_an_editor_is_the_map() {
 #[test]
 #[ignore = "writes and reads back every map of every pack"]
 fn all_maps_come_back() {
-    let Some(folder) = game() else {
+    let Some(folder) = test_data::folder() else {
         return;
     };
     let mut packs: Vec<PathBuf> = std::fs::read_dir(&folder)

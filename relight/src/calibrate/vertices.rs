@@ -1,0 +1,46 @@
+//! Light at the vertices of surfaces that have no lightmap, as measurements.
+
+use super::bvh::Occluders;
+use super::random::Random;
+use super::samples::{Sample, Stored, pick, sample_at, tells};
+use crate::world::{RelitWorld, WorldSurface};
+use q3bsp::SurfaceKind;
+
+/// Whether a surface stores its light at its vertices, which are the map's own.
+pub(super) fn lit(surface: &WorldSurface) -> bool {
+    surface.lightmap == q3bsp::lightmap_index::BY_VERTEX
+        && matches!(
+            surface.kind,
+            SurfaceKind::Planar | SurfaceKind::TriangleSoup
+        )
+}
+
+/// Lit vertices of surfaces without a page. Each stands for itself, however large its surface is.
+pub(super) fn take(
+    world: &RelitWorld,
+    occluders: &Occluders,
+    count: usize,
+    random: &mut Random,
+) -> Vec<Sample> {
+    let mut all = Vec::new();
+    for (index, surface) in world.surfaces.iter().enumerate() {
+        if !lit(surface) || !tells(world, surface) {
+            continue;
+        }
+        let stored = world.bsp.surfaces.get(index);
+        let stored = stored.map_or(&[][..], |s| world.bsp.surface_vertices(s));
+        let first = surface.first_vertex as usize;
+        let made = world.vertices.get(first..).unwrap_or_default();
+        all.extend(stored.iter().zip(made).map(|(raw, vertex)| {
+            let [r, g, b, _] = raw.color;
+            let place = (vertex.position, vertex.normal);
+            (place, surface.material, Stored::alone([r, g, b]))
+        }));
+    }
+    pick(all.len(), count, random)
+        .filter_map(|i| all.get(i))
+        .filter_map(|&(place, material, stored)| {
+            sample_at(world, occluders, place, material, stored)
+        })
+        .collect()
+}
