@@ -610,6 +610,11 @@ pub mod constants {
     pub const LIGHT_CHANGING_SPHERE: u32 = 3;
     pub const LIGHT_SUN: u32 = 4;
     pub const TRIANGLE_RANK_SHIFT: u32 = 8;
+    pub const TRIANGLE_PATHS_SHIFT: u32 = 16;
+    pub const PATHS_ALL: u32 = 0;
+    pub const PATHS_DIRECT: u32 = 1;
+    pub const PATHS_PORTAL: u32 = 2;
+    pub const PATHS_MOST: u32 = 32;
     pub const LAST_UNKNOWN: u32 = 0;
     pub const LAST_MOVED: u32 = 1;
     pub const LAST_SAME: u32 = 2;

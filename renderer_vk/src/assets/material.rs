@@ -1,7 +1,7 @@
 //! What a material is once it is registered: a script's definition bound to images, in the form that the passes read.
 
 use shaders::types::Dielectric;
-use shaderscript::{AlphaGen, Cull, Fog, Shader, TcGen};
+use shaderscript::{AlphaGen, Cull, Deform, Fog, Shader, TcGen};
 
 /// What a surface's light comes from: part of a material's identity, as the engine's lightmap index is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -135,6 +135,12 @@ impl Material {
     /// Whether vertices move with time or view, so that its surfaces are dynamic meshes.
     pub fn deforms(&self) -> bool {
         !self.shader.deforms.is_empty()
+    }
+
+    /// Whether its surfaces turn to the eye.
+    pub fn turns_to_eye(&self) -> bool {
+        let turns = |d: &Deform| matches!(d, Deform::AutoSprite | Deform::AutoSprite2);
+        self.shader.deforms.iter().any(turns)
     }
 
     /// Its name in lists: the default material has one of its own.

@@ -10,6 +10,7 @@ use super::lighting;
 use super::mesh::RawMesh;
 use super::shapes::MeshBuilder;
 use super::surfaces::{self, LocalView};
+use super::turned::Way;
 use super::{Look, Submodel, ViewScene};
 use crate::api::{EntityKind, RefEntity, renderfx};
 use crate::assets::Model;
@@ -57,21 +58,32 @@ impl Gatherer<'_> {
             placed.flags |= c::INSTANCE_SUSPENDED;
         }
         out.instances.push(placed);
-        let raw = RawMesh::begin(out, material, instance, fog);
-        let (view, settings) = (self.view, self.input.settings);
-        let mut builder = MeshBuilder {
-            vertices: &mut out.vertices,
-            indices: &mut out.indices,
-        };
-        match entity.kind {
-            EntityKind::Sprite => builder.sprite(entity, &view),
-            EntityKind::Beam => builder.beam(entity),
-            EntityKind::RailCore => builder.rail_core(entity, &view, settings),
-            EntityKind::RailRings => builder.rail_rings(entity, settings),
-            EntityKind::Lightning => builder.lightning(entity, &view),
-            EntityKind::Model | EntityKind::Poly | EntityKind::PortalSurface => {}
+        let settings = self.input.settings;
+        let turns = matches!(
+            entity.kind,
+            EntityKind::Sprite | EntityKind::RailCore | EntityKind::Lightning
+        ) || materials.get(material).turns_to_eye();
+        let ways = self.ways_of(entity, turns);
+        for way in 0..ways {
+            let Some(Way { paths, view }) = self.way(way, ways) else {
+                continue;
+            };
+            let mut raw = RawMesh::begin(out, material, instance, fog);
+            raw.paths = paths;
+            let mut builder = MeshBuilder {
+                vertices: &mut out.vertices,
+                indices: &mut out.indices,
+            };
+            match entity.kind {
+                EntityKind::Sprite => builder.sprite(entity, &view),
+                EntityKind::Beam => builder.beam(entity),
+                EntityKind::RailCore => builder.rail_core(entity, &view, settings),
+                EntityKind::RailRings => builder.rail_rings(entity, settings),
+                EntityKind::Lightning => builder.lightning(entity, &view),
+                EntityKind::Model | EntityKind::Poly | EntityKind::PortalSurface => {}
+            }
+            self.finish_and_list(raw, asked, number, Some(entity), out);
         }
-        self.finish_and_list(raw, asked, number, Some(entity), out);
     }
 
     fn add_model(&mut self, number: u32, entity: &RefEntity, hidden: bool, out: &mut ViewScene) {
@@ -91,15 +103,21 @@ impl Gatherer<'_> {
                 out.instances
                     .push(entity::effect_instance(entity, &self.view, out.time));
                 let axes = self.input.materials.internal().axes;
-                let raw = RawMesh::begin(out, axes, instance, 0);
-                let view = self.view;
-                MeshBuilder {
-                    vertices: &mut out.vertices,
-                    indices: &mut out.indices,
+                let ways = self.ways_of(entity, true);
+                for way in 0..ways {
+                    let Some(Way { paths, view }) = self.way(way, ways) else {
+                        continue;
+                    };
+                    let mut raw = RawMesh::begin(out, axes, instance, 0);
+                    raw.paths = paths;
+                    MeshBuilder {
+                        vertices: &mut out.vertices,
+                        indices: &mut out.indices,
+                    }
+                    .axes(entity, &view);
+                    // the engine lists it under its default material
+                    self.finish_and_list(raw, 0, number, Some(entity), out);
                 }
-                .axes(entity, &view);
-                // the engine lists it under its default material
-                self.finish_and_list(raw, 0, number, Some(entity), out);
             }
         }
     }

@@ -14,11 +14,12 @@ use super::rigid::RigidMeshes;
 use super::surfaces::{
     self, LocalLight, LocalView, PendingDeform, SurfaceRun, WORLD_ENTITY, sort_key,
 };
+use super::turned::{self, Way};
 use super::{
     DynamicMesh, GatherInput, Look, MeshId, Scene, Shape, Statistics, Sun, View, ViewEntity,
     ViewScene,
 };
-use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
+use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags, renderfx};
 use crate::world::{Bounds, VisibleQuery, VisibleSet, WorldData};
 
 /// Stands for the map in the numbers of meshes: models have positive handles.
@@ -71,9 +72,17 @@ pub(super) fn views(
         .pool
         .pop()
         .unwrap_or_else(|| ViewScene::empty(def, view));
-    Gatherer::new(scene, input, def, look, view).gather(def.view_origin, &mut main);
+    let portals = match look {
+        Look::Traced => portal::find_all(&scene.entities, input, def),
+        Look::Classic => Vec::new(),
+    };
+    let mut turned = std::mem::take(&mut scene.turned);
+    turned::views(&portals, &view, &mut turned);
+    Gatherer::new(scene, input, def, look, view, &turned).gather(def.view_origin, &mut main);
+    main.portals.extend(portals);
+    scene.turned = turned;
     match look {
-        Look::Traced => portal::find_all(&scene.entities, input, def, &mut main),
+        Look::Traced => {}
         Look::Classic => {
             if let Some(portal) = portal::find_first(&scene.entities, input, def, &main) {
                 let seen = portal::view_through(&portal, &main.view);
@@ -81,7 +90,8 @@ pub(super) fn views(
                     .pool
                     .pop()
                     .unwrap_or_else(|| ViewScene::empty(def, seen));
-                Gatherer::new(scene, input, def, look, seen).gather(portal.pvs_origin, &mut behind);
+                Gatherer::new(scene, input, def, look, seen, &[])
+                    .gather(portal.pvs_origin, &mut behind);
                 main.portals.push(portal);
                 out.push(behind);
                 if input.settings.portal_only {
@@ -112,6 +122,8 @@ pub(super) struct Gatherer<'a> {
     pub(super) def: &'a RefDef,
     pub(super) look: Look,
     pub(super) view: View,
+    /// The views through portals, by the numbers of their paths: what turns to the eye turns to these, too.
+    turned: &'a [Option<View>],
     /// The world, when the view shows it.
     pub(super) world: Option<&'a WorldData>,
     pub(super) frustum: [Vec4; 4],
@@ -126,6 +138,7 @@ impl<'a> Gatherer<'a> {
         def: &'a RefDef,
         look: Look,
         view: View,
+        turned: &'a [Option<View>],
     ) -> Self {
         let settings = input.settings;
         let dynamic = settings.dynamic_light && !settings.vertex_light;
@@ -149,6 +162,7 @@ impl<'a> Gatherer<'a> {
             def,
             look,
             view,
+            turned,
             world: input.world.filter(|_| shows_world),
             frustum: view.frustum(),
             culling: look == Look::Classic && !settings.no_cull,
@@ -377,40 +391,76 @@ impl<'a> Gatherer<'a> {
             let Some(surface) = world.surfaces.get(deform.surface as usize) else {
                 continue;
             };
-            let mut raw = RawMesh::begin(out, deform.material, instance, surface.fog);
-            raw.world_surface = Some(deform.surface);
-            raw.shape = Shape::Animated(MeshId {
-                model: WORLD_MODEL,
-                level: 0,
-                surface: deform.surface,
-            });
-            let first = surface.first_index as usize;
-            let range = first..first + surface.index_count as usize;
-            let base = count(out.vertices.len());
-            let own = world.surface_vertices(surface);
-            let classic = world
-                .classic_vertices(surface)
-                .filter(|_| self.look == Look::Classic);
-            out.vertices.extend_from_slice(classic.unwrap_or(own));
-            out.indices.extend(
-                world
-                    .indices
-                    .get(range)
-                    .unwrap_or_default()
-                    .iter()
-                    .map(|i| i.wrapping_sub(surface.first_vertex).wrapping_add(base)),
-            );
-            let mesh = self.finish(raw, entity, out);
-            if let Some(mesh) = mesh.filter(|_| self.look == Look::Classic) {
-                surfaces::push_mesh_surface(
-                    out,
-                    &mesh,
-                    deform.sort_key,
-                    surface.lightmap,
-                    deform.dlights,
+            let turns = self.input.materials.get(deform.material).turns_to_eye();
+            let ways = if turns { self.turned.len() + 1 } else { 1 };
+            for way in 0..ways {
+                let Some(Way { paths, .. }) = self.way(way, ways) else {
+                    continue;
+                };
+                let mut raw = RawMesh::begin(out, deform.material, instance, surface.fog);
+                raw.paths = paths;
+                raw.world_surface = Some(deform.surface);
+                raw.shape = Shape::Animated(MeshId {
+                    model: WORLD_MODEL,
+                    level: 0,
+                    surface: deform.surface,
+                });
+                let first = surface.first_index as usize;
+                let range = first..first + surface.index_count as usize;
+                let base = count(out.vertices.len());
+                let own = world.surface_vertices(surface);
+                let classic = world
+                    .classic_vertices(surface)
+                    .filter(|_| self.look == Look::Classic);
+                out.vertices.extend_from_slice(classic.unwrap_or(own));
+                out.indices.extend(
+                    world
+                        .indices
+                        .get(range)
+                        .unwrap_or_default()
+                        .iter()
+                        .map(|i| i.wrapping_sub(surface.first_vertex).wrapping_add(base)),
                 );
+                let mesh = self.finish(raw, entity, out);
+                if let Some(mesh) = mesh.filter(|_| self.look == Look::Classic) {
+                    surfaces::push_mesh_surface(
+                        out,
+                        &mesh,
+                        deform.sort_key,
+                        surface.lightmap,
+                        deform.dlights,
+                    );
+                }
             }
         }
+    }
+
+    /// On how many ways the eye may see an entity: one, if it does not turn to the eye, or is seen straight on alone.
+    pub(super) fn ways_of(&self, entity: &RefEntity, turns: bool) -> usize {
+        let first_person = entity.renderfx & renderfx::FIRST_PERSON != 0;
+        if turns && !first_person {
+            self.turned.len() + 1
+        } else {
+            1
+        }
+    }
+
+    /// One of so many ways; `None` if nothing is seen on it.
+    pub(super) fn way(&self, index: usize, ways: usize) -> Option<Way> {
+        let Some(index) = index.checked_sub(1) else {
+            return Some(Way {
+                paths: if ways > 1 {
+                    turned::DIRECT
+                } else {
+                    turned::ALL
+                },
+                view: self.view,
+            });
+        };
+        Some(Way {
+            paths: turned::PORTAL.checked_add(u8::try_from(index).ok()?)?,
+            view: self.turned.get(index).copied()??,
+        })
     }
 
     fn finish(
@@ -419,11 +469,14 @@ impl<'a> Gatherer<'a> {
         entity: Option<&RefEntity>,
         out: &mut ViewScene,
     ) -> Option<DynamicMesh> {
+        let way = raw.paths.checked_sub(turned::PORTAL);
+        let through = way.and_then(|way| self.turned.get(usize::from(way)).copied()?);
         mesh::finish(
             raw,
             entity,
             self.input.materials,
             self.def,
+            &through.unwrap_or(self.view),
             &mut self.scratch.deform,
             out,
         )

@@ -6,7 +6,7 @@ use shaderscript::Deform;
 use shaderscript::eval::{self, DeformContext, DeformVertex, ShadowProjection};
 
 use super::entity::into_axes;
-use super::{DynamicMesh, Shape, View, ViewScene};
+use super::{DynamicMesh, Shape, View, ViewScene, turned};
 use crate::api::{RefDef, RefEntity};
 use crate::assets::Materials;
 
@@ -35,6 +35,8 @@ pub(super) struct RawMesh {
     pub world_surface: Option<u32>,
     /// How much of it is the same in the next frame.
     pub shape: Shape,
+    /// Which paths meet it, see [`turned`](super::turned).
+    pub paths: u8,
 }
 
 impl RawMesh {
@@ -48,6 +50,7 @@ impl RawMesh {
             fog,
             world_surface: None,
             shape: Shape::Changing,
+            paths: turned::ALL,
         }
     }
 }
@@ -68,19 +71,20 @@ impl ViewScene {
     }
 }
 
-/// Deforms what was appended since `raw` began, and lists it. `None` when nothing is left of it, or some
-/// position is not a number.
+/// Deforms what was appended since `raw` began, as `view` sees it, and lists it. `None` when nothing is left of it, or
+/// some position is not a number.
 pub(super) fn finish(
     raw: RawMesh,
     entity: Option<&RefEntity>,
     materials: &Materials,
     def: &RefDef,
+    view: &View,
     scratch: &mut DeformScratch,
     out: &mut ViewScene,
 ) -> Option<DynamicMesh> {
     let material = materials.get(raw.material);
     if material.deforms() {
-        deform(&raw, entity, material, def, scratch, out);
+        deform(&raw, entity, material, def, view, scratch, out);
     }
     let vertex_count = out.vertices.len() - raw.first_vertex;
     let index_count = out.indices.len() - raw.first_index;
@@ -105,6 +109,7 @@ pub(super) fn finish(
         fog: raw.fog,
         world_surface: raw.world_surface,
         shape: raw.shape,
+        paths: raw.paths,
     };
     out.meshes.push(mesh);
     Some(mesh)
@@ -115,6 +120,7 @@ fn deform(
     entity: Option<&RefEntity>,
     material: &crate::assets::Material,
     def: &RefDef,
+    view: &View,
     scratch: &mut DeformScratch,
     out: &mut ViewScene,
 ) {
@@ -142,7 +148,6 @@ fn deform(
     let raw_indices = out.indices.get(raw.first_index..).unwrap_or_default();
     indices.extend(raw_indices.iter().map(|i| i.wrapping_sub(base)));
     let texts: [&[u8]; 8] = std::array::from_fn(|i| def.text[i].as_slice());
-    let view: &View = &out.view;
     let scaled = entity.filter(|e| e.non_normalized_axes);
     let context = DeformContext {
         time: {

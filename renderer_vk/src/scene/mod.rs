@@ -23,6 +23,7 @@ mod shapes;
 mod sky;
 mod statistics;
 mod surfaces;
+pub(crate) mod turned;
 pub mod view;
 
 use std::sync::Arc;
@@ -111,6 +112,8 @@ pub struct DynamicMesh {
     pub world_surface: Option<u32>,
     /// How much of it is the same in the next frame.
     pub shape: Shape,
+    /// Which paths of the traced look meet it: those of one of the numbers of [`turned`].
+    pub paths: u8,
 }
 
 /// The triangles of a mesh, wherever they are kept; in the space of its instance.
@@ -379,6 +382,8 @@ pub struct Scene {
     /// Empty lists of views, for their memory.
     lists: Vec<Vec<ViewScene>>,
     scratch: gather::Scratch,
+    /// Memory of the views through portals.
+    turned: Vec<Option<View>>,
     warned_not_finite: bool,
     eye: Eye,
 }

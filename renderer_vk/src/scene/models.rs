@@ -12,6 +12,7 @@ use super::cull;
 use super::gather::{Gatherer, count};
 use super::key_frames::{self, Frames};
 use super::mesh::RawMesh;
+use super::turned::Way;
 use super::{DynamicMesh, Look, MeshId, Shape, ViewScene};
 use crate::api::{RefEntity, renderfx};
 use crate::assets::{IqmModel, Md3Lod, MdrModel, Model};
@@ -277,7 +278,21 @@ impl Gatherer<'_> {
             if volumes && Some(asked) != shadow {
                 out.add_shadow_volumes(&raw);
             }
-            self.finish_and_list(raw, asked, placed.number, Some(placed.entity), out);
+            let turns = self.input.materials.get(material).turns_to_eye();
+            let ways = self.ways_of(placed.entity, turns);
+            for way in 0..ways {
+                let Some(Way { paths, .. }) = self.way(way, ways) else {
+                    continue;
+                };
+                if way > 0 {
+                    let shape = raw.shape;
+                    raw = RawMesh::begin(out, material, placed.instance, placed.fog);
+                    raw.shape = shape;
+                    append(out);
+                }
+                raw.paths = paths;
+                self.finish_and_list(raw, asked, placed.number, Some(placed.entity), out);
+            }
         }
     }
 
@@ -326,6 +341,7 @@ impl Gatherer<'_> {
                 fog: raw.fog,
                 world_surface: None,
                 shape,
+                paths: raw.paths,
             });
         }
         true

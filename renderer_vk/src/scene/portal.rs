@@ -8,7 +8,8 @@ use shaders::types::Instance;
 
 use super::shapes::perpendicular;
 use super::{DrawSurface, GatherInput, Geometry, Portal, View, ViewScene, entity};
-use crate::api::{EntityKind, RefDef, RefEntity};
+use crate::api::{EntityKind, RefDef, RefEntity, rdflags};
+use crate::assets::Model;
 use crate::world::WorldData;
 
 /// Farthest that the entity may be from the plane that it marks, units.
@@ -47,26 +48,20 @@ pub(super) fn find_all(
     entities: &[RefEntity],
     input: &GatherInput<'_>,
     def: &RefDef,
-    out: &mut ViewScene,
-) {
-    let Some(world) = input.world.filter(|_| out.has_world) else {
-        return;
+) -> Vec<Portal> {
+    let mut found: Vec<Portal> = Vec::new();
+    let shows_world = def.flags & rdflags::NO_WORLD_MODEL == 0;
+    let Some(world) = input.world.filter(|_| shows_world) else {
+        return found;
     };
     if input.settings.no_portals || !entities.iter().any(|e| e.kind == EntityKind::PortalSurface) {
-        return;
+        return found;
     }
     for &index in &world.portal_surfaces {
         let Some(surface) = world.surfaces.get(index as usize) else {
             continue;
         };
-        let placed = (surface.model == 0)
-            .then_some(0)
-            .or_else(|| {
-                let of_model = out.submodels.iter().find(|s| s.model == surface.model);
-                of_model.map(|s| s.instance)
-            })
-            .and_then(|instance| out.instances.get(instance as usize).copied());
-        let Some(instance) = placed else {
+        let Some(instance) = placed_model(surface.model, entities, input) else {
             continue;
         };
         let plane = surface.plane.map(|plane| placed_plane(plane, &instance));
@@ -79,13 +74,42 @@ pub(super) fn find_all(
         let Some(portal) = plane.and_then(|plane| portal_at(plane, entities, def)) else {
             continue;
         };
-        let known = out.portals.iter().any(|p| {
+        let known = found.iter().any(|p| {
             p.plane.abs_diff_eq(portal.plane, 1e-3) && p.entity_origin == portal.entity_origin
         });
         if !known {
-            out.portals.push(portal);
+            found.push(portal);
         }
     }
+    found
+}
+
+/// Where a model of the map is: 0 is the map itself. `None`: no entity places it.
+fn placed_model(model: u32, entities: &[RefEntity], input: &GatherInput<'_>) -> Option<Instance> {
+    let identity = Instance {
+        axis: [Vec3::X, Vec3::Y, Vec3::Z],
+        ..Instance::default()
+    };
+    if model == 0 {
+        return Some(identity);
+    }
+    if !input.settings.draw_entities {
+        return None;
+    }
+    let places = |e: &&RefEntity| {
+        let of_map = |m: &Model| matches!(m, Model::Inline { model: of, .. } if *of == model);
+        e.kind == EntityKind::Model && input.models.get(e.model).is_some_and(of_map)
+    };
+    let entity = entities.iter().find(places)?;
+    entity
+        .axis
+        .iter()
+        .all(|a| a.is_finite())
+        .then_some(Instance {
+            axis: entity.axis,
+            origin: entity.origin,
+            ..identity
+        })
 }
 
 /// The plane that the map stores for a surface of the view. Which way is up in a portal depends on the least of its
@@ -245,7 +269,7 @@ pub(super) fn view_through(portal: &Portal, from: &View) -> View {
     let mut view = View {
         origin: portal.camera_origin + turn(from.origin - portal.surface_origin),
         axis: from.axis.map(turn),
-        mirrored: portal.mirror,
+        mirrored: portal.mirror != from.mirrored,
         clip_plane: Some(Vec4::from((normal, normal.dot(portal.camera_origin)))),
         is_portal: true,
         ..*from

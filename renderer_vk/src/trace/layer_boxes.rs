@@ -10,7 +10,7 @@ use super::geometry::StaticGeometry;
 use super::input::{Kind, MaterialTable};
 use super::parts::axes;
 use super::surroundings::{Corners, merged};
-use crate::scene::ViewScene;
+use crate::scene::{ViewScene, turned};
 use crate::world::{Bounds, outside};
 
 /// Boxes that a ray is held against; with more of them in sight each is around several.
@@ -108,7 +108,9 @@ pub fn in_sight(
     }
     for mesh in &view.meshes {
         let (_, info) = materials.info(mesh.material);
-        if Kind::of(info.flags) == Some(Kind::Translucent) {
+        // the rays that meet what is turned otherwise ask anyway
+        let straight_on = mesh.paths < turned::PORTAL;
+        if straight_on && Kind::of(info.flags) == Some(Kind::Translucent) {
             let vertices = view.mesh_geometry(mesh).vertices;
             add(&bounds_of(vertices.iter()), mesh.instance);
         }

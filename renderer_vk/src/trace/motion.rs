@@ -242,14 +242,14 @@ impl Past {
     /// Surfaces of the world that are deformed.
     fn follow_world(&self, view: &ViewScene, positions: &mut [Vec3]) {
         let ours = |mesh: &&DynamicMesh| mesh.instance == 0 && mesh.world_surface.is_some();
-        let old: HashMap<u32, &DynamicMesh> = self
+        let old: HashMap<(u32, u8), &DynamicMesh> = self
             .meshes
             .iter()
             .filter(ours)
-            .filter_map(|mesh| Some((mesh.world_surface?, mesh)))
+            .filter_map(|mesh| Some(((mesh.world_surface?, mesh.paths), mesh)))
             .collect();
         for mesh in view.meshes.iter().filter(ours) {
-            if let Some(old) = mesh.world_surface.and_then(|s| old.get(&s)) {
+            if let Some(old) = mesh.world_surface.and_then(|s| old.get(&(s, mesh.paths))) {
                 self.follow_mesh(mesh, old, positions);
             }
         }

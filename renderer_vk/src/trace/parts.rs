@@ -6,7 +6,7 @@ use std::ops::Range;
 use glam::{Mat3, Vec3};
 use shaders::trace_types::constants::{
     MASK_FIRST_SOLID, MASK_FIRST_TRANSLUCENT, MASK_NO_SHADOW, MASK_SKY, MASK_SOLID,
-    MASK_THIRD_SOLID, MASK_THIRD_TRANSLUCENT, MASK_TRANSLUCENT,
+    MASK_THIRD_SOLID, MASK_THIRD_TRANSLUCENT, MASK_TRANSLUCENT, TRIANGLE_PATHS_SHIFT,
 };
 use shaders::types::constants as c;
 use shaders::types::{Instance, Triangle};
@@ -14,7 +14,7 @@ use shaders::types::{Instance, Triangle};
 use super::cutout::Coverage;
 use super::geometry::rank_bits;
 use super::input::{Kind, MaterialInfo, MaterialTable};
-use crate::scene::{DynamicMesh, MeshId, Shape, ViewScene};
+use crate::scene::{DynamicMesh, MeshId, Shape, ViewScene, turned};
 
 /// Smallest volume of an entity's axes that an instance can be turned back from; flatter ones are left out.
 const FLAT: f32 = 1.0e-12;
@@ -297,10 +297,25 @@ impl Parts {
         } else {
             0
         };
-        let flags = world | faces_eye | rank_bits(info);
+        let paths = u32::from(mesh.paths) << TRIANGLE_PATHS_SHIFT;
+        let flags = world | faces_eye | rank_bits(info) | paths;
         // Seen from anywhere, the faces of something pressed flat lie in one plane, and which of them a ray meets first
         // is left to the last bits of its distance: it would flicker.
         if !is_solid(axes(instance)) {
+            return;
+        }
+        // Only paths of the eye that were turned by a portal meet what is turned to the eye as they see it: to all
+        // tracers it is a translucent layer, whatever its stages are, because nothing else asks for those.
+        if mesh.paths >= turned::PORTAL {
+            let seen = Seen::ThirdPerson;
+            self.add_changing(
+                view,
+                mesh,
+                instance,
+                (seen, Kind::Translucent),
+                material,
+                flags,
+            );
             return;
         }
         let (source, vertices, indices) = match mesh.shape {
@@ -319,7 +334,8 @@ impl Parts {
                 (Source::Animated(id), mesh.vertex_count, mesh.index_count)
             }
             Shape::Animated(_) | Shape::Changing => {
-                self.add_changing(view, mesh, instance, kind, material, flags);
+                let slot = (Seen::of(instance.flags), kind);
+                self.add_changing(view, mesh, instance, slot, material, flags);
                 return;
             }
         };
@@ -435,11 +451,10 @@ impl Parts {
         view: &ViewScene,
         mesh: &DynamicMesh,
         instance: &Instance,
-        kind: Kind,
+        (seen, kind): (Seen, Kind),
         material: u32,
         flags: u32,
     ) {
-        let seen = Seen::of(instance.flags);
         let slots = &mut self.slots;
         let Some(slot) = slots.iter_mut().find(|s| s.seen == seen && s.kind == kind) else {
             return;

@@ -142,8 +142,65 @@ fn persons_show_where_they_should() {
             .iter()
             .filter(|m| m.world_surface == Some(7))
             .count(),
-        1
+        2
     );
+}
+
+#[test]
+fn what_turns_to_the_eye_turns_to_mirrors_too() {
+    let mut game = game();
+    let world = room(&mut game);
+    let sprite = |renderfx| RefEntity {
+        origin: Vec3::new(0.0, 40.0, 0.0),
+        radius: 5.0,
+        renderfx,
+        ..entity(EntityKind::Sprite)
+    };
+    let mirror = RefEntity {
+        origin: Vec3::new(250.0, 0.0, 0.0),
+        old_origin: Vec3::new(250.0, 0.0, 0.0),
+        ..entity(EntityKind::PortalSurface)
+    };
+    // seen from above
+    let turn = glam::Quat::from_rotation_y(0.7);
+    let def = RefDef {
+        view_axis: [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| turn * axis),
+        ..def()
+    };
+    let mut scene = Scene::new();
+    let mut shown = |look, renderfx, mirrored: bool| {
+        scene.add_entity(&sprite(renderfx));
+        if mirrored {
+            scene.add_entity(&mirror);
+        }
+        let views = gather(&mut scene, &game, Some(&world), &def, look);
+        let of_view = |view: &ViewScene| -> Vec<(u8, Vec<Vec3>)> {
+            let ours = view.meshes.iter().filter(|m| m.world_surface.is_none());
+            let corners = |m: &crate::scene::DynamicMesh| {
+                let vertices = view.mesh_geometry(m).vertices;
+                vertices.iter().map(|v| v.position).collect()
+            };
+            ours.map(|m| (m.paths, corners(m))).collect()
+        };
+        views.iter().flat_map(of_view).collect::<Vec<_>>()
+    };
+    // the two views of the classic look, the mirror's first
+    let classic = shown(Look::Classic, 0, true);
+    let traced = shown(Look::Traced, 0, true);
+    let [(_, in_mirror), (_, straight_on)] = classic.as_slice() else {
+        panic!("{classic:?}");
+    };
+    let [direct, through] = traced.as_slice() else {
+        panic!("{traced:?}");
+    };
+    let same = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).all(|(a, b)| a.abs_diff_eq(*b, 1.0e-3));
+    assert_eq!((direct.0, through.0), (1, 2));
+    assert!(same(&direct.1, straight_on) && same(&through.1, in_mirror));
+    assert!(!same(&direct.1, &through.1));
+    // without a mirror in sight, and for what mirrors do not show, there is one for all
+    assert_eq!(shown(Look::Traced, 0, false)[0].0, 0);
+    let first_person = shown(Look::Traced, renderfx::FIRST_PERSON, true);
+    assert_eq!((first_person.len(), first_person[0].0), (1, 0));
 }
 
 #[test]

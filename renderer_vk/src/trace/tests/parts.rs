@@ -94,6 +94,7 @@ fn parts_of_skins(mesh: RigidMesh, skins: &[u32], up: Vec3) -> Vec<(u32, Kind, V
             fog: 0,
             world_surface: None,
             shape: Shape::Rigid(0),
+            paths: 0,
         });
     }
     let mut parts = Parts::default();

@@ -78,6 +78,7 @@ fn add(
         fog: 0,
         world_surface: None,
         shape: Shape::Changing,
+        paths: 0,
     };
     if how == How::Rigid {
         mesh.shape = Shape::Rigid(scene.rigid.len() as u32);

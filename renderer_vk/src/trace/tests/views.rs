@@ -109,6 +109,70 @@ fn a_mirror_shows_what_is_behind_the_eye_and_who_looks_with(gpu: &mut Gpu) {
 }
 
 #[test]
+fn what_turns_to_the_eye_is_met_on_its_own_way() {
+    Gpu::each(what_turns_to_the_eye_is_met_on_its_own_way_with);
+}
+
+fn what_turns_to_the_eye_is_met_on_its_own_way_with(gpu: &mut Gpu) {
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
+    let red = scene.material(&[stage::constant(RED)], 0);
+    let green = scene.material(&[stage::constant(GREEN)], 0);
+    let veil = scene.material(
+        &[stage::blend(BLUE, 1.0)],
+        c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED,
+    );
+    let white = scene.material(&[stage::constant([1.0; 3])], 0);
+    let mirror = scene.material(&[stage::add([0.0; 3])], c::MATERIAL_PORTAL);
+    scene.quad(screen(50.0), mirror);
+    scene.quad(screen(-100.0), white);
+    scene.portals.push(mirror_at(50.0));
+    let mut on_way = |scene: &mut Scene, x: f32, material: u32, paths: u8| {
+        scene.mesh(screen(x), material, identity());
+        scene.meshes.last_mut().unwrap().paths = paths;
+        gpu.mean(scene, &reference(), 1)
+    };
+    // what only the eye sees straight on is not in the mirror, solid or not
+    let mean = on_way(&mut scene, -10.0, red, 1);
+    assert!(close(mean, Vec3::ONE), "{mean}");
+    let mean = on_way(&mut scene, -15.0, veil, 1);
+    assert!(close(mean, Vec3::ONE), "{mean}");
+    // what is turned to another mirror is not, either; what is turned to this one is
+    let mean = on_way(&mut scene, -20.0, red, 3);
+    assert!(close(mean, Vec3::ONE), "{mean}");
+    let mean = on_way(&mut scene, -40.0, veil, 2);
+    assert!(close(mean, linear(BLUE)), "{mean}");
+    let mean = on_way(&mut scene, -30.0, green, 2);
+    assert!(close(mean, linear(GREEN)), "{mean}");
+    // and is not in the eye's own way
+    let mean = on_way(&mut scene, 30.0, red, 2);
+    assert!(close(mean, linear(GREEN)), "{mean}");
+    let mean = on_way(&mut scene, 20.0, veil, 1);
+    assert!(close(mean, linear(BLUE)), "{mean}");
+    // a mirror in the mirror: its paths have numbers after those of one mirror
+    scene.meshes.clear();
+    scene.entities.clear();
+    scene.quad(screen(-90.0), mirror);
+    scene.portals.push(Portal {
+        plane: plane(Vec3::X, Vec3::X * -90.0),
+        surface_origin: Vec3::X * -90.0,
+        camera_origin: Vec3::X * -90.0,
+        surface_axis: [Vec3::X, Vec3::Y, Vec3::NEG_Z],
+        camera_axis: [Vec3::NEG_X, Vec3::Y, Vec3::NEG_Z],
+        ..mirror_at(50.0)
+    });
+    let mut on_way = |scene: &mut Scene, x: f32, material: u32, paths: u8| {
+        scene.mesh(screen(x), material, identity());
+        scene.meshes.last_mut().unwrap().paths = paths;
+        gpu.mean(scene, &reference(), 1)
+    };
+    let two_sided = scene.material(&[stage::constant(RED)], c::MATERIAL_TWO_SIDED);
+    let mean = on_way(&mut scene, -60.0, two_sided, 2 + 2 + 1);
+    assert!(close(mean, linear(RED)), "{mean}");
+    let mean = on_way(&mut scene, -50.0, green, 2);
+    assert!(close(mean, linear(GREEN)), "{mean}");
+}
+
+#[test]
 fn a_portal_shows_what_its_camera_sees() {
     Gpu::each(a_portal_shows_what_its_camera_sees_with);
 }

@@ -215,6 +215,7 @@ impl Scene {
             fog: 0,
             world_surface: None,
             shape: Shape::Changing,
+            paths: 0,
         });
     }
 
