@@ -1,6 +1,7 @@
 //! One frame: what was queued, in order. The passes of a traced view are listed in `trace`; a classic view is one pass.
 
 use glam::{Mat4, Vec3, Vec4};
+use shaders::types::Instance;
 
 use crate::assets::Assets;
 use crate::gpu::{self, ColorMask, Image, Recorder};
@@ -15,6 +16,8 @@ use crate::world::World;
 
 /// What the game asked for, in its order.
 pub enum Item {
+    /// The whole picture becomes one colour.
+    Clear([f32; 4]),
     /// 2D pictures, with the shader time in seconds.
     Overlay(Overlay, f32),
     /// A 3D view in the classic look: at most one portal view, then the view itself.
@@ -56,12 +59,24 @@ impl<'a> FrameContext<'a> {
     /// The device is out of memory or lost.
     pub fn record(&mut self, recorder: &mut Recorder, item: &Item) -> Result<(), gpu::Error> {
         match item {
+            Item::Clear(color) => self.clear(recorder, *color),
             Item::Overlay(overlay, time) => self.overlay(recorder, overlay, *time),
             Item::Classic(scenes) => scenes
                 .iter()
                 .try_for_each(|scene| self.classic(recorder, scene)),
             Item::Traced(scene) => self.traced(recorder, scene),
         }
+    }
+
+    fn clear(&mut self, recorder: &mut Recorder, color: [f32; 4]) -> Result<(), gpu::Error> {
+        self.list.clear();
+        let parameters = ViewParameters {
+            clear_color: Some(color),
+            ..self.window_parameters(&[])
+        };
+        let target = self.target();
+        self.raster
+            .record(recorder, "clear", target, self.list, &parameters)
     }
 
     fn traced(&mut self, recorder: &mut Recorder, scene: &ViewScene) -> Result<(), gpu::Error> {
@@ -112,7 +127,6 @@ impl<'a> FrameContext<'a> {
         overlay: &Overlay,
         time: f32,
     ) -> Result<(), gpu::Error> {
-        let (width, height) = (self.color.width() as f32, self.color.height() as f32);
         let instance = overlay_instance(time);
         let aids = Aids {
             edges: self.settings.show_tris && self.raster.draws_edges(),
@@ -120,7 +134,17 @@ impl<'a> FrameContext<'a> {
             ..Aids::default()
         };
         overlay.draw(self.list, self.stages(), &instance, aids);
-        let parameters = ViewParameters {
+        let instances = [instance];
+        let parameters = self.window_parameters(&instances);
+        let target = self.target();
+        self.raster
+            .record(recorder, "overlay", target, self.list, &parameters)
+    }
+
+    /// What is drawn in window pixels is drawn with.
+    fn window_parameters<'b>(&self, instances: &'b [Instance]) -> ViewParameters<'b> {
+        let (width, height) = (self.color.width() as f32, self.color.height() as f32);
+        ViewParameters {
             // window pixels to clip space; pictures lie at the near plane, a depth of 1 before the far one
             world_to_clip: Mat4::from_cols(
                 Vec4::new(2.0 / width, 0.0, 0.0, 0.0),
@@ -137,21 +161,23 @@ impl<'a> FrameContext<'a> {
             static_vertices: 0,
             dynamic_vertices: None,
             fogs: 0,
-            instances: &[instance],
+            instances,
             lights: &[],
             light_backs: true,
             viewport: [0, 0, width as i32, height as i32],
             clear_depth: false,
             clear_color: None,
             shadows: None,
-        };
-        let target = Target {
+        }
+    }
+
+    /// What the classic look draws to.
+    fn target(&self) -> Target<'a> {
+        Target {
             color: self.drawn,
             depth: self.depth,
             mask: self.mask,
-        };
-        self.raster
-            .record(recorder, "overlay", target, self.list, &parameters)
+        }
     }
 
     fn classic(&mut self, recorder: &mut Recorder, scene: &ViewScene) -> Result<(), gpu::Error> {
@@ -194,11 +220,7 @@ impl<'a> FrameContext<'a> {
             clear_color: clear_color(scene, settings),
             shadows: Some((&scene.shadows, view)),
         };
-        let target = Target {
-            color: self.drawn,
-            depth: self.depth,
-            mask: self.mask,
-        };
+        let target = self.target();
         self.raster
             .record(recorder, "classic", target, self.list, &parameters)?;
         let test = self.flares.begin(recorder, scene)?;
@@ -251,13 +273,14 @@ impl<'a> FrameContext<'a> {
     }
 }
 
-/// The engine clears colour only where a setting or the game asks for it.
+/// With `r_clear` each frame begins with this colour.
+pub const CLEAR: [f32; 4] = [1.0, 0.0, 0.5, 1.0];
+
+/// The engine clears the colour of a view only where a setting or the game asks for it.
 pub fn clear_color(scene: &ViewScene, settings: &Settings) -> Option<[f32; 4]> {
     if scene.def.flags & crate::api::rdflags::HYPERSPACE != 0 {
         let grey = (scene.def.time_ms & 255) as f32 / 255.0;
         Some([grey, grey, grey, 1.0])
-    } else if settings.clear {
-        Some([1.0, 0.0, 0.5, 1.0])
     } else if settings.fast_sky && scene.has_world {
         Some([0.0, 0.0, 0.0, 1.0])
     } else {

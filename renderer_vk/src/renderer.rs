@@ -13,7 +13,7 @@ use glam::{Vec2, Vec3};
 use relight::GameFiles;
 
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
-use crate::assets::{Assets, LoadedFont};
+use crate::assets::{Assets, LoadedFont, desaturate};
 use crate::error::Error;
 use crate::frame::Item;
 use crate::gpu::{
@@ -465,7 +465,9 @@ impl Renderer {
     pub fn set_color(&mut self, rgba: Option<[f32; 4]>) {
         self.color_2d = rgba.map_or(u32::MAX, |rgba| {
             // truncated and wrapped, not clamped
-            u32::from_le_bytes(rgba.map(|c| (c * 255.0) as i32 as u8))
+            let mut bytes = rgba.map(|c| (c * 255.0) as i32 as u8);
+            desaturate(&mut bytes, self.settings.greyscale);
+            u32::from_le_bytes(bytes)
         });
     }
 

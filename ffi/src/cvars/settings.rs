@@ -47,6 +47,15 @@ pub fn apply_at_registration(cvars: &Cvars, settings: &mut Settings) {
         TracerChoice::Auto
     });
     settings.rt_lights = map_lights(&cvars.string(Cvar::RtLights));
+    apply_color_tables(cvars, settings);
+}
+
+/// Reads what the engine's own renderer makes tables of when it starts and when `r_gamma` changes: games set these
+/// variables, too, and mean the next start.
+fn apply_color_tables(cvars: &Cvars, settings: &mut Settings) {
+    settings.gamma = cvars.value(Cvar::Gamma).clamp(0.5, 3.0);
+    settings.intensity = cvars.value(Cvar::Intensity).max(1.0);
+    settings.overbright_bits = count(cvars, Cvar::OverBrightBits);
 }
 
 /// Reads every other setting. Cheap: the variables are the engine's memory; text is copied when it changed.
@@ -86,7 +95,6 @@ pub fn apply(cvars: &Cvars, window: WindowFacts, settings: &mut Settings) {
     settings.round_images_down = flag(Cvar::RoundImagesDown);
     settings.simple_mip_maps = flag(Cvar::SimpleMipMaps);
     settings.detail_textures = flag(Cvar::DetailTextures);
-    settings.intensity = value(Cvar::Intensity).max(1.0);
     settings.greyscale = value(Cvar::Greyscale).clamp(0.0, 1.0);
     settings.color_mip_levels = flag(Cvar::ColorMipLevels);
     settings.single_shader = flag(Cvar::SingleShader);
@@ -113,13 +121,15 @@ pub fn apply(cvars: &Cvars, window: WindowFacts, settings: &mut Settings) {
     settings.map_overbright_bits = count(cvars, Cvar::MapOverBrightBits);
     settings.ignore_hw_gamma = !window.gamma;
     settings.fullscreen = window.fullscreen;
-    settings.overbright_bits = count(cvars, Cvar::OverBrightBits);
     settings.vertex_light = flag(Cvar::VertexLight);
     settings.ui_fullscreen = flag(Cvar::UiFullscreen);
     settings.fullbright = flag(Cvar::FullBright);
     settings.subdivisions = value(Cvar::Subdivisions);
 
-    settings.gamma = value(Cvar::Gamma).clamp(0.5, 3.0);
+    if cvars.modified(Cvar::Gamma) {
+        apply_color_tables(cvars, settings);
+        cvars.seen(Cvar::Gamma);
+    }
     settings.swap_interval = integer(Cvar::SwapInterval);
     settings.lod_bias = integer(Cvar::LodBias);
     settings.lod_scale = value(Cvar::LodScale);

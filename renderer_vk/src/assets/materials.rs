@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use shaders::types;
-use shaderscript::{ImplicitKind, Shader, StageImage, strip_extension};
+use shaderscript::{ImplicitKind, RgbGen, Shader, StageImage, strip_extension};
 
 mod changes;
 mod listing;
@@ -16,6 +16,7 @@ use super::dielectric;
 use super::flags;
 use super::material::{LightmapClass, Material, SkyBox, VideoStage};
 use super::material_buffers::Uploaded;
+use super::prepare::grey;
 use super::source::{ImageFlags, ImageSource};
 use crate::settings::Settings;
 
@@ -23,7 +24,7 @@ use crate::settings::Settings;
 pub const DEFAULT_PORTAL_RANGE: f32 = 256.0;
 
 /// What the settings say about materials that are found from now on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaterialSettings {
     /// Stages marked `detail` are drawn.
     pub detail_textures: bool,
@@ -33,6 +34,8 @@ pub struct MaterialSettings {
     pub menu: bool,
     /// Scripts that are used are named in the log.
     pub print: bool,
+    /// 0..1: how much colour is taken out of the colours that scripts name.
+    pub greyscale: f32,
 }
 
 impl MaterialSettings {
@@ -43,6 +46,7 @@ impl MaterialSettings {
             vertex_light: settings.vertex_light,
             menu: settings.ui_fullscreen,
             print: settings.print_shaders,
+            greyscale: settings.greyscale,
         }
     }
 }
@@ -124,7 +128,7 @@ impl Materials {
         };
         let mut default = internal_shader("*default", |stage| {
             stage.image = StageImage::Map("*default".into());
-            stage.rgb_gen = shaderscript::RgbGen::Identity;
+            stage.rgb_gen = RgbGen::Identity;
         });
         default.cull = shaderscript::Cull::Front;
         materials.add(
@@ -136,7 +140,7 @@ impl Materials {
             source,
         );
         let mut beam = internal_shader("*beam", |stage| {
-            stage.rgb_gen = shaderscript::RgbGen::Const(Vec3::X);
+            stage.rgb_gen = RgbGen::Const(Vec3::X);
             stage.blend = Some((
                 shaderscript::BlendFactor::One,
                 shaderscript::BlendFactor::One,
@@ -148,7 +152,7 @@ impl Materials {
         materials.internal.beam =
             materials.add("*beam", beam, LightmapClass::None, false, None, source);
         let axes = internal_shader("*axes", |stage| {
-            stage.rgb_gen = shaderscript::RgbGen::ExactVertex;
+            stage.rgb_gen = RgbGen::ExactVertex;
         });
         materials.internal.axes =
             materials.add("*axes", axes, LightmapClass::None, false, None, source);
@@ -281,6 +285,11 @@ impl Materials {
         }
         if !self.settings.detail_textures {
             shader.stages.retain(|stage| !stage.detail);
+        }
+        for stage in &mut shader.stages {
+            if let RgbGen::Const(color) = &mut stage.rgb_gen {
+                *color = grey(*color, self.settings.greyscale);
+            }
         }
         if let Some(sun) = &shader.sun {
             self.last_sun = Some(sun.direction.normalize_or_zero());

@@ -25,7 +25,7 @@ pub use material::{Combine, LightmapClass, Material, RasterPass, SkyBox, VideoSt
 pub use materials::{DEFAULT_PORTAL_RANGE, Internal, MaterialSettings, Materials};
 pub use models::{IqmModel, MAX_LODS, Md3Lod, MdrModel, Model, Models};
 pub use prepare::TextureSettings;
-pub(crate) use prepare::desaturate;
+pub(crate) use prepare::{desaturate, grey};
 pub use skins::{LoadedSkin, Skins};
 pub use source::{ImageFlags, ImageSource};
 pub use textures::{Samplers, Textures, is_texture_mode};

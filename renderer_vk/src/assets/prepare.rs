@@ -2,7 +2,7 @@
 //!
 //! Source: engine behaviour of `renderer_opengl1`: sides become powers of two, `r_picmip` halves, then the mip chain.
 
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 use relight::image::Image;
 use relight::overbright;
 
@@ -154,11 +154,19 @@ fn weighted(image: &Image) -> Image {
     Image::from_rgba(width, height, rgba).unwrap_or_else(|| image.halve())
 }
 
-/// Moves colours towards their luma (Rec. 709 weights, as the engine).
+/// Luma's weights (Rec. 709, as the engine).
+const LUMA: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
+
+/// A colour moved towards its luma by `amount`, 0 to 1 (`r_greyscale`).
+pub fn grey(color: Vec3, amount: f32) -> Vec3 {
+    color.lerp(Vec3::splat(color.dot(LUMA)), amount)
+}
+
+/// Moves colours towards their luma.
 pub fn desaturate(rgba: &mut [u8], amount: f32) {
     for texel in rgba.as_chunks_mut::<4>().0 {
         let [r, g, b, _] = *texel;
-        let luma = 0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b);
+        let luma = LUMA.dot(Vec3::new(f32::from(r), f32::from(g), f32::from(b)));
         for channel in texel.iter_mut().take(3) {
             let value = f32::from(*channel);
             *channel = (value + (luma - value) * amount) as u8;

@@ -8,7 +8,7 @@ use super::Renderer;
 use crate::api::Picture;
 use crate::assets::ImageSource;
 use crate::error::Error;
-use crate::frame::{FrameContext, Item};
+use crate::frame::{CLEAR, FrameContext, Item};
 use crate::gpu::{ColorMask, Format, Recorder};
 use crate::raster::{self, Present};
 use crate::scene::Statistics;
@@ -53,6 +53,10 @@ impl Renderer {
         self.set_eye(Eye::Both);
         self.held.begin_frame();
         self.overlay_time = time_ms as f32 * 0.001;
+        // the second eye's picture goes over the first's
+        if self.settings.clear && self.queue.is_empty() {
+            self.queue.push((Item::Clear(CLEAR), ColorMask::ALL));
+        }
     }
 
     /// Says whose picture the calls that follow are for, after [`begin_frame`](Self::begin_frame). A frame begins with
@@ -101,6 +105,7 @@ impl Renderer {
                     overlay.clear();
                     self.spare_overlays.push(overlay);
                 }
+                Item::Clear(_) => {}
                 Item::Classic(scenes) => self.scene.recycle(scenes),
                 // held views are copies: to keep their memory too would let it grow with each frame
                 Item::Traced(_) if self.settings.rt_pause => {}
@@ -177,7 +182,7 @@ impl Renderer {
                         stats.scene.add(&scene.statistics);
                     }
                 }
-                stats.views += u32::from(!matches!(item, Item::Overlay(..)));
+                stats.views += u32::from(!matches!(item, Item::Overlay(..) | Item::Clear(_)));
                 stats.draws += context.list.calls.len() as u32;
             }
         }

@@ -10,6 +10,7 @@ use shaders::types;
 
 use super::View;
 use super::entity::to_world;
+use crate::assets::grey;
 use crate::settings::Settings;
 use crate::world::WorldData;
 
@@ -96,6 +97,7 @@ impl FlareView<'_> {
         let spread = distance + size * coefficient.sqrt();
         let intensity = coefficient * size * size / (spread * spread);
         let color = flare.color * facing * intensity * 255.0 * self.through_fog(flare.fog, at);
+        let color = grey(color, self.settings.greyscale);
         // a negative coefficient has no root
         if !(color.is_finite() && size.is_finite()) {
             return None;

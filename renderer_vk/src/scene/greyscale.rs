@@ -6,14 +6,7 @@
 use glam::Vec3;
 
 use super::ViewScene;
-use crate::assets::desaturate;
-
-/// Luma's weights (Rec. 709, as the engine).
-const LUMA: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
-
-fn grey(color: Vec3, amount: f32) -> Vec3 {
-    color.lerp(Vec3::splat(color.dot(LUMA)), amount)
-}
+use crate::assets::{desaturate, grey};
 
 impl ViewScene {
     /// Takes this share (0 to 1) of the colour out of entities, their light, polygons and dynamic lights. The map's

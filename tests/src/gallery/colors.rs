@@ -106,6 +106,31 @@ fn alpha_kinds(shape: Shape) -> Board {
     Board::new(4, shape, all.filter(defined))
 }
 
+/// What `r_greyscale` takes the colour out of: every source of colours on every shape that has it.
+fn grey() -> Board {
+    let colored = |shape, kinds: &[&str]| {
+        let body = |kind: &&str| format!("{{\nmap g/base.tga\nrgbGen {kind}\n}}");
+        Board::new(6, shape, kinds.iter().map(body))
+    };
+    let mut board = colored(Shape::Face, &RGB);
+    for (shape, kinds) in [
+        (Shape::Dome(6), &["exactVertex", "const ( 1 0.3 0.1 )"][..]),
+        (
+            Shape::Model,
+            &["entity", "oneMinusEntity", "lightingDiffuse"],
+        ),
+        (Shape::Sprite, &["entity", "vertex"]),
+        (Shape::Poly, &["vertex", "oneMinusVertex"]),
+        (
+            Shape::Picture,
+            &["vertex", "exactVertex", "const ( 0.1 0.9 0.4 )"],
+        ),
+    ] {
+        board.tiles.extend(colored(shape, kinds).tiles);
+    }
+    board
+}
+
 fn portal_alpha() -> Board {
     let ranges = [64.0, 128.0, 150.0, 200.0, 256.0, 1000.0, 0.0];
     let stages =
@@ -143,6 +168,20 @@ pub(super) fn scenes() -> Vec<Scene> {
             alpha_waves(),
             &TIMES
         ),
+        Scene {
+            cvars: &[("r_greyscale", "1")],
+            quick: true,
+            ..board_scene!("rgb-grey", "Every colour with r_greyscale 1.", grey(), &[0])
+        },
+        Scene {
+            cvars: &[("r_greyscale", "0.4")],
+            ..board_scene!(
+                "rgb-half-grey",
+                "Every colour with r_greyscale 0.4.",
+                grey(),
+                &[0]
+            )
+        },
         board_scene!(
             "rgb-noise",
             "rgbGen wave noise.",

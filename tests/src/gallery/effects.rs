@@ -11,6 +11,7 @@ use crate::engine::abi::refEntity_t;
 
 const DEPTH_HACK: i32 = 0x8;
 const CROSSHAIR: i32 = 0x10;
+const NO_WORLD: i32 = 1;
 
 /// The scenes of this module.
 pub(super) fn scenes() -> Vec<Scene> {
@@ -27,6 +28,21 @@ pub(super) fn scenes() -> Vec<Scene> {
                 "Flares that appear, stay, are hidden and go, straight on and aside.",
                 &[("r_flares", "1")],
                 flares,
+            )
+        },
+        scene(
+            "effects-flares-grey",
+            "The same with half the colour.",
+            &[("r_flares", "1"), ("r_greyscale", "0.5")],
+            flares,
+        ),
+        Scene {
+            quick: true,
+            ..scene(
+                "effects-clear",
+                "What r_clear and r_fastsky clear before views of a part of the window.",
+                &[],
+                cleared,
             )
         },
         Scene {
@@ -240,6 +256,30 @@ fn eyes(stage: &mut Stage) -> Result<(), Raised> {
     look(stage, "wide")?;
     stage.set("r_fastsky", "1");
     look(stage, "cleared")
+}
+
+fn cleared(stage: &mut Stage) -> Result<(), Raised> {
+    stage.start_map(MAP)?;
+    let tube = tube_at(stage, Vec3::new(0.0, 20.0, 10.0))?;
+    let white = stage.register_shader("white")?;
+    let mut world = stage.view(Vec3::new(-130.0, 0.0, 10.0), 8.0);
+    (world.place, world.width, world.height) = ([40, 60], 400, 300);
+    let mut alone = stage.view(Vec3::new(-40.0, 20.0, 10.0), 0.0);
+    (alone.place, alone.width, alone.height) = ([300, 200], 200, 200);
+    alone.flags = NO_WORLD;
+    for (name, clear, fast_sky) in [("clear", "1", "0"), ("both", "1", "1"), ("sky", "0", "1")] {
+        stage.set("r_clear", clear);
+        stage.set("r_fastsky", fast_sky);
+        stage.keep(name, |e| {
+            e.draw_stretch_pic([10.0, 10.0, 200.0, 100.0], [0.0, 0.0, 1.0, 1.0], white)?;
+            e.clear_scene()?;
+            e.render_scene(&world)?;
+            e.clear_scene()?;
+            e.add_entity(&tube)?;
+            e.render_scene(&alone)
+        })?;
+    }
+    Ok(())
 }
 
 fn bright(stage: &mut Stage) -> Result<(), Raised> {
