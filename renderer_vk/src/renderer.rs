@@ -112,9 +112,23 @@ impl Renderer {
     /// # Errors
     /// There is no Vulkan, no device that fits, or it is out of memory.
     pub fn new(options: RendererOptions) -> Result<Self, Error> {
+        Self::on(options, false)
+    }
+
+    /// The same on a device that shows nothing of what it could do beyond what this renderer requires: how poor devices
+    /// draw can be seen on a rich one.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn with_required_only(options: RendererOptions) -> Result<Self, Error> {
+        Self::on(options, true)
+    }
+
+    fn on(options: RendererOptions, required_only: bool) -> Result<Self, Error> {
         let (kept_pipelines, pipeline_cache) = KeptPipelines::read(options.pipeline_cache);
         let device_options = DeviceOptions {
             pipeline_cache,
+            required_only,
             ..device_options(options.device.as_deref(), options.validation)
         };
         let (device, swapchain) = match options.window {

@@ -9,7 +9,7 @@ use q3bsp::builder::MapBuilder;
 use q3model::{Frame, Md3, PackedVertex, Surface};
 use relight::MemoryFiles;
 use renderer_vk::api::{EntityKind, Picture, RefDef, RefEntity};
-use renderer_vk::{Eye, Renderer, RendererOptions, Settings};
+use renderer_vk::{Error, Eye, Renderer, RendererOptions, Settings};
 
 /// Side of the picture, pixels.
 const SIDE: u32 = 64;
@@ -37,6 +37,13 @@ struct Stage {
 
 impl Stage {
     fn new(settings: Settings) -> Option<Self> {
+        Self::made(settings, Renderer::new)
+    }
+
+    fn made(
+        settings: Settings,
+        make: impl FnOnce(RendererOptions) -> Result<Renderer, Error>,
+    ) -> Option<Self> {
         let options = RendererOptions {
             width: SIDE,
             height: SIDE,
@@ -46,7 +53,7 @@ impl Stage {
             vsync: false,
             pipeline_cache: None,
         };
-        let mut renderer = match Renderer::new(options) {
+        let mut renderer = match make(options) {
             Ok(renderer) => renderer,
             Err(e) => {
                 let required = std::env::var("RELIGHT_REQUIRE_GPU").is_ok_and(|v| v == "1");
@@ -331,4 +338,39 @@ fn each_eye_draws_its_channels_from_its_place() {
     // alone again
     stage.settings.anaglyph = 0;
     assert!(stage.frame(&def(), &[cube]).rgb == both.rgb);
+}
+
+#[test]
+fn a_device_with_nothing_optional_draws_all_but_what_needs_it() {
+    let settings = Settings {
+        shadows: 2,
+        anisotropy: 16.0,
+        ..Settings::default()
+    };
+    let Some(mut rich) = Stage::new(settings.clone()) else {
+        return;
+    };
+    let mut poor = Stage::made(settings, Renderer::with_required_only).unwrap();
+    let info = poor.renderer.device_info();
+    assert!(info.ray_tracing.is_none() && !info.ray_query && !info.wireframe);
+    assert_eq!(info.anisotropy, None);
+    let cube = |stage: &Stage| entity(stage.box_model, Vec3::new(100.0, 60.0, -60.0));
+    let pictures = [&mut rich, &mut poor].map(|stage| stage.frame(&def(), &[cube(stage)]));
+    assert!(pictures[0].rgb == pictures[1].rgb);
+    let plain = &pictures[1];
+    // lines, counts and flares need what such a device has not: nothing comes of them, and nothing fails
+    poor.settings.flares = true;
+    poor.settings.show_tris = true;
+    poor.settings.show_normals = true;
+    poor.settings.measure_overdraw = true;
+    for _ in 0..3 {
+        assert!(poor.frame(&def(), &[cube(&poor)]).rgb == plain.rgb);
+    }
+    poor.settings.multisample = 4;
+    poor.frame(&def(), &[cube(&poor)]);
+    // rays find their way without the device's help
+    poor.settings.rt = true;
+    for _ in 0..2 {
+        poor.frame(&def(), &[cube(&poor)]);
+    }
 }

@@ -397,10 +397,16 @@ fn foreign(format: ImageFormat, bytes: &[u8]) -> Result<Image, Fault> {
     let decoder = reader.into_decoder().map_err(fault)?;
     let (width, height) = decoder.dimensions();
     check_size(width, height)?;
-    let rgba = DynamicImage::from_decoder(decoder)
-        .map_err(fault)?
-        .into_rgba8()
-        .into_raw();
+    let deep = decoder.original_color_type().bits_per_pixel()
+        > 8 * u16::from(decoder.original_color_type().channel_count());
+    let picture = DynamicImage::from_decoder(decoder).map_err(fault)?;
+    let rgba = if deep {
+        // the engine keeps the high byte, and does not round
+        let words = picture.into_rgba16().into_raw();
+        words.iter().map(|word| (word >> 8) as u8).collect()
+    } else {
+        picture.into_rgba8().into_raw()
+    };
     finish(width, height, rgba)
 }
 

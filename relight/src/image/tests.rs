@@ -97,6 +97,16 @@ fn tga_runs_cross_rows_and_grey_is_grey() {
 }
 
 #[test]
+fn deep_pngs_keep_their_high_byte() {
+    let words = vec![0x12ff, 0xfe80, 0x0080];
+    let grey = image::ImageBuffer::from_vec(3, 1, words).unwrap();
+    let file = encode(&DynamicImage::ImageLuma16(grey), ImageFormat::Png);
+    let ours = decode("x.png", "png", &file).unwrap();
+    let grey = |v: u8| [v, v, v, 255];
+    assert_eq!(ours.rgba, [grey(0x12), grey(0xfe), grey(0)].concat());
+}
+
+#[test]
 fn bmp_agrees_with_the_oracle_and_keeps_alpha() {
     for width in [1, 2, 3, 4, 7] {
         let rgb = DynamicImage::from(DynamicImage::from(pattern(width, 5)).into_rgb8());

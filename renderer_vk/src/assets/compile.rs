@@ -280,8 +280,8 @@ impl StageArrays {
         };
         match image {
             StageImage::Map(name) | StageImage::ClampMap(name) => {
-                // literal internal names reach the image cache in the engine, too
-                if name.eq_ignore_ascii_case("*white") || name.eq_ignore_ascii_case("$whiteimage") {
+                // the engine finds its own image by this name, too; `$whiteimage` is a word of `map` alone
+                if name == "*white" {
                     self.images.push(source.white());
                     found.flags = c::STAGE_WHITE;
                     return Ok(found);

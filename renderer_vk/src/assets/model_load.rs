@@ -124,10 +124,11 @@ impl Loader<'_> {
         Some(Model::Mdr(MdrModel { mdr, materials }))
     }
 
-    /// Reads what levels there are.
+    /// Reads what levels there are, the coarsest first: materials of equal sort are drawn in the order in which they
+    /// were registered.
     fn md3_lods(&mut self, name: &str) -> Option<Model> {
         let mut found: [Option<Arc<Md3Lod>>; MAX_LODS] = Default::default();
-        for (lod, slot) in found.iter_mut().enumerate() {
+        for (lod, slot) in found.iter_mut().enumerate().rev() {
             // a level that fails is taken over from a coarser one
             *slot = self.md3(&lod_name(name, lod)).map(Arc::new);
         }

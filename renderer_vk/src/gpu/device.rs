@@ -29,6 +29,8 @@ pub struct DeviceOptions {
     pub prefer: Option<String>,
     /// `false`: behave as on a device without ray tracing.
     pub allow_ray_tracing: bool,
+    /// `true`: behave as on a device that has what is required and nothing of what is optional.
+    pub required_only: bool,
     /// What [`Device::pipeline_cache_data`] gave in an earlier run; ignored when it does not fit.
     pub pipeline_cache: Option<Vec<u8>>,
 }
@@ -40,6 +42,7 @@ impl Default for DeviceOptions {
             validation: false,
             prefer: None,
             allow_ray_tracing: true,
+            required_only: false,
             pipeline_cache: None,
         }
     }
@@ -107,11 +110,7 @@ impl Device {
     /// One message that says what is missing: the loader, the surface, or on each device which feature.
     pub fn new(options: &DeviceOptions, source: SurfaceSource<'_>) -> Result<Self, Error> {
         let instance = Instance::new(&options.app_name, options.validation, source)?;
-        let choice = select::choose(
-            &instance,
-            options.prefer.as_deref(),
-            options.allow_ray_tracing,
-        )?;
+        let choice = select::choose(&instance, options)?;
         let raw = select::create_device(&instance, &choice)?;
         pin_drivers(raw.fp_v1_0().queue_submit);
         let core = RawDevice { raw, instance };

@@ -4,6 +4,7 @@ use std::ffi::CStr;
 
 use ash::{ext, khr, vk};
 
+use super::device::DeviceOptions;
 use super::error::{Context, Error};
 use super::instance::Instance;
 
@@ -122,18 +123,15 @@ const STORAGE_IMAGES: u32 = 4096;
 
 /// Chooses among the devices that meet the requirements: the one `prefer` names (part of its name, or its index),
 /// else discrete before integrated before virtual before software.
-pub(crate) fn choose(
-    instance: &Instance,
-    prefer: Option<&str>,
-    allow_ray_tracing: bool,
-) -> Result<Choice, Error> {
+pub(crate) fn choose(instance: &Instance, options: &DeviceOptions) -> Result<Choice, Error> {
+    let prefer = options.prefer.as_deref();
     // SAFETY: the instance is alive.
     let devices = unsafe { instance.raw.enumerate_physical_devices() }
         .context("vkEnumeratePhysicalDevices")?;
     let mut refused = Vec::new();
     let mut usable: Vec<(usize, Choice)> = Vec::new();
     for (index, physical) in devices.into_iter().enumerate() {
-        match examine(instance, physical, allow_ray_tracing)? {
+        match examine(instance, physical, options)? {
             Ok(choice) => usable.push((index, choice)),
             Err(reason) => refused.push(reason),
         }
@@ -169,7 +167,7 @@ pub(crate) fn choose(
 fn examine(
     instance: &Instance,
     physical: vk::PhysicalDevice,
-    allow_ray_tracing: bool,
+    options: &DeviceOptions,
 ) -> Result<Result<Choice, String>, Error> {
     let raw = &instance.raw;
     // SAFETY: the physical device belongs to the live instance.
@@ -194,7 +192,7 @@ fn examine(
             .any(|e| e.extension_name_as_c_str().is_ok_and(|n| n == wanted))
     };
 
-    let acceleration_ext = allow_ray_tracing
+    let acceleration_ext = options.allow_ray_tracing
         && has(khr::acceleration_structure::NAME)
         && has(khr::deferred_host_operations::NAME);
     let pipeline_ext = acceleration_ext && has(khr::ray_tracing_pipeline::NAME);
@@ -321,6 +319,9 @@ fn examine(
         storage16: on(f11.storage_buffer16_bit_access),
         storage8: on(f12.storage_buffer8_bit_access),
     };
+    if options.required_only {
+        abilities = Abilities::default();
+    }
 
     let mut p11 = vk::PhysicalDeviceVulkan11Properties::default();
     let mut p12 = vk::PhysicalDeviceVulkan12Properties::default();

@@ -100,6 +100,12 @@ impl WorldData {
     ) -> Self {
         materials.forget_sun();
         let lightmaps = make_lightmaps(&relit, source, options, failure);
+        // before the surfaces', as the engine: of equal sort, what was found first is drawn first
+        let fog_materials = relit
+            .fogs
+            .iter()
+            .map(|fog| materials.find(source, &fog.volume.shader, LightmapClass::None, true))
+            .collect();
         let patches = relit.bsp.patch_meshes(options.subdivisions);
         let mut indices = relit.indices.clone();
         let mut surfaces = Vec::with_capacity(relit.surfaces.len());
@@ -155,11 +161,6 @@ impl WorldData {
                     copy_for_classic(&relit, index, surface, &mut vertices, &mut indices);
             }
         }
-        let fog_materials = relit
-            .fogs
-            .iter()
-            .map(|fog| materials.find(source, &fog.volume.shader, LightmapClass::None, true))
-            .collect();
         remap_by_map(&relit, materials, source, options);
         let mut data = Self {
             vertices,

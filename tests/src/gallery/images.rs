@@ -79,7 +79,7 @@ fn kinds() -> Vec<(&'static str, Vec<u8>)> {
         ("png8.png", png(8, 0).write(SIDES, grey_of(8))),
         (
             "png16.png",
-            png(16, 0).write(SIDES, |x, y| vec![u16::from(grey(x, y)[0]) * 257]),
+            png(16, 0).write(SIDES, |x, y| vec![u16::from(grey(x, y)[0]) * 256 + 255]),
         ),
         ("png24.png", png(8, 2).write(SIDES, colored)),
         (

@@ -207,6 +207,21 @@ fn malformed() -> Board {
             "{\nmap g/base.tga\nalphaFunc\n}".into(),
             "{\nmap g/base.tga\nanimMap 2\n}".into(),
             "{\nanimMap 2 g/base.tga g/nothing.tga\n}".into(),
+            // words of `map` alone
+            "{\nclampMap $whiteimage\n}".into(),
+            "{\nclampMap $lightmap\n}".into(),
+            "{\nclampMap *white\n}".into(),
+            "{\nanimMap 1 $whiteimage\n}".into(),
+            "{\nmap $WHITEIMAGE\nrgbGen const ( 1 .5 0 )\n}".into(),
+            "{ map g/base.tga rgbGen identity }".into(),
+            "{\nmap \"g/base.tga\" rgbGen \"identity\"\n}".into(),
+            "{\nanimMap 0 g/base.tga g/env.tga\n}".into(),
+            "{\nanimMap -3 g/base.tga g/env.tga\n}".into(),
+            "{\nmap g/base.tga\ntcMod scale 2x 1e1\n}".into(),
+            "sort 6\nsort additive\n{\nmap g/base.tga\n}".into(),
+            "{\nmap g/base.tga\ntcGen vector ( 1 0 0 ) ( 0 1 )\n}".into(),
+            "{\nmap g/base.tga/* c */\n}".into(),
+            "{\nmap g\\base.tga\n}".into(),
         ],
     )
 }
