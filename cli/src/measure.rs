@@ -2,7 +2,15 @@
 //!
 //! Truth is the mean of many frames with all the sampling switched to its unbiased form (`rt_accumulate`). Every picture
 //! has the exposure that the map starts with, so that differences are those of the light. Cameras follow from the map
-//! by the rule of `relight cameras`.
+//! by the rule of `relight cameras`, or are named.
+//!
+//! How alike pictures are is told of all pixels, and apart for those that show something by way of a mirror, a portal, glass, a
+//! liquid or a shiny surface (`rt_debug 11`) and those that show it directly. Light is compared before it is displayed: what
+//! is clipped at white or rounded to black has another mean.
+
+mod region;
+mod stage;
+mod table;
 
 use std::path::{Path, PathBuf};
 
@@ -10,14 +18,16 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
-use relight::compare::{Rgb8, compare, flip};
-use renderer_vk::api::{DynamicLight, RefEntity};
-use renderer_vk::{LightSelection, Renderer, RendererOptions, Settings};
+use relight::compare::{Rgb8, compare};
+use renderer_vk::api::DynamicLight;
+use renderer_vk::{Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
 
-use crate::cameras::{EYES, places};
-use crate::render::parse_size;
-use crate::statistics::{luminance, relative_bias, relative_error, temporal_noise};
+use self::region::Regions;
+use self::stage::{Stage, Variant, variants};
+use crate::cameras::{EYES, Place, places};
+use crate::render::{parse_size, parse_view};
+use crate::statistics::{luminance, relative_bias, relative_error};
 use crate::view::{Camera, Maps, map_entities, open};
 
 /// Measure the traced look in real time against its reference
@@ -34,6 +44,18 @@ pub struct MeasureArgs {
     /// Places of each map
     #[arg(long, default_value_t = 2)]
     each: usize,
+    /// Look from here in place of the rule's places, units and degrees; may be given more than once
+    #[arg(long, value_name = "X,Y,Z,YAW,PITCH", value_parser = parse_view, allow_hyphen_values = true)]
+    view: Vec<Camera>,
+    /// A model in the hands: its file in the game's data
+    #[arg(long, value_name = "MODEL")]
+    hold: Option<String>,
+    /// Pictures to make, by the table's names; all where none is named
+    #[arg(long, value_name = "NAME")]
+    picture: Vec<String>,
+    /// Leave out the lights that go out and fly by
+    #[arg(long)]
+    no_lights: bool,
     /// Size in pixels
     #[arg(long, default_value = "1024x768", value_parser = parse_size)]
     size: (u32, u32),
@@ -46,10 +68,13 @@ pub struct MeasureArgs {
     /// Diffuse bounces
     #[arg(long, default_value_t = 1)]
     bounces: u32,
+    /// Exposure in stops, on top of the one that the map starts with: for dark places
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    exposure: f32,
     /// Vulkan device: part of its name
     #[arg(long)]
     device: Option<String>,
-    /// Folder for the pictures of every variant beside the reference
+    /// Folder for the pictures of every variant beside the reference, and of which pixels show reflections and the like
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Print JSON instead of a table
@@ -57,122 +82,11 @@ pub struct MeasureArgs {
     json: bool,
 }
 
-/// Degrees that the camera turns and units that it moves forward in a frame on its way to a place: a player who looks
-/// around while walking.
-const TURN: f32 = 0.5;
-const WALK: f32 = 0.75;
-
 /// Distance of the light that is switched, before the eye, and its reach: about an explosion.
 const LIGHT_DISTANCE: f32 = 96.0;
 const LIGHT_REACH: f32 = 300.0;
 /// Units a frame of the light that moves: a rocket at 60 frames a second.
 const LIGHT_SPEED: f32 = 15.0;
-
-/// A way to make the picture.
-struct Variant {
-    name: &'static str,
-    settings: Settings,
-}
-
-/// One light sample a pixel, and what is done with it.
-fn variants(base: &Settings) -> Vec<Variant> {
-    let with = |name, change: &dyn Fn(&mut Settings)| {
-        let mut settings = base.clone();
-        change(&mut settings);
-        Variant { name, settings }
-    };
-    vec![
-        with("raw", &|s| (s.rt_denoiser, s.rt_taa) = (0, false)),
-        with("denoised", &|s| (s.rt_denoiser, s.rt_taa) = (1, false)),
-        with("denoised-taa", &|s| (s.rt_denoiser, s.rt_taa) = (1, true)),
-        with("sparse-taa", &|s| (s.rt_denoiser, s.rt_taa) = (2, true)),
-        with("baseline", &|s| {
-            (s.rt_denoiser, s.rt_taa) = (1, true);
-            s.rt_light_selection = LightSelection::Uniform;
-            s.rt_gradients = false;
-        }),
-    ]
-}
-
-/// A map that pictures are taken of.
-struct Stage {
-    renderer: Renderer,
-    entities: Vec<RefEntity>,
-    size: (u32, u32),
-}
-
-impl Stage {
-    /// Draws a frame.
-    fn frame(&mut self, camera: &Camera, lights: &[DynamicLight]) -> Result<()> {
-        self.renderer.begin_frame(0);
-        self.renderer.clear_scene();
-        for entity in &self.entities {
-            self.renderer.add_entity(entity);
-        }
-        for light in lights {
-            self.renderer.add_light(*light);
-        }
-        self.renderer
-            .render_scene(&camera.ref_def(self.size, 90.0))?;
-        self.renderer.end_frame()?;
-        Ok(())
-    }
-
-    /// What the last frame shows.
-    fn picture(&mut self) -> Result<Rgb8> {
-        let picture = self.renderer.read_pixels()?;
-        Ok(Rgb8::new(
-            picture.width as usize,
-            picture.height as usize,
-            picture.rgb,
-        )?)
-    }
-
-    /// Forgets all frames: the next one starts without a past.
-    fn cut(&mut self, camera: &Camera, settings: &Settings) -> Result<()> {
-        // a frame of the other mode ends both kinds of memory
-        let other = Settings {
-            rt_accumulate: !settings.rt_accumulate,
-            ..settings.clone()
-        };
-        self.renderer.set_settings(&other);
-        self.frame(camera, &[])?;
-        self.renderer.set_settings(settings);
-        Ok(())
-    }
-
-    /// The mean of `frames` frames.
-    fn reference(
-        &mut self,
-        base: &Settings,
-        camera: &Camera,
-        lights: &[DynamicLight],
-        frames: u32,
-        bar: &ProgressBar,
-    ) -> Result<Rgb8> {
-        let settings = Settings {
-            rt_accumulate: true,
-            ..base.clone()
-        };
-        self.cut(camera, &settings)?;
-        for _ in 0..frames {
-            self.frame(camera, lights)?;
-            bar.inc(1);
-        }
-        self.picture()
-    }
-}
-
-/// Where the camera is `left` frames before it arrives.
-fn on_the_way(camera: &Camera, left: u32) -> Camera {
-    let left = left as f32;
-    let [forward, ..] = camera.axis();
-    Camera {
-        origin: camera.origin - forward * (WALK * left),
-        yaw: camera.yaw - TURN * left,
-        ..*camera
-    }
-}
 
 /// Frames that the eye takes to adapt: two seconds.
 const ADAPTATION: u32 = 120;
@@ -191,7 +105,7 @@ fn brightness(
             ..base.clone()
         });
         for _ in 0..frames {
-            stage.frame(camera, &[])?;
+            stage.frame(camera, 0, &[])?;
             bar.inc(1);
         }
         anyhow::Ok(stage.picture()?.mean_luminance())
@@ -210,114 +124,188 @@ fn place(
     bar: &ProgressBar,
 ) -> Result<Value> {
     bar.set_message(format!("{name}: reference"));
-    let truth = stage.reference(base, camera, &[], args.reference, bar)?;
-    let [forward, left, _] = camera.axis();
-    let light = |offset: f32| DynamicLight {
-        origin: camera.origin + forward * LIGHT_DISTANCE + left * offset,
-        radius: LIGHT_REACH,
-        color: Vec3::new(1.0, 0.75, 0.4),
-        additive: false,
+    let (truth, _) = stage.reference(base, camera, &[], args.reference, bar)?;
+    let regions = Regions::new(&truth, stage.specular(base, camera)?);
+    let lights = match args.no_lights {
+        true => None,
+        false => Some(Lights::new(stage, args, base, camera, bar)?),
     };
-    let brightness = brightness(stage, base, camera, bar)?;
-    // a lit picture needs less: it only tells which pixels the light reaches
-    let lit = stage.reference(base, camera, &[light(0.0)], args.reference.div_ceil(8), bar)?;
-    // the light that moves comes from the left and is here at the end
-    let moved = LIGHT_SPEED * args.frames as f32 * 0.25;
-    let moved_truth = stage.reference(
-        base,
-        camera,
-        &[light(-moved)],
-        args.reference.div_ceil(4),
-        bar,
-    )?;
-    let truth_values = luminance(&truth);
-    let reached: Vec<bool> = luminance(&lit)
-        .iter()
-        .zip(&truth_values)
-        .map(|(lit, dark)| *lit > 2.0 * dark && *lit > 0.01)
-        .collect();
-    let moved_values = luminance(&moved_truth);
-    // where the light was ten frames ago and its light is not any more
-    let trail: Vec<bool> = reached
-        .iter()
-        .zip(moved_values.iter().zip(&truth_values))
-        .map(|(reached, (now, dark))| *reached && *now < 1.5 * dark)
-        .collect();
 
     let mut results = serde_json::Map::new();
-    results.insert("brightness".into(), json!(brightness));
+    results.insert("specular_share".into(), json!(regions.specular_share()));
+    if !args.no_lights {
+        let brightness = brightness(stage, base, camera, bar)?;
+        results.insert("brightness".into(), json!(brightness));
+    }
     for Variant {
         name: kind,
         settings,
     } in variants(base)
     {
+        if !args.picture.is_empty() && !args.picture.iter().any(|p| p == kind) {
+            continue;
+        }
         bar.set_message(format!("{name}: {kind}"));
         stage.cut(camera, &settings)?;
         for left in (0..args.frames).rev() {
-            stage.frame(&on_the_way(camera, left), &[])?;
+            stage.frame(camera, left, &[])?;
             bar.inc(1);
         }
         let picture = stage.picture()?;
-        let difference = compare(&truth, &picture)?;
 
         // at rest: settled, then watched
         let mut watched = Vec::new();
         for frame in 0..2 * args.frames {
-            stage.frame(camera, &[])?;
+            stage.frame(camera, 0, &[])?;
             bar.inc(1);
             if frame >= args.frames {
-                watched.push(luminance(&stage.picture()?));
+                watched.push(stage.light()?);
             }
         }
-
-        // a light goes out
-        for _ in 0..args.frames {
-            stage.frame(camera, &[light(0.0)])?;
-            bar.inc(1);
-        }
-        let mut gone = None;
-        for frame in 1..=args.frames {
-            stage.frame(camera, &[])?;
-            bar.inc(1);
-            let values = luminance(&stage.picture()?);
-            if relative_bias(&values, &truth_values, &reached).abs() <= 0.1 {
-                gone = Some(frame);
-                break;
+        let rested = stage.picture()?;
+        let mut result = regions.compare(&picture, &rested, &watched)?;
+        if let Some(lights) = &lights {
+            let (figures, flown) = lights.measure(stage, args, camera, bar)?;
+            result.extend(figures);
+            if let Some(folder) = &args.output {
+                save(folder, &format!("{name}-{kind}-flown"), &flown)?;
             }
         }
-
-        // a light flies by
-        for frame in 0..args.frames {
-            let offset = LIGHT_SPEED * (args.frames - 1 - frame) as f32 - moved;
-            stage.frame(camera, &[light(offset)])?;
-            bar.inc(1);
-        }
-        let flown = stage.picture()?;
-        let flown_values = luminance(&flown);
-        results.insert(
-            kind.into(),
-            json!({
-                "ssim": difference.ssim,
-                "flip": flip(&truth, &picture)?,
-                "noise": temporal_noise(&watched),
-                "light_off_frames": gone,
-                "moving_light": {
-                    "ssim": compare(&moved_truth, &flown)?.ssim,
-                    "trail": relative_bias(&flown_values, &moved_values, &trail),
-                    "error": relative_error(&flown_values, &moved_values, &reached),
-                },
-            }),
-        );
+        results.insert(kind.into(), Value::Object(result));
         if let Some(folder) = &args.output {
             save(folder, &format!("{name}-{kind}"), &picture)?;
-            save(folder, &format!("{name}-{kind}-flown"), &flown)?;
+            save(folder, &format!("{name}-{kind}-rested"), &rested)?;
         }
     }
     if let Some(folder) = &args.output {
         save(folder, &format!("{name}-reference"), &truth)?;
-        save(folder, &format!("{name}-reference-flown"), &moved_truth)?;
+        save(folder, &format!("{name}-specular"), &regions.picture()?)?;
+        if let Some(lights) = &lights {
+            save(folder, &format!("{name}-reference-flown"), &lights.flown)?;
+        }
     }
     Ok(Value::Object(results))
+}
+
+/// What lights that go out or fly by leave, and the truth about it.
+struct Lights {
+    /// How far the light that flies by is to the left at the end, units.
+    moved: f32,
+    dark: Vec<f32>,
+    /// The view with that light.
+    flown: Rgb8,
+    flown_light: Vec<f32>,
+    /// Where the light that goes out was seen, and where one that has flown by was and is no more.
+    reached: Vec<bool>,
+    left: Vec<bool>,
+}
+
+/// A pixel tells of a light that went out where the light made it at least twice as bright and by this much of display white
+/// brighter, and where it is not black without: at least this much of display white, 7 of 255 as displayed. At least this
+/// part of the picture has to tell.
+const SEEN_LIGHT: f32 = 0.01;
+const SEEN_DARK: f32 = 0.002;
+const SEEN_PART: f32 = 0.002;
+
+impl Lights {
+    fn light(camera: &Camera, offset: f32) -> DynamicLight {
+        let [forward, left, _] = camera.axis();
+        DynamicLight {
+            origin: camera.origin + forward * LIGHT_DISTANCE + left * offset,
+            radius: LIGHT_REACH,
+            color: Vec3::new(1.0, 0.75, 0.4),
+            additive: false,
+        }
+    }
+
+    fn new(
+        stage: &mut Stage,
+        args: &MeasureArgs,
+        base: &Settings,
+        camera: &Camera,
+        bar: &ProgressBar,
+    ) -> Result<Self> {
+        // of means over as many frames as possible: relative errors of dark places count
+        let (truth, dark) = stage.reference(base, camera, &[], args.reference.div_ceil(2), bar)?;
+        // a lit picture needs less: it only tells which pixels the light reaches
+        let frames = args.reference.div_ceil(8);
+        let (lit, _) = stage.reference(base, camera, &[Self::light(camera, 0.0)], frames, bar)?;
+        // the light that moves comes from the left and is here at the end
+        let moved = LIGHT_SPEED * args.frames as f32 * 0.25;
+        let light = Self::light(camera, -moved);
+        let (flown, flown_light) =
+            stage.reference(base, camera, &[light], args.reference.div_ceil(4), bar)?;
+        let shown = [&truth, &lit].map(luminance);
+        let mut reached: Vec<bool> = std::iter::zip(&shown[0], &shown[1])
+            .map(|(dark, lit)| *dark >= SEEN_DARK && *lit > 2.0 * dark && *lit > dark + SEEN_LIGHT)
+            .collect();
+        let count = reached.iter().filter(|r| **r).count();
+        if (count as f32) < SEEN_PART * reached.len() as f32 {
+            reached.fill(false);
+        }
+        // where the light was some frames ago and its light is not any more
+        let left = reached
+            .iter()
+            .zip(flown_light.iter().zip(&dark))
+            .map(|(reached, (now, dark))| *reached && *now < 1.5 * dark)
+            .collect();
+        Ok(Self {
+            moved,
+            dark,
+            flown,
+            flown_light,
+            reached,
+            left,
+        })
+    }
+
+    /// Figures, and the picture at the end of the flight.
+    fn measure(
+        &self,
+        stage: &mut Stage,
+        args: &MeasureArgs,
+        camera: &Camera,
+        bar: &ProgressBar,
+    ) -> Result<(serde_json::Map<String, Value>, Rgb8)> {
+        let rested = relative_bias(&stage.light()?, &self.dark, &self.reached);
+        for _ in 0..args.frames {
+            stage.frame(camera, 0, &[Self::light(camera, 0.0)])?;
+            bar.inc(1);
+        }
+        let mut off = Vec::new();
+        for _ in 0..args.frames {
+            stage.frame(camera, 0, &[])?;
+            bar.inc(1);
+            off.push(relative_bias(&stage.light()?, &self.dark, &self.reached));
+        }
+        // for good: not only while it passes from too bright to too dark
+        let gone = off.iter().rposition(|bias| bias.abs() > 0.1);
+        let gone = match (self.reached.contains(&true), gone.map_or(0, |i| i + 1)) {
+            (false, _) => json!("nothing"),
+            (true, last) if last == off.len() => Value::Null,
+            (true, last) => json!(last + 1),
+        };
+
+        for frame in 0..args.frames {
+            let offset = LIGHT_SPEED * (args.frames - 1 - frame) as f32 - self.moved;
+            stage.frame(camera, 0, &[Self::light(camera, offset)])?;
+            bar.inc(1);
+        }
+        let (picture, light) = (stage.picture()?, stage.light()?);
+        let mut figures = serde_json::Map::new();
+        figures.insert("rested_bias".into(), json!(rested));
+        figures.insert("light_off_bias".into(), json!(off));
+        figures.insert("light_off_frames".into(), gone);
+        figures.insert(
+            "moving_light".into(),
+            json!({
+                "ssim": compare(&self.flown, &picture)?.ssim,
+                "trail": relative_bias(&light, &self.flown_light, &self.left),
+                "error": relative_error(&light, &self.flown_light, &self.reached),
+            }),
+        );
+        Ok((figures, picture))
+    }
 }
 
 fn save(folder: &Path, name: &str, picture: &Rgb8) -> Result<()> {
@@ -331,6 +319,16 @@ fn save(folder: &Path, name: &str, picture: &Rgb8) -> Result<()> {
         image::ColorType::Rgb8,
     )
     .with_context(|| format!("{}: cannot be written", path.display()))
+}
+
+/// The places of `relight cameras`, seen with a player's eyes.
+fn ruled_cameras(entities: &[q3bsp::Entity], each: usize) -> Vec<Camera> {
+    let eyes = |at: &Place| Camera {
+        origin: at.origin + Vec3::Z * EYES,
+        yaw: at.yaw,
+        pitch: 0.0,
+    };
+    places(entities, each).iter().map(eyes).collect()
 }
 
 /// Runs the command.
@@ -355,6 +353,7 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
             rt: true,
             rt_bounces: args.bounces,
             rt_auto_exposure: false,
+            rt_exposure: args.exposure,
             ..Settings::default()
         };
         renderer.begin_registration(files, &base)?;
@@ -365,30 +364,30 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
             .map(|w| w.relit.bsp.clone())
             .context("no map")?;
         let entities = map_entities(&mut renderer, &bsp);
+        let held = args.hold.as_ref().map(|m| renderer.register_model(m));
         let mut stage = Stage {
             renderer,
             entities,
+            held,
             size: args.size,
         };
-        let cameras = places(&bsp.entities(), args.each);
+        let cameras = match args.view.is_empty() {
+            true => ruled_cameras(&bsp.entities(), args.each),
+            false => args.view.clone(),
+        };
         let (variants, frames) = (variants(&base).len() as u64, u64::from(args.frames));
         let bar = ProgressBar::new(
             cameras.len() as u64
-                * (u64::from(args.reference) * 11 / 8
+                * (u64::from(args.reference) * 15 / 8
                     + u64::from(ADAPTATION)
                     + variants * 6 * frames),
         );
         bar.set_style(ProgressStyle::with_template(
             "{msg} {bar:30} {pos}/{len} frames, {eta} left",
         )?);
-        for (index, at) in cameras.iter().enumerate() {
-            let camera = Camera {
-                origin: at.origin + Vec3::Z * EYES,
-                yaw: at.yaw,
-                pitch: 0.0,
-            };
+        for (index, camera) in cameras.iter().enumerate() {
             let name = format!("{map}-{index}");
-            let result = place(&mut stage, args, &base, &camera, &name, &bar)?;
+            let result = place(&mut stage, args, &base, camera, &name, &bar)?;
             all.insert(name, result);
         }
         bar.finish_and_clear();
@@ -396,85 +395,7 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
     if args.json {
         println!("{}", Value::Object(all));
     } else {
-        table(&all);
+        table::print(&all);
     }
     Ok(())
-}
-
-/// A line for each place and way, and their means.
-fn table(all: &serde_json::Map<String, Value>) {
-    println!(
-        "{:<20} {:<14} {:>7} {:>7} {:>8} {:>6} {:>8} {:>7}",
-        "place", "picture", "SSIM", "FLIP", "noise %", "off", "fly SSIM", "trail %"
-    );
-    let mut sums: Vec<(String, [f64; 5], f64, f64)> = Vec::new();
-    let mut brightness = Vec::new();
-    for (place, kinds) in all {
-        brightness.extend(
-            kinds
-                .pointer("/brightness")
-                .and_then(Value::as_f64)
-                .map(|b| (place, b)),
-        );
-        for (kind, v) in kinds
-            .as_object()
-            .into_iter()
-            .flatten()
-            .filter(|(_, v)| v.is_object())
-        {
-            let number = |path: &str| v.pointer(path).and_then(Value::as_f64).unwrap_or(f64::NAN);
-            let row = [
-                number("/ssim"),
-                number("/flip"),
-                100.0 * number("/noise"),
-                number("/moving_light/ssim"),
-                100.0 * number("/moving_light/trail"),
-            ];
-            let off = v.pointer("/light_off_frames").and_then(Value::as_u64);
-            let shown = off.map_or("never".into(), |n| n.to_string());
-            line(place, kind, row, &shown);
-            let off = off.map_or(f64::INFINITY, |n| n as f64);
-            match sums.iter_mut().find(|(k, ..)| k == kind) {
-                Some((_, sum, worst, count)) => {
-                    (0..row.len()).for_each(|i| sum[i] += row[i]);
-                    (*worst, *count) = (worst.max(off), *count + 1.0);
-                }
-                None => sums.push((kind.clone(), row, off, 1.0)),
-            }
-        }
-    }
-    for (kind, sum, worst, count) in sums {
-        line(
-            "mean (worst off)",
-            &kind,
-            sum.map(|v| v / count),
-            &format!("{worst}"),
-        );
-    }
-    for (place, ratio) in brightness {
-        println!("{place:<20} brightness of the traced over the classic look {ratio:.2}");
-    }
-}
-
-fn line(place: &str, kind: &str, [ssim, flip, noise, fly, trail]: [f64; 5], off: &str) {
-    println!(
-        "{place:<20} {kind:<14} {ssim:>7.4} {flip:>7.4} {noise:>8.2} {off:>6} {fly:>8.4} {trail:>7.1}"
-    );
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_camera_arrives() {
-        let camera = Camera {
-            origin: Vec3::new(1.0, 2.0, 3.0),
-            yaw: 30.0,
-            pitch: 0.0,
-        };
-        assert_eq!(on_the_way(&camera, 0).origin, camera.origin);
-        assert_eq!(on_the_way(&camera, 4).yaw, 28.0);
-        assert!(on_the_way(&camera, 4).origin.distance(camera.origin) - 3.0 < 1.0e-5);
-    }
 }

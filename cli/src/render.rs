@@ -193,7 +193,7 @@ fn read_path(file: &Path) -> anyhow::Result<Vec<PathPoint>> {
 }
 
 /// `X,Y,Z[,YAW[,PITCH]]`, or with spaces between.
-fn parse_view(text: &str) -> Result<Camera, String> {
+pub fn parse_view(text: &str) -> Result<Camera, String> {
     let words = text
         .split(|c: char| c == ',' || c.is_whitespace())
         .filter(|word| !word.is_empty());

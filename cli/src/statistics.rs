@@ -18,11 +18,19 @@ pub fn luminance(picture: &Rgb8) -> Vec<f32> {
         .collect()
 }
 
-/// Median over the pixels of standard deviation over mean of their values in time.
-pub fn temporal_noise(frames: &[Vec<f32>]) -> f32 {
+/// Mean of the values that `part` marks; 0 without any.
+pub fn marked_mean(values: &[f32], part: &[bool]) -> f32 {
+    let marked = || values.iter().zip(part).filter(|(_, m)| **m);
+    let sum: f64 = marked().map(|(v, _)| f64::from(*v)).sum();
+    (sum / marked().count().max(1) as f64) as f32
+}
+
+/// Median over the pixels that `part` marks of standard deviation over mean of their values in time.
+pub fn temporal_noise(frames: &[Vec<f32>], part: &[bool]) -> f32 {
     let count = frames.len() as f32;
     let pixels = frames.first().map_or(0, Vec::len);
     let mut ratios: Vec<f32> = (0..pixels)
+        .filter(|pixel| part.get(*pixel).copied().unwrap_or(false))
         .filter_map(|pixel| {
             let values = || frames.iter().filter_map(|f| f.get(pixel));
             let mean = values().sum::<f32>() / count;
@@ -66,8 +74,11 @@ mod tests {
     fn noise_is_the_median_of_deviation_over_mean() {
         // pixels: still, between 1 and 3 (deviation 1, mean 2), black
         let frames = [vec![1.0, 1.0, 0.0], vec![1.0, 3.0, 0.0]];
-        assert!((temporal_noise(&frames) - 0.5).abs() < 1.0e-6);
-        assert_eq!(temporal_noise(&[]), 0.0);
+        assert!((temporal_noise(&frames, &[true; 3]) - 0.5).abs() < 1.0e-6);
+        assert_eq!(temporal_noise(&frames, &[true, false, true]), 0.0);
+        assert_eq!(temporal_noise(&[], &[]), 0.0);
+        assert!((marked_mean(&[1.0, 5.0, 2.0], &[true, false, true]) - 1.5).abs() < 1.0e-6);
+        assert_eq!(marked_mean(&[1.0], &[false]), 0.0);
     }
 
     #[test]

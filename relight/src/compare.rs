@@ -76,6 +76,17 @@ pub fn flip(a: &Rgb8, b: &Rgb8) -> Result<f64, CompareError> {
     Ok(flip::mean(a, b))
 }
 
+/// FLIP at each pixel, rows from the top; see [`flip`].
+///
+/// # Errors
+/// The pictures differ in size.
+pub fn flip_map(a: &Rgb8, b: &Rgb8) -> Result<Vec<f32>, CompareError> {
+    if (a.width, a.height) != (b.width, b.height) {
+        return Err(CompareError::Size((a.width, a.height), (b.width, b.height)));
+    }
+    Ok(flip::map(a, b).into_iter().map(|v| v as f32).collect())
+}
+
 impl Rgb8 {
     /// Takes over `pixels`, which have to be `width * height * 3` bytes.
     ///
@@ -225,6 +236,35 @@ pub fn compare(a: &Rgb8, b: &Rgb8) -> Result<Difference, CompareError> {
     })
 }
 
+/// Structural similarity at each pixel, mean of the channels: of the window around it, or near the picture's edge of the
+/// nearest window that lies fully in it. Rows from the top.
+///
+/// # Errors
+/// As [`compare`].
+pub fn ssim_map(a: &Rgb8, b: &Rgb8) -> Result<Vec<f32>, CompareError> {
+    if (a.width, a.height) != (b.width, b.height) {
+        return Err(CompareError::Size((a.width, a.height), (b.width, b.height)));
+    }
+    if a.width < WINDOW || a.height < WINDOW {
+        return Err(CompareError::TooSmall(a.width, a.height));
+    }
+    let (columns, rows) = (a.width - WINDOW + 1, a.height - WINDOW + 1);
+    let mut windows = vec![0.0; columns * rows];
+    for channel in 0..3 {
+        let mut next = windows.iter_mut();
+        each_window(a, b, channel, |ssim| {
+            if let Some(window) = next.next() {
+                *window += ssim / 3.0;
+            }
+        });
+    }
+    let near = |at: usize, count: usize| at.saturating_sub(WINDOW / 2).min(count - 1);
+    let places = (0..a.height).flat_map(|y| (0..a.width).map(move |x| (x, y)));
+    Ok(places
+        .map(|(x, y)| windows[near(y, rows) * columns + near(x, columns)] as f32)
+        .collect())
+}
+
 /// Sums over a window: of the values, their squares and their products.
 #[derive(Clone, Copy, Default)]
 struct Sums {
@@ -278,15 +318,21 @@ impl Sums {
     }
 }
 
-/// Mean similarity of one channel. A window slides down the columns' running sums, so the work does not grow
-/// with the window.
+/// Mean similarity of one channel.
 fn channel_ssim(a: &Rgb8, b: &Rgb8, channel: usize) -> f64 {
+    let mut total = 0.0;
+    each_window(a, b, channel, |ssim| total += ssim);
+    total / ((a.width - WINDOW + 1) * (a.height - WINDOW + 1)) as f64
+}
+
+/// Similarity of one channel in each window, row by row. A window slides down the columns' running sums, so the work does
+/// not grow with the window.
+fn each_window(a: &Rgb8, b: &Rgb8, channel: usize, mut found: impl FnMut(f64)) {
     let at = |x: usize, y: usize| {
         let i = (y * a.width + x) * 3 + channel;
         Sums::of(a.pixels[i], b.pixels[i])
     };
     let mut columns = vec![Sums::default(); a.width];
-    let mut total = 0.0;
     for y in 0..a.height {
         for (x, column) in columns.iter_mut().enumerate() {
             column.add(&at(x, y));
@@ -304,11 +350,10 @@ fn channel_ssim(a: &Rgb8, b: &Rgb8, channel: usize) -> f64 {
                 window.subtract(&columns[x - WINDOW]);
             }
             if x + 1 >= WINDOW {
-                total += window.ssim();
+                found(window.ssim());
             }
         }
     }
-    total / ((a.width - WINDOW + 1) * (a.height - WINDOW + 1)) as f64
 }
 
 #[cfg(test)]
@@ -384,6 +429,26 @@ mod tests {
         }
         let wanted = total / (3 * (24 - WINDOW + 1) * (32 - WINDOW + 1)) as f64;
         assert!((compare(&a, &b).unwrap().ssim - wanted).abs() < 1e-12);
+    }
+
+    /// A window in the middle of the picture is that of its pixel, and far from a difference nothing differs.
+    #[test]
+    fn maps_tell_where_pictures_differ() {
+        let a = ramp(0);
+        let mut pixels = a.pixels().to_vec();
+        pixels[(12 * 32 + 16) * 3] ^= 0x80;
+        let b = Rgb8::new(32, 24, pixels).unwrap();
+        let ssim = ssim_map(&a, &b).unwrap();
+        assert_eq!(ssim.len(), 32 * 24);
+        assert!(ssim[12 * 32 + 16] < 0.99 && ssim[12 * 32 + 19] < 0.99);
+        assert_eq!(
+            (ssim[12 * 32 + 20], ssim[0], ssim[32 * 24 - 1]),
+            (1.0, 1.0, 1.0)
+        );
+        let flips = flip_map(&a, &b).unwrap();
+        let mean = flips.iter().map(|v| f64::from(*v)).sum::<f64>() / flips.len() as f64;
+        assert!((mean - flip(&a, &b).unwrap()).abs() < 1e-6);
+        assert!(flips[12 * 32 + 16] > 0.05 && flips[0] == 0.0);
     }
 
     #[test]

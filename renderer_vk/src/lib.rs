@@ -8,6 +8,7 @@ pub mod assets;
 mod error;
 mod frame;
 pub mod gpu;
+mod half;
 pub mod path;
 mod raster;
 mod renderer;

@@ -518,6 +518,8 @@ pub struct TraceView {
     pub image_surface: u32,
     /// RG32UI: what the light of the surface is multiplied by, and what is in front of it.
     pub image_shown: u32,
+    /// R32UI: the albedo of what a pixel does not show where a reflection and what lies behind it are seen in turns.
+    pub image_other: u32,
     pub image_direct: u32,
     pub image_indirect: u32,
     /// RGBA16F, of the traced size; not written while frames are accumulated.
@@ -534,7 +536,6 @@ pub struct TraceView {
     pub target_height: u32,
     /// Clamped, with mip levels: for the images of sky boxes.
     pub sky_sampler: u32,
-    pub padding: u32,
     /// Camera of the last frame.
     pub last_eye: Vec3,
     pub last_forward: Vec3,
@@ -586,6 +587,7 @@ pub mod constants {
     pub const DEBUG_VARIANCE: u32 = 8;
     pub const DEBUG_GRADIENTS: u32 = 9;
     pub const DEBUG_RAYS: u32 = 10;
+    pub const DEBUG_SPECULAR: u32 = 11;
     pub const COUNT_PRIMARY: u32 = 0;
     pub const COUNT_DIRECT: u32 = 1;
     pub const COUNT_INDIRECT: u32 = 2;

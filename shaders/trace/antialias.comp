@@ -21,7 +21,8 @@ layout(local_size_x = GROUP, local_size_y = GROUP) in;
 
 // Compressed colour (YCoCg), and length of the way to what is seen there.
 shared vec4 tile[TILE][TILE];
-// How much of each colour is of what has moved in front of the surface, whose history knows nothing of it.
+// How much of each colour is of what has moved in front of the surface, whose history knows nothing of it. Negative where
+// a reflection and what lies behind it are seen in turns and the pixel's own surface is the lesser part of the colour.
 shared float fresh_parts[TILE][TILE];
 
 // Standard deviation of a pixel's filter, output pixels: nearly that of its square.
@@ -98,7 +99,7 @@ void main() {
         ivec2 pixel = clamp(first + at, ivec2(0), traced_size - 1);
         vec4 color = imageLoad(images_rgba16f[VIEW.image_composite], pixel);
         tile[at.y][at.x] = vec4(to_ycocg(compress(color.rgb, exposure)), path_read(pixel));
-        fresh_parts[at.y][at.x] = color.a;
+        fresh_parts[at.y][at.x] = color.a == 0.0 ? LEAST_FRESH : color.a;
     }
     barrier();
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
@@ -110,7 +111,9 @@ void main() {
     vec3 sum = vec3(0.0), squares = vec3(0.0);
     vec4 narrow = vec4(0.0), wide = vec4(0.0);
     // an edge moves with what is in front; on one surface the pixel's own motion is the right one
-    float nearest = tile[middle.y - first.y][middle.x - first.x].w * IN_FRONT;
+    // not that of what is the lesser part of what is seen
+    bool lesser = fresh_parts[middle.y - first.y][middle.x - first.x] < 0.0;
+    float nearest = lesser ? 1.0e30 : tile[middle.y - first.y][middle.x - first.x].w * IN_FRONT;
     ivec2 nearest_at = ivec2(0);
     float fresh = 0.0;
     for (int y = -1; y <= 1; y++) {
@@ -124,8 +127,9 @@ void main() {
             sum += s.rgb;
             squares += s.rgb * s.rgb;
             // next to it, too: the samples of an edge's pixels meet it in one frame and miss it in the next
-            fresh = max(fresh, fresh_parts[at.y][at.x]);
-            if (s.w < nearest) {
+            float fresh_part = fresh_parts[at.y][at.x];
+            fresh = max(fresh, abs(fresh_part) - LEAST_FRESH);
+            if (s.w < nearest && fresh_part >= 0.0) {
                 nearest = s.w;
                 nearest_at = ivec2(x, y);
             }

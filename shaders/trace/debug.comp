@@ -4,6 +4,7 @@
 #include "trace/tracer.glsl"
 #include "trace/lights.glsl"
 #include "trace/denoise.glsl"
+#include "trace/camera.glsl"
 #include "trace/motion.glsl"
 #include "trace/picture.glsl"
 
@@ -37,6 +38,17 @@ vec3 cluster_color(uint cluster, vec3 normal) {
     // shades by direction keep the room's shape visible
     float shade = 0.75 + 0.15 * normal.z + 0.1 * normal.x;
     return mix(vec3(1.0), hue(float(x & 0xFFFFu) / 65536.0 * 2.0 * PI), 0.45 + 0.5 * float(x >> 16) / 65536.0) * shade;
+}
+
+// What a pixel shows by way of others: green what a surface reflects, blue what lies behind it, white all that a mirror or
+// a portal shows, or what is seen bent.
+vec3 specular_color(ivec2 pixel, GBufferPixel g) {
+    float field = mark_field(mark_read(pixel));
+    if (field > 0.0) return field == 2.0 ? vec3(0.0, 1.0, 0.0) : vec3(0.0, 0.0, 1.0);
+    if (g.path < 0.0) return vec3(0.0);
+    rng_begin(uvec2(pixel), VIEW.seed, 0);
+    CameraRay ray = camera_ray(pixel);
+    return distance(ray.origin + ray.direction * g.path, g.position) > 0.1 + 0.01 * g.path ? vec3(1.0) : vec3(0.0);
 }
 
 vec3 debug_color(ivec2 pixel) {
@@ -76,6 +88,7 @@ vec3 debug_color(ivec2 pixel) {
     case DEBUG_RAYS:
         if (VIEW.post.image_rays == NO_IMAGE) return NOTHING;
         return heat_count(float(imageLoad(uimages_r32ui[VIEW.post.image_rays], pixel).x), 8.0);
+    case DEBUG_SPECULAR: return specular_color(pixel, g);
     }
     return NOTHING;
 }

@@ -28,6 +28,9 @@ Motion motion_read(ivec2 pixel) {
 // Most new light that a pixel tells of, times the light of its front: the unit of the fraction beside the field.
 const float MOST_FRESH = 8.0;
 
+// Added to the part of a pixel's colour that is new, so that it can have a sign.
+const float LEAST_FRESH = 1.0 / 1024.0;
+
 // The pixel's mark, which the motion image has room for: the field of a pixel that shows either a reflection (2) or what
 // lies behind it (1), otherwise 0; its fraction tells how much light of what is in front moves otherwise than the surface.
 float mark_read(ivec2 pixel) { return imageLoad(images_rgba16f[VIEW.motion.image], pixel).w; }

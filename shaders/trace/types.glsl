@@ -94,10 +94,10 @@ struct TraceView {
     float eye_shift; uint channels;
     uint fog_count; uint portal_count;
     uint max_depth; uint bounces;
-    uint image_position; uint image_surface; uint image_shown; uint image_direct; uint image_indirect; uint image_composite;
+    uint image_position; uint image_surface; uint image_shown; uint image_other; uint image_direct; uint image_indirect; uint image_composite;
     uint image_accumulation; uint image_target;
     float exposure_bias; float exposure_base; float exposure_blend;
-    uint target_width; uint target_height; uint sky_sampler; uint padding;
+    uint target_width; uint target_height; uint sky_sampler;
     vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up;
     DenoiseView denoise;
 };
@@ -119,7 +119,7 @@ const uint VIEW_JITTER = 1, VIEW_FIRST_PERSON = 2, VIEW_ACCUMULATE = 4, VIEW_AUT
     VIEW_SPARSE_BOUNCE = 512;
 // The views of rt_debug.
 const uint DEBUG_ALBEDO = 1, DEBUG_NORMALS = 2, DEBUG_DEPTH = 3, DEBUG_MOTION = 4, DEBUG_CLUSTERS = 5, DEBUG_LIGHTS = 6,
-    DEBUG_SAMPLES = 7, DEBUG_VARIANCE = 8, DEBUG_GRADIENTS = 9, DEBUG_RAYS = 10;
+    DEBUG_SAMPLES = 7, DEBUG_VARIANCE = 8, DEBUG_GRADIENTS = 9, DEBUG_RAYS = 10, DEBUG_SPECULAR = 11;
 // Counted passes, and counters of each.
 const uint COUNT_PRIMARY = 0, COUNT_DIRECT = 1, COUNT_INDIRECT = 2, COUNTER_ROWS = 64;
 // No storage image.

@@ -176,7 +176,7 @@ cvars! {
     RtFlashlight = c"rt_flashlight", c"0", ARCHIVE, range(0.0, 1.0, true), c"1 carries a lamp at the eye.";
     RtLightScale = c"rt_lightScale", c"1", ARCHIVE, range(0.0, 100.0, false), c"Multiplies every light of the map when it is traced.";
     RtDlightScale = c"rt_dlightScale", c"1", ARCHIVE, range(0.0, 100.0, false), c"Multiplies lights of explosions, missiles and items when they are traced.";
-    RtDebug = c"rt_debug", c"0", NONE, range(0.0, 10.0, true), c"Shows a step of the traced look in place of the picture: 1 albedo, 2 normals, 3 depth, 4 motion, 5 clusters, 6 lights per pixel, 7 samples, 8 variance, 9 gradients, 10 rays per pixel.";
+    RtDebug = c"rt_debug", c"0", NONE, range(0.0, 11.0, true), c"Shows a step of the traced look in place of the picture: 1 albedo, 2 normals, 3 depth, 4 motion, 5 clusters, 6 lights per pixel, 7 samples, 8 variance, 9 gradients, 10 rays per pixel, 11 reflections.";
     Device = c"r_device", c"", ARCHIVE | LATCH, None, c"Part of the name of the Vulkan device to use; empty takes the best.";
     VkValidation = c"r_vkValidation", c"0", LATCH, range(0.0, 1.0, true), c"1 loads the Vulkan validation layer and prints what it finds.";
     Headless = c"r_headless", c"0", LATCH, range(0.0, 1.0, true), c"1 renders without a window, for tests.";

@@ -245,6 +245,12 @@ fn appearance(picture: &Rgb8) -> Appearance {
 
 /// The mean over all pixels of `b`'s difference from `a`; 0 for equal pictures, at most 1. Sizes have to agree.
 pub(super) fn mean(a: &Rgb8, b: &Rgb8) -> f64 {
+    let values = map(a, b);
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// The measure at each pixel, rows from the top.
+pub(super) fn map(a: &Rgb8, b: &Rgb8) -> Vec<f64> {
     let (a, b) = (appearance(a), appearance(b));
     let green_to_blue = hyab(hunt_lab([0.0, 1.0, 0.0]), hunt_lab([0.0, 0.0, 1.0]));
     let most = green_to_blue.powf(COLOR_EXPONENT);
@@ -254,7 +260,7 @@ pub(super) fn mean(a: &Rgb8, b: &Rgb8) -> f64 {
     let colors = a.colors.iter().zip(&b.colors);
     let edges = edges_a.iter().zip(edges_b).map(|(x, y)| (x - y).abs());
     let points = points_a.iter().zip(points_b).map(|(x, y)| (x - y).abs());
-    let total: f64 = colors
+    colors
         .zip(edges.zip(points))
         .map(|((x, y), (edge, point))| {
             let distance = hyab(*x, *y).powf(COLOR_EXPONENT);
@@ -266,8 +272,7 @@ pub(super) fn mean(a: &Rgb8, b: &Rgb8) -> f64 {
             let feature = (edge.max(point) / std::f64::consts::SQRT_2).powf(FEATURE_EXPONENT);
             color.powf(1.0 - feature)
         })
-        .sum();
-    total / a.colors.len().max(1) as f64
+        .collect()
 }
 
 #[cfg(test)]

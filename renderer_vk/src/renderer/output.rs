@@ -10,6 +10,7 @@ use crate::assets::ImageSource;
 use crate::error::Error;
 use crate::frame::{CLEAR, FrameContext, Item};
 use crate::gpu::{ColorMask, Format, Recorder};
+use crate::half::half;
 use crate::raster::{self, Present};
 use crate::scene::Statistics;
 use crate::stereo::Eye;
@@ -312,7 +313,18 @@ impl Renderer {
         let Some(hdr) = self.trace.as_ref().and_then(TraceLook::hdr) else {
             return Ok(Vec::new());
         };
-        let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&self.device.read_image(hdr)?);
+        let (bytes, is_half) = (
+            self.device.read_image(hdr)?,
+            hdr.format() == Format::Rgba16F,
+        );
+        if is_half {
+            let texels: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+            return Ok(texels
+                .iter()
+                .map(|t| [t[0], t[1], t[2]].map(half))
+                .collect());
+        }
+        let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
         Ok(texels.iter().map(|t| [t[0], t[1], t[2]]).collect())
     }
 }

@@ -4,7 +4,7 @@ use super::passes::{COMPUTE_TILE, dispatch};
 use crate::gpu::{ComputePipeline, Device, Error, Recorder};
 
 /// Names of the views, by their numbers in `rt_debug` from 1 on.
-pub const DEBUG_VIEWS: [&str; 10] = [
+pub const DEBUG_VIEWS: [&str; 11] = [
     "albedo",
     "normals",
     "depth",
@@ -15,6 +15,7 @@ pub const DEBUG_VIEWS: [&str; 10] = [
     "variance",
     "gradients",
     "rays per pixel",
+    "reflections",
 ];
 
 /// Reads the G-buffer and what the passes count; writes the view's rectangle of the target. Its pipeline is compiled

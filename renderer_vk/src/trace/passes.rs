@@ -180,6 +180,17 @@ ray_pass!(
     Indirect, "trace_indirect", TRACE_INDIRECT_RGEN,
     TRACE_INDIRECT_RGEN_COMPUTE, TRACE_INDIRECT_RGEN_QUERY
 );
+impl Indirect {
+    /// The same pass for maps with fog, which lies in the way of its rays.
+    ///
+    /// # Errors
+    /// The driver refuses the pipeline.
+    pub fn with_fog(device: &Device, tracer: Tracer) -> Result<Self, Error> {
+        // HAS_FOG in indirect.rgen
+        Self::with(device, tracer, &[(1, 1)])
+    }
+}
+
 ray_pass!(
     /// Reads the acceleration structures and the flares of the view; writes which of them are seen. `size`: their number
     /// and 1.

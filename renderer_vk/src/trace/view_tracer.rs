@@ -49,6 +49,8 @@ pub struct ViewTracer {
     fog: LitFog,
     direct: Direct,
     indirect: Indirect,
+    /// The same for maps with fog, made when there is one.
+    fog_indirect: Option<Indirect>,
     fill: Fill,
     /// Made when a view has flares.
     flare_rays: Option<FlareRays>,
@@ -99,6 +101,7 @@ impl ViewTracer {
             fog: LitFog::new(device, tracer),
             direct: Direct::new(device, tracer)?,
             indirect: Indirect::new(device, tracer)?,
+            fog_indirect: None,
             fill: Fill::new(device)?,
             flare_rays: None,
             tracer,
@@ -283,12 +286,22 @@ impl ViewTracer {
         self.direct.record(rec, address, size)?;
         if settings.rt_bounces == 0 {
             self.darken_indirect(rec)?;
-        } else if sparse_bounce(settings) {
-            let cells = [width.div_ceil(2), height.div_ceil(2)];
-            self.indirect.record(rec, address, cells)?;
-            self.fill.record(rec, address, cells)?;
         } else {
-            self.indirect.record(rec, address, size)?;
+            let indirect = if params.fog_count == 0 {
+                &self.indirect
+            } else {
+                match &mut self.fog_indirect {
+                    Some(made) => made,
+                    none => none.insert(Indirect::with_fog(&self.device, self.tracer)?),
+                }
+            };
+            if sparse_bounce(settings) {
+                let cells = [width.div_ceil(2), height.div_ceil(2)];
+                indirect.record(rec, address, cells)?;
+                self.fill.record(rec, address, cells)?;
+            } else {
+                indirect.record(rec, address, size)?;
+            }
         }
         self.fog.record(rec, address)?;
         self.counters.end(rec)?;
@@ -471,6 +484,7 @@ impl ViewTracer {
             image_position: targets.position.storage_index(),
             image_surface: targets.surface.storage_index(),
             image_shown: targets.shown.storage_index(),
+            image_other: targets.other.storage_index(),
             image_direct: targets.direct.storage_index(),
             image_indirect: targets.indirect.storage_index(),
             image_composite: targets.composite.storage_index(),
@@ -485,7 +499,6 @@ impl ViewTracer {
             target_width: target.width(),
             target_height: target.height(),
             sky_sampler: materials.sky_sampler(),
-            padding: 0,
             last_eye,
             last_forward,
             last_left,

@@ -247,3 +247,48 @@ fn no_light_leaks_through_walls_with(gpu: &mut Gpu) {
         assert!(gpu.mean(&scene, &bounced(0), 4).min_element() > 0.1);
     }
 }
+
+#[test]
+fn bounced_light_passes_fog() {
+    Gpu::each(bounced_light_passes_fog_with);
+}
+
+fn bounced_light_passes_fog_with(gpu: &mut Gpu) {
+    // below a slab of fog under a glowing ceiling, all without end: from the direction at the angle t to the normal the
+    // floor gets fog * f + glow * (1 - f), f = sqrt(thickness / cos t / depth), weighed by 2 cos t sin t
+    let (glow, tint) = (0.8, Vec3::new(0.1, 0.5, 0.2));
+    let mut scene = Scene::new(Vec3::Z * 20.0, Vec3::new(0.1, 0.0, 0.0), 20.0, 32);
+    let ceiling = scene.material(&[stage::constant([encode(glow); 3])], 0);
+    let floor = scene.material(&[stage::light()], 0);
+    let (x, y) = (Vec3::X * 80_000.0, Vec3::Y * 80_000.0);
+    let corner = Vec3::new(-40_000.0, -40_000.0, 0.0);
+    scene.quad(rectangle(corner, x, y), floor);
+    scene.quad(rectangle(corner + Vec3::Z * 200.0, y, x), ceiling);
+    let exact_without = through_byte(encode(glow));
+    let without = gpu.mean(&scene, &bounced(1), 16);
+    assert!((without.y / exact_without - 1.0).abs() < 0.01, "{without}");
+    let (thickness, depth) = (40.0, 160.0);
+    scene.fogs.push(shaders::types::Fog {
+        mins: Vec3::new(-1.0e5, -1.0e5, 100.0),
+        maxs: Vec3::new(1.0e5, 1.0e5, 100.0 + thickness),
+        plane: [0.0; 4],
+        has_surface: 0,
+        color: tint,
+        depth,
+    });
+    let steps = 10_000;
+    let factor: f32 = (0..steps)
+        .map(|i| {
+            // even steps of the squared sine are even in 2 cos t sin t dt
+            let cosine = (1.0 - (i as f32 + 0.5) / steps as f32).sqrt();
+            (thickness / cosine / depth).sqrt().min(1.0) / steps as f32
+        })
+        .sum();
+    let exact = decode(tint) * factor + exact_without * (1.0 - factor);
+    let mean = gpu.mean(&scene, &bounced(1), 64);
+    println!("{mean} {exact}");
+    assert!(
+        (mean / exact - 1.0).abs().max_element() < 0.01,
+        "{mean} {exact}"
+    );
+}

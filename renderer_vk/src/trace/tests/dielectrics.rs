@@ -243,6 +243,68 @@ fn an_environment_stage_shows_what_is_around_with(gpu: &mut Gpu) {
 }
 
 #[test]
+fn the_texture_of_what_shines_is_seen_in_every_pixel() {
+    Gpu::each(the_texture_of_what_shines_is_seen_in_every_pixel_with);
+}
+
+fn the_texture_of_what_shines_is_seen_in_every_pixel_with(gpu: &mut Gpu) {
+    let upload = |name, side: u32, bytes: &[u8]| {
+        let desc = ImageDesc::new(name, side, side, Format::Rgba8, ImageUsage::SAMPLED);
+        let image = Image::new(&gpu.device, &desc).expect("image");
+        gpu.device
+            .upload_image(&image, 0, 0, bytes)
+            .expect("upload");
+        image
+    };
+    // about a texel a pixel, each of another grey
+    let mut state = 1u32;
+    let texels: Vec<u8> = (0..32 * 32)
+        .flat_map(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let grey = 40 + (state >> 24) as u8 / 2;
+            [grey, grey, grey, 255]
+        })
+        .collect();
+    let around = upload("environment", 1, &[128, 128, 128, 255]);
+    let texture = upload("texture", 32, &texels);
+    let body = Stage {
+        blend_src: c::BLEND_DST_COLOR,
+        blend_dst: c::BLEND_ZERO,
+        ..stage::image(1)
+    };
+    let shine = Stage {
+        flags: c::STAGE_REFLECTION,
+        tc_gen: c::TCGEN_ENVIRONMENT,
+        blend_src: c::BLEND_ONE,
+        blend_dst: c::BLEND_ONE,
+        ..stage::image(0)
+    };
+    let mut scene = Scene::new(Vec3::Z * 60.0, Vec3::new(0.1, 0.0, 0.0), 50.0, SIDE as i32);
+    scene.ambient = Vec3::splat(0.7);
+    scene.images = vec![around.texture_index(), texture.texture_index()];
+    let ceiling = scene.material(&[stage::constant([encode(ABOVE); 3])], 0);
+    scene.quad(level(300.0, false), ceiling);
+    let floor = scene.material(&[stage::light(), body, shine], 0);
+    let (x, y) = (Vec3::X * 64.0, Vec3::Y * 64.0);
+    scene.quad(rectangle(Vec3::new(-32.0, -32.0, 0.0), x, y), floor);
+    let (truth, _) = gpu.render(&scene, &middles(), 2);
+    let live = Settings {
+        rt_accumulate: false,
+        rt_denoiser: 0,
+        rt_taa: false,
+        ..middles()
+    };
+    let (pixels, _) = gpu.render(&scene, &live, 1);
+    let mean = truth.iter().map(|p| p.x).sum::<f32>() / truth.len() as f32;
+    let deviation = truth.iter().map(|p| (p.x - mean).abs()).sum::<f32>() / truth.len() as f32;
+    assert!(deviation > 0.1 * mean, "a test of nothing: {deviation}");
+    for (i, (pixel, exact)) in pixels.iter().zip(&truth).enumerate() {
+        let ratio = pixel.x / exact.x;
+        assert!((ratio - 1.0).abs() < 0.01, "{i}: {ratio}");
+    }
+}
+
+#[test]
 fn a_shiny_pixel_alone_is_as_bright_as_its_surface() {
     Gpu::each(a_shiny_pixel_alone_is_as_bright_as_its_surface_with);
 }

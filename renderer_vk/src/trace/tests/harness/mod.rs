@@ -7,21 +7,11 @@ pub mod stage;
 use glam::{Vec3, Vec4};
 use shaders::types::Instance;
 
+use crate::half::half;
 use crate::settings::Settings;
 
 pub use gpu::Gpu;
 pub use scene::Scene;
-
-/// The value of a half float.
-fn half(bits: u16) -> f32 {
-    let sign = if bits & 0x8000 != 0 { -1.0 } else { 1.0 };
-    let (exponent, mantissa) = (i32::from(bits >> 10 & 31), f32::from(bits & 0x3ff));
-    sign * match exponent {
-        0 => mantissa * 2f32.powi(-24),
-        31 => f32::INFINITY,
-        _ => (1.0 + mantissa / 1024.0) * 2f32.powi(exponent - 15),
-    }
-}
 
 /// Settings of a reference picture without bounced light.
 pub fn reference() -> Settings {

@@ -1,0 +1,86 @@
+//! How alike pictures are, of parts of the picture.
+
+use anyhow::Result;
+use relight::compare::{Rgb8, flip_map, ssim_map};
+use serde_json::{Map, Value, json};
+
+use crate::statistics::{marked_mean, temporal_noise};
+
+/// The true picture, and which of its pixels are told of apart.
+pub struct Regions {
+    truth: Rgb8,
+    all: Vec<bool>,
+    /// Seen by way of a mirror, a portal, glass, a liquid or a shiny surface.
+    specular: Vec<bool>,
+    /// The others.
+    direct: Vec<bool>,
+}
+
+impl Regions {
+    /// `specular`: rows from the top, of the picture's size.
+    pub fn new(truth: &Rgb8, specular: Vec<bool>) -> Self {
+        Self {
+            truth: truth.clone(),
+            all: vec![true; specular.len()],
+            direct: specular.iter().map(|s| !s).collect(),
+            specular,
+        }
+    }
+
+    /// Part of the picture that shows reflections and the like, 0 to 1.
+    pub fn specular_share(&self) -> f32 {
+        let count = self.specular.iter().filter(|s| **s).count();
+        count as f32 / self.specular.len().max(1) as f32
+    }
+
+    /// Which pixels these are, white on black.
+    ///
+    /// # Errors
+    /// None where the regions are of the picture's size.
+    pub fn picture(&self) -> Result<Rgb8> {
+        let pixels = self.specular.iter().flat_map(|s| [u8::from(*s) * 255; 3]);
+        let (width, height) = (self.truth.width(), self.truth.height());
+        Ok(Rgb8::new(width, height, pixels.collect())?)
+    }
+
+    /// Similarity of what a moving and a resting camera show, and the noise of the latter, of all pixels and of each part
+    /// that there is at least a hundredth of.
+    ///
+    /// # Errors
+    /// Pictures of another size, or too small ones.
+    pub fn compare(
+        &self,
+        moving: &Rgb8,
+        rested: &Rgb8,
+        watched: &[Vec<f32>],
+    ) -> Result<Map<String, Value>> {
+        let maps = [
+            ssim_map(&self.truth, moving)?,
+            flip_map(&self.truth, moving)?,
+            ssim_map(&self.truth, rested)?,
+            flip_map(&self.truth, rested)?,
+        ];
+        let figures = |part: &[bool]| {
+            let [ssim, flip, rest_ssim, rest_flip] =
+                [0, 1, 2, 3].map(|i| marked_mean(&maps[i], part));
+            let mut figures = Map::new();
+            figures.insert("ssim".into(), json!(ssim));
+            figures.insert("flip".into(), json!(flip));
+            figures.insert("rest_ssim".into(), json!(rest_ssim));
+            figures.insert("rest_flip".into(), json!(rest_flip));
+            figures.insert("noise".into(), json!(temporal_noise(watched, part)));
+            figures
+        };
+        let mut result = figures(&self.all);
+        let share = self.specular_share();
+        for (name, part, share) in [
+            ("specular", &self.specular, share),
+            ("direct", &self.direct, 1.0 - share),
+        ] {
+            if share >= 0.01 {
+                result.insert(name.into(), Value::Object(figures(part)));
+            }
+        }
+        Ok(result)
+    }
+}

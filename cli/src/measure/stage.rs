@@ -1,0 +1,211 @@
+//! A map that pictures are taken of, and the ways to make them.
+
+use anyhow::Result;
+use glam::{Mat3, Vec3};
+use indicatif::ProgressBar;
+use relight::compare::Rgb8;
+use renderer_vk::api::{DynamicLight, RefDef, RefEntity, renderfx};
+use renderer_vk::{LightSelection, Renderer, Settings};
+
+use crate::view::Camera;
+
+/// Degrees that the camera turns and units that it moves forward in a frame on its way to a place: a player who looks
+/// around while walking.
+const TURN: f32 = 0.5;
+const WALK: f32 = 0.75;
+
+/// The view of `rt_debug` that tells what is seen by way of mirrors, glass and shiny surfaces.
+const DEBUG_SPECULAR: u32 = 11;
+
+/// Milliseconds of a frame on that way, and game time at its end: what ripples and drifts does so on the way.
+const FRAME_TIME: u32 = 16;
+const ARRIVAL_TIME: i32 = 60_000;
+
+/// A way to make the picture.
+pub struct Variant {
+    /// As the table calls it.
+    pub name: &'static str,
+    /// What makes it.
+    pub settings: Settings,
+}
+
+/// One light sample a pixel, and what is done with it.
+pub fn variants(base: &Settings) -> Vec<Variant> {
+    let with = |name, change: &dyn Fn(&mut Settings)| {
+        let mut settings = base.clone();
+        change(&mut settings);
+        Variant { name, settings }
+    };
+    vec![
+        with("raw", &|s| (s.rt_denoiser, s.rt_taa) = (0, false)),
+        with("denoised", &|s| (s.rt_denoiser, s.rt_taa) = (1, false)),
+        with("denoised-taa", &|s| (s.rt_denoiser, s.rt_taa) = (1, true)),
+        with("sparse-taa", &|s| (s.rt_denoiser, s.rt_taa) = (2, true)),
+        with("baseline", &|s| {
+            (s.rt_denoiser, s.rt_taa) = (1, true);
+            s.rt_light_selection = LightSelection::Uniform;
+            s.rt_gradients = false;
+        }),
+    ]
+}
+
+/// A map that pictures are taken of.
+pub struct Stage {
+    /// Has the map.
+    pub renderer: Renderer,
+    /// What the game would add to every view.
+    pub entities: Vec<RefEntity>,
+    /// A model in the hands, by its handle.
+    pub held: Option<i32>,
+    /// Pixels.
+    pub size: (u32, u32),
+}
+
+/// Where a model in the hands is, units forward, to the left and up of the eye: about where games put it.
+const HELD_AT: Vec3 = Vec3::new(12.0, -5.0, -7.0);
+
+impl Stage {
+    /// Draws a frame, `left` frames before the camera arrives.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn frame(&mut self, camera: &Camera, left: u32, lights: &[DynamicLight]) -> Result<()> {
+        let camera = on_the_way(camera, left);
+        self.renderer.begin_frame(0);
+        self.renderer.clear_scene();
+        for entity in &self.entities {
+            self.renderer.add_entity(entity);
+        }
+        if let Some(model) = self.held {
+            let axis = camera.axis();
+            let at = camera.origin + Mat3::from_cols_array_2d(&axis.map(Into::into)) * HELD_AT;
+            self.renderer.add_entity(&RefEntity {
+                renderfx: renderfx::FIRST_PERSON | renderfx::DEPTH_HACK,
+                model,
+                axis,
+                origin: at,
+                old_origin: at,
+                lighting_origin: camera.origin,
+                shader_rgba: [255; 4],
+                ..RefEntity::default()
+            });
+        }
+        for light in lights {
+            self.renderer.add_light(*light);
+        }
+        self.renderer.render_scene(&RefDef {
+            time_ms: ARRIVAL_TIME.saturating_sub_unsigned(left.saturating_mul(FRAME_TIME)),
+            ..camera.ref_def(self.size, 90.0)
+        })?;
+        self.renderer.end_frame()?;
+        Ok(())
+    }
+
+    /// Linear luminance of what the last frame shows, before exposure.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn light(&mut self) -> Result<Vec<f32>> {
+        let radiance = self.renderer.read_radiance()?;
+        let luminance = |[r, g, b]: &[f32; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
+        Ok(radiance.iter().map(luminance).collect())
+    }
+
+    /// The pixels whose light comes by way of a mirror, a portal, glass, a liquid or a shiny surface.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn specular(&mut self, base: &Settings, camera: &Camera) -> Result<Vec<bool>> {
+        let settings = Settings {
+            rt_debug: DEBUG_SPECULAR,
+            rt_taa: false,
+            ..base.clone()
+        };
+        self.cut(camera, &settings)?;
+        self.frame(camera, 0, &[])?;
+        let picture = self.picture()?;
+        let pixels = picture.pixels().chunks_exact(3);
+        Ok(pixels.map(|p| p.iter().any(|v| *v > 127)).collect())
+    }
+
+    /// What the last frame shows.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn picture(&mut self) -> Result<Rgb8> {
+        let picture = self.renderer.read_pixels()?;
+        Ok(Rgb8::new(
+            picture.width as usize,
+            picture.height as usize,
+            picture.rgb,
+        )?)
+    }
+
+    /// Forgets all frames: the next one starts without a past.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn cut(&mut self, camera: &Camera, settings: &Settings) -> Result<()> {
+        // a frame of the other mode ends both kinds of memory
+        let other = Settings {
+            rt_accumulate: !settings.rt_accumulate,
+            ..settings.clone()
+        };
+        self.renderer.set_settings(&other);
+        self.frame(camera, 0, &[])?;
+        self.renderer.set_settings(settings);
+        Ok(())
+    }
+
+    /// The mean of `frames` frames, as displayed and as luminance before exposure.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub fn reference(
+        &mut self,
+        base: &Settings,
+        camera: &Camera,
+        lights: &[DynamicLight],
+        frames: u32,
+        bar: &ProgressBar,
+    ) -> Result<(Rgb8, Vec<f32>)> {
+        let settings = Settings {
+            rt_accumulate: true,
+            ..base.clone()
+        };
+        self.cut(camera, &settings)?;
+        for _ in 0..frames {
+            self.frame(camera, 0, lights)?;
+            bar.inc(1);
+        }
+        Ok((self.picture()?, self.light()?))
+    }
+}
+
+/// Where the camera is `left` frames before it arrives.
+fn on_the_way(camera: &Camera, left: u32) -> Camera {
+    let left = left as f32;
+    let [forward, ..] = camera.axis();
+    Camera {
+        origin: camera.origin - forward * (WALK * left),
+        yaw: camera.yaw - TURN * left,
+        ..*camera
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_camera_arrives() {
+        let camera = Camera {
+            origin: Vec3::new(1.0, 2.0, 3.0),
+            yaw: 30.0,
+            pitch: 0.0,
+        };
+        assert_eq!(on_the_way(&camera, 0).origin, camera.origin);
+        assert_eq!(on_the_way(&camera, 4).yaw, 28.0);
+        assert!(on_the_way(&camera, 4).origin.distance(camera.origin) - 3.0 < 1.0e-5);
+    }
+}
