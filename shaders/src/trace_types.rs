@@ -31,6 +31,8 @@ pub struct TriangleLight {
     pub radiance: Vec3,
     /// `LIGHT_*` bits.
     pub flags: u32,
+    /// L without shadows below which it gives nothing; 0 for a light without an end.
+    pub end: f32,
 }
 
 /// A small sphere that gives light: a point light of the map or a dynamic light of the game.
@@ -56,6 +58,8 @@ pub struct SphereLight {
     pub core: f32,
     /// Where light that falls off linearly ends; 0 for light that falls off with the square of the distance.
     pub reach: f32,
+    /// L without shadows below which it gives nothing; 0 for a light without an end.
+    pub end: f32,
 }
 
 /// A far disc of light.

@@ -186,6 +186,7 @@ LightSample sample_triangle(TriangleLight light, vec3 position, vec3 normal, vec
         s.light = light.radiance * (0.5 * double_area * abs(dot(s.direction, face)) / (squared * PI));
     }
     s.light *= max(dot(normal, s.direction), 0.0);
+    if (max_component(s.light) < light.end) s.light = vec3(0.0);
     // stop short of the light's own surface
     s.distance -= 0.02 + 2.0e-4 * s.distance;
     return s;
@@ -210,6 +211,7 @@ LightSample sample_sphere(SphereLight light, vec3 position, vec3 normal, vec2 u)
         s.light *= 8.0 * part * part * max(1.0 - part / max(cosine, 1.0e-4), 0.0);
     }
     if (squared < light.core * light.core) s.light *= squared / (light.core * light.core);
+    if (max_component(s.light) < light.end) s.light = vec3(0.0);
     s.distance = d - max(light.clearance, light.radius);
     return s;
 }

@@ -7,9 +7,9 @@
 
 struct GeometryRecord { uint64_t triangles; uint64_t vertices; uint instance; uint kind; };
 
-struct TriangleLight { vec3 corners[3]; vec3 radiance; uint flags; };
+struct TriangleLight { vec3 corners[3]; vec3 radiance; uint flags; float end; };
 
-struct SphereLight { vec3 origin; float radius; vec3 radiance; float clearance; vec3 axis; float cos_inner; float cos_outer; float core; float reach; };
+struct SphereLight { vec3 origin; float radius; vec3 radiance; float clearance; vec3 axis; float cos_inner; float cos_outer; float core; float reach; float end; };
 
 struct SunLight { vec3 direction; float cos_angle; vec3 irradiance; };
 

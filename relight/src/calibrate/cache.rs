@@ -123,7 +123,8 @@ fn print(solution: &Solution) -> String {
     );
     let _ = writeln!(text, "before {}", agreement(&report.before));
     let _ = writeln!(text, "after {}", agreement(&report.after));
-    let _ = writeln!(text, "gamma {}", report.gamma);
+    let ends = if report.ends { " ends" } else { "" };
+    let _ = writeln!(text, "gamma {}{ends}", report.gamma);
     let _ = writeln!(text, "ambient {}", three(solution.ambient));
     if let Some(exposure) = solution.exposure {
         let _ = writeln!(text, "exposure {exposure}");
@@ -197,8 +198,13 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
             }
             "before" => solution.report.before = agreement.ok_or(wrong("not three numbers"))?,
             "after" => solution.report.after = agreement.ok_or(wrong("not three numbers"))?,
-            "gamma" => match numbers[..] {
-                [gamma] if finite && super::gamma::possible(gamma) => solution.report.gamma = gamma,
+            "gamma" => match (&numbers[..], words.get(1)) {
+                ([gamma], None) | ([gamma, _], Some(&"ends"))
+                    if super::compiler::possible(*gamma) =>
+                {
+                    solution.report.gamma = *gamma;
+                    solution.report.ends = words.len() == 2;
+                }
                 _ => return Err(wrong("not a gamma")),
             },
             "exposure" => match numbers[..] {

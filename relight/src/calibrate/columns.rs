@@ -63,12 +63,58 @@ pub(super) struct Column {
     pub source: Source,
     /// (sample, light there for strength 1), by rising sample.
     pub rows: Vec<(u32, f32)>,
+    /// Where lights end: what its lights give, by how much each gives, as if they did not.
+    pub pieces: Vec<Piece>,
     /// Its strength: radiance of a group's brightest triangle, intensity of points, irradiance of suns.
     pub strength: Vec3,
     /// The most it may be.
     pub limit: Vec3,
     /// `None` for lights put in, and for skies that nothing tells the light of.
     pub prior: Option<Prior>,
+}
+
+/// What lights that give about the same give to a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Piece {
+    /// The sample.
+    sample: u32,
+    /// Light without shadows that one of them gives, for strength 1.
+    bare: f32,
+    /// Light that arrives from all of them, for strength 1.
+    given: f32,
+}
+
+impl Column {
+    /// Lets each of its lights end where, at the strength that it has, it gives no more than `least`.
+    pub fn end_at(&mut self, least: f32) {
+        if self.pieces.is_empty() {
+            return;
+        }
+        let strength = self.strength.max_element();
+        // What is not lit yet has not ended anywhere.
+        let least = if strength > 0.0 {
+            least / strength
+        } else {
+            0.0
+        };
+        self.rows.clear();
+        for piece in self.pieces.iter().filter(|p| p.bare > least) {
+            match self.rows.last_mut() {
+                Some((last, sum)) if *last == piece.sample => *sum += piece.given,
+                _ => self.rows.push((piece.sample, piece.given)),
+            }
+        }
+    }
+}
+
+/// Rows of one light as pieces.
+pub(super) fn pieces_of(rows: &[(u32, f32)]) -> Vec<Piece> {
+    let piece = |&(sample, given): &(u32, f32)| Piece {
+        sample,
+        bare: given,
+        given,
+    };
+    rows.iter().map(piece).collect()
 }
 
 /// Light per intensity at a sample, and 0 where the light is behind it or out of a spot's cone. No shadows.
@@ -154,24 +200,38 @@ pub(super) fn known(
     silent: &[u32],
 ) -> Vec<Column> {
     let (groups, of_light) = group(world);
+    let ends = world.light_end > 0.0;
+    let pieces_if = |rows: &[(u32, f32)]| if ends { pieces_of(rows) } else { Vec::new() };
     let found = parallel::map(samples, |i, sample| {
         let mut random = Random::new(0x7121 + i as u64);
-        triangles_at(world, occluders, sample, &groups, &of_light, &mut random)
+        triangles_at(world, occluders, sample, &of_light, &mut random)
     });
     let mut columns: Vec<Column> = groups
         .iter()
         .map(|g| Column {
             source: Source::Group(g.material, g.evidence),
             rows: Vec::new(),
+            pieces: Vec::new(),
             strength: g.strength,
             limit: Vec3::INFINITY,
             prior: (!silent.contains(&g.material)).then(|| prior_of(g.strength, g.evidence)),
         })
         .collect();
-    for (i, sums) in (0u32..).zip(found) {
-        for (group, light) in sums {
-            if let Some(column) = columns.get_mut(group as usize) {
-                column.rows.push((i, light));
+    for (i, given) in (0u32..).zip(found) {
+        for heap in given {
+            let Some(column) = columns.get_mut(heap.group as usize) else {
+                continue;
+            };
+            match column.rows.last_mut() {
+                Some((last, sum)) if *last == i => *sum += heap.given,
+                _ => column.rows.push((i, heap.given)),
+            }
+            if ends {
+                column.pieces.push(Piece {
+                    sample: i,
+                    bare: heap.bare / heap.count,
+                    given: heap.given,
+                });
             }
         }
     }
@@ -198,6 +258,7 @@ pub(super) fn known(
     for ((index, rows), light) in points.into_iter().zip(rows).zip(&world.point_lights) {
         columns.push(Column {
             source: Source::Entity(index),
+            pieces: pieces_if(&rows),
             rows,
             strength: light.intensity,
             limit: Vec3::INFINITY,
@@ -208,6 +269,7 @@ pub(super) fn known(
         columns.push(Column {
             source: Source::Sun(index),
             rows: sun_rows(occluders, samples, sun.direction),
+            pieces: Vec::new(),
             strength: sun.irradiance,
             limit: Vec3::INFINITY,
             prior: Some(prior_of(sun.irradiance, EmissionSource::SurfaceLight)),
@@ -335,16 +397,63 @@ pub(super) fn material_of(world: &RelitWorld, light: &TriangleLight) -> u32 {
         .map_or(u32::MAX, |s| s.material)
 }
 
+/// What surfaces of a group that give about the same give to a sample, for strength 1.
+struct Heap {
+    group: u32,
+    /// Power of two of what one of them gives without shadows; of skies, which do not end, all the same.
+    size: i32,
+    count: f32,
+    /// Light of all of them without shadows.
+    bare: f32,
+    /// Light that arrives.
+    given: f32,
+}
+
+/// What a surface gives to a sample, of a group and for strength 1.
+#[derive(Clone, Copy, Default)]
+struct Given {
+    surface: u32,
+    group: u32,
+    sky: bool,
+    bare: f32,
+    arrives: f32,
+}
+
+impl Given {
+    fn heap_on(self, heaps: &mut Vec<Heap>) {
+        if self.arrives <= 0.0 {
+            return;
+        }
+        let endless = if self.sky { f32::INFINITY } else { self.bare };
+        let size = endless.log2().clamp(-120.0, 120.0) as i32;
+        let same = |h: &&mut Heap| h.group == self.group && h.size == size;
+        match heaps.iter_mut().find(same) {
+            Some(heap) => {
+                heap.count += 1.0;
+                heap.bare += endless;
+                heap.given += self.arrives;
+            }
+            None => heaps.push(Heap {
+                group: self.group,
+                size,
+                count: 1.0,
+                bare: endless,
+                given: self.arrives,
+            }),
+        }
+    }
+}
+
 /// Light of each group at a sample, for strength 1.
 fn triangles_at(
     world: &RelitWorld,
     occluders: &Occluders,
     sample: &Sample,
-    groups: &[Group],
     of_light: &[(u32, f32)],
     random: &mut Random,
-) -> Vec<(u32, f32)> {
-    let mut sums: Vec<f32> = vec![0.0; groups.len()];
+) -> Vec<Heap> {
+    let mut heaps: Vec<Heap> = Vec::new();
+    let mut one = Given::default();
     let scale = sample.level() + sample.floor;
     for &entry in world.light_lists.row(sample.cluster) {
         let LightRef::Triangle(index) = world.light_lists.light(entry) else {
@@ -366,12 +475,21 @@ fn triangles_at(
             continue;
         }
         let seen = visible_part(occluders, sample, light, random);
-        if let Some(sum) = sums.get_mut(group as usize) {
-            *sum += geometric * part * seen / chance;
+        if (one.surface, one.group) != (light.surface, group) {
+            one.heap_on(&mut heaps);
+            one = Given {
+                surface: light.surface,
+                group,
+                sky: light.is_sky,
+                ..Given::default()
+            };
         }
+        one.bare += geometric * part;
+        one.arrives += geometric * part * seen / chance;
     }
-    let lit = (0u32..).zip(sums).filter(|(_, light)| *light > 0.0);
-    lit.collect()
+    one.heap_on(&mut heaps);
+    heaps.sort_by_key(|heap| heap.group);
+    heaps
 }
 
 /// Part of a triangle that a sample sees: one ray to the middle, or several to a large one.

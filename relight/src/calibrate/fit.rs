@@ -59,6 +59,8 @@ pub(super) struct Fit<'a> {
     pub ambient: Ambient,
     /// Places that the light grid's directions meet at.
     pub crossings: Vec<Crossing>,
+    /// Light at which lights end.
+    pub least: f32,
 }
 
 impl Fit<'_> {
@@ -66,6 +68,16 @@ impl Fit<'_> {
     pub fn agreement(&self) -> Agreement {
         let computed = solve::predict(&self.samples, &self.columns, self.ambient.value);
         Agreement::of(self.world, &self.samples, &computed)
+    }
+
+    /// [`agreement`](Self::agreement) with all texels, those that are fitted, too.
+    pub fn agreement_overall(&self) -> Agreement {
+        let computed = solve::predict(&self.samples, &self.columns, self.ambient.value);
+        let mut samples = self.samples.clone();
+        for sample in samples.iter_mut().filter(|s| s.site == Site::Surface) {
+            sample.held_out = true;
+        }
+        Agreement::of(self.world, &samples, &computed)
     }
 
     /// Exposure at which light as it is now is as bright as the engine shows the map, in the mean of what players see where
@@ -110,9 +122,12 @@ impl Fit<'_> {
         let measured: Vec<Vec3> = self.samples.iter().map(|s| s.value).collect();
         self.bounce_of(&measured, false);
         let (columns, ambient) = (&mut self.columns, &mut self.ambient);
-        solve::solve(&self.samples, columns, ambient, FIRST);
+        solve::solve(&self.samples, columns, ambient, FIRST, 0.0);
         if self.occluders.any_sky() {
-            suns::find(self.occluders, &self.samples, columns, ambient, FIRST);
+            suns::find(self.occluders, &self.samples, columns, ambient, FIRST, 0.0);
+        }
+        if self.least > 0.0 {
+            solve::solve(&self.samples, columns, ambient, NEXT, self.least);
         }
     }
 
@@ -120,7 +135,13 @@ impl Fit<'_> {
     pub fn settle(&mut self) {
         for _ in 0..3 {
             self.rebounce(false);
-            solve::solve(&self.samples, &mut self.columns, &mut self.ambient, NEXT);
+            solve::solve(
+                &self.samples,
+                &mut self.columns,
+                &mut self.ambient,
+                NEXT,
+                self.least,
+            );
         }
         self.rebounce(false);
     }
@@ -141,6 +162,7 @@ impl Fit<'_> {
                 of_triangle: &of_triangle,
                 candidates,
                 linear,
+                least: self.least,
             };
             let (columns, ambient) = (&mut self.columns, &mut self.ambient);
             if round == 0 {

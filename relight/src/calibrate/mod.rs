@@ -14,7 +14,8 @@
 //!    (`crossings`), then in front of what stays unexplained, for as long as
 //!    that makes light agree better at what is held out. `fit` holds these steps together.
 //!    Where lights that fall off with the square of the distance leave much, once more with linear ones.
-//! 6. `gamma`: all of that with less effort for light that was stored encoded, to see whether it explains more.
+//! 6. `compiler`: all of that with less effort for light that was stored encoded, and for lights that end, to see whether
+//!    it explains more.
 //! 7. The world's lights get their strengths, lost lights are added to
 //!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
 //!
@@ -30,9 +31,9 @@ mod bounce;
 pub(crate) mod bvh;
 pub(crate) mod cache;
 mod columns;
+mod compiler;
 mod crossings;
 mod fit;
-mod gamma;
 pub(crate) mod parallel;
 mod place;
 pub(crate) mod random;
@@ -57,18 +58,19 @@ pub use samples::Evidence;
 use crate::world::RelitWorld;
 use bvh::Occluders;
 use columns::{Lamp, Source};
+use compiler::Compiler;
 use fit::Fit;
 use glam::Vec3;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 14;
+const VERSION: u32 = 15;
 
 /// One in so many candidates comes from the directions of the light grid.
 const CROSSINGS: usize = 5;
 
-/// Part of the time that looking for the compiler's gamma takes, about.
-const GAMMA_PART: f32 = 0.25;
+/// Part of the time that looking for what the compiler did takes, about.
+const COMPILER_PART: f32 = 0.3;
 
 /// How a world is calibrated.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,6 +113,8 @@ struct Solution {
     /// How bright this light is to be shown: see [`RelitWorld::exposure`].
     exposure: Option<f32>,
     report: CalibrationReport,
+    /// Agreement at all texels, those that were fitted, too: two fits alike are compared by it with less noise.
+    overall: Agreement,
 }
 
 impl Solution {
@@ -152,11 +156,12 @@ pub fn calibrate_with(
             if let Err(problem) = missing {
                 world.warnings.push(problem.to_string());
             }
-            world.stored_gamma = gamma::find(world, &silent, options, &mut |part| {
-                progress(part * GAMMA_PART);
+            let found = compiler::find(world, &silent, options, &mut |part| {
+                progress(part * COMPILER_PART);
             });
+            (world.stored_gamma, world.light_end) = (found.gamma, found.light_end());
             let solution = find(world, &silent, options, true, &mut |part| {
-                progress(GAMMA_PART + part * (1.0 - GAMMA_PART));
+                progress(COMPILER_PART + part * (1.0 - COMPILER_PART));
             });
             if let (Some(cache), Some(key)) = (&options.cache, key)
                 && let Err(problem) = cache.write(key, &solution)
@@ -166,7 +171,11 @@ pub fn calibrate_with(
             solution
         }
     };
-    world.stored_gamma = solution.report.gamma;
+    let compiler = Compiler {
+        gamma: solution.report.gamma,
+        ends: solution.report.ends,
+    };
+    (world.stored_gamma, world.light_end) = (compiler.gamma, compiler.light_end());
     world.exposure = solution.exposure;
     if solution.report.evidence == Evidence::Nothing {
         skies::close(world, &silent);
@@ -210,6 +219,7 @@ fn find(
             held_out: samples.iter().filter(|s| s.held_out).count(),
             known,
             gamma: world.stored_gamma,
+            ends: world.light_end > 0.0,
             ..Default::default()
         },
         ..Default::default()
@@ -231,6 +241,7 @@ fn find(
         transfer,
         columns,
         crossings,
+        least: world.light_end,
     };
     let first = std::mem::replace(&mut fit.ambient.value, world.ambient);
     fit.rebounce(true);
@@ -258,6 +269,7 @@ fn find(
     fit.more_ambient();
     progress(1.0);
     solution.report.after = fit.agreement();
+    solution.overall = fit.agreement_overall();
     solution.exposure = fit.exposure();
     let columns = fit.columns;
     solution.known = columns.iter().take(known).map(|c| c.strength).collect();

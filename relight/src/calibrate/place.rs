@@ -6,7 +6,7 @@
 //! is done once more.
 
 use super::bvh::Occluders;
-use super::columns::{Column, Lamp, Source, point_rows, unshadowed};
+use super::columns::{self, Column, Lamp, Source, point_rows, unshadowed};
 use super::crossings::Crossing;
 use super::parallel;
 use super::samples::{self, Sample, mean};
@@ -78,6 +78,8 @@ pub(super) struct Scene<'a> {
     pub candidates: usize,
     /// Whether lights may fall off linearly, too.
     pub linear: bool,
+    /// Light at which lights end.
+    pub least: f32,
 }
 
 impl Scene<'_> {
@@ -153,6 +155,11 @@ impl Scene<'_> {
     fn column(&self, lamp: Lamp, rows: Vec<(u32, f32)>, strength: Vec3) -> Column {
         Column {
             source: Source::Placed(lamp),
+            pieces: if self.least > 0.0 {
+                columns::pieces_of(&rows)
+            } else {
+                Vec::new()
+            },
             rows,
             strength,
             limit: self.limit(lamp),
@@ -286,7 +293,7 @@ fn choose(
         sparsity: 0.5,
         anew: false,
     };
-    let state = solve(scene.samples, columns, ambient, sparse);
+    let state = solve(scene.samples, columns, ambient, sparse, scene.least);
     drop_useless(columns, known, &state, WORTH * 0.25);
     merge(scene, columns, known, spacing * 1.5);
     let refit = Effort {
@@ -295,10 +302,10 @@ fn choose(
         sparsity: 0.2,
         anew: false,
     };
-    let mut state = solve(scene.samples, columns, ambient, refit);
+    let mut state = solve(scene.samples, columns, ambient, refit, scene.least);
     for step in [0.5, 0.25, 0.125] {
         look_around(scene, columns, known, &state, spacing * step);
-        state = solve(scene.samples, columns, ambient, refit);
+        state = solve(scene.samples, columns, ambient, refit, scene.least);
         drop_useless(columns, known, &state, WORTH * 0.5);
     }
     merge(scene, columns, known, spacing * 0.5);
@@ -308,9 +315,9 @@ fn choose(
         sparsity: 0.1,
         anew: false,
     };
-    let state = solve(scene.samples, columns, ambient, settle);
+    let state = solve(scene.samples, columns, ambient, settle, scene.least);
     drop_useless(columns, known, &state, WORTH);
-    solve(scene.samples, columns, ambient, settle);
+    solve(scene.samples, columns, ambient, settle, scene.least);
 }
 
 /// Removes placed lights without which the error would hardly grow.
@@ -438,6 +445,22 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
         }
         if norm > 0.0 {
             let strength = (gradient / norm).max(Vec3::ZERO).min(scene.limit(lamp));
+            if scene.least > 0.0 && strength.max_element() > 0.0 {
+                // Again with what such a light would have left.
+                let least = scene.least / strength.max_element();
+                let (mut gradient, mut norm) = (Vec3::ZERO, 0.0);
+                for &(i, a) in rows.iter().filter(|(_, a)| *a > least) {
+                    if let Some((wanted, weight)) = wanted.get(i as usize) {
+                        gradient += *wanted * (*weight * a);
+                        norm += *weight * a * a;
+                    }
+                }
+                if norm <= 0.0 {
+                    return (0.0, Vec3::ZERO);
+                }
+                let strength = (gradient / norm).max(Vec3::ZERO).min(scene.limit(lamp));
+                return ((gradient * 2.0 - strength * norm).dot(strength), strength);
+            }
             let taken = (gradient * 2.0 - strength * norm).dot(strength);
             (taken, strength)
         } else {

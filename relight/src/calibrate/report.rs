@@ -78,6 +78,8 @@ pub struct CalibrationReport {
     /// Gamma that the compiler encoded light with before it stored it: see
     /// [`RelitWorld::stored_gamma`](crate::RelitWorld::stored_gamma).
     pub gamma: f32,
+    /// Whether the map's lights end where they give little: see [`RelitWorld::light_end`](crate::RelitWorld::light_end).
+    pub ends: bool,
     /// Agreement of the light that directives tell of: direct, ambient and bounced.
     pub before: Agreement,
     /// Agreement of calibrated light: direct, ambient and bounced.
@@ -99,6 +101,7 @@ impl Default for CalibrationReport {
             placed: 0,
             suns: 0,
             gamma: 1.0,
+            ends: false,
             before: Agreement::default(),
             after: Agreement::default(),
             cached: false,

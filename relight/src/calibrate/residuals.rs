@@ -50,7 +50,10 @@ pub fn residuals(world: &RelitWorld, options: &CalibrationOptions) -> Vec<Residu
     let occluders = samples::occluders(world);
     let (samples, _) = samples::take(world, &occluders, options.samples, options.seed);
     let silent = skies::silent(world);
-    let columns = columns::known(world, &occluders, &samples, &silent);
+    let mut columns = columns::known(world, &occluders, &samples, &silent);
+    for column in &mut columns {
+        column.end_at(world.light_end);
+    }
     let direct = solve::direct(&samples, &columns);
     let unlisted = |material| silent.contains(&material);
     let transfer = Transfer::new(world, &occluders, &samples, options.bounces, unlisted);

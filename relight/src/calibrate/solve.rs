@@ -114,9 +114,15 @@ pub(super) fn solve(
     columns: &mut [Column],
     ambient: &mut Ambient,
     effort: Effort,
+    least: f32,
 ) -> Residual {
     let mut state = residual(samples, columns, ambient.value);
     for round in 0..effort.rounds {
+        if least > 0.0 {
+            for column in columns.iter_mut() {
+                column.end_at(least);
+            }
+        }
         if round > 0 {
             state = residual(samples, columns, ambient.value);
         } else if effort.anew {
@@ -144,6 +150,11 @@ pub(super) fn solve(
                 }
             }
             improve_ambient(samples, ambient, &mut state);
+        }
+    }
+    if least > 0.0 {
+        for column in columns.iter_mut() {
+            column.end_at(least);
         }
     }
     residual(samples, columns, ambient.value)

@@ -35,6 +35,7 @@ pub(super) fn find(
     columns: &mut Vec<Column>,
     ambient: &mut Ambient,
     effort: Effort,
+    least: f32,
 ) {
     let worthwhile = WORTH * samples.iter().filter(|s| !s.held_out).count() as f32;
     let state = residual(samples, columns, ambient.value);
@@ -54,17 +55,18 @@ pub(super) fn find(
         columns.push(Column {
             source: Source::FoundSun(direction),
             rows: sun_rows(occluders, samples, direction),
+            pieces: Vec::new(),
             strength: Vec3::ZERO,
             limit: Vec3::INFINITY,
             prior: None,
         });
-        let mut state = solve(samples, columns, ambient, effort);
+        let mut state = solve(samples, columns, ambient, effort, least);
         let Some(sun) = columns.last() else {
             return;
         };
         if worth(sun, &state) < worthwhile {
             columns.truncate(known);
-            solve(samples, columns, ambient, effort);
+            solve(samples, columns, ambient, effort, least);
             return;
         }
         if turns == 0 {

@@ -1,3 +1,4 @@
+mod ends;
 mod grid;
 mod known_truth;
 mod linear;

@@ -23,6 +23,7 @@ pub struct Lighting {
     report: LightReport,
     calibration: Option<CalibrationReport>,
     stored_gamma: f32,
+    light_end: f32,
     exposure: Option<f32>,
 }
 
@@ -43,6 +44,7 @@ impl RelitWorld {
             report: self.report.clone(),
             calibration: self.calibration.clone(),
             stored_gamma: self.stored_gamma,
+            light_end: self.light_end,
             exposure: self.exposure,
         }
     }
@@ -64,6 +66,7 @@ impl RelitWorld {
         self.report = lighting.report;
         self.calibration = lighting.calibration;
         self.stored_gamma = lighting.stored_gamma;
+        self.light_end = lighting.light_end;
         self.exposure = lighting.exposure;
     }
 }

@@ -233,6 +233,7 @@ impl RelitWorld {
             warnings,
             color_exponent,
             stored_gamma: 1.0,
+            light_end: 0.0,
             exposure: None,
             overbright_shift: options.overbright_shift,
             bsp,

@@ -72,6 +72,10 @@ pub struct RelitWorld {
     /// and where nobody [calibrated](crate::calibrate()) to find out. Light is counted in a unit in which what the engine
     /// shows as white is 1 with any gamma.
     pub stored_gamma: f32,
+    /// Light, irradiance / π without shadows, that a surface must get from one light to get any: compilers that save time
+    /// leave out what adds less than a step of light. 0: lights have no end. Suns and skies have none. Found by
+    /// [calibration](crate::calibrate()).
+    pub light_end: f32,
     /// Exposure at which the world's light, on the map's textures, is as bright in the mean as the engine shows the map:
     /// found by [calibration](crate::calibrate()). `None`: see [`display_exposure`](crate::exposure::display_exposure).
     pub exposure: Option<f32>,

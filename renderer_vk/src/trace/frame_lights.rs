@@ -65,6 +65,7 @@ impl FrameLights {
                 corners,
                 radiance: light.light.radiance * scale_of(light),
                 flags: light.light.flags,
+                end: light.light.end * scale_of(light),
             });
         }
         if self.triangles.len() == first {
@@ -144,6 +145,7 @@ impl MapLights {
                 .iter()
                 .map(|changing| t::TriangleLight {
                     radiance: changing.light.radiance * scale_of(changing),
+                    end: changing.light.end * scale_of(changing),
                     ..changing.light
                 })
                 .collect(),

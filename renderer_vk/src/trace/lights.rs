@@ -1,5 +1,6 @@
 //! The lights of a map on the GPU. Those of one view are in [`frame_lights`](super::frame_lights).
 
+use std::collections::HashMap;
 use std::f32::consts::PI;
 
 use glam::Vec3;
@@ -75,6 +76,8 @@ pub struct MapLightSource<'a> {
     pub model_origins: &'a [Vec3],
     /// Radiance of the even light from everywhere.
     pub ambient: Vec3,
+    /// Light, irradiance / π, that a surface must get from one light to get any; 0: lights have no end.
+    pub light_end: f32,
     /// The map's tree; `None`: every point gets the list of all lights.
     pub bsp: Option<&'a Bsp>,
 }
@@ -111,6 +114,7 @@ pub(super) fn sphere(origin: Vec3, radius: f32, intensity: Vec3, clearance: f32)
         cos_outer: -2.0,
         core: 0.0,
         reach: 0.0,
+        end: 0.0,
     }
 }
 
@@ -146,7 +150,28 @@ pub(super) fn triangle_bounds(light: &t::TriangleLight) -> t::LightBounds {
     }
 }
 
-fn triangle_light(light: &TriangleLight, origin: Vec3) -> t::TriangleLight {
+/// For each light the L below which it gives nothing. The compiler let whole surfaces end: each of a surface's triangles
+/// ends at its part of that. Skies have no end.
+fn ends(source: &MapLightSource<'_>) -> Vec<f32> {
+    if source.light_end <= 0.0 {
+        return vec![0.0; source.triangles.len()];
+    }
+    let mut areas: HashMap<u32, f32> = HashMap::new();
+    for light in source.triangles {
+        *areas.entry(light.surface).or_default() += light.area();
+    }
+    let part = |light: &TriangleLight| {
+        let whole = areas.get(&light.surface).copied().unwrap_or(0.0);
+        if light.is_sky || whole <= 0.0 {
+            0.0
+        } else {
+            source.light_end * light.area() / whole
+        }
+    };
+    source.triangles.iter().map(part).collect()
+}
+
+fn triangle_light(light: &TriangleLight, end: f32, origin: Vec3) -> t::TriangleLight {
     t::TriangleLight {
         corners: light.vertices.map(|p| p - origin),
         radiance: light.radiance,
@@ -155,12 +180,14 @@ fn triangle_light(light: &TriangleLight, origin: Vec3) -> t::TriangleLight {
         } else {
             0
         },
+        end,
     }
 }
 
-fn point_light(light: &PointLight) -> t::SphereLight {
+fn point_light(light: &PointLight, end: f32) -> t::SphereLight {
     let mut s = sphere(light.origin, light.radius, light.intensity, light.radius);
     s.reach = light.falloff.reach().unwrap_or(0.0);
+    s.end = end;
     if let Some(spot) = light.spot {
         s.axis = spot.direction.normalize_or(Vec3::NEG_Z);
         (s.cos_inner, s.cos_outer) = spot_cosines(spot.tan_half_angle);
@@ -181,7 +208,9 @@ impl MapLights {
         let mut flickers: Vec<Flicker> = Vec::new();
         // what a list's entry is called here; lights of brush models are in no list
         let mut numbers = Vec::with_capacity(source.triangles.len());
+        let ends = ends(source);
         for (index, light) in source.triangles.iter().enumerate() {
+            let end = ends.get(index).copied().unwrap_or(0.0);
             let known = source.flickers.get(index).copied().flatten();
             let flicker = known.map(|flicker| {
                 let at = flickers.iter().position(|f| f == flicker);
@@ -191,7 +220,7 @@ impl MapLights {
                 })
             });
             if light.model == 0 {
-                let placed = triangle_light(light, Vec3::ZERO);
+                let placed = triangle_light(light, end, Vec3::ZERO);
                 if flicker.is_some() {
                     let light = number(c::LIGHT_CHANGING_TRIANGLE, changing.len());
                     numbers.push(Some(light));
@@ -208,7 +237,7 @@ impl MapLights {
             numbers.push(None);
             let origin = source.model_origins.get(light.model as usize);
             let light_of_model = ChangingLight {
-                light: triangle_light(light, origin.copied().unwrap_or(Vec3::ZERO)),
+                light: triangle_light(light, end, origin.copied().unwrap_or(Vec3::ZERO)),
                 flicker,
             };
             match moving.iter_mut().find(|(model, _)| *model == light.model) {
@@ -216,7 +245,9 @@ impl MapLights {
                 None => moving.push((light.model, vec![light_of_model])),
             }
         }
-        let spheres: Vec<t::SphereLight> = source.points.iter().map(point_light).collect();
+        let spheres: Vec<t::SphereLight> = (source.points.iter())
+            .map(|light| point_light(light, source.light_end))
+            .collect();
         let suns: Vec<t::SunLight> = source
             .suns
             .iter()
@@ -309,6 +340,7 @@ impl MapLights {
             flickers: &[],
             model_origins: &[],
             ambient: Vec3::ZERO,
+            light_end: 0.0,
             bsp: None,
         };
         Self::new(device, &source)

@@ -141,6 +141,7 @@ impl TraceLook {
             flickers: &flickers,
             model_origins: &model_origins,
             ambient: relit.ambient,
+            light_end: relit.light_end,
             bsp: Some(&relit.bsp),
         };
         let tracer = Tracer::of(device.info(), settings.rt_tracer);

@@ -272,6 +272,14 @@ fn spheres_and_suns_give_their_irradiance_with(gpu: &mut Gpu) {
         falloff: relight::light::Falloff::InverseSquare,
     });
     check(gpu, &scene, &|p| 7000.0 * falloff(p) / std::f32::consts::PI);
+    // where it gives too little it gives nothing
+    scene.light_end = 7000.0 * falloff(at - Vec3::Z * at.z + Vec3::X * 40.0) / std::f32::consts::PI;
+    let end = scene.light_end;
+    check(gpu, &scene, &|p| {
+        let full = 7000.0 * falloff(p) / std::f32::consts::PI;
+        if full < end { 0.0 } else { full }
+    });
+    scene.light_end = 0.0;
     // a linear one: E = 8 I / R² (cos - d / R)
     let linear = relight::light::Falloff::Linear { reach: 160.0 };
     scene.points[0].falloff = linear;

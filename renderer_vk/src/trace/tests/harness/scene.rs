@@ -31,6 +31,7 @@ pub struct Scene {
     pub points: Vec<PointLight>,
     pub suns: Vec<SunLight>,
     pub ambient: Vec3,
+    pub light_end: f32,
     pub fogs: Vec<Fog>,
     /// Boxes around what colours light.
     pub filters: Vec<[Vec3; 2]>,
@@ -68,6 +69,7 @@ impl Scene {
             points: Vec::new(),
             suns: Vec::new(),
             ambient: Vec3::ZERO,
+            light_end: 0.0,
             fogs: Vec::new(),
             filters: Vec::new(),
             instances: vec![Instance {
@@ -290,6 +292,7 @@ impl Scene {
             flickers: &[],
             model_origins: &[],
             ambient: self.ambient,
+            light_end: self.light_end,
             bsp: self.tree.as_ref().map(|t| &t.0),
         };
         let scene = StaticScene {
