@@ -81,21 +81,18 @@ struct BvhWalk {
     float tmax;
     vec3 direction; // world space
     Hit hit;
-    float key;
+    // of a walk for layers
+    LayerList layers;
     LayerOrder last;
 };
 
 // Takes note of a hit; true ends the walk.
 bool bvh_report(inout BvhWalk walk, Hit hit, uint kind) {
     if (walk.mode == BVH_LAYER) {
-        float key;
-        LayerOrder best = LayerOrder(walk.key, walk.hit.geometry, walk.hit.primitive);
-        if (is_next_layer(hit, walk.direction, walk.last, best, key)) {
-            walk.hit = hit;
-            walk.key = key;
-            // nothing farther than this can have a smaller key
-            walk.tmax = min(walk.tmax, key + 2.0 * layer_slack(hit.t));
-        }
+        layers_add(walk.layers, hit, walk.direction, walk.last);
+        // nothing farther than this can have a smaller key than the last of the list
+        float last = walk.layers.keys[LAYERS_A_RAY - 1];
+        if (last < LAYER_NONE) walk.tmax = min(walk.tmax, last + 2.0 * layer_slack(last + layer_slack(last)));
         return false;
     }
     if (kind == KIND_TESTED && !is_stopped_by(hit)) return false;
@@ -214,9 +211,9 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
     return walk.hit;
 }
 
-// The next translucent layer behind `order` and before tmax; moves `order` to it. Layers in one plane come in the
-// order of the engine, what it draws last first.
-Hit trace_layer(vec3 origin, vec3 direction, float tmax, uint mask, inout LayerOrder order) {
+// The next translucent layers behind `order` and before tmax. Layers in one plane come in the order of the engine, what
+// it draws last first.
+void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
     rays_asked++;
     BvhWalk walk;
     walk.mode = BVH_LAYER;
@@ -224,11 +221,10 @@ Hit trace_layer(vec3 origin, vec3 direction, float tmax, uint mask, inout LayerO
     walk.tmax = tmax;
     walk.direction = direction;
     walk.hit = Hit(NO_HIT, 0, vec2(0.0), 0.0);
-    walk.key = LAYER_NONE;
+    layers_clear(walk.layers);
     walk.last = order;
     bvh_walk(walk, origin, mask);
-    if (walk.hit.geometry != NO_HIT) order = LayerOrder(walk.key, walk.hit.geometry, walk.hit.primitive);
-    return walk.hit;
+    found = walk.layers;
 }
 
 #endif

@@ -17,15 +17,54 @@ const float LAYER_NONE = 1.0e30;
 
 LayerOrder layer_begin() { return LayerOrder(-LAYER_NONE, NO_HIT, NO_HIT); }
 
-// A search for the next translucent layer: it lies behind `last`, and before `best` (key LAYER_NONE: none yet).
-// Returns whether the hit is a better one, with its key.
-bool is_next_layer(Hit hit, vec3 direction, LayerOrder last, LayerOrder best, out float key) {
-    // the order first: of many layers on a ray, each is looked at for every other one
+// Layers that one ray finds. With one a ray, each pixel behind layers needs a ray for each of them and one more to know
+// that there is none left; more are more to keep in registers while a layer is shaded.
+const uint LAYERS_A_RAY = 4;
+
+// The nearest layers of a ray behind a place in the order, in order; where there are fewer the others have no geometry.
+struct LayerList {
+    float keys[LAYERS_A_RAY];
+    Hit hits[LAYERS_A_RAY];
+};
+
+// A list of none; its keys tell, and what else is in it counts for nothing.
+void layers_clear(out LayerList list) {
+    for (uint i = 0; i < LAYERS_A_RAY; i++) {
+        list.keys[i] = LAYER_NONE;
+        list.hits[i].geometry = NO_HIT;
+        list.hits[i].primitive = NO_HIT;
+    }
+}
+
+// Adds a hit to the list, if it is a translucent layer that shows its face, lies behind `last`, and is among the nearest so far.
+void layers_add(inout LayerList list, Hit hit, vec3 direction, LayerOrder last) {
+    // the order first: of many layers on a ray, each is looked at for every other list
     GeometryRecord record = Geometries(VIEW.geometries).at[hit.geometry];
-    key = layer_key(Triangles(record.triangles).at[hit.primitive].flags, hit.t);
-    if (!layer_before(last.key, last.geometry, last.primitive, key, hit.geometry, hit.primitive)) return false;
-    if (best.key < LAYER_NONE && !layer_before(key, hit.geometry, hit.primitive, best.key, best.geometry, best.primitive)) return false;
-    return !is_culled(surface_point(hit), direction);
+    float key = layer_key(Triangles(record.triangles).at[hit.primitive].flags, hit.t);
+    if (!layer_before(last.key, last.geometry, last.primitive, key, hit.geometry, hit.primitive)) return;
+    const int end = int(LAYERS_A_RAY) - 1;
+    if (!layer_before(key, hit.geometry, hit.primitive, list.keys[end], list.hits[end].geometry, list.hits[end].primitive)) return;
+    if (is_culled(surface_point(hit), direction)) return;
+    for (int i = end; i >= 0; i--) {
+        if (!layer_before(key, hit.geometry, hit.primitive, list.keys[i], list.hits[i].geometry, list.hits[i].primitive)) break;
+        if (i < end) {
+            list.keys[i + 1] = list.keys[i];
+            list.hits[i + 1] = list.hits[i];
+        }
+        list.keys[i] = key;
+        list.hits[i] = hit;
+    }
+}
+
+// Takes the nearest layer out of the list; `order` becomes its place. No geometry: the list is empty.
+Hit layers_take(inout LayerList list, inout LayerOrder order) {
+    Hit hit = list.hits[0];
+    if (hit.geometry != NO_HIT) order = LayerOrder(list.keys[0], hit.geometry, hit.primitive);
+    for (uint i = 1; i < LAYERS_A_RAY; i++) {
+        list.keys[i - 1] = list.keys[i];
+        list.hits[i - 1] = list.hits[i];
+    }
+    return hit;
 }
 
 // From where on layers behind `last` are found: a layer lies at its key or a bias behind it.

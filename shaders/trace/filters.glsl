@@ -24,8 +24,10 @@ vec3 filtered(vec3 origin, vec3 direction, float distance) {
     vec3 color = vec3(1.0);
     if (VIEW.transport.filter_count == 0 || !meets_filter(origin, direction, distance)) return color;
     LayerOrder order = layer_begin();
+    LayerList found;
     for (uint i = 0; i < MAX_FILTERS; i++) {
-        Hit hit = trace_layer(origin, direction, distance, MASK_TRANSLUCENT, order);
+        if (i % LAYERS_A_RAY == 0) trace_layers(origin, direction, distance, MASK_TRANSLUCENT, order, found);
+        Hit hit = layers_take(found, order);
         if (hit.geometry == NO_HIT) break;
         SurfacePoint p = surface_point(hit);
         Dielectric dielectric = material_of(p.triangle.material).dielectric;

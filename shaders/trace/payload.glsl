@@ -2,16 +2,20 @@
 #ifndef RELIGHT_TRACE_PAYLOAD_GLSL
 #define RELIGHT_TRACE_PAYLOAD_GLSL
 
+#include "trace/candidate.glsl"
+
+// Of a ray for what stops it.
 struct Payload {
     float t;
     uint geometry;
     uint primitive;
     vec2 barycentrics;
-    // translucent layers: the best one so far, and the one that it must lie behind
-    float key;
-    float last_key;
-    uint last_geometry;
-    uint last_primitive;
+};
+
+// Of a ray for translucent layers: the nearest so far, and the one that they must lie behind.
+struct LayerPayload {
+    LayerList found;
+    LayerOrder last;
 };
 
 #endif

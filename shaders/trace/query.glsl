@@ -24,25 +24,15 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
     return QUERY_HIT(query, true);
 }
 
-// The next translucent layer behind `order` and before tmax; moves `order` to it. Layers in one plane come in the
-// order of the engine, what it draws last first.
-Hit trace_layer(vec3 origin, vec3 direction, float tmax, uint mask, inout LayerOrder order) {
+// The next translucent layers behind `order` and before tmax. Layers in one plane come in the order of the engine, what
+// it draws last first.
+void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
     rays_asked++;
+    layers_clear(found);
     rayQueryEXT query;
     rayQueryInitializeEXT(query, scenes[VIEW.scene], gl_RayFlagsNoneEXT, mask, origin, layer_start(order), direction, tmax);
-    Hit found = Hit(NO_HIT, 0, vec2(0.0), 0.0);
-    LayerOrder best = LayerOrder(LAYER_NONE, NO_HIT, NO_HIT);
-    // none is ever confirmed: the best one so far is noted
-    while (rayQueryProceedEXT(query)) {
-        Hit hit = QUERY_HIT(query, false);
-        float key;
-        if (is_next_layer(hit, direction, order, best, key)) {
-            found = hit;
-            best = LayerOrder(key, hit.geometry, hit.primitive);
-        }
-    }
-    if (found.geometry != NO_HIT) order = best;
-    return found;
+    // none is ever confirmed: the nearest so far are noted
+    while (rayQueryProceedEXT(query)) layers_add(found, QUERY_HIT(query, false), direction, order);
 }
 
 #endif

@@ -25,6 +25,7 @@ layout(local_size_x = 8, local_size_y = 4) in;
 
 #define LAUNCH_PIXEL ivec2(gl_LaunchIDEXT.xy)
 layout(location = 0) rayPayloadEXT Payload payload;
+layout(location = 1) rayPayloadEXT LayerPayload layer_payload;
 
 Hit payload_hit() {
     return Hit(payload.geometry, payload.primitive, payload.barycentrics, payload.t);
@@ -36,26 +37,20 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
     rays_asked++;
     // where nothing reports, the ray was blocked
     payload.geometry = any_hit ? 0 : NO_HIT;
-    payload.key = LAYER_NONE;
     uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT;
     traceRayEXT(scenes[VIEW.scene], flags, mask, 0, 0, 0, origin, tmin, direction, tmax, 0);
     return payload_hit();
 }
 
-// The next translucent layer behind `order` and before tmax; moves `order` to it. Layers in one plane come in the
-// order of the engine, what it draws last first.
-Hit trace_layer(vec3 origin, vec3 direction, float tmax, uint mask, inout LayerOrder order) {
+// The next translucent layers behind `order` and before tmax. Layers in one plane come in the order of the engine, what
+// it draws last first.
+void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
     rays_asked++;
-    payload.geometry = NO_HIT;
-    payload.key = LAYER_NONE;
-    payload.last_key = order.key;
-    payload.last_geometry = order.geometry;
-    payload.last_primitive = order.primitive;
-    traceRayEXT(scenes[VIEW.scene], gl_RayFlagsSkipClosestHitShaderEXT, mask, 0, 0, 0, origin, layer_start(order), direction, tmax, 0);
-    Hit hit = payload_hit();
-    if (payload.key >= LAYER_NONE) hit.geometry = NO_HIT;
-    else order = LayerOrder(payload.key, hit.geometry, hit.primitive);
-    return hit;
+    layers_clear(layer_payload.found);
+    layer_payload.last = order;
+    const uint missed = 1;
+    traceRayEXT(scenes[VIEW.scene], gl_RayFlagsSkipClosestHitShaderEXT, mask, 0, 0, missed, origin, layer_start(order), direction, tmax, 1);
+    found = layer_payload.found;
 }
 
 #endif

@@ -20,7 +20,7 @@ fn ray_pipeline(
         &RayTracingDesc {
             name,
             raygen,
-            miss: &[&shaders::TRACE_MISS_RMISS],
+            miss: &[&shaders::TRACE_MISS_RMISS, &shaders::TRACE_LAYERS_RMISS],
             hit: &[
                 HitGroup {
                     closest_hit: Some(&shaders::TRACE_HIT_RCHIT),

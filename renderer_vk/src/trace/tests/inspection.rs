@@ -78,11 +78,33 @@ fn only_rays_near_something_translucent_ask_for_layers() {
             gpu.rays().expect("counted")[0]
         };
         for moves in [false, true] {
-            // a part of the picture: there a ray for the layer, and one for the next that there may be
+            // a part of the picture
             let some = asked(moves, 5.0, false);
             assert!(some > pixels && some < 2 * pixels, "{some} of {pixels}");
             assert_eq!(asked(moves, 5.0, true), pixels, "behind the floor");
         }
+    });
+}
+
+#[test]
+fn a_ray_finds_several_layers() {
+    Gpu::each(|gpu| {
+        gpu.count_rays(true);
+        let pixels = u64::from(SIZE * SIZE);
+        let mut asked = |layers: u32| {
+            let mut scene = lit_floor();
+            let flags = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
+            let pane = scene.material(&[stage::blend([0.5; 3], 0.1)], flags);
+            for i in 0..layers {
+                let corner = Vec3::new(-500.0, -500.0, 1.0 + i as f32);
+                let points = rectangle(corner, Vec3::X * 1000.0, Vec3::Y * 1000.0);
+                scene.quad(points, pane);
+            }
+            gpu.render(&scene, &reference(), 4);
+            gpu.rays().expect("counted")[0] / pixels
+        };
+        // one for the floor; a ray for layers finds four, and one that finds fewer is the last
+        assert_eq!([1, 3, 4, 8].map(&mut asked), [2, 2, 3, 4]);
     });
 }
 
