@@ -53,6 +53,20 @@ pub struct Picture2d {
     pub color: u32,
 }
 
+/// Where the upper or lower edge of a picture is put. An edge may run through the centres of a row of pixels, which
+/// menus and HUDs drawn for 640 x 480 do at many sizes of the window. Such a row then is that of the picture above the
+/// edge: OpenGL counts rows from below. Vulkan gives it to the one below, so the edge goes a part of a pixel further.
+fn row_edge(y: f32) -> f32 {
+    // positions are rounded to this part of a pixel before pixels are counted
+    const STEP: f32 = 1.0 / 256.0;
+    let center = y.floor() + 0.5;
+    if (y - center).abs() < STEP / 2.0 {
+        center + STEP
+    } else {
+        y
+    }
+}
+
 impl Overlay {
     /// Nothing is queued.
     pub fn is_empty(&self) -> bool {
@@ -87,7 +101,11 @@ impl Overlay {
 
     fn push(&mut self, content: Content, p: &Picture2d) {
         let corner = |x: f32, y: f32| Vertex {
-            position: (p.position + p.size * Vec2::new(x, y)).extend(0.0),
+            position: Vec3::new(
+                p.position.x + p.size.x * x,
+                row_edge(p.position.y + p.size.y * y),
+                0.0,
+            ),
             normal: Vec3::NEG_Z,
             st: p.st1 + (p.st2 - p.st1) * Vec2::new(x, y),
             lightmap: Vec2::ZERO,

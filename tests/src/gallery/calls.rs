@@ -4,7 +4,7 @@ use glam::Vec3;
 use relight::compare::Rgb8;
 
 use super::board::{Board, MAP, Shape};
-use super::{File, Scene, Stage, model};
+use super::{File, Limit, Scene, Stage, model};
 use crate::engine::Raised;
 use crate::engine::abi::{fontInfo_t, polyVert_t, refEntity_t};
 use crate::maps;
@@ -27,6 +27,18 @@ pub(super) fn scenes() -> Vec<Scene> {
             files: || script(PICTURES),
             quick: true,
             ..Scene::new("2d-pictures", "DrawStretchPic and SetColor.", pictures)
+        },
+        Scene {
+            limit: Limit {
+                ssim: 0.9999,
+                ..Limit::SAME
+            },
+            quick: true,
+            ..Scene::new(
+                "2d-between",
+                "Pictures whose edges run through centres of pixels, or near them.",
+                between,
+            )
         },
         Scene {
             quick: true,
@@ -134,6 +146,28 @@ p/two { { map g/base.tga } { map g/env.tga blendFunc filter } }
 p/light { { map $lightmap } { map g/base.tga blendFunc filter } }
 p/depth { { map g/base.tga depthWrite } }
 ";
+
+fn between(stage: &mut Stage) -> Result<(), Raised> {
+    let steps = [0.5, 0.0, 0.499, 0.501, 0.4999, 0.5001, 0.25, 0.75];
+    stage.keep("edges", |e| {
+        clear(e)?;
+        let base = e.register_shader("g/base")?;
+        let white = e.register_shader("white")?;
+        for (column, across) in (0u8..).zip(steps) {
+            for (row, down) in (0u8..).zip(steps) {
+                let corner = [f32::from(column) * 76.0, f32::from(row) * 56.0];
+                let (x, y) = (corner[0] + 6.0 + across, corner[1] + 6.0 + down);
+                e.set_color(Some([0.3, 0.9, 0.6, 1.0]))?;
+                e.draw_stretch_pic([x, y, 30.0, 20.0], WHOLE, white)?;
+                e.draw_stretch_pic([x + 34.0, y, 20.5, 20.5], WHOLE, base)?;
+                // one line, which is drawn or not
+                e.draw_stretch_pic([x, y + 26.0, 40.0, 1.0], WHOLE, white)?;
+                e.draw_stretch_pic([x, y + 30.0, 40.0, 0.5], WHOLE, white)?;
+            }
+        }
+        e.set_color(None)
+    })
+}
 
 fn pictures(stage: &mut Stage) -> Result<(), Raised> {
     let names = [
