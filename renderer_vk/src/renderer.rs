@@ -75,8 +75,6 @@ pub struct Renderer {
     settings: Settings,
     /// Rays of traced views are counted.
     counts_rays: bool,
-    /// The last frame's picture is not shown yet.
-    unshown: bool,
     marker: Marker,
     /// With the channels that each is drawn in.
     queue: Vec<(Item, ColorMask)>,
@@ -171,7 +169,6 @@ impl Renderer {
             settings: Settings::default(),
             marker: Marker::default(),
             queue: Vec::new(),
-            unshown: false,
             counts_rays: false,
             eye: Eye::Both,
             shown_anaglyph: 0,

@@ -6,7 +6,7 @@ use super::device::{Device, lock};
 use super::error::{Context, Error};
 use super::graveyard::Garbage;
 use super::recorder::{Recorder, Recording, SlotResources};
-use super::swapchain::Swapchain;
+use super::swapchain::{Submitted, Swapchain};
 
 /// A place in the ring.
 struct Slot {
@@ -150,14 +150,15 @@ impl FrameRing {
         swapchain: &mut Swapchain,
     ) -> Result<(), Error> {
         swapchain.prepare_present(&mut recorder);
+        swapchain.show()?;
         match self.submit(recorder)? {
-            Some((index, finished)) => swapchain.present(index, finished),
+            Some(image) => swapchain.submitted(image),
             None => Ok(()),
         }
     }
 
-    /// Submits; returns the acquired image and the semaphore that says when it is drawn.
-    fn submit(&mut self, mut recorder: Recorder) -> Result<Option<(u32, vk::Semaphore)>, Error> {
+    /// Submits; returns the acquired image.
+    fn submit(&mut self, mut recorder: Recorder) -> Result<Option<Submitted>, Error> {
         let device = self.device.clone();
         recorder.close_drawing();
         let Recorder {
@@ -225,7 +226,10 @@ impl FrameRing {
         }
         drop(recording);
         submitted?;
-        Ok(acquired.map(|a| (a.index, a.finished)))
+        Ok(acquired.map(|a| Submitted {
+            index: a.index,
+            finished: a.finished,
+        }))
     }
 }
 

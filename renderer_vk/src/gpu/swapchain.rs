@@ -33,12 +33,27 @@ pub struct Swapchain {
     stale: bool,
     /// Images can be copied to.
     copies: bool,
-    /// What the acquisition for a frame signals while that frame is not presented yet.
+    /// What the acquisition for a frame signals while that frame is not submitted yet.
     acquired: Option<vk::Semaphore>,
+    /// An image of a submitted frame that is to be shown before the next one is submitted.
+    put_off: Option<Submitted>,
+    /// Images are shown late; see [`Swapchain::new`].
+    late: bool,
+}
+
+/// The image of a submitted frame.
+#[derive(Clone, Copy)]
+pub(crate) struct Submitted {
+    pub index: u32,
+    /// Signalled when it is drawn.
+    pub finished: vk::Semaphore,
 }
 
 impl Swapchain {
     /// Makes the swapchain of the device's window. The window may be minimised; images come when it is shown.
+    ///
+    /// Presenting waits until a software device has finished drawing. So its pictures are shown just before the next
+    /// frame is submitted: the game goes on meanwhile, and that frame is recorded.
     ///
     /// # Errors
     /// A headless device, a surface without a usable format, out of memory, a lost surface.
@@ -52,6 +67,8 @@ impl Swapchain {
             stale: true,
             copies: false,
             acquired: None,
+            put_off: None,
+            late: false,
         };
         swapchain.format = swapchain.choose_format()?.0;
         swapchain.recreate()?;
@@ -166,19 +183,32 @@ impl Swapchain {
         }
     }
 
-    /// Shows an image of a submitted frame.
-    pub(crate) fn present(&mut self, index: u32, finished: vk::Semaphore) -> Result<(), Error> {
+    /// Shows the image of a frame that was just submitted, soon or at once.
+    pub(crate) fn submitted(&mut self, image: Submitted) -> Result<(), Error> {
         self.acquired = None;
+        self.put_off = Some(image);
+        if self.late { Ok(()) } else { self.show() }
+    }
+
+    /// Shows at once what was put off, for the next frame may take long.
+    ///
+    /// # Errors
+    /// Out of memory, a lost surface, device loss.
+    pub fn show(&mut self) -> Result<(), Error> {
+        let Some(image) = self.put_off.take() else {
+            return Ok(());
+        };
         let Some(functions) = &self.device.0.swapchain else {
             return Ok(());
         };
-        let (waits, swapchains, indices) = ([finished], [self.raw], [index]);
+        let (waits, swapchains, indices) = ([image.finished], [self.raw], [image.index]);
         let info = vk::PresentInfoKHR::default()
             .wait_semaphores(&waits)
             .swapchains(&swapchains)
             .image_indices(&indices);
         let queue = lock(&self.device.0.queue);
-        // SAFETY: the image was acquired, the frame that signals the semaphore was submitted, the queue is held.
+        // SAFETY: the image was acquired from this swapchain, the frame that signals the semaphore was submitted, the
+        // queue is held.
         match unsafe { functions.queue_present(*queue, &info) } {
             Ok(suboptimal) => self.stale |= suboptimal,
             Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.stale = true,
@@ -257,6 +287,7 @@ impl Swapchain {
     /// Makes the swapchain anew for the window as it is now; without images when the window is minimised. Waits for
     /// the device, because nothing says when the window system has done with the old images.
     fn recreate(&mut self) -> Result<(), Error> {
+        self.show()?;
         if let Some(available) = self.acquired.take() {
             self.swallow(available)?;
         }
@@ -356,6 +387,8 @@ impl Swapchain {
         unsafe { swapchains.destroy_swapchain(old, None) };
         self.raw = made.context("vkCreateSwapchainKHR")?;
         self.format = format;
+        // one image waits while the next frame takes another
+        self.late = device.info().software && count > caps.min_image_count;
         device.0.name(self.raw, "swapchain");
         // SAFETY: just made.
         let raw_images = unsafe { swapchains.get_swapchain_images(self.raw) }

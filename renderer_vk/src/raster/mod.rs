@@ -237,8 +237,9 @@ impl Raster {
         if width == 0 || height == 0 {
             return Ok(());
         }
-        // depth is kept for no later view, so that of the whole image may go where drawing begins
-        let begins = !recorder.goes_on(&rendering);
+        // Depth is kept for no later view, so that of the whole image may go where drawing begins. Mesa's software driver
+        // would take that for a picture of its own, and wake its threads for it.
+        let begins = !recorder.goes_on(&rendering) && !self.device.info().software;
         let cover_depth = p.clear_depth && !begins;
         if cover_depth {
             self.cover.prepare(&self.device, kind, cover::Kind::Depth)?;

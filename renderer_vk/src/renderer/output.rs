@@ -137,10 +137,6 @@ impl Renderer {
         self.queue_overlay();
         let mut stats = FrameStats::default();
         let show = end && !self.hidden && self.swapchain.is_some();
-        let later = show && self.device.info().software;
-        if later {
-            self.show_finished()?;
-        }
         if !self.queue.is_empty() {
             let format = self.picture_format();
             self.targets.fit(&self.device, &self.settings, format)?;
@@ -195,11 +191,10 @@ impl Renderer {
         }
         self.recycle_queue();
         let recorded = Instant::now();
-        if later || !show {
-            self.ring.end(recorder)?;
-            self.unshown |= later;
-        } else {
+        if show {
             self.show(recorder)?;
+        } else {
+            self.ring.end(recorder)?;
         }
         stats.cpu = CpuTimes {
             gather: std::mem::take(&mut self.gather_ms),
@@ -210,15 +205,12 @@ impl Renderer {
         Ok(stats)
     }
 
-    /// Shows the picture that a software device still worked on when its frame ended. Such a device works in the
-    /// game's own time, and presenting waits for it: so the picture is shown when the next one begins, and meanwhile
-    /// the game goes on.
+    /// Shows the last frame's picture, before work that takes long.
     pub(super) fn show_finished(&mut self) -> Result<(), Error> {
-        if std::mem::take(&mut self.unshown) {
-            let recorder = self.ring.begin()?;
-            self.show(recorder)?;
+        match &mut self.swapchain {
+            Some(swapchain) => Ok(swapchain.show()?),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Ends a frame with the picture on its way to the window.
