@@ -14,7 +14,7 @@ layout(constant_id = 0) const uint BOUNCES = 1;
 const vec2 MIN_WEIGHT = vec2(0.05, 0.035);
 const float MIN_VARIANCE_WEIGHT = 0.1;
 // A change of the light by this part counts as much as the noise of one frame, filtered.
-const float NOISE = 0.2;
+const float NOISE = 0.15;
 // Frames before the variance over time can be trusted; until then it is taken over space.
 const float TRUSTED_FRAMES = 4.0;
 // How far around; of the rows every other one is enough.
@@ -138,11 +138,13 @@ void main() {
         if ((DENOISE.flags & DENOISE_GRADIENTS) != 0) {
             // The part of the light that has changed is error in the history; against the noise of the light it is what
             // decides. As only this frame sees the change, what is older than it loses its say for good.
-            // Of two errors, one of them relative to what is left of the light, the mean of least variance is taken.
+            // A light that comes or goes changes for many frames, so the history errs by more than the last change: the
+            // weight is the steady gain of Kalman's filter (A New Approach to Linear Filtering and Prediction Problems,
+            // 1960) for a value that wanders by `change` a frame, observed with the noise, which is relative to what is left.
             change = imageLoad(images_rg16f[DENOISE.gradient], pixel / STRATUM).xy;
             vec2 left = NOISE * (1.0 - change);
-            change *= change;
-            change /= max(change + left * left, 1.0e-6);
+            vec2 ratio = change * change / max(left * left, 1.0e-6);
+            change = 2.0 / (1.0 + sqrt(1.0 + 4.0 / max(ratio, 1.0e-12)));
             frames *= 1.0 - change;
             weight = max(weight, change);
         }
