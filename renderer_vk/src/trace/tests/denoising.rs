@@ -277,6 +277,34 @@ fn a_moving_light_leaves_no_trail() {
 }
 
 #[test]
+fn a_light_that_fades_is_followed() {
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    // by a twelfth each frame: little enough to be taken for noise, and after some frames far from what it was
+    let scene = room();
+    let fade = |frame: u32, view: &mut ViewScene| {
+        let light = lamp(Vec3::new(0.0, -60.0, 20.0));
+        let left = (11.0f32 / 12.0).powf(frame as f32);
+        view.dlights = vec![DynamicLight {
+            color: light.color * left,
+            ..light
+        }];
+    };
+    let (truth, _) = gpu.render_views(&scene, &truth_settings(), 128, |_, view| fade(30, view));
+    let (pixels, _) = gpu.render_views(&scene, &live(), 31, fade);
+    gpu.use_gradients(false);
+    let (without, _) = gpu.render_views(&scene, &live(), 31, fade);
+    let [(mean, _), (mean_without, _)] = [&pixels, &without].map(|p| compare(p, &truth));
+    println!("fading light: {mean}, without gradients {mean_without}");
+    assert!((mean - 1.0).abs() < 0.06, "{mean}");
+    assert!(
+        mean_without - 1.0 > 0.12,
+        "a test of nothing: {mean_without}"
+    );
+}
+
+#[test]
 fn a_broken_number_does_not_spread() {
     let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
         return;
