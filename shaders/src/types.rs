@@ -401,5 +401,7 @@ pub mod constants {
         TRIANGLE_WORLD = 1;
         /// The triangle is turned to the eye: mirrors see it from behind, and see it all the same.
         TRIANGLE_FACES_EYE = 2;
+        /// The triangle has an opposite in its plane, and rays that come from its back are left to that.
+        TRIANGLE_ONE_SIDED = 4;
     }
 }

@@ -95,7 +95,7 @@ bool bvh_report(inout BvhWalk walk, Hit hit, uint kind) {
         if (last < LAYER_NONE) walk.tmax = min(walk.tmax, last + 2.0 * layer_slack(last + layer_slack(last)));
         return false;
     }
-    if (kind == KIND_TESTED && !is_stopped_by(hit)) return false;
+    if (kind == KIND_TESTED && !is_stopped_by(hit, walk.direction)) return false;
     walk.hit = hit;
     walk.tmax = hit.t;
     return walk.mode == BVH_ANY;

@@ -70,7 +70,11 @@ Hit layers_take(inout LayerList list, inout LayerOrder order) {
 // From where on layers behind `last` are found: a layer lies at its key or a bias behind it.
 float layer_start(LayerOrder last) { return max(last.key - 0.01, 0.0); }
 
-// Whether a triangle with holes stops the ray where it meets it.
-bool is_stopped_by(Hit hit) { return is_solid_at(surface_point(hit), hit.t * VIEW.pixel_spread); }
+// Whether a triangle with holes, or with an opposite in its plane, stops the ray where it meets it.
+bool is_stopped_by(Hit hit, vec3 direction) {
+    SurfacePoint p = surface_point(hit);
+    if ((p.triangle.flags & TRIANGLE_ONE_SIDED) != 0) return !is_culled(p, direction);
+    return is_solid_at(p, hit.t * VIEW.pixel_spread);
+}
 
 #endif

@@ -17,7 +17,7 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
     uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT : gl_RayFlagsNoneEXT;
     rayQueryInitializeEXT(query, scenes[VIEW.scene], flags, mask, origin, tmin, direction, tmax);
     while (rayQueryProceedEXT(query)) {
-        if (is_stopped_by(QUERY_HIT(query, false))) rayQueryConfirmIntersectionEXT(query);
+        if (is_stopped_by(QUERY_HIT(query, false), direction)) rayQueryConfirmIntersectionEXT(query);
     }
     if (rayQueryGetIntersectionTypeEXT(query, true) != gl_RayQueryCommittedIntersectionTriangleEXT)
         return Hit(NO_HIT, 0, vec2(0.0), 0.0);

@@ -7,10 +7,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::{Vec2, Vec3};
 use shaders::trace_types::SkyRecord;
 use shaders::types::Triangle;
-use shaders::types::constants::{NO_TEXTURE, TRIANGLE_WORLD};
+use shaders::types::constants::{NO_TEXTURE, TRIANGLE_ONE_SIDED, TRIANGLE_WORLD};
 
 use super::bvh::{Aabb, build_triangles};
 use super::cutout::Coverage;
+use super::doubled::doubled;
 use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use super::layer_boxes::{StaticLayer, bounds_of};
 use super::surroundings::Surroundings;
@@ -93,11 +94,27 @@ struct Grouped {
     skies: Vec<SkyRecord>,
 }
 
-/// Surfaces of one structure with the material that is drawn for each; of a cut-out's only the triangles that are
-/// covered so.
-type Members<'a> = Vec<(&'a StaticSurface, u32, MaterialInfo, Option<Coverage>)>;
+/// Which triangles of a surface.
+#[derive(Clone, Copy)]
+enum Portion {
+    /// All.
+    Whole,
+    /// Of a cut-out those that are covered so.
+    Covered(Coverage),
+    /// Those that have opposites in their plane, or those that have none.
+    Doubled(bool),
+}
+
+/// Surfaces of one structure with the material that is drawn for each.
+type Members<'a> = Vec<(&'a StaticSurface, u32, MaterialInfo, Portion)>;
 
 fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
+    let doubled = doubled(scene, materials);
+    let has_doubled = |surface: &StaticSurface| {
+        let first = surface.first_index as usize;
+        let firsts = (0..surface.index_count as usize).step_by(3);
+        !doubled.is_empty() && firsts.into_iter().any(|i| doubled.contains(&(first + i)))
+    };
     let mut sorted: BTreeMap<(u32, Kind), Members<'_>> = BTreeMap::new();
     for surface in &scene.surfaces {
         let (material, info) = materials.info(surface.material);
@@ -108,10 +125,13 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
             };
             if kind == Kind::Tested {
                 // what has no hole need not be tested, and what is all hole is not there
-                add(Kind::Opaque, Some(Coverage::Solid));
-                add(Kind::Tested, Some(Coverage::Mixed));
+                add(Kind::Opaque, Portion::Covered(Coverage::Solid));
+                add(Kind::Tested, Portion::Covered(Coverage::Mixed));
+            } else if has_doubled(surface) {
+                add(Kind::Opaque, Portion::Doubled(false));
+                add(Kind::Tested, Portion::Doubled(true));
             } else {
-                add(kind, None);
+                add(kind, Portion::Whole);
             }
         }
     }
@@ -144,22 +164,32 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
             let range = surface.first_index as usize
                 ..(surface.first_index as usize).saturating_add(surface.index_count as usize);
             let corners = scene.indices.get(range).unwrap_or_default();
-            for corner in corners.chunks_exact(3) {
+            for (i, corner) in corners.chunks_exact(3).enumerate() {
                 let indices = [corner[0], corner[1], corner[2]];
                 if indices.iter().any(|&i| i as usize >= scene.vertices.len()) {
                     continue;
                 }
                 let st = |i: u32| scene.vertices.get(i as usize).map_or(Vec2::ZERO, |v| v.st);
-                if part.is_some_and(|part| materials.coverage(material, indices.map(st)) != part) {
+                let first = surface.first_index as usize + 3 * i;
+                let takes = match part {
+                    Portion::Whole => true,
+                    Portion::Covered(c) => materials.coverage(material, indices.map(st)) == c,
+                    Portion::Doubled(is) => doubled.contains(&first) == is,
+                };
+                if !takes {
                     continue;
                 }
+                let sides = match part {
+                    Portion::Doubled(true) => TRIANGLE_ONE_SIDED,
+                    _ => 0,
+                };
                 grouped.triangles.push(Triangle {
                     indices,
                     material,
                     instance: 0,
                     fog: surface.fog,
                     lightmap,
-                    flags: TRIANGLE_WORLD | rank_bits(&info),
+                    flags: TRIANGLE_WORLD | sides | rank_bits(&info),
                 });
             }
         }

@@ -18,6 +18,7 @@ pub mod counters;
 pub mod cutout;
 pub mod debug;
 pub mod denoise;
+mod doubled;
 pub mod fog;
 mod frame_lights;
 pub mod geometry;

@@ -231,6 +231,34 @@ fn back_faces_do_not_show_with(gpu: &mut Gpu) {
 }
 
 #[test]
+fn of_two_faces_in_one_plane_the_one_that_shows_is_met() {
+    Gpu::each(of_two_faces_in_one_plane_the_one_that_shows_is_met_with);
+}
+
+fn of_two_faces_in_one_plane_the_one_that_shows_is_met_with(gpu: &mut Gpu) {
+    // no plane along an axis, so that distances to it are rounded in all sorts of ways
+    let normal = Vec3::new(-0.8, 0.47, -0.371).normalize();
+    let across = normal.cross(Vec3::Z).normalize() * 400.0;
+    let along = normal.cross(across);
+    let middle = Vec3::new(130.7, 3.3, -9.1);
+    let corner = middle - 0.5 * (across + along);
+    let mut scene = Scene::new(Vec3::new(1.3, 0.7, 0.1), Vec3::X * 100.0, 50.0, 32);
+    let red = scene.material(&[stage::constant(RED)], 0);
+    let green = scene.material(&[stage::constant(GREEN)], 0);
+    let blue = scene.material(&[stage::constant(BLUE)], 0);
+    scene.quad(screen(500.0), green);
+    // that which shows its back first and last, each cut otherwise
+    let back = rectangle(corner, along, across);
+    scene.quad(back, blue);
+    scene.quad(rectangle(corner, across, along), red);
+    let [a, b, c, d] = back;
+    scene.quad([b, c, d, a], blue);
+    let (pixels, _) = gpu.render(&scene, &reference(), 1);
+    let wrong = pixels.iter().filter(|p| !close(**p, linear(RED)));
+    assert_eq!(wrong.count(), 0);
+}
+
+#[test]
 fn the_sky_is_where_its_stages_say_and_lets_the_sun_in() {
     Gpu::each(the_sky_is_where_its_stages_say_and_lets_the_sun_in_with);
 }
