@@ -188,6 +188,11 @@ impl Renderer {
         self.device.info()
     }
 
+    /// How many descriptors were written so far; drawing a frame like the one before writes none.
+    pub fn descriptor_writes(&self) -> u64 {
+        self.device.descriptor_writes()
+    }
+
     /// What the validation layer has said so far.
     pub fn validation_messages(&self) -> Vec<String> {
         self.device.validation_messages()

@@ -374,3 +374,42 @@ fn a_device_with_nothing_optional_draws_all_but_what_needs_it() {
         poor.frame(&def(), &[cube(&poor)]);
     }
 }
+
+#[test]
+fn no_descriptor_is_written_while_drawing() {
+    let settings = Settings {
+        flares: true,
+        shadows: 2,
+        ..Settings::default()
+    };
+    let Some(mut stage) = Stage::new(settings) else {
+        return;
+    };
+    let before = stage.renderer.descriptor_writes();
+    let white = stage.renderer.register_shader("white", true);
+    assert!(before > 0 && white > 0);
+    let mut counts = Vec::new();
+    for frame in 0..6 {
+        // what moves, turns and comes anew each time
+        let mut entities = vec![entity(stage.door, Vec3::Z * 8.0 * frame as f32)];
+        for number in 0..=frame {
+            let place = Vec3::new(100.0, 60.0 - 24.0 * number as f32, -60.0);
+            entities.push(entity(stage.box_model, place));
+        }
+        let def = RefDef {
+            time_ms: 1000 + frame * 25,
+            ..def()
+        };
+        stage
+            .renderer
+            .stretch_pic(0.0, 0.0, 9.0, 9.0, 0.0, 0.0, 1.0, 1.0, white);
+        stage.frame(&def, &entities);
+        counts.push(stage.renderer.descriptor_writes());
+    }
+    // the first frames make what they are drawn to
+    let last = counts[2];
+    assert!(
+        counts.iter().skip(2).all(|count| *count == last),
+        "{counts:?}"
+    );
+}

@@ -5,6 +5,7 @@
 //! (update-after-bind); an index is used again only after its frames are over (`graveyard`).
 
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use ash::vk;
 
@@ -95,6 +96,8 @@ impl Slots {
 /// The descriptor set, its layout, and the free indices.
 #[derive(Default)]
 pub(crate) struct Bindless {
+    /// Descriptors written so far.
+    pub writes: AtomicU64,
     set_layout: vk::DescriptorSetLayout,
     pool: vk::DescriptorPool,
     pub set: vk::DescriptorSet,
@@ -261,6 +264,7 @@ impl Bindless {
         write.descriptor_count = 1;
         // SAFETY: the index is below the binding's count and no frame uses it (it was free).
         unsafe { raw.update_descriptor_sets(&[write], &[]) };
+        self.writes.fetch_add(1, Ordering::Relaxed);
         Ok(index)
     }
 
@@ -286,6 +290,7 @@ impl Bindless {
             .image_info(&images);
         // SAFETY: the index is below the binding's count and no frame uses it (it was free).
         unsafe { raw.update_descriptor_sets(&[write], &[]) };
+        self.writes.fetch_add(1, Ordering::Relaxed);
     }
 
     pub fn free_texture(&self, index: u32) {
@@ -365,6 +370,7 @@ impl Device {
             .image_info(&images);
         // SAFETY: the index is new, so no frame uses it.
         unsafe { self.vk().update_descriptor_sets(&[write], &[]) };
+        self.0.bindless.writes.fetch_add(1, Ordering::Relaxed);
         samplers.push((*desc, sampler));
         Ok(index)
     }

@@ -230,6 +230,11 @@ impl Device {
         lock(&self.0.state).graveyard.len()
     }
 
+    /// How many descriptors were written so far: as many as images, samplers and scenes were made, none by drawing.
+    pub fn descriptor_writes(&self) -> u64 {
+        self.0.bindless.writes.load(Ordering::Relaxed)
+    }
+
     /// Whether fragment shaders can write to buffers.
     pub fn fragment_stores(&self) -> bool {
         self.0.abilities.fragment_stores
