@@ -386,8 +386,8 @@ fn no_descriptor_is_written_while_drawing() {
         return;
     };
     let before = stage.renderer.descriptor_writes();
-    let white = stage.renderer.register_shader("white", true);
-    assert!(before > 0 && white > 0);
+    let picture = stage.renderer.register_shader("t/wall", true);
+    assert!(before > 0 && picture > 0);
     let mut counts = Vec::new();
     for frame in 0..6 {
         // what moves, turns and comes anew each time
@@ -402,7 +402,7 @@ fn no_descriptor_is_written_while_drawing() {
         };
         stage
             .renderer
-            .stretch_pic(0.0, 0.0, 9.0, 9.0, 0.0, 0.0, 1.0, 1.0, white);
+            .stretch_pic(0.0, 0.0, 9.0, 9.0, 0.0, 0.0, 1.0, 1.0, picture);
         stage.frame(&def, &entities);
         counts.push(stage.renderer.descriptor_writes());
     }
