@@ -193,6 +193,36 @@ fn the_traced_look_shows_the_same_places() {
 }
 
 #[test]
+fn lights_by_hand_light_the_traced_look() {
+    if !real::available() {
+        return;
+    }
+    let (map, camera) = VIEWS[0];
+    let lights = "// a red lamp in the dark\n\
+        without points\nwithout suns\nscale surfaces 0.001\nambient 0 1 1 1\n\
+        point -540 775 110 400 1 0 0 16\n\
+        point 1 2\n";
+    let mut commands = vec!["set sv_pure 0".to_string()];
+    commands.extend(start_map(map));
+    commands.extend([format!("setviewpos {camera}"), "set r_rt 1".to_string()]);
+    commands.extend(picture(camera, 8, "shot"));
+    let files = vec![(format!("maps/{map}.lights"), lights.into())];
+    let outcome = run_with("vk", (160, 120), commands, files);
+    outcome.assert_clean();
+    let told = format!("maps/{map}.lights: line 7: ");
+    assert!(outcome.log.contains(&told), "{}", outcome.log_end());
+    let picture = outcome.picture("shot");
+    keep_picture(picture, "lights-by-hand");
+    let mean = |channel: usize| {
+        let all = picture.pixels().iter().skip(channel).step_by(3);
+        all.map(|&v| u32::from(v)).sum::<u32>()
+    };
+    let [red, green, blue] = [0, 1, 2].map(mean);
+    println!("{red} {green} {blue}");
+    assert!(red > 2 * green.max(blue), "{red} {green} {blue}");
+}
+
+#[test]
 fn a_session_with_everything() {
     if !real::available() {
         return;

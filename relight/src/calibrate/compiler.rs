@@ -19,14 +19,17 @@ const TRIED: [f32; 3] = [1.4, 1.8, 2.2];
 const FIRST: f32 = 1.8;
 
 /// Part of the error without gamma that the best may leave to be believed.
-const BELIEVED: f32 = 0.8;
+const BELIEVED: f32 = 0.87;
 
 /// Part that one more of them may leave, and the first, for the others to be tried.
 const SUPPORTED: f32 = 0.92;
 
 /// Gammas that explain light nearly as well as the best, a factor of the error: of these the largest is believed, as the
 /// display's own is what compilers are told as a rule.
-const ALIKE: f32 = 1.04;
+const ALIKE: f32 = 1.07;
+
+/// Part of the error without gamma that may be left with all that is found.
+const BETTER: f32 = 0.92;
 
 /// Part of the error of lights without an end that such with an end may leave to be believed.
 const ENDED: f32 = 0.97;
@@ -124,17 +127,19 @@ fn without_cut_outs(
         ..Compiler::PLAIN
     };
     let ended_error = error(world, ended).map_or(f32::INFINITY, |[_, e]| e);
-    let ends = ended_error < endless * ENDED;
-    let none = if ends { ended_error } else { endless };
-    let linear = Compiler { gamma: 1.0, ends };
+    let linear = Compiler {
+        gamma: 1.0,
+        ends: ended_error < endless * ENDED,
+    };
     let fallback = world.report.fallback;
     let mut trial = |world: &mut RelitWorld, compiler: Compiler| {
         let [before, after] = error(world, compiler)?;
         // A map without any light has what loading put there in its place.
         (fallback || before <= said * CONTRADICTED).then_some(after)
     };
-    let with = |gamma| Compiler { gamma, ends };
-    let Some(first) = trial(world, with(FIRST)).filter(|e| *e < none * SUPPORTED) else {
+    // Like is compared with like: ends that belong to one gamma mislead with another.
+    let with = |gamma| Compiler { gamma, ends: false };
+    let Some(first) = trial(world, with(FIRST)).filter(|e| *e < endless * SUPPORTED) else {
         return Some(linear);
     };
     let mut found: Vec<(f32, f32)> = TRIED
@@ -147,25 +152,17 @@ fn without_cut_outs(
     let [(best, _), (next, _), ..] = found[..] else {
         return Some(linear);
     };
-    if best >= none * BELIEVED || next >= none * SUPPORTED {
+    if best >= endless * BELIEVED || next >= endless * SUPPORTED {
         return Some(linear);
     }
-    let alike = found.iter().filter(|(e, _)| *e <= best * ALIKE);
-    let gamma = alike.map(|(_, gamma)| *gamma).fold(1.0, f32::max);
-    // Whether lights end shows only where light is decoded as it was encoded.
-    let own = found
-        .iter()
-        .find(|(_, g)| *g == gamma)
-        .map_or(best, |f| f.0);
-    let other = Compiler { gamma, ends: !ends };
-    let other_error = trial(world, other).unwrap_or(f32::INFINITY);
-    let changed = if ends {
-        own >= other_error * ENDED
-    } else {
-        other_error < own * ENDED
-    };
-    Some(Compiler {
-        gamma,
-        ends: ends != changed,
-    })
+    let alike = found.into_iter().filter(|(e, _)| *e <= best * ALIKE);
+    let (error, gamma) = alike.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let ended = Compiler { gamma, ends: true };
+    let ended_with = trial(world, ended).unwrap_or(f32::INFINITY);
+    let ends = ended_with < error * ENDED;
+    let none = endless.min(ended_error);
+    if error.min(ended_with) >= none * BETTER {
+        return Some(linear);
+    }
+    Some(Compiler { gamma, ends })
 }

@@ -35,6 +35,16 @@ const TRUST_IN_BLACK: f32 = 0.2;
 /// an end (linear falloff, spots), which lights of the square of the distance have not: then black would put them out.
 const BLACK_OVER_LIT: f32 = 0.1;
 
+/// Where more than this part of a map's texels is black, black ones are measured less often: the map may lie in a dark
+/// box much larger than itself.
+const MOSTLY_BLACK: f32 = 0.5;
+
+/// One of so many black texels is measured there.
+const BLACK_THINNED: f32 = 3.0;
+
+/// Texels that tell how many are black.
+const LOOKS: usize = 2000;
+
 /// Points tried in each stratum before it is given up.
 const TRIES: usize = 8;
 
@@ -412,18 +422,40 @@ fn texels(
             }
         }
     }
+    // The texel at a part of the whole area.
+    let texel_at = |part: f64, random: &mut Random| {
+        let found = triangles.partition_point(|(end, ..)| *end <= part * total);
+        let &(_, triangle, surface) = triangles.get(found)?;
+        let (place, stored) = texel(world, triangle, surface, random)?;
+        Some((place, surface.material, stored))
+    };
+    let dark = |stored: &Stored| black(stored.rgb);
+    let (mut looks, mut blacks) = (0.0f32, 0.0);
+    let mut looking = Random::new(0xB1AC);
+    for k in 0..LOOKS {
+        let part = (k as f64 + 0.5) / LOOKS as f64;
+        if let Some((_, _, stored)) = texel_at(part, &mut looking) {
+            looks += 1.0;
+            blacks += f32::from(u8::from(dark(&stored)));
+        }
+    }
+    let thinned = blacks > looks * MOSTLY_BLACK;
+    let mut strata = count;
+    if thinned {
+        let measured = 1.0 - blacks / looks * (1.0 - 1.0 / BLACK_THINNED);
+        strata = (count as f32 / measured) as usize;
+    }
     let mut samples = Vec::with_capacity(count);
-    for stratum in 0..count {
+    for stratum in 0..strata {
         for _ in 0..TRIES {
-            let at = (stratum as f64 + f64::from(random.next())) / count as f64 * total;
-            let found = triangles.partition_point(|(end, ..)| *end <= at);
-            let Some(&(_, triangle, surface)) = triangles.get(found) else {
-                break;
+            let at = (stratum as f64 + f64::from(random.next())) / strata as f64;
+            let Some((place, material, stored)) = texel_at(at, random) else {
+                continue;
             };
-            let sample = texel(world, triangle, surface, random).and_then(|(place, stored)| {
-                sample_at(world, occluders, place, surface.material, stored)
-            });
-            if let Some(sample) = sample {
+            if thinned && dark(&stored) && random.next() * BLACK_THINNED >= 1.0 {
+                break;
+            }
+            if let Some(sample) = sample_at(world, occluders, place, material, stored) {
                 samples.push(sample);
                 break;
             }

@@ -272,13 +272,27 @@ fn spheres_and_suns_give_their_irradiance_with(gpu: &mut Gpu) {
         falloff: relight::light::Falloff::InverseSquare,
     });
     check(gpu, &scene, &|p| 7000.0 * falloff(p) / std::f32::consts::PI);
-    // where it gives too little it gives nothing
-    scene.light_end = 7000.0 * falloff(at - Vec3::Z * at.z + Vec3::X * 40.0) / std::f32::consts::PI;
-    let end = scene.light_end;
-    check(gpu, &scene, &|p| {
-        let full = 7000.0 * falloff(p) / std::f32::consts::PI;
-        if full < end { 0.0 } else { full }
-    });
+    // where it gives too little it gives nothing; at the edge its size and the pixels' blur that
+    let full = |p: Vec3| 7000.0 * falloff(p) / std::f32::consts::PI;
+    let end = full(Vec3::new(at.x + 40.0, at.y, 0.0));
+    scene.light_end = end;
+    let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::Resampled), 32);
+    let (mut dark, mut lit) = (0, 0);
+    for (i, pixel) in pixels.iter().enumerate() {
+        let exact = full(floor_point(&scene, i % 32, i / 32));
+        if exact < end * 0.8 {
+            dark += 1;
+            assert_eq!(pixel.x, 0.0, "{i}");
+        } else if exact > end * 1.25 {
+            lit += 1;
+            assert!(
+                (pixel.x / exact - 1.0).abs() < 0.05,
+                "{i} {} {exact}",
+                pixel.x
+            );
+        }
+    }
+    assert!(dark > 20 && lit > 5, "{dark} {lit}");
     scene.light_end = 0.0;
     // a linear one: E = 8 I / R² (cos - d / R)
     let linear = relight::light::Falloff::Linear { reach: 160.0 };
