@@ -199,7 +199,10 @@ fn find(
 ) -> Solution {
     progress(0.0);
     let occluders = samples::occluders(world);
-    let (mut samples, evidence) = samples::take(world, &occluders, options.samples, options.seed);
+    // Where lights end, black tells little.
+    let few_black = thorough && world.light_end > 0.0;
+    let (mut samples, evidence) =
+        samples::take(world, &occluders, options.samples, options.seed, few_black);
     let texels = samples.len();
     let mut crossings = Vec::new();
     if thorough && evidence == Evidence::Lightmaps {

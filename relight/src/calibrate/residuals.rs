@@ -48,7 +48,7 @@ impl Residual {
 /// [materials measured](RelitWorld::measure_materials).
 pub fn residuals(world: &RelitWorld, options: &CalibrationOptions) -> Vec<Residual> {
     let occluders = samples::occluders(world);
-    let (samples, _) = samples::take(world, &occluders, options.samples, options.seed);
+    let (samples, _) = samples::take(world, &occluders, options.samples, options.seed, false);
     let silent = skies::silent(world);
     let mut columns = columns::known(world, &occluders, &samples, &silent);
     for column in &mut columns {

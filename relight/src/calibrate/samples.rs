@@ -35,7 +35,7 @@ const TRUST_IN_BLACK: f32 = 0.2;
 /// an end (linear falloff, spots), which lights of the square of the distance have not: then black would put them out.
 const BLACK_OVER_LIT: f32 = 0.1;
 
-/// Where more than this part of a map's texels is black, black ones are measured less often: the map may lie in a dark
+/// Where more than this part of a map's texels is black, black ones can be measured less often: the map may lie in a dark
 /// box much larger than itself.
 const MOSTLY_BLACK: f32 = 0.5;
 
@@ -243,15 +243,16 @@ fn area(world: &RelitWorld, is: fn(&WorldSurface) -> bool) -> f64 {
     areas.sum()
 }
 
-/// About `count` measurements, spread evenly over the map's area.
+/// About `count` measurements, spread evenly over the map's area. `few_black`: fewer of them black where most of it is.
 pub(super) fn take(
     world: &RelitWorld,
     occluders: &Occluders,
     count: usize,
     seed: u64,
+    few_black: bool,
 ) -> (Vec<Sample>, Evidence) {
     let mut random = Random::new(seed);
-    let mut lightmaps = texels(world, occluders, count, &mut random);
+    let mut lightmaps = texels(world, occluders, count, few_black, &mut random);
     // A few lightmapped scraps say nothing about the rest.
     if lightmaps.len() >= 16 {
         balance(&mut lightmaps);
@@ -403,6 +404,7 @@ fn texels(
     world: &RelitWorld,
     occluders: &Occluders,
     count: usize,
+    few_black: bool,
     random: &mut Random,
 ) -> Vec<Sample> {
     let mut triangles = Vec::new();
@@ -439,7 +441,7 @@ fn texels(
             blacks += f32::from(u8::from(dark(&stored)));
         }
     }
-    let thinned = blacks > looks * MOSTLY_BLACK;
+    let thinned = few_black && blacks > looks * MOSTLY_BLACK;
     let mut strata = count;
     if thinned {
         let measured = 1.0 - blacks / looks * (1.0 - 1.0 / BLACK_THINNED);
