@@ -222,7 +222,7 @@ fn bounced_light_in_an_even_room_is_albedo_times_light() {
         material.albedo = albedo;
     }
     let occluders = samples::occluders(&world);
-    let (samples, evidence) = samples::take(&world, &occluders, 500, 1);
+    let (samples, evidence) = samples::take(&world, &occluders, 500, 1, false);
     assert_eq!(evidence, Evidence::Lightmaps);
     assert!(samples.len() > 400);
     let direct: Vec<Vec3> = samples.iter().map(|s| s.value).collect();
