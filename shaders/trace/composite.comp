@@ -132,6 +132,11 @@ void main() {
         // not as this pixel's own surface does, but as those of the other field
         float fresh = min(mark_new_part(mark) * max_component(own.front) / max(max_component(radiance), 1.0e-6), 0.99);
         if (!(fresh > 0.0)) fresh = 0.0;
+        // so is light that has changed: history of the whole colour is off by as much
+        if (own.is_lit && (VIEW.flags & VIEW_DENOISE) != 0 && (DENOISE.flags & DENOISE_GRADIENTS) != 0) {
+            vec2 change = imageLoad(images_rg16f[DENOISE.gradient], pixel / STRATUM).xy;
+            fresh = max(fresh, min(max(change.x, change.y), 0.99));
+        }
         fresh += LEAST_FRESH;
         imageStore(images_rgba16f[VIEW.image_composite], pixel, vec4(min(radiance, vec3(60000.0)), lesser ? -fresh : fresh));
         return;
