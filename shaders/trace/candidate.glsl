@@ -19,7 +19,7 @@ LayerOrder layer_begin() { return LayerOrder(-LAYER_NONE, NO_HIT, NO_HIT); }
 
 // Layers that one ray finds. With one a ray, each pixel behind layers needs a ray for each of them and one more to know
 // that there is none left; more are more to keep in registers while a layer is shaded.
-const uint LAYERS_A_RAY = 4;
+const uint LAYERS_A_RAY = 2;
 
 // The nearest layers of a ray behind a place in the order, in order; where there are fewer the others have no geometry.
 struct LayerList {

@@ -90,6 +90,9 @@ pub(super) fn dispatch(
 
 macro_rules! ray_pass {
     ($(#[$doc:meta])* $type:ident, $name:literal, $raygen:ident, $compute:ident, $query:ident) => {
+        ray_pass!($(#[$doc])* $type, $name, $raygen, $compute, $query, &[]);
+    };
+    ($(#[$doc:meta])* $type:ident, $name:literal, $raygen:ident, $compute:ident, $query:ident, $constants:expr) => {
         $(#[$doc])*
         pub struct $type(RayPass);
 
@@ -99,7 +102,7 @@ macro_rules! ray_pass {
             /// # Errors
             /// The driver refuses the pipeline.
             pub fn new(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-                Self::with(device, tracer, &[])
+                Self::with(device, tracer, $constants)
             }
 
             /// Compiles the pipeline with specialization constants, id and value.
@@ -163,6 +166,16 @@ impl Primary {
         Self::with(device, tracer, &[(0, 1)])
     }
 }
+
+ray_pass!(
+    /// Follows those paths of the eye that were split between a reflection and what lies behind it once more, to the side
+    /// that the pixel does not show: writes its albedo (`other`). Reads the marks of `motion` besides what the eye's
+    /// paths read.
+    OtherSide, "trace_other_side", TRACE_PRIMARY_RGEN,
+    TRACE_PRIMARY_RGEN_COMPUTE, TRACE_PRIMARY_RGEN_QUERY,
+    // OTHER_FIELD in primary.rgen
+    &[(2, 1)]
+);
 
 ray_pass!(
     /// Reads the points in fog and the light lists; writes the light there. `size`: cells of the fog.

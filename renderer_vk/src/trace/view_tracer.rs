@@ -20,7 +20,9 @@ use super::input::{MaterialTable, Tracer};
 use super::layer_boxes::in_sight;
 use super::lights::MapLights;
 use super::motion::Motion;
-use super::passes::{Composite, Direct, Exposure, Fill, FlareRays, Indirect, Primary, ToneMap};
+use super::passes::{
+    Composite, Direct, Exposure, Fill, FlareRays, Indirect, OtherSide, Primary, ToneMap,
+};
 use super::targets::Targets;
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
@@ -46,6 +48,7 @@ pub struct ViewTracer {
     primary: Primary,
     /// The same with lit fog, made when there is some.
     fog_primary: Option<Primary>,
+    other_side: OtherSide,
     fog: LitFog,
     direct: Direct,
     indirect: Indirect,
@@ -98,6 +101,7 @@ impl ViewTracer {
             accel: Accel::new(device, tracer),
             primary: Primary::new(device, tracer)?,
             fog_primary: None,
+            other_side: OtherSide::new(device, tracer)?,
             fog: LitFog::new(device, tracer),
             direct: Direct::new(device, tracer)?,
             indirect: Indirect::new(device, tracer)?,
@@ -275,6 +279,9 @@ impl ViewTracer {
         primary
             .unwrap_or(&self.primary)
             .record(rec, address, size)?;
+        if !settings.rt_accumulate {
+            self.other_side.record(rec, address, size)?;
+        }
         if params.flares.count > 0 {
             let flare_rays = match &mut self.flare_rays {
                 Some(made) => made,
