@@ -76,7 +76,7 @@ pub fn flip(a: &Rgb8, b: &Rgb8) -> Result<f64, CompareError> {
     Ok(flip::mean(a, b))
 }
 
-/// FLIP at each pixel, rows from the top; see [`flip`].
+/// FLIP at each pixel, rows from the top; see [`flip()`].
 ///
 /// # Errors
 /// The pictures differ in size.
