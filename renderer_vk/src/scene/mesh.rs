@@ -35,7 +35,7 @@ pub(super) struct RawMesh {
     pub world_surface: Option<u32>,
     /// How much of it is the same in the next frame.
     pub shape: Shape,
-    /// Which paths meet it, see [`turned`](super::turned).
+    /// Which paths meet it, see [`turned`].
     pub paths: u8,
 }
 
