@@ -4,6 +4,7 @@
 //! strength 1; the strength is what is looked for, channel by channel. Shadow rays decide what is reached.
 
 use super::bvh::Occluders;
+use super::ends::{Given, Heap, Piece, pieces_of};
 use super::parallel;
 use super::random::Random;
 use super::samples::{Sample, Site};
@@ -71,50 +72,6 @@ pub(super) struct Column {
     pub limit: Vec3,
     /// `None` for lights put in, and for skies that nothing tells the light of.
     pub prior: Option<Prior>,
-}
-
-/// What lights that give about the same give to a sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Piece {
-    /// The sample.
-    sample: u32,
-    /// Light without shadows that one of them gives, for strength 1.
-    bare: f32,
-    /// Light that arrives from all of them, for strength 1.
-    given: f32,
-}
-
-impl Column {
-    /// Lets each of its lights end where, at the strength that it has, it gives no more than `least`.
-    pub fn end_at(&mut self, least: f32) {
-        if self.pieces.is_empty() {
-            return;
-        }
-        let strength = self.strength.max_element();
-        // What is not lit yet has not ended anywhere.
-        let least = if strength > 0.0 {
-            least / strength
-        } else {
-            0.0
-        };
-        self.rows.clear();
-        for piece in self.pieces.iter().filter(|p| p.bare > least) {
-            match self.rows.last_mut() {
-                Some((last, sum)) if *last == piece.sample => *sum += piece.given,
-                _ => self.rows.push((piece.sample, piece.given)),
-            }
-        }
-    }
-}
-
-/// Rows of one light as pieces.
-pub(super) fn pieces_of(rows: &[(u32, f32)]) -> Vec<Piece> {
-    let piece = |&(sample, given): &(u32, f32)| Piece {
-        sample,
-        bare: given,
-        given,
-    };
-    rows.iter().map(piece).collect()
 }
 
 /// Light per intensity at a sample, and 0 where the light is behind it or out of a spot's cone. No shadows.
@@ -395,53 +352,6 @@ pub(super) fn material_of(world: &RelitWorld, light: &TriangleLight) -> u32 {
         .surfaces
         .get(light.surface as usize)
         .map_or(u32::MAX, |s| s.material)
-}
-
-/// What surfaces of a group that give about the same give to a sample, for strength 1.
-struct Heap {
-    group: u32,
-    /// Power of two of what one of them gives without shadows; of skies, which do not end, all the same.
-    size: i32,
-    count: f32,
-    /// Light of all of them without shadows.
-    bare: f32,
-    /// Light that arrives.
-    given: f32,
-}
-
-/// What a surface gives to a sample, of a group and for strength 1.
-#[derive(Clone, Copy, Default)]
-struct Given {
-    surface: u32,
-    group: u32,
-    sky: bool,
-    bare: f32,
-    arrives: f32,
-}
-
-impl Given {
-    fn heap_on(self, heaps: &mut Vec<Heap>) {
-        if self.arrives <= 0.0 {
-            return;
-        }
-        let endless = if self.sky { f32::INFINITY } else { self.bare };
-        let size = endless.log2().clamp(-120.0, 120.0) as i32;
-        let same = |h: &&mut Heap| h.group == self.group && h.size == size;
-        match heaps.iter_mut().find(same) {
-            Some(heap) => {
-                heap.count += 1.0;
-                heap.bare += endless;
-                heap.given += self.arrives;
-            }
-            None => heaps.push(Heap {
-                group: self.group,
-                size,
-                count: 1.0,
-                bare: endless,
-                given: self.arrives,
-            }),
-        }
-    }
 }
 
 /// Light of each group at a sample, for strength 1.

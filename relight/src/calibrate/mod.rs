@@ -33,6 +33,7 @@ pub(crate) mod cache;
 mod columns;
 mod compiler;
 mod crossings;
+mod ends;
 mod fit;
 pub(crate) mod parallel;
 mod place;

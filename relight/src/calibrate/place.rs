@@ -6,8 +6,9 @@
 //! is done once more.
 
 use super::bvh::Occluders;
-use super::columns::{self, Column, Lamp, Source, point_rows, unshadowed};
+use super::columns::{Column, Lamp, Source, point_rows, unshadowed};
 use super::crossings::Crossing;
+use super::ends::pieces_of;
 use super::parallel;
 use super::samples::{self, Sample, mean};
 use super::solve::{Ambient, Effort, Residual, norm, residual, solve};
@@ -156,7 +157,7 @@ impl Scene<'_> {
         Column {
             source: Source::Placed(lamp),
             pieces: if self.least > 0.0 {
-                columns::pieces_of(&rows)
+                pieces_of(&rows)
             } else {
                 Vec::new()
             },

@@ -202,6 +202,16 @@ fn ripples_keep_the_light_that_a_surface_sends_on_with(gpu: &mut Gpu) {
     assert!((mean / exact - 1.0).abs() < 0.005, "{mean} {exact}");
 }
 
+/// A square picture of RGBA8 texels.
+fn square(gpu: &Gpu, side: u32, texels: &[u8]) -> Image {
+    let desc = ImageDesc::new("square", side, side, Format::Rgba8, ImageUsage::SAMPLED);
+    let image = Image::new(&gpu.device, &desc).expect("image");
+    gpu.device
+        .upload_image(&image, 0, 0, texels)
+        .expect("upload");
+    image
+}
+
 #[test]
 fn an_environment_stage_shows_what_is_around() {
     Gpu::each(an_environment_stage_shows_what_is_around_with);
@@ -209,14 +219,7 @@ fn an_environment_stage_shows_what_is_around() {
 
 fn an_environment_stage_shows_what_is_around_with(gpu: &mut Gpu) {
     let above = through_byte(encode(ABOVE));
-    let image = Image::new(
-        &gpu.device,
-        &ImageDesc::new("environment", 1, 1, Format::Rgba8, ImageUsage::SAMPLED),
-    )
-    .expect("image");
-    gpu.device
-        .upload_image(&image, 0, 0, &[128, 128, 128, 255])
-        .expect("upload");
+    let image = square(gpu, 1, &[128, 128, 128, 255]);
     // a body of one colour, shiny by a quarter of what is around
     let body = stage::constant([0.5; 3]);
     let shine = Stage {
@@ -248,14 +251,6 @@ fn the_texture_of_what_shines_is_seen_in_every_pixel() {
 }
 
 fn the_texture_of_what_shines_is_seen_in_every_pixel_with(gpu: &mut Gpu) {
-    let upload = |name, side: u32, bytes: &[u8]| {
-        let desc = ImageDesc::new(name, side, side, Format::Rgba8, ImageUsage::SAMPLED);
-        let image = Image::new(&gpu.device, &desc).expect("image");
-        gpu.device
-            .upload_image(&image, 0, 0, bytes)
-            .expect("upload");
-        image
-    };
     // about a texel a pixel, each of another grey
     let mut state = 1u32;
     let texels: Vec<u8> = (0..32 * 32)
@@ -265,8 +260,8 @@ fn the_texture_of_what_shines_is_seen_in_every_pixel_with(gpu: &mut Gpu) {
             [grey, grey, grey, 255]
         })
         .collect();
-    let around = upload("environment", 1, &[128, 128, 128, 255]);
-    let texture = upload("texture", 32, &texels);
+    let around = square(gpu, 1, &[128, 128, 128, 255]);
+    let texture = square(gpu, 32, &texels);
     let body = Stage {
         blend_src: c::BLEND_DST_COLOR,
         blend_dst: c::BLEND_ZERO,

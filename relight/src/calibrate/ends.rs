@@ -1,0 +1,105 @@
+//! Lights that end: compilers leave out what a light adds less than a step of light to.
+//!
+//! Where a light ends hangs on its strength, which is what is looked for. So besides what a column gives, what its lights
+//! give one by one is kept, heaped by how much that is, and the column is put together anew from what has not ended.
+
+use super::columns::Column;
+
+/// What lights that give about the same give to a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Piece {
+    /// The sample.
+    pub sample: u32,
+    /// Light without shadows that one of them gives, for strength 1.
+    pub bare: f32,
+    /// Light that arrives from all of them, for strength 1.
+    pub given: f32,
+}
+
+impl Column {
+    /// Lets each of its lights end where, at the strength that it has, it gives no more than `least`.
+    pub fn end_at(&mut self, least: f32) {
+        if self.pieces.is_empty() {
+            return;
+        }
+        let strength = self.strength.max_element();
+        // What is not lit yet has not ended anywhere.
+        let least = if strength > 0.0 {
+            least / strength
+        } else {
+            0.0
+        };
+        self.rows.clear();
+        for piece in self.pieces.iter().filter(|p| p.bare > least) {
+            match self.rows.last_mut() {
+                Some((last, sum)) if *last == piece.sample => *sum += piece.given,
+                _ => self.rows.push((piece.sample, piece.given)),
+            }
+        }
+    }
+}
+
+/// Rows of one light as pieces.
+pub(super) fn pieces_of(rows: &[(u32, f32)]) -> Vec<Piece> {
+    let piece = |&(sample, given): &(u32, f32)| Piece {
+        sample,
+        bare: given,
+        given,
+    };
+    rows.iter().map(piece).collect()
+}
+
+/// What surfaces of a group that give about the same give to a sample, for strength 1.
+pub(super) struct Heap {
+    /// The group.
+    pub group: u32,
+    /// Power of two of what one of them gives without shadows; of skies, which do not end, all the same.
+    size: i32,
+    /// How many.
+    pub count: f32,
+    /// Light of all of them without shadows.
+    pub bare: f32,
+    /// Light that arrives.
+    pub given: f32,
+}
+
+/// What a surface gives to a sample, of a group and for strength 1.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Given {
+    /// The surface.
+    pub surface: u32,
+    /// The group.
+    pub group: u32,
+    /// It is a sky, which does not end.
+    pub sky: bool,
+    /// Light without shadows.
+    pub bare: f32,
+    /// Light that arrives.
+    pub arrives: f32,
+}
+
+impl Given {
+    /// Joins those of its group that give about as much.
+    pub fn heap_on(self, heaps: &mut Vec<Heap>) {
+        if self.arrives <= 0.0 {
+            return;
+        }
+        let endless = if self.sky { f32::INFINITY } else { self.bare };
+        let size = endless.log2().clamp(-120.0, 120.0) as i32;
+        let same = |h: &&mut Heap| h.group == self.group && h.size == size;
+        match heaps.iter_mut().find(same) {
+            Some(heap) => {
+                heap.count += 1.0;
+                heap.bare += endless;
+                heap.given += self.arrives;
+            }
+            None => heaps.push(Heap {
+                group: self.group,
+                size,
+                count: 1.0,
+                bare: endless,
+                given: self.arrives,
+            }),
+        }
+    }
+}
