@@ -198,6 +198,7 @@ impl<'a> FrameContext<'a> {
                 lightmaps: settings.lightmap,
                 sky_in_front: settings.show_sky,
                 last_sort: settings.debug_sort,
+                overdraw: settings.measure_overdraw,
             },
         );
         let view = &scene.view;

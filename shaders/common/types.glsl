@@ -43,7 +43,7 @@ struct RasterView {
 };
 
 struct Draw {
-    uint textures[2]; uint stages[2]; float texcoords[2][6]; vec4 color; float time; uint instance; uint fog; uint light;
+    uint textures[4]; uint stages[4]; float texcoords[4][6]; vec4 colors[4]; float time; uint instance; uint fog; uint light;
     uint dynamic_vertices;
 };
 
@@ -73,7 +73,8 @@ const uint MATERIAL_TWO_SIDED = 1, MATERIAL_CULL_BACK = 2, MATERIAL_CUT_OUT = 4,
 const uint INSTANCE_DEPTH_HACK = 1, INSTANCE_FIRST_PERSON = 2, INSTANCE_THIRD_PERSON = 4, INSTANCE_NO_SHADOW = 8, INSTANCE_UNLIT = 16,
     INSTANCE_CROSSHAIR = 32, INSTANCE_SUSPENDED = 64;
 const uint DRAW_STAGE = 0, DRAW_LIGHT = 1, DRAW_FOG = 2, DRAW_DEPTH = 3;
-const uint COMBINE_NONE = 0, COMBINE_MODULATE = 1, COMBINE_ADD = 2, COMBINE_REPLACE = 3;
+const uint COMBINE_NONE = 0, COMBINE_MODULATE = 1, COMBINE_ADD = 2, COMBINE_REPLACE = 3, COMBINE_BLEND = 4;
+const uint DRAW_STAGES = 4;
 const uint COLOR_WHITE = 0, COLOR_FLAT = 1, COLOR_VERTEX = 2;
 const uint FOG_ADJUST_NONE = 0, FOG_ADJUST_RGB = 1, FOG_ADJUST_ALPHA = 2, FOG_ADJUST_RGBA = 3;
 const uint TRIANGLE_WORLD = 1, TRIANGLE_FACES_EYE = 2, TRIANGLE_ONE_SIDED = 4;

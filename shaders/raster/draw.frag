@@ -1,14 +1,16 @@
 #version 460
-// One draw of the classic look: texture times colour, one or two textures, alpha test, a light's blob, or fog.
-// variants: COUNT=-DCOUNT_FRAGMENTS
+// One draw of the classic look: one or more passes of a material (each texture times colour, with an alpha test), a
+// light's blob, or fog.
+// variants: MANY=-DMANY_STAGES
+// variants: COUNT=-DMANY_STAGES -DCOUNT_FRAGMENTS
 // The constants of draw.glsl leave only what the draw needs; without `discard`, depth is tested first.
 #include "raster/draw.glsl"
 
-layout(location = 0) in vec4 in_color;
-layout(location = 1) in vec4 in_uv;
+layout(location = 0) in vec4 in_uv[STAGES / 2]; // two stages each
 layout(location = 2) in float in_clip;
-layout(location = 3) in flat vec4 in_flat_color;
-layout(location = 4) in flat uvec2 in_textures; // see `Draw`
+layout(location = 3) in flat uvec4 in_textures; // see `Draw`
+layout(location = 4) in vec4 in_color[STAGES];
+layout(location = 8) in flat vec4 in_flat_color[STAGES];
 
 layout(location = 0) out vec4 out_color;
 
@@ -17,28 +19,80 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counter { ui
 #endif
 
 // The indices are the same for the whole draw, so they need no nonuniformEXT.
-vec4 sample_stage(uint stage, uint handle, vec2 uv) {
+vec4 sample_stage(uint stage) {
     if ((TEXTURES >> stage & 1) == 0) return vec4(1.0);
+    uint handle = in_textures[stage];
+    vec2 uv = (stage & 1) == 0 ? in_uv[stage / 2].xy : in_uv[stage / 2].zw;
     return texture(sampler2D(textures[handle & 0xFFFFFF], samplers[handle >> 24]), uv);
+}
+
+vec4 stage_value(uint stage) {
+    vec4 color = sample_stage(stage);
+    if (of_stage(COLOR, stage) == COLOR_FLAT) color *= in_flat_color[stage];
+    if (of_stage(COLOR, stage) == COLOR_VERTEX) color *= in_color[stage];
+    return color;
+}
+
+bool passes_alpha_test(uint stage, vec4 color) {
+    uint alpha_func = of_stage(ALPHA_FUNC, stage);
+    return alpha_func == ALPHAFUNC_NONE || alpha_passes(alpha_func, color.a);
+}
+
+// As the picture keeps it.
+vec3 stored(vec3 color) { return round(color * 255.0) / 255.0; }
+
+// What blending makes of one side. The picture's alpha reads as 1, as in raster/pipelines.rs.
+vec3 weighted(vec3 side, uint factor, vec4 source, vec3 target) {
+    switch (factor) {
+    case BLEND_ZERO: case BLEND_ONE_MINUS_DST_ALPHA: case BLEND_SRC_ALPHA_SATURATE: return vec3(0.0);
+    case BLEND_DST_COLOR: return stored(side * target);
+    case BLEND_ONE_MINUS_DST_COLOR: return stored(side * (1.0 - target));
+    case BLEND_SRC_ALPHA: return stored(side * source.a);
+    case BLEND_ONE_MINUS_SRC_ALPHA: return stored(side * (1.0 - source.a));
+    case BLEND_SRC_COLOR: return stored(side * source.rgb);
+    case BLEND_ONE_MINUS_SRC_COLOR: return stored(side * (1.0 - source.rgb));
+    default: return side;
+    }
+}
+
+// A pass blended over what those before it left, in steps of 255 as drivers in software do it, those of OpenGL among
+// them; GPUs have a finer source and sum.
+vec4 blend(vec4 before, vec4 pass, uint stage) {
+    vec4 source = clamp(pass, 0.0, 1.0);
+    source = vec4(stored(source.rgb), round(source.a * 255.0) / 255.0);
+    vec3 target = stored(clamp(before.rgb, 0.0, 1.0));
+    return vec4(weighted(source.rgb, of_stage(BLEND_SOURCE, stage), source, target)
+        + weighted(target, of_stage(BLEND_TARGET, stage), source, target), 1.0);
+}
+
+// A stage onto those before it.
+vec4 onto(vec4 before, uint stage) {
+    uint combine = of_stage(COMBINE, stage);
+    if (combine == COMBINE_NONE) return before;
+    vec4 color = stage_value(stage);
+    // what fails leaves what was there
+    if (combine == COMBINE_BLEND) return passes_alpha_test(stage, color) ? blend(before, color, stage) : before;
+    if (combine == COMBINE_MODULATE) color *= before;
+    if (combine == COMBINE_ADD) color = vec4(before.rgb + color.rgb, before.a * color.a);
+    if (!passes_alpha_test(stage, color)) discard;
+    return color;
 }
 
 void main() {
     if (CLIP != 0 && in_clip < 0.0) discard;
     if (MODE == DRAW_LIGHT) {
-        out_color = vec4(in_color.rgb * sample_stage(0, in_textures.x, in_uv.xy).rgb, 1.0);
+        out_color = vec4(in_color[0].rgb * sample_stage(0).rgb, 1.0);
     } else if (MODE == DRAW_FOG) {
-        out_color = vec4(in_flat_color.rgb, sample_stage(0, in_textures.x, in_uv.xy).a);
+        out_color = vec4(in_flat_color[0].rgb, sample_stage(0).a);
     } else {
-        vec4 color = sample_stage(0, in_textures.x, in_uv.xy);
-        if (COLOR == COLOR_FLAT) color *= in_flat_color;
-        if (COLOR == COLOR_VERTEX) color *= in_color;
-        if (COMBINE != COMBINE_NONE) {
-            vec4 second = sample_stage(1, in_textures.y, in_uv.zw);
-            if (COMBINE == COMBINE_REPLACE) color = second;
-            else color = COMBINE == COMBINE_ADD ? vec4(color.rgb + second.rgb, color.a * second.a) : color * second;
-        }
-        if (ALPHA_FUNC != ALPHAFUNC_NONE && !alpha_passes(ALPHA_FUNC, color.a)) discard;
-        out_color = color;
+        out_color = stage_value(0);
+        if (!passes_alpha_test(0, out_color)) discard;
+        // written out, so that every compiler sees the constants
+        out_color = onto(out_color, 1);
+#ifdef MANY_STAGES
+        out_color = onto(out_color, 2);
+        out_color = onto(out_color, 3);
+#endif
     }
 #ifdef COUNT_FRAGMENTS
     // nothing asks for early tests, so that what is hidden is counted, too

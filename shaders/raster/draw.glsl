@@ -5,17 +5,28 @@
 #include "common/material.glsl"
 
 layout(constant_id = 0) const uint MODE = 0;          // DRAW_*
-layout(constant_id = 1) const uint TEXTURES = 3;      // bit i: stage i has a texture; otherwise it is white
-layout(constant_id = 2) const uint COMBINE = 0;       // COMBINE_*
-layout(constant_id = 3) const uint ALPHA_FUNC = 0;    // ALPHAFUNC_*
-layout(constant_id = 4) const uint COLOR = 2;         // COLOR_*
-layout(constant_id = 5) const uint RGB_GEN = 0;       // RGBGEN_* of COLOR_VERTEX
-layout(constant_id = 6) const uint ALPHA_GEN = 0;     // ALPHAGEN_* of COLOR_VERTEX
-layout(constant_id = 7) const uint TC_GEN_0 = 0;      // TCGEN_* of the first stage
-layout(constant_id = 8) const uint TC_GEN_1 = 0;      // TCGEN_* of the second stage
-layout(constant_id = 9) const uint TC_MODS = 0;       // bit i: stage i's tcMods differ between vertices
-layout(constant_id = 10) const uint FOG_ADJUST = 0;   // FOG_ADJUST_*
-layout(constant_id = 11) const uint CLIP = 0;         // 1: there is a clip plane
+layout(constant_id = 1) const uint FOG_ADJUST = 0;    // FOG_ADJUST_* of the first stage
+layout(constant_id = 2) const uint CLIP = 0;          // 1: there is a clip plane
+layout(constant_id = 3) const uint TEXTURES = 0xF;    // bit i: stage i has a texture; otherwise it is white
+layout(constant_id = 4) const uint TC_MODS = 0;       // bit i: stage i's tcMods differ between vertices
+// Four bits for each stage, the first's lowest: `of_stage`.
+layout(constant_id = 5) const uint COMBINE = 0;       // COMBINE_*
+layout(constant_id = 6) const uint BLEND_SOURCE = 0;  // BLEND_* of COMBINE_BLEND
+layout(constant_id = 7) const uint BLEND_TARGET = 0;  // BLEND_* of COMBINE_BLEND
+layout(constant_id = 8) const uint ALPHA_FUNC = 0;    // ALPHAFUNC_*, of the last stage of each pass
+layout(constant_id = 9) const uint COLOR = 2;         // COLOR_*
+layout(constant_id = 10) const uint RGB_GEN = 0;      // RGBGEN_* of COLOR_VERTEX
+layout(constant_id = 11) const uint ALPHA_GEN = 0;    // ALPHAGEN_* of COLOR_VERTEX
+layout(constant_id = 12) const uint TC_GEN = 0;       // TCGEN_*
+
+// Most draws have one stage or two, and a driver makes pipelines faster of shaders without the others.
+#ifdef MANY_STAGES
+const uint STAGES = DRAW_STAGES;
+#else
+const uint STAGES = 2;
+#endif
+
+uint of_stage(uint constant, uint stage) { return constant >> 4 * stage & 0xF; }
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vertices { Vertex at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Instances { Instance at[]; };

@@ -252,19 +252,22 @@ pub struct RasterView {
     pub lights: u64,
 }
 
+/// As many stages go into one draw of the classic look.
+pub const DRAW_STAGES: usize = constants::DRAW_STAGES as usize;
+
 /// One draw call of the classic look. What the shaders are specialised for is not in it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Draw {
-    /// Bindless indices of the textures in the lower 24 bits, of their samplers in the upper 8.
-    pub textures: [u32; 2],
-    /// One or two (multitexture) stages, for what is evaluated per vertex.
-    pub stages: [u32; 2],
+    /// Of each stage the bindless index of its texture in the lower 24 bits, of its sampler in the upper 8.
+    pub textures: [u32; DRAW_STAGES],
+    /// The stages, for what is evaluated per vertex.
+    pub stages: [u32; DRAW_STAGES],
     /// What each stage's `tcMod`s come to where they are the same for all vertices:
     /// `s' = s m[0] + t m[2] + m[4]`, `t' = s m[1] + t m[3] + m[5]`.
-    pub texcoords: [[f32; 6]; 2],
-    /// Colour of the whole draw, where it is the same for all vertices.
-    pub color: [f32; 4],
+    pub texcoords: [[f32; 6]; DRAW_STAGES],
+    /// Colour of each stage, where it is the same for all vertices.
+    pub colors: [[f32; 4]; DRAW_STAGES],
     /// The material's time, seconds.
     pub time: f32,
     /// Index of the instance.
@@ -392,9 +395,12 @@ pub mod constants {
         DRAW_FOG = 2;
         /// Depth alone, before everything else.
         DRAW_DEPTH = 3;
-        /// Of a draw: there is one stage, or two of which the second multiplies or is added.
-        COMBINE_NONE = 0; COMBINE_MODULATE = 1; COMBINE_ADD = 2; COMBINE_REPLACE = 3;
-        /// Of a draw: its colour is white, the same for all vertices, or each vertex's own.
+        /// See [`super::DRAW_STAGES`].
+        DRAW_STAGES = 4;
+        /// How a stage of a draw goes onto those before it: it is the first or there is none; it multiplies, is added or
+        /// is shown instead, as a second texture of the same pass; it is blended, as a pass of its own.
+        COMBINE_NONE = 0; COMBINE_MODULATE = 1; COMBINE_ADD = 2; COMBINE_REPLACE = 3; COMBINE_BLEND = 4;
+        /// Of a stage: its colour is white, the same for all vertices, or each vertex's own.
         COLOR_WHITE = 0; COLOR_FLAT = 1; COLOR_VERTEX = 2;
         FOG_ADJUST_NONE = 0; FOG_ADJUST_RGB = 1; FOG_ADJUST_ALPHA = 2; FOG_ADJUST_RGBA = 3;
         /// The triangle belongs to the world (its vertex colours and lightmap are baked light).

@@ -28,9 +28,16 @@ pub struct Aids {
     pub sky_in_front: bool,
     /// Leave out materials of a greater sort value (`r_debugSort`); 0: none.
     pub last_sort: i32,
+    /// Fragments are counted (`r_measureOverdraw`), those of each pass.
+    pub overdraw: bool,
 }
 
 impl Aids {
+    /// Whether each pass has to be a draw of its own.
+    pub fn passes_alone(&self) -> bool {
+        self.lightmaps || self.overdraw
+    }
+
     /// Whether a material of this sort value is left out.
     pub fn leaves_out(&self, sort: f32) -> bool {
         self.last_sort != 0 && (self.last_sort as f32) < sort

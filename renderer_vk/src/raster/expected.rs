@@ -6,9 +6,10 @@ use shaders::types::{Draw, Instance};
 
 use super::depth_first;
 use super::list::{faces, stage_depth};
+use super::passes;
 use super::pipelines::{CullFaces, State};
 use super::shading::{Shading, StageContext};
-use crate::assets::{LightmapClass, Material};
+use crate::assets::{LightmapClass, Material, RasterPass};
 
 /// Calls `found` with each state that `material` is drawn with in a view or in the overlay.
 pub fn states(stages: &StageContext<'_>, material: &Material, mut found: impl FnMut(State)) {
@@ -21,37 +22,45 @@ pub fn states(stages: &StageContext<'_>, material: &Material, mut found: impl Fn
         LightmapClass::Page => 0,
         _ => c::NO_TEXTURE,
     };
-    for pass in &material.passes {
-        let (shading, _) = stages.pass(
+    let state = |passes: &[RasterPass]| {
+        let first = passes.first()?;
+        let (shading, _) = stages.passes(
             material,
-            pass,
+            passes,
             &Instance::default(),
             lightmap,
             c::FOG_ADJUST_NONE,
             Draw::default(),
         );
-        let in_view = State {
-            blend: pass.blend,
-            depth: stage_depth(pass),
-            depth_write: pass.depth_write,
+        Some(State {
+            blend: first.blend,
+            depth: stage_depth(first),
+            depth_write: first.depth_write,
             cull: faces(material.shader.cull, false),
             offset: material.polygon_offset,
             wireframe: false,
             shading,
-        };
+        })
+    };
+    for passes in passes::draws(&material.passes, false) {
         // pictures of the overlay are sprites and marks in views, too, unless no script says how
-        if !flat || pass.depth_test {
+        if flat && passes.iter().any(|pass| !pass.depth_test) {
+            continue;
+        }
+        if let Some(in_view) = state(passes) {
             found(in_view);
             if depth_first::covers(material) {
                 found(depth_first::depth_alone(in_view.cull));
             }
         }
-        if flat {
+    }
+    for pass in material.passes.iter().filter(|_| flat) {
+        if let Some(state) = state(std::slice::from_ref(pass)) {
             found(State {
                 depth_write: pass.depth_write && pass.depth_test,
                 cull: CullFaces::None,
                 offset: false,
-                ..in_view
+                ..state
             });
         }
     }

@@ -4,7 +4,7 @@
 //! Changing the pipeline is what a call costs most, with software drivers above all. So where the picture cannot tell,
 //! calls of the same state are brought together. Surfaces whose first stage covers all behind them
 //! ([`depth_first::covers`]) end up one in each pixel, whatever the order: of neighbouring groups of one such material
-//! every stage is drawn for all of them before the next stage, and the lights and the fog of all such groups are put off
+//! every draw's stages ([`passes`]) are drawn for all of them before the next ones, and the lights and the fog of all such groups are put off
 //! until something else is drawn. They pass the depth test only on the surface that is in sight. For the same reason
 //! entities are drawn before the map where they are between such surfaces: what they hide is not textured.
 
@@ -18,6 +18,7 @@ use super::list::{
     Call, DepthRange, DrawList, Statics, faces, fog_adjust, light_source_factor, shows_lightmap,
     stage_depth,
 };
+use super::passes;
 use super::pipelines::{Depth, State};
 use super::shading::{Shading, StageContext};
 use crate::assets::{Material, RasterPass};
@@ -235,25 +236,27 @@ impl DrawList {
                 self.note_depth(material, plain, surfaces.unwrap_or_default());
             }
         }
-        for pass in &material.passes {
+        let aids = context.aids;
+        for passes in passes::draws(&material.passes, aids.passes_alone()) {
             for group in groups {
-                self.add_stage(material, pass, group, context);
+                self.add_passes(material, passes, group, context);
             }
-            if context.aids.lightmaps && shows_lightmap(pass, context.stages.materials) {
+            let shown = |pass| shows_lightmap(pass, context.stages.materials);
+            if aids.lightmaps && passes.iter().any(shown) {
                 break;
             }
         }
     }
 
-    fn add_stage(
+    fn add_passes(
         &mut self,
         material: &Material,
-        pass: &RasterPass,
+        passes: &[RasterPass],
         group: &Group,
         context: &GroupContext<'_>,
     ) {
         let (stages, aids) = (context.stages, context.aids);
-        let Some(instance) = context.instance(group) else {
+        let (Some(instance), Some(pass)) = (context.instance(group), passes.first()) else {
             return;
         };
         let first_blends = material.passes.first().is_some_and(|p| p.blend.is_some());
@@ -265,7 +268,7 @@ impl DrawList {
         let draw = plain_draw(group);
         let lightmap = group.common.lightmap;
         let (mut shading, mut draw) =
-            stages.pass(material, pass, instance, lightmap, fog_adjust, draw);
+            stages.passes(material, passes, instance, lightmap, fog_adjust, draw);
         // of two textures in one pass the second is shown, which with a lightmap is the lightmap
         if aids.lightmaps && pass.stage_count == 2 {
             (shading, draw) = match (shows_lightmap(pass, stages.materials), lightmap) {

@@ -6,6 +6,7 @@ use shaders::types::{Draw, Instance, Vertex};
 use super::aids::Aids;
 use super::depth_first::Occluder;
 use super::groups::{Group, GroupContext};
+use super::passes;
 use super::pipelines::{CullFaces, Depth, State};
 use super::shading::{Shading, StageContext};
 use super::sky;
@@ -190,8 +191,7 @@ impl DrawList {
         }
         let span = (first_index, self.indices.len() as u32 - first_index);
         if span.1 > 0 {
-            let range = aids.sky_range();
-            self.add_sky_passes(material, world, CullFaces::None, range, span, draw, stages);
+            self.add_sky_passes(material, world, CullFaces::None, span, draw, stages, aids);
             if aids.edges {
                 self.push_edges(span, draw, CullFaces::None);
             }
@@ -210,8 +210,7 @@ impl DrawList {
             ..Draw::default()
         };
         let cull = faces(material.shader.cull, scene.view.mirrored);
-        let range = aids.sky_range();
-        self.add_sky_passes(material, world, cull, range, span, draw, stages);
+        self.add_sky_passes(material, world, cull, span, draw, stages, aids);
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -220,22 +219,23 @@ impl DrawList {
         material: &Material,
         world: &Instance,
         cull: CullFaces,
-        range: DepthRange,
         span: (u32, u32),
         draw: Draw,
         stages: StageContext<'_>,
+        aids: Aids,
     ) {
-        for pass in &material.passes {
-            let (shading, draw) = stages.pass(
+        for passes in passes::draws(&material.passes, aids.passes_alone()) {
+            let Some(pass) = passes.first() else { continue };
+            let (shading, draw) = stages.passes(
                 material,
-                pass,
+                passes,
                 world,
                 c::NO_TEXTURE,
                 c::FOG_ADJUST_NONE,
                 draw,
             );
             let state = sky_state(pass.blend, pass.depth_write, cull, shading);
-            self.push(state, range, span, draw);
+            self.push(state, aids.sky_range(), span, draw);
         }
     }
 

@@ -14,6 +14,7 @@ mod light_reach;
 mod list;
 mod overdraw;
 mod overlay;
+mod passes;
 mod pipelines;
 mod present;
 mod shading;

@@ -239,9 +239,9 @@ impl Overlay {
                         continue;
                     }
                     for pass in &material.passes {
-                        let (shading, draw) = stages.pass(
+                        let (shading, draw) = stages.passes(
                             material,
-                            pass,
+                            std::slice::from_ref(pass),
                             instance,
                             c::NO_TEXTURE,
                             c::FOG_ADJUST_NONE,

@@ -101,10 +101,16 @@ impl Pipelines {
             return Ok(());
         }
         let depth_alone = state.shading.mode == c::DRAW_DEPTH;
-        let fragment = if target.counted {
-            &shaders::RASTER_DRAW_FRAG_COUNT
-        } else {
-            &shaders::RASTER_DRAW_FRAG
+        let (vertex, fragment) = match (target.counted, state.shading.has_many_stages()) {
+            (true, _) => (
+                &shaders::RASTER_DRAW_VERT_MANY,
+                &shaders::RASTER_DRAW_FRAG_COUNT,
+            ),
+            (false, true) => (
+                &shaders::RASTER_DRAW_VERT_MANY,
+                &shaders::RASTER_DRAW_FRAG_MANY,
+            ),
+            (false, false) => (&shaders::RASTER_DRAW_VERT, &shaders::RASTER_DRAW_FRAG),
         };
         let pipeline = GraphicsPipeline::new(
             &self.device,
@@ -134,7 +140,7 @@ impl Pipelines {
                 wireframe: state.wireframe && self.device.info().wireframe,
                 constants: &state.shading.constants(),
                 fragment: (!depth_alone).then_some(fragment),
-                ..GraphicsDesc::new("raster", &shaders::RASTER_DRAW_VERT, fragment)
+                ..GraphicsDesc::new("raster", vertex, fragment)
             },
         )?;
         self.made.insert((target, state), pipeline);

@@ -3,7 +3,7 @@
 
 use glam::Vec2;
 use shaders::types::constants as c;
-use shaders::types::{Draw, Instance};
+use shaders::types::{DRAW_STAGES, Draw, Instance};
 use shaderscript::{AlphaGen, RgbGen, TcMod, WaveFunction, eval};
 
 use crate::assets::compile::sampler;
@@ -12,51 +12,79 @@ use crate::assets::{Combine, Material, Materials, RasterPass, Samplers};
 /// Bits of a texture handle in [`Draw::textures`] that are the texture's; the sampler's lie above.
 const TEXTURE_BITS: u32 = 24;
 
+/// A value below 16 of each stage of a draw, four bits each, the first's lowest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct PerStage(u32);
+
+impl PerStage {
+    /// Bits of a stage.
+    const BITS: usize = 4;
+
+    /// 0 for each stage.
+    const NONE: Self = Self(0);
+
+    /// `value` for the first stage, 0 for the others.
+    const fn first(value: u32) -> Self {
+        Self(value)
+    }
+
+    fn set(&mut self, stage: usize, value: u32) {
+        let shift = Self::BITS * stage;
+        self.0 = self.0 & !(0xF << shift) | value << shift;
+    }
+}
+
 /// What a draw's shaders do. Every value is a specialization constant (`shaders/raster/draw.glsl`), so that a fragment
 /// pays for what its draw needs and not for all that any draw may need.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Shading {
     /// `DRAW_*`.
     pub mode: u32,
-    /// Bit i: stage i has a texture; otherwise it is white.
-    pub textures: u32,
-    /// `COMBINE_*`.
-    pub combine: u32,
-    /// `ALPHAFUNC_*`.
-    pub alpha_func: u32,
-    /// `COLOR_*`.
-    pub color: u32,
-    /// `RGBGEN_*` of a colour per vertex.
-    pub rgb_gen: u32,
-    /// `ALPHAGEN_*` of a colour per vertex.
-    pub alpha_gen: u32,
-    /// `TCGEN_*` of each stage.
-    pub tc_gen: [u32; 2],
-    /// Bit i: the `tcMod`s of stage i differ between vertices.
-    pub tc_mods: u32,
-    /// `FOG_ADJUST_*`.
+    /// `FOG_ADJUST_*` of the first stage.
     pub fog_adjust: u32,
     /// There is a clip plane.
     pub clip: bool,
+    /// Bit i: stage i has a texture; otherwise it is white.
+    pub textures: u32,
+    /// Bit i: the `tcMod`s of stage i differ between vertices.
+    pub tc_mods: u32,
+    /// `COMBINE_*`.
+    pub combine: PerStage,
+    /// `BLEND_*` of the source of a blended stage.
+    pub blend_source: PerStage,
+    /// `BLEND_*` of what a blended stage is blended with.
+    pub blend_target: PerStage,
+    /// `ALPHAFUNC_*`, of the last stage of each pass.
+    pub alpha_func: PerStage,
+    /// `COLOR_*`.
+    pub color: PerStage,
+    /// `RGBGEN_*` of a colour per vertex.
+    pub rgb_gen: PerStage,
+    /// `ALPHAGEN_*` of a colour per vertex.
+    pub alpha_gen: PerStage,
+    /// `TCGEN_*`.
+    pub tc_gen: PerStage,
 }
 
 /// Number of specialization constants.
-pub const CONSTANTS: usize = 12;
+pub const CONSTANTS: usize = 13;
 
 impl Shading {
     /// One colour, white.
     pub const WHITE: Self = Self {
         mode: c::DRAW_STAGE,
-        textures: 0,
-        combine: c::COMBINE_NONE,
-        alpha_func: c::ALPHAFUNC_NONE,
-        color: c::COLOR_WHITE,
-        rgb_gen: 0,
-        alpha_gen: 0,
-        tc_gen: [0; 2],
-        tc_mods: 0,
         fog_adjust: c::FOG_ADJUST_NONE,
         clip: false,
+        textures: 0,
+        tc_mods: 0,
+        combine: PerStage::NONE,
+        blend_source: PerStage::NONE,
+        blend_target: PerStage::NONE,
+        alpha_func: PerStage::NONE,
+        color: PerStage::NONE,
+        rgb_gen: PerStage::NONE,
+        alpha_gen: PerStage::NONE,
+        tc_gen: PerStage::NONE,
     };
 
     /// A dynamic light's spot.
@@ -68,34 +96,38 @@ impl Shading {
 
     /// The vertices' colours.
     pub const VERTEX_COLOR: Self = Self {
-        color: c::COLOR_VERTEX,
-        rgb_gen: c::RGBGEN_EXACT_VERTEX,
+        color: PerStage::first(c::COLOR_VERTEX),
+        rgb_gen: PerStage::first(c::RGBGEN_EXACT_VERTEX),
         ..Self::WHITE
     };
 
     /// The same with the second of two textures alone (`r_lightmap`).
-    pub fn second_alone(self) -> Self {
-        Self {
-            combine: c::COMBINE_REPLACE,
-            ..self
-        }
+    pub fn second_alone(mut self) -> Self {
+        self.combine.set(1, c::COMBINE_REPLACE);
+        self
+    }
+
+    /// Whether there are more than two stages.
+    pub fn has_many_stages(&self) -> bool {
+        self.combine.0 >> (2 * PerStage::BITS) != 0
     }
 
     /// The specialization constants: id and value.
     pub fn constants(&self) -> [(u32, u32); CONSTANTS] {
         [
             (0, self.mode),
-            (1, self.textures),
-            (2, self.combine),
-            (3, self.alpha_func),
-            (4, self.color),
-            (5, self.rgb_gen),
-            (6, self.alpha_gen),
-            (7, self.tc_gen[0]),
-            (8, self.tc_gen[1]),
-            (9, self.tc_mods),
-            (10, self.fog_adjust),
-            (11, self.clip.into()),
+            (1, self.fog_adjust),
+            (2, self.clip.into()),
+            (3, self.textures),
+            (4, self.tc_mods),
+            (5, self.combine.0),
+            (6, self.blend_source.0),
+            (7, self.blend_target.0),
+            (8, self.alpha_func.0),
+            (9, self.color.0),
+            (10, self.rgb_gen.0),
+            (11, self.alpha_gen.0),
+            (12, self.tc_gen.0),
         ]
     }
 }
@@ -124,12 +156,13 @@ pub struct StageContext<'a> {
 }
 
 impl StageContext<'_> {
-    /// The draw of a pass of `material`'s on an instance. `draw` has what does not depend on the stages; `lightmap` is
-    /// the page's texture or `NO_TEXTURE`, `fog_adjust` one of `FOG_ADJUST_*`.
-    pub fn pass(
+    /// The draw of passes of `material`'s on an instance: of one, or of several that go together
+    /// ([`super::passes`]). `draw` has what does not depend on the stages; `lightmap` is the page's texture or
+    /// `NO_TEXTURE`, `fog_adjust` one of `FOG_ADJUST_*`, of a single pass.
+    pub fn passes(
         &self,
         material: &Material,
-        pass: &RasterPass,
+        passes: &[RasterPass],
         instance: &Instance,
         lightmap: u32,
         fog_adjust: u32,
@@ -137,56 +170,60 @@ impl StageContext<'_> {
     ) -> (Shading, Draw) {
         let clamp = material.shader.clamp_time.unwrap_or(f32::INFINITY);
         let time = (instance.time - material.time_offset).min(clamp);
-        let mut draw = Draw {
-            stages: pass.stages,
-            time,
-            ..draw
-        };
+        let mut draw = Draw { time, ..draw };
         let mut shading = Shading {
-            combine: match (pass.stage_count, pass.combine) {
-                (0 | 1, _) => c::COMBINE_NONE,
-                (_, Combine::Modulate) => c::COMBINE_MODULATE,
-                (_, Combine::Add) => c::COMBINE_ADD,
-            },
-            alpha_func: pass.alpha_func,
+            fog_adjust,
             ..Shading::WHITE
         };
-        let arrays = self.materials.arrays();
-        for (i, &index) in (0..).zip(pass.stages.iter().take(pass.stage_count as usize)) {
-            let Some(stage) = arrays.stages.get(index as usize) else {
+        for (place, (pass, part)) in (0..DRAW_STAGES).zip(parts(passes)) {
+            let combine = match (place, part, pass.combine) {
+                (0, ..) => c::COMBINE_NONE,
+                (_, 0, _) => c::COMBINE_BLEND,
+                (.., Combine::Modulate) => c::COMBINE_MODULATE,
+                (.., Combine::Add) => c::COMBINE_ADD,
+            };
+            shading.combine.set(place, combine);
+            if combine == c::COMBINE_BLEND {
+                let (source, target) = pass.blend.unwrap_or((c::BLEND_ONE, c::BLEND_ZERO));
+                shading.blend_source.set(place, source);
+                shading.blend_target.set(place, target);
+            }
+            if part + 1 == pass.stage_count as usize {
+                shading.alpha_func.set(place, pass.alpha_func);
+            }
+            let index = pass.stages[part];
+            draw.stages[place] = index;
+            let script = script_stage(material, index);
+            let Some(stage) = self.materials.arrays().stages.get(index as usize) else {
                 continue;
             };
-            let Some(texture) = self.stage_texture(stage, lightmap, time) else {
-                continue;
+            if let Some(texture) = self.stage_texture(stage, lightmap, time) {
+                shading.textures |= 1 << place;
+                shading.tc_gen.set(place, stage.tc_gen);
+                draw.textures[place] = self.handle(texture, stage.sampler_index);
+                let tc_mods = script.map_or(&[][..], |s| &s.tc_mods);
+                match affine(tc_mods, seconds(time), instance.texcoord) {
+                    Some(matrix) => draw.texcoords[place] = matrix,
+                    None => shading.tc_mods |= 1 << place,
+                }
+            }
+            let color = match (part, script) {
+                (0, _) if fog_adjust != c::FOG_ADJUST_NONE => Color::Vertex,
+                (0, Some(script)) => self.color(script, instance, time),
+                // the colour of a pass is that of its first stage
+                _ => Color::White,
             };
-            let place = i as usize;
-            shading.textures |= 1 << i;
-            shading.tc_gen[place] = stage.tc_gen;
-            draw.textures[place] = self.handle(texture, stage.sampler_index);
-            let tc_mods = script_stage(material, index).map_or(&[][..], |s| &s.tc_mods);
-            match affine(tc_mods, seconds(time), instance.texcoord) {
-                Some(matrix) => draw.texcoords[place] = matrix,
-                None => shading.tc_mods |= 1 << i,
-            }
-        }
-        let color = match pass.stages.first() {
-            _ if fog_adjust != c::FOG_ADJUST_NONE => Color::Vertex,
-            Some(&first) => script_stage(material, first)
-                .map_or(Color::White, |stage| self.color(stage, instance, time)),
-            None => Color::White,
-        };
-        match color {
-            Color::White => shading.color = c::COLOR_WHITE,
-            Color::Flat(color) => {
-                shading.color = c::COLOR_FLAT;
-                draw.color = color;
-            }
-            Color::Vertex => {
-                let stage = arrays.stages.get(pass.stages[0] as usize);
-                shading.color = c::COLOR_VERTEX;
-                shading.rgb_gen = stage.map_or(0, |s| s.rgb_gen);
-                shading.alpha_gen = stage.map_or(0, |s| s.alpha_gen);
-                shading.fog_adjust = fog_adjust;
+            match color {
+                Color::White => shading.color.set(place, c::COLOR_WHITE),
+                Color::Flat(color) => {
+                    shading.color.set(place, c::COLOR_FLAT);
+                    draw.colors[place] = color;
+                }
+                Color::Vertex => {
+                    shading.color.set(place, c::COLOR_VERTEX);
+                    shading.rgb_gen.set(place, stage.rgb_gen);
+                    shading.alpha_gen.set(place, stage.alpha_gen);
+                }
             }
         }
         (shading, draw)
@@ -207,18 +244,16 @@ impl StageContext<'_> {
         let light = self.identity_light;
         let shading = Shading {
             textures: 1,
-            color: if light >= 1.0 {
+            color: PerStage::first(if light >= 1.0 {
                 c::COLOR_WHITE
             } else {
                 c::COLOR_FLAT
-            },
+            }),
             ..Shading::WHITE
         };
-        let draw = Draw {
-            color: [light, light, light, 1.0],
-            ..draw
-        };
-        (shading, self.textured(texture, kind, draw))
+        let mut draw = self.textured(texture, kind, draw);
+        draw.colors[0] = [light, light, light, 1.0];
+        (shading, draw)
     }
 
     /// The draw of a dynamic light on a surface.
@@ -244,18 +279,17 @@ impl StageContext<'_> {
     pub fn lightmap(&self, texture: u32, draw: Draw) -> (Shading, Draw) {
         let shading = Shading {
             textures: 1,
-            tc_gen: [c::TCGEN_LIGHTMAP, 0],
+            tc_gen: PerStage::first(c::TCGEN_LIGHTMAP),
             ..Shading::WHITE
         };
         (shading, self.textured(texture, sampler::CLAMP, draw))
     }
 
-    fn textured(&self, texture: u32, kind: u32, draw: Draw) -> Draw {
-        Draw {
-            textures: [self.handle(texture, kind), 0],
-            texcoords: [UNCHANGED, UNCHANGED],
-            ..draw
-        }
+    /// The draw with one texture.
+    fn textured(&self, texture: u32, kind: u32, mut draw: Draw) -> Draw {
+        draw.textures[0] = self.handle(texture, kind);
+        draw.texcoords[0] = UNCHANGED;
+        draw
     }
 
     /// A texture with a sampler ([`sampler`]).
@@ -361,6 +395,12 @@ impl StageContext<'_> {
         // the engine keeps bytes; see `stage_color` in material.glsl
         Color::Flat([r, g, b, alpha].map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.001).floor() / 255.0))
     }
+}
+
+/// The stages of passes: the pass, and which of its two it is.
+fn parts(passes: &[RasterPass]) -> impl Iterator<Item = (&RasterPass, usize)> {
+    let stages = |pass: &RasterPass| 0..pass.stages.len().min(pass.stage_count as usize);
+    (passes.iter()).flat_map(move |pass| stages(pass).map(move |part| (pass, part)))
 }
 
 /// A time as the engine has it. Its clock counts milliseconds, which 32-bit seconds only come near to, and the engine's
