@@ -174,6 +174,8 @@ fn as_json(map: &str, report: &CalibrationReport, found: Option<&Recovery>) -> V
         "map": map,
         "evidence": report.evidence.label(),
         "gamma": report.gamma,
+        "ends": report.ends,
+        "dirty": report.dirty,
         "samples": report.samples,
         "held_out": report.held_out,
         "known": report.known,

@@ -109,6 +109,7 @@ pub(super) fn samples(
             cluster: point.cluster,
             material: u32::MAX,
             saturated: point.saturated,
+            part: 1.0,
             floor,
             trust: 1.0,
             held_out: false,

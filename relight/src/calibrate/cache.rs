@@ -124,7 +124,8 @@ fn print(solution: &Solution) -> String {
     let _ = writeln!(text, "before {}", agreement(&report.before));
     let _ = writeln!(text, "after {}", agreement(&report.after));
     let ends = if report.ends { " ends" } else { "" };
-    let _ = writeln!(text, "gamma {}{ends}", report.gamma);
+    let dirty = if report.dirty { " dirty" } else { "" };
+    let _ = writeln!(text, "gamma {}{ends}{dirty}", report.gamma);
     let _ = writeln!(text, "ambient {}", three(solution.ambient));
     if let Some(exposure) = solution.exposure {
         let _ = writeln!(text, "exposure {exposure}");
@@ -198,15 +199,20 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
             }
             "before" => solution.report.before = agreement.ok_or(wrong("not three numbers"))?,
             "after" => solution.report.after = agreement.ok_or(wrong("not three numbers"))?,
-            "gamma" => match (&numbers[..], words.get(1)) {
-                ([gamma], None) | ([gamma, _], Some(&"ends"))
-                    if super::compiler::possible(*gamma) =>
-                {
-                    solution.report.gamma = *gamma;
-                    solution.report.ends = words.len() == 2;
-                }
-                _ => return Err(wrong("not a gamma")),
-            },
+            "gamma" => {
+                let (gamma, more) = match (&numbers[..], words.get(1..)) {
+                    ([gamma, ..], Some(more)) if super::compiler::possible(*gamma) => (gamma, more),
+                    _ => return Err(wrong("not a gamma")),
+                };
+                solution.report.gamma = *gamma;
+                (solution.report.ends, solution.report.dirty) = match more {
+                    [] => (false, false),
+                    ["ends"] => (true, false),
+                    ["dirty"] => (false, true),
+                    ["ends", "dirty"] => (true, true),
+                    _ => return Err(wrong("unknown word")),
+                };
+            }
             "exposure" => match numbers[..] {
                 [exposure] if crate::exposure::possible(exposure) => {
                     solution.exposure = Some(exposure);

@@ -524,6 +524,7 @@ mod tests {
             cluster: 0,
             material: u32::MAX,
             saturated: false,
+            part: 1.0,
             floor: 0.0,
             trust: 1.0,
             held_out: false,

@@ -1,15 +1,18 @@
-//! What the map's compiler did to light: with which gamma it encoded it, and whether it let lights end.
+//! What the map's compiler did to light: with which gamma it encoded it, whether it let lights end, whether it made corners
+//! darker.
 //!
-//! Compilers store light as it is unless told otherwise; told so (`-gamma`), they store (L / 255)^(1 / g). Nothing in a
-//! map says so, but light is linear in its sources only as it was before: taken for linear, bright light is too weak
+//! Compilers store light as it is unless told otherwise; told so (`-gamma`), they store (L / 255)^(1 / g). Light is linear in
+//! its sources only as it was before: taken for linear, bright light is too weak
 //! beside dim light, suns are turned down, and lights are put in to fill what is left. To save time (`-fast`) they leave
-//! out of a texel what a light adds less than a step of light to, so that all light of many weak lights has an end. So a
-//! map is fitted with less effort for some gammas and with lights that end, and one of them is believed where it leaves
+//! out of a texel what a light adds less than a step of light to, so that all light of many weak lights has an end. And they
+//! may multiply it by the part of the surroundings that is open (`-dirty`). Some maps say what was done ([`said`]); else a
+//! map is fitted with less effort for some gammas, with lights that end, and with dirt, and one of them is believed where it leaves
 //! much less unexplained *of what is stored*, of gammas another leaves less as well, and the light that directives tell of
 //! does not speak against it. Compared is the error at all texels, fitted ones too: these fits have the same freedom, and a
 //! fifth of the texels would leave the choice to chance.
 
-use super::{CalibrationCache, CalibrationOptions, Evidence};
+use super::said::{self, CommandLine, Dirt};
+use super::{CalibrationCache, CalibrationOptions, CalibrationReport, Evidence};
 use crate::world::RelitWorld;
 
 /// Gammas tried: about the display's own, and two between it and none.
@@ -34,6 +37,9 @@ const BETTER: f32 = 0.92;
 /// Part of the error of lights without an end that such with an end may leave to be believed.
 const ENDED: f32 = 0.97;
 
+/// Part of the error without dirt that dirt which no command line tells of may leave to be believed.
+const DIRTY: f32 = 0.9;
+
 /// How many times as far off as without gamma what directives say may be: it was the compiler that read them.
 const CONTRADICTED: f32 = 1.5;
 
@@ -46,9 +52,12 @@ const SAMPLES: usize = 1000;
 /// Light, in steps of 1 / 255 as compilers count it before their gamma, at which lights end.
 const LAST_STEP: f32 = 1.0;
 
+/// Gammas that a compiler can be told.
+const POSSIBLE: std::ops::RangeInclusive<f32> = 0.5..=4.0;
+
 /// Whether a number can be the gamma of a compiler.
 pub(super) fn possible(gamma: f32) -> bool {
-    gamma == 1.0 || TRIED.contains(&gamma)
+    POSSIBLE.contains(&gamma)
 }
 
 /// What a compiler did to light.
@@ -58,6 +67,8 @@ pub(super) struct Compiler {
     pub gamma: f32,
     /// Whether its lights end.
     pub ends: bool,
+    /// How it made corners darker.
+    pub dirt: Option<Dirt>,
 }
 
 impl Compiler {
@@ -65,11 +76,26 @@ impl Compiler {
     const PLAIN: Compiler = Compiler {
         gamma: 1.0,
         ends: false,
+        dirt: None,
     };
+
+    /// What was found before, as far as the world knows of it.
+    pub fn of(report: &CalibrationReport) -> Compiler {
+        Compiler {
+            gamma: report.gamma,
+            ends: report.ends,
+            dirt: None,
+        }
+    }
+
+    /// Lets the world know.
+    pub fn tell(self, world: &mut RelitWorld) {
+        (world.stored_gamma, world.light_end) = (self.gamma, self.light_end());
+    }
 
     /// The value of [`RelitWorld::light_end`]. A stored byte of 255 is light of 4 (the engine's overbright shift), to the
     /// power of gamma: a step of what was encoded is a 255th of that.
-    pub fn light_end(self) -> f32 {
+    fn light_end(self) -> f32 {
         if self.ends {
             LAST_STEP / 255.0 * 4.0f32.powf(self.gamma)
         } else {
@@ -78,7 +104,8 @@ impl Compiler {
     }
 }
 
-/// Looks for what a world's compiler did. `progress` gets the part that is done.
+/// What a world's compiler did: what the map says of it, else what explains its light. `progress` gets the part that is
+/// done.
 ///
 /// Cut-outs let all light through here: that single rays are let through by a grate or not is noise, which a wrong gamma
 /// would seem to explain.
@@ -88,81 +115,145 @@ pub(super) fn find(
     options: &CalibrationOptions,
     progress: &mut dyn FnMut(f32),
 ) -> Compiler {
+    let line = said::command_line(&world.bsp.entities());
     let holes: Vec<_> = (world.materials.iter_mut().map(|m| m.holes.take())).collect();
-    let found = without_cut_outs(world, silent, options, progress);
+    let mut trials = Trials {
+        world,
+        silent,
+        less: CalibrationOptions {
+            samples: (options.samples / 3).max(SAMPLES).min(options.samples),
+            candidates: options.candidates / 5,
+            cache: None::<CalibrationCache>,
+            ..*options
+        },
+        progress,
+        done: Vec::new(),
+    };
+    let found = match line {
+        Some(line) => trials.as_said(line),
+        None => trials.by_light().unwrap_or(Compiler::PLAIN),
+    };
     for (material, holes) in world.materials.iter_mut().zip(holes) {
         material.holes = holes;
     }
-    found.unwrap_or(Compiler::PLAIN)
+    found
 }
 
-fn without_cut_outs(
-    world: &mut RelitWorld,
-    silent: &[u32],
-    options: &CalibrationOptions,
-    progress: &mut dyn FnMut(f32),
-) -> Option<Compiler> {
-    let less = CalibrationOptions {
-        samples: (options.samples / 3).max(SAMPLES).min(options.samples),
-        candidates: options.candidates / 5,
-        cache: None::<CalibrationCache>,
-        ..*options
-    };
-    let steps = 3.0 + TRIED.len() as f32;
-    let mut done = 0.0;
-    // Error of what directives say, and of what is fitted.
-    let mut error = |world: &mut RelitWorld, compiler: Compiler| {
-        progress(done / steps);
-        done += 1.0;
-        (world.stored_gamma, world.light_end) = (compiler.gamma, compiler.light_end());
+/// Fits with less effort.
+struct Trials<'a> {
+    world: &'a mut RelitWorld,
+    silent: &'a [u32],
+    less: CalibrationOptions,
+    progress: &'a mut dyn FnMut(f32),
+    /// Those that are done, and their errors.
+    done: Vec<(Compiler, Option<[f32; 2]>)>,
+}
+
+impl Trials<'_> {
+    /// Error of what directives say, and of what is fitted.
+    fn error(&mut self, compiler: Compiler) -> Option<[f32; 2]> {
+        if let Some((_, errors)) = self.done.iter().find(|(tried, _)| *tried == compiler) {
+            return *errors;
+        }
+        (self.progress)(self.done.len() as f32 / (4.0 + TRIED.len() as f32));
+        compiler.tell(self.world);
         // What is stored on surfaces decides, with lights that fall off as light does.
-        let found = super::find(world, silent, &less, false, &mut |_| ());
-        (world.stored_gamma, world.light_end) = (1.0, 0.0);
+        let (less, nothing) = (&self.less, &mut |_| ());
+        let found = super::find(self.world, self.silent, less, compiler, false, nothing);
+        Compiler::PLAIN.tell(self.world);
         let errors = [found.report.before.median_stops, found.overall.median_stops];
-        (found.report.evidence != Evidence::Nothing).then_some(errors)
-    };
-    let [said, endless] = error(world, Compiler::PLAIN).filter(|[_, e]| *e > NOTHING)?;
-    let ended = Compiler {
-        ends: true,
-        ..Compiler::PLAIN
-    };
-    let ended_error = error(world, ended).map_or(f32::INFINITY, |[_, e]| e);
-    let linear = Compiler {
-        gamma: 1.0,
-        ends: ended_error < endless * ENDED,
-    };
-    let fallback = world.report.fallback;
-    let mut trial = |world: &mut RelitWorld, compiler: Compiler| {
-        let [before, after] = error(world, compiler)?;
-        // A map without any light has what loading put there in its place.
-        (fallback || before <= said * CONTRADICTED).then_some(after)
-    };
-    // Like is compared with like: ends that belong to one gamma mislead with another.
-    let with = |gamma| Compiler { gamma, ends: false };
-    let Some(first) = trial(world, with(FIRST)).filter(|e| *e < endless * SUPPORTED) else {
-        return Some(linear);
-    };
-    let mut found: Vec<(f32, f32)> = TRIED
-        .into_iter()
-        .filter(|gamma| *gamma != FIRST)
-        .filter_map(|gamma| Some((trial(world, with(gamma))?, gamma)))
-        .collect();
-    found.push((first, FIRST));
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let [(best, _), (next, _), ..] = found[..] else {
-        return Some(linear);
-    };
-    if best >= endless * BELIEVED || next >= endless * SUPPORTED {
-        return Some(linear);
+        let errors = (found.report.evidence != Evidence::Nothing).then_some(errors);
+        self.done.push((compiler, errors));
+        errors
     }
-    let alike = found.into_iter().filter(|(e, _)| *e <= best * ALIKE);
-    let (error, gamma) = alike.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let ended = Compiler { gamma, ends: true };
-    let ended_with = trial(world, ended).unwrap_or(f32::INFINITY);
-    let ends = ended_with < error * ENDED;
-    let none = endless.min(ended_error);
-    if error.min(ended_with) >= none * BETTER {
-        return Some(linear);
+
+    /// What a command line says. Dirt is believed where light agrees with it: not all maps look like what their command
+    /// lines say of it.
+    fn as_said(&mut self, line: CommandLine) -> Compiler {
+        let clean = Compiler {
+            gamma: line.gamma,
+            ends: line.ends,
+            dirt: None,
+        };
+        match line.dirt {
+            Some(dirt) => self.dirty_or_clean(clean, dirt, 1.0),
+            None => clean,
+        }
     }
-    Some(Compiler { gamma, ends })
+
+    /// What explains the map's light best, if it does so by far.
+    fn by_light(&mut self) -> Option<Compiler> {
+        let clean = self.gamma_and_ends()?;
+        Some(self.dirty_or_clean(clean, Dirt::USUAL, DIRTY))
+    }
+
+    /// With dirt, where that leaves less than a part of the error.
+    fn dirty_or_clean(&mut self, clean: Compiler, dirt: Dirt, part: f32) -> Compiler {
+        let dirty = Compiler {
+            dirt: Some(dirt),
+            ..clean
+        };
+        match [clean, dirty].map(|c| self.error(c)) {
+            [Some([_, without]), Some([_, with])] if with < without * part => dirty,
+            _ => clean,
+        }
+    }
+
+    /// The gamma, and whether lights end.
+    fn gamma_and_ends(&mut self) -> Option<Compiler> {
+        let [said, endless] = self.error(Compiler::PLAIN).filter(|[_, e]| *e > NOTHING)?;
+        let ended = Compiler {
+            ends: true,
+            ..Compiler::PLAIN
+        };
+        let ended_error = self.error(ended).map_or(f32::INFINITY, |[_, e]| e);
+        let linear = Compiler {
+            gamma: 1.0,
+            ends: ended_error < endless * ENDED,
+            dirt: None,
+        };
+        let fallback = self.world.report.fallback;
+        let mut trial = |compiler: Compiler| {
+            let [before, after] = self.error(compiler)?;
+            // A map without any light has what loading put there in its place.
+            (fallback || before <= said * CONTRADICTED).then_some(after)
+        };
+        // Like is compared with like: ends that belong to one gamma mislead with another.
+        let with = |gamma| Compiler {
+            gamma,
+            ..Compiler::PLAIN
+        };
+        let Some(first) = trial(with(FIRST)).filter(|e| *e < endless * SUPPORTED) else {
+            return Some(linear);
+        };
+        let mut found: Vec<(f32, f32)> = TRIED
+            .into_iter()
+            .filter(|gamma| *gamma != FIRST)
+            .filter_map(|gamma| Some((trial(with(gamma))?, gamma)))
+            .collect();
+        found.push((first, FIRST));
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let [(best, _), (next, _), ..] = found[..] else {
+            return Some(linear);
+        };
+        if best >= endless * BELIEVED || next >= endless * SUPPORTED {
+            return Some(linear);
+        }
+        let alike = found.into_iter().filter(|(e, _)| *e <= best * ALIKE);
+        let (error, gamma) = alike.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let ended = Compiler {
+            ends: true,
+            ..with(gamma)
+        };
+        let ended_with = trial(ended).unwrap_or(f32::INFINITY);
+        let ends = ended_with < error * ENDED;
+        let none = endless.min(ended_error);
+        if error.min(ended_with) >= none * BETTER {
+            return Some(linear);
+        }
+        Some(Compiler {
+            ends,
+            ..with(gamma)
+        })
+    }
 }

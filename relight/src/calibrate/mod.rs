@@ -41,12 +41,14 @@ pub(crate) mod random;
 mod recovery;
 mod report;
 mod residuals;
+mod said;
 pub(crate) mod samples;
 mod skies;
 mod solve;
 mod suns;
 #[cfg(test)]
 mod tests;
+mod texels;
 mod vertices;
 mod views;
 
@@ -62,10 +64,11 @@ use columns::{Lamp, Source};
 use compiler::Compiler;
 use fit::Fit;
 use glam::Vec3;
+use samples::Taking;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 16;
+const VERSION: u32 = 17;
 
 /// One in so many candidates comes from the directions of the light grid.
 const CROSSINGS: usize = 5;
@@ -160,8 +163,8 @@ pub fn calibrate_with(
             let found = compiler::find(world, &silent, options, &mut |part| {
                 progress(part * COMPILER_PART);
             });
-            (world.stored_gamma, world.light_end) = (found.gamma, found.light_end());
-            let solution = find(world, &silent, options, true, &mut |part| {
+            found.tell(world);
+            let solution = find(world, &silent, options, found, true, &mut |part| {
                 progress(COMPILER_PART + part * (1.0 - COMPILER_PART));
             });
             if let (Some(cache), Some(key)) = (&options.cache, key)
@@ -172,11 +175,7 @@ pub fn calibrate_with(
             solution
         }
     };
-    let compiler = Compiler {
-        gamma: solution.report.gamma,
-        ends: solution.report.ends,
-    };
-    (world.stored_gamma, world.light_end) = (compiler.gamma, compiler.light_end());
+    Compiler::of(&solution.report).tell(world);
     world.exposure = solution.exposure;
     if solution.report.evidence == Evidence::Nothing {
         skies::close(world, &silent);
@@ -188,22 +187,28 @@ pub fn calibrate_with(
     solution.report
 }
 
-/// Solves for a world's light. `silent`: skies of which directives tell nothing.
+/// Solves for a world's light. `silent`: skies of which directives tell nothing. `compiler`: what was done to light, which
+/// the world knows but for dirt.
 ///
 /// `thorough`: whether the light grid is measured beside lightmaps, and linear falloff tried.
 fn find(
     world: &RelitWorld,
     silent: &[u32],
     options: &CalibrationOptions,
+    compiler: Compiler,
     thorough: bool,
     progress: &mut dyn FnMut(f32),
 ) -> Solution {
     progress(0.0);
     let occluders = samples::occluders(world);
     // Where lights end, black tells little.
-    let few_black = thorough && world.light_end > 0.0;
-    let (mut samples, evidence) =
-        samples::take(world, &occluders, options.samples, options.seed, few_black);
+    let taking = Taking {
+        count: options.samples,
+        seed: options.seed,
+        few_black: thorough && world.light_end > 0.0,
+        dirt: compiler.dirt,
+    };
+    let (mut samples, evidence) = samples::take(world, &occluders, &taking);
     let texels = samples.len();
     let mut crossings = Vec::new();
     if thorough && evidence == Evidence::Lightmaps {
@@ -224,6 +229,7 @@ fn find(
             known,
             gamma: world.stored_gamma,
             ends: world.light_end > 0.0,
+            dirty: compiler.dirt.is_some(),
             ..Default::default()
         },
         ..Default::default()

@@ -12,6 +12,7 @@ use super::ends::pieces_of;
 use super::parallel;
 use super::samples::{self, Sample, mean};
 use super::solve::{Ambient, Effort, Residual, norm, residual, solve};
+use super::texels;
 use crate::light::Falloff;
 use crate::world::RelitWorld;
 use glam::Vec3;
@@ -128,7 +129,7 @@ impl Scene<'_> {
             let triangle = hit.tag as usize;
             let surface = self.of_triangle.get(triangle).map(|s| *s as usize);
             let at = origin + ray * hit.t;
-            let stored = surface.and_then(|s| samples::stored_at(self.world, s, triangle, at));
+            let stored = surface.and_then(|s| texels::stored_at(self.world, s, triangle, at));
             let cosine = -hit.normal.dot(ray);
             if let Some(stored) = stored
                 && hit.front

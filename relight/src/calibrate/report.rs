@@ -12,8 +12,8 @@ const BLACK: f32 = 0.25;
 
 /// Computed light against stored light, over measurements that fitting did not see.
 ///
-/// Stops are those of what is stored: where a map's compiler encoded light with a gamma, computed light is encoded so,
-/// too.
+/// Stops are those of what is stored: what a map's compiler is known to have done to light before it stored it (a gamma,
+/// darker corners) is done to computed light, too.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Agreement {
     /// Median of |log2(computed / stored)|, stops: 0 is perfect, 1 is a factor of two.
@@ -32,8 +32,8 @@ impl Agreement {
             samples
                 .iter()
                 .zip(computed)
-                .filter(|(s, _)| s.held_out && !s.saturated && s.level() >= dark)
-                .map(|(s, c)| (s.level(), mean(*c)))
+                .filter(|(s, _)| s.held_out && !s.saturated && s.level() * s.part >= dark)
+                .map(|(s, c)| (s.level() * s.part, mean(*c) * s.part))
         };
         let mut stops: Vec<f32> = judged()
             .map(|(stored, computed)| {
@@ -80,6 +80,8 @@ pub struct CalibrationReport {
     pub gamma: f32,
     /// Whether the map's lights end where they give little: see [`RelitWorld::light_end`](crate::RelitWorld::light_end).
     pub ends: bool,
+    /// Whether the compiler made corners darker (its *dirt*): what it stored is compared with light made as dark.
+    pub dirty: bool,
     /// Agreement of the light that directives tell of: direct, ambient and bounced.
     pub before: Agreement,
     /// Agreement of calibrated light: direct, ambient and bounced.
@@ -102,6 +104,7 @@ impl Default for CalibrationReport {
             suns: 0,
             gamma: 1.0,
             ends: false,
+            dirty: false,
             before: Agreement::default(),
             after: Agreement::default(),
             cached: false,

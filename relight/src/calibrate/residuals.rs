@@ -1,7 +1,8 @@
 //! Light as it would be traced beside stored light, place by place, of a world as it is: calibrated or not.
 
 use super::bounce::Transfer;
-use super::{CalibrationOptions, columns, samples, skies, solve};
+use super::samples::Taking;
+use super::{CalibrationOptions, columns, said, samples, skies, solve};
 use crate::world::RelitWorld;
 use glam::Vec3;
 
@@ -15,7 +16,7 @@ pub struct Residual {
     pub normal: Vec3,
     /// Material of the surface, index into [`RelitWorld::materials`]; `u32::MAX` for points of the light grid.
     pub material: u32,
-    /// Light that the map stores.
+    /// Light that the map stores, without the compiler's dirt.
     pub stored: Vec3,
     /// Light that comes straight from lights.
     pub direct: Vec3,
@@ -48,7 +49,17 @@ impl Residual {
 /// [materials measured](RelitWorld::measure_materials).
 pub fn residuals(world: &RelitWorld, options: &CalibrationOptions) -> Vec<Residual> {
     let occluders = samples::occluders(world);
-    let (samples, _) = samples::take(world, &occluders, options.samples, options.seed, false);
+    let dirty = world
+        .calibration
+        .as_ref()
+        .is_some_and(|report| report.dirty);
+    let taking = Taking {
+        count: options.samples,
+        seed: options.seed,
+        few_black: false,
+        dirt: dirty.then(|| said::dirt(&world.bsp.entities())),
+    };
+    let (samples, _) = samples::take(world, &occluders, &taking);
     let silent = skies::silent(world);
     let mut columns = columns::known(world, &occluders, &samples, &silent);
     for column in &mut columns {

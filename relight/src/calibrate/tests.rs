@@ -2,6 +2,7 @@ mod ends;
 mod grid;
 mod known_truth;
 mod linear;
+mod said;
 
 use super::*;
 use crate::files::{MemoryFiles, SearchPath};
@@ -168,6 +169,15 @@ fn from_hidden(at: Vec3, normal: Vec3) -> Vec3 {
         .sum()
 }
 
+/// So many measurements.
+fn taking(count: usize) -> Taking {
+    Taking {
+        count,
+        seed: 1,
+        ..Default::default()
+    }
+}
+
 fn small() -> CalibrationOptions {
     CalibrationOptions {
         samples: 2000,
@@ -222,7 +232,7 @@ fn bounced_light_in_an_even_room_is_albedo_times_light() {
         material.albedo = albedo;
     }
     let occluders = samples::occluders(&world);
-    let (samples, evidence) = samples::take(&world, &occluders, 500, 1, false);
+    let (samples, evidence) = samples::take(&world, &occluders, &taking(500));
     assert_eq!(evidence, Evidence::Lightmaps);
     assert!(samples.len() > 400);
     let direct: Vec<Vec3> = samples.iter().map(|s| s.value).collect();

@@ -1,9 +1,9 @@
 //! Light at the vertices of surfaces that have no lightmap, as measurements.
 
-use super::bvh::Occluders;
 use super::random::Random;
-use super::samples::{Sample, Stored, pick, sample_at, tells};
-use crate::world::{RelitWorld, WorldSurface};
+use super::samples::{Gauge, Sample, pick, sample_at, tells};
+use super::texels::Stored;
+use crate::world::WorldSurface;
 use q3bsp::SurfaceKind;
 
 /// Whether a surface stores its light at its vertices, which are the map's own.
@@ -16,12 +16,8 @@ pub(super) fn lit(surface: &WorldSurface) -> bool {
 }
 
 /// Lit vertices of surfaces without a page. Each stands for itself, however large its surface is.
-pub(super) fn take(
-    world: &RelitWorld,
-    occluders: &Occluders,
-    count: usize,
-    random: &mut Random,
-) -> Vec<Sample> {
+pub(super) fn take(gauge: &Gauge<'_>, count: usize, random: &mut Random) -> Vec<Sample> {
+    let world = gauge.world;
     let mut all = Vec::new();
     for (index, surface) in world.surfaces.iter().enumerate() {
         if !lit(surface) || !tells(world, surface) {
@@ -39,8 +35,6 @@ pub(super) fn take(
     }
     pick(all.len(), count, random)
         .filter_map(|i| all.get(i))
-        .filter_map(|&(place, material, stored)| {
-            sample_at(world, occluders, place, material, stored)
-        })
+        .filter_map(|&(place, material, stored)| sample_at(gauge, place, material, stored))
         .collect()
 }

@@ -1,0 +1,184 @@
+//! What a map says of how its light was computed.
+//!
+//! q3map2 writes the command lines of its stages into the world's entity. What is said there need not be found out: with
+//! which gamma light was stored, whether lights end. It may also say that corners were made darker (*dirt*: ambient
+//! occlusion, by which all light is multiplied).
+//!
+//! Source: meaning and defaults are q3map2's.
+
+use super::bvh::Occluders;
+use super::compiler;
+use glam::Vec3;
+use q3bsp::Entity;
+use std::f32::consts::TAU;
+
+/// Key of the world's entity that holds the command lines, one after the other.
+const COMMAND_LINES: &str = "_q3map2_cmdline";
+
+/// Rays around the normal that dirt is found by: angles from it, degrees, and how many at each.
+const DIRT_RINGS: ([f32; 3], u32) = ([14.5, 43.5, 72.5], 16);
+
+/// Least part of light that is believed to be left by dirt.
+const LEAST_PART: f32 = 0.1;
+
+/// What the command line of the stage that computed light says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct CommandLine {
+    /// Gamma that light was encoded with; 1 for none.
+    pub gamma: f32,
+    /// Whether lights end where they give little.
+    pub ends: bool,
+    /// How corners were made darker, if they were.
+    pub dirt: Option<Dirt>,
+}
+
+/// Ambient occlusion as the compiler multiplies all light of a texel by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Dirt {
+    /// How far surfaces matter, id units.
+    depth: f32,
+    /// Exponent of the part of the surroundings that is near.
+    gain: f32,
+    /// How much of that is taken away.
+    scale: f32,
+}
+
+/// The command line that light was computed with: the last one, for light is computed anew. `None` where none is kept, or
+/// one that cannot be.
+pub(super) fn command_line(entities: &[Entity]) -> Option<CommandLine> {
+    let stages = entities.first()?.last(COMMAND_LINES)?.split(';');
+    let words = |stage: &'_ str| stage.split_ascii_whitespace().map(str::to_owned).collect();
+    let light: Vec<String> = stages
+        .map(words)
+        .rfind(|words: &Vec<String>| words.first().is_some_and(|w| w == "-light"))?;
+    let is = |option: &str| light.iter().any(|w| w == option);
+    let number = |option: &str| {
+        let at = light.iter().rposition(|w| w == option)?;
+        light.get(at + 1)?.parse::<f32>().ok()
+    };
+    let or = |option: &str, default: f32| match is(option) {
+        true => number(option).filter(|n| n.is_finite() && *n > 0.0),
+        false => Some(default),
+    };
+    Some(CommandLine {
+        gamma: or("-gamma", 1.0).filter(|g| compiler::possible(*g))?,
+        ends: is("-fast") || is("-faster"),
+        dirt: match is("-dirty") {
+            true => Some(Dirt {
+                depth: or("-dirtdepth", Dirt::USUAL.depth)?,
+                gain: or("-dirtgain", Dirt::USUAL.gain)?,
+                scale: or("-dirtscale", Dirt::USUAL.scale)?,
+            }),
+            false => None,
+        },
+    })
+}
+
+/// The dirt of a map that has some: what its command line tells, else what is usual.
+pub(super) fn dirt(entities: &[Entity]) -> Dirt {
+    command_line(entities)
+        .and_then(|line| line.dirt)
+        .unwrap_or(Dirt::USUAL)
+}
+
+impl Dirt {
+    /// What the compiler does if nothing else is said.
+    pub const USUAL: Dirt = Dirt {
+        depth: 128.0,
+        gain: 1.0,
+        scale: 1.0,
+    };
+
+    /// Part of the light at a place that is stored.
+    pub fn part_stored(&self, occluders: &Occluders, position: Vec3, normal: Vec3) -> f32 {
+        let (u, v) = normal.any_orthonormal_pair();
+        let (angles, count) = DIRT_RINGS;
+        let around = angles.into_iter().flat_map(|angle| {
+            let (out, up) = angle.to_radians().sin_cos();
+            (0..count).map(move |k| {
+                let (sin, cos) = (k as f32 / count as f32 * TAU).sin_cos();
+                (u * cos + v * sin) * out + normal * up
+            })
+        });
+        let (mut near, mut rays) = (0.0f32, 0.0);
+        for ray in around.chain([normal]) {
+            rays += 1.0;
+            let hit = occluders.nearest(position, ray, self.depth);
+            near += hit
+                .filter(|h| !h.sky)
+                .map_or(0.0, |h| 1.0 - h.t / self.depth);
+        }
+        let taken = (near / rays).powf(self.gain).min(1.0) * self.scale;
+        (1.0 - taken).clamp(LEAST_PART, 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn world(pairs: &str) -> Vec<Entity> {
+        q3bsp::entities::parse(format!("{{ \"classname\" \"worldspawn\" {pairs} }}").as_bytes()).0
+    }
+
+    fn said(line: &str) -> Option<CommandLine> {
+        command_line(&world(&format!("\"{COMMAND_LINES}\" \"{line}\"")))
+    }
+
+    #[test]
+    fn the_last_computation_of_light_counts() {
+        assert_eq!(command_line(&world("")), None);
+        assert_eq!(said("-meta -patchmeta; -vis -fast"), None);
+        let plain = CommandLine {
+            gamma: 1.0,
+            ends: false,
+            dirt: None,
+        };
+        assert_eq!(said("-meta; -vis -fast; -light -bounce 8"), Some(plain));
+        // A word that is no option is none.
+        assert_eq!(said("-light -dirt"), Some(plain));
+        let line =
+            "-vis; -light -gamma 2.2; -light -fast -gamma 1.5 -dirty -dirtdepth 64 -samples 3";
+        let dirt = Dirt {
+            depth: 64.0,
+            gain: 1.0,
+            scale: 1.0,
+        };
+        let expected = CommandLine {
+            gamma: 1.5,
+            ends: true,
+            dirt: Some(dirt),
+        };
+        assert_eq!(said(line), Some(expected));
+        for wrong in [
+            "-light -gamma",
+            "-light -gamma x",
+            "-light -gamma -1",
+            "-light -gamma 1e9",
+        ] {
+            assert_eq!(said(wrong), None, "{wrong}");
+        }
+        assert_eq!(said("-light -dirty -dirtdepth nan"), None);
+    }
+
+    #[test]
+    fn corners_are_dirty_and_open_ground_is_not() {
+        let dirt = Dirt::USUAL;
+        // A wall along y at x = 0, as high as rays go.
+        let (a, b, c) = (
+            Vec3::new(0.0, -999.0, -999.0),
+            Vec3::new(0.0, 999.0, -999.0),
+            Vec3::new(0.0, 0.0, 999.0),
+        );
+        let wall = |sky| Occluders::new(std::iter::once(([a, b, c], sky, 0)));
+        let at = |x: f32| dirt.part_stored(&wall(false), Vec3::new(x, 0.0, 0.0), Vec3::Z);
+        assert_eq!(at(129.0), 1.0);
+        assert!(at(64.0) < 1.0 && at(16.0) < at(64.0) && at(1.0) < at(16.0));
+        // Half of the rays but for the one along the normal meet it at once.
+        let half = 24.0 / 49.0;
+        assert!((at(1e-3) - (1.0 - half)).abs() < 0.07, "{}", at(1e-3));
+        // The sky is far away.
+        let open = dirt.part_stored(&wall(true), Vec3::new(1.0, 0.0, 0.0), Vec3::Z);
+        assert_eq!(open, 1.0);
+    }
+}

@@ -1,0 +1,336 @@
+//! Texels of lightmaps as measurements: where in space they lie, and what they store.
+
+use super::random::Random;
+use super::samples::{Gauge, Sample, decode, sample_at, shown, tells};
+use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
+use glam::{Vec2, Vec3};
+use q3bsp::Lightmap;
+use std::collections::HashSet;
+
+/// How far around a black texel others are black as well where no light falls, texels.
+const BLACK_AROUND: i32 = 2;
+
+/// Where more than this part of a map's texels is black, black ones can be measured less often: the map may lie in a dark
+/// box much larger than itself.
+const MOSTLY_BLACK: f32 = 0.5;
+
+/// One of so many black texels is measured there.
+const BLACK_THINNED: f32 = 3.0;
+
+/// Texels that tell how many are black.
+const LOOKS: usize = 2000;
+
+/// Points tried in each stratum before it is given up.
+const TRIES: usize = 8;
+
+/// Whether a surface's first layer of light is the one that never changes (style 0).
+fn constant(world: &RelitWorld, surface: usize) -> bool {
+    let layers = world.bsp.layers.surfaces.get(surface);
+    layers.is_none_or(|l| l.lightmap_styles.first() == Some(&0))
+}
+
+/// Whether a surface stores its light in a lightmap.
+pub(super) fn lit_by_texel(surface: &WorldSurface) -> bool {
+    surface.lightmap >= 0
+}
+
+/// What is stored at a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Stored {
+    rgb: [u8; 3],
+    /// Black, and not all around it is.
+    lone_black: bool,
+    /// What the compiler multiplied light by before it stored it.
+    scale: f32,
+}
+
+impl Stored {
+    /// A value that tells nothing of what is around it.
+    pub(super) fn alone(rgb: [u8; 3]) -> Stored {
+        Stored {
+            rgb,
+            lone_black: dark(rgb),
+            scale: 1.0,
+        }
+    }
+
+    /// Whether it is black while something near it is not.
+    pub(super) fn lone_black(&self) -> bool {
+        self.lone_black
+    }
+
+    /// Whether some channel is at its end.
+    pub(super) fn saturated(&self) -> bool {
+        self.rgb.contains(&255)
+    }
+
+    /// What the engine shows of it.
+    pub(super) fn shown(&self) -> Vec3 {
+        shown(Vec3::from_array(self.rgb.map(f32::from)))
+    }
+
+    /// The light that it stands for, irradiance / π.
+    pub(super) fn light(&self, world: &RelitWorld) -> Vec3 {
+        decode(world, Vec3::from_array(self.rgb.map(f32::from)), self.scale)
+    }
+
+    /// A texel of a page, of a surface whose light was multiplied by `scale`.
+    fn texel(page: &Lightmap, x: usize, y: usize, scale: f32) -> Stored {
+        let rgb = page.texel(x, y);
+        let around = || {
+            let sides = -BLACK_AROUND..=BLACK_AROUND;
+            sides
+                .clone()
+                .flat_map(move |dy| sides.clone().map(move |dx| (dx, dy)))
+        };
+        let lit = |(dx, dy): (i32, i32)| {
+            let inside = |at: usize, by: i32| {
+                let at = at.checked_add_signed(by as isize)?;
+                (at < page.size()).then_some(at)
+            };
+            match (inside(x, dx), inside(y, dy)) {
+                (Some(x), Some(y)) => !dark(page.texel(x, y)),
+                _ => false,
+            }
+        };
+        Stored {
+            rgb,
+            lone_black: dark(rgb) && around().any(lit),
+            scale,
+        }
+    }
+}
+
+/// Whether a stored colour is less than a step of all its channels.
+fn dark(rgb: [u8; 3]) -> bool {
+    rgb.map(u32::from).iter().sum::<u32>() < 3
+}
+
+/// A texel: page, column, row.
+pub(super) type Texel = (usize, usize, usize);
+
+/// How often black texels are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Black {
+    /// As often as others.
+    Alike,
+    /// Less often where most of the map is black.
+    Few,
+}
+
+/// Texels of lightmaps, stratified by area; none of those that are `taken`, which they become.
+pub(super) fn take(
+    gauge: &Gauge<'_>,
+    count: usize,
+    black: Black,
+    taken: &mut HashSet<Texel>,
+    random: &mut Random,
+) -> Vec<Sample> {
+    let area = Area::new(gauge.world);
+    let thinned = match black {
+        Black::Alike => None,
+        Black::Few => Some(area.part_black()).filter(|part| *part > MOSTLY_BLACK),
+    };
+    let measured = thinned.map_or(1.0, |part| 1.0 - part * (1.0 - 1.0 / BLACK_THINNED));
+    let strata = (count as f32 / measured) as usize;
+    let mut samples = Vec::with_capacity(count);
+    for stratum in 0..strata {
+        for _ in 0..TRIES {
+            let at = (stratum as f64 + f64::from(random.next())) / strata as f64;
+            let Some((texel, place, material, stored)) = area.texel_at(at, random) else {
+                continue;
+            };
+            if thinned.is_some() && dark(stored.rgb) && random.next() * BLACK_THINNED >= 1.0 {
+                break;
+            }
+            if taken.contains(&texel) {
+                continue;
+            }
+            if let Some(sample) = sample_at(gauge, place, material, stored) {
+                taken.insert(texel);
+                samples.push(sample);
+                break;
+            }
+        }
+    }
+    samples
+}
+
+/// Triangles whose texels tell of light, by area.
+struct Area<'a> {
+    world: &'a RelitWorld,
+    /// Area up to the end of a triangle, the triangle, its surface.
+    triangles: Vec<(f64, usize, &'a WorldSurface)>,
+}
+
+impl<'a> Area<'a> {
+    fn new(world: &'a RelitWorld) -> Area<'a> {
+        let mut triangles = Vec::new();
+        let mut total = 0.0f64;
+        for (index, surface) in world.surfaces.iter().enumerate() {
+            if !lit_by_texel(surface) || !tells(world, surface) || !constant(world, index) {
+                continue;
+            }
+            let first = surface.first_index as usize / 3;
+            for triangle in first..first + surface.num_indices as usize / 3 {
+                if let Some([a, b, c]) = world.triangle(triangle) {
+                    let area = f64::from((b - a).cross(c - a).length() * 0.5);
+                    if area > 0.0 && area.is_finite() {
+                        total += area;
+                        triangles.push((total, triangle, surface));
+                    }
+                }
+            }
+        }
+        Area { world, triangles }
+    }
+
+    /// A random texel of the triangle at a part of the whole area: which, its place, its material, what it stores.
+    fn texel_at(
+        &self,
+        part: f64,
+        random: &mut Random,
+    ) -> Option<(Texel, (Vec3, Vec3), u32, Stored)> {
+        let total = self.triangles.last()?.0;
+        let found = self
+            .triangles
+            .partition_point(|(end, ..)| *end <= part * total);
+        let &(_, triangle, surface) = self.triangles.get(found)?;
+        let (texel, place, stored) = texel(self.world, triangle, surface, random)?;
+        Some((texel, place, surface.material, stored))
+    }
+
+    /// The part of texels that is black.
+    fn part_black(&self) -> f32 {
+        let mut random = Random::new(0xB1AC);
+        let (mut looks, mut blacks) = (0.0f32, 0.0);
+        for k in 0..LOOKS {
+            let part = (k as f64 + 0.5) / LOOKS as f64;
+            if let Some((.., stored)) = self.texel_at(part, &mut random) {
+                looks += 1.0;
+                blacks += f32::from(u8::from(dark(stored.rgb)));
+            }
+        }
+        blacks / looks.max(1.0)
+    }
+}
+
+/// The texel that a random point of a triangle falls into: which, the place of its middle, the normal there, what it
+/// stores. `None` when the middle is beyond the surface: compilers move such texels.
+fn texel(
+    world: &RelitWorld,
+    triangle: usize,
+    surface: &WorldSurface,
+    random: &mut Random,
+) -> Option<(Texel, (Vec3, Vec3), Stored)> {
+    let number = usize::try_from(surface.lightmap).ok()?;
+    let page = world.bsp.lightmaps.get(number)?;
+    let size = page.size() as f32;
+    let (u, v) = random.in_triangle();
+    let [a, b, c] = corners(world, triangle)?.map(|c| c.lightmap * size);
+    let cell = (a + (b - a) * u + (c - a) * v).floor();
+    if !(cell.min_element() >= 0.0 && cell.max_element() < size) {
+        return None;
+    }
+    let middle = cell + Vec2::splat(0.5);
+    let first = surface.first_index as usize / 3;
+    let others = first..first + surface.num_indices as usize / 3;
+    let place = std::iter::once(triangle)
+        .chain(others)
+        .find_map(|t| place_of(corners(world, t)?, middle, size))?;
+    let scale = stored_scale(world, surface);
+    let (x, y) = (cell.x as usize, cell.y as usize);
+    let stored = Stored::texel(page, x, y, scale);
+    Some(((number, x, y), place, stored))
+}
+
+/// Light that the lightmap stores where a ray met a triangle; `None` where it tells nothing: of other surfaces, of texels
+/// at their end and of black ones that are alone.
+pub(super) fn stored_at(
+    world: &RelitWorld,
+    surface: usize,
+    triangle: usize,
+    at: Vec3,
+) -> Option<Vec3> {
+    let own = world.surfaces.get(surface)?;
+    if !tells(world, own) || !constant(world, surface) {
+        return None;
+    }
+    let page = world
+        .bsp
+        .lightmaps
+        .get(usize::try_from(own.lightmap).ok()?)?;
+    let [a, b, c] = corners(world, triangle)?;
+    let (e1, e2, offset) = (
+        b.position - a.position,
+        c.position - a.position,
+        at - a.position,
+    );
+    let normal = e1.cross(e2);
+    let squared = normal.length_squared();
+    if squared <= 0.0 {
+        return None;
+    }
+    let u = offset.cross(e2).dot(normal) / squared;
+    let v = e1.cross(offset).dot(normal) / squared;
+    let place = a.lightmap + (b.lightmap - a.lightmap) * u + (c.lightmap - a.lightmap) * v;
+    let cell = (place * page.size() as f32).floor();
+    if !(cell.min_element() >= 0.0 && cell.max_element() < page.size() as f32) {
+        return None;
+    }
+    let scale = stored_scale(world, own);
+    let stored = Stored::texel(page, cell.x as usize, cell.y as usize, scale);
+    (!stored.lone_black && !stored.rgb.contains(&255)).then(|| stored.light(world))
+}
+
+/// What the compiler multiplied a surface's light by before it stored it.
+fn stored_scale(world: &RelitWorld, surface: &WorldSurface) -> f32 {
+    let material = world.materials.get(surface.material as usize);
+    material.map_or(1.0, WorldMaterial::stored_scale)
+}
+
+/// Vertices of a triangle.
+pub(super) fn corners(world: &RelitWorld, triangle: usize) -> Option<[&WorldVertex; 3]> {
+    let [a, b, c] = *world.indices.as_chunks::<3>().0.get(triangle)?;
+    let vertex = |i: u32| world.vertices.get(i as usize);
+    Some([vertex(a)?, vertex(b)?, vertex(c)?])
+}
+
+/// Position and normal of a place in a lightmap page of `size` texels a side, in texels, if the triangle covers it.
+fn place_of([a, b, c]: [&WorldVertex; 3], at: Vec2, size: f32) -> Option<(Vec3, Vec3)> {
+    let (e1, e2) = (
+        (b.lightmap - a.lightmap) * size,
+        (c.lightmap - a.lightmap) * size,
+    );
+    let offset = at - a.lightmap * size;
+    let determinant = e1.perp_dot(e2);
+    if determinant.abs() < 1e-6 {
+        return None;
+    }
+    let (u, v) = (
+        offset.perp_dot(e2) / determinant,
+        e1.perp_dot(offset) / determinant,
+    );
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| {
+        let on = a.position + (b.position - a.position) * u + (c.position - a.position) * v;
+        let normal = a.normal + (b.normal - a.normal) * u + (c.normal - a.normal) * v;
+        (on, normal.normalize_or_zero())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn black_counts_where_all_around_is_black() {
+        let side = q3bsp::LIGHTMAP_SIZE;
+        let mut texels = vec![0u8; side * side * 3].into_boxed_slice();
+        // One lit texel, in the middle of the first row.
+        texels[10 * 3..10 * 3 + 3].fill(90);
+        let page = Lightmap(texels);
+        let lone = |x, y| Stored::texel(&page, x, y, 1.0).lone_black;
+        assert!(!lone(10, 0) && lone(9, 0) && lone(8, 2) && lone(12, 0));
+        assert!(!lone(7, 0) && !lone(10, 3) && !lone(0, 0) && !lone(side - 1, side - 1));
+    }
+}
