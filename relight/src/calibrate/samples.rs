@@ -7,13 +7,13 @@ use super::air;
 use super::bvh::{CutOut, Occluders};
 use super::random::Random;
 use super::said::Dirt;
-use super::texels::{self, Black, Stored, corners, lit_by_texel};
+use super::texels::{self, Stored, corners, lit_by_texel};
 use super::vertices;
 use crate::light;
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface};
 use glam::Vec3;
 use shaderscript::light::SurfaceClass;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Radiance of white for a stored value of 1, where light is stored as it is.
@@ -34,7 +34,7 @@ const TRUST_IN_BLACK: f32 = 0.2;
 const BLACK_OVER_LIT: f32 = 0.1;
 
 /// One of so many measurements is not fitted, to judge by.
-const HELD_OUT: usize = 5;
+pub(super) const HELD_OUT: usize = 5;
 
 /// Where a measurement was taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -256,21 +256,11 @@ pub(super) fn take(
         dirt: taking.dirt,
     };
     let count = taking.count;
-    let black = match taking.few_black {
-        true => Black::Few,
-        false => Black::Alike,
-    };
-    let mut taken = HashSet::new();
-    let held_out = count / HELD_OUT;
-    let mut judges = texels::take(&gauge, held_out, Black::Alike, &mut taken, &mut random);
-    let mut samples = texels::take(&gauge, count - held_out, black, &mut taken, &mut random);
+    let lightmaps = texels::take(&gauge, count, taking.few_black, &mut random);
     // A few lightmapped scraps say nothing about the rest.
-    if judges.len() + samples.len() >= 16 {
+    if lightmaps.len() >= 16 {
+        let mut samples = lightmaps;
         balance(&mut samples);
-        for judge in &mut judges {
-            judge.held_out = true;
-        }
-        samples.extend(judges);
         // What the map lights by vertex tells as much of its light as texels of the same area; agreement is told by
         // texels alone.
         let [by_vertex, by_texel] = [vertices::lit, lit_by_texel].map(|is| area(world, is));
@@ -291,11 +281,12 @@ pub(super) fn take(
     (Vec::new(), Evidence::Nothing)
 }
 
-/// Bounds what black measurements weigh together.
+/// Bounds what black measurements that are fitted weigh together.
 fn balance(samples: &mut [Sample]) {
     let black = |s: &Sample| s.value == Vec3::ZERO;
-    let dark = samples.iter().filter(|s| black(s)).count() as f32;
-    let lit = samples.len() as f32 - dark;
+    let fitted = || samples.iter().filter(|s| !s.held_out);
+    let dark = fitted().filter(|s| black(s)).count() as f32;
+    let lit = fitted().count() as f32 - dark;
     let most = (BLACK_OVER_LIT * lit / dark.max(1.0)).clamp(TRUST_IN_BLACK, 1.0);
     for sample in samples.iter_mut().filter(|s| black(s)) {
         sample.trust = sample.trust.min(most);
@@ -303,7 +294,7 @@ fn balance(samples: &mut [Sample]) {
 }
 
 /// Keeps one of so many out of fitting.
-fn hold_out(mut samples: Vec<Sample>, random: &mut Random) -> Vec<Sample> {
+pub(super) fn hold_out(mut samples: Vec<Sample>, random: &mut Random) -> Vec<Sample> {
     for group in samples.chunks_mut(HELD_OUT) {
         let chosen = (random.next() * HELD_OUT as f32) as usize;
         if let Some(sample) = group.get_mut(chosen) {

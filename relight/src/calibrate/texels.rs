@@ -1,11 +1,10 @@
 //! Texels of lightmaps as measurements: where in space they lie, and what they store.
 
 use super::random::Random;
-use super::samples::{Gauge, Sample, decode, sample_at, shown, tells};
+use super::samples::{Gauge, HELD_OUT, Sample, decode, hold_out, sample_at, shown, tells};
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
 use glam::{Vec2, Vec3};
 use q3bsp::Lightmap;
-use std::collections::HashSet;
 
 /// How far around a black texel others are black as well where no light falls, texels.
 const BLACK_AROUND: i32 = 2;
@@ -106,52 +105,40 @@ fn dark(rgb: [u8; 3]) -> bool {
     rgb.map(u32::from).iter().sum::<u32>() < 3
 }
 
-/// A texel: page, column, row.
-pub(super) type Texel = (usize, usize, usize);
-
-/// How often black texels are measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Black {
-    /// As often as others.
-    Alike,
-    /// Less often where most of the map is black.
-    Few,
-}
-
-/// Texels of lightmaps, stratified by area; none of those that are `taken`, which they become.
+/// Texels of lightmaps, stratified by area. One of so many is held out, whatever it stores. `few_black`: of those that are
+/// fitted, fewer are black where most of the map is.
 pub(super) fn take(
     gauge: &Gauge<'_>,
     count: usize,
-    black: Black,
-    taken: &mut HashSet<Texel>,
+    few_black: bool,
     random: &mut Random,
 ) -> Vec<Sample> {
     let area = Area::new(gauge.world);
-    let thinned = match black {
-        Black::Alike => None,
-        Black::Few => Some(area.part_black()).filter(|part| *part > MOSTLY_BLACK),
-    };
-    let measured = thinned.map_or(1.0, |part| 1.0 - part * (1.0 - 1.0 / BLACK_THINNED));
+    let black = if few_black { area.part_black() } else { 0.0 };
+    let thinned = black > MOSTLY_BLACK;
+    let mut measured = 1.0;
+    if thinned {
+        let fitted = 1.0 - 1.0 / HELD_OUT as f32;
+        measured -= black * fitted * (1.0 - 1.0 / BLACK_THINNED);
+    }
     let strata = (count as f32 / measured) as usize;
-    let mut samples = Vec::with_capacity(count);
+    let mut samples = Vec::with_capacity(strata);
     for stratum in 0..strata {
         for _ in 0..TRIES {
             let at = (stratum as f64 + f64::from(random.next())) / strata as f64;
-            let Some((texel, place, material, stored)) = area.texel_at(at, random) else {
+            let Some((place, material, stored)) = area.texel_at(at, random) else {
                 continue;
             };
-            if thinned.is_some() && dark(stored.rgb) && random.next() * BLACK_THINNED >= 1.0 {
-                break;
-            }
-            if taken.contains(&texel) {
-                continue;
-            }
             if let Some(sample) = sample_at(gauge, place, material, stored) {
-                taken.insert(texel);
                 samples.push(sample);
                 break;
             }
         }
+    }
+    let mut samples = hold_out(samples, random);
+    if thinned {
+        let dark = |s: &Sample| s.value == Vec3::ZERO;
+        samples.retain(|s| s.held_out || !dark(s) || random.next() * BLACK_THINNED < 1.0);
     }
     samples
 }
@@ -185,19 +172,15 @@ impl<'a> Area<'a> {
         Area { world, triangles }
     }
 
-    /// A random texel of the triangle at a part of the whole area: which, its place, its material, what it stores.
-    fn texel_at(
-        &self,
-        part: f64,
-        random: &mut Random,
-    ) -> Option<(Texel, (Vec3, Vec3), u32, Stored)> {
+    /// A random texel of the triangle at a part of the whole area: its place, its material, what it stores.
+    fn texel_at(&self, part: f64, random: &mut Random) -> Option<((Vec3, Vec3), u32, Stored)> {
         let total = self.triangles.last()?.0;
         let found = self
             .triangles
             .partition_point(|(end, ..)| *end <= part * total);
         let &(_, triangle, surface) = self.triangles.get(found)?;
-        let (texel, place, stored) = texel(self.world, triangle, surface, random)?;
-        Some((texel, place, surface.material, stored))
+        let (place, stored) = texel(self.world, triangle, surface, random)?;
+        Some((place, surface.material, stored))
     }
 
     /// The part of texels that is black.
@@ -215,16 +198,16 @@ impl<'a> Area<'a> {
     }
 }
 
-/// The texel that a random point of a triangle falls into: which, the place of its middle, the normal there, what it
-/// stores. `None` when the middle is beyond the surface: compilers move such texels.
+/// The texel that a random point of a triangle falls into: the place of its middle, the normal there, what it stores.
+/// `None` when the middle is beyond the surface: compilers move such texels.
 fn texel(
     world: &RelitWorld,
     triangle: usize,
     surface: &WorldSurface,
     random: &mut Random,
-) -> Option<(Texel, (Vec3, Vec3), Stored)> {
-    let number = usize::try_from(surface.lightmap).ok()?;
-    let page = world.bsp.lightmaps.get(number)?;
+) -> Option<((Vec3, Vec3), Stored)> {
+    let page = usize::try_from(surface.lightmap).ok()?;
+    let page = world.bsp.lightmaps.get(page)?;
     let size = page.size() as f32;
     let (u, v) = random.in_triangle();
     let [a, b, c] = corners(world, triangle)?.map(|c| c.lightmap * size);
@@ -239,9 +222,8 @@ fn texel(
         .chain(others)
         .find_map(|t| place_of(corners(world, t)?, middle, size))?;
     let scale = stored_scale(world, surface);
-    let (x, y) = (cell.x as usize, cell.y as usize);
-    let stored = Stored::texel(page, x, y, scale);
-    Some(((number, x, y), place, stored))
+    let stored = Stored::texel(page, cell.x as usize, cell.y as usize, scale);
+    Some((place, stored))
 }
 
 /// Light that the lightmap stores where a ray met a triangle; `None` where it tells nothing: of other surfaces, of texels
