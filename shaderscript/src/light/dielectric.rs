@@ -5,7 +5,7 @@ use std::f32::consts::TAU;
 use super::{SurfaceClass, classify};
 use crate::{
     shader::{Deform, Shader},
-    stage::{AlphaGen, RgbGen, Stage, TcGen, TcMod},
+    stage::{AlphaGen, BlendFactor, RgbGen, Stage, TcGen, TcMod},
     surface_params::{CONTENTS_LAVA, CONTENTS_SLIME, SURF_LIGHTFILTER},
 };
 
@@ -99,14 +99,22 @@ fn moves_as_effect(tc_mod: &TcMod) -> bool {
 /// Whether a stage stands for a reflection of the surroundings: a picture of an environment, placed by the reflected
 /// view direction, on a body that is drawn by another stage. One that turns or drifts slowly imitates a shine that
 /// wanders as its bearer moves, and real surroundings do that by themselves. A picture that moves faster or pulses is an
-/// effect (the glow of a power-up), and so is one that nothing lies under: they show what they show.
+/// effect (the glow of a power-up), and so is one that nothing lies under: they show what they show. One that multiplies
+/// the body and leaves nothing else of it shades it: as a reflection it would make a mirror of cloth and skin.
 pub fn is_reflection(shader: &Shader, stage: &Stage) -> bool {
     let is_picture = |s: &Stage| s.tc_gen == TcGen::Environment && !s.image.names().is_empty();
     let rests = !stage.tc_mods.iter().any(moves_as_effect)
         && !matches!(stage.rgb_gen, RgbGen::Wave(_))
         && !matches!(stage.alpha_gen, AlphaGen::Wave(_));
+    let shades = matches!(
+        stage.blend,
+        Some((
+            BlendFactor::Zero | BlendFactor::DstColor,
+            BlendFactor::Zero | BlendFactor::SrcColor
+        ))
+    );
     let has_body = shader.stages.iter().any(|s| s.tc_gen != TcGen::Environment);
-    is_picture(stage) && stage.image.names().len() == 1 && rests && has_body
+    is_picture(stage) && stage.image.names().len() == 1 && rests && !shades && has_body
 }
 
 #[cfg(test)]
@@ -178,6 +186,18 @@ mod tests {
             let stage = format!("{{\nmap e\ntcGen environment\n{mods}\nblendFunc add\n}}");
             reflects(&format!("{stage}\n{BODY}"))
         };
+        // laid over the body by its own colour it is a shine; what only multiplies it is no light of its own
+        for (blend, shines) in [
+            ("gl_dst_color gl_dst_alpha", true),
+            ("gl_dst_color gl_one", true),
+            ("blend", true),
+            ("gl_dst_color gl_src_color", false),
+            ("filter", false),
+            ("gl_zero gl_src_color", false),
+        ] {
+            let picture = format!("{{\nmap e\ntcGen environment\nblendFunc {blend}\n}}");
+            assert_eq!(reflects(&format!("{BODY}\n{picture}")), shines, "{blend}");
+        }
         assert!(moving("tcMod scale .5 .5"));
         assert!(moving("tcMod rotate -4"));
         assert!(moving("tcMod scroll 0 .02"));
