@@ -83,14 +83,18 @@ pub enum Kind {
 
 impl Kind {
     /// From a material's `MATERIAL_*` bits; `None` if no ray sees it. Fog brushes are volumes, not surfaces. A portal's
-    /// surface stops the ray, because what lies behind is replaced by what it shows.
+    /// surface stops the ray, because what lies behind is replaced by what it shows. What is painted on a wall with
+    /// holes and blends with it is passed: the wall lies in the same plane, and a ray that was stopped would miss it.
     pub fn of(flags: u32) -> Option<Self> {
+        const PAINTED: u32 = c::MATERIAL_TRANSLUCENT | c::MATERIAL_POLYGON_OFFSET;
         if flags & (c::MATERIAL_INVISIBLE | c::MATERIAL_FOG) != 0 {
             None
         } else if flags & c::MATERIAL_SKY != 0 {
             Some(Self::Sky)
         } else if flags & c::MATERIAL_PORTAL != 0 {
             Some(Self::Opaque)
+        } else if flags & PAINTED == PAINTED {
+            Some(Self::Translucent)
         } else if flags & c::MATERIAL_CUT_OUT != 0 {
             Some(Self::Tested)
         } else if flags & c::MATERIAL_TRANSLUCENT != 0 {

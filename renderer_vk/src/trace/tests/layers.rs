@@ -1,18 +1,17 @@
-//! Translucent layers, cut-outs and fog.
+//! Translucent layers and fog.
 
 use glam::Vec3;
 use shaders::types::constants as c;
 use shaders::types::{Fog, Stage};
 
 use super::harness::{Gpu, Scene, encode, identity, rectangle, reference, stage, through_byte};
-use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::settings::Settings;
 use crate::trace::frame_lights::decode;
 
 const TRANSLUCENT: u32 = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
 
 /// A rectangle at distance x that fills the view of `scene()`.
-fn screen(x: f32) -> [Vec3; 4] {
+pub(super) fn screen(x: f32) -> [Vec3; 4] {
     // faces -x
     rectangle(
         Vec3::new(x, -200.0, -200.0),
@@ -21,7 +20,7 @@ fn screen(x: f32) -> [Vec3; 4] {
     )
 }
 
-fn scene() -> Scene {
+pub(super) fn scene() -> Scene {
     Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 32)
 }
 
@@ -31,7 +30,7 @@ fn byte(value: f32) -> f32 {
 }
 
 /// A constant colour as it is displayed.
-fn displayed(color: [f32; 3]) -> Vec3 {
+pub(super) fn displayed(color: [f32; 3]) -> Vec3 {
     Vec3::from(color.map(byte))
 }
 
@@ -46,7 +45,7 @@ fn over(layers: &[([f32; 3], f32)], background: [f32; 3]) -> Vec3 {
     decode(mixed)
 }
 
-fn close(a: Vec3, b: Vec3) -> bool {
+pub(super) fn close(a: Vec3, b: Vec3) -> bool {
     // what a pixel shows is kept to a part of its largest channel, rounded up or down in reference mode
     (a - b).abs().max_element() < 5.0e-4 + b.max_element() / 256.0
 }
@@ -411,79 +410,6 @@ fn sprites_are_seen_from_behind_with(gpu: &mut Gpu) {
         );
         let mean = gpu.mean(&scene, &reference(), 2);
         assert!(close(mean, decode(displayed(back) + seen)), "{mean}");
-    }
-}
-
-#[test]
-fn cut_outs_have_holes_for_eyes_and_shadows() {
-    Gpu::each(cut_outs_have_holes_for_eyes_and_shadows_with);
-}
-
-fn cut_outs_have_holes_for_eyes_and_shadows_with(gpu: &mut Gpu) {
-    let image = Image::new(
-        &gpu.device,
-        &ImageDesc::new("stripes", 2, 1, Format::Rgba8, ImageUsage::SAMPLED),
-    )
-    .expect("image");
-    // left half white and solid, right half a hole
-    gpu.device
-        .upload_image(&image, 0, 0, &[255, 255, 255, 255, 255, 255, 255, 0])
-        .expect("upload");
-    let mut scene = scene();
-    scene.images.push(image.texture_index());
-    let back = [0.2, 0.4, 0.8];
-    let wall = scene.material(&[stage::constant(back)], 0);
-    scene.quad(screen(300.0), wall);
-    let mut grate = stage::image(0);
-    grate.alpha_func = c::ALPHAFUNC_GE128;
-    let grate = scene.material(&[grate], c::MATERIAL_CUT_OUT | c::MATERIAL_TWO_SIDED);
-    // s runs along z, from below to above
-    scene.quad(screen(100.0), grate);
-    let (pixels, _) = gpu.render(&scene, &reference(), 1);
-    let hole = Vec3::from(back.map(through_byte));
-    for (row, color) in [(4, hole), (28, Vec3::ONE)] {
-        for column in 0..32 {
-            let pixel = pixels[row * 32 + column];
-            assert!(close(pixel, color), "row {row}: {pixel}");
-        }
-    }
-    // the same for a shadow: light from beyond the grate falls through the hole only
-    let mut scene = Scene::new(Vec3::new(0.0, 0.0, 50.0), Vec3::ZERO, 60.0, 32);
-    scene.images.push(image.texture_index());
-    let white = scene.diffuse(1.0);
-    scene.quad(
-        rectangle(
-            Vec3::new(-100.0, -100.0, 0.0),
-            Vec3::X * 200.0,
-            Vec3::Y * 200.0,
-        ),
-        white,
-    );
-    let mut stripes = stage::image(0);
-    stripes.alpha_func = c::ALPHAFUNC_GE128;
-    let grate = scene.material(&[stripes], c::MATERIAL_CUT_OUT | c::MATERIAL_TWO_SIDED);
-    // above the eye; s runs along x: the hole is at x > 0
-    scene.quad(
-        rectangle(
-            Vec3::new(-100.0, -100.0, 60.0),
-            Vec3::X * 200.0,
-            Vec3::Y * 200.0,
-        ),
-        grate,
-    );
-    scene.suns.push(relight::light::SunLight {
-        direction: Vec3::Z,
-        irradiance: Vec3::splat(std::f32::consts::PI),
-        angular_radius: 0.001,
-        material: None,
-    });
-    let (pixels, _) = gpu.render(&scene, &reference(), 2);
-    for (i, pixel) in pixels.iter().enumerate() {
-        let p = super::harness::floor_point(&scene, i % 32, i / 32);
-        if p.x.abs() > 3.0 {
-            let exact = if p.x > 0.0 { 1.0 } else { 0.0 };
-            assert!((pixel.x - exact).abs() < 0.002, "{p} {pixel}");
-        }
     }
 }
 

@@ -1,0 +1,136 @@
+//! Cut-outs: what has holes where its image says so.
+
+use glam::Vec3;
+use shaders::types::Stage;
+use shaders::types::constants as c;
+
+use super::harness::{Gpu, Scene, rectangle, reference, stage, through_byte};
+use super::layers::{close, displayed, scene, screen};
+use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
+use crate::trace::frame_lights::decode;
+
+/// An image of two texels beside each other.
+fn stripes(gpu: &Gpu, texels: [[u8; 4]; 2]) -> Image {
+    let image = Image::new(
+        &gpu.device,
+        &ImageDesc::new("stripes", 2, 1, Format::Rgba8, ImageUsage::SAMPLED),
+    )
+    .expect("image");
+    gpu.device
+        .upload_image(&image, 0, 0, texels.as_flattened())
+        .expect("upload");
+    image
+}
+
+#[test]
+fn cut_outs_have_holes_for_eyes_and_shadows() {
+    Gpu::each(cut_outs_have_holes_for_eyes_and_shadows_with);
+}
+
+fn cut_outs_have_holes_for_eyes_and_shadows_with(gpu: &mut Gpu) {
+    let image = stripes(gpu, [[255; 4], [255, 255, 255, 0]]);
+    // left half white and solid, right half a hole
+    let mut scene = scene();
+    scene.images.push(image.texture_index());
+    let back = [0.2, 0.4, 0.8];
+    let wall = scene.material(&[stage::constant(back)], 0);
+    scene.quad(screen(300.0), wall);
+    let mut grate = stage::image(0);
+    grate.alpha_func = c::ALPHAFUNC_GE128;
+    let grate = scene.material(&[grate], c::MATERIAL_CUT_OUT | c::MATERIAL_TWO_SIDED);
+    // s runs along z, from below to above
+    scene.quad(screen(100.0), grate);
+    let (pixels, _) = gpu.render(&scene, &reference(), 1);
+    let hole = Vec3::from(back.map(through_byte));
+    for (row, color) in [(4, hole), (28, Vec3::ONE)] {
+        for column in 0..32 {
+            let pixel = pixels[row * 32 + column];
+            assert!(close(pixel, color), "row {row}: {pixel}");
+        }
+    }
+    // the same for a shadow: light from beyond the grate falls through the hole only
+    let mut scene = Scene::new(Vec3::new(0.0, 0.0, 50.0), Vec3::ZERO, 60.0, 32);
+    scene.images.push(image.texture_index());
+    let white = scene.diffuse(1.0);
+    scene.quad(
+        rectangle(
+            Vec3::new(-100.0, -100.0, 0.0),
+            Vec3::X * 200.0,
+            Vec3::Y * 200.0,
+        ),
+        white,
+    );
+    let mut stripes = stage::image(0);
+    stripes.alpha_func = c::ALPHAFUNC_GE128;
+    let grate = scene.material(&[stripes], c::MATERIAL_CUT_OUT | c::MATERIAL_TWO_SIDED);
+    // above the eye; s runs along x: the hole is at x > 0
+    scene.quad(
+        rectangle(
+            Vec3::new(-100.0, -100.0, 60.0),
+            Vec3::X * 200.0,
+            Vec3::Y * 200.0,
+        ),
+        grate,
+    );
+    scene.suns.push(relight::light::SunLight {
+        direction: Vec3::Z,
+        irradiance: Vec3::splat(std::f32::consts::PI),
+        angular_radius: 0.001,
+        material: None,
+    });
+    let (pixels, _) = gpu.render(&scene, &reference(), 2);
+    for (i, pixel) in pixels.iter().enumerate() {
+        let p = super::harness::floor_point(&scene, i % 32, i / 32);
+        if p.x.abs() > 3.0 {
+            let exact = if p.x > 0.0 { 1.0 } else { 0.0 };
+            assert!((pixel.x - exact).abs() < 0.002, "{p} {pixel}");
+        }
+    }
+}
+
+#[test]
+fn paint_with_holes_lets_its_wall_through() {
+    Gpu::each(paint_with_holes_lets_its_wall_through_with);
+}
+
+/// Nearly in the plane of its wall, as the depth offset of such a material asks for: behind a ray that stopped at the
+/// paint there would be no wall left.
+fn paint_with_holes_lets_its_wall_through_with(gpu: &mut Gpu) {
+    let image = stripes(gpu, [[255, 128, 64, 255], [255, 128, 64, 0]]);
+    let back = [0.2, 0.4, 0.3];
+    let mut painted = Stage {
+        blend_src: c::BLEND_DST_COLOR,
+        blend_dst: c::BLEND_ZERO,
+        ..stage::image(0)
+    };
+    painted.alpha_func = c::ALPHAFUNC_GE128;
+    // twice as bright, where the stage before it is
+    let doubled = Stage {
+        blend_dst: c::BLEND_ONE,
+        ..stage::filter([1.0; 3])
+    };
+    for (before, behind) in [(0.0, 0.0), (0.0005, 0.0), (0.0, 0.0005)] {
+        let mut scene = scene();
+        scene.images.push(image.texture_index());
+        let paint = scene.material(
+            &[painted, doubled],
+            c::MATERIAL_CUT_OUT | c::MATERIAL_TRANSLUCENT | c::MATERIAL_POLYGON_OFFSET,
+        );
+        let wall = scene.material(&[stage::constant(back)], 0);
+        // s runs along z, from below to above
+        scene.quad(screen(300.0 - before), paint);
+        scene.quad(screen(300.0 - behind), wall);
+        let (pixels, _) = gpu.render(&scene, &reference(), 1);
+        let shown = displayed(back) * Vec3::new(255.0, 128.0, 64.0) / 255.0 * 2.0;
+        for (row, color) in [(4, displayed(back)), (28, shown)] {
+            for column in 0..32 {
+                let pixel = pixels[row * 32 + column];
+                let exact = decode(color);
+                assert!(
+                    close(pixel, exact),
+                    "{before} {behind}, row {row}: {pixel} {exact}"
+                );
+            }
+        }
+    }
+}
