@@ -52,7 +52,7 @@ const LEAST_COLOR: f32 = 0.05;
 
 /// What a material does to rays that pass it. The absorption of a liquid has no directive: it is derived from the colour
 /// that the stages have in the mean over white, in white light, with its brightest channel at 1. A volume of fog absorbs
-/// by itself.
+/// by itself; map compilers make one of a liquid that has `fogParms`, too.
 pub fn dielectric(
     shader: &Shader,
     class: LightmapClass,
@@ -74,7 +74,8 @@ pub fn dielectric(
     let liquid = light::classify(shader).liquid;
     let mut absorption = Vec3::ZERO;
     let color = mean.lit + mean.emission + mean.through;
-    if liquid && shader.content_flags & CONTENTS_FOG == 0 && color.is_finite() {
+    let foggy = shader.fog.is_some() || shader.content_flags & CONTENTS_FOG != 0;
+    if liquid && !foggy && color.is_finite() {
         let color = color / color.max_element().max(1.0e-6);
         absorption = -color
             .clamp(Vec3::splat(LEAST_COLOR), Vec3::ONE)
