@@ -374,8 +374,6 @@ pub struct DenoiseView {
     pub history: u64,
     /// Light of this frame and those before.
     pub fresh: u64,
-    /// The light that the picture is made with, once filtered.
-    pub lit: u64,
     /// Number of frames and variance of each pixel.
     pub past: u64,
     /// The same of the last frame.

@@ -12,6 +12,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = 0) const uint BOUNCES = 1;
 // Whether the variance of a pixel is taken from around it, too: that of fresh light is itself noisy.
 layout(constant_id = 1) const uint NOISY_VARIANCE = 1;
+// Whether this is the last step, which leaves the sum of both kinds of light where direct light was.
+layout(constant_id = 2) const uint LAST = 0;
 
 // Differences of luminance that count as noise, in standard deviations: of direct and indirect light.
 const vec2 LUMINANCE_SIGMA = vec2(4.0, 6.0);
@@ -33,7 +35,7 @@ void main() {
     uvec4 packed = LightTexels(push.source).at[place];
     LightTexel middle = unpack_texel(packed);
     if (middle.guide == 0) {
-        LightTexels(push.target).at[place] = uvec4(0);
+        if (LAST == 0) LightTexels(push.target).at[place] = uvec4(0);
         return;
     }
     int spacing = int(push.spacing);
@@ -88,11 +90,15 @@ void main() {
             weight.y = exp2(alike[i] - abs(luminance(tap_indirect) - value.y) * light_scale.y);
             indirect += tap_indirect * weight.y;
         }
-        variance += unpackHalf2x16(taps[i].z) * weight * weight;
+        if (LAST == 0) variance += unpackHalf2x16(taps[i].z) * weight * weight;
         total += weight;
     }
     middle.direct = direct / total.x;
     middle.indirect = indirect / total.y;
+    if (LAST != 0) {
+        light_write(VIEW.image_direct, pixel, middle.direct + middle.indirect, dither(pixel, 2));
+        return;
+    }
     middle.variance = variance / (total * total);
     LightTexels(push.target).at[place] = pack_texel(middle, dither(pixel, 2));
 }

@@ -45,9 +45,7 @@ Shown shown(ivec2 pixel) {
     s.front = g.front * exp2(-VIEW.exposure_base);
     s.is_lit = g.path >= 0.0;
     s.albedo = g.albedo;
-    if (!s.is_lit) s.light = vec3(0.0);
-    else if ((VIEW.flags & VIEW_DENOISE) != 0) s.light = filtered_light(pixel);
-    else s.light = light_read(VIEW.image_direct, pixel) + light_read(VIEW.image_indirect, pixel);
+    s.light = s.is_lit ? light_of(pixel) : vec3(0.0);
     return s;
 }
 

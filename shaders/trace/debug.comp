@@ -77,7 +77,7 @@ vec3 debug_color(ivec2 pixel) {
     case DEBUG_VARIANCE: {
         if (!is_lit || (VIEW.flags & VIEW_DENOISE) == 0 || (DENOISE.flags & DENOISE_SPARSE) != 0) return NOTHING;
         vec2 variance = past_variance(Pasts(DENOISE.past).at[place_of(pixel)]);
-        float deviation = sqrt(variance.x + variance.y) / max(luminance(filtered_light(pixel)), 1.0e-4);
+        float deviation = sqrt(variance.x + variance.y) / max(luminance(light_of(pixel)), 1.0e-4);
         return heat((log2(max(deviation, 1.0e-4)) + 6.0) / 8.0);
     }
     case DEBUG_GRADIENTS: {

@@ -127,11 +127,10 @@ Before before_of(ivec2 pixel) {
     return before;
 }
 
-// The light that a picture is made with.
-vec3 filtered_light(ivec2 pixel) {
-    if ((DENOISE.flags & DENOISE_SPARSE) != 0) return unpack_light(SparseTexels(DENOISE.lit).at[place_of(pixel)].x);
-    LightTexel lit = unpack_texel(LightTexels(DENOISE.lit).at[place_of(pixel)]);
-    return lit.direct + lit.indirect;
+// The light that a picture is made with: both kinds, which the denoiser sums up where direct light was.
+vec3 light_of(ivec2 pixel) {
+    vec3 light = light_read(VIEW.image_direct, pixel);
+    return (VIEW.flags & VIEW_DENOISE) != 0 ? light : light + light_read(VIEW.image_indirect, pixel);
 }
 
 #endif

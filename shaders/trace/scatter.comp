@@ -9,12 +9,15 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
+// Whether this is the last pass, which leaves the light where direct light was.
+layout(constant_id = 0) const uint LAST = 0;
+
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (!inside(pixel)) return;
     SparseTexel middle = sparse_read(push.source, pixel);
     if (middle.guide == 0) {
-        SparseTexels(push.target).at[place_of(pixel)] = uvec2(0);
+        if (LAST == 0) SparseTexels(push.target).at[place_of(pixel)] = uvec2(0);
         return;
     }
     float depth = sparse_depth(middle.guide), value = luminance(middle.light);
@@ -46,5 +49,6 @@ void main() {
         total += weight;
     }
     middle.light = sum / total;
-    sparse_write(push.target, pixel, middle, dither(pixel, 2));
+    if (LAST != 0) light_write(VIEW.image_direct, pixel, middle.light, dither(pixel, 2));
+    else sparse_write(push.target, pixel, middle, dither(pixel, 2));
 }

@@ -62,7 +62,7 @@ struct AntialiasView {
 };
 
 struct DenoiseView {
-    uint64_t history; uint64_t fresh; uint64_t lit; uint64_t past; uint64_t last_past;
+    uint64_t history; uint64_t fresh; uint64_t past; uint64_t last_past;
     uint flags; uint last_seed; uint samples; uint sample_surfaces; uint carried; uint stratum_guide; uint gradient_sums; uint gradient;
     uint slope; uint gradient_samples;
 };

@@ -7,7 +7,8 @@
 //!    surface of the last frame again, with the random numbers of then.
 //! 2. [`Denoiser::filter`], after: the change of light that those samples show is spread over their neighbourhood; the
 //!    light joins that of earlier frames, which keep less weight where it has changed; three wavelet steps, guided by
-//!    the variance, even out what noise is left. The first of them is what the next frame starts from.
+//!    the variance, even out what noise is left. The first of them is what the next frame starts from; the last leaves
+//!    the light of the picture where the rays' direct light was.
 //!
 //! `rt_denoiser 2` costs about a third: a running mean over frames, and three passes of few scattered taps.
 
@@ -29,13 +30,6 @@ const WAVELET: [u32; 3] = [1, 3, 8];
 /// Radii of the passes of the cheap filter, pixels.
 const SPARSE: [u32; 3] = [3, 9, 5];
 
-/// Index in [`Images::light`] of the last frame's light, and of the result.
-const RESULT: usize = 0;
-/// Index of the texels that the temporal pass writes.
-const FRESH: usize = 1;
-/// Index of the texels after the first step: what the next frame starts from.
-const HISTORY: usize = 2;
-
 /// Which filter.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Tier {
@@ -43,12 +37,15 @@ enum Tier {
     Sparse,
 }
 
-/// What is kept for one size of view: 68 bytes a pixel, of the cheap filter 28.
+/// What is kept for one size of view: 52 bytes a pixel, of the cheap filter 20. Light has its guide beside it, of the
+/// adaptive filter its variance, too.
 struct Images {
     tier: Tier,
     size: [u32; 2],
-    /// Light that is filtered, with its guide; of the adaptive filter with its variance.
-    light: [Buffer; 3],
+    /// What the last frame left; once it has joined the fresh light, that after the first step, for the next frame.
+    history: Buffer,
+    /// Light of this frame and those before, then after the second step.
+    fresh: Buffer,
     slope: Image,
     adaptive: Option<AdaptiveImages>,
 }
@@ -100,11 +97,8 @@ impl Images {
         Ok(Self {
             tier,
             size,
-            light: [
-                texels(device, "trace light 0", size, bytes)?,
-                texels(device, "trace light 1", size, bytes)?,
-                texels(device, "trace light 2", size, bytes)?,
-            ],
+            history: texels(device, "trace light history", size, bytes)?,
+            fresh: texels(device, "trace light", size, bytes)?,
             slope: make(device, "trace slope", size, Format::Rg16F)?,
             adaptive: match tier {
                 Tier::Adaptive => Some(AdaptiveImages::new(device, size)?),
@@ -154,10 +148,10 @@ pub struct Denoiser {
     gradient_wide: ComputePipeline,
     /// Without and with bounced light.
     temporal: [ComputePipeline; 2],
-    /// Likewise; the first step, and those after it.
-    wavelet: [[ComputePipeline; 2]; 2],
+    /// Likewise; each of the three steps.
+    wavelet: [[ComputePipeline; 3]; 2],
     sparse_temporal: ComputePipeline,
-    sparse: ComputePipeline,
+    sparse: [ComputePipeline; 3],
     images: Option<Images>,
     /// Stands for every image that is not there: software drivers look at the images of branches that are not taken.
     nothing: Image,
@@ -178,14 +172,21 @@ impl Denoiser {
             let code = &shaders::TRACE_TEMPORAL_COMP;
             ComputePipeline::new(device, "trace_temporal", code, &[(0, bounces)])
         };
-        let wavelet = |bounces, noisy| {
-            let constants = [(0, bounces), (1, noisy)];
-            ComputePipeline::new(
-                device,
-                "trace_wavelet",
-                &shaders::TRACE_ATROUS_COMP,
-                &constants,
-            )
+        let wavelet = |bounces, noisy, last| {
+            let constants = [(0, bounces), (1, noisy), (2, last)];
+            let code = &shaders::TRACE_ATROUS_COMP;
+            ComputePipeline::new(device, "trace_wavelet", code, &constants)
+        };
+        let wavelets = |bounces| -> Result<_, Error> {
+            Ok([
+                wavelet(bounces, 1, 0)?,
+                wavelet(bounces, 0, 0)?,
+                wavelet(bounces, 0, 1)?,
+            ])
+        };
+        let sparse = |last| {
+            let code = &shaders::TRACE_SCATTER_COMP;
+            ComputePipeline::new(device, "trace_sparse", code, &[(0, last)])
         };
         Ok(Self {
             device: device.clone(),
@@ -197,15 +198,12 @@ impl Denoiser {
             gradient: compute("trace_gradient", &shaders::TRACE_GRADIENT_COMP)?,
             gradient_wide: compute("trace_gradient_wide", &shaders::TRACE_GRADIENT_WIDE_COMP)?,
             temporal: [temporal(0)?, temporal(1)?],
-            wavelet: [
-                [wavelet(0, 1)?, wavelet(0, 0)?],
-                [wavelet(1, 1)?, wavelet(1, 0)?],
-            ],
+            wavelet: [wavelets(0)?, wavelets(1)?],
             sparse_temporal: compute(
                 "trace_sparse_temporal",
                 &shaders::TRACE_SCATTER_TEMPORAL_COMP,
             )?,
-            sparse: compute("trace_sparse", &shaders::TRACE_SCATTER_COMP)?,
+            sparse: [sparse(0)?, sparse(0)?, sparse(1)?],
             images: None,
             nothing: make(device, "trace no light", [1, 1], Format::Rgba32Uint)?,
             history: false,
@@ -274,9 +272,8 @@ impl Denoiser {
             flags: flag(self.history, t::DENOISE_HISTORY)
                 | flag(self.carries().is_some(), t::DENOISE_GRADIENTS)
                 | flag(images.tier == Tier::Sparse, t::DENOISE_SPARSE),
-            history: images.light[RESULT].address(),
-            fresh: images.light[FRESH].address(),
-            lit: images.light[RESULT].address(),
+            history: images.history.address(),
+            fresh: images.fresh.address(),
             slope: images.slope.storage_index(),
             ..empty
         };
@@ -312,8 +309,9 @@ impl Denoiser {
         }
     }
 
-    /// Reads the G-buffer, the light of the rays and what the last frame left; writes the filtered light. `view`:
-    /// device address of the `TraceView`; `bounces`: there is bounced light.
+    /// Reads the G-buffer, the light of the rays and what the last frame left; writes the filtered light, direct and
+    /// indirect together, to where direct light was. `view`: device address of the `TraceView`; `bounces`: there is
+    /// bounced light.
     ///
     /// # Errors
     /// Out of memory.
@@ -336,14 +334,13 @@ impl Denoiser {
                 let tile = [TILE; 2];
                 let temporal = &self.temporal[usize::from(bounces)];
                 dispatch(rec, "trace_temporal", temporal, view, size, tile)?;
-                let [first, rest] = &self.wavelet[usize::from(bounces)];
-                steps(rec, "trace_wavelet", [first, rest], view, images, &WAVELET)
+                let wavelet = &self.wavelet[usize::from(bounces)];
+                steps(rec, "trace_wavelet", wavelet, view, images, WAVELET)
             }
             Tier::Sparse => {
                 let name = "trace_sparse_temporal";
                 dispatch(rec, name, &self.sparse_temporal, view, size, [TILE; 2])?;
-                let pipelines = [&self.sparse; 2];
-                steps(rec, "trace_sparse", pipelines, view, images, &SPARSE)
+                steps(rec, "trace_sparse", &self.sparse, view, images, SPARSE)
             }
         }
     }
@@ -351,48 +348,38 @@ impl Denoiser {
     /// The frame is recorded: what it wrote becomes what the last one wrote.
     pub fn advance(&mut self) {
         self.history = self.images.is_some();
-        if let Some(images) = &mut self.images {
-            images.light.swap(RESULT, HISTORY);
-            if let Some(adaptive) = &mut images.adaptive {
-                adaptive.past.swap(0, 1);
-            }
+        let images = self.images.as_mut();
+        if let Some(adaptive) = images.and_then(|i| i.adaptive.as_mut()) {
+            adaptive.past.swap(0, 1);
         }
     }
 }
 
-/// Steps of a filter, at least three, from the fresh texels to the result; `spacings` is what differs. `pipelines`: of
-/// the first step, and of those after it.
+/// The steps of a filter from the fresh texels to the light of the picture; `spacings` is what differs.
 fn steps(
     rec: &mut Recorder,
     name: &str,
-    pipelines: [&ComputePipeline; 2],
+    pipelines: &[ComputePipeline; 3],
     view: u64,
     images: &Images,
-    spacings: &[u32],
+    spacings: [u32; 3],
 ) -> Result<(), Error> {
     let mut pass = rec.pass(name, Access::COMPUTE, Access::COMPUTE)?;
     let [x, y] = images.size.map(|s| s.div_ceil(TILE));
-    for (step, &spacing) in spacings.iter().enumerate() {
-        // The last frame's light, where the result goes, is free once the fresh light holds it too. The first step is
-        // kept; those after it take turns so that the last one ends where the result is looked for.
-        let to_result = (spacings.len() - step) % 2 == 1;
-        let (source, target) = match (step, to_result) {
-            (0, _) => (FRESH, HISTORY),
-            (1, true) => (HISTORY, RESULT),
-            (1, false) => (HISTORY, FRESH),
-            (_, true) => (FRESH, RESULT),
-            (_, false) => (RESULT, FRESH),
-        };
-        let [source, target] = [source, target].map(|i| images.light[i].address());
+    let [history, fresh] = [&images.history, &images.fresh].map(Buffer::address);
+    // The first step is kept in place of the last frame's light, which the fresh light holds by now; the last step writes
+    // no texels.
+    let places = [(fresh, history), (history, fresh), (fresh, fresh)];
+    for (step, (source, target)) in places.into_iter().enumerate() {
         if step > 0 {
             pass.barrier();
         }
-        pass.bind_compute(pipelines[step.min(1)]);
+        pass.bind_compute(&pipelines[step]);
         pass.push(&Step {
             view,
             source,
             target,
-            spacing,
+            spacing: spacings[step],
             padding: 0,
         });
         pass.dispatch(x, y, 1);
