@@ -229,6 +229,8 @@ pub struct BvhTriangle {
     pub c: Vec3,
     /// Index of the geometry's triangle.
     pub primitive: u32,
+    /// Makes the size a multiple of 16, so that it is read in three pieces.
+    pub padding: [u32; 2],
 }
 
 /// A placed hierarchy, in the order of the top hierarchy's leafs.

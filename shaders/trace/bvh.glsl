@@ -5,9 +5,9 @@
 
 #include "trace/candidate.glsl"
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BvhNodes { BvhNode at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BvhTriangles { BvhTriangle at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer BvhInstances { BvhInstance at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BvhNodes { BvhNode at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BvhTriangles { BvhTriangle at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BvhInstances { BvhInstance at[]; };
 
 // What a walk looks for.
 const uint BVH_CLOSEST = 0, BVH_ANY = 1, BVH_LAYER = 2;

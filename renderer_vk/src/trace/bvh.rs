@@ -369,7 +369,13 @@ pub fn box_of(corners: &[Vec3; 3]) -> Aabb {
 pub fn ordered(hierarchy: &Hierarchy, corners: &[[Vec3; 3]]) -> Vec<BvhTriangle> {
     let triangle = |&primitive: &u32| {
         let [a, b, c] = *corners.get(primitive as usize)?;
-        Some(BvhTriangle { a, b, c, primitive })
+        Some(BvhTriangle {
+            a,
+            b,
+            c,
+            primitive,
+            padding: [0; 2],
+        })
     };
     hierarchy.order.iter().filter_map(triangle).collect()
 }
