@@ -472,6 +472,9 @@ pub struct TraceView {
     pub skies: u64,
     /// State of automatic exposure: histogram and current exposure.
     pub exposure: u64,
+    /// 16 bytes a pixel that passes hand on to those after them: what the eye's rays meet first, then the light that each
+    /// pixel asks for.
+    pub texels: u64,
     /// Top hierarchy of the compute tracer; 0: nothing.
     pub bvh_nodes: u64,
     pub bvh_instances: u64,
@@ -592,9 +595,10 @@ pub mod constants {
     pub const DEBUG_GRADIENTS: u32 = 9;
     pub const DEBUG_RAYS: u32 = 10;
     pub const DEBUG_SPECULAR: u32 = 11;
-    pub const COUNT_PRIMARY: u32 = 0;
-    pub const COUNT_DIRECT: u32 = 1;
-    pub const COUNT_INDIRECT: u32 = 2;
+    pub const COUNT_EYE: u32 = 0;
+    pub const COUNT_PRIMARY: u32 = 1;
+    pub const COUNT_DIRECT: u32 = 2;
+    pub const COUNT_INDIRECT: u32 = 3;
     pub const COUNTER_ROWS: u32 = 64;
     pub const NO_IMAGE: u32 = 0xFFFF_FFFF;
     pub const DENOISE_HISTORY: u32 = 1;

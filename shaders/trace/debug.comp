@@ -1,12 +1,12 @@
 #version 460
 // `rt_debug`: a step of the traced look in place of the picture. docs/settings.md says what the colours mean.
-#define TRACER_COMPUTE
-#include "trace/tracer.glsl"
 #include "trace/lights.glsl"
 #include "trace/denoise.glsl"
 #include "trace/camera.glsl"
 #include "trace/motion.glsl"
 #include "trace/picture.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
 
 const vec3 NOTHING = vec3(0.1, 0.1, 0.1);
 
@@ -94,7 +94,7 @@ vec3 debug_color(ivec2 pixel) {
 }
 
 void main() {
-    ivec2 pixel = LAUNCH_PIXEL;
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, picture_size()))) return;
     ivec2 target = pixel + ivec2(VIEW.target_x, VIEW.target_y);
     if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target_width) || target.y >= int(VIEW.target_height)) return;

@@ -16,9 +16,6 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) buffer LightTexels
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer SparseTexels { uvec2 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Pasts { uint at[]; };
 
-// Where a pixel's texel is.
-uint place_of(ivec2 pixel) { return uint(pixel.y) * VIEW.width + uint(pixel.x); }
-
 // Pixels to the edge of a stratum: each has one gradient sample (Schied et al. 2018, section 4.2).
 const int STRATUM = 3;
 

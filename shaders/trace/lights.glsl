@@ -1,4 +1,4 @@
-// Direct light on a point: which lights can matter, the estimators that choose among them, and points on lights.
+// The lights of a point: which can matter, the estimators that choose among them, and points on lights.
 //
 // Light is measured as L, the radiance that a white diffuse surface would show: irradiance divided by pi. Every
 // estimator divides by the probability with which it made its choices, so all of them have the same mean.
@@ -7,10 +7,7 @@
 
 #include "trace/color.glsl"
 #include "trace/random.glsl"
-#include "trace/trace.glsl"
-#include "trace/filters.glsl"
-
-const uint MASK_SHADOW = MASK_SOLID | MASK_THIRD_SOLID;
+#include "trace/geometry.glsl"
 
 // The lights that may reach a point: a cluster's list, the suns, and the list of lights of this frame.
 struct LightSet {
@@ -277,15 +274,6 @@ float light_target(uint light, vec3 position, vec3 normal) {
     return towards * scale * cosine / max(squared, 0.25 * bounds.radius * bounds.radius);
 }
 
-// Whether the sample's light arrives. Suns arrive where the ray meets sky first or leaves the map. For all other lights
-// sky is as solid as a wall: pieces of sky that shine are lights of their own, and a ray to one that passes another would
-// count the same direction twice.
-bool light_arrives(LightSample s, vec3 origin) {
-    if (!s.sky && s.distance <= 0.0) return true;
-    Hit hit = trace_ray(origin, 0.0, s.direction, s.distance, MASK_SHADOW | MASK_SKY, !s.sky);
-    return hit.geometry == NO_HIT || (s.sky && Geometries(VIEW.geometries).at[hit.geometry].kind == KIND_SKY);
-}
-
 // A light to send a ray to, and what its light is to be multiplied by; weight 0: none.
 struct LightChoice {
     uint light;
@@ -369,72 +357,6 @@ LightChoice choose_one(LightSet set, vec3 position, vec3 normal) {
     float chance = clamp(sun_target / (sun_target + listed.total), 0.25, 0.75);
     if (rng_next() < chance) return LightChoice(sun.light, sun.weight / chance, sun.total);
     return LightChoice(listed.light, listed.weight / (1.0 - chance), listed.total);
-}
-
-// What arrives of a sample's light.
-vec3 arriving(LightSample s, vec3 origin) {
-    if (!(max_component(s.light) > 0.0) || !light_arrives(s, origin)) return vec3(0.0);
-    return s.light * filtered(origin, s.direction, s.distance);
-}
-
-// One resampled estimate of direct light, with the choices of `direct_light`. All is chosen before the first ray,
-// so that little has to be kept over the rays.
-vec3 direct_light_once(vec3 position, vec3 face_normal, vec3 normal) {
-    LightSet set = lights_at(position, face_normal);
-    if (set_count(set) == 0) return vec3(0.0);
-    vec3 origin = offset_ray(position, face_normal);
-    LightChoice choice = choose_resampled(set, position, normal);
-    LightSample chosen = no_light();
-    if (choice.weight > 0.0) chosen = sample_light(choice.light, position, normal, rng_next2());
-    chosen.light *= choice.weight;
-    vec3 from_sun = vec3(0.0);
-    if (set.suns > 0) {
-        LightChoice sun = choose_sun(set.suns);
-        LightSample s = sample_light(sun.light, position, normal, rng_next2());
-        s.light *= sun.weight;
-        from_sun = arriving(s, origin);
-    }
-    return from_sun + arriving(chosen, origin);
-}
-
-// Direct light on a point whose surface faces `face_normal`, with `samples` independent estimates.
-vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint selection, uint samples) {
-    LightSet set = lights_at(position, face_normal);
-    uint count = set_count(set);
-    if (count == 0) return vec3(0.0);
-    vec3 origin = offset_ray(position, face_normal);
-    vec3 sum = vec3(0.0);
-    samples = max(samples, 1);
-    // rays of one estimate, and those of them that pick a light
-    uint rays = 1, picks = 1;
-    LightSet from = set;
-    if (selection == SELECT_ALL) {
-        // each light has its ray, but of the weak ones, which give little together, some are picked by what they give
-        uint weak = set.listed - set.strong;
-        from = LightSet(set.first + set.listed, weak, 0, 0, 0, 0);
-        picks = min(weak, WEAK_RAYS);
-        rays = picks + count - weak;
-    } else if (selection == SELECT_RESAMPLED && set.suns > 0) rays = 2;
-    for (uint i = 0; i < samples * rays; i++) {
-        uint ray = i % rays;
-        LightChoice choice;
-        if (selection == SELECT_UNIFORM) choice = choose_uniform(set);
-        else if (ray >= picks && selection == SELECT_ALL) {
-            uint member = ray - picks;
-            if (member >= set.strong) member += from.listed;
-            choice = LightChoice(light_of_member(set, member), 1.0, 0.0);
-        } else if (ray >= picks) choice = choose_sun(set.suns);
-        else if (selection == SELECT_ONE) choice = choose_one(set, position, normal);
-        else {
-            choice = choose_resampled(from, position, normal);
-            choice.weight /= float(picks);
-        }
-        if (!(choice.weight > 0.0)) continue;
-        LightSample s = sample_light(choice.light, position, normal, rng_next2());
-        s.light *= choice.weight;
-        sum += arriving(s, origin);
-    }
-    return sum / float(samples);
 }
 
 #endif

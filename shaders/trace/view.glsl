@@ -36,6 +36,9 @@ layout(push_constant, scalar) uniform Push { uint64_t view; } push;
 #endif
 #define VIEW (TraceViews(push.view).view)
 
+// Where a pixel's texel is in a buffer of texels.
+uint place_of(ivec2 pixel) { return uint(pixel.y) * VIEW.width + uint(pixel.x); }
+
 const float PI = 3.14159265358979;
 // Farther than anything in a map (the engine's world ends at 131072 units).
 const float FAR = 1.0e6;

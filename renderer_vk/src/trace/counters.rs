@@ -8,7 +8,12 @@ use crate::gpu::{
 };
 
 /// The counted passes by the names that their times go by, in the order of `COUNT_*`.
-pub const COUNTED: [&str; 3] = ["trace_primary", "trace_direct", "trace_indirect"];
+pub const COUNTED: [&str; 4] = [
+    "trace_eye",
+    "trace_primary",
+    "trace_direct",
+    "trace_indirect",
+];
 
 /// Bytes of the counters.
 const SIZE: u64 = COUNTED.len() as u64 * t::COUNTER_ROWS as u64 * 4;

@@ -1,6 +1,6 @@
 //! `rt_debug`: a step of the traced look in place of the picture.
 
-use super::passes::{COMPUTE_TILE, dispatch};
+use super::passes::{TILE, dispatch};
 use crate::gpu::{ComputePipeline, Device, Error, Recorder};
 
 /// Names of the views, by their numbers in `rt_debug` from 1 on.
@@ -43,6 +43,6 @@ impl DebugView {
                     .insert(ComputePipeline::new(device, "trace_debug", shader, &[])?)
             }
         };
-        dispatch(rec, "trace_debug", pipeline, view, size, COMPUTE_TILE)
+        dispatch(rec, "trace_debug", pipeline, view, size, [TILE; 2])
     }
 }

@@ -16,9 +16,9 @@ use shaders::trace_types::DenoiseView;
 use shaders::trace_types::constants as t;
 
 use super::passes::{TILE, dispatch};
+use super::targets::texels;
 use crate::gpu::{
-    Access, Buffer, BufferDesc, BufferUsage, ComputePipeline, Device, Error, Format, Image,
-    ImageDesc, ImageUsage, Memory, Recorder,
+    Access, Buffer, ComputePipeline, Device, Error, Format, Image, ImageDesc, ImageUsage, Recorder,
 };
 
 /// Pixels to the edge of a stratum, see `denoise.glsl`.
@@ -37,15 +37,13 @@ enum Tier {
     Sparse,
 }
 
-/// What is kept for one size of view: 52 bytes a pixel, of the cheap filter 20. Light has its guide beside it, of the
+/// What is kept for one size of view: 36 bytes a pixel, of the cheap filter 12. Light has its guide beside it, of the
 /// adaptive filter its variance, too.
 struct Images {
     tier: Tier,
     size: [u32; 2],
     /// What the last frame left; once it has joined the fresh light, that after the first step, for the next frame.
     history: Buffer,
-    /// Light of this frame and those before, then after the second step.
-    fresh: Buffer,
     slope: Image,
     adaptive: Option<AdaptiveImages>,
 }
@@ -74,20 +72,6 @@ fn make(device: &Device, name: &str, size: [u32; 2], format: Format) -> Result<I
     )
 }
 
-/// Texels of a size in pixels, `bytes` each.
-fn texels(device: &Device, name: &str, size: [u32; 2], bytes: u64) -> Result<Buffer, Error> {
-    let [width, height] = size.map(u64::from);
-    Buffer::new(
-        device,
-        &BufferDesc {
-            name,
-            size: width * height * bytes,
-            usage: BufferUsage::SCREEN,
-            memory: Memory::Device,
-        },
-    )
-}
-
 impl Images {
     fn new(device: &Device, tier: Tier, size: [u32; 2]) -> Result<Self, Error> {
         let bytes = match tier {
@@ -98,7 +82,6 @@ impl Images {
             tier,
             size,
             history: texels(device, "trace light history", size, bytes)?,
-            fresh: texels(device, "trace light", size, bytes)?,
             slope: make(device, "trace slope", size, Format::Rg16F)?,
             adaptive: match tier {
                 Tier::Adaptive => Some(AdaptiveImages::new(device, size)?),
@@ -248,8 +231,9 @@ impl Denoiser {
             .filter(|i| wanted && i.tier == Tier::Adaptive)
     }
 
-    /// What the passes read. `last_seed`: of the last frame's random numbers.
-    pub fn view(&self, last_seed: u32) -> DenoiseView {
+    /// What the passes read. `last_seed`: of the last frame's random numbers; `fresh`: texels for light that is being
+    /// filtered, 16 bytes a pixel.
+    pub fn view(&self, last_seed: u32, fresh: &Buffer) -> DenoiseView {
         let nothing = self.nothing.storage_index();
         let empty = DenoiseView {
             flags: 0,
@@ -273,7 +257,7 @@ impl Denoiser {
                 | flag(self.carries().is_some(), t::DENOISE_GRADIENTS)
                 | flag(images.tier == Tier::Sparse, t::DENOISE_SPARSE),
             history: images.history.address(),
-            fresh: images.fresh.address(),
+            fresh: fresh.address(),
             slope: images.slope.storage_index(),
             ..empty
         };
@@ -310,12 +294,18 @@ impl Denoiser {
     }
 
     /// Reads the G-buffer, the light of the rays and what the last frame left; writes the filtered light, direct and
-    /// indirect together, to where direct light was. `view`: device address of the `TraceView`; `bounces`: there is
-    /// bounced light.
+    /// indirect together, to where direct light was. `view`: device address of the `TraceView`; `fresh`: as for
+    /// [`view`](Self::view); `bounces`: there is bounced light.
     ///
     /// # Errors
     /// Out of memory.
-    pub fn filter(&self, rec: &mut Recorder, view: u64, bounces: bool) -> Result<(), Error> {
+    pub fn filter(
+        &self,
+        rec: &mut Recorder,
+        view: u64,
+        fresh: &Buffer,
+        bounces: bool,
+    ) -> Result<(), Error> {
         let Some(images) = &self.images else {
             return Ok(());
         };
@@ -335,12 +325,20 @@ impl Denoiser {
                 let temporal = &self.temporal[usize::from(bounces)];
                 dispatch(rec, "trace_temporal", temporal, view, size, tile)?;
                 let wavelet = &self.wavelet[usize::from(bounces)];
-                steps(rec, "trace_wavelet", wavelet, view, images, WAVELET)
+                steps(rec, "trace_wavelet", wavelet, view, images, fresh, WAVELET)
             }
             Tier::Sparse => {
                 let name = "trace_sparse_temporal";
                 dispatch(rec, name, &self.sparse_temporal, view, size, [TILE; 2])?;
-                steps(rec, "trace_sparse", &self.sparse, view, images, SPARSE)
+                steps(
+                    rec,
+                    "trace_sparse",
+                    &self.sparse,
+                    view,
+                    images,
+                    fresh,
+                    SPARSE,
+                )
             }
         }
     }
@@ -362,13 +360,14 @@ fn steps(
     pipelines: &[ComputePipeline; 3],
     view: u64,
     images: &Images,
+    fresh: &Buffer,
     spacings: [u32; 3],
 ) -> Result<(), Error> {
     let mut pass = rec.pass(name, Access::COMPUTE, Access::COMPUTE)?;
     let [x, y] = images.size.map(|s| s.div_ceil(TILE));
-    let [history, fresh] = [&images.history, &images.fresh].map(Buffer::address);
+    let [history, fresh] = [&images.history, fresh].map(Buffer::address);
     // The first step is kept in place of the last frame's light, which the fresh light holds by now; the last step writes
-    // no texels.
+    // the picture's light.
     let places = [(fresh, history), (history, fresh), (fresh, fresh)];
     for (step, (source, target)) in places.into_iter().enumerate() {
         if step > 0 {

@@ -43,7 +43,7 @@ enum RayPass {
 }
 
 /// Groups of the compute shaders that trace.
-pub(super) const COMPUTE_TILE: [u32; 2] = [8, 4];
+const COMPUTE_TILE: [u32; 2] = [8, 4];
 
 fn trace(
     rec: &mut Recorder,
@@ -151,8 +151,13 @@ macro_rules! pixel_pass {
 }
 
 ray_pass!(
-    /// Reads the acceleration structures and materials; writes the G-buffer (`position`, `surface`) and `front`: the
-    /// picture of all that lies in front of the surface whose light is asked for.
+    /// Reads the acceleration structures; writes what the eye's own rays meet first (`texels`).
+    EyeRays, "trace_eye", TRACE_EYE_RGEN,
+    TRACE_EYE_RGEN_COMPUTE, TRACE_EYE_RGEN_QUERY
+);
+ray_pass!(
+    /// Reads what the eye's rays meet, the acceleration structures and materials; writes the G-buffer (`position`,
+    /// `surface`) and `front`: the picture of all that lies in front of the surface whose light is asked for.
     Primary, "trace_primary", TRACE_PRIMARY_RGEN,
     TRACE_PRIMARY_RGEN_COMPUTE, TRACE_PRIMARY_RGEN_QUERY
 );
@@ -187,6 +192,17 @@ ray_pass!(
     Direct, "trace_direct", TRACE_DIRECT_RGEN,
     TRACE_DIRECT_RGEN_COMPUTE, TRACE_DIRECT_RGEN_QUERY
 );
+impl Direct {
+    /// The same pass, whose lights [`Choose`] has chosen.
+    ///
+    /// # Errors
+    /// The driver refuses the pipeline.
+    pub fn of_chosen(device: &Device, tracer: Tracer) -> Result<Self, Error> {
+        // CHOSEN in direct.rgen
+        Self::with(device, tracer, &[(0, 1)])
+    }
+}
+
 ray_pass!(
     /// Reads the G-buffer and the light lists; writes `indirect`: with `VIEW_SPARSE_BOUNCE` for one of 2 × 2
     /// pixels, and `size` is half as large then.
@@ -209,6 +225,10 @@ ray_pass!(
     /// and 1.
     FlareRays, "trace_flares", TRACE_FLARES_RGEN,
     TRACE_FLARES_RGEN_COMPUTE, TRACE_FLARES_RGEN_QUERY
+);
+pixel_pass!(
+    /// Reads the G-buffer and the light lists; writes for each pixel the light that it sends a ray to (`texels`).
+    Choose, "trace_choose", TRACE_CHOOSE_COMP
 );
 pixel_pass!(
     /// Reads the G-buffer and `indirect`; writes `indirect` where it was not gathered. `size`: half of the view's.

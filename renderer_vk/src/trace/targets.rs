@@ -1,6 +1,27 @@
 //! The images of the traced look.
 
-use crate::gpu::{Device, Error, Format, Image, ImageDesc, ImageUsage};
+use crate::gpu::{
+    Buffer, BufferDesc, BufferUsage, Device, Error, Format, Image, ImageDesc, ImageUsage, Memory,
+};
+
+/// Texels of a size in pixels, `bytes` each.
+pub(super) fn texels(
+    device: &Device,
+    name: &str,
+    size: [u32; 2],
+    bytes: u64,
+) -> Result<Buffer, Error> {
+    let [width, height] = size.map(u64::from);
+    Buffer::new(
+        device,
+        &BufferDesc {
+            name,
+            size: width * height * bytes,
+            usage: BufferUsage::SCREEN,
+            memory: Memory::Device,
+        },
+    )
+}
 
 /// Images of one size: the G-buffer, the light, the picture before tone mapping, and the accumulated sum.
 pub struct Targets {
@@ -8,6 +29,9 @@ pub struct Targets {
     pub width: u32,
     /// Pixels.
     pub height: u32,
+    /// 16 bytes a pixel that passes hand on: what the eye's rays meet, until the G-buffer is written; the light that is
+    /// chosen, until a ray is sent to it; then the light that the denoiser is filtering.
+    pub texels: Buffer,
     /// World position and length of the way from the eye.
     pub position: Image,
     /// Packed normals.
@@ -47,6 +71,7 @@ impl Targets {
         Ok(Self {
             width,
             height,
+            texels: texels(device, "trace texels", [width, height], 16)?,
             position: make("trace position", Format::Rgba32F)?,
             surface: make("trace surface", Format::Rg32Uint)?,
             shown: make("trace shown", Format::Rg32Uint)?,

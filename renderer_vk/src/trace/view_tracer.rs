@@ -21,7 +21,8 @@ use super::layer_boxes::in_sight;
 use super::lights::MapLights;
 use super::motion::Motion;
 use super::passes::{
-    Composite, Direct, Exposure, Fill, FlareRays, Indirect, OtherSide, Primary, ToneMap,
+    Choose, Composite, Direct, Exposure, EyeRays, Fill, FlareRays, Indirect, OtherSide, Primary,
+    ToneMap,
 };
 use super::targets::Targets;
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
@@ -45,11 +46,15 @@ pub struct TracedMap<'a> {
 pub struct ViewTracer {
     pub(super) device: Device,
     pub(super) accel: Accel,
+    eye_rays: EyeRays,
     primary: Primary,
     /// The same with lit fog, made when there is some.
     fog_primary: Option<Primary>,
     other_side: OtherSide,
     fog: LitFog,
+    choose: Choose,
+    /// Of one chosen light a pixel, and of any number.
+    chosen_direct: Direct,
     direct: Direct,
     indirect: Indirect,
     /// The same for maps with fog, made when there is one.
@@ -99,10 +104,13 @@ impl ViewTracer {
         Ok(Self {
             device: device.clone(),
             accel: Accel::new(device, tracer),
+            eye_rays: EyeRays::new(device, tracer)?,
             primary: Primary::new(device, tracer)?,
             fog_primary: None,
             other_side: OtherSide::new(device, tracer)?,
             fog: LitFog::new(device, tracer),
+            choose: Choose::new(device)?,
+            chosen_direct: Direct::of_chosen(device, tracer)?,
             direct: Direct::new(device, tracer)?,
             indirect: Indirect::new(device, tracer)?,
             fog_indirect: None,
@@ -275,6 +283,7 @@ impl ViewTracer {
         if let Some(targets) = &mut self.targets {
             targets.indirect_is_black &= settings.rt_bounces == 0;
         }
+        self.eye_rays.record(rec, address, size)?;
         let primary = self.fog_primary.as_ref().filter(|_| self.fog.is_on());
         primary
             .unwrap_or(&self.primary)
@@ -290,7 +299,15 @@ impl ViewTracer {
             flare_rays.record(rec, address, [params.flares.count, 1])?;
         }
         self.denoiser.choose_gradient_samples(rec, address)?;
-        self.direct.record(rec, address, size)?;
+        if is_lit(settings)
+            && params.lights.selection == t::SELECT_RESAMPLED
+            && params.lights.samples == 1
+        {
+            self.choose.record(rec, address, size)?;
+            self.chosen_direct.record(rec, address, size)?;
+        } else {
+            self.direct.record(rec, address, size)?;
+        }
         if settings.rt_bounces == 0 {
             self.darken_indirect(rec)?;
         } else {
@@ -312,8 +329,10 @@ impl ViewTracer {
         }
         self.fog.record(rec, address)?;
         self.counters.end(rec)?;
-        self.denoiser
-            .filter(rec, address, settings.rt_bounces > 0)?;
+        if let Some(targets) = &self.targets {
+            self.denoiser
+                .filter(rec, address, &targets.texels, settings.rt_bounces > 0)?;
+        }
         self.composite.record(rec, address, size)?;
         self.antialias.record(rec, address)?;
         self.exposure.record(rec, address, output)?;
@@ -437,6 +456,7 @@ impl ViewTracer {
             portals: rec.arena().push(portals)?,
             skies: map.map_or(0, |m| m.geometry.skies.address()),
             exposure: self.exposure_state.address(),
+            texels: targets.texels.address(),
             bvh_nodes: accel.nodes,
             bvh_instances: accel.placed,
             flares: FlareView {
@@ -510,7 +530,7 @@ impl ViewTracer {
             last_forward,
             last_left,
             last_up,
-            denoise: self.denoiser.view(self.frame.wrapping_sub(1)),
+            denoise: (self.denoiser).view(self.frame.wrapping_sub(1), &targets.texels),
         })
     }
 }

@@ -116,7 +116,7 @@ fn costs_are_told_in_lines_and_as_json() {
     }
     let lines = text_of(&engine.take_messages());
     for part in [
-        "trace_primary",
+        "trace_eye",
         "rays",
         "all passes",
         "screen images",
@@ -126,9 +126,9 @@ fn costs_are_told_in_lines_and_as_json() {
     }
     let json = engine.read_file("stats/frame.json").expect("the file");
     let json = String::from_utf8(json).unwrap();
-    let primary = json.lines().find(|l| l.contains("\"trace_primary\""));
-    let primary = primary.expect("the pass");
-    let rays = primary
+    let eye = json.lines().find(|l| l.contains("\"trace_eye\""));
+    let eye = eye.expect("the pass");
+    let rays = eye
         .split("\"rays\": ")
         .nth(1)
         .and_then(|t| t.split(',').next());

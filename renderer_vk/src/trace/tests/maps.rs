@@ -239,7 +239,12 @@ fn tracers_agree_on_maps() {
                 .begin()
                 .and_then(|rec| gpu.ring.end(rec))
                 .expect("frame");
-            let passes = ["trace_primary", "trace_direct", "trace_indirect"];
+            let passes = [
+                "trace_eye",
+                "trace_primary",
+                "trace_direct",
+                "trace_indirect",
+            ];
             let timings = device.timings();
             let took: Vec<_> = timings
                 .iter()

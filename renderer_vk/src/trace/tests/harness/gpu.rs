@@ -78,7 +78,7 @@ impl Gpu {
     }
 
     /// Rays of each counted pass in the newest finished frame.
-    pub fn rays(&self) -> Option<[u64; 3]> {
+    pub fn rays(&self) -> Option<[u64; 4]> {
         self.look.rays()
     }
 
