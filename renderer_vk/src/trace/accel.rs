@@ -4,12 +4,14 @@
 //! the frame, are placed in world space on the CPU; those that a ray treats alike share one structure, built each frame.
 //! All builds of a frame are one batch.
 
+use std::iter;
+
 use glam::{Mat3, Vec3};
 use shaders::trace_types::constants::NO_INSTANCE;
 use shaders::trace_types::{BvhInstance, GeometryRecord};
 
 use super::bvh::{Aabb, build, build_triangles};
-use super::geometry::{StaticGeometry, Structure};
+use super::geometry::{StaticGeometry, StaticPart, Structure};
 use super::input::{Kind, MaterialTable, Tracer};
 use super::parts::{Parts, Seen, Slot, axes, is_solid};
 use super::shapes::{Bottom, OwnBottom, Shapes};
@@ -70,6 +72,9 @@ enum Part<'a> {
     /// Index of the part.
     Kept(usize, super::shapes::Prepared),
 }
+
+/// A record for each geometry of a structure.
+type Records<'a> = &'a mut dyn Iterator<Item = GeometryRecord>;
 
 /// A structure in its place.
 struct Placement<'a> {
@@ -165,7 +170,8 @@ impl Accel {
         };
         let mut records: Vec<GeometryRecord> = Vec::new();
         let mut placed: Vec<Placement<'_>> = Vec::new();
-        let mut place = |part, axis, origin, mask, kind: Kind, record: GeometryRecord| {
+        // a hit finds its record by the number of the first
+        let mut place = |part, axis, origin, mask, kind: Kind, of: Records<'_>| {
             placed.push(Placement {
                 part,
                 axis,
@@ -174,11 +180,11 @@ impl Accel {
                 mask,
                 kind,
             });
-            records.push(record);
+            records.extend(of);
         };
         if let Some(geometry) = geometry {
             let submodels = view.submodels.iter().map(|s| (s.model, s.instance));
-            for (model, index) in std::iter::once((0, 0)).chain(submodels) {
+            for (model, index) in iter::once((0, 0)).chain(submodels) {
                 let Some(instance) = view.instances.get(index as usize) else {
                     continue;
                 };
@@ -187,16 +193,21 @@ impl Accel {
                 if !is_solid(axis) {
                     continue;
                 }
-                for part in geometry.structures.iter().filter(|s| s.model == model) {
-                    let record = GeometryRecord {
+                for blas in geometry.structures.iter().filter(|s| s.model == model) {
+                    let Some(first) = blas.parts.first() else {
+                        continue;
+                    };
+                    let record = |part: &StaticPart| GeometryRecord {
                         triangles: part.triangles,
                         vertices: geometry.vertices,
                         instance: index,
                         kind: part.kind.index(),
                     };
-                    let mask = Seen::Always.mask(part.kind);
-                    let structure = Part::Static(&part.structure);
-                    place(structure, axis, instance.origin, mask, part.kind, record);
+                    let mask = |mask, part: &StaticPart| mask | Seen::Always.mask(part.kind);
+                    let mask = blas.parts.iter().fold(0, mask);
+                    let structure = Part::Static(&blas.structure);
+                    let of = &mut blas.parts.iter().map(record);
+                    place(structure, axis, instance.origin, mask, first.kind, of);
                 }
             }
         }
@@ -221,7 +232,7 @@ impl Accel {
                 instance.origin,
                 mask,
                 part.kind,
-                record,
+                &mut iter::once(record),
             );
         }
         for (index, slot) in self.parts.slots.iter().enumerate() {
@@ -236,7 +247,8 @@ impl Accel {
             };
             let mask = slot.seen.mask(slot.kind);
             let part = Part::Slot(index);
-            place(part, Mat3::IDENTITY, Vec3::ZERO, mask, slot.kind, record);
+            let of = &mut iter::once(record);
+            place(part, Mat3::IDENTITY, Vec3::ZERO, mask, slot.kind, of);
         }
         output.geometries = rec.arena().push(&records)?;
         if self.driver.is_some() {

@@ -18,14 +18,21 @@ use super::surroundings::Surroundings;
 use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
 use crate::world::Bounds;
 
+/// Triangles of one kind.
+pub struct StaticPart {
+    /// Their kind.
+    pub kind: Kind,
+    /// Device address of the `Triangle`s.
+    pub triangles: u64,
+}
+
 /// One bottom-level structure of the map.
 pub struct StaticBlas {
     /// BSP model.
     pub model: u32,
-    /// Kind of its triangles.
-    pub kind: Kind,
-    /// Device address of its `Triangle`s.
-    pub triangles: u64,
+    /// The geometries in it. All that stops rays of a model is in one structure of the driver's, because each that a ray
+    /// meets is a walk of its own; what is translucent is in another, and ours have one kind each.
+    pub parts: Vec<StaticPart>,
     /// The structure.
     pub structure: Structure,
 }
@@ -294,35 +301,41 @@ fn driver_structures(
         compact: true,
         ..BlasFlags::default()
     };
-    let mut parts = Vec::new();
+    let mut parts: BTreeMap<(u32, bool), (Vec<StaticPart>, Vec<BlasGeometry>)> = BTreeMap::new();
     for ((model, kind), group) in &grouped.groups {
-        let geometry = [BlasGeometry {
+        let translucent = *kind == Kind::Translucent;
+        let (members, geometries) = parts.entry((*model, translucent)).or_default();
+        members.push(StaticPart {
+            kind: *kind,
+            triangles: triangles.address() + (group.first * size_of::<Triangle>()) as u64,
+        });
+        geometries.push(BlasGeometry {
             vertex_address: position_buffer.address(),
             vertex_stride: size_of::<Vec3>() as u64,
             max_vertex: u32::try_from(scene.vertices.len().saturating_sub(1)).unwrap_or(u32::MAX),
             index_address: index_buffer.address() + (group.first * size_of::<[u32; 3]>()) as u64,
             triangle_count: u32::try_from(group.count).unwrap_or(u32::MAX),
             opaque: matches!(kind, Kind::Opaque | Kind::Sky),
-            no_duplicate_any_hit: *kind == Kind::Translucent,
-        }];
-        let blas = Blas::new(device, &format!("trace model {model} {kind:?}"), flags);
-        parts.push((*model, *kind, group.first, blas, geometry));
+            no_duplicate_any_hit: translucent,
+        });
     }
-    let mut builds: Vec<BlasBuild<'_>> = parts
-        .iter_mut()
-        .map(|(_, _, _, blas, geometries)| BlasBuild {
+    let blas = |(model, translucent)| {
+        let name = if translucent { "translucent" } else { "solid" };
+        Blas::new(device, &format!("trace model {model} {name}"), flags)
+    };
+    let mut structures: Vec<Blas> = parts.keys().copied().map(blas).collect();
+    let mut builds: Vec<BlasBuild<'_>> = (structures.iter_mut().zip(parts.values()))
+        .map(|(blas, (_, geometries))| BlasBuild {
             blas,
             geometries,
             refit: false,
         })
         .collect();
     device.build_static_blas(&mut builds)?;
-    Ok(parts
-        .into_iter()
-        .map(|(model, kind, first, blas, _)| StaticBlas {
+    Ok((parts.into_iter().zip(structures))
+        .map(|(((model, _), (parts, _)), blas)| StaticBlas {
             model,
-            kind,
-            triangles: triangles.address() + (first * size_of::<Triangle>()) as u64,
+            parts,
             structure: Structure::Driver(blas),
         })
         .collect())
@@ -357,8 +370,10 @@ fn own_structures(
         let storage = BufferUsage::STORAGE;
         structures.push(StaticBlas {
             model: *model,
-            kind: *kind,
-            triangles: triangles.address() + (group.first * size_of::<Triangle>()) as u64,
+            parts: vec![StaticPart {
+                kind: *kind,
+                triangles: triangles.address() + (group.first * size_of::<Triangle>()) as u64,
+            }],
             structure: Structure::Own(OwnStructure {
                 nodes: Buffer::with_data(device, "trace nodes", storage, &hierarchy.nodes)?,
                 triangles: Buffer::with_data(device, "trace leafs", storage, &hierarchy.triangles)?,
