@@ -202,16 +202,19 @@ fn passes_drawn_together_look_as_one_after_the_other() {
     for (a, b) in expected.rgb.iter().zip(&picture.rgb) {
         steps[usize::from(a.abs_diff(*b))] += 1;
     }
-    // drivers in software blend in steps of 255, as the shader does; GPUs round once for each pass
-    let [same, one, two, more @ ..] = steps;
     let all = picture.rgb.len();
-    println!("{many} draws, {few} together; of {all} values {one} a step off, {two} two");
-    let allowed = match renderer.device_info().software {
-        true => all / 1000,
-        false => all / 2,
+    println!(
+        "{many} draws, {few} together; of {all} values {:?} off",
+        &steps[..8]
+    );
+    // Drivers in software blend in steps of 255, as the shader does. GPUs round once for each pass: a source and two
+    // products that are rounded before make two steps at most, in each of three passes.
+    let (most, differing) = match renderer.device_info().software {
+        true => (1, all / 1000),
+        false => (6, all),
     };
-    assert_eq!(more.iter().sum::<usize>(), 0, "{steps:?}");
-    assert!(one + two <= allowed, "{same} {one} {two}");
+    assert_eq!(steps[most + 1..].iter().sum::<usize>(), 0, "{steps:?}");
+    assert!(all - steps[0] <= differing, "{steps:?}");
     let messages = renderer.validation_messages();
     assert!(messages.is_empty(), "validation: {messages:#?}");
 }
