@@ -73,13 +73,14 @@ vec4 last_bicubic(vec2 place, vec2 size) {
 
 // Whether the traced pixels around a place showed something at that distance in the last frame: within their range, because
 // a floor seen aslant has many distances. They are taken from a pixel around, because the samples of an edge's pixels
-// meet one side in one frame and the other in the next.
+// meet one side in one frame and the other in the next. Where pixels show a reflection and what lies behind it in turns,
+// those beside it show the other one, and the way may be theirs.
 bool was_seen(vec2 place, float path) {
+    const vec2 around[5] = vec2[](vec2(0.0), vec2(0.99, 0.0), vec2(-0.99, 0.0), vec2(0.0, 0.99), vec2(0.0, -0.99));
     ivec2 last = ivec2(VIEW.width, VIEW.height) - 1;
     float least = 1.0e30, most = 0.0;
-    for (int i = 0; i < 4; i++) {
-        vec2 beside = vec2((i & 1) * 2 - 1, (i >> 1) * 2 - 1) * 0.99;
-        float then = last_path_read(clamp(ivec2(floor(place + beside)), ivec2(0), last));
+    for (int i = 0; i < 5; i++) {
+        float then = last_path_read(clamp(ivec2(floor(place + around[i])), ivec2(0), last));
         least = min(least, then);
         most = max(most, then);
     }

@@ -2,7 +2,7 @@
 // Puts light and surface together: what is in front + albedo * light. In reference mode it joins the running mean of the
 // frames since anything changed. Where a reflection and what lies behind it are seen in one place, pixels show either in
 // turns, like the fields of a chessboard: there a pixel is the mean of what it shows and of what it would show of the
-// other field, whose surface it knows and whose light is that of its neighbours.
+// other field: that surface and what is in front of it it knows, its light is that of its neighbours.
 #include "trace/denoise.glsl"
 #include "trace/motion.glsl"
 
@@ -55,13 +55,15 @@ vec3 lit_fog(ivec2 pixel) {
     return max_component(weight) > 0.0 ? weight * light_in_fog(pixel) : vec3(0.0);
 }
 
-// What the pixels of the other field around a pixel show, as it would be seen at the pixel. Their light and what glows
-// is the mean of them; what the light falls on is known for the pixel itself, so that textures are as sharp as anywhere.
+// What the pixels of the other field around a pixel show, as it would be seen at the pixel. Their light is the mean of
+// them; what it falls on, and what glows, is known for the pixel itself, so that textures are as sharp as anywhere.
 // False: there are none.
 bool other_side(ivec2 pixel, float field, out vec3 other, out vec3 whole) {
     const ivec2 beside[4] = ivec2[](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1));
-    vec3 albedo = light_read(VIEW.image_other, pixel);
-    bool is_lit = max_component(albedo) > 0.0;
+    GBufferPixel own;
+    shown_read(VIEW.image_other, pixel, own);
+    own.front *= exp2(-VIEW.exposure_base);
+    bool is_lit = max_component(own.albedo) > 0.0;
     // to the sides, above and below: of those that show a surface where one is to be shown, and of all
     vec3 sums[2] = vec3[](vec3(0.0), vec3(0.0)), all_sum = vec3(0.0);
     float counts[2] = float[](0.0, 0.0), contrast[2] = float[](0.0, 0.0), any_count = 0.0, whole_count = 0.0;
@@ -72,17 +74,17 @@ bool other_side(ivec2 pixel, float field, out vec3 other, out vec3 whole) {
         float other_field = mark_field(mark_read(at));
         if (other_field == field) continue;
         Shown s = shown(at);
-        s.front += lit_fog(at);
+        vec3 fog = lit_fog(at);
+        vec3 seen = radiance_of(s) + fog;
         if (other_field == 0.0) {
-            whole += radiance_of(s);
+            whole += seen;
             whole_count += 1.0;
             continue;
         }
-        all_sum += radiance_of(s);
+        all_sum += seen;
         any_count += 1.0;
         if (s.is_lit != is_lit) continue;
-        s.albedo = albedo;
-        vec3 value = radiance_of(s);
+        vec3 value = own.albedo * s.light + own.front + fog;
         sums[i >> 1] += value;
         counts[i >> 1] += 1.0;
         contrast[i >> 1] += (i & 1) == 0 ? luminance(value) : -luminance(value);
@@ -92,7 +94,7 @@ bool other_side(ivec2 pixel, float field, out vec3 other, out vec3 whole) {
     other = vec3(0.0);
     if (any_count == 0.0) return false;
     if (counts[0] + counts[1] == 0.0) {
-        other = all_sum / any_count;
+        other = is_lit ? all_sum / any_count : own.front;
         return true;
     }
     // along an edge rather than across it, so that a line is not seen in every other pixel alone

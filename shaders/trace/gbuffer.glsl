@@ -30,11 +30,22 @@ vec3 unpack_normal(uint packed) {
     return normalize(n);
 }
 
+// Albedo and what is in front; `dither`: see pack_light.
+void shown_write(uint image, ivec2 pixel, GBufferPixel g, vec2 dither) {
+    imageStore(uimages_rg32ui[image], pixel, uvec4(pack_light(g.albedo, dither.x), pack_light(g.front, dither.y), 0, 0));
+}
+
+void shown_read(uint image, ivec2 pixel, inout GBufferPixel g) {
+    uvec2 shown = imageLoad(uimages_rg32ui[image], pixel).xy;
+    g.albedo = unpack_light(shown.x);
+    g.front = unpack_light(shown.y);
+}
+
 // `dither`: see pack_light.
 void gbuffer_write(ivec2 pixel, GBufferPixel g, vec2 dither) {
     imageStore(images_rgba32f[VIEW.image_position], pixel, vec4(g.position, g.path));
     imageStore(uimages_rg32ui[VIEW.image_surface], pixel, uvec4(pack_normal(g.face_normal), pack_normal(g.normal), 0, 0));
-    imageStore(uimages_rg32ui[VIEW.image_shown], pixel, uvec4(pack_light(g.albedo, dither.x), pack_light(g.front, dither.y), 0, 0));
+    shown_write(VIEW.image_shown, pixel, g, dither);
 }
 
 GBufferPixel gbuffer_read(ivec2 pixel) {
@@ -45,9 +56,7 @@ GBufferPixel gbuffer_read(ivec2 pixel) {
     g.path = position.w;
     g.face_normal = unpack_normal(surface.x);
     g.normal = unpack_normal(surface.y);
-    uvec2 shown = imageLoad(uimages_rg32ui[VIEW.image_shown], pixel).xy;
-    g.albedo = unpack_light(shown.x);
-    g.front = unpack_light(shown.y);
+    shown_read(VIEW.image_shown, pixel, g);
     return g;
 }
 

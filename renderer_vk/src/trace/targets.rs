@@ -39,7 +39,7 @@ pub struct Targets {
     /// Albedo, with all that lies between the eye and the surface, and the radiance of what is in front of the surface and
     /// of its own glow; packed as in `light_image.glsl`.
     pub shown: Image,
-    /// Where pixels show what a surface reflects and what lies behind it in turns: the albedo of that which the pixel
+    /// Where pixels show what a surface reflects and what lies behind it in turns: as `shown`, of that which the pixel
     /// does not show.
     pub other: Image,
     /// Where the surface was in the last frame and how far away, see [`super::motion`], and the mark of the pixel.
@@ -75,7 +75,7 @@ impl Targets {
             position: make("trace position", Format::Rgba32F)?,
             surface: make("trace surface", Format::Rg32Uint)?,
             shown: make("trace shown", Format::Rg32Uint)?,
-            other: make("trace other", Format::R32Uint)?,
+            other: make("trace other", Format::Rg32Uint)?,
             motion: make("trace motion", Format::Rgba16F)?,
             path: [
                 make("trace path", Format::R16F)?,

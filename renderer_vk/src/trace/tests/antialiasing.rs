@@ -2,8 +2,9 @@
 
 use glam::{Mat3, Vec3};
 use relight::compare::{Rgb8, compare};
-use shaders::types::constants as c;
+use shaders::types::{Stage, constants as c};
 
+use super::dielectrics::square;
 use super::harness::{Gpu, Scene, identity, rectangle, reference, stage};
 use crate::settings::Settings;
 use crate::trace::input::Tracer;
@@ -82,6 +83,7 @@ fn temporal_antialiasing() {
     what_glows_and_moves_is_as_bright_as_it_is(&mut gpu);
     a_smaller_traced_picture_comes_to_the_full_one(&mut gpu);
     the_lens_blurs_by_its_circle_of_confusion(&mut gpu);
+    both_sides_of_a_reflection_come_to_rest(&mut gpu);
 }
 
 fn at_rest_it_comes_to_the_mean_of_many_samples(gpu: &mut Gpu) {
@@ -99,6 +101,37 @@ fn at_rest_it_comes_to_the_mean_of_many_samples(gpu: &mut Gpu) {
     let flicker = error(&settled, &next);
     println!("from frame to frame: {flicker}");
     assert!(flicker < 0.15 * raw, "{flicker} {raw}");
+}
+
+/// What a shiny floor reflects is far behind it, so its pixels are by turns of a short and of a long way.
+fn both_sides_of_a_reflection_come_to_rest(gpu: &mut Gpu) {
+    let mut scene = checkerboard();
+    let around = square(gpu, 1, &[128, 128, 128, 255]);
+    scene.images.push(around.texture_index());
+    let shine = Stage {
+        flags: c::STAGE_REFLECTION,
+        tc_gen: c::TCGEN_ENVIRONMENT,
+        blend_src: c::BLEND_ONE,
+        blend_dst: c::BLEND_ONE,
+        ..stage::image(0)
+    };
+    for i in 0..8 {
+        let grey = [0.1, 0.9][i % 2];
+        let shiny = scene.material(&[stage::constant([grey; 3]), shine], 0);
+        let corner = Vec3::new(-120.0 + i as f32 * 28.0, -150.0, 1.0);
+        scene.quad(rectangle(corner, Vec3::X * 28.0, Vec3::Y * 300.0), shiny);
+    }
+    let (_, truth) = gpu.render(&scene, &reference(), 512);
+    let (_, jagged) = gpu.render(&scene, &plain(), 1);
+    let (_, settled) = gpu.render(&scene, &live(), 64);
+    let (_, next) = gpu.render(&scene, &live(), 65);
+    let [raw, now] = [&jagged, &settled].map(|p| error(p, &truth));
+    let flicker = error(&settled, &next);
+    println!(
+        "a shiny floor at rest: error {raw} without, {now} with; from frame to frame {flicker}"
+    );
+    assert!(now < 0.4 * raw, "{now} {raw}");
+    assert!(flicker < 0.25 * raw, "{flicker} {raw}");
 }
 
 fn in_motion_it_stays_sharp(gpu: &mut Gpu) {

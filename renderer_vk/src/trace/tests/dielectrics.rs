@@ -203,7 +203,7 @@ fn ripples_keep_the_light_that_a_surface_sends_on_with(gpu: &mut Gpu) {
 }
 
 /// A square picture of RGBA8 texels.
-fn square(gpu: &Gpu, side: u32, texels: &[u8]) -> Image {
+pub(super) fn square(gpu: &Gpu, side: u32, texels: &[u8]) -> Image {
     let desc = ImageDesc::new("square", side, side, Format::Rgba8, ImageUsage::SAMPLED);
     let image = Image::new(&gpu.device, &desc).expect("image");
     gpu.device
@@ -262,34 +262,43 @@ fn the_texture_of_what_shines_is_seen_in_every_pixel_with(gpu: &mut Gpu) {
         .collect();
     let around = square(gpu, 1, &[128, 128, 128, 255]);
     let texture = square(gpu, 32, &texels);
-    let body = Stage {
+    let images = vec![around.texture_index(), texture.texture_index()];
+    let lit = Stage {
         blend_src: c::BLEND_DST_COLOR,
         blend_dst: c::BLEND_ZERO,
         ..stage::image(1)
     };
-    let shine = Stage {
-        flags: c::STAGE_REFLECTION,
-        tc_gen: c::TCGEN_ENVIRONMENT,
-        blend_src: c::BLEND_ONE,
-        blend_dst: c::BLEND_ONE,
-        ..stage::image(0)
-    };
-    let mut scene = Scene::new(Vec3::Z * 60.0, Vec3::new(0.1, 0.0, 0.0), 50.0, SIDE as i32);
-    scene.ambient = Vec3::splat(0.7);
-    scene.images = vec![around.texture_index(), texture.texture_index()];
-    let ceiling = scene.material(&[stage::constant([encode(ABOVE); 3])], 0);
-    scene.quad(level(300.0, false), ceiling);
-    let floor = scene.material(&[stage::light(), body, shine], 0);
-    let (x, y) = (Vec3::X * 64.0, Vec3::Y * 64.0);
-    scene.quad(rectangle(Vec3::new(-32.0, -32.0, 0.0), x, y), floor);
-    let (truth, _) = gpu.render(&scene, &middles(), 2);
+    // what is lit, and what glows by itself
+    for body in [&[stage::light(), lit][..], &[stage::image(1)]] {
+        let mut stages = body.to_vec();
+        stages.push(Stage {
+            flags: c::STAGE_REFLECTION,
+            tc_gen: c::TCGEN_ENVIRONMENT,
+            blend_src: c::BLEND_ONE,
+            blend_dst: c::BLEND_ONE,
+            ..stage::image(0)
+        });
+        let mut scene = Scene::new(Vec3::Z * 60.0, Vec3::new(0.1, 0.0, 0.0), 50.0, SIDE as i32);
+        scene.ambient = Vec3::splat(0.7);
+        scene.images.clone_from(&images);
+        let ceiling = scene.material(&[stage::constant([encode(ABOVE); 3])], 0);
+        scene.quad(level(300.0, false), ceiling);
+        let floor = scene.material(&stages, 0);
+        let (x, y) = (Vec3::X * 64.0, Vec3::Y * 64.0);
+        scene.quad(rectangle(Vec3::new(-32.0, -32.0, 0.0), x, y), floor);
+        is_seen_in_every_pixel(gpu, &scene);
+    }
+}
+
+fn is_seen_in_every_pixel(gpu: &mut Gpu, scene: &Scene) {
+    let (truth, _) = gpu.render(scene, &middles(), 2);
     let live = Settings {
         rt_accumulate: false,
         rt_denoiser: 0,
         rt_taa: false,
         ..middles()
     };
-    let (pixels, _) = gpu.render(&scene, &live, 1);
+    let (pixels, _) = gpu.render(scene, &live, 1);
     let mean = truth.iter().map(|p| p.x).sum::<f32>() / truth.len() as f32;
     let deviation = truth.iter().map(|p| (p.x - mean).abs()).sum::<f32>() / truth.len() as f32;
     assert!(deviation > 0.1 * mean, "a test of nothing: {deviation}");
