@@ -74,13 +74,14 @@ vec4 last_bicubic(vec2 place, vec2 size) {
 // Whether the traced pixels around a place showed something at that distance in the last frame: within their range, because
 // a floor seen aslant has many distances. They are taken from a pixel around, because the samples of an edge's pixels
 // meet one side in one frame and the other in the next. Where pixels show a reflection and what lies behind it in turns,
-// those beside it show the other one, and the way may be theirs.
-bool was_seen(vec2 place, float path) {
-    const vec2 around[5] = vec2[](vec2(0.0), vec2(0.99, 0.0), vec2(-0.99, 0.0), vec2(0.0, 0.99), vec2(0.0, -0.99));
+// those at the corners show the same as the pixel, and those beside it the other one, whose way it may be. These count at
+// rest alone: what ripples bend has no motion of its own, and in motion its history would smear it.
+bool was_seen(vec2 place, float path, bool rests) {
+    const vec2 around[8] = vec2[](vec2(1, 1), vec2(-1, 1), vec2(1, -1), vec2(-1, -1), vec2(1, 0), vec2(-1, 0), vec2(0, 1), vec2(0, -1));
     ivec2 last = ivec2(VIEW.width, VIEW.height) - 1;
     float least = 1.0e30, most = 0.0;
-    for (int i = 0; i < 5; i++) {
-        float then = last_path_read(clamp(ivec2(floor(place + around[i])), ivec2(0), last));
+    for (int i = 0; i < (rests ? 8 : 4); i++) {
+        float then = last_path_read(clamp(ivec2(floor(place + 0.99 * around[i])), ivec2(0), last));
         least = min(least, then);
         most = max(most, then);
     }
@@ -147,7 +148,7 @@ void main() {
     bool known = VIEW.antialias.history != 0 && motion.last_path >= 0.0
         && all(greaterThanEqual(last_place, vec2(0.0))) && all(lessThan(last_place, vec2(output_size)));
     bool rests = motion.offset == vec2(0.0);
-    if (known && was_seen(last_place * ratio, motion.last_path)) {
+    if (known && was_seen(last_place * ratio, motion.last_path, rests)) {
         vec4 history = last_bicubic(last_place, vec2(output_size));
         old = to_ycocg(compress(history.rgb, exposure));
         float range = rests ? REST_RANGE : MOVING_RANGE;
