@@ -15,7 +15,7 @@ struct Chosen {
 // `dither`: see pack_light.
 void chosen_write(ivec2 pixel, LightSample s, float dither, uint suns) {
     ChosenTexels(VIEW.texels).at[place_of(pixel)] =
-        uvec4(pack_normal(s.direction), floatBitsToUint(s.distance), pack_light(s.light, dither), suns);
+        uvec4(pack_normal(s.direction), floatBitsToUint(s.distance), pack_light(sound_light(s.light), dither), suns);
 }
 
 Chosen chosen_read(ivec2 pixel) {

@@ -27,9 +27,13 @@ vec3 unpack_light(uint packed) {
 vec3 light_read(uint image, ivec2 pixel) { return unpack_light(imageLoad(uimages_r32ui[image], pixel).x); }
 
 // What is no number, or none that light can be, is left out: filters and history would spread it over the picture.
-void light_write(uint image, ivec2 pixel, vec3 light, float dither) {
+vec3 sound_light(vec3 light) {
     const float MOST = 1.0e30;
-    if (!all(lessThan(abs(light), vec3(MOST)))) light = vec3(0.0);
+    return all(lessThan(abs(light), vec3(MOST))) ? light : vec3(0.0);
+}
+
+void light_write(uint image, ivec2 pixel, vec3 light, float dither) {
+    light = sound_light(light);
     imageStore(uimages_r32ui[image], pixel, uvec4(pack_light(light, dither)));
 }
 
