@@ -4,9 +4,10 @@
 //! Changing the pipeline is what a call costs most, with software drivers above all. So where the picture cannot tell,
 //! calls of the same state are brought together. Surfaces whose first stage covers all behind them
 //! ([`depth_first::covers`]) end up one in each pixel, whatever the order: of neighbouring groups of one such material
-//! every draw's stages ([`passes`]) are drawn for all of them before the next ones, and the lights and the fog of all such groups are put off
-//! until something else is drawn. They pass the depth test only on the surface that is in sight. For the same reason
-//! entities are drawn before the map where they are between such surfaces: what they hide is not textured.
+//! every draw's stages ([`passes`]) are drawn for all of them before the next ones, and the lights and the fog of all
+//! such groups are put off until something else is drawn. They pass the depth test only on the surface that is in sight.
+//! For the same reason entities are drawn before the map where they are between such surfaces: what they hide is not
+//! textured.
 
 use shaders::types::constants as c;
 use shaders::types::{Draw, Instance};

@@ -174,8 +174,8 @@ impl Primary {
 
 ray_pass!(
     /// Follows those paths of the eye that were split between a reflection and what lies behind it once more, to the side
-    /// that the pixel does not show: writes its albedo and what is in front of it (`other`). Reads the marks of `motion` besides what the eye's
-    /// paths read.
+    /// that the pixel does not show: writes its albedo and what is in front of it (`other`). Reads the marks of `motion`
+    /// besides what the eye's paths read.
     OtherSide, "trace_other_side", TRACE_PRIMARY_RGEN,
     TRACE_PRIMARY_RGEN_COMPUTE, TRACE_PRIMARY_RGEN_QUERY,
     // OTHER_FIELD in primary.rgen
