@@ -20,10 +20,11 @@ const vec2 LUMINANCE_SIGMA = vec2(4.0, 6.0);
 const float LOG2_E = 1.44269504;
 
 // The exponents to which normals of guides go with the square of their differences: of normals of unit length those of
-// about the 64th power of their cosine; of each component, whose bits are where they are in the guide.
+// about the 64th power of their cosine; of each component, whose bits are where they are in the guide. That of z has the
+// bit of reflections above it, by which one differs from all that is none.
 const float NORMAL_SCALE = 0.4528; // root of 32 log2(e) / 15^2
 const vec3 COMPONENT_SCALE = NORMAL_SCALE / vec3(1.0, 32.0, 1024.0);
-const uvec3 COMPONENTS = uvec3(31u, 31u << 5, 31u << 10);
+const uvec3 COMPONENTS = uvec3(31u, 31u << 5, 63u << 10);
 
 // The components as they stand in the guide, times one, 32 and 1024.
 vec3 components(uint guide) { return uintBitsToFloat(0x4B000000u | guide & COMPONENTS); }

@@ -30,7 +30,7 @@ void main() {
     ivec2 middle = min(first + 1, ivec2(VIEW.width, VIEW.height) - 1);
     float path = imageLoad(images_rgba32f[VIEW.image_position], middle).w;
     uint guide = 0;
-    if (path >= 0.0) guide = pack_guide(depth_of(middle, path), unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], middle).x));
+    if (path >= 0.0) guide = pack_guide(depth_of(middle, path), unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], middle).x), false);
     imageStore(uimages_r32ui[DENOISE.stratum_guide], stratum, uvec4(guide));
 
     float nearest = REACH;

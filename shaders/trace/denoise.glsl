@@ -34,16 +34,20 @@ float dither(ivec2 pixel, uint stream) {
 }
 
 // The guide of a pixel in 32 bits: above the inverse of its depth as half float, which is linear on a plane and exact to
-// 0.05 %; below a normal of 3 x 5 bits, which are compared as they are. 0: nothing to light.
+// 0.05 %; below a normal of 3 x 5 bits, which are compared as they are, under a bit that is set where the pixel shows a
+// reflection that takes turns with what lies behind it: the two may be walls side by side, and lit otherwise. It is the
+// highest bit of the normal's z, so that to compare normals is to compare it, too. 0: nothing to light.
 const float NEAREST_DEPTH = 1.0e-3, FARTHEST_DEPTH = 60000.0;
 // Keeps inverses of all depths within the normal numbers of halfs.
 const float INVERSE_SCALE = 32.0;
 
 uint pack_depth(float depth) { return packHalf2x16(vec2(INVERSE_SCALE / clamp(depth, NEAREST_DEPTH, FARTHEST_DEPTH), 0.0)); }
 
-uint pack_guide(float depth, vec3 normal) {
+const uint REFLECTION_BIT = 1u << 15;
+
+uint pack_guide(float depth, vec3 normal, bool reflection) {
     uvec3 n = uvec3(round(clamp(normal, -1.0, 1.0) * 15.0) + 16.0);
-    return pack_depth(depth) << 16 | n.z << 10 | n.y << 5 | n.x;
+    return pack_depth(depth) << 16 | (reflection ? REFLECTION_BIT : 0u) | n.z << 10 | n.y << 5 | n.x;
 }
 
 // A small whole number as float: its bits in the mantissa of 2^23, several times faster than a conversion.

@@ -2,6 +2,7 @@
 // Bounced light of the pixels that it was not gathered for: the mean of the gathered ones around that lie on the same
 // surface, the nearer the more. Bounced light changes slowly over a surface, and the denoiser smooths it over far more
 // than a pixel.
+#include "trace/motion.glsl"
 #include "trace/sparse.glsl"
 
 const int TILE = 8, WIDE = TILE + 2;
@@ -37,6 +38,9 @@ void main() {
         if (position.w >= 0.0) {
             vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).x);
             float tolerance = 0.1 + 6.0 * position.w * VIEW.pixel_spread;
+            // those of the other field show another surface, so a field's own lie farther apart
+            bool takes_turns = mark_field(mark_read(pixel)) > 0.0;
+            float reach = takes_turns ? 7.5 : 3.0;
             // where no neighbour fits, as on a wire, what is around is better than black
             vec3 any_light = vec3(0.0);
             float weight = 0.0, any_weight = 0.0;
@@ -46,11 +50,12 @@ void main() {
                 if (other.w < 0.0) continue;
                 uvec3 tap = gathered[at];
                 vec2 off = vec2(pixel - ivec2(tap.x & 0xFFFFu, tap.x >> 16));
-                float near = max(3.0 - 0.75 * dot(off, off), 0.0);
+                float near = max(reach - 0.75 * dot(off, off), 0.0);
                 if (near == 0.0) continue;
                 vec3 found = unpack_light(tap.y);
                 any_light += found * near;
                 any_weight += near;
+                if (takes_turns && (int(off.x + off.y) & 1) != 0) continue;
                 if (dot(normal, unpack_normal(tap.z)) < 0.9 || abs(dot(other.xyz - position.xyz, normal)) > tolerance) continue;
                 light += found * near;
                 weight += near;

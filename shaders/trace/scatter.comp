@@ -38,7 +38,7 @@ void main() {
         ivec2 tap = pixel + ivec2(offset);
         if (!inside(tap)) continue;
         SparseTexel other = sparse_read(push.source, tap);
-        if (other.guide == 0) continue;
+        if (other.guide == 0 || ((other.guide ^ middle.guide) & REFLECTION_BIT) != 0) continue;
         float off_plane = abs((1.0 + dot(slope, offset)) * sparse_depth(other.guide) / depth - 1.0);
         float alike = max(dot(normal, sparse_normal(other.guide)), 0.0);
         alike *= alike; alike *= alike; alike *= alike;

@@ -1,5 +1,5 @@
-// The cheap filter's texel: 8 bytes with the light, which is not told apart here, depth, a normal of 2 x 6 bits and the
-// number of frames, up to 15.
+// The cheap filter's texel: 8 bytes with the light, which is not told apart here, depth, the bit of reflections where the
+// depth has its sign, a normal of 2 x 6 bits and the number of frames, up to 15.
 #ifndef RELIGHT_TRACE_SCATTER_GLSL
 #define RELIGHT_TRACE_SCATTER_GLSL
 
@@ -12,12 +12,12 @@ struct SparseTexel {
 
 const uint SPARSE_FRAMES = 15;
 
-uint pack_sparse_guide(float depth, vec3 normal, uint frames) {
+uint pack_sparse_guide(float depth, vec3 normal, bool reflection, uint frames) {
     uvec2 n = uvec2(round((unpackSnorm2x16(pack_normal(normal)) * 0.5 + 0.5) * 63.0));
-    return pack_depth(depth) | n.x << 16 | n.y << 22 | min(frames, SPARSE_FRAMES) << 28;
+    return pack_depth(depth) | (reflection ? REFLECTION_BIT : 0u) | n.x << 16 | n.y << 22 | min(frames, SPARSE_FRAMES) << 28;
 }
 
-float sparse_depth(uint guide) { return unpack_depth(guide & 0xFFFFu); }
+float sparse_depth(uint guide) { return unpack_depth(guide & 0x7FFFu); }
 vec3 sparse_normal(uint guide) {
     return unpack_normal(packSnorm2x16(vec2(guide >> 16 & 63u, guide >> 22 & 63u) * (2.0 / 63.0) - 1.0));
 }

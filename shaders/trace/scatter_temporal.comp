@@ -16,7 +16,9 @@ void main() {
         return;
     }
     vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).y);
-    vec2 slope = slope_at(depth);
+    float field = mark_field(mark_read(pixel));
+    uint reflection = field == 2.0 ? REFLECTION_BIT : 0u;
+    vec2 slope = slope_at(depth, field > 0.0);
     SparseTexel texel;
     texel.light = light_read(VIEW.image_direct, pixel) + light_read(VIEW.image_indirect, pixel);
 
@@ -31,7 +33,7 @@ void main() {
             float weight = (offset.x == 1 ? part.x : 1.0 - part.x) * (offset.y == 1 ? part.y : 1.0 - part.y);
             if (weight < 1.0e-3 || !inside(tap)) continue;
             SparseTexel other = sparse_read(DENOISE.history, tap);
-            if (other.guide == 0 || abs(sparse_depth(other.guide) - before.depth) > tolerance
+            if (other.guide == 0 || (other.guide & REFLECTION_BIT) != reflection || abs(sparse_depth(other.guide) - before.depth) > tolerance
                 || dot(sparse_normal(other.guide), normal) < 0.8) continue;
             old += other.light * weight;
             frames += sparse_frames(other.guide) * weight;
@@ -45,7 +47,7 @@ void main() {
         frames = 0.0;
     }
     float random = dither(pixel, 0);
-    texel.guide = pack_sparse_guide(depth, normal, uint(frames + 1.0 + random));
+    texel.guide = pack_sparse_guide(depth, normal, reflection != 0u, uint(frames + 1.0 + random));
     sparse_write(DENOISE.fresh, pixel, texel, dither(pixel, 1));
     imageStore(images_rg16f[DENOISE.slope], pixel, vec4(slope, 0.0, 0.0));
 }

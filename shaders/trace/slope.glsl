@@ -3,6 +3,7 @@
 #define RELIGHT_TRACE_SLOPE_GLSL
 
 #include "trace/denoise.glsl"
+#include "trace/motion.glsl"
 
 const int TILE = 8;
 layout(local_size_x = TILE, local_size_y = TILE) in;
@@ -31,14 +32,18 @@ float own_depth() { return depths[own_place()]; }
 float lesser(float a, float b) { return abs(a) < abs(b) ? a : b; }
 
 // By how much the inverse of depth grows from pixel to pixel, in parts of it. That of a plane is linear on the screen,
-// also of one that a flat mirror shows.
-vec2 slope_at(float depth) {
-    int place = own_place();
-    vec4 around = vec4(depths[place - 1], depths[place + 1], depths[place - TILE - 2], depths[place + TILE + 2]);
+// also of one that a flat mirror shows. `takes_turns`: the pixels beside it show another surface, and those at its corners
+// the same one.
+vec2 slope_at(float depth, bool takes_turns) {
+    const int ROW = TILE + 2;
+    int place = own_place(), first = takes_turns ? ROW + 1 : 1, second = takes_turns ? ROW - 1 : ROW;
+    vec4 around = vec4(depths[place - first], depths[place + first], depths[place - second], depths[place + second]);
     vec4 change = depth / max(around, 1.0e-3) - 1.0;
     change = mix(change, vec4(1.0e3), equal(around, vec4(0.0)));
     vec2 slope = vec2(lesser(-change.x, change.y), lesser(-change.z, change.w));
-    return mix(slope, vec2(0.0), greaterThanEqual(abs(slope), vec2(1.0)));
+    slope = mix(slope, vec2(0.0), greaterThanEqual(abs(slope), vec2(1.0)));
+    // from along the diagonals to along rows and columns
+    return takes_turns ? 0.5 * vec2(slope.x - slope.y, slope.x + slope.y) : slope;
 }
 
 #endif

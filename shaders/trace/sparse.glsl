@@ -8,19 +8,20 @@
 // Pixels to the edge of a cell.
 const int CELL = 2;
 
-// Where in a cell the pixel is whose turn it is.
-ivec2 turn() {
+// Where in a cell of a row of cells the pixel is whose turn it is.
+ivec2 turn(int row) {
     uint frame = VIEW.seed & 3u;
-    // across, then the other two, so that two frames make a chessboard
-    return ivec2(frame == 1u || frame == 2u, frame == 1u || frame == 3u);
+    // across, then the other two, so that two frames make a chessboard; shifted in every other row, so that each frame has
+    // pixels of both fields where a reflection and what lies behind it take turns
+    return ivec2((frame == 1u || frame == 2u) != ((row & 1) == 1), frame == 1u || frame == 3u);
 }
 
 // The pixel of a cell that is traced.
 ivec2 sparse_pixel(ivec2 cell) {
-    ivec2 end = ivec2(VIEW.width, VIEW.height) - 1, pixel = min(cell * CELL + turn(), end);
+    ivec2 end = ivec2(VIEW.width, VIEW.height) - 1, first = turn(cell.y), pixel = min(cell * CELL + first, end);
     if ((DENOISE.flags & DENOISE_GRADIENTS) == 0) return pixel;
     for (int i = 0; i < 4; i++) {
-        ivec2 other = min(cell * CELL + (turn() ^ ivec2(i & 1, i >> 1)), end);
+        ivec2 other = min(cell * CELL + (first ^ ivec2(i & 1, i >> 1)), end);
         if (is_carried(other)) return other;
     }
     return pixel;

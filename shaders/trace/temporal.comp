@@ -29,11 +29,12 @@ struct History {
     float weight;
 };
 
-void add_tap(inout History h, ivec2 tap, Before before, vec3 normal, float tolerance, float weight) {
+void add_tap(inout History h, ivec2 tap, Before before, uint guide, vec3 normal, float tolerance, float weight) {
     if (!inside(tap) || !(weight > 0.0)) return;
     uint place = place_of(tap);
     LightTexel light = unpack_texel(LightTexels(DENOISE.history).at[place]);
-    if (light.guide == 0 || abs(guide_depth(light.guide) - before.depth) > tolerance || dot(guide_normal(light.guide), normal) < 0.85) return;
+    if (light.guide == 0 || ((light.guide ^ guide) & REFLECTION_BIT) != 0) return;
+    if (abs(guide_depth(light.guide) - before.depth) > tolerance || dot(guide_normal(light.guide), normal) < 0.85) return;
     uint past = Pasts(DENOISE.last_past).at[place];
     h.direct += light.direct * weight;
     if (BOUNCES != 0) h.indirect += light.indirect * weight;
@@ -42,7 +43,7 @@ void add_tap(inout History h, ivec2 tap, Before before, vec3 normal, float toler
     h.weight += weight;
 }
 
-History history_at(ivec2 pixel, vec3 normal, vec2 slope) {
+History history_at(ivec2 pixel, uint guide, vec3 normal, vec2 slope) {
     History h = History(vec3(0.0), vec3(0.0), vec2(0.0), vec2(0.0), 0.0);
     if ((DENOISE.flags & DENOISE_HISTORY) == 0) return h;
     Before before = before_of(pixel);
@@ -54,7 +55,7 @@ History history_at(ivec2 pixel, vec3 normal, vec2 slope) {
         ivec2 offset = ivec2(i & 1, i >> 1);
         float weight = (offset.x == 1 ? part.x : 1.0 - part.x) * (offset.y == 1 ? part.y : 1.0 - part.y);
         // a place that is a rounding error off a pixel's middle is there
-        add_tap(h, ivec2(low) + offset, before, normal, tolerance, weight < 1.0e-3 ? 0.0 : weight);
+        add_tap(h, ivec2(low) + offset, before, guide, normal, tolerance, weight < 1.0e-3 ? 0.0 : weight);
     }
     if (h.weight < 0.01) return History(vec3(0.0), vec3(0.0), vec2(0.0), vec2(0.0), 0.0);
     float scale = 1.0 / h.weight;
@@ -62,12 +63,13 @@ History history_at(ivec2 pixel, vec3 normal, vec2 slope) {
 }
 
 // Variance of the luminance of this frame's light around a pixel.
-vec2 variance_around(ivec2 pixel, float depth, vec2 slope) {
+vec2 variance_around(ivec2 pixel, float depth, vec2 slope, bool takes_turns) {
     vec4 moments = vec4(0.0);
     float count = 0.0;
     for (int y = -AROUND.y; y <= AROUND.y; y += 2) {
         for (int x = -AROUND.x; x <= AROUND.x; x++) {
             ivec2 tap = pixel + ivec2(x, y);
+            if (takes_turns && ((x ^ y) & 1) != 0) continue;
             float other = depth_at(tap);
             if (other == 0.0 || abs(depth / other - 1.0 - dot(slope, vec2(x, y))) > 0.02) continue;
             vec2 l = vec2(luminance(light_read(VIEW.image_direct, tap)), BOUNCES != 0 ? luminance(light_read(VIEW.image_indirect, tap)) : 0.0);
@@ -86,15 +88,18 @@ bool is_kept(ivec2 pixel, ivec2 stratum, out bool again) {
     Carried c = Carried(false, false, 0, ivec2(0));
     if ((DENOISE.flags & DENOISE_GRADIENTS) != 0) c = carried_at(stratum);
     // one whose turn it is where bounced light is not gathered everywhere: in each direction there are one or two
-    ivec2 first = (turn() + stratum * STRATUM) & 1;
+    bool sparse = (VIEW.flags & VIEW_SPARSE_BOUNCE) != 0;
     int random = int(4.0 * dither(stratum, 3));
-    if ((VIEW.flags & VIEW_SPARSE_BOUNCE) == 0) first = ivec2(dither(stratum, 6) < 0.5, dither(stratum, 7) < 0.5);
-    ivec2 choice = first + 2 * ivec2(first.x == 0 && (random & 1) != 0, first.y == 0 && (random & 2) != 0);
+    ivec2 corner = stratum * STRATUM, first, choice;
+    first.y = sparse ? (turn(0).y + corner.y) & 1 : int(dither(stratum, 7) < 0.5);
+    choice.y = first.y + (first.y == 0 && (random & 2) != 0 ? 2 : 0);
+    first.x = sparse ? (turn((corner.y + choice.y) / CELL).x + corner.x) & 1 : int(dither(stratum, 6) < 0.5);
+    choice.x = first.x + (first.x == 0 && (random & 1) != 0 ? 2 : 0);
     int index = choice.y * STRATUM + choice.x;
     if (c.valid && c.index == index) {
         // another of the same turn, or any other
         if (first.x == 0) index += choice.x == 0 ? 2 : -2;
-        else if (first.y == 0) index += choice.y == 0 ? 2 * STRATUM : -2 * STRATUM;
+        else if (first.y == 0) index = (2 - choice.y) * STRATUM;
         else index = 0;
     }
     // at the right and the lower edge strata are cut off
@@ -120,17 +125,18 @@ void main() {
     }
     uvec2 surface = imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).xy;
     vec3 normal = unpack_normal(surface.y);
-    vec2 slope = slope_at(depth);
+    float field = mark_field(mark_read(pixel));
+    vec2 slope = slope_at(depth, field > 0.0);
 
     LightTexel light;
     light.direct = light_read(VIEW.image_direct, pixel);
     light.indirect = BOUNCES != 0 ? light_read(VIEW.image_indirect, pixel) : vec3(0.0);
-    light.guide = pack_guide(depth, normal);
+    light.guide = pack_guide(depth, normal, field == 2.0);
     vec2 value = vec2(luminance(light.direct), luminance(light.indirect));
 
     if (kept) keep_sample(stratum, pixel, imageLoad(images_rgba32f[VIEW.image_position], pixel), surface, is_gathered(pixel) ? value : vec2(value.x, -1.0));
 
-    History h = history_at(pixel, normal, slope);
+    History h = history_at(pixel, light.guide, normal, slope);
     vec2 frames = vec2(0.0), variance = vec2(0.0);
     if (h.weight > 0.0) {
         frames = h.frames;
@@ -157,7 +163,7 @@ void main() {
     }
     frames = min(frames + 1.0, 1.0 / MIN_WEIGHT);
     if (min(frames.x, frames.y) < TRUSTED_FRAMES) {
-        vec2 around = variance_around(pixel, depth, slope);
+        vec2 around = variance_around(pixel, depth, slope, field > 0.0);
         variance = mix(variance, max(variance, around), lessThan(frames, vec2(TRUSTED_FRAMES)));
     }
     // of the mean over the frames: what has settled is left as it is

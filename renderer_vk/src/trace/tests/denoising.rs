@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 use relight::light::PointLight;
+use shaders::types::{Dielectric, constants as c};
 
-use super::harness::{Gpu, Scene, identity, rectangle, reference};
+use super::harness::{Gpu, Scene, identity, rectangle, reference, stage};
 use crate::api::DynamicLight;
 use crate::scene::ViewScene;
 use crate::settings::Settings;
@@ -119,13 +120,7 @@ fn what_comes_into_sight_has_no_history_with(gpu: &mut Gpu) {
     // a wall slides over everything: what it shows must not come from what was there before
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, 32);
     let white = scene.diffuse(1.0);
-    let black = scene.material(
-        &[
-            super::harness::stage::light(),
-            super::harness::stage::filter([0.0; 3]),
-        ],
-        0,
-    );
+    let black = scene.material(&[stage::light(), stage::filter([0.0; 3])], 0);
     scene.ambient = Vec3::ONE;
     scene.quad(
         rectangle(
@@ -422,4 +417,65 @@ fn the_cheap_filter_comes_near_the_truth() {
     assert!((settled.0 - 1.0).abs() < 0.03, "{settled:?}");
     assert!(first.1 < 0.6 * raw.1, "{first:?} {raw:?}");
     assert!(settled.1 < 0.5 * raw.1, "{settled:?} {raw:?}");
+}
+
+/// A wall that stands in water, lit above it and dark below it: what the water mirrors and what lies in it are side by side
+/// in the picture, as far away and turned alike, and differ in their light alone.
+#[test]
+fn both_sides_of_water_keep_their_light() {
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    let mut scene = Scene::new(
+        Vec3::new(-60.0, 0.0, 40.0),
+        Vec3::new(100.0, 0.0, -20.0),
+        40.0,
+        64,
+    );
+    let grey = scene.diffuse(0.6);
+    let water = scene.material(
+        &[stage::filter([1.0; 3])],
+        c::MATERIAL_LIQUID | c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED,
+    );
+    // seen through, but lets no light of the lamps pass
+    scene.materials[water as usize].0.dielectric = Dielectric {
+        index: 1.33,
+        scale: 1.0,
+        filters: 1,
+        ..Dielectric::default()
+    };
+    scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), grey);
+    let surface = rectangle(
+        Vec3::new(-100.0, -100.0, 0.0),
+        Vec3::X * 200.0,
+        Vec3::Y * 200.0,
+    );
+    scene.quad(surface, water);
+    scene.filters.push([
+        Vec3::new(-100.0, -100.0, -1.0),
+        Vec3::new(100.0, 100.0, 1.0),
+    ]);
+    let lamp = Vec3::new(0.0, -30.0, 95.0);
+    scene.light(
+        [lamp, lamp + Vec3::Y * 60.0, lamp + Vec3::X * 60.0],
+        Vec3::splat(12.0),
+    );
+    // direct and bounced light each go their own way through the denoiser
+    for (bounces, denoiser) in [(0, 1), (1, 1), (0, 2)] {
+        let with = |settings: Settings| Settings {
+            rt_bounces: bounces,
+            ..settings
+        };
+        let filtered = Settings {
+            rt_denoiser: denoiser,
+            ..live()
+        };
+        let (truth, _) = gpu.render(&scene, &with(truth_settings()), 256);
+        let (settled, _) = gpu.render(&scene, &with(filtered), 32);
+        let water = 24 * 64..60 * 64;
+        let (mean, error) = compare(&settled[water.clone()], &truth[water]);
+        println!("water, {bounces} bounces, filter {denoiser}: mean {mean}, error {error}");
+        assert!((mean - 1.0).abs() < 0.04, "{bounces}, {denoiser}: {mean}");
+        assert!(error < 0.15, "{bounces}, {denoiser}: {error}");
+    }
 }
