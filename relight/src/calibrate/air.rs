@@ -49,8 +49,12 @@ pub(super) struct AirPoint {
     pub saturated: bool,
 }
 
-/// Lit points that lie in the open, in the order of the map's.
-pub(super) fn points(world: &RelitWorld, occluders: &Occluders) -> Vec<AirPoint> {
+/// Lit points that lie in the open where that is `wanted`, in the order of the map's.
+pub(super) fn points(
+    world: &RelitWorld,
+    occluders: &Occluders,
+    wanted: impl Fn(Vec3) -> bool,
+) -> Vec<AirPoint> {
     let Some(layout) = world.bsp.light_grid() else {
         return Vec::new();
     };
@@ -60,7 +64,9 @@ pub(super) fn points(world: &RelitWorld, occluders: &Occluders) -> Vec<AirPoint>
     let lit: Vec<usize> = (0..all.len())
         .filter(|&i| {
             let dark = |p: &q3bsp::GridPoint| p.ambient == [0; 3] || p.directed == [0; 3];
-            all.get(i).is_some_and(|p| !dark(p)) && world.bsp.cluster_at(place(i)) >= 0
+            all.get(i).is_some_and(|p| !dark(p))
+                && wanted(place(i))
+                && world.bsp.cluster_at(place(i)) >= 0
         })
         .collect();
     let mut random = Random::new(0xA1_0000);

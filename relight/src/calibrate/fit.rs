@@ -4,6 +4,7 @@ use super::air;
 use super::bounce::{Transfer, surfaces_of_triangles};
 use super::columns::Column;
 use super::crossings::Crossing;
+use super::nodes::Measured;
 use super::place::{self, Scene};
 use super::report::Agreement;
 use super::samples::{Sample, Site, light_of, mean};
@@ -53,6 +54,8 @@ pub(super) struct Fit<'a> {
     pub world: &'a RelitWorld,
     pub occluders: &'a Occluders,
     pub samples: Vec<Sample>,
+    /// Where texels, or what tells in their place, are measured.
+    pub measured: Measured,
     pub transfer: Transfer,
     /// Known sources first.
     pub columns: Vec<Column>,
@@ -159,6 +162,7 @@ impl Fit<'_> {
                 world: self.world,
                 occluders: self.occluders,
                 samples: &self.samples,
+                measured: &self.measured,
                 of_triangle: &of_triangle,
                 candidates,
                 linear,

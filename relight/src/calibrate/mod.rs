@@ -35,6 +35,7 @@ mod compiler;
 mod crossings;
 mod ends;
 mod fit;
+mod nodes;
 pub(crate) mod parallel;
 mod place;
 pub(crate) mod random;
@@ -64,11 +65,12 @@ use columns::{Lamp, Source};
 use compiler::Compiler;
 use fit::Fit;
 use glam::Vec3;
+use nodes::Measured;
 use samples::Taking;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 17;
+const VERSION: u32 = 18;
 
 /// One in so many candidates comes from the directions of the light grid.
 const CROSSINGS: usize = 5;
@@ -210,9 +212,10 @@ fn find(
     };
     let (mut samples, evidence) = samples::take(world, &occluders, &taking);
     let texels = samples.len();
+    let measured = Measured::new(&samples);
     let mut crossings = Vec::new();
     if thorough && evidence == Evidence::Lightmaps {
-        let points = air::points(world, &occluders);
+        let points = air::points(world, &occluders, |at| measured.holds(at));
         crossings = crossings::find(world, &points, &occluders, options.candidates / CROSSINGS);
         samples.extend(air::more_samples(world, &points, options));
     }
@@ -248,6 +251,7 @@ fn find(
         occluders: &occluders,
         ambient: fit::first_ambient(world, &samples),
         samples,
+        measured,
         transfer,
         columns,
         crossings,

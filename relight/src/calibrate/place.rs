@@ -9,6 +9,7 @@ use super::bvh::Occluders;
 use super::columns::{Column, Lamp, Source, point_rows, unshadowed};
 use super::crossings::Crossing;
 use super::ends::pieces_of;
+use super::nodes::Measured;
 use super::parallel;
 use super::samples::{self, Sample, mean};
 use super::solve::{Ambient, Effort, Residual, norm, residual, solve};
@@ -20,9 +21,6 @@ use std::f32::consts::PI;
 
 /// Least distance of a light from surfaces, id units: its ball must not reach into them.
 pub(super) const CLEARANCE: f32 = 8.0;
-
-/// Grid spacing to begin with, id units.
-const SPACING: f32 = 64.0;
 
 /// How far candidates are tried, id units. Lights that are kept reach as far as they are seen.
 const RANGE: f32 = 700.0;
@@ -74,6 +72,8 @@ pub(super) struct Scene<'a> {
     pub world: &'a RelitWorld,
     pub occluders: &'a Occluders,
     pub samples: &'a [Sample],
+    /// Where these are.
+    pub measured: &'a Measured,
     /// For every triangle, the surface that it is of.
     pub of_triangle: &'a [u32],
     /// Most candidates at a time.
@@ -181,45 +181,6 @@ impl Scene<'_> {
         !self.occluders.blocked(a, b, false)
     }
 
-    /// Nodes of a grid over open space: as fine as the number of candidates allows.
-    fn grid(&self) -> (Vec<Vec3>, f32) {
-        let mut mins = Vec3::INFINITY;
-        let mut maxs = Vec3::NEG_INFINITY;
-        for sample in self.samples {
-            mins = mins.min(sample.position);
-            maxs = maxs.max(sample.position);
-        }
-        let mut spacing = SPACING;
-        // Bounded work for maps of any size: a first guess from the volume, then what is open decides.
-        let volume = (maxs - mins).max(Vec3::splat(1.0));
-        let nodes = |s: f32| (volume / s + 1.0).element_product();
-        while nodes(spacing) > 60.0 * self.candidates as f32 {
-            spacing *= 1.1;
-        }
-        loop {
-            let counts = ((maxs - mins) / spacing).floor().max(Vec3::ZERO);
-            let origin = mins + ((maxs - mins) - counts * spacing) * 0.5;
-            let mut places = Vec::new();
-            for z in 0..=counts.z as u32 {
-                for y in 0..=counts.y as u32 {
-                    for x in 0..=counts.x as u32 {
-                        let at = origin + Vec3::new(x as f32, y as f32, z as f32) * spacing;
-                        if self.world.bsp.cluster_at(at) >= 0 {
-                            places.push(at);
-                        }
-                    }
-                }
-            }
-            if places.len() <= self.candidates {
-                places.retain(|&at| self.open(at));
-                return (places, spacing);
-            }
-            spacing *= (places.len() as f32 / self.candidates as f32)
-                .cbrt()
-                .max(1.03);
-        }
-    }
-
     /// Places in front of bright samples that are not explained, the worst first.
     fn in_front(&self, state: &Residual) -> Vec<Vec3> {
         let mut worst: Vec<(f32, usize)> = self
@@ -255,7 +216,8 @@ pub(super) fn over_space(
     fixed: usize,
     ambient: &mut Ambient,
 ) -> f32 {
-    let (mut nodes, spacing) = scene.grid();
+    let open = |at| scene.open(at);
+    let (mut nodes, spacing) = scene.measured.grid(scene.world, scene.candidates, open);
     nodes.extend(
         crossings
             .iter()

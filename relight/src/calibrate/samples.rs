@@ -5,7 +5,7 @@
 
 use super::air;
 use super::bvh::{CutOut, Occluders};
-use super::random::Random;
+use super::random::{self, Random};
 use super::said::Dirt;
 use super::texels::{self, Stored, corners, lit_by_texel};
 use super::vertices;
@@ -228,6 +228,8 @@ pub(super) struct Gauge<'a> {
     pub occluders: &'a Occluders,
     /// How corners were made darker.
     dirt: Option<Dirt>,
+    /// Seed of the choice of what is held out.
+    pub seed: u64,
 }
 
 /// How measurements are taken.
@@ -254,6 +256,7 @@ pub(super) fn take(
         world,
         occluders,
         dirt: taking.dirt,
+        seed: taking.seed,
     };
     let count = taking.count;
     let lightmaps = texels::take(&gauge, count, taking.few_black, &mut random);
@@ -272,11 +275,16 @@ pub(super) fn take(
     let lit = |s: &[Sample]| s.iter().any(|s| s.level() > 0.0 && !s.saturated);
     let vertices = vertices::take(&gauge, count, &mut random);
     if vertices.len() >= 16 && lit(&vertices) {
-        return (hold_out(vertices, &mut random), Evidence::Vertices);
+        return (hold_out(vertices, taking.seed), Evidence::Vertices);
     }
-    let grid = air::samples(world, &air::points(world, occluders), count, &mut random);
+    let grid = air::samples(
+        world,
+        &air::points(world, occluders, |_| true),
+        count,
+        &mut random,
+    );
     if grid.len() >= 16 && lit(&grid) {
-        return (hold_out(grid, &mut random), Evidence::Grid);
+        return (hold_out(grid, taking.seed), Evidence::Grid);
     }
     (Vec::new(), Evidence::Nothing)
 }
@@ -293,15 +301,18 @@ fn balance(samples: &mut [Sample]) {
     }
 }
 
-/// Keeps one of so many out of fitting.
-pub(super) fn hold_out(mut samples: Vec<Sample>, random: &mut Random) -> Vec<Sample> {
-    for group in samples.chunks_mut(HELD_OUT) {
-        let chosen = (random.next() * HELD_OUT as f32) as usize;
-        if let Some(sample) = group.get_mut(chosen) {
-            sample.held_out = true;
-        }
+/// Keeps one of so many out of fitting: at a place all of them or none.
+fn hold_out(mut samples: Vec<Sample>, seed: u64) -> Vec<Sample> {
+    for sample in &mut samples {
+        let place = sample.position.to_array().map(f32::to_bits);
+        sample.held_out = is_held_out(seed, &place);
     }
     samples
+}
+
+/// Whether what has this name is kept out of fitting.
+pub(super) fn is_held_out(seed: u64, name: &[u32]) -> bool {
+    random::lot(seed, name) * (HELD_OUT as f32) < 1.0
 }
 
 /// A measurement at a place, unless the place is outside of the map or inside of something.
@@ -364,8 +375,16 @@ pub(super) fn pick(len: usize, count: usize, random: &mut Random) -> impl Iterat
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+
+    /// A measurement of some light at a place.
+    pub fn sample_at_place(position: Vec3) -> Sample {
+        Sample {
+            position,
+            ..sample(0.5, 1.0)
+        }
+    }
 
     fn sample(value: f32, trust: f32) -> Sample {
         Sample {

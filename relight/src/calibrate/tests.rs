@@ -1,5 +1,6 @@
 mod ends;
 mod grid;
+mod held_out;
 mod known_truth;
 mod linear;
 mod said;

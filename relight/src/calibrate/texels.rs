@@ -1,10 +1,11 @@
 //! Texels of lightmaps as measurements: where in space they lie, and what they store.
 
 use super::random::Random;
-use super::samples::{Gauge, HELD_OUT, Sample, decode, hold_out, sample_at, shown, tells};
+use super::samples::{Gauge, HELD_OUT, Sample, decode, is_held_out, sample_at, shown, tells};
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
 use glam::{Vec2, Vec3};
 use q3bsp::Lightmap;
+use std::collections::HashSet;
 
 /// How far around a black texel others are black as well where no light falls, texels.
 const BLACK_AROUND: i32 = 2;
@@ -105,37 +106,43 @@ fn dark(rgb: [u8; 3]) -> bool {
     rgb.map(u32::from).iter().sum::<u32>() < 3
 }
 
-/// Texels of lightmaps, stratified by area. One of so many is held out, whatever it stores. `few_black`: of those that are
-/// fitted, fewer are black where most of the map is.
+/// Texels of lightmaps, stratified by area, each at most once. One of so many is held out: which ones is a matter of the texel
+/// and the seed alone, so that no other choice of measurements fits one of them. `few_black`: of those that are fitted, fewer
+/// are black where most of the map is.
 pub(super) fn take(
     gauge: &Gauge<'_>,
     count: usize,
     few_black: bool,
     random: &mut Random,
 ) -> Vec<Sample> {
-    let area = Area::new(gauge.world);
-    let black = if few_black { area.part_black() } else { 0.0 };
+    let mut shares = Shares::new(gauge.world, count);
+    let black = if few_black { shares.part_black() } else { 0.0 };
     let thinned = black > MOSTLY_BLACK;
-    let mut measured = 1.0;
     if thinned {
         let fitted = 1.0 - 1.0 / HELD_OUT as f32;
-        measured -= black * fitted * (1.0 - 1.0 / BLACK_THINNED);
+        let measured = 1.0 - black * fitted * (1.0 - 1.0 / BLACK_THINNED);
+        shares = Shares::new(gauge.world, (count as f32 / measured) as usize);
     }
-    let strata = (count as f32 / measured) as usize;
+    let strata = shares.total() as usize;
     let mut samples = Vec::with_capacity(strata);
+    let mut taken = HashSet::new();
     for stratum in 0..strata {
         for _ in 0..TRIES {
             let at = (stratum as f64 + f64::from(random.next())) / strata as f64;
-            let Some((place, material, stored)) = area.texel_at(at, random) else {
+            let Some(found) = shares.texel_at(at, random) else {
                 continue;
             };
-            if let Some(sample) = sample_at(gauge, place, material, stored) {
+            if !taken.insert(found.id) {
+                continue;
+            }
+            let sample = sample_at(gauge, found.place, found.material, found.stored);
+            if let Some(mut sample) = sample {
+                sample.held_out = is_held_out(gauge.seed, &found.id);
                 samples.push(sample);
                 break;
             }
         }
     }
-    let mut samples = hold_out(samples, random);
     if thinned {
         let dark = |s: &Sample| s.value == Vec3::ZERO;
         samples.retain(|s| s.held_out || !dark(s) || random.next() * BLACK_THINNED < 1.0);
@@ -143,44 +150,77 @@ pub(super) fn take(
     samples
 }
 
-/// Triangles whose texels tell of light, by area.
-struct Area<'a> {
+/// Page, column and row of a texel.
+type TexelId = [u32; 3];
+
+/// A texel that light is measured at.
+struct Texel {
+    id: TexelId,
+    /// Its middle and the normal there.
+    place: (Vec3, Vec3),
+    material: u32,
+    stored: Stored,
+}
+
+/// How many measurements each triangle gets whose texels tell of light: by area, but no more than it has texels. Else what
+/// lies far around a map, in texels as large as rooms, would take the place of the map's own.
+struct Shares<'a> {
     world: &'a RelitWorld,
-    /// Area up to the end of a triangle, the triangle, its surface.
+    /// Measurements up to the end of a triangle, the triangle, its surface.
     triangles: Vec<(f64, usize, &'a WorldSurface)>,
 }
 
-impl<'a> Area<'a> {
-    fn new(world: &'a RelitWorld) -> Area<'a> {
+impl<'a> Shares<'a> {
+    /// Shares of about `count` measurements.
+    fn new(world: &'a RelitWorld, count: usize) -> Shares<'a> {
+        let mut sizes = Vec::new();
         let mut triangles = Vec::new();
-        let mut total = 0.0f64;
         for (index, surface) in world.surfaces.iter().enumerate() {
             if !lit_by_texel(surface) || !tells(world, surface) || !constant(world, index) {
                 continue;
             }
+            let page = usize::try_from(surface.lightmap).ok();
+            let page = page.and_then(|page| world.bsp.lightmaps.get(page));
+            let side = page.map_or(0.0, |page| page.size() as f32);
             let first = surface.first_index as usize / 3;
             for triangle in first..first + surface.num_indices as usize / 3 {
-                if let Some([a, b, c]) = world.triangle(triangle) {
-                    let area = f64::from((b - a).cross(c - a).length() * 0.5);
-                    if area > 0.0 && area.is_finite() {
-                        total += area;
-                        triangles.push((total, triangle, surface));
-                    }
+                let Some(corners) = corners(world, triangle) else {
+                    continue;
+                };
+                let [a, b, c] = corners.map(|c| c.position);
+                let [s, t, u] = corners.map(|c| c.lightmap * side);
+                let area = (b - a).cross(c - a).length() * 0.5;
+                let texels = (t - s).perp_dot(u - s).abs() * 0.5;
+                if area > 0.0 && area.is_finite() && texels.is_finite() {
+                    sizes.push([f64::from(area), f64::from(texels)]);
+                    triangles.push((triangle, surface));
                 }
             }
         }
-        Area { world, triangles }
+        let density = density(&sizes, count as f64);
+        let mut end = 0.0;
+        let triangles = triangles.into_iter().zip(sizes);
+        let triangles = triangles.map(|((triangle, surface), [area, texels])| {
+            end += (area * density).min(texels);
+            (end, triangle, surface)
+        });
+        Shares {
+            world,
+            triangles: triangles.collect(),
+        }
     }
 
-    /// A random texel of the triangle at a part of the whole area: its place, its material, what it stores.
-    fn texel_at(&self, part: f64, random: &mut Random) -> Option<((Vec3, Vec3), u32, Stored)> {
-        let total = self.triangles.last()?.0;
-        let found = self
-            .triangles
-            .partition_point(|(end, ..)| *end <= part * total);
+    /// All measurements.
+    fn total(&self) -> f64 {
+        self.triangles.last().map_or(0.0, |(end, ..)| *end)
+    }
+
+    /// A random texel of the triangle at a part of all measurements.
+    fn texel_at(&self, part: f64, random: &mut Random) -> Option<Texel> {
+        let at = part * self.total();
+        let found = self.triangles.partition_point(|(end, ..)| *end <= at);
         let &(_, triangle, surface) = self.triangles.get(found)?;
-        let (place, stored) = texel(self.world, triangle, surface, random)?;
-        Some((place, surface.material, stored))
+        texel(self.world, triangle, surface, random)
     }
 
     /// The part of texels that is black.
@@ -189,25 +229,41 @@ impl<'a> Area<'a> {
         let (mut looks, mut blacks) = (0.0f32, 0.0);
         for k in 0..LOOKS {
             let part = (k as f64 + 0.5) / LOOKS as f64;
-            if let Some((.., stored)) = self.texel_at(part, &mut random) {
+            if let Some(texel) = self.texel_at(part, &mut random) {
                 looks += 1.0;
-                blacks += f32::from(u8::from(dark(stored.rgb)));
+                blacks += f32::from(u8::from(dark(texel.stored.rgb)));
             }
         }
         blacks / looks.max(1.0)
     }
 }
 
-/// The texel that a random point of a triangle falls into: the place of its middle, the normal there, what it stores.
-/// `None` when the middle is beyond the surface: compilers move such texels.
+/// Measurements per area that make so many of triangles with these areas and texels, none of which gets more than it has texels.
+fn density(sizes: &[[f64; 2]], count: f64) -> f64 {
+    let mut by_texel_size: Vec<[f64; 2]> = sizes.to_vec();
+    by_texel_size.sort_by(|[a, s], [b, t]| (s / a).total_cmp(&(t / b)));
+    let mut wanted = count;
+    let mut area: f64 = sizes.iter().map(|[area, _]| area).sum();
+    // Those with the largest texels run out first; what they cannot give is left to the others.
+    for [own, texels] in by_texel_size {
+        if area <= 0.0 || wanted * own <= texels * area {
+            return (wanted / area.max(f64::MIN_POSITIVE)).max(0.0);
+        }
+        wanted -= texels;
+        area -= own;
+    }
+    f64::INFINITY
+}
+
+/// The texel that a random point of a triangle falls into. `None` when the middle is beyond the surface: compilers move such texels.
 fn texel(
     world: &RelitWorld,
     triangle: usize,
     surface: &WorldSurface,
     random: &mut Random,
-) -> Option<((Vec3, Vec3), Stored)> {
-    let page = usize::try_from(surface.lightmap).ok()?;
-    let page = world.bsp.lightmaps.get(page)?;
+) -> Option<Texel> {
+    let number = usize::try_from(surface.lightmap).ok()?;
+    let page = world.bsp.lightmaps.get(number)?;
     let size = page.size() as f32;
     let (u, v) = random.in_triangle();
     let [a, b, c] = corners(world, triangle)?.map(|c| c.lightmap * size);
@@ -222,8 +278,12 @@ fn texel(
         .chain(others)
         .find_map(|t| place_of(corners(world, t)?, middle, size))?;
     let scale = stored_scale(world, surface);
-    let stored = Stored::texel(page, cell.x as usize, cell.y as usize, scale);
-    Some((place, stored))
+    Some(Texel {
+        id: [number as u32, cell.x as u32, cell.y as u32],
+        place,
+        material: surface.material,
+        stored: Stored::texel(page, cell.x as usize, cell.y as usize, scale),
+    })
 }
 
 /// Light that the lightmap stores where a ray met a triangle; `None` where it tells nothing: of other surfaces, of texels
