@@ -1,6 +1,7 @@
 //! Walking the tree, and slices that a validated map can hand out without a check.
 
-use crate::lumps::{Brush, BrushSide, DrawVert, Leaf, Model};
+use crate::flags::{content_flags, surface_flags};
+use crate::lumps::{Brush, BrushSide, DrawVert, Leaf, Model, ShaderRef};
 use crate::surface::Surface;
 use crate::{Bsp, Plane};
 use glam::Vec3;
@@ -38,6 +39,34 @@ impl Bsp {
         self.leafs
             .get(self.leaf_at(p))
             .map_or(-1, |leaf| leaf.cluster)
+    }
+
+    /// Whether a point lies inside of something solid that is seen from outside: in a solid brush of the world of which
+    /// some side is drawn. Detail brushes do not make solid leafs, so [`Bsp::cluster_at`] does not tell. `margin`: how far
+    /// inside, id units.
+    pub fn is_in_drawn_brush(&self, p: Vec3, margin: f32) -> bool {
+        let has = |shader: i32, is: fn(&ShaderRef) -> bool| {
+            let shader = usize::try_from(shader).ok();
+            shader.and_then(|s| self.shaders.get(s)).is_some_and(is)
+        };
+        let solid = |s: &ShaderRef| s.content_flags & content_flags::SOLID != 0;
+        let drawn = |s: &ShaderRef| s.surface_flags & surface_flags::NODRAW == 0;
+        let leaf = self.leafs.get(self.leaf_at(p));
+        let brushes = leaf.map_or(&[][..], |leaf| self.leaf_brush_indices(leaf));
+        let brushes = brushes.iter().filter_map(|&index| {
+            let index = usize::try_from(index).ok()?;
+            self.brushes.get(index)
+        });
+        brushes.filter(|b| has(b.shader, solid)).any(|brush| {
+            let sides = self.sides_of(brush);
+            let behind = |side: &BrushSide| {
+                let plane = self.plane_of(side);
+                plane.is_some_and(|plane| plane.distance(p) < -margin)
+            };
+            !sides.is_empty()
+                && sides.iter().all(behind)
+                && sides.iter().any(|side| has(side.shader, drawn))
+        })
     }
 
     /// Indices of the leafs that can be reached from the root, each once, front before back. Compilers
@@ -143,5 +172,32 @@ impl Bsp {
     /// The plane of a brush side.
     pub fn plane_of(&self, side: &BrushSide) -> Option<&Plane> {
         self.planes.get(usize::try_from(side.plane).ok()?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::builder::MapBuilder;
+    use crate::{content_flags, surface_flags};
+    use glam::Vec3;
+
+    #[test]
+    fn inside_is_what_no_one_sees() {
+        let mut map = MapBuilder::new();
+        let wall = map.add_shader("t/wall", 0, content_flags::SOLID);
+        let hull = map.add_shader("t/hull", surface_flags::NODRAW, content_flags::SOLID);
+        let clip = map.add_shader("t/clip", 0, content_flags::PLAYERCLIP);
+        map.add_room(wall, Vec3::ZERO, Vec3::splat(400.0));
+        let at = |x: f32| Vec3::new(x, 200.0, 200.0);
+        for (x, shader) in [(100.0, wall), (200.0, hull), (300.0, clip)] {
+            map.add_box_brush(shader, at(x) - 20.0, at(x) + 20.0);
+        }
+        let bsp = map.build();
+        let inside = |x: f32, margin: f32| bsp.is_in_drawn_brush(at(x), margin);
+        assert!(bsp.cluster_at(at(100.0)) >= 0 && inside(100.0, 0.0));
+        // Nor is what nobody can see, or nothing bumps into, something to be in.
+        assert!(!inside(200.0, 0.0) && !inside(300.0, 0.0) && !inside(160.0, 0.0));
+        assert!(inside(119.0, 0.5) && !inside(119.0, 1.5));
+        assert!(!inside(121.0, 0.0) && !inside(121.0, -0.5) && inside(121.0, -1.5));
     }
 }

@@ -35,7 +35,7 @@ const ALIKE: f32 = 1.07;
 const BETTER: f32 = 0.92;
 
 /// Part of the error of lights without an end that such with an end may leave to be believed.
-const ENDED: f32 = 0.97;
+const ENDED: f32 = 0.95;
 
 /// Part of the error without dirt that dirt which no command line tells of may leave to be believed.
 const DIRTY: f32 = 0.9;

@@ -172,6 +172,7 @@ impl Scene<'_> {
     /// Whether a light fits at a place: in the map, and clear of surfaces.
     fn open(&self, origin: Vec3) -> bool {
         self.world.bsp.cluster_at(origin) >= 0
+            && !self.world.bsp.is_in_drawn_brush(origin, 0.0)
             && AROUND
                 .into_iter()
                 .all(|d| self.occluders.nearest(origin, d, CLEARANCE).is_none())

@@ -44,8 +44,8 @@ impl Residual {
     }
 }
 
-/// Compares light at about `options.samples` places, chosen by `options.seed`: places that fitting did not see when it
-/// used another. Empty for worlds that store no light. The world must have been loaded to be calibrated, or its
+/// Compares light at about `options.samples` places, chosen by `options.seed`. With another seed than fitting had they are
+/// other places, though a few that were fitted may be among them. Empty for worlds that store no light. The world must have been loaded to be calibrated, or its
 /// [materials measured](RelitWorld::measure_materials).
 pub fn residuals(world: &RelitWorld, options: &CalibrationOptions) -> Vec<Residual> {
     let occluders = samples::occluders(world);

@@ -25,6 +25,9 @@ const FLOOR: f32 = 2.0;
 /// How far off its surface light is gathered, id units.
 const LIFT: f32 = 1.0;
 
+/// How far inside of a brush a place is not seen any more, id units.
+const INSIDE: f32 = -0.5;
+
 /// How much a black texel tells that may be black for another reason than the lack of light: compilers leave texels
 /// black where the point that they measured at lay inside of something, and some maps are full of them.
 const TRUST_IN_BLACK: f32 = 0.2;
@@ -327,7 +330,7 @@ pub(super) fn sample_at(
     } = *gauge;
     let position = on + normal * LIFT;
     let cluster = world.bsp.cluster_at(position);
-    if cluster < 0 {
+    if cluster < 0 || world.bsp.is_in_drawn_brush(position, INSIDE) {
         return None;
     }
     // What is seen from behind all around is something that this place is inside of.

@@ -92,3 +92,23 @@ fn a_surface_tells_no_more_than_it_has_texels() {
     // What it cannot tell is asked of the others.
     assert!(samples.len() > 2700, "{}", samples.len());
 }
+
+#[test]
+fn what_lies_in_a_brush_tells_nothing() {
+    let [low, high] = [
+        Vec3::new(100.0, -200.0, -8.0),
+        Vec3::new(200.0, -100.0, 60.0),
+    ];
+    let in_it = |blocked: bool| {
+        let mut map = room_map("t/wall", false, usize::MAX, Some(&from_hidden));
+        let wall = map.add_shader("t/wall", 0, 1);
+        if blocked {
+            map.add_box_brush(wall, low, high);
+        }
+        let samples = taken(&relit(&map.build()), 4000, 1);
+        let inside = |s: &&Sample| s.position.cmpgt(low).all() && s.position.cmplt(high).all();
+        samples.iter().filter(inside).count()
+    };
+    assert!(in_it(false) > 20);
+    assert_eq!(in_it(true), 0);
+}
