@@ -40,6 +40,9 @@ const ENDED: f32 = 0.95;
 /// Part of the error without dirt that dirt which no command line tells of may leave to be believed.
 const DIRTY: f32 = 0.9;
 
+/// The same of dirt that the command line tells of: less may be chance.
+const DIRTY_AS_SAID: f32 = 0.95;
+
 /// How many times as far off as without gamma what directives say may be: it was the compiler that read them.
 const CONTRADICTED: f32 = 1.5;
 
@@ -176,7 +179,7 @@ impl Trials<'_> {
             dirt: None,
         };
         match line.dirt {
-            Some(dirt) => self.dirty_or_clean(clean, dirt, 1.0),
+            Some(dirt) => self.dirty_or_clean(clean, dirt, DIRTY_AS_SAID),
             None => clean,
         }
     }
