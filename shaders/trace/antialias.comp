@@ -31,6 +31,8 @@ const float NARROW = 0.3;
 const float WIDE = 0.5;
 // Frames' worth of samples that a pixel keeps at rest, and where it is resampled from frame to frame.
 const float REST_FRAMES = 16.0, MOVING_FRAMES = 5.0;
+// The same in motion for what ripples bend: it has no motion of its own, and more of its history would smear it.
+const float BENT_FRAMES = 2.0;
 // Standard deviations that history may differ by, at rest and in motion.
 const float REST_RANGE = 1.25, MOVING_RANGE = 1.0;
 // Part of the way to a pixel's surface at which a neighbour's is in front of it.
@@ -74,19 +76,21 @@ vec4 last_bicubic(vec2 place, vec2 size) {
 // Whether the traced pixels around a place showed something at that distance in the last frame: within their range, because
 // a floor seen aslant has many distances. They are taken from a pixel around, because the samples of an edge's pixels
 // meet one side in one frame and the other in the next. Where pixels show a reflection and what lies behind it in turns,
-// those at the corners show the same as the pixel, and those beside it the other one, whose way it may be. These count at
-// rest alone: what ripples bend has no motion of its own, and in motion its history would smear it.
-bool was_seen(vec2 place, float path, bool rests) {
+// those at the corners and those beside the pixel show different things, and the way may be that of either.
+// At rest what is too thin to be met in each frame was there all the same, if nothing around has gone away since.
+bool was_seen(vec2 place, float path, bool rests, bool takes_turns) {
     const vec2 around[8] = vec2[](vec2(1, 1), vec2(-1, 1), vec2(1, -1), vec2(-1, -1), vec2(1, 0), vec2(-1, 0), vec2(0, 1), vec2(0, -1));
     ivec2 last = ivec2(VIEW.width, VIEW.height) - 1;
     float least = 1.0e30, most = 0.0;
-    for (int i = 0; i < (rests ? 8 : 4); i++) {
+    bool rested = rests;
+    for (int i = 0; i < (rests || takes_turns ? 8 : 4); i++) {
         float then = last_path_read(clamp(ivec2(floor(place + 0.99 * around[i])), ivec2(0), last));
-        least = min(least, then);
-        most = max(most, then);
+        rested = rested && then >= 0.0;
+        least = min(least, abs(then));
+        most = max(most, abs(then));
     }
     float slack = SAME_PATH * path + 1.0;
-    return path > least - slack && path < most + slack;
+    return rested || path > least - slack && path < most + slack;
 }
 
 void main() {
@@ -148,7 +152,7 @@ void main() {
     bool known = VIEW.antialias.history != 0 && motion.last_path >= 0.0
         && all(greaterThanEqual(last_place, vec2(0.0))) && all(lessThan(last_place, vec2(output_size)));
     bool rests = motion.offset == vec2(0.0);
-    if (known && was_seen(last_place * ratio, motion.last_path, rests)) {
+    if (known && was_seen(last_place * ratio, motion.last_path, rests, mark_field(motion.mark) > 0.0)) {
         vec4 history = last_bicubic(last_place, vec2(output_size));
         old = to_ycocg(compress(history.rgb, exposure));
         float range = rests ? REST_RANGE : MOVING_RANGE;
@@ -156,7 +160,8 @@ void main() {
         vec3 parts = abs(off) / (deviation * range + 1.0e-4);
         old = mean + off / max(max_component(parts), 1.0);
         // in the sum with what is new, history is to have the part that is not
-        frames = min(min(history.a, rests ? REST_FRAMES : MOVING_FRAMES), (1.0 - fresh) / max(fresh, 1.0e-3));
+        float most = rests ? REST_FRAMES : mark_bent(motion.mark) ? BENT_FRAMES : MOVING_FRAMES;
+        frames = min(min(history.a, most), (1.0 - fresh) / max(fresh, 1.0e-3));
     }
     vec3 now = wide.rgb / wide.w;
     float confidence = 1.0;

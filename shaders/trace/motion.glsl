@@ -18,11 +18,12 @@ const float SKY_PATH = 60000.0;
 struct Motion {
     vec2 offset;     // from the pixel to where its surface was in the last frame, pixels
     float last_path; // length of the way to it then; negative: unknown
+    float mark;
 };
 
 Motion motion_read(ivec2 pixel) {
     vec4 v = imageLoad(images_rgba16f[VIEW.motion.image], pixel);
-    return Motion(v.xy, v.z);
+    return Motion(v.xy, v.z, v.w);
 }
 
 // Most new light that a pixel tells of, times the light of its front: the unit of the fraction beside the field.
@@ -32,15 +33,18 @@ const float MOST_FRESH = 8.0;
 const float LEAST_FRESH = 1.0 / 1024.0;
 
 // The pixel's mark, which the motion image has room for: the field of a pixel that shows either a reflection (2) or what
-// lies behind it (1), otherwise 0; its fraction tells how much light of what is in front moves otherwise than the surface.
+// lies behind it (1), otherwise 0, and 3 more if it is seen bent, so that its motion is a guess; its fraction tells how much
+// light of what is in front moves otherwise than the surface.
 float mark_read(ivec2 pixel) { return imageLoad(images_rgba16f[VIEW.motion.image], pixel).w; }
-float mark_field(float mark) { return floor(mark); }
+float mark_of(uint field, bool bent, float new_part) { return float(field + (bent ? 3u : 0u)) + new_part; }
+bool mark_bent(float mark) { return mark >= 3.0; }
+float mark_field(float mark) { return floor(mark) - (mark_bent(mark) ? 3.0 : 0.0); }
 float mark_new_part(float mark) { return (mark - floor(mark)) * MOST_FRESH; }
 
 // Length of the way to what a pixel shows; SKY_PATH: the sky.
-float path_read(ivec2 pixel) { return imageLoad(images_r16f[VIEW.motion.path], pixel).x; }
+float path_read(ivec2 pixel) { return abs(imageLoad(images_r16f[VIEW.motion.path], pixel).x); }
 
-// The way to what a pixel showed in the last frame.
+// The way to what a pixel showed in the last frame; negative if that did not rest in the picture.
 float last_path_read(ivec2 pixel) { return imageLoad(images_r16f[VIEW.motion.last_path], pixel).x; }
 
 // Where the eye of the last frame took points to be: x is seen at turn * x + shift.
@@ -124,7 +128,8 @@ vec4 motion_of(CameraRay ray, LastPlace place) {
 // `motion`: as `motion_of` makes it.
 void motion_write(ivec2 pixel, vec4 motion, float mark) {
     imageStore(images_rgba16f[VIEW.motion.image], pixel, vec4(motion.xyz, mark));
-    imageStore(images_r16f[VIEW.motion.path], pixel, motion.wwww);
+    bool rests = motion.xy == vec2(0.0) && motion.z >= 0.0;
+    imageStore(images_r16f[VIEW.motion.path], pixel, vec4(rests ? motion.w : -motion.w));
 }
 
 #endif

@@ -84,6 +84,7 @@ fn temporal_antialiasing() {
     a_smaller_traced_picture_comes_to_the_full_one(&mut gpu);
     the_lens_blurs_by_its_circle_of_confusion(&mut gpu);
     both_sides_of_a_reflection_come_to_rest(&mut gpu);
+    what_is_thin_comes_to_rest(&mut gpu);
 }
 
 fn at_rest_it_comes_to_the_mean_of_many_samples(gpu: &mut Gpu) {
@@ -325,4 +326,38 @@ fn the_lens_blurs_by_its_circle_of_confusion(gpu: &mut Gpu) {
             );
         }
     }
+}
+
+/// Wires thinner than a pixel, far before a wall: most frames' samples miss them.
+fn what_is_thin_comes_to_rest(gpu: &mut Gpu) {
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, SIZE);
+    let wall = scene.material(&[stage::constant([0.1; 3])], 0);
+    let wire = scene.material(&[stage::constant([0.9; 3])], c::MATERIAL_TWO_SIDED);
+    scene.room(Vec3::splat(-600.0), Vec3::splat(600.0), wall);
+    let pixel = 2.0 * 100.0 * 30f32.to_radians().tan() / SIZE as f32;
+    for i in -4..5 {
+        let corner = Vec3::new(100.0, (i as f32 * 6.3 + 0.4) * pixel, -90.0);
+        let shape = rectangle(corner, Vec3::Z * 180.0, Vec3::Y * (0.12 * pixel));
+        scene.quad(shape, wire);
+    }
+    let (_, truth) = gpu.render(&scene, &reference(), 1024);
+    let (first, last) = (48, 96);
+    let mut frames: Vec<Vec<Vec3>> = Vec::new();
+    let mut watch = |frame: u32, pixels: &[Vec3]| {
+        if frame >= first {
+            frames.push(pixels.to_vec());
+        }
+    };
+    let (_, settled) = gpu.render_watched(&scene, &live(), last, |_, _| {}, Some(&mut watch));
+    // how much brighter than in the mean a pixel gets for a frame
+    let count = frames.len() as f32;
+    let mut flash = 0.0f32;
+    for i in 0..truth.len() {
+        let values = || frames.iter().filter_map(|f| f.get(i)).map(|p| p.x);
+        let mean = values().sum::<f32>() / count;
+        flash = flash.max(values().fold(0.0, f32::max) - mean);
+    }
+    let off = error(&settled, &truth);
+    println!("thin wires: error {off}, brightest flash {flash}");
+    assert!(flash < 0.15, "{flash}");
 }

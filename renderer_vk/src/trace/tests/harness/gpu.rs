@@ -208,7 +208,8 @@ impl Gpu {
         let paths: Vec<u16> = bytemuck::pod_collect_to_vec(&read(&targets.path[1]));
         let motions = halves.iter().zip(paths).map(|(motion, path)| {
             let [x, y, last, _mark] = motion.map(half);
-            [x, y, last, half(path)]
+            // its sign tells whether it rests
+            [x, y, last, half(path).abs()]
         });
         places.into_iter().zip(motions).collect()
     }
