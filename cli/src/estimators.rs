@@ -15,10 +15,11 @@ use crate::view::{Camera, Maps, map_entities, open};
 /// Renders a view with every light of the list for each point (the reference), with one light chosen uniformly, with
 /// one chosen by importance, and with every light of the map; then prints for each the relative difference of the whole
 /// picture and of the worst square of 16 x 16 pixels from the reference, how many standard errors these are (noise
-/// stays below 4 or 5, bias grows with the frames), and the noise of a frame: the mean squared error over the squared
-/// mean of the picture, and the mean over the pixels of the squared error over the squared pixel (a bright pixel counts
-/// for no more than a dark one; up to a hundredth of the picture's mean). A square darker than a hundredth of the
-/// picture is measured against that.
+/// stays below 4 or 5, bias grows with the frames), and the noise of the first frame, of 16 and of all: the mean squared
+/// error over the squared mean of the picture, times the frames, which would be one number if frames were independent
+/// (that of all frames has the reference's own noise in it). JSON has beside it the mean over the pixels of the squared
+/// error over the squared pixel (a bright pixel counts for no more than a dark one; up to a hundredth of the picture's
+/// mean). A square darker than a hundredth of the picture is measured against that.
 ///
 /// Example: relight estimators oa_dm1 --frames 4096 --size 512x384
 #[derive(Args, Debug)]
@@ -57,11 +58,22 @@ pub struct EstimatorsArgs {
 /// Side of the squares that are compared.
 const TILE: usize = 16;
 
-/// Frames after which the noise is taken.
-const NOISE_FRAMES: u32 = 16;
+/// Frames after which the noise is taken, beside all of them.
+const NOISE_FRAMES: [u32; 2] = [1, 16];
 
 /// A picture: linear RGB.
 type Picture = Vec<[f32; 3]>;
+
+/// What an estimator made.
+struct Rendered {
+    /// Mean of all frames.
+    mean: Picture,
+    frames: u32,
+    /// Means of the first frames, with their number.
+    early: Vec<(u32, Picture)>,
+    /// Median milliseconds of the pass for direct light.
+    time: f32,
+}
 
 struct Stage {
     renderer: Renderer,
@@ -71,20 +83,15 @@ struct Stage {
 }
 
 impl Stage {
-    /// The mean of `frames` frames, the mean of the first few, and the median milliseconds of the pass for direct light.
-    fn render(
-        &mut self,
-        name: &str,
-        settings: &Settings,
-        frames: u32,
-    ) -> Result<(Picture, Picture, f32)> {
+    /// The mean of `frames` frames, that of the first few, and the median milliseconds of the pass for direct light.
+    fn render(&mut self, name: &str, settings: &Settings, frames: u32) -> Result<Rendered> {
         let bar = ProgressBar::new(frames.into());
         bar.set_style(ProgressStyle::with_template(
             "{msg} {bar:40} {pos}/{len} frames, {eta} left",
         )?);
         bar.set_message(name.to_owned());
         self.renderer.set_settings(settings);
-        let mut early = None;
+        let mut early = Vec::new();
         let mut times = Vec::new();
         for frame in 1..=frames {
             self.renderer.begin_frame(0);
@@ -95,8 +102,8 @@ impl Stage {
             self.renderer
                 .render_scene(&self.camera.ref_def(self.size, 90.0))?;
             self.renderer.end_frame()?;
-            if frame == NOISE_FRAMES.min(frames) {
-                early = Some(self.renderer.read_radiance()?);
+            if NOISE_FRAMES.contains(&frame) {
+                early.push((frame, self.renderer.read_radiance()?));
             }
             let passes = self.renderer.timings();
             times.extend(passes.iter().find(|p| p.0.contains("direct")).map(|p| p.1));
@@ -105,8 +112,12 @@ impl Stage {
         bar.finish_and_clear();
         times.sort_by(f32::total_cmp);
         let mean = self.renderer.read_radiance()?;
-        let time = times.get(times.len() / 2).copied().unwrap_or(0.0);
-        Ok((mean, early.unwrap_or_default(), time))
+        Ok(Rendered {
+            mean,
+            frames,
+            early,
+            time: times.get(times.len() / 2).copied().unwrap_or(0.0),
+        })
     }
 }
 
@@ -163,7 +174,7 @@ fn compare(picture: &Picture, truth: &Picture, width: usize) -> Value {
     })
 }
 
-/// Mean squared error of a frame over the squared mean of the picture, from the mean of some frames.
+/// Mean squared error over the squared mean of the picture, times the frames that the picture is the mean of.
 fn noise(early: &Picture, truth: &Picture, frames: u32) -> f64 {
     let mean = truth.iter().map(level).sum::<f64>() / truth.len().max(1) as f64;
     let squares = early
@@ -173,7 +184,7 @@ fn noise(early: &Picture, truth: &Picture, frames: u32) -> f64 {
     squares.sum::<f64>() / truth.len().max(1) as f64 * f64::from(frames) / (mean * mean).max(1e-18)
 }
 
-/// Mean over the pixels of the squared error of a frame over the squared pixel, from the mean of some frames.
+/// Mean over the pixels of the squared error over the squared pixel, times the frames.
 fn relative_noise(early: &Picture, truth: &Picture, frames: u32) -> f64 {
     let count = truth.len().max(1) as f64;
     let floor = truth.iter().map(level).sum::<f64>() / count * 0.01;
@@ -187,8 +198,9 @@ fn relative_noise(early: &Picture, truth: &Picture, frames: u32) -> f64 {
 /// Prints what JSON says of an estimator as a row of a table.
 fn row(line: &Value) {
     let number = |key: &str| line.get(key).and_then(Value::as_f64).unwrap_or(0.0);
+    let noise = |path: &str| line.pointer(path).and_then(Value::as_f64).unwrap_or(0.0);
     println!(
-        "{:<18} {:>6} {:>9.3} % {:>7.1} {:>9.2} % {:>7.1} {:>9.3} {:>9.3} {:>9.2}",
+        "{:<18} {:>6} {:>9.3} % {:>7.1} {:>9.2} % {:>7.1} {:>9.3} {:>9.3} {:>9.3} {:>9.2}",
         line.get("estimator")
             .and_then(Value::as_str)
             .unwrap_or_default(),
@@ -197,8 +209,12 @@ fn row(line: &Value) {
         number("standard_errors"),
         number("worst_tile_difference") * 100.0,
         number("worst_tile_standard_errors"),
-        number("noise_of_a_frame"),
-        number("relative_noise_of_a_frame"),
+        noise("/noise/0/noise"),
+        noise("/noise/1/noise"),
+        line.pointer("/noise")
+            .and_then(Value::as_array)
+            .and_then(|all| all.last()?.get("noise")?.as_f64())
+            .unwrap_or(0.0),
         number("direct_ms"),
     );
 }
@@ -255,16 +271,24 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
             ..base.clone()
         };
         let reference = args.reference.unwrap_or((args.frames / 16).max(16));
-        let (truth, early, time) = stage.render(&format!("{map} all"), &all, reference)?;
-        let print = |name: &str, time: f32, frames: u32, picture: &Picture, early: &Picture| {
-            let mut line = compare(picture, &truth, width as usize);
+        let truth = stage.render(&format!("{map} all"), &all, reference)?;
+        let print = |name: &str, rendered: &Rendered| {
+            let mut line = compare(&rendered.mean, &truth.mean, width as usize);
             line["map"] = json!(map);
             line["estimator"] = json!(name);
-            line["frames"] = json!(frames);
-            line["direct_ms"] = json!(time);
-            line["noise_of_a_frame"] = json!(noise(early, &truth, NOISE_FRAMES.min(frames)));
-            line["relative_noise_of_a_frame"] =
-                json!(relative_noise(early, &truth, NOISE_FRAMES.min(frames)));
+            line["frames"] = json!(rendered.frames);
+            line["direct_ms"] = json!(rendered.time);
+            let early = rendered.early.iter().map(|(frames, p)| (*frames, p));
+            let noises = early
+                .chain([(rendered.frames, &rendered.mean)])
+                .map(|(frames, p)| {
+                    json!({
+                        "frames": frames,
+                        "noise": noise(p, &truth.mean, frames),
+                        "relative": relative_noise(p, &truth.mean, frames),
+                    })
+                });
+            line["noise"] = noises.collect();
             if args.json {
                 println!("{line}");
             } else {
@@ -274,19 +298,20 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
         if !args.json {
             println!("{map}");
             println!(
-                "{:<18} {:>6} {:>11} {:>7} {:>11} {:>7} {:>9} {:>9} {:>9}",
+                "{:<18} {:>6} {:>11} {:>7} {:>11} {:>7} {:>9} {:>9} {:>9} {:>9}",
                 "estimator",
                 "frames",
                 "difference",
                 "errors",
                 "worst tile",
                 "errors",
-                "noise",
-                "relative",
+                "noise 1",
+                "noise 16",
+                "noise all",
                 "direct ms"
             );
         }
-        print("all", time, reference, &truth, &early);
+        print("all", &truth);
         let with = |selection, cull, lights| Settings {
             rt_light_selection: selection,
             rt_cull_lights: cull,
@@ -313,9 +338,10 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
             ));
         }
         for (name, settings, frames) in ways {
-            let (picture, early, time) =
-                stage.render(&format!("{map} {name}"), &settings, frames)?;
-            print(name, time, frames, &picture, &early);
+            print(
+                name,
+                &stage.render(&format!("{map} {name}"), &settings, frames)?,
+            );
         }
     }
     Ok(())
