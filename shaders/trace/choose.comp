@@ -14,12 +14,13 @@ void main() {
     GBufferPixel g = task.surface;
     if (g.path < 0.0) return;
     rng_begin(uvec2(task.pixel), task.seed, 1);
-    float random = rng_next();
+    float random = rng_independent();
     LightSet set = lights_at(g.position, g.face_normal);
     LightSample chosen = no_light();
     if (set_count(set) > set.suns) {
-        LightChoice choice = choose_resampled(set, g.position, g.normal);
-        if (choice.weight > 0.0) chosen = sample_light(choice.light, g.position, g.normal, rng_next2());
+        vec2 u = rng_next2();
+        LightChoice choice = choose_resampled(set, g.position, g.normal, u.x);
+        if (choice.weight > 0.0) chosen = sample_light(choice.light, g.position, g.normal, u);
         chosen.light *= choice.weight;
     }
     chosen_write(pixel, chosen, random, set.suns);

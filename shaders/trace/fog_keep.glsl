@@ -37,7 +37,7 @@ void fog_write(ivec2 pixel) {
     bool filtered = (VIEW.fog.flags & FOG_FILTERED) != 0;
     // filtered light has no colour of its own: the sum over the way is free of noise
     vec3 weight = filtered ? fog_weight : fog_tint * fog_weight_sum;
-    light_write(VIEW.fog.weight, pixel, weight, rng_next());
+    light_write(VIEW.fog.weight, pixel, weight, rng_independent());
     int cell = int(VIEW.fog.cell);
     ivec2 at = pixel / cell;
     // each pixel of a cell in turn; from the eye, so that half floats are as exact as one sees

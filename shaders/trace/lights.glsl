@@ -281,16 +281,16 @@ struct LightChoice {
     float total; // what all that it was chosen from would give without shadows, about; of resampled ones alone
 };
 
-// One light, each with the same probability.
-LightChoice choose_uniform(LightSet set) {
-    uint count = set_count(set);
-    uint member = min(uint(rng_next() * float(count)), count - 1);
+// One light, each with the same probability. `u` of this and what follows: uniform, before and after (see rng_decide), so
+// that with another number it is a point on the chosen light.
+LightChoice choose_uniform(LightSet set, inout float u) {
+    uint count = set_count(set), member = rng_pick(u, count);
     return LightChoice(light_of_member(set, member), float(count), 0.0);
 }
 
 // One of the suns; a map has one as a rule.
-LightChoice choose_sun(uint count) {
-    uint index = count > 1 ? min(uint(rng_next() * float(count)), count - 1) : 0;
+LightChoice choose_sun(uint count, inout float u) {
+    uint index = count > 1 ? rng_pick(u, count) : 0;
     return LightChoice((LIGHT_SUN << LIGHT_KIND_SHIFT) | index, float(count), 0.0);
 }
 
@@ -299,24 +299,28 @@ LightChoice choose_sun(uint count) {
 // chances by what each light gives to the cluster, shadows included; the whole list is taken if it is short enough.
 // Lights of this frame are candidates of their own. A hidden sun would outshine all that is left in its shadow: suns
 // get a ray of their own.
-LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal) {
+LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal, inout float u) {
     uint candidates = max(VIEW.lights.candidates, 1);
     uint drawn = min(set.listed, candidates), drawn_dynamic = min(set.dynamic_count, candidates);
     LightSlots slots = LightSlots(VIEW.lights.slots);
     float sum = 0.0, chosen_target = 0.0;
+    float offset = set.listed > drawn ? rng_next() : 0.0, dynamic_offset = set.dynamic_count > drawn_dynamic ? rng_next() : 0.0;
     uint chosen = 0;
     for (uint i = 0; i < drawn + drawn_dynamic; i++) {
+        // decisions use up digits: those of one number last for some
+        if (i > 0 && i % 8 == 0) u = rng_next();
         uint light;
         float weight = 1.0, visibility = 1.0;
         if (i < drawn) {
             uint member = i;
-            // stratified
-            if (set.listed > drawn) member = min(uint((float(i) + rng_next()) / float(drawn) * float(set.listed)), set.listed - 1);
+            // one number moves all of them, each in its part of the list
+            float within = (float(i) + offset) / float(drawn);
+            if (set.listed > drawn) member = rng_pick(within, set.listed);
             LightSlot slot = slots.at[set.first + member];
             light = slot.light;
             visibility = slot.visibility;
             if (set.listed > drawn) {
-                bool first = rng_next() < slot.threshold;
+                bool first = within < slot.threshold;
                 if (!first) {
                     light = slot.alias;
                     visibility = slot.alias_visibility;
@@ -326,7 +330,8 @@ LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal) {
         } else {
             uint member = i - drawn;
             if (set.dynamic_count > drawn_dynamic) {
-                member = min(uint((float(member) + rng_next()) / float(drawn_dynamic) * float(set.dynamic_count)), set.dynamic_count - 1);
+                float within = (float(member) + dynamic_offset) / float(drawn_dynamic);
+                member = rng_pick(within, set.dynamic_count);
                 weight = float(set.dynamic_count) / float(drawn_dynamic);
             }
             light = dynamic_light(set, member);
@@ -334,7 +339,7 @@ LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal) {
         float target = light_target(light, position, normal) * visibility;
         if (!(target > 0.0)) continue;
         sum += target * weight;
-        if (rng_next() * sum < target * weight) {
+        if (rng_decide(u, target * weight / sum)) {
             chosen = light;
             chosen_target = target;
         }
@@ -344,10 +349,10 @@ LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal) {
 
 // A light of the list or a sun, for points that get one ray: about by what each would give without shadows, neither of
 // them rarely, as nobody knows here what is in the way.
-LightChoice choose_one(LightSet set, vec3 position, vec3 normal) {
-    LightChoice listed = choose_resampled(set, position, normal);
+LightChoice choose_one(LightSet set, vec3 position, vec3 normal, inout float u) {
+    LightChoice listed = choose_resampled(set, position, normal, u);
     if (set.suns == 0) return listed;
-    LightChoice sun = choose_sun(set.suns);
+    LightChoice sun = choose_sun(set.suns, u);
     SunLight light = SunLights(VIEW.lights.suns).at[light_index(sun.light)];
     // the disc's edge may be up where its middle is not
     float aloft = dot(normal, light.direction) + sqrt(max(1.0 - light.cos_angle * light.cos_angle, 0.0));
@@ -355,7 +360,7 @@ LightChoice choose_one(LightSet set, vec3 position, vec3 normal) {
     if (!(listed.weight > 0.0)) return sun;
     float sun_target = luminance(light.irradiance) * VIEW.lights.scale * min(aloft, 1.0) * sun.weight;
     float chance = clamp(sun_target / (sun_target + listed.total), 0.25, 0.75);
-    if (rng_next() < chance) return LightChoice(sun.light, sun.weight / chance, sun.total);
+    if (rng_decide(u, chance)) return LightChoice(sun.light, sun.weight / chance, sun.total);
     return LightChoice(listed.light, listed.weight / (1.0 - chance), listed.total);
 }
 

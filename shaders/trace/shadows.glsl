@@ -44,19 +44,20 @@ vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint selection, 
     for (uint i = 0; i < samples * rays; i++) {
         uint ray = i % rays;
         LightChoice choice;
-        if (selection == SELECT_UNIFORM) choice = choose_uniform(set);
+        vec2 u = rng_next2();
+        if (selection == SELECT_UNIFORM) choice = choose_uniform(set, u.x);
         else if (ray >= picks && selection == SELECT_ALL) {
             uint member = ray - picks;
             if (member >= set.strong) member += from.listed;
             choice = LightChoice(light_of_member(set, member), 1.0, 0.0);
-        } else if (ray >= picks) choice = choose_sun(set.suns);
-        else if (selection == SELECT_ONE) choice = choose_one(set, position, normal);
+        } else if (ray >= picks) choice = choose_sun(set.suns, u.x);
+        else if (selection == SELECT_ONE) choice = choose_one(set, position, normal, u.x);
         else {
-            choice = choose_resampled(from, position, normal);
+            choice = choose_resampled(from, position, normal, u.x);
             choice.weight /= float(picks);
         }
         if (!(choice.weight > 0.0)) continue;
-        LightSample s = sample_light(choice.light, position, normal, rng_next2());
+        LightSample s = sample_light(choice.light, position, normal, u);
         s.light *= choice.weight;
         sum += arriving(s, origin);
     }

@@ -16,6 +16,10 @@ ivec2 turn(int row) {
     return ivec2((frame == 1u || frame == 2u) != ((row & 1) == 1), frame == 1u || frame == 3u);
 }
 
+// Which of the frames that gather light for a pixel this one is. Numbers that are evenly spread over all frames are not over
+// every fourth.
+uint sparse_index(uint frame) { return (VIEW.flags & VIEW_SPARSE_BOUNCE) != 0 ? frame >> 2 : frame; }
+
 // The pixel of a cell that is traced.
 ivec2 sparse_pixel(ivec2 cell) {
     ivec2 end = ivec2(VIEW.width, VIEW.height) - 1, first = turn(cell.y), pixel = min(cell * CELL + first, end);

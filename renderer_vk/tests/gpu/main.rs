@@ -5,5 +5,6 @@
 mod drawing;
 mod life;
 mod memory;
+mod random;
 mod rays;
 mod support;

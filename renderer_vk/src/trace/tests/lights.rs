@@ -354,14 +354,15 @@ fn estimators_differ_by_noise_alone_with(gpu: &mut Gpu) {
     let scene = crowd();
     let (truth, _) = gpu.render(&scene, &all_lights(), 16);
     for selection in [LightSelection::Uniform, LightSelection::Resampled] {
-        for candidates in [3, 8] {
+        // one sample a pixel goes through a pass of its own
+        for (candidates, samples, frames) in [(3, 16, 12), (8, 16, 12), (8, 1, 192)] {
             let settings = Settings {
                 rt_light_selection: selection,
-                rt_num_random_dl: 16,
+                rt_num_random_dl: samples,
                 rt_candidates: candidates,
                 ..all_lights()
             };
-            let (pixels, _) = gpu.render(&scene, &settings, 12);
+            let (pixels, _) = gpu.render(&scene, &settings, frames);
             let score = |chosen: &dyn Fn(usize) -> bool| {
                 let differences = pixels.iter().zip(&truth).enumerate();
                 let (sum, squares) = differences
@@ -381,5 +382,34 @@ fn estimators_differ_by_noise_alone_with(gpu: &mut Gpu) {
                 );
             }
         }
+    }
+}
+
+#[test]
+fn errors_fall_faster_than_those_of_independent_frames() {
+    Gpu::each(errors_fall_faster_than_those_of_independent_frames_with);
+}
+
+fn errors_fall_faster_than_those_of_independent_frames_with(gpu: &mut Gpu) {
+    let scene = crowd();
+    let (truth, _) = gpu.render(&scene, &all_lights(), 48);
+    for (selection, bound) in [
+        (LightSelection::Uniform, 0.25),
+        (LightSelection::Resampled, 0.3),
+    ] {
+        let settings = Settings {
+            rt_light_selection: selection,
+            rt_num_random_dl: 1,
+            ..all_lights()
+        };
+        // mean squared error times the frames: one number for independent ones, however many they are
+        let mut noise = |frames: u32| {
+            let (pixels, _) = gpu.render(&scene, &settings, frames);
+            let errors = pixels.iter().zip(&truth).map(|(a, b)| (a.x - b.x).powi(2));
+            errors.sum::<f32>() / pixels.len() as f32 * frames as f32
+        };
+        let (first, later) = (noise(4), noise(512));
+        println!("{selection:?}: {first} after 4 frames, {later} after 512");
+        assert!(later < bound * first, "{selection:?}: {first} {later}");
     }
 }
