@@ -23,5 +23,5 @@ void main() {
         if (choice.weight > 0.0) chosen = sample_light(choice.light, g.position, g.normal, u);
         chosen.light *= choice.weight;
     }
-    chosen_write(pixel, chosen, random, set.suns);
+    chosen_write(pixel, chosen, random, set.suns > 0);
 }

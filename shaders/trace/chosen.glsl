@@ -9,18 +9,25 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) buffer ChosenTexel
 
 struct Chosen {
     LightSample light;
-    uint suns; // how many may reach the pixel, too
+    bool suns; // whether suns may reach the pixel, too
 };
 
-// `dither`: see pack_light.
-void chosen_write(ivec2 pixel, LightSample s, float dither, uint suns) {
+const uint SIGN_BIT = 0x80000000u;
+
+// The direction is kept as it is: rounded to 2 x 16 bits it makes rays end at what they ought to pass, and some pictures
+// darker or brighter by a thousandth. `dither`: see pack_light.
+void chosen_write(ivec2 pixel, LightSample s, float dither, bool suns) {
+    // light from nearer than 0 arrives as that from 0 does, so the sign is free
+    uint distance = floatBitsToUint(max(s.distance, 0.0)) & ~SIGN_BIT | (suns ? SIGN_BIT : 0u);
     ChosenTexels(VIEW.texels).at[place_of(pixel)] =
-        uvec4(pack_normal(s.direction), floatBitsToUint(s.distance), pack_light(sound_light(s.light), dither), suns);
+        uvec4(floatBitsToUint(octahedral(s.direction)), distance, pack_light(sound_light(s.light), dither));
 }
 
 Chosen chosen_read(ivec2 pixel) {
     uvec4 packed = ChosenTexels(VIEW.texels).at[place_of(pixel)];
-    return Chosen(LightSample(unpack_normal(packed.x), uintBitsToFloat(packed.y), unpack_light(packed.z), false), packed.w);
+    float distance = uintBitsToFloat(packed.z & ~SIGN_BIT);
+    LightSample light = LightSample(from_octahedral(uintBitsToFloat(packed.xy)), distance, unpack_light(packed.w), false);
+    return Chosen(light, (packed.z & SIGN_BIT) != 0);
 }
 
 #endif
