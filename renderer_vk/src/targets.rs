@@ -47,7 +47,7 @@ impl FrameTargets {
             self.several = None;
         }
         let wanted = if settings.rt { 0 } else { settings.multisample };
-        let stencil = settings.shadows == 2 && device.depth_stencil_format().is_some();
+        let stencil = settings.shadows == 2;
         let samples = samples(device, wanted, stencil);
         let drawn = self.drawn().samples();
         if samples != drawn {
@@ -143,8 +143,7 @@ fn samples(device: &Device, wish: u32, stencil: bool) -> u32 {
     if wish < 2 {
         return 1;
     }
-    let depth = device.depth_stencil_format().filter(|_| stencil);
-    let depth = depth.unwrap_or(raster::DEPTH_FORMAT);
+    let depth = device.depth_format(stencil);
     let can = |samples: &u32| {
         device.supports_samples(raster::COLOR_FORMAT, *samples)
             && device.supports_samples(depth, *samples)
@@ -155,15 +154,14 @@ fn samples(device: &Device, wish: u32, stencil: bool) -> u32 {
     more.or_else(|| sizes.next_back()).unwrap_or(1)
 }
 
-/// A depth image as large as `color`; with a stencil if that is asked for and the device has one.
+/// A depth image as large as `color`.
 fn depth_image(
     device: &Device,
     color: &Image,
     samples: u32,
     stencil: bool,
 ) -> Result<Image, gpu::Error> {
-    let format = device.depth_stencil_format().filter(|_| stencil);
-    let format = format.unwrap_or(raster::DEPTH_FORMAT);
+    let format = device.depth_format(stencil);
     let (width, height) = (color.width(), color.height());
     Image::new(
         device,

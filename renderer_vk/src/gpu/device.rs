@@ -240,12 +240,19 @@ impl Device {
         self.0.abilities.fragment_stores
     }
 
-    /// The format of depth with stencil to use, if the device can draw to one.
-    pub fn depth_stencil_format(&self) -> Option<Format> {
+    /// The format of depth to use: 24 bits, as the engine asks OpenGL for, where the device draws to them. Some GPUs
+    /// clear and test them faster than floats. Every device has one of each kind.
+    pub fn depth_format(&self, stencil: bool) -> Format {
+        let (format, other) = match stencil {
+            false => (Format::D24, Format::D32F),
+            true => (Format::D24S8, Format::D32FS8),
+        };
         let needed = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
-        [Format::D32FS8, Format::D24S8]
-            .into_iter()
-            .find(|format| self.0.features(*format).contains(needed))
+        if self.0.features(format).contains(needed) {
+            format
+        } else {
+            other
+        }
     }
 
     /// Whether the device draws to images of a colour or depth format with so many samples.

@@ -89,6 +89,8 @@ formats! {
     D32F = D32_SFLOAT, 1, 4;
     /// Depth, float, and 8 bits of stencil. Copies carry the depth alone.
     D32FS8 = D32_SFLOAT_S8_UINT, 1, 4;
+    /// Depth, 24 bits normalized.
+    D24 = X8_D24_UNORM_PACK32, 1, 4;
     /// Depth, 24 bits normalized, and 8 bits of stencil. Copies carry the depth alone.
     D24S8 = D24_UNORM_S8_UINT, 1, 4;
 }
@@ -102,7 +104,7 @@ impl Format {
 
     pub(crate) fn aspect(self) -> vk::ImageAspectFlags {
         match self {
-            Self::D32F => vk::ImageAspectFlags::DEPTH,
+            Self::D24 | Self::D32F => vk::ImageAspectFlags::DEPTH,
             Self::D32FS8 | Self::D24S8 => {
                 vk::ImageAspectFlags::DEPTH | vk::ImageAspectFlags::STENCIL
             }

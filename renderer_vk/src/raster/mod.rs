@@ -45,8 +45,6 @@ use target::TargetKind;
 
 /// Format of the frame's colour image, unless it is shown just as it is: then it has the window's.
 pub const COLOR_FORMAT: Format = Format::Rgba8;
-/// Format of the frame's depth image.
-pub const DEPTH_FORMAT: Format = Format::D32F;
 
 /// How far down 3D views are moved, pixels: one step of the usual grid of 1/256 that corners are rounded to. Windows of
 /// OpenGL count rows from the bottom, so of a pixel that an edge cuts through its middle the triangle
