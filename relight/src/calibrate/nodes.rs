@@ -14,6 +14,10 @@ const SPACING: f32 = 64.0;
 /// Side of the blocks that measurements are counted in, id units.
 const BLOCK: f32 = 256.0;
 
+/// Nothing that is measured farther from the middle is looked at, id units: engines end long before, and counting blocks
+/// must not overflow.
+const FARTHEST: f32 = 1.0e6;
+
 /// The part of all measurements that lies in a block or in those around it, at least, where lights are looked for.
 const LEAST_PART: f32 = 1.0 / 1500.0;
 
@@ -33,7 +37,8 @@ impl Measured {
     pub fn new(samples: &[Sample]) -> Measured {
         let mut counts: HashMap<IVec3, f32> = HashMap::new();
         let (mut mins, mut maxs) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        for sample in samples {
+        let near = |s: &&Sample| s.position.abs().max_element() < FARTHEST;
+        for sample in samples.iter().filter(near) {
             mins = mins.min(sample.position);
             maxs = maxs.max(sample.position);
             for k in 0..27 {
@@ -116,7 +121,7 @@ mod tests {
     #[test]
     fn a_box_far_around_does_not_make_the_grid_coarse() {
         let on_floor = (0..1600).map(|k| Vec3::new((k % 40) as f32, (k / 40) as f32, 0.0) * 16.0);
-        let far = [-9000.0, 9000.0].map(|x| Vec3::new(x, x, x));
+        let far = [-9000.0, 9000.0, -3.0e38, 3.0e38].map(Vec3::splat);
         let samples: Vec<_> = on_floor.chain(far).map(sample_at_place).collect();
         let measured = Measured::new(&samples);
         assert!(measured.holds(Vec3::new(320.0, 320.0, 100.0)));
