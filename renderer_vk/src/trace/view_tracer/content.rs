@@ -1,0 +1,82 @@
+//! What the accumulated frames of a view have in common.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use glam::Vec3;
+
+use crate::scene::ViewScene;
+use crate::settings::Settings;
+use crate::trace::input::MaterialTable;
+
+/// A number that changes whenever the mean picture does: camera, everything in the scene, time, settings.
+pub(super) fn content_hash(
+    view: &ViewScene,
+    materials: &dyn MaterialTable,
+    settings: &Settings,
+) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    let mut floats = |values: &[f32]| {
+        for value in values {
+            value.to_bits().hash(&mut hasher);
+        }
+    };
+    let vector = |v: Vec3| [v.x, v.y, v.z];
+    let camera = &view.view;
+    floats(&vector(camera.origin));
+    for axis in camera.axis {
+        floats(&vector(axis));
+    }
+    floats(&[camera.tan_x, camera.tan_y, view.time]);
+    floats(&[camera.stereo.slope, camera.stereo.distance]);
+    floats(&[settings.rt_light_scale, settings.rt_dlight_scale]);
+    for light in &view.dlights {
+        floats(&vector(light.origin));
+        floats(&vector(light.color));
+        floats(&[light.radius]);
+    }
+    for portal in &view.portals {
+        floats(&portal.plane.to_array());
+        floats(&vector(portal.camera_origin));
+        for axis in portal.camera_axis {
+            floats(&vector(axis));
+        }
+    }
+    camera.viewport.hash(&mut hasher);
+    bytemuck::cast_slice::<_, u8>(&view.instances).hash(&mut hasher);
+    for mesh in &view.meshes {
+        let geometry = view.mesh_geometry(mesh);
+        bytemuck::cast_slice::<_, u8>(geometry.vertices).hash(&mut hasher);
+        // whether a mesh is kept from frame to frame is nothing that shows
+        for triangle in geometry.triangles() {
+            triangle.hash(&mut hasher);
+        }
+        (mesh.material, mesh.instance, mesh.fog).hash(&mut hasher);
+    }
+    for submodel in &view.submodels {
+        (submodel.model, submodel.instance).hash(&mut hasher);
+    }
+    view.has_world.hash(&mut hasher);
+    materials.generation().hash(&mut hasher);
+    (
+        settings.rt_max_depth,
+        settings.rt_bounces,
+        settings.fast_sky,
+        settings.fullbright || !settings.rt_illumination,
+    )
+        .hash(&mut hasher);
+    (settings.dynamic_light, settings.no_portals).hash(&mut hasher);
+    (settings.rt_antialiasing, settings.rt_dof).hash(&mut hasher);
+    let lens = [settings.rt_aperture, settings.rt_focal_length];
+    lens.map(f32::to_bits).hash(&mut hasher);
+    // estimators with the same mean could go on together, but a comparison wants them apart
+    (
+        settings.rt_cull_lights,
+        settings.rt_soft_shadows,
+        settings.rt_flashlight,
+        settings.rt_light_selection as u32,
+        settings.rt_num_random_dl,
+        settings.rt_candidates,
+    )
+        .hash(&mut hasher);
+    hasher.finish()
+}

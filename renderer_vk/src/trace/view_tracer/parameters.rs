@@ -1,0 +1,179 @@
+//! What the shaders of a view are told.
+
+use glam::Vec3;
+use shaders::trace_types::constants as t;
+use shaders::trace_types::{
+    AntialiasView, FlareView, MotionView, PortalRecord, PostView, TraceView, TransportView,
+};
+
+use super::{LIGHT_ADAPTATION, TracedMap, ViewTracer, is_lit, sparse_bounce};
+use crate::gpu::{Error, Image, Recorder};
+use crate::raster::FlareTest;
+use crate::scene::ViewScene;
+use crate::settings::Settings;
+use crate::trace::accel::AccelOutput;
+use crate::trace::input::MaterialTable;
+use crate::trace::layer_boxes::in_sight;
+
+impl ViewTracer {
+    #[allow(clippy::too_many_arguments)] // what a view depends on
+    pub(super) fn params(
+        &self,
+        rec: &mut Recorder,
+        view: &ViewScene,
+        map: Option<TracedMap<'_>>,
+        materials: &dyn MaterialTable,
+        settings: &Settings,
+        target: &Image,
+        accel: AccelOutput,
+        accumulated: u32,
+        portals: &[PortalRecord],
+        motion: MotionView,
+        antialias: AntialiasView,
+    ) -> Result<TraceView, Error> {
+        let Some(targets) = &self.targets else {
+            return Ok(TraceView::default()); // made by the caller
+        };
+        let camera = &view.view;
+        let lights = map.map_or(&self.no_lights, |m| m.lights);
+        let flares = map.map_or_else(FlareTest::default, |m| m.flares);
+        let mut flags = 0;
+        let mut set = |bit: u32, on: bool| flags |= if on { bit } else { 0 };
+        set(
+            t::VIEW_JITTER,
+            settings.rt_accumulate && settings.rt_antialiasing,
+        );
+        set(t::VIEW_ACCUMULATE, settings.rt_accumulate);
+        set(t::VIEW_FIRST_PERSON, accel.first_person);
+        let is_lit = is_lit(settings);
+        set(t::VIEW_AUTO_EXPOSURE, settings.rt_auto_exposure && is_lit);
+        set(t::VIEW_EXPOSURE_RESET, !self.exposure_started);
+        set(t::VIEW_FAST_SKY, settings.fast_sky);
+        set(t::VIEW_FULLBRIGHT, !is_lit);
+        set(t::VIEW_DENOISE, self.denoiser.is_on());
+        set(t::VIEW_SPARSE_BOUNCE, sparse_bounce(settings));
+        set(t::VIEW_HISTORY, self.history.is_some());
+        let [last_eye, last_forward, last_left, last_up] = self.history.unwrap_or([Vec3::ZERO; 4]);
+        let [eye, forward, left, up] = camera_frame(view);
+        let boxes = in_sight(view, map.map(|m| m.geometry), materials);
+        let (layers, layer_count) = if settings.rt_dof {
+            // rays start beside the eye
+            (0, u32::MAX)
+        } else {
+            let count = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
+            (rec.arena().push(&boxes)?, count)
+        };
+        Ok(TraceView {
+            geometries: accel.geometries,
+            instances: accel.instances,
+            fogs: map.map_or(0, |m| m.geometry.fogs.address()),
+            portals: rec.arena().push(portals)?,
+            skies: map.map_or(0, |m| m.geometry.skies.address()),
+            exposure: self.exposure_state.address(),
+            texels: targets.texels.address(),
+            bvh_nodes: accel.nodes,
+            bvh_instances: accel.placed,
+            flares: FlareView {
+                flares: flares.flares,
+                states: flares.states,
+                count: flares.count,
+                padding: 0,
+            },
+            materials: materials.buffers(),
+            post: PostView::default(), // filled in by the caller
+            motion: MotionView {
+                image: targets.motion.storage_index(),
+                path: targets.path[0].storage_index(),
+                last_path: targets.path[1].storage_index(),
+                ..motion
+            },
+            antialias,
+            lights: lights.of_view(rec, view, settings)?,
+            eye,
+            forward,
+            left,
+            up,
+            width: targets.width,
+            height: targets.height,
+            target_x: camera.viewport[0],
+            target_y: camera.viewport[1],
+            scene: accel.scene,
+            flags,
+            seed: if settings.rt_accumulate {
+                accumulated
+            } else {
+                self.frame
+            },
+            accumulated,
+            time: view.time,
+            pixel_spread: pixel_spread(camera.tan_y, targets.height),
+            ambient: lights.ambient * settings.rt_light_scale.max(0.0),
+            transport: TransportView {
+                layers,
+                layer_count,
+                ..map.map_or_else(Default::default, |m| {
+                    m.geometry.surroundings.view(camera.origin)
+                })
+            },
+            eye_shift: camera.stereo.slope / camera.tan_x,
+            channels: self.channels,
+            fog_count: map.map_or(0, |m| m.geometry.fog_count),
+            portal_count: u32::try_from(portals.len()).unwrap_or(u32::MAX),
+            fog: self.fog.view(&targets.direct, &targets.composite),
+            max_depth: settings.rt_max_depth,
+            bounces: settings.rt_bounces.min(2),
+            image_position: targets.position.storage_index(),
+            image_surface: targets.surface.storage_index(),
+            image_shown: targets.shown.storage_index(),
+            image_other: targets.other.storage_index(),
+            image_direct: targets.direct.storage_index(),
+            image_indirect: targets.indirect.storage_index(),
+            image_composite: targets.composite.storage_index(),
+            image_accumulation: targets
+                .accumulation
+                .as_ref()
+                .map_or(0, Image::storage_index),
+            image_target: target.storage_index(),
+            exposure_bias: settings.rt_exposure,
+            exposure_base: self.exposure_base,
+            exposure_blend: self.exposure_blend(view, settings, LIGHT_ADAPTATION),
+            target_width: target.width(),
+            target_height: target.height(),
+            sky_sampler: materials.sky_sampler(),
+            last_eye,
+            last_forward,
+            last_left,
+            last_up,
+            denoise: (self.denoiser).view(self.frame.wrapping_sub(1), &targets.texels),
+        })
+    }
+}
+
+/// Eye, forward, and left and up scaled by the tangents of the half angles.
+pub(super) fn camera_frame(view: &ViewScene) -> [Vec3; 4] {
+    let camera = &view.view;
+    let [forward, left, up] = camera.axis;
+    [
+        camera.origin + left * camera.stereo.offset(),
+        forward,
+        left * camera.tan_x,
+        up * camera.tan_y,
+    ]
+}
+
+/// Width of a pixel's cone at distance 1.
+#[allow(clippy::cast_precision_loss)] // a height in pixels
+fn pixel_spread(tan_y: f32, height: u32) -> f32 {
+    2.0 * tan_y / height.max(1) as f32
+}
+
+pub(super) fn portal_record(portal: &crate::scene::Portal) -> PortalRecord {
+    PortalRecord {
+        plane: portal.plane.to_array(),
+        mirror: u32::from(portal.mirror),
+        surface_origin: portal.surface_origin,
+        surface_axis: portal.surface_axis,
+        camera_origin: portal.camera_origin,
+        camera_axis: portal.camera_axis,
+    }
+}
