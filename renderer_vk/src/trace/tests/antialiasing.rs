@@ -2,7 +2,7 @@
 
 use glam::{Mat3, Vec3};
 use relight::compare::{Rgb8, compare};
-use shaders::types::{Stage, constants as c};
+use shaders::types::constants as c;
 
 use super::dielectrics::square;
 use super::harness::{Gpu, Scene, identity, rectangle, reference, stage};
@@ -109,13 +109,7 @@ fn both_sides_of_a_reflection_come_to_rest(gpu: &mut Gpu) {
     let mut scene = checkerboard();
     let around = square(gpu, 1, &[128, 128, 128, 255]);
     scene.images.push(around.texture_index());
-    let shine = Stage {
-        flags: c::STAGE_REFLECTION,
-        tc_gen: c::TCGEN_ENVIRONMENT,
-        blend_src: c::BLEND_ONE,
-        blend_dst: c::BLEND_ONE,
-        ..stage::image(0)
-    };
+    let shine = stage::shine(0);
     for i in 0..8 {
         let grey = [0.1, 0.9][i % 2];
         let shiny = scene.material(&[stage::constant([grey; 3]), shine], 0);

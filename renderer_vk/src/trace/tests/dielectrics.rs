@@ -222,13 +222,7 @@ fn an_environment_stage_shows_what_is_around_with(gpu: &mut Gpu) {
     let image = square(gpu, 1, &[128, 128, 128, 255]);
     // a body of one colour, shiny by a quarter of what is around
     let body = stage::constant([0.5; 3]);
-    let shine = Stage {
-        flags: c::STAGE_REFLECTION,
-        tc_gen: c::TCGEN_ENVIRONMENT,
-        blend_src: c::BLEND_ONE,
-        blend_dst: c::BLEND_ONE,
-        ..stage::image(0)
-    };
+    let shine = stage::shine(0);
     let eye = Vec3::new(0.0, 0.0, 60.0);
     let target = Vec3::new(100.0, 10.0, 0.0);
     let mut scene = scene(eye, target, &[body, shine], 0, Dielectric::default());
@@ -271,13 +265,7 @@ fn the_texture_of_what_shines_is_seen_in_every_pixel_with(gpu: &mut Gpu) {
     // what is lit, and what glows by itself
     for body in [&[stage::light(), lit][..], &[stage::image(1)]] {
         let mut stages = body.to_vec();
-        stages.push(Stage {
-            flags: c::STAGE_REFLECTION,
-            tc_gen: c::TCGEN_ENVIRONMENT,
-            blend_src: c::BLEND_ONE,
-            blend_dst: c::BLEND_ONE,
-            ..stage::image(0)
-        });
+        stages.push(stage::shine(0));
         let mut scene = Scene::new(Vec3::Z * 60.0, Vec3::new(0.1, 0.0, 0.0), 50.0, SIDE as i32);
         scene.ambient = Vec3::splat(0.7);
         scene.images.clone_from(&images);
@@ -324,13 +312,7 @@ fn a_shiny_pixel_alone_is_as_bright_as_its_surface_with(gpu: &mut Gpu) {
         .upload_image(&image, 0, 0, &[20, 20, 20, 255])
         .expect("upload");
     let body = stage::constant([0.5; 3]);
-    let shine = Stage {
-        flags: c::STAGE_REFLECTION,
-        tc_gen: c::TCGEN_ENVIRONMENT,
-        blend_src: c::BLEND_ONE,
-        blend_dst: c::BLEND_ONE,
-        ..stage::image(0)
-    };
+    let shine = stage::shine(0);
     let (eye, target) = (Vec3::new(0.0, 0.0, 60.0), Vec3::new(100.0, 10.0, 0.0));
     let mut scene = scene(eye, target, &[body], 0, Dielectric::default());
     scene.images.push(image.texture_index());

@@ -70,3 +70,14 @@ pub fn image(first: u32) -> Stage {
         ..plain()
     }
 }
+
+/// A reflection added to what is below, as strong as an image of the scene, by its bindless index, is bright.
+pub fn shine(first: u32) -> Stage {
+    Stage {
+        flags: c::STAGE_REFLECTION,
+        tc_gen: c::TCGEN_ENVIRONMENT,
+        blend_src: c::BLEND_ONE,
+        blend_dst: c::BLEND_ONE,
+        ..image(first)
+    }
+}
