@@ -4,7 +4,7 @@ use glam::{Vec3, Vec4};
 use shaders::types::{self, constants as c};
 use shaderscript::Shader;
 use shaderscript::light::{self, LightLinear};
-use shaderscript::surface_params::{CONTENTS_FOG, CONTENTS_SLIME};
+use shaderscript::surface_params::CONTENTS_SLIME;
 
 use super::compile::StageArrays;
 use super::flags::has_vertex_light;
@@ -51,8 +51,8 @@ const LEAST_TRANSMISSION: f32 = 0.15;
 const LEAST_COLOR: f32 = 0.05;
 
 /// What a material does to rays that pass it. The absorption of a liquid has no directive: it is derived from the colour
-/// that the stages have in the mean over white, in white light, with its brightest channel at 1. A volume of fog absorbs
-/// by itself; map compilers make one of a liquid that has `fogParms`, too.
+/// that the stages have in the mean over white, in white light, with its brightest channel at 1. Where a map has a volume
+/// of fog of it that absorbs instead ([`Materials::leave_to_fog`](super::Materials::leave_to_fog)).
 pub fn dielectric(
     shader: &Shader,
     class: LightmapClass,
@@ -74,8 +74,7 @@ pub fn dielectric(
     let liquid = light::classify(shader).liquid;
     let mut absorption = Vec3::ZERO;
     let color = mean.lit + mean.emission + mean.through;
-    let foggy = shader.fog.is_some() || shader.content_flags & CONTENTS_FOG != 0;
-    if liquid && !foggy && color.is_finite() {
+    if liquid && color.is_finite() {
         let color = color / color.max_element().max(1.0e-6);
         absorption = -color
             .clamp(Vec3::splat(LEAST_COLOR), Vec3::ONE)

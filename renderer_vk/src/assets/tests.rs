@@ -73,16 +73,6 @@ t/water
     rgbGen const ( 1 0.5 0.25 )
     tcMod scroll 1 0 }
 }
-t/murk
-{
-  surfaceparm water
-  surfaceparm trans
-  fogParms ( 0.2 0.3 0.3 ) 1024
-  { map $whiteimage
-    blendFunc GL_DST_COLOR GL_ONE
-    rgbGen const ( 1 0.5 0.25 )
-    tcMod scroll 1 0 }
-}
 t/lava
 {
   surfaceparm lava
@@ -225,12 +215,6 @@ fn liquids_and_reflections_come_from_directives() {
     // red goes through, blue least of all
     let [red, green, blue] = water.absorption.to_array();
     assert!(red.abs() < 1.0e-6 && green > 0.0 && blue > green);
-    // its fog says what becomes of light in it
-    let murk = material("t/murk").dielectric;
-    assert_eq!(
-        (murk.index, murk.absorption),
-        (water.index, glam::Vec3::ZERO)
-    );
     assert_eq!(material("t/lava").dielectric.index, 0.0);
     assert_eq!(material("t/wall").dielectric, Default::default());
     let shiny = material("t/shiny");

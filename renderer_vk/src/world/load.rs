@@ -161,6 +161,9 @@ impl WorldData {
                     copy_for_classic(&relit, index, surface, &mut vertices, &mut indices);
             }
         }
+        for fog in &relit.fogs {
+            materials.leave_to_fog(&fog.volume.shader);
+        }
         remap_by_map(&relit, materials, source, options);
         let mut data = Self {
             vertices,

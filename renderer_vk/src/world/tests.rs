@@ -14,7 +14,9 @@ fn game() -> Registration {
         ("t/wall.tga", PIXEL),
         (
             "scripts/t.shader",
-            b"t/nomarks\n{\nsurfaceparm nomarks\n{\nmap t/wall.tga\n}\n}\nt/mist\n{\nsurfaceparm fog\nfogParms ( 0.5 0.25 1 ) 300\n}\n",
+            b"t/nomarks\n{\nsurfaceparm nomarks\n{\nmap t/wall.tga\n}\n}\nt/mist\n{\nsurfaceparm fog\nfogParms ( 0.5 0.25 1 ) 300\n}\n\
+              t/murk\n{\nsurfaceparm water\nsurfaceparm trans\nfogParms ( 0.2 0.3 0.3 ) 1024\n\
+              {\nmap $whiteimage\nblendFunc filter\nrgbGen const ( 1 0.5 0.25 )\n}\n}\n",
         ),
     ])
 }
@@ -265,6 +267,24 @@ fn fog_volumes_take_in_spheres_and_boxes() {
     };
     assert_eq!(world.fog_of_box(&bounds(50.0)), 1);
     assert_eq!(world.fog_of_box(&bounds(150.0)), 0);
+}
+
+/// Compilers make fog of a liquid that has `fogParms`, but not of every one.
+#[test]
+fn a_liquid_absorbs_unless_it_is_fog() {
+    for is_fog in [true, false] {
+        let mut game = game();
+        let mut map = MapBuilder::new();
+        let murk = map.add_shader("t/murk", 0, 0x20);
+        map.add_room(murk, Vec3::ZERO, Vec3::splat(100.0));
+        if is_fog {
+            map.add_fog_brush(murk, Vec3::ZERO, Vec3::splat(100.0), 5);
+        }
+        let world = game.build(map.build());
+        let liquid = game.materials.get(world.surfaces[0].material).dielectric;
+        assert!(liquid.index > 1.0);
+        assert_eq!(liquid.absorption == Vec3::ZERO, is_fog);
+    }
 }
 
 #[test]

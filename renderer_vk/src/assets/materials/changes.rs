@@ -105,6 +105,17 @@ impl Materials {
         self.touch();
     }
 
+    /// Leaves what becomes of light in a liquid to the volume of fog that the map has of it.
+    pub fn leave_to_fog(&mut self, name: &str) {
+        let name = strip_extension(name);
+        for material in &mut self.list {
+            if strip_extension(&material.name).eq_ignore_ascii_case(name) {
+                material.dielectric.absorption = Vec3::ZERO;
+            }
+        }
+        self.touch();
+    }
+
     /// Points every stage that shows texture `old` for a client at `new`.
     pub fn replace_scratch(&mut self, client: usize, new: u32) {
         let mut changed = false;
