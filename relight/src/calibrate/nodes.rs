@@ -73,6 +73,7 @@ impl Measured {
         most: usize,
         open: impl Fn(Vec3) -> bool,
     ) -> (Vec<Vec3>, f32) {
+        let most = most.max(1);
         // A first guess from the volume, then what is open decides.
         let volume = self.blocks.len() as f32 * BLOCK.powi(3);
         let mut spacing = (volume / (LOOKED_AT * most as f32)).cbrt().max(SPACING);
@@ -129,7 +130,7 @@ mod tests {
         let nodes = measured.nodes(64.0);
         assert!(nodes.iter().all(|&at| measured.holds(at)));
         let mut distinct = nodes.clone();
-        distinct.sort_by(|a, b| a.to_array().partial_cmp(&b.to_array()).unwrap());
+        distinct.sort_by_key(|at| at.to_array().map(f32::to_bits));
         distinct.dedup();
         assert_eq!(distinct.len(), nodes.len());
         // A cube of three blocks a side more than the floor's, at 4 nodes a block's side.

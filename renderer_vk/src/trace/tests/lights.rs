@@ -4,9 +4,9 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 use relight::light::SunLight;
-use shaders::types::Instance;
+use shaders::types::{Instance, constants as c};
 
-use super::harness::{Gpu, Scene, floor_point, identity, lambert, rectangle, reference};
+use super::harness::{Gpu, Scene, floor_point, identity, lambert, rectangle, reference, stage};
 use crate::api::DynamicLight;
 use crate::settings::{LightSelection, Settings};
 
@@ -383,6 +383,48 @@ fn estimators_differ_by_noise_alone_with(gpu: &mut Gpu) {
             }
         }
     }
+}
+
+#[test]
+fn a_chosen_ray_goes_where_it_was_sent() {
+    Gpu::each(a_chosen_ray_goes_where_it_was_sent_with);
+}
+
+fn a_chosen_ray_goes_where_it_was_sent_with(gpu: &mut Gpu) {
+    // a small lamp, far away, in a hole that is hardly wider: what turns a ray by a hundred-thousandth lets it miss the hole
+    const HEIGHT: f32 = 4000.0;
+    const LAMP: f32 = 0.125;
+    const HOLE: f32 = 0.131;
+    const BEFORE: f32 = 2.0;
+    let mut scene = floor_from_above(10.0);
+    let corner = |x: f32, y: f32| Vec3::new(x * LAMP, y * LAMP, HEIGHT);
+    for side in [1.0, -1.0] {
+        let triangle = [
+            corner(-side, -side),
+            corner(-side, side),
+            corner(side, -side),
+        ];
+        scene.light(triangle, Vec3::splat(4.0e8));
+    }
+    let wall = scene.material(&[stage::light()], c::MATERIAL_TWO_SIDED);
+    let (x, y) = (Vec3::X, Vec3::Y);
+    for (beside, along) in [(x, y), (y, x), (-x, y), (-y, x)] {
+        let first = Vec3::Z * (HEIGHT - BEFORE) + beside * HOLE - along * 50.0;
+        scene.quad(rectangle(first, along * 100.0, beside * 50.0), wall);
+    }
+    let (truth, _) = gpu.render(&scene, &all_lights(), 16);
+    let chosen = Settings {
+        rt_light_selection: LightSelection::Resampled,
+        rt_num_random_dl: 1,
+        ..all_lights()
+    };
+    let (pixels, _) = gpu.render(&scene, &chosen, 64);
+    let sum = |pixels: &[Vec3]| pixels.iter().map(|p| p.x).sum::<f32>();
+    let mean = sum(&truth) / truth.len() as f32;
+    println!("light {mean}, chosen {}", sum(&pixels) / sum(&truth));
+    assert!((0.3..1.0).contains(&mean), "{mean}");
+    let off = sum(&pixels) / sum(&truth) - 1.0;
+    assert!(off.abs() < 0.01, "{off}");
 }
 
 #[test]
