@@ -180,6 +180,7 @@ fn as_json(map: &str, report: &CalibrationReport, found: Option<&Recovery>) -> V
         "held_out": report.held_out,
         "known": report.known,
         "placed": report.placed,
+        "splashes": report.splashes,
         "before": agreement(&report.before),
         "after": agreement(&report.after),
         "ratio": ratio(report),

@@ -1,24 +1,35 @@
 //! What was found, written into the world.
 
-use super::{Solution, columns};
+use super::{Solution, columns, splash};
 use crate::light::{self, DEFAULT_SUN_RADIUS, PointLight, SunLight};
 use crate::world::RelitWorld;
 
 /// Radius of the balls that lights put in are drawn from, id units: they keep clear of surfaces by as much.
 const PLACED_RADIUS: f32 = super::place::CLEARANCE;
 
-/// Sets strengths, adds lights, and builds the light lists anew.
-pub(super) fn apply(world: &mut RelitWorld, solution: &Solution) {
+/// Sets strengths, adds lights, and builds the light lists anew. Of the lights that it adds, the first are back splashes:
+/// returns how many.
+pub(super) fn apply(world: &mut RelitWorld, solution: &Solution) -> usize {
+    let splashes: Vec<_> = splash::of(world)
+        .into_iter()
+        .zip(&solution.splashes)
+        .filter(|(_, strength)| strength.max_element() > 0.0)
+        .flat_map(|(of, strength)| {
+            let points = of.points.into_iter();
+            points.map(|(lamp, power)| (lamp, *strength * power))
+        })
+        .collect();
     columns::set_known(world, &solution.known);
     world.ambient = solution.ambient;
-    let placed = solution.placed.iter().map(|&(lamp, intensity)| PointLight {
+    let added = splashes.iter().chain(&solution.placed);
+    let added = added.map(|&(lamp, intensity)| PointLight {
         origin: lamp.origin,
         intensity,
         radius: PLACED_RADIUS,
         spot: None,
         falloff: lamp.falloff,
     });
-    world.point_lights.extend(placed);
+    world.point_lights.extend(added);
     let suns = solution
         .suns
         .iter()
@@ -35,9 +46,10 @@ pub(super) fn apply(world: &mut RelitWorld, solution: &Solution) {
         // What gives no light need not be looked at.
         light::take_out(world, |_| false);
     }
-    if solution.placed.is_empty() && !dark {
-        return;
+    if splashes.is_empty() && solution.placed.is_empty() && !dark {
+        return 0;
     }
     light::build_lists(world);
     world.report.point_lights = world.point_lights.len();
+    splashes.len()
 }

@@ -145,6 +145,9 @@ fn print(solution: &Solution) -> String {
             three(*intensity)
         );
     }
+    for strength in &solution.splashes {
+        let _ = writeln!(text, "splash {}", three(*strength));
+    }
     for (direction, irradiance) in &solution.suns {
         let _ = writeln!(text, "sun {} {}", three(*direction), three(*irradiance));
     }
@@ -221,6 +224,7 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
             },
             "ambient" => solution.ambient = light(&numbers)?,
             "known" => solution.known.push(light(&numbers)?),
+            "splash" => solution.splashes.push(light(&numbers)?),
             "placed" => {
                 let (numbers, falloff) = match numbers[..] {
                     [.., reach] if numbers.len() == 7 && reach > 0.0 => {

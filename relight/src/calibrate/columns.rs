@@ -35,6 +35,8 @@ pub(super) enum Source {
     Sun(u32),
     /// A light put in by calibration.
     Placed(Lamp),
+    /// The back splashes of a material's lamps: index into [`splash::of`](super::splash::of).
+    Splash(u32),
     /// A sun put in by calibration: the direction to it.
     FoundSun(Vec3),
 }

@@ -12,7 +12,7 @@
 //! fifth of the texels would leave the choice to chance.
 
 use super::said::{self, CommandLine, Dirt};
-use super::{CalibrationCache, CalibrationOptions, CalibrationReport, Evidence};
+use super::{CalibrationCache, CalibrationOptions, CalibrationReport, Evidence, Purpose};
 use crate::world::RelitWorld;
 
 /// Gammas tried: about the display's own, and two between it and none.
@@ -39,9 +39,6 @@ const ENDED: f32 = 0.95;
 
 /// Part of the error without dirt that dirt which no command line tells of may leave to be believed.
 const DIRTY: f32 = 0.9;
-
-/// The same of dirt that the command line tells of: less may be chance.
-const DIRTY_AS_SAID: f32 = 0.95;
 
 /// How many times as far off as without gamma what directives say may be: it was the compiler that read them.
 const CONTRADICTED: f32 = 1.5;
@@ -107,8 +104,8 @@ impl Compiler {
     }
 }
 
-/// What a world's compiler did: what the map says of it, else what explains its light. `progress` gets the part that is
-/// done.
+/// What a world's compiler did: what the map says of it, else what explains its light. Where it is two things, light has to
+/// be found with both to tell. `progress` gets the part that is done.
 ///
 /// Cut-outs let all light through here: that single rays are let through by a grate or not is noise, which a wrong gamma
 /// would seem to explain.
@@ -117,8 +114,11 @@ pub(super) fn find(
     silent: &[u32],
     options: &CalibrationOptions,
     progress: &mut dyn FnMut(f32),
-) -> Compiler {
+) -> Vec<Compiler> {
     let line = said::command_line(&world.bsp.entities());
+    if let Some(line) = line {
+        return as_said(line);
+    }
     let holes: Vec<_> = (world.materials.iter_mut().map(|m| m.holes.take())).collect();
     let mut trials = Trials {
         world,
@@ -132,14 +132,23 @@ pub(super) fn find(
         progress,
         done: Vec::new(),
     };
-    let found = match line {
-        Some(line) => trials.as_said(line),
-        None => trials.by_light().unwrap_or(Compiler::PLAIN),
-    };
+    let found = trials.by_light().unwrap_or(Compiler::PLAIN);
     for (material, holes) in world.materials.iter_mut().zip(holes) {
         material.holes = holes;
     }
-    found
+    vec![found]
+}
+
+/// What a command line says. Dirt may not be there: not all maps look like what their command lines say of it, and fits with
+/// less effort take for dirt what they lack lights for.
+fn as_said(line: CommandLine) -> Vec<Compiler> {
+    let with = |dirt| Compiler {
+        gamma: line.gamma,
+        ends: line.ends,
+        dirt,
+    };
+    let dirty = line.dirt.map(|dirt| with(Some(dirt)));
+    dirty.into_iter().chain([with(None)]).collect()
 }
 
 /// Fits with less effort.
@@ -162,42 +171,36 @@ impl Trials<'_> {
         compiler.tell(self.world);
         // What is stored on surfaces decides, with lights that fall off as light does.
         let (less, nothing) = (&self.less, &mut |_| ());
-        let found = super::find(self.world, self.silent, less, compiler, false, nothing);
+        let found = super::find(
+            self.world,
+            self.silent,
+            less,
+            compiler,
+            Purpose::Trial,
+            nothing,
+        );
         Compiler::PLAIN.tell(self.world);
+        let found = found?;
         let errors = [found.report.before.median_stops, found.overall.median_stops];
         let errors = (found.report.evidence != Evidence::Nothing).then_some(errors);
         self.done.push((compiler, errors));
         errors
     }
 
-    /// What a command line says. Dirt is believed where light agrees with it: not all maps look like what their command
-    /// lines say of it.
-    fn as_said(&mut self, line: CommandLine) -> Compiler {
-        let clean = Compiler {
-            gamma: line.gamma,
-            ends: line.ends,
-            dirt: None,
-        };
-        match line.dirt {
-            Some(dirt) => self.dirty_or_clean(clean, dirt, DIRTY_AS_SAID),
-            None => clean,
-        }
-    }
-
     /// What explains the map's light best, if it does so by far.
     fn by_light(&mut self) -> Option<Compiler> {
         let clean = self.gamma_and_ends()?;
-        Some(self.dirty_or_clean(clean, Dirt::USUAL, DIRTY))
+        Some(self.dirty_or_clean(clean))
     }
 
-    /// With dirt, where that leaves less than a part of the error.
-    fn dirty_or_clean(&mut self, clean: Compiler, dirt: Dirt, part: f32) -> Compiler {
+    /// With dirt, where that leaves much less of the error.
+    fn dirty_or_clean(&mut self, clean: Compiler) -> Compiler {
         let dirty = Compiler {
-            dirt: Some(dirt),
+            dirt: Some(Dirt::USUAL),
             ..clean
         };
         match [clean, dirty].map(|c| self.error(c)) {
-            [Some([_, without]), Some([_, with])] if with < without * part => dirty,
+            [Some([_, without]), Some([_, with])] if with < without * DIRTY => dirty,
             _ => clean,
         }
     }

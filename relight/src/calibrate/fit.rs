@@ -30,6 +30,13 @@ const MUCH: f32 = 0.25;
 /// samples held out: then these texels are dark for another reason.
 const MORE_AMBIENT: f32 = 0.93;
 
+/// Back splashes are believed when they leave less than this part of the error at samples held out.
+const SPLASHED: f32 = 0.95;
+
+/// How many times the error that is asked for leaves no hope after the first round that lights are looked for, and after each
+/// other one.
+const HOPELESS: (f32, f32) = (1.3, 1.1);
+
 /// Strengths from a rough guess.
 const FIRST: Effort = Effort {
     rounds: 8,
@@ -64,6 +71,8 @@ pub(super) struct Fit<'a> {
     pub crossings: Vec<Crossing>,
     /// Light at which lights end.
     pub least: f32,
+    /// Error at samples held out, stops, that is asked for: what will not come near it need not be looked for to the end.
+    pub asked: f32,
 }
 
 impl Fit<'_> {
@@ -134,6 +143,24 @@ impl Fit<'_> {
         }
     }
 
+    /// Adds back splashes where they explain what known lights do not.
+    pub fn splash(&mut self, splashes: Vec<Column>) {
+        let start = self.start();
+        self.settle();
+        let without = self.agreement().median_stops;
+        let known = self.columns.len();
+        self.columns.extend(splashes);
+        self.settle();
+        let believed = self.agreement().median_stops < without * SPLASHED;
+        let state = solve::residual(&self.samples, &self.columns, self.ambient.value);
+        place::drop_useless(&mut self.columns, known, &state, place::WORTH);
+        let splashes = self.columns.split_off(known);
+        (self.columns, self.ambient, self.samples) = start;
+        if believed {
+            self.columns.extend(splashes);
+        }
+    }
+
     /// Fits strengths and the light that they throw back to each other, in turns.
     pub fn settle(&mut self) {
         for _ in 0..3 {
@@ -151,7 +178,13 @@ impl Fit<'_> {
 
     /// Puts in point lights for as long as samples that are held out get better by it.
     /// `linear`: such that may fall off linearly, too. `progress` gets the part of the most rounds that are done.
-    pub fn place(&mut self, candidates: usize, linear: bool, progress: &mut dyn FnMut(f32)) {
+    /// Whether what is asked for was not come near to.
+    pub fn place(
+        &mut self,
+        candidates: usize,
+        linear: bool,
+        progress: &mut dyn FnMut(f32),
+    ) -> bool {
         let fixed = self.columns.len();
         let of_triangle = surfaces_of_triangles(self.world);
         let mut spacing = 0.0;
@@ -186,11 +219,17 @@ impl Fit<'_> {
                 (self.columns, self.ambient) = kept;
                 self.rebounce(false);
             }
-            if found > best * ENOUGH {
-                return;
+            let done = found > best * ENOUGH;
+            best = best.min(found);
+            let hopeless = if round == 0 { HOPELESS.0 } else { HOPELESS.1 };
+            if best > self.asked * hopeless {
+                return true;
             }
-            best = found;
+            if done {
+                break;
+            }
         }
+        best > self.asked
     }
 
     /// Puts in lights that may fall off linearly, as compilers can have it, in place of those of [`place`](Self::place),

@@ -9,13 +9,14 @@
 //!    count as known lights of unknown strength (`skies`).
 //! 3. `bounce`: which part of the light at samples others throw there, as tracing will.
 //! 4. `solve` fits strengths by sparse non-negative least squares of logarithmic error. What directives say is a prior,
-//!    and what is the same everywhere is ambient, within limits. `suns` looks for a sun where none is known.
+//!    and what is the same everywhere is ambient, within limits. `suns` looks for a sun where none is known, `splash`
+//!    puts weak lights in front of lamps, as compilers do.
 //! 5. `place`: candidates for lost lights all over open space, and where the directions of the light grid meet
 //!    (`crossings`), then in front of what stays unexplained, for as long as
 //!    that makes light agree better at what is held out. `fit` holds these steps together.
 //!    Where lights that fall off with the square of the distance leave much, once more with linear ones.
 //! 6. `compiler`: all of that with less effort for light that was stored encoded, and for lights that end, to see whether
-//!    it explains more.
+//!    it explains more. Where the map says that corners were made darker, all of it is done both ways.
 //! 7. The world's lights get their strengths, lost lights are added to
 //!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
 //!
@@ -46,6 +47,7 @@ mod said;
 pub(crate) mod samples;
 mod skies;
 mod solve;
+mod splash;
 mod suns;
 #[cfg(test)]
 mod tests;
@@ -70,16 +72,13 @@ use samples::Taking;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 18;
+const VERSION: u32 = 19;
 
 /// One in so many candidates comes from the directions of the light grid.
 const CROSSINGS: usize = 5;
 
 /// Part of the time that looking for what the compiler did takes, about.
 const COMPILER_PART: f32 = 0.3;
-
-/// Part of the rest of the time after which most maps are done.
-const FIRST_PART: f32 = 0.95;
 
 /// Error at measurements held out, stops, that asks for more measurements: light of many small lights takes more to tell.
 const UNEXPLAINED: f32 = 0.3;
@@ -122,6 +121,8 @@ struct Solution {
     known: Vec<Vec3>,
     /// Lights put in: where and how, intensity.
     placed: Vec<(Lamp, Vec3)>,
+    /// Strengths of back splashes, in the order of [`splash::of`].
+    splashes: Vec<Vec3>,
     /// Suns put in: direction to it, irradiance.
     suns: Vec<(Vec3, Vec3)>,
     ambient: Vec3,
@@ -135,7 +136,7 @@ struct Solution {
 impl Solution {
     /// Number of sources.
     fn lights(&self) -> usize {
-        self.known.len() + self.placed.len() + self.suns.len()
+        self.known.len() + self.placed.len() + self.splashes.len() + self.suns.len()
     }
 }
 
@@ -171,13 +172,7 @@ pub fn calibrate_with(
             if let Err(problem) = missing {
                 world.warnings.push(problem.to_string());
             }
-            let found = compiler::find(world, &silent, options, &mut |part| {
-                progress(part * COMPILER_PART);
-            });
-            found.tell(world);
-            let solution = find_with_enough(world, &silent, options, found, &mut |part| {
-                progress(COMPILER_PART + part * (1.0 - COMPILER_PART));
-            });
+            let solution = best(world, &silent, options, progress);
             if let (Some(cache), Some(key)) = (&options.cache, key)
                 && let Err(problem) = cache.write(key, &solution)
             {
@@ -191,11 +186,39 @@ pub fn calibrate_with(
     if solution.report.evidence == Evidence::Nothing {
         skies::close(world, &silent);
     } else {
-        apply::apply(world, &solution);
+        solution.report.splashes = apply::apply(world, &solution);
     }
     solution.report.seconds = begin.elapsed().as_secs_f64();
     world.calibration = Some(solution.report.clone());
     solution.report
+}
+
+/// The solution that agrees best, of what the compiler may have done.
+fn best(
+    world: &mut RelitWorld,
+    silent: &[u32],
+    options: &CalibrationOptions,
+    progress: &mut dyn FnMut(f32),
+) -> Solution {
+    let mut reached = 0.0;
+    let ways = compiler::find(world, silent, options, &mut |part| {
+        reached = part * COMPILER_PART;
+        progress(reached);
+    });
+    let each = (1.0 - reached) / ways.len().max(1) as f32;
+    let mut best: Option<Solution> = None;
+    for way in ways {
+        way.tell(world);
+        let found = find_with_enough(world, silent, options, way, &mut |part| {
+            progress(reached + part * each);
+        });
+        reached += each;
+        let off = |solution: &Solution| solution.report.after.median_stops;
+        if best.as_ref().is_none_or(|best| off(&found) < off(best)) {
+            best = Some(found);
+        }
+    }
+    best.unwrap_or_default()
 }
 
 /// [`find`] with the measurements that it takes.
@@ -206,10 +229,19 @@ fn find_with_enough(
     compiler: Compiler,
     progress: &mut dyn FnMut(f32),
 ) -> Solution {
-    let first = find(world, silent, options, compiler, true, &mut |part| {
-        progress(part * FIRST_PART);
-    });
-    if first.report.after.median_stops <= UNEXPLAINED {
+    let mut reached = 0.0;
+    let first = find(
+        world,
+        silent,
+        options,
+        compiler,
+        Purpose::Enough(UNEXPLAINED),
+        &mut |part| {
+            reached = part;
+            progress(part);
+        },
+    );
+    if let Some(first) = first {
         return first;
     }
     let options = CalibrationOptions {
@@ -217,24 +249,34 @@ fn find_with_enough(
         cache: None,
         ..*options
     };
-    find(world, silent, &options, compiler, true, &mut |part| {
-        progress(FIRST_PART + part * (1.0 - FIRST_PART));
-    })
+    let last = Purpose::Enough(f32::INFINITY);
+    let rest = &mut |part| progress(reached + part * (1.0 - reached));
+    find(world, silent, &options, compiler, last, rest).unwrap_or_default()
+}
+
+/// What a solution is for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Purpose {
+    /// To compare one compiler with another: without the light grid and linear falloff.
+    Trial,
+    /// To be kept if it leaves no more error than so many stops.
+    Enough(f32),
 }
 
 /// Solves for a world's light. `silent`: skies of which directives tell nothing. `compiler`: what was done to light, which
 /// the world knows but for dirt.
 ///
-/// `thorough`: whether the light grid is measured beside lightmaps, and linear falloff tried.
+/// `None` as soon as it is known not to do what it is for.
 fn find(
     world: &RelitWorld,
     silent: &[u32],
     options: &CalibrationOptions,
     compiler: Compiler,
-    thorough: bool,
+    purpose: Purpose,
     progress: &mut dyn FnMut(f32),
-) -> Solution {
+) -> Option<Solution> {
     progress(0.0);
+    let thorough = purpose != Purpose::Trial;
     let occluders = samples::occluders(world);
     // Where lights end, black tells little. Trials do not know yet whether they do, and measure alike to be compared.
     let taking = Taking {
@@ -271,7 +313,7 @@ fn find(
         ..Default::default()
     };
     if samples.is_empty() {
-        return solution;
+        return Some(solution);
     }
     let unlisted = |material| silent.contains(&material);
     progress(0.15);
@@ -289,6 +331,10 @@ fn find(
         columns,
         crossings,
         least: world.light_end,
+        asked: match purpose {
+            Purpose::Trial => f32::INFINITY,
+            Purpose::Enough(asked) => asked,
+        },
     };
     let first = std::mem::replace(&mut fit.ambient.value, world.ambient);
     fit.rebounce(true);
@@ -296,13 +342,20 @@ fn find(
     fit.ambient.value = first;
     progress(0.25);
     fit.known();
+    progress(0.3);
+    let splashes = splash::of(world);
+    let own = splash::columns(world, &occluders, &fit.samples, &splashes, &fit.columns);
+    fit.splash(own);
     progress(0.35);
     if options.candidates > 0 {
         let start = fit.start();
         let part_of = if thorough { 0.4 } else { 0.55 };
-        fit.place(options.candidates, false, &mut |part| {
+        let hopeless = fit.place(options.candidates, false, &mut |part| {
             progress(0.35 + part_of * part);
         });
+        if hopeless {
+            return None;
+        }
         if thorough {
             fit.place_linear(start, options.candidates);
         }
@@ -319,6 +372,7 @@ fn find(
     solution.overall = fit.agreement_overall();
     solution.exposure = fit.exposure();
     let columns = fit.columns;
+    solution.splashes = vec![Vec3::ZERO; splashes.len()];
     solution.known = columns.iter().take(known).map(|c| c.strength).collect();
     for column in columns.iter().skip(known) {
         match column.source {
@@ -326,11 +380,16 @@ fn find(
             Source::FoundSun(direction) if column.strength != Vec3::ZERO => {
                 solution.suns.push((direction, column.strength));
             }
+            Source::Splash(index) => {
+                if let Some(strength) = solution.splashes.get_mut(index as usize) {
+                    *strength = column.strength;
+                }
+            }
             _ => {}
         }
     }
     solution.report.placed = solution.placed.len();
     solution.report.suns = solution.suns.len();
     solution.ambient = fit.ambient.value;
-    solution
+    Some(solution)
 }

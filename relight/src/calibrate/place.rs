@@ -29,7 +29,7 @@ const RANGE: f32 = 700.0;
 const FRONTS: [f32; 4] = [12.0, 28.0, 60.0, 120.0];
 
 /// Squared error (samples that are off by a factor e) that a light must take away to be kept.
-const WORTH: f32 = 0.6;
+pub(super) const WORTH: f32 = 0.6;
 
 /// Samples that a light is moved by: so many tell where it is.
 const JUDGES: usize = 240;
@@ -286,7 +286,7 @@ fn choose(
 }
 
 /// Removes placed lights without which the error would hardly grow.
-fn drop_useless(columns: &mut Vec<Column>, known: usize, state: &Residual, worth: f32) {
+pub(super) fn drop_useless(columns: &mut Vec<Column>, known: usize, state: &Residual, worth: f32) {
     let mut index = 0;
     columns.retain(|column| {
         index += 1;

@@ -50,7 +50,9 @@ pub fn recovery(hidden: &[PointLight], world: &RelitWorld) -> Recovery {
     let level = |light: &PointLight| light.intensity.element_sum() / 3.0;
     let mut gathered = vec![(Vec3::ZERO, 0.0f32); hidden.len()];
     let (mut invented, mut power_invented, mut power_placed) = (0, 0.0, 0.0);
-    for placed in &world.point_lights {
+    // Those of lamps are no one's entities.
+    let splashes = world.calibration.as_ref().map_or(0, |c| c.splashes);
+    for placed in world.point_lights.iter().skip(splashes) {
         let power = level(placed);
         power_placed += power;
         let nearest = hidden

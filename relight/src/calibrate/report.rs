@@ -73,6 +73,8 @@ pub struct CalibrationReport {
     pub known: usize,
     /// Lights put in.
     pub placed: usize,
+    /// Back splashes put in: weak lights in front of lamps, as the compiler had them.
+    pub splashes: usize,
     /// Suns put in.
     pub suns: usize,
     /// Gamma that the compiler encoded light with before it stored it: see
@@ -101,6 +103,7 @@ impl Default for CalibrationReport {
             held_out: 0,
             known: 0,
             placed: 0,
+            splashes: 0,
             suns: 0,
             gamma: 1.0,
             ends: false,

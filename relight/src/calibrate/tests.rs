@@ -4,6 +4,7 @@ mod held_out;
 mod known_truth;
 mod linear;
 mod said;
+mod splash;
 
 use super::*;
 use crate::files::{MemoryFiles, SearchPath};

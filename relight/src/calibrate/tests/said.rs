@@ -68,6 +68,15 @@ fn dirty_corners_are_taken_for_dirt() {
 }
 
 #[test]
+fn dirt_that_is_told_of_may_not_be_there() {
+    let line = ("_q3map2_cmdline", "-light -dirty");
+    let mut world = saying(&[line], &from_hidden);
+    let report = calibrate(&mut world, &small());
+    assert!(!report.dirty, "{report:?}");
+    assert!(report.after.median_stops < 0.05, "{report:?}");
+}
+
+#[test]
 fn what_the_map_says_of_its_compiler_is_not_looked_for() {
     // No trial has this gamma.
     let gamma = 1.5f32;

@@ -1,0 +1,82 @@
+//! A lamp whose compiler put a weak light in front of it.
+
+use super::*;
+
+/// Strength of the lamp in terms of what its directive says.
+const FACTOR: f32 = 2.5;
+
+const AREA: f32 = 40.0 * 60.0;
+
+/// Light from the lamp, and from its back splash of so much of its light.
+fn from_lamp(splash: f32) -> impl Fn(Vec3, Vec3) -> Vec3 {
+    let power = FACTOR * LAMP * SURFACE_LIGHT_RADIANCE * AREA;
+    let [a, b, _, d] = LAMP_CORNERS;
+    move |at, normal| {
+        let point = |origin: Vec3, side: f32, part: f32| {
+            let offset = origin - at;
+            if in_pillar(at, origin) || side < 0.0 {
+                return 0.0;
+            }
+            let cosine = normal.dot(offset).max(0.0) / offset.length();
+            part * side * cosine / offset.length_squared()
+        };
+        let mut sum = point((a + (b - a + d - a) * 0.5) - Vec3::Z * 23.0, 1.0, splash);
+        for i in 0..64 {
+            let (u, v) = ((i % 8) as f32 + 0.5, (i / 8) as f32 + 0.5);
+            let origin = a + (b - a) * (u / 8.0) + (d - a) * (v / 8.0);
+            sum += point(origin, (origin - at).normalize().z, 1.0 / 64.0);
+        }
+        Vec3::splat(sum * power / PI)
+    }
+}
+
+#[test]
+fn the_light_in_front_of_a_lamp_is_found_as_one() {
+    let part = 0.08;
+    let mut world = room(true, Some(&from_lamp(part)));
+    let report = calibrate(&mut world, &small());
+    println!("{report:?} {:?}", world.point_lights);
+    assert_eq!(report.splashes, 1);
+    // Both triangles of the lamp together have one, where the compiler puts it.
+    let splash = world.point_lights[0];
+    let place = Vec3::new(200.0, 0.0, 227.0);
+    assert!(splash.origin.distance(place) < 0.01, "{splash:?}");
+    let power = world.lights[0].radiance * AREA;
+    let off = splash.intensity / (power * part) - 1.0;
+    assert!(off.abs().max_element() < 0.15, "{off}");
+    let factor = world.lights[0].radiance.x / (LAMP * SURFACE_LIGHT_RADIANCE);
+    assert!((factor / FACTOR - 1.0).abs() < 0.06, "{factor}");
+    assert!(report.after.median_stops < 0.05, "{report:?}");
+}
+
+#[test]
+fn lamps_without_such_lights_get_none() {
+    let mut world = room(true, Some(&from_lamp(0.0)));
+    let report = calibrate(&mut world, &small());
+    assert_eq!(report.splashes, 0, "{report:?}");
+}
+
+#[test]
+fn splashes_are_no_entities_that_were_found() {
+    let mut world = room(true, Some(&from_lamp(0.08)));
+    let report = calibrate(&mut world, &small());
+    let found = recovery(&[], &world);
+    assert_eq!(report.splashes, 1);
+    assert_eq!(found.invented, report.placed);
+}
+
+#[test]
+fn what_nothing_explains_is_measured_twice_and_progress_never_falls() {
+    // No light is like that: each texel by chance.
+    let noise = |at: Vec3, _: Vec3| {
+        let lot = random::lot(3, &at.to_array().map(f32::to_bits));
+        Vec3::splat(4.0 * 0.01f32.powf(lot))
+    };
+    let mut world = room(true, Some(&noise));
+    let mut told = Vec::new();
+    let report = calibrate_with(&mut world, &small(), &mut |part| told.push(part));
+    assert!(report.after.median_stops > 0.3, "{report:?}");
+    assert!(report.samples > 2 * small().samples * 9 / 10, "{report:?}");
+    assert!(told.is_sorted(), "{told:?}");
+    assert!(told.last().is_some_and(|last| (0.99..=1.0).contains(last)));
+}
