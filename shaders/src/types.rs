@@ -357,6 +357,8 @@ pub mod constants {
         STAGE_REFLECTION = 8;
         /// Covers what lies behind by an alpha that the game fades: smoke, blood. It does not glow.
         STAGE_MATTER = 16;
+        /// The stage's picture, which stands for a reflection, shows the light at the surface, too.
+        STAGE_GLOSS = 32;
         /// Seen from both sides.
         MATERIAL_TWO_SIDED = 1;
         /// Only the back side is seen.

@@ -179,8 +179,23 @@ Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, flo
 // One part of displayed values in linear light. Most parts of most layers are nothing.
 vec3 linear_part(vec3 displayed) { return displayed == vec3(0.0) ? vec3(0.0) : decode_display(max(displayed, 0.0)); }
 
+// A picture of an environment in the mean: its smallest level.
+vec4 environment_mean(Stage stage, SurfacePoint p) {
+    uint image = stage_image(VIEW.materials, stage, NO_TEXTURE, p.stage.time);
+    return textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), vec2(0.5), 32.0);
+}
+
+// What becomes of reflections: a ray follows them, or pictures of an environment stand for them where rays end. Diffuse
+// bounces do not find them.
+const uint SEEN_FOLLOWED = 0, SEEN_LAST = 1, SEEN_BOUNCED = 2;
+
 // Runs the stages of a material over the background, in displayed values.
-Layer run_stages(Material material, SurfacePoint p, Footprint footprint) {
+//
+// A picture of an environment is two things where its author lit it (STAGE_GLOSS): what is polished mirrors the
+// surroundings, as strongly as the picture is bright in the mean; what is rough gathers the light from all around, and
+// shows it by the picture as a texture does. Were it a mirror alone it would be far too dark: the picture is of
+// surroundings in full light, and so counts their albedo already, which a mirrored ray finds once more.
+Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint seen) {
     bool world = (p.triangle.flags & TRIANGLE_WORLD) != 0;
     if (material.plain_image != NO_TEXTURE && (world || (material.flags & MATERIAL_VERTEX_LIGHT) == 0)) {
         // what the stages below come to, for the many materials that are an image under light
@@ -205,20 +220,24 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint) {
             // the lightmap: the light itself, as bright as the stage lets it through
             source.lit = color.rgb;
             alpha = color.a;
-        } else if ((stage.flags & STAGE_REFLECTION) != 0) {
-            // the picture of an environment in the mean: its smallest level. What it shows, the mirrored ray finds
-            uint image = stage_image(VIEW.materials, stage, NO_TEXTURE, p.stage.time);
-            vec4 mean = textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), vec2(0.5), 32.0);
-            source.reflected = mean.rgb * color.rgb;
-            alpha = mean.a * color.a;
         } else {
-            vec4 texel = stage_texel(stage, p, instance, footprint);
-            vec3 image = texel.rgb;
             bool baked = world && (material.flags & MATERIAL_VERTEX_LIGHT) != 0
                 && (stage.rgb_gen == RGBGEN_VERTEX || stage.rgb_gen == RGBGEN_EXACT_VERTEX);
-            if (stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE || baked) {
+            bool mirrors = (stage.flags & STAGE_REFLECTION) != 0, gloss = (stage.flags & STAGE_GLOSS) != 0;
+            // the light of the corners that a shine under a lightmap is multiplied by is no light that falls on it once more:
+            // it says where its author had it shine
+            bool is_lit = stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE || (baked && !(mirrors && p.triangle.lightmap != NO_TEXTURE));
+            // the picture is placed as the eye sees it, which is not what a bounce finds
+            vec4 mean = mirrors ? environment_mean(stage, p) : vec4(0.0);
+            vec4 texel = mirrors && (!gloss || seen == SEEN_BOUNCED) ? mean : stage_texel(stage, p, instance, footprint);
+            vec3 image = texel.rgb;
+            alpha = texel.a * (stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE && stage.alpha_gen == ALPHAGEN_IDENTITY ? 1.0 : color.a);
+            // what is mirrored brings its own light
+            if (mirrors && seen == SEEN_FOLLOWED) source.reflected = mean.rgb * (is_lit ? vec3(1.0) : color.rgb);
+            if (mirrors && !gloss) {
+                if (seen == SEEN_LAST) source.emission = image * color.rgb;
+            } else if (is_lit) {
                 source.lit = image;
-                alpha = texel.a * (stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE && stage.alpha_gen == ALPHAGEN_IDENTITY ? 1.0 : color.a);
             } else {
                 vec3 shown = image * color.rgb;
                 bool matter = !world && (stage.flags & STAGE_MATTER) != 0;
@@ -229,7 +248,6 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint) {
                     if (matter && (instance.flags & INSTANCE_SUSPENDED) != 0) shown *= instance.ambient;
                     source.emission = shown;
                 }
-                alpha = texel.a * color.a;
             }
         }
         if (stage.alpha_func != ALPHAFUNC_NONE && !alpha_passes(stage.alpha_func, alpha)) continue;
@@ -244,10 +262,10 @@ vec3 bounded_albedo(Material material, vec3 lit) {
     return material.lit_scale != 1.0 ? min(lit * material.lit_scale, max(lit, 1.0)) : lit;
 }
 
-// Each part of the point's stages as it is by itself, in linear light.
+// Each part of the point's stages as a diffuse bounce finds it by itself, in linear light.
 Layer evaluate_stages(SurfacePoint p, Footprint footprint) {
     Material material = material_of(p.triangle.material);
-    Layer shown = run_stages(material, p, footprint);
+    Layer shown = run_stages(material, p, footprint, SEEN_BOUNCED);
     return Layer(bounded_albedo(material, linear_part(shown.lit)), linear_part(shown.emission), linear_part(shown.through),
         linear_part(shown.reflected));
 }

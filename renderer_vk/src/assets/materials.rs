@@ -300,6 +300,7 @@ impl Materials {
             shader = shaderscript::collapse_vertex_light(&shader, class == LightmapClass::None);
         }
         let stage_first = self.arrays.stages.len();
+        let vertex_light = class == LightmapClass::Vertex;
         let mut videos = Vec::new();
         let mut kept = 0;
         for stage in &shader.stages {
@@ -313,6 +314,9 @@ impl Materials {
                         && let Some(pushed) = self.arrays.stages.get_mut(index as usize)
                     {
                         pushed.flags |= types::constants::STAGE_REFLECTION;
+                        if shaderscript::light::is_gloss(&shader, kept - 1, vertex_light) {
+                            pushed.flags |= types::constants::STAGE_GLOSS;
+                        }
                     }
                     let stage = index;
                     videos.extend(video.map(|(name, client)| VideoStage {

@@ -87,6 +87,15 @@ t/shiny
     blendFunc add
     tcGen environment }
 }
+t/metal
+{
+  { map t/b.tga
+    tcGen environment }
+  { map t/a.tga
+    blendFunc add }
+  { map $lightmap
+    blendFunc filter }
+}
 t/smoke
 {
   { map t/a.tga
@@ -217,11 +226,16 @@ fn liquids_and_reflections_come_from_directives() {
     assert!(red.abs() < 1.0e-6 && green > 0.0 && blue > green);
     assert_eq!(material("t/lava").dielectric.index, 0.0);
     assert_eq!(material("t/wall").dielectric, Default::default());
-    let shiny = material("t/shiny");
-    let reflects: Vec<bool> = (game.materials.stages(&shiny).iter())
-        .map(|stage| stage.flags & c::STAGE_REFLECTION != 0)
-        .collect();
-    assert_eq!(reflects, [false, true]);
+    let (shiny, metal) = (material("t/shiny"), material("t/metal"));
+    let has = |material, flag| -> Vec<bool> {
+        (game.materials.stages(material).iter())
+            .map(|stage| stage.flags & flag != 0)
+            .collect()
+    };
+    assert_eq!(has(&shiny, c::STAGE_REFLECTION), [false, true]);
+    assert_eq!(has(&shiny, c::STAGE_GLOSS), [false, false]);
+    assert_eq!(has(&metal, c::STAGE_REFLECTION), [true, false, false]);
+    assert_eq!(has(&metal, c::STAGE_GLOSS), [true, false, false]);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::f32::consts::TAU;
 
-use super::{SurfaceClass, classify};
+use super::{SurfaceClass, classify, glow_stages};
 use crate::{
     shader::{Deform, Shader},
     stage::{AlphaGen, BlendFactor, RgbGen, Stage, TcGen, TcMod},
@@ -117,6 +117,16 @@ pub fn is_reflection(shader: &Shader, stage: &Stage) -> bool {
     is_picture(stage) && stage.image.names().len() == 1 && rests && !shades && has_body
 }
 
+/// Whether the picture of a reflection, the stage of this index, shows the light at its surface as a texture does: where
+/// light is what it comes to, because the stage is lit itself or a lightmap multiplies it. Its author made it as bright as
+/// the place is lit, as metal is that is not polished all over. Glass and liquids do nothing but mirror, and a picture that
+/// no light reaches stands for a mirror, too.
+pub fn is_gloss(shader: &Shader, index: usize, vertex_light: bool) -> bool {
+    (shader.stages.get(index)).is_some_and(|stage| is_reflection(shader, stage))
+        && refraction_index(shader).is_none()
+        && !glow_stages(shader, vertex_light).contains(&index)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -206,6 +216,37 @@ mod tests {
         assert!(!moving("tcMod turb 0 .1 0 .1"));
         assert!(!reflects(&format!(
             "{{\nmap e\ntcGen environment\nblendFunc add\nrgbGen wave sin 0 1 0 1\n}}\n{BODY}"
+        )));
+    }
+
+    #[test]
+    fn what_is_lit_has_gloss() {
+        let gloss = |body: &str| {
+            let shader = shader(body);
+            let index = (shader.stages.iter()).position(|s| is_reflection(&shader, s));
+            index.is_some_and(|index| is_gloss(&shader, index, true))
+        };
+        const BODY: &str = "{\nmap a\nblendFunc add\n}";
+        const LIGHT: &str = "{\nmap $lightmap\nblendFunc filter\n}";
+        let picture = |says: &str| format!("{{\nmap e\ntcGen environment\n{says}\n}}");
+        let bare = picture("");
+        assert!(gloss(&format!("{bare}\n{BODY}\n{LIGHT}")));
+        // no light comes to what is added above the lightmap, or where there is none
+        assert!(!gloss(&format!("{bare}\n{BODY}")));
+        let added = picture("blendFunc add");
+        assert!(!gloss(&format!("{{\nmap a\n}}\n{LIGHT}\n{added}")));
+        let lit = picture("blendFunc add\nrgbGen lightingDiffuse");
+        let model = "{\nmap a\nrgbGen lightingDiffuse\n}";
+        assert!(gloss(&format!("{model}\n{lit}")));
+        assert!(!gloss(&format!("{model}\n{added}")));
+        // glass mirrors
+        assert!(!gloss(&format!(
+            "surfaceparm trans\n{added}\n{BODY}\n{LIGHT}"
+        )));
+        // an effect is no reflection
+        assert!(!gloss(&format!(
+            "{}\n{BODY}\n{LIGHT}",
+            picture("tcMod scroll 1 1")
         )));
     }
 }

@@ -12,8 +12,8 @@ pub use algebra::{
     stage_samples_white,
 };
 pub use dielectric::{
-    INDEX_GLASS, INDEX_SLIME, INDEX_WATER, filters_light, is_reflection, refraction_index,
-    ripple_slope,
+    INDEX_GLASS, INDEX_SLIME, INDEX_WATER, filters_light, is_gloss, is_reflection,
+    refraction_index, ripple_slope,
 };
 
 use crate::{

@@ -6,6 +6,7 @@ use glam::Vec3;
 use relight::light::{PointLight, SunLight};
 use shaders::types::constants as c;
 
+use super::dielectrics::square;
 use super::harness::{Gpu, Scene, encode, floor_point, lambert, rectangle, stage, through_byte};
 use crate::settings::{LightSelection, Settings};
 use crate::trace::frame_lights::decode;
@@ -98,6 +99,49 @@ fn what_stores_a_part_of_its_light_throws_back_that_part_with(gpu: &mut Gpu) {
         let mean = gpu.mean(&scene, &bounced(1), 16).x;
         println!("{scale}: {mean} {exact}");
         assert!((mean / exact - 1.0).abs() < 0.01, "{scale}: {mean} {exact}");
+    }
+}
+
+#[test]
+fn gloss_throws_back_what_its_picture_shows() {
+    Gpu::each(gloss_throws_back_what_its_picture_shows_with);
+}
+
+fn gloss_throws_back_what_its_picture_shows_with(gpu: &mut Gpu) {
+    // a small white patch in a furnace whose walls are nothing but gloss: of their glow g it finds g and, with a second
+    // bounce, g a, where a is the mean of their picture
+    let texels: Vec<u8> = [40u8, 216].iter().flat_map(|&v| [v, v, v, 255]).collect();
+    let texels = [texels.clone(), texels].concat();
+    let picture = square(gpu, 2, &texels);
+    let eye = Vec3::new(0.0, 0.0, 2.0);
+    let mut scene = Scene::new(eye, Vec3::new(0.1, 0.0, 0.0), 30.0, 16);
+    scene.images.push(picture.texture_index());
+    let stages = [
+        stage::constant([0.0; 3]),
+        stage::gloss(0),
+        stage::light_over(),
+        stage::add([encode(0.25); 3]),
+    ];
+    let wall = scene.material(&stages, 0);
+    let (mins, maxs) = (Vec3::new(-100.0, -100.0, -2.0), Vec3::splat(100.0));
+    scene.room(mins, maxs, wall);
+    let white = scene.material(&[stage::light()], 0);
+    let corner = Vec3::new(-2.0, -2.0, 0.0);
+    scene.quad(rectangle(corner, Vec3::X * 4.0, Vec3::Y * 4.0), white);
+    let glow = through_byte(encode(0.25));
+    let mut once = 0.0;
+    for (bounces, exact) in [
+        (1, glow),
+        (2, glow * (1.0 + decode(Vec3::splat(128.0 / 255.0)).x)),
+    ] {
+        let mean = gpu.mean(&scene, &bounced(bounces), 64).x;
+        println!("{bounces}: {mean} {exact}");
+        assert!(
+            (mean / exact - 1.0).abs() < 0.01,
+            "{bounces}: {mean} {exact}"
+        );
+        assert!(mean > 1.1 * once, "a test of nothing");
+        once = mean;
     }
 }
 

@@ -240,6 +240,40 @@ fn an_environment_stage_shows_what_is_around_with(gpu: &mut Gpu) {
 }
 
 #[test]
+fn gloss_shows_the_light_by_its_picture_and_mirrors() {
+    Gpu::each(gloss_shows_the_light_by_its_picture_and_mirrors_with);
+}
+
+fn gloss_shows_the_light_by_its_picture_and_mirrors_with(gpu: &mut Gpu) {
+    let above = through_byte(encode(ABOVE));
+    let image = square(gpu, 1, &[128, 128, 128, 255]);
+    let (body, picture) = (64.0 / 255.0, 128.0 / 255.0);
+    let stages = [
+        stage::constant([body; 3]),
+        stage::gloss(0),
+        stage::light_over(),
+    ];
+    let (eye, target) = (Vec3::new(0.0, 0.0, 60.0), Vec3::new(100.0, 10.0, 0.0));
+    let mut scene = scene(eye, target, &stages, 0, Dielectric::default());
+    scene.images.push(image.texture_index());
+    let linear = |displayed: f32| crate::trace::frame_lights::decode(Vec3::splat(displayed)).x;
+    for light in [0.7, 0.0] {
+        scene.ambient = Vec3::splat(light);
+        // body and picture are summed as they are displayed, and lit; what is mirrored brings its own light
+        let lit = linear(body + picture) * light;
+        compare(gpu, &scene, &middles(), |_| lit + linear(picture) * above);
+        // where rays end nothing is mirrored
+        let ended = Settings {
+            rt_max_depth: 0,
+            ..reference()
+        };
+        if light > 0.0 {
+            compare(gpu, &scene, &ended, |_| lit);
+        }
+    }
+}
+
+#[test]
 fn the_texture_of_what_shines_is_seen_in_every_pixel() {
     Gpu::each(the_texture_of_what_shines_is_seen_in_every_pixel_with);
 }

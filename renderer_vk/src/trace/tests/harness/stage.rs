@@ -71,6 +71,24 @@ pub fn image(first: u32) -> Stage {
     }
 }
 
+/// Multiplies what is below by the light.
+pub fn light_over() -> Stage {
+    Stage {
+        blend_src: c::BLEND_DST_COLOR,
+        blend_dst: c::BLEND_ZERO,
+        ..light()
+    }
+}
+
+/// A reflection as [`shine`], whose picture shows the light at the surface, too, where [`light_over`] follows.
+pub fn gloss(first: u32) -> Stage {
+    let shine = shine(first);
+    Stage {
+        flags: shine.flags | c::STAGE_GLOSS,
+        ..shine
+    }
+}
+
 /// A reflection added to what is below, as strong as an image of the scene, by its bindless index, is bright.
 pub fn shine(first: u32) -> Stage {
     Stage {
