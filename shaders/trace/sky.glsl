@@ -30,6 +30,16 @@ vec2 cloud_uv(vec3 d, float height) {
     return acos(clamp(v.xy, -1.0, 1.0));
 }
 
+// How much those coordinates change with the direction: the geometric mean of both ways, by differences. Overhead, where the
+// sphere is near, it is a few times less than at the horizon.
+float cloud_scale(vec3 d, vec2 uv, float height) {
+    const float step_d = 1.0 / 128.0;
+    vec3 aside = normalize(abs(d.z) < 0.9 ? vec3(-d.y, d.x, 0.0) : vec3(d.z, 0.0, -d.x));
+    vec2 along_x = cloud_uv(normalize(d + aside * step_d), height) - uv;
+    vec2 along_y = cloud_uv(normalize(d + cross(d, aside) * step_d), height) - uv;
+    return sqrt(abs(along_x.x * along_y.y - along_x.y * along_y.x)) / step_d;
+}
+
 // What a blend factor multiplies by, of colours as they are displayed. The frame buffer's alpha reads as one.
 vec3 displayed_factor(uint factor, vec4 source, vec3 destination) {
     switch (factor) {
@@ -74,12 +84,11 @@ vec3 sky_radiance(SurfacePoint p, vec3 d, float spread) {
         float lod = max(log2(max(spread * 0.5 * max(size.x, size.y), 1.0e-6)), 0.0);
         color = textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[VIEW.sky_sampler]), uv, lod).rgb;
     }
-    if (face != 5u) {
+    if (face != 5u && material_of(p.triangle.material).stage_count > 0) {
         p.stage.st = cloud_uv(d, sky.cloud_height);
         p.stage.lightmap = p.stage.st;
         p.triangle.lightmap = NO_TEXTURE;
-        // one unit of direction moves the coordinates by about radius over height of the sphere's cap, at most
-        p.texel_scale = 1.0;
+        p.texel_scale = cloud_scale(d, p.stage.st, sky.cloud_height);
         color = displayed_clouds(p, round_footprint(spread), color);
     }
     return decode_display(color);

@@ -15,6 +15,7 @@ mod lights;
 mod maps;
 mod motion;
 mod parts;
+mod skies;
 mod structures;
 mod texture_filter;
 mod views;

@@ -1,0 +1,91 @@
+//! Clouds against the geometry of their sphere.
+
+use glam::{Vec2, Vec3};
+use shaders::trace_types::SkyRecord;
+use shaders::types::constants as c;
+
+use super::harness::{Gpu, Scene, encode, reference, stage};
+use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
+use crate::settings::Settings;
+
+/// Texels on each side of the picture.
+const SIDE: u32 = 1024;
+/// What one level of the picture is brighter than the one before it.
+const STEP: u8 = 20;
+const HEIGHT: f32 = 512.0;
+
+/// A picture whose levels tell which they are.
+fn levels(gpu: &Gpu) -> Image {
+    let mut desc = ImageDesc::new("levels", SIDE, SIDE, Format::Rgba8, ImageUsage::SAMPLED);
+    desc.mips = SIDE.ilog2() + 1;
+    let image = Image::new(&gpu.device, &desc).expect("image");
+    for mip in 0..desc.mips {
+        let grey = STEP * u8::try_from(mip).expect("few levels");
+        let side = (SIDE >> mip) as usize;
+        let texels = [grey, grey, grey, 255].repeat(side * side);
+        gpu.device
+            .upload_image(&image, mip, 0, &texels)
+            .expect("upload");
+    }
+    image
+}
+
+/// The clouds' coordinates: arc cosines of the direction from the centre of the sphere, 4096 below the eye.
+fn coordinates(d: Vec3) -> Vec2 {
+    let center = Vec3::new(0.0, 0.0, -4096.0);
+    let (b, c) = (
+        -center.dot(d),
+        4096.0f32.powi(2) - (4096.0 + HEIGHT).powi(2),
+    );
+    let on_sphere = d * (-b + (b * b - c).sqrt());
+    let v = (on_sphere - center).normalize();
+    Vec2::new(v.x.acos(), v.y.acos())
+}
+
+#[test]
+fn clouds_are_as_sharp_as_a_pixel_is_small() {
+    Gpu::each(clouds_are_as_sharp_as_a_pixel_is_small_with);
+}
+
+fn clouds_are_as_sharp_as_a_pixel_is_small_with(gpu: &mut Gpu) {
+    const SIZE: usize = 16;
+    const FOV: f32 = 40.0;
+    let image = levels(gpu);
+    // overhead, half way, and near the horizon
+    for elevation in [89.0f32, 45.0, 22.0] {
+        let (sine, cosine) = elevation.to_radians().sin_cos();
+        let forward = Vec3::new(cosine, 0.0, sine);
+        let mut scene = Scene::new(Vec3::ZERO, forward * 100.0, FOV, SIZE as i32);
+        scene.images.push(image.texture_index());
+        let record = SkyRecord {
+            faces: [c::NO_TEXTURE; 6],
+            cloud_height: HEIGHT,
+        };
+        let sky = scene.sky(&[stage::image(0)], record);
+        scene.room(Vec3::splat(-200.0), Vec3::splat(200.0), sky);
+        let settings = Settings {
+            rt_antialiasing: false,
+            ..reference()
+        };
+        let (pixels, _) = gpu.render(&scene, &settings, 1);
+        let tan = (FOV.to_radians() * 0.5).tan();
+        let pixel = 2.0 * tan / SIZE as f32;
+        let [_, left, up] = scene.def.view_axis;
+        let d = (forward - (left + up) * (0.5 * pixel)).normalize();
+        let h = 0.01;
+        let aside = d.cross(Vec3::Y).normalize();
+        let [a, b] = [aside, d.cross(aside)].map(|way| {
+            let moved = coordinates((d + way * h).normalize());
+            (moved - coordinates((d - way * h).normalize())) / (2.0 * h)
+        });
+        let texels = a.perp_dot(b).abs().sqrt() * pixel * SIDE as f32;
+        let wanted = texels.log2();
+        let found = encode(pixels[(SIZE + 1) * SIZE / 2].x) * 255.0 / f32::from(STEP);
+        println!("{elevation} degrees: level {found}, {wanted}");
+        assert!(wanted > 0.5, "a test of nothing");
+        assert!(
+            (found - wanted).abs() < 0.1,
+            "{elevation}: {found} {wanted}"
+        );
+    }
+}
