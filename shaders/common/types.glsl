@@ -49,6 +49,8 @@ struct Draw {
 
 struct Flare { vec3 color; float size; vec2 center; uint pixel[2]; float depth; uint slot; uint fresh; vec3 at; float reach; };
 
+struct SunDisc { vec3 direction; uint material; vec3 left; float size; };
+
 struct FlareState { uint seen; uint visible; int since; };
 
 struct RasterLight { vec3 origin; float radius; vec3 color; };

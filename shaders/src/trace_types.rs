@@ -5,7 +5,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
-use crate::types::MaterialBuffers;
+use crate::types::{MaterialBuffers, SunDisc};
 
 /// One geometry of the acceleration structures: found by a hit's instance custom index plus geometry index.
 #[repr(C)]
@@ -486,6 +486,7 @@ pub struct TraceView {
     pub transport: TransportView,
     pub flares: FlareView,
     pub fog: FogView,
+    pub sun: SunDisc,
     pub eye: Vec3,
     pub forward: Vec3,
     /// Scaled by the tangent of half the horizontal angle.

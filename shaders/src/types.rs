@@ -316,6 +316,20 @@ pub struct Flare {
     pub reach: f32,
 }
 
+/// The sun's disc: a square picture in the sky (`r_drawSun`).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct SunDisc {
+    /// Unit vector towards it.
+    pub direction: Vec3,
+    /// Index of its material; `NO_TEXTURE`: there is none.
+    pub material: u32,
+    /// Unit vector to the left of the picture.
+    pub left: Vec3,
+    /// Half the side of the square, as a part of its distance.
+    pub size: f32,
+}
+
 /// What is known of a flare from frame to frame.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]

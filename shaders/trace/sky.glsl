@@ -1,4 +1,4 @@
-// Sky by direction: the box of six images, and the cloud stages on a sphere around the world.
+// Sky by direction: the box of six images, the cloud stages on a sphere around the world, and the picture of the sun.
 #ifndef RELIGHT_TRACE_SKY_GLSL
 #define RELIGHT_TRACE_SKY_GLSL
 
@@ -70,8 +70,26 @@ vec3 displayed_clouds(SurfacePoint p, Footprint width, vec3 below) {
     return below;
 }
 
+// The picture of the sun over what lies behind it.
+vec3 displayed_sun(SurfacePoint p, vec3 d, float spread, vec3 below) {
+    SunDisc sun = VIEW.sun;
+    float ahead = dot(d, sun.direction);
+    if (sun.material == NO_TEXTURE || ahead <= 0.0) return below;
+    vec3 up = cross(sun.direction, sun.left);
+    vec2 place = vec2(dot(d, sun.left), dot(d, up)) / (ahead * sun.size);
+    if (max(abs(place.x), abs(place.y)) > 1.0) return below;
+    p.triangle.material = sun.material;
+    p.triangle.lightmap = NO_TEXTURE;
+    p.stage.st = 0.5 - 0.5 * place;
+    p.stage.color = vec4(1.0);
+    p.stage.time = shader_time(material_of(sun.material), instance_of(p.instance));
+    p.texel_scale = 0.5 / sun.size;
+    return displayed_clouds(p, round_footprint(spread), below);
+}
+
 // Displayed radiance of the sky in direction d. `p`: the sky surface that was hit; its lightmap index is the sky's.
-vec3 sky_radiance(SurfacePoint p, vec3 d, float spread) {
+// `with_sun`: with the picture of the sun, which is seen but gives no light: that is a light's.
+vec3 sky_radiance(SurfacePoint p, vec3 d, float spread, bool with_sun) {
     if ((VIEW.flags & VIEW_FAST_SKY) != 0) return vec3(0.0);
     SkyRecord sky = Skies(VIEW.skies).at[p.triangle.lightmap];
     uint face;
@@ -91,6 +109,7 @@ vec3 sky_radiance(SurfacePoint p, vec3 d, float spread) {
         p.texel_scale = cloud_scale(d, p.stage.st, sky.cloud_height);
         color = displayed_clouds(p, round_footprint(spread), color);
     }
+    if (with_sun) color = displayed_sun(p, d, spread, color);
     return decode_display(color);
 }
 

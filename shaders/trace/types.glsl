@@ -87,6 +87,7 @@ struct TraceView {
     TransportView transport;
     FlareView flares;
     FogView fog;
+    SunDisc sun;
     vec3 eye; vec3 forward; vec3 left; vec3 up;
     uint width; uint height; int target_x; int target_y;
     uint scene; uint flags; uint seed; uint accumulated;

@@ -6,14 +6,12 @@
 use glam::{Vec2, Vec3};
 use shaders::types::Vertex;
 
-use crate::scene::{Cells, SKY_CELLS, View, cube_point, perpendicular};
+use crate::scene::{Cells, SKY_CELLS, SUN_SIZE, View, cube_point, perpendicular};
 
 /// Radius of the planet under the clouds, units.
 const PLANET_RADIUS: f32 = 4096.0;
 /// How far away the box and the sun are, as a part of the distance of the far plane; less than its corners.
 const DISTANCE: f32 = 1.0 / 1.75;
-/// Half the side of the sun, as a part of its distance.
-const SUN_SIZE: f32 = 0.1;
 
 /// Coordinates on the cloud layer in `direction` (any length), clouds `height` above the ground.
 pub fn cloud_coordinates(direction: Vec3, height: f32) -> Vec2 {

@@ -199,6 +199,9 @@ pub struct Portal {
     pub entity_origin: Vec3,
 }
 
+/// Half the side of the sun's picture, as a part of its distance.
+pub const SUN_SIZE: f32 = 0.1;
+
 /// The sun's disc.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sun {

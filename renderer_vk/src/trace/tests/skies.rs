@@ -1,4 +1,4 @@
-//! Clouds against the geometry of their sphere.
+//! Clouds against the geometry of their sphere, and the picture of the sun against that of its square.
 
 use glam::{Vec2, Vec3};
 use shaders::trace_types::SkyRecord;
@@ -6,6 +6,7 @@ use shaders::types::constants as c;
 
 use super::harness::{Gpu, Scene, encode, reference, stage};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
+use crate::scene::Sun;
 use crate::settings::Settings;
 
 /// Texels on each side of the picture.
@@ -88,4 +89,60 @@ fn clouds_are_as_sharp_as_a_pixel_is_small_with(gpu: &mut Gpu) {
             "{elevation}: {found} {wanted}"
         );
     }
+}
+
+#[test]
+fn the_sun_is_a_square_in_its_direction() {
+    Gpu::each(the_sun_is_a_square_in_its_direction_with);
+}
+
+fn the_sun_is_a_square_in_its_direction_with(gpu: &mut Gpu) {
+    const SIZE: usize = 32;
+    let direction = Vec3::new(0.8, 0.3, 0.5).normalize();
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::new(100.0, 30.0, 55.0), 30.0, SIZE as i32);
+    let (blue, glow) = ([0.0, 0.0, 0.4], [0.6, 0.2, 0.2]);
+    let record = SkyRecord {
+        faces: [c::NO_TEXTURE; 6],
+        cloud_height: HEIGHT,
+    };
+    let sky = scene.sky(&[stage::constant(blue)], record);
+    scene.room(Vec3::splat(-200.0), Vec3::splat(200.0), sky);
+    let material = scene.material(&[stage::add(glow)], c::MATERIAL_TRANSLUCENT);
+    let settings = Settings {
+        rt_antialiasing: false,
+        ..reference()
+    };
+    let (pixels, _) = gpu.render_views(&scene, &settings, 1, |_, view| {
+        view.sun = Some(Sun {
+            material,
+            direction,
+        });
+    });
+    let tan = (15.0f32).to_radians().tan();
+    let [forward, left, up] = scene.def.view_axis;
+    let across = crate::scene::perpendicular(direction);
+    let mut inside = 0;
+    for (i, pixel) in pixels.iter().enumerate() {
+        let at = |n: usize| ((n as f32 + 0.5) / SIZE as f32 * 2.0 - 1.0) * tan;
+        let d = forward - left * at(i % SIZE) - up * at(i / SIZE);
+        let d = d / d.dot(direction);
+        // the square has a tenth of the distance to each side
+        let far = [across, direction.cross(across)].map(|way| d.dot(way).abs());
+        let far = far[0].max(far[1]);
+        if (far - 0.1).abs() < 1.0e-4 {
+            continue;
+        }
+        let in_it = far < 0.1;
+        inside += usize::from(in_it);
+        let channel = |n: usize| blue[n] + if in_it { glow[n] } else { 0.0 };
+        for n in 0..3 {
+            let found = encode(pixel[n]);
+            assert!(
+                (found - channel(n)).abs() < 0.01,
+                "{i}: {found} {}",
+                channel(n)
+            );
+        }
+    }
+    assert!(inside > 100 && inside < SIZE * SIZE / 2, "{inside}");
 }

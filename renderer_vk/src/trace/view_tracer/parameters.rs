@@ -5,11 +5,12 @@ use shaders::trace_types::constants as t;
 use shaders::trace_types::{
     AntialiasView, FlareView, MotionView, PortalRecord, PostView, TraceView, TransportView,
 };
+use shaders::types::{SunDisc, constants::NO_TEXTURE};
 
 use super::{LIGHT_ADAPTATION, TracedMap, ViewTracer, is_lit, sparse_bounce};
 use crate::gpu::{Error, Image, Recorder};
 use crate::raster::FlareTest;
-use crate::scene::ViewScene;
+use crate::scene::{SUN_SIZE, ViewScene, perpendicular};
 use crate::settings::Settings;
 use crate::trace::accel::AccelOutput;
 use crate::trace::input::MaterialTable;
@@ -119,6 +120,7 @@ impl ViewTracer {
             channels: self.channels,
             fog_count: map.map_or(0, |m| m.geometry.fog_count),
             portal_count: u32::try_from(portals.len()).unwrap_or(u32::MAX),
+            sun: sun_disc(view),
             fog: self.fog.view(&targets.direct, &targets.composite),
             max_depth: settings.rt_max_depth,
             bounces: settings.rt_bounces.min(2),
@@ -159,6 +161,22 @@ pub(super) fn camera_frame(view: &ViewScene) -> [Vec3; 4] {
         left * camera.tan_x,
         up * camera.tan_y,
     ]
+}
+
+/// The sun's picture where it is to be seen.
+fn sun_disc(view: &ViewScene) -> SunDisc {
+    view.sun.map_or(
+        SunDisc {
+            material: NO_TEXTURE,
+            ..SunDisc::default()
+        },
+        |sun| SunDisc {
+            direction: sun.direction,
+            material: sun.material,
+            left: perpendicular(sun.direction),
+            size: SUN_SIZE,
+        },
+    )
 }
 
 /// Width of a pixel's cone at distance 1.
