@@ -50,6 +50,12 @@ pub struct MeasureArgs {
     /// A model in the hands: its file in the game's data
     #[arg(long, value_name = "MODEL")]
     hold: Option<String>,
+    /// Horizontal angle of view, degrees: a small one shows details as a large picture does
+    #[arg(long, default_value_t = 90.0)]
+    fov: f32,
+    /// Stand still where the camera would turn and walk; game time runs all the same
+    #[arg(long)]
+    stand: bool,
     /// Pictures to make, by the table's names; all where none is named
     #[arg(long, value_name = "NAME")]
     picture: Vec<String>,
@@ -370,6 +376,8 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
             entities,
             held,
             size: args.size,
+            fov: args.fov,
+            stand: args.stand,
         };
         let cameras = match args.view.is_empty() {
             true => ruled_cameras(&bsp.entities(), args.each),

@@ -59,6 +59,10 @@ pub struct Stage {
     pub held: Option<i32>,
     /// Pixels.
     pub size: (u32, u32),
+    /// Horizontal, degrees.
+    pub fov: f32,
+    /// The camera is at its place from the first frame on.
+    pub stand: bool,
 }
 
 /// Where a model in the hands is, units forward, to the left and up of the eye: about where games put it.
@@ -70,7 +74,7 @@ impl Stage {
     /// # Errors
     /// The device is lost or out of memory.
     pub fn frame(&mut self, camera: &Camera, left: u32, lights: &[DynamicLight]) -> Result<()> {
-        let camera = on_the_way(camera, left);
+        let camera = on_the_way(camera, if self.stand { 0 } else { left });
         self.renderer.begin_frame(0);
         self.renderer.clear_scene();
         for entity in &self.entities {
@@ -95,7 +99,7 @@ impl Stage {
         }
         self.renderer.render_scene(&RefDef {
             time_ms: ARRIVAL_TIME.saturating_sub_unsigned(left.saturating_mul(FRAME_TIME)),
-            ..camera.ref_def(self.size, 90.0)
+            ..camera.ref_def(self.size, self.fov)
         })?;
         self.renderer.end_frame()?;
         Ok(())
