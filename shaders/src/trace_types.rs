@@ -316,6 +316,10 @@ pub struct MotionView {
     pub last_path: u32,
     /// 1: camera, mirrors and portals are where they were.
     pub still: u32,
+    /// 1: no time has passed since the last frame.
+    pub time_stands: u32,
+    /// Unused.
+    pub padding: u32,
 }
 
 /// What the passes after the light read, and what they count with.

@@ -3,7 +3,7 @@
 // to the picture of the window's size. Karis, High-Quality Temporal Supersampling (SIGGRAPH 2014 course) for the whole;
 // Salvi, An Excursion in Temporal Supersampling (GDC 2016) for the clipping by variance; Yang, Liu, Salvi, A Survey of
 // Temporal Antialiasing Techniques (Eurographics 2020), sections 4 and 5, for weighing samples of a coarser grid by their
-// distance from the pixel.
+// distance from the pixel; Dodgson, Quadratic Interpolation for Image Resampling (1997), for the newest frame in motion.
 //
 // What glows in front of a surface and moves otherwise than it does has no history there: of it the newest frame alone is
 // shown, as far as it is a part of the colour (as a mask of reactive pixels does it in AMD's FidelityFX Super Resolution 2).
@@ -29,10 +29,11 @@ shared float fresh_parts[TILE][TILE];
 const float NARROW = 0.3;
 // The same in traced pixels for a pixel without history.
 const float WIDE = 0.5;
-// Frames' worth of samples that a pixel keeps at rest, and where it is resampled from frame to frame.
-const float REST_FRAMES = 16.0, MOVING_FRAMES = 5.0;
+// Frames' worth of samples that a pixel keeps at rest, and where it is resampled from frame to frame, which blurs it: there
+// the newest frame counts as a whole one, and where it is not as fine as the picture as far as its samples are near.
+const float REST_FRAMES = 16.0, MOVING_FRAMES = 2.0, COARSE_MOVING_FRAMES = 5.0;
 // The same in motion for what ripples bend: it has no motion of its own, and more of its history would smear it.
-const float BENT_FRAMES = 2.0;
+const float BENT_FRAMES = 0.5;
 // Standard deviations that history may differ by, at rest and in motion.
 const float REST_RANGE = 1.25, MOVING_RANGE = 1.0;
 // Part of the way to a pixel's surface at which a neighbour's is in front of it.
@@ -71,6 +72,12 @@ vec4 last_bicubic(vec2 place, vec2 size) {
     sum += last_resolved(vec2(inner.x, high.y)).rgb * (w12.x * w3.y);
     float weight = w12.x * w12.y + w12.x * (w0.y + w3.y) + w12.y * (w0.x + w3.x);
     return vec4(max(sum / weight, 0.0), center.a);
+}
+
+// The kernel of quadratic interpolation: 3 x 3 samples a pixel apart make the value between them, as sharp as a cubic.
+float quadratic(float x) {
+    x = abs(x);
+    return x < 0.5 ? 1.0 - 2.0 * x * x : x < 1.5 ? (x - 2.5) * x + 1.5 : 0.0;
 }
 
 // Whether the traced pixels around a place showed something at that distance in the last frame: within their range, because
@@ -116,6 +123,7 @@ void main() {
     ivec2 middle = ivec2(floor(place));
     vec3 sum = vec3(0.0), squares = vec3(0.0);
     vec4 narrow = vec4(0.0), wide = vec4(0.0);
+    vec3 between = vec3(0.0), least = vec3(1.0e30), most = vec3(-1.0e30);
     // an edge moves with what is in front; on one surface the pixel's own motion is the right one
     // not that of what is the lesser part of what is seen
     bool lesser = fresh_parts[middle.y - first.y][middle.x - first.x] < 0.0;
@@ -130,6 +138,9 @@ void main() {
             vec2 away_output = away / ratio;
             narrow += vec4(s.rgb, 1.0) * exp(dot(away_output, away_output) * (-0.5 / (NARROW * NARROW)));
             wide += vec4(s.rgb, 1.0) * exp(dot(away, away) * (-0.5 / (WIDE * WIDE)));
+            between += s.rgb * (quadratic(away.x) * quadratic(away.y));
+            least = min(least, s.rgb);
+            most = max(most, s.rgb);
             sum += s.rgb;
             squares += s.rgb * s.rgb;
             // next to it, too: the samples of an edge's pixels meet it in one frame and miss it in the next
@@ -151,7 +162,7 @@ void main() {
     float frames = 0.0;
     bool known = VIEW.antialias.history != 0 && motion.last_path >= 0.0
         && all(greaterThanEqual(last_place, vec2(0.0))) && all(lessThan(last_place, vec2(output_size)));
-    bool rests = motion.offset == vec2(0.0);
+    bool rests = motion.offset == vec2(0.0), is_fine = traced_size == output_size;
     if (known && was_seen(last_place * ratio, motion.last_path, rests, mark_field(motion.mark) > 0.0)) {
         vec4 history = last_bicubic(last_place, vec2(output_size));
         old = to_ycocg(compress(history.rgb, exposure));
@@ -160,12 +171,14 @@ void main() {
         vec3 parts = abs(off) / (deviation * range + 1.0e-4);
         old = mean + off / max(max_component(parts), 1.0);
         // in the sum with what is new, history is to have the part that is not
-        float most = rests ? REST_FRAMES : mark_bent(motion.mark) ? BENT_FRAMES : MOVING_FRAMES;
-        frames = min(min(history.a, most), (1.0 - fresh) / max(fresh, 1.0e-3));
+        float kept = rests ? REST_FRAMES : mark_bent(motion.mark) ? BENT_FRAMES : is_fine ? MOVING_FRAMES : COARSE_MOVING_FRAMES;
+        frames = min(min(history.a, kept), (1.0 - fresh) / max(fresh, 1.0e-3));
     }
     vec3 now = wide.rgb / wide.w;
     float confidence = 1.0;
-    if (frames > 0.0) {
+    if (frames > 0.0 && !rests && is_fine) {
+        now = clamp(between, least, most);
+    } else if (frames > 0.0) {
         confidence = mix(min(narrow.w, 1.0), 1.0, fresh);
         if (narrow.w > 1.0e-3) now = mix(narrow.rgb / narrow.w, now, fresh);
     }

@@ -14,6 +14,9 @@
 // Length of the way to the sky as the motion image holds it: beyond every map, within half floats.
 const float SKY_PATH = 60000.0;
 
+// Pixels; less than this is nothing.
+const float LEAST_OFFSET = 1.0e-3;
+
 // The motion of a pixel.
 struct Motion {
     vec2 offset;     // from the pixel to where its surface was in the last frame, pixels
@@ -122,6 +125,8 @@ vec4 motion_of(CameraRay ray, LastPlace place) {
     ndc.x -= VIEW.eye_shift;
     vec2 offset = (ndc * 0.5 + 0.5) * vec2(VIEW.width, VIEW.height) - ray.seen;
     float last_path = place.at.w > 0.0 ? min(length(v), SKY_PATH) : SKY_PATH;
+    // none at all is the mark of what rests
+    if (offset == vec2(0.0)) offset.x = LEAST_OFFSET;
     return vec4(clamp(offset, -60000.0, 60000.0), last_path, path);
 }
 

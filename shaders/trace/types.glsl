@@ -49,7 +49,7 @@ struct LastInstance { vec3 axis[3]; vec3 origin; uint known; };
 
 struct MotionView {
     uint64_t vertices; uint64_t vertex_bytes; uint64_t last_positions; uint64_t last_instances; uint64_t last_portals;
-    uint image; uint path; uint last_path; uint still;
+    uint image; uint path; uint last_path; uint still; uint time_stands; uint padding;
 };
 
 struct PostView {

@@ -97,9 +97,11 @@ impl Antialias {
         })
     }
 
-    /// The next picture has nothing to do with the last one.
+    /// The next picture has nothing to do with the last one. Its samples begin anew, too, so that the same frames make the
+    /// same picture.
     pub fn reset(&mut self) {
         self.history = false;
+        self.frame = 0;
     }
 
     /// Makes ready for a view of the size `output`. `picture`: the image that is the picture if nothing is resolved;

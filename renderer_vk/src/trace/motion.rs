@@ -88,6 +88,8 @@ pub(super) struct Followed {
     pub positions: Vec<Vec3>,
     /// Of each portal.
     pub portals: Vec<PortalRecord>,
+    /// No time has passed.
+    pub time_stands: bool,
 }
 
 impl Motion {
@@ -111,6 +113,7 @@ impl Motion {
             last_instances: rec.arena().push(&found.instances)?,
             last_portals: rec.arena().push(&found.portals)?,
             still: u32::from(found.portals == portals),
+            time_stands: u32::from(found.time_stands),
             ..MotionView::default()
         })
     }
@@ -122,6 +125,7 @@ impl Motion {
             instances: vec![LastInstance::default(); view.instances.len()],
             positions: view.vertices.iter().map(|v| v.position).collect(),
             portals: portals.iter().map(|p| past.portal(p)).collect(),
+            time_stands: view.time == past.time,
         };
         if let (Some(last), Some(world)) = (found.instances.first_mut(), view.instances.first()) {
             *last = last_instance(world, (world.axis, world.origin));

@@ -8,7 +8,7 @@ use super::harness::{Gpu, Scene, encode, rectangle, reference, stage, through_by
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::settings::Settings;
 
-const LIQUID: u32 = c::MATERIAL_LIQUID | c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
+pub(super) const LIQUID: u32 = c::MATERIAL_LIQUID | c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
 const SIDE: usize = 24;
 /// Linear radiance above and below.
 const ABOVE: f32 = 0.8;

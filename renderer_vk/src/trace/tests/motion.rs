@@ -161,8 +161,8 @@ fn meshes_move_with_their_entities_and_by_their_vertices(gpu: &mut Gpu) {
     assert!(unknown > SIZE * SIZE / 2 && unknown < SIZE * SIZE);
 }
 
-fn mirror_at(x: f32) -> Portal {
-    let normal = Vec3::NEG_X;
+/// A mirror across x; `normal`: along x, to the side that it shows.
+pub(super) fn mirror_at(x: f32, normal: Vec3) -> Portal {
     let origin = Vec3::new(x, 0.0, 0.0);
     Portal {
         plane: plane(normal, origin),
@@ -194,7 +194,7 @@ fn what_a_mirror_shows_moves_like_its_mirror_image(gpu: &mut Gpu) {
         },
     );
     // the mirror comes nearer too, as one on a moving brush does
-    scene.portals.push(mirror_at(50.0));
+    scene.portals.push(mirror_at(50.0, Vec3::NEG_X));
     let moved = Vec3::new(4.0, -3.0, 2.0);
     gpu.render_views(&scene, &live(), 2, |frame, view| {
         view.time = frame as f32 * 0.02;
@@ -203,7 +203,7 @@ fn what_a_mirror_shows_moves_like_its_mirror_image(gpu: &mut Gpu) {
             view.instances.last_mut().expect("placed").origin = moved;
             view.entities[0].origin = moved;
         }
-        view.portals[0] = mirror_at(if frame == 0 { 49.5 } else { 50.0 });
+        view.portals[0] = mirror_at(if frame == 0 { 49.5 } else { 50.0 }, Vec3::NEG_X);
     });
     let last = |p: Vec3| {
         let then = p - moved;
@@ -235,7 +235,7 @@ fn what_a_portal_shows_moves_as_if_it_stood_there(gpu: &mut Gpu) {
         mirror: false,
         camera_origin: Vec3::new(5000.0, 0.0, 0.0),
         camera_axis: [Vec3::NEG_Y, Vec3::X, Vec3::Z],
-        ..mirror_at(50.0)
+        ..mirror_at(50.0, Vec3::NEG_X)
     });
     gpu.render_views(&scene, &live(), 2, |frame, view| {
         if frame == 1 {
