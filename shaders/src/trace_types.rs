@@ -563,6 +563,7 @@ pub mod constants {
     pub const KIND_TESTED: u32 = 1;
     pub const KIND_TRANSLUCENT: u32 = 2;
     pub const KIND_SKY: u32 = 3;
+    pub const RAY_TILE: u32 = 16;
     pub const BVH_NONE: u32 = 0xFFFF_FFFF;
     pub const BVH_LEAF: u32 = 0x8000_0000;
     pub const BVH_COUNT_SHIFT: u32 = 28;
@@ -604,6 +605,8 @@ pub mod constants {
     pub const COUNT_PRIMARY: u32 = 1;
     pub const COUNT_DIRECT: u32 = 2;
     pub const COUNT_INDIRECT: u32 = 3;
+    pub const COUNT_BOUNCE: u32 = 4;
+    pub const COUNT_BOUNCE_LIGHT: u32 = 5;
     pub const COUNTER_ROWS: u32 = 64;
     pub const NO_IMAGE: u32 = 0xFFFF_FFFF;
     pub const DENOISE_HISTORY: u32 = 1;
@@ -616,7 +619,6 @@ pub mod constants {
     pub const SELECT_RESAMPLED: u32 = 1;
     pub const WEAK_RAYS: u32 = 4;
     pub const SELECT_ALL: u32 = 2;
-    pub const SELECT_ONE: u32 = 3;
     pub const LIGHTS_SOFT: u32 = 1;
     pub const LIGHT_KIND_SHIFT: u32 = 29;
     pub const LIGHT_TRIANGLE: u32 = 0;

@@ -51,7 +51,6 @@ vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint selection, 
             if (member >= set.strong) member += from.listed;
             choice = LightChoice(light_of_member(set, member), 1.0, 0.0);
         } else if (ray >= picks) choice = choose_sun(set.suns, u.x);
-        else if (selection == SELECT_ONE) choice = choose_one(set, position, normal, u.x);
         else {
             choice = choose_resampled(from, position, normal, u.x);
             choice.weight /= float(picks);

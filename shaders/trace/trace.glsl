@@ -12,6 +12,7 @@
 
 layout(local_size_x = 8, local_size_y = 4) in;
 #define LAUNCH_PIXEL ivec2(gl_GlobalInvocationID.xy)
+#define LAUNCH_SLOT ((gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 32u + gl_LocalInvocationIndex)
 
 #if defined(TRACER_COMPUTE)
 #include "trace/bvh.glsl"
@@ -24,6 +25,7 @@ layout(local_size_x = 8, local_size_y = 4) in;
 #include "trace/payload.glsl"
 
 #define LAUNCH_PIXEL ivec2(gl_LaunchIDEXT.xy)
+#define LAUNCH_SLOT gl_LaunchIDEXT.x
 layout(location = 0) rayPayloadEXT Payload payload;
 layout(location = 1) rayPayloadEXT LayerPayload layer_payload;
 

@@ -105,6 +105,8 @@ struct TraceView {
 
 // What a geometry's triangles are to a ray.
 const uint KIND_OPAQUE = 0, KIND_TESTED = 1, KIND_TRANSLUCENT = 2, KIND_SKY = 3;
+// Edge of the tiles of pixels whose rays are sorted.
+const uint RAY_TILE = 16;
 // BvhNode.children: nothing; the bit of a leaf; where the number of its entries less one stands; the first of them.
 const uint BVH_NONE = 0xFFFFFFFFu, BVH_LEAF = 0x80000000u, BVH_COUNT_SHIFT = 28, BVH_FIRST = 0x0FFFFFFFu;
 // Entries that a walk of one level keeps for later at most.
@@ -122,7 +124,7 @@ const uint VIEW_JITTER = 1, VIEW_FIRST_PERSON = 2, VIEW_ACCUMULATE = 4, VIEW_AUT
 const uint DEBUG_ALBEDO = 1, DEBUG_NORMALS = 2, DEBUG_DEPTH = 3, DEBUG_MOTION = 4, DEBUG_CLUSTERS = 5, DEBUG_LIGHTS = 6,
     DEBUG_SAMPLES = 7, DEBUG_VARIANCE = 8, DEBUG_GRADIENTS = 9, DEBUG_RAYS = 10, DEBUG_SPECULAR = 11;
 // Counted passes, and counters of each.
-const uint COUNT_EYE = 0, COUNT_PRIMARY = 1, COUNT_DIRECT = 2, COUNT_INDIRECT = 3, COUNTER_ROWS = 64;
+const uint COUNT_EYE = 0, COUNT_PRIMARY = 1, COUNT_DIRECT = 2, COUNT_INDIRECT = 3, COUNT_BOUNCE = 4, COUNT_BOUNCE_LIGHT = 5, COUNTER_ROWS = 64;
 // No storage image.
 const uint NO_IMAGE = 0xFFFFFFFFu;
 // Bits of DenoiseView.flags: the last frame's light is there; its samples are lit again; the cheap
@@ -131,7 +133,7 @@ const uint DENOISE_HISTORY = 1, DENOISE_GRADIENTS = 2, DENOISE_SPARSE = 4;
 // Bits of FogView.flags: fog is lit; its light is filtered; the last frame's is there.
 const uint FOG_LIT = 1, FOG_FILTERED = 2, FOG_HISTORY = 4;
 // How a light is chosen: LightView.selection; the last one is for bounces: as resampled, with one ray for lights and suns.
-const uint SELECT_UNIFORM = 0, SELECT_RESAMPLED = 1, SELECT_ALL = 2, SELECT_ONE = 3;
+const uint SELECT_UNIFORM = 0, SELECT_RESAMPLED = 1, SELECT_ALL = 2;
 // Bits of LightView.flags.
 // rays of an estimate by all lights for the weak ones of a list
 const uint WEAK_RAYS = 4;

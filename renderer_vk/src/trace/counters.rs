@@ -8,11 +8,13 @@ use crate::gpu::{
 };
 
 /// The counted passes by the names that their times go by, in the order of `COUNT_*`.
-pub const COUNTED: [&str; 4] = [
+pub const COUNTED: [&str; 6] = [
     "trace_eye",
     "trace_primary",
     "trace_direct",
     "trace_indirect",
+    "trace_bounce",
+    "trace_bounce_light",
 ];
 
 /// Bytes of the counters.

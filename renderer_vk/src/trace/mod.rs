@@ -1,7 +1,7 @@
 //! The traced look: acceleration structures, and the passes from camera rays to the picture.
 //!
 //! A frame, in the order of [`view_tracer`]: [`accel`] builds what moves and the top level; [`passes::Primary`] finds what each
-//! pixel shows; [`passes::Direct`] and [`passes::Indirect`] light it; [`denoise`] takes the noise out; [`passes::Composite`], [`antialias::Antialias`],
+//! pixel shows; [`passes::Direct`] and [`indirect`] light it; [`denoise`] takes the noise out; [`passes::Composite`], [`antialias::Antialias`],
 //! [`passes::Exposure`] and [`passes::ToneMap`] make the picture of it. Rays are launched only from the ray generation
 //! shaders; hit shaders report what was hit and decide cut-outs.
 //!
@@ -22,6 +22,7 @@ mod doubled;
 pub mod fog;
 mod frame_lights;
 pub mod geometry;
+mod indirect;
 pub mod input;
 pub mod layer_boxes;
 pub mod light_cells;

@@ -2,6 +2,7 @@
 //! All of them read their inputs and outputs from one `TraceView`, whose address `record` is given.
 
 use shaders::Spirv;
+use shaders::trace_types::constants::RAY_TILE;
 
 use super::input::Tracer;
 use crate::gpu::{
@@ -127,6 +128,9 @@ macro_rules! ray_pass {
 
 macro_rules! pixel_pass {
     ($(#[$doc:meta])* $type:ident, $name:literal, $shader:ident) => {
+        pixel_pass!($(#[$doc])* $type, $name, $shader, TILE);
+    };
+    ($(#[$doc:meta])* $type:ident, $name:literal, $shader:ident, $tile:expr) => {
         $(#[$doc])*
         pub struct $type(ComputePipeline);
 
@@ -136,7 +140,12 @@ macro_rules! pixel_pass {
             /// # Errors
             /// The driver refuses the pipeline.
             pub fn new(device: &Device) -> Result<Self, Error> {
-                Ok(Self(ComputePipeline::new(device, $name, &shaders::$shader, &[])?))
+                Self::with(device, &[])
+            }
+
+            /// Compiles the pipeline with specialization constants, id and value.
+            fn with(device: &Device, constants: &[(u32, u32)]) -> Result<Self, Error> {
+                Ok(Self(ComputePipeline::new(device, $name, &shaders::$shader, constants)?))
             }
 
             /// Records the pass. `view`: device address of the `TraceView`; `size`: its pixels.
@@ -144,7 +153,7 @@ macro_rules! pixel_pass {
             /// # Errors
             /// Out of memory.
             pub fn record(&self, rec: &mut Recorder, view: u64, size: [u32; 2]) -> Result<(), Error> {
-                dispatch(rec, $name, &self.0, view, size, [TILE; 2])
+                dispatch(rec, $name, &self.0, view, size, [$tile; 2])
             }
         }
     };
@@ -201,11 +210,33 @@ impl Direct {
         // CHOSEN in direct.rgen
         Self::with(device, tracer, &[(0, 1)])
     }
+
+    /// Records the pass for rays in the order that [`Choose`] has left them in.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn record_chosen(
+        &self,
+        rec: &mut Recorder,
+        view: u64,
+        size: [u32; 2],
+    ) -> Result<(), Error> {
+        let [across, down] = size.map(|n| n.div_ceil(RAY_TILE));
+        let launch = match self.0 {
+            RayPass::Pipeline(_) => [across * down * RAY_TILE * RAY_TILE, 1],
+            // the groups of a tile side by side
+            RayPass::Compute(_) => {
+                let groups = RAY_TILE * RAY_TILE / (COMPUTE_TILE[0] * COMPUTE_TILE[1]);
+                [across * groups * COMPUTE_TILE[0], down * COMPUTE_TILE[1]]
+            }
+        };
+        trace(rec, "trace_direct", &self.0, view, launch)
+    }
 }
 
 ray_pass!(
-    /// Reads the G-buffer and the light lists; writes `indirect`: with `VIEW_SPARSE_BOUNCE` for one of 2 × 2
-    /// pixels, and `size` is half as large then.
+    /// Reads the G-buffer and the light lists; writes `indirect`, by paths of any number of bounces: with
+    /// `VIEW_SPARSE_BOUNCE` for one of 2 × 2 pixels, and `size` is half as large then.
     Indirect, "trace_indirect", TRACE_INDIRECT_RGEN,
     TRACE_INDIRECT_RGEN_COMPUTE, TRACE_INDIRECT_RGEN_QUERY
 );
@@ -215,10 +246,37 @@ impl Indirect {
     /// # Errors
     /// The driver refuses the pipeline.
     pub fn with_fog(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-        // HAS_FOG in indirect.rgen
+        // HAS_FOG in bounce.glsl
         Self::with(device, tracer, &[(1, 1)])
     }
 }
+
+ray_pass!(
+    /// Reads the G-buffer; writes what the rays of a single bounce meet (`texels`). `size`: half of the view's, of this and
+    /// the next two.
+    BounceRays, "trace_bounce", TRACE_BOUNCE_RGEN,
+    TRACE_BOUNCE_RGEN_COMPUTE, TRACE_BOUNCE_RGEN_QUERY
+);
+pixel_pass!(
+    /// Reads what those rays meet, and the light lists; writes the light that is found there and that which a ray is to be
+    /// sent to (`texels`).
+    BounceMeets, "trace_bounce_meets", TRACE_BOUNCE_COMP
+);
+impl BounceMeets {
+    /// The same pass for maps with fog, which lies in the way of those rays.
+    ///
+    /// # Errors
+    /// The driver refuses the pipeline.
+    pub fn with_fog(device: &Device) -> Result<Self, Error> {
+        // HAS_FOG in bounce.glsl
+        Self::with(device, &[(1, 1)])
+    }
+}
+ray_pass!(
+    /// Reads that light; writes `indirect` for one of 2 × 2 pixels.
+    BounceLights, "trace_bounce_light", TRACE_BOUNCE_LIGHT_RGEN,
+    TRACE_BOUNCE_LIGHT_RGEN_COMPUTE, TRACE_BOUNCE_LIGHT_RGEN_QUERY
+);
 
 ray_pass!(
     /// Reads the acceleration structures and the flares of the view; writes which of them are seen. `size`: their number
@@ -227,8 +285,9 @@ ray_pass!(
     TRACE_FLARES_RGEN_COMPUTE, TRACE_FLARES_RGEN_QUERY
 );
 pixel_pass!(
-    /// Reads the G-buffer and the light lists; writes for each pixel the light that it sends a ray to (`texels`).
-    Choose, "trace_choose", TRACE_CHOOSE_COMP
+    /// Reads the G-buffer and the light lists; writes for each pixel the light that it sends a ray to (`texels`), those of a
+    /// tile in the order of where the rays go.
+    Choose, "trace_choose", TRACE_CHOOSE_COMP, RAY_TILE
 );
 pixel_pass!(
     /// Reads the G-buffer and `indirect`; writes `indirect` where it was not gathered. `size`: half of the view's.

@@ -1,5 +1,7 @@
 //! The images of the traced look.
 
+use shaders::trace_types::constants::RAY_TILE;
+
 use crate::gpu::{
     Buffer, BufferDesc, BufferUsage, Device, Error, Format, Image, ImageDesc, ImageUsage, Memory,
 };
@@ -71,7 +73,12 @@ impl Targets {
         Ok(Self {
             width,
             height,
-            texels: texels(device, "trace texels", [width, height], 16)?,
+            texels: texels(
+                device,
+                "trace texels",
+                [width, height].map(|n| n.next_multiple_of(RAY_TILE)),
+                16,
+            )?,
             position: make("trace position", Format::Rgba32F)?,
             surface: make("trace surface", Format::Rg32Uint)?,
             shown: make("trace shown", Format::Rg32Uint)?,

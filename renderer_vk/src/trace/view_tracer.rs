@@ -15,12 +15,12 @@ use super::debug::DebugView;
 use super::denoise::Denoiser;
 use super::fog::LitFog;
 use super::geometry::StaticGeometry;
+use super::indirect::IndirectLight;
 use super::input::{MaterialTable, Tracer};
 use super::lights::MapLights;
 use super::motion::Motion;
 use super::passes::{
-    Choose, Composite, Direct, Exposure, EyeRays, Fill, FlareRays, Indirect, OtherSide, Primary,
-    ToneMap,
+    Choose, Composite, Direct, Exposure, EyeRays, FlareRays, OtherSide, Primary, ToneMap,
 };
 use super::targets::Targets;
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
@@ -56,10 +56,7 @@ pub struct ViewTracer {
     /// Of one chosen light a pixel, and of any number.
     chosen_direct: Direct,
     direct: Direct,
-    indirect: Indirect,
-    /// The same for maps with fog, made when there is one.
-    fog_indirect: Option<Indirect>,
-    fill: Fill,
+    indirect: IndirectLight,
     /// Made when a view has flares.
     flare_rays: Option<FlareRays>,
     tracer: Tracer,
@@ -112,9 +109,7 @@ impl ViewTracer {
             choose: Choose::new(device)?,
             chosen_direct: Direct::of_chosen(device, tracer)?,
             direct: Direct::new(device, tracer)?,
-            indirect: Indirect::new(device, tracer)?,
-            fog_indirect: None,
-            fill: Fill::new(device)?,
+            indirect: IndirectLight::new(device, tracer)?,
             flare_rays: None,
             tracer,
             denoiser: Denoiser::new(device)?,
@@ -304,28 +299,16 @@ impl ViewTracer {
             && params.lights.samples == 1
         {
             self.choose.record(rec, address, size)?;
-            self.chosen_direct.record(rec, address, size)?;
+            self.chosen_direct.record_chosen(rec, address, size)?;
         } else {
             self.direct.record(rec, address, size)?;
         }
         if settings.rt_bounces == 0 {
             self.darken_indirect(rec)?;
         } else {
-            let indirect = if params.fog_count == 0 {
-                &self.indirect
-            } else {
-                match &mut self.fog_indirect {
-                    Some(made) => made,
-                    none => none.insert(Indirect::with_fog(&self.device, self.tracer)?),
-                }
-            };
-            if sparse_bounce(settings) {
-                let cells = [width.div_ceil(2), height.div_ceil(2)];
-                indirect.record(rec, address, cells)?;
-                self.fill.record(rec, address, cells)?;
-            } else {
-                indirect.record(rec, address, size)?;
-            }
+            let has_fog = params.fog_count > 0;
+            self.indirect
+                .record(rec, address, size, settings, has_fog)?;
         }
         self.fog.record(rec, address)?;
         self.counters.end(rec)?;
@@ -415,10 +398,4 @@ fn fog_in_sight(map: &TracedMap<'_>, view: &ViewScene) -> bool {
 /// Whether surfaces show light; otherwise they show their own colour.
 fn is_lit(settings: &Settings) -> bool {
     settings.rt_illumination && !settings.fullbright
-}
-
-/// Whether bounced light is gathered for a quarter of the pixels: in a picture that is denoised nobody can tell, and it is the
-/// dearest pass. Reference mode and undenoised pictures get every pixel.
-fn sparse_bounce(settings: &Settings) -> bool {
-    !settings.rt_accumulate && settings.rt_denoiser > 0 && settings.rt_bounces > 0
 }

@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 use relight::light::{PointLight, SunLight};
-use shaders::types::constants as c;
+use shaders::types::{Dielectric, constants as c};
 
 use super::dielectrics::square;
 use super::harness::{Gpu, Scene, encode, floor_point, lambert, rectangle, stage, through_byte};
@@ -16,6 +16,22 @@ fn bounced(bounces: u32) -> Settings {
         rt_bounces: bounces,
         ..super::harness::reference()
     }
+}
+
+/// The mean of a picture with one bounce: in reference mode, and in that of a game, which has passes of its own for it.
+fn by_each_way(gpu: &mut Gpu, scene: &Scene, settings: &Settings, frames: u32) -> [Vec3; 2] {
+    let live = Settings {
+        rt_accumulate: false,
+        rt_denoiser: 1,
+        rt_taa: false,
+        ..settings.clone()
+    };
+    let mut sum = Vec3::ZERO;
+    let mut add = |_, pixels: &[Vec3]| {
+        sum += pixels.iter().sum::<Vec3>() / pixels.len() as f32;
+    };
+    gpu.render_watched(scene, &live, frames, |_, _| {}, Some(&mut add));
+    [gpu.mean(scene, settings, frames), sum / frames as f32]
 }
 
 /// What an eye sees of a wall that glows and is lit: both are summed as displayed under the light that the engine shows,
@@ -69,6 +85,10 @@ fn a_furnace_sums_its_bounces_with(gpu: &mut Gpu) {
             light += power;
             power *= a;
         }
+        let exact = seen(e, a, e);
+        let [_, live] = by_each_way(gpu, &scene, &bounced(1), 16);
+        println!("albedo {albedo}, as a game shows it: {live} {exact}");
+        assert!((live.x / exact - 1.0).abs() < 0.003, "{live} {exact}");
     }
 }
 
@@ -233,6 +253,9 @@ fn a_bounce_has_one_ray_for_lamps_and_sun_with(gpu: &mut Gpu) {
             };
             gpu.mean(&scene, &settings, 256).x - gpu.mean(&scene, &direct, 256).x
         });
+    let [reference, live] = by_each_way(gpu, &scene, &bounced(1), 256);
+    println!("as a game shows it: {}", live.x / reference.x);
+    assert!((live.x / reference.x - 1.0).abs() < 0.02);
     println!("bounced: {uniform} with one of all, {resampled} with the better choice");
     assert!(uniform > 0.01, "{uniform}");
     assert!(
@@ -329,10 +352,51 @@ fn bounced_light_passes_fog_with(gpu: &mut Gpu) {
         })
         .sum();
     let exact = decode(tint) * factor + exact_without * (1.0 - factor);
-    let mean = gpu.mean(&scene, &bounced(1), 64);
-    println!("{mean} {exact}");
-    assert!(
-        (mean / exact - 1.0).abs().max_element() < 0.01,
-        "{mean} {exact}"
+    for mean in by_each_way(gpu, &scene, &bounced(1), 64) {
+        println!("{mean} {exact}");
+        assert!(
+            (mean / exact - 1.0).abs().max_element() < 0.01,
+            "{mean} {exact}"
+        );
+    }
+}
+
+#[test]
+fn bounced_light_passes_tinted_glass() {
+    Gpu::each(bounced_light_passes_tinted_glass_with);
+}
+
+fn bounced_light_passes_tinted_glass_with(gpu: &mut Gpu) {
+    // a white floor under a glowing ceiling, all without end, and tinted glass between them
+    let (glow, tint) = (0.8, Vec3::new(0.9, 0.2, 0.1));
+    let mut scene = Scene::new(Vec3::Z * 20.0, Vec3::new(0.1, 0.0, 0.0), 20.0, 32);
+    let ceiling = scene.material(&[stage::constant([encode(glow); 3])], 0);
+    let floor = scene.material(&[stage::light()], 0);
+    let glass = scene.material(
+        &[stage::filter([1.0; 3])],
+        c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED,
     );
+    scene.materials[glass as usize].0.dielectric = Dielectric {
+        filters: 1,
+        filter_color: tint,
+        ..Dielectric::default()
+    };
+    let (x, y) = (Vec3::X * 80_000.0, Vec3::Y * 80_000.0);
+    let corner = Vec3::new(-40_000.0, -40_000.0, 0.0);
+    scene.quad(rectangle(corner, x, y), floor);
+    scene.quad(rectangle(corner + Vec3::Z * 100.0, y, x), glass);
+    scene.quad(rectangle(corner + Vec3::Z * 200.0, y, x), ceiling);
+    let around = Vec3::Z;
+    scene.filters.push([
+        corner + Vec3::Z * 100.0 - around,
+        corner + x + y + Vec3::Z * 100.0 + around,
+    ]);
+    let exact = through_byte(encode(glow)) * tint;
+    for mean in by_each_way(gpu, &scene, &bounced(1), 16) {
+        println!("{mean} {exact}");
+        assert!(
+            (mean / exact - 1.0).abs().max_element() < 0.01,
+            "{mean} {exact}"
+        );
+    }
 }

@@ -7,7 +7,8 @@ use shaders::trace_types::{
 };
 use shaders::types::{SunDisc, constants::NO_TEXTURE};
 
-use super::{LIGHT_ADAPTATION, TracedMap, ViewTracer, is_lit, sparse_bounce};
+use super::super::indirect::is_sparse;
+use super::{LIGHT_ADAPTATION, TracedMap, ViewTracer, is_lit};
 use crate::gpu::{Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::{SUN_SIZE, ViewScene, perpendicular};
@@ -52,7 +53,7 @@ impl ViewTracer {
         set(t::VIEW_FAST_SKY, settings.fast_sky);
         set(t::VIEW_FULLBRIGHT, !is_lit);
         set(t::VIEW_DENOISE, self.denoiser.is_on());
-        set(t::VIEW_SPARSE_BOUNCE, sparse_bounce(settings));
+        set(t::VIEW_SPARSE_BOUNCE, is_sparse(settings));
         set(t::VIEW_HISTORY, self.history.is_some());
         let [last_eye, last_forward, last_left, last_up] = self.history.unwrap_or([Vec3::ZERO; 4]);
         let [eye, forward, left, up] = camera_frame(view);

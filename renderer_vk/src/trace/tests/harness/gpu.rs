@@ -12,6 +12,7 @@ use crate::gpu::{
 use crate::raster::FlareTest;
 use crate::scene::{View, ViewScene};
 use crate::settings::Settings;
+use crate::trace::counters::COUNTED;
 use crate::trace::input::Tracer;
 use crate::trace::view_tracer::{TracedMap, ViewTracer};
 
@@ -78,7 +79,7 @@ impl Gpu {
     }
 
     /// Rays of each counted pass in the newest finished frame.
-    pub fn rays(&self) -> Option<[u64; 4]> {
+    pub fn rays(&self) -> Option<[u64; COUNTED.len()]> {
         self.look.rays()
     }
 

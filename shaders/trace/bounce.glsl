@@ -1,0 +1,94 @@
+// Bounced light: a path of cosine-weighted bounces with a light sample at every vertex but the first, whose own light is
+// `direct`. With that density the estimator of L is the radiance found: cosine and pi cancel, and so a vertex multiplies
+// the throughput by its albedo alone.
+#ifndef RELIGHT_TRACE_BOUNCE_GLSL
+#define RELIGHT_TRACE_BOUNCE_GLSL
+
+#include "trace/lights.glsl"
+#include "trace/layer.glsl"
+#include "trace/sky.glsl"
+#include "trace/fog.glsl"
+#include "trace/sparse.glsl"
+
+// The map has fog: without, nothing of it is compiled in.
+layout(constant_id = 1) const uint HAS_FOG = 0;
+
+// What bounced rays meet.
+const uint MASK_BOUNCE = MASK_SOLID | MASK_THIRD_SOLID | MASK_SKY | MASK_NO_SHADOW;
+// Cones of bounced light are wide: about the spread of a hemisphere cut into as many pieces as one needs to look smooth.
+const float BOUNCE_SPREAD = 0.1;
+
+// Where a path is.
+struct PathVertex {
+    vec3 position;
+    vec3 face_normal; // on the side that the path comes from
+    vec3 normal;
+};
+
+// Begins the random numbers of a pixel's bounced light; returns one for its rounding.
+float bounce_random(LightTask task) {
+    rng_begin(uvec2(task.pixel), sparse_index(task.seed), 2);
+    return rng_independent();
+}
+
+// A cosine-weighted direction about n; the estimator of L is then the radiance that it finds.
+vec3 sample_cosine(vec3 n, vec2 u) {
+    vec3 t, b;
+    basis(n, t, b);
+    float r = sqrt(u.x), phi = 2.0 * PI * u.y;
+    return normalize(t * (r * cos(phi)) + b * (r * sin(phi)) + n * sqrt(max(1.0 - u.x, 0.0)));
+}
+
+// Where a path goes on; false: into its own surface, as a bent normal can point, where nothing comes from.
+bool bounce_direction(PathVertex v, out vec3 direction) {
+    direction = sample_cosine(v.normal, rng_next2());
+    return dot(direction, v.face_normal) > 0.0;
+}
+
+// Whether light can come from there: the side of a surface that is never drawn closes the world, and what lies behind it
+// (the outside of the map, the inside of a model) gives no light.
+bool shows_face(SurfacePoint p, vec3 direction) {
+    return p.kind == KIND_SKY || !is_culled(p, direction);
+}
+
+// What a path finds at what its ray meets: adds what glows there to `sum`, and moves on. False: the path ends.
+bool bounce_meets(Hit hit, vec3 origin, vec3 direction, inout vec3 throughput, inout vec3 sum, out PathVertex v) {
+    SurfacePoint p = surface_point(hit);
+    float t = dot(p.position - origin, direction);
+    if (HAS_FOG != 0) {
+        // as the eye sees it: with its own colour, which shows as the engine shows it
+        vec3 fog = vec3(0.0);
+        fog_segment(origin, direction, 0.0, t, 0.0, throughput, fog);
+        sum += fog * exp2(-VIEW.exposure_base);
+    }
+    if (!shows_face(p, direction)) return false;
+    // what is in the light lists is counted by sampling the lights, never twice
+    bool in_lists = (material_of(p.triangle.material).flags & MATERIAL_EMITTER) != 0;
+    if (p.kind == KIND_SKY) {
+        if (!in_lists) sum += throughput * sky_radiance(p, direction, BOUNCE_SPREAD, false);
+        return false;
+    }
+    Layer layer = evaluate_stages(p, round_footprint(t * BOUNCE_SPREAD));
+    if (!in_lists) sum += throughput * max(layer.emission, 0.0);
+    throughput *= clamp(layer.lit, 0.0, 1.0);
+    v.position = p.position;
+    v.face_normal = dot(p.face_normal, direction) > 0.0 ? -p.face_normal : p.face_normal;
+    v.normal = dot(p.normal, v.face_normal) < 0.0 ? -p.normal : p.normal;
+    return max_component(throughput) > 0.0;
+}
+
+// The light that a vertex sends its ray to. One is enough: the bounce itself is noisier than the choice.
+LightSample vertex_light(PathVertex v) {
+    LightSet set = lights_at(v.position, v.face_normal);
+    if (set_count(set) == 0) return no_light();
+    vec2 u = rng_next2();
+    LightChoice choice;
+    if (VIEW.lights.selection == SELECT_UNIFORM) choice = choose_uniform(set, u.x);
+    else choice = choose_one(set, v.position, v.normal, u.x);
+    if (!(choice.weight > 0.0)) return no_light();
+    LightSample s = sample_light(choice.light, v.position, v.normal, u);
+    s.light *= choice.weight;
+    return s;
+}
+
+#endif

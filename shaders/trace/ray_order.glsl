@@ -1,0 +1,51 @@
+// Rays in the order of where they go: those of a tile of pixels are sorted by direction, because rays that are followed
+// side by side are followed the faster the longer they go the same way (Deligiannis and Schmid, It Just Works: Ray-Traced
+// Reflections in Battlefield V, GDC 2019).
+#ifndef RELIGHT_TRACE_RAY_ORDER_GLSL
+#define RELIGHT_TRACE_RAY_ORDER_GLSL
+
+#include "trace/gbuffer.glsl"
+
+const uint TILE_RAYS = RAY_TILE * RAY_TILE;
+
+// The pixel, which may lie beyond the picture, of the ray with number `slot` in this order, from its place in the tile.
+// `width`: of the picture.
+ivec2 pixel_of_slot(uint slot, uvec2 place, uint width) {
+    uint tiles = (width + RAY_TILE - 1) / RAY_TILE, tile = slot / TILE_RAYS;
+    return ivec2(RAY_TILE * uvec2(tile % tiles, tile / tiles) + place);
+}
+
+#ifdef SORTS_RAYS
+shared uint ray_counts[2][TILE_RAYS];
+
+// Bits of a number below 16 with room between them.
+uint spread_bits(uint v) {
+    v = (v | v << 2) & 0x33u;
+    return (v | v << 1) & 0x55u;
+}
+
+// The number of the calling thread's ray; all threads of a tile ask together. Cells of the sphere are counted along a curve
+// that keeps neighbours together (Morton's); `sent`: there is a ray at all.
+uint ray_slot(vec3 direction, bool sent) {
+    uint self = gl_LocalInvocationIndex;
+    uvec2 cell = uvec2(clamp(octahedral(direction) * 8.0 + 8.0, 0.0, 15.0));
+    uint key = sent ? spread_bits(cell.x) | spread_bits(cell.y) << 1 : TILE_RAYS - 1;
+    ray_counts[0][self] = 0;
+    barrier();
+    uint rank = atomicAdd(ray_counts[0][key], 1);
+    barrier();
+    // how many are before each cell (Hillis and Steele, Data Parallel Algorithms, 1986)
+    uint from = 0;
+    for (uint step = 1; step < TILE_RAYS; step *= 2) {
+        uint sum = ray_counts[from][self];
+        if (self >= step) sum += ray_counts[from][self - step];
+        from ^= 1;
+        ray_counts[from][self] = sum;
+        barrier();
+    }
+    uint tile = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    return tile * TILE_RAYS + (key == 0 ? 0 : ray_counts[from][key - 1]) + rank;
+}
+#endif
+
+#endif
