@@ -607,6 +607,7 @@ pub mod constants {
     pub const COUNT_INDIRECT: u32 = 3;
     pub const COUNT_BOUNCE: u32 = 4;
     pub const COUNT_BOUNCE_LIGHT: u32 = 5;
+    pub const COUNT_SUNS: u32 = 6;
     pub const COUNTER_ROWS: u32 = 64;
     pub const NO_IMAGE: u32 = 0xFFFF_FFFF;
     pub const DENOISE_HISTORY: u32 = 1;

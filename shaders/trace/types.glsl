@@ -124,7 +124,7 @@ const uint VIEW_JITTER = 1, VIEW_FIRST_PERSON = 2, VIEW_ACCUMULATE = 4, VIEW_AUT
 const uint DEBUG_ALBEDO = 1, DEBUG_NORMALS = 2, DEBUG_DEPTH = 3, DEBUG_MOTION = 4, DEBUG_CLUSTERS = 5, DEBUG_LIGHTS = 6,
     DEBUG_SAMPLES = 7, DEBUG_VARIANCE = 8, DEBUG_GRADIENTS = 9, DEBUG_RAYS = 10, DEBUG_SPECULAR = 11;
 // Counted passes, and counters of each.
-const uint COUNT_EYE = 0, COUNT_PRIMARY = 1, COUNT_DIRECT = 2, COUNT_INDIRECT = 3, COUNT_BOUNCE = 4, COUNT_BOUNCE_LIGHT = 5, COUNTER_ROWS = 64;
+const uint COUNT_EYE = 0, COUNT_PRIMARY = 1, COUNT_DIRECT = 2, COUNT_INDIRECT = 3, COUNT_BOUNCE = 4, COUNT_BOUNCE_LIGHT = 5, COUNT_SUNS = 6, COUNTER_ROWS = 64;
 // No storage image.
 const uint NO_IMAGE = 0xFFFFFFFFu;
 // Bits of DenoiseView.flags: the last frame's light is there; its samples are lit again; the cheap

@@ -211,6 +211,15 @@ impl Direct {
         Self::with(device, tracer, &[(0, 1)])
     }
 
+    /// The pass after that, which adds the light of suns.
+    ///
+    /// # Errors
+    /// The driver refuses the pipeline.
+    pub fn of_suns(device: &Device, tracer: Tracer) -> Result<Self, Error> {
+        // CHOSEN in direct.rgen
+        Self::with(device, tracer, &[(0, 2)])
+    }
+
     /// Records the pass for rays in the order that [`Choose`] has left them in.
     ///
     /// # Errors
@@ -218,6 +227,7 @@ impl Direct {
     pub fn record_chosen(
         &self,
         rec: &mut Recorder,
+        name: &str,
         view: u64,
         size: [u32; 2],
     ) -> Result<(), Error> {
@@ -230,7 +240,7 @@ impl Direct {
                 [across * groups * COMPUTE_TILE[0], down * COMPUTE_TILE[1]]
             }
         };
-        trace(rec, "trace_direct", &self.0, view, launch)
+        trace(rec, name, &self.0, view, launch)
     }
 }
 

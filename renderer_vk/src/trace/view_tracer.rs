@@ -55,6 +55,7 @@ pub struct ViewTracer {
     choose: Choose,
     /// Of one chosen light a pixel, and of any number.
     chosen_direct: Direct,
+    suns: Direct,
     direct: Direct,
     indirect: IndirectLight,
     /// Made when a view has flares.
@@ -108,6 +109,7 @@ impl ViewTracer {
             fog: LitFog::new(device, tracer),
             choose: Choose::new(device)?,
             chosen_direct: Direct::of_chosen(device, tracer)?,
+            suns: Direct::of_suns(device, tracer)?,
             direct: Direct::new(device, tracer)?,
             indirect: IndirectLight::new(device, tracer)?,
             flare_rays: None,
@@ -299,7 +301,11 @@ impl ViewTracer {
             && params.lights.samples == 1
         {
             self.choose.record(rec, address, size)?;
-            self.chosen_direct.record_chosen(rec, address, size)?;
+            self.chosen_direct
+                .record_chosen(rec, "trace_direct", address, size)?;
+            if params.lights.sun_count > 0 {
+                self.suns.record_chosen(rec, "trace_suns", address, size)?;
+            }
         } else {
             self.direct.record(rec, address, size)?;
         }

@@ -1,10 +1,11 @@
 //! What the traced look tells about itself: counted rays, views of its steps.
 
 use glam::Vec3;
+use relight::light::SunLight;
 use shaders::types::constants as c;
 
 use super::harness::{Gpu, Scene, identity, rectangle, reference, stage};
-use crate::settings::Settings;
+use crate::settings::{LightSelection, Settings};
 
 const SIZE: u32 = 32;
 
@@ -42,11 +43,11 @@ fn rays_are_counted_exactly_and_only_when_asked() {
         let rays = gpu.rays().expect("counted");
         let pixels = u64::from(SIZE * SIZE);
         // for each pixel one for the floor and one to the light; nothing translucent is there to ask for
-        assert_eq!(rays, [pixels, 0, pixels, 0, 0, 0]);
+        assert_eq!(rays, [pixels, 0, pixels, 0, 0, 0, 0]);
         gpu.render(&scene, &settings(1), 4);
         // the floor sees nothing but emptiness
         let rays = gpu.rays().expect("counted");
-        assert_eq!(rays, [pixels, 0, pixels, pixels, 0, 0]);
+        assert_eq!(rays, [pixels, 0, pixels, pixels, 0, 0, 0]);
         // one of 2 x 2 pixels in a picture that is denoised, by other passes
         let denoised = Settings {
             rt_accumulate: false,
@@ -55,7 +56,23 @@ fn rays_are_counted_exactly_and_only_when_asked() {
         };
         gpu.render(&scene, &denoised, 4);
         let rays = gpu.rays().expect("counted");
-        assert_eq!(rays, [pixels, 0, pixels, 0, pixels / 4, 0]);
+        assert_eq!(rays, [pixels, 0, pixels, 0, pixels / 4, 0, 0]);
+        // of what is chosen for each pixel, and of a sun beside it
+        let mut sunny = lit_floor();
+        sunny.suns.push(SunLight {
+            direction: Vec3::Z,
+            irradiance: Vec3::ONE,
+            angular_radius: 0.01,
+            material: None,
+        });
+        let chosen = Settings {
+            rt_num_random_dl: 1,
+            rt_light_selection: LightSelection::Resampled,
+            ..settings(0)
+        };
+        gpu.render(&sunny, &chosen, 4);
+        let rays = gpu.rays().expect("counted");
+        assert_eq!(rays, [pixels, 0, pixels, 0, 0, 0, pixels]);
         gpu.count_rays(false);
         gpu.render(&scene, &settings(0), 1);
         assert_eq!(gpu.rays(), None);
