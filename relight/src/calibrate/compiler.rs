@@ -69,6 +69,8 @@ pub(super) struct Compiler {
     pub ends: bool,
     /// How it made corners darker.
     pub dirt: Option<Dirt>,
+    /// Whether weak lights may stand in front of lamps ([`splash`](super::splash)).
+    pub splashes: bool,
 }
 
 impl Compiler {
@@ -77,6 +79,7 @@ impl Compiler {
         gamma: 1.0,
         ends: false,
         dirt: None,
+        splashes: true,
     };
 
     /// What was found before, as far as the world knows of it.
@@ -84,7 +87,7 @@ impl Compiler {
         Compiler {
             gamma: report.gamma,
             ends: report.ends,
-            dirt: None,
+            ..Compiler::PLAIN
         }
     }
 
@@ -146,6 +149,7 @@ fn as_said(line: CommandLine) -> Vec<Compiler> {
         gamma: line.gamma,
         ends: line.ends,
         dirt,
+        ..Compiler::PLAIN
     };
     let dirty = line.dirt.map(|dirt| with(Some(dirt)));
     dirty.into_iter().chain([with(None)]).collect()
@@ -214,9 +218,8 @@ impl Trials<'_> {
         };
         let ended_error = self.error(ended).map_or(f32::INFINITY, |[_, e]| e);
         let linear = Compiler {
-            gamma: 1.0,
             ends: ended_error < endless * ENDED,
-            dirt: None,
+            ..Compiler::PLAIN
         };
         let fallback = self.world.report.fallback;
         let mut trial = |compiler: Compiler| {

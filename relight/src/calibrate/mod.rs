@@ -72,7 +72,7 @@ use samples::Taking;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 19;
+const VERSION: u32 = 20;
 
 /// One in so many candidates comes from the directions of the light grid.
 const CROSSINGS: usize = 5;
@@ -205,21 +205,50 @@ fn best(
         reached = part * COMPILER_PART;
         progress(reached);
     });
-    let each = (1.0 - reached) / ways.len().max(1) as f32;
-    let mut best: Option<Solution> = None;
-    for way in ways {
+    // one more, as splashes may have to go
+    let each = (1.0 - reached) / (ways.len() + 1) as f32;
+    let mut try_way = |world: &mut RelitWorld, way: Compiler| {
         way.tell(world);
         let found = find_with_enough(world, silent, options, way, &mut |part| {
             progress(reached + part * each);
         });
         reached += each;
-        let off = |solution: &Solution| solution.report.after.median_stops;
-        if best.as_ref().is_none_or(|best| off(&found) < off(best)) {
-            best = Some(found);
+        found
+    };
+    let off = |solution: &Solution| solution.report.after.median_stops;
+    let mut best: Option<(Compiler, Solution)> = None;
+    for way in ways {
+        let found = try_way(world, way);
+        if best
+            .as_ref()
+            .is_none_or(|(_, best)| off(&found) < off(best))
+        {
+            best = Some((way, found));
         }
     }
-    best.unwrap_or_default()
+    let Some((way, splashed)) = best else {
+        return Solution::default();
+    };
+    if splashed.report.splashes == 0 {
+        return splashed;
+    }
+    // what they explain, lights that are put in explain as well in many a map, and with fewer
+    let plain = Compiler {
+        splashes: false,
+        ..way
+    };
+    let without = try_way(world, plain);
+    let added = |solution: &Solution| solution.report.splashes + solution.report.placed;
+    let fewer = added(&splashed) <= added(&without) && off(&splashed) <= off(&without);
+    if fewer || off(&splashed) < off(&without) * SPLASHES_KEPT {
+        splashed
+    } else {
+        without
+    }
 }
+
+/// Part of the error without back splashes that they may leave to be kept, where they are more lights.
+const SPLASHES_KEPT: f32 = 0.95;
 
 /// [`find`] with the measurements that it takes.
 fn find_with_enough(
@@ -343,7 +372,10 @@ fn find(
     progress(0.25);
     fit.known();
     progress(0.3);
-    let splashes = splash::of(world);
+    let splashes = match compiler.splashes {
+        true => splash::of(world),
+        false => Vec::new(),
+    };
     let own = splash::columns(world, &occluders, &fit.samples, &splashes, &fit.columns);
     fit.splash(own);
     progress(0.35);
@@ -389,6 +421,10 @@ fn find(
         }
     }
     solution.report.placed = solution.placed.len();
+    solution.report.splashes = (splashes.iter().zip(&solution.splashes))
+        .filter(|(_, strength)| strength.max_element() > 0.0)
+        .map(|(splash, _)| splash.points.len())
+        .sum();
     solution.report.suns = solution.suns.len();
     solution.ambient = fit.ambient.value;
     Some(solution)

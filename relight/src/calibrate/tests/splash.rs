@@ -9,6 +9,11 @@ const AREA: f32 = 40.0 * 60.0;
 
 /// Light from the lamp, and from its back splash of so much of its light.
 fn from_lamp(splash: f32) -> impl Fn(Vec3, Vec3) -> Vec3 {
+    from_lamp_and_point(splash, 23.0)
+}
+
+/// Light from the lamp, and from a point so far below its middle that gives so much of its light.
+fn from_lamp_and_point(splash: f32, below: f32) -> impl Fn(Vec3, Vec3) -> Vec3 {
     let power = FACTOR * LAMP * SURFACE_LIGHT_RADIANCE * AREA;
     let [a, b, _, d] = LAMP_CORNERS;
     move |at, normal| {
@@ -20,7 +25,7 @@ fn from_lamp(splash: f32) -> impl Fn(Vec3, Vec3) -> Vec3 {
             let cosine = normal.dot(offset).max(0.0) / offset.length();
             part * side * cosine / offset.length_squared()
         };
-        let mut sum = point((a + (b - a + d - a) * 0.5) - Vec3::Z * 23.0, 1.0, splash);
+        let mut sum = point((a + (b - a + d - a) * 0.5) - Vec3::Z * below, 1.0, splash);
         for i in 0..64 {
             let (u, v) = ((i % 8) as f32 + 0.5, (i / 8) as f32 + 0.5);
             let origin = a + (b - a) * (u / 8.0) + (d - a) * (v / 8.0);
@@ -54,6 +59,19 @@ fn lamps_without_such_lights_get_none() {
     let mut world = room(true, Some(&from_lamp(0.0)));
     let report = calibrate(&mut world, &small());
     assert_eq!(report.splashes, 0, "{report:?}");
+}
+
+#[test]
+fn splashes_go_where_lights_put_in_explain_as_much() {
+    // A splash explains much of this light, but not as well as the point that it is.
+    let mut world = room(true, Some(&from_lamp_and_point(0.3, 50.0)));
+    let report = calibrate(&mut world, &small());
+    println!("{report:?} {:?}", world.point_lights);
+    assert_eq!(report.splashes, 0);
+    let place = Vec3::new(200.0, 0.0, 200.0);
+    let nearest = world.point_lights.iter().map(|l| l.origin.distance(place));
+    assert!(nearest.fold(f32::MAX, f32::min) < 16.0);
+    assert!(report.after.median_stops < 0.05, "{report:?}");
 }
 
 #[test]
