@@ -25,6 +25,13 @@ struct PathVertex {
     vec3 normal;
 };
 
+// Whether a pixel gathers bounced light at all.
+bool gathers(LightTask task) { return task.surface.path >= 0.0 && (VIEW.flags & VIEW_FULLBRIGHT) == 0; }
+
+PathVertex first_vertex(LightTask task) {
+    return PathVertex(task.surface.position, task.surface.face_normal, task.surface.normal);
+}
+
 // Begins the random numbers of a pixel's bounced light; returns one for its rounding.
 float bounce_random(LightTask task) {
     rng_begin(uvec2(task.pixel), sparse_index(task.seed), 2);

@@ -4,10 +4,9 @@
 #define RELIGHT_TRACE_BOUNCE_RAY_GLSL
 
 #include "trace/bounce.glsl"
+#include "trace/light_ray.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer BounceTexels { uvec4 at[]; };
-
-const uint BOUNCE_SIGN = 0x80000000u;
 
 ivec2 bounce_cells() { return (ivec2(VIEW.width, VIEW.height) + CELL - 1) / CELL; }
 
@@ -43,26 +42,18 @@ struct BounceLight {
 // `dither`: see pack_light.
 void bounce_light_write(ivec2 cell, BounceLight b, float dither) {
     BounceTexels texels = BounceTexels(VIEW.texels);
-    // light from nearer than 0 arrives as that from 0 does, so the sign is free
-    uint distance = floatBitsToUint(max(b.light.distance, 0.0)) & ~BOUNCE_SIGN | (b.light.sky ? BOUNCE_SIGN : 0u);
     texels.at[bounce_place(cell, 2)] = uvec4(floatBitsToUint(b.origin), pack_light(sound_light(b.found), dither));
-    texels.at[bounce_place(cell, 3)] =
-        uvec4(floatBitsToUint(octahedral(b.light.direction)), distance, pack_light(sound_light(b.light.light), dither));
+    texels.at[bounce_place(cell, 3)] = pack_light_ray(b.light, uvec2(0), b.light.sky, dither);
 }
 
 BounceLight bounce_light_read(ivec2 cell) {
     BounceTexels texels = BounceTexels(VIEW.texels);
-    uvec4 a = texels.at[bounce_place(cell, 2)], b = texels.at[bounce_place(cell, 3)];
-    LightSample light = LightSample(from_octahedral(uintBitsToFloat(b.xy)), uintBitsToFloat(b.z & ~BOUNCE_SIGN),
-        unpack_light(b.w), (b.z & BOUNCE_SIGN) != 0);
-    return BounceLight(uintBitsToFloat(a.xyz), light, unpack_light(a.w));
-}
-
-// Whether a pixel gathers bounced light at all.
-bool gathers(LightTask task) { return task.surface.path >= 0.0 && (VIEW.flags & VIEW_FULLBRIGHT) == 0; }
-
-PathVertex first_vertex(LightTask task) {
-    return PathVertex(task.surface.position, task.surface.face_normal, task.surface.normal);
+    uvec4 found = texels.at[bounce_place(cell, 2)];
+    uvec2 spare;
+    bool sky;
+    LightSample light = unpack_light_ray(texels.at[bounce_place(cell, 3)], spare, sky);
+    light.sky = sky;
+    return BounceLight(uintBitsToFloat(found.xyz), light, unpack_light(found.w));
 }
 
 #endif

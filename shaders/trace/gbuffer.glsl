@@ -4,6 +4,7 @@
 #ifndef RELIGHT_TRACE_GBUFFER_GLSL
 #define RELIGHT_TRACE_GBUFFER_GLSL
 
+#include "trace/direction.glsl"
 #include "trace/light_image.glsl"
 #include "trace/view.glsl"
 
@@ -15,23 +16,6 @@ struct GBufferPixel {
     vec3 albedo;
     vec3 front; // radiance of what is in front of the surface, and of its own glow
 };
-
-// Octahedral normals (Cigolle et al., A Survey of Efficient Representations for Independent Unit Vectors, 2014).
-vec2 octahedral(vec3 n) {
-    vec2 p = n.xy / max(abs(n.x) + abs(n.y) + abs(n.z), 1.0e-20);
-    if (n.z < 0.0) p = (1.0 - abs(p.yx)) * vec2(p.x >= 0.0 ? 1.0 : -1.0, p.y >= 0.0 ? 1.0 : -1.0);
-    return p;
-}
-
-vec3 from_octahedral(vec2 p) {
-    vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
-    if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
-    return normalize(n);
-}
-
-uint pack_normal(vec3 n) { return packSnorm2x16(octahedral(n)); }
-
-vec3 unpack_normal(uint packed) { return from_octahedral(unpackSnorm2x16(packed)); }
 
 // Albedo and what is in front; `dither`: see pack_light.
 void shown_write(uint image, ivec2 pixel, GBufferPixel g, vec2 dither) {

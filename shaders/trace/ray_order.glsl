@@ -4,14 +4,14 @@
 #ifndef RELIGHT_TRACE_RAY_ORDER_GLSL
 #define RELIGHT_TRACE_RAY_ORDER_GLSL
 
-#include "trace/gbuffer.glsl"
+#include "trace/direction.glsl"
+#include "trace/view.glsl"
 
 const uint TILE_RAYS = RAY_TILE * RAY_TILE;
 
 // The pixel, which may lie beyond the picture, of the ray with number `slot` in this order, from its place in the tile.
-// `width`: of the picture.
-ivec2 pixel_of_slot(uint slot, uvec2 place, uint width) {
-    uint tiles = (width + RAY_TILE - 1) / RAY_TILE, tile = slot / TILE_RAYS;
+ivec2 pixel_of_slot(uint slot, uvec2 place) {
+    uint tiles = (VIEW.width + RAY_TILE - 1) / RAY_TILE, tile = slot / TILE_RAYS;
     return ivec2(RAY_TILE * uvec2(tile % tiles, tile / tiles) + place);
 }
 

@@ -132,7 +132,7 @@ const uint NO_IMAGE = 0xFFFFFFFFu;
 const uint DENOISE_HISTORY = 1, DENOISE_GRADIENTS = 2, DENOISE_SPARSE = 4;
 // Bits of FogView.flags: fog is lit; its light is filtered; the last frame's is there.
 const uint FOG_LIT = 1, FOG_FILTERED = 2, FOG_HISTORY = 4;
-// How a light is chosen: LightView.selection; the last one is for bounces: as resampled, with one ray for lights and suns.
+// How a light is chosen: LightView.selection.
 const uint SELECT_UNIFORM = 0, SELECT_RESAMPLED = 1, SELECT_ALL = 2;
 // Bits of LightView.flags.
 // rays of an estimate by all lights for the weak ones of a list

@@ -2,6 +2,7 @@
 //!
 //! Without a device each test says so and passes, unless `RELIGHT_REQUIRE_GPU=1`.
 
+mod direction;
 mod drawing;
 mod life;
 mod memory;

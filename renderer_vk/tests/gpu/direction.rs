@@ -1,0 +1,95 @@
+//! Directions in few bits: nothing is lost but what rounding takes, along the axes either.
+
+use super::support::{collect, device, finish};
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+use renderer_vk::gpu::*;
+
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+struct Kept {
+    direction: [f32; 3],
+    spare: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    directions: u64,
+    count: u32,
+    padding: u32,
+}
+
+/// Directions along the axes and planes between them, and by chance all around.
+fn directions() -> Vec<Vec3> {
+    let mut all = Vec::new();
+    for i in 0..27 {
+        let step = |n: i32| (n % 3 - 1) as f32;
+        let v = Vec3::new(step(i), step(i / 3), step(i / 9));
+        if v != Vec3::ZERO {
+            all.push(v.normalize());
+        }
+    }
+    let mut state = 1u32;
+    let mut next = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / 8_388_608.0 - 1.0
+    };
+    all.extend((0..20_000).map(|_| Vec3::new(next(), next(), next()).normalize()));
+    // nearly along an axis
+    all.extend((0..2000).map(|_| Vec3::new(next() * 1.0e-7, 1.0, next() * 1.0e-6).normalize()));
+    all
+}
+
+#[test]
+fn directions_of_rays_come_back_as_they_were() {
+    let Some(device) = device(true) else {
+        return;
+    };
+    let given: Vec<Kept> = (0u32..)
+        .zip(directions())
+        .map(|(i, direction)| Kept {
+            direction: direction.to_array(),
+            spare: i % 256,
+        })
+        .collect();
+    let mut ring = FrameRing::new(&device, 2).unwrap();
+    let pipeline =
+        ComputePipeline::new(&device, "direction", &shaders::TEST_DIRECTION_COMP, &[]).unwrap();
+    let bytes: &[u8] = bytemuck::cast_slice(&given);
+    let kept = Buffer::new(
+        &device,
+        &BufferDesc {
+            name: "directions",
+            size: bytes.len() as u64,
+            usage: BufferUsage::STORAGE,
+            memory: Memory::Readback,
+        },
+    )
+    .unwrap();
+    kept.write(0, bytes).unwrap();
+    let count = u32::try_from(given.len()).unwrap();
+    let mut rec = ring.begin().unwrap();
+    let mut pass = rec
+        .pass("direction", Access::COMPUTE, Access::COMPUTE)
+        .unwrap();
+    pass.bind_compute(&pipeline);
+    pass.push(&Push {
+        directions: kept.address(),
+        count,
+        padding: 0,
+    });
+    pass.dispatch(count.div_ceil(64), 1, 1);
+    drop(pass);
+    ring.end(rec).unwrap();
+    device.wait_idle().unwrap();
+    let mut bytes = vec![0; bytes.len()];
+    kept.read(0, &mut bytes).unwrap();
+    for (was, is) in given.iter().zip(collect::<Kept>(&bytes)) {
+        let off = Vec3::from(was.direction).distance(Vec3::from(is.direction));
+        assert!(off < 4.0e-7, "{was:?} {is:?}: {off}");
+        assert_eq!(was.spare, is.spare);
+    }
+    drop((kept, ring, pipeline));
+    finish(device);
+}
