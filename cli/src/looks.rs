@@ -35,6 +35,12 @@ pub struct LooksArgs {
     /// Frames accumulated for a traced picture
     #[arg(long, default_value_t = 32)]
     frames: u32,
+    /// Draw frames as a game shows them, filtered; nothing accumulates
+    #[arg(long)]
+    no_accumulation: bool,
+    /// Leave automatic exposure out
+    #[arg(long)]
+    fixed_exposure: bool,
     /// Folder for pictures: classic, traced by directives, traced calibrated, from left to right
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -172,7 +178,8 @@ fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
     let settings = |look: Option<MapLightChoice>| Settings {
         rt: look.is_some(),
         rt_lights: look.unwrap_or_default(),
-        rt_accumulate: true,
+        rt_accumulate: !args.no_accumulation,
+        rt_auto_exposure: !args.fixed_exposure,
         ..Settings::default()
     };
     renderer.begin_registration(files, &settings(None))?;
