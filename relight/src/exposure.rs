@@ -6,7 +6,10 @@
 //! power, D(t v) would be D(t) D(v), and e would not depend on textures: mean D(v) over mean v. It is not: e is found such
 //! that the means of both agree, over what players see where the game sets them and over the pixels of the textures there
 //! ([`matching`]). L is the light of the lights that calibration found: what comes out too bright in the mean is exposed
-//! less.
+//! less. What mirrors besides shows its surroundings: in the mean what all these pixels show.
+//!
+//! Automatic exposure brings a picture a little nearer to a usual one of its map: how bright that is
+//! ([`Exposure::middle`]) is taken from the same pixels.
 //!
 //! Without such light ([`display_exposure`] of a world that nobody calibrated) there is the mean of D(v) over the mean of
 //! v; where the map's compiler stored light with a gamma g, that light is v^g, and the mean is over that.
@@ -25,6 +28,13 @@ const DARK: f32 = 2.0 / 255.0;
 const DEFAULT: f32 = 0.25;
 /// Bounds, so that a strange map stays visible.
 const LIMITS: (f32, f32) = (0.02, 1.0);
+/// Mean luminance of a usual picture, logarithms averaged, linear.
+const MIDDLE: f32 = 0.02;
+/// Least luminance of a picture's pixel, stops: the histogram's end in `exposure.glsl`.
+const DARKEST: f32 = -12.0;
+/// Pixels left out of a picture's mean at the dark and at the bright end, of all, as in `exposure.comp`.
+const DARK_PART: f32 = 0.2;
+const BRIGHT_PART: f32 = 0.05;
 /// Bounds of an exposure that light and textures tell.
 const MATCHED: (f32, f32) = (0.005, 8.0);
 /// Steps in which it is found, at most.
@@ -34,10 +44,43 @@ const NEAR: f32 = 1e-3;
 /// Below this the picture is linear: the knee of the tone curve, as in `tonemap.comp`.
 const KNEE: f32 = 0.6;
 
+/// How many times the stored light the light found may count as, where the stored one is not cut off at white. Where it is
+/// more it is a light beside a wall that is not where it was, or not as it was: a spot that is wrong, and no reason to show
+/// all else darker.
+const MOST_OVER: f32 = 2.0;
+/// From here on stored light may be cut off, encoded.
+const CUT_OFF: f32 = 0.99;
+
 /// Brightness of a texture, encoded: about the mean of lit surfaces in OpenArena's maps (0.13 to 0.33).
 const TEXTURE: f32 = 0.2;
 /// Exponent of the display's curve on a map that has no light stored.
 pub(crate) const DEFAULT_EXPONENT: f32 = 1.4;
+
+/// How bright a map is shown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Exposure {
+    /// A factor of radiance.
+    pub scale: f32,
+    /// How bright a usual picture of the map is as the engine shows it: the mean of the logarithm of luminance, stops,
+    /// without the pixels that automatic exposure leaves out.
+    pub middle: f32,
+}
+
+impl Exposure {
+    /// An exposure, of pictures as bright as those of OpenArena's maps in the mean: what is known where no light is
+    /// calibrated.
+    pub fn usual(scale: f32) -> Exposure {
+        Exposure {
+            scale,
+            middle: MIDDLE.log2(),
+        }
+    }
+
+    /// Whether it can have been found by calibration.
+    pub(crate) fn is_possible(&self) -> bool {
+        (MATCHED.0..=MATCHED.1).contains(&self.scale) && (DARKEST..=0.0).contains(&self.middle)
+    }
+}
 
 /// A place where light is stored, and what the world's lights give there.
 pub(crate) struct Place<'a> {
@@ -47,11 +90,6 @@ pub(crate) struct Place<'a> {
     pub light: Vec3,
     /// What the surface throws back; nothing known: of usual brightness.
     pub shades: &'a [Shade],
-}
-
-/// Whether a number can have been found by [`matching`].
-pub(crate) fn possible(exposure: f32) -> bool {
-    (MATCHED.0..=MATCHED.1).contains(&exposure)
 }
 
 /// Luminance of linear colours (Rec. 709).
@@ -69,13 +107,15 @@ fn tone(x: f32) -> f32 {
 }
 
 /// The exposure at which places are as bright in the mean, traced, as the engine shows them; `None` where all is dark.
-pub(crate) fn matching<'a>(places: impl Iterator<Item = Place<'a>>) -> Option<f32> {
+pub(crate) fn matching<'a>(places: impl Iterator<Item = Place<'a>>) -> Option<Exposure> {
     let usual = [Shade {
         linear: Vec3::splat(overbright::to_linear(TEXTURE)),
         encoded: Vec3::splat(TEXTURE),
+        mirrored: Vec3::ZERO,
     }];
     let mut engine = 0.0f64;
-    let mut traced: Vec<(Vec3, f32)> = Vec::new();
+    let mut shown_by_engine: Vec<(f32, f32)> = Vec::new();
+    let mut traced: Vec<(Vec3, Vec3, f32)> = Vec::new();
     for place in places {
         let shades = if place.shades.is_empty() {
             &usual
@@ -83,15 +123,19 @@ pub(crate) fn matching<'a>(places: impl Iterator<Item = Place<'a>>) -> Option<f3
             place.shades
         };
         let part = 1.0 / shades.len() as f32;
+        let light = believed(&place);
         for shade in shades {
             let shown = overbright::colour_to_linear((shade.encoded * place.stored).min(Vec3::ONE));
             engine += f64::from(luminance(shown) * part);
-            traced.push((shade.linear * place.light, part));
+            shown_by_engine.push((luminance(shown), part));
+            traced.push((shade.linear * light, shade.mirrored, part));
         }
     }
+    let surroundings = surroundings(&traced);
     let mean = |exposure: f32| -> f64 {
-        let shown = |(radiance, part): &(Vec3, f32)| {
-            let shown = (*radiance * exposure).to_array().map(tone);
+        let shown = |(own, mirrored, part): &(Vec3, Vec3, f32)| {
+            let radiance = *own + *mirrored * surroundings;
+            let shown = (radiance * exposure).to_array().map(tone);
             f64::from(luminance(Vec3::from_array(shown)) * part)
         };
         traced.iter().map(shown).sum()
@@ -105,20 +149,67 @@ pub(crate) fn matching<'a>(places: impl Iterator<Item = Place<'a>>) -> Option<f3
         }
         exposure = (exposure * ratio).clamp(MATCHED.0, MATCHED.1);
         if (ratio - 1.0).abs() < NEAR {
-            return Some(exposure);
+            let middle = middle(shown_by_engine);
+            return Some(Exposure {
+                scale: exposure,
+                middle,
+            });
         }
     }
     // No exposure does: most of what is lit has no light.
     None
 }
 
-/// The exposure of a map, a factor of radiance: what calibration found; else from its lightmaps, or from the colours of
-/// its vertices.
-pub fn display_exposure(world: &RelitWorld) -> f32 {
+/// The light of a place as it counts.
+fn believed(place: &Place<'_>) -> Vec3 {
+    let most = MOST_OVER * luminance(place.stored).max(DARK);
+    let found = luminance(place.light);
+    if found <= most || place.stored.max_element() > CUT_OFF {
+        return place.light;
+    }
+    place.light * (most / found)
+}
+
+/// The mean of the logarithm of luminances, each with its weight, as automatic exposure takes it: stops.
+fn middle(mut pixels: Vec<(f32, f32)>) -> f32 {
+    pixels.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let whole: f64 = pixels.iter().map(|(_, part)| f64::from(*part)).sum();
+    let (from, to) = (
+        whole * f64::from(DARK_PART),
+        whole * f64::from(1.0 - BRIGHT_PART),
+    );
+    let (mut below, mut sum) = (0.0, 0.0);
+    for (luminance, part) in pixels {
+        let above = below + f64::from(part);
+        let inside = (above.min(to) - f64::max(below, from)).max(0.0);
+        sum += inside * f64::from(luminance.log2().clamp(DARKEST, 0.0));
+        below = above;
+    }
+    (sum / (to - from)) as f32
+}
+
+/// Most of what is around that mirrors count as giving back, so that mirrors among mirrors stay finite.
+const MOST_MIRRORED: f32 = 0.9;
+
+/// Mean radiance of what mirrors find, of pixels that show radiance of their own and mirror a part of it, each with its
+/// weight: what all of them show, in mirrors, too.
+fn surroundings(pixels: &[(Vec3, Vec3, f32)]) -> Vec3 {
+    let whole: f32 = pixels.iter().map(|(.., part)| part).sum();
+    let mean = |of: fn(&(Vec3, Vec3, f32)) -> Vec3| {
+        let sum: Vec3 = pixels.iter().map(|pixel| of(pixel) * pixel.2).sum();
+        sum / whole.max(1.0)
+    };
+    let (own, mirrored) = (mean(|pixel| pixel.0), mean(|pixel| pixel.1));
+    own / (1.0 - mirrored.min(Vec3::splat(MOST_MIRRORED)))
+}
+
+/// The exposure of a map: what calibration found; else from its lightmaps, or from the colours of its vertices.
+pub fn display_exposure(world: &RelitWorld) -> Exposure {
     if let Some(exposure) = world.exposure {
         return exposure;
     }
-    of_stored(&world.bsp, |light| ratio(light, world.stored_gamma)).unwrap_or(DEFAULT)
+    let found = of_stored(&world.bsp, |light| ratio(light, world.stored_gamma));
+    Exposure::usual(found.unwrap_or(DEFAULT))
 }
 
 /// The exponent of the power law that the display's curve D comes to where a map shows its light: the mean of
@@ -183,6 +274,7 @@ mod tests {
                     let shade = |&t: &f32| Shade {
                         linear: Vec3::splat(overbright::to_linear(t)),
                         encoded: Vec3::splat(t),
+                        mirrored: Vec3::ZERO,
                     };
                     textures.iter().map(shade).collect()
                 })
@@ -197,6 +289,7 @@ mod tests {
                         shades,
                     }),
             )
+            .map(|exposure| exposure.scale)
         };
         let shown = |t: f32, v: f32| overbright::to_linear(t * v);
         let near = |found: Option<f32>, meant: f32| {
@@ -215,6 +308,10 @@ mod tests {
         near(found(&[(0.5, 0.5, &[0.2]), (0.5, 0.5, &[0.6])]), both);
         // The engine shows no more than white: three times as much light is exposed a third.
         near(found(&[(1.0, 3.0, &[0.4])]), 1.0 / 3.0);
+        // A spot far brighter than what was stored there counts a little more than the rest, not so much more.
+        let spot = found(&[(0.4, 0.4, &[0.4]), (0.4, 90.0, &[0.4])]).unwrap();
+        let even = found(&[(0.4, 0.4, &[0.4])]).unwrap();
+        assert!((spot / even - 2.0 / 3.0).abs() < 1e-3);
         // The tone curve takes from what is bright, which is made up for.
         let white = found(&[(0.95, 0.95, &[1.0])]).unwrap();
         assert!((tone(white * 0.95) / shown(1.0, 0.95) - 1.0).abs() < 1e-3);
@@ -222,6 +319,47 @@ mod tests {
         assert_eq!(found(&[(0.0, 1.0, &[0.5])]), None);
         assert_eq!(found(&[(0.5, 0.0, &[0.5])]), None);
         assert!(found(&[(0.5, 0.5, &[])]).is_some());
+    }
+
+    #[test]
+    fn a_usual_picture_is_that_of_the_map() {
+        // a fifth of the dark and a twentieth of the bright pixels are left out, in part, too
+        let near = |pixels: &[(f32, f32)], meant: f32| {
+            let found = middle(pixels.to_vec());
+            assert!((found - meant).abs() < 1e-4, "{found} {meant}");
+        };
+        near(&[(0.25, 3.0)], -2.0);
+        near(&[(1.0, 0.05), (0.25, 0.75), (0.001, 0.2)], -2.0);
+        near(&[(0.125, 0.5), (0.5, 0.5)], (-3.0 * 0.3 - 0.45) / 0.75);
+        near(&[(0.0, 1.0)], DARKEST);
+        let place = Place {
+            stored: Vec3::splat(0.5),
+            light: Vec3::ONE,
+            shades: &[],
+        };
+        let found = matching(std::iter::once(place)).unwrap();
+        let shown = overbright::to_linear(0.5 * TEXTURE).log2();
+        assert!((found.middle - shown).abs() < 1e-4, "{found:?}");
+        assert!(found.is_possible() && Exposure::usual(1.0).is_possible());
+    }
+
+    #[test]
+    fn what_mirrors_shows_its_surroundings_besides() {
+        // A room of nothing but metal: each wall shows its own light, and of what it mirrors a tenth, a hundredth and so on.
+        let found = |mirrored: f32| {
+            let shades = [Shade {
+                linear: Vec3::splat(overbright::to_linear(0.5)),
+                encoded: Vec3::splat(0.5),
+                mirrored: Vec3::splat(mirrored),
+            }];
+            let place = Place {
+                stored: Vec3::splat(0.5),
+                light: Vec3::splat(0.5),
+                shades: &shades,
+            };
+            matching(std::iter::once(place)).unwrap().scale
+        };
+        assert!((found(0.1) / found(0.0) - 0.9).abs() < 1e-3);
     }
 
     #[test]

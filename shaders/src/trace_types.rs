@@ -336,8 +336,8 @@ pub struct PostView {
     pub debug: u32,
     /// Storage image of the rays of each pixel (`R32Uint`), or `NO_IMAGE`.
     pub image_rays: u32,
-    /// As `TraceView::exposure_blend`, for a picture that became darker.
-    pub exposure_blend_dark: f32,
+    /// Nothing.
+    pub padding: u32,
 }
 
 /// The camera's samples, and how they become the picture.
@@ -542,8 +542,12 @@ pub struct TraceView {
     pub exposure_bias: f32,
     /// Stops at which the map looks as bright as the engine shows it.
     pub exposure_base: f32,
+    /// How bright a usual picture of the map is: mean logarithm of luminance, stops.
+    pub exposure_middle: f32,
     /// How far automatic exposure moves to its aim in this frame, 0..1.
     pub exposure_blend: f32,
+    /// The same for a picture that became darker.
+    pub exposure_blend_dark: f32,
     pub target_width: u32,
     pub target_height: u32,
     /// Clamped, with mip levels: for the images of sky boxes.

@@ -2,7 +2,7 @@
 // From the histogram to the exposure. The map's own base (stops at which it looks as bright as the engine shows it) is
 // what counts; automatic exposure corrects a part of how far this view is from a usual picture: the mean logarithm of
 // luminance (Reinhard et al., Photographic Tone Reproduction for Digital Images, SIGGRAPH 2002, equation 1), taken
-// between two percentiles, is brought towards that of a usual picture (their equation 2: the key over that mean).
+// between two percentiles, is brought towards that of a usual picture of the map (their equation 2: the key over that mean).
 // Dark rooms stay darker than bright ones, for the map's author chose its light: the key falls with the picture's
 // luminance (as in Krawczyk et al. 2005, section 3.1; here by a constant part of the difference in stops). The exposure
 // follows exponentially, faster into the light than into the dark (their section 3.2).
@@ -13,8 +13,6 @@ layout(local_size_x = EXPOSURE_BINS) in;
 
 shared uint bins[EXPOSURE_BINS];
 
-// Mean of a usual picture of the engine, linear.
-const float MIDDLE = 0.02;
 // How much of the difference is corrected, and bounds. Little: a picture is to stay within a quarter of the brightness
 // that the classic look has, and that look adapts to nothing.
 const float ADAPTATION = 0.15;
@@ -42,8 +40,8 @@ void main() {
     }
     float stops = 0.0;
     if ((VIEW.flags & VIEW_AUTO_EXPOSURE) != 0 && weight > 0.0)
-        stops = clamp((log2(MIDDLE) - VIEW.exposure_base - sum / weight) * ADAPTATION, MIN_STOPS, MAX_STOPS);
+        stops = clamp((VIEW.exposure_middle - VIEW.exposure_base - sum / weight) * ADAPTATION, MIN_STOPS, MAX_STOPS);
     float old = log2(clamp(state.exposure, exp2(MIN_STOPS), exp2(MAX_STOPS)));
     if ((VIEW.flags & VIEW_EXPOSURE_RESET) != 0 || isnan(old)) old = stops;
-    state.exposure = exp2(mix(old, stops, stops < old ? VIEW.exposure_blend : VIEW.post.exposure_blend_dark));
+    state.exposure = exp2(mix(old, stops, stops < old ? VIEW.exposure_blend : VIEW.exposure_blend_dark));
 }

@@ -53,7 +53,7 @@ struct MotionView {
 };
 
 struct PostView {
-    uint64_t counters; uint64_t bloom; float bloom_strength; uint debug; uint image_rays; float exposure_blend_dark;
+    uint64_t counters; uint64_t bloom; float bloom_strength; uint debug; uint image_rays; uint padding;
 };
 
 struct AntialiasView {
@@ -97,7 +97,7 @@ struct TraceView {
     uint max_depth; uint bounces;
     uint image_position; uint image_surface; uint image_shown; uint image_other; uint image_direct; uint image_indirect; uint image_composite;
     uint image_accumulation; uint image_target;
-    float exposure_bias; float exposure_base; float exposure_blend;
+    float exposure_bias; float exposure_base; float exposure_middle; float exposure_blend; float exposure_blend_dark;
     uint target_width; uint target_height; uint sky_sampler;
     vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up;
     DenoiseView denoise;

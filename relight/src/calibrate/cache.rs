@@ -7,6 +7,7 @@ use super::columns::Lamp;
 use super::report::Agreement;
 use super::samples::Evidence;
 use super::{CalibrationOptions, Solution, VERSION};
+use crate::exposure::Exposure;
 use crate::light::Falloff;
 use crate::world::RelitWorld;
 use glam::Vec3;
@@ -127,8 +128,8 @@ fn print(solution: &Solution) -> String {
     let dirty = if report.dirty { " dirty" } else { "" };
     let _ = writeln!(text, "gamma {}{ends}{dirty}", report.gamma);
     let _ = writeln!(text, "ambient {}", three(solution.ambient));
-    if let Some(exposure) = solution.exposure {
-        let _ = writeln!(text, "exposure {exposure}");
+    if let Some(Exposure { scale, middle }) = solution.exposure {
+        let _ = writeln!(text, "exposure {scale} {middle}");
     }
     for strength in &solution.known {
         let _ = writeln!(text, "known {}", three(*strength));
@@ -217,8 +218,12 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
                 };
             }
             "exposure" => match numbers[..] {
-                [exposure] if crate::exposure::possible(exposure) => {
-                    solution.exposure = Some(exposure);
+                [scale, middle] => {
+                    let found = Exposure { scale, middle };
+                    solution.exposure = found.is_possible().then_some(found);
+                    if solution.exposure.is_none() {
+                        return Err(wrong("not an exposure"));
+                    }
                 }
                 _ => return Err(wrong("not an exposure")),
             },
@@ -320,6 +325,7 @@ impl Hash {
             for shade in &material.shades {
                 self.vector(shade.linear);
                 self.vector(shade.encoded);
+                self.vector(shade.mirrored);
             }
             self.vector(material.shown);
         }

@@ -10,7 +10,7 @@ use super::report::Agreement;
 use super::samples::{Sample, Site, light_of, mean};
 use super::solve::{self, Ambient, Effort};
 use super::{Occluders, suns, views};
-use crate::exposure::{self, Place};
+use crate::exposure::{self, Exposure, Place};
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::Vec3;
 
@@ -94,7 +94,7 @@ impl Fit<'_> {
 
     /// Exposure at which light as it is now is as bright as the engine shows the map, in the mean of what players see where
     /// they are set; over the map's area where nothing tells where that is.
-    pub fn exposure(&self) -> Option<f32> {
+    pub fn exposure(&self) -> Option<Exposure> {
         let computed = solve::predict(&self.samples, &self.columns, self.ambient.value);
         let place = |sample: usize, material: u32| {
             let stored = self.samples.get(sample)?.shown;

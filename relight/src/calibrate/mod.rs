@@ -61,6 +61,7 @@ pub use report::{Agreement, CalibrationReport};
 pub use residuals::{Residual, residuals};
 pub use samples::Evidence;
 
+use crate::exposure::Exposure;
 use crate::world::RelitWorld;
 use bvh::Occluders;
 use columns::{Lamp, Source};
@@ -72,7 +73,7 @@ use samples::Taking;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 20;
+const VERSION: u32 = 21;
 
 /// One in so many candidates comes from the directions of the light grid.
 const CROSSINGS: usize = 5;
@@ -127,7 +128,7 @@ struct Solution {
     suns: Vec<(Vec3, Vec3)>,
     ambient: Vec3,
     /// How bright this light is to be shown: see [`RelitWorld::exposure`].
-    exposure: Option<f32>,
+    exposure: Option<Exposure>,
     report: CalibrationReport,
     /// Agreement at all texels, those that were fitted, too: two fits alike are compared by it with less noise.
     overall: Agreement,

@@ -177,7 +177,7 @@ impl Export<'_> {
     /// What all light is multiplied by.
     fn exposure(&self) -> f32 {
         let found = self.options.exposure;
-        found.unwrap_or_else(|| crate::exposure::display_exposure(self.world))
+        found.unwrap_or_else(|| crate::exposure::display_exposure(self.world).scale)
     }
 }
 

@@ -110,6 +110,7 @@ pub fn bake(files: &dyn GameFiles, shader: &Shader, side: usize) -> Option<Image
                     samples.push(StageSample {
                         texture,
                         color: *color,
+                        ..StageSample::WHITE
                     });
                 }
                 let drawn = compose(&shader.stages, &samples, false);

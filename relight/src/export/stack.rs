@@ -115,6 +115,7 @@ pub fn mean_of(
                 None => Vec4::ONE,
             },
             color: color_of(stage, moment),
+            ..StageSample::WHITE
         })
         .collect();
     // The test is on texels, not on their mean.
@@ -243,6 +244,7 @@ impl Baking {
                 samples.extend(self.pictures.iter().map(|laid| StageSample {
                     texture: self.texel(laid, x, first + y),
                     color: laid.color,
+                    ..StageSample::WHITE
                 }));
                 *out = self.pixel(&samples);
             }

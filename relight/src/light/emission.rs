@@ -172,8 +172,8 @@ impl<'a> Finder<'a> {
         mean_emission(shader, |name| self.images.get(name)?.as_ref())
     }
 
-    /// What a material throws back of light all over its texture. Nothing for skies.
-    pub fn shades(&mut self, material: &WorldMaterial) -> Vec<Shade> {
+    /// What a material throws back of light all over its texture, where its corners have these colours. Nothing for skies.
+    pub fn shades(&mut self, material: &WorldMaterial, corners: [u8; 4]) -> Vec<Shade> {
         let shader = &material.resolved.shader;
         if material.is_sky() {
             return Vec::new();
@@ -181,7 +181,9 @@ impl<'a> Finder<'a> {
         for name in shader.image_names() {
             self.image(name);
         }
-        shades(shader, |name| self.images.get(name)?.as_ref())
+        shades(shader, material.lighting, corners, |name| {
+            self.images.get(name)?.as_ref()
+        })
     }
 
     /// Where a cut-out lets light through.

@@ -102,6 +102,7 @@ impl Flicker {
                 StageSample {
                     texture,
                     color: *color,
+                    ..StageSample::WHITE
                 }
             }));
             sum += compose(&self.stages, &samples, true)

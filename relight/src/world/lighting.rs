@@ -3,6 +3,7 @@
 
 use super::RelitWorld;
 use crate::calibrate::CalibrationReport;
+use crate::exposure::Exposure;
 use crate::light::{Emission, LightLists, LightReport, PointLight, SunLight, TriangleLight};
 use glam::Vec3;
 
@@ -24,7 +25,7 @@ pub struct Lighting {
     calibration: Option<CalibrationReport>,
     stored_gamma: f32,
     light_end: f32,
-    exposure: Option<f32>,
+    exposure: Option<Exposure>,
 }
 
 impl RelitWorld {

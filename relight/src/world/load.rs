@@ -11,7 +11,7 @@ use crate::image;
 use crate::light::{self, LightColor, LightReport, TriangleLight};
 use crate::materials::Materials;
 use crate::overbright::MAP_OVERBRIGHT_BITS;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use q3bsp::{Bsp, Entity, SurfaceKind};
 use std::collections::HashMap;
 
@@ -268,14 +268,42 @@ impl RelitWorld {
     }
 
     fn measure_materials_with(&mut self, finder: &mut light::Finder<'_>) {
-        for material in &mut self.materials {
-            material.throw_back(finder);
+        let corners = self.corner_colors();
+        for (material, corners) in self.materials.iter_mut().zip(corners) {
+            material.throw_back(finder, corners);
             material.shown = if material.is_sky() {
                 finder.sky_radiance(material)
             } else {
                 finder.shown(material)
             };
         }
+    }
+
+    /// Mean colour of each material's corners over its area, encoded; white where it has none.
+    fn corner_colors(&self) -> Vec<[u8; 4]> {
+        let mut sums = vec![(Vec4::ZERO, 0.0); self.materials.len()];
+        for surface in &self.surfaces {
+            let Some((sum, whole)) = sums.get_mut(surface.material as usize) else {
+                continue;
+            };
+            let first = surface.first_index as usize / 3;
+            for triangle in first..first + surface.num_indices as usize / 3 {
+                let Some([a, b, c]) = self.triangle(triangle) else {
+                    continue;
+                };
+                let area = (b - a).cross(c - a).length() * 0.5;
+                let indices = self.indices.iter().skip(triangle * 3).take(3);
+                let colors = indices.filter_map(|&i| Some(self.vertices.get(i as usize)?.color));
+                let color: Vec4 = colors.map(|c| Vec4::from_array(c.map(f32::from))).sum();
+                *sum += color * (area / 3.0);
+                *whole += area;
+            }
+        }
+        let mean = |(sum, whole): (Vec4, f32)| match whole > 0.0 {
+            true => (sum / whole).to_array().map(|c| c.round() as u8),
+            false => [255; 4],
+        };
+        sums.into_iter().map(mean).collect()
     }
 
     /// Material of the sky surfaces with the largest area together.

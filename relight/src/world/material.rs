@@ -73,14 +73,14 @@ impl WorldMaterial {
         let mut finder = Finder::new(files, DEFAULT_EXPONENT);
         material.emission = finder.emission(&material);
         material.flicker = finder.flicker(&material);
-        material.throw_back(&mut finder);
+        material.throw_back(&mut finder, [255; 4]);
         material.shown = finder.shown(&material);
         material
     }
 
-    /// Finds what it throws back of light, and where it lets it through.
-    pub(super) fn throw_back(&mut self, finder: &mut Finder<'_>) {
-        self.shades = finder.shades(self);
+    /// Finds what it throws back of light, and where it lets it through. `corners`: the mean colour of its corners.
+    pub(super) fn throw_back(&mut self, finder: &mut Finder<'_>, corners: [u8; 4]) {
+        self.shades = finder.shades(self, corners);
         self.holes = finder.holes(self).map(Arc::new);
         let count = self.shades.len().max(1) as f32;
         let mean = self.shades.iter().map(|s| s.linear).sum::<Vec3>() / count;

@@ -17,6 +17,7 @@ pub use load::{LoadError, Options, Progress, Stage};
 pub use material::WorldMaterial;
 
 use crate::calibrate::CalibrationReport;
+use crate::exposure::Exposure;
 use crate::light::{Flicker, LightLists, LightReport, PointLight, SunLight, TriangleLight};
 use crate::overbright;
 use glam::Vec3;
@@ -78,7 +79,7 @@ pub struct RelitWorld {
     pub light_end: f32,
     /// Exposure at which the world's light, on the map's textures, is as bright in the mean as the engine shows the map:
     /// found by [calibration](crate::calibrate()). `None`: see [`display_exposure`](crate::exposure::display_exposure).
-    pub exposure: Option<f32>,
+    pub exposure: Option<Exposure>,
     /// Shift that was applied to vertex colours; see [`overbright`].
     pub overbright_shift: u32,
 }

@@ -147,10 +147,10 @@ impl TraceLook {
         let tracer = Tracer::of(device.info(), settings.rt_tracer);
         let mut view_tracer = ViewTracer::new(device, tracer)?;
         let exposure = display_exposure(relit);
-        view_tracer.exposure_base = exposure.log2();
+        view_tracer.map_exposure = exposure;
         let geometry = geometry(device, tracer, world, assets)?;
         let mut lights = MapLights::new(device, &source)?;
-        lights.white = exposure.recip();
+        lights.white = exposure.scale.recip();
         lights.find_fogs(&geometry.fog_boxes);
         Ok(Self {
             tracer: view_tracer,
@@ -196,7 +196,7 @@ impl TraceLook {
                 Some(made) => made,
                 none => {
                     let mut made = ViewTracer::new(rec.device(), self.kind)?;
-                    made.exposure_base = self.tracer.exposure_base;
+                    made.map_exposure = self.tracer.map_exposure;
                     none.insert(Box::new(made))
                 }
             }

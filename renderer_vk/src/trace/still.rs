@@ -30,7 +30,7 @@ impl Still {
         samples: u32,
     ) -> Result<Self, Error> {
         let mut tracer = ViewTracer::new(device, look.tracer())?;
-        tracer.exposure_base = look.tracer.exposure_base;
+        tracer.map_exposure = look.tracer.map_exposure;
         let [width, height] = size;
         let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
         let desc = ImageDesc::new("still picture", width, height, Format::Rgba8, usage);

@@ -77,8 +77,8 @@ pub struct ViewTracer {
     pub(super) targets: Option<Targets>,
     exposure_state: Buffer,
     exposure_started: bool,
-    /// Stops at which the map looks as bright as the engine shows it.
-    pub(super) exposure_base: f32,
+    /// At which the map looks as bright as the engine shows it.
+    pub(super) map_exposure: relight::exposure::Exposure,
     no_lights: MapLights,
     frame: u32,
     last_time: f32,
@@ -134,7 +134,7 @@ impl ViewTracer {
                 &[0u8; Exposure::STATE_SIZE as usize],
             )?,
             exposure_started: false,
-            exposure_base: 0.0,
+            map_exposure: relight::exposure::Exposure::usual(1.0),
             no_lights: MapLights::none(device)?,
             frame: 0,
             last_time: 0.0,
@@ -273,7 +273,7 @@ impl ViewTracer {
                 .prepare(&self.device, output, settings.rt_bloom)?,
             bloom_strength: settings.rt_bloom.clamp(0.0, 1.0),
             debug: settings.rt_debug,
-            exposure_blend_dark: self.exposure_blend(view, settings, DARK_ADAPTATION),
+            padding: 0,
         };
         let address = rec.arena().push(&[params])?;
 

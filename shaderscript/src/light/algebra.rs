@@ -6,7 +6,7 @@
 //! and B, and blending multiplies polynomials; two rules keep the result linear:
 //!
 //! * L^2 counts as L: a surface that was multiplied by its light twice is still lit once.
-//! * L B counts as B: the background brings its own light.
+//! * L B counts as B: the background brings its own light, and so do mirrored surroundings.
 //!
 //! All colours are linear; nothing is clamped. Alphas and blend factors made of them are plain numbers. The engine blends
 //! colours that are encoded for the display, though. Where that comes to something else than the same sum in linear light
@@ -29,6 +29,9 @@ pub struct StageSample {
     /// `rgbGen` and `alphaGen`. The colour is ignored where it stands for incident light: `lightingDiffuse`, and
     /// `vertex` or `exactVertex` on surfaces with vertex light.
     pub color: Vec4,
+    /// How much of its surroundings the stage mirrors; zero for all but reflections
+    /// ([`is_reflection`](super::is_reflection)).
+    pub mirrored: Vec3,
 }
 
 impl StageSample {
@@ -36,10 +39,11 @@ impl StageSample {
     pub const WHITE: StageSample = StageSample {
         texture: Vec4::ONE,
         color: Vec4::ONE,
+        mirrored: Vec3::ZERO,
     };
 }
 
-/// A colour that depends linearly on light: `lit * L + emission + through * B`, channel by channel.
+/// A colour that depends linearly on light: `lit * L + emission + through * B + reflected * R`, channel by channel.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct LightLinear {
     /// Coefficient of the incident light L: the diffuse albedo when L is irradiance over pi.
@@ -48,6 +52,8 @@ pub struct LightLinear {
     pub emission: Vec3,
     /// Coefficient of the background B; zero for opaque surfaces.
     pub through: Vec3,
+    /// Coefficient of the mirrored surroundings R, which bring their own light.
+    pub reflected: Vec3,
 }
 
 impl LightLinear {
@@ -56,9 +62,10 @@ impl LightLinear {
         lit: Vec3::ZERO,
         emission: Vec3::ZERO,
         through: Vec3::ONE,
+        reflected: Vec3::ZERO,
     };
 
-    /// Value for given light and background.
+    /// Value for given light and background, where nothing is mirrored.
     pub fn evaluate(&self, light: Vec3, background: Vec3) -> Vec3 {
         self.lit * light + self.emission + self.through * background
     }
@@ -68,6 +75,7 @@ impl LightLinear {
             lit: self.lit * factor,
             emission: self.emission * factor,
             through: self.through * factor,
+            reflected: self.reflected * factor,
         }
     }
 
@@ -76,6 +84,7 @@ impl LightLinear {
             lit: self.lit + other.lit,
             emission: self.emission + other.emission,
             through: self.through + other.through,
+            reflected: self.reflected + other.reflected,
         }
     }
 
@@ -89,6 +98,8 @@ impl LightLinear {
             lit: self.lit * drawn.lit + self.lit * drawn.emission + self.emission * drawn.lit,
             emission: self.emission * drawn.emission,
             through: (self.lit + self.emission) * drawn.through,
+            reflected: (self.lit + self.emission) * drawn.reflected
+                + self.reflected * (drawn.lit + drawn.emission),
         }
     }
 }
@@ -216,7 +227,10 @@ fn source_of(stage: &Stage, sample: StageSample, vertex_light: bool) -> (LightLi
         RgbGen::Vertex | RgbGen::ExactVertex => vertex_light,
         _ => false,
     };
-    let mut source = LightLinear::default();
+    let mut source = LightLinear {
+        reflected: sample.mirrored,
+        ..LightLinear::default()
+    };
     let mut alpha = sample.color.w;
     if stage.image == StageImage::Lightmap {
         // Lightmaps have no alpha.
@@ -266,8 +280,8 @@ pub fn stage_samples_white(stages: &[Stage]) -> Vec<StageSample> {
                 _ => 1.0,
             };
             StageSample {
-                texture: Vec4::ONE,
                 color: color.extend(alpha),
+                ..StageSample::WHITE
             }
         })
         .collect()
@@ -327,7 +341,7 @@ mod tests {
     fn texel(color: Vec3, alpha: f32) -> StageSample {
         StageSample {
             texture: color.extend(alpha),
-            color: Vec4::ONE,
+            ..StageSample::WHITE
         }
     }
 
@@ -447,6 +461,27 @@ mod tests {
     }
 
     #[test]
+    fn what_is_mirrored_brings_its_own_light() {
+        // gloss under paint with holes, and a lightmap over both
+        let shine = StageSample {
+            mirrored: BLUE,
+            ..texel(BLUE, 1.0)
+        };
+        let found = run(
+            "{\nmap e\ntcGen environment\n}\n{\nmap a\nblendFunc blend\n}\n{\nmap $lightmap\nblendFunc filter\n}",
+            &[shine, texel(RED, 0.75), StageSample::WHITE],
+        );
+        near(found, mixed(BLUE, RED, 0.75), Vec3::ZERO, Vec3::ZERO);
+        assert!(found.reflected.abs_diff_eq(0.25 * BLUE, 1e-6));
+        // multiplied by a body that is lit
+        let found = run(
+            "{\nmap a\nrgbGen lightingDiffuse\n}\n{\nmap e\ntcGen environment\nblendFunc gl_dst_color gl_one\n}",
+            &[texel(RED, 1.0), shine],
+        );
+        assert!(found.reflected.abs_diff_eq(RED * BLUE, 1e-6));
+    }
+
+    #[test]
     fn environment_base_lightmap() {
         let found = run(
             "{\nmap e\ntcGen environment\n}\n{\nmap a\nblendFunc blend\n}\n{\nmap $lightmap\nblendFunc filter\n}",
@@ -506,6 +541,7 @@ mod tests {
         let colored = StageSample {
             texture: RED.extend(1.0),
             color: BLUE.extend(1.0),
+            ..StageSample::WHITE
         };
         near(
             compose(&vertex.stages, &[colored], true),

@@ -8,7 +8,7 @@ use shaders::trace_types::{
 use shaders::types::{SunDisc, constants::NO_TEXTURE};
 
 use super::super::indirect::is_sparse;
-use super::{LIGHT_ADAPTATION, TracedMap, ViewTracer, is_lit};
+use super::{DARK_ADAPTATION, LIGHT_ADAPTATION, TracedMap, ViewTracer, is_lit};
 use crate::gpu::{Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::{SUN_SIZE, ViewScene, perpendicular};
@@ -138,8 +138,10 @@ impl ViewTracer {
                 .map_or(0, Image::storage_index),
             image_target: target.storage_index(),
             exposure_bias: settings.rt_exposure,
-            exposure_base: self.exposure_base,
+            exposure_base: self.map_exposure.scale.log2(),
+            exposure_middle: self.map_exposure.middle,
             exposure_blend: self.exposure_blend(view, settings, LIGHT_ADAPTATION),
+            exposure_blend_dark: self.exposure_blend(view, settings, DARK_ADAPTATION),
             target_width: target.width(),
             target_height: target.height(),
             sky_sampler: materials.sky_sampler(),
