@@ -80,14 +80,16 @@ float quadratic(float x) {
     return x < 0.5 ? 1.0 - 2.0 * x * x : x < 1.5 ? (x - 2.5) * x + 1.5 : 0.0;
 }
 
-// Whether the traced pixels around a place showed something at that distance in the last frame: within their range, because
-// a floor seen aslant has many distances. They are taken from a pixel around, because the samples of an edge's pixels
-// meet one side in one frame and the other in the next. Where pixels show a reflection and what lies behind it in turns,
+// Whether the traced pixel of a place showed something at that distance in the last frame, as nearly all do, or those around it:
+// within their range, because a floor seen aslant has many distances. They are taken from a pixel around, because the samples
+// of an edge's pixels meet one side in one frame and the other in the next. Where pixels show a reflection and what lies behind it in turns,
 // those at the corners and those beside the pixel show different things, and the way may be that of either.
 // At rest what is too thin to be met in each frame was there all the same, if nothing around has gone away since.
 bool was_seen(vec2 place, float path, bool rests, bool takes_turns) {
     const vec2 around[8] = vec2[](vec2(1, 1), vec2(-1, 1), vec2(1, -1), vec2(-1, -1), vec2(1, 0), vec2(-1, 0), vec2(0, 1), vec2(0, -1));
     ivec2 last = ivec2(VIEW.width, VIEW.height) - 1;
+    float slack = SAME_PATH * path + 1.0;
+    if (abs(abs(last_path_read(clamp(ivec2(floor(place)), ivec2(0), last))) - path) < slack) return true;
     float least = 1.0e30, most = 0.0;
     bool rested = rests;
     for (int i = 0; i < (rests || takes_turns ? 8 : 4); i++) {
@@ -96,7 +98,6 @@ bool was_seen(vec2 place, float path, bool rests, bool takes_turns) {
         least = min(least, abs(then));
         most = max(most, abs(then));
     }
-    float slack = SAME_PATH * path + 1.0;
     return rested || path > least - slack && path < most + slack;
 }
 

@@ -19,31 +19,27 @@ layout(constant_id = 2) const uint LAST = 0;
 const vec2 LUMINANCE_SIGMA = vec2(4.0, 6.0);
 const float LOG2_E = 1.44269504;
 
-// The exponents to which normals of guides go with the square of their differences: of normals of unit length those of
-// about the 64th power of their cosine; of each component, whose bits are where they are in the guide. That of z has the
-// bit of reflections above it, by which one differs from all that is none.
-const float NORMAL_SCALE = 0.4528; // root of 32 log2(e) / 15^2
-const vec3 COMPONENT_SCALE = NORMAL_SCALE / vec3(1.0, 32.0, 1024.0);
-const uvec3 COMPONENTS = uvec3(31u, 31u << 5, 63u << 10);
+// The exponent to which normals of guides go with the square of their difference: of normals of unit length about the
+// 64th power of their cosine. By the bit of reflections one differs from all that is none.
+const float NORMAL_SCALE = 0.205; // 32 log2(e) / 15^2
 
-// The components as they stand in the guide, times one, 32 and 1024.
-vec3 components(uint guide) { return uintBitsToFloat(0x4B000000u | guide & COMPONENTS); }
+// Of both kinds of light, or direct light alone.
+vec2 of_kinds(vec2 v) { return BOUNCES != 0 ? v : vec2(v.x, 0.0); }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (!inside(pixel)) return;
     uint place = place_of(pixel);
-    uvec4 packed = LightTexels(push.source).at[place];
-    LightTexel middle = unpack_texel(packed);
-    if (middle.guide == 0) {
+    uvec4 own = LightTexels(push.source).at[place];
+    uint guide = own.w;
+    if (guide == 0) {
         if (LAST == 0) LightTexels(push.target).at[place] = uvec4(0);
         return;
     }
     int spacing = int(push.spacing);
-    vec3 normal = components(middle.guide);
-    float depth = guide_depth(middle.guide);
+    vec3 normal = guide_components(guide);
+    float depth = guide_depth(guide);
     vec2 slope = imageLoad(images_rg16f[DENOISE.slope], pixel).xy * float(spacing);
-    vec2 value = vec2(luminance(middle.direct), luminance(middle.indirect));
 
     // the plane in camera space: its point at tangent (x, y) has the inverse depth a x + b y + c
     vec2 tangent = tangent_of(vec2(pixel));
@@ -60,46 +56,52 @@ void main() {
     // How much of the same surface a tap is, as a power of 2. A tap that has nothing to light is far from every normal.
     uvec4 taps[8];
     float alike[8];
-    vec2 variance_sum = middle.variance * 4.0;
-    float count = 4.0;
+    vec2 level = of_kinds(unpackHalf2x16(own.x)), variance_sum = of_kinds(unpackHalf2x16(own.z));
+    float count = 1.0;
     [[unroll]] for (int i = 0; i < 8; i++) {
         const int at = i < 4 ? i : i + 1;
         const ivec2 offset = ivec2(at % 3, at / 3);
         taps[i] = LightTexels(push.source).at[uint(rows[offset.y] + columns[offset.x])];
-        uint guide = taps[i].w;
+        uint other = taps[i].w;
         float expected = 1.0 + dot(slope, vec2(offset - 1));
-        float off_plane = abs(expected - guide_inverse(guide) * unit);
-        vec3 bend = (components(guide) - normal) * COMPONENT_SCALE;
-        alike[i] = -off_plane * plane_scale - dot(bend, bend) + (offset.x == 1 ? 1.0 : 0.0) + (offset.y == 1 ? 1.0 : 0.0);
+        float off_plane = abs(expected - guide_inverse(other) * unit);
+        vec3 bend = guide_components(other) - normal;
+        const float kernel = (offset.x == 1 ? 0.0 : -1.0) + (offset.y == 1 ? 0.0 : -1.0);
+        alike[i] = kernel - off_plane * plane_scale - dot(bend, bend) * NORMAL_SCALE;
         if (NOISY_VARIANCE != 0) {
             float same = exp2(alike[i]);
-            variance_sum += unpackHalf2x16(taps[i].z) * same;
+            variance_sum += of_kinds(unpackHalf2x16(taps[i].z)) * same;
             count += same;
         }
     }
-    vec2 deviation = sqrt(variance_sum / count);
-    vec2 light_scale = LOG2_E / (LUMINANCE_SIGMA * deviation + 1.0e-3 * value + 1.0e-6);
+    vec2 variance = variance_sum / count, deviation = sqrt(variance);
+    vec2 light_scale = LOG2_E / (LUMINANCE_SIGMA * deviation + 1.0e-3 * level + 1.0e-6);
 
-    vec3 direct = middle.direct * 4.0, indirect = middle.indirect * 4.0;
-    vec2 variance = middle.variance * 16.0, total = vec2(4.0);
+    // colours are summed up as codes, times the level
+    vec2 level_sum = level, green = level * green_code(own.y), red = level * red_code(own.y);
+    vec2 squares = vec2(1.0), total = vec2(1.0);
     [[unroll]] for (int i = 0; i < 8; i++) {
-        vec3 tap_direct = unpack_light(taps[i].x);
-        vec2 weight = vec2(exp2(alike[i] - abs(luminance(tap_direct) - value.x) * light_scale.x), 0.0);
-        direct += tap_direct * weight.x;
-        if (BOUNCES != 0) {
-            vec3 tap_indirect = unpack_light(taps[i].y);
-            weight.y = exp2(alike[i] - abs(luminance(tap_indirect) - value.y) * light_scale.y);
-            indirect += tap_indirect * weight.y;
-        }
-        if (LAST == 0) variance += unpackHalf2x16(taps[i].z) * weight * weight;
+        vec2 other = of_kinds(unpackHalf2x16(taps[i].x));
+        vec2 weight = of_kinds(exp2(alike[i] - abs(other - level) * light_scale));
+        vec2 light = other * weight;
         total += weight;
+        level_sum += light;
+        green += light * green_code(taps[i].y);
+        red += light * red_code(taps[i].y);
+        if (LAST == 0) squares += weight * weight;
     }
-    middle.direct = direct / total.x;
-    middle.indirect = indirect / total.y;
+    vec2 scale = 1.0 / total;
+    LightTexel mean;
+    mean.level = level_sum * scale;
+    mean.green = (green - CODE_GREY * level_sum) * (CODE_SCALE * scale);
+    mean.red = (red - CODE_GREY * level_sum) * (CODE_SCALE * scale);
     if (LAST != 0) {
-        light_write(VIEW.image_direct, pixel, middle.direct + middle.indirect, dither(pixel, 2));
+        vec3 light = light_of_texel(mean.level.x + mean.level.y, mean.green.x + mean.green.y, mean.red.x + mean.red.y);
+        light_write(VIEW.image_direct, pixel, light, dither(pixel, 2));
         return;
     }
-    middle.variance = variance / (total * total);
-    LightTexels(push.target).at[place] = pack_texel(middle, dither(pixel, 2));
+    // those around, which weigh because they are alike, vary as much
+    mean.variance = variance * squares * (scale * scale);
+    mean.guide = guide;
+    LightTexels(push.target).at[place] = pack_texel(mean, dither(pixel, 2));
 }

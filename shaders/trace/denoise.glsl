@@ -68,6 +68,13 @@ vec3 guide_normal(uint guide) {
     return vec3(small_float(guide & 31u), small_float(guide >> 5 & 31u), small_float(guide >> 10 & 31u)) * (1.0 / 15.0) - 16.0 / 15.0;
 }
 
+// The normal with its bit of reflections, to be compared: three whole numbers, each as the mantissa of a float whose digits
+// count ones where the number stands in the guide. Of normals of unit length 15 times what they differ by.
+const uvec3 COMPONENTS = uvec3(31u, 31u << 5, 63u << 10), COMPONENT_BASE = uvec3(0x4B000000u, 0x48800000u, 0x46000000u);
+// What stands for nothing in each.
+const vec3 COMPONENT_ZERO = vec3(8388608.0, 262144.0, 8192.0);
+vec3 guide_components(uint guide) { return uintBitsToFloat(guide & COMPONENTS | COMPONENT_BASE); }
+
 // What a pixel's history is: how many frames direct and indirect light were gathered over, and the variance of the
 // luminance of one frame's, as logarithm in steps of a fourth. In 32 bits.
 const float VARIANCE_STEP = 0.25, VARIANCE_FIRST = -32.0;
@@ -83,20 +90,47 @@ vec2 past_frames(uint past) { return vec2(past & 0xFFu, past >> 8 & 0xFFu); }
 
 vec2 past_variance(uint past) { return exp2(vec2(past >> 16 & 0xFFu, past >> 24) * VARIANCE_STEP + VARIANCE_FIRST); }
 
-// A texel that is filtered.
+// A texel that is filtered: both kinds of light as level (r/4 + g/2 + b/4), as what is left of green in it and as what red
+// has over blue, each of which is at most as large as the level. Direct light is x, indirect light is y of each.
 struct LightTexel {
-    vec3 direct;
-    vec3 indirect;
-    vec2 variance; // of the luminance of both, of the mean that they are
+    vec2 level;
+    vec2 green;
+    vec2 red;
+    vec2 variance; // of the levels, of the mean that they are
     uint guide;
 };
 
-LightTexel unpack_texel(uvec4 t) {
-    return LightTexel(unpack_light(t.x), unpack_light(t.y), unpackHalf2x16(t.z), t.w);
+vec3 texel_of(vec3 light) {
+    float green = 0.5 * light.g, rest = 0.25 * (light.r + light.b);
+    return vec3(green + rest, green - rest, 0.25 * (light.r - light.b));
 }
 
+vec3 light_of_texel(float level, float green, float red) {
+    float rest = level - green;
+    return vec3(rest + 2.0 * red, level + green, rest - 2.0 * red);
+}
+
+const float MOST_LEVEL = 16000.0;
+
+// Colours over the level, as bytes of which 128 is grey: the low ones of both halves, and the high ones.
+const uint CODES = 0x00FF00FFu, CODE_BASE = 0x64006400u; // halfs from 1024 on count ones
+
+const float CODE_GREY = 1024.0 + 128.0, CODE_SCALE = 1.0 / 127.0;
+
+vec2 green_code(uint codes) { return unpackHalf2x16(codes & CODES | CODE_BASE); }
+vec2 red_code(uint codes) { return unpackHalf2x16(codes >> 8 & CODES | CODE_BASE); }
+
+// `dither`: uniform in [0, 1), makes the mean over many frames exact.
 uvec4 pack_texel(LightTexel t, float dither) {
-    return uvec4(pack_light(t.direct, dither), pack_light(t.indirect, dither), packHalf2x16(min(t.variance, vec2(60000.0))), t.guide);
+    dither -= 0.5;
+    vec2 level = clamp(t.level, 0.0, MOST_LEVEL);
+    // the place of the last digit that a half keeps
+    vec2 digit = uintBitsToFloat(floatBitsToUint(level) & 0x7F800000u) * (1.0 / 1024.0);
+    vec2 scale = 127.0 / max(level, 1.0e-6);
+    // as in pack_light, rounded by adding 2^23
+    uvec4 codes = floatBitsToUint(clamp(vec4(t.green, t.red) * scale.xyxy + (128.0 + dither), 0.0, 255.0) + 8388608.0) & 0xFFu;
+    return uvec4(packHalf2x16(level + digit * dither), codes.x | codes.z << 8 | codes.y << 16 | codes.w << 24,
+        packHalf2x16(min(t.variance, vec2(60000.0))), t.guide);
 }
 
 // Coordinates of a pixel's middle on the plane at distance 1, to the left and up.

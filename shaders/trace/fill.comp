@@ -10,7 +10,9 @@ layout(local_size_x = TILE, local_size_y = TILE) in;
 
 // Of the cells of the group and those around: the pixel that was gathered for (x, y in 16 bits each), its light and
 // normal; its position and path, negative where there is nothing.
-shared uvec3 gathered[WIDE * WIDE];
+shared uint gathered[WIDE * WIDE];
+shared vec3 lights[WIDE * WIDE];
+shared vec3 normals[WIDE * WIDE];
 shared vec4 places[WIDE * WIDE];
 
 void main() {
@@ -22,8 +24,9 @@ void main() {
         if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, cells))) continue;
         ivec2 pixel = sparse_pixel(cell);
         places[i] = imageLoad(images_rgba32f[VIEW.image_position], pixel);
-        gathered[i] = uvec3(uint(pixel.x) | uint(pixel.y) << 16, imageLoad(uimages_r32ui[VIEW.image_indirect], pixel).x,
-            imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).x);
+        gathered[i] = uint(pixel.x) | uint(pixel.y) << 16;
+        lights[i] = light_read(VIEW.image_indirect, pixel);
+        normals[i] = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).x);
     }
     barrier();
     ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
@@ -31,7 +34,7 @@ void main() {
     int own = (int(gl_LocalInvocationID.y) + 1) * WIDE + int(gl_LocalInvocationID.x) + 1;
     for (int i = 0; i < CELL * CELL; i++) {
         ivec2 in_cell = ivec2(i & 1, i >> 1), pixel = cell * CELL + in_cell;
-        bool is_own = gathered[own].x == (uint(pixel.x) | uint(pixel.y) << 16);
+        bool is_own = gathered[own] == (uint(pixel.x) | uint(pixel.y) << 16);
         if (is_own || any(greaterThanEqual(pixel, size))) continue;
         vec4 position = imageLoad(images_rgba32f[VIEW.image_position], pixel);
         vec3 light = vec3(0.0);
@@ -48,15 +51,14 @@ void main() {
                 int at = own + (j / 3 - 1) * WIDE + j % 3 - 1;
                 vec4 other = places[at];
                 if (other.w < 0.0) continue;
-                uvec3 tap = gathered[at];
-                vec2 off = vec2(pixel - ivec2(tap.x & 0xFFFFu, tap.x >> 16));
+                vec2 off = vec2(pixel - ivec2(gathered[at] & 0xFFFFu, gathered[at] >> 16));
                 float near = max(reach - 0.75 * dot(off, off), 0.0);
                 if (near == 0.0) continue;
-                vec3 found = unpack_light(tap.y);
+                vec3 found = lights[at];
                 any_light += found * near;
                 any_weight += near;
                 if (takes_turns && (int(off.x + off.y) & 1) != 0) continue;
-                if (dot(normal, unpack_normal(tap.z)) < 0.9 || abs(dot(other.xyz - position.xyz, normal)) > tolerance) continue;
+                if (dot(normal, normals[at]) < 0.9 || abs(dot(other.xyz - position.xyz, normal)) > tolerance) continue;
                 light += found * near;
                 weight += near;
             }

@@ -4,34 +4,40 @@
 // apart, and divided at the end, which gradient_wide.comp does).
 #include "trace/denoise.glsl"
 
-const int TILE = 16, BORDER = 7, WIDE = TILE + 2 * BORDER; // steps of 1, 2 and 4 strata reach 7 far
+const int TILE = 16, BORDER = 6, WIDE = TILE + 2 * BORDER; // steps of 1, 2 and 3 strata reach 6 far
 layout(local_size_x = TILE, local_size_y = TILE) in;
 
-// change and size of direct light, of indirect light, as halfs
-shared uvec2 tile[WIDE * WIDE];
+// change and size of direct light, of indirect light, as halfs; each step reads one and writes the other
+shared uvec2 tiles[2][WIDE * WIDE];
 shared uint guides[WIDE * WIDE];
 // logarithms of the luminance that the last frame was left with, of both, as halfs: bright light that has not changed
 // must not hide that dim light beside it has
 shared uint levels[WIDE * WIDE];
+// logarithms of the inverse depths
+shared float depths[WIDE * WIDE];
 
-uvec2 filtered(ivec2 at, int spacing) {
-    uint guide = guides[at.y * WIDE + at.x];
-    vec3 normal = guide_normal(guide);
-    uint own = levels[at.y * WIDE + at.x];
+uvec2 filtered(uint source, ivec2 at, int spacing) {
+    int place = at.y * WIDE + at.x;
+    vec3 normal = guide_normal(guides[place]);
+    // of the dot product with a normal as the guide has it, 15 times as long and 16 from nothing
+    float turned = -16.0 / 15.0 * (normal.x + normal.y + normal.z);
+    float depth = depths[place], depth_scale = -8.0 / float(spacing);
+    // a stratum without a sample takes from all around
+    uint packed = levels[place];
+    vec2 own = unpackHalf2x16(packed);
     vec4 sum = vec4(0.0);
-    for (int y = -1; y <= 1; y++) {
-        for (int x = -1; x <= 1; x++) {
-            int tap = (at.y + y * spacing) * WIDE + at.x + x * spacing;
-            uint other = guides[tap];
-            if (other == 0) continue;
-            float weight = (x == 0 ? 2.0 : 1.0) * (y == 0 ? 2.0 : 1.0);
-            // wide for slanted surfaces: a gradient that leaks costs noise, not light
-            weight *= exp2(-8.0 * abs(depth_change(guide, other)) / float(spacing)) * max(dot(normal, guide_normal(other)), 0.0);
-            vec2 weights = vec2(weight);
-            // a stratum without a sample takes from all around
-            if (own != 0 && levels[tap] != 0) weights *= exp2(-abs(unpackHalf2x16(own) - unpackHalf2x16(levels[tap])));
-            sum += weights.xxyy * vec4(unpackHalf2x16(tile[tap].x), unpackHalf2x16(tile[tap].y));
-        }
+    for (int i = 0; i < 9; i++) {
+        ivec2 offset = ivec2(i % 3, i / 3) - 1;
+        int tap = place + (offset.y * WIDE + offset.x) * spacing;
+        float kernel = (offset.x == 0 ? 1.0 : 0.0) + (offset.y == 0 ? 1.0 : 0.0);
+        // wide for slanted surfaces: a gradient that leaks costs noise, not light
+        vec2 alike = vec2(kernel + depth_scale * abs(depth - depths[tap]));
+        uint level = levels[tap];
+        if (packed != 0 && level != 0) alike -= abs(own - unpackHalf2x16(level));
+        float cosine = dot(normal, guide_components(guides[tap]) - COMPONENT_ZERO) * (1.0 / 15.0) + turned;
+        vec2 weight = exp2(alike) * max(cosine, 0.0);
+        uvec2 gradient = tiles[source][tap];
+        sum += weight.xxyy * vec4(unpackHalf2x16(gradient.x), unpackHalf2x16(gradient.y));
     }
     // the scale is the same for change and size and falls out at the end; this one keeps it near that of the input
     sum *= 1.0 / 16.0;
@@ -46,32 +52,26 @@ void main() {
         ivec2 stratum = corner + ivec2(i % WIDE, i / WIDE);
         bool there = all(greaterThanEqual(stratum, ivec2(0))) && all(lessThan(stratum, strata));
         uvec4 own = there ? imageLoad(uimages_rgba32ui[DENOISE.gradient_samples], stratum) : uvec4(0);
-        tile[i] = own.xy;
+        tiles[0][i] = own.xy;
         levels[i] = own.z;
         guides[i] = own.w;
-    }
-    int border = 0;
-    for (int spacing = 1; spacing <= 4; spacing *= 2) {
-        barrier();
-        border += spacing;
-        int edge = WIDE - 2 * border;
-        // all are read before any is written
-        uvec2 results[(WIDE * WIDE + TILE * TILE - 1) / (TILE * TILE)];
-        int count = 0;
-        for (int i = index; i < edge * edge; i += TILE * TILE) {
-            ivec2 at = ivec2(i % edge, i / edge) + border;
-            results[count++] = guides[at.y * WIDE + at.x] != 0 ? filtered(at, spacing) : uvec2(0);
-        }
-        barrier();
-        count = 0;
-        for (int i = index; i < edge * edge; i += TILE * TILE) {
-            ivec2 at = ivec2(i % edge, i / edge) + border;
-            tile[at.y * WIDE + at.x] = results[count++];
-        }
+        depths[i] = log2(max(guide_inverse(own.w), 1.0e-6)); // 0 where there is nothing to light
     }
     barrier();
+    int border = 0;
+    for (int spacing = 1; spacing <= 3; spacing++) {
+        border += spacing;
+        int edge = WIDE - 2 * border;
+        uint source = (spacing & 1) ^ 1;
+        for (int i = index; i < edge * edge; i += TILE * TILE) {
+            ivec2 at = ivec2(i % edge, i / edge) + border;
+            int place = at.y * WIDE + at.x;
+            tiles[source ^ 1][place] = guides[place] != 0 ? filtered(source, at, spacing) : uvec2(0);
+        }
+        barrier();
+    }
     ivec2 stratum = corner + BORDER + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(stratum, strata))) return;
-    int place = (int(gl_LocalInvocationID.y) + BORDER) * WIDE + int(gl_LocalInvocationID.x) + BORDER;
-    imageStore(images_rgba16f[DENOISE.gradient_sums], stratum, vec4(unpackHalf2x16(tile[place].x), unpackHalf2x16(tile[place].y)));
+    uvec2 sums = tiles[1][(int(gl_LocalInvocationID.y) + BORDER) * WIDE + int(gl_LocalInvocationID.x) + BORDER];
+    imageStore(images_rgba16f[DENOISE.gradient_sums], stratum, vec4(unpackHalf2x16(sums.x), unpackHalf2x16(sums.y)));
 }

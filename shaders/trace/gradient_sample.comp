@@ -7,8 +7,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uint level_of(Carried c) {
-    LightTexel light = unpack_texel(LightTexels(DENOISE.history).at[place_of(c.last)]);
-    return packHalf2x16(log2(vec2(luminance(light.direct), luminance(light.indirect)) + 1.0e-5));
+    return packHalf2x16(log2(unpackHalf2x16(LightTexels(DENOISE.history).at[place_of(c.last)].x) + 1.0e-5));
 }
 
 uvec2 gradient_at(ivec2 stratum, Carried c) {

@@ -17,63 +17,80 @@ const float MIN_VARIANCE_WEIGHT = 0.1;
 const float NOISE = 0.15;
 // Frames before the variance over time can be trusted; until then it is taken over space.
 const float TRUSTED_FRAMES = 4.0;
-// How far around; of the rows every other one is enough.
-const ivec2 AROUND = ivec2(3, 2);
+// Square of the difference of two normals' components beyond which they are of two surfaces: a cosine of 0.85.
+const float MOST_BEND = 67.5;
+// How far up and down it is taken from, of the pixels of the group.
+const int AROUND = 2;
 
-// What the last frame left.
+// Levels of this frame's light of the group's pixels.
+shared vec2 levels[TILE * TILE];
+
+// What the last frame left; all zero: nothing.
 struct History {
-    vec3 direct;
-    vec3 indirect;
-    vec2 variance; // of one frame's light
+    LightTexel light; // whose variance is that of one frame's
     vec2 frames;
     float weight;
 };
 
-void add_tap(inout History h, ivec2 tap, Before before, uint guide, vec3 normal, float tolerance, float weight) {
+// Colours are summed up as codes, times the level. `normal`: components of the guide; `range`: least and greatest inverse of
+// the depth that is the surface's.
+void add_tap(inout History h, ivec2 tap, vec3 normal, vec2 range, float weight) {
     if (!inside(tap) || !(weight > 0.0)) return;
     uint place = place_of(tap);
-    LightTexel light = unpack_texel(LightTexels(DENOISE.history).at[place]);
-    if (light.guide == 0 || ((light.guide ^ guide) & REFLECTION_BIT) != 0) return;
-    if (abs(guide_depth(light.guide) - before.depth) > tolerance || dot(guide_normal(light.guide), normal) < 0.85) return;
+    uvec4 texel = LightTexels(DENOISE.history).at[place];
+    float inverse = guide_inverse(texel.w);
+    vec3 bend = guide_components(texel.w) - normal;
+    // where there is nothing to light the inverse is 0
+    if (inverse < range.x || inverse > range.y || dot(bend, bend) > MOST_BEND) return;
     uint past = Pasts(DENOISE.last_past).at[place];
-    h.direct += light.direct * weight;
-    if (BOUNCES != 0) h.indirect += light.indirect * weight;
-    h.variance += past_variance(past) * weight;
+    vec2 level = unpackHalf2x16(texel.x) * weight;
+    h.light.level += level;
+    h.light.green += green_code(texel.y) * level;
+    h.light.red += red_code(texel.y) * level;
+    h.light.variance += past_variance(past) * weight;
     h.frames += past_frames(past) * weight;
     h.weight += weight;
 }
 
-History history_at(ivec2 pixel, uint guide, vec3 normal, vec2 slope) {
-    History h = History(vec3(0.0), vec3(0.0), vec2(0.0), vec2(0.0), 0.0);
+History history_at(ivec2 pixel, uint guide, vec2 slope) {
+    const History NONE = History(LightTexel(vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), 0), vec2(0.0), 0.0);
+    History h = NONE;
     if ((DENOISE.flags & DENOISE_HISTORY) == 0) return h;
     Before before = before_of(pixel);
     if (!(before.depth > 0.0)) return h;
     // depths of taps differ by about as much as those of this frame's pixels, and by rounding
     float tolerance = before.depth * (0.01 + 2.0 * (abs(slope.x) + abs(slope.y))) + 0.1;
+    vec2 range = INVERSE_SCALE / vec2(before.depth + tolerance, max(before.depth - tolerance, NEAREST_DEPTH));
+    vec3 normal = guide_components(guide);
     vec2 low = floor(before.pixel), part = before.pixel - low;
     for (int i = 0; i < 4; i++) {
         ivec2 offset = ivec2(i & 1, i >> 1);
         float weight = (offset.x == 1 ? part.x : 1.0 - part.x) * (offset.y == 1 ? part.y : 1.0 - part.y);
         // a place that is a rounding error off a pixel's middle is there
-        add_tap(h, ivec2(low) + offset, before, guide, normal, tolerance, weight < 1.0e-3 ? 0.0 : weight);
+        add_tap(h, ivec2(low) + offset, normal, range, weight < 1.0e-3 ? 0.0 : weight);
     }
-    if (h.weight < 0.01) return History(vec3(0.0), vec3(0.0), vec2(0.0), vec2(0.0), 0.0);
+    if (h.weight < 0.01) return NONE;
     float scale = 1.0 / h.weight;
-    return History(h.direct * scale, h.indirect * scale, h.variance * scale, h.frames * scale, h.weight);
+    h.light.green = (h.light.green - CODE_GREY * h.light.level) * (CODE_SCALE * scale);
+    h.light.red = (h.light.red - CODE_GREY * h.light.level) * (CODE_SCALE * scale);
+    h.light.level *= scale;
+    h.light.variance *= scale;
+    h.frames *= scale;
+    return h;
 }
 
-// Variance of the luminance of this frame's light around a pixel.
-vec2 variance_around(ivec2 pixel, float depth, vec2 slope, bool takes_turns) {
+// Variance of the level of this frame's light around the pixel, of what the group has of its surface: of every other row and
+// column, which show the same where pixels take turns. Where one pixel asks for it the others wait, so it reads no memory.
+vec2 variance_around(float depth, vec2 slope) {
+    ivec2 own = ivec2(gl_LocalInvocationID.xy);
     vec4 moments = vec4(0.0);
     float count = 0.0;
-    for (int y = -AROUND.y; y <= AROUND.y; y += 2) {
-        for (int x = -AROUND.x; x <= AROUND.x; x++) {
-            ivec2 tap = pixel + ivec2(x, y);
-            if (takes_turns && ((x ^ y) & 1) != 0) continue;
-            float other = depth_at(tap);
-            if (other == 0.0 || abs(depth / other - 1.0 - dot(slope, vec2(x, y))) > 0.02) continue;
-            vec2 l = vec2(luminance(light_read(VIEW.image_direct, tap)), BOUNCES != 0 ? luminance(light_read(VIEW.image_indirect, tap)) : 0.0);
-            moments += vec4(l, l * l);
+    for (int y = max(own.y - AROUND, own.y & 1); y <= min(own.y + AROUND, TILE - 1); y += 2) {
+        for (int x = own.x & 1; x < TILE; x += 2) {
+            float other = depths[(y + 1) * (TILE + 2) + x + 1];
+            if (other == 0.0 || abs(depth / other - 1.0 - dot(slope, vec2(ivec2(x, y) - own))) > 0.02) continue;
+            vec2 level = levels[y * TILE + x];
+            moments += vec4(level, level * level);
             count += 1.0;
         }
     }
@@ -81,10 +98,14 @@ vec2 variance_around(ivec2 pixel, float depth, vec2 slope, bool takes_turns) {
     return max(moments.zw - moments.xy * moments.xy, vec2(0.0));
 }
 
-// Whether the pixel is the one of its stratum that may be kept for the next frame's gradient; `again`: it is a gradient
-// sample itself, whose random numbers are older than this frame.
-bool is_kept(ivec2 pixel, ivec2 stratum, out bool again) {
-    again = false;
+// Of each stratum of the group the pixel that may be kept for the next frame's gradient, as `pack_place` does it.
+const int STRATA = TILE / STRATUM + 2;
+shared uint choices[STRATA * STRATA];
+// That pixel is a gradient sample itself, whose random numbers are older than this frame; bounced light was gathered for it.
+const uint AGAIN = 1u << 31, GATHERED = 1u << 30;
+
+uint choice_of(ivec2 stratum) {
+    stratum = min(stratum, (ivec2(VIEW.width, VIEW.height) - 1) / STRATUM);
     Carried c = Carried(false, false, 0, ivec2(0));
     if ((DENOISE.flags & DENOISE_GRADIENTS) != 0) c = carried_at(stratum);
     // one whose turn it is where bounced light is not gathered everywhere: in each direction there are one or two
@@ -103,19 +124,31 @@ bool is_kept(ivec2 pixel, ivec2 stratum, out bool again) {
         else index = 0;
     }
     // at the right and the lower edge strata are cut off
-    if (pixel != min(pixel_of(stratum, index), ivec2(VIEW.width, VIEW.height) - 1)) return false;
-    again = c.valid && pixel == pixel_of(stratum, c.index);
-    return true;
+    ivec2 pixel = min(pixel_of(stratum, index), ivec2(VIEW.width, VIEW.height) - 1);
+    return pack_place(pixel) | (c.valid && pixel == pixel_of(stratum, c.index) ? AGAIN : 0) | (is_gathered(pixel) ? GATHERED : 0);
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 stratum = pixel / STRATUM, first_stratum = ivec2(gl_WorkGroupID.xy) * TILE / STRATUM;
+    int index = int(gl_LocalInvocationIndex);
+    if (index < STRATA * STRATA) choices[index] = choice_of(first_stratum + ivec2(index % STRATA, index / STRATA));
+    vec3 direct = vec3(0.0), indirect = vec3(0.0);
+    if (inside(pixel)) {
+        direct = light_read(VIEW.image_direct, pixel);
+        if (BOUNCES != 0) indirect = light_read(VIEW.image_indirect, pixel);
+    }
+    vec2 luminances = vec2(luminance(direct), luminance(indirect));
+    direct = texel_of(direct);
+    indirect = texel_of(indirect);
+    levels[index] = vec2(direct.x, indirect.x);
     load_depths();
     if (!inside(pixel)) return;
     float depth = own_depth();
-    ivec2 stratum = pixel / STRATUM;
-    bool again, kept = is_kept(pixel, stratum, again);
-    if (kept && (depth == 0.0 || again)) {
+    ivec2 in_group = stratum - first_stratum;
+    uint choice = choices[in_group.y * STRATA + in_group.x];
+    bool kept = (choice & ~(AGAIN | GATHERED)) == pack_place(pixel);
+    if (kept && (depth == 0.0 || choice >= AGAIN)) {
         keep_nothing(stratum);
         kept = false;
     }
@@ -129,14 +162,17 @@ void main() {
     vec2 slope = slope_at(depth, field > 0.0);
 
     LightTexel light;
-    light.direct = light_read(VIEW.image_direct, pixel);
-    light.indirect = BOUNCES != 0 ? light_read(VIEW.image_indirect, pixel) : vec3(0.0);
+    light.level = vec2(direct.x, indirect.x);
+    light.green = vec2(direct.y, indirect.y);
+    light.red = vec2(direct.z, indirect.z);
     light.guide = pack_guide(depth, normal, field == 2.0);
-    vec2 value = vec2(luminance(light.direct), luminance(light.indirect));
 
-    if (kept) keep_sample(stratum, pixel, imageLoad(images_rgba32f[VIEW.image_position], pixel), surface, is_gathered(pixel) ? value : vec2(value.x, -1.0));
+    if (kept) {
+        if ((choice & GATHERED) == 0) luminances.y = -1.0;
+        keep_sample(stratum, pixel, imageLoad(images_rgba32f[VIEW.image_position], pixel), surface, luminances);
+    }
 
-    History h = history_at(pixel, light.guide, normal, slope);
+    History h = history_at(pixel, light.guide, slope);
     vec2 frames = vec2(0.0), variance = vec2(0.0);
     if (h.weight > 0.0) {
         frames = h.frames;
@@ -156,14 +192,15 @@ void main() {
         }
         weight = max(weight, 1.0 / (frames + 1.0));
         // what is known to be change is no noise
-        vec2 away = (1.0 - change) * (value - vec2(luminance(h.direct), luminance(h.indirect)));
-        variance = mix(h.variance * (1.0 - change), away * away, max(weight, MIN_VARIANCE_WEIGHT));
-        light.direct = mix(h.direct, light.direct, weight.x);
-        light.indirect = mix(h.indirect, light.indirect, weight.y);
+        vec2 away = (1.0 - change) * (light.level - h.light.level);
+        variance = mix(h.light.variance * (1.0 - change), away * away, max(weight, MIN_VARIANCE_WEIGHT));
+        light.level = mix(h.light.level, light.level, weight);
+        light.green = mix(h.light.green, light.green, weight);
+        light.red = mix(h.light.red, light.red, weight);
     }
     frames = min(frames + 1.0, 1.0 / MIN_WEIGHT);
     if (min(frames.x, frames.y) < TRUSTED_FRAMES) {
-        vec2 around = variance_around(pixel, depth, slope, field > 0.0);
+        vec2 around = variance_around(depth, slope);
         variance = mix(variance, max(variance, around), lessThan(frames, vec2(TRUSTED_FRAMES)));
     }
     // of the mean over the frames: what has settled is left as it is

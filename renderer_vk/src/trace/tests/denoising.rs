@@ -479,3 +479,32 @@ fn both_sides_of_water_keep_their_light() {
         assert!(error < 0.15, "{bounces}, {denoiser}: {error}");
     }
 }
+
+/// Light that is the same everywhere comes out of the filter, over many frames, as it went in: of any color, dim and bright.
+#[test]
+fn even_light_keeps_its_level_and_color() {
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    let colors = [[1.0, 0.3, 0.05], [0.0, 1.0, 0.0], [0.02, 0.1, 1.0]].map(Vec3::from);
+    for light in [1.0e-3, 1.0, 1.0e3].map(|level| colors.map(|color| color * level)) {
+        for light in light {
+            let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, 32);
+            let white = scene.diffuse(1.0);
+            scene.ambient = light;
+            let wall = Vec3::new(300.0, -900.0, -900.0);
+            scene.quad(rectangle(wall, Vec3::Z * 1800.0, Vec3::Y * 1800.0), white);
+            let (pixels, _) = gpu.render(&scene, &live(), 16);
+            let mean = pixels.iter().sum::<Vec3>() / pixels.len() as f32;
+            let most = light.max_element();
+            let off = (mean - light).abs().max_element() / most;
+            let worst = pixels
+                .iter()
+                .map(|p| (*p - light).abs().max_element() / most)
+                .fold(0.0, f32::max);
+            println!("{light}: mean off by {off}, worst pixel by {worst}");
+            assert!(off < 0.003, "{light}: {mean}");
+            assert!(worst < 0.02, "{light}: {worst}");
+        }
+    }
+}
