@@ -11,14 +11,24 @@ const uint EYE_STREAM = 0;
 // What every path sees, and what the eye's own ray sees.
 const uint MASK_ALWAYS = MASK_SKY | MASK_NO_SHADOW, EYE_MASK = MASK_SOLID | MASK_ALWAYS;
 
-void eye_hit_write(ivec2 pixel, Hit hit) {
-    EyeHits(VIEW.texels).at[place_of(pixel)] = uvec4(hit.geometry, hit.primitive, floatBitsToUint(hit.barycentrics));
+// Bits beside the number of the triangle: it is of what only the eye itself sees, and the pixel is finished.
+const uint EYE_HIT_FIRST_PERSON = 1u << 31, EYE_HIT_FINISHED = 1u << 30, EYE_HIT_BITS = EYE_HIT_FIRST_PERSON | EYE_HIT_FINISHED;
+
+void eye_hit_write(ivec2 pixel, Hit hit, bool first_person) {
+    uint bits = first_person ? EYE_HIT_FIRST_PERSON : 0u;
+    EyeHits(VIEW.texels).at[place_of(pixel)] = uvec4(hit.geometry, hit.primitive & ~EYE_HIT_BITS | bits, floatBitsToUint(hit.barycentrics));
 }
 
 // How far away it is, the point on the triangle tells.
-Hit eye_hit_read(ivec2 pixel) {
+Hit eye_hit_read(ivec2 pixel, out bool first_person) {
     uvec4 packed = EyeHits(VIEW.texels).at[place_of(pixel)];
-    return Hit(packed.x, packed.y, uintBitsToFloat(packed.zw), 0.0);
+    first_person = (packed.y & EYE_HIT_FIRST_PERSON) != 0;
+    return Hit(packed.x, packed.y & ~EYE_HIT_BITS, uintBitsToFloat(packed.zw), 0.0);
 }
+
+// Whether primary.rgen has told without a ray what the pixel shows.
+bool eye_hit_finished(ivec2 pixel) { return (EyeHits(VIEW.texels).at[place_of(pixel)].y & EYE_HIT_FINISHED) != 0; }
+
+void eye_hit_finish(ivec2 pixel) { EyeHits(VIEW.texels).at[place_of(pixel)].y |= EYE_HIT_FINISHED; }
 
 #endif

@@ -8,9 +8,9 @@
 #include "trace/geometry.glsl"
 #include "trace/fog_keep.glsl"
 
-// Where the ray is inside the volume: x < y, or an empty range.
-vec2 fog_range(Fog fog, vec3 origin, vec3 direction) {
-    vec2 range = box_range(fog.mins, fog.maxs, origin, inverse_direction(direction), FAR);
+// Where the ray is inside the volume: x < y, or an empty range. `inverse`: of the direction.
+vec2 fog_range(Fog fog, vec3 origin, vec3 direction, vec3 inverse) {
+    vec2 range = box_range(fog.mins, fog.maxs, origin, inverse, FAR);
     float enter = range.x, leave = range.y;
     if (fog.has_surface != 0) {
         float below = dot(fog.plane.xyz, origin) - fog.plane.w;
@@ -38,31 +38,31 @@ void fog_segment(vec3 origin, vec3 direction, float from, float to, float travel
     uint count = VIEW.fog_count;
     float last_enter = -1.0;
     uint last_index = 0;
+    vec3 inverse = inverse_direction(direction);
     TraceFogs fogs = TraceFogs(VIEW.fogs);
     for (uint step_index = 0; step_index < count; step_index++) {
         // the next volume by entry, then by index
-        float best = FAR;
+        vec2 best = vec2(FAR);
         uint chosen = count;
         for (uint i = 0; i < count; i++) {
-            vec2 range = fog_range(fogs.at[i], origin, direction);
+            vec2 range = fog_range(fogs.at[i], origin, direction, inverse);
             if (range.x >= range.y || range.x >= to || range.y <= from) continue;
             bool later = range.x > last_enter || (range.x == last_enter && i > last_index);
-            if (later && range.x < best) { best = range.x; chosen = i; }
+            if (later && range.x < best.x) { best = range; chosen = i; }
         }
         if (chosen == count) return;
         Fog fog = fogs.at[chosen];
-        vec2 range = fog_range(fog, origin, direction);
-        float before = fog_transmittance(fog, range, from);
-        float ratio = before > 0.0 ? clamp(fog_transmittance(fog, range, to) / before, 0.0, 1.0) : 0.0;
+        float before = fog_transmittance(fog, best, from);
+        float ratio = before > 0.0 ? clamp(fog_transmittance(fog, best, to) / before, 0.0, 1.0) : 0.0;
         vec3 scattered = transmittance * decode_display(fog.color) * (1.0 - ratio);
         radiance += scattered;
         if (LIT_FOG != 0) {
             float depth = max(fog.depth, 1.0);
-            vec2 place = clamp((min(vec2(from, to), range.y) - range.x) / depth, 0.0, 1.0);
-            fog_keep(scattered, depth, place, range.x, origin, direction, travelled);
+            vec2 place = clamp((min(vec2(from, to), best.y) - best.x) / depth, 0.0, 1.0);
+            fog_keep(scattered, depth, place, best.x, origin, direction, travelled);
         }
         transmittance *= ratio;
-        last_enter = best;
+        last_enter = best.x;
         last_index = chosen;
     }
 }

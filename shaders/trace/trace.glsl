@@ -1,21 +1,27 @@
 // The tracer: how a pass asks for rays. Passes use these functions only, so the same pass is compiled for three
 // tracers: the ray tracing pipeline, whose hit shaders report what was hit and decide cut-outs; ray queries
 // (TRACER_QUERY); and our own hierarchies (TRACER_COMPUTE), which need no ray tracing hardware. The last two are walked
-// in a compute shader.
+// in a compute shader. A fourth one (TRACER_NONE) sends none, for what can be told without.
 #ifndef RELIGHT_TRACE_TRACE_GLSL
 #define RELIGHT_TRACE_TRACE_GLSL
 
 #include "trace/candidate.glsl"
 #include "trace/count.glsl"
 
-#if defined(TRACER_COMPUTE) || defined(TRACER_QUERY)
+#if defined(TRACER_COMPUTE) || defined(TRACER_QUERY) || defined(TRACER_NONE)
 
+#ifdef TRACER_NONE
+layout(local_size_x = 8, local_size_y = 8) in;
+#else
 layout(local_size_x = 8, local_size_y = 4) in;
+#endif
 #define LAUNCH_PIXEL ivec2(gl_GlobalInvocationID.xy)
 #define LAUNCH_SLOT ((gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 32u + gl_LocalInvocationIndex)
 
 #if defined(TRACER_COMPUTE)
 #include "trace/bvh.glsl"
+#elif defined(TRACER_NONE)
+#include "trace/no_rays.glsl"
 #else
 #include "trace/query.glsl"
 #endif
@@ -55,6 +61,12 @@ void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder
     found = layer_payload.found;
 }
 
+#endif
+
+#ifndef TRACER_NONE
+// See no_rays.glsl.
+const bool rays_wanted = false;
+#define NEEDS_RAYS(answer)
 #endif
 
 #endif

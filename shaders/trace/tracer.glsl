@@ -3,6 +3,7 @@
 //
 //     variants: COMPUTE=-DTRACER_COMPUTE -S comp     hierarchies of our own, in compute
 //     variants: QUERY=-DTRACER_QUERY -S comp         ray queries, in compute
+//     variants: NO_RAYS=-DTRACER_NONE -S comp        no rays at all: see no_rays.glsl
 //
 // Without a definition it is for the ray tracing pipeline.
 #ifndef RELIGHT_TRACE_TRACER_GLSL
@@ -11,10 +12,10 @@
 #ifdef TRACER_QUERY
 #extension GL_EXT_ray_query : require
 #endif
-#if !defined(TRACER_QUERY) && !defined(TRACER_COMPUTE)
+#if !defined(TRACER_QUERY) && !defined(TRACER_COMPUTE) && !defined(TRACER_NONE)
 #extension GL_EXT_ray_tracing : require
 #endif
-#ifndef TRACER_COMPUTE
+#if !defined(TRACER_COMPUTE) && !defined(TRACER_NONE)
 #define BINDLESS_SCENES
 #endif
 

@@ -166,7 +166,8 @@ ray_pass!(
 );
 ray_pass!(
     /// Reads what the eye's rays meet, the acceleration structures and materials; writes the G-buffer (`position`,
-    /// `surface`) and `front`: the picture of all that lies in front of the surface whose light is asked for.
+    /// `surface`) and `front`: the picture of all that lies in front of the surface whose light is asked for. Pixels that
+    /// [`PlainPrimary`] has finished stay.
     Primary, "trace_primary", TRACE_PRIMARY_RGEN,
     TRACE_PRIMARY_RGEN_COMPUTE, TRACE_PRIMARY_RGEN_QUERY
 );
@@ -178,6 +179,21 @@ impl Primary {
     pub fn with_lit_fog(device: &Device, tracer: Tracer) -> Result<Self, Error> {
         // LIT_FOG in fog_keep.glsl
         Self::with(device, tracer, &[(0, 1)])
+    }
+}
+
+pixel_pass!(
+    /// What [`Primary`] does, for those pixels that need no ray for it beyond the eye's own: they are finished then.
+    PlainPrimary, "trace_plain", TRACE_PRIMARY_RGEN_NO_RAYS
+);
+impl PlainPrimary {
+    /// The same pass, which in addition leaves the points where fog is to be lit.
+    ///
+    /// # Errors
+    /// The driver refuses the pipeline.
+    pub fn with_lit_fog(device: &Device) -> Result<Self, Error> {
+        // LIT_FOG in fog_keep.glsl
+        Self::with(device, &[(0, 1)])
     }
 }
 

@@ -20,7 +20,8 @@ use super::input::{MaterialTable, Tracer};
 use super::lights::MapLights;
 use super::motion::Motion;
 use super::passes::{
-    Choose, Composite, Direct, Exposure, EyeRays, FlareRays, OtherSide, Primary, ToneMap,
+    Choose, Composite, Direct, Exposure, EyeRays, FlareRays, OtherSide, PlainPrimary, Primary,
+    ToneMap,
 };
 use super::targets::Targets;
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
@@ -47,9 +48,9 @@ pub struct ViewTracer {
     pub(super) device: Device,
     pub(super) accel: Accel,
     eye_rays: EyeRays,
-    primary: Primary,
+    primary: (PlainPrimary, Primary),
     /// The same with lit fog, made when there is some.
-    fog_primary: Option<Primary>,
+    fog_primary: Option<(PlainPrimary, Primary)>,
     other_side: OtherSide,
     fog: LitFog,
     choose: Choose,
@@ -103,7 +104,7 @@ impl ViewTracer {
             device: device.clone(),
             accel: Accel::new(device, tracer),
             eye_rays: EyeRays::new(device, tracer)?,
-            primary: Primary::new(device, tracer)?,
+            primary: (PlainPrimary::new(device)?, Primary::new(device, tracer)?),
             fog_primary: None,
             other_side: OtherSide::new(device, tracer)?,
             fog: LitFog::new(device, tracer),
@@ -227,7 +228,10 @@ impl ViewTracer {
         self.fog
             .prepare(has_fog && is_lit(settings), denoiser > 0, size, goes_on)?;
         if self.fog.is_on() && self.fog_primary.is_none() {
-            self.fog_primary = Some(Primary::with_lit_fog(&self.device, self.tracer)?);
+            self.fog_primary = Some((
+                PlainPrimary::with_lit_fog(&self.device)?,
+                Primary::with_lit_fog(&self.device, self.tracer)?,
+            ));
         }
         let accumulated = self.accumulated_before(view, materials, settings);
         let accel = self
@@ -281,10 +285,10 @@ impl ViewTracer {
             targets.indirect_is_black &= settings.rt_bounces == 0;
         }
         self.eye_rays.record(rec, address, size)?;
-        let primary = self.fog_primary.as_ref().filter(|_| self.fog.is_on());
-        primary
-            .unwrap_or(&self.primary)
-            .record(rec, address, size)?;
+        let fog_primary = self.fog_primary.as_ref().filter(|_| self.fog.is_on());
+        let (plain, primary) = fog_primary.unwrap_or(&self.primary);
+        plain.record(rec, address, size)?;
+        primary.record(rec, address, size)?;
         if !settings.rt_accumulate {
             self.other_side.record(rec, address, size)?;
         }

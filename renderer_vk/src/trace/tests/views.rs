@@ -109,6 +109,32 @@ fn a_mirror_shows_what_is_behind_the_eye_and_who_looks_with(gpu: &mut Gpu) {
 }
 
 #[test]
+fn only_the_fronts_of_a_weapon_are_seen() {
+    Gpu::each(only_the_fronts_of_a_weapon_are_seen_with);
+}
+
+fn only_the_fronts_of_a_weapon_are_seen_with(gpu: &mut Gpu) {
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
+    let red = scene.material(&[stage::constant(RED)], 0);
+    let green = scene.material(&[stage::constant(GREEN)], 0);
+    let blue = scene.material(&[stage::constant(BLUE)], 0);
+    let weapon = Instance {
+        flags: c::INSTANCE_FIRST_PERSON,
+        ..identity()
+    };
+    // the wall is nearer than the back of a weapon that sticks into it
+    scene.quad(screen(40.0), red);
+    let [a, b, c, d] = screen(60.0);
+    scene.mesh([d, c, b, a], green, weapon);
+    let mean = gpu.mean(&scene, &reference(), 1);
+    assert!(close(mean, linear(RED)), "{mean}");
+    // and behind that back is a front
+    scene.mesh(screen(80.0), blue, weapon);
+    let mean = gpu.mean(&scene, &reference(), 1);
+    assert!(close(mean, linear(BLUE)), "{mean}");
+}
+
+#[test]
 fn what_turns_to_the_eye_is_met_on_its_own_way() {
     Gpu::each(what_turns_to_the_eye_is_met_on_its_own_way_with);
 }
