@@ -1,5 +1,5 @@
 #version 460
-// Test of directions in 2 x 28 bits: what becomes of them, and of the numbers beside them.
+// Test of directions in 2 x 24 bits: what becomes of them, and of the numbers beside them.
 #include "common/bindless.glsl"
 #include "trace/direction.glsl"
 
@@ -14,7 +14,7 @@ void main() {
     uint index = gl_GlobalInvocationID.x;
     if (index >= count) return;
     Kept k = directions.at[index];
-    uvec2 packed = pack_direction(k.direction, uvec2(k.spare & 15u, k.spare >> 4));
+    uvec2 packed = pack_direction(k.direction, uvec2(k.spare & 255u, k.spare >> 8));
     uvec2 spare = spare_of_direction(packed);
-    directions.at[index] = Kept(unpack_direction(packed), spare.x | spare.y << 4);
+    directions.at[index] = Kept(unpack_direction(packed), spare.x | spare.y << 8);
 }

@@ -5,6 +5,7 @@
 #include "trace/lights.glsl"
 #include "trace/carry.glsl"
 #include "trace/chosen.glsl"
+#include "trace/suns.glsl"
 
 layout(local_size_x = RAY_TILE, local_size_y = RAY_TILE) in;
 
@@ -12,7 +13,7 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     LightSample chosen = no_light();
     float random = 0.5;
-    uint suns = 0;
+    bool sun = false;
     if (inside(pixel)) {
         LightTask task = light_task(pixel);
         GBufferPixel g = task.surface;
@@ -20,15 +21,15 @@ void main() {
             rng_begin(uvec2(task.pixel), task.seed, 1);
             random = rng_independent();
             LightSet set = lights_at(g.position, g.face_normal);
-            suns = set.suns;
-            if (set_count(set) > suns) {
+            if (set_count(set) > set.suns) {
                 vec2 u = rng_next2();
                 LightChoice choice = choose_resampled(set, g.position, g.normal, u.x);
                 if (choice.weight > 0.0) chosen = sample_light(choice.light, g.position, g.normal, u);
                 chosen.light *= choice.weight;
             }
+            sun = set.suns > 0 && max_component(sun_sample(task).light) > 0.0;
         }
     }
     uint slot = ray_slot(chosen.direction, max_component(chosen.light) > 0.0);
-    chosen_write(slot, gl_LocalInvocationID.xy, chosen, random, suns > 0);
+    chosen_write(slot, gl_LocalInvocationID.xy, wanted_place(slot, sun), chosen, random);
 }

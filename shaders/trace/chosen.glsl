@@ -10,20 +10,29 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) buffer ChosenTexel
 struct Chosen {
     LightSample light;
     ivec2 pixel;
-    bool suns; // whether suns may reach the pixel, too
 };
 
-// `slot`: see ray_order.glsl; `place`: of the pixel in its tile; `dither`: see pack_light.
-void chosen_write(uint slot, uvec2 place, LightSample s, float dither, bool suns) {
-    ChosenTexels(VIEW.texels).at[slot] = pack_light_ray(s, place, suns, dither);
+// `slot`: see ray_order.glsl; `place`: of the pixel in its tile; `sun_place`: that of the pixel with the same number among
+// those that send a ray to a sun, too, or NO_PLACE; `dither`: see pack_light.
+void chosen_write(uint slot, uvec2 place, uvec2 sun_place, LightSample s, float dither) {
+    bool sun = sun_place != NO_PLACE;
+    ChosenTexels(VIEW.texels).at[slot] = pack_light_ray(s, place | (sun ? sun_place << 4 : uvec2(0)), sun, dither);
 }
 
 Chosen chosen_read(uint slot) {
     Chosen chosen;
-    uvec2 place;
-    chosen.light = unpack_light_ray(ChosenTexels(VIEW.texels).at[slot], place, chosen.suns);
-    chosen.pixel = pixel_of_slot(slot, place);
+    uvec2 spare;
+    bool sun;
+    chosen.light = unpack_light_ray(ChosenTexels(VIEW.texels).at[slot], spare, sun);
+    chosen.pixel = pixel_of_slot(slot, spare & 15u);
     return chosen;
+}
+
+// Whether there is a pixel with this number that sends a ray to a sun, and which.
+bool chosen_for_sun(uint slot, out ivec2 pixel) {
+    uvec4 packed = ChosenTexels(VIEW.texels).at[slot];
+    pixel = pixel_of_slot(slot, spare_of_direction(packed.xy) >> 4);
+    return flag_of_light_ray(packed);
 }
 
 #endif

@@ -20,19 +20,18 @@ uint pack_normal(vec3 n) { return packSnorm2x16(octahedral(n)); }
 
 vec3 unpack_normal(uint packed) { return from_octahedral(unpackSnorm2x16(packed)); }
 
-// Steps from 0 to 1 of 28 bits with a sign. The largest number of these bits is no float, and the next one, 2^27, is one too
-// many: it would turn a direction along an axis around.
-const float DIRECTION_STEPS = 134217720.0;
+// Steps from 0 to 1 of 24 bits with a sign.
+const float DIRECTION_STEPS = 8388607.0;
 
-// In 2 x 28 bits, as fine as the numbers that directions are computed with: for rays. Rounded to 2 x 16 bits they end at what
-// they ought to pass, and some pictures are darker or brighter by a thousandth. `spare`: two numbers below 16.
+// In 2 x 24 bits, nearly as fine as the numbers that directions are computed with: for rays. Rounded to 2 x 16 bits they end at what
+// they ought to pass, and some pictures are darker or brighter by a thousandth. `spare`: two numbers below 256.
 uvec2 pack_direction(vec3 n, uvec2 spare) {
     ivec2 steps = ivec2(round(clamp(octahedral(n), -1.0, 1.0) * DIRECTION_STEPS));
-    return uvec2(steps) << 4 | spare;
+    return uvec2(steps) << 8 | spare;
 }
 
-vec3 unpack_direction(uvec2 packed) { return from_octahedral(vec2(ivec2(packed) >> 4) / DIRECTION_STEPS); }
+vec3 unpack_direction(uvec2 packed) { return from_octahedral(vec2(ivec2(packed) >> 8) / DIRECTION_STEPS); }
 
-uvec2 spare_of_direction(uvec2 packed) { return packed & 15u; }
+uvec2 spare_of_direction(uvec2 packed) { return packed & 255u; }
 
 #endif

@@ -8,16 +8,18 @@
 
 const uint SIGN_BIT = 0x80000000u;
 
-// `spare`: two numbers below 16; `flag`: kept beside it in place of `sky`; `dither`: see pack_light.
+// `spare`: two numbers below 256; `flag`: kept beside it in place of `sky`; `dither`: see pack_light.
 uvec4 pack_light_ray(LightSample s, uvec2 spare, bool flag, float dither) {
     // light from nearer than 0 arrives as that from 0 does, so the sign is free
     uint distance = floatBitsToUint(max(s.distance, 0.0)) & ~SIGN_BIT | (flag ? SIGN_BIT : 0u);
     return uvec4(pack_direction(s.direction, spare), distance, pack_light(sound_light(s.light), dither));
 }
 
+bool flag_of_light_ray(uvec4 packed) { return (packed.z & SIGN_BIT) != 0; }
+
 LightSample unpack_light_ray(uvec4 packed, out uvec2 spare, out bool flag) {
     spare = spare_of_direction(packed.xy);
-    flag = (packed.z & SIGN_BIT) != 0;
+    flag = flag_of_light_ray(packed);
     return LightSample(unpack_direction(packed.xy), uintBitsToFloat(packed.z & ~SIGN_BIT), unpack_light(packed.w), false);
 }
 

@@ -15,8 +15,12 @@ ivec2 pixel_of_slot(uint slot, uvec2 place) {
     return ivec2(RAY_TILE * uvec2(tile % tiles, tile / tiles) + place);
 }
 
+const uvec2 NO_PLACE = uvec2(RAY_TILE);
+
 #ifdef SORTS_RAYS
 shared uint ray_counts[2][TILE_RAYS];
+shared uint wanted_count;
+shared uint wanted[TILE_RAYS];
 
 // Bits of a number below 16 with room between them.
 uint spread_bits(uint v) {
@@ -45,6 +49,18 @@ uint ray_slot(vec3 direction, bool sent) {
     }
     uint tile = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     return tile * TILE_RAYS + (key == 0 ? 0 : ray_counts[from][key - 1]) + rank;
+}
+
+// The place of that pixel of the tile which has number `slot` among those whose threads `want`, or NO_PLACE where they are
+// fewer: so that few of a tile have their rays followed side by side. All threads of a tile ask together.
+uvec2 wanted_place(uint slot, bool want) {
+    if (gl_LocalInvocationIndex == 0) wanted_count = 0;
+    barrier();
+    if (want) wanted[atomicAdd(wanted_count, 1)] = gl_LocalInvocationIndex;
+    barrier();
+    uint number = slot % TILE_RAYS;
+    if (number >= wanted_count) return NO_PLACE;
+    return uvec2(wanted[number] % RAY_TILE, wanted[number] / RAY_TILE);
 }
 #endif
 

@@ -50,7 +50,7 @@ fn directions_of_rays_come_back_as_they_were() {
         .zip(directions())
         .map(|(i, direction)| Kept {
             direction: direction.to_array(),
-            spare: i % 256,
+            spare: i % 65536,
         })
         .collect();
     let mut ring = FrameRing::new(&device, 2).unwrap();
@@ -87,7 +87,7 @@ fn directions_of_rays_come_back_as_they_were() {
     kept.read(0, &mut bytes).unwrap();
     for (was, is) in given.iter().zip(collect::<Kept>(&bytes)) {
         let off = Vec3::from(was.direction).distance(Vec3::from(is.direction));
-        assert!(off < 4.0e-7, "{was:?} {is:?}: {off}");
+        assert!(off < 8.0e-7, "{was:?} {is:?}: {off}");
         assert_eq!(was.spare, is.spare);
     }
     drop((kept, ring, pipeline));

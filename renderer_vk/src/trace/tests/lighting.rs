@@ -332,6 +332,18 @@ fn spheres_and_suns_give_their_irradiance_with(gpu: &mut Gpu) {
         material: None,
     });
     check(gpu, &scene, &|_| 2.0 * direction.z / std::f32::consts::PI);
+    // a low one: few rays, each of which counts for more
+    let low = Vec3::new(0.8, 0.6, 0.008).normalize();
+    scene.suns[0] = SunLight {
+        direction: low,
+        irradiance: Vec3::splat(200.0),
+        angular_radius: 0.001,
+        material: None,
+    };
+    let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::Resampled), 32);
+    let mean = pixels.iter().map(|p| p.x).sum::<f32>() / pixels.len() as f32;
+    let exact = 200.0 * low.z / std::f32::consts::PI;
+    assert!((mean / exact - 1.0).abs() < 0.01, "{mean} {exact}");
     // and the even light is simply there
     let mut scene = floor();
     scene.ambient = Vec3::splat(0.25);
