@@ -85,17 +85,6 @@ bool bounce_meets(Hit hit, vec3 origin, vec3 direction, inout vec3 throughput, i
 }
 
 // The light that a vertex sends its ray to. One is enough: the bounce itself is noisier than the choice.
-LightSample vertex_light(PathVertex v) {
-    LightSet set = lights_at(v.position, v.face_normal);
-    if (set_count(set) == 0) return no_light();
-    vec2 u = rng_next2();
-    LightChoice choice;
-    if (VIEW.lights.selection == SELECT_UNIFORM) choice = choose_uniform(set, u.x);
-    else choice = choose_one(set, v.position, v.normal, u.x);
-    if (!(choice.weight > 0.0)) return no_light();
-    LightSample s = sample_light(choice.light, v.position, v.normal, u);
-    s.light *= choice.weight;
-    return s;
-}
+LightSample vertex_light(PathVertex v) { return one_light(v.position, v.face_normal, v.normal); }
 
 #endif

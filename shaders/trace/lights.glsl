@@ -364,4 +364,18 @@ LightChoice choose_one(LightSet set, vec3 position, vec3 normal, inout float u) 
     return LightChoice(listed.light, listed.weight / (1.0 - chance), listed.total);
 }
 
+// A point on the one light of a point whose surface faces `face_normal`.
+LightSample one_light(vec3 position, vec3 face_normal, vec3 normal) {
+    LightSet set = lights_at(position, face_normal);
+    if (set_count(set) == 0) return no_light();
+    vec2 u = rng_next2();
+    LightChoice choice;
+    if (VIEW.lights.selection == SELECT_UNIFORM) choice = choose_uniform(set, u.x);
+    else choice = choose_one(set, position, normal, u.x);
+    if (!(choice.weight > 0.0)) return no_light();
+    LightSample s = sample_light(choice.light, position, normal, u);
+    s.light *= choice.weight;
+    return s;
+}
+
 #endif
