@@ -4,17 +4,18 @@
 // apart, and divided at the end, which gradient_wide.comp does).
 #include "trace/denoise.glsl"
 
-const int TILE = 16, BORDER = 6, WIDE = TILE + 2 * BORDER; // steps of 1, 2 and 3 strata reach 6 far
-layout(local_size_x = TILE, local_size_y = TILE) in;
+// Steps of 1, 2 and 3 strata reach 6 far. Every device lets a group share 16 KiB.
+const int ACROSS = 16, DOWN = 8, BORDER = 6, WIDE = ACROSS + 2 * BORDER, HIGH = DOWN + 2 * BORDER;
+layout(local_size_x = ACROSS, local_size_y = DOWN) in;
 
 // change and size of direct light, of indirect light, as halfs; each step reads one and writes the other
-shared uvec2 tiles[2][WIDE * WIDE];
-shared uint guides[WIDE * WIDE];
+shared uvec2 tiles[2][WIDE * HIGH];
+shared uint guides[WIDE * HIGH];
 // logarithms of the luminance that the last frame was left with, of both, as halfs: bright light that has not changed
 // must not hide that dim light beside it has
-shared uint levels[WIDE * WIDE];
+shared uint levels[WIDE * HIGH];
 // logarithms of the inverse depths
-shared float depths[WIDE * WIDE];
+shared float depths[WIDE * HIGH];
 
 uvec2 filtered(uint source, ivec2 at, int spacing) {
     int place = at.y * WIDE + at.x;
@@ -46,9 +47,9 @@ uvec2 filtered(uint source, ivec2 at, int spacing) {
 
 void main() {
     ivec2 strata = (ivec2(VIEW.width, VIEW.height) + STRATUM - 1) / STRATUM;
-    ivec2 corner = ivec2(gl_WorkGroupID.xy) * TILE - BORDER;
+    ivec2 corner = ivec2(gl_WorkGroupID.xy) * ivec2(ACROSS, DOWN) - BORDER;
     int index = int(gl_LocalInvocationIndex);
-    for (int i = index; i < WIDE * WIDE; i += TILE * TILE) {
+    for (int i = index; i < WIDE * HIGH; i += ACROSS * DOWN) {
         ivec2 stratum = corner + ivec2(i % WIDE, i / WIDE);
         bool there = all(greaterThanEqual(stratum, ivec2(0))) && all(lessThan(stratum, strata));
         uvec4 own = there ? imageLoad(uimages_rgba32ui[DENOISE.gradient_samples], stratum) : uvec4(0);
@@ -61,10 +62,10 @@ void main() {
     int border = 0;
     for (int spacing = 1; spacing <= 3; spacing++) {
         border += spacing;
-        int edge = WIDE - 2 * border;
+        ivec2 inner = ivec2(WIDE, HIGH) - 2 * border;
         uint source = (spacing & 1) ^ 1;
-        for (int i = index; i < edge * edge; i += TILE * TILE) {
-            ivec2 at = ivec2(i % edge, i / edge) + border;
+        for (int i = index; i < inner.x * inner.y; i += ACROSS * DOWN) {
+            ivec2 at = ivec2(i % inner.x, i / inner.x) + border;
             int place = at.y * WIDE + at.x;
             tiles[source ^ 1][place] = guides[place] != 0 ? filtered(source, at, spacing) : uvec2(0);
         }

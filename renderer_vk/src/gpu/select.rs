@@ -120,6 +120,8 @@ pub(crate) struct Choice {
 const TEXTURES: u32 = 65536;
 /// Most entries of the storage image table.
 const STORAGE_IMAGES: u32 = 4096;
+/// Invocations of the largest groups of compute shaders: 16 x 16. Vulkan promises half as many, drivers have more.
+const GROUP: u32 = 256;
 
 /// Chooses among the devices that meet the requirements: the one `prefer` names (part of its name, or its index),
 /// else discrete before integrated before virtual before software.
@@ -260,6 +262,9 @@ fn examine(
         ("shaderInt64", base.shader_int64),
     ];
     let mut missing: Vec<&str> = required.iter().filter(|r| !on(r.1)).map(|r| r.0).collect();
+    if properties.limits.max_compute_work_group_invocations < GROUP {
+        missing.push("compute groups of 256");
+    }
     if instance.surface.is_some() && !has(khr::swapchain::NAME) {
         missing.push("VK_KHR_swapchain");
     }

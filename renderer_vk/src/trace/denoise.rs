@@ -23,8 +23,8 @@ use crate::gpu::{
 
 /// Pixels to the edge of a stratum, see `denoise.glsl`.
 const STRATUM: u32 = 3;
-/// Strata to the edge of a group of the gradient's pass, see `gradient.comp`.
-const GRADIENT_TILE: u32 = 16;
+/// Strata of a group of the gradient's pass, across and down, see `gradient.comp`.
+const GRADIENT_TILE: [u32; 2] = [16, 8];
 /// Distances between the taps of the wavelet steps, pixels: a fourth step between them changes no measure of quality.
 const WAVELET: [u32; 3] = [1, 3, 8];
 /// Radii of the passes of the cheap filter, pixels.
@@ -314,8 +314,8 @@ impl Denoiser {
             let strata = size.map(|s| s.div_ceil(STRATUM));
             let name = "trace_gradient_sample";
             dispatch(rec, name, &self.gradient_sample, view, strata, [TILE; 2])?;
-            let tile = [GRADIENT_TILE; 2];
-            dispatch(rec, "trace_gradient", &self.gradient, view, strata, tile)?;
+            let name = "trace_gradient";
+            dispatch(rec, name, &self.gradient, view, strata, GRADIENT_TILE)?;
             let name = "trace_gradient_wide";
             dispatch(rec, name, &self.gradient_wide, view, strata, [TILE; 2])?;
         }
