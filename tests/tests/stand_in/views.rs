@@ -117,7 +117,9 @@ fn flares_show_where_nothing_hides_them_in_both_looks() {
         };
         let (shown, hidden) = (green(&mut engine, false), green(&mut engine, true));
         assert!(shown > hidden + 20, "r_rt {look}: {shown} {hidden}");
-        assert_eq!(green(&mut engine, false), shown, "r_rt {look}");
+        // what is filtered over frames may move by a step of the display
+        let again = green(&mut engine, false);
+        assert!((again - shown).abs() <= 2, "r_rt {look}: {again} {shown}");
     }
     engine.assert_clean();
 }
