@@ -28,7 +28,7 @@ struct Material {
 
 struct Instance {
     vec3 axis[3]; vec3 origin; vec3 viewer; vec4 color; vec2 texcoord; float time;
-    vec3 ambient; vec3 directed; vec3 light_direction; uint flags;
+    vec3 ambient; vec3 directed; vec3 light_direction; float added; uint flags;
 };
 
 struct Triangle { uint indices[3]; uint material; uint instance; uint fog; uint lightmap; uint flags; };

@@ -164,6 +164,8 @@ pub struct Instance {
     pub directed: Vec3,
     /// Unit direction towards that light, in the entity's space.
     pub light_direction: Vec3,
+    /// The part of `ambient` that is no light of the place: the engine adds it to the light of every model.
+    pub added: f32,
     /// `INSTANCE_*` bits.
     pub flags: u32,
 }

@@ -15,6 +15,9 @@ layout(constant_id = 1) const uint HAS_FOG = 0;
 
 // What bounced rays meet.
 const uint MASK_BOUNCE = MASK_SOLID | MASK_THIRD_SOLID | MASK_SKY | MASK_NO_SHADOW;
+
+// What the first of a path's rays meets: see shadow_mask.
+uint first_bounce_mask(bool first_person) { return first_person ? MASK_BOUNCE & ~MASK_THIRD_SOLID : MASK_BOUNCE; }
 // Cones of bounced light are wide: about the spread of a hemisphere cut into as many pieces as one needs to look smooth.
 const float BOUNCE_SPREAD = 0.1;
 

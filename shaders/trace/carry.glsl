@@ -83,6 +83,7 @@ LightTask light_task(ivec2 pixel) {
     task.surface.position = s.position;
     task.surface.face_normal = s.face_normal;
     task.surface.normal = s.normal;
+    task.surface.first_person = first_person_of(s.path);
     return task;
 }
 

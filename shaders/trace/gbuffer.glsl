@@ -15,7 +15,12 @@ struct GBufferPixel {
     vec3 normal;
     vec3 albedo;
     vec3 front; // radiance of what is in front of the surface, and of its own glow
+    bool first_person; // of what only the eye itself sees: no ray from there meets what only others see of who carries it
 };
+
+// The path's lowest bit, a part in ten million of its length, holds `first_person`.
+float pack_path(GBufferPixel g) { return uintBitsToFloat(floatBitsToUint(g.path) & ~1u | (g.first_person ? 1u : 0u)); }
+bool first_person_of(float packed_path) { return (floatBitsToUint(packed_path) & 1u) != 0; }
 
 // Albedo and what is in front; `dither`: see pack_light.
 void shown_write(uint image, ivec2 pixel, GBufferPixel g, vec2 dither) {
@@ -30,7 +35,7 @@ void shown_read(uint image, ivec2 pixel, inout GBufferPixel g) {
 
 // `dither`: see pack_light.
 void gbuffer_write(ivec2 pixel, GBufferPixel g, vec2 dither) {
-    imageStore(images_rgba32f[VIEW.image_position], pixel, vec4(g.position, g.path));
+    imageStore(images_rgba32f[VIEW.image_position], pixel, vec4(g.position, pack_path(g)));
     imageStore(uimages_rg32ui[VIEW.image_surface], pixel, uvec4(pack_normal(g.face_normal), pack_normal(g.normal), 0, 0));
     shown_write(VIEW.image_shown, pixel, g, dither);
 }
@@ -41,6 +46,7 @@ GBufferPixel gbuffer_read(ivec2 pixel) {
     uvec2 surface = imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).xy;
     g.position = position.xyz;
     g.path = position.w;
+    g.first_person = first_person_of(position.w);
     g.face_normal = unpack_normal(surface.x);
     g.normal = unpack_normal(surface.y);
     shown_read(VIEW.image_shown, pixel, g);

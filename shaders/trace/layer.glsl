@@ -276,8 +276,24 @@ vec3 shown_glow(Material material) {
     return radiance / (1.0 + max_component(radiance));
 }
 
-// The light that the engine shows at a surface, as displayed: its lightmap, the colours of its corners, or what the light
-// grid gives a model. Nothing is lit by it: it tells how much of the displayed sum of layers each of them is.
+// What the light grid gives a model at the point, as displayed.
+vec3 grid_light(SurfacePoint p, Instance instance) {
+    float incoming = max(dot(p.stage.normal, instance.light_direction), 0.0);
+    return min(instance.ambient - instance.added + incoming * instance.directed, vec3(1.0));
+}
+
+// What the engine adds to the light of the place on models, so that players see their weapons and each other in the dark,
+// linear. It adds it to what is displayed, so it is worth the more the more light there is. Nothing else is lit by it.
+vec3 added_light(SurfacePoint p) {
+    if ((p.triangle.flags & TRIANGLE_WORLD) != 0 || (VIEW.flags & VIEW_FULLBRIGHT) != 0) return vec3(0.0);
+    Instance instance = instance_of(p.instance);
+    if ((instance.flags & INSTANCE_UNLIT) != 0) return vec3(0.0);
+    vec3 displayed = grid_light(p, instance);
+    return decode_display(min(displayed + instance.added, vec3(1.0))) - decode_display(displayed);
+}
+
+// The light of the place that the engine shows at a surface, as displayed: its lightmap, the colours of its corners, or what
+// the light grid gives a model. Nothing is lit by it: it tells how much of the displayed sum of layers each of them is.
 vec3 displayed_light(SurfacePoint p) {
     if ((p.triangle.flags & TRIANGLE_WORLD) != 0) {
         uint page = p.triangle.lightmap;
@@ -286,7 +302,7 @@ vec3 displayed_light(SurfacePoint p) {
     }
     Instance instance = instance_of(p.instance);
     if ((instance.flags & INSTANCE_UNLIT) != 0) return vec3(1.0);
-    return min(instance.ambient + max(dot(p.stage.normal, instance.light_direction), 0.0) * instance.directed, vec3(1.0));
+    return grid_light(p, instance);
 }
 
 #endif

@@ -8,23 +8,27 @@
 
 const uint MASK_SHADOW = MASK_SOLID | MASK_THIRD_SOLID;
 
+// What is in the way of light to a surface. A weapon before the eye is where others see the body of its bearer, and the
+// same weapon once more: neither is in its light.
+uint shadow_mask(bool first_person) { return first_person ? MASK_SOLID : MASK_SHADOW; }
+
 // Whether the sample's light arrives. Suns arrive where the ray meets sky first or leaves the map. For all other lights
 // sky is as solid as a wall: pieces of sky that shine are lights of their own, and a ray to one that passes another would
 // count the same direction twice.
-bool light_arrives(LightSample s, vec3 origin) {
+bool light_arrives(LightSample s, vec3 origin, uint mask) {
     if (!s.sky && s.distance <= 0.0) return true;
-    Hit hit = trace_ray(origin, 0.0, s.direction, s.distance, MASK_SHADOW | MASK_SKY, !s.sky);
+    Hit hit = trace_ray(origin, 0.0, s.direction, s.distance, mask | MASK_SKY, !s.sky);
     return hit.geometry == NO_HIT || (s.sky && Geometries(VIEW.geometries).at[hit.geometry].kind == KIND_SKY);
 }
 
-// What arrives of a sample's light.
-vec3 arriving(LightSample s, vec3 origin) {
-    if (!(max_component(s.light) > 0.0) || !light_arrives(s, origin)) return vec3(0.0);
+// What arrives of a sample's light. `mask`: see shadow_mask.
+vec3 arriving(LightSample s, vec3 origin, uint mask) {
+    if (!(max_component(s.light) > 0.0) || !light_arrives(s, origin, mask)) return vec3(0.0);
     return s.light * filtered(origin, s.direction, s.distance);
 }
 
 // Direct light on a point whose surface faces `face_normal`, with `samples` independent estimates.
-vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint selection, uint samples) {
+vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint mask, uint selection, uint samples) {
     LightSet set = lights_at(position, face_normal);
     uint count = set_count(set);
     if (count == 0) return vec3(0.0);
@@ -58,7 +62,7 @@ vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint selection, 
         if (!(choice.weight > 0.0)) continue;
         LightSample s = sample_light(choice.light, position, normal, u);
         s.light *= choice.weight;
-        sum += arriving(s, origin);
+        sum += arriving(s, origin, mask);
     }
     return sum / float(samples);
 }

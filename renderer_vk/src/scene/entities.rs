@@ -146,8 +146,10 @@ impl Gatherer<'_> {
             log::info!("amb:{ambient}  dir:{directed}");
         }
         let instance = count(out.instances.len());
-        out.instances
-            .push(entity::model_instance(entity, &self.view, out.time, &light));
+        let added = lighting::added(self.input.settings);
+        out.instances.push(entity::model_instance(
+            entity, &self.view, out.time, &light, added,
+        ));
         instance
     }
 

@@ -50,12 +50,13 @@ pub(super) fn effect_instance(entity: &RefEntity, view: &View, time: f32) -> Ins
     }
 }
 
-/// A model in its own space.
+/// A model in its own space. `added`: the part of its ambient light that is no light of the place.
 pub(super) fn model_instance(
     entity: &RefEntity,
     view: &View,
     time: f32,
     light: &GridLight,
+    added: f32,
 ) -> Instance {
     let axis = entity.axis;
     let into_axes = |v: Vec3| Vec3::new(v.dot(axis[0]), v.dot(axis[1]), v.dot(axis[2]));
@@ -76,6 +77,7 @@ pub(super) fn model_instance(
         ambient: light.ambient / 255.0,
         directed: light.directed / 255.0,
         light_direction: into_axes(light.direction),
+        added: added / 255.0,
         flags: flags(entity),
     }
 }

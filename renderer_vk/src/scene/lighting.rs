@@ -15,6 +15,11 @@ const MINIMUM: f32 = 32.0;
 /// Strength of a dynamic light of radius 1 at distance 1, of 255; also the least distance that counts.
 const DYNAMIC_AT_RADIUS: f32 = 16.0;
 
+/// The part of [`entity_light`]'s ambient light that is no light of the place, of 255.
+pub(super) fn added(settings: &Settings) -> f32 {
+    MINIMUM * settings.identity_light()
+}
+
 /// Light on an entity at `point`, world directions, 0..255 scale. `has_world`: the view shows the world.
 pub(super) fn entity_light(
     world: Option<&WorldData>,
@@ -32,7 +37,7 @@ pub(super) fn entity_light(
         directed: Vec3::splat(NO_GRID * identity),
         direction: world.map_or(Vec3::ZERO, |world| world.sun_direction),
     });
-    light.ambient += MINIMUM * identity;
+    light.ambient += added(settings);
     let mut direction = light.direction * light.directed.length();
     for dynamic in lights {
         let to_light = dynamic.origin - point;

@@ -13,6 +13,7 @@ mod layers;
 mod lighting;
 mod lights;
 mod maps;
+mod models;
 mod motion;
 mod parts;
 mod skies;
