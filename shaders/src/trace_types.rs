@@ -307,9 +307,6 @@ pub struct MotionView {
     pub last_instances: u64,
     /// For each portal of the view the [`PortalRecord`] of the last frame.
     pub last_portals: u64,
-    /// RGBA16F: how far the pixel's surface was from here in the last frame (pixels, right and down), length of the way
-    /// to it then (negative: it was not in the picture, or nobody knows where), and the pixel's mark (`motion.glsl`).
-    pub image: u32,
     /// R16F: length of the way now, which the next frame reads, too.
     pub path: u32,
     /// The same image of the last frame.
@@ -318,8 +315,6 @@ pub struct MotionView {
     pub still: u32,
     /// 1: no time has passed since the last frame.
     pub time_stands: u32,
-    /// Unused.
-    pub padding: u32,
 }
 
 /// What the passes after the light read, and what they count with.
@@ -334,10 +329,6 @@ pub struct PostView {
     pub bloom_strength: f32,
     /// `DEBUG_*`; 0: the picture.
     pub debug: u32,
-    /// Storage image of the rays of each pixel (`R32Uint`), or `NO_IMAGE`.
-    pub image_rays: u32,
-    /// Nothing.
-    pub padding: u32,
 }
 
 /// The camera's samples, and how they become the picture.
@@ -368,8 +359,6 @@ pub struct AntialiasView {
     pub texture_scale: f32,
     /// How much longer than wide the part of a texture may be that one look-up takes in; 1 and below: no longer.
     pub anisotropy: f32,
-    /// Nothing.
-    pub padding: u32,
 }
 
 /// What the denoiser's passes read: addresses of their texels, bindless indices of their images.
@@ -412,16 +401,12 @@ pub struct DenoiseView {
 pub struct TransportView {
     /// Boxes around the surfaces of the world that colour the light that passes them: smallest and largest corners.
     pub filters: u64,
-    /// Absorption of the liquid that the eye is in, per unit of length.
-    pub eye_absorption: Vec3,
-    /// Number of `filters`.
-    pub filter_count: u32,
     /// Boxes around what is translucent in sight of the eye, likewise.
     pub layers: u64,
+    /// Number of `filters`.
+    pub filter_count: u32,
     /// Number of `layers`; all ones: anything may be anywhere.
     pub layer_count: u32,
-    /// Makes the size a multiple of eight without hidden bytes.
-    pub padding: u32,
 }
 
 /// The flares of a view.
@@ -432,10 +417,6 @@ pub struct FlareView {
     pub flares: u64,
     /// [`FlareState`](crate::types::FlareState)s, by slot.
     pub states: u64,
-    /// Number of `flares`.
-    pub count: u32,
-    /// Nothing.
-    pub padding: u32,
 }
 
 /// Light in fog: bindless image indices.
@@ -460,11 +441,10 @@ pub struct FogView {
     pub height: u32,
     /// `FOG_*` bits.
     pub flags: u32,
-    /// Nothing.
-    pub padding: u32,
 }
 
-/// All that the passes of one traced view read: camera, arrays, images, settings.
+/// All that the passes of one traced view read: camera, arrays, images, settings. What holds addresses comes first, so
+/// that nothing needs padding.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)] // counts and addresses of the arrays that the other structures describe; bindless image indices
@@ -484,13 +464,16 @@ pub struct TraceView {
     pub bvh_instances: u64,
     pub materials: MaterialBuffers,
     pub motion: MotionView,
-    pub antialias: AntialiasView,
     pub post: PostView,
     pub lights: LightView,
     pub transport: TransportView,
     pub flares: FlareView,
+    pub denoise: DenoiseView,
+    pub antialias: AntialiasView,
     pub fog: FogView,
     pub sun: SunDisc,
+    /// Absorption of the liquid that the eye is in, per unit of length.
+    pub eye_absorption: Vec3,
     pub eye: Vec3,
     pub forward: Vec3,
     /// Scaled by the tangent of half the horizontal angle.
@@ -523,6 +506,7 @@ pub struct TraceView {
     pub channels: u32,
     pub fog_count: u32,
     pub portal_count: u32,
+    pub flare_count: u32,
     /// Mirrors and portals on a path.
     pub max_depth: u32,
     pub bounces: u32,
@@ -537,6 +521,11 @@ pub struct TraceView {
     /// RGBA16F, of the traced size; not written while frames are accumulated.
     pub image_composite: u32,
     pub image_accumulation: u32,
+    /// RGBA16F: how far the pixel's surface was from here in the last frame (pixels, right and down), length of the way
+    /// to it then (negative: it was not in the picture, or nobody knows where), and the pixel's mark (`motion.glsl`).
+    pub image_motion: u32,
+    /// Storage image of the rays of each pixel (`R32Uint`), or `NO_IMAGE`.
+    pub image_rays: u32,
     pub image_target: u32,
     /// Stops.
     pub exposure_bias: f32,
@@ -557,7 +546,6 @@ pub struct TraceView {
     pub last_forward: Vec3,
     pub last_left: Vec3,
     pub last_up: Vec3,
-    pub denoise: DenoiseView,
 }
 
 /// Names of constants used on both sides.

@@ -40,7 +40,7 @@ void main() {
     for (int i = 0; i < 9; i++) {
         ivec2 pixel = pixel_of(stratum, i);
         if (!inside(pixel)) continue;
-        vec4 motion = imageLoad(images_rgba16f[VIEW.motion.image], pixel);
+        vec4 motion = imageLoad(images_rgba16f[VIEW.image_motion], pixel);
         vec2 before = vec2(pixel) + motion.xy;
         ivec2 last = ivec2(floor(before + 0.5));
         if (motion.z < 0.0 || !inside(last)) continue;

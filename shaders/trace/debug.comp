@@ -86,8 +86,8 @@ vec3 debug_color(ivec2 pixel) {
         return heat(max(change.x, change.y));
     }
     case DEBUG_RAYS:
-        if (VIEW.post.image_rays == NO_IMAGE) return NOTHING;
-        return heat_count(float(imageLoad(uimages_r32ui[VIEW.post.image_rays], pixel).x), 8.0);
+        if (VIEW.image_rays == NO_IMAGE) return NOTHING;
+        return heat_count(float(imageLoad(uimages_r32ui[VIEW.image_rays], pixel).x), 8.0);
     case DEBUG_SPECULAR: return specular_color(pixel, g);
     }
     return NOTHING;

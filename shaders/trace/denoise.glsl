@@ -153,7 +153,7 @@ struct Before {
 };
 
 Before before_of(ivec2 pixel) {
-    vec4 motion = imageLoad(images_rgba16f[VIEW.motion.image], pixel);
+    vec4 motion = imageLoad(images_rgba16f[VIEW.image_motion], pixel);
     Before before = Before(vec2(pixel) + motion.xy, -1.0);
     if (motion.z >= 0.0) {
         vec2 t = tangent_of(before.pixel);

@@ -25,7 +25,7 @@ struct Motion {
 };
 
 Motion motion_read(ivec2 pixel) {
-    vec4 v = imageLoad(images_rgba16f[VIEW.motion.image], pixel);
+    vec4 v = imageLoad(images_rgba16f[VIEW.image_motion], pixel);
     return Motion(v.xy, v.z, v.w);
 }
 
@@ -38,7 +38,7 @@ const float LEAST_FRESH = 1.0 / 1024.0;
 // The pixel's mark, which the motion image has room for: the field of a pixel that shows either a reflection (2) or what
 // lies behind it (1), otherwise 0, and 3 more if it is seen bent, so that its motion is a guess; its fraction tells how much
 // light of what is in front moves otherwise than the surface.
-float mark_read(ivec2 pixel) { return imageLoad(images_rgba16f[VIEW.motion.image], pixel).w; }
+float mark_read(ivec2 pixel) { return imageLoad(images_rgba16f[VIEW.image_motion], pixel).w; }
 float mark_of(uint field, bool bent, float new_part) { return float(field + (bent ? 3u : 0u)) + new_part; }
 bool mark_bent(float mark) { return mark >= 3.0; }
 float mark_field(float mark) { return floor(mark) - (mark_bent(mark) ? 3.0 : 0.0); }
@@ -132,7 +132,7 @@ vec4 motion_of(CameraRay ray, LastPlace place) {
 
 // `motion`: as `motion_of` makes it.
 void motion_write(ivec2 pixel, vec4 motion, float mark) {
-    imageStore(images_rgba16f[VIEW.motion.image], pixel, vec4(motion.xyz, mark));
+    imageStore(images_rgba16f[VIEW.image_motion], pixel, vec4(motion.xyz, mark));
     bool rests = motion.xy == vec2(0.0) && motion.z >= 0.0;
     imageStore(images_r16f[VIEW.motion.path], pixel, vec4(rests ? motion.w : -motion.w));
 }

@@ -49,16 +49,16 @@ struct LastInstance { vec3 axis[3]; vec3 origin; uint known; };
 
 struct MotionView {
     uint64_t vertices; uint64_t vertex_bytes; uint64_t last_positions; uint64_t last_instances; uint64_t last_portals;
-    uint image; uint path; uint last_path; uint still; uint time_stands; uint padding;
+    uint path; uint last_path; uint still; uint time_stands;
 };
 
 struct PostView {
-    uint64_t counters; uint64_t bloom; float bloom_strength; uint debug; uint image_rays; uint padding;
+    uint64_t counters; uint64_t bloom; float bloom_strength; uint debug;
 };
 
 struct AntialiasView {
     vec2 jitter; uint output_width; uint output_height; uint image_picture; uint image_resolved; uint last_resolved;
-    uint sampler_index; uint history; float lens_radius; float focal_distance; float texture_scale; float anisotropy; uint padding;
+    uint sampler_index; uint history; float lens_radius; float focal_distance; float texture_scale; float anisotropy;
 };
 
 struct DenoiseView {
@@ -67,13 +67,13 @@ struct DenoiseView {
     uint slope; uint gradient_samples;
 };
 
-struct TransportView { uint64_t filters; vec3 eye_absorption; uint filter_count; uint64_t layers; uint layer_count; uint padding; };
+struct TransportView { uint64_t filters; uint64_t layers; uint filter_count; uint layer_count; };
 
-struct FlareView { uint64_t flares; uint64_t states; uint count; uint padding; };
+struct FlareView { uint64_t flares; uint64_t states; };
 
 struct FogView {
     uint weight; uint point; uint fresh; uint last; uint filtered; uint cell; uint width; uint height;
-    uint flags; uint padding;
+    uint flags;
 };
 
 struct TraceView {
@@ -81,26 +81,27 @@ struct TraceView {
     uint64_t bvh_nodes; uint64_t bvh_instances;
     MaterialBuffers materials;
     MotionView motion;
-    AntialiasView antialias;
     PostView post;
     LightView lights;
     TransportView transport;
     FlareView flares;
+    DenoiseView denoise;
+    AntialiasView antialias;
     FogView fog;
     SunDisc sun;
+    vec3 eye_absorption;
     vec3 eye; vec3 forward; vec3 left; vec3 up;
     uint width; uint height; int target_x; int target_y;
     uint scene; uint flags; uint seed; uint accumulated;
     float time; float pixel_spread; vec3 ambient;
     float eye_shift; uint channels;
-    uint fog_count; uint portal_count;
+    uint fog_count; uint portal_count; uint flare_count;
     uint max_depth; uint bounces;
     uint image_position; uint image_surface; uint image_shown; uint image_other; uint image_direct; uint image_indirect; uint image_composite;
-    uint image_accumulation; uint image_target;
+    uint image_accumulation; uint image_motion; uint image_rays; uint image_target;
     float exposure_bias; float exposure_base; float exposure_middle; float exposure_blend; float exposure_blend_dark;
     uint target_width; uint target_height; uint sky_sampler;
     vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up;
-    DenoiseView denoise;
 };
 
 // What a geometry's triangles are to a ray.

@@ -163,7 +163,6 @@ impl Antialias {
             focal_distance: settings.rt_focal_length.max(1.0),
             texture_scale: texture_scale(settings, output, jittered),
             anisotropy: settings.anisotropy,
-            padding: 0,
         })
     }
 

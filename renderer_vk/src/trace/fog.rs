@@ -175,7 +175,6 @@ impl LitFog {
             flags: t::FOG_LIT
                 | flag(images.filtered.is_some(), t::FOG_FILTERED)
                 | flag(self.history && images.filtered.is_some(), t::FOG_HISTORY),
-            padding: 0,
         }
     }
 

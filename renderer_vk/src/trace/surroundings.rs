@@ -85,16 +85,20 @@ impl Surroundings {
         })
     }
 
-    /// As shaders read it, for an eye.
-    pub fn view(&self, eye: Vec3) -> TransportView {
-        let outside = |plane: &Vec4| plane.truncate().dot(eye) > plane.w;
-        let around = |liquid: &&Liquid| !liquid.planes.iter().any(outside);
+    /// As shaders read it, without layers.
+    pub fn view(&self) -> TransportView {
         TransportView {
             filters: self.boxes.as_ref().map_or(0, Buffer::address),
-            eye_absorption: (self.liquids.iter().find(around)).map_or(Vec3::ZERO, |l| l.absorption),
             filter_count: self.count,
             ..TransportView::default()
         }
+    }
+
+    /// Absorption of the liquid around a point, per unit of length; zero outside of liquids.
+    pub fn absorption(&self, point: Vec3) -> Vec3 {
+        let outside = |plane: &Vec4| plane.truncate().dot(point) > plane.w;
+        let around = |liquid: &&Liquid| !liquid.planes.iter().any(outside);
+        (self.liquids.iter().find(around)).map_or(Vec3::ZERO, |l| l.absorption)
     }
 }
 

@@ -271,14 +271,13 @@ impl ViewTracer {
         )?;
         params.post = PostView {
             counters: counting.address,
-            image_rays: counting.image,
             bloom: self
                 .bloom
                 .prepare(&self.device, output, settings.rt_bloom)?,
             bloom_strength: settings.rt_bloom.clamp(0.0, 1.0),
             debug: settings.rt_debug,
-            padding: 0,
         };
+        params.image_rays = counting.image;
         let address = rec.arena().push(&[params])?;
 
         if let Some(targets) = &mut self.targets {
@@ -292,12 +291,12 @@ impl ViewTracer {
         if !settings.rt_accumulate {
             self.other_side.record(rec, address, size)?;
         }
-        if params.flares.count > 0 {
+        if params.flare_count > 0 {
             let flare_rays = match &mut self.flare_rays {
                 Some(made) => made,
                 none => none.insert(FlareRays::new(&self.device, self.tracer)?),
             };
-            flare_rays.record(rec, address, [params.flares.count, 1])?;
+            flare_rays.record(rec, address, [params.flare_count, 1])?;
         }
         self.denoiser.choose_gradient_samples(rec, address)?;
         if is_lit(settings)

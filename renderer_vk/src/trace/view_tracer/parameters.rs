@@ -78,13 +78,12 @@ impl ViewTracer {
             flares: FlareView {
                 flares: flares.flares,
                 states: flares.states,
-                count: flares.count,
-                padding: 0,
             },
             materials: materials.buffers(),
-            post: PostView::default(), // filled in by the caller
+            // filled in by the caller
+            post: PostView::default(),
+            image_rays: t::NO_IMAGE,
             motion: MotionView {
-                image: targets.motion.storage_index(),
                 path: targets.path[0].storage_index(),
                 last_path: targets.path[1].storage_index(),
                 ..motion
@@ -113,14 +112,16 @@ impl ViewTracer {
             transport: TransportView {
                 layers,
                 layer_count,
-                ..map.map_or_else(Default::default, |m| {
-                    m.geometry.surroundings.view(camera.origin)
-                })
+                ..map.map_or_else(Default::default, |m| m.geometry.surroundings.view())
             },
+            eye_absorption: map.map_or(Vec3::ZERO, |m| {
+                m.geometry.surroundings.absorption(camera.origin)
+            }),
             eye_shift: camera.stereo.slope / camera.tan_x,
             channels: self.channels,
             fog_count: map.map_or(0, |m| m.geometry.fog_count),
             portal_count: u32::try_from(portals.len()).unwrap_or(u32::MAX),
+            flare_count: flares.count,
             sun: sun_disc(view),
             fog: self.fog.view(&targets.direct, &targets.composite),
             max_depth: settings.rt_max_depth,
@@ -136,6 +137,7 @@ impl ViewTracer {
                 .accumulation
                 .as_ref()
                 .map_or(0, Image::storage_index),
+            image_motion: targets.motion.storage_index(),
             image_target: target.storage_index(),
             exposure_bias: settings.rt_exposure,
             exposure_base: self.map_exposure.scale.log2(),
