@@ -133,8 +133,7 @@ fn layouts(root: &Path) -> String {
     let mut table = String::from(
         "/// Name, size, and name and offset of each field.\npub const LAYOUTS: &[Layout] = &[\n",
     );
-    for module in ["types", "trace_types"] {
-        let text = fs::read_to_string(root.join(format!("src/{module}.rs"))).unwrap_or_default();
+    for (module, text) in ["types", "trace_types"].map(|m| (m, texts(root, m))) {
         let mut structure: Option<&str> = None;
         for line in text.lines() {
             let line = line.trim();
@@ -166,6 +165,23 @@ fn layouts(root: &Path) -> String {
     }
     table.push_str("];\n");
     table
+}
+
+/// The text of a module of this crate and of the modules in its folder, whose structures it publishes as its own.
+fn texts(root: &Path, module: &str) -> String {
+    let folder = root.join("src").join(module);
+    let mut files: Vec<PathBuf> = fs::read_dir(&folder)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path())
+        .collect();
+    files.sort();
+    files.insert(0, folder.with_extension("rs"));
+    let texts = files
+        .into_iter()
+        .map(|file| fs::read_to_string(file).unwrap_or_default());
+    texts.collect()
 }
 
 /// Collects the paths of all GLSL files below `folder`, relative to `root`, with `/`.

@@ -184,7 +184,7 @@ fn constants_have_the_same_values_in_glsl_and_rust() {
     let read = |file: &str| std::fs::read_to_string(root.join(file)).unwrap();
     for (glsl_file, rust_file) in [
         ("common/types.glsl", "src/types.rs"),
-        ("trace/types.glsl", "src/trace_types.rs"),
+        ("trace/types.glsl", "src/trace_types/constants.rs"),
     ] {
         let (glsl, rust) = (constants(&read(glsl_file)), constants(&read(rust_file)));
         assert!(

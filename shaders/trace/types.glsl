@@ -1,4 +1,4 @@
-// The structures of the traced look that GLSL and Rust (shaders/src/trace_types.rs) share, under the same names.
+// The structures of the traced look that GLSL and Rust (shaders/src/trace_types) share, under the same names.
 // Everything is laid out `scalar`. Addresses are buffer device addresses.
 #ifndef RELIGHT_TRACE_TYPES_GLSL
 #define RELIGHT_TRACE_TYPES_GLSL
