@@ -6,15 +6,14 @@
 
 mod algebra;
 mod dielectric;
+mod glow;
 
-pub use algebra::{
-    LightLinear, StageSample, compose, compose_encoded, glow_stages, is_glowing,
-    stage_samples_white,
-};
+pub use algebra::{LightLinear, StageSample, compose, compose_encoded};
 pub use dielectric::{
     INDEX_GLASS, INDEX_SLIME, INDEX_WATER, filters_light, is_gloss, is_reflection,
     refraction_index, ripple_slope,
 };
+pub use glow::{glow_stages, is_glowing, stage_samples_white};
 
 use crate::{
     shader::{Cull, Shader, sort},
