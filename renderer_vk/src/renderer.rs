@@ -3,24 +3,24 @@
 mod held;
 mod kept_pipelines;
 mod output;
+mod pictures;
 mod queries;
+mod registration;
 mod still;
 
-use std::sync::Arc;
 use std::time::Instant;
 
-use glam::{Vec2, Vec3};
-use relight::GameFiles;
+use glam::Vec3;
 
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags};
-use crate::assets::{Assets, LoadedFont, desaturate};
+use crate::assets::Assets;
 use crate::error::Error;
 use crate::frame::Item;
 use crate::gpu::{
     ColorMask, Device, DeviceInfo, DeviceOptions, FrameRing, SurfaceSource, Swapchain,
     SwapchainDesc, Window,
 };
-use crate::raster::{self, DrawList, Flares, Overlay, Picture2d, Present, Raster};
+use crate::raster::{DrawList, Flares, Overlay, Present, Raster};
 use crate::scene::{Look, Scene};
 use crate::settings::Settings;
 use crate::stereo::Eye;
@@ -233,131 +233,6 @@ impl Renderer {
         (color.width(), color.height())
     }
 
-    // --- registration ---------------------------------------------------------------------------------------------
-
-    /// Starts afresh: forgets every model, texture, material and the map, and reads the scripts through `files`.
-    ///
-    /// # Errors
-    /// The device is out of memory.
-    pub fn begin_registration(
-        &mut self,
-        files: Arc<dyn GameFiles>,
-        settings: &Settings,
-    ) -> Result<(), Error> {
-        self.show_finished()?;
-        self.shutdown_registration();
-        self.settings = settings.clone();
-        let (scripts, diagnostics) = relight::Materials::load(&*files);
-        for diagnostic in diagnostics {
-            log::debug!("{diagnostic}");
-        }
-        for fault in scripts.unusable_files() {
-            log::warn!("{fault}");
-        }
-        self.assets = Some(Assets::new(
-            &self.device,
-            files,
-            Arc::new(scripts),
-            settings,
-        )?);
-        Ok(())
-    }
-
-    /// The game has registered everything: makes the pipelines that it will draw with.
-    pub fn end_registration(&mut self) {
-        let format = self.picture_format();
-        let fits = self.targets.fit(&self.device, &self.settings, format);
-        let Some(assets) = &self.assets else { return };
-        let target = raster::Target {
-            color: self.targets.drawn(),
-            depth: self.targets.depth(),
-            mask: ColorMask::ALL,
-        };
-        let stages = raster::StageContext {
-            materials: &assets.materials,
-            samplers: &assets.samplers,
-            identity_light: self.settings.identity_light(),
-            light_spot: assets.textures.dynamic_light(),
-            only_texture: None,
-        };
-        // what is not made now is made when it is drawn
-        let made = self.raster.expect_materials(target.kind(), stages);
-        if let Err(e) = fits.and(made.map_err(Error::from)) {
-            log::warn!("pipelines are not made ahead: {e}");
-        }
-        self.kept_pipelines.write(&self.device);
-    }
-
-    /// Forgets every model, texture, material and the map. May be called again and again.
-    pub fn shutdown_registration(&mut self) {
-        self.queue.clear();
-        self.overlay.clear();
-        self.scene = Scene::default();
-        self.held.release();
-        self.still.cancel();
-        self.trace = None;
-        self.world = None;
-        self.assets = None;
-        self.entity_tokens = EntityTokens::default();
-    }
-
-    /// Handle of a material by name; `mip` is false for 2D art. 0: there is none, the default is drawn.
-    pub fn register_shader(&mut self, name: &str, mip: bool) -> i32 {
-        self.assets
-            .as_mut()
-            .map_or(0, |assets| assets.register_shader(name, mip))
-    }
-
-    /// Handle of a model by file name, or `*n` for the map's inline models. 0: there is none.
-    pub fn register_model(&mut self, name: &str) -> i32 {
-        // loading takes a while after the picture that tells of it
-        if let Err(e) = self.show_finished() {
-            log::warn!("{e}");
-        }
-        self.assets
-            .as_mut()
-            .map_or(0, |assets| assets.register_model(name))
-    }
-
-    /// Handle of a `.skin` file or of a skin of one material. 0: the default.
-    pub fn register_skin(&mut self, name: &str) -> i32 {
-        self.assets
-            .as_mut()
-            .map_or(0, |assets| assets.register_skin(name))
-    }
-
-    /// A pre-rendered font of a size in points (0: 12), with its glyphs' materials registered.
-    pub fn register_font(&mut self, point_size: i32) -> Option<LoadedFont> {
-        self.assets.as_mut()?.register_font(point_size)
-    }
-
-    /// Loads a map (`maps/NAME.bsp`).
-    ///
-    /// # Errors
-    /// The file is missing or broken, or a map is loaded already; the message names file and place.
-    pub fn load_world(&mut self, name: &str) -> Result<(), Error> {
-        self.show_finished()?;
-        let Some(assets) = &mut self.assets else {
-            return Err(Error::NotRegistered);
-        };
-        if self.world.is_some() {
-            return Err(Error::WorldTwice { name: name.into() });
-        }
-        let world = World::load(&self.device, assets, name, &self.settings)?;
-        self.world = Some(world);
-        self.entity_tokens = EntityTokens::default();
-        Ok(())
-    }
-
-    /// Draws `new` wherever `old` would be; `old` = `new` takes that back.
-    pub fn remap_shader(&mut self, old: &str, new: &str, time_offset: Option<f32>) {
-        if let Some(assets) = &mut self.assets {
-            assets.remap_shader(old, new, time_offset);
-        }
-    }
-
-    // --- the scene ------------------------------------------------------------------------------------------------
-
     /// Settings for what follows. What is latched counts at the next [`begin_registration`](Self::begin_registration).
     pub fn set_settings(&mut self, settings: &Settings) {
         if self.settings != *settings {
@@ -473,102 +348,6 @@ impl Renderer {
             self.trace = Some(TraceLook::new(&self.device, world, assets, &self.settings)?);
         }
         Ok(self.trace.is_some())
-    }
-
-    // --- 2D ---------------------------------------------------------------------------------------------------------
-
-    /// Colour of the pictures that follow; `None` is white. Values become bytes as the engine makes them.
-    pub fn set_color(&mut self, rgba: Option<[f32; 4]>) {
-        self.color_2d = rgba.map_or(u32::MAX, |rgba| {
-            // truncated and wrapped, not clamped
-            let mut bytes = rgba.map(|c| (c * 255.0) as i32 as u8);
-            desaturate(&mut bytes, self.settings.greyscale);
-            u32::from_le_bytes(bytes)
-        });
-    }
-
-    /// Draws a material in a rectangle of window pixels.
-    #[allow(clippy::too_many_arguments)]
-    pub fn stretch_pic(
-        &mut self,
-        x: f32,
-        y: f32,
-        w: f32,
-        h: f32,
-        s1: f32,
-        t1: f32,
-        s2: f32,
-        t2: f32,
-        shader: i32,
-    ) {
-        let Some(assets) = &self.assets else { return };
-        let material = assets.materials.resolve(assets.material_of_handle(shader));
-        self.overlay.add(
-            material,
-            &Picture2d {
-                position: Vec2::new(x, y),
-                size: Vec2::new(w, h),
-                st1: Vec2::new(s1, t1),
-                st2: Vec2::new(s2, t2),
-                color: self.color_2d,
-            },
-        );
-    }
-
-    /// Draws RGBA8 pixels, stretched to a rectangle of the window.
-    ///
-    /// # Errors
-    /// The picture's size is not a power of two, or the data is too short.
-    #[allow(clippy::too_many_arguments)]
-    pub fn stretch_raw(
-        &mut self,
-        x: i32,
-        y: i32,
-        w: i32,
-        h: i32,
-        cols: u32,
-        rows: u32,
-        rgba: &[u8],
-        client: usize,
-        dirty: bool,
-    ) -> Result<(), Error> {
-        if !cols.is_power_of_two() || !rows.is_power_of_two() {
-            return Err(Error::NotPowerOfTwo { cols, rows });
-        }
-        self.upload_cinematic(cols, rows, rgba, client, dirty)?;
-        let Some(texture) = (self.assets.as_mut()).map(|a| a.textures.queue_scratch(client)) else {
-            return Ok(());
-        };
-        let half = Vec2::new(0.5 / cols as f32, 0.5 / rows as f32);
-        self.overlay.add_film(
-            texture,
-            &Picture2d {
-                position: Vec2::new(x as f32, y as f32),
-                size: Vec2::new(w as f32, h as f32),
-                st1: half,
-                st2: Vec2::ONE - half,
-                color: u32::MAX,
-            },
-        );
-        Ok(())
-    }
-
-    /// Replaces the picture of a cinematic.
-    ///
-    /// # Errors
-    /// The data is shorter than the size says, or the device is out of memory.
-    pub fn upload_cinematic(
-        &mut self,
-        cols: u32,
-        rows: u32,
-        rgba: &[u8],
-        client: usize,
-        dirty: bool,
-    ) -> Result<(), Error> {
-        match &mut self.assets {
-            Some(assets) => Ok(assets.update_scratch(client, cols, rows, rgba, dirty)?),
-            None => Ok(()),
-        }
     }
 }
 

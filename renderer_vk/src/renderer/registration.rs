@@ -1,0 +1,137 @@
+//! What the game registers: models, materials, fonts, the map.
+
+use std::sync::Arc;
+
+use relight::GameFiles;
+
+use super::Renderer;
+use crate::assets::{Assets, LoadedFont};
+use crate::error::Error;
+use crate::gpu::ColorMask;
+use crate::raster;
+use crate::scene::Scene;
+use crate::settings::Settings;
+use crate::world::{EntityTokens, World};
+
+impl Renderer {
+    /// Starts afresh: forgets every model, texture, material and the map, and reads the scripts through `files`.
+    ///
+    /// # Errors
+    /// The device is out of memory.
+    pub fn begin_registration(
+        &mut self,
+        files: Arc<dyn GameFiles>,
+        settings: &Settings,
+    ) -> Result<(), Error> {
+        self.show_finished()?;
+        self.shutdown_registration();
+        self.settings = settings.clone();
+        let (scripts, diagnostics) = relight::Materials::load(&*files);
+        for diagnostic in diagnostics {
+            log::debug!("{diagnostic}");
+        }
+        for fault in scripts.unusable_files() {
+            log::warn!("{fault}");
+        }
+        self.assets = Some(Assets::new(
+            &self.device,
+            files,
+            Arc::new(scripts),
+            settings,
+        )?);
+        Ok(())
+    }
+
+    /// The game has registered everything: makes the pipelines that it will draw with.
+    pub fn end_registration(&mut self) {
+        let format = self.picture_format();
+        let fits = self.targets.fit(&self.device, &self.settings, format);
+        let Some(assets) = &self.assets else { return };
+        let target = raster::Target {
+            color: self.targets.drawn(),
+            depth: self.targets.depth(),
+            mask: ColorMask::ALL,
+        };
+        let stages = raster::StageContext {
+            materials: &assets.materials,
+            samplers: &assets.samplers,
+            identity_light: self.settings.identity_light(),
+            light_spot: assets.textures.dynamic_light(),
+            only_texture: None,
+        };
+        // what is not made now is made when it is drawn
+        let made = self.raster.expect_materials(target.kind(), stages);
+        if let Err(e) = fits.and(made.map_err(Error::from)) {
+            log::warn!("pipelines are not made ahead: {e}");
+        }
+        self.kept_pipelines.write(&self.device);
+    }
+
+    /// Forgets every model, texture, material and the map. May be called again and again.
+    pub fn shutdown_registration(&mut self) {
+        self.queue.clear();
+        self.overlay.clear();
+        self.scene = Scene::default();
+        self.held.release();
+        self.still.cancel();
+        self.trace = None;
+        self.world = None;
+        self.assets = None;
+        self.entity_tokens = EntityTokens::default();
+    }
+
+    /// Handle of a material by name; `mip` is false for 2D art. 0: there is none, the default is drawn.
+    pub fn register_shader(&mut self, name: &str, mip: bool) -> i32 {
+        self.assets
+            .as_mut()
+            .map_or(0, |assets| assets.register_shader(name, mip))
+    }
+
+    /// Handle of a model by file name, or `*n` for the map's inline models. 0: there is none.
+    pub fn register_model(&mut self, name: &str) -> i32 {
+        // loading takes a while after the picture that tells of it
+        if let Err(e) = self.show_finished() {
+            log::warn!("{e}");
+        }
+        self.assets
+            .as_mut()
+            .map_or(0, |assets| assets.register_model(name))
+    }
+
+    /// Handle of a `.skin` file or of a skin of one material. 0: the default.
+    pub fn register_skin(&mut self, name: &str) -> i32 {
+        self.assets
+            .as_mut()
+            .map_or(0, |assets| assets.register_skin(name))
+    }
+
+    /// A pre-rendered font of a size in points (0: 12), with its glyphs' materials registered.
+    pub fn register_font(&mut self, point_size: i32) -> Option<LoadedFont> {
+        self.assets.as_mut()?.register_font(point_size)
+    }
+
+    /// Loads a map (`maps/NAME.bsp`).
+    ///
+    /// # Errors
+    /// The file is missing or broken, or a map is loaded already; the message names file and place.
+    pub fn load_world(&mut self, name: &str) -> Result<(), Error> {
+        self.show_finished()?;
+        let Some(assets) = &mut self.assets else {
+            return Err(Error::NotRegistered);
+        };
+        if self.world.is_some() {
+            return Err(Error::WorldTwice { name: name.into() });
+        }
+        let world = World::load(&self.device, assets, name, &self.settings)?;
+        self.world = Some(world);
+        self.entity_tokens = EntityTokens::default();
+        Ok(())
+    }
+
+    /// Draws `new` wherever `old` would be; `old` = `new` takes that back.
+    pub fn remap_shader(&mut self, old: &str, new: &str, time_offset: Option<f32>) {
+        if let Some(assets) = &mut self.assets {
+            assets.remap_shader(old, new, time_offset);
+        }
+    }
+}
