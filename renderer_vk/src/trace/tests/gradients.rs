@@ -1,0 +1,100 @@
+//! How far the denoiser tells of a light that has changed.
+
+use glam::Vec3;
+use relight::light::{Falloff, PointLight};
+use shaders::trace_types::constants::DEBUG_SAMPLES;
+
+use super::harness::{Gpu, Scene, rectangle, reference};
+use crate::api::DynamicLight;
+use crate::scene::ViewScene;
+use crate::settings::Settings;
+use crate::trace::input::Tracer;
+
+const WIDTH: usize = 192;
+const HEIGHT: usize = 24;
+/// Pixels to the edge of a stratum (`denoise.glsl`).
+const STRATUM: usize = 3;
+/// Strata that a change is told over: 12 by the last step, over sums of 6 by those before.
+const REACH: usize = 18;
+
+/// A wall in even light. A board before its middle, seen from its edge, keeps what shines on the left from the right.
+fn halved_wall() -> Scene {
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, WIDTH as i32);
+    scene.def.height = HEIGHT as i32;
+    let tan = 30f32.to_radians().tan() * HEIGHT as f32 / WIDTH as f32;
+    scene.def.fov_y = 2.0 * tan.atan().to_degrees();
+    let grey = scene.diffuse(0.5);
+    let board = scene.diffuse(0.0);
+    let corner = Vec3::new(200.0, -400.0, -400.0);
+    scene.quad(rectangle(corner, Vec3::Z * 800.0, Vec3::Y * 800.0), grey);
+    let corner = Vec3::new(100.0, 0.0, -400.0);
+    let [a, b, c, d] = rectangle(corner, Vec3::Z * 800.0, Vec3::X * 100.0);
+    scene.quad([a, b, c, d], board);
+    scene.quad([d, c, b, a], board);
+    scene.points.push(PointLight {
+        origin: Vec3::new(-2000.0, 0.0, 0.0),
+        intensity: Vec3::splat(2.0e6),
+        radius: 1.0,
+        spot: None,
+        falloff: Falloff::InverseSquare,
+    });
+    scene
+}
+
+#[test]
+fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther() {
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    let scene = halved_wall();
+    let settings = Settings {
+        rt_accumulate: false,
+        rt_taa: false,
+        rt_denoiser: 1,
+        // all of them, so that one that is gone changes nothing where it did not shine
+        rt_num_random_dl: 0,
+        rt_debug: DEBUG_SAMPLES,
+        ..reference()
+    };
+    let last = 15;
+    let mut history = |lit_until: u32| {
+        let lamp = |frame: u32, view: &mut ViewScene| {
+            view.dlights.clear();
+            if frame < lit_until {
+                view.dlights.push(DynamicLight {
+                    origin: Vec3::new(180.0, 60.0, 0.0),
+                    radius: 200.0,
+                    color: Vec3::ONE,
+                    additive: false,
+                });
+            }
+        };
+        let (_, picture) = gpu.render_views(&scene, &settings, last + 1, lamp);
+        picture
+    };
+    let (never, until_now) = (history(0), history(last));
+    // of each column, the pixels whose history is not what it would be without the lamp
+    let changed: Vec<usize> = (0..WIDTH)
+        .map(|x| {
+            let at = |y: usize| y * WIDTH + x;
+            (0..HEIGHT)
+                .filter(|&y| never.get(at(y)) != until_now.get(at(y)))
+                .count()
+        })
+        .collect();
+    println!("pixels with another history, by column: {changed:?}");
+    let edge = WIDTH / 2;
+    assert!(
+        changed.iter().take(edge).all(|&n| n == HEIGHT),
+        "where the lamp shone: {changed:?}"
+    );
+    // beside it two thirds of the way: farther than the first steps alone reach
+    let beside = changed.iter().skip(edge).take(REACH * 2 / 3 * STRATUM);
+    assert!(
+        beside.clone().all(|&n| n == HEIGHT),
+        "within reach: {changed:?}"
+    );
+    let beyond = changed.iter().skip(edge + (REACH + 1) * STRATUM);
+    assert!(beyond.len() > 30);
+    assert!(beyond.clone().all(|&n| n == 0), "beyond reach: {changed:?}");
+}
