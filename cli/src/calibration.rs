@@ -6,7 +6,8 @@ use anyhow::Result;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use relight::calibrate::{
-    Agreement, CalibrationReport, FOUND_WITHIN, POWER_WITHIN, Recovery, hide_entities, recovery,
+    Agreement, CalibrationReport, FOUND_WITHIN, POWER_WITHIN, Recovery, Spots, hide_entities,
+    recovery, spots,
 };
 use relight::{CalibrationCache, CalibrationOptions, Materials, Options, RelitWorld};
 use serde_json::{Value, json};
@@ -36,6 +37,9 @@ pub struct CalibrationArgs {
     /// Hide the light entities that maps kept, and tell how many of them are found again
     #[arg(long)]
     hide_entities: bool,
+    /// Tell how many lightmap texels beside point lights these make too bright
+    #[arg(long)]
+    spots: bool,
     /// One JSON object a map, in place of a table
     #[arg(long)]
     json: bool,
@@ -89,6 +93,7 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
         });
         bar.finish_and_clear();
         let found = hidden.map(|hidden| recovery(&hidden, &world));
+        let spots = args.spots.then(|| spots(&world));
         for warning in &world.warnings {
             log::warn!("{path}: {warning}");
         }
@@ -96,7 +101,7 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
             continue;
         };
         if args.json {
-            println!("{}", as_json(map, report, found.as_ref()));
+            println!("{}", as_json(map, report, found.as_ref(), spots));
         } else {
             println!(
                 "{map:20} {:>9} {:5.1} {:7} {:5} {:6} {:7.3} {:7.3} {:6.2} {:7.3} {:7.3} {:8.2}",
@@ -115,6 +120,9 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
         }
         if let Some(found) = found.filter(|_| !args.json) {
             println!("    {}", in_words(&found));
+        }
+        if let Some(spots) = spots.filter(|_| !args.json) {
+            println!("    {}", spots_in_words(&spots));
         }
         reports.push(report.clone());
     }
@@ -162,7 +170,19 @@ fn in_words(found: &Recovery) -> String {
     )
 }
 
-fn as_json(map: &str, report: &CalibrationReport, found: Option<&Recovery>) -> Value {
+fn spots_in_words(spots: &Spots) -> String {
+    format!(
+        "{} texels beside point lights, {} of them more than a stop too bright by these alone",
+        spots.texels, spots.too_bright
+    )
+}
+
+fn as_json(
+    map: &str,
+    report: &CalibrationReport,
+    found: Option<&Recovery>,
+    spots: Option<Spots>,
+) -> Value {
     let agreement = |a: &Agreement| {
         json!({
             "median_stops": a.median_stops,
@@ -195,6 +215,7 @@ fn as_json(map: &str, report: &CalibrationReport, found: Option<&Recovery>) -> V
             "invented": f.invented,
             "power_invented": f.power_invented,
         })),
+        "spots": spots.map(|s| json!({ "texels": s.texels, "too_bright": s.too_bright })),
         "cached": report.cached,
         "seconds": report.seconds,
     })

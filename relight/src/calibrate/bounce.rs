@@ -29,6 +29,7 @@ const OFF_PLANE: f32 = 16.0;
 const SAME_NORMAL: f32 = 0.7;
 
 /// From light at measurements to light that is thrown from there to measurements.
+#[derive(Clone)]
 pub(super) struct Transfer {
     /// For each sample: samples that light what it sees, and which part of their light comes here.
     rows: Vec<Vec<(u32, Vec3)>>,
@@ -52,73 +53,49 @@ impl Transfer {
         bounces: u32,
         unlisted: impl Fn(u32) -> bool + Sync,
     ) -> Transfer {
-        let of_triangle = surfaces_of_triangles(world);
-        let near = Near::new(samples);
-        let found = parallel::map(samples, |i, sample| {
-            if sample.site == Site::Air {
-                return (Vec::new(), Vec3::ZERO, Vec3::ZERO);
-            }
-            let mut random = Random::new(0xB0_0000 + i as u64);
-            let (u, v) = sample.normal.any_orthonormal_pair();
-            let (mut sky, mut glow) = (Vec3::ZERO, Vec3::ZERO);
-            let mut row: Vec<(u32, Vec3)> = Vec::new();
-            let part = 1.0 / (SIDE * SIDE) as f32;
-            for stratum in 0..SIDE * SIDE {
-                let x = ((stratum % SIDE) as f32 + random.next()) / SIDE as f32;
-                let y = ((stratum / SIDE) as f32 + random.next()) / SIDE as f32;
-                // Density cosine / π: the mean of radiance is irradiance / π (Malley's method).
-                let (sin, cos) = (x * TAU).sin_cos();
-                let radius = y.sqrt();
-                let ray =
-                    u * (radius * cos) + v * (radius * sin) + sample.normal * (1.0 - y).sqrt();
-                let Some(hit) = occluders.nearest(sample.position, ray, f32::INFINITY) else {
-                    continue;
-                };
-                let Some((index, material)) = material_of(world, &of_triangle, &hit) else {
-                    continue;
-                };
-                if hit.sky {
-                    if unlisted(index) {
-                        sky += material.shown * part;
-                    }
-                    continue;
-                }
-                if !hit.front {
-                    continue;
-                }
-                if material.emission.is_none() {
-                    glow += material.shown * part;
-                }
-                let at = sample.position + ray * hit.t;
-                let weight = material.albedo * part;
-                if weight != Vec3::ZERO
-                    && let Some(lit) = near.find(samples, at, hit.normal)
-                {
-                    match row.iter_mut().find(|(other, _)| *other == lit) {
-                        Some((_, sum)) => *sum += weight,
-                        None => row.push((lit, weight)),
-                    }
-                }
-            }
-            let found: Found = (row, sky, glow);
-            found
-        });
         let mut transfer = Transfer {
             rows: Vec::with_capacity(samples.len()),
             skies: Vec::with_capacity(samples.len()),
             glows: Vec::with_capacity(samples.len()),
             bounces,
         };
-        for (row, sky, glow) in found {
-            transfer.rows.push(row);
-            transfer.skies.push(sky);
-            transfer.glows.push(glow);
-        }
-        if bounces == 0 {
-            transfer.skies.fill(Vec3::ZERO);
-            transfer.glows.fill(Vec3::ZERO);
-        }
+        transfer.add(world, occluders, samples, samples, unlisted);
         transfer
+    }
+
+    /// Traces what further samples see; what they see is lit as at `lit`, the first of all samples.
+    pub fn add(
+        &mut self,
+        world: &RelitWorld,
+        occluders: &Occluders,
+        lit: &[Sample],
+        more: &[Sample],
+        unlisted: impl Fn(u32) -> bool + Sync,
+    ) {
+        let of_triangle = surfaces_of_triangles(world);
+        let near = Near::new(lit);
+        let first = self.rows.len();
+        let found = parallel::map(more, |i, sample| {
+            let mut random = Random::new(0xB0_0000 + (first + i) as u64);
+            if sample.site == Site::Air {
+                return Found::default();
+            }
+            seen(
+                world,
+                occluders,
+                &of_triangle,
+                (lit, &near),
+                sample,
+                &mut random,
+                &unlisted,
+            )
+        });
+        for (row, sky, glow) in found {
+            let pictures = if self.bounces == 0 { 0.0 } else { 1.0 };
+            self.rows.push(row);
+            self.skies.push(sky * pictures);
+            self.glows.push(glow * pictures);
+        }
     }
 
     /// Bounced light at each sample where lights give `direct`; `pictures`: and what pictures of skies give.
@@ -152,6 +129,59 @@ impl Transfer {
         }
         bounced
     }
+}
+
+/// What the rays of a sample find. `lit`: samples that stand for what is seen.
+fn seen(
+    world: &RelitWorld,
+    occluders: &Occluders,
+    of_triangle: &[u32],
+    (lit, near): (&[Sample], &Near),
+    sample: &Sample,
+    random: &mut Random,
+    unlisted: &impl Fn(u32) -> bool,
+) -> Found {
+    let (u, v) = sample.normal.any_orthonormal_pair();
+    let (mut sky, mut glow) = (Vec3::ZERO, Vec3::ZERO);
+    let mut row: Vec<(u32, Vec3)> = Vec::new();
+    let part = 1.0 / (SIDE * SIDE) as f32;
+    for stratum in 0..SIDE * SIDE {
+        let x = ((stratum % SIDE) as f32 + random.next()) / SIDE as f32;
+        let y = ((stratum / SIDE) as f32 + random.next()) / SIDE as f32;
+        // Density cosine / π: the mean of radiance is irradiance / π (Malley's method).
+        let (sin, cos) = (x * TAU).sin_cos();
+        let radius = y.sqrt();
+        let ray = u * (radius * cos) + v * (radius * sin) + sample.normal * (1.0 - y).sqrt();
+        let Some(hit) = occluders.nearest(sample.position, ray, f32::INFINITY) else {
+            continue;
+        };
+        let Some((index, material)) = material_of(world, of_triangle, &hit) else {
+            continue;
+        };
+        if hit.sky {
+            if unlisted(index) {
+                sky += material.shown * part;
+            }
+            continue;
+        }
+        if !hit.front {
+            continue;
+        }
+        if material.emission.is_none() {
+            glow += material.shown * part;
+        }
+        let at = sample.position + ray * hit.t;
+        let weight = material.albedo * part;
+        if weight != Vec3::ZERO
+            && let Some(lit) = near.find(lit, at, hit.normal)
+        {
+            match row.iter_mut().find(|(other, _)| *other == lit) {
+                Some((_, sum)) => *sum += weight,
+                None => row.push((lit, weight)),
+            }
+        }
+    }
+    (row, sky, glow)
 }
 
 /// For every triangle, the surface that it is of.

@@ -112,6 +112,20 @@ pub(super) fn point_rows(
     spot: Option<&Spot>,
     range: f32,
 ) -> Vec<(u32, f32)> {
+    // Samples that follow each other are neighbours as a rule, and in the shadow of the same triangle.
+    rows_again(bsp, occluders, samples, lamp, (spot, range), &mut [None])
+}
+
+/// [`point_rows`], asking first what stopped earlier rays: `stopped` has a place for each sample, or for so many that take turns.
+pub(super) fn rows_again(
+    bsp: &Bsp,
+    occluders: &Occluders,
+    samples: &[Sample],
+    lamp: Lamp,
+    (spot, range): (Option<&Spot>, f32),
+    stopped: &mut [Option<u32>],
+) -> Vec<(u32, f32)> {
+    let places = stopped.len().max(1);
     let origin = lamp.origin;
     let cluster = bsp.cluster_at(origin);
     let mut rows = Vec::new();
@@ -120,10 +134,13 @@ pub(super) fn point_rows(
             continue;
         }
         let light = unshadowed(sample, lamp, spot);
+        let Some(last) = stopped.get_mut(i as usize % places) else {
+            continue;
+        };
         if light > 0.0
             && (bsp.cluster_sees(cluster, sample.cluster)
                 || bsp.cluster_sees(sample.cluster, cluster))
-            && !occluders.blocked(origin, sample.position, false)
+            && !occluders.blocked_again(origin, sample.position, last)
         {
             rows.push((i, light));
         }

@@ -1,18 +1,21 @@
 //! The state of a fit, and its steps: strengths, ambient and bounced light, which depend on each other.
 
 use super::air;
-use super::bounce::{Transfer, surfaces_of_triangles};
+use super::bounce::Transfer;
 use super::columns::Column;
 use super::crossings::Crossing;
 use super::nodes::Measured;
-use super::place::{self, Scene};
+use super::place::{self, Candidates, Scene};
 use super::report::Agreement;
-use super::samples::{Sample, Site, light_of, mean};
+use super::samples::{Sample, Site, Taking, light_of, mean};
 use super::solve::{self, Ambient, Effort};
-use super::{Occluders, suns, views};
+use super::splash::Splashes;
+use super::texels::TexelId;
+use super::{Occluders, Purpose, suns, views};
 use crate::exposure::{self, Exposure, Place};
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::Vec3;
+use std::collections::HashSet;
 
 /// Most times that lights are looked for.
 const ROUNDS: u32 = 4;
@@ -22,6 +25,12 @@ const ENOUGH: f32 = 0.985;
 
 /// Linear falloff is believed when it leaves less than this part of the error at samples held out.
 const LINEAR: f32 = 0.97;
+
+/// Times that texels beside lights are looked at once these stay where they are.
+const LAST_LOOKS: u32 = 2;
+
+/// How many times the error at samples held out these texels may leave then: they are a small part of the map.
+const BESIDE: f32 = 1.02;
 
 /// Error, stops, of lights that fall off with the square of the distance, from which on linear ones are tried.
 const MUCH: f32 = 0.25;
@@ -53,26 +62,45 @@ const NEXT: Effort = Effort {
     anew: false,
 };
 
-/// A state to come back to: sources, ambient, measurements.
-pub(super) type Start = (Vec<Column>, Ambient, Vec<Sample>);
+/// A state to come back to.
+#[derive(Clone)]
+pub(super) struct Start {
+    columns: Vec<Column>,
+    ambient: Ambient,
+    samples: Vec<Sample>,
+    transfer: Transfer,
+    beside: HashSet<TexelId>,
+}
 
 /// A fit in progress.
 pub(super) struct Fit<'a> {
     pub world: &'a RelitWorld,
     pub occluders: &'a Occluders,
+    /// Skies of which directives tell nothing.
+    pub silent: &'a [u32],
+    /// For every triangle, the surface that it is of.
+    pub of_triangle: Vec<u32>,
+    /// How measurements are taken.
+    pub taking: Taking,
     pub samples: Vec<Sample>,
+    /// Texels that joined them, beside lights that were put in.
+    pub beside: HashSet<TexelId>,
     /// Where texels, or what tells in their place, are measured.
     pub measured: Measured,
     pub transfer: Transfer,
+    /// Back splashes that there may be.
+    pub splashes: Vec<Splashes>,
     /// Known sources first.
     pub columns: Vec<Column>,
     pub ambient: Ambient,
     /// Places that the light grid's directions meet at.
     pub crossings: Vec<Crossing>,
+    /// Candidates all over open space, once they were tried: they see the first measurements alike each time.
+    pub tried: Option<Candidates>,
     /// Light at which lights end.
     pub least: f32,
-    /// Error at samples held out, stops, that is asked for: what will not come near it need not be looked for to the end.
-    pub asked: f32,
+    /// What it is for: what will not do that need not be looked for to the end.
+    pub purpose: Purpose<'a>,
 }
 
 impl Fit<'_> {
@@ -143,8 +171,8 @@ impl Fit<'_> {
         }
     }
 
-    /// Adds back splashes where they explain what known lights do not.
-    pub fn splash(&mut self, splashes: Vec<Column>) {
+    /// Adds back splashes where they explain what known lights do not. Whether some were added.
+    pub fn splash(&mut self, splashes: Vec<Column>) -> bool {
         let start = self.start();
         self.settle();
         let without = self.agreement().median_stops;
@@ -155,10 +183,12 @@ impl Fit<'_> {
         let state = solve::residual(&self.samples, &self.columns, self.ambient.value);
         place::drop_useless(&mut self.columns, known, &state, place::WORTH);
         let splashes = self.columns.split_off(known);
-        (self.columns, self.ambient, self.samples) = start;
-        if believed {
+        self.back_to(start);
+        let added = believed && !splashes.is_empty();
+        if added {
             self.columns.extend(splashes);
         }
+        added
     }
 
     /// Fits strengths and the light that they throw back to each other, in turns.
@@ -186,7 +216,10 @@ impl Fit<'_> {
         progress: &mut dyn FnMut(f32),
     ) -> bool {
         let fixed = self.columns.len();
-        let of_triangle = surfaces_of_triangles(self.world);
+        let asked = match self.purpose {
+            Purpose::Trial => f32::INFINITY,
+            Purpose::Enough(asked, _) => asked,
+        };
         let mut spacing = 0.0;
         let mut best = f32::INFINITY;
         for round in 0..ROUNDS {
@@ -196,14 +229,18 @@ impl Fit<'_> {
                 occluders: self.occluders,
                 samples: &self.samples,
                 measured: &self.measured,
-                of_triangle: &of_triangle,
+                of_triangle: &self.of_triangle,
                 candidates,
                 linear,
                 least: self.least,
             };
             let (columns, ambient) = (&mut self.columns, &mut self.ambient);
             if round == 0 {
-                spacing = place::over_space(&scene, &self.crossings, columns, fixed, ambient);
+                let tried = self
+                    .tried
+                    .get_or_insert_with(|| place::over_space(&scene, &self.crossings));
+                spacing = tried.spacing;
+                place::out_of(&scene, tried.clone(), columns, fixed, ambient);
             } else {
                 place::in_front(&scene, columns, fixed, ambient, spacing);
             }
@@ -222,14 +259,28 @@ impl Fit<'_> {
             let done = found > best * ENOUGH;
             best = best.min(found);
             let hopeless = if round == 0 { HOPELESS.0 } else { HOPELESS.1 };
-            if best > self.asked * hopeless {
+            if best > asked * hopeless {
                 return true;
             }
             if done {
                 break;
             }
+            self.look_beside(fixed);
         }
-        best > self.asked
+        // What is moved or grows to make up for what was too bright may be too bright elsewhere.
+        for _ in 0..LAST_LOOKS {
+            let kept = self.start();
+            if !self.look_beside(fixed) {
+                break;
+            }
+            self.settle();
+            let found = self.agreement().median_stops;
+            if found > best * BESIDE {
+                self.back_to(kept);
+                break;
+            }
+        }
+        best > asked
     }
 
     /// Puts in lights that may fall off linearly, as compilers can have it, in place of those of [`place`](Self::place),
@@ -239,19 +290,30 @@ impl Fit<'_> {
         if before < MUCH {
             return;
         }
-        let kept = std::mem::replace(&mut self.columns, start.0);
-        let kept = (kept, std::mem::replace(&mut self.ambient, start.1));
-        let samples = std::mem::replace(&mut self.samples, start.2);
+        let kept = self.start();
+        self.back_to(start);
         self.place(candidates, true, &mut |_| ());
         if self.agreement().median_stops > before * LINEAR {
-            (self.columns, self.ambient) = kept;
-            self.samples = samples;
+            self.back_to(kept);
         }
     }
 
     /// What [`place`](Self::place) begins with.
     pub fn start(&self) -> Start {
-        (self.columns.clone(), self.ambient, self.samples.clone())
+        Start {
+            columns: self.columns.clone(),
+            ambient: self.ambient,
+            samples: self.samples.clone(),
+            transfer: self.transfer.clone(),
+            beside: self.beside.clone(),
+        }
+    }
+
+    /// Goes back to a state.
+    fn back_to(&mut self, start: Start) {
+        (self.columns, self.ambient) = (start.columns, start.ambient);
+        (self.samples, self.transfer) = (start.samples, start.transfer);
+        self.beside = start.beside;
     }
 
     /// Leaves the measurements in the air out again where samples held out say so.

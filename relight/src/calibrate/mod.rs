@@ -13,7 +13,8 @@
 //!    puts weak lights in front of lamps, as compilers do.
 //! 5. `place`: candidates for lost lights all over open space, and where the directions of the light grid meet
 //!    (`crossings`), then in front of what stays unexplained, for as long as
-//!    that makes light agree better at what is held out. `fit` holds these steps together.
+//!    that makes light agree better at what is held out. `fit` holds these steps together. `beside`: texels right beside
+//!    these lights join the measurements where they are too bright.
 //!    Where lights that fall off with the square of the distance leave much, once more with linear ones.
 //! 6. `compiler`: all of that with less effort for light that was stored encoded, and for lights that end, to see whether
 //!    it explains more. Where the map says that corners were made darker, all of it is done both ways.
@@ -28,6 +29,7 @@
 
 mod air;
 mod apply;
+mod beside;
 mod bounce;
 pub(crate) mod bvh;
 pub(crate) mod cache;
@@ -55,6 +57,7 @@ mod texels;
 mod vertices;
 mod views;
 
+pub use beside::{Spots, spots};
 pub use cache::CalibrationCache;
 pub use recovery::{FOUND_WITHIN, POWER_WITHIN, Recovery, hide_entities, recovery};
 pub use report::{Agreement, CalibrationReport};
@@ -70,10 +73,12 @@ use fit::Fit;
 use glam::Vec3;
 use nodes::Measured;
 use samples::Taking;
+use std::cell::Cell;
+use std::collections::HashSet;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 21;
+const VERSION: u32 = 22;
 
 /// One in so many candidates comes from the directions of the light grid.
 const CROSSINGS: usize = 5;
@@ -174,6 +179,7 @@ pub fn calibrate_with(
                 world.warnings.push(problem.to_string());
             }
             let solution = best(world, &silent, options, progress);
+            progress(1.0);
             if let (Some(cache), Some(key)) = (&options.cache, key)
                 && let Err(problem) = cache.write(key, &solution)
             {
@@ -206,45 +212,50 @@ fn best(
         reached = part * COMPILER_PART;
         progress(reached);
     });
-    // one more, as splashes may have to go
-    let each = (1.0 - reached) / (ways.len() + 1) as f32;
+    let mut left = 2 * ways.len();
     let mut try_way = |world: &mut RelitWorld, way: Compiler| {
         way.tell(world);
-        let found = find_with_enough(world, silent, options, way, &mut |part| {
-            progress(reached + part * each);
+        // once more without splashes, unless there are none
+        let splashes = Cell::new(way.splashes);
+        let begin = reached;
+        left -= 1;
+        let found = find_with_enough(world, silent, options, way, &splashes, &mut |part| {
+            let tries = left + usize::from(!way.splashes || splashes.get());
+            reached = reached.max(begin + part * (1.0 - begin) / tries.max(1) as f32);
+            progress(reached);
         });
-        reached += each;
+        if way.splashes && !splashes.get() {
+            left -= 1;
+        }
         found
     };
     let off = |solution: &Solution| solution.report.after.median_stops;
-    let mut best: Option<(Compiler, Solution)> = None;
+    let mut best: Option<Solution> = None;
     for way in ways {
-        let found = try_way(world, way);
-        if best
-            .as_ref()
-            .is_none_or(|(_, best)| off(&found) < off(best))
-        {
-            best = Some((way, found));
+        let mut found = try_way(world, way);
+        if found.report.splashes > 0 {
+            let plain = Compiler {
+                splashes: false,
+                ..way
+            };
+            found = splashed_or_plain(found, try_way(world, plain));
+        }
+        if best.as_ref().is_none_or(|best| off(&found) < off(best)) {
+            best = Some(found);
         }
     }
-    let Some((way, splashed)) = best else {
-        return Solution::default();
-    };
-    if splashed.report.splashes == 0 {
-        return splashed;
-    }
-    // what they explain, lights that are put in explain as well in many a map, and with fewer
-    let plain = Compiler {
-        splashes: false,
-        ..way
-    };
-    let without = try_way(world, plain);
+    best.unwrap_or_default()
+}
+
+/// What splashes explain, lights that are put in explain as well in many a map, and with fewer.
+fn splashed_or_plain(splashed: Solution, plain: Solution) -> Solution {
+    let off = |solution: &Solution| solution.report.after.median_stops;
     let added = |solution: &Solution| solution.report.splashes + solution.report.placed;
-    let fewer = added(&splashed) <= added(&without) && off(&splashed) <= off(&without);
-    if fewer || off(&splashed) < off(&without) * SPLASHES_KEPT {
+    let fewer = added(&splashed) <= added(&plain) && off(&splashed) <= off(&plain);
+    if fewer || off(&splashed) < off(&plain) * SPLASHES_KEPT {
         splashed
     } else {
-        without
+        plain
     }
 }
 
@@ -257,6 +268,7 @@ fn find_with_enough(
     silent: &[u32],
     options: &CalibrationOptions,
     compiler: Compiler,
+    splashes: &Cell<bool>,
     progress: &mut dyn FnMut(f32),
 ) -> Solution {
     let mut reached = 0.0;
@@ -265,7 +277,7 @@ fn find_with_enough(
         silent,
         options,
         compiler,
-        Purpose::Enough(UNEXPLAINED),
+        Purpose::Enough(UNEXPLAINED, splashes),
         &mut |part| {
             reached = part;
             progress(part);
@@ -279,18 +291,18 @@ fn find_with_enough(
         cache: None,
         ..*options
     };
-    let last = Purpose::Enough(f32::INFINITY);
+    let last = Purpose::Enough(f32::INFINITY, splashes);
     let rest = &mut |part| progress(reached + part * (1.0 - reached));
     find(world, silent, &options, compiler, last, rest).unwrap_or_default()
 }
 
 /// What a solution is for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Purpose {
+enum Purpose<'a> {
     /// To compare one compiler with another: without the light grid and linear falloff.
     Trial,
-    /// To be kept if it leaves no more error than so many stops.
-    Enough(f32),
+    /// To be kept if it leaves no more error than so many stops. Told as soon as it is known: whether it has back splashes.
+    Enough(f32, &'a Cell<bool>),
 }
 
 /// Solves for a world's light. `silent`: skies of which directives tell nothing. `compiler`: what was done to light, which
@@ -302,7 +314,7 @@ fn find(
     silent: &[u32],
     options: &CalibrationOptions,
     compiler: Compiler,
-    purpose: Purpose,
+    purpose: Purpose<'_>,
     progress: &mut dyn FnMut(f32),
 ) -> Option<Solution> {
     progress(0.0);
@@ -354,6 +366,15 @@ fn find(
     let mut fit = Fit {
         world,
         occluders: &occluders,
+        silent,
+        of_triangle: bounce::surfaces_of_triangles(world),
+        taking,
+        beside: HashSet::new(),
+        tried: None,
+        splashes: match compiler.splashes {
+            true => splash::of(world),
+            false => Vec::new(),
+        },
         ambient: fit::first_ambient(world, &samples),
         samples,
         measured,
@@ -361,10 +382,7 @@ fn find(
         columns,
         crossings,
         least: world.light_end,
-        asked: match purpose {
-            Purpose::Trial => f32::INFINITY,
-            Purpose::Enough(asked) => asked,
-        },
+        purpose,
     };
     let first = std::mem::replace(&mut fit.ambient.value, world.ambient);
     fit.rebounce(true);
@@ -373,12 +391,11 @@ fn find(
     progress(0.25);
     fit.known();
     progress(0.3);
-    let splashes = match compiler.splashes {
-        true => splash::of(world),
-        false => Vec::new(),
-    };
-    let own = splash::columns(world, &occluders, &fit.samples, &splashes, &fit.columns);
-    fit.splash(own);
+    let own = splash::columns(world, &occluders, &fit.samples, &fit.splashes, &fit.columns);
+    let splashed = fit.splash(own);
+    if let Purpose::Enough(_, splashes) = purpose {
+        splashes.set(splashed);
+    }
     progress(0.35);
     if options.candidates > 0 {
         let start = fit.start();
@@ -404,7 +421,7 @@ fn find(
     solution.report.after = fit.agreement();
     solution.overall = fit.agreement_overall();
     solution.exposure = fit.exposure();
-    let columns = fit.columns;
+    let (columns, splashes) = (fit.columns, fit.splashes);
     solution.splashes = vec![Vec3::ZERO; splashes.len()];
     solution.known = columns.iter().take(known).map(|c| c.strength).collect();
     for column in columns.iter().skip(known) {

@@ -6,7 +6,7 @@
 //! is done once more.
 
 use super::bvh::Occluders;
-use super::columns::{Column, Lamp, Source, point_rows, unshadowed};
+use super::columns::{Column, Lamp, Source, point_rows, rows_again, unshadowed};
 use super::crossings::Crossing;
 use super::ends::pieces_of;
 use super::nodes::Measured;
@@ -86,10 +86,7 @@ pub(super) struct Scene<'a> {
 
 impl Scene<'_> {
     fn rows(&self, lamp: Lamp, range: f32) -> Vec<(u32, f32)> {
-        self.rows_of(self.samples, lamp, range)
-    }
-
-    fn rows_of(&self, samples: &[Sample], lamp: Lamp, range: f32) -> Vec<(u32, f32)> {
+        let samples = self.samples;
         point_rows(&self.world.bsp, self.occluders, samples, lamp, None, range)
     }
 
@@ -209,14 +206,16 @@ impl Scene<'_> {
     }
 }
 
-/// Adds lights out of a grid over open space to `columns`, of which the first `fixed` stay. Returns the grid's spacing.
-pub(super) fn over_space(
-    scene: &Scene<'_>,
-    crossings: &[Crossing],
-    columns: &mut Vec<Column>,
-    fixed: usize,
-    ambient: &mut Ambient,
-) -> f32 {
+/// Candidates all over open space.
+#[derive(Clone)]
+pub(super) struct Candidates {
+    columns: Vec<Column>,
+    /// The grid's spacing.
+    pub spacing: f32,
+}
+
+/// Candidates out of a grid over open space, and where directions of the light grid meet.
+pub(super) fn over_space(scene: &Scene<'_>, crossings: &[Crossing]) -> Candidates {
     let open = |at| scene.open(at);
     let (mut nodes, spacing) = scene.measured.grid(scene.world, scene.candidates, open);
     nodes.extend(
@@ -225,8 +224,22 @@ pub(super) fn over_space(
             .map(|c| c.origin)
             .filter(|&at| scene.open(at)),
     );
-    choose(scene, columns, fixed, ambient, &nodes, spacing);
-    spacing
+    Candidates {
+        columns: scene.columns(&nodes, RANGE),
+        spacing,
+    }
+}
+
+/// Adds lights out of candidates to `columns`, of which the first `fixed` stay.
+pub(super) fn out_of(
+    scene: &Scene<'_>,
+    candidates: Candidates,
+    columns: &mut Vec<Column>,
+    fixed: usize,
+    ambient: &mut Ambient,
+) {
+    columns.extend(candidates.columns);
+    choose(scene, columns, fixed, ambient, candidates.spacing);
 }
 
 /// Adds lights in front of what stays unexplained.
@@ -239,19 +252,18 @@ pub(super) fn in_front(
 ) {
     let state = residual(scene.samples, columns, ambient.value);
     let fronts = scene.in_front(&state);
-    choose(scene, columns, fixed, ambient, &fronts, spacing * 0.5);
+    columns.extend(scene.columns(&fronts, RANGE));
+    choose(scene, columns, fixed, ambient, spacing * 0.5);
 }
 
-/// Tries candidates beside the lights placed so far; keeps the best, merged, moved and solved anew.
+/// Of candidates and lights placed so far keeps the best, merged, moved and solved anew.
 fn choose(
     scene: &Scene<'_>,
     columns: &mut Vec<Column>,
     known: usize,
     ambient: &mut Ambient,
-    candidates: &[Vec3],
     spacing: f32,
 ) {
-    columns.extend(scene.columns(candidates, RANGE));
     let sparse = Effort {
         rounds: 4,
         sweeps: 16,
@@ -432,7 +444,12 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
             (0.0, Vec3::ZERO)
         }
     };
-    let seen = |lamp: Lamp| scene.rows_of(&judged, lamp, f32::INFINITY);
+    // What stops light on its way to a sample stops it as well from a place beside.
+    let mut stopped = vec![None; judged.len()];
+    let mut seen = |lamp: Lamp| {
+        let (bsp, all) = (&scene.world.bsp, (None, f32::INFINITY));
+        rows_again(bsp, scene.occluders, &judged, lamp, all, &mut stopped)
+    };
     let mut best = (start, worth(start, &seen(start)));
     for _ in 0..2 {
         let from = best.0;

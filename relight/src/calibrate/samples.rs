@@ -235,6 +235,18 @@ pub(super) struct Gauge<'a> {
     pub seed: u64,
 }
 
+impl<'a> Gauge<'a> {
+    /// What measurements are taken of in a way.
+    pub fn new(world: &'a RelitWorld, occluders: &'a Occluders, taking: &Taking) -> Gauge<'a> {
+        Gauge {
+            world,
+            occluders,
+            dirt: taking.dirt,
+            seed: taking.seed,
+        }
+    }
+}
+
 /// How measurements are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Taking {
@@ -255,12 +267,7 @@ pub(super) fn take(
     taking: &Taking,
 ) -> (Vec<Sample>, Evidence) {
     let mut random = Random::new(taking.seed);
-    let gauge = Gauge {
-        world,
-        occluders,
-        dirt: taking.dirt,
-        seed: taking.seed,
-    };
+    let gauge = Gauge::new(world, occluders, taking);
     let count = taking.count;
     let lightmaps = texels::take(&gauge, count, taking.few_black, &mut random);
     // A few lightmapped scraps say nothing about the rest.

@@ -151,7 +151,7 @@ pub(super) fn take(
 }
 
 /// Page, column and row of a texel.
-type TexelId = [u32; 3];
+pub(super) type TexelId = [u32; 3];
 
 /// A texel that light is measured at.
 struct Texel {
@@ -262,12 +262,22 @@ fn texel(
     surface: &WorldSurface,
     random: &mut Random,
 ) -> Option<Texel> {
+    let [a, b, c] = corners(world, triangle)?.map(|c| c.lightmap);
+    let (u, v) = random.in_triangle();
+    texel_at(world, triangle, surface, a + (b - a) * u + (c - a) * v)
+}
+
+/// The texel at a place of its page (0 to 1).
+fn texel_at(
+    world: &RelitWorld,
+    triangle: usize,
+    surface: &WorldSurface,
+    at: Vec2,
+) -> Option<Texel> {
     let number = usize::try_from(surface.lightmap).ok()?;
     let page = world.bsp.lightmaps.get(number)?;
     let size = page.size() as f32;
-    let (u, v) = random.in_triangle();
-    let [a, b, c] = corners(world, triangle)?.map(|c| c.lightmap * size);
-    let cell = (a + (b - a) * u + (c - a) * v).floor();
+    let cell = (at * size).floor();
     if !(cell.min_element() >= 0.0 && cell.max_element() < size) {
         return None;
     }
@@ -295,13 +305,40 @@ pub(super) fn stored_at(
     at: Vec3,
 ) -> Option<Vec3> {
     let own = world.surfaces.get(surface)?;
-    if !tells(world, own) || !constant(world, surface) {
-        return None;
-    }
     let page = world
         .bsp
         .lightmaps
         .get(usize::try_from(own.lightmap).ok()?)?;
+    let cell = (page_place(world, surface, triangle, at)? * page.size() as f32).floor();
+    if !(cell.min_element() >= 0.0 && cell.max_element() < page.size() as f32) {
+        return None;
+    }
+    let scale = stored_scale(world, own);
+    let stored = Stored::texel(page, cell.x as usize, cell.y as usize, scale);
+    (!stored.lone_black && !stored.rgb.contains(&255)).then(|| stored.light(world))
+}
+
+/// The measurement of the texel where a ray met a triangle; `None` where it tells nothing.
+pub(super) fn sample_on(
+    gauge: &Gauge<'_>,
+    surface: usize,
+    triangle: usize,
+    at: Vec3,
+) -> Option<(TexelId, Sample)> {
+    let place = page_place(gauge.world, surface, triangle, at)?;
+    let own = gauge.world.surfaces.get(surface)?;
+    let found = texel_at(gauge.world, triangle, own, place)?;
+    let mut sample = sample_at(gauge, found.place, found.material, found.stored)?;
+    sample.held_out = is_held_out(gauge.seed, &found.id);
+    Some((found.id, sample))
+}
+
+/// Where in its page (0 to 1) a place on a triangle lies; `None` for surfaces that tell of no light.
+fn page_place(world: &RelitWorld, surface: usize, triangle: usize, at: Vec3) -> Option<Vec2> {
+    let own = world.surfaces.get(surface)?;
+    if !lit_by_texel(own) || !tells(world, own) || !constant(world, surface) {
+        return None;
+    }
     let [a, b, c] = corners(world, triangle)?;
     let (e1, e2, offset) = (
         b.position - a.position,
@@ -315,14 +352,7 @@ pub(super) fn stored_at(
     }
     let u = offset.cross(e2).dot(normal) / squared;
     let v = e1.cross(offset).dot(normal) / squared;
-    let place = a.lightmap + (b.lightmap - a.lightmap) * u + (c.lightmap - a.lightmap) * v;
-    let cell = (place * page.size() as f32).floor();
-    if !(cell.min_element() >= 0.0 && cell.max_element() < page.size() as f32) {
-        return None;
-    }
-    let scale = stored_scale(world, own);
-    let stored = Stored::texel(page, cell.x as usize, cell.y as usize, scale);
-    (!stored.lone_black && !stored.rgb.contains(&255)).then(|| stored.light(world))
+    Some(a.lightmap + (b.lightmap - a.lightmap) * u + (c.lightmap - a.lightmap) * v)
 }
 
 /// What the compiler multiplied a surface's light by before it stored it.

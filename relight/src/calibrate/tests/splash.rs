@@ -57,8 +57,13 @@ fn the_light_in_front_of_a_lamp_is_found_as_one() {
 #[test]
 fn lamps_without_such_lights_get_none() {
     let mut world = room(true, Some(&from_lamp(0.0)));
-    let report = calibrate(&mut world, &small());
+    let mut told = vec![0.0];
+    let report = calibrate_with(&mut world, &small(), &mut |part| told.push(part));
     assert_eq!(report.splashes, 0, "{report:?}");
+    // Nor does progress wait for a try without them.
+    let steps = told.windows(2).map(|pair| pair[1] - pair[0]);
+    let longest = steps.fold(0.0, f32::max);
+    assert!(longest < 0.3, "{longest} {told:?}");
 }
 
 #[test]

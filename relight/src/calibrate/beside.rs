@@ -1,0 +1,249 @@
+//! Texels right beside point lights.
+//!
+//! A point is brightest on the surface beside it, in a spot that falls between measurements. So once lights have been put
+//! in, the texels around each are looked at, and those that they make too bright join the measurements: what follows is
+//! fitted to them, too.
+
+use super::bounce::surfaces_of_triangles;
+use super::columns::{self, Column, Lamp, Source, point_rows, sun_rows};
+use super::ends::pieces_of;
+use super::fit::Fit;
+use super::samples::{self, Gauge, Sample, Taking};
+use super::texels::{self, TexelId};
+use super::{Occluders, Purpose, parallel, said, splash};
+use crate::world::RelitWorld;
+use glam::Vec3;
+use std::collections::HashSet;
+use std::f32::consts::{PI, TAU};
+
+/// How far around a light texels are looked at, id units: farther off there are measurements enough.
+pub(super) const NEAR: f32 = 128.0;
+
+/// Directions from each light that are looked into.
+const LOOKS: usize = 160;
+
+/// Texels that lights make so many times as bright as they are join the measurements.
+const EXCESS: f32 = 1.3;
+
+/// Most texels that join for each light.
+const MOST: usize = 12;
+
+/// How much one of them tells, beside other measurements: they stand for less of the map.
+const TRUST: f32 = 0.3;
+
+/// Part of stored light below which a light does not matter to what is too bright.
+const PART: f32 = 0.05;
+
+/// Directions from each light that [`spots`] looks into.
+const COUNTED: usize = 512;
+
+/// How many times as bright as it is a texel has to be made to be a spot: a stop.
+const SPOT: f32 = 2.0;
+
+/// Even directions over the sphere.
+///
+/// Source: González 2010, the lattice of the golden ratio.
+fn directions(count: usize) -> impl Iterator<Item = Vec3> {
+    let golden = TAU / (1.0 + 5.0f32.sqrt()) * 2.0;
+    (0..count).map(move |k| {
+        let z = 1.0 - (2 * k + 1) as f32 / count as f32;
+        let (sin, cos) = (k as f32 * golden).sin_cos();
+        let radius = (1.0 - z * z).max(0.0).sqrt();
+        Vec3::new(radius * cos, radius * sin, z)
+    })
+}
+
+/// Measurements of texels that are seen from a place within [`NEAR`], by about so many rays, each once.
+pub(super) fn around(
+    gauge: &Gauge<'_>,
+    of_triangle: &[u32],
+    origin: Vec3,
+    rays: usize,
+) -> Vec<(TexelId, Sample)> {
+    let mut taken = HashSet::new();
+    let look = |ray: Vec3| {
+        let hit = gauge.occluders.nearest(origin, ray, NEAR)?;
+        let triangle = hit.tag as usize;
+        let surface = *of_triangle.get(triangle)? as usize;
+        if !hit.front || hit.sky {
+            return None;
+        }
+        let (id, sample) = texels::sample_on(gauge, surface, triangle, origin + ray * hit.t)?;
+        taken.insert(id).then_some((id, sample))
+    };
+    directions(rays).filter_map(look).collect()
+}
+
+impl Fit<'_> {
+    /// Lets texels right beside lights that were put in join the measurements where these make them too bright. `fixed`:
+    /// how many of the sources were there before. Whether some did.
+    pub fn look_beside(&mut self, fixed: usize) -> bool {
+        if self.purpose == Purpose::Trial {
+            return false;
+        }
+        let gauge = Gauge::new(self.world, self.occluders, &self.taking);
+        let placed: Vec<(Lamp, Vec3)> = self.columns.iter().skip(fixed).filter_map(lit).collect();
+        let per_light = parallel::map(&placed, |_, &(lamp, _)| {
+            let found = around(&gauge, &self.of_triangle, lamp.origin, LOOKS);
+            let usable = |(id, s): &(TexelId, Sample)| {
+                !s.held_out && !s.saturated && s.trust >= 1.0 && !self.beside.contains(id)
+            };
+            let found: Vec<_> = found.into_iter().filter(usable).collect();
+            let samples: Vec<Sample> = found.iter().map(|(_, s)| *s).collect();
+            let given = given_by(self.world, self.occluders, &samples, &placed, self.least);
+            let mut bright: Vec<(f32, TexelId, Sample)> = found
+                .into_iter()
+                .zip(given)
+                .map(|((id, s), given)| ((given + s.floor) / (s.level() + s.floor), id, s))
+                .filter(|(excess, ..)| *excess > EXCESS)
+                .collect();
+            bright.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            bright.truncate(MOST);
+            bright
+        });
+        let mut more = Vec::new();
+        for (_, id, sample) in per_light.into_iter().flatten() {
+            if self.beside.insert(id) {
+                more.push(Sample {
+                    trust: TRUST,
+                    ..sample
+                });
+            }
+        }
+        if more.is_empty() {
+            return false;
+        }
+        self.join(&more);
+        true
+    }
+
+    /// Adds measurements to those that sources are fitted to.
+    fn join(&mut self, more: &[Sample]) {
+        let (world, occluders, silent) = (self.world, self.occluders, self.silent);
+        let first = self.samples.len() as u32;
+        let mut known = columns::known(world, occluders, more, silent).into_iter();
+        let splashes = splash::columns(world, occluders, more, &self.splashes, &[]);
+        for column in &mut self.columns {
+            let rows = |lamp| point_rows(&world.bsp, occluders, more, lamp, None, f32::INFINITY);
+            let (rows, pieces) = match column.source {
+                Source::Group(..) | Source::Entity(_) | Source::Sun(_) => match known.next() {
+                    Some(found) => (found.rows, found.pieces),
+                    None => continue,
+                },
+                Source::Splash(index) => match splashes.get(index as usize) {
+                    Some(found) => (found.rows.clone(), found.pieces.clone()),
+                    None => continue,
+                },
+                Source::FoundSun(direction) => (sun_rows(occluders, more, direction), Vec::new()),
+                Source::Placed(lamp) => {
+                    let rows = rows(lamp);
+                    let pieces = match self.least > 0.0 {
+                        true => pieces_of(&rows),
+                        false => Vec::new(),
+                    };
+                    (rows, pieces)
+                }
+            };
+            let after = |i: u32| first + i;
+            column
+                .rows
+                .extend(rows.into_iter().map(|(i, a)| (after(i), a)));
+            column.pieces.extend(pieces.into_iter().map(|mut piece| {
+                piece.sample = after(piece.sample);
+                piece
+            }));
+        }
+        let unlisted = |material| silent.contains(&material);
+        let lit = &self.samples;
+        self.transfer.add(world, occluders, lit, more, unlisted);
+        self.samples.extend_from_slice(more);
+    }
+}
+
+/// A light that was put in and is lit.
+fn lit(column: &Column) -> Option<(Lamp, Vec3)> {
+    match column.source {
+        Source::Placed(lamp) if column.strength != Vec3::ZERO => Some((lamp, column.strength)),
+        _ => None,
+    }
+}
+
+/// Light, mean of the channels, irradiance / π, that lights give to samples which lie near to each other.
+fn given_by(
+    world: &RelitWorld,
+    occluders: &Occluders,
+    samples: &[Sample],
+    lights: &[(Lamp, Vec3)],
+    least: f32,
+) -> Vec<f32> {
+    let mut sums = vec![0.0; samples.len()];
+    let Some(first) = samples.first() else {
+        return sums;
+    };
+    for &(lamp, strength) in lights {
+        // what gives less than a part of what is stored does not make it too bright
+        let power = samples::mean(strength);
+        let reach = (power / (PI * PART * (first.level() + first.floor).max(1e-6))).sqrt();
+        if lamp.origin.distance(first.position) > reach + NEAR * 2.0 {
+            continue;
+        }
+        let rows = point_rows(&world.bsp, occluders, samples, lamp, None, f32::INFINITY);
+        for (i, a) in rows {
+            let ends = strength.max_element() * a <= least;
+            if let Some(sum) = sums.get_mut(i as usize).filter(|_| !ends) {
+                *sum += power * a;
+            }
+        }
+    }
+    sums
+}
+
+/// How point lights light the texels beside them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Spots {
+    /// Texels within 128 units of a point light, of those that tell how bright it was.
+    pub texels: usize,
+    /// Of these, such that point lights alone make more than a stop too bright.
+    pub too_bright: usize,
+}
+
+/// Looks for spots of light beside the point lights of a world as it is, calibrated or not, that its lightmaps do not have.
+pub fn spots(world: &RelitWorld) -> Spots {
+    let occluders = samples::occluders(world);
+    let dirty = world
+        .calibration
+        .as_ref()
+        .is_some_and(|report| report.dirty);
+    let taking = Taking {
+        dirt: dirty.then(|| said::dirt(&world.bsp.entities())),
+        ..Default::default()
+    };
+    let gauge = Gauge::new(world, &occluders, &taking);
+    let of_triangle = surfaces_of_triangles(world);
+    let lights: Vec<(Lamp, Vec3)> = (world.point_lights.iter())
+        .filter(|light| light.spot.is_none())
+        .map(|light| {
+            let (origin, falloff) = (light.origin, light.falloff);
+            (Lamp { origin, falloff }, light.intensity)
+        })
+        .collect();
+    let found = parallel::map(&lights, |_, &(lamp, _)| {
+        let mut found = around(&gauge, &of_triangle, lamp.origin, COUNTED);
+        found.retain(|(_, s)| !s.saturated && s.trust >= 1.0);
+        let samples: Vec<Sample> = found.iter().map(|(_, s)| *s).collect();
+        let given = given_by(world, &occluders, &samples, &lights, world.light_end);
+        let bright = samples.iter().zip(given);
+        let bright = bright.map(|(s, given)| given + s.floor > SPOT * (s.level() + s.floor));
+        let found: Vec<(TexelId, bool)> = found.into_iter().map(|(id, _)| id).zip(bright).collect();
+        found
+    });
+    let mut spots = Spots::default();
+    let mut counted = HashSet::new();
+    for (id, bright) in found.into_iter().flatten() {
+        if counted.insert(id) {
+            spots.texels += 1;
+            spots.too_bright += usize::from(bright);
+        }
+    }
+    spots
+}
