@@ -1,18 +1,25 @@
-//! Shadow rays on the CPU: a bounding volume hierarchy over the triangles that stop light.
+//! Shadow rays on the CPU: a bounding volume hierarchy over the triangles that stop light, four children to a node and four
+//! triangles to a leaf, so that a ray meets four at a time.
 //!
-//! Source: Möller and Trumbore 1997 for the triangle, the slab test for boxes, Wald 2007 for splits by
-//! the surface area heuristic over bins along the longest
-//! axis.
+//! Source: Möller and Trumbore 1997 for the triangle, the slab test for boxes, Dammertz et al. 2008 for four at a time.
+
+mod build;
+#[cfg(test)]
+mod tests;
 
 use crate::world::Holes;
-use glam::{Vec2, Vec3, Vec3A};
+use build::Binary;
+use glam::{Vec2, Vec3, Vec4};
 use std::sync::Arc;
 
-/// Triangles of a leaf.
-const LEAF: usize = 4;
+/// Triangles of a leaf, and children of a node.
+const WIDE: usize = 4;
 
-/// Depth of the stack of a walk. Halves of halves: 2^64 triangles fit.
-const STACK: usize = 96;
+/// Nodes of a walk that are kept without taking from the heap: more than maps need as a rule.
+const STACK: usize = 48;
+
+/// Set in references to leaves; the rest of them is the leaf's index.
+const LEAF: u32 = 1 << 31;
 
 /// What a ray found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,17 +34,11 @@ pub(crate) struct Hit {
     pub tag: u32,
     /// Unit normal of its front.
     pub normal: Vec3,
-    /// Place of the triangle in the tree.
-    index: u32,
-    /// Barycentric coordinates of the second and third corner.
-    at: [f32; 2],
 }
 
+/// What is known of a triangle beside its shape.
 #[derive(Clone, Copy)]
-struct Triangle {
-    a: Vec3A,
-    e1: Vec3A,
-    e2: Vec3A,
+struct Kind {
     sky: bool,
     tag: u32,
     /// Index of its [`CutOut`]; `u32::MAX` for triangles without holes.
@@ -52,432 +53,402 @@ pub(crate) struct CutOut {
     pub holes: Arc<Holes>,
 }
 
-#[derive(Clone, Copy)]
+/// Four vectors, an axis at a time.
+type Four = [Vec4; 3];
+
+/// The boxes of a node's children.
 struct Node {
-    mins: Vec3A,
-    maxs: Vec3A,
-    /// Leaf: first triangle. Inner node: its right child; the left one follows the node.
-    first: u32,
-    /// Triangles of a leaf; 0 for inner nodes.
-    count: u16,
-    /// Axis of the split; the left child lies lower on it.
-    axis: u16,
+    mins: Four,
+    maxs: Four,
+    /// Nodes, or leaves (with [`LEAF`]).
+    children: [u32; WIDE],
+    /// Which of them are there, a bit for each.
+    there: u32,
+}
+
+/// Triangles. Where there are fewer than four the rest have no area, so that nothing meets them.
+struct Leaf {
+    a: Four,
+    e1: Four,
+    e2: Four,
+    kinds: [Kind; WIDE],
 }
 
 /// Triangles that stop light, sorted into boxes.
 pub(crate) struct Occluders {
     nodes: Vec<Node>,
-    triangles: Vec<Triangle>,
+    leaves: Vec<Leaf>,
     cut_outs: Vec<CutOut>,
+}
+
+/// Largest part of a reciprocal: what is finite gives a number, not NaN, for a ray along an axis.
+const STEEPEST: Vec3 = Vec3::splat(1e30);
+
+/// A ray as four alike.
+struct Ray {
+    from: Four,
+    way: Four,
+    inverse: Four,
+}
+
+impl Ray {
+    fn new(from: Vec3, way: Vec3) -> Ray {
+        let splat = |v: Vec3| v.to_array().map(Vec4::splat);
+        Ray {
+            from: splat(from),
+            way: splat(way),
+            inverse: splat(way.recip().clamp(-STEEPEST, STEEPEST)),
+        }
+    }
+}
+
+/// Where a ray meets the planes of a leaf's triangles.
+struct Meeting {
+    /// Those of the triangles that it meets, a bit for each.
+    mask: u32,
+    t: Vec4,
+    u: Vec4,
+    v: Vec4,
+    determinant: Vec4,
 }
 
 impl Occluders {
     /// Builds the tree over (corners, is sky, tag).
     pub fn new(input: impl Iterator<Item = ([Vec3; 3], bool, u32)>) -> Occluders {
-        let mut triangles: Vec<(Triangle, Vec3A)> = input
+        let kept: Vec<([Vec3; 3], Kind)> = input
             .filter(|(corners, ..)| corners.iter().all(|c| c.is_finite()))
             .map(|(corners, sky, tag)| {
-                let [a, b, c] = corners.map(Vec3A::from);
-                let triangle = Triangle {
-                    a,
-                    e1: b - a,
-                    e2: c - a,
-                    sky,
-                    tag,
-                    cut_out: u32::MAX,
-                };
-                (triangle, a.min(b).min(c) + a.max(b).max(c))
+                let cut_out = u32::MAX;
+                (corners, Kind { sky, tag, cut_out })
             })
             .collect();
-        let mut nodes = Vec::with_capacity(triangles.len());
-        if !triangles.is_empty() {
-            build(&mut nodes, &mut triangles, 0);
-        }
-        Occluders {
-            nodes,
-            triangles: triangles.into_iter().map(|(t, _)| t).collect(),
+        let mut occluders = Occluders {
+            nodes: Vec::new(),
+            leaves: Vec::new(),
             cut_outs: Vec::new(),
+        };
+        if let Some(root) = build::build(kept) {
+            // The root is a node even if all that there is is a leaf.
+            occluders.add(vec![root]);
         }
+        occluders
+    }
+
+    /// Adds a node with these children, taking up theirs in place of them as long as there is room; its index.
+    fn add(&mut self, mut children: Vec<Binary>) -> u32 {
+        while children.len() < WIDE {
+            let inner = |(_, c): &(usize, &Binary)| c.halves.is_ok();
+            let area = |(_, c): &(usize, &Binary)| c.bounds.area();
+            let largest = (children.iter().enumerate().filter(inner))
+                .max_by(|a, b| area(a).total_cmp(&area(b)))
+                .map(|(i, _)| i);
+            let Some(largest) = largest else {
+                break;
+            };
+            let taken = children.swap_remove(largest);
+            if let Ok(halves) = taken.halves {
+                children.extend(*halves);
+            }
+        }
+        let index = self.nodes.len();
+        let boxes = || children.iter().map(|c| c.bounds.padded());
+        self.nodes.push(Node {
+            mins: four(boxes().map(|(mins, _)| mins)),
+            maxs: four(boxes().map(|(_, maxs)| maxs)),
+            children: [0; WIDE],
+            there: (1 << children.len()) - 1,
+        });
+        for (i, child) in children.into_iter().enumerate() {
+            let reference = match child.halves {
+                Ok(halves) => self.add((*halves).into()),
+                Err(triangles) => {
+                    self.leaves.push(Leaf::new(&triangles));
+                    (self.leaves.len() - 1) as u32 | LEAF
+                }
+            };
+            if let Some(slot) = self
+                .nodes
+                .get_mut(index)
+                .and_then(|n| n.children.get_mut(i))
+            {
+                *slot = reference;
+            }
+        }
+        index as u32
     }
 
     /// Cuts holes: `cut_out` tells of a triangle's tag whether it has some.
     pub fn cut(mut self, cut_out: impl Fn(u32) -> Option<CutOut>) -> Occluders {
-        for triangle in self.triangles.iter_mut().filter(|t| !t.sky) {
-            if let Some(found) = cut_out(triangle.tag) {
-                triangle.cut_out = self.cut_outs.len() as u32;
+        let kinds = self.leaves.iter_mut().flat_map(|leaf| &mut leaf.kinds);
+        for kind in kinds.filter(|kind| !kind.sky) {
+            if let Some(found) = cut_out(kind.tag) {
+                kind.cut_out = self.cut_outs.len() as u32;
                 self.cut_outs.push(found);
             }
         }
         self
     }
 
-    /// Where a ray meets a triangle, unless it is a hole there. Of what is drawn from both sides both are fronts.
-    fn meet(&self, triangle: &Triangle, from: Vec3A, ray: Vec3A, limit: f32) -> Option<Hit> {
-        let mut hit = meet(triangle, from, ray, limit)?;
-        if let Some(CutOut { st, holes }) = self.cut_outs.get(triangle.cut_out as usize) {
+    /// What a ray meets of a leaf's triangle, unless it is a hole there. Of what is drawn from both sides both are fronts.
+    fn hit(&self, leaf: &Leaf, meeting: &Meeting, lane: usize) -> Option<Hit> {
+        let kind = leaf.kinds.get(lane)?;
+        // The determinant is positive against the counter-clockwise side.
+        let mut front = meeting.determinant[lane] < 0.0;
+        // Clockwise corners: the front is the other way.
+        let mut normal = at(&leaf.e2, lane)
+            .cross(at(&leaf.e1, lane))
+            .normalize_or_zero();
+        if let Some(CutOut { st, holes }) = self.cut_outs.get(kind.cut_out as usize) {
             let [a, b, c] = *st;
-            let [u, v] = hit.at;
-            if !holes.is_solid(a + (b - a) * u + (c - a) * v) {
+            if !holes.is_solid(a + (b - a) * meeting.u[lane] + (c - a) * meeting.v[lane]) {
                 return None;
             }
-            if holes.two_sided && !hit.front {
-                hit.front = true;
-                hit.normal = -hit.normal;
+            if holes.two_sided && !front {
+                (front, normal) = (true, -normal);
             }
         }
-        Some(hit)
+        Some(Hit {
+            t: meeting.t[lane],
+            sky: kind.sky,
+            front,
+            tag: kind.tag,
+            normal,
+        })
+    }
+
+    /// Whether a leaf stops a ray.
+    fn stops(&self, leaf: u32, ray: &Ray, through_sky: bool) -> bool {
+        let Some(leaf) = self.leaves.get(leaf as usize) else {
+            return false;
+        };
+        let meeting = leaf.meet(ray, SHORT);
+        lanes(meeting.mask).any(|lane| {
+            let hit = self.hit(leaf, &meeting, lane);
+            hit.is_some_and(|hit| !(through_sky && hit.sky))
+        })
     }
 
     /// Whether some triangle is sky.
     pub fn any_sky(&self) -> bool {
-        self.triangles.iter().any(|t| t.sky)
+        let mut kinds = self.leaves.iter().flat_map(|leaf| &leaf.kinds);
+        kinds.any(|kind| kind.sky)
     }
 
     /// Whether something lies on the way. `through_sky`: sky does not count.
     pub fn blocked(&self, from: Vec3, to: Vec3, through_sky: bool) -> bool {
-        self.walk(from, to - from, 0.9999, true, |sky| !(through_sky && sky))
-            .is_some()
+        let ray = Ray::new(from, to - from);
+        self.walk(&ray, SHORT, |leaf, _| self.stops(leaf, &ray, through_sky))
     }
 
     /// As [`blocked`](Self::blocked) where sky counts; `last` is what stopped an earlier ray: it is asked first, for
     /// rays from about one place to another are often stopped by the same triangle.
     pub fn blocked_again(&self, from: Vec3, to: Vec3, last: &mut Option<u32>) -> bool {
-        let ray = to - from;
-        let known = last.and_then(|index| self.triangles.get(index as usize));
-        if known.is_some_and(|t| {
-            let hit = self.meet(t, from.into(), ray.into(), 0.9999);
-            hit.is_some()
-        }) {
+        let ray = Ray::new(from, to - from);
+        if last.is_some_and(|leaf| self.stops(leaf, &ray, false)) {
             return true;
         }
-        match self.walk(from, ray, 0.9999, true, |_| true) {
-            Some(hit) => {
-                *last = Some(hit.index);
-                true
+        self.walk(&ray, SHORT, |leaf, _| {
+            let stopped = self.stops(leaf, &ray, false);
+            if stopped {
+                *last = Some(leaf);
             }
-            None => false,
-        }
+            stopped
+        })
     }
 
     /// The nearest hit before `limit` lengths of `ray`.
     pub fn nearest(&self, from: Vec3, ray: Vec3, limit: f32) -> Option<Hit> {
-        self.walk(from, ray, limit, false, |_| true)
+        let ray = Ray::new(from, ray);
+        let mut nearest: Option<Hit> = None;
+        self.walk(&ray, limit, |index, limit| {
+            let Some(leaf) = self.leaves.get(index as usize) else {
+                return false;
+            };
+            let meeting = leaf.meet(&ray, *limit);
+            for lane in lanes(meeting.mask) {
+                if meeting.t[lane] < *limit
+                    && let Some(hit) = self.hit(leaf, &meeting, lane)
+                {
+                    *limit = hit.t;
+                    nearest = Some(hit);
+                }
+            }
+            false
+        });
+        nearest
     }
 
-    /// Walks the tree for hits on triangles that count (told whether they are sky): the first one met when `any`
-    /// will do, else the nearest.
-    fn walk(
-        &self,
-        from: Vec3,
-        ray: Vec3,
-        mut limit: f32,
-        any: bool,
-        counts: impl Fn(bool) -> bool,
-    ) -> Option<Hit> {
-        let (from, ray) = (Vec3A::from(from), Vec3A::from(ray));
-        let inverse = ray.recip();
-        let down = ray.cmplt(Vec3A::ZERO).bitmask();
-        let mut nearest = None;
-        let mut stack = [0u32; STACK];
-        let mut depth = 0;
-        let mut at = 0u32;
+    /// Shows the leaves that a ray comes to before `limit`, near ones first, until `leaf` has seen enough (true) or all;
+    /// whether it has. It may lower the limit.
+    fn walk(&self, ray: &Ray, mut limit: f32, mut leaf: impl FnMut(u32, &mut f32) -> bool) -> bool {
+        let mut stack = Stack::new();
+        let mut next = (!self.nodes.is_empty()).then_some(0);
+        while let Some(at) = next.take().or_else(|| stack.pop(limit)) {
+            if at & LEAF != 0 {
+                if leaf(at & !LEAF, &mut limit) {
+                    return true;
+                }
+                continue;
+            }
+            let Some(node) = self.nodes.get(at as usize) else {
+                continue;
+            };
+            let (mask, near) = node.enters(ray, limit);
+            let near = near.to_array();
+            let from = stack.depth;
+            for lane in lanes(mask) {
+                stack.push(node.children[lane], near[lane], from);
+            }
+        }
+        false
+    }
+}
+
+/// Part of the way to a place beyond which it is the place itself that is met.
+const SHORT: f32 = 0.9999;
+
+/// What a walk has still to see.
+struct Stack {
+    /// References, and where on the ray their boxes begin.
+    entries: [(u32, f32); STACK],
+    depth: usize,
+    /// What does not fit.
+    more: Vec<(u32, f32)>,
+}
+
+impl Stack {
+    fn new() -> Stack {
+        Stack {
+            entries: [(0, 0.0); STACK],
+            depth: 0,
+            more: Vec::new(),
+        }
+    }
+
+    /// Adds a child. Of those above `from`, which are its node's, the nearest stays on top.
+    fn push(&mut self, reference: u32, near: f32, from: usize) {
+        let Some(slot) = self.entries.get_mut(self.depth) else {
+            self.more.push((reference, near));
+            return;
+        };
+        *slot = (reference, near);
+        let mut at = self.depth;
+        self.depth += 1;
+        while at > from && self.entries[at - 1].1 < near {
+            self.entries.swap(at - 1, at);
+            at -= 1;
+        }
+    }
+
+    /// The next that begins before the limit.
+    fn pop(&mut self, limit: f32) -> Option<u32> {
         loop {
-            let node = self.nodes.get(at as usize)?;
-            if enters(node, from, inverse, limit) {
-                if node.count == 0 {
-                    let (near, far) = if down >> node.axis & 1 == 0 {
-                        (at + 1, node.first)
-                    } else {
-                        (node.first, at + 1)
-                    };
-                    if let Some(slot) = stack.get_mut(depth) {
-                        *slot = far;
-                        depth += 1;
-                    }
-                    at = near;
-                    continue;
+            let (reference, near) = match self.more.pop() {
+                Some(entry) => entry,
+                None => {
+                    self.depth = self.depth.checked_sub(1)?;
+                    *self.entries.get(self.depth)?
                 }
-                let first = node.first as usize;
-                let range = first..first + usize::from(node.count);
-                for (triangle, index) in self
-                    .triangles
-                    .get(range)
-                    .unwrap_or_default()
-                    .iter()
-                    .zip(node.first..)
-                {
-                    if counts(triangle.sky)
-                        && let Some(hit) = self.meet(triangle, from, ray, limit)
-                    {
-                        let hit = Hit { index, ..hit };
-                        if any {
-                            return Some(hit);
-                        }
-                        limit = hit.t;
-                        nearest = Some(hit);
-                    }
-                }
+            };
+            if near <= limit {
+                return Some(reference);
             }
-            if depth == 0 {
-                return nearest;
-            }
-            depth -= 1;
-            at = stack.get(depth).copied().unwrap_or(0);
         }
     }
 }
 
-/// Whether a ray comes into a box before `limit`. NaN (a ray along a face of the box) counts as inside.
-fn enters(node: &Node, from: Vec3A, inverse: Vec3A, limit: f32) -> bool {
-    let a = (node.mins - from) * inverse;
-    let b = (node.maxs - from) * inverse;
-    let near = a.min(b).max_element();
-    let far = a.max(b).min_element();
-    !(near > far || far < 0.0 || near > limit)
+impl Node {
+    /// The children whose boxes a ray comes into before `limit`, a bit for each, and where.
+    fn enters(&self, ray: &Ray, limit: f32) -> (u32, Vec4) {
+        let mut near = Vec4::ZERO;
+        let mut far = Vec4::splat(limit);
+        for k in 0..3 {
+            let a = (self.mins[k] - ray.from[k]) * ray.inverse[k];
+            let b = (self.maxs[k] - ray.from[k]) * ray.inverse[k];
+            near = near.max(a.min(b));
+            far = far.min(a.max(b));
+        }
+        (near.cmple(far).bitmask() & self.there, near)
+    }
 }
 
-/// Where a ray meets a triangle, from either side.
-fn meet(triangle: &Triangle, from: Vec3A, ray: Vec3A, limit: f32) -> Option<Hit> {
-    let p = ray.cross(triangle.e2);
-    let determinant = triangle.e1.dot(p);
-    if determinant == 0.0 {
-        return None;
+impl Leaf {
+    fn new(triangles: &[([Vec3; 3], Kind)]) -> Leaf {
+        let none = Kind {
+            sky: false,
+            tag: u32::MAX,
+            cut_out: u32::MAX,
+        };
+        let kind = |i: usize| triangles.get(i).map_or(none, |(_, kind)| *kind);
+        let corners = || triangles.iter().map(|(corners, _)| *corners);
+        Leaf {
+            a: four(corners().map(|[a, ..]| a)),
+            e1: four(corners().map(|[a, b, _]| b - a)),
+            e2: four(corners().map(|[a, _, c]| c - a)),
+            kinds: [kind(0), kind(1), kind(2), kind(3)],
+        }
     }
-    let inverse = 1.0 / determinant;
-    let s = from - triangle.a;
-    let u = s.dot(p) * inverse;
-    if !(0.0..=1.0).contains(&u) {
-        return None;
+
+    /// Where a ray meets the triangles, from either side.
+    fn meet(&self, ray: &Ray, limit: f32) -> Meeting {
+        let p = cross(&ray.way, &self.e2);
+        let determinant = dot(&self.e1, &p);
+        let inverse = 1.0 / determinant;
+        let s = [0, 1, 2].map(|k| ray.from[k] - self.a[k]);
+        let u = dot(&s, &p) * inverse;
+        let q = cross(&s, &self.e1);
+        let v = dot(&ray.way, &q) * inverse;
+        let t = dot(&self.e2, &q) * inverse;
+        let inside = u.cmpge(Vec4::ZERO)
+            & u.cmple(Vec4::ONE)
+            & v.cmpge(Vec4::ZERO)
+            & (u + v).cmple(Vec4::ONE)
+            & t.cmpgt(Vec4::splat(1e-5))
+            & t.cmplt(Vec4::splat(limit))
+            & determinant.cmpne(Vec4::ZERO);
+        Meeting {
+            mask: inside.bitmask(),
+            t,
+            u,
+            v,
+            determinant,
+        }
     }
-    let q = s.cross(triangle.e1);
-    let v = ray.dot(q) * inverse;
-    let t = triangle.e2.dot(q) * inverse;
-    (v >= 0.0 && u + v <= 1.0 && t > 1e-5 && t < limit).then_some(Hit {
-        t,
-        sky: triangle.sky,
-        // The determinant is positive against the counter-clockwise side.
-        front: determinant < 0.0,
-        tag: triangle.tag,
-        // Clockwise corners: the front is the other way.
-        normal: triangle.e2.cross(triangle.e1).normalize_or_zero().into(),
-        index: 0,
-        at: [u, v],
+}
+
+/// The bits of a mask.
+fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = mask.trailing_zeros();
+        mask &= mask.wrapping_sub(1);
+        (lane < WIDE as u32).then_some(lane as usize)
     })
 }
 
-/// Bins of the surface area heuristic.
-const BINS: usize = 12;
-
-#[derive(Clone, Copy)]
-struct Bounds {
-    mins: Vec3A,
-    maxs: Vec3A,
-    count: usize,
+/// Up to four vectors; zero for those that are not there.
+fn four(vectors: impl Iterator<Item = Vec3>) -> Four {
+    let mut axes = [Vec4::ZERO; 3];
+    for (lane, vector) in vectors.take(WIDE).enumerate() {
+        for (axis, value) in axes.iter_mut().zip(vector.to_array()) {
+            axis[lane] = value;
+        }
+    }
+    axes
 }
 
-impl Bounds {
-    const EMPTY: Bounds = Bounds {
-        mins: Vec3A::INFINITY,
-        maxs: Vec3A::NEG_INFINITY,
-        count: 0,
-    };
-
-    fn add(&mut self, triangle: &Triangle) {
-        for corner in [
-            triangle.a,
-            triangle.a + triangle.e1,
-            triangle.a + triangle.e2,
-        ] {
-            self.mins = self.mins.min(corner);
-            self.maxs = self.maxs.max(corner);
-        }
-        self.count += 1;
-    }
-
-    fn merge(&mut self, other: &Bounds) {
-        self.mins = self.mins.min(other.mins);
-        self.maxs = self.maxs.max(other.maxs);
-        self.count += other.count;
-    }
-
-    /// Half the surface, times the triangles: what a walk may cost here.
-    fn cost(&self) -> f32 {
-        let size = (self.maxs - self.mins).max(Vec3A::ZERO);
-        (size.x * size.y + size.y * size.z + size.z * size.x) * self.count as f32
-    }
+/// One of four vectors.
+fn at(four: &Four, lane: usize) -> Vec3 {
+    Vec3::from(four.map(|axis| axis[lane]))
 }
 
-/// Appends the tree over `triangles`, the first of which has index `base`.
-fn build(nodes: &mut Vec<Node>, triangles: &mut [(Triangle, Vec3A)], base: u32) {
-    let mut bounds = Bounds::EMPTY;
-    let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
-    for (triangle, centre) in triangles.iter() {
-        bounds.add(triangle);
-        low = low.min(*centre);
-        high = high.max(*centre);
-    }
-    let axis = (high - low).max_position();
-    let at = nodes.len();
-    let leaf = triangles.len() <= LEAF;
-    nodes.push(Node {
-        mins: bounds.mins,
-        maxs: bounds.maxs,
-        first: base,
-        count: if leaf { triangles.len() as u16 } else { 0 },
-        axis: axis as u16,
-    });
-    if leaf {
-        return;
-    }
-    let split = divide(triangles, axis, low[axis], high[axis]);
-    let (left, right) = triangles.split_at_mut(split);
-    build(nodes, left, base);
-    let second = nodes.len() as u32;
-    if let Some(node) = nodes.get_mut(at) {
-        node.first = second;
-    }
-    build(nodes, right, base + split as u32);
+fn dot(a: &Four, b: &Four) -> Vec4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Puts the triangles of the cheaper left side first; returns how many these are: not none and not all.
-fn divide(triangles: &mut [(Triangle, Vec3A)], axis: usize, low: f32, high: f32) -> usize {
-    let scale = BINS as f32 / (high - low).max(f32::MIN_POSITIVE);
-    let bin = |centre: &Vec3A| (((centre[axis] - low) * scale) as usize).min(BINS - 1);
-    let mut bins = [Bounds::EMPTY; BINS];
-    for (triangle, centre) in triangles.iter() {
-        if let Some(bin) = bins.get_mut(bin(centre)) {
-            bin.add(triangle);
-        }
-    }
-    let mut costs = [0.0f32; BINS];
-    let mut sum = Bounds::EMPTY;
-    for (cost, bin) in costs.iter_mut().zip(&bins) {
-        sum.merge(bin);
-        *cost = if sum.count > 0 { sum.cost() } else { 0.0 };
-    }
-    sum = Bounds::EMPTY;
-    let mut best = (f32::INFINITY, 0);
-    for (i, bin) in bins.iter().enumerate().skip(1).rev() {
-        sum.merge(bin);
-        let right = if sum.count > 0 { sum.cost() } else { 0.0 };
-        let cost = costs.get(i - 1).copied().unwrap_or(0.0) + right;
-        if cost < best.0 && sum.count > 0 && sum.count < triangles.len() {
-            best = (cost, i);
-        }
-    }
-    let mut split = 0;
-    for i in 0..triangles.len() {
-        if triangles.get(i).is_some_and(|(_, c)| bin(c) < best.1) {
-            triangles.swap(i, split);
-            split += 1;
-        }
-    }
-    // All in one place, or so lopsided that the tree would be deep: then the median.
-    let least = (triangles.len() / 64).max(1);
-    if split < least || triangles.len() - split < least {
-        split = triangles.len() / 2;
-        triangles.select_nth_unstable_by(split, |a, b| a.1[axis].total_cmp(&b.1[axis]));
-    }
-    split
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::random::Random;
-    use super::*;
-
-    #[test]
-    fn agrees_with_trying_every_triangle() {
-        let mut random = Random::new(7);
-        let mut point =
-            |scale: f32| (Vec3::new(random.next(), random.next(), random.next()) - 0.5) * scale;
-        let input: Vec<([Vec3; 3], bool, u32)> = (0..500)
-            .map(|tag| {
-                let at = point(100.0);
-                let corners = [at, at + point(20.0), at + point(20.0)];
-                (corners, tag % 5 == 0, tag)
-            })
-            .collect();
-        let tree = Occluders::new(input.iter().copied());
-        let mut found = 0;
-        for _ in 0..500 {
-            let (from, to) = (point(150.0), point(150.0));
-            let tried = |sky: bool| {
-                input
-                    .iter()
-                    .filter(|(.., s)| sky || *s % 5 != 0)
-                    .filter_map(|&(corners, sky, tag)| {
-                        let [a, b, c] = corners.map(Vec3A::from);
-                        let triangle = Triangle {
-                            a,
-                            e1: b - a,
-                            e2: c - a,
-                            sky,
-                            tag,
-                            cut_out: u32::MAX,
-                        };
-                        meet(&triangle, from.into(), (to - from).into(), 0.9999)
-                    })
-                    .min_by(|a, b| a.t.total_cmp(&b.t))
-            };
-            // Which place in the tree it has is the tree's own affair.
-            let nearest = tree.nearest(from, to - from, 0.9999);
-            let nearest = nearest.map(|hit| Hit { index: 0, ..hit });
-            assert_eq!(nearest, tried(true));
-            assert_eq!(tree.blocked(from, to, false), tried(true).is_some());
-            assert_eq!(tree.blocked(from, to, true), tried(false).is_some());
-            found += usize::from(tried(true).is_some());
-        }
-        assert!(found > 50, "{found}");
-        assert!(!Occluders::new(std::iter::empty()).blocked(Vec3::ZERO, Vec3::ONE, false));
-    }
-
-    #[test]
-    fn light_passes_holes() {
-        // Texture coordinates are places; the right half of the picture is a hole.
-        let corners = [Vec3::ZERO, Vec3::Y * 4.0, Vec3::X * 4.0];
-        let script = "t\n{\ncull none\n{\nmap a\nalphaFunc GE128\n}\n}\n";
-        let shader = shaderscript::parse_script("test", script.as_bytes());
-        let mut rgba = vec![255; 16];
-        (rgba[7], rgba[15]) = (0, 0);
-        let picture = crate::image::Image::from_rgba(2, 2, rgba).unwrap();
-        for two_sided in [true, false] {
-            let holes =
-                Holes::of(&shader.shaders[0], two_sided, |_| Some(picture.clone())).unwrap();
-            let holes = Arc::new(holes);
-            let tree = Occluders::new(std::iter::once((corners, false, 7))).cut(|tag| {
-                (tag == 7).then(|| CutOut {
-                    st: corners.map(|c| c.truncate()),
-                    holes: Arc::clone(&holes),
-                })
-            });
-            let through = |x: f32| {
-                let (above, below) = (Vec3::new(x, 0.3, 1.0), Vec3::new(x, 0.3, -1.0));
-                let mut last = Some(0);
-                let open = !tree.blocked(above, below, false);
-                assert_eq!(open, !tree.blocked_again(above, below, &mut last));
-                open
-            };
-            assert_eq!(
-                [0.2, 0.7, 1.2, 1.7].map(through),
-                [false, true, false, true]
-            );
-            let under = tree
-                .nearest(Vec3::new(0.2, 0.3, -1.0), Vec3::Z, 9.0)
-                .unwrap();
-            assert_eq!(under.front, two_sided);
-            assert!(!two_sided || under.normal.z < -0.9);
-        }
-    }
-
-    #[test]
-    fn fronts_are_clockwise() {
-        // Seen from +z, x to the right, y up: clockwise.
-        let corners = [Vec3::ZERO, Vec3::Y, Vec3::X];
-        let tree = Occluders::new(std::iter::once((corners, false, 3)));
-        let hit = tree.nearest(Vec3::new(0.2, 0.2, 5.0), Vec3::NEG_Z, 10.0);
-        assert!(hit.is_some_and(|h| h.front && h.tag == 3 && (h.t - 5.0).abs() < 1e-5));
-        let hit = tree.nearest(Vec3::new(0.2, 0.2, -5.0), Vec3::Z, 10.0);
-        assert!(hit.is_some_and(|h| !h.front));
-    }
+fn cross(a: &Four, b: &Four) -> Four {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
