@@ -238,8 +238,13 @@ pub(super) fn out_of(
     fixed: usize,
     ambient: &mut Ambient,
 ) {
-    columns.extend(candidates.columns);
-    choose(scene, columns, fixed, ambient, candidates.spacing);
+    choose(
+        scene,
+        columns,
+        fixed,
+        ambient,
+        (candidates.columns, candidates.spacing),
+    );
 }
 
 /// Adds lights in front of what stays unexplained.
@@ -252,8 +257,8 @@ pub(super) fn in_front(
 ) {
     let state = residual(scene.samples, columns, ambient.value);
     let fronts = scene.in_front(&state);
-    columns.extend(scene.columns(&fronts, RANGE));
-    choose(scene, columns, fixed, ambient, spacing * 0.5);
+    let candidates = scene.columns(&fronts, RANGE);
+    choose(scene, columns, fixed, ambient, (candidates, spacing * 0.5));
 }
 
 /// Of candidates and lights placed so far keeps the best, merged, moved and solved anew.
@@ -262,8 +267,10 @@ fn choose(
     columns: &mut Vec<Column>,
     known: usize,
     ambient: &mut Ambient,
-    spacing: f32,
+    (mut candidates, spacing): (Vec<Column>, f32),
 ) {
+    let placed = columns.len();
+    columns.append(&mut candidates);
     let sparse = Effort {
         rounds: 4,
         sweeps: 16,
@@ -271,8 +278,12 @@ fn choose(
         anew: false,
     };
     let state = solve(scene.samples, columns, ambient, sparse, scene.least);
+    let mut chosen = columns.split_off(placed);
     drop_useless(columns, known, &state, WORTH * 0.25);
-    merge(scene, columns, known, spacing * 1.5);
+    drop_useless(&mut chosen, 0, &state, WORTH * 0.25);
+    let whole = columns.len();
+    columns.append(&mut chosen);
+    merge(scene, columns, known, spacing * 1.5, whole);
     let refit = Effort {
         rounds: 2,
         sweeps: 16,
@@ -285,7 +296,8 @@ fn choose(
         state = solve(scene.samples, columns, ambient, refit, scene.least);
         drop_useless(columns, known, &state, WORTH * 0.5);
     }
-    merge(scene, columns, known, spacing * 0.5);
+    let whole = columns.len();
+    merge(scene, columns, known, spacing * 0.5, whole);
     let settle = Effort {
         rounds: 4,
         sweeps: 16,
@@ -308,20 +320,20 @@ pub(super) fn drop_useless(columns: &mut Vec<Column>, known: usize, state: &Resi
     });
 }
 
-/// Makes one light of those that are near to each other and see each other, strongest first.
-fn merge(scene: &Scene<'_>, columns: &mut Vec<Column>, known: usize, radius: f32) {
-    let mut placed: Vec<(Lamp, Vec3)> = columns
-        .drain(known..)
-        .filter_map(|c| match c.source {
-            Source::Placed(lamp) => Some((lamp, c.strength)),
+/// Makes one light of those that are near to each other and see each other, strongest first. The first `whole` of the columns
+/// reach as far as they are seen: such of them as stay alone stay as they are.
+fn merge(scene: &Scene<'_>, columns: &mut Vec<Column>, known: usize, radius: f32, whole: usize) {
+    let mut placed: Vec<(Lamp, Column, bool)> = (known..)
+        .zip(columns.drain(known..))
+        .filter_map(|(i, c)| match c.source {
+            Source::Placed(lamp) => Some((lamp, c, i < whole)),
             _ => None,
         })
         .collect();
-    placed.sort_by(|a, b| mean(b.1).total_cmp(&mean(a.1)));
+    placed.sort_by(|a, b| mean(b.1.strength).total_cmp(&mean(a.1.strength)));
     let mut taken = vec![false; placed.len()];
-    let mut places = Vec::new();
-    let mut strengths = Vec::new();
-    for (i, &(lamp, strength)) in placed.iter().enumerate() {
+    let mut merged = Vec::new();
+    for (i, (lamp, column, _)) in placed.iter().enumerate() {
         let origin = lamp.origin;
         if taken.get(i).copied().unwrap_or(true) {
             continue;
@@ -329,34 +341,41 @@ fn merge(scene: &Scene<'_>, columns: &mut Vec<Column>, known: usize, radius: f32
         let mut centre = Vec3::ZERO;
         let mut total = 0.0;
         let mut sum = Vec3::ZERO;
-        for (other, taken) in placed.iter().zip(&mut taken).skip(i) {
+        for ((other, own, _), taken) in placed.iter().zip(&mut taken).skip(i) {
             if !*taken
-                && other.0.origin.distance(origin) <= radius
-                && (other.0.origin == origin || scene.sees(origin, other.0.origin))
+                && other.origin.distance(origin) <= radius
+                && (other.origin == origin || scene.sees(origin, other.origin))
             {
                 *taken = true;
-                centre += other.0.origin * mean(other.1);
-                total += mean(other.1);
-                sum += other.1;
+                let power = mean(own.strength);
+                centre += other.origin * power;
+                total += power;
+                sum += own.strength;
             }
         }
-        let centre = if total > 0.0 { centre / total } else { origin };
-        if centre.distance(origin) > 1e-3 && scene.open(centre) && scene.sees(origin, centre) {
-            // It falls off as the strongest of them does.
-            places.push(Lamp {
-                origin: centre,
-                ..lamp
-            });
-            strengths.push(sum);
+        let strength = if sum == Vec3::ZERO {
+            column.strength
         } else {
-            places.push(lamp);
-            strengths.push(if sum == Vec3::ZERO { strength } else { sum });
+            sum
+        };
+        let centre = if total > 0.0 { centre / total } else { origin };
+        let moved =
+            centre.distance(origin) > 1e-3 && scene.open(centre) && scene.sees(origin, centre);
+        // It falls off as the strongest of them does.
+        let origin = if moved { centre } else { origin };
+        merged.push((Lamp { origin, ..*lamp }, strength, (!moved).then_some(i)));
+    }
+    let traced = |(lamp, strength, of): &(Lamp, Vec3, Option<usize>)| {
+        let same = of.and_then(|i| placed.get(i));
+        match same {
+            Some((_, column, true)) => Column {
+                strength: *strength,
+                ..column.clone()
+            },
+            _ => scene.column(*lamp, scene.rows(*lamp, f32::INFINITY), *strength),
         }
-    }
-    let rows = parallel::map(&places, |_, &lamp| scene.rows(lamp, f32::INFINITY));
-    for ((lamp, strength), rows) in places.into_iter().zip(strengths).zip(rows) {
-        columns.push(scene.column(lamp, rows, strength));
-    }
+    };
+    columns.extend(parallel::map(&merged, |_, light| traced(light)));
 }
 
 /// Reaches that are tried.
