@@ -44,7 +44,7 @@ const DIRTY: f32 = 0.9;
 const CONTRADICTED: f32 = 1.5;
 
 /// Error that leaves nothing to be explained, stops.
-const NOTHING: f32 = 0.01;
+pub(super) const NOTHING: f32 = 0.01;
 
 /// Least measurements of a trial.
 const SAMPLES: usize = 1000;

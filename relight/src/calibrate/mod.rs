@@ -86,8 +86,14 @@ const CROSSINGS: usize = 5;
 /// Part of the time that looking for what the compiler did takes, about.
 const COMPILER_PART: f32 = 0.3;
 
+/// Part of the time after which what was planned is tried: more measurements may follow.
+const TRIED_PART: f32 = 0.85;
+
 /// Error at measurements held out, stops, that asks for more measurements: light of many small lights takes more to tell.
 const UNEXPLAINED: f32 = 0.3;
+
+/// Part of the error of what directives say that asks for more measurements, too, where more of it is left.
+const HALF: f32 = 0.5;
 
 /// So many times as many.
 const MORE_SAMPLES: usize = 2;
@@ -137,6 +143,8 @@ struct Solution {
     report: CalibrationReport,
     /// Agreement at all texels, those that were fitted, too: two fits alike are compared by it with less noise.
     overall: Agreement,
+    /// Found with [`MORE_SAMPLES`].
+    measured_more: bool,
 }
 
 impl Solution {
@@ -221,7 +229,7 @@ fn best(
         left -= 1;
         let found = find_with_enough(world, silent, options, way, &splashes, &mut |part| {
             let tries = left + usize::from(!way.splashes || splashes.get());
-            reached = reached.max(begin + part * (1.0 - begin) / tries.max(1) as f32);
+            reached = reached.max(begin + part * (TRIED_PART - begin) / tries.max(1) as f32);
             progress(reached);
         });
         if way.splashes && !splashes.get() {
@@ -230,7 +238,7 @@ fn best(
         found
     };
     let off = |solution: &Solution| solution.report.after.median_stops;
-    let mut best: Option<Solution> = None;
+    let mut best: Option<(Solution, Compiler)> = None;
     for way in ways {
         let mut found = try_way(world, way);
         if found.report.splashes > 0 {
@@ -240,11 +248,27 @@ fn best(
             };
             found = splashed_or_plain(found, try_way(world, plain));
         }
-        if best.as_ref().is_none_or(|best| off(&found) < off(best)) {
-            best = Some(found);
+        if (best.as_ref()).is_none_or(|(best, _)| off(&found) < off(best)) {
+            best = Some((found, way));
         }
     }
-    best.unwrap_or_default()
+    let Some((found, way)) = best else {
+        return Solution::default();
+    };
+    let halved = (found.report.before.median_stops * HALF).max(compiler::NOTHING);
+    if off(&found) <= halved || found.measured_more {
+        return found;
+    }
+    let splashes = found.report.splashes > 0;
+    let same = Compiler { splashes, ..way };
+    same.tell(world);
+    let rest = &mut |part| progress(reached + part * (1.0 - reached));
+    let again = find_more(world, silent, options, same, &Cell::new(splashes), rest);
+    if off(&again) < off(&found) {
+        again
+    } else {
+        found
+    }
 }
 
 /// What splashes explain, lights that are put in explain as well in many a map, and with fewer.
@@ -286,14 +310,30 @@ fn find_with_enough(
     if let Some(first) = first {
         return first;
     }
+    let rest = &mut |part| progress(reached + part * (1.0 - reached));
+    find_more(world, silent, options, compiler, splashes, rest)
+}
+
+/// [`find`] with more measurements.
+fn find_more(
+    world: &RelitWorld,
+    silent: &[u32],
+    options: &CalibrationOptions,
+    compiler: Compiler,
+    splashes: &Cell<bool>,
+    progress: &mut dyn FnMut(f32),
+) -> Solution {
     let options = CalibrationOptions {
         samples: options.samples * MORE_SAMPLES,
         cache: None,
         ..*options
     };
     let last = Purpose::Enough(f32::INFINITY, splashes);
-    let rest = &mut |part| progress(reached + part * (1.0 - reached));
-    find(world, silent, &options, compiler, last, rest).unwrap_or_default()
+    let found = find(world, silent, &options, compiler, last, progress);
+    Solution {
+        measured_more: true,
+        ..found.unwrap_or_default()
+    }
 }
 
 /// What a solution is for.

@@ -4,6 +4,7 @@ mod grid;
 mod held_out;
 mod known_truth;
 mod linear;
+mod more;
 mod said;
 mod splash;
 

@@ -3,12 +3,12 @@
 use super::*;
 
 /// Strength of the lamp in terms of what its directive says.
-const FACTOR: f32 = 2.5;
+pub(super) const FACTOR: f32 = 2.5;
 
 const AREA: f32 = 40.0 * 60.0;
 
 /// Light from the lamp, and from its back splash of so much of its light.
-fn from_lamp(splash: f32) -> impl Fn(Vec3, Vec3) -> Vec3 {
+pub(super) fn from_lamp(splash: f32) -> impl Fn(Vec3, Vec3) -> Vec3 {
     from_lamp_and_point(splash, 23.0)
 }
 
