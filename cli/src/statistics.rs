@@ -1,20 +1,19 @@
 //! What `relight measure` takes from pictures.
 
+use glam::Vec3;
 use relight::compare::Rgb8;
+use relight::overbright;
 
 /// Radiance as displayed of each pixel: luminance of the decoded values, 0 to 1.
 pub fn luminance(picture: &Rgb8) -> Vec<f32> {
-    let decode = |v: u8| {
-        let v = f32::from(v) / 255.0;
-        if v <= 0.04045 {
-            v / 12.92
-        } else {
-            ((v + 0.055) / 1.055).powf(2.4)
-        }
-    };
+    let linear = overbright::byte_table();
     let pixels = picture.pixels().chunks_exact(3);
     pixels
-        .map(|p| 0.2126 * decode(p[0]) + 0.7152 * decode(p[1]) + 0.0722 * decode(p[2]))
+        .map(|p| {
+            overbright::luminance(Vec3::from_array(
+                [0, 1, 2].map(|c| linear[usize::from(p[c])]),
+            ))
+        })
         .collect()
 }
 

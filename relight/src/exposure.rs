@@ -15,7 +15,7 @@
 //! v; where the map's compiler stored light with a gamma g, that light is v^g, and the mean is over that.
 
 use crate::light::Shade;
-use crate::overbright;
+use crate::overbright::{self, luminance};
 use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::Bsp;
@@ -90,11 +90,6 @@ pub(crate) struct Place<'a> {
     pub light: Vec3,
     /// What the surface throws back; nothing known: of usual brightness.
     pub shades: &'a [Shade],
-}
-
-/// Luminance of linear colours (Rec. 709).
-fn luminance(color: Vec3) -> f32 {
-    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
 /// What the traced look shows of an exposed radiance, linear: see `tonemap.comp`.
@@ -237,7 +232,7 @@ fn of_stored(
 
 /// Luminance of a colour, encoded like its bytes (Rec. 709); `None` of what is dark.
 fn level(rgb: [u8; 3]) -> Option<f32> {
-    let value = Vec3::from_array(rgb.map(f32::from)).dot(Vec3::new(0.2126, 0.7152, 0.0722)) / 255.0;
+    let value = luminance(Vec3::from_array(rgb.map(f32::from))) / 255.0;
     (value > DARK).then_some(value)
 }
 

@@ -59,6 +59,11 @@ pub fn from_linear(linear: f32) -> f32 {
     }
 }
 
+/// Relative luminance of a linear colour (ITU-R BT.709-6, whose primaries are sRGB's).
+pub fn luminance(color: Vec3) -> f32 {
+    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
+
 /// What a display's gamma ramp shows for every byte: `c^(1/gamma)`, then shifted left by `bits`.
 pub fn gamma_table(gamma: f32, bits: u32) -> [u8; 256] {
     std::array::from_fn(|i| {

@@ -111,7 +111,7 @@ impl Stage {
     /// The device is lost or out of memory.
     pub fn light(&mut self) -> Result<Vec<f32>> {
         let radiance = self.renderer.read_radiance()?;
-        let luminance = |[r, g, b]: &[f32; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
+        let luminance = |rgb: &[f32; 3]| relight::overbright::luminance(Vec3::from_array(*rgb));
         Ok(radiance.iter().map(luminance).collect())
     }
 

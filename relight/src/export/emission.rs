@@ -4,6 +4,7 @@ use super::images::Encoded;
 use super::look::{Look, Picture, look as read_look, ratio};
 use super::stack::Moment;
 use super::{Export, ExportError, ImagePlace};
+use crate::overbright::luminance;
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::{Vec3, Vec4};
 use shaderscript::Shader;
@@ -27,11 +28,6 @@ pub fn radiances(world: &RelitWorld) -> Vec<Vec3> {
         if mean.is_finite() { mean } else { Vec3::ZERO }
     };
     sums.into_iter().map(mean).collect()
-}
-
-/// Relative luminance of linear colours (Rec. 709).
-pub fn luminance(color: Vec3) -> f32 {
-    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
 /// What a picture is multiplied with so that its mean is `radiance`. Where the picture lacks a colour of the light, its

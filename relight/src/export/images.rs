@@ -358,7 +358,7 @@ fn edited(image: &Image, edit: Edit) -> Image {
             }
             Edit::FromDarkness => {
                 let color = linear([r, g, b]);
-                let passed = color.dot(Vec3::new(0.2126, 0.7152, 0.0722));
+                let passed = overbright::luminance(color);
                 [
                     0,
                     0,

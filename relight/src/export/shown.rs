@@ -13,7 +13,7 @@ const STEP: f32 = 16.0;
 
 /// The brightness of light as a byte, sRGB-encoded, that a picture with its glow is made for.
 fn level(light: Vec3) -> u8 {
-    let encoded = overbright::from_linear(super::emission::luminance(light)) * 255.0;
+    let encoded = overbright::from_linear(overbright::luminance(light)) * 255.0;
     ((encoded / STEP).round() * STEP).clamp(0.0, 255.0) as u8
 }
 

@@ -16,7 +16,7 @@
 //! channel by channel, with Y the luminance. sRGB's curve is no power law; γ is what its slope is at the brightnesses
 //! that a map shows: [`display_exponent`](crate::exposure::display_exponent).
 
-use super::emission::luminance;
+use crate::overbright::luminance;
 use glam::Vec3;
 
 /// How the colours of stored light, and of directives, which are numbers of the same kind, become colours of light.

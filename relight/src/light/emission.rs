@@ -89,11 +89,6 @@ impl Emission {
 /// a display grey of 37 %. Full-bright trim is dimmer than that; lamps, screens and lava are not.
 pub const GLOW_THRESHOLD: f32 = 0.11;
 
-/// Relative luminance of linear colours (Rec. 709).
-pub(super) fn luminance(color: Vec3) -> f32 {
-    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
-}
-
 /// Longest side of the copies of textures that means are taken from.
 const SAMPLE_SIDE: u32 = 64;
 
@@ -154,7 +149,7 @@ impl<'a> Finder<'a> {
             return None;
         }
         let shown = self.shown(material);
-        (luminance(shown) >= GLOW_THRESHOLD)
+        (overbright::luminance(shown) >= GLOW_THRESHOLD)
             .then(|| Emission::of(material, EmissionSource::Glow, shown))
     }
 

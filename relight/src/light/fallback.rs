@@ -146,6 +146,6 @@ impl Finder<'_> {
         } else {
             EmissionSource::Glow
         };
-        (super::emission::luminance(shown) > 1e-3).then(|| Emission::of(material, source, shown))
+        (overbright::luminance(shown) > 1e-3).then(|| Emission::of(material, source, shown))
     }
 }

@@ -2,9 +2,9 @@
 //! mean.
 
 use super::Finder;
-use super::emission::luminance;
 use crate::image::Image;
 use crate::overbright;
+use crate::overbright::luminance;
 use crate::world::WorldMaterial;
 use glam::{Vec3, Vec4};
 use shaderscript::eval::{self, ColorContext};

@@ -1,8 +1,8 @@
 //! What a stack of stages shows of its own, without any light falling on it, and what it shows of the light that does.
 
-use super::emission::luminance;
 use crate::image::Image;
 use crate::overbright;
+use crate::overbright::luminance;
 use glam::{Vec2, Vec3, Vec4};
 use shaderscript::eval::{self, ColorContext};
 use shaderscript::light::{

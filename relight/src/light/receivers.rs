@@ -149,9 +149,9 @@ fn in_boxes(
     }
 }
 
-/// Luminance of linear Rec. 709 colours.
+/// Luminance of linear colours, of negative ones none.
 pub(super) fn luminance(color: Vec3) -> f32 {
-    super::emission::luminance(color).max(0.0)
+    crate::overbright::luminance(color).max(0.0)
 }
 
 /// A light as rays see it.

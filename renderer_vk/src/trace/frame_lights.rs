@@ -288,16 +288,9 @@ fn flashlight(view: &View, white: f32) -> t::SphereLight {
     }
 }
 
-/// sRGB to linear (IEC 61966-2-1), as `shaders/trace/color.glsl` does it.
+/// Linear colour of an encoded one, as `shaders/trace/color.glsl` decodes it.
 pub fn decode(c: Vec3) -> Vec3 {
-    let channel = |c: f32| {
-        if c <= 0.04045 {
-            c / 12.92
-        } else {
-            ((c + 0.055) / 1.055).powf(2.4)
-        }
-    };
-    Vec3::new(channel(c.x), channel(c.y), channel(c.z))
+    c.map(relight::overbright::to_linear)
 }
 
 #[cfg(test)]

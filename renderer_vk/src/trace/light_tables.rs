@@ -115,9 +115,9 @@ pub fn cluster_balls(bsp: &Bsp, clusters: usize) -> Vec<Option<(Vec3, f32)>> {
     boxes.into_iter().map(|b| b.map(ball)).collect()
 }
 
-/// Relative luminance of linear Rec. 709 colours, negative ones as none.
+/// Luminance of linear colours, of negative ones none.
 pub fn luminance(c: Vec3) -> f32 {
-    c.dot(Vec3::new(0.2126, 0.7152, 0.0722)).max(0.0)
+    relight::overbright::luminance(c).max(0.0)
 }
 
 /// Irradiance over pi of a surface for power over squared distance: one over pi times the mean cosine of surfaces that

@@ -8,6 +8,7 @@ use crate::export::geometry::Geometry;
 use crate::export::images::Encoded;
 use crate::export::look::Picture;
 use crate::export::{ExportError, ImagePlace, Sky, emission, extras, sky};
+use crate::overbright::luminance;
 use glam::{Vec3, Vec4};
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -67,7 +68,7 @@ impl Document<'_> {
         let shown = (mean.w > 0.0).then(|| mean.truncate() / mean.w);
         let strength = match (radiance, shown) {
             (Some(radiance), Some(shown)) if source.options.sky_light => {
-                emission::luminance(radiance) / emission::luminance(shown).max(1.0e-3)
+                luminance(radiance) / luminance(shown).max(1.0e-3)
             }
             _ => 1.0,
         };

@@ -11,6 +11,7 @@ use crate::half::half;
 use crate::settings::Settings;
 
 pub use gpu::Gpu;
+pub use relight::overbright::from_linear as encode;
 pub use scene::Scene;
 
 /// Settings of a reference picture without bounced light.
@@ -22,15 +23,6 @@ pub fn reference() -> Settings {
         rt_auto_exposure: false,
         rt_bloom: 0.0,
         ..Settings::default()
-    }
-}
-
-/// sRGB code of a linear value.
-pub fn encode(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 {
-        linear * 12.92
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
     }
 }
 
