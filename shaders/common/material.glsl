@@ -62,22 +62,25 @@ float wave_value(Wave wave, float time) {
     return wave.base + wave_table(wave.function, wave_turns(wave.phase, wave.frequency, time)) * wave.amplitude;
 }
 
-vec2 stage_texcoord(MaterialBuffers buffers, Stage stage, Instance instance, StagePoint p) {
-    vec2 st;
-    switch (stage.tc_gen) {
-    case TCGEN_LIGHTMAP: st = p.lightmap; break;
+// Texture coordinates as they are generated: the first of what a stage does to them.
+vec2 generated_texcoord(uint tc_gen, vec3 vector_s, vec3 vector_t, vec3 viewer, StagePoint p) {
+    switch (tc_gen) {
+    case TCGEN_LIGHTMAP: return p.lightmap;
     case TCGEN_ENVIRONMENT: {
-        vec3 viewer = normalize(instance.viewer - p.position);
-        vec3 reflected = p.normal * (2.0 * dot(p.normal, viewer)) - viewer;
-        st = vec2(0.5 + 0.5 * reflected.y, 0.5 - 0.5 * reflected.z);
-        break;
+        vec3 to_viewer = normalize(viewer - p.position);
+        vec3 reflected = p.normal * (2.0 * dot(p.normal, to_viewer)) - to_viewer;
+        return vec2(0.5 + 0.5 * reflected.y, 0.5 - 0.5 * reflected.z);
     }
-    case TCGEN_VECTOR: st = vec2(dot(p.position, stage.vector_s), dot(p.position, stage.vector_t)); break;
-    default: st = p.st;
+    case TCGEN_VECTOR: return vec2(dot(p.position, vector_s), dot(p.position, vector_t));
+    default: return p.st;
     }
+}
+
+// Then `count` modifiers, in order.
+vec2 modified_texcoord(MaterialBuffers buffers, uint first, uint count, vec2 entity_texcoord, StagePoint p, vec2 st) {
     TcMods mods = TcMods(buffers.tc_mods);
-    for (uint i = 0; i < stage.tc_mod_count; i++) {
-        TcMod mod = mods.at[stage.tc_mod_first + i];
+    for (uint i = 0; i < count; i++) {
+        TcMod mod = mods.at[first + i];
         switch (mod.kind) {
         case TCMOD_TURBULENT: {
             float now = wave_turns(mod.wave.phase, mod.wave.frequency, p.time);
@@ -105,63 +108,79 @@ vec2 stage_texcoord(MaterialBuffers buffers, Stage stage, Instance instance, Sta
             st = vec2(st.x * c - st.y * s + 0.5 - 0.5 * c + 0.5 * s, st.x * s + st.y * c + 0.5 - 0.5 * s - 0.5 * c);
             break;
         }
-        case TCMOD_ENTITY_TRANSLATE: st += fract(instance.texcoord * p.time); break;
+        case TCMOD_ENTITY_TRANSLATE: st += fract(entity_texcoord * p.time); break;
         }
     }
     return st;
 }
 
-// Colour and alpha that the stage's image is multiplied by.
-vec4 stage_color(MaterialBuffers buffers, Stage stage, Instance instance, StagePoint p) {
+vec2 stage_texcoord(MaterialBuffers buffers, Stage stage, Instance instance, StagePoint p) {
+    vec2 st = generated_texcoord(stage.tc_gen, stage.vector_s, stage.vector_t, instance.viewer, p);
+    return modified_texcoord(buffers, stage.tc_mod_first, stage.tc_mod_count, instance.texcoord, p, st);
+}
+
+// What a stage's colour and alpha are where they are the same for every point; 1 where they are not.
+vec4 flat_color(MaterialBuffers buffers, Stage stage, Instance instance, float time, float identity_light) {
     vec4 c = vec4(1.0);
     switch (stage.rgb_gen) {
-    case RGBGEN_IDENTITY_LIGHTING: c.rgb = vec3(p.identity_light); break;
+    case RGBGEN_IDENTITY_LIGHTING: c.rgb = vec3(identity_light); break;
     case RGBGEN_WAVE:
         if (stage.rgb_wave.function == WAVE_NOISE) {
-            float n = noise_at_time(NoiseLattice(buffers.noise), (p.time + stage.rgb_wave.phase) * stage.rgb_wave.frequency);
-            c.rgb = vec3(clamp(stage.rgb_wave.base + n * stage.rgb_wave.amplitude, 0.0, 1.0));
+            float n = noise_at_time(NoiseLattice(buffers.noise), (time + stage.rgb_wave.phase) * stage.rgb_wave.frequency);
+            c.rgb = vec3(stage.rgb_wave.base + n * stage.rgb_wave.amplitude);
         } else {
-            c.rgb = vec3(clamp(wave_value(stage.rgb_wave, p.time) * p.identity_light, 0.0, 1.0));
+            c.rgb = vec3(wave_value(stage.rgb_wave, time) * identity_light);
         }
         break;
     case RGBGEN_CONST: c.rgb = stage.constant.rgb; break;
-    case RGBGEN_ENTITY: c = instance.color; break;
-    case RGBGEN_ONE_MINUS_ENTITY: c = 1.0 - instance.color; break;
-    case RGBGEN_VERTEX: c.rgb = p.color.rgb * p.identity_light; break;
-    case RGBGEN_EXACT_VERTEX: c = p.color; break;
-    case RGBGEN_ONE_MINUS_VERTEX: c.rgb = (1.0 - p.color.rgb) * p.identity_light; break;
-    case RGBGEN_LIGHTING_DIFFUSE:
-        if ((instance.flags & INSTANCE_UNLIT) != 0) {
-            c = vec4(0.0); // the engine has no light for it
-        } else {
-            float incoming = max(dot(p.normal, instance.light_direction), 0.0);
-            c = vec4(min(instance.ambient + incoming * instance.directed, vec3(1.0)), 1.0);
-        }
-        break;
+    case RGBGEN_ENTITY: c.rgb = instance.color.rgb; break;
+    case RGBGEN_ONE_MINUS_ENTITY: c.rgb = 1.0 - instance.color.rgb; break;
     }
     switch (stage.alpha_gen) {
-    case ALPHAGEN_IDENTITY:
-        // vertex colours that nothing scales keep their alpha, as does light, which sets its own
-        if (stage.rgb_gen == RGBGEN_VERTEX && p.identity_light == 1.0) c.a = p.color.a;
-        else if (stage.rgb_gen != RGBGEN_LIGHTING_DIFFUSE) c.a = 1.0;
-        break;
     case ALPHAGEN_CONST: c.a = stage.constant.a; break;
-    case ALPHAGEN_WAVE: c.a = clamp(wave_value(stage.alpha_wave, p.time), 0.0, 1.0); break;
+    case ALPHAGEN_WAVE: c.a = wave_value(stage.alpha_wave, time); break;
     case ALPHAGEN_ENTITY: c.a = instance.color.a; break;
     case ALPHAGEN_ONE_MINUS_ENTITY: c.a = 1.0 - instance.color.a; break;
+    }
+    return c;
+}
+
+// The same with what differs between points, as the engine keeps it: in bytes.
+vec4 point_color(vec4 c, uint rgb_gen, uint alpha_gen, float portal_range, Instance instance, StagePoint p) {
+    switch (rgb_gen) {
+    case RGBGEN_VERTEX: c.rgb = p.color.rgb * p.identity_light; break;
+    case RGBGEN_EXACT_VERTEX: c.rgb = p.color.rgb; break;
+    case RGBGEN_ONE_MINUS_VERTEX: c.rgb = (1.0 - p.color.rgb) * p.identity_light; break;
+    case RGBGEN_LIGHTING_DIFFUSE: {
+        // there is none for some
+        bool lit = (instance.flags & INSTANCE_UNLIT) == 0;
+        float incoming = max(dot(p.normal, instance.light_direction), 0.0);
+        c.rgb = lit ? instance.ambient + incoming * instance.directed : vec3(0.0);
+        if (alpha_gen == ALPHAGEN_IDENTITY && !lit) c.a = 0.0;
+        break;
+    }
+    }
+    switch (alpha_gen) {
+    // vertex colours that nothing scales keep their alpha
+    case ALPHAGEN_IDENTITY: if (rgb_gen == RGBGEN_VERTEX && p.identity_light == 1.0) c.a = p.color.a; break;
     case ALPHAGEN_VERTEX: c.a = p.color.a; break;
     case ALPHAGEN_ONE_MINUS_VERTEX: c.a = 1.0 - p.color.a; break;
     case ALPHAGEN_LIGHTING_SPECULAR: {
         vec3 light = normalize(vec3(-960.0, 1980.0, 96.0) - p.position);
         vec3 reflected = p.normal * (2.0 * dot(p.normal, light)) - light;
         float s = max(dot(reflected, normalize(instance.viewer - p.position)), 0.0);
-        c.a = min(s * s * s * s, 1.0);
+        c.a = s * s * s * s;
         break;
     }
-    case ALPHAGEN_PORTAL: c.a = clamp(p.view_distance / stage.portal_range, 0.0, 1.0); break;
+    case ALPHAGEN_PORTAL: c.a = p.view_distance / portal_range; break;
     }
-    // the engine keeps bytes
     return floor(clamp(c, 0.0, 1.0) * 255.0 + 0.001) / 255.0;
+}
+
+// Colour and alpha that the stage's image is multiplied by.
+vec4 stage_color(MaterialBuffers buffers, Stage stage, Instance instance, StagePoint p) {
+    vec4 c = flat_color(buffers, stage, instance, p.time, p.identity_light);
+    return point_color(c, stage.rgb_gen, stage.alpha_gen, stage.portal_range, instance, p);
 }
 
 // Bindless texture of the stage at this time; `lightmap` is the draw's page.

@@ -6,7 +6,7 @@
 // The constants of draw.glsl leave only what the draw needs; without `discard`, depth is tested first.
 #include "raster/draw.glsl"
 
-layout(location = 0) in vec4 in_uv[STAGES / 2]; // two stages each
+layout(location = 0) in vec4 in_uv[STAGE_PAIRS]; // two stages each
 layout(location = 2) in float in_clip;
 layout(location = 3) in flat uvec4 in_textures; // see `Draw`
 layout(location = 4) in vec4 in_color[STAGES];
@@ -38,6 +38,7 @@ bool passes_alpha_test(uint stage, vec4 color) {
     return alpha_func == ALPHAFUNC_NONE || alpha_passes(alpha_func, color.a);
 }
 
+#ifdef MANY_STAGES
 // As the picture keeps it.
 vec3 stored(vec3 color) { return round(color * 255.0) / 255.0; }
 
@@ -77,6 +78,7 @@ vec4 onto(vec4 before, uint stage) {
     if (!passes_alpha_test(stage, color)) discard;
     return color;
 }
+#endif
 
 void main() {
     if (CLIP != 0 && in_clip < 0.0) discard;
@@ -87,9 +89,9 @@ void main() {
     } else {
         out_color = stage_value(0);
         if (!passes_alpha_test(0, out_color)) discard;
+#ifdef MANY_STAGES
         // written out, so that every compiler sees the constants
         out_color = onto(out_color, 1);
-#ifdef MANY_STAGES
         out_color = onto(out_color, 2);
         out_color = onto(out_color, 3);
 #endif

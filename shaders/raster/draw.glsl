@@ -19,12 +19,13 @@ layout(constant_id = 10) const uint RGB_GEN = 0;      // RGBGEN_* of COLOR_VERTE
 layout(constant_id = 11) const uint ALPHA_GEN = 0;    // ALPHAGEN_* of COLOR_VERTEX
 layout(constant_id = 12) const uint TC_GEN = 0;       // TCGEN_*
 
-// Most draws have one stage or two, and a driver makes pipelines faster of shaders without the others.
+// Most draws have one stage, and a driver makes pipelines several times faster of shaders without the others.
 #ifdef MANY_STAGES
 const uint STAGES = DRAW_STAGES;
 #else
-const uint STAGES = 2;
+const uint STAGES = 1;
 #endif
+const uint STAGE_PAIRS = (STAGES + 1) / 2;
 
 uint of_stage(uint constant, uint stage) { return constant >> 4 * stage & 0xF; }
 
@@ -37,6 +38,9 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Vie
 
 // `overdraw`: where fragments are counted, if they are.
 layout(push_constant, scalar) uniform Push { uint64_t view; uint64_t overdraw; } push;
+
+// Members are read one by one where they are needed: a driver takes long to find out that a copy of all is for a few.
+#define VIEW Views(push.view).view
 
 // How much of what is seen is fog; s: distance in the fog, t: how deep. The engine takes the root from a table of 256
 // values. Fog over opaque surfaces is a picture of this instead (`fog_picture` in assets/prepare.rs).

@@ -268,7 +268,7 @@ pub struct Draw {
     /// What each stage's `tcMod`s come to where they are the same for all vertices:
     /// `s' = s m[0] + t m[2] + m[4]`, `t' = s m[1] + t m[3] + m[5]`.
     pub texcoords: [[f32; 6]; DRAW_STAGES],
-    /// Colour of each stage, where it is the same for all vertices.
+    /// Of the colour of each stage what is the same for all vertices; 1 where it is not.
     pub colors: [[f32; 4]; DRAW_STAGES],
     /// The material's time, seconds.
     pub time: f32,

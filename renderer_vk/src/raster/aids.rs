@@ -111,10 +111,11 @@ impl DrawList {
             blend: add,
             ..outlines(CullFaces::None)
         };
-        let draw = Draw {
+        let mut draw = Draw {
             dynamic_vertices: 1,
             ..Draw::default()
         };
+        draw.colors[0] = [1.0; 4];
         let mut first = 0;
         for &size in &polygons.sizes {
             let corners = first..first + size as usize;

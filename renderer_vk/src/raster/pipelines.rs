@@ -101,16 +101,21 @@ impl Pipelines {
             return Ok(());
         }
         let depth_alone = state.shading.mode == c::DRAW_DEPTH;
-        let (vertex, fragment) = match (target.counted, state.shading.has_many_stages()) {
-            (true, _) => (
+        // a driver makes a pipeline the sooner the less there is in its shaders
+        let (vertex, fragment) = if depth_alone {
+            (&shaders::RASTER_DRAW_VERT_DEPTH, &shaders::RASTER_DRAW_FRAG)
+        } else if target.counted {
+            (
                 &shaders::RASTER_DRAW_VERT_MANY,
                 &shaders::RASTER_DRAW_FRAG_COUNT,
-            ),
-            (false, true) => (
+            )
+        } else if state.shading.is_involved() {
+            (
                 &shaders::RASTER_DRAW_VERT_MANY,
                 &shaders::RASTER_DRAW_FRAG_MANY,
-            ),
-            (false, false) => (&shaders::RASTER_DRAW_VERT, &shaders::RASTER_DRAW_FRAG),
+            )
+        } else {
+            (&shaders::RASTER_DRAW_VERT, &shaders::RASTER_DRAW_FRAG)
         };
         let pipeline = GraphicsPipeline::new(
             &self.device,

@@ -107,9 +107,10 @@ impl Shading {
         self
     }
 
-    /// Whether there are more than two stages.
-    pub fn has_many_stages(&self) -> bool {
-        self.combine.0 >> (2 * PerStage::BITS) != 0
+    /// Whether it takes the shaders that are made for all that a draw may need: several stages, or `tcMod`s that differ
+    /// between vertices.
+    pub fn is_involved(&self) -> bool {
+        self.combine != PerStage::NONE || self.tc_mods != 0
     }
 
     /// The specialization constants: id and value.
@@ -132,12 +133,26 @@ impl Shading {
     }
 }
 
-/// Where the colour of a stage comes from.
+/// The colour of a stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Color {
-    White,
-    Flat([f32; 4]),
-    Vertex,
+struct StageColor {
+    /// What of it is the same for every vertex; 1 where it is not.
+    flat: [f32; 4],
+    /// Whether it is white at all times.
+    always_white: bool,
+    /// `RGBGEN_*` of a colour that differs between vertices.
+    rgb_gen: Option<u32>,
+    /// `ALPHAGEN_*` of an alpha that does.
+    alpha_gen: Option<u32>,
+}
+
+impl StageColor {
+    const WHITE: Self = Self {
+        flat: [1.0; 4],
+        always_white: true,
+        rgb_gen: None,
+        alpha_gen: None,
+    };
 }
 
 /// What stages are evaluated with.
@@ -208,23 +223,26 @@ impl StageContext<'_> {
                 }
             }
             let color = match (part, script) {
-                (0, _) if fog_adjust != c::FOG_ADJUST_NONE => Color::Vertex,
                 (0, Some(script)) => self.color(script, instance, time),
                 // the colour of a pass is that of its first stage
-                _ => Color::White,
+                _ => StageColor::WHITE,
             };
-            match color {
-                Color::White => shading.color.set(place, c::COLOR_WHITE),
-                Color::Flat(color) => {
-                    shading.color.set(place, c::COLOR_FLAT);
-                    draw.colors[place] = color;
-                }
-                Color::Vertex => {
-                    shading.color.set(place, c::COLOR_VERTEX);
-                    shading.rgb_gen.set(place, stage.rgb_gen);
-                    shading.alpha_gen.set(place, stage.alpha_gen);
-                }
-            }
+            draw.colors[place] = color.flat;
+            let fades = part == 0 && fog_adjust != c::FOG_ADJUST_NONE;
+            let kind = if fades || color.rgb_gen.is_some() || color.alpha_gen.is_some() {
+                shading
+                    .rgb_gen
+                    .set(place, color.rgb_gen.unwrap_or(c::RGBGEN_IDENTITY));
+                shading
+                    .alpha_gen
+                    .set(place, color.alpha_gen.unwrap_or(c::ALPHAGEN_CONST));
+                c::COLOR_VERTEX
+            } else if color.always_white {
+                c::COLOR_WHITE
+            } else {
+                c::COLOR_FLAT
+            };
+            shading.color.set(place, kind);
         }
         (shading, draw)
     }
@@ -289,6 +307,7 @@ impl StageContext<'_> {
     fn textured(&self, texture: u32, kind: u32, mut draw: Draw) -> Draw {
         draw.textures[0] = self.handle(texture, kind);
         draw.texcoords[0] = UNCHANGED;
+        draw.colors[0] = StageColor::WHITE.flat;
         draw
     }
 
@@ -328,12 +347,12 @@ impl StageContext<'_> {
         (texture != c::NO_TEXTURE).then_some(texture)
     }
 
-    /// The colour of a stage, if it is the same for every vertex. White is only what is always white, so that a pulse
-    /// does not change the pipeline.
-    fn color(&self, stage: &shaderscript::Stage, instance: &Instance, time: f32) -> Color {
+    /// The colour of a stage. White is only what is always white, so that a pulse does not change the pipeline.
+    fn color(&self, stage: &shaderscript::Stage, instance: &Instance, time: f32) -> StageColor {
         let time = seconds(time);
         let [er, eg, eb, ea] = instance.color;
         let mut always_white = true;
+        let mut rgb_gen = None;
         let rgb = match &stage.rgb_gen {
             RgbGen::Identity => [1.0; 3],
             RgbGen::IdentityLighting => {
@@ -360,13 +379,30 @@ impl StageContext<'_> {
                 always_white = false;
                 [1.0 - er, 1.0 - eg, 1.0 - eb]
             }
-            RgbGen::Vertex
-            | RgbGen::ExactVertex
-            | RgbGen::OneMinusVertex
-            | RgbGen::LightingDiffuse => return Color::Vertex,
+            RgbGen::Vertex => {
+                rgb_gen = Some(c::RGBGEN_VERTEX);
+                [1.0; 3]
+            }
+            RgbGen::ExactVertex => {
+                rgb_gen = Some(c::RGBGEN_EXACT_VERTEX);
+                [1.0; 3]
+            }
+            RgbGen::OneMinusVertex => {
+                rgb_gen = Some(c::RGBGEN_ONE_MINUS_VERTEX);
+                [1.0; 3]
+            }
+            RgbGen::LightingDiffuse => {
+                rgb_gen = Some(c::RGBGEN_LIGHTING_DIFFUSE);
+                [1.0; 3]
+            }
         };
+        let mut alpha_gen = None;
         let alpha = match &stage.alpha_gen {
-            AlphaGen::Identity => 1.0,
+            AlphaGen::Identity => {
+                // light and vertex colours may bring their own
+                alpha_gen = rgb_gen.map(|_| c::ALPHAGEN_IDENTITY);
+                1.0
+            }
             AlphaGen::Const(alpha) => {
                 always_white &= *alpha >= 1.0;
                 *alpha
@@ -383,17 +419,31 @@ impl StageContext<'_> {
                 always_white = false;
                 1.0 - ea
             }
-            AlphaGen::Vertex
-            | AlphaGen::OneMinusVertex
-            | AlphaGen::LightingSpecular
-            | AlphaGen::Portal { .. } => return Color::Vertex,
+            AlphaGen::Vertex => {
+                alpha_gen = Some(c::ALPHAGEN_VERTEX);
+                1.0
+            }
+            AlphaGen::OneMinusVertex => {
+                alpha_gen = Some(c::ALPHAGEN_ONE_MINUS_VERTEX);
+                1.0
+            }
+            AlphaGen::LightingSpecular => {
+                alpha_gen = Some(c::ALPHAGEN_LIGHTING_SPECULAR);
+                1.0
+            }
+            AlphaGen::Portal { .. } => {
+                alpha_gen = Some(c::ALPHAGEN_PORTAL);
+                1.0
+            }
         };
-        if always_white {
-            return Color::White;
-        }
         let [r, g, b] = rgb;
-        // the engine keeps bytes; see `stage_color` in material.glsl
-        Color::Flat([r, g, b, alpha].map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.001).floor() / 255.0))
+        StageColor {
+            // the engine keeps bytes; see `point_color` in material.glsl
+            flat: [r, g, b, alpha].map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.001).floor() / 255.0),
+            always_white,
+            rgb_gen,
+            alpha_gen,
+        }
     }
 }
 
