@@ -5,6 +5,7 @@
 
 pub mod api;
 pub mod assets;
+mod at_once;
 mod error;
 mod frame;
 pub mod gpu;

@@ -76,47 +76,55 @@ vec2 generated_texcoord(uint tc_gen, vec3 vector_s, vec3 vector_t, vec3 viewer, 
     }
 }
 
-// Then `count` modifiers, in order.
-vec2 modified_texcoord(MaterialBuffers buffers, uint first, uint count, vec2 entity_texcoord, StagePoint p, vec2 st) {
+// Then `count` modifiers, in order. `jacobian`: of the coordinates, is multiplied by theirs.
+vec2 modified_texcoord(MaterialBuffers buffers, uint first, uint count, vec2 entity_texcoord, StagePoint p, vec2 st, inout mat2 jacobian) {
     TcMods mods = TcMods(buffers.tc_mods);
-    for (uint i = 0; i < count; i++) {
-        TcMod mod = mods.at[first + i];
-        switch (mod.kind) {
+    for (uint i = first; i < first + count; i++) {
+        mat2 m = mat2(1.0);
+        vec2 offset = vec2(0.0);
+        switch (mods.at[i].kind) {
         case TCMOD_TURBULENT: {
-            float now = wave_turns(mod.wave.phase, mod.wave.frequency, p.time);
-            st += vec2(wave_table(WAVE_SIN, (p.position.x + p.position.z) * (1.0 / 1024.0) + now),
-                       wave_table(WAVE_SIN, p.position.y * (1.0 / 1024.0) + now)) * mod.wave.amplitude;
+            Wave wave = mods.at[i].wave;
+            float now = wave_turns(wave.phase, wave.frequency, p.time);
+            offset = vec2(wave_table(WAVE_SIN, (p.position.x + p.position.z) * (1.0 / 1024.0) + now),
+                          wave_table(WAVE_SIN, p.position.y * (1.0 / 1024.0) + now)) * wave.amplitude;
             break;
         }
-        case TCMOD_SCALE: st *= vec2(mod.values[0], mod.values[1]); break;
-        case TCMOD_SCROLL: st += fract(vec2(mod.values[0], mod.values[1]) * p.time); break;
+        case TCMOD_SCALE: m = mat2(mods.at[i].values[0], 0.0, 0.0, mods.at[i].values[1]); break;
+        case TCMOD_SCROLL: offset = fract(vec2(mods.at[i].values[0], mods.at[i].values[1]) * p.time); break;
         case TCMOD_STRETCH: {
-            float scale = 1.0 / wave_value(mod.wave, p.time);
-            st = st * scale + (0.5 - 0.5 * scale);
+            float scale = 1.0 / wave_value(mods.at[i].wave, p.time);
+            m = mat2(scale);
+            offset = vec2(0.5 - 0.5 * scale);
             break;
         }
         case TCMOD_TRANSFORM:
-            st = vec2(st.x * mod.values[0] + st.y * mod.values[2] + mod.values[4],
-                      st.x * mod.values[1] + st.y * mod.values[3] + mod.values[5]);
+            m = mat2(mods.at[i].values[0], mods.at[i].values[1], mods.at[i].values[2], mods.at[i].values[3]);
+            offset = vec2(mods.at[i].values[4], mods.at[i].values[5]);
             break;
         case TCMOD_ROTATE: {
             // the engine looks the angle up in its 1024-entry sine table
-            float turns = -mod.values[0] * p.time / 360.0;
+            float turns = -mods.at[i].values[0] * p.time / 360.0;
             int index = int(fract(turns) * 1024.0);
             float s = sin(float(index & 1023) * (6.283185307 / 1023.0));
             float c = sin(float((index + 256) & 1023) * (6.283185307 / 1023.0));
-            st = vec2(st.x * c - st.y * s + 0.5 - 0.5 * c + 0.5 * s, st.x * s + st.y * c + 0.5 - 0.5 * s - 0.5 * c);
+            m = mat2(c, s, -s, c);
+            offset = vec2(0.5 - 0.5 * c + 0.5 * s, 0.5 - 0.5 * s - 0.5 * c);
             break;
         }
-        case TCMOD_ENTITY_TRANSLATE: st += fract(entity_texcoord * p.time); break;
+        case TCMOD_ENTITY_TRANSLATE: offset = fract(entity_texcoord * p.time); break;
         }
+        st = m * st + offset;
+        jacobian = m * jacobian;
     }
     return st;
 }
 
-vec2 stage_texcoord(MaterialBuffers buffers, Stage stage, Instance instance, StagePoint p) {
+// The stage's texture coordinates. `jacobian`: what becomes of small changes of those of the vertices, turbulence aside.
+vec2 stage_texcoord(MaterialBuffers buffers, Stage stage, Instance instance, StagePoint p, out mat2 jacobian) {
+    jacobian = mat2(1.0);
     vec2 st = generated_texcoord(stage.tc_gen, stage.vector_s, stage.vector_t, instance.viewer, p);
-    return modified_texcoord(buffers, stage.tc_mod_first, stage.tc_mod_count, instance.texcoord, p, st);
+    return modified_texcoord(buffers, stage.tc_mod_first, stage.tc_mod_count, instance.texcoord, p, st, jacobian);
 }
 
 // What a stage's colour and alpha are where they are the same for every point; 1 where they are not.

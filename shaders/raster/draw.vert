@@ -44,7 +44,11 @@ vec2 texcoord(Draws draws, Instance instance, StagePoint point, uint i) {
     uint index = draws.at[gl_InstanceIndex].stages[i];
     vec2 st = generated_texcoord(of_stage(TC_GEN, i), stages.at[index].vector_s, stages.at[index].vector_t, instance.viewer, point);
 #ifdef MANY_STAGES
-    if ((TC_MODS >> i & 1) != 0) return modified_texcoord(VIEW.materials, stages.at[index].tc_mod_first, stages.at[index].tc_mod_count, instance.texcoord, point, st);
+    if ((TC_MODS >> i & 1) != 0) {
+        mat2 jacobian = mat2(1.0);
+        return modified_texcoord(VIEW.materials, stages.at[index].tc_mod_first, stages.at[index].tc_mod_count, instance.texcoord, point,
+            st, jacobian);
+    }
 #endif
     float m[6] = draws.at[gl_InstanceIndex].texcoords[i];
     return vec2(st.x * m[0] + st.y * m[2] + m[4], st.x * m[1] + st.y * m[3] + m[5]);

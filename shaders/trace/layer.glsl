@@ -93,34 +93,14 @@ bool has_ellipse(Footprint f) { return VIEW.antialias.anisotropy > 1.0 && f.alon
 vec4 stage_texel(Stage stage, SurfacePoint p, Instance instance, Footprint footprint) {
     uint image = stage_image(VIEW.materials, stage, p.triangle.lightmap, p.stage.time);
     if ((stage.flags & STAGE_WHITE) != 0 || image == NO_TEXTURE) return vec4(1.0);
-    vec2 uv = stage_texcoord(VIEW.materials, stage, instance, p.stage);
-    if (stage.tc_gen == TCGEN_BASE && has_ellipse(footprint)) {
-        vec2 along = footprint.along, across = footprint.across;
-        if (stage.tc_mod_count > 0) {
-            // what the modifiers make of the axes: all but turbulence are linear in the coordinates, and that is slow
-            SurfacePoint q = p;
-            q.stage.st = p.stage.st + along;
-            along = stage_texcoord(VIEW.materials, stage, instance, q.stage) - uv;
-            q.stage.st = p.stage.st + across;
-            across = stage_texcoord(VIEW.materials, stage, instance, q.stage) - uv;
-        }
-        return texel_in_ellipse(image, stage.sampler_index, uv, along, across);
-    }
+    mat2 jacobian;
+    vec2 uv = stage_texcoord(VIEW.materials, stage, instance, p.stage, jacobian);
+    if (stage.tc_gen == TCGEN_BASE && has_ellipse(footprint))
+        return texel_in_ellipse(image, stage.sampler_index, uv, jacobian * footprint.along, jacobian * footprint.across);
     float scale = p.texel_scale;
-    if (stage.tc_gen == TCGEN_ENVIRONMENT) {
-        scale = 0.0;
-    } else if (stage.tc_gen == TCGEN_VECTOR) {
-        scale = sqrt(length(stage.vector_s) * length(stage.vector_t));
-    } else if (stage.tc_mod_count > 0) {
-        // how much the modifiers stretch the image: the Jacobian by differences
-        const float step_st = 1.0 / 64.0;
-        SurfacePoint q = p;
-        q.stage.st = p.stage.st + vec2(step_st, 0.0);
-        vec2 ds = stage_texcoord(VIEW.materials, stage, instance, q.stage) - uv;
-        q.stage.st = p.stage.st + vec2(0.0, step_st);
-        vec2 dt = stage_texcoord(VIEW.materials, stage, instance, q.stage) - uv;
-        scale *= sqrt(abs(ds.x * dt.y - ds.y * dt.x)) / step_st;
-    }
+    if (stage.tc_gen == TCGEN_ENVIRONMENT) scale = 0.0;
+    if (stage.tc_gen == TCGEN_VECTOR) scale = sqrt(length(stage.vector_s) * length(stage.vector_t));
+    scale *= sqrt(abs(determinant(jacobian)));
     float lod = texture_lod(image, scale, footprint.width);
     return textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), uv, lod);
 }

@@ -72,6 +72,16 @@ struct Passes {
     filter: ComputePipeline,
 }
 
+impl Passes {
+    fn new(device: &Device, tracer: Tracer) -> Result<Self, Error> {
+        let (name, code) = ("trace_fog_filter", &shaders::TRACE_FOG_FILTER_COMP);
+        Ok(Self {
+            light: FogLight::new(device, tracer)?,
+            filter: ComputePipeline::new(device, name, code, &[])?,
+        })
+    }
+}
+
 /// Lights fog; nothing is held while there is none.
 pub struct LitFog {
     device: Device,
@@ -85,16 +95,23 @@ pub struct LitFog {
 }
 
 impl LitFog {
-    /// Nothing is made before there is fog.
-    pub fn new(device: &Device, tracer: Tracer) -> Self {
-        Self {
+    /// Compiles the pipelines if there is fog (`has_fog`); else when it comes into sight, as images are made then.
+    ///
+    /// # Errors
+    /// The driver refuses a pipeline.
+    pub fn new(device: &Device, tracer: Tracer, has_fog: bool) -> Result<Self, Error> {
+        Ok(Self {
             device: device.clone(),
             tracer,
-            passes: None,
+            passes: if has_fog {
+                Some(Passes::new(device, tracer)?)
+            } else {
+                None
+            },
             images: None,
             history: false,
             unseen: 0,
-        }
+        })
     }
 
     /// To be called before a frame's parameters are gathered. `wanted`: the view has fog that is lit; `filtered`: its
@@ -126,11 +143,7 @@ impl LitFog {
         }
         self.history &= goes_on && fits && wanted;
         if wanted && self.passes.is_none() {
-            let (name, code) = ("trace_fog_filter", &shaders::TRACE_FOG_FILTER_COMP);
-            self.passes = Some(Passes {
-                light: FogLight::new(&self.device, self.tracer)?,
-                filter: ComputePipeline::new(&self.device, name, code, &[])?,
-            });
+            self.passes = Some(Passes::new(&self.device, self.tracer)?);
         }
         Ok(())
     }

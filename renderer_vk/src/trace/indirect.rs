@@ -28,6 +28,14 @@ impl<T> Kinds<T> {
     }
 }
 
+fn bounce_meets(device: &Device, has_fog: bool) -> Result<BounceMeets, Error> {
+    if has_fog {
+        BounceMeets::with_fog(device)
+    } else {
+        BounceMeets::new(device)
+    }
+}
+
 /// Records the passes that write `indirect`.
 pub struct IndirectLight {
     device: Device,
@@ -40,16 +48,18 @@ pub struct IndirectLight {
 }
 
 impl IndirectLight {
-    /// Compiles what a denoised picture with one bounce needs; the rest when it is asked for.
+    /// Compiles what a denoised picture of a map with one bounce needs; the rest when it is asked for.
     ///
     /// # Errors
     /// The driver refuses a pipeline.
-    pub fn new(device: &Device, tracer: Tracer) -> Result<Self, Error> {
+    pub fn new(device: &Device, tracer: Tracer, has_fog: bool) -> Result<Self, Error> {
+        let mut meets = Kinds([None, None]);
+        meets.get(has_fog, |fog| bounce_meets(device, fog))?;
         Ok(Self {
             device: device.clone(),
             tracer,
             rays: BounceRays::new(device, tracer)?,
-            meets: Kinds([Some(BounceMeets::new(device)?), None]),
+            meets,
             lights: BounceLights::new(device, tracer)?,
             fill: Fill::new(device)?,
             paths: Kinds([None, None]),
@@ -72,13 +82,7 @@ impl IndirectLight {
         let cells = size.map(|n| n.div_ceil(2));
         let sparse = is_sparse(settings);
         if sparse && settings.rt_bounces == 1 {
-            let meets = self.meets.get(has_fog, |fog| {
-                if fog {
-                    BounceMeets::with_fog(device)
-                } else {
-                    BounceMeets::new(device)
-                }
-            })?;
+            let meets = self.meets.get(has_fog, |fog| bounce_meets(device, fog))?;
             self.rays.record(rec, view, cells)?;
             meets.record(rec, view, cells)?;
             self.lights.record(rec, view, cells)?;

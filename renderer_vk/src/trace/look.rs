@@ -145,7 +145,8 @@ impl TraceLook {
             bsp: Some(&relit.bsp),
         };
         let tracer = Tracer::of(device.info(), settings.rt_tracer);
-        let mut view_tracer = ViewTracer::new(device, tracer)?;
+        let has_fog = !relit.bsp.fogs.is_empty();
+        let mut view_tracer = ViewTracer::new(device, tracer, has_fog)?;
         let exposure = display_exposure(relit);
         view_tracer.map_exposure = exposure;
         let geometry = geometry(device, tracer, world, assets)?;
@@ -195,7 +196,8 @@ impl TraceLook {
             match &mut self.right {
                 Some(made) => made,
                 none => {
-                    let mut made = ViewTracer::new(rec.device(), self.kind)?;
+                    let has_fog = !world.data.relit.bsp.fogs.is_empty();
+                    let mut made = ViewTracer::new(rec.device(), self.kind, has_fog)?;
                     made.map_exposure = self.tracer.map_exposure;
                     none.insert(Box::new(made))
                 }

@@ -24,6 +24,7 @@ use super::passes::{
     ToneMap,
 };
 use super::targets::Targets;
+use crate::at_once::{Late, Make, make_all};
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::ViewScene;
@@ -54,10 +55,11 @@ pub struct ViewTracer {
     other_side: OtherSide,
     fog: LitFog,
     choose: Choose,
-    /// Of one chosen light a pixel, and of any number.
+    /// Of one chosen light a pixel.
     chosen_direct: Direct,
     suns: Direct,
-    direct: Direct,
+    /// Of any number of lights, made when it is asked for.
+    direct: Option<Direct>,
     indirect: IndirectLight,
     /// Made when a view has flares.
     flare_rays: Option<FlareRays>,
@@ -95,31 +97,75 @@ const LIGHT_ADAPTATION: f32 = 0.1;
 const DARK_ADAPTATION: f32 = 0.4;
 
 impl ViewTracer {
-    /// Compiles the pipelines and makes what stays from frame to frame.
+    /// Compiles the pipelines and makes what stays from frame to frame. `has_fog`: the map has some; where this is not
+    /// known, its pipelines are made when it comes into sight.
     ///
     /// # Errors
     /// The device refuses a pipeline, or is out of memory.
-    pub fn new(device: &Device, tracer: Tracer) -> Result<Self, Error> {
+    pub fn new(device: &Device, tracer: Tracer, has_fog: bool) -> Result<Self, Error> {
+        // drivers compile for a long time where they have not done it before
+        let eye_rays = Late::new(|| EyeRays::new(device, tracer));
+        let plain = Late::new(|| PlainPrimary::new(device));
+        let primary = Late::new(|| Primary::new(device, tracer));
+        let other_side = Late::new(|| OtherSide::new(device, tracer));
+        let choose = Late::new(|| Choose::new(device));
+        let chosen_direct = Late::new(|| Direct::of_chosen(device, tracer));
+        let suns = Late::new(|| Direct::of_suns(device, tracer));
+        let fog_plain = Late::new(|| PlainPrimary::with_lit_fog(device));
+        let fog_primary = Late::new(|| Primary::with_lit_fog(device, tracer));
+        let fog = Late::new(|| LitFog::new(device, tracer, has_fog));
+        let indirect = Late::new(|| IndirectLight::new(device, tracer, has_fog));
+        let denoiser = Late::new(|| Denoiser::new(device));
+        let composite = Late::new(|| Composite::new(device));
+        let antialias = Late::new(|| Antialias::new(device));
+        let exposure = Late::new(|| Exposure::new(device));
+        let tone_map = Late::new(|| ToneMap::new(device));
+        // those that take longest first
+        let mut things: Vec<&dyn Make> = Vec::new();
+        if has_fog {
+            things.extend([&fog_primary as &dyn Make, &fog_plain]);
+        }
+        things.extend([
+            &primary as &dyn Make,
+            &other_side,
+            &indirect,
+            &denoiser,
+            &plain,
+            &fog,
+            &chosen_direct,
+            &suns,
+            &eye_rays,
+            &choose,
+            &antialias,
+            &composite,
+            &exposure,
+            &tone_map,
+        ]);
+        make_all(&things);
         Ok(Self {
             device: device.clone(),
             accel: Accel::new(device, tracer),
-            eye_rays: EyeRays::new(device, tracer)?,
-            primary: (PlainPrimary::new(device)?, Primary::new(device, tracer)?),
-            fog_primary: None,
-            other_side: OtherSide::new(device, tracer)?,
-            fog: LitFog::new(device, tracer),
-            choose: Choose::new(device)?,
-            chosen_direct: Direct::of_chosen(device, tracer)?,
-            suns: Direct::of_suns(device, tracer)?,
-            direct: Direct::new(device, tracer)?,
-            indirect: IndirectLight::new(device, tracer)?,
+            eye_rays: eye_rays.take()?,
+            primary: (plain.take()?, primary.take()?),
+            fog_primary: if has_fog {
+                Some((fog_plain.take()?, fog_primary.take()?))
+            } else {
+                None
+            },
+            other_side: other_side.take()?,
+            fog: fog.take()?,
+            choose: choose.take()?,
+            chosen_direct: chosen_direct.take()?,
+            suns: suns.take()?,
+            direct: None,
+            indirect: indirect.take()?,
             flare_rays: None,
             tracer,
-            denoiser: Denoiser::new(device)?,
-            composite: Composite::new(device)?,
-            antialias: Antialias::new(device)?,
-            exposure: Exposure::new(device)?,
-            tone_map: ToneMap::new(device)?,
+            denoiser: denoiser.take()?,
+            composite: composite.take()?,
+            antialias: antialias.take()?,
+            exposure: exposure.take()?,
+            tone_map: tone_map.take()?,
             motion: Motion::default(),
             bloom: Bloom::default(),
             debug: DebugView::default(),
@@ -310,7 +356,11 @@ impl ViewTracer {
                 self.suns.record_chosen(rec, "trace_suns", address, size)?;
             }
         } else {
-            self.direct.record(rec, address, size)?;
+            let direct = match &mut self.direct {
+                Some(made) => made,
+                none => none.insert(Direct::new(&self.device, self.tracer)?),
+            };
+            direct.record(rec, address, size)?;
         }
         if settings.rt_bounces == 0 {
             self.darken_indirect(rec)?;

@@ -66,7 +66,7 @@ impl Gpu {
                 .expect("sampler");
         }
         Some(Self {
-            look: ViewTracer::new(&device, tracer).expect("pipelines"),
+            look: ViewTracer::new(&device, tracer, false).expect("pipelines"),
             tracer,
             ring: FrameRing::new(&device, 2).expect("frames"),
             device,
