@@ -1,4 +1,5 @@
-// Surfaces that light passes and takes its colour from: tinted glass, filters, liquids.
+// Surfaces that light passes and takes its colour from: tinted glass and filters. Liquids leave it as it is, as for maps'
+// compilers: the light that was measured in them has lost nothing on its way, and would be taken from twice.
 //
 // The colour is the mean over the surface, so that a shadow ray runs no stages. Light goes straight through: what
 // refraction would focus (caustics) is spread evenly, which keeps its mean.
@@ -32,9 +33,6 @@ vec3 filtered(vec3 origin, vec3 direction, float distance) {
         SurfacePoint p = surface_point(hit);
         Dielectric dielectric = material_of(p.triangle.material).dielectric;
         if (dielectric.filters == 0 || (p.triangle.flags & TRIANGLE_WORLD) == 0) continue;
-        bool leaves = dot(p.face_normal, direction) > 0.0;
-        // from within a liquid: what it has absorbed on the way to its surface
-        if (leaves) color *= exp(-dielectric.absorption * hit.t);
         if (hit.t < FILTER_CLEARANCE) continue;
         color *= dielectric.filter_color;
         // light comes the other way and is never totally reflected from outside

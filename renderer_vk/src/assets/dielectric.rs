@@ -43,7 +43,7 @@ fn mean_layer(
 }
 
 /// Distance in a liquid after which white light has the colour that its surface shows, units.
-const LIQUID_DEPTH: f32 = 512.0;
+const LIQUID_DEPTH: f32 = 1024.0;
 /// Slime that in the mean passes less than this is not seen through, whatever its class: it stays what its stages show.
 /// Water is smooth all the same.
 const LEAST_TRANSMISSION: f32 = 0.15;
@@ -89,13 +89,8 @@ pub fn dielectric(
             0.0
         },
         scale: 1.0 / passed.max(1.0),
-        filters: u32::from(filters || liquid),
-        // a liquid colours light on its way through
-        filter_color: if liquid {
-            Vec3::ONE
-        } else {
-            mean.through.clamp(Vec3::ZERO, Vec3::ONE)
-        },
+        filters: u32::from(filters && !liquid),
+        filter_color: mean.through.clamp(Vec3::ZERO, Vec3::ONE),
         absorption,
     }
 }

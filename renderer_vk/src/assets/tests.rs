@@ -221,6 +221,7 @@ fn liquids_and_reflections_come_from_directives() {
     assert!((water.index - 1.33).abs() < 1.0e-6 && water.ripple > 0.0);
     // its stage doubles the brightest channel of what is behind: that much is taken back
     assert!((water.scale - 0.5).abs() < 0.01, "{}", water.scale);
+    assert_eq!(water.filters, 0);
     // red goes through, blue least of all
     let [red, green, blue] = water.absorption.to_array();
     assert!(red.abs() < 1.0e-6 && green > 0.0 && blue > green);

@@ -386,23 +386,32 @@ fn light_takes_on_the_colour_of_what_it_passes_with(gpu: &mut Gpu) {
         angular_radius: 0.001,
         material: None,
     });
-    // a red sheet over x < 0, above the eye, and a second one of half the light over y < 0
-    let sheet = |scene: &mut Scene, corner: Vec3, u: Vec3, v: Vec3, color: Vec3| {
+    let sheet = |scene: &mut Scene, corner: Vec3, u: Vec3, v: Vec3, dielectric: Dielectric| {
         let material = scene.material(&[clear()], c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED);
-        scene.materials[material as usize].0.dielectric = Dielectric {
-            filters: 1,
-            filter_color: color,
-            ..Dielectric::default()
-        };
+        scene.materials[material as usize].0.dielectric = dielectric;
         scene.quad(rectangle(corner, u, v), material);
         scene.filters.push([corner - 1.0, corner + u + v + 1.0]);
     };
+    let filter = |filter_color: Vec3| Dielectric {
+        filters: 1,
+        filter_color,
+        ..Dielectric::default()
+    };
+    // a red sheet over x < 0, above the eye, and a second one of half the light over y < 0
     let (x, y) = (Vec3::X * 200.0, Vec3::Y * 400.0);
     let red = Vec3::new(0.9, 0.2, 0.1);
     let corner = Vec3::new(-200.0, -200.0, 70.0);
-    sheet(&mut scene, corner, x, y, red);
+    sheet(&mut scene, corner, x, y, filter(red));
     let grey = Vec3::splat(0.5);
-    sheet(&mut scene, corner + Vec3::Z * 10.0, x * 2.0, y * 0.5, grey);
+    let above = corner + Vec3::Z * 10.0;
+    sheet(&mut scene, above, x * 2.0, y * 0.5, filter(grey));
+    // light in a liquid was measured there: it has lost nothing on its way
+    let water = Dielectric {
+        index: 1.33,
+        absorption: Vec3::splat(0.01),
+        ..Dielectric::default()
+    };
+    sheet(&mut scene, corner - Vec3::Z * 10.0, x * 2.0, y, water);
     let (pixels, _) = gpu.render(&scene, &middles(), 2);
     for (i, pixel) in pixels.iter().enumerate() {
         let p = super::harness::floor_point(&scene, i % SIDE, i / SIDE);
