@@ -106,7 +106,7 @@ pub struct TraceView {
     pub image_surface: u32,
     /// RG32UI: what the light of the surface is multiplied by, and what is in front of it.
     pub image_shown: u32,
-    /// R32UI: the albedo of what a pixel does not show where a reflection and what lies behind it are seen in turns.
+    /// RG32UI: as `image_shown`, of what a pixel does not show where a reflection and what lies behind it are seen in turns.
     pub image_other: u32,
     pub image_direct: u32,
     pub image_indirect: u32,

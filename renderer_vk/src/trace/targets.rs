@@ -26,6 +26,9 @@ pub(super) fn texels(
 }
 
 /// Images of one size: the G-buffer, the light, the picture before tone mapping, and the accumulated sum.
+///
+/// Formats are given as texels are read; colours are linear, lengths units of the map. *Light* is four bytes: three
+/// mantissas of nine bits with one exponent (`light_image.glsl`).
 pub struct Targets {
     /// Pixels.
     pub width: u32,
@@ -34,29 +37,35 @@ pub struct Targets {
     /// 16 bytes a pixel that passes hand on: what the eye's rays meet, until the G-buffer is written; the light that is
     /// chosen, until a ray is sent to it; then the light that the denoiser is filtering.
     pub texels: Buffer,
-    /// World position and length of the way from the eye.
+    /// `Rgba32F`: world position of the surface that is shown, and length of the way to it from the eye (negative: nothing
+    /// to light; its lowest bit is set of what the eye alone sees). Written by `plain` and `primary`, read by all that light
+    /// or filter.
     pub position: Image,
-    /// Packed normals.
+    /// `Rg32Uint`: normal of its triangle and normal that it is lit by, packed (`direction.glsl`). Written and read as
+    /// `position` is.
     pub surface: Image,
-    /// Albedo, with all that lies between the eye and the surface, and the radiance of what is in front of the surface and
-    /// of its own glow; packed as in `light_image.glsl`.
+    /// `Rg32Uint`, two of light: albedo, with all that lies between the eye and the surface, and the radiance of what is in
+    /// front of the surface and of its own glow. Written by `plain` and `primary`, read by `composite`.
     pub shown: Image,
     /// Where pixels show what a surface reflects and what lies behind it in turns: as `shown`, of that which the pixel
-    /// does not show.
+    /// does not show. Written by the pass of the other side.
     pub other: Image,
-    /// Where the surface was in the last frame and how far away, see [`super::motion`], and the mark of the pixel.
+    /// `Rgba16F`: how far from the pixel its surface was in the last frame (pixels, right and down), the length of the way
+    /// to it then (negative: unknown), and the mark of the pixel (`motion.glsl`). Read by the denoiser and by TAA.
     pub motion: Image,
-    /// How far away it is; of this frame and the last.
+    /// `R16F`: length of the way to it, of this frame and the last; negative where it does not rest in the picture.
     pub path: [Image; 2],
-    /// Direct light as it comes from the rays, packed as in `light_image.glsl`.
+    /// `R32Uint`, light: what comes straight from lamps and suns, without albedo. Written by `direct` and `suns`, where the
+    /// denoiser leaves the filtered light for `composite`.
     pub direct: Image,
     /// Bounced light, likewise.
     pub indirect: Image,
     /// `indirect` holds zeros: nothing has to be written while nothing bounces.
     pub indirect_is_black: bool,
-    /// Linear picture of the traced size.
+    /// `Rgba16F`: radiance of the traced size before exposure; 1 is display white of the classic look. Written by
+    /// `composite`, read by TAA or the tone curve.
     pub composite: Image,
-    /// Mean of the frames in reference mode, while that is on.
+    /// `Rgba32F`: the mean of the frames in reference mode, while that is on.
     pub accumulation: Option<Image>,
 }
 
