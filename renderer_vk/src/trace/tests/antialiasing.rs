@@ -6,8 +6,7 @@ use shaders::types::Dielectric;
 use shaders::types::constants as c;
 
 use super::dielectrics::{LIQUID, square};
-use super::harness::{Gpu, Scene, identity, rectangle, reference, stage};
-use super::motion::mirror_at;
+use super::harness::{Gpu, Scene, identity, mirror_at, rectangle, reference, stage};
 use crate::api::RefDef;
 use crate::scene::ViewScene;
 use crate::settings::Settings;

@@ -6,7 +6,7 @@ use shaders::trace_types::constants::{LAST_MOVED, LAST_SAME, LAST_UNKNOWN};
 use shaders::types::Instance;
 use shaders::types::constants as c;
 
-use super::harness::{Gpu, Scene, identity, plane, rectangle, reference, stage};
+use super::harness::{Gpu, Scene, identity, mirror_at, rectangle, reference, stage};
 use crate::api::{EntityKind, RefDef};
 use crate::scene::{Portal, View, ViewEntity, ViewScene};
 use crate::settings::Settings;
@@ -159,21 +159,6 @@ fn meshes_move_with_their_entities_and_by_their_vertices(gpu: &mut Gpu) {
     });
     let unknown = gpu.motion().iter().filter(|(_, m)| m[2] < 0.0).count() as i32;
     assert!(unknown > SIZE * SIZE / 2 && unknown < SIZE * SIZE);
-}
-
-/// A mirror across x; `normal`: along x, to the side that it shows.
-pub(super) fn mirror_at(x: f32, normal: Vec3) -> Portal {
-    let origin = Vec3::new(x, 0.0, 0.0);
-    Portal {
-        plane: plane(normal, origin),
-        mirror: true,
-        surface_origin: origin,
-        surface_axis: [normal, Vec3::Y, Vec3::Z],
-        camera_origin: origin,
-        camera_axis: [-normal, Vec3::Y, Vec3::Z],
-        pvs_origin: origin,
-        entity_origin: origin,
-    }
 }
 
 fn what_a_mirror_shows_moves_like_its_mirror_image(gpu: &mut Gpu) {

@@ -6,7 +6,7 @@ use shaders::types::Instance;
 use shaders::types::constants as c;
 
 use super::harness::{
-    Gpu, Scene, encode, identity, plane, rectangle, reference, stage, through_byte,
+    Gpu, Scene, encode, identity, mirror_at, plane, rectangle, reference, stage, through_byte,
 };
 use crate::scene::Portal;
 use crate::settings::Settings;
@@ -43,21 +43,6 @@ fn screen(x: f32) -> [Vec3; 4] {
     }
 }
 
-fn mirror_at(x: f32) -> Portal {
-    let normal = Vec3::NEG_X;
-    let origin = Vec3::new(x, 0.0, 0.0);
-    Portal {
-        plane: plane(normal, origin),
-        mirror: true,
-        surface_origin: origin,
-        surface_axis: [normal, Vec3::Y, Vec3::Z],
-        camera_origin: origin,
-        camera_axis: [-normal, Vec3::Y, Vec3::Z],
-        pvs_origin: origin,
-        entity_origin: origin,
-    }
-}
-
 #[test]
 fn a_mirror_shows_what_is_behind_the_eye_and_who_looks() {
     Gpu::each(a_mirror_shows_what_is_behind_the_eye_and_who_looks_with);
@@ -70,7 +55,7 @@ fn a_mirror_shows_what_is_behind_the_eye_and_who_looks_with(gpu: &mut Gpu) {
     let mirror = scene.material(&[stage::filter([encode(0.5); 3])], c::MATERIAL_PORTAL);
     scene.quad(screen(-100.0), red);
     scene.quad(screen(50.0), mirror);
-    scene.portals.push(mirror_at(50.0));
+    scene.portals.push(mirror_at(50.0, Vec3::NEG_X));
     // a product of what is displayed
     let byte = |v: f32| (v * 255.0 + 0.001).floor() / 255.0;
     let half = |color: [f32; 3]| decode(Vec3::from(color.map(byte)) * byte(encode(0.5)));
@@ -151,7 +136,7 @@ fn what_turns_to_the_eye_is_met_on_its_own_way_with(gpu: &mut Gpu) {
     let mirror = scene.material(&[stage::add([0.0; 3])], c::MATERIAL_PORTAL);
     scene.quad(screen(50.0), mirror);
     scene.quad(screen(-100.0), white);
-    scene.portals.push(mirror_at(50.0));
+    scene.portals.push(mirror_at(50.0, Vec3::NEG_X));
     let mut on_way = |scene: &mut Scene, x: f32, material: u32, paths: u8| {
         scene.mesh(screen(x), material, identity());
         scene.meshes.last_mut().unwrap().paths = paths;
@@ -184,7 +169,7 @@ fn what_turns_to_the_eye_is_met_on_its_own_way_with(gpu: &mut Gpu) {
         camera_origin: Vec3::X * -90.0,
         surface_axis: [Vec3::X, Vec3::Y, Vec3::NEG_Z],
         camera_axis: [Vec3::NEG_X, Vec3::Y, Vec3::NEG_Z],
-        ..mirror_at(50.0)
+        ..mirror_at(50.0, Vec3::NEG_X)
     });
     let mut on_way = |scene: &mut Scene, x: f32, material: u32, paths: u8| {
         scene.mesh(screen(x), material, identity());
@@ -224,7 +209,7 @@ fn a_portal_shows_what_its_camera_sees_with(gpu: &mut Gpu) {
         camera_origin: Vec3::new(5000.0, 0.0, 0.0),
         // surface axis 0 looks to the eye; looking into the surface (-axis 0) becomes +y
         camera_axis: [Vec3::NEG_Y, Vec3::X, Vec3::Z],
-        ..mirror_at(50.0)
+        ..mirror_at(50.0, Vec3::NEG_X)
     });
     let mean = gpu.mean(&scene, &reference(), 1);
     assert!(close(mean, linear(GREEN)), "{mean}");

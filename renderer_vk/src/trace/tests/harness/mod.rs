@@ -8,6 +8,7 @@ use glam::{Vec3, Vec4};
 use shaders::types::Instance;
 
 use crate::half::half;
+use crate::scene::Portal;
 use crate::settings::Settings;
 
 pub use gpu::Gpu;
@@ -79,4 +80,19 @@ pub fn floor_point(scene: &Scene, x: usize, y: usize) -> Vec3 {
 /// The plane through a point, as `xyz.p = w`.
 pub fn plane(normal: Vec3, point: Vec3) -> Vec4 {
     normal.extend(normal.dot(point))
+}
+
+/// A mirror across x; `normal`: along x, to the side that it shows.
+pub fn mirror_at(x: f32, normal: Vec3) -> Portal {
+    let origin = Vec3::new(x, 0.0, 0.0);
+    Portal {
+        plane: plane(normal, origin),
+        mirror: true,
+        surface_origin: origin,
+        surface_axis: [normal, Vec3::Y, Vec3::Z],
+        camera_origin: origin,
+        camera_axis: [-normal, Vec3::Y, Vec3::Z],
+        pvs_origin: origin,
+        entity_origin: origin,
+    }
 }
