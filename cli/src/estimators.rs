@@ -8,7 +8,7 @@ use renderer_vk::{LightSelection, Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
 
 use crate::render::parse_size;
-use crate::view::{Camera, Maps, map_entities, open};
+use crate::view::{Camera, Maps, load, open};
 
 /// Compare the ways to choose lights: all of them have the same mean
 ///
@@ -236,21 +236,11 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
         };
         let (width, height) = args.size;
         let mut renderer = Renderer::new(RendererOptions {
-            width,
-            height,
-            window: None,
-            validation: false,
             device: args.device.clone(),
-            vsync: false,
-            pipeline_cache: None,
+            ..RendererOptions::headless(width, height)
         })
         .context("no picture without a Vulkan device")?;
-        renderer.begin_registration(files, &base)?;
-        renderer.load_world(&map)?;
-        renderer.end_registration();
-        let bsp = renderer.world().map(|w| w.relit.bsp.clone());
-        let bsp = bsp.context("no map")?;
-        let entities = map_entities(&mut renderer, &bsp);
+        let (bsp, entities) = load(&mut renderer, files, &map, &base)?;
         let camera = match args.camera.as_deref() {
             Some([x, y, z, yaw, rest @ ..]) => Camera {
                 origin: glam::Vec3::new(*x, *y, *z),

@@ -13,7 +13,7 @@ use crate::cameras::{EYES, places};
 use crate::chromaticity::ColorDifference;
 use crate::render::parse_size;
 use crate::statistics::luminance;
-use crate::view::{Camera, Maps, map_entities, open};
+use crate::view::{Camera, Maps, load, open};
 
 /// Draw views in the classic look and traced, side by side, and compare how bright and how coloured they are
 ///
@@ -164,16 +164,8 @@ impl Sums {
 fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
     let (files, path) = open(map, &args.chosen.games)?;
     let (width, height) = args.size;
-    let mut renderer = Renderer::new(RendererOptions {
-        width,
-        height,
-        window: None,
-        validation: false,
-        device: None,
-        vsync: false,
-        pipeline_cache: None,
-    })
-    .context("no picture without a Vulkan device")?;
+    let mut renderer = Renderer::new(RendererOptions::headless(width, height))
+        .context("no picture without a Vulkan device")?;
     renderer.keep_calibrations(args.cache.clone());
     let settings = |look: Option<MapLightChoice>| Settings {
         rt: look.is_some(),
@@ -182,14 +174,7 @@ fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
         rt_auto_exposure: !args.fixed_exposure,
         ..Settings::default()
     };
-    renderer.begin_registration(files, &settings(None))?;
-    renderer.load_world(&path)?;
-    renderer.end_registration();
-    let bsp = renderer
-        .world()
-        .map(|w| w.relit.bsp.clone())
-        .context("no map")?;
-    let entities = map_entities(&mut renderer, &bsp);
+    let (bsp, entities) = load(&mut renderer, files, &path, &settings(None))?;
     let cameras: Vec<Camera> = places(&bsp.entities(), args.views)
         .iter()
         .map(|place| Camera {

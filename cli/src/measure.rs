@@ -28,7 +28,7 @@ use self::stage::{Stage, Variant, variants};
 use crate::cameras::{EYES, Place, places};
 use crate::render::{parse_size, parse_view};
 use crate::statistics::{luminance, relative_bias, relative_error};
-use crate::view::{Camera, Maps, map_entities, open};
+use crate::view::{Camera, Maps, load, open};
 
 /// Measure the traced look in real time against its reference
 ///
@@ -346,13 +346,8 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
     for map in &args.chosen.maps {
         let (files, path) = open(map, &args.chosen.games)?;
         let mut renderer = Renderer::new(RendererOptions {
-            width: args.size.0,
-            height: args.size.1,
-            window: None,
-            validation: false,
             device: args.device.clone(),
-            vsync: false,
-            pipeline_cache: None,
+            ..RendererOptions::headless(args.size.0, args.size.1)
         })
         .context("nothing to measure without a Vulkan device")?;
         let base = Settings {
@@ -362,14 +357,7 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
             rt_exposure: args.exposure,
             ..Settings::default()
         };
-        renderer.begin_registration(files, &base)?;
-        renderer.load_world(&path)?;
-        renderer.end_registration();
-        let bsp = renderer
-            .world()
-            .map(|w| w.relit.bsp.clone())
-            .context("no map")?;
-        let entities = map_entities(&mut renderer, &bsp);
+        let (bsp, entities) = load(&mut renderer, files, &path, &base)?;
         let held = args.hold.as_ref().map(|m| renderer.register_model(m));
         let mut stage = Stage {
             renderer,

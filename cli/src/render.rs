@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::pictures::write_png;
 use crate::timings::Timings;
-use crate::view::{Camera, map_entities, open};
+use crate::view::{Camera, load, open};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use glam::Vec3;
@@ -398,29 +398,17 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     };
     let (width, height) = args.size;
     let mut renderer = Renderer::new(RendererOptions {
-        width,
-        height,
-        window: None,
         validation: args.validate,
         device: args.device.clone(),
-        vsync: false,
-        pipeline_cache: None,
+        ..RendererOptions::headless(width, height)
     })
     .context("no picture without a Vulkan device")?;
     let info = renderer.device_info().clone();
-    renderer.begin_registration(files, &args.settings())?;
-    renderer.load_world(&map)?;
-    renderer.end_registration();
-
-    let (bsp, camera) = {
-        let world = renderer.world().context("no map")?;
-        let camera = match args.path {
-            Some(_) => Camera::default(),
-            None => args.camera(&world.relit)?,
-        };
-        (world.relit.bsp.clone(), camera)
+    let (_, entities) = load(&mut renderer, files, &map, &args.settings())?;
+    let camera = match args.path {
+        Some(_) => Camera::default(),
+        None => args.camera(&renderer.world().context("no map")?.relit)?,
     };
-    let entities = map_entities(&mut renderer, &bsp);
     let shots = args.shots(camera)?;
     let frames = shots.len();
     let bar = ProgressBar::new(frames as u64);

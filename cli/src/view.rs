@@ -9,8 +9,8 @@ use clap::Args;
 use glam::Vec3;
 use q3bsp::{Bsp, Format};
 use relight::{GameFiles, LoadError, MemoryFiles, Overlay, Pk3, RelitWorld, SearchPath, map_files};
-use renderer_vk::Renderer;
 use renderer_vk::api::{EntityKind, RefDef, RefEntity};
+use renderer_vk::{Renderer, Settings};
 
 /// Which maps a command is about.
 #[derive(Args, Debug)]
@@ -255,8 +255,27 @@ impl Camera {
     }
 }
 
+/// Has a renderer load a map, as a game does; the map's data, and [what the game would add](map_entities) to every view.
+///
+/// # Errors
+/// The map cannot be read, or the device is out of memory.
+pub fn load(
+    renderer: &mut Renderer,
+    files: Arc<dyn GameFiles>,
+    path: &str,
+    settings: &Settings,
+) -> anyhow::Result<(Bsp, Vec<RefEntity>)> {
+    renderer.begin_registration(files, settings)?;
+    renderer.load_world(path)?;
+    renderer.end_registration();
+    let bsp = renderer.world().map(|w| w.relit.bsp.clone());
+    let bsp = bsp.context("no map")?;
+    let entities = map_entities(renderer, &bsp);
+    Ok((bsp, entities))
+}
+
 /// What the game would add to every view: the map's inline models at rest, and the marks of its mirrors.
-pub fn map_entities(renderer: &mut Renderer, bsp: &Bsp) -> Vec<RefEntity> {
+fn map_entities(renderer: &mut Renderer, bsp: &Bsp) -> Vec<RefEntity> {
     let mut entities = Vec::new();
     let axis = [Vec3::X, Vec3::Y, Vec3::Z];
     for entity in bsp.entities() {

@@ -52,6 +52,21 @@ pub struct RendererOptions {
     pub pipeline_cache: Option<std::path::PathBuf>,
 }
 
+impl RendererOptions {
+    /// Without a window, on whatever device there is, and keeping nothing. Sizes in pixels.
+    pub fn headless(width: u32, height: u32) -> Self {
+        Self {
+            width,
+            height,
+            window: None,
+            validation: false,
+            device: None,
+            vsync: false,
+            pipeline_cache: None,
+        }
+    }
+}
+
 /// The renderer: one device, one window or none, and what the game has registered.
 pub struct Renderer {
     // dropped in this order: what the device owns comes before it

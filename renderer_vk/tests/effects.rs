@@ -45,13 +45,8 @@ impl Stage {
         make: impl FnOnce(RendererOptions) -> Result<Renderer, Error>,
     ) -> Option<Self> {
         let options = RendererOptions {
-            width: SIDE,
-            height: SIDE,
-            window: None,
             validation: true,
-            device: None,
-            vsync: false,
-            pipeline_cache: None,
+            ..RendererOptions::headless(SIDE, SIDE)
         };
         let mut renderer = match make(options) {
             Ok(renderer) => renderer,

@@ -100,13 +100,8 @@ fn image(channel: impl Fn(usize, usize) -> [usize; 4]) -> Vec<u8> {
 fn renderer() -> Option<Renderer> {
     let side = (ROW * PIXELS) as u32;
     let options = RendererOptions {
-        width: side,
-        height: side,
-        window: None,
         validation: true,
-        device: None,
-        vsync: false,
-        pipeline_cache: None,
+        ..RendererOptions::headless(side, side)
     };
     let mut renderer = match Renderer::new(options) {
         Ok(renderer) => renderer,
