@@ -27,7 +27,7 @@ pub struct MotionView {
     pub last_positions: u64,
     /// A [`LastInstance`] for each instance of the view.
     pub last_instances: u64,
-    /// For each portal of the view the [`PortalRecord`] of the last frame.
+    /// For each portal of the view the [`PortalRecord`](super::PortalRecord) of the last frame.
     pub last_portals: u64,
     /// R16F: length of the way now, which the next frame reads, too.
     pub path: u32,
