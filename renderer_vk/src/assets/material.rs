@@ -65,8 +65,6 @@ pub struct SkyBox {
     /// Bindless indices of the far box's sides `rt bk lf ft up dn`; `None` without a box (or when its first side is
     /// missing: the engine then draws none).
     pub faces: Option<[u32; 6]>,
-    /// Height of the cloud layer, units.
-    pub cloud_height: f32,
 }
 
 /// A stage that plays a video.

@@ -66,7 +66,7 @@ pub struct Materials {
     scripts: Arc<relight::Materials>,
     settings: MaterialSettings,
     internal: Internal,
-    last_cloud_height: f32,
+    cloud_height: f32,
     last_sun: Option<Vec3>,
     pub(super) uploaded: Option<Uploaded>,
     pub(super) dirty: bool,
@@ -119,7 +119,7 @@ impl Materials {
             scripts,
             settings,
             internal: Internal::default(),
-            last_cloud_height: 512.0,
+            cloud_height: 512.0,
             last_sun: None,
             uploaded: None,
             dirty: true,
@@ -340,13 +340,12 @@ impl Materials {
         }
         shader.stages.truncate(kept);
         let sky = shader.sky.clone().map(|sky| {
-            self.last_cloud_height = sky.cloud_height;
+            self.cloud_height = sky.cloud_height;
             SkyBox {
                 faces: sky
                     .outer
                     .as_deref()
                     .and_then(|outer| sky_faces(outer, source)),
-                cloud_height: sky.cloud_height,
             }
         });
         let stage_first = u32::try_from(stage_first).unwrap_or(u32::MAX);
@@ -465,9 +464,9 @@ impl Materials {
         self.internal
     }
 
-    /// Cloud height of the sky parsed last: the engine has one cloud dome for all skies.
-    pub fn last_cloud_height(&self) -> f32 {
-        self.last_cloud_height
+    /// Height of the cloud layer of all skies, units: that of the sky parsed last, as the engine has one dome for all.
+    pub fn cloud_height(&self) -> f32 {
+        self.cloud_height
     }
 
     /// Direction towards the sun of the material parsed last that has one.

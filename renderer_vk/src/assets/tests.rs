@@ -115,6 +115,11 @@ t/sky
   skyParms t/box 300 -
   { map t/a.tga }
 }
+t/highsky
+{
+  skyParms - 700 -
+  { map t/a.tga }
+}
 ";
 
 fn game() -> Registration {
@@ -397,13 +402,17 @@ fn videos_show_their_client() {
 fn skies_have_faces_and_clouds() {
     let mut game = game();
     let sky = game.find("t/sky", LightmapClass::None, true);
-    let material = game.materials.get(sky);
+    let material = game.materials.get(sky).clone();
     let found = material.sky.unwrap();
     let faces = found.faces.unwrap();
     assert_eq!(faces[0], game.textures.index("t/box_rt.tga").unwrap());
     assert_eq!(faces[1], game.textures.default_image());
     assert_eq!(faces[4], game.textures.index("t/box_up.tga").unwrap());
-    assert_eq!(found.cloud_height, 300.0);
+    assert_eq!(game.materials.cloud_height(), 300.0);
+    // all skies have the height of the last one, in the engine
+    game.find("t/highsky", LightmapClass::None, true);
+    game.find("t/sky", LightmapClass::None, true);
+    assert_eq!(game.materials.cloud_height(), 700.0);
     assert!(material.flags & c::MATERIAL_SKY != 0);
     assert_eq!(material.sort, shaderscript::sort::SKY);
 }

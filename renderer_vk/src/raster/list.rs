@@ -183,7 +183,7 @@ impl DrawList {
         }
         let first_index = self.indices.len() as u32;
         // one dome serves all skies, and none has clouds below
-        let clouds = sky::Coordinates::Clouds(stages.materials.last_cloud_height());
+        let clouds = sky::Coordinates::Clouds(stages.materials.cloud_height());
         for face in 0..SKY_FACES - 1 {
             if let Some(cells) = visible.coverage.cells(face) {
                 self.mesh().append_face(face, cells, view, color, clouds);

@@ -31,7 +31,7 @@ impl MaterialTable for Assets {
         let material = self.materials.get(drawn);
         let sky = material.sky.as_ref().map(|sky| SkyRecord {
             faces: sky.faces.unwrap_or([NO_TEXTURE; 6]),
-            cloud_height: sky.cloud_height,
+            cloud_height: self.materials.cloud_height(),
         });
         let info = MaterialInfo {
             flags: material.flags,
@@ -59,9 +59,10 @@ impl MaterialTable for Assets {
     }
 }
 
-/// Changes when another material is drawn in place of one.
+/// Changes when another material is drawn in place of one, or the skies' clouds move to another height.
 fn remapping(materials: &Materials) -> u64 {
     let mut hasher = DefaultHasher::new();
+    materials.cloud_height().to_bits().hash(&mut hasher);
     for material in materials.iter() {
         if let Some(drawn) = material.remapped {
             (material.order, drawn).hash(&mut hasher);
