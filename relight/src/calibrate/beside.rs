@@ -210,12 +210,8 @@ pub struct Spots {
 /// Looks for spots of light beside the point lights of a world as it is, calibrated or not, that its lightmaps do not have.
 pub fn spots(world: &RelitWorld) -> Spots {
     let occluders = samples::occluders(world);
-    let dirty = world
-        .calibration
-        .as_ref()
-        .is_some_and(|report| report.dirty);
     let taking = Taking {
-        dirt: dirty.then(|| said::dirt(&world.bsp.entities())),
+        dirt: said::believed_dirt(world),
         ..Default::default()
     };
     let gauge = Gauge::new(world, &occluders, &taking);

@@ -49,15 +49,11 @@ impl Residual {
 /// [materials measured](RelitWorld::measure_materials).
 pub fn residuals(world: &RelitWorld, options: &CalibrationOptions) -> Vec<Residual> {
     let occluders = samples::occluders(world);
-    let dirty = world
-        .calibration
-        .as_ref()
-        .is_some_and(|report| report.dirty);
     let taking = Taking {
         count: options.samples,
         seed: options.seed,
         few_black: false,
-        dirt: dirty.then(|| said::dirt(&world.bsp.entities())),
+        dirt: said::believed_dirt(world),
     };
     let (samples, _) = samples::take(world, &occluders, &taking);
     let silent = skies::silent(world);

@@ -8,6 +8,7 @@
 
 use super::bvh::Occluders;
 use super::compiler;
+use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::Entity;
 use std::f32::consts::TAU;
@@ -72,6 +73,12 @@ pub(super) fn command_line(entities: &[Entity]) -> Option<CommandLine> {
             false => None,
         },
     })
+}
+
+/// The dirt of a calibrated map, if it was taken for dirty.
+pub(super) fn believed_dirt(world: &RelitWorld) -> Option<Dirt> {
+    let report = world.calibration.as_ref()?;
+    report.dirty.then(|| dirt(&world.bsp.entities()))
 }
 
 /// The dirt of a map that has some: what its command line tells, else what is usual.

@@ -65,8 +65,8 @@ fn models_have_the_light_that_the_engine_adds_with(gpu: &mut Gpu) {
     assert!(close(mean, albedo * traced), "{mean}");
 }
 
-/// A weapon before the eye in the light of a lamp above, with a roof between that instances of `flags` have.
-fn under_a_roof(flags: u32) -> Scene {
+/// A weapon before the eye, which fills the picture.
+fn armed() -> Scene {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 20.0, 16);
     let skin = scene.material(&lit(), 0);
     let weapon = Instance {
@@ -74,6 +74,12 @@ fn under_a_roof(flags: u32) -> Scene {
         ..identity()
     };
     scene.mesh(screen(100.0), skin, weapon);
+    scene
+}
+
+/// The weapon in the light of a lamp above, with a roof between that instances of `flags` have.
+fn under_a_roof(flags: u32) -> Scene {
+    let mut scene = armed();
     let black = scene.material(&[stage::constant([0.0; 3])], c::MATERIAL_TWO_SIDED);
     let corner = Vec3::new(-900.0, -900.0, 300.0);
     let roof = rectangle(corner, Vec3::X * 1800.0, Vec3::Y * 1800.0);
@@ -125,13 +131,7 @@ fn who_carries_a_weapon_is_not_in_the_way_of_bounced_light() {
 fn who_carries_a_weapon_is_not_in_the_way_of_bounced_light_with(gpu: &mut Gpu) {
     // a glowing wall behind the eye, and a body between
     let scene_of = |flags: u32| {
-        let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 20.0, 16);
-        let skin = scene.material(&lit(), 0);
-        let weapon = Instance {
-            flags: c::INSTANCE_FIRST_PERSON,
-            ..identity()
-        };
-        scene.mesh(screen(100.0), skin, weapon);
+        let mut scene = armed();
         let glow = scene.material(&[stage::constant([1.0; 3])], c::MATERIAL_TWO_SIDED);
         scene.quad(screen(-60.0), glow);
         let black = scene.material(&[stage::constant([0.0; 3])], c::MATERIAL_TWO_SIDED);
