@@ -8,6 +8,7 @@ use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::bindless::Bindless;
+use super::dynamic_state::{DynamicStateCommands, Shared};
 use super::error::{Context, Error};
 use super::graveyard::{Garbage, SyncState};
 use super::image::Format;
@@ -71,6 +72,7 @@ pub(crate) struct DeviceInner {
     pub bindless: Bindless,
     pub render_passes: Mutex<HashMap<RenderPassKey, vk::RenderPass>>,
     pub pipeline_cache: vk::PipelineCache,
+    pub shared_pipelines: Shared,
     pub timeline: vk::Semaphore,
     pub timings: Mutex<Vec<(String, f32)>>,
     /// Passes are timed.
@@ -86,6 +88,7 @@ pub(crate) struct DeviceInner {
     pub acceleration: Option<khr::acceleration_structure::Device>,
     pub ray_tracing: Option<khr::ray_tracing_pipeline::Device>,
     pub swapchain: Option<khr::swapchain::Device>,
+    pub dynamic_state: Option<DynamicStateCommands>,
     pub debug: Option<ext::debug_utils::Device>,
     pub core: RawDevice,
 }
@@ -124,6 +127,7 @@ impl Device {
             bindless: Bindless::default(),
             render_passes: Mutex::new(HashMap::new()),
             pipeline_cache: vk::PipelineCache::null(),
+            shared_pipelines: Shared::default(),
             timeline: vk::Semaphore::null(),
             timings: Mutex::new(Vec::new()),
             measuring: AtomicBool::new(true),
@@ -150,6 +154,7 @@ impl Device {
                 .surface
                 .is_some()
                 .then(|| khr::swapchain::Device::new(vi, vd)),
+            dynamic_state: a.dynamic_state.then(|| DynamicStateCommands::new(vi, vd)),
             debug: select::debug_utils(&core.instance, vd),
             info: choice.info,
             core,

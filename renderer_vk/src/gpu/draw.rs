@@ -215,7 +215,7 @@ impl Pass<'_> {
     }
 
     fn can_draw(&self) -> bool {
-        let can = self.rendering.is_some() && self.bound.graphics;
+        let can = self.rendering.is_some() && self.bound.graphics.is_some();
         if !can {
             self.refuse("a draw without attachments or pipeline");
         }

@@ -50,6 +50,16 @@ pub enum DepthTest {
     Equal,
 }
 
+impl DepthTest {
+    pub(super) fn vk(self) -> vk::CompareOp {
+        match self {
+            Self::Always => vk::CompareOp::ALWAYS,
+            Self::LessEqual => vk::CompareOp::LESS_OR_EQUAL,
+            Self::Equal => vk::CompareOp::EQUAL,
+        }
+    }
+}
+
 /// What a draw does with the stencil, where it passes all tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stencil {
@@ -133,6 +143,16 @@ pub enum Cull {
     Front,
     /// Back faces.
     Back,
+}
+
+impl Cull {
+    pub(super) fn vk(self) -> vk::CullModeFlags {
+        match self {
+            Self::None => vk::CullModeFlags::NONE,
+            Self::Front => vk::CullModeFlags::FRONT,
+            Self::Back => vk::CullModeFlags::BACK,
+        }
+    }
 }
 
 /// What the vertices make.

@@ -25,6 +25,7 @@ mod copy;
 mod device;
 mod draw;
 mod draw_state;
+mod dynamic_state;
 mod error;
 mod frame;
 mod graveyard;

@@ -8,6 +8,7 @@ use super::bindless::PUSH_BYTES;
 use super::buffer::Buffer;
 use super::device::{Device, lock};
 use super::draw::Attachments;
+use super::dynamic_state::DynamicState;
 use super::pipeline::{ComputePipeline, GraphicsPipeline};
 use super::ray_tracing::{RayTracingPipeline, SbtRegions};
 use super::recorder::Recorder;
@@ -28,7 +29,8 @@ pub struct Pass<'a> {
 /// Which pipelines are bound.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Bound {
-    pub graphics: bool,
+    /// The pipeline for draws, and the dynamic state that was told.
+    pub graphics: Option<(vk::Pipeline, DynamicState)>,
     compute: bool,
     /// The bind point that the descriptor set was bound for last.
     set: Option<vk::PipelineBindPoint>,
@@ -91,8 +93,14 @@ impl<'a> Pass<'a> {
 
     /// Binds a pipeline for the draws that follow.
     pub fn bind_graphics(&mut self, pipeline: &GraphicsPipeline) {
-        self.bind(vk::PipelineBindPoint::GRAPHICS, pipeline.raw());
-        self.bound.graphics = true;
+        let (raw, state) = (pipeline.raw(), pipeline.state());
+        let before = self.bound.graphics.replace((raw, state));
+        if before.map(|(raw, _)| raw) != Some(raw) {
+            self.bind(vk::PipelineBindPoint::GRAPHICS, raw);
+        }
+        if let Some(commands) = &self.rec.device.0.dynamic_state {
+            commands.record(self.cmd(), state, before.map(|(_, state)| state));
+        }
     }
 
     /// Binds a pipeline for the dispatches that follow.

@@ -1,10 +1,13 @@
 //! Graphics and compute pipelines. All have the same layout: the bindless set and 128 bytes of push constants.
 
+use std::sync::Arc;
+
 use ash::vk;
 use shaders::Spirv;
 
 use super::device::Device;
 use super::draw_state::{BlendFactor, ColorMask, Cull, DepthTest, Stencil, Topology};
+use super::dynamic_state::DynamicState;
 use super::error::{Context, Error};
 use super::graveyard::Garbage;
 use super::image::Format;
@@ -155,15 +158,34 @@ impl Constants {
     }
 }
 
-/// A pipeline for draws.
-pub struct GraphicsPipeline(Pipeline);
+/// A pipeline for draws, with the state that may not be part of it.
+pub struct GraphicsPipeline {
+    pipeline: Arc<Pipeline>,
+    state: DynamicState,
+}
 
 impl GraphicsPipeline {
-    /// Compiles a pipeline.
+    /// Compiles a pipeline, or takes one that differs in blending, culling and depth tests alone, where the device is
+    /// told these while drawing.
     ///
     /// # Errors
     /// Wireframe on a device without it; the driver's refusal.
     pub fn new(device: &Device, desc: &GraphicsDesc<'_>) -> Result<Self, Error> {
+        let pipeline = if device.0.dynamic_state.is_some() {
+            device
+                .0
+                .shared_pipelines
+                .get(desc, || Self::compile(device, desc))?
+        } else {
+            Arc::new(Self::compile(device, desc)?)
+        };
+        Ok(Self {
+            pipeline,
+            state: DynamicState::of(desc),
+        })
+    }
+
+    fn compile(device: &Device, desc: &GraphicsDesc<'_>) -> Result<Pipeline, Error> {
         if desc.wireframe && !device.0.info.wireframe {
             return Err(Error::Unsupported {
                 name: desc.name.to_owned(),
@@ -209,11 +231,7 @@ impl GraphicsPipeline {
             } else {
                 vk::PolygonMode::FILL
             })
-            .cull_mode(match desc.cull {
-                Cull::None => vk::CullModeFlags::NONE,
-                Cull::Front => vk::CullModeFlags::FRONT,
-                Cull::Back => vk::CullModeFlags::BACK,
-            })
+            .cull_mode(desc.cull.vk())
             .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
             .depth_bias_enable(desc.polygon_offset.is_some())
             .depth_bias_slope_factor(slope)
@@ -227,11 +245,7 @@ impl GraphicsPipeline {
         let mut depth = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(desc.depth.is_some())
             .depth_write_enable(desc.depth.is_some() && desc.depth_write)
-            .depth_compare_op(match desc.depth_test {
-                DepthTest::Always => vk::CompareOp::ALWAYS,
-                DepthTest::LessEqual => vk::CompareOp::LESS_OR_EQUAL,
-                DepthTest::Equal => vk::CompareOp::EQUAL,
-            });
+            .depth_compare_op(desc.depth_test.vk());
         if let Some(stencil) = stencil {
             depth = depth
                 .stencil_test_enable(true)
@@ -256,7 +270,10 @@ impl GraphicsPipeline {
         if desc.color.is_some() {
             blend = blend.attachments(&attachments);
         }
-        let states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        let mut states = vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        if device.0.dynamic_state.is_some() {
+            states.extend(DynamicState::STATES);
+        }
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&states);
         let render_pass = device.0.render_pass(RenderPassKey {
             color: desc.color.map(Format::vk),
@@ -283,16 +300,15 @@ impl GraphicsPipeline {
                 .vk()
                 .create_graphics_pipelines(device.0.pipeline_cache, &infos, None)
         };
-        Ok(Self(one(
-            device,
-            made,
-            "vkCreateGraphicsPipelines",
-            desc.name,
-        )?))
+        one(device, made, "vkCreateGraphicsPipelines", desc.name)
     }
 
     pub(crate) fn raw(&self) -> vk::Pipeline {
-        self.0.raw
+        self.pipeline.raw
+    }
+
+    pub(crate) fn state(&self) -> DynamicState {
+        self.state
     }
 }
 

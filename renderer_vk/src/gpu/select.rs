@@ -104,6 +104,7 @@ pub(crate) struct Abilities {
     pub int8: bool,
     pub storage16: bool,
     pub storage8: bool,
+    pub dynamic_state: bool,
 }
 
 /// The device that was chosen.
@@ -199,12 +200,16 @@ fn examine(
         && has(khr::deferred_host_operations::NAME);
     let pipeline_ext = acceleration_ext && has(khr::ray_tracing_pipeline::NAME);
     let query_ext = acceleration_ext && has(khr::ray_query::NAME);
+    let dynamic_ext =
+        has(ext::extended_dynamic_state::NAME) && has(ext::extended_dynamic_state3::NAME);
 
     let mut f11 = vk::PhysicalDeviceVulkan11Features::default();
     let mut f12 = vk::PhysicalDeviceVulkan12Features::default();
     let mut f_accel = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
     let mut f_pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default();
     let mut f_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
+    let mut f_dynamic = vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT::default();
+    let mut f_dynamic3 = vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::default();
     let mut features = vk::PhysicalDeviceFeatures2::default()
         .push_next(&mut f11)
         .push_next(&mut f12);
@@ -216,6 +221,11 @@ fn examine(
     }
     if query_ext {
         features = features.push_next(&mut f_query);
+    }
+    if dynamic_ext {
+        features = features
+            .push_next(&mut f_dynamic)
+            .push_next(&mut f_dynamic3);
     }
     // SAFETY: the chain holds only structures of this version and of extensions that the device has.
     unsafe { raw.get_physical_device_features2(physical, &mut features) };
@@ -323,6 +333,9 @@ fn examine(
         int8: on(f12.shader_int8),
         storage16: on(f11.storage_buffer16_bit_access),
         storage8: on(f12.storage_buffer8_bit_access),
+        dynamic_state: on(f_dynamic.extended_dynamic_state)
+            && on(f_dynamic3.extended_dynamic_state3_color_blend_enable)
+            && on(f_dynamic3.extended_dynamic_state3_color_blend_equation),
     };
     if options.required_only {
         abilities = Abilities::default();
@@ -439,6 +452,10 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
     if a.query {
         extensions.push(khr::ray_query::NAME.as_ptr());
     }
+    if a.dynamic_state {
+        extensions.push(ext::extended_dynamic_state::NAME.as_ptr());
+        extensions.push(ext::extended_dynamic_state3::NAME.as_ptr());
+    }
     let features = vk::PhysicalDeviceFeatures::default()
         .shader_int64(true)
         .shader_sampled_image_array_dynamic_indexing(true)
@@ -474,6 +491,11 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
     let mut f_pipeline =
         vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
     let mut f_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+    let mut f_dynamic =
+        vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT::default().extended_dynamic_state(true);
+    let mut f_dynamic3 = vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::default()
+        .extended_dynamic_state3_color_blend_enable(true)
+        .extended_dynamic_state3_color_blend_equation(true);
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default()
         .queue_family_index(choice.queue_family)
@@ -492,6 +514,9 @@ pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash:
     }
     if a.query {
         info = info.push_next(&mut f_query);
+    }
+    if a.dynamic_state {
+        info = info.push_next(&mut f_dynamic).push_next(&mut f_dynamic3);
     }
     // SAFETY: features and extensions are ones that `examine` found on this device; pointers live here.
     unsafe { instance.raw.create_device(choice.physical, &info, None) }.context("vkCreateDevice")

@@ -3,6 +3,7 @@
 //! Without a device each test says so and passes, unless `RELIGHT_REQUIRE_GPU=1`.
 
 mod direction;
+mod draw_state;
 mod drawing;
 mod life;
 mod memory;

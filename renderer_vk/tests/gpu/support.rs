@@ -5,11 +5,25 @@ use renderer_vk::gpu::*;
 
 /// A headless device, or `None` with a printed line.
 pub(super) fn device(allow_ray_tracing: bool) -> Option<Device> {
+    made(DeviceOptions {
+        allow_ray_tracing,
+        ..DeviceOptions::default()
+    })
+}
+
+/// The same, with what is required alone.
+pub(super) fn poor_device() -> Option<Device> {
+    made(DeviceOptions {
+        required_only: true,
+        ..DeviceOptions::default()
+    })
+}
+
+fn made(options: DeviceOptions) -> Option<Device> {
     let options = DeviceOptions {
         app_name: "gpu tests".to_owned(),
         validation: true,
-        allow_ray_tracing,
-        ..DeviceOptions::default()
+        ..options
     };
     match Device::new(&options, SurfaceSource::Headless) {
         Ok(device) => Some(device),

@@ -1,0 +1,175 @@
+//! Blending, culling and depth of draws that follow each other, on devices that are told these while drawing and on
+//! such that are not.
+
+use super::support::{device, finish, poor_device};
+use bytemuck::{Pod, Zeroable};
+use renderer_vk::gpu::*;
+
+const SIZE: u32 = 32;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Draw {
+    corners: u64,
+    color: [f32; 4],
+}
+
+/// What a draw does to a pixel of its own.
+#[derive(Clone, Copy)]
+struct State {
+    cull: Cull,
+    test: DepthTest,
+    write: bool,
+    blend: Option<(BlendFactor, BlendFactor)>,
+}
+
+/// All combinations, in an order in which each part changes by itself and with others.
+fn states() -> Vec<State> {
+    let mut all = Vec::new();
+    for blend in [
+        None,
+        Some((BlendFactor::One, BlendFactor::One)),
+        Some((BlendFactor::DstColor, BlendFactor::Zero)),
+    ] {
+        for test in [DepthTest::Always, DepthTest::LessEqual, DepthTest::Equal] {
+            for write in [false, true] {
+                for cull in [Cull::None, Cull::Front, Cull::Back] {
+                    all.push(State {
+                        cull,
+                        test,
+                        write,
+                        blend,
+                    });
+                }
+            }
+        }
+    }
+    let count = all.len();
+    (0..count * 7)
+        .map(|i| all[i * (1 + i / count) % count])
+        .collect()
+}
+
+/// What is left of a pixel of 0.4 at depth 0.5 after a clockwise draw of 0.6 at depth `z` and a test whether depth 0.6
+/// passes, which shows in blue.
+fn expected(state: State, z: f32) -> [u8; 3] {
+    let near_enough = match state.test {
+        DepthTest::Always => true,
+        DepthTest::LessEqual => z <= 0.5,
+        DepthTest::Equal => z == 0.5,
+    };
+    let passes = near_enough && state.cull != Cull::Back;
+    let red = match state.blend {
+        _ if !passes => 0.4,
+        None => 0.6,
+        Some((BlendFactor::One, _)) => 0.4 + 0.6,
+        Some(_) => 0.4 * 0.6f32,
+    };
+    let depth = if passes && state.write { z } else { 0.5 };
+    [
+        (red * 255.0).round() as u8,
+        0,
+        if depth >= 0.6 { 255 } else { 0 },
+    ]
+}
+
+fn draws_keep_their_own_state(device: Device) {
+    let image = |name, format, usage| {
+        Image::new(&device, &ImageDesc::new(name, SIZE, SIZE, format, usage)).unwrap()
+    };
+    let color = image("color", Format::Rgba8, ImageUsage::COLOR);
+    let depth = image("depth", Format::D32F, ImageUsage::DEPTH);
+    let desc = GraphicsDesc {
+        color: Some(Format::Rgba8),
+        depth: Some(Format::D32F),
+        ..GraphicsDesc::new(
+            "state",
+            &shaders::TEST_TRIANGLE_VERT,
+            &shaders::TEST_TRIANGLE_FRAG,
+        )
+    };
+    let make = |state: State| {
+        let desc = GraphicsDesc {
+            cull: state.cull,
+            depth_test: state.test,
+            depth_write: state.write,
+            blend: state.blend,
+            ..desc
+        };
+        GraphicsPipeline::new(&device, &desc).unwrap()
+    };
+    let cases: Vec<(State, f32)> = states()
+        .into_iter()
+        .zip([0.25, 0.75, 0.5, 0.75].into_iter().cycle())
+        .collect();
+    assert!(cases.len() <= (SIZE * SIZE) as usize);
+    let pipelines: Vec<_> = cases.iter().map(|(state, _)| make(*state)).collect();
+    let probe = make(State {
+        cull: Cull::None,
+        test: DepthTest::LessEqual,
+        write: false,
+        blend: Some((BlendFactor::One, BlendFactor::One)),
+    });
+    let mut ring = FrameRing::new(&device, 2).unwrap();
+    let mut rec = ring.begin().unwrap();
+    // clockwise on the screen, which is the back
+    let mut corners = |z: f32| {
+        let all = [[-1.0, -1.0, z], [3.0, -1.0, z], [-1.0, 3.0, z]];
+        rec.arena().push(&all).unwrap()
+    };
+    let places: Vec<u64> = cases.iter().map(|(_, z)| corners(*z)).collect();
+    let tested = corners(0.6);
+    let mut pass = rec
+        .pass("state", Access::GRAPHICS, Access::GRAPHICS)
+        .unwrap();
+    pass.begin_rendering(&Rendering {
+        color: Some(&color),
+        depth: Some(&depth),
+        clear_color: Some([0.4, 0.0, 0.0, 1.0]),
+        clear_depth: Some(0.5),
+    })
+    .unwrap();
+    for (i, pipeline) in (0..).zip(&pipelines) {
+        pass.set_scissor(i % SIZE as i32, i / SIZE as i32, 1, 1);
+        pass.bind_graphics(pipeline);
+        pass.push(&Draw {
+            corners: places[i as usize],
+            color: [0.6, 0.0, 0.0, 1.0],
+        });
+        pass.draw(3, 1, 0, 0);
+    }
+    pass.set_scissor(0, 0, SIZE, SIZE);
+    pass.bind_graphics(&probe);
+    pass.push(&Draw {
+        corners: tested,
+        color: [0.0, 0.0, 1.0, 0.0],
+    });
+    pass.draw(3, 1, 0, 0);
+    drop(pass);
+    ring.end(rec).unwrap();
+    let bytes = device.read_image(&color).unwrap();
+    for ((state, z), pixel) in cases.iter().zip(bytes.chunks_exact(4)) {
+        let State {
+            cull,
+            test,
+            write,
+            blend,
+        } = state;
+        assert!(
+            pixel[..3]
+                .iter()
+                .zip(expected(*state, *z))
+                .all(|(a, b)| a.abs_diff(b) <= 1),
+            "{cull:?} {test:?} write {write} {blend:?} at {z}: {pixel:?}"
+        );
+    }
+    drop((color, depth, pipelines, probe, ring));
+    finish(device);
+}
+
+#[test]
+fn draws_keep_their_own_state_whatever_was_drawn_before() {
+    let Some(rich) = device(true) else { return };
+    draws_keep_their_own_state(rich);
+    draws_keep_their_own_state(poor_device().unwrap());
+}
