@@ -2,6 +2,7 @@
 // One draw of the classic look: fetches the vertex, evaluates the stages' colours and texture coordinates per vertex
 // as the engine does. gl_InstanceIndex is the index of the Draw.
 // variants: MANY=-DMANY_STAGES
+// variants: MODIFIED=-DMANY_STAGES -DMODIFIED_TEXCOORDS
 // variants: DEPTH=-DDEPTH_ALONE
 #include "raster/draw.glsl"
 
@@ -43,7 +44,7 @@ vec2 texcoord(Draws draws, Instance instance, StagePoint point, uint i) {
     Stages stages = Stages(VIEW.materials.stages);
     uint index = draws.at[gl_InstanceIndex].stages[i];
     vec2 st = generated_texcoord(of_stage(TC_GEN, i), stages.at[index].vector_s, stages.at[index].vector_t, instance.viewer, point);
-#ifdef MANY_STAGES
+#ifdef MODIFIED_TEXCOORDS
     if ((TC_MODS >> i & 1) != 0) {
         mat2 jacobian = mat2(1.0);
         return modified_texcoord(VIEW.materials, stages.at[index].tc_mod_first, stages.at[index].tc_mod_count, instance.texcoord, point,

@@ -102,20 +102,23 @@ impl Pipelines {
         }
         let depth_alone = state.shading.mode == c::DRAW_DEPTH;
         // a driver makes a pipeline the sooner the less there is in its shaders
-        let (vertex, fragment) = if depth_alone {
-            (&shaders::RASTER_DRAW_VERT_DEPTH, &shaders::RASTER_DRAW_FRAG)
-        } else if target.counted {
-            (
-                &shaders::RASTER_DRAW_VERT_MANY,
-                &shaders::RASTER_DRAW_FRAG_COUNT,
-            )
-        } else if state.shading.is_involved() {
-            (
-                &shaders::RASTER_DRAW_VERT_MANY,
-                &shaders::RASTER_DRAW_FRAG_MANY,
-            )
+        let modified = state.shading.tc_mods != 0;
+        let many = state.shading.has_stages() || modified || target.counted;
+        let vertex = if depth_alone {
+            &shaders::RASTER_DRAW_VERT_DEPTH
+        } else if modified {
+            &shaders::RASTER_DRAW_VERT_MODIFIED
+        } else if many {
+            &shaders::RASTER_DRAW_VERT_MANY
         } else {
-            (&shaders::RASTER_DRAW_VERT, &shaders::RASTER_DRAW_FRAG)
+            &shaders::RASTER_DRAW_VERT
+        };
+        let fragment = if target.counted {
+            &shaders::RASTER_DRAW_FRAG_COUNT
+        } else if many {
+            &shaders::RASTER_DRAW_FRAG_MANY
+        } else {
+            &shaders::RASTER_DRAW_FRAG
         };
         let pipeline = GraphicsPipeline::new(
             &self.device,

@@ -107,10 +107,9 @@ impl Shading {
         self
     }
 
-    /// Whether it takes the shaders that are made for all that a draw may need: several stages, or `tcMod`s that differ
-    /// between vertices.
-    pub fn is_involved(&self) -> bool {
-        self.combine != PerStage::NONE || self.tc_mods != 0
+    /// Whether it has several stages.
+    pub fn has_stages(&self) -> bool {
+        self.combine != PerStage::NONE
     }
 
     /// The specialization constants: id and value.
