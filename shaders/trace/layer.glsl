@@ -121,13 +121,32 @@ bool is_solid_at(SurfacePoint p, float width) {
     return !tested;
 }
 
-// a * b for polynomials in L and the background. Light seen twice counts once: L * L becomes L. What the background
-// is multiplied by, light included, scales it.
-Layer layer_product(Layer a, Layer b) {
+// What the light grid gives a model at the point, as displayed.
+vec3 grid_light(SurfacePoint p, Instance instance) {
+    float incoming = max(dot(p.stage.normal, instance.light_direction), 0.0);
+    return min(instance.ambient - instance.added + incoming * instance.directed, vec3(1.0));
+}
+
+// The light of the place that the engine shows at a surface, as displayed: its lightmap, the colours of its corners, or what
+// the light grid gives a model. Nothing is lit by it: it tells how much of the displayed sum of layers each of them is.
+vec3 displayed_light(SurfacePoint p) {
+    if ((p.triangle.flags & TRIANGLE_WORLD) != 0) {
+        uint page = p.triangle.lightmap;
+        if (page == NO_TEXTURE) return p.stage.color.rgb;
+        return textureLod(sampler2D(textures[nonuniformEXT(page)], samplers[VIEW.sky_sampler]), p.stage.lightmap, 0.0).rgb;
+    }
+    Instance instance = instance_of(p.instance);
+    if ((instance.flags & INSTANCE_UNLIT) != 0) return vec3(1.0);
+    return grid_light(p, instance);
+}
+
+// a * b for polynomials in L and the background. Light seen twice counts once: L * L becomes L. The background brings its
+// own light; what it is multiplied by, the light that the engine shows here (`light`) included, scales it.
+Layer layer_product(Layer a, Layer b, vec3 light) {
     Layer r;
     r.lit = a.lit * b.lit + a.lit * b.emission + a.emission * b.lit;
     r.emission = a.emission * b.emission;
-    r.through = a.through * (b.lit + b.emission) + b.through * (a.lit + a.emission);
+    r.through = a.through * (b.lit * light + b.emission) + b.through * (a.lit * light + a.emission);
     // so does it scale what is reflected, which brings its own light, too
     r.reflected = a.reflected * (b.lit + b.emission) + b.reflected * (a.lit + a.emission);
     return r;
@@ -142,13 +161,13 @@ Layer layer_subtract(Layer a, Layer b) {
 }
 
 // `value` times a blend factor. The frame buffer has no alpha of its own: destination alpha reads as one.
-Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, float source_alpha) {
+Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, float source_alpha, vec3 light) {
     switch (factor) {
     case BLEND_ONE: return value;
-    case BLEND_DST_COLOR: return layer_product(value, destination);
-    case BLEND_ONE_MINUS_DST_COLOR: return layer_subtract(value, layer_product(value, destination));
-    case BLEND_SRC_COLOR: return layer_product(value, source);
-    case BLEND_ONE_MINUS_SRC_COLOR: return layer_subtract(value, layer_product(value, source));
+    case BLEND_DST_COLOR: return layer_product(value, destination, light);
+    case BLEND_ONE_MINUS_DST_COLOR: return layer_subtract(value, layer_product(value, destination, light));
+    case BLEND_SRC_COLOR: return layer_product(value, source, light);
+    case BLEND_ONE_MINUS_SRC_COLOR: return layer_subtract(value, layer_product(value, source, light));
     case BLEND_SRC_ALPHA: return layer_scale(value, source_alpha);
     case BLEND_ONE_MINUS_SRC_ALPHA: return layer_scale(value, 1.0 - source_alpha);
     case BLEND_DST_ALPHA: return value;
@@ -231,8 +250,9 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
             }
         }
         if (stage.alpha_func != ALPHAFUNC_NONE && !alpha_passes(stage.alpha_func, alpha)) continue;
-        layer = layer_add(layer_blend(stage.blend_src, source, source, layer, alpha),
-            layer_blend(stage.blend_dst, layer, source, layer, alpha));
+        vec3 light = source.lit != vec3(0.0) && layer.through != vec3(0.0) ? displayed_light(p) : vec3(1.0);
+        layer = layer_add(layer_blend(stage.blend_src, source, source, layer, alpha, light),
+            layer_blend(stage.blend_dst, layer, source, layer, alpha, light));
     }
     return layer;
 }
@@ -256,12 +276,6 @@ vec3 shown_glow(Material material) {
     return radiance / (1.0 + max_component(radiance));
 }
 
-// What the light grid gives a model at the point, as displayed.
-vec3 grid_light(SurfacePoint p, Instance instance) {
-    float incoming = max(dot(p.stage.normal, instance.light_direction), 0.0);
-    return min(instance.ambient - instance.added + incoming * instance.directed, vec3(1.0));
-}
-
 // What the engine adds to the light of the place on models, so that players see their weapons and each other in the dark,
 // linear. It adds it to what is displayed, so it is worth the more the more light there is. Nothing else is lit by it.
 vec3 added_light(SurfacePoint p) {
@@ -270,19 +284,6 @@ vec3 added_light(SurfacePoint p) {
     if ((instance.flags & INSTANCE_UNLIT) != 0) return vec3(0.0);
     vec3 displayed = grid_light(p, instance);
     return decode_display(min(displayed + instance.added, vec3(1.0))) - decode_display(displayed);
-}
-
-// The light of the place that the engine shows at a surface, as displayed: its lightmap, the colours of its corners, or what
-// the light grid gives a model. Nothing is lit by it: it tells how much of the displayed sum of layers each of them is.
-vec3 displayed_light(SurfacePoint p) {
-    if ((p.triangle.flags & TRIANGLE_WORLD) != 0) {
-        uint page = p.triangle.lightmap;
-        if (page == NO_TEXTURE) return p.stage.color.rgb;
-        return textureLod(sampler2D(textures[nonuniformEXT(page)], samplers[VIEW.sky_sampler]), p.stage.lightmap, 0.0).rgb;
-    }
-    Instance instance = instance_of(p.instance);
-    if ((instance.flags & INSTANCE_UNLIT) != 0) return vec3(1.0);
-    return grid_light(p, instance);
 }
 
 #endif

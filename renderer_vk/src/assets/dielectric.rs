@@ -88,7 +88,12 @@ pub fn dielectric(
         } else {
             0.0
         },
-        scale: 1.0 / passed.max(1.0),
+        // the light that darkens what is behind bounds it already
+        scale: if light::darkens_behind(&shader.stages, has_vertex_light(class)) {
+            1.0
+        } else {
+            1.0 / passed.max(1.0)
+        },
         filters: u32::from(filters && !liquid),
         filter_color: mean.through.clamp(Vec3::ZERO, Vec3::ONE),
         absorption,

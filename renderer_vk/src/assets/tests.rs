@@ -73,6 +73,15 @@ t/water
     rgbGen const ( 1 0.5 0.25 )
     tcMod scroll 1 0 }
 }
+t/lit_water
+{
+  surfaceparm water
+  surfaceparm trans
+  { map $whiteimage
+    blendFunc GL_DST_COLOR GL_ONE }
+  { map $lightmap
+    blendFunc filter }
+}
 t/lava
 {
   surfaceparm lava
@@ -226,6 +235,8 @@ fn liquids_and_reflections_come_from_directives() {
     assert!((water.index - 1.33).abs() < 1.0e-6 && water.ripple > 0.0);
     // its stage doubles the brightest channel of what is behind: that much is taken back
     assert!((water.scale - 0.5).abs() < 0.01, "{}", water.scale);
+    // the light that its lightmap multiplies bounds it as well
+    assert_eq!(material("t/lit_water").dielectric.scale, 1.0);
     assert_eq!(water.filters, 0);
     // red goes through, blue least of all
     let [red, green, blue] = water.absorption.to_array();

@@ -6,7 +6,8 @@
 //! and B, and blending multiplies polynomials; two rules keep the result linear:
 //!
 //! * L^2 counts as L: a surface that was multiplied by its light twice is still lit once.
-//! * L B counts as B: the background brings its own light, and so do mirrored surroundings.
+//! * L B counts as B: the background brings its own light, and so do mirrored surroundings. (The eye sees the background
+//!   darkened by stored light once more where the engine does so: [`darkens_behind`].)
 //!
 //! All colours are linear; nothing is clamped. Alphas and blend factors made of them are plain numbers. The engine blends
 //! colours that are encoded for the display, though. Where that comes to something else than the same sum in linear light
@@ -121,6 +122,27 @@ pub fn compose_encoded(
     vertex_light: bool,
 ) -> LightLinear {
     compose_in(stages, samples, vertex_light, Numbers::Encoded)
+}
+
+/// Whether the engine multiplies what lies behind by the light at the surface, too: a lightmap over layers that are seen
+/// through.
+pub fn darkens_behind(stages: &[Stage], vertex_light: bool) -> bool {
+    use BlendFactor::{DstColor, OneMinusDstColor, OneMinusSrcColor, SrcColor};
+    let grey = StageSample {
+        texture: Vec4::splat(0.5),
+        ..StageSample::WHITE
+    };
+    let samples = vec![grey; stages.len()];
+    stages.iter().enumerate().any(|(i, stage)| {
+        let below = stages.get(..i).unwrap_or_default();
+        let multiplies = stage.blend.is_some_and(|(source, destination)| {
+            matches!(source, DstColor | OneMinusDstColor)
+                || matches!(destination, SrcColor | OneMinusSrcColor)
+        });
+        multiplies
+            && source_of(stage, grey, vertex_light).0.lit != Vec3::ZERO
+            && compose(below, &samples, vertex_light).through != Vec3::ZERO
+    })
 }
 
 /// What colours are numbers of.

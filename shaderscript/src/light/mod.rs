@@ -8,7 +8,7 @@ mod algebra;
 mod dielectric;
 mod glow;
 
-pub use algebra::{LightLinear, StageSample, compose, compose_encoded};
+pub use algebra::{LightLinear, StageSample, compose, compose_encoded, darkens_behind};
 pub use dielectric::{
     INDEX_GLASS, INDEX_SLIME, INDEX_WATER, filters_light, is_gloss, is_reflection,
     refraction_index, ripple_slope,

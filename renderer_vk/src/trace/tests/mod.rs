@@ -7,6 +7,7 @@ mod bounces;
 mod cut_outs;
 mod denoising;
 mod dielectrics;
+mod fog;
 mod gradients;
 mod harness;
 mod inspection;

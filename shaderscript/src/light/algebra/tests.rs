@@ -269,3 +269,21 @@ fn failed_alpha_tests_draw_nothing() {
     );
     near(found, Vec3::ZERO, RED, Vec3::ZERO);
 }
+
+#[test]
+fn light_over_what_is_seen_through_darkens_what_lies_behind() {
+    let darkens = |body: &str| {
+        let script = parse_script("test", format!("t\n{{\n{body}\n}}\n").as_bytes());
+        darkens_behind(&script.shaders.first().unwrap().stages, true)
+    };
+    const LIGHT: &str = "{\nmap $lightmap\nblendFunc filter\n}";
+    const WATER: &str = "{\nmap a\nblendFunc GL_DST_COLOR GL_ONE\n}";
+    const WALL: &str = "{\nmap a\n}";
+    assert!(darkens(&format!("{WATER}\n{LIGHT}")));
+    assert!(darkens("{\nmap a\nblendFunc filter\nrgbGen exactVertex\n}"));
+    assert!(!darkens(WATER));
+    // nothing is seen through a wall, and what is added or mixed leaves the rest alone
+    assert!(!darkens(&format!("{WALL}\n{LIGHT}")));
+    assert!(!darkens("{\nmap $lightmap\nblendFunc add\n}"));
+    assert!(!darkens("{\nmap a\nblendFunc blend\nrgbGen vertex\n}"));
+}
