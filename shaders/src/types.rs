@@ -375,6 +375,8 @@ pub mod constants {
         STAGE_MATTER = 16;
         /// The stage's picture, which stands for a reflection, shows the light at the surface, too.
         STAGE_GLOSS = 32;
+        /// The stage shows the lightmap of a surface that has none: the engine takes a white picture.
+        STAGE_NO_LIGHTMAP = 64;
         /// Seen from both sides.
         MATERIAL_TWO_SIDED = 1;
         /// Only the back side is seen.

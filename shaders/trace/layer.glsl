@@ -216,8 +216,10 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
         Layer source = layer_nothing();
         float alpha;
         if (stage.image_count == 0 && (stage.flags & STAGE_WHITE) == 0) {
-            // the lightmap: the light itself, as bright as the stage lets it through
-            source.lit = color.rgb;
+            // the lightmap: the light itself, as bright as the stage lets it through. Where there is none the eye sees the
+            // engine's white picture; that light falls on nothing else, as it did not when the map was lit
+            if ((stage.flags & STAGE_NO_LIGHTMAP) != 0 && seen != SEEN_BOUNCED) source.emission = color.rgb;
+            else source.lit = color.rgb;
             alpha = color.a;
         } else {
             bool baked = world && (material.flags & MATERIAL_VERTEX_LIGHT) != 0

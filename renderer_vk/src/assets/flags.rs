@@ -2,13 +2,22 @@
 
 use shaders::types::constants as c;
 use shaderscript::light::{self, SurfaceClass};
-use shaderscript::{Deform, Shader};
+use shaderscript::{Deform, RgbGen, Shader, Stage, StageImage};
 
 use super::material::LightmapClass;
 
 /// Whether vertex colours are baked light on surfaces of a class.
 pub(super) fn has_vertex_light(class: LightmapClass) -> bool {
     matches!(class, LightmapClass::Page | LightmapClass::Vertex)
+}
+
+/// Whether a stage is white in full light on surfaces without a lightmap: it shows the lightmap, and no other light.
+pub(super) fn shows_full_light(stage: &Stage) -> bool {
+    let lit = matches!(
+        stage.rgb_gen,
+        RgbGen::LightingDiffuse | RgbGen::Vertex | RgbGen::ExactVertex
+    );
+    stage.image == StageImage::Lightmap && !lit
 }
 
 /// `MATERIAL_*` bits, from the material's directives alone.

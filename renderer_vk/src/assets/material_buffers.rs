@@ -115,8 +115,10 @@ impl Materials {
     /// where light is computed or baked into vertices, or the image and the lightmap multiplied in either order.
     pub(super) fn plain_image(&self, material: &Material) -> Option<(u32, u32)> {
         let stages = self.stages(material);
-        let plain =
-            |s: &types::Stage| s.alpha_func == c::ALPHAFUNC_NONE && s.flags & c::STAGE_WHITE == 0;
+        let plain = |s: &types::Stage| {
+            s.alpha_func == c::ALPHAFUNC_NONE
+                && s.flags & (c::STAGE_WHITE | c::STAGE_NO_LIGHTMAP) == 0
+        };
         let opaque = |s: &types::Stage| (s.blend_src, s.blend_dst) == (c::BLEND_ONE, c::BLEND_ZERO);
         let filter = |s: &types::Stage| {
             [

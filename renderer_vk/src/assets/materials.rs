@@ -13,7 +13,7 @@ mod listing;
 use super::bind::{internal_shader, passes, sky_faces};
 use super::compile::{FOG_IMAGE, StageArrays, VideoClients, sampler};
 use super::dielectric;
-use super::flags;
+use super::flags::{self, shows_full_light};
 use super::material::{LightmapClass, Material, SkyBox, VideoStage};
 use super::material_buffers::Uploaded;
 use super::prepare::grey;
@@ -310,13 +310,18 @@ impl Materials {
             match pushed {
                 Ok((index, video)) => {
                     kept += 1;
-                    if shaderscript::light::is_reflection(&shader, stage)
-                        && let Some(pushed) = self.arrays.stages.get_mut(index as usize)
-                    {
-                        pushed.flags |= types::constants::STAGE_REFLECTION;
+                    let mut flags = 0;
+                    if class != LightmapClass::Page && shows_full_light(stage) {
+                        flags |= types::constants::STAGE_NO_LIGHTMAP;
+                    }
+                    if shaderscript::light::is_reflection(&shader, stage) {
+                        flags |= types::constants::STAGE_REFLECTION;
                         if shaderscript::light::is_gloss(&shader, kept - 1, vertex_light) {
-                            pushed.flags |= types::constants::STAGE_GLOSS;
+                            flags |= types::constants::STAGE_GLOSS;
                         }
+                    }
+                    if let Some(pushed) = self.arrays.stages.get_mut(index as usize) {
+                        pushed.flags |= flags;
                     }
                     let stage = index;
                     videos.extend(video.map(|(name, client)| VideoStage {

@@ -164,11 +164,19 @@ fn lightmap_and_image_are_one_pass() {
     );
     let stages = game.materials.stages(material);
     assert_eq!(stages[0].image_count, 0, "the lightmap belongs to the draw");
+    assert_eq!(stages[0].flags & c::STAGE_NO_LIGHTMAP, 0);
     assert_eq!(stages[0].tc_gen, c::TCGEN_LIGHTMAP);
     assert_eq!(stages[1].image_count, 1);
     assert!(material.flags & c::MATERIAL_VERTEX_LIGHT != 0);
     assert_eq!(game.find("t/wall", LightmapClass::Page, true), wall);
-    assert_ne!(game.find("t/wall", LightmapClass::Vertex, true), wall);
+    // where there is no lightmap the engine takes white for it
+    for class in [LightmapClass::Vertex, LightmapClass::None] {
+        let other = game.find("t/wall", class, true);
+        assert_ne!(other, wall);
+        let stages = game.materials.stages(game.materials.get(other));
+        let white = |i: usize| stages[i].flags & c::STAGE_NO_LIGHTMAP != 0;
+        assert!(white(0) && !white(1));
+    }
 }
 
 #[test]

@@ -256,6 +256,59 @@ fn light_behind_a_veil_counts_in_proportion_with(gpu: &mut Gpu) {
 }
 
 #[test]
+fn light_over_a_layer_darkens_what_lies_behind_it() {
+    Gpu::each(light_over_a_layer_darkens_what_lies_behind_it_with);
+}
+
+fn light_over_a_layer_darkens_what_lies_behind_it_with(gpu: &mut Gpu) {
+    // water whose stages multiply what is behind, and their lightmap that, too: the light that the engine shows at the water
+    let (back, tint, stored) = ([0.9, 0.8, 0.5], [0.9, 0.7, 0.8], [153, 102, 204]);
+    let mut scene = scene();
+    let wall = scene.material(&[stage::constant(back)], 0);
+    scene.quad(screen(300.0), wall);
+    let water = scene.material(&[stage::filter(tint), stage::light_over()], TRANSLUCENT);
+    scene.quad(screen(100.0), water);
+    let [red, green, blue] = stored;
+    for corner in scene.vertices.iter_mut().rev().take(4) {
+        corner.color = u32::from_le_bytes([red, green, blue, 255]);
+    }
+    let exact = decode(
+        displayed(back) * displayed(tint) * Vec3::from(stored.map(|c| f32::from(c) / 255.0)),
+    );
+    let mean = gpu.mean(&scene, &reference(), 1);
+    assert!(close(mean, exact), "{mean} {exact}");
+}
+
+#[test]
+fn the_lightmap_of_what_has_none_is_white_and_lights_nothing() {
+    Gpu::each(the_lightmap_of_what_has_none_is_white_and_lights_nothing_with);
+}
+
+fn the_lightmap_of_what_has_none_is_white_and_lights_nothing_with(gpu: &mut Gpu) {
+    let color = [0.3, 0.5, 0.7];
+    let mut white = stage::light();
+    white.flags |= c::STAGE_NO_LIGHTMAP;
+    let mut bright = scene();
+    let shown = bright.material(&[white, stage::filter(color)], 0);
+    bright.quad(screen(300.0), shown);
+    let mean = gpu.mean(&bright, &reference(), 1);
+    assert!(close(mean, decode(displayed(color))), "{mean}");
+    // a wall that sees nothing else
+    let mut dark = scene();
+    let wall = dark.diffuse(0.8);
+    dark.quad(screen(300.0), wall);
+    let shown = dark.material(&[white, stage::filter(color)], 0);
+    let mut facing = screen(-100.0);
+    facing.reverse();
+    dark.quad(facing, shown);
+    let settings = Settings {
+        rt_bounces: 1,
+        ..reference()
+    };
+    assert_eq!(gpu.mean(&dark, &settings, 4), Vec3::ZERO);
+}
+
+#[test]
 fn layers_in_one_plane_come_in_drawing_order() {
     Gpu::each(layers_in_one_plane_come_in_drawing_order_with);
 }
