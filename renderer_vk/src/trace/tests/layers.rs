@@ -4,7 +4,7 @@ use glam::Vec3;
 use shaders::types::Stage;
 use shaders::types::constants as c;
 
-use super::harness::{Gpu, Scene, encode, identity, rectangle, reference, stage, through_byte};
+use super::harness::{Gpu, Scene, encode, identity, rectangle, reference, stage};
 use crate::settings::Settings;
 use crate::trace::frame_lights::decode;
 
