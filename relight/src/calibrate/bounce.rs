@@ -206,6 +206,28 @@ fn material_of<'a>(
     Some((index, world.materials.get(index as usize)?))
 }
 
+/// A cell and those around it, near ones first: what is found soon leaves others out.
+const AROUND: [IVec3; 27] = around();
+
+const fn around() -> [IVec3; 27] {
+    let mut cells = [IVec3::ZERO; 27];
+    let mut count = 0;
+    let mut steps = 0;
+    while steps <= 3 {
+        let mut k = 0;
+        while k < 27 {
+            let (x, y, z) = (k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+            if x * x + y * y + z * z == steps {
+                cells[count] = IVec3::new(x, y, z);
+                count += 1;
+            }
+            k += 1;
+        }
+        steps += 1;
+    }
+    cells
+}
+
 /// Samples by place.
 pub(super) struct Near(HashMap<IVec3, Vec<u32>>);
 
@@ -224,29 +246,28 @@ impl Near {
         let middle = cell(at);
         let mut best = None;
         let mut least = f32::INFINITY;
-        for z in -1..=1 {
-            for y in -1..=1 {
-                for x in -1..=1 {
-                    let Some(found) = self.0.get(&(middle + IVec3::new(x, y, z))) else {
-                        continue;
-                    };
-                    for &i in found {
-                        let Some(sample) = samples.get(i as usize) else {
-                            continue;
-                        };
-                        let offset = sample.position - at;
-                        if sample.normal.dot(normal) < SAME_NORMAL {
-                            continue;
-                        }
-                        let mut distance = offset.length_squared();
-                        if offset.dot(normal).abs() > OFF_PLANE {
-                            distance *= 4.0;
-                        }
-                        if distance < least {
-                            least = distance;
-                            best = Some(i);
-                        }
-                    }
+        for offset in AROUND {
+            let cell = middle + offset;
+            let mins = cell.as_vec3() * CELL;
+            let nearest = at.clamp(mins, mins + CELL);
+            if nearest.distance_squared(at) >= least {
+                continue;
+            }
+            for &i in self.0.get(&cell).map_or(&[][..], Vec::as_slice) {
+                let Some(sample) = samples.get(i as usize) else {
+                    continue;
+                };
+                let offset = sample.position - at;
+                if sample.normal.dot(normal) < SAME_NORMAL {
+                    continue;
+                }
+                let mut distance = offset.length_squared();
+                if offset.dot(normal).abs() > OFF_PLANE {
+                    distance *= 4.0;
+                }
+                if distance < least {
+                    least = distance;
+                    best = Some(i);
                 }
             }
         }
@@ -256,4 +277,34 @@ impl Near {
 
 fn cell(at: Vec3) -> IVec3 {
     (at / CELL).floor().as_ivec3()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::samples::tests::sample_at_place;
+
+    #[test]
+    fn the_nearest_sample_of_its_plane_stands_for_a_place() {
+        let mut random = Random::new(7);
+        let mut anywhere = || Vec3::new(random.next(), random.next(), random.next()) * 500.0;
+        let samples: Vec<Sample> = (0..400).map(|_| sample_at_place(anywhere())).collect();
+        let near = Near::new(&samples);
+        let mut elsewhere = 0;
+        for _ in 0..300 {
+            let at = anywhere();
+            let far = |s: &Sample| (cell(s.position) - cell(at)).abs().max_element() > 1;
+            let distance = |s: &Sample| {
+                let off = (s.position.z - at.z).abs() > OFF_PLANE;
+                s.position.distance_squared(at) * if off { 4.0 } else { 1.0 }
+            };
+            let all = samples.iter().filter(|s| !far(s));
+            let best = all.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            let found = near.find(&samples, at, Vec3::Z);
+            assert_eq!(found.map(|i| &samples[i as usize]), best);
+            elsewhere += usize::from(best.is_some_and(|s| cell(s.position) != cell(at)));
+            assert!(near.find(&samples, at, Vec3::X).is_none());
+        }
+        assert!(elsewhere > 30, "{elsewhere}");
+    }
 }

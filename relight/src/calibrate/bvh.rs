@@ -189,21 +189,28 @@ impl Occluders {
         self
     }
 
+    /// The triangle's holes, if it has some, and whether one of them is where a ray meets it.
+    fn holes(&self, kind: Kind, meeting: &Meeting, lane: usize) -> Option<(&CutOut, bool)> {
+        let cut_out = self.cut_outs.get(kind.cut_out as usize)?;
+        let [a, b, c] = cut_out.st;
+        let st = a + (b - a) * meeting.u[lane] + (c - a) * meeting.v[lane];
+        Some((cut_out, !cut_out.holes.is_solid(st)))
+    }
+
     /// What a ray meets of a leaf's triangle, unless it is a hole there. Of what is drawn from both sides both are fronts.
     fn hit(&self, leaf: &Leaf, meeting: &Meeting, lane: usize) -> Option<Hit> {
-        let kind = leaf.kinds.get(lane)?;
+        let kind = *leaf.kinds.get(lane)?;
         // The determinant is positive against the counter-clockwise side.
         let mut front = meeting.determinant[lane] < 0.0;
         // Clockwise corners: the front is the other way.
         let mut normal = at(&leaf.e2, lane)
             .cross(at(&leaf.e1, lane))
             .normalize_or_zero();
-        if let Some(CutOut { st, holes }) = self.cut_outs.get(kind.cut_out as usize) {
-            let [a, b, c] = *st;
-            if !holes.is_solid(a + (b - a) * meeting.u[lane] + (c - a) * meeting.v[lane]) {
+        if let Some((cut_out, hole)) = self.holes(kind, meeting, lane) {
+            if hole {
                 return None;
             }
-            if holes.two_sided && !front {
+            if cut_out.holes.two_sided && !front {
                 (front, normal) = (true, -normal);
             }
         }
@@ -223,8 +230,11 @@ impl Occluders {
         };
         let meeting = leaf.meet(ray, SHORT);
         lanes(meeting.mask).any(|lane| {
-            let hit = self.hit(leaf, &meeting, lane);
-            hit.is_some_and(|hit| !(through_sky && hit.sky))
+            let stops = |kind: &Kind| {
+                let hole = self.holes(*kind, &meeting, lane);
+                !(through_sky && kind.sky || hole.is_some_and(|(_, hole)| hole))
+            };
+            leaf.kinds.get(lane).is_some_and(stops)
         })
     }
 
