@@ -11,8 +11,9 @@
 //! does not speak against it. Compared is the error at all texels, fitted ones too: these fits have the same freedom, and a
 //! fifth of the texels would leave the choice to chance.
 
+use super::fit::ROUNDS;
 use super::said::{self, CommandLine, Dirt};
-use super::{CalibrationCache, CalibrationOptions, CalibrationReport, Evidence, Purpose};
+use super::{CalibrationCache, CalibrationOptions, CalibrationReport, Evidence, Purpose, Solution};
 use crate::world::RelitWorld;
 
 /// Gammas tried: about the display's own, and two between it and none.
@@ -37,8 +38,18 @@ const BETTER: f32 = 0.92;
 /// Part of the error of lights without an end that such with an end may leave to be believed.
 const ENDED: f32 = 0.95;
 
-/// Part of the error without dirt that dirt which no command line tells of may leave to be believed.
-const DIRTY: f32 = 0.9;
+/// Part of the error without dirt that dirt which no command line tells of leaves, where fits with less effort cannot tell
+/// whether it is there. What leaves less is dirty, what leaves more is not.
+const DIRT_IN_DOUBT: std::ops::RangeInclusive<f32> = 0.88..=1.1;
+
+/// Part of the error of lights without an end that such with an end leave, where these fits cannot tell.
+const END_IN_DOUBT: std::ops::RangeInclusive<f32> = ENDED..=1.08;
+
+/// Part of the error that dirt or an end leaves then, with all measurements and candidates, to be believed.
+const CLOSER: f32 = 0.96;
+
+/// Times that lights are looked for to tell.
+const CLOSE_ROUNDS: usize = 2;
 
 /// How many times as far off as without gamma what directives say may be: it was the compiler that read them.
 const CONTRADICTED: f32 = 1.5;
@@ -126,6 +137,7 @@ pub(super) fn find(
     let mut trials = Trials {
         world,
         silent,
+        options,
         less: CalibrationOptions {
             samples: (options.samples / 3).max(SAMPLES).min(options.samples),
             candidates: options.candidates / 5,
@@ -134,6 +146,7 @@ pub(super) fn find(
         },
         progress,
         done: Vec::new(),
+        close: Vec::new(),
     };
     let found = trials.by_light().unwrap_or(Compiler::PLAIN);
     for (material, holes) in world.materials.iter_mut().zip(holes) {
@@ -159,10 +172,13 @@ fn as_said(line: CommandLine) -> Vec<Compiler> {
 struct Trials<'a> {
     world: &'a mut RelitWorld,
     silent: &'a [u32],
+    options: &'a CalibrationOptions,
     less: CalibrationOptions,
     progress: &'a mut dyn FnMut(f32),
     /// Those that are done, and their errors.
     done: Vec<(Compiler, Option<[f32; 2]>)>,
+    /// Fits with all measurements, and their errors.
+    close: Vec<(Compiler, f32)>,
 }
 
 impl Trials<'_> {
@@ -172,41 +188,78 @@ impl Trials<'_> {
             return *errors;
         }
         (self.progress)(self.done.len() as f32 / (4.0 + TRIED.len() as f32));
-        compiler.tell(self.world);
         // What is stored on surfaces decides, with lights that fall off as light does.
-        let (less, nothing) = (&self.less, &mut |_| ());
-        let found = super::find(
-            self.world,
-            self.silent,
-            less,
-            compiler,
-            Purpose::Trial,
-            nothing,
-        );
-        Compiler::PLAIN.tell(self.world);
-        let found = found?;
+        let less = self.less.clone();
+        let found = self.fit(compiler, &less, Purpose::Trial(ROUNDS))?;
         let errors = [found.report.before.median_stops, found.overall.median_stops];
         let errors = (found.report.evidence != Evidence::Nothing).then_some(errors);
         self.done.push((compiler, errors));
         errors
     }
 
+    /// A fit for a compiler.
+    fn fit(
+        &mut self,
+        compiler: Compiler,
+        options: &CalibrationOptions,
+        purpose: Purpose<'_>,
+    ) -> Option<Solution> {
+        compiler.tell(self.world);
+        let (world, silent) = (&*self.world, self.silent);
+        let found = super::find(world, silent, options, compiler, purpose, &mut |_| ());
+        Compiler::PLAIN.tell(self.world);
+        found
+    }
+
     /// What explains the map's light best, if it does so by far.
     fn by_light(&mut self) -> Option<Compiler> {
         let clean = self.gamma_and_ends()?;
-        Some(self.dirty_or_clean(clean))
-    }
-
-    /// With dirt, where that leaves much less of the error.
-    fn dirty_or_clean(&mut self, clean: Compiler) -> Compiler {
         let dirty = Compiler {
             dirt: Some(Dirt::USUAL),
             ..clean
         };
-        match [clean, dirty].map(|c| self.error(c)) {
-            [Some([_, without]), Some([_, with])] if with < without * DIRTY => dirty,
-            _ => clean,
+        let part = self.part_left(dirty, clean)?;
+        let dirty = if DIRT_IN_DOUBT.contains(&part) {
+            self.looks_closer(dirty, clean)
+        } else {
+            part < *DIRT_IN_DOUBT.start()
+        };
+        let dirt = dirty.then_some(Dirt::USUAL);
+        let found = Compiler { dirt, ..clean };
+        let ended = Compiler {
+            ends: true,
+            ..clean
+        };
+        let in_doubt = |part: &f32| !clean.ends && END_IN_DOUBT.contains(part);
+        if self.part_left(ended, clean).is_some_and(|p| in_doubt(&p)) {
+            let ended = Compiler { dirt, ..ended };
+            return Some(match self.looks_closer(ended, found) {
+                true => ended,
+                false => found,
+            });
         }
+        Some(found)
+    }
+
+    /// Part of the error with one compiler that another leaves.
+    fn part_left(&mut self, of: Compiler, with: Compiler) -> Option<f32> {
+        let [[_, of], [_, with]] = [self.error(of)?, self.error(with)?];
+        Some(of / with)
+    }
+
+    /// Whether one leaves less of the error than another with all measurements and candidates, where fits with less effort
+    /// cannot tell: what they lack lights for hides what the compiler did.
+    fn looks_closer(&mut self, one: Compiler, than: Compiler) -> bool {
+        let mut error = |compiler| {
+            if let Some((_, error)) = self.close.iter().find(|(tried, _)| *tried == compiler) {
+                return *error;
+            }
+            let found = self.fit(compiler, self.options, Purpose::Trial(CLOSE_ROUNDS));
+            let error = found.map_or(f32::INFINITY, |found| found.overall.median_stops);
+            self.close.push((compiler, error));
+            error
+        };
+        error(one) < error(than) * CLOSER
     }
 
     /// The gamma, and whether lights end.

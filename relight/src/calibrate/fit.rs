@@ -4,6 +4,7 @@ use super::air;
 use super::bounce::Transfer;
 use super::columns::Column;
 use super::crossings::Crossing;
+use super::fronts::Fronts;
 use super::nodes::Measured;
 use super::place::{self, Candidates, Scene};
 use super::report::Agreement;
@@ -18,7 +19,7 @@ use glam::Vec3;
 use std::collections::HashSet;
 
 /// Most times that lights are looked for.
-const ROUNDS: u32 = 4;
+pub(super) const ROUNDS: usize = 4;
 
 /// Lights are looked for again while that leaves less than this part of the error at samples held out.
 const ENOUGH: f32 = 0.985;
@@ -72,6 +73,27 @@ pub(super) struct Start {
     beside: HashSet<TexelId>,
 }
 
+/// What lights that are put in have to come up to.
+struct Rivals {
+    /// Error that is asked for, stops.
+    asked: f32,
+    /// Error that another way left after each round, and a little more.
+    pace: Vec<f32>,
+    /// Most times that lights are looked for.
+    rounds: usize,
+}
+
+impl Rivals {
+    /// Error after a round that leaves no hope.
+    fn hopeless(&self, round: usize) -> f32 {
+        match (self.pace.get(round), round) {
+            (Some(pace), _) => *pace,
+            (None, 0) => self.asked * HOPELESS.0,
+            (None, _) => self.asked * HOPELESS.1,
+        }
+    }
+}
+
 /// A fit in progress.
 pub(super) struct Fit<'a> {
     pub world: &'a RelitWorld,
@@ -97,6 +119,10 @@ pub(super) struct Fit<'a> {
     pub crossings: Vec<Crossing>,
     /// Candidates all over open space, once they were tried: they see the first measurements alike each time.
     pub tried: Option<Candidates>,
+    /// Places in front of samples that were candidates before.
+    pub fronts: Fronts,
+    /// Error at samples held out after each round of lights that fall off with the square of the distance.
+    pub rounds: Vec<f32>,
     /// Light at which lights end.
     pub least: f32,
     /// What it is for: what will not do that need not be looked for to the end.
@@ -206,6 +232,21 @@ impl Fit<'_> {
         self.rebounce(false);
     }
 
+    /// What lights that are put in have to come up to.
+    fn rivals(&self, linear: bool) -> Rivals {
+        let (asked, pace, rounds) = match self.purpose {
+            // they are worth having if they agree better than what there is
+            _ if linear => (f32::INFINITY, self.rounds.clone(), ROUNDS),
+            Purpose::Trial(rounds) => (f32::INFINITY, Vec::new(), rounds),
+            Purpose::Enough(asked) => (asked.stops, asked.pace.to_vec(), ROUNDS),
+        };
+        Rivals {
+            asked,
+            pace,
+            rounds,
+        }
+    }
+
     /// Puts in point lights for as long as samples that are held out get better by it.
     /// `linear`: such that may fall off linearly, too. `progress` gets the part of the most rounds that are done.
     /// Whether what is asked for was not come near to.
@@ -216,13 +257,10 @@ impl Fit<'_> {
         progress: &mut dyn FnMut(f32),
     ) -> bool {
         let fixed = self.columns.len();
-        let asked = match self.purpose {
-            Purpose::Trial => f32::INFINITY,
-            Purpose::Enough(asked, _) => asked,
-        };
+        let rivals = self.rivals(linear);
         let mut spacing = 0.0;
         let mut best = f32::INFINITY;
-        for round in 0..ROUNDS {
+        for round in 0..rivals.rounds {
             let kept = (self.columns.clone(), self.ambient);
             let scene = Scene {
                 world: self.world,
@@ -242,7 +280,7 @@ impl Fit<'_> {
                 spacing = tried.spacing;
                 place::out_of(&scene, tried.clone(), columns, fixed, ambient);
             } else {
-                place::in_front(&scene, columns, fixed, ambient, spacing);
+                place::in_front(&scene, &mut self.fronts, columns, fixed, ambient, spacing);
             }
             self.settle();
             let direct = solve::direct(&self.samples, &self.columns);
@@ -258,8 +296,10 @@ impl Fit<'_> {
             }
             let done = found > best * ENOUGH;
             best = best.min(found);
-            let hopeless = if round == 0 { HOPELESS.0 } else { HOPELESS.1 };
-            if best > asked * hopeless {
+            if !linear {
+                self.rounds.push(best);
+            }
+            if best > rivals.hopeless(round) {
                 return true;
             }
             if done {
@@ -280,7 +320,7 @@ impl Fit<'_> {
                 break;
             }
         }
-        best > asked
+        best > rivals.asked
     }
 
     /// Puts in lights that may fall off linearly, as compilers can have it, in place of those of [`place`](Self::place),
@@ -292,8 +332,8 @@ impl Fit<'_> {
         }
         let kept = self.start();
         self.back_to(start);
-        self.place(candidates, true, &mut |_| ());
-        if self.agreement().median_stops > before * LINEAR {
+        let hopeless = self.place(candidates, true, &mut |_| ());
+        if hopeless || self.agreement().median_stops > before * LINEAR {
             self.back_to(kept);
         }
     }

@@ -12,12 +12,13 @@
 //!    and what is the same everywhere is ambient, within limits. `suns` looks for a sun where none is known, `splash`
 //!    puts weak lights in front of lamps, as compilers do.
 //! 5. `place`: candidates for lost lights all over open space, and where the directions of the light grid meet
-//!    (`crossings`), then in front of what stays unexplained, for as long as
+//!    (`crossings`), then in front of what stays unexplained (`fronts`), for as long as
 //!    that makes light agree better at what is held out. `fit` holds these steps together. `beside`: texels right beside
 //!    these lights join the measurements where they are too bright.
 //!    Where lights that fall off with the square of the distance leave much, once more with linear ones.
 //! 6. `compiler`: all of that with less effort for light that was stored encoded, and for lights that end, to see whether
-//!    it explains more. Where the map says that corners were made darker, all of it is done both ways.
+//!    it explains more. `ways`: where the map says that corners were made darker, all of it is done both ways; with back
+//!    splashes and without; with more measurements where much is left.
 //! 7. The world's lights get their strengths, lost lights are added to
 //!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
 //!
@@ -38,6 +39,7 @@ mod compiler;
 mod crossings;
 mod ends;
 mod fit;
+mod fronts;
 mod nodes;
 pub(crate) mod parallel;
 mod place;
@@ -56,6 +58,7 @@ mod tests;
 mod texels;
 mod vertices;
 mod views;
+mod ways;
 
 pub use beside::{Spots, spots};
 pub use cache::CalibrationCache;
@@ -70,6 +73,7 @@ use bvh::Occluders;
 use columns::{Lamp, Source};
 use compiler::Compiler;
 use fit::Fit;
+use fronts::Fronts;
 use glam::Vec3;
 use nodes::Measured;
 use samples::Taking;
@@ -78,25 +82,10 @@ use std::collections::HashSet;
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 23;
+const VERSION: u32 = 24;
 
 /// One in so many candidates comes from the directions of the light grid.
 const CROSSINGS: usize = 5;
-
-/// Part of the time that looking for what the compiler did takes, about.
-const COMPILER_PART: f32 = 0.3;
-
-/// Part of the time after which what was planned is tried: more measurements may follow.
-const TRIED_PART: f32 = 0.85;
-
-/// Error at measurements held out, stops, that asks for more measurements: light of many small lights takes more to tell.
-const UNEXPLAINED: f32 = 0.3;
-
-/// Part of the error of what directives say that asks for more measurements, too, where more of it is left.
-const HALF: f32 = 0.5;
-
-/// So many times as many.
-const MORE_SAMPLES: usize = 2;
 
 /// How a world is calibrated.
 #[derive(Debug, Clone, PartialEq)]
@@ -143,8 +132,10 @@ struct Solution {
     report: CalibrationReport,
     /// Agreement at all texels, those that were fitted, too: two fits alike are compared by it with less noise.
     overall: Agreement,
-    /// Found with [`MORE_SAMPLES`].
+    /// Found with more measurements than asked for.
     measured_more: bool,
+    /// Error at measurements held out after each round of points, stops.
+    rounds: Vec<f32>,
 }
 
 impl Solution {
@@ -186,7 +177,7 @@ pub fn calibrate_with(
             if let Err(problem) = missing {
                 world.warnings.push(problem.to_string());
             }
-            let solution = best(world, &silent, options, progress);
+            let solution = ways::best(world, &silent, options, progress);
             progress(1.0);
             if let (Some(cache), Some(key)) = (&options.cache, key)
                 && let Err(problem) = cache.write(key, &solution)
@@ -208,141 +199,25 @@ pub fn calibrate_with(
     solution.report
 }
 
-/// The solution that agrees best, of what the compiler may have done.
-fn best(
-    world: &mut RelitWorld,
-    silent: &[u32],
-    options: &CalibrationOptions,
-    progress: &mut dyn FnMut(f32),
-) -> Solution {
-    let mut reached = 0.0;
-    let ways = compiler::find(world, silent, options, &mut |part| {
-        reached = part * COMPILER_PART;
-        progress(reached);
-    });
-    let mut left = 2 * ways.len();
-    let mut try_way = |world: &mut RelitWorld, way: Compiler| {
-        way.tell(world);
-        // once more without splashes, unless there are none
-        let splashes = Cell::new(way.splashes);
-        let begin = reached;
-        left -= 1;
-        let found = find_with_enough(world, silent, options, way, &splashes, &mut |part| {
-            let tries = left + usize::from(!way.splashes || splashes.get());
-            reached = reached.max(begin + part * (TRIED_PART - begin) / tries.max(1) as f32);
-            progress(reached);
-        });
-        if way.splashes && !splashes.get() {
-            left -= 1;
-        }
-        found
-    };
-    let off = |solution: &Solution| solution.report.after.median_stops;
-    let mut best: Option<(Solution, Compiler)> = None;
-    for way in ways {
-        let mut found = try_way(world, way);
-        if found.report.splashes > 0 {
-            let plain = Compiler {
-                splashes: false,
-                ..way
-            };
-            found = splashed_or_plain(found, try_way(world, plain));
-        }
-        if (best.as_ref()).is_none_or(|(best, _)| off(&found) < off(best)) {
-            best = Some((found, way));
-        }
-    }
-    let Some((found, way)) = best else {
-        return Solution::default();
-    };
-    let halved = (found.report.before.median_stops * HALF).max(compiler::NOTHING);
-    if off(&found) <= halved || found.measured_more {
-        return found;
-    }
-    let splashes = found.report.splashes > 0;
-    let same = Compiler { splashes, ..way };
-    same.tell(world);
-    let rest = &mut |part| progress(reached + part * (1.0 - reached));
-    let again = find_more(world, silent, options, same, &Cell::new(splashes), rest);
-    if off(&again) < off(&found) {
-        again
-    } else {
-        found
-    }
-}
-
-/// What splashes explain, lights that are put in explain as well in many a map, and with fewer.
-fn splashed_or_plain(splashed: Solution, plain: Solution) -> Solution {
-    let off = |solution: &Solution| solution.report.after.median_stops;
-    let added = |solution: &Solution| solution.report.splashes + solution.report.placed;
-    let fewer = added(&splashed) <= added(&plain) && off(&splashed) <= off(&plain);
-    if fewer || off(&splashed) < off(&plain) * SPLASHES_KEPT {
-        splashed
-    } else {
-        plain
-    }
-}
-
-/// Part of the error without back splashes that they may leave to be kept, where they are more lights.
-const SPLASHES_KEPT: f32 = 0.95;
-
-/// [`find`] with the measurements that it takes.
-fn find_with_enough(
-    world: &RelitWorld,
-    silent: &[u32],
-    options: &CalibrationOptions,
-    compiler: Compiler,
-    splashes: &Cell<bool>,
-    progress: &mut dyn FnMut(f32),
-) -> Solution {
-    let mut reached = 0.0;
-    let first = find(
-        world,
-        silent,
-        options,
-        compiler,
-        Purpose::Enough(UNEXPLAINED, splashes),
-        &mut |part| {
-            reached = part;
-            progress(part);
-        },
-    );
-    if let Some(first) = first {
-        return first;
-    }
-    let rest = &mut |part| progress(reached + part * (1.0 - reached));
-    find_more(world, silent, options, compiler, splashes, rest)
-}
-
-/// [`find`] with more measurements.
-fn find_more(
-    world: &RelitWorld,
-    silent: &[u32],
-    options: &CalibrationOptions,
-    compiler: Compiler,
-    splashes: &Cell<bool>,
-    progress: &mut dyn FnMut(f32),
-) -> Solution {
-    let options = CalibrationOptions {
-        samples: options.samples * MORE_SAMPLES,
-        cache: None,
-        ..*options
-    };
-    let last = Purpose::Enough(f32::INFINITY, splashes);
-    let found = find(world, silent, &options, compiler, last, progress);
-    Solution {
-        measured_more: true,
-        ..found.unwrap_or_default()
-    }
-}
-
 /// What a solution is for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Purpose<'a> {
-    /// To compare one compiler with another: without the light grid and linear falloff.
-    Trial,
-    /// To be kept if it leaves no more error than so many stops. Told as soon as it is known: whether it has back splashes.
-    Enough(f32, &'a Cell<bool>),
+    /// To compare one compiler with another: without the light grid and linear falloff. Lights are looked for so many times
+    /// at most.
+    Trial(usize),
+    /// To be kept if it agrees well enough.
+    Enough(Asked<'a>),
+}
+
+/// When a solution is good enough to be kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Asked<'a> {
+    /// Most error that is left at measurements held out, stops.
+    stops: f32,
+    /// What may be left after each round: another way that has more is given up.
+    pace: &'a [f32],
+    /// Told as soon as it is known: whether there are back splashes.
+    splashes: &'a Cell<bool>,
 }
 
 /// Solves for a world's light. `silent`: skies of which directives tell nothing. `compiler`: what was done to light, which
@@ -358,7 +233,7 @@ fn find(
     progress: &mut dyn FnMut(f32),
 ) -> Option<Solution> {
     progress(0.0);
-    let thorough = purpose != Purpose::Trial;
+    let thorough = !matches!(purpose, Purpose::Trial(_));
     let occluders = samples::occluders(world);
     // Where lights end, black tells little. Trials do not know yet whether they do, and measure alike to be compared.
     let taking = Taking {
@@ -411,6 +286,8 @@ fn find(
         taking,
         beside: HashSet::new(),
         tried: None,
+        fronts: Fronts::new(samples.len()),
+        rounds: Vec::new(),
         splashes: match compiler.splashes {
             true => splash::of(world),
             false => Vec::new(),
@@ -433,8 +310,8 @@ fn find(
     progress(0.3);
     let own = splash::columns(world, &occluders, &fit.samples, &fit.splashes, &fit.columns);
     let splashed = fit.splash(own);
-    if let Purpose::Enough(_, splashes) = purpose {
-        splashes.set(splashed);
+    if let Purpose::Enough(asked) = purpose {
+        asked.splashes.set(splashed);
     }
     progress(0.35);
     if options.candidates > 0 {
@@ -461,6 +338,7 @@ fn find(
     solution.report.after = fit.agreement();
     solution.overall = fit.agreement_overall();
     solution.exposure = fit.exposure();
+    solution.rounds = std::mem::take(&mut fit.rounds);
     let (columns, splashes) = (fit.columns, fit.splashes);
     solution.splashes = vec![Vec3::ZERO; splashes.len()];
     solution.known = columns.iter().take(known).map(|c| c.strength).collect();

@@ -9,6 +9,7 @@ use super::bvh::Occluders;
 use super::columns::{Column, Lamp, Source, point_rows, rows_again, unshadowed};
 use super::crossings::Crossing;
 use super::ends::pieces_of;
+use super::fronts::Fronts;
 use super::nodes::Measured;
 use super::parallel;
 use super::samples::{self, Sample, mean};
@@ -23,10 +24,7 @@ use std::f32::consts::PI;
 pub(super) const CLEARANCE: f32 = 8.0;
 
 /// How far candidates are tried, id units. Lights that are kept reach as far as they are seen.
-const RANGE: f32 = 700.0;
-
-/// Distances from a sample at which candidates are put in front of it, id units.
-const FRONTS: [f32; 4] = [12.0, 28.0, 60.0, 120.0];
+pub(super) const RANGE: f32 = 700.0;
 
 /// Squared error (samples that are off by a factor e) that a light must take away to be kept.
 pub(super) const WORTH: f32 = 0.6;
@@ -60,7 +58,7 @@ const NEAR: f32 = 64.0;
 const EXCESS: f32 = 1.5;
 
 /// A light as light is.
-fn lamp(origin: Vec3) -> Lamp {
+pub(super) fn lamp(origin: Vec3) -> Lamp {
     Lamp {
         origin,
         falloff: Falloff::InverseSquare,
@@ -111,7 +109,7 @@ impl Scene<'_> {
 
     /// The most that a light at a place may be, by the light that lightmaps store on the surfaces right beside it. There it
     /// is brightest, and measurements are too sparse to tell of such spots.
-    fn limit(&self, lamp: Lamp) -> Vec3 {
+    pub(super) fn limit(&self, lamp: Lamp) -> Vec3 {
         let origin = lamp.origin;
         let mut limit = Vec3::INFINITY;
         let floor = samples::floor(self.world);
@@ -152,6 +150,17 @@ impl Scene<'_> {
     }
 
     fn column(&self, lamp: Lamp, rows: Vec<(u32, f32)>, strength: Vec3) -> Column {
+        self.limited(lamp, rows, strength, self.limit(lamp))
+    }
+
+    /// The column of a light at a place that may be so much.
+    pub(super) fn limited(
+        &self,
+        lamp: Lamp,
+        rows: Vec<(u32, f32)>,
+        strength: Vec3,
+        limit: Vec3,
+    ) -> Column {
         Column {
             source: Source::Placed(lamp),
             pieces: if self.least > 0.0 {
@@ -161,13 +170,13 @@ impl Scene<'_> {
             },
             rows,
             strength,
-            limit: self.limit(lamp),
+            limit,
             prior: None,
         }
     }
 
     /// Whether a light fits at a place: in the map, and clear of surfaces.
-    fn open(&self, origin: Vec3) -> bool {
+    pub(super) fn open(&self, origin: Vec3) -> bool {
         self.world.bsp.cluster_at(origin) >= 0
             && !self.world.bsp.is_in_drawn_brush(origin, 0.0)
             && AROUND
@@ -175,34 +184,8 @@ impl Scene<'_> {
                 .all(|d| self.occluders.nearest(origin, d, CLEARANCE).is_none())
     }
 
-    fn sees(&self, a: Vec3, b: Vec3) -> bool {
+    pub(super) fn sees(&self, a: Vec3, b: Vec3) -> bool {
         !self.occluders.blocked(a, b, false)
-    }
-
-    /// Places in front of bright samples that are not explained, the worst first.
-    fn in_front(&self, state: &Residual) -> Vec<Vec3> {
-        let mut worst: Vec<(f32, usize)> = self
-            .samples
-            .iter()
-            .zip(&state.rest)
-            .enumerate()
-            .filter(|(_, (s, _))| !s.held_out && s.site == samples::Site::Surface)
-            .map(|(i, (s, rest))| (mean(*rest) / (s.level() + s.floor), i))
-            .filter(|(missing, _)| *missing > 0.25)
-            .collect();
-        worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let fronts = worst.into_iter().flat_map(|(_, i)| {
-            let sample = self.samples.get(i);
-            FRONTS.into_iter().filter_map(move |distance| {
-                let sample = sample?;
-                Some((sample.position, sample.position + sample.normal * distance))
-            })
-        });
-        fronts
-            .filter(|&(from, at)| self.sees(from, at) && self.open(at))
-            .map(|(_, at)| at)
-            .take(self.candidates)
-            .collect()
     }
 }
 
@@ -250,14 +233,14 @@ pub(super) fn out_of(
 /// Adds lights in front of what stays unexplained.
 pub(super) fn in_front(
     scene: &Scene<'_>,
+    fronts: &mut Fronts,
     columns: &mut Vec<Column>,
     fixed: usize,
     ambient: &mut Ambient,
     spacing: f32,
 ) {
     let state = residual(scene.samples, columns, ambient.value);
-    let fronts = scene.in_front(&state);
-    let candidates = scene.columns(&fronts, RANGE);
+    let candidates = fronts.candidates(scene, &state);
     choose(scene, columns, fixed, ambient, (candidates, spacing * 0.5));
 }
 
@@ -474,6 +457,10 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
         let from = best.0;
         for direction in AROUND {
             let at = from.origin + direction * step;
+            // there and back again
+            if at.distance(start.origin) < step * 0.5 {
+                continue;
+            }
             if !scene.open(at) || !scene.sees(from.origin, at) {
                 continue;
             }

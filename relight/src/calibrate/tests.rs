@@ -1,5 +1,6 @@
 mod beside;
 mod ends;
+mod fronts;
 mod grid;
 mod held_out;
 mod known_truth;

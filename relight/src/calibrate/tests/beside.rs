@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::calibrate::beside::spots;
+use crate::calibrate::fronts::Fronts;
 use crate::light::Falloff;
 
 /// Light of a point in the middle of the room.
@@ -83,7 +84,13 @@ fn texels_that_a_light_makes_too_bright_join_and_turn_it_down() {
         crossings: Vec::new(),
         tried: None,
         least: 0.0,
-        purpose: Purpose::Enough(1.0, &again),
+        fronts: Fronts::new(samples.len()),
+        rounds: Vec::new(),
+        purpose: Purpose::Enough(Asked {
+            stops: 1.0,
+            pace: &[],
+            splashes: &again,
+        }),
         samples,
     };
     let before = fit.samples.len();

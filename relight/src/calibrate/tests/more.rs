@@ -1,8 +1,9 @@
-//! Measurements that are taken where directives are nearly as good as what is found.
+//! Ways that are tried: more measurements where directives are nearly as good as what is found, and what is given up.
 
 use super::splash::from_lamp;
 use super::*;
 use crate::calibrate::random::lot;
+use crate::calibrate::ways::{HALF, Rival, UNEXPLAINED, Ways};
 
 /// How far off what any light could explain texels are, stops.
 const NOISE: f32 = 0.2;
@@ -31,7 +32,7 @@ fn where_directives_are_nearly_right_more_is_measured_and_the_better_is_kept() {
         println!("{report:?}");
         let [before, after] = [&report.before, &report.after].map(|a| a.median_stops);
         assert!(after < UNEXPLAINED && after > before * HALF);
-        let world = noisy();
+        let mut world = noisy();
         let way = |splashes: bool| Compiler {
             gamma: report.gamma,
             ends: report.ends,
@@ -39,13 +40,45 @@ fn where_directives_are_nearly_right_more_is_measured_and_the_better_is_kept() {
             splashes,
         };
         assert!(report.gamma == 1.0 && !report.ends && !report.dirty);
-        let cell = Cell::new(true);
-        let once = find_with_enough(&world, &[], &options, way(true), &cell, &mut |_| ());
-        let splashes = once.report.splashes > 0;
-        let more = find_more(&world, &[], &options, way(splashes), &cell, &mut |_| ());
+        let nothing = &mut |_| ();
+        let mut ways = Ways::new(&mut world, &[], &options, nothing);
+        let once = ways.with(way(true));
+        let (cell, same) = (Cell::new(true), way(once.report.splashes > 0));
+        let more = ways.measured_more(same, None, &cell, &|| 1.0).unwrap();
         assert!(!once.measured_more && more.measured_more);
         assert!(more.report.samples > once.report.samples * 3 / 2);
         let off = [once, more].map(|s| s.report.after.median_stops);
         assert_eq!(after, off[0].min(off[1]), "{off:?}");
     }
+}
+
+#[test]
+fn what_falls_behind_a_rival_is_given_up() {
+    let mut world = room(false, Some(&from_hidden));
+    let (options, nothing) = (small(), &mut |_| ());
+    let mut ways = Ways::new(&mut world, &[], &options, nothing);
+    let plain = Compiler {
+        gamma: 1.0,
+        ends: false,
+        dirt: None,
+        splashes: false,
+    };
+    let cell = Cell::new(false);
+    let mut more = |rival: Option<&Rival>| ways.measured_more(plain, rival, &cell, &|| 1.0);
+    let found = more(None).unwrap();
+    assert!(!found.rounds.is_empty() && found.measured_more);
+    let rival = || {
+        let mut rival = Rival::of(&found);
+        rival.stops *= 1.1;
+        rival
+    };
+    // it keeps up with itself
+    let again = more(Some(&rival())).unwrap();
+    assert_eq!(again.rounds, found.rounds);
+    let mut faster = rival();
+    faster.pace[0] = found.rounds[0] * 0.9;
+    assert!(more(Some(&faster)).is_none());
+    let mut better = rival();
+    better.stops = found.report.after.median_stops * 0.9;
+    assert!(more(Some(&better)).is_none());
 }
