@@ -19,7 +19,9 @@ use crate::view::{Camera, Maps, load, open};
 /// error over the squared mean of the picture, times the frames, which would be one number if frames were independent
 /// (that of all frames has the reference's own noise in it). JSON has beside it the mean over the pixels of the squared
 /// error over the squared pixel (a bright pixel counts for no more than a dark one; up to a hundredth of the picture's
-/// mean). A square darker than a hundredth of the picture is measured against that.
+/// mean). A square darker than a hundredth of the picture is measured against that. With --tiles each estimator's
+/// noisiest squares follow: where, how bright beside the picture, the difference and the standard error of its mean.
+/// Noise after more frames can be told from these: the standard error falls at least with the root of the frames.
 ///
 /// Example: relight estimators oa_dm1 --frames 4096 --size 512x384
 #[derive(Args, Debug)]
@@ -44,6 +46,9 @@ pub struct EstimatorsArgs {
     /// Leave out the pictures lit by every light of the map
     #[arg(long)]
     no_unculled: bool,
+    /// Print the noisiest squares of each estimator, so many
+    #[arg(long, default_value_t = 0)]
+    tiles: usize,
     /// Camera: X Y Z YAW PITCH; default: the map's intermission or first spawn point
     #[arg(long, num_args = 4..=5, allow_negative_numbers = true, value_names = ["X", "Y", "Z", "YAW", "PITCH"])]
     camera: Option<Vec<f32>>,
@@ -125,13 +130,26 @@ fn level(p: &[f32; 3]) -> f64 {
     f64::from(p[0] + p[1] + p[2]) / 3.0
 }
 
-/// Mean relative difference and how many standard errors that is, of the picture and of the worst square.
-fn compare(picture: &Picture, truth: &Picture, width: usize) -> Value {
-    let mean = truth.iter().map(level).sum::<f64>() / truth.len().max(1) as f64;
-    let floor = (mean * 0.01).max(1.0e-9);
-    // the difference of means over that of the reference; pixels are independent, so the squares of their differences
-    // tell the standard error of the sum
-    let score = |pixels: &mut dyn Iterator<Item = (&[f32; 3], &[f32; 3])>| {
+/// A part of a picture beside the same part of its reference.
+struct Score {
+    /// Its first pixel.
+    at: (usize, usize),
+    /// Mean of the reference over that of its whole picture.
+    brightness: f64,
+    /// Relative difference of the mean.
+    difference: f64,
+    /// Standard error of that, from the differences of the pixels.
+    error: f64,
+}
+
+impl Score {
+    /// `mean`: of the reference's whole picture; what is darker than a hundredth of that is measured against it.
+    fn new<'a>(
+        at: (usize, usize),
+        pixels: impl Iterator<Item = (&'a [f32; 3], &'a [f32; 3])>,
+        mean: f64,
+    ) -> Self {
+        // pixels are independent, so the squares of their differences tell the standard error of the sum
         let (mut sum, mut squares, mut light, mut count) = (0.0, 0.0, 0.0, 0.0f64);
         for (a, b) in pixels {
             let d = level(a) - level(b);
@@ -140,38 +158,64 @@ fn compare(picture: &Picture, truth: &Picture, width: usize) -> Value {
             light += level(b);
             count += 1.0;
         }
-        let relative = sum / light.max(floor * count);
-        let errors = if squares > 0.0 {
-            sum / squares.sqrt()
+        let floor = (mean * 0.01).max(1.0e-9);
+        let against = light.max(floor * count);
+        Self {
+            at,
+            brightness: light / (count * mean).max(1.0e-9),
+            difference: sum.abs() / against,
+            error: squares.sqrt() / against,
+        }
+    }
+
+    fn standard_errors(&self) -> f64 {
+        if self.error > 0.0 {
+            self.difference / self.error
         } else {
             0.0
-        };
-        (relative.abs(), errors.abs())
-    };
-    let all = score(&mut picture.iter().zip(truth));
+        }
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "at": [self.at.0, self.at.1],
+            "brightness": self.brightness,
+            "difference": self.difference,
+            "standard_error": self.error,
+        })
+    }
+}
+
+/// Relative difference of the picture and of its squares, with the noisiest `noisiest` of these.
+fn compare(picture: &Picture, truth: &Picture, width: usize, noisiest: usize) -> Value {
+    let mean = truth.iter().map(level).sum::<f64>() / truth.len().max(1) as f64;
+    let all = Score::new((0, 0), picture.iter().zip(truth), mean);
     let height = truth.len() / width.max(1);
     let mut tiles = Vec::new();
     for y in (0..height).step_by(TILE) {
         for x in (0..width).step_by(TILE) {
-            let mut pixels = (y..(y + TILE).min(height)).flat_map(|row| {
+            let pixels = (y..(y + TILE).min(height)).flat_map(|row| {
                 let range = row * width + x..row * width + (x + TILE).min(width);
                 let rows = picture.get(range.clone()).zip(truth.get(range));
                 rows.into_iter().flat_map(|(a, b)| a.iter().zip(b))
             });
-            tiles.push((score(&mut pixels), (x, y)));
+            tiles.push(Score::new((x, y), pixels, mean));
         }
     }
-    let worst = tiles.iter().max_by(|a, b| a.0.0.total_cmp(&b.0.0));
-    let strangest = tiles.iter().map(|t| t.0.1).fold(0.0, f64::max);
-    let mean_tile = tiles.iter().map(|t| t.0.0).sum::<f64>() / tiles.len().max(1) as f64;
-    json!({
-        "difference": all.0,
-        "standard_errors": all.1,
+    let worst = (tiles.iter()).max_by(|a, b| a.difference.total_cmp(&b.difference));
+    let strangest = tiles.iter().map(Score::standard_errors).fold(0.0, f64::max);
+    let mean_tile = tiles.iter().map(|t| t.difference).sum::<f64>() / tiles.len().max(1) as f64;
+    let mut line = json!({
+        "difference": all.difference,
+        "standard_errors": all.standard_errors(),
         "mean_tile_difference": mean_tile,
-        "worst_tile_difference": worst.map_or(0.0, |w| w.0.0),
-        "worst_tile": worst.map(|w| [w.1.0, w.1.1]),
+        "worst_tile_difference": worst.map_or(0.0, |w| w.difference),
+        "worst_tile": worst.map(|w| [w.at.0, w.at.1]),
         "worst_tile_standard_errors": strangest,
-    })
+    });
+    tiles.sort_by(|a, b| b.error.total_cmp(&a.error));
+    line["noisiest_tiles"] = tiles.iter().take(noisiest).map(Score::json).collect();
+    line
 }
 
 /// Mean squared error over the squared mean of the picture, times the frames that the picture is the mean of.
@@ -217,6 +261,18 @@ fn row(line: &Value) {
             .unwrap_or(0.0),
         number("direct_ms"),
     );
+    let tiles = line.get("noisiest_tiles").and_then(Value::as_array);
+    for tile in tiles.into_iter().flatten() {
+        let number = |path: &str| tile.pointer(path).and_then(Value::as_f64).unwrap_or(0.0);
+        println!(
+            "  tile at {:>4} {:>4}: {:>7.3} of the brightness, {:>6.2} % off, standard error {:>6.2} %",
+            number("/at/0"),
+            number("/at/1"),
+            number("/brightness"),
+            number("/difference") * 100.0,
+            number("/standard_error") * 100.0,
+        );
+    }
 }
 
 /// Runs the command: a table for each map, or one JSON object a map and estimator.
@@ -263,7 +319,7 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
         let reference = args.reference.unwrap_or((args.frames / 16).max(16));
         let truth = stage.render(&format!("{map} all"), &all, reference)?;
         let print = |name: &str, rendered: &Rendered| {
-            let mut line = compare(&rendered.mean, &truth.mean, width as usize);
+            let mut line = compare(&rendered.mean, &truth.mean, width as usize, args.tiles);
             line["map"] = json!(map);
             line["estimator"] = json!(name);
             line["frames"] = json!(rendered.frames);
@@ -335,4 +391,45 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_noisiest_tiles_are_told_with_their_standard_error() {
+        // four tiles; one is off up and down by a tenth, a darker one by a fifth up
+        let (width, height) = (2 * TILE, 2 * TILE);
+        let pixel = |i: usize| (i % width / TILE, i / width / TILE);
+        let truth: Picture = (0..width * height)
+            .map(|i| [if pixel(i) == (0, 1) { 0.5 } else { 1.0 }; 3])
+            .collect();
+        let off = |i: usize, level: f32| match pixel(i) {
+            (1, 0) => level * if i.is_multiple_of(2) { 1.1 } else { 0.9 },
+            (0, 1) => level * 1.2,
+            _ => level,
+        };
+        let picture: Picture = (truth.iter().enumerate())
+            .map(|(i, p)| p.map(|level| off(i, level)))
+            .collect();
+        let told = compare(&picture, &truth, width, 2);
+        let tiles = told["noisiest_tiles"].as_array().unwrap();
+        assert_eq!(tiles.len(), 2);
+        let near = |path: &str, expected: f64| {
+            let found = told.pointer(path).and_then(Value::as_f64).unwrap();
+            assert!((found - expected).abs() < 1.0e-5, "{path}: {found}");
+        };
+        assert_eq!(tiles[0]["at"], json!([0, TILE]));
+        near("/noisiest_tiles/0/brightness", 0.5 / 0.875);
+        near("/noisiest_tiles/0/difference", 0.2);
+        // the root of 256 squares over 256 pixels
+        near("/noisiest_tiles/0/standard_error", 0.2 / 16.0);
+        assert_eq!(tiles[1]["at"], json!([TILE, 0]));
+        near("/noisiest_tiles/1/difference", 0.0);
+        near("/noisiest_tiles/1/standard_error", 0.1 / 16.0);
+        near("/worst_tile_difference", 0.2);
+        near("/difference", 0.1 / 3.5);
+        near("/standard_errors", 25.6 / (256.0f64 * 0.01 * 2.0).sqrt());
+    }
 }
