@@ -20,7 +20,7 @@ void main() {
         if (g.path >= 0.0) {
             rng_begin(uvec2(task.pixel), task.seed, 1);
             random = rng_independent();
-            LightSet set = lights_at(g.position, g.face_normal);
+            LightSet set = lights_at(g.position, g.face_normal, g.normal);
             if (set_count(set) > set.suns) {
                 vec2 u = rng_next2();
                 LightChoice choice = choose_resampled(set, g.position, g.normal, u.x);

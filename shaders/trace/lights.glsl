@@ -9,7 +9,7 @@
 #include "trace/random.glsl"
 #include "trace/geometry.glsl"
 
-// The lights that may reach a point: a cluster's list, the suns, and the list of lights of this frame.
+// The lights that may reach a point: those of a row, the suns, and the list of lights of this frame.
 struct LightSet {
     uint first;
     uint listed;
@@ -21,9 +21,12 @@ struct LightSet {
 
 uint set_count(LightSet set) { return set.listed + set.suns + set.dynamic_count; }
 
-// Cell of a point, a piece of a cluster, by a walk through the map's tree; the row of "all lights" for a point in none.
+// Number of cells, which have a row for each way that a surface may face; after these comes the row of all lights.
+uint cell_count() { return (VIEW.lights.row_count - 1) / FACINGS; }
+
+// Cell of a point, a piece of a cluster, by a walk through the map's tree; the number of cells for a point in none.
 uint cell_at(vec3 position) {
-    uint no_cell = VIEW.lights.row_count - 1;
+    uint no_cell = cell_count();
     uint node_count = VIEW.lights.node_count;
     if (node_count == 0) return no_cell;
     BspNodes nodes = BspNodes(VIEW.lights.nodes);
@@ -45,9 +48,17 @@ uint cell_at(vec3 position) {
     return cell >= 0 && uint(cell) < no_cell ? uint(cell) : no_cell;
 }
 
-LightSet lights_at(vec3 position, vec3 normal) {
+// The axis that a normal is nearest to, one of twice three.
+uint facing_of(vec3 normal) {
+    vec3 size = abs(normal);
+    uint axis = size.x >= max(size.y, size.z) ? 0 : size.y >= size.z ? 1 : 2;
+    return axis * 2 + (normal[axis] < 0.0 ? 1 : 0);
+}
+
+LightSet lights_at(vec3 position, vec3 face_normal, vec3 normal) {
     // a point of a surface lies on the boundary of leaves: step into the room that it faces
-    LightRow row = LightRows(VIEW.lights.rows).at[cell_at(position + normal)];
+    uint place = cell_at(position + face_normal) * FACINGS + facing_of(normal);
+    LightRow row = LightRows(VIEW.lights.rows).at[min(place, VIEW.lights.row_count - 1)];
     LightSet set = LightSet(row.first, row.count, row.strong, row.suns != 0 ? VIEW.lights.sun_count : 0, 0, 0);
     uint dynamic_rows = VIEW.lights.dynamic_row_count;
     if (dynamic_rows > 0) {
@@ -281,11 +292,20 @@ struct LightChoice {
     float total; // what all that it was chosen from would give without shadows, about; of resampled ones alone
 };
 
-// One light, each with the same probability. `u` of this and what follows: uniform, before and after (see rng_decide), so
-// that with another number it is a point on the chosen light.
+// One light, each with about the same probability. `u` of this and what follows: uniform, before and after (see rng_decide),
+// so that with another number it is a point on the chosen light.
 LightChoice choose_uniform(LightSet set, inout float u) {
-    uint count = set_count(set), member = rng_pick(u, count);
-    return LightChoice(light_of_member(set, member), float(count), 0.0);
+    uint count = set_count(set), length = uint(findMSB(count));
+    if (length > 13) {
+        uint member = rng_pick(u, count);
+        return LightChoice(light_of_member(set, member), float(count), 0.0);
+    }
+    // Shares are multiples of a part of two, four to eight times as fine: so of the frames, whose points are spread evenly
+    // over such parts, each light gets as many as are its due, and not one more or less.
+    uint parts = 8u << length, member = (uint(u * float(parts)) * count) >> (length + 3);
+    uint first = (member * parts + count - 1) / count, next = ((member + 1) * parts + count - 1) / count;
+    u = min((u * float(parts) - float(first)) / float(next - first), 1.0 - 1.0 / 16777216.0);
+    return LightChoice(light_of_member(set, member), float(parts) / float(next - first), 0.0);
 }
 
 // One of the suns; a map has one as a rule.
@@ -295,8 +315,8 @@ LightChoice choose_sun(uint count, inout float u) {
 }
 
 // Resampled importance sampling (Talbot et al. 2005): some candidates, one of them chosen by its target, weighed by
-// the inverse of the chance that it had. Candidates come from the cluster's list by alias tables (Walker 1977), with
-// chances by what each light gives to the cluster, shadows included; the whole list is taken if it is short enough.
+// the inverse of the chance that it had. Candidates come from the row's list by alias tables (Walker 1977), with
+// chances by what each light gives in the cell to what faces about that way, shadows included; the whole list is taken if it is short enough.
 // Lights of this frame are candidates of their own. A hidden sun would outshine all that is left in its shadow: suns
 // get a ray of their own.
 LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal, inout float u) {
@@ -366,7 +386,7 @@ LightChoice choose_one(LightSet set, vec3 position, vec3 normal, inout float u) 
 
 // A point on the one light of a point whose surface faces `face_normal`.
 LightSample one_light(vec3 position, vec3 face_normal, vec3 normal) {
-    LightSet set = lights_at(position, face_normal);
+    LightSet set = lights_at(position, face_normal, normal);
     if (set_count(set) == 0) return no_light();
     vec2 u = rng_next2();
     LightChoice choice;

@@ -29,7 +29,7 @@ vec3 arriving(LightSample s, vec3 origin, uint mask) {
 
 // Direct light on a point whose surface faces `face_normal`, with `samples` independent estimates.
 vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint mask, uint selection, uint samples) {
-    LightSet set = lights_at(position, face_normal);
+    LightSet set = lights_at(position, face_normal, normal);
     uint count = set_count(set);
     if (count == 0) return vec3(0.0);
     vec3 origin = offset_ray(position, face_normal);

@@ -140,6 +140,7 @@ const uint SELECT_UNIFORM = 0, SELECT_RESAMPLED = 1, SELECT_ALL = 2;
 const uint WEAK_RAYS = 4;
 const uint LIGHTS_SOFT = 1;
 // The upper bits of a light's number say what it is, the others which one.
+const uint FACINGS = 6;
 const uint LIGHT_KIND_SHIFT = 29;
 const uint LIGHT_TRIANGLE = 0, LIGHT_CHANGING_TRIANGLE = 1, LIGHT_SPHERE = 2, LIGHT_CHANGING_SPHERE = 3, LIGHT_SUN = 4;
 // Triangle.flags: bits from here on hold the drawing rank, sort value times 8, at most 255.

@@ -11,11 +11,13 @@ use q3bsp::Bsp;
 use relight::light::TriangleLight;
 use shaders::trace_types::BspNode;
 
+use super::light_facings::{Facings, facings};
+
 /// Sides of the grid that are tried, units, from the finest; after these clusters stay whole.
 const SIDES: [f32; 7] = [128.0, 192.0, 256.0, 384.0, 512.0, 1024.0, 2048.0];
 
-/// Entries of all lists, at the most, for which clusters are cut: 32 MiB of slots.
-const MOST_ENTRIES: f64 = 1_048_576.0;
+/// Entries of all lists, at the most, for which clusters are cut: 80 MiB of slots.
+const MOST_ENTRIES: f64 = 2_621_440.0;
 
 /// How far behind a light's plane a cell must lie for its list to do without the light, units: the list of a point is
 /// that of the cell one unit before it.
@@ -57,6 +59,8 @@ pub struct Cells {
     pub leaf_cells: Vec<i32>,
     /// The cells.
     pub cells: Vec<Cell>,
+    /// Of each cell where surfaces face which way.
+    pub facings: Vec<Facings>,
 }
 
 /// A leaf of the map that is to be cut.
@@ -187,9 +191,39 @@ impl Cells {
             };
             leafs.iter().map(of).sum()
         };
-        let fits = SIDES
+        let fine = SIDES
             .into_iter()
-            .find(|&side| entries(side) <= MOST_ENTRIES);
+            .filter(|&side| entries(side) <= MOST_ENTRIES)
+            .map(|side| Self::cut(bsp, &leafs, Some(side), &length))
+            .find(|cells| cells.entries(&length) <= MOST_ENTRIES);
+        fine.unwrap_or_else(|| {
+            let mut whole = Self::cut(bsp, &leafs, None, &length);
+            if whole.entries(&length) > MOST_ENTRIES {
+                whole.facings.fill_with(Facings::default);
+            }
+            whole
+        })
+    }
+
+    /// Entries of the lists: of each cell one for all normals, and one for each way that surfaces face.
+    fn entries(&self, length: impl Fn(usize) -> usize) -> f64 {
+        let cells = self.cells.iter().zip(&self.facings);
+        let lists = cells.map(|(cell, facings)| {
+            let lists = 1 + facings.iter().filter(|points| !points.is_empty()).count();
+            #[allow(clippy::cast_precision_loss)] // lengths of lists
+            let entries = (lists * length(cell.cluster)) as f64;
+            entries
+        });
+        lists.sum()
+    }
+
+    /// Cuts leafs, which have an index, a cluster and bounds, along a grid; without one they stay whole.
+    fn cut(
+        bsp: &Bsp,
+        leafs: &[(usize, usize, Vec3, Vec3)],
+        side: Option<f32>,
+        length: impl Fn(usize) -> usize,
+    ) -> Self {
         let plane = |index: i32| {
             let plane = usize::try_from(index).ok().and_then(|i| bsp.planes.get(i));
             plane.map_or([0.0; 4], |p| p.normal.extend(p.dist).to_array())
@@ -199,19 +233,19 @@ impl Cells {
             children: node.children,
         });
         let mut cutter = Cutter {
-            side: fits.unwrap_or(1.0),
+            side: side.unwrap_or(1.0),
             made: Cells {
                 nodes: nodes.collect(),
                 leaf_cells: vec![-1; bsp.leafs.len()],
-                cells: Vec::new(),
+                ..Cells::default()
             },
             known: HashMap::new(),
         };
         // what takes the place of each leaf as a child
         let mut instead: Vec<Option<i32>> = vec![None; bsp.leafs.len()];
-        for &(index, cluster, mins, maxs) in &leafs {
+        for &(index, cluster, mins, maxs) in leafs {
             // Where there is no light, there is nothing to tell apart: such a leaf may be as large as the map.
-            let piece = match fits.filter(|_| length(cluster) > 0) {
+            let piece = match side.filter(|_| length(cluster) > 0) {
                 Some(side) => Piece::new(cluster, mins, maxs, side),
                 None => Piece {
                     cluster,
@@ -239,6 +273,7 @@ impl Cells {
                 }
             }
         }
+        made.facings = facings(bsp, &made.cells);
         made
     }
 }

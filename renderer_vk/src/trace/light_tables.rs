@@ -1,8 +1,6 @@
 //! Alias tables for drawing lights from a cluster's list.
 
 use glam::Vec3;
-use q3bsp::Bsp;
-use relight::light::{PointLight, TriangleLight};
 use shaders::trace_types::LightSlot;
 
 /// Part of a row's chance that is shared out evenly, so that no light is left out by a bad guess.
@@ -97,64 +95,9 @@ pub fn append_slots(slots: &mut Vec<LightSlot>, entries: &[Entry]) {
     }
 }
 
-/// Middle and half diagonal of the boxes of each cluster's leafs; `None` for a cluster without leafs.
-pub fn cluster_balls(bsp: &Bsp, clusters: usize) -> Vec<Option<(Vec3, f32)>> {
-    let mut boxes: Vec<Option<(Vec3, Vec3)>> = vec![None; clusters];
-    for leaf in &bsp.leafs {
-        let slot = usize::try_from(leaf.cluster)
-            .ok()
-            .and_then(|c| boxes.get_mut(c));
-        if let Some(slot) = slot {
-            #[allow(clippy::cast_precision_loss)] // map coordinates
-            let [mins, maxs] = [leaf.mins, leaf.maxs].map(|v| Vec3::from(v.map(|x| x as f32)));
-            let (low, high) = slot.unwrap_or((mins, maxs));
-            *slot = Some((low.min(mins), high.max(maxs)));
-        }
-    }
-    let ball = |(low, high): (Vec3, Vec3)| ((low + high) * 0.5, (high - low).length() * 0.5);
-    boxes.into_iter().map(|b| b.map(ball)).collect()
-}
-
 /// Luminance of linear colours, of negative ones none.
 pub fn luminance(c: Vec3) -> f32 {
     relight::overbright::luminance(c).max(0.0)
-}
-
-/// Irradiance over pi of a surface for power over squared distance: one over pi times the mean cosine of surfaces that
-/// may face any way.
-const USUAL: f32 = 0.25 / std::f32::consts::PI;
-
-/// About how much light a triangle brings to a cluster (middle and half diagonal); without one its power.
-pub fn triangle_weight(light: &TriangleLight, cluster: Option<(Vec3, f32)>) -> f32 {
-    let [a, b, c] = light.vertices;
-    let middle = (a + b + c) / 3.0;
-    let area = light.area();
-    let facing = match cluster {
-        // how far the cluster can lie in front of the light; never none, for it is large
-        Some((centre, radius)) if !light.two_sided => {
-            let to = centre - middle;
-            ((light.normal().dot(to) + radius) / (to.length() + radius).max(1.0)).clamp(0.05, 1.0)
-        }
-        _ => 1.0,
-    };
-    USUAL * luminance(light.radiance) * area * facing / squared_distance(middle, area, cluster)
-}
-
-/// About how much light a point light brings to a cluster; without one its power.
-pub fn point_weight(light: &PointLight, cluster: Option<(Vec3, f32)>) -> f32 {
-    USUAL * luminance(light.intensity)
-        / squared_distance(light.origin, light.radius * light.radius, cluster)
-}
-
-/// Nearer than half the cluster's size all distances are alike.
-fn squared_distance(origin: Vec3, size: f32, cluster: Option<(Vec3, f32)>) -> f32 {
-    cluster.map_or(1.0, |(centre, radius)| {
-        centre
-            .distance_squared(origin)
-            .max(radius * radius * 0.25)
-            .max(size)
-            .max(1.0)
-    })
 }
 
 #[cfg(test)]

@@ -5,18 +5,14 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 use q3bsp::Bsp;
-use relight::light::{
-    ClusterSet, Flicker, LightLists, LightRef, LightShare, PointLight, Sight, SunLight,
-    TriangleLight,
-};
+use relight::light::{ClusterSet, Flicker, LightLists, PointLight, Sight, SunLight, TriangleLight};
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
 
 use super::cell_grid::CellGrid;
-use super::light_cells::{Cell, Cells};
-use super::light_tables::{
-    Entry, append_slots, cluster_balls, luminance, point_weight, triangle_weight,
-};
+use super::light_cells::Cells;
+use super::light_rows;
+use super::light_tables::luminance;
 use crate::gpu::{Buffer, BufferUsage, Device, Error};
 use crate::world::Bounds;
 
@@ -171,7 +167,7 @@ fn ends(source: &MapLightSource<'_>) -> Vec<f32> {
     source.triangles.iter().map(part).collect()
 }
 
-fn triangle_light(light: &TriangleLight, end: f32, origin: Vec3) -> t::TriangleLight {
+pub(super) fn triangle_light(light: &TriangleLight, end: f32, origin: Vec3) -> t::TriangleLight {
     t::TriangleLight {
         corners: light.vertices.map(|p| p - origin),
         radiance: light.radiance,
@@ -184,7 +180,7 @@ fn triangle_light(light: &TriangleLight, end: f32, origin: Vec3) -> t::TriangleL
     }
 }
 
-fn point_light(light: &PointLight, end: f32) -> t::SphereLight {
+pub(super) fn point_light(light: &PointLight, end: f32) -> t::SphereLight {
     let mut s = sphere(light.origin, light.radius, light.intensity, light.radius);
     s.reach = light.falloff.reach().unwrap_or(0.0);
     s.end = end;
@@ -263,7 +259,7 @@ impl MapLights {
             .bsp
             .map(|bsp| Cells::new(bsp, lists.clusters(), length));
         let cells = cells.unwrap_or_default();
-        let (rows, slots) = tables(source, &numbers, &cells);
+        let (rows, slots) = light_rows::rows(source, &numbers, &cells);
         let (nodes, leaf_cells) = (&cells.nodes, &cells.leaf_cells);
         let bounds = source.bsp.and_then(|bsp| bsp.models.first());
         let (low, high) = bounds
@@ -368,101 +364,4 @@ impl MapLights {
     pub(super) fn fixed(&self) -> t::LightView {
         self.fixed
     }
-}
-
-/// Part of a list's light that its weak lights may give together, by what is known of them. Where all lights are used,
-/// some of these are picked at random.
-const WEAK_PART: f32 = 0.1;
-
-/// Fewest strong lights of a list that has weak ones: shorter lists are used whole.
-const LEAST_STRONG: usize = 12;
-
-/// How many of the entries, which fall by what they give, are strong.
-fn strong(entries: &[Entry]) -> usize {
-    let all: f32 = entries.iter().map(Entry::given).sum();
-    let mut weak = 0.0;
-    let few = entries.iter().rev().take_while(|entry| {
-        weak += entry.given();
-        weak <= all * WEAK_PART
-    });
-    let strong = entries.len() - few.count();
-    if all.is_finite() && strong.max(LEAST_STRONG) + WEAK_RAYS < entries.len() {
-        strong.max(LEAST_STRONG)
-    } else {
-        entries.len()
-    }
-}
-
-/// Rays for the weak lights of a list, as the shaders send them.
-const WEAK_RAYS: usize = c::WEAK_RAYS as usize;
-
-/// Rows and slots of the lists, a row for each cell. The last row, which is always there, holds all lights.
-fn tables(
-    source: &MapLightSource<'_>,
-    numbers: &[Option<u32>],
-    cells: &Cells,
-) -> (Vec<t::LightRow>, Vec<t::LightSlot>) {
-    let lists = source.lists;
-    let balls = source.bsp.map(|bsp| cluster_balls(bsp, lists.clusters()));
-    let mut rows = Vec::with_capacity(cells.cells.len() + 1);
-    let mut slots = Vec::new();
-    let mut entries = Vec::new();
-    for cell in cells.cells.iter().map(Some).chain([None]) {
-        let cluster = cell.and_then(|c| i32::try_from(c.cluster).ok());
-        let whole = cell.and_then(|c| balls.as_ref()?.get(c.cluster).copied().flatten());
-        let ball = cell.map(Cell::ball);
-        entries.clear();
-        let listed = lists.row(cluster.unwrap_or(-1)).iter();
-        let shares = lists.shares(cluster.unwrap_or(-1));
-        entries.extend(listed.enumerate().filter_map(|(i, &entry)| {
-            let (light, guess, guess_of_all) = match lists.light(entry) {
-                LightRef::Triangle(i) => {
-                    let number = numbers.get(i as usize).copied().flatten()?;
-                    let light = source.triangles.get(i as usize)?;
-                    if cell.is_some_and(|c| c.behind(light)) {
-                        return None;
-                    }
-                    let guess = |ball| triangle_weight(light, ball);
-                    (number, guess(ball), guess(whole))
-                }
-                LightRef::Point(i) => {
-                    let light = source.points.get(i as usize)?;
-                    let guess = |ball| point_weight(light, ball);
-                    (
-                        number(c::LIGHT_SPHERE, i as usize),
-                        guess(ball),
-                        guess(whole),
-                    )
-                }
-            };
-            let share = shares.get(i).copied().unwrap_or(LightShare::UNKNOWN);
-            // what rays found for the whole cluster, and by how much the cell is nearer or further
-            let weight = if share.bare > 0.0 && guess_of_all > 0.0 {
-                share.bare * (guess / guess_of_all)
-            } else {
-                guess
-            };
-            Some(Entry {
-                light,
-                weight,
-                visibility: share.visible,
-            })
-        }));
-        entries.sort_by(|a, b| b.given().total_cmp(&a.given()).then(a.light.cmp(&b.light)));
-        let strong = if shares.is_empty() || cell.is_none() {
-            entries.len()
-        } else {
-            strong(&entries)
-        };
-        rows.push(t::LightRow {
-            first: count(slots.len()),
-            count: count(entries.len()),
-            strong: count(strong),
-            suns: u32::from(cluster.is_none_or(|c| lists.sees_sky(c))),
-            cluster: cluster.map_or(u32::MAX, i32::unsigned_abs),
-        });
-        append_slots(&mut slots, &entries);
-        append_slots(&mut slots, entries.get(strong..).unwrap_or_default());
-    }
-    (rows, slots)
 }

@@ -26,6 +26,8 @@ mod indirect;
 pub mod input;
 pub mod layer_boxes;
 pub mod light_cells;
+pub mod light_facings;
+pub mod light_rows;
 pub mod light_tables;
 pub mod lights;
 pub mod look;

@@ -60,6 +60,7 @@ pub const FOG_FILTERED: u32 = 2;
 pub const FOG_HISTORY: u32 = 4;
 pub const SELECT_UNIFORM: u32 = 0;
 pub const SELECT_RESAMPLED: u32 = 1;
+pub const FACINGS: u32 = 6;
 pub const WEAK_RAYS: u32 = 4;
 pub const SELECT_ALL: u32 = 2;
 pub const LIGHTS_SOFT: u32 = 1;

@@ -1,0 +1,254 @@
+//! Which ways surfaces face in each cell, and where in it those lie.
+
+use glam::Vec3;
+use q3bsp::{Bsp, Surface, SurfaceKind, surface_flags};
+use shaders::trace_types::constants as c;
+
+use super::light_cells::Cell;
+
+/// Directions that surfaces may face: one for each side of a cube.
+pub const FACINGS: usize = c::FACINGS as usize;
+
+/// How far beside its cell a point may lie, units: that of a point is the cell one unit before it.
+pub const BESIDE: f32 = 1.5;
+
+/// Points on surfaces of a cell, with unit normals, for each direction that these face; none where none does.
+pub type Facings = [Vec<(Vec3, Vec3)>; FACINGS];
+
+/// Points for each direction of a cell, at the most.
+pub const POINTS: usize = 8;
+
+/// The axis of a direction.
+pub fn direction(facing: usize) -> Vec3 {
+    let axis = Vec3::AXES.get(facing / 2).copied().unwrap_or(Vec3::X);
+    if facing.is_multiple_of(2) {
+        axis
+    } else {
+        -axis
+    }
+}
+
+/// How much shorter a part of a normal may be than its longest and still be taken for that: what shaders know of normals is
+/// rounded, and a slope of 45 degrees faces two ways.
+const TIE: f32 = 0.99;
+
+/// Whether shaders may take a normal to face a direction.
+fn faces(normal: Vec3, facing: usize) -> bool {
+    normal.dot(direction(facing)) >= TIE * normal.abs().max_element()
+}
+
+/// A triangle of a surface.
+struct Piece {
+    corners: [Vec3; 3],
+    normal: Vec3,
+}
+
+impl Piece {
+    /// From positions and normals; `None` without an area.
+    fn new(corners: [(Vec3, Vec3); 3]) -> Option<Self> {
+        let [a, b, c] = corners.map(|(p, _)| p);
+        // fronts are clockwise
+        let front = (c - a).cross(b - a).try_normalize()?;
+        let normal: Vec3 = corners.iter().map(|(_, n)| *n).sum();
+        Some(Self {
+            corners: [a, b, c],
+            normal: normal.normalize_or(front),
+        })
+    }
+
+    /// What of it lies in a box, as corners of a polygon (Sutherland and Hodgman, Reentrant Polygon Clipping, 1974).
+    fn within(&self, low: Vec3, high: Vec3) -> Vec<Vec3> {
+        let mut polygon = self.corners.to_vec();
+        let planes = Vec3::AXES.map(|axis| [(axis, axis.dot(low)), (-axis, -axis.dot(high))]);
+        for (normal, dist) in planes.into_iter().flatten() {
+            let height = |p: Vec3| p.dot(normal) - dist;
+            let next = polygon.iter().cycle().skip(1);
+            let mut kept = Vec::with_capacity(polygon.len() + 1);
+            for (&a, &b) in polygon.iter().zip(next) {
+                let (x, y) = (height(a), height(b));
+                if x >= 0.0 {
+                    kept.push(a);
+                }
+                if (x >= 0.0) != (y >= 0.0) {
+                    kept.push(a + (b - a) * (x / (x - y)));
+                }
+            }
+            polygon = kept;
+        }
+        polygon
+    }
+}
+
+/// What of a surface is drawn; of a curved one its control points' triangles, which lie near it.
+fn pieces(bsp: &Bsp, surface: &Surface) -> Vec<Piece> {
+    let vertices = bsp.surface_vertices(surface);
+    let corner = |i: usize| Some((vertices.get(i)?.position, vertices.get(i)?.normal));
+    let piece = |[a, b, c]: [usize; 3]| Piece::new([corner(a)?, corner(b)?, corner(c)?]);
+    match surface.kind {
+        SurfaceKind::Planar | SurfaceKind::TriangleSoup => {
+            let triangles = bsp.surface_indices(surface).chunks_exact(3);
+            let index = |i: &i32| usize::try_from(*i).ok();
+            let corners = triangles.filter_map(|t| match t {
+                [a, b, c] => Some([index(a)?, index(b)?, index(c)?]),
+                _ => None,
+            });
+            corners.filter_map(piece).collect()
+        }
+        SurfaceKind::Patch => {
+            let width = usize::try_from(surface.patch_width).unwrap_or(0);
+            let squares = (0..vertices.len()).filter(|i| width > 0 && i % width + 1 < width);
+            let halves = squares.flat_map(|i| {
+                let (below, beyond) = (i + width, i + width + 1);
+                [[i, below, i + 1], [i + 1, below, beyond]]
+            });
+            halves.filter_map(piece).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Parts of surfaces that face one way: triangles with the sum of the areas up to them.
+#[derive(Default)]
+struct Parts {
+    triangles: Vec<(f32, [Vec3; 3], Vec3)>,
+    area: f32,
+}
+
+impl Parts {
+    fn add(&mut self, polygon: &[Vec3], normal: Vec3) {
+        let Some((&a, others)) = polygon.split_first() else {
+            return;
+        };
+        for (&b, &c) in others.iter().zip(others.iter().skip(1)) {
+            let area = (b - a).cross(c - a).length() * 0.5;
+            if area > 0.0 && area.is_finite() {
+                self.area += area;
+                self.triangles.push((self.area, [a, b, c], normal));
+            }
+        }
+    }
+
+    /// Points spread evenly over the area, each a unit before its surface.
+    fn points(&self) -> Vec<(Vec3, Vec3)> {
+        let point = |i: usize| {
+            #[allow(clippy::cast_precision_loss)] // a handful
+            let (at, turn) = ((i as f32 + 0.5) / POINTS as f32 * self.area, i as f32 + 0.5);
+            let found = self.triangles.partition_point(|(end, ..)| *end <= at);
+            let (_, [a, b, c], normal) = *self.triangles.get(found).or(self.triangles.last())?;
+            // Roberts' additive recurrence in the square, folded to a triangle
+            let (u, v) = ((turn * 0.754_877_7).fract(), (turn * 0.569_840_3).fract());
+            let (u, v) = if u + v > 1.0 {
+                (1.0 - u, 1.0 - v)
+            } else {
+                (u, v)
+            };
+            Some((a + (b - a) * u + (c - a) * v + normal, normal))
+        };
+        (0..POINTS).filter_map(point).collect()
+    }
+}
+
+/// For each cell points on the surfaces of the world in it, but for skies.
+pub fn facings(bsp: &Bsp, cells: &[Cell]) -> Vec<Facings> {
+    let world = bsp.models.first().map(|model| bsp.model_surfaces(model));
+    let drawn: Vec<(Vec3, Vec3, Vec<Piece>)> = (bsp.surfaces.iter().enumerate())
+        .map(|(index, surface)| {
+            let shader = usize::try_from(surface.shader).ok();
+            let shader = shader.and_then(|s| bsp.shaders.get(s));
+            let sky = shader.is_some_and(|s| s.surface_flags & surface_flags::SKY != 0);
+            let pieces = if sky || !world.as_ref().is_some_and(|w| w.contains(&index)) {
+                Vec::new()
+            } else {
+                pieces(bsp, surface)
+            };
+            let corners = pieces.iter().flat_map(|piece| piece.corners);
+            let low = corners.clone().fold(Vec3::INFINITY, Vec3::min);
+            (low, corners.fold(Vec3::NEG_INFINITY, Vec3::max), pieces)
+        })
+        .collect();
+    let listed = bsp.cluster_surfaces();
+    let of_cell = |cell: &Cell| {
+        let (low, high) = (cell.mins - BESIDE, cell.maxs + BESIDE);
+        let touches = |mins: Vec3, maxs: Vec3| mins.cmple(high).all() && maxs.cmpge(low).all();
+        let mut parts: [Parts; FACINGS] = Default::default();
+        let surfaces = listed.get(cell.cluster).into_iter().flatten();
+        let surfaces = surfaces.filter_map(|&s| drawn.get(s as usize));
+        for (.., pieces) in surfaces.filter(|(mins, maxs, _)| touches(*mins, *maxs)) {
+            for piece in pieces {
+                let [a, b, c] = piece.corners;
+                if !touches(a.min(b).min(c), a.max(b).max(c)) {
+                    continue;
+                }
+                let polygon = piece.within(low, high);
+                for (facing, parts) in parts.iter_mut().enumerate() {
+                    if faces(piece.normal, facing) {
+                        parts.add(&polygon, piece.normal);
+                    }
+                }
+            }
+        }
+        parts.map(|parts| parts.points())
+    };
+    cells.iter().map(of_cell).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use q3bsp::builder::MapBuilder;
+
+    #[test]
+    fn a_slope_of_45_degrees_faces_two_ways() {
+        let count = |normal: Vec3| (0..FACINGS).filter(|&f| faces(normal, f)).count();
+        assert!(faces(Vec3::NEG_Y, 3) && count(Vec3::NEG_Y) == 1);
+        let slope = Vec3::new(-0.707_2, 0.0, -0.707_0);
+        assert!(faces(slope, 1) && faces(slope, 5) && count(slope) == 2);
+        assert_eq!(count(Vec3::new(0.6, 0.0, 0.8)), 1);
+    }
+
+    #[test]
+    fn only_what_lies_in_a_box_is_left_of_a_triangle() {
+        let up = |p| (p, Vec3::Z);
+        let corners = [Vec3::ZERO, Vec3::Y * 100.0, Vec3::X * 100.0];
+        let piece = Piece::new(corners.map(up)).unwrap();
+        let mut parts = Parts::default();
+        let polygon = piece.within(Vec3::splat(-1.0), Vec3::new(60.0, 60.0, 1.0));
+        parts.add(&polygon, Vec3::Z);
+        // the square but for the corner beyond the long side
+        assert!(
+            (parts.area - (3600.0 - 200.0)).abs() < 0.1,
+            "{}",
+            parts.area
+        );
+        let points = parts.points();
+        assert_eq!(points.len(), POINTS);
+        for (p, normal) in points {
+            assert_eq!((normal, p.z), (Vec3::Z, 1.0));
+            assert!(
+                p.min_element() >= 0.0 && p.truncate().max_element() <= 60.0,
+                "{p}"
+            );
+            assert!(p.x + p.y <= 100.01, "{p}");
+        }
+        assert!(piece.within(Vec3::splat(2.0), Vec3::splat(60.0)).is_empty());
+        assert!(Piece::new([up(Vec3::ZERO); 3]).is_none());
+    }
+
+    #[test]
+    fn cells_know_which_ways_their_surfaces_face() {
+        let mut map = MapBuilder::new();
+        map.add_cell(Vec3::ZERO, Vec3::splat(100.0));
+        let stone = map.add_shader("stone", 0, 0);
+        let corners = [Vec3::ZERO, Vec3::Y, Vec3::ONE - Vec3::Z, Vec3::X];
+        map.add_quad(stone, corners.map(|p| p * 100.0));
+        let cell = |low: f32, high: f32| Cell {
+            cluster: 0,
+            mins: Vec3::new(0.0, 0.0, low),
+            maxs: Vec3::new(100.0, 100.0, high),
+        };
+        let found = facings(&map.build(), &[cell(0.0, 50.0), cell(50.0, 100.0)]);
+        let faced = |i: usize| found[i].iter().map(|points| !points.is_empty());
+        assert!(faced(0).eq((0..FACINGS).map(|f| f == 4)), "{found:?}");
+        assert!(faced(1).all(|faced| !faced), "{found:?}");
+    }
+}
