@@ -300,7 +300,7 @@ LightChoice choose_uniform(LightSet set, inout float u) {
         uint member = rng_pick(u, count);
         return LightChoice(light_of_member(set, member), float(count), 0.0);
     }
-    // Shares are multiples of a part of two, four to eight times as fine: so of the frames, whose points are spread evenly
+    // Shares are multiples of one over a power of two, four to eight times as fine, so that of the frames, whose points are spread evenly
     // over such parts, each light gets as many as are its due, and not one more or less.
     uint parts = 8u << length, member = (uint(u * float(parts)) * count) >> (length + 3);
     uint first = (member * parts + count - 1) / count, next = ((member + 1) * parts + count - 1) / count;

@@ -93,7 +93,7 @@ pub struct LightSlot {
     pub padding: u32,
 }
 
-/// The list of a cluster: slots from `first` on.
+/// The list of a cell for normals about one way: slots from `first` on.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct LightRow {
@@ -141,7 +141,8 @@ pub struct LightView {
     pub spheres: [u64; 2],
     /// [`SunLight`]s.
     pub suns: u64,
-    /// [`LightRow`] of each cell (a piece of a cluster); the last is for points in none, and holds all lights.
+    /// `FACINGS` [`LightRow`]s of each cell (a piece of a cluster), one for each side of a cube that normals point to; the
+    /// last is for points in no cell, and holds all lights.
     pub rows: u64,
     /// [`LightSlot`]s.
     pub slots: u64,
