@@ -377,6 +377,8 @@ pub mod constants {
         STAGE_GLOSS = 32;
         /// The stage shows the lightmap of a surface that has none: the engine takes a white picture.
         STAGE_NO_LIGHTMAP = 64;
+        /// The stage's picture, which stands for a reflection, is a lit haze over what lies behind, too.
+        STAGE_HAZE = 128;
         /// Seen from both sides.
         MATERIAL_TWO_SIDED = 1;
         /// Only the back side is seen.

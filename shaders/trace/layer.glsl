@@ -18,9 +18,10 @@ struct Layer {
     vec3 emission;
     vec3 through;
     vec3 reflected;
+    vec3 haze; // of the emission: what waits for the light that the engine shows here
 };
 
-Layer layer_nothing() { return Layer(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)); }
+Layer layer_nothing() { return Layer(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)); }
 
 // What a ray sees of a texture.
 struct Footprint {
@@ -149,15 +150,16 @@ Layer layer_product(Layer a, Layer b, vec3 light) {
     r.through = a.through * (b.lit * light + b.emission) + b.through * (a.lit * light + a.emission);
     // so does it scale what is reflected, which brings its own light, too
     r.reflected = a.reflected * (b.lit + b.emission) + b.reflected * (a.lit + a.emission);
+    r.haze = a.haze * (b.lit * light + b.emission) + b.haze * (a.lit * light + a.emission);
     return r;
 }
 
-Layer layer_scale(Layer a, float s) { return Layer(a.lit * s, a.emission * s, a.through * s, a.reflected * s); }
+Layer layer_scale(Layer a, float s) { return Layer(a.lit * s, a.emission * s, a.through * s, a.reflected * s, a.haze * s); }
 Layer layer_add(Layer a, Layer b) {
-    return Layer(a.lit + b.lit, a.emission + b.emission, a.through + b.through, a.reflected + b.reflected);
+    return Layer(a.lit + b.lit, a.emission + b.emission, a.through + b.through, a.reflected + b.reflected, a.haze + b.haze);
 }
 Layer layer_subtract(Layer a, Layer b) {
-    return Layer(a.lit - b.lit, a.emission - b.emission, a.through - b.through, a.reflected - b.reflected);
+    return Layer(a.lit - b.lit, a.emission - b.emission, a.through - b.through, a.reflected - b.reflected, a.haze - b.haze);
 }
 
 // `value` times a blend factor. The frame buffer has no alpha of its own: destination alpha reads as one.
@@ -194,22 +196,24 @@ const uint SEEN_FOLLOWED = 0, SEEN_LAST = 1, SEEN_BOUNCED = 2;
 // surroundings, as strongly as the picture is bright in the mean; what is rough gathers the light from all around, and
 // shows it by the picture as a texture does. Were it a mirror alone it would be far too dark: the picture is of
 // surroundings in full light, and so counts their albedo already, which a mirrored ray finds once more.
+// On panes the lit picture is a haze over what lies behind (STAGE_HAZE), by the light that the engine shows there:
+// as one more surface that light falls on it would take turns with the others of the pixel.
 Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint seen) {
     bool world = (p.triangle.flags & TRIANGLE_WORLD) != 0;
     if (material.plain_image != NO_TEXTURE && (world || (material.flags & MATERIAL_VERTEX_LIGHT) == 0)) {
         // what the stages below come to, for the many materials that are an image under light
         if (has_ellipse(footprint)) {
             vec4 texel = texel_in_ellipse(material.plain_image, material.plain_sampler, p.stage.st, footprint.along, footprint.across);
-            return Layer(texel.rgb, vec3(0.0), vec3(0.0), vec3(0.0));
+            return Layer(texel.rgb, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
         }
         float lod = texture_lod(material.plain_image, p.texel_scale, footprint.width);
         vec3 texel = textureLod(sampler2D(textures[nonuniformEXT(material.plain_image)],
             samplers[nonuniformEXT(material.plain_sampler)]), p.stage.st, lod).rgb;
-        return Layer(texel, vec3(0.0), vec3(0.0), vec3(0.0));
+        return Layer(texel, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
     }
     Instance instance = instance_of(p.instance);
     Stages stages = Stages(VIEW.materials.stages);
-    Layer layer = Layer(vec3(0.0), vec3(0.0), vec3(1.0), vec3(0.0));
+    Layer layer = Layer(vec3(0.0), vec3(0.0), vec3(1.0), vec3(0.0), vec3(0.0));
     for (uint i = 0; i < material.stage_count; i++) {
         Stage stage = stages.at[material.stage_first + i];
         vec4 color = stage_color(VIEW.materials, stage, instance, p.stage);
@@ -225,17 +229,20 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
             bool baked = world && (material.flags & MATERIAL_VERTEX_LIGHT) != 0
                 && (stage.rgb_gen == RGBGEN_VERTEX || stage.rgb_gen == RGBGEN_EXACT_VERTEX);
             bool mirrors = (stage.flags & STAGE_REFLECTION) != 0, gloss = (stage.flags & STAGE_GLOSS) != 0;
+            bool haze = (stage.flags & STAGE_HAZE) != 0 && seen != SEEN_BOUNCED;
             // the light of the corners that a shine under a lightmap is multiplied by is no light that falls on it once more:
             // it says where its author had it shine
             bool is_lit = stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE || (baked && !(mirrors && p.triangle.lightmap != NO_TEXTURE));
             // the picture is placed as the eye sees it, which is not what a bounce finds
             vec4 mean = mirrors ? environment_mean(stage, p) : vec4(0.0);
-            vec4 texel = mirrors && (!gloss || seen == SEEN_BOUNCED) ? mean : stage_texel(stage, p, instance, footprint);
+            vec4 texel = mirrors && !haze && (!gloss || seen == SEEN_BOUNCED) ? mean : stage_texel(stage, p, instance, footprint);
             vec3 image = texel.rgb;
             alpha = texel.a * (stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE && stage.alpha_gen == ALPHAGEN_IDENTITY ? 1.0 : color.a);
             // what is mirrored brings its own light
             if (mirrors && seen == SEEN_FOLLOWED) source.reflected = mean.rgb * (is_lit ? vec3(1.0) : color.rgb);
-            if (mirrors && !gloss) {
+            if (haze) {
+                source.haze = image * (is_lit ? displayed_light(p) : color.rgb);
+            } else if (mirrors && !gloss) {
                 if (seen == SEEN_LAST) source.emission = image * color.rgb;
             } else if (is_lit) {
                 source.lit = image;
@@ -252,7 +259,7 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
             }
         }
         if (stage.alpha_func != ALPHAFUNC_NONE && !alpha_passes(stage.alpha_func, alpha)) continue;
-        vec3 light = source.lit != vec3(0.0) && layer.through != vec3(0.0) ? displayed_light(p) : vec3(1.0);
+        vec3 light = source.lit != vec3(0.0) && (layer.through != vec3(0.0) || layer.haze != vec3(0.0)) ? displayed_light(p) : vec3(1.0);
         layer = layer_add(layer_blend(stage.blend_src, source, source, layer, alpha, light),
             layer_blend(stage.blend_dst, layer, source, layer, alpha, light));
     }
@@ -269,7 +276,7 @@ Layer evaluate_stages(SurfacePoint p, Footprint footprint) {
     Material material = material_of(p.triangle.material);
     Layer shown = run_stages(material, p, footprint, SEEN_BOUNCED);
     return Layer(bounded_albedo(material, linear_part(shown.lit)), linear_part(shown.emission), linear_part(shown.through),
-        linear_part(shown.reflected));
+        linear_part(shown.reflected), vec3(0.0));
 }
 
 // What a lamp shows of the light that it gives: its texture at up to full brightness.

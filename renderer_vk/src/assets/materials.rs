@@ -318,6 +318,8 @@ impl Materials {
                         flags |= types::constants::STAGE_REFLECTION;
                         if shaderscript::light::is_gloss(&shader, kept - 1, vertex_light) {
                             flags |= types::constants::STAGE_GLOSS;
+                        } else if shaderscript::light::is_haze(&shader, kept - 1, vertex_light) {
+                            flags |= types::constants::STAGE_HAZE;
                         }
                     }
                     if let Some(pushed) = self.arrays.stages.get_mut(index as usize) {

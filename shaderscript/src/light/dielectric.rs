@@ -122,8 +122,18 @@ pub fn is_reflection(shader: &Shader, stage: &Stage) -> bool {
 /// the place is lit, as metal is that is not polished all over. Glass and liquids do nothing but mirror, and a picture that
 /// no light reaches stands for a mirror, too.
 pub fn is_gloss(shader: &Shader, index: usize, vertex_light: bool) -> bool {
+    is_lit_reflection(shader, index, vertex_light) && refraction_index(shader).is_none()
+}
+
+/// Whether the picture of a reflection, the stage of this index, is a haze over what is seen through glass, too: where it
+/// would be gloss on a body the engine adds it, as bright as the place is lit, to what lies behind. A liquid mirrors so much
+/// that nothing of its picture is left to show.
+pub fn is_haze(shader: &Shader, index: usize, vertex_light: bool) -> bool {
+    is_lit_reflection(shader, index, vertex_light) && refraction_index(shader) == Some(INDEX_GLASS)
+}
+
+fn is_lit_reflection(shader: &Shader, index: usize, vertex_light: bool) -> bool {
     (shader.stages.get(index)).is_some_and(|stage| is_reflection(shader, stage))
-        && refraction_index(shader).is_none()
         && !glow_stages(shader, vertex_light).contains(&index)
 }
 
@@ -239,10 +249,19 @@ mod tests {
         let model = "{\nmap a\nrgbGen lightingDiffuse\n}";
         assert!(gloss(&format!("{model}\n{lit}")));
         assert!(!gloss(&format!("{model}\n{added}")));
-        // glass mirrors
-        assert!(!gloss(&format!(
-            "surfaceparm trans\n{added}\n{BODY}\n{LIGHT}"
+        // glass has no gloss, but a haze where it is lit
+        let haze = |body: &str| {
+            let shader = shader(body);
+            let index = (shader.stages.iter()).position(|s| is_reflection(&shader, s));
+            index.is_some_and(|index| is_haze(&shader, index, true))
+        };
+        let glass = format!("surfaceparm trans\n{added}\n{BODY}\n{LIGHT}");
+        assert!(!gloss(&glass) && haze(&glass));
+        assert!(!haze(&format!("surfaceparm trans\n{added}\n{BODY}")));
+        assert!(!haze(&format!(
+            "surfaceparm water\n{added}\n{BODY}\n{LIGHT}"
         )));
+        assert!(!haze(&format!("{bare}\n{BODY}\n{LIGHT}")));
         // an effect is no reflection
         assert!(!gloss(&format!(
             "{}\n{BODY}\n{LIGHT}",

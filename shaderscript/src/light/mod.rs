@@ -10,7 +10,7 @@ mod glow;
 
 pub use algebra::{LightLinear, StageSample, compose, compose_encoded, darkens_behind};
 pub use dielectric::{
-    INDEX_GLASS, INDEX_SLIME, INDEX_WATER, filters_light, is_gloss, is_reflection,
+    INDEX_GLASS, INDEX_SLIME, INDEX_WATER, filters_light, is_gloss, is_haze, is_reflection,
     refraction_index, ripple_slope,
 };
 pub use glow::{glow_stages, is_glowing, stage_samples_white};

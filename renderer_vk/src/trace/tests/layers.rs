@@ -4,6 +4,7 @@ use glam::Vec3;
 use shaders::types::Stage;
 use shaders::types::constants as c;
 
+use super::dielectrics::square;
 use super::harness::{Gpu, Scene, encode, identity, rectangle, reference, stage};
 use crate::settings::Settings;
 use crate::trace::frame_lights::decode;
@@ -277,6 +278,38 @@ fn light_over_a_layer_darkens_what_lies_behind_it_with(gpu: &mut Gpu) {
     );
     let mean = gpu.mean(&scene, &reference(), 1);
     assert!(close(mean, exact), "{mean} {exact}");
+}
+
+#[test]
+fn a_lit_picture_on_a_pane_is_a_haze() {
+    Gpu::each(a_lit_picture_on_a_pane_is_a_haze_with);
+}
+
+fn a_lit_picture_on_a_pane_is_a_haze_with(gpu: &mut Gpu) {
+    let (back, stored) = ([0.3, 0.4, 0.5], [153, 102, 204]);
+    let texel = [90, 60, 30];
+    let image = square(gpu, 1, &[texel[0], texel[1], texel[2], 255]);
+    let mut scene = scene();
+    scene.images.push(image.texture_index());
+    let wall = scene.material(&[stage::constant(back)], 0);
+    scene.quad(screen(300.0), wall);
+    let pane = scene.material(&[stage::haze(0), stage::light_over()], TRANSLUCENT);
+    scene.quad(screen(100.0), pane);
+    let [red, green, blue] = stored;
+    for corner in scene.vertices.iter_mut().rev().take(4) {
+        corner.color = u32::from_le_bytes([red, green, blue, 255]);
+    }
+    let unit = |bytes: [u8; 3]| Vec3::from(bytes.map(|c| f32::from(c) / 255.0));
+    // added as displayed to what lies behind, and both by the light that the map stores; nothing lies before the pane
+    let exact = decode((displayed(back) + unit(texel)) * unit(stored));
+    for depth in [0, 2] {
+        let settings = Settings {
+            rt_max_depth: depth,
+            ..reference()
+        };
+        let mean = gpu.mean(&scene, &settings, 1);
+        assert!(close(mean, exact), "{depth}: {mean} {exact}");
+    }
 }
 
 #[test]

@@ -89,6 +89,15 @@ pub fn gloss(first: u32) -> Stage {
     }
 }
 
+/// A reflection as [`shine`], whose picture is a haze, too, where [`light_over`] follows.
+pub fn haze(first: u32) -> Stage {
+    let shine = shine(first);
+    Stage {
+        flags: shine.flags | c::STAGE_HAZE,
+        ..shine
+    }
+}
+
 /// A reflection added to what is below, as strong as an image of the scene, by its bindless index, is bright.
 pub fn shine(first: u32) -> Stage {
     Stage {
