@@ -87,7 +87,7 @@ struct BvhWalk {
 };
 
 // Takes note of a hit; true ends the walk.
-bool bvh_report(inout BvhWalk walk, Hit hit, uint kind) {
+bool bvh_report(inout BvhWalk walk, Hit hit) {
     if (walk.mode == BVH_LAYER) {
         layers_add(walk.layers, hit, walk.direction, walk.last);
         // nothing farther than this can have a smaller key than the last of the list
@@ -95,7 +95,8 @@ bool bvh_report(inout BvhWalk walk, Hit hit, uint kind) {
         if (last < LAYER_NONE) walk.tmax = min(walk.tmax, last + 2.0 * layer_slack(last + layer_slack(last)));
         return false;
     }
-    if (kind == KIND_TESTED && !is_stopped_by(hit, walk.direction)) return false;
+    bool tested = Geometries(VIEW.geometries).at[hit.geometry].kind == KIND_TESTED;
+    if (tested && !is_stopped_by(hit, walk.direction)) return false;
     walk.hit = hit;
     walk.tmax = hit.t;
     return walk.mode == BVH_ANY;
@@ -122,10 +123,9 @@ void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
     BvhNodes nodes = BvhNodes(VIEW.bvh_nodes);
     BvhInstances instances = BvhInstances(VIEW.bvh_instances);
     BvhTriangles triangles = BvhTriangles(uint64_t(0));
-    uint geometry = 0, kind = 0;
-    // what is left for later, and how much of it there was when the instance was entered
-    uint stack[2 * BVH_STACK];
-    float entered[2 * BVH_STACK];
+    uint geometry = 0;
+    // what is left for later with the distance at which it begins, and how much of it there was when the instance was entered
+    uvec2 stack[2 * BVH_STACK];
     uint size = 0;
     uint base = BVH_TOP;
     uint current = 0;
@@ -142,16 +142,16 @@ void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
             bvh_sort(n0, c0, n2, c2);
             bvh_sort(n1, c1, n3, c3);
             bvh_sort(n1, c1, n2, c2);
-            if (n3 < FAR_AWAY) { stack[size] = c3; entered[size++] = n3; }
-            if (n2 < FAR_AWAY) { stack[size] = c2; entered[size++] = n2; }
-            if (n1 < FAR_AWAY) { stack[size] = c1; entered[size++] = n1; }
+            if (n3 < FAR_AWAY) stack[size++] = uvec2(c3, floatBitsToUint(n3));
+            if (n2 < FAR_AWAY) stack[size++] = uvec2(c2, floatBitsToUint(n2));
+            if (n1 < FAR_AWAY) stack[size++] = uvec2(c1, floatBitsToUint(n1));
             current = c0;
             if (n0 >= FAR_AWAY) {
                 uint floor = base == BVH_TOP ? 0 : base;
                 current = BVH_NONE;
                 while (size > floor && current == BVH_NONE) {
-                    size--;
-                    if (entered[size] <= walk.tmax) current = stack[size];
+                    uvec2 later = stack[--size];
+                    if (uintBitsToFloat(later.y) <= walk.tmax) current = later.x;
                 }
             }
         }
@@ -169,7 +169,6 @@ void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
                     nodes = BvhNodes(instance.nodes);
                     triangles = BvhTriangles(instance.triangles);
                     geometry = instance.geometry;
-                    kind = instance.kind;
                     base = size;
                     current = 0;
                     continue;
@@ -180,7 +179,7 @@ void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
                     BvhTriangle triangle = triangles.at[i];
                     vec3 found = bvh_triangle(ray, triangle);
                     if (!(found.x >= walk.tmin && found.x <= walk.tmax)) continue;
-                    if (bvh_report(walk, Hit(geometry, triangle.primitive, found.yz, found.x), kind)) return;
+                    if (bvh_report(walk, Hit(geometry + triangle.part, triangle.primitive, found.yz, found.x))) return;
                 }
             }
         }
@@ -190,10 +189,9 @@ void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
             nodes = BvhNodes(VIEW.bvh_nodes);
         }
         if (size == 0) return;
-        size--;
-        current = stack[size];
+        uvec2 later = stack[--size];
         // farther than what was found since
-        if (entered[size] > walk.tmax) current = BVH_NONE;
+        current = uintBitsToFloat(later.y) <= walk.tmax ? later.x : BVH_NONE;
     }
 }
 

@@ -35,9 +35,9 @@ struct BspNode { vec4 plane; int children[2]; };
 
 struct BvhNode { vec3 origin; vec3 step; uint low[3]; uint high[3]; uint children[4]; };
 
-struct BvhTriangle { vec3 a; vec3 b; vec3 c; uint primitive; uint padding[2]; };
+struct BvhTriangle { vec3 a; vec3 b; vec3 c; uint primitive; uint part; uint padding; };
 
-struct BvhInstance { uint64_t nodes; uint64_t triangles; vec4 to_object[3]; uint geometry; uint mask; uint kind; uint padding; };
+struct BvhInstance { uint64_t nodes; uint64_t triangles; vec4 to_object[3]; uint geometry; uint mask; };
 
 struct SkyRecord { uint faces[6]; float cloud_height; };
 

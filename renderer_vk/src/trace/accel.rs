@@ -402,8 +402,6 @@ impl Accel {
                 to_object: rows(inverse, -(inverse * p.origin)),
                 geometry: p.record,
                 mask: u32::from(p.mask),
-                kind: p.kind.index(),
-                padding: 0,
             });
         }
         // an instance costs as much as a node, and more

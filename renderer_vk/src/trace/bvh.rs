@@ -374,7 +374,8 @@ pub fn ordered(hierarchy: &Hierarchy, corners: &[[Vec3; 3]]) -> Vec<BvhTriangle>
             b,
             c,
             primitive,
-            padding: [0; 2],
+            part: 0,
+            padding: 0,
         })
     };
     hierarchy.order.iter().filter_map(triangle).collect()

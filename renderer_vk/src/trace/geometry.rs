@@ -30,8 +30,8 @@ pub struct StaticPart {
 pub struct StaticBlas {
     /// BSP model.
     pub model: u32,
-    /// The geometries in it. All that stops rays of a model is in one structure of the driver's, because each that a ray
-    /// meets is a walk of its own; what is translucent is in another, and ours have one kind each.
+    /// The geometries in it. All that stops rays of a model is in one structure, because each that a ray meets is a walk
+    /// of its own; what is translucent is in another.
     pub parts: Vec<StaticPart>,
     /// The structure.
     pub structure: Structure,
@@ -355,25 +355,37 @@ fn own_structures(
             .get(i as usize)
             .map_or(Vec3::ZERO, |v| v.position)
     };
+    let mut together: BTreeMap<(u32, bool), Vec<(Kind, &Group)>> = BTreeMap::new();
     for ((model, kind), group) in &grouped.groups {
-        let members = grouped
-            .triangles
-            .get(group.first..group.first + group.count);
-        let corners: Vec<[Vec3; 3]> = members
-            .unwrap_or_default()
-            .iter()
-            .map(|t| t.indices.map(position))
-            .collect();
-        let Some(hierarchy) = build_triangles(&corners) else {
+        let members = together.entry((*model, *kind == Kind::Translucent));
+        members.or_default().push((*kind, group));
+    }
+    for ((model, _), groups) in together {
+        // of each triangle its geometry, counted from the first, and its number there
+        let mut places: Vec<[u32; 2]> = Vec::new();
+        let mut corners: Vec<[Vec3; 3]> = Vec::new();
+        for (part, (_, group)) in (0..).zip(&groups) {
+            let range = group.first..group.first + group.count;
+            let members = grouped.triangles.get(range).unwrap_or_default();
+            places.extend((0..).zip(members).map(|(primitive, _)| [part, primitive]));
+            corners.extend(members.iter().map(|t| t.indices.map(position)));
+        }
+        let Some(mut hierarchy) = build_triangles(&corners) else {
             continue;
         };
+        for triangle in &mut hierarchy.triangles {
+            if let Some(&[part, primitive]) = places.get(triangle.primitive as usize) {
+                (triangle.part, triangle.primitive) = (part, primitive);
+            }
+        }
         let storage = BufferUsage::STORAGE;
+        let part = |(kind, group): &(Kind, &Group)| StaticPart {
+            kind: *kind,
+            triangles: triangles.address() + (group.first * size_of::<Triangle>()) as u64,
+        };
         structures.push(StaticBlas {
-            model: *model,
-            parts: vec![StaticPart {
-                kind: *kind,
-                triangles: triangles.address() + (group.first * size_of::<Triangle>()) as u64,
-            }],
+            model,
+            parts: groups.iter().map(part).collect(),
             structure: Structure::Own(OwnStructure {
                 nodes: Buffer::with_data(device, "trace nodes", storage, &hierarchy.nodes)?,
                 triangles: Buffer::with_data(device, "trace leafs", storage, &hierarchy.triangles)?,

@@ -55,10 +55,12 @@ impl Tracer {
         }
     }
 
-    /// The wish where it is possible, otherwise the fastest, as measured: where the driver traces in software,
-    /// hierarchies of our own.
+    /// The wish where it is possible, otherwise the fastest, as measured: where the driver follows rays by programs,
+    /// hierarchies of our own. A device that has units for rays has queries, too; drivers that do without such units
+    /// (NVIDIA's for Pascal, Volta and devices made for computing) offer pipelines alone.
     fn choose(wish: TracerChoice, software: bool, possible: impl Fn(Self) -> bool) -> Self {
-        let fastest = [Self::Pipeline, Self::Query].map(|tracer| (!software).then_some(tracer));
+        let by_programs = software || (possible(Self::Pipeline) && !possible(Self::Query));
+        let fastest = [Self::Pipeline, Self::Query].map(|tracer| (!by_programs).then_some(tracer));
         [Self::wished(wish)]
             .into_iter()
             .chain(fastest)
@@ -185,11 +187,8 @@ mod tests {
     fn a_wish_is_met_where_the_device_can() {
         use Tracer::{Compute, Pipeline, Query};
         use TracerChoice as W;
-        let (none, both, query) = (
-            &[Compute][..],
-            &[Pipeline, Query, Compute],
-            &[Query, Compute],
-        );
+        let (none, both) = (&[Compute][..], &[Pipeline, Query, Compute]);
+        let (query, pipeline) = (&[Query, Compute], &[Pipeline, Compute]);
         for (device, software, wish, found) in [
             (none, false, W::Auto, Compute),
             (none, false, W::Pipeline, Compute),
@@ -199,6 +198,8 @@ mod tests {
             (both, false, W::Compute, Compute),
             (query, false, W::Auto, Query),
             (query, false, W::Pipeline, Query),
+            (pipeline, false, W::Auto, Compute),
+            (pipeline, false, W::Pipeline, Pipeline),
             (both, true, W::Auto, Compute),
             (both, true, W::Pipeline, Pipeline),
             (none, true, W::Pipeline, Compute),

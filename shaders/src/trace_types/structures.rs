@@ -47,8 +47,10 @@ pub struct BvhTriangle {
     pub c: Vec3,
     /// Index of the geometry's triangle.
     pub primitive: u32,
+    /// Number of the geometry, counted from the instance's first.
+    pub part: u32,
     /// Makes the size a multiple of 16, so that it is read in three pieces.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 /// A placed hierarchy, in the order of the top hierarchy's leafs.
@@ -61,12 +63,8 @@ pub struct BvhInstance {
     pub triangles: u64,
     /// World to object, three rows.
     pub to_object: [[f32; 4]; 3],
-    /// Index of the geometry record.
+    /// Index of its first geometry record.
     pub geometry: u32,
     /// Rays see it when their mask shares a bit.
     pub mask: u32,
-    /// `KIND_*`.
-    pub kind: u32,
-    /// Keeps the size a multiple of eight without hidden bytes.
-    pub padding: u32,
 }
