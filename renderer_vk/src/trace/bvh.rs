@@ -310,6 +310,8 @@ fn cheapest(
     middles: Aabb,
 ) -> Option<(f32, usize, f32)> {
     let mut best: Option<(f32, usize, f32)> = None;
+    // few entries need few of them
+    let used = BINS.min(2 * entries.len());
     for axis in 0..3 {
         let (low, size) = (middles.low[axis], middles.high[axis] - middles.low[axis]);
         if size <= 0.0 {
@@ -321,7 +323,7 @@ fn cheapest(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss
         )]
-        let bin_of = |x: f32| (((x - low) / size * BINS as f32) as usize).min(BINS - 1);
+        let bin_of = |x: f32| (((x - low) / size * used as f32) as usize).min(used - 1);
         for &i in entries {
             let bounds = of(i);
             let bin = &mut bins[bin_of(bounds.middle()[axis])];
@@ -330,7 +332,7 @@ fn cheapest(
         // cost of everything to the right of each cut
         let mut right = [0.0; BINS];
         let (mut bounds, mut count) = (Aabb::EMPTY, 0);
-        for i in (1..BINS).rev() {
+        for i in (1..used).rev() {
             bounds = bounds.union(bins[i].0);
             count += bins[i].1;
             #[allow(clippy::cast_precision_loss)]
@@ -342,7 +344,7 @@ fn cheapest(
             };
         }
         let (mut bounds, mut count) = (Aabb::EMPTY, 0);
-        for i in 1..BINS {
+        for i in 1..used {
             bounds = bounds.union(bins[i - 1].0);
             count += bins[i - 1].1;
             if count == 0 || count == entries.len() {
@@ -351,7 +353,7 @@ fn cheapest(
             #[allow(clippy::cast_precision_loss)]
             let cost = bounds.half_area() * count as f32 + right[i];
             #[allow(clippy::cast_precision_loss)]
-            let cut = low + size * i as f32 / BINS as f32;
+            let cut = low + size * i as f32 / used as f32;
             if best.is_none_or(|b| cost < b.0) {
                 best = Some((cost, axis, cut));
             }

@@ -26,6 +26,53 @@ struct Child {
     count: u32,
 }
 
+/// The children of a wide node, without memory of their own: animated models are widened in each frame.
+struct Children {
+    list: [Child; WIDTH],
+    count: usize,
+}
+
+impl Children {
+    /// Those of a binary node, of which the largest are replaced by their own until there are `most`.
+    fn of(hierarchy: &Hierarchy, node: usize, most: usize) -> Self {
+        let none = Child {
+            bounds: Aabb::EMPTY,
+            first: 0,
+            count: 0,
+        };
+        let mut found = Self {
+            list: [none; WIDTH],
+            count: 0,
+        };
+        found.extend(children(hierarchy, node));
+        while found.count < most.min(WIDTH) {
+            let area = |c: &Child| c.bounds.half_area();
+            let nodes = (found.as_slice().iter().enumerate()).filter(|(_, c)| c.count == 0);
+            let Some((largest, _)) = nodes.max_by(|a, b| area(a.1).total_cmp(&area(b.1))) else {
+                break;
+            };
+            let opened = found.list[largest];
+            found.count -= 1;
+            found.list[largest] = found.list[found.count];
+            found.extend(children(hierarchy, opened.first as usize));
+        }
+        found
+    }
+
+    fn extend(&mut self, children: impl Iterator<Item = Child>) {
+        for child in children {
+            if let Some(slot) = self.list.get_mut(self.count) {
+                *slot = child;
+                self.count += 1;
+            }
+        }
+    }
+
+    fn as_slice(&self) -> &[Child] {
+        self.list.get(..self.count).unwrap_or_default()
+    }
+}
+
 /// A node to be made.
 struct Task {
     /// Binary node whose children it begins with.
@@ -50,19 +97,11 @@ pub fn widen(hierarchy: &Hierarchy) -> Vec<BvhNode> {
         room: BVH_STACK,
     }];
     while let Some(task) = tasks.pop() {
-        let mut children: Vec<Child> = children(hierarchy, task.node).collect();
         // a walk keeps all children but one, and must have room for one more on each level below
         let spare = task.room.saturating_sub(height(task.node)) as usize;
-        while children.len() < WIDTH.min(spare + 2) {
-            let area = |c: &Child| c.bounds.half_area();
-            let nodes = (children.iter().enumerate()).filter(|(_, c)| c.count == 0);
-            let Some((largest, _)) = nodes.max_by(|a, b| area(a.1).total_cmp(&area(b.1))) else {
-                break;
-            };
-            let opened = children.remove(largest);
-            children.extend(self::children(hierarchy, opened.first as usize));
-        }
-        let mut node = quantize(&children);
+        let children = Children::of(hierarchy, task.node, WIDTH.min(spare + 2));
+        let children = children.as_slice();
+        let mut node = quantize(children);
         let kept = u32::try_from(children.len().saturating_sub(1)).unwrap_or(0);
         for (child, slot) in children.iter().zip(&mut node.children) {
             *slot = if child.count > 0 {
@@ -128,12 +167,15 @@ fn quantize(children: &[Child]) -> BvhNode {
         let origin = low - step;
         node.origin[axis] = origin;
         node.step[axis] = step;
+        let steps = 1.0 / step;
         for (i, child) in children.iter().take(WIDTH).enumerate() {
-            let place = |x: f32| (x - origin) / step;
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0 to 255
-            let byte = |x: f32| u32::from(x.clamp(0.0, 255.0) as u8);
-            let low = byte((place(child.bounds.low[axis]) - MARGIN).floor());
-            let high = byte((place(child.bounds.high[axis]) + MARGIN).ceil());
+            let place = |x: f32| (x - origin) * steps;
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            // 0 to 255, and none where it is no number
+            let floor = |x: f32| u32::from(x as u8);
+            let low = floor(place(child.bounds.low[axis]) - MARGIN);
+            // what lies on a step gets one more than it needs
+            let high = (floor(place(child.bounds.high[axis]) + MARGIN) + 1).min(255);
             node.low[axis] |= low << (8 * i);
             node.high[axis] |= high << (8 * i);
         }
