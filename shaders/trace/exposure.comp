@@ -5,7 +5,8 @@
 // between two percentiles, is brought towards that of a usual picture of the map (their equation 2: the key over that mean).
 // Dark rooms stay darker than bright ones, for the map's author chose its light: the key falls with the picture's
 // luminance (as in Krawczyk et al. 2005, section 3.1; here by a constant part of the difference in stops). The exposure
-// follows exponentially, faster into the light than into the dark (their section 3.2).
+// follows exponentially, faster into the light than into the dark (their section 3.2). Surfaces alone are looked at, and as
+// much of the correction is made as they cover of the picture.
 #include "trace/exposure.glsl"
 #include "trace/picture.glsl"
 
@@ -17,7 +18,7 @@ shared uint bins[EXPOSURE_BINS];
 // that the classic look has, and that look adapts to nothing.
 const float ADAPTATION = 0.15;
 const float MIN_STOPS = -0.75, MAX_STOPS = 0.75;
-// Pixels left out at the dark and at the bright end, of all.
+// Pixels left out at the dark and at the bright end, of those that are counted.
 const float DARK_PART = 0.2, BRIGHT_PART = 0.05;
 
 void main() {
@@ -27,7 +28,8 @@ void main() {
     state.bins[own] = 0;
     barrier();
     if (own != 0) return;
-    float total = float(histogram_size().x) * float(histogram_size().y);
+    float all = float(histogram_size().x) * float(histogram_size().y), total = 0.0;
+    for (uint i = 0; i < EXPOSURE_BINS; i++) total += float(bins[i]);
     float from = total * DARK_PART, to = total * (1.0 - BRIGHT_PART);
     float below = 0.0, sum = 0.0, weight = 0.0;
     for (uint i = 0; i < EXPOSURE_BINS; i++) {
@@ -40,7 +42,7 @@ void main() {
     }
     float stops = 0.0;
     if ((VIEW.flags & VIEW_AUTO_EXPOSURE) != 0 && weight > 0.0)
-        stops = clamp((VIEW.exposure_middle - VIEW.exposure_base - sum / weight) * ADAPTATION, MIN_STOPS, MAX_STOPS);
+        stops = clamp((VIEW.exposure_middle - VIEW.exposure_base - sum / weight) * ADAPTATION, MIN_STOPS, MAX_STOPS) * (total / all);
     float old = log2(clamp(state.exposure, exp2(MIN_STOPS), exp2(MAX_STOPS)));
     if ((VIEW.flags & VIEW_EXPOSURE_RESET) != 0 || isnan(old)) old = stops;
     state.exposure = exp2(mix(old, stops, stops < old ? VIEW.exposure_blend : VIEW.exposure_blend_dark));

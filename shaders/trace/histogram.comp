@@ -1,9 +1,16 @@
 #version 460
-// Counts one of each 2 x 2 of the picture's pixels by the logarithm of its luminance.
+// Counts one of each 2 x 2 of the picture's pixels by the logarithm of its luminance, if it shows a surface that light
+// falls on: a usual picture of the map, which exposure is compared with, is one of such surfaces. How bright a sky is, or
+// that space is black, says nothing of them.
 #include "trace/exposure.glsl"
 #include "trace/picture.glsl"
 
 layout(local_size_x = 16, local_size_y = 16) in;
+
+bool shows_surface(ivec2 pixel) {
+    vec2 traced = (vec2(pixel) + 0.5) * vec2(VIEW.width, VIEW.height) / vec2(picture_size());
+    return imageLoad(images_rgba32f[VIEW.image_position], ivec2(traced)).w >= 0.0;
+}
 
 shared uint counts[EXPOSURE_BINS];
 
@@ -15,9 +22,11 @@ void main() {
     if (all(lessThan(cell, histogram_size()))) {
         // each of the four in turn, so that no row or column of a pattern is left out
         ivec2 pixel = min(cell * 2 + (cell.yx & 1), picture_size() - 1);
-        float value = log2(max(luminance(picture_load(pixel)), 1.0e-6));
-        float place = (value - EXPOSURE_MIN_LOG) / (EXPOSURE_MAX_LOG - EXPOSURE_MIN_LOG);
-        atomicAdd(counts[uint(clamp(place, 0.0, 0.9999) * float(EXPOSURE_BINS))], 1u);
+        if (shows_surface(pixel)) {
+            float value = log2(max(luminance(picture_load(pixel)), 1.0e-6));
+            float place = (value - EXPOSURE_MIN_LOG) / (EXPOSURE_MAX_LOG - EXPOSURE_MIN_LOG);
+            atomicAdd(counts[uint(clamp(place, 0.0, 0.9999) * float(EXPOSURE_BINS))], 1u);
+        }
     }
     barrier();
     if (local_index < EXPOSURE_BINS && counts[local_index] > 0)

@@ -376,23 +376,42 @@ fn display_white_keeps_its_brightness_with(gpu: &mut Gpu) {
         "{:?}",
         picture[100]
     );
-    // automatic exposure lifts what is dark, but not to the brightness of what is not
+}
+
+#[test]
+fn exposure_adapts_to_surfaces_alone() {
+    Gpu::each(exposure_adapts_to_surfaces_alone_with);
+}
+
+fn exposure_adapts_to_surfaces_alone_with(gpu: &mut Gpu) {
     let automatic = Settings {
         rt_auto_exposure: true,
         ..reference()
     };
-    let mut levels = Vec::new();
-    for value in [0.01, 0.1] {
+    // a lit wall, and a glow that covers the left half of it or nothing: the wall at the right, as displayed
+    let mut shown = |value: f32, glow: Option<f32>| {
         let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
-        let wall = scene.material(&[stage::constant([encode(value); 3])], 0);
+        scene.ambient = Vec3::ONE;
+        let wall = scene.diffuse(value);
         scene.quad(screen(100.0), wall);
+        if let Some(glow) = glow {
+            let glow = scene.material(&[stage::constant([encode(glow); 3])], 0);
+            let (up, left) = (Vec3::Z * 1800.0, Vec3::Y * 1800.0);
+            scene.quad(rectangle(Vec3::new(90.0, 0.0, -900.0), up, left), glow);
+        }
         let (_, picture) = gpu.render(&scene, &automatic, 1);
-        levels.push(f32::from(picture[100][0]));
+        f32::from(picture[8 * 16 + 12][0])
+    };
+    // what is dark is lifted, but not to the brightness of what is not
+    let (dark, bright) = (shown(0.01, None), shown(0.1, None));
+    let (fixed, lifted) = (encode(0.01) * 255.0, encode(0.0105) * 255.0);
+    assert!(dark > lifted && dark < bright, "{dark} {bright}");
+    // half as much where half of the picture glows, however brightly
+    let halves = [0.001, 0.5].map(|glow| shown(0.01, Some(glow)));
+    for half in halves {
+        assert!(half > fixed + 0.2 && half < dark, "{half} {fixed} {dark}");
     }
-    assert!(
-        levels[0] > encode(0.0105) * 255.0 && levels[0] < levels[1],
-        "{levels:?}"
-    );
+    assert!((halves[0] - halves[1]).abs() < 1.1, "{halves:?}");
 }
 
 #[test]
