@@ -68,7 +68,7 @@ bool bounce_meets(Hit hit, vec3 origin, vec3 direction, inout vec3 throughput, i
     if (HAS_FOG != 0) {
         // as the eye sees it: with its own colour, which shows as the engine shows it
         vec3 fog = vec3(0.0);
-        fog_segment(origin, direction, 0.0, t, 0.0, throughput, fog);
+        fog_in_light(origin, direction, t, throughput, fog);
         sum += fog * exp2(-VIEW.exposure_base);
     }
     if (!shows_face(p, direction)) return false;

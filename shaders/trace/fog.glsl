@@ -1,12 +1,11 @@
 // Fog volumes along a ray. Inside a volume's box and below its surface the engine's factor is sqrt(length / depth),
-// opaque at `depth`; here the length is that of the ray's own way through the volume. The factor weighs linear light.
+// opaque at `depth`; here the length is that of the ray's own way through the volume.
 #ifndef RELIGHT_TRACE_FOG_GLSL
 #define RELIGHT_TRACE_FOG_GLSL
 
 #include "trace/boxes.glsl"
 #include "trace/color.glsl"
 #include "trace/geometry.glsl"
-#include "trace/fog_keep.glsl"
 
 // Where the ray is inside the volume: x < y, or an empty range. `inverse`: of the direction.
 vec2 fog_range(Fog fog, vec3 origin, vec3 direction, vec3 inverse) {
@@ -31,39 +30,58 @@ float fog_transmittance(Fog fog, vec2 range, float t) {
     return 1.0 - sqrt(min(inside / max(fog.depth, 1.0), 1.0));
 }
 
-// Composes the fog between two distances on a ray behind what is in front (`transmittance`, `radiance`). Volumes do not
-// overlap, so each is taken whole, nearest first. The fog's colour stands for light that was scattered often; what comes
-// straight from lights is found at the points that are kept. `travelled`: length of the path before the ray.
-void fog_segment(vec3 origin, vec3 direction, float from, float to, float travelled, inout vec3 transmittance, inout vec3 radiance) {
+// What a piece of a ray has of one volume. The fog's colour stands for light that was scattered often; what comes straight
+// from lights is found at the points that are kept (fog_keep.glsl).
+struct FogPiece {
+    vec3 color;  // displayed
+    float ratio; // of what lies behind, what is left
+    float depth; // at which the fog is opaque, units
+    vec2 place;  // where on the ray's way through the volume the piece begins and ends, as parts of the depth
+    float enter; // where that way begins
+};
+
+// The volume whose piece was the last one.
+struct FogOrder {
+    float enter;
+    uint index;
+};
+
+FogOrder fog_begin() { return FogOrder(-1.0, 0u); }
+
+// The next piece between two distances on a ray; false: there is none. Volumes do not overlap, so each is taken whole,
+// nearest first.
+bool fog_next(vec3 origin, vec3 direction, vec3 inverse, float from, float to, inout FogOrder order, out FogPiece piece) {
     uint count = VIEW.fog_count;
-    float last_enter = -1.0;
-    uint last_index = 0;
-    vec3 inverse = inverse_direction(direction);
     TraceFogs fogs = TraceFogs(VIEW.fogs);
-    for (uint step_index = 0; step_index < count; step_index++) {
-        // the next volume by entry, then by index
-        vec2 best = vec2(FAR);
-        uint chosen = count;
-        for (uint i = 0; i < count; i++) {
-            vec2 range = fog_range(fogs.at[i], origin, direction, inverse);
-            if (range.x >= range.y || range.x >= to || range.y <= from) continue;
-            bool later = range.x > last_enter || (range.x == last_enter && i > last_index);
-            if (later && range.x < best.x) { best = range; chosen = i; }
-        }
-        if (chosen == count) return;
-        Fog fog = fogs.at[chosen];
-        float before = fog_transmittance(fog, best, from);
-        float ratio = before > 0.0 ? clamp(fog_transmittance(fog, best, to) / before, 0.0, 1.0) : 0.0;
-        vec3 scattered = transmittance * decode_display(fog.color) * (1.0 - ratio);
-        radiance += scattered;
-        if (LIT_FOG != 0) {
-            float depth = max(fog.depth, 1.0);
-            vec2 place = clamp((min(vec2(from, to), best.y) - best.x) / depth, 0.0, 1.0);
-            fog_keep(scattered, depth, place, best.x, origin, direction, travelled);
-        }
-        transmittance *= ratio;
-        last_enter = best.x;
-        last_index = chosen;
+    vec2 best = vec2(FAR);
+    uint chosen = count;
+    for (uint i = 0; i < count; i++) {
+        vec2 range = fog_range(fogs.at[i], origin, direction, inverse);
+        if (range.x >= range.y || range.x >= to || range.y <= from) continue;
+        bool later = range.x > order.enter || (range.x == order.enter && i > order.index);
+        if (later && range.x < best.x) { best = range; chosen = i; }
+    }
+    if (chosen == count) return false;
+    Fog fog = fogs.at[chosen];
+    float before = fog_transmittance(fog, best, from);
+    piece.color = fog.color;
+    piece.ratio = before > 0.0 ? clamp(fog_transmittance(fog, best, to) / before, 0.0, 1.0) : 0.0;
+    piece.depth = max(fog.depth, 1.0);
+    piece.place = clamp((min(vec2(from, to), best.y) - best.x) / piece.depth, 0.0, 1.0);
+    piece.enter = best.x;
+    order = FogOrder(best.x, chosen);
+    return true;
+}
+
+// Composes the fog before a distance on a ray of bounced light behind what is in front (`transmittance`, `radiance`): each
+// part by itself, in light. What the eye sees of fog is mixed as it is displayed (primary.rgen).
+void fog_in_light(vec3 origin, vec3 direction, float to, inout vec3 transmittance, inout vec3 radiance) {
+    vec3 inverse = inverse_direction(direction);
+    FogOrder order = fog_begin();
+    FogPiece piece;
+    for (uint i = 0; i < VIEW.fog_count && fog_next(origin, direction, inverse, 0.0, to, order, piece); i++) {
+        radiance += transmittance * decode_display(piece.color) * (1.0 - piece.ratio);
+        transmittance *= piece.ratio;
     }
 }
 

@@ -4,6 +4,7 @@
 #ifndef RELIGHT_TRACE_FOG_KEEP_GLSL
 #define RELIGHT_TRACE_FOG_KEEP_GLSL
 
+#include "trace/fog.glsl"
 #include "trace/random.glsl"
 #include "trace/light_image.glsl"
 
@@ -16,9 +17,8 @@ vec3 fog_tint = vec3(0.0);    // of the kept place, as a multiple of its chance
 vec3 fog_point = vec3(0.0);
 float fog_distance = -1.0;    // from the eye along the way
 
-// `weight`: what the light of a stretch is multiplied by; `place`: where on its volume's range the stretch begins and
-// ends, as parts of the depth at which the fog is opaque; `enter`: where the range begins; `travelled`: before this ray.
-void fog_keep(vec3 weight, float depth, vec2 place, float enter, vec3 origin, vec3 direction, float travelled) {
+// `weight`: what the light of the piece is multiplied by; `travelled`: length of the path before its ray.
+void fog_keep(vec3 weight, FogPiece piece, vec3 origin, vec3 direction, float travelled) {
     float chance = max(weight.r, max(weight.g, weight.b));
     if (!(chance > 0.0)) return;
     fog_weight += weight;
@@ -26,8 +26,8 @@ void fog_keep(vec3 weight, float depth, vec2 place, float enter, vec3 origin, ve
     if (fog_weight_sum > chance && rng_next() * fog_weight_sum >= chance) return;
     fog_tint = weight / chance;
     // transmittance is 1 - sqrt(length / depth): even steps of it are squares of even steps
-    float root = mix(sqrt(place.x), sqrt(place.y), rng_next());
-    float t = enter + root * root * depth;
+    float root = mix(sqrt(piece.place.x), sqrt(piece.place.y), rng_next());
+    float t = piece.enter + root * root * piece.depth;
     fog_point = origin + direction * t;
     fog_distance = travelled + t;
 }
