@@ -28,7 +28,7 @@ void main() {
     state.bins[own] = 0;
     barrier();
     if (own != 0) return;
-    float all = float(histogram_size().x) * float(histogram_size().y), total = 0.0;
+    float whole = float(histogram_size().x) * float(histogram_size().y), total = 0.0;
     for (uint i = 0; i < EXPOSURE_BINS; i++) total += float(bins[i]);
     float from = total * DARK_PART, to = total * (1.0 - BRIGHT_PART);
     float below = 0.0, sum = 0.0, weight = 0.0;
@@ -42,7 +42,7 @@ void main() {
     }
     float stops = 0.0;
     if ((VIEW.flags & VIEW_AUTO_EXPOSURE) != 0 && weight > 0.0)
-        stops = clamp((VIEW.exposure_middle - VIEW.exposure_base - sum / weight) * ADAPTATION, MIN_STOPS, MAX_STOPS) * (total / all);
+        stops = clamp((VIEW.exposure_middle - VIEW.exposure_base - sum / weight) * ADAPTATION, MIN_STOPS, MAX_STOPS) * (total / whole);
     float old = log2(clamp(state.exposure, exp2(MIN_STOPS), exp2(MAX_STOPS)));
     if ((VIEW.flags & VIEW_EXPOSURE_RESET) != 0 || isnan(old)) old = stops;
     state.exposure = exp2(mix(old, stops, stops < old ? VIEW.exposure_blend : VIEW.exposure_blend_dark));
