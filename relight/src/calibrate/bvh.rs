@@ -58,8 +58,8 @@ type Four = [Vec4; 3];
 
 /// The boxes of a node's children.
 struct Node {
-    mins: Four,
-    maxs: Four,
+    /// Their least and their largest coordinates, an axis at a time.
+    planes: [[Vec4; 2]; 3],
     /// Nodes, or leaves (with [`LEAF`]).
     children: [u32; WIDE],
     /// Which of them are there, a bit for each.
@@ -89,15 +89,19 @@ struct Ray {
     from: Four,
     way: Four,
     inverse: Four,
+    /// For each axis, which of a box's planes it meets first.
+    first: [usize; 3],
 }
 
 impl Ray {
     fn new(from: Vec3, way: Vec3) -> Ray {
         let splat = |v: Vec3| v.to_array().map(Vec4::splat);
+        let inverse = way.recip().clamp(-STEEPEST, STEEPEST);
         Ray {
             from: splat(from),
             way: splat(way),
-            inverse: splat(way.recip().clamp(-STEEPEST, STEEPEST)),
+            inverse: splat(inverse),
+            first: inverse.to_array().map(|i| usize::from(i < 0.0)),
         }
     }
 }
@@ -152,9 +156,10 @@ impl Occluders {
         }
         let index = self.nodes.len();
         let boxes = || children.iter().map(|c| c.bounds.padded());
+        let mins = four(boxes().map(|(mins, _)| mins));
+        let maxs = four(boxes().map(|(_, maxs)| maxs));
         self.nodes.push(Node {
-            mins: four(boxes().map(|(mins, _)| mins)),
-            maxs: four(boxes().map(|(_, maxs)| maxs)),
+            planes: [0, 1, 2].map(|k| [mins[k], maxs[k]]),
             children: [0; WIDE],
             there: (1 << children.len()) - 1,
         });
@@ -247,7 +252,7 @@ impl Occluders {
     /// Whether something lies on the way. `through_sky`: sky does not count.
     pub fn blocked(&self, from: Vec3, to: Vec3, through_sky: bool) -> bool {
         let ray = Ray::new(from, to - from);
-        self.walk(&ray, SHORT, |leaf, _| self.stops(leaf, &ray, through_sky))
+        self.stopper(&ray, through_sky).is_some()
     }
 
     /// As [`blocked`](Self::blocked) where sky counts; `last` is what stopped an earlier ray: it is asked first, for
@@ -257,13 +262,39 @@ impl Occluders {
         if last.is_some_and(|leaf| self.stops(leaf, &ray, false)) {
             return true;
         }
-        self.walk(&ray, SHORT, |leaf, _| {
-            let stopped = self.stops(leaf, &ray, false);
-            if stopped {
-                *last = Some(leaf);
+        let stopper = self.stopper(&ray, false);
+        *last = stopper.or(*last);
+        stopper.is_some()
+    }
+
+    /// A leaf that stops a ray. Which of them is all the same, so that none has to be the nearest.
+    fn stopper(&self, ray: &Ray, through_sky: bool) -> Option<u32> {
+        let mut stack = [0; STACK];
+        let mut depth = 0;
+        let mut more = Vec::new();
+        let mut next = (!self.nodes.is_empty()).then_some(0);
+        while let Some(at) = next {
+            if at & LEAF == 0 {
+                let node = self.nodes.get(at as usize)?;
+                let (mask, _) = node.enters(ray, SHORT);
+                for lane in lanes(mask) {
+                    match stack.get_mut(depth) {
+                        Some(slot) => {
+                            *slot = node.children[lane];
+                            depth += 1;
+                        }
+                        None => more.push(node.children[lane]),
+                    }
+                }
+            } else if self.stops(at & !LEAF, ray, through_sky) {
+                return Some(at & !LEAF);
             }
-            stopped
-        })
+            next = more.pop().or_else(|| {
+                depth = depth.checked_sub(1)?;
+                stack.get(depth).copied()
+            });
+        }
+        None
     }
 
     /// The nearest hit before `limit` lengths of `ray`.
@@ -373,10 +404,10 @@ impl Node {
         let mut near = Vec4::ZERO;
         let mut far = Vec4::splat(limit);
         for k in 0..3 {
-            let a = (self.mins[k] - ray.from[k]) * ray.inverse[k];
-            let b = (self.maxs[k] - ray.from[k]) * ray.inverse[k];
-            near = near.max(a.min(b));
-            far = far.min(a.max(b));
+            let first = ray.first[k] & 1;
+            let planes = &self.planes[k];
+            near = near.max((planes[first] - ray.from[k]) * ray.inverse[k]);
+            far = far.min((planes[1 - first] - ray.from[k]) * ray.inverse[k]);
         }
         (near.cmple(far).bitmask() & self.there, near)
     }

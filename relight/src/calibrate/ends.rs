@@ -29,6 +29,9 @@ impl Column {
         } else {
             0.0
         };
+        if least == 0.0 && self.rows.len() == self.pieces.len() {
+            return;
+        }
         self.rows.clear();
         for piece in self.pieces.iter().filter(|p| p.bare > least) {
             match self.rows.last_mut() {

@@ -12,8 +12,9 @@
 //! descent with an L1 penalty.
 
 use super::columns::Column;
+use super::parallel;
 use super::samples::{Sample, mean};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 /// |log ratio| up to which a sample counts in full.
 const HUBER: f32 = 0.3;
@@ -137,19 +138,18 @@ pub(super) fn solve(
                 }
             }
         }
-        let norms: Vec<f32> = columns
-            .iter()
-            .map(|column| norm(column, &state.weights))
-            .collect();
+        let both = state.rest.iter().zip(&state.weights);
+        let mut rest: Vec<Vec4> = both.map(|(rest, weight)| rest.extend(*weight)).collect();
+        let heard = parallel::map(columns, |_, column| Heard::of(column, &rest));
         for sweep in 0..effort.sweeps {
             // Lights that are out seldom come back: they are looked at now and then.
             let all = sweep % 4 == 0 || sweep + 1 == effort.sweeps;
-            for (column, &norm) in columns.iter_mut().zip(&norms) {
-                if (all || column.strength != Vec3::ZERO) && norm > 0.0 {
-                    improve(column, norm, &mut state, effort.sparsity);
-                }
-            }
-            improve_ambient(samples, ambient, &mut state);
+            let looked_at: Vec<usize> = (columns.iter().zip(&heard).enumerate())
+                .filter(|(_, (column, heard))| (all || is_lit(column)) && heard.norm > 0.0)
+                .map(|(index, _)| index)
+                .collect();
+            sweep_over(columns, &heard, &looked_at, &mut rest, effort.sparsity);
+            improve_ambient(samples, ambient, &mut rest);
         }
     }
     if least > 0.0 {
@@ -166,16 +166,92 @@ pub(super) fn norm(column: &Column, weights: &[f32]) -> f32 {
     column.rows.iter().map(|&(i, a)| weight(i) * a * a).sum()
 }
 
-/// Sets a column to its best strength while all others stay.
-fn improve(column: &mut Column, norm: f32, state: &mut Residual, sparsity: f32) {
-    let mut gradient = Vec3::ZERO;
-    for &(i, a) in &column.rows {
-        if let (Some(rest), Some(weight)) =
-            (state.rest.get(i as usize), state.weights.get(i as usize))
-        {
-            gradient += *rest * (*weight * a);
+/// What a column says to the samples that tell something.
+struct Heard {
+    rows: Vec<(u32, f32)>,
+    /// Weighted square of its length.
+    norm: f32,
+}
+
+impl Heard {
+    fn of(column: &Column, rest: &[Vec4]) -> Heard {
+        let weight = |i: u32| rest.get(i as usize).map_or(0.0, |rest| rest.w);
+        let rows = column.rows.iter().copied();
+        let rows: Vec<(u32, f32)> = rows.filter(|(i, _)| weight(*i) != 0.0).collect();
+        let norm = rows.iter().map(|&(i, a)| weight(i) * a * a).sum();
+        Heard { rows, norm }
+    }
+}
+
+fn is_lit(column: &Column) -> bool {
+    column.strength != Vec3::ZERO
+}
+
+/// Columns that are out whose sums are taken at once: one alone waits for each addition before the next.
+const AT_ONCE: usize = 4;
+
+/// Sets columns, one after the other, to their best strengths while all others stay. `rest`: with what each sample weighs.
+fn sweep_over(
+    columns: &mut [Column],
+    heard: &[Heard],
+    looked_at: &[usize],
+    rest: &mut [Vec4],
+    sparsity: f32,
+) {
+    let mut done = 0;
+    while let Some(left) = looked_at.get(done..).filter(|left| !left.is_empty()) {
+        // What is lit is about to change all sums.
+        let is_out = |i: &&usize| columns.get(**i).is_some_and(|c| !is_lit(c));
+        let out = left.iter().take(AT_ONCE).take_while(is_out).count();
+        let (now, _) = left.split_at(out.max(1));
+        let mut rows: [&[(u32, f32)]; AT_ONCE] = [&[]; AT_ONCE];
+        for (rows, index) in rows.iter_mut().zip(now) {
+            *rows = heard.get(*index).map_or(&[], |heard| &heard.rows);
+        }
+        for (&index, sum) in now.iter().zip(sums(rows, rest)) {
+            done += 1;
+            let (Some(column), Some(heard)) = (columns.get_mut(index), heard.get(index)) else {
+                continue;
+            };
+            let change = improve(column, heard.norm, sum.truncate(), sparsity);
+            if change != Vec3::ZERO {
+                let change = change.extend(0.0);
+                for &(i, a) in &heard.rows {
+                    if let Some(rest) = rest.get_mut(i as usize) {
+                        *rest -= change * a;
+                    }
+                }
+                // The other sums are no more what they were.
+                break;
+            }
         }
     }
+}
+
+/// For each column, the sum of what is left at its rows, weighted by what these weigh and by what it gives there.
+fn sums(rows: [&[(u32, f32)]; AT_ONCE], rest: &[Vec4]) -> [Vec4; AT_ONCE] {
+    let mut sums = [Vec4::ZERO; AT_ONCE];
+    let term = |(i, a): (u32, f32)| {
+        let rest = rest.get(i as usize).copied().unwrap_or(Vec4::ZERO);
+        rest * (rest.w * a)
+    };
+    let together = rows.iter().map(|rows| rows.len()).min().unwrap_or(0);
+    let (first, more) = (rows.map(|r| &r[..together]), rows.map(|r| &r[together..]));
+    for row in 0..together {
+        for (sum, rows) in sums.iter_mut().zip(first) {
+            *sum += term(rows[row]);
+        }
+    }
+    for (sum, rows) in sums.iter_mut().zip(more) {
+        for row in rows {
+            *sum += term(*row);
+        }
+    }
+    sums
+}
+
+/// Sets a column to its best strength while all others stay, and tells by how much that changes it.
+fn improve(column: &mut Column, norm: f32, gradient: Vec3, sparsity: f32) -> Vec3 {
     let best = match &column.prior {
         Some(prior) => {
             let scale = prior
@@ -193,33 +269,31 @@ fn improve(column: &mut Column, norm: f32, state: &mut Residual, sparsity: f32) 
         }
     };
     let change = best - column.strength;
-    if !change.is_finite() || change == Vec3::ZERO {
-        return;
+    if !change.is_finite() {
+        return Vec3::ZERO;
     }
     column.strength = best;
-    for &(i, a) in &column.rows {
-        if let Some(rest) = state.rest.get_mut(i as usize) {
-            *rest -= change * a;
-        }
-    }
+    change
 }
 
-fn improve_ambient(samples: &[Sample], ambient: &mut Ambient, state: &mut Residual) {
-    let mut gradient = Vec3::ZERO;
+fn improve_ambient(samples: &[Sample], ambient: &mut Ambient, rest: &mut [Vec4]) {
+    let mut gradient = Vec4::ZERO;
     let mut norm = 0.0;
-    for (sample, (rest, &weight)) in samples.iter().zip(state.rest.iter().zip(&state.weights)) {
-        let weight = weight * sample.ambient();
+    for (sample, rest) in samples.iter().zip(rest.iter()) {
+        let weight = rest.w * sample.ambient();
         gradient += *rest * weight;
         norm += weight;
     }
     if norm <= 0.0 {
         return;
     }
+    let gradient = gradient.truncate();
     let best = (ambient.value + gradient / norm).clamp(Vec3::ZERO, ambient.limit.max(Vec3::ZERO));
     let change = best - ambient.value;
     if change.is_finite() && change != Vec3::ZERO {
         ambient.value = best;
-        for (rest, sample) in state.rest.iter_mut().zip(samples) {
+        let change = change.extend(0.0);
+        for (rest, sample) in rest.iter_mut().zip(samples) {
             *rest -= change * sample.ambient();
         }
     }
