@@ -53,12 +53,14 @@ fn directions(count: usize) -> impl Iterator<Item = Vec3> {
     })
 }
 
-/// Measurements of texels that are seen from a place within [`NEAR`], by about so many rays, each once.
+/// Measurements of texels that are seen from a place within [`NEAR`], by about so many rays, each once: of those that are wanted
+/// and tell how bright it is there. What is not is not measured.
 pub(super) fn around(
     gauge: &Gauge<'_>,
     of_triangle: &[u32],
     origin: Vec3,
     rays: usize,
+    wanted: impl Fn(&TexelId) -> bool,
 ) -> Vec<(TexelId, Sample)> {
     let mut taken = HashSet::new();
     let look = |ray: Vec3| {
@@ -68,8 +70,15 @@ pub(super) fn around(
         if !hit.front || hit.sky {
             return None;
         }
-        let (id, sample) = texels::sample_on(gauge, surface, triangle, origin + ray * hit.t)?;
-        taken.insert(id).then_some((id, sample))
+        let at = origin + ray * hit.t;
+        let texel = texels::texel_on(gauge.world, surface, triangle, at)?;
+        let (id, stored) = (texel.id, &texel.stored);
+        if stored.saturated() || stored.lone_black() || taken.contains(&id) || !wanted(&id) {
+            return None;
+        }
+        let sample = texel.measured(gauge)?;
+        taken.insert(id);
+        Some((id, sample))
     };
     directions(rays).filter_map(look).collect()
 }
@@ -84,11 +93,9 @@ impl Fit<'_> {
         let gauge = Gauge::new(self.world, self.occluders, &self.taking);
         let placed: Vec<(Lamp, Vec3)> = self.columns.iter().skip(fixed).filter_map(lit).collect();
         let per_light = parallel::map(&placed, |_, &(lamp, _)| {
-            let found = around(&gauge, &self.of_triangle, lamp.origin, LOOKS);
-            let usable = |(id, s): &(TexelId, Sample)| {
-                !s.held_out && !s.saturated && s.trust >= 1.0 && !self.beside.contains(id)
-            };
-            let found: Vec<_> = found.into_iter().filter(usable).collect();
+            let usable =
+                |id: &TexelId| !samples::is_held_out(gauge.seed, id) && !self.beside.contains(id);
+            let found = around(&gauge, &self.of_triangle, lamp.origin, LOOKS, usable);
             let samples: Vec<Sample> = found.iter().map(|(_, s)| *s).collect();
             let given = given_by(self.world, self.occluders, &samples, &placed, self.least);
             let mut bright: Vec<(f32, TexelId, Sample)> = found
@@ -224,8 +231,7 @@ pub fn spots(world: &RelitWorld) -> Spots {
         })
         .collect();
     let found = parallel::map(&lights, |_, &(lamp, _)| {
-        let mut found = around(&gauge, &of_triangle, lamp.origin, COUNTED);
-        found.retain(|(_, s)| !s.saturated && s.trust >= 1.0);
+        let found = around(&gauge, &of_triangle, lamp.origin, COUNTED, |_| true);
         let samples: Vec<Sample> = found.iter().map(|(_, s)| *s).collect();
         let given = given_by(world, &occluders, &samples, &lights, world.light_end);
         let bright = samples.iter().zip(given);

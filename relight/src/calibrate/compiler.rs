@@ -12,6 +12,7 @@
 //! fifth of the texels would leave the choice to chance.
 
 use super::fit::ROUNDS;
+use super::memory::Memory;
 use super::said::{self, CommandLine, Dirt};
 use super::{CalibrationCache, CalibrationOptions, CalibrationReport, Evidence, Purpose, Solution};
 use crate::world::RelitWorld;
@@ -127,6 +128,7 @@ pub(super) fn find(
     world: &mut RelitWorld,
     silent: &[u32],
     options: &CalibrationOptions,
+    memory: &mut Memory,
     progress: &mut dyn FnMut(f32),
 ) -> Vec<Compiler> {
     let line = said::command_line(&world.bsp.entities());
@@ -144,6 +146,7 @@ pub(super) fn find(
             cache: None::<CalibrationCache>,
             ..*options
         },
+        memory,
         progress,
         done: Vec::new(),
         close: Vec::new(),
@@ -174,6 +177,7 @@ struct Trials<'a> {
     silent: &'a [u32],
     options: &'a CalibrationOptions,
     less: CalibrationOptions,
+    memory: &'a mut Memory,
     progress: &'a mut dyn FnMut(f32),
     /// Those that are done, and their errors.
     done: Vec<(Compiler, Option<[f32; 2]>)>,
@@ -205,8 +209,16 @@ impl Trials<'_> {
         purpose: Purpose<'_>,
     ) -> Option<Solution> {
         compiler.tell(self.world);
-        let (world, silent) = (&*self.world, self.silent);
-        let found = super::find(world, silent, options, compiler, purpose, &mut |_| ());
+        let (world, silent, memory) = (&*self.world, self.silent, &mut *self.memory);
+        let found = super::find(
+            world,
+            silent,
+            options,
+            compiler,
+            purpose,
+            memory,
+            &mut |_| (),
+        );
         Compiler::PLAIN.tell(self.world);
         found
     }

@@ -40,6 +40,7 @@ mod crossings;
 mod ends;
 mod fit;
 mod fronts;
+mod memory;
 mod nodes;
 pub(crate) mod parallel;
 mod place;
@@ -75,6 +76,7 @@ use compiler::Compiler;
 use fit::Fit;
 use fronts::Fronts;
 use glam::Vec3;
+use memory::Memory;
 use nodes::Measured;
 use samples::Taking;
 use std::cell::Cell;
@@ -221,7 +223,7 @@ struct Asked<'a> {
 }
 
 /// Solves for a world's light. `silent`: skies of which directives tell nothing. `compiler`: what was done to light, which
-/// the world knows but for dirt.
+/// the world knows but for dirt. `memory`: what was traced for the same world before.
 ///
 /// `None` as soon as it is known not to do what it is for.
 fn find(
@@ -230,6 +232,7 @@ fn find(
     options: &CalibrationOptions,
     compiler: Compiler,
     purpose: Purpose<'_>,
+    memory: &mut Memory,
     progress: &mut dyn FnMut(f32),
 ) -> Option<Solution> {
     progress(0.0);
@@ -242,7 +245,7 @@ fn find(
         few_black: !thorough || world.light_end > 0.0,
         dirt: compiler.dirt,
     };
-    let (mut samples, evidence) = samples::take(world, &occluders, &taking);
+    let (mut samples, evidence) = memory.take(world, &occluders, &taking);
     let texels = samples.len();
     let measured = Measured::new(&samples);
     let mut crossings = Vec::new();
@@ -274,7 +277,7 @@ fn find(
     }
     let unlisted = |material| silent.contains(&material);
     progress(0.15);
-    let transfer = bounce::Transfer::new(world, &occluders, &samples, options.bounces, unlisted);
+    let transfer = memory.transfer(world, &occluders, &samples, options.bounces, unlisted);
     for column in columns.iter_mut().filter(|c| c.prior.is_none()) {
         column.strength = Vec3::ZERO;
     }

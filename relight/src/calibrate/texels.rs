@@ -135,9 +135,7 @@ pub(super) fn take(
             if !taken.insert(found.id) {
                 continue;
             }
-            let sample = sample_at(gauge, found.place, found.material, found.stored);
-            if let Some(mut sample) = sample {
-                sample.held_out = is_held_out(gauge.seed, &found.id);
+            if let Some(sample) = found.measured(gauge) {
                 samples.push(sample);
                 break;
             }
@@ -154,12 +152,21 @@ pub(super) fn take(
 pub(super) type TexelId = [u32; 3];
 
 /// A texel that light is measured at.
-struct Texel {
-    id: TexelId,
+pub(super) struct Texel {
+    pub id: TexelId,
     /// Its middle and the normal there.
     place: (Vec3, Vec3),
     material: u32,
-    stored: Stored,
+    pub stored: Stored,
+}
+
+impl Texel {
+    /// What it tells; `None` where nothing can be measured.
+    pub fn measured(self, gauge: &Gauge<'_>) -> Option<Sample> {
+        let mut sample = sample_at(gauge, self.place, self.material, self.stored)?;
+        sample.held_out = is_held_out(gauge.seed, &self.id);
+        Some(sample)
+    }
 }
 
 /// How many measurements each triangle gets whose texels tell of light: by area, but no more than it has texels. Else what
@@ -318,19 +325,15 @@ pub(super) fn stored_at(
     (!stored.lone_black && !stored.rgb.contains(&255)).then(|| stored.light(world))
 }
 
-/// The measurement of the texel where a ray met a triangle; `None` where it tells nothing.
-pub(super) fn sample_on(
-    gauge: &Gauge<'_>,
+/// The texel where a ray met a triangle; `None` where it tells nothing.
+pub(super) fn texel_on(
+    world: &RelitWorld,
     surface: usize,
     triangle: usize,
     at: Vec3,
-) -> Option<(TexelId, Sample)> {
-    let place = page_place(gauge.world, surface, triangle, at)?;
-    let own = gauge.world.surfaces.get(surface)?;
-    let found = texel_at(gauge.world, triangle, own, place)?;
-    let mut sample = sample_at(gauge, found.place, found.material, found.stored)?;
-    sample.held_out = is_held_out(gauge.seed, &found.id);
-    Some((found.id, sample))
+) -> Option<Texel> {
+    let place = page_place(world, surface, triangle, at)?;
+    texel_at(world, triangle, world.surfaces.get(surface)?, place)
 }
 
 /// Where in its page (0 to 1) a place on a triangle lies; `None` for surfaces that tell of no light.

@@ -6,6 +6,7 @@
 //! known to agree no better.
 
 use super::compiler::{self, Compiler};
+use super::memory::Memory;
 use super::{Asked, CalibrationOptions, Purpose, Solution, find};
 use crate::world::RelitWorld;
 use std::cell::Cell;
@@ -37,6 +38,7 @@ pub(super) struct Ways<'a> {
     silent: &'a [u32],
     options: &'a CalibrationOptions,
     progress: &'a mut dyn FnMut(f32),
+    memory: Memory,
     /// The part that is done.
     reached: f32,
     /// Ways to be tried after this one, at most.
@@ -51,11 +53,13 @@ pub(super) fn best(
     progress: &mut dyn FnMut(f32),
 ) -> Solution {
     let mut reached = 0.0;
-    let compilers = compiler::find(world, silent, options, &mut |part| {
+    let mut memory = Memory::default();
+    let compilers = compiler::find(world, silent, options, &mut memory, &mut |part| {
         reached = part * COMPILER_PART;
         progress(reached);
     });
     let mut ways = Ways {
+        memory,
         reached,
         left: 2 * compilers.len(),
         ..Ways::new(world, silent, options, progress)
@@ -124,6 +128,7 @@ impl<'a> Ways<'a> {
             silent,
             options,
             progress,
+            memory: Memory::default(),
             reached: 0.0,
             left: 0,
         }
@@ -205,6 +210,7 @@ impl<'a> Ways<'a> {
             options,
             compiler,
             Purpose::Enough(asked),
+            &mut self.memory,
             &mut |part| {
                 *reached = reached.max(begin + part * (end() - begin));
                 tell(*reached);
