@@ -107,46 +107,43 @@ impl Scene<'_> {
             .collect()
     }
 
-    /// The most that a light at a place may be, by the light that lightmaps store on the surfaces right beside it. There it
+    /// The most that a light may be, by the light that lightmaps store on the surfaces right beside it. There it
     /// is brightest, and measurements are too sparse to tell of such spots.
     pub(super) fn limit(&self, lamp: Lamp) -> Vec3 {
-        let origin = lamp.origin;
-        let mut limit = Vec3::INFINITY;
+        limit_by(&self.beside(lamp.origin), lamp)
+    }
+
+    /// The surfaces right beside a place.
+    fn beside(&self, origin: Vec3) -> Vec<Beside> {
         let floor = samples::floor(self.world);
         let corners = (0..8u8).map(|k| {
             let side = |bit: u8| if k & bit == 0 { -1.0 } else { 1.0 };
             Vec3::new(side(1), side(2), side(4)).normalize()
         });
-        for ray in AROUND.into_iter().chain(corners) {
-            let Some(hit) = self.occluders.nearest(origin, ray, NEAR) else {
-                continue;
-            };
+        let look = |ray: Vec3| {
+            let hit = self.occluders.nearest(origin, ray, NEAR)?;
             let triangle = hit.tag as usize;
             let surface = self.of_triangle.get(triangle).map(|s| *s as usize);
             let at = origin + ray * hit.t;
             let stored = surface.and_then(|s| texels::stored_at(self.world, s, triangle, at));
             let cosine = -hit.normal.dot(ray);
-            if let Some(stored) = stored
-                && hit.front
-                && cosine > 0.1
-            {
-                let given = lamp.falloff.irradiance(hit.t, cosine);
-                if given > 0.0 {
-                    limit = limit.min((stored + floor) * (EXCESS * PI / given));
-                }
-            }
-        }
-        limit
+            (hit.front && cosine > 0.1).then_some(Beside {
+                stored: stored? + floor,
+                distance: hit.t,
+                cosine,
+            })
+        };
+        AROUND.into_iter().chain(corners).filter_map(look).collect()
     }
 
     /// Columns of lights at places, in order; such as reach nothing are left out.
     fn columns(&self, places: &[Vec3], range: f32) -> Vec<Column> {
         let lamps: Vec<Lamp> = places.iter().copied().map(lamp).collect();
-        let rows = parallel::map(&lamps, |_, &lamp| self.rows(lamp, range));
-        let with_rows = lamps.into_iter().zip(rows).filter(|(_, r)| !r.is_empty());
-        with_rows
-            .map(|(lamp, rows)| self.column(lamp, rows, Vec3::ZERO))
-            .collect()
+        let columns = parallel::map(&lamps, |_, &lamp| {
+            let rows = self.rows(lamp, range);
+            (!rows.is_empty()).then(|| self.column(lamp, rows, Vec3::ZERO))
+        });
+        columns.into_iter().flatten().collect()
     }
 
     fn column(&self, lamp: Lamp, rows: Vec<(u32, f32)>, strength: Vec3) -> Column {
@@ -187,6 +184,26 @@ impl Scene<'_> {
     pub(super) fn sees(&self, a: Vec3, b: Vec3) -> bool {
         !self.occluders.blocked(a, b, false)
     }
+}
+
+/// A surface right beside a place.
+struct Beside {
+    /// Light that it stores, and what is too little to tell apart.
+    stored: Vec3,
+    distance: f32,
+    cosine: f32,
+}
+
+/// The most that a light may be, by the surfaces beside it.
+fn limit_by(beside: &[Beside], lamp: Lamp) -> Vec3 {
+    let most = |beside: &Beside| {
+        let given = lamp.falloff.irradiance(beside.distance, beside.cosine);
+        (given > 0.0).then(|| beside.stored * (EXCESS * PI / given))
+    };
+    beside
+        .iter()
+        .filter_map(most)
+        .fold(Vec3::INFINITY, Vec3::min)
 }
 
 /// Candidates all over open space.
@@ -413,7 +430,7 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
         })
         .collect();
     // Error taken away by a light at a place with the strength that is best there, and that strength.
-    let worth = |lamp: Lamp, rows: &[(u32, f32)]| {
+    let worth = |beside: &[Beside], lamp: Lamp, rows: &[(u32, f32)]| {
         let mut gradient = Vec3::ZERO;
         let mut norm = 0.0;
         for &(i, a) in rows {
@@ -423,7 +440,8 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
             }
         }
         if norm > 0.0 {
-            let strength = (gradient / norm).max(Vec3::ZERO).min(scene.limit(lamp));
+            let limit = limit_by(beside, lamp);
+            let strength = (gradient / norm).max(Vec3::ZERO).min(limit);
             if scene.least > 0.0 && strength.max_element() > 0.0 {
                 // Again with what such a light would have left.
                 let least = scene.least / strength.max_element();
@@ -437,7 +455,7 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
                 if norm <= 0.0 {
                     return (0.0, Vec3::ZERO);
                 }
-                let strength = (gradient / norm).max(Vec3::ZERO).min(scene.limit(lamp));
+                let strength = (gradient / norm).max(Vec3::ZERO).min(limit);
                 return ((gradient * 2.0 - strength * norm).dot(strength), strength);
             }
             let taken = (gradient * 2.0 - strength * norm).dot(strength);
@@ -452,7 +470,8 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
         let (bsp, all) = (&scene.world.bsp, (None, f32::INFINITY));
         rows_again(bsp, scene.occluders, &judged, lamp, all, &mut stopped)
     };
-    let mut best = (start, worth(start, &seen(start)));
+    let mut beside = scene.beside(start.origin);
+    let mut best = (start, worth(&beside, start, &seen(start)));
     for _ in 0..2 {
         let from = best.0;
         for direction in AROUND {
@@ -465,9 +484,10 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
                 continue;
             }
             let moved = Lamp { origin: at, ..from };
-            let found = worth(moved, &seen(moved));
+            let beside_it = scene.beside(at);
+            let found = worth(&beside_it, moved, &seen(moved));
             if found.0 > best.1.0 * 1.001 {
-                best = (moved, found);
+                (best, beside) = ((moved, found), beside_it);
             }
         }
         if best.0 == from {
@@ -484,12 +504,15 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
             let given =
                 |&(i, _): &(u32, f32)| Some((i, unshadowed(judged.get(i as usize)?, kind, None)));
             let rows: Vec<(u32, f32)> = seen.iter().filter_map(given).collect();
-            let found = worth(kind, &rows);
+            let found = worth(&beside, kind, &rows);
             if found.0 > best.1.0 * more {
                 best = (kind, found);
             }
         }
     }
     let (lamp, (_, strength)) = best;
-    (lamp != start).then(|| scene.column(lamp, scene.rows(lamp, f32::INFINITY), strength))
+    (lamp != start).then(|| {
+        let rows = scene.rows(lamp, f32::INFINITY);
+        scene.limited(lamp, rows, strength, limit_by(&beside, lamp))
+    })
 }
