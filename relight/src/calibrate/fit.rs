@@ -17,6 +17,7 @@ use crate::exposure::{self, Exposure, Place};
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::Vec3;
 use std::collections::HashSet;
+use std::sync::Arc;
 
 /// Most times that lights are looked for.
 pub(super) const ROUNDS: usize = 4;
@@ -118,7 +119,7 @@ pub(super) struct Fit<'a> {
     /// Places that the light grid's directions meet at.
     pub crossings: Vec<Crossing>,
     /// Candidates all over open space, once they were tried: they see the first measurements alike each time.
-    pub tried: Option<Candidates>,
+    pub tried: Option<Arc<Candidates>>,
     /// Places in front of samples that were candidates before.
     pub fronts: Fronts,
     /// Error at samples held out after each round of lights that fall off with the square of the distance.
@@ -276,9 +277,9 @@ impl Fit<'_> {
             if round == 0 {
                 let tried = self
                     .tried
-                    .get_or_insert_with(|| place::over_space(&scene, &self.crossings));
+                    .get_or_insert_with(|| Arc::new(place::over_space(&scene, &self.crossings)));
                 spacing = tried.spacing;
-                place::out_of(&scene, tried.clone(), columns, fixed, ambient);
+                place::out_of(&scene, tried, columns, fixed, ambient);
             } else {
                 place::in_front(&scene, &mut self.fronts, columns, fixed, ambient, spacing);
             }

@@ -1,17 +1,48 @@
-//! What ways of looking for a map's light have in common: which measurements are taken, and what these see of each other. Most
-//! ways take the same, so that it is traced once.
+//! What ways of looking for a map's light have in common: which measurements are taken, what these see of each other,
+//! and which of them candidates for lost lights see. Most ways take the same, so that it is traced once.
 
 use super::Evidence;
 use super::bounce::Transfer;
 use super::bvh::Occluders;
+use super::crossings::Crossing;
+use super::place::Candidates;
 use super::samples::{self, Sample, Site, Taking};
 use crate::world::RelitWorld;
+use glam::Vec3;
+use std::sync::Arc;
 
 /// What was traced for other ways.
 #[derive(Default)]
 pub(super) struct Memory {
     taken: Vec<Taken>,
     seen: Vec<Seen>,
+    tried: Option<(Looked, Arc<Candidates>)>,
+}
+
+/// What candidates all over open space, and what they see, depend on.
+#[derive(PartialEq)]
+pub(super) struct Looked {
+    holes: bool,
+    measured: Vec<(Vec3, Vec3)>,
+    crossings: Vec<Vec3>,
+    most: usize,
+}
+
+impl Looked {
+    /// At most so many candidates for some measurements, and where directions of the light grid meet.
+    pub fn of(
+        world: &RelitWorld,
+        samples: &[Sample],
+        crossings: &[Crossing],
+        most: usize,
+    ) -> Looked {
+        Looked {
+            holes: holes(world),
+            measured: samples.iter().map(|s| (s.position, s.normal)).collect(),
+            crossings: crossings.iter().map(|c| c.origin).collect(),
+            most,
+        }
+    }
 }
 
 /// Measurements, and all that they depend on.
@@ -37,6 +68,17 @@ fn holes(world: &RelitWorld) -> bool {
 }
 
 impl Memory {
+    /// Candidates that were tried for the same.
+    pub fn tried(&self, looked: &Looked) -> Option<Arc<Candidates>> {
+        let (of, tried) = self.tried.as_ref()?;
+        (of == looked).then(|| Arc::clone(tried))
+    }
+
+    /// Keeps candidates, the last ones alone: they are much, and ways that look alike mostly follow each other.
+    pub fn keep_tried(&mut self, looked: Looked, tried: Option<Arc<Candidates>>) {
+        self.tried = tried.map(|tried| (looked, tried));
+    }
+
     /// [`samples::take`].
     pub fn take(
         &mut self,

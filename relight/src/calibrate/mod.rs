@@ -76,7 +76,7 @@ use compiler::Compiler;
 use fit::Fit;
 use fronts::Fronts;
 use glam::Vec3;
-use memory::Memory;
+use memory::{Looked, Memory};
 use nodes::Measured;
 use samples::Taking;
 use std::cell::Cell;
@@ -277,6 +277,7 @@ fn find(
     }
     let unlisted = |material| silent.contains(&material);
     progress(0.15);
+    let looked = Looked::of(world, &samples, &crossings, options.candidates);
     let transfer = memory.transfer(world, &occluders, &samples, options.bounces, unlisted);
     for column in columns.iter_mut().filter(|c| c.prior.is_none()) {
         column.strength = Vec3::ZERO;
@@ -288,7 +289,7 @@ fn find(
         of_triangle: bounce::surfaces_of_triangles(world),
         taking,
         beside: HashSet::new(),
-        tried: None,
+        tried: memory.tried(&looked),
         fronts: Fronts::new(samples.len()),
         rounds: Vec::new(),
         splashes: match compiler.splashes {
@@ -323,6 +324,7 @@ fn find(
         let hopeless = fit.place(options.candidates, false, &mut |part| {
             progress(0.35 + part_of * part);
         });
+        memory.keep_tried(looked, fit.tried.clone());
         if hopeless {
             return None;
         }

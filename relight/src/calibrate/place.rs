@@ -136,16 +136,6 @@ impl Scene<'_> {
         AROUND.into_iter().chain(corners).filter_map(look).collect()
     }
 
-    /// Columns of lights at places, in order; such as reach nothing are left out.
-    fn columns(&self, places: &[Vec3], range: f32) -> Vec<Column> {
-        let lamps: Vec<Lamp> = places.iter().copied().map(lamp).collect();
-        let columns = parallel::map(&lamps, |_, &lamp| {
-            let rows = self.rows(lamp, range);
-            (!rows.is_empty()).then(|| self.column(lamp, rows, Vec3::ZERO))
-        });
-        columns.into_iter().flatten().collect()
-    }
-
     fn column(&self, lamp: Lamp, rows: Vec<(u32, f32)>, strength: Vec3) -> Column {
         self.limited(lamp, rows, strength, self.limit(lamp))
     }
@@ -207,9 +197,9 @@ fn limit_by(beside: &[Beside], lamp: Lamp) -> Vec3 {
 }
 
 /// Candidates all over open space.
-#[derive(Clone)]
 pub(super) struct Candidates {
-    columns: Vec<Column>,
+    /// Where they are, and what they give to measurements for strength 1; such as reach nothing are left out.
+    places: Vec<(Vec3, Vec<(u32, f32)>)>,
     /// The grid's spacing.
     pub spacing: f32,
 }
@@ -224,8 +214,10 @@ pub(super) fn over_space(scene: &Scene<'_>, crossings: &[Crossing]) -> Candidate
             .map(|c| c.origin)
             .filter(|&at| scene.open(at)),
     );
+    let rows = parallel::map(&nodes, |_, &at| scene.rows(lamp(at), RANGE));
+    let places = nodes.into_iter().zip(rows);
     Candidates {
-        columns: scene.columns(&nodes, RANGE),
+        places: places.filter(|(_, rows)| !rows.is_empty()).collect(),
         spacing,
     }
 }
@@ -233,18 +225,15 @@ pub(super) fn over_space(scene: &Scene<'_>, crossings: &[Crossing]) -> Candidate
 /// Adds lights out of candidates to `columns`, of which the first `fixed` stay.
 pub(super) fn out_of(
     scene: &Scene<'_>,
-    candidates: Candidates,
+    candidates: &Candidates,
     columns: &mut Vec<Column>,
     fixed: usize,
     ambient: &mut Ambient,
 ) {
-    choose(
-        scene,
-        columns,
-        fixed,
-        ambient,
-        (candidates.columns, candidates.spacing),
-    );
+    let of = parallel::map(&candidates.places, |_, (at, rows)| {
+        scene.column(lamp(*at), rows.clone(), Vec3::ZERO)
+    });
+    choose(scene, columns, fixed, ambient, (of, candidates.spacing));
 }
 
 /// Adds lights in front of what stays unexplained.

@@ -298,3 +298,52 @@ fn improve_ambient(samples: &[Sample], ambient: &mut Ambient, rest: &mut [Vec4])
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::columns::{Lamp, Source};
+    use crate::calibrate::random::Random;
+    use crate::light::Falloff;
+
+    #[test]
+    fn columns_looked_at_together_become_what_they_become_one_by_one() {
+        let mut random = Random::new(3);
+        let origin = Vec3::ZERO;
+        let falloff = Falloff::InverseSquare;
+        let mut rows = || -> Vec<(u32, f32)> {
+            let chosen: Vec<u32> = (0..50).filter(|_| random.next() < 0.3).collect();
+            chosen.into_iter().map(|i| (i, random.next())).collect()
+        };
+        let columns: Vec<Column> = (0..60)
+            .map(|_| Column {
+                source: Source::Placed(Lamp { origin, falloff }),
+                rows: rows(),
+                pieces: Vec::new(),
+                strength: Vec3::ZERO,
+                limit: Vec3::INFINITY,
+                prior: None,
+            })
+            .collect();
+        let rest: Vec<Vec4> = (0..50)
+            .map(|_| Vec4::new(random.next(), random.next(), random.next(), 1.0))
+            .collect();
+        let heard: Vec<Heard> = columns.iter().map(|c| Heard::of(c, &rest)).collect();
+        let all: Vec<usize> = (0..columns.len()).collect();
+        let (mut together, mut rest_together) = (columns.clone(), rest.clone());
+        let (mut alone, mut rest_alone) = (columns, rest);
+        for _ in 0..3 {
+            sweep_over(&mut together, &heard, &all, &mut rest_together, 0.4);
+            for index in &all {
+                sweep_over(&mut alone, &heard, &[*index], &mut rest_alone, 0.4);
+            }
+        }
+        let strengths = |columns: &[Column]| -> Vec<Vec3> {
+            columns.iter().map(|column| column.strength).collect()
+        };
+        assert_eq!(strengths(&together), strengths(&alone));
+        assert_eq!(rest_together, rest_alone);
+        let lit = alone.iter().filter(|column| is_lit(column)).count();
+        assert!((5..55).contains(&lit), "{lit}");
+    }
+}

@@ -5,6 +5,7 @@ mod grid;
 mod held_out;
 mod known_truth;
 mod linear;
+mod memory;
 mod more;
 mod said;
 mod splash;
