@@ -18,7 +18,7 @@
 //!    Where lights that fall off with the square of the distance leave much, once more with linear ones.
 //! 6. `compiler`: all of that with less effort for light that was stored encoded, and for lights that end, to see whether
 //!    it explains more. `ways`: where the map says that corners were made darker, all of it is done both ways; with back
-//!    splashes and without; with more measurements where much is left.
+//!    splashes and without; with more measurements where much is left. `memory`: what these have in common is traced once.
 //! 7. The world's lights get their strengths, lost lights are added to
 //!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
 //!
