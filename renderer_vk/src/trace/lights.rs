@@ -5,7 +5,9 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 use q3bsp::Bsp;
-use relight::light::{ClusterSet, Flicker, LightLists, PointLight, Sight, SunLight, TriangleLight};
+use relight::light::{
+    ClusterSet, Flicker, LightLists, Occlusion, PointLight, Sight, SunLight, TriangleLight,
+};
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
 
@@ -76,6 +78,8 @@ pub struct MapLightSource<'a> {
     pub light_end: f32,
     /// The map's tree; `None`: every point gets the list of all lights.
     pub bsp: Option<&'a Bsp>,
+    /// What is in the way of light; `None`: only what the lists know of that is known.
+    pub occlusion: Option<&'a Occlusion>,
 }
 
 pub(super) fn count(n: usize) -> u32 {
@@ -338,6 +342,7 @@ impl MapLights {
             ambient: Vec3::ZERO,
             light_end: 0.0,
             bsp: None,
+            occlusion: None,
         };
         Self::new(device, &source)
     }

@@ -16,6 +16,7 @@ use super::lights::{MapLightSource, MapLights};
 use super::surroundings::Surroundings;
 use super::view_tracer::{TracedMap, ViewTracer};
 use relight::exposure::display_exposure;
+use relight::light::Occlusion;
 
 use crate::assets::compile::sampler;
 use crate::assets::{Assets, Materials};
@@ -134,6 +135,7 @@ impl TraceLook {
         let relit = &world.data.relit;
         let model_origins: Vec<_> = relit.models.iter().map(|m| m.origin).collect();
         let flickers: Vec<_> = relit.lights.iter().map(|l| relit.flicker_of(l)).collect();
+        let occlusion = Occlusion::new(relit);
         let source = MapLightSource {
             triangles: &relit.lights,
             points: &relit.point_lights,
@@ -144,6 +146,7 @@ impl TraceLook {
             ambient: relit.ambient,
             light_end: relit.light_end,
             bsp: Some(&relit.bsp),
+            occlusion: Some(&occlusion),
         };
         let tracer = Tracer::of(device.info(), settings.rt_tracer);
         let has_fog = !relit.bsp.fogs.is_empty();

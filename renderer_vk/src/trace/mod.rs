@@ -29,6 +29,7 @@ pub mod light_cells;
 pub mod light_facings;
 pub mod light_rows;
 pub mod light_tables;
+pub mod light_weights;
 pub mod lights;
 pub mod look;
 pub mod motion;

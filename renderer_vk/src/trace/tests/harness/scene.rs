@@ -294,6 +294,7 @@ impl Scene {
             ambient: self.ambient,
             light_end: self.light_end,
             bsp: self.tree.as_ref().map(|t| &t.0),
+            occlusion: None,
         };
         let scene = StaticScene {
             vertices: &self.vertices,

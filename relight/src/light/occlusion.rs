@@ -1,0 +1,28 @@
+//! What is in the way of a map's light.
+
+use glam::Vec3;
+
+use crate::calibrate::bvh::Occluders;
+use crate::calibrate::samples;
+use crate::world::RelitWorld;
+
+/// What stops light in a map: all that does not move, cut-outs where these are there, and skies.
+pub struct Occlusion(Occluders);
+
+impl Occlusion {
+    /// Of a world.
+    pub fn new(world: &RelitWorld) -> Self {
+        Self(samples::occluders(world))
+    }
+
+    /// Whether nothing is between two points. `last`: what was in the way of an earlier ray, which is asked first.
+    pub fn is_free(&self, from: Vec3, to: Vec3, last: &mut Option<u32>) -> bool {
+        !self.0.blocked_again(from, to, last)
+    }
+}
+
+impl std::fmt::Debug for Occlusion {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Occlusion").finish_non_exhaustive()
+    }
+}
