@@ -137,7 +137,7 @@ const uint FOG_LIT = 1, FOG_FILTERED = 2, FOG_HISTORY = 4;
 const uint SELECT_UNIFORM = 0, SELECT_RESAMPLED = 1, SELECT_ALL = 2;
 // Bits of LightView.flags.
 // rays of an estimate by all lights for the weak ones of a list
-const uint WEAK_RAYS = 4;
+const uint WEAK_RAYS = 3;
 const uint LIGHTS_SOFT = 1;
 // The upper bits of a light's number say what it is, the others which one.
 const uint FACINGS = 6;

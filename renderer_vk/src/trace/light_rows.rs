@@ -29,10 +29,10 @@ const ANYWHERE_PART: f32 = 0.125;
 
 /// Part of a list's light that its weak lights may give together, by what is known of them. Where all lights are used,
 /// some of these are picked at random.
-const WEAK_PART: f32 = 0.1;
+const WEAK_PART: f32 = 0.2;
 
 /// Fewest strong lights of a list that has weak ones: shorter lists are used whole.
-const LEAST_STRONG: usize = 4;
+const LEAST_STRONG: usize = 2;
 
 /// Rays for the weak lights of a list, as the shaders send them.
 const WEAK_RAYS: usize = c::WEAK_RAYS as usize;
