@@ -33,7 +33,7 @@ struct Instance {
 
 struct Triangle { uint indices[3]; uint material; uint instance; uint fog; uint lightmap; uint flags; };
 
-struct Fog { vec3 mins; vec3 maxs; vec4 plane; uint has_surface; vec3 color; float depth; };
+struct Fog { vec3 mins; vec3 maxs; vec4 plane; uint has_surface; vec3 color; float depth; vec3 own_light; };
 
 struct MaterialBuffers { uint64_t materials; uint64_t stages; uint64_t tc_mods; uint64_t images; uint64_t noise; };
 

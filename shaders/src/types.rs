@@ -204,6 +204,8 @@ pub struct Fog {
     pub color: Vec3,
     /// Depth at which the fog is opaque, units.
     pub depth: f32,
+    /// Mean radiance at places in it that the map's lights give; the traced look alone asks for it.
+    pub own_light: Vec3,
 }
 
 /// Device addresses of the materials' arrays.

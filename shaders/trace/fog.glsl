@@ -30,14 +30,15 @@ float fog_transmittance(Fog fog, vec2 range, float t) {
     return 1.0 - sqrt(min(inside / max(fog.depth, 1.0), 1.0));
 }
 
-// What a piece of a ray has of one volume. The fog's colour stands for light that was scattered often; what comes straight
-// from lights is found at the points that are kept (fog_keep.glsl).
+// What a piece of a ray has of one volume. The fog's colour stands for all light that its author saw there; the part of it that
+// comes straight from lights is found at the points that are kept (fog_keep.glsl).
 struct FogPiece {
     vec3 color;  // displayed
     float ratio; // of what lies behind, what is left
     float depth; // at which the fog is opaque, units
     vec2 place;  // where on the ray's way through the volume the piece begins and ends, as parts of the depth
     float enter; // where that way begins
+    vec3 own_light; // radiance at places in the volume in the mean, of the map's lights
 };
 
 // The volume whose piece was the last one.
@@ -69,6 +70,7 @@ bool fog_next(vec3 origin, vec3 direction, vec3 inverse, float from, float to, i
     piece.depth = max(fog.depth, 1.0);
     piece.place = clamp((min(vec2(from, to), best.y) - best.x) / piece.depth, 0.0, 1.0);
     piece.enter = best.x;
+    piece.own_light = fog.own_light;
     order = FogOrder(best.x, chosen);
     return true;
 }

@@ -11,6 +11,21 @@
 // Fog of this map is lit: without, nothing of this is compiled in.
 layout(constant_id = 0) const uint LIT_FOG = 0;
 
+// Most that straight light may be of a fog's colour: the rest was scattered often, and is the same everywhere.
+const float MOST_LIT = 0.5;
+
+// The map's own light in a volume in the mean, as it is displayed; `rt_lightScale` does not count, which is to be seen.
+vec3 fog_own_light(FogPiece piece) { return piece.own_light * exp2(VIEW.exposure_base); }
+
+// The part of the fog's colour that is the map's own straight light, in the mean of the volume.
+vec3 fog_lit_part(FogPiece piece) { return min(fog_own_light(piece), MOST_LIT); }
+
+// What light is multiplied by, beside the fog's colour, so that the map's own comes to `lit` in the mean.
+vec3 fog_scattering(FogPiece piece, vec3 lit) {
+    vec3 own = fog_own_light(piece);
+    return mix(vec3(1.0), lit / max(own, 1.0e-6), greaterThan(own, vec3(MOST_LIT)));
+}
+
 vec3 fog_weight = vec3(0.0);  // of all fog on the way
 float fog_weight_sum = 0.0;
 vec3 fog_tint = vec3(0.0);    // of the kept place, as a multiple of its chance

@@ -19,6 +19,12 @@ impl Occlusion {
     pub fn is_free(&self, from: Vec3, to: Vec3, last: &mut Option<u32>) -> bool {
         !self.0.blocked_again(from, to, last)
     }
+
+    /// Whether the first thing in a direction is a sky, within what a float can tell.
+    pub fn sees_sky(&self, from: Vec3, direction: Vec3) -> bool {
+        let hit = self.0.nearest(from, direction, f32::INFINITY);
+        hit.is_some_and(|hit| hit.sky)
+    }
 }
 
 impl std::fmt::Debug for Occlusion {

@@ -92,6 +92,12 @@ impl Listed<'_> {
         })
     }
 
+    /// Irradiance over pi that it gives to what faces it, about; `nearest`: the least distance that is believed. `None`
+    /// where it shines the other way.
+    pub fn straight_on(&self, point: Vec3, nearest: f32) -> Option<f32> {
+        self.seen_from(point, nearest).map(|seen| seen.light)
+    }
+
     /// What it gives to all sides, about.
     pub fn power(&self) -> f32 {
         if self.bounds.even > 0.0 {
@@ -103,7 +109,7 @@ impl Listed<'_> {
 
     /// One of some points of it, `turn` says which, short of what the light itself may stand in; `None` where it shines the
     /// other way.
-    fn point_for(&self, place: Vec3, turn: usize) -> Option<Vec3> {
+    pub fn point_for(&self, place: Vec3, turn: usize) -> Option<Vec3> {
         let Some(triangle) = self.triangle else {
             let away = (place - self.bounds.centre).clamp_length_max(self.bounds.radius);
             return Some(self.bounds.centre + away);

@@ -4,12 +4,13 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use glam::Vec2;
 use shaders::trace_types::SkyRecord;
-use shaders::types::MaterialBuffers;
 use shaders::types::constants::NO_TEXTURE;
+use shaders::types::{Fog, MaterialBuffers};
 
 use super::accel::AccelMemory;
 use super::counters::COUNTED;
 use super::cutout::{Coverage, coverage};
+use super::fog_light;
 use super::geometry::StaticGeometry;
 use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use super::lights::{MapLightSource, MapLights};
@@ -73,7 +74,7 @@ fn remapping(materials: &Materials) -> u64 {
 }
 
 /// What of the map keeps its shape.
-fn static_scene(world: &World) -> StaticScene<'_> {
+fn static_scene<'a>(world: &'a World, fogs: &'a [Fog]) -> StaticScene<'a> {
     let data = &world.data;
     let surfaces = data
         .surfaces
@@ -93,7 +94,7 @@ fn static_scene(world: &World) -> StaticScene<'_> {
                 model: s.model,
             })
             .collect(),
-        fogs: &data.fogs,
+        fogs,
     }
 }
 
@@ -102,9 +103,10 @@ fn geometry(
     device: &Device,
     tracer: Tracer,
     world: &World,
+    fogs: &[Fog],
     assets: &Assets,
 ) -> Result<StaticGeometry, Error> {
-    let mut geometry = StaticGeometry::new(device, tracer, &static_scene(world), assets)?;
+    let mut geometry = StaticGeometry::new(device, tracer, &static_scene(world, fogs), assets)?;
     geometry.surroundings = Surroundings::new(device, world, assets)?;
     Ok(geometry)
 }
@@ -116,6 +118,8 @@ pub struct TraceLook {
     right: Option<Box<ViewTracer>>,
     kind: Tracer,
     geometry: StaticGeometry,
+    /// The map's, with the light in them.
+    fogs: Vec<Fog>,
     lights: MapLights,
     /// Of the materials, when `geometry` was built.
     remapping: u64,
@@ -153,7 +157,8 @@ impl TraceLook {
         let mut view_tracer = ViewTracer::new(device, tracer, has_fog)?;
         let exposure = display_exposure(relit);
         view_tracer.map_exposure = exposure;
-        let geometry = geometry(device, tracer, world, assets)?;
+        let fogs = fog_light::lit(&world.data.fogs, &source);
+        let geometry = geometry(device, tracer, world, &fogs, assets)?;
         let mut lights = MapLights::new(device, &source)?;
         lights.white = exposure.scale.recip();
         lights.find_fogs(&geometry.fog_boxes);
@@ -162,6 +167,7 @@ impl TraceLook {
             right: None,
             kind: tracer,
             geometry,
+            fogs,
             lights,
             remapping: remapping(&assets.materials),
         })
@@ -187,7 +193,7 @@ impl TraceLook {
         let remapping = remapping(&assets.materials);
         if remapping != self.remapping {
             // triangles name their materials; this happens when a game changes a flag's or button's look
-            self.geometry = geometry(rec.device(), self.kind, world, assets)?;
+            self.geometry = geometry(rec.device(), self.kind, world, &self.fogs, assets)?;
             self.remapping = remapping;
         }
         let map = TracedMap {

@@ -20,6 +20,7 @@ pub mod debug;
 pub mod denoise;
 mod doubled;
 pub mod fog;
+mod fog_light;
 mod frame_lights;
 pub mod geometry;
 mod indirect;

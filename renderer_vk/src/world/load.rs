@@ -342,6 +342,7 @@ fn fog(fog: &relight::world::WorldFog) -> types::Fog {
         has_surface: u32::from(surface.is_some()),
         color: fog.color,
         depth: fog.depth,
+        own_light: Vec3::ZERO,
     }
 }
 

@@ -342,6 +342,7 @@ fn bounced_light_passes_fog_with(gpu: &mut Gpu) {
         has_surface: 0,
         color: tint,
         depth,
+        own_light: Vec3::ZERO,
     });
     let steps = 10_000;
     let factor: f32 = (0..steps)

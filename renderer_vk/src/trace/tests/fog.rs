@@ -25,6 +25,7 @@ fn fog_is_lit_by_what_lights_each_place_of_it_with(gpu: &mut Gpu) {
         has_surface: 0,
         color: Vec3::new(0.2, 0.4, 0.6),
         depth,
+        own_light: Vec3::ZERO,
     });
     // mixed as it is displayed: what is behind is black
     let ambient = decode(Vec3::new(0.2, 0.4, 0.6) * (100.0f32 / depth).sqrt());
@@ -63,6 +64,15 @@ fn fog_is_lit_by_what_lights_each_place_of_it_with(gpu: &mut Gpu) {
         let mean = gpu.mean(&scene, &settings, frames) - ambient;
         let error = ((mean - exact) / exact).abs().max_element();
         assert!(error < tolerance, "{mean} {exact}");
+        // what the map's lights give in the mean is a part of the fog's colour, at most one half
+        let own = Vec3::new(0.8, 0.2, 0.4);
+        scene.fogs[0].own_light = own;
+        let part = own.min(Vec3::splat(0.5));
+        let exact = ambient * (1.0 - part) + exact * part / own;
+        let mean = gpu.mean(&scene, &settings, frames);
+        let error = ((mean - exact) / exact).abs().max_element();
+        assert!(error < tolerance, "{mean} {exact}");
+        scene.fogs[0].own_light = Vec3::ZERO;
     }
     // a screen between the light and the fog's nearer half; what glows is not lit
     let wall = scene.material(&[stage::constant([0.0; 3])], 0);
@@ -101,6 +111,7 @@ fn fog_follows_the_way_through_its_volume_with(gpu: &mut Gpu) {
         has_surface: 1,
         color: Vec3::new(0.2, 0.4, 0.6),
         depth: 400.0,
+        own_light: Vec3::ZERO,
     });
     let fog_color = Vec3::new(0.2, 0.4, 0.6);
     let back_shown = displayed(back);
