@@ -178,7 +178,7 @@ pub struct Triangle {
     pub indices: [u32; 3],
     /// Index of the material.
     pub material: u32,
-    /// Index of the instance (entity) it belongs to.
+    /// Index of the instance (entity) it belongs to; with `TRIANGLE_STATIC` the number of its surface in the map.
     pub instance: u32,
     /// Fog volume plus one; 0 none.
     pub fog: u32,
@@ -433,5 +433,7 @@ pub mod constants {
         TRIANGLE_FACES_EYE = 2;
         /// The triangle has an opposite in its plane, and rays that come from its back are left to that.
         TRIANGLE_ONE_SIDED = 4;
+        /// The triangle keeps its shape: its geometry names its instance, and `instance` is the number of its surface.
+        TRIANGLE_STATIC = 8;
     }
 }

@@ -67,7 +67,10 @@ struct DenoiseView {
     uint slope; uint gradient_samples;
 };
 
-struct TransportView { uint64_t filters; uint64_t layers; uint filter_count; uint layer_count; };
+struct TransportView {
+    uint64_t filters; uint64_t layers; uint64_t beyond; uint64_t beyond_surfaces;
+    uint filter_count; uint layer_count; uint beyond_count; uint beyond_surface_count;
+};
 
 struct FlareView { uint64_t flares; uint64_t states; };
 

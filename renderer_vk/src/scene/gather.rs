@@ -226,6 +226,7 @@ impl<'a> Gatherer<'a> {
         out.submodels.clear();
         out.entities.clear();
         out.surfaces.clear();
+        out.potential.clear();
         out.dlights.clear();
         out.dlights.extend_from_slice(self.lights);
         out.portals.clear();
@@ -311,6 +312,7 @@ impl<'a> Gatherer<'a> {
                 }
             }
             Look::Traced => {
+                out.potential.extend_from_slice(&self.visible.surfaces);
                 let deformed = self
                     .visible
                     .surfaces

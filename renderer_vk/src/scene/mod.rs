@@ -236,6 +236,8 @@ pub struct ViewScene {
     pub entities: Vec<ViewEntity>,
     /// Visible surfaces in drawing order (classic look only).
     pub surfaces: Vec<DrawSurface>,
+    /// Numbers of the world's surfaces in the visible set (traced look only): those that show through a sky.
+    pub potential: Vec<u32>,
     /// Static world surfaces that the tracer must not see in the static structure because `meshes` has their
     /// deformed copy are fixed per map (see `world::World::is_deformed`), so they are not listed here.
     pub dlights: Vec<DynamicLight>,
@@ -313,6 +315,7 @@ impl ViewScene {
             submodels: Vec::new(),
             entities: Vec::new(),
             surfaces: Vec::new(),
+            potential: Vec::new(),
             dlights: Vec::new(),
             portals: Vec::new(),
             has_world: false,

@@ -7,8 +7,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::{Vec2, Vec3};
 use shaders::trace_types::SkyRecord;
 use shaders::types::Triangle;
-use shaders::types::constants::{NO_TEXTURE, TRIANGLE_ONE_SIDED, TRIANGLE_WORLD};
+use shaders::types::constants::{NO_TEXTURE, TRIANGLE_ONE_SIDED, TRIANGLE_STATIC, TRIANGLE_WORLD};
 
+use super::beyond_sky::MapSkies;
 use super::bvh::{Aabb, build_triangles};
 use super::cutout::Coverage;
 use super::doubled::doubled;
@@ -73,6 +74,8 @@ pub struct StaticGeometry {
     pub fog_boxes: Vec<Bounds>,
     /// What of it is translucent.
     pub layers: Vec<StaticLayer>,
+    /// Its skies, and what may show through them.
+    pub map_skies: MapSkies,
     /// What lies in the way of light; nothing unless it is put here.
     pub surroundings: Surroundings,
     // kept alive for the structures' triangles
@@ -193,10 +196,10 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
                 grouped.triangles.push(Triangle {
                     indices,
                     material,
-                    instance: 0,
+                    instance: surface.number,
                     fog: surface.fog,
                     lightmap,
-                    flags: TRIANGLE_WORLD | sides | rank_bits(&info),
+                    flags: TRIANGLE_WORLD | TRIANGLE_STATIC | sides | rank_bits(&info),
                 });
             }
         }
@@ -214,17 +217,9 @@ fn layers(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Vec<StaticL
         let (_, info) = materials.info(s.material);
         Kind::of(info.flags) == Some(Kind::Translucent)
     };
-    let layer = |s: &StaticSurface| {
-        let first = s.first_index as usize;
-        let corners = first..first.saturating_add(s.index_count as usize);
-        let corners = scene.indices.get(corners).unwrap_or_default();
-        let vertices = corners
-            .iter()
-            .filter_map(|&i| scene.vertices.get(i as usize));
-        StaticLayer {
-            model: s.model,
-            bounds: bounds_of(vertices),
-        }
+    let layer = |s: &StaticSurface| StaticLayer {
+        model: s.model,
+        bounds: bounds_of(scene.corners(s)),
     };
     scene.surfaces.iter().filter(is_layer).map(layer).collect()
 }
@@ -278,6 +273,7 @@ impl StaticGeometry {
                 })
                 .collect(),
             layers: layers(scene, materials),
+            map_skies: MapSkies::new(scene, materials),
             surroundings: Surroundings::default(),
             triangle_records: triangles,
         })

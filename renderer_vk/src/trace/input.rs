@@ -162,6 +162,8 @@ pub struct StaticSurface {
     pub lightmap: u32,
     /// BSP model: 0 is the world, others are placed by entities.
     pub model: u32,
+    /// Among all surfaces of the map.
+    pub number: u32,
 }
 
 /// A map's geometry that keeps its shape.
@@ -177,6 +179,16 @@ pub struct StaticScene<'a> {
     pub surfaces: Vec<StaticSurface>,
     /// Fog volumes.
     pub fogs: &'a [Fog],
+}
+
+impl StaticScene<'_> {
+    /// The corners of a surface's triangles, three each.
+    pub fn corners(&self, surface: &StaticSurface) -> impl Iterator<Item = &Vertex> {
+        let first = surface.first_index as usize;
+        let range = first..first.saturating_add(surface.index_count as usize);
+        let indices = self.indices.get(range).unwrap_or_default();
+        (indices.iter()).filter_map(|&i| self.vertices.get(i as usize))
+    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! Most rays of the eye meet no translucent layer, and to find that out by a ray costs about a quarter of what the ray for
 //! solids costs. A ray that meets none of these boxes asks for no layers.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use shaders::types::{Instance, Vertex};
 
 use super::geometry::StaticGeometry;
@@ -48,7 +48,7 @@ const EVERYWHERE: Bounds = Bounds {
 };
 
 /// A box where an instance places it, with room for rounding; `None`: nothing is in it.
-fn placed(bounds: &Bounds, instance: &Instance) -> Option<Bounds> {
+pub(super) fn placed(bounds: &Bounds, instance: &Instance) -> Option<Bounds> {
     if !bounds.mins.cmple(bounds.maxs).all() {
         return None;
     }
@@ -65,6 +65,18 @@ fn placed(bounds: &Bounds, instance: &Instance) -> Option<Bounds> {
         mins: middle - reach,
         maxs: middle + reach,
     })
+}
+
+/// Whether rays of a view's pixels may meet a box.
+pub(super) fn may_be_seen(bounds: &Bounds, eye: Vec3, frustum: &[Vec4]) -> bool {
+    // rays go through all of a pixel, also of those on the picture's edge
+    let farthest = (bounds.mins - eye).abs().max((bounds.maxs - eye).abs());
+    let margin = Vec3::splat(0.01 * farthest.max_element());
+    let wide = Bounds {
+        mins: bounds.mins - margin,
+        maxs: bounds.maxs + margin,
+    };
+    !outside(&wide, frustum)
 }
 
 /// The boxes of what is translucent in a view: at most [`MAX_BOXES`], smallest and largest corners. `geometry`: the
@@ -84,14 +96,7 @@ pub fn in_sight(
         let Some(bounds) = placed(bounds, instance) else {
             return;
         };
-        // rays go through all of a pixel, also of those on the picture's edge
-        let farthest = (bounds.mins - eye).abs().max((bounds.maxs - eye).abs());
-        let margin = Vec3::splat(0.01 * farthest.max_element());
-        let wide = Bounds {
-            mins: bounds.mins - margin,
-            maxs: bounds.maxs + margin,
-        };
-        if !outside(&wide, &frustum) {
+        if may_be_seen(&bounds, eye, &frustum) {
             boxes.push([bounds.mins, bounds.maxs]);
         }
     };

@@ -79,19 +79,21 @@ fn static_scene<'a>(world: &'a World, fogs: &'a [Fog]) -> StaticScene<'a> {
     let surfaces = data
         .surfaces
         .iter()
-        .filter(|s| s.index_count > 0 && !s.deformed);
+        .zip(0..)
+        .filter(|(s, _)| s.index_count > 0 && !s.deformed);
     StaticScene {
         vertices: &data.vertices,
         vertex_address: world.vertex_buffer.address(),
         indices: &data.indices,
         surfaces: surfaces
-            .map(|s| StaticSurface {
+            .map(|(s, number)| StaticSurface {
                 first_index: s.first_index,
                 index_count: s.index_count,
                 material: s.material,
                 fog: s.fog,
                 lightmap: s.lightmap,
                 model: s.model,
+                number,
             })
             .collect(),
         fogs,

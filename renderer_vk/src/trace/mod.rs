@@ -11,6 +11,7 @@
 
 pub mod accel;
 pub mod antialias;
+pub mod beyond_sky;
 pub mod bloom;
 pub mod bvh;
 mod cell_grid;

@@ -39,10 +39,18 @@ pub struct TransportView {
     pub filters: u64,
     /// Boxes around what is translucent in sight of the eye, likewise.
     pub layers: u64,
+    /// Boxes around what may show through a sky, likewise.
+    pub beyond: u64,
+    /// One bit for each surface of the world: it may show through a sky.
+    pub beyond_surfaces: u64,
     /// Number of `filters`.
     pub filter_count: u32,
     /// Number of `layers`; all ones: anything may be anywhere.
     pub layer_count: u32,
+    /// Number of `beyond`.
+    pub beyond_count: u32,
+    /// Number of bits in `beyond_surfaces`.
+    pub beyond_surface_count: u32,
 }
 
 /// The flares of a view.

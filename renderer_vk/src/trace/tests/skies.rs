@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use shaders::trace_types::SkyRecord;
 use shaders::types::constants as c;
 
-use super::harness::{Gpu, Scene, encode, reference, stage};
+use super::harness::{Gpu, Scene, encode, identity, rectangle, reference, stage};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::scene::Sun;
 use crate::settings::Settings;
@@ -145,4 +145,68 @@ fn the_sun_is_a_square_in_its_direction_with(gpu: &mut Gpu) {
         }
     }
     assert!(inside > 100 && inside < SIZE * SIZE / 2, "{inside}");
+}
+
+#[test]
+fn what_the_visible_set_holds_shows_through_a_sky() {
+    Gpu::each(what_the_visible_set_holds_shows_through_a_sky_with);
+}
+
+fn what_the_visible_set_holds_shows_through_a_sky_with(gpu: &mut Gpu) {
+    const SIZE: usize = 16;
+    let colors = [
+        [0.0, 0.0, 0.4],
+        [0.6, 0.2, 0.2],
+        [0.2, 0.6, 0.2],
+        [0.8, 0.0, 0.8],
+    ];
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 60.0, SIZE as i32);
+    let record = SkyRecord {
+        faces: [c::NO_TEXTURE; 6],
+        cloud_height: HEIGHT,
+    };
+    let blue = scene.sky(&[stage::constant(colors[0])], record);
+    let [red, green, violet] = [1, 2, 3].map(|i| scene.material(&[stage::constant(colors[i])], 0));
+    // faces the eye, `half` to each side
+    let wall = |x: f32, half: f32| {
+        let edge = 2.0 * half;
+        rectangle(Vec3::new(x, -half, -half), Vec3::Z * edge, Vec3::Y * edge)
+    };
+    // the second surface of the map and the third, in front of it, behind the first two, which are sky
+    scene.quad(wall(100.0, 500.0), blue);
+    scene.quad(wall(110.0, 500.0), blue);
+    scene.quad(wall(200.0, 40.0), red);
+    scene.quad(wall(150.0, 60.0), violet);
+    scene.mesh(wall(300.0, 100.0), green, identity());
+    let settings = Settings {
+        rt_antialiasing: false,
+        ..reference()
+    };
+    // colours in the middle of the picture, outside of the red wall, and outside of the green one
+    for (potential, shown) in [
+        (&[0u32, 1, 2, 3][..], [3, 3, 0]),
+        (&[0, 1, 2], [1, 2, 0]),
+        (&[0, 1], [2, 2, 0]),
+        // nothing of the sky is known to be in sight
+        (&[2, 3], [0, 0, 0]),
+    ] {
+        let (pixels, _) = gpu.render_views(&scene, &settings, 1, |_, view| {
+            view.potential = potential.to_vec();
+        });
+        for (x, color) in [8, 11, 15].into_iter().zip(shown) {
+            let found = pixels[SIZE / 2 * SIZE + x].to_array().map(encode);
+            let differs = found
+                .iter()
+                .zip(colors[color])
+                .any(|(a, b)| (a - b).abs() > 0.01);
+            assert!(!differs, "{potential:?} at {x}: {found:?}, not {color}");
+        }
+    }
+    // what moves shows behind a sky alone as well, where it has a face to the eye
+    let (pixels, _) = gpu.render_views(&scene, &settings, 1, |_, view| {
+        view.potential = vec![0, 1, 2];
+        view.meshes.clear();
+    });
+    let found = pixels[SIZE / 2 * SIZE + 11].to_array().map(encode);
+    assert!((found[2] - colors[0][2]).abs() < 0.01, "{found:?}");
 }

@@ -56,6 +56,7 @@ pub(super) fn content_hash(
         (submodel.model, submodel.instance).hash(&mut hasher);
     }
     view.has_world.hash(&mut hasher);
+    view.potential.hash(&mut hasher);
     materials.generation().hash(&mut hasher);
     (
         settings.rt_max_depth,

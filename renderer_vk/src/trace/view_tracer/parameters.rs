@@ -14,6 +14,7 @@ use crate::raster::FlareTest;
 use crate::scene::{SUN_SIZE, ViewScene, perpendicular};
 use crate::settings::Settings;
 use crate::trace::accel::AccelOutput;
+use crate::trace::beyond_sky::Beyond;
 use crate::trace::input::MaterialTable;
 use crate::trace::layer_boxes::in_sight;
 
@@ -65,6 +66,12 @@ impl ViewTracer {
             let count = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
             (rec.arena().push(&boxes)?, count)
         };
+        let lens = if settings.rt_dof {
+            settings.rt_aperture
+        } else {
+            0.0
+        };
+        let beyond = Beyond::of(view, eye, lens, map.map(|m| m.geometry), materials);
         Ok(TraceView {
             geometries: accel.geometries,
             instances: accel.instances,
@@ -112,6 +119,10 @@ impl ViewTracer {
             transport: TransportView {
                 layers,
                 layer_count,
+                beyond: rec.arena().push(&beyond.boxes)?,
+                beyond_surfaces: rec.arena().push(&beyond.surfaces)?,
+                beyond_count: u32::try_from(beyond.boxes.len()).unwrap_or(u32::MAX),
+                beyond_surface_count: u32::try_from(32 * beyond.surfaces.len()).unwrap_or(u32::MAX),
                 ..map.map_or_else(Default::default, |m| m.geometry.surroundings.view())
             },
             eye_absorption: map.map_or(Vec3::ZERO, |m| {

@@ -166,6 +166,7 @@ impl Scene {
             fog: 0,
             lightmap: c::NO_TEXTURE,
             model: 0,
+            number: self.surfaces.len() as u32,
         });
     }
 
@@ -248,6 +249,7 @@ impl Scene {
             submodels: self.submodels.clone(),
             entities: self.entities.clone(),
             surfaces: Vec::new(),
+            potential: (0..self.surfaces.len() as u32).collect(),
             dlights: self.dlights.clone(),
             portals: self.portals.clone(),
             has_world: true,
