@@ -6,10 +6,15 @@
 #include "trace/boxes.glsl"
 #include "trace/geometry.glsl"
 
+// What lies less far behind a sky, units along the ray, is taken for a part of it.
+const float IN_SKY = 0.25;
+
 // Whether a ray that meets a sky at `t` may meet something behind it that shows.
 bool meets_beyond_sky(vec3 origin, vec3 direction, float t) {
     uint count = VIEW.transport.beyond_count;
-    return count > 0 && meets_box(Boxes(VIEW.transport.beyond), count, origin + direction * t, direction, FAR);
+    // a box that ends at the sky is before it
+    vec3 start = origin + direction * (t + IN_SKY + 1.0e-5 * t);
+    return count > 0 && meets_box(Boxes(VIEW.transport.beyond), count, start, direction, FAR);
 }
 
 // Whether the visible set holds the surface of a point. What moves is in sight wherever the game has put it there.

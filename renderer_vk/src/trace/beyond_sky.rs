@@ -178,7 +178,10 @@ impl Beyond {
         }
         let mut beyond = Self::default();
         let skies = skies_in_sight(map, view, world, eye, lens);
-        let is_hidden = |bounds: &Bounds| skies.iter().any(|sky| sky.hides(bounds, eye));
+        let frustum = view.view.frustum();
+        let is_hidden = |bounds: &Bounds| {
+            may_be_seen(bounds, eye, &frustum) && skies.iter().any(|sky| sky.hides(bounds, eye))
+        };
         if skies.is_empty() {
             return beyond;
         }
