@@ -9,7 +9,7 @@ use super::columns::{self, Column, Lamp, Source, point_rows, sun_rows};
 use super::ends::pieces_of;
 use super::fit::Fit;
 use super::samples::{self, Gauge, Sample, Taking};
-use super::texels::{self, TexelId};
+use super::texels::{self, Texel, TexelId};
 use super::{Occluders, Purpose, parallel, said, splash};
 use crate::world::RelitWorld;
 use glam::Vec3;
@@ -54,13 +54,14 @@ fn directions(count: usize) -> impl Iterator<Item = Vec3> {
 }
 
 /// Measurements of texels that are seen from a place within [`NEAR`], by about so many rays, each once: of those that are wanted
-/// and tell how bright it is there. What is not is not measured.
+/// and tell how bright it is there. What is not is not measured. `measure` gets the triangle, too: surfaces may share a texel.
 pub(super) fn around(
     gauge: &Gauge<'_>,
     of_triangle: &[u32],
     origin: Vec3,
     rays: usize,
     wanted: impl Fn(&TexelId) -> bool,
+    mut measure: impl FnMut(Texel, usize) -> Option<Sample>,
 ) -> Vec<(TexelId, Sample)> {
     let mut taken = HashSet::new();
     let look = |ray: Vec3| {
@@ -76,7 +77,7 @@ pub(super) fn around(
         if stored.saturated() || stored.lone_black() || taken.contains(&id) || !wanted(&id) {
             return None;
         }
-        let sample = texel.measured(gauge)?;
+        let sample = measure(texel, triangle)?;
         taken.insert(id);
         Some((id, sample))
     };
@@ -95,7 +96,18 @@ impl Fit<'_> {
         let per_light = parallel::map(&placed, |_, &(lamp, _)| {
             let usable =
                 |id: &TexelId| !samples::is_held_out(gauge.seed, id) && !self.beside.contains(id);
-            let found = around(&gauge, &self.of_triangle, lamp.origin, LOOKS, usable);
+            let mut new = Vec::new();
+            let measure = |texel: Texel, triangle| {
+                let key = (texel.id, triangle as u32);
+                let known = self.looked_at.get(&key).copied();
+                known.unwrap_or_else(|| {
+                    let sample = texel.measured(&gauge);
+                    new.push((key, sample));
+                    sample
+                })
+            };
+            let (of_triangle, origin) = (&self.of_triangle, lamp.origin);
+            let found = around(&gauge, of_triangle, origin, LOOKS, usable, measure);
             let samples: Vec<Sample> = found.iter().map(|(_, s)| *s).collect();
             let given = given_by(self.world, self.occluders, &samples, &placed, self.least);
             let mut bright: Vec<(f32, TexelId, Sample)> = found
@@ -106,15 +118,18 @@ impl Fit<'_> {
                 .collect();
             bright.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
             bright.truncate(MOST);
-            bright
+            (bright, new)
         });
         let mut more = Vec::new();
-        for (_, id, sample) in per_light.into_iter().flatten() {
-            if self.beside.insert(id) {
-                more.push(Sample {
-                    trust: TRUST,
-                    ..sample
-                });
+        for (bright, new) in per_light {
+            self.looked_at.extend(new);
+            for (_, id, sample) in bright {
+                if self.beside.insert(id) {
+                    more.push(Sample {
+                        trust: TRUST,
+                        ..sample
+                    });
+                }
             }
         }
         if more.is_empty() {
@@ -231,7 +246,9 @@ pub fn spots(world: &RelitWorld) -> Spots {
         })
         .collect();
     let found = parallel::map(&lights, |_, &(lamp, _)| {
-        let found = around(&gauge, &of_triangle, lamp.origin, COUNTED, |_| true);
+        let measure = |texel: Texel, _| texel.measured(&gauge);
+        let every = |_: &TexelId| true;
+        let found = around(&gauge, &of_triangle, lamp.origin, COUNTED, every, measure);
         let samples: Vec<Sample> = found.iter().map(|(_, s)| *s).collect();
         let given = given_by(world, &occluders, &samples, &lights, world.light_end);
         let bright = samples.iter().zip(given);

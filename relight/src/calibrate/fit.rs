@@ -16,7 +16,7 @@ use super::{Occluders, Purpose, suns, views};
 use crate::exposure::{self, Exposure, Place};
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::Vec3;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// Most times that lights are looked for.
@@ -108,6 +108,8 @@ pub(super) struct Fit<'a> {
     pub samples: Vec<Sample>,
     /// Texels that joined them, beside lights that were put in.
     pub beside: HashSet<TexelId>,
+    /// What was measured beside lights before, by texel and triangle.
+    pub looked_at: HashMap<(TexelId, u32), Option<Sample>>,
     /// Where texels, or what tells in their place, are measured.
     pub measured: Measured,
     pub transfer: Transfer,

@@ -80,7 +80,7 @@ use memory::{Looked, Memory};
 use nodes::Measured;
 use samples::Taking;
 use std::cell::Cell;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
@@ -289,6 +289,7 @@ fn find(
         of_triangle: bounce::surfaces_of_triangles(world),
         taking,
         beside: HashSet::new(),
+        looked_at: HashMap::new(),
         tried: memory.tried(&looked),
         fronts: Fronts::new(samples.len()),
         rounds: Vec::new(),
@@ -342,7 +343,9 @@ fn find(
     progress(1.0);
     solution.report.after = fit.agreement();
     solution.overall = fit.agreement_overall();
-    solution.exposure = fit.exposure();
+    if thorough {
+        solution.exposure = fit.exposure();
+    }
     solution.rounds = std::mem::take(&mut fit.rounds);
     let (columns, splashes) = (fit.columns, fit.splashes);
     solution.splashes = vec![Vec3::ZERO; splashes.len()];

@@ -1,11 +1,21 @@
 //! Work spread over the processor's cores. Threads end before the call does.
 
+use std::sync::{Mutex, OnceLock};
+
+/// Pieces for each thread, taken as threads get free: items differ in cost.
+const PIECES: usize = 32;
+
+/// How many threads work. The system is asked once: that takes as long as little work does.
+fn threads() -> usize {
+    static THREADS: OnceLock<usize> = OnceLock::new();
+    *THREADS.get_or_init(|| std::thread::available_parallelism().map_or(1, usize::from))
+}
+
 /// `f` of every item, in order. The result does not depend on the number of threads.
 pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(usize, &T) -> R + Sync) -> Vec<R> {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    // Several pieces for each thread, taken as threads get free: items differ in cost.
-    let piece = items.len().div_ceil(threads * 8).max(1);
-    let queue = std::sync::Mutex::new(items.chunks(piece).enumerate());
+    let threads = threads();
+    let piece = items.len().div_ceil(threads * PIECES).max(1);
+    let queue = Mutex::new(items.chunks(piece).enumerate());
     let work = || {
         let mut done = Vec::new();
         loop {
@@ -42,6 +52,28 @@ pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(usize, &T) -> R + Sy
     pieces.into_iter().flat_map(|(_, r)| r).collect()
 }
 
+/// Does `f` to every item.
+pub(crate) fn each<T: Send>(items: &mut [T], f: impl Fn(&mut T) + Sync) {
+    let threads = threads();
+    let piece = items.len().div_ceil(threads * PIECES).max(1);
+    if threads == 1 || items.len() <= piece {
+        return items.iter_mut().for_each(f);
+    }
+    let queue = Mutex::new(items.chunks_mut(piece));
+    let work = || {
+        let next = || queue.lock().ok().and_then(|mut queue| queue.next());
+        while let Some(chunk) = next() {
+            chunk.iter_mut().for_each(&f);
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(work);
+        }
+        work();
+    });
+}
+
 #[cfg(test)]
 mod tests {
     #[test]
@@ -51,5 +83,13 @@ mod tests {
         assert!(doubled.iter().enumerate().all(|(i, d)| *d == 2 * i));
         assert_eq!(doubled.len(), 1000);
         assert!(super::map(&[0u8; 0], |i, _| i).is_empty());
+    }
+
+    #[test]
+    fn reaches_every_item_once() {
+        let mut items: Vec<usize> = (0..1000).collect();
+        super::each(&mut items, |item| *item += 1);
+        assert!(items.iter().enumerate().all(|(i, item)| *item == i + 1));
+        super::each(&mut [0u8; 0], |_| panic!("there is none"));
     }
 }

@@ -245,6 +245,16 @@ impl<'a> Gauge<'a> {
             seed: taking.seed,
         }
     }
+
+    /// Takes what the compiler's dirt did out of a measurement at a [place](sample_at): it was made as dark as that.
+    pub fn clean(&self, sample: &mut Sample) {
+        let Some(dirt) = self.dirt else {
+            return;
+        };
+        sample.part = dirt.part_stored(self.occluders, sample.position, sample.normal);
+        sample.value /= sample.part;
+        sample.floor /= sample.part;
+    }
 }
 
 /// How measurements are taken.
@@ -325,7 +335,8 @@ pub(super) fn is_held_out(seed: u64, name: &[u32]) -> bool {
     random::lot(seed, name) * (HELD_OUT as f32) < 1.0
 }
 
-/// A measurement at a place, unless the place is outside of the map or inside of something.
+/// A measurement at a place, unless the place is outside of the map or inside of something. It is yet to be
+/// [cleaned](Gauge::clean).
 pub(super) fn sample_at(
     gauge: &Gauge<'_>,
     (on, normal): (Vec3, Vec3),
@@ -343,28 +354,27 @@ pub(super) fn sample_at(
     // What is seen from behind all around is something that this place is inside of.
     let (u, v) = normal.any_orthonormal_pair();
     let around = [normal, normal + u, normal - u, normal + v, normal - v];
-    let backs = around
-        .into_iter()
-        .filter_map(|ray| occluders.nearest(position, ray, f32::INFINITY))
-        .filter(|hit| !hit.front && !hit.sky);
-    if backs.count() > around.len() / 2 {
+    let is_back = |ray: &Vec3| {
+        let hit = occluders.nearest(position, *ray, f32::INFINITY);
+        hit.is_some_and(|hit| !hit.front && !hit.sky)
+    };
+    let most = around.len().div_ceil(2);
+    let open = around.iter().filter(|ray| !is_back(ray));
+    if open.take(most).count() < most {
         return None;
     }
-    let part = gauge
-        .dirt
-        .map_or(1.0, |d| d.part_stored(occluders, position, normal));
     Some(Sample {
         site: Site::Surface,
         position,
         normal,
-        value: stored.light(world) / part,
+        value: stored.light(world),
         shown: stored.shown(),
         bounce: Vec3::ZERO,
         cluster,
         material,
         saturated: stored.saturated(),
-        part,
-        floor: floor(world) / part,
+        part: 1.0,
+        floor: floor(world),
         trust: if stored.lone_black() {
             TRUST_IN_BLACK
         } else {

@@ -120,9 +120,7 @@ pub(super) fn solve(
     let mut state = residual(samples, columns, ambient.value);
     for round in 0..effort.rounds {
         if least > 0.0 {
-            for column in columns.iter_mut() {
-                column.end_at(least);
-            }
+            parallel::each(columns, |column| column.end_at(least));
         }
         if round > 0 {
             state = residual(samples, columns, ambient.value);
@@ -153,9 +151,7 @@ pub(super) fn solve(
         }
     }
     if least > 0.0 {
-        for column in columns.iter_mut() {
-            column.end_at(least);
-        }
+        parallel::each(columns, |column| column.end_at(least));
     }
     residual(samples, columns, ambient.value)
 }

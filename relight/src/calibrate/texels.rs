@@ -1,5 +1,6 @@
 //! Texels of lightmaps as measurements: where in space they lie, and what they store.
 
+use super::parallel;
 use super::random::Random;
 use super::samples::{Gauge, HELD_OUT, Sample, decode, is_held_out, sample_at, shown, tells};
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
@@ -135,7 +136,7 @@ pub(super) fn take(
             if !taken.insert(found.id) {
                 continue;
             }
-            if let Some(sample) = found.measured(gauge) {
+            if let Some(sample) = found.sample(gauge) {
                 samples.push(sample);
                 break;
             }
@@ -145,6 +146,7 @@ pub(super) fn take(
         let dark = |s: &Sample| s.value == Vec3::ZERO;
         samples.retain(|s| s.held_out || !dark(s) || random.next() * BLACK_THINNED < 1.0);
     }
+    parallel::each(&mut samples, |sample| gauge.clean(sample));
     samples
 }
 
@@ -163,6 +165,13 @@ pub(super) struct Texel {
 impl Texel {
     /// What it tells; `None` where nothing can be measured.
     pub fn measured(self, gauge: &Gauge<'_>) -> Option<Sample> {
+        let mut sample = self.sample(gauge)?;
+        gauge.clean(&mut sample);
+        Some(sample)
+    }
+
+    /// The same, yet to be cleaned.
+    fn sample(self, gauge: &Gauge<'_>) -> Option<Sample> {
         let mut sample = sample_at(gauge, self.place, self.material, self.stored)?;
         sample.held_out = is_held_out(gauge.seed, &self.id);
         Some(sample)

@@ -1,5 +1,6 @@
 //! Light at the vertices of surfaces that have no lightmap, as measurements.
 
+use super::parallel;
 use super::random::Random;
 use super::samples::{Gauge, Sample, pick, sample_at, tells};
 use super::texels::Stored;
@@ -33,8 +34,13 @@ pub(super) fn take(gauge: &Gauge<'_>, count: usize, random: &mut Random) -> Vec<
             (place, surface.material, Stored::alone([r, g, b]))
         }));
     }
-    pick(all.len(), count, random)
-        .filter_map(|i| all.get(i))
-        .filter_map(|&(place, material, stored)| sample_at(gauge, place, material, stored))
-        .collect()
+    let chosen: Vec<_> = (pick(all.len(), count, random))
+        .filter_map(|i| all.get(i).copied())
+        .collect();
+    let found = parallel::map(&chosen, |_, &(place, material, stored)| {
+        let mut sample = sample_at(gauge, place, material, stored)?;
+        gauge.clean(&mut sample);
+        Some(sample)
+    });
+    found.into_iter().flatten().collect()
 }
