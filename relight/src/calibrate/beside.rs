@@ -9,6 +9,7 @@ use super::columns::{self, Column, Lamp, Source, point_rows, sun_rows};
 use super::ends::pieces_of;
 use super::fit::Fit;
 use super::samples::{self, Gauge, Sample, Taking};
+use super::spread::Spread;
 use super::texels::{self, Texel, TexelId};
 use super::{Occluders, Purpose, parallel, said, splash};
 use crate::world::RelitWorld;
@@ -145,8 +146,9 @@ impl Fit<'_> {
         let first = self.samples.len() as u32;
         let mut known = columns::known(world, occluders, more, silent).into_iter();
         let splashes = splash::columns(world, occluders, more, &self.splashes, &[]);
+        let spread = Spread::new(more);
         for column in &mut self.columns {
-            let rows = |lamp| point_rows(&world.bsp, occluders, more, lamp, None, f32::INFINITY);
+            let rows = |lamp| point_rows(&world.bsp, occluders, &spread, lamp, None, f32::INFINITY);
             let (rows, pieces) = match column.source {
                 Source::Group(..) | Source::Entity(_) | Source::Sun(_) => match known.next() {
                     Some(found) => (found.rows, found.pieces),
@@ -202,6 +204,7 @@ fn given_by(
     let Some(first) = samples.first() else {
         return sums;
     };
+    let spread = Spread::new(samples);
     for &(lamp, strength) in lights {
         // what gives less than a part of what is stored does not make it too bright
         let power = samples::mean(strength);
@@ -209,7 +212,7 @@ fn given_by(
         if lamp.origin.distance(first.position) > reach + NEAR * 2.0 {
             continue;
         }
-        let rows = point_rows(&world.bsp, occluders, samples, lamp, None, f32::INFINITY);
+        let rows = point_rows(&world.bsp, occluders, &spread, lamp, None, f32::INFINITY);
         for (i, a) in rows {
             let ends = strength.max_element() * a <= least;
             if let Some(sum) = sums.get_mut(i as usize).filter(|_| !ends) {

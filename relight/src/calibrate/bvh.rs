@@ -7,13 +7,11 @@ mod build;
 #[cfg(test)]
 mod tests;
 
+use super::fours::{Four, WIDE, at, cross, dot, four, lanes, splat, sub};
 use crate::world::Holes;
 use build::Binary;
 use glam::{Vec2, Vec3, Vec4};
 use std::sync::Arc;
-
-/// Triangles of a leaf, and children of a node.
-const WIDE: usize = 4;
 
 /// Nodes of a walk that are kept without taking from the heap: more than maps need as a rule.
 const STACK: usize = 48;
@@ -52,9 +50,6 @@ pub(crate) struct CutOut {
     /// Where its material is there.
     pub holes: Arc<Holes>,
 }
-
-/// Four vectors, an axis at a time.
-type Four = [Vec4; 3];
 
 /// The boxes of a node's children.
 struct Node {
@@ -95,7 +90,6 @@ struct Ray {
 
 impl Ray {
     fn new(from: Vec3, way: Vec3) -> Ray {
-        let splat = |v: Vec3| v.to_array().map(Vec4::splat);
         let inverse = way.recip().clamp(-STEEPEST, STEEPEST);
         Ray {
             from: splat(from),
@@ -435,7 +429,7 @@ impl Leaf {
         let p = cross(&ray.way, &self.e2);
         let determinant = dot(&self.e1, &p);
         let inverse = 1.0 / determinant;
-        let s = [0, 1, 2].map(|k| ray.from[k] - self.a[k]);
+        let s = sub(&ray.from, &self.a);
         let u = dot(&s, &p) * inverse;
         let q = cross(&s, &self.e1);
         let v = dot(&ray.way, &q) * inverse;
@@ -455,41 +449,4 @@ impl Leaf {
             determinant,
         }
     }
-}
-
-/// The bits of a mask.
-fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = mask.trailing_zeros();
-        mask &= mask.wrapping_sub(1);
-        (lane < WIDE as u32).then_some(lane as usize)
-    })
-}
-
-/// Up to four vectors; zero for those that are not there.
-fn four(vectors: impl Iterator<Item = Vec3>) -> Four {
-    let mut axes = [Vec4::ZERO; 3];
-    for (lane, vector) in vectors.take(WIDE).enumerate() {
-        for (axis, value) in axes.iter_mut().zip(vector.to_array()) {
-            axis[lane] = value;
-        }
-    }
-    axes
-}
-
-/// One of four vectors.
-fn at(four: &Four, lane: usize) -> Vec3 {
-    Vec3::from(four.map(|axis| axis[lane]))
-}
-
-fn dot(a: &Four, b: &Four) -> Vec4 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: &Four, b: &Four) -> Four {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
 }

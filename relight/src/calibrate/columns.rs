@@ -8,6 +8,7 @@ use super::ends::{Given, Heap, Piece, pieces_of};
 use super::parallel;
 use super::random::Random;
 use super::samples::{Sample, Site};
+use super::spread::{NEAREST, Spread};
 use crate::light::{EmissionSource, EmitterSummary, Falloff, LightRef, Spot, TriangleLight};
 use crate::world::RelitWorld;
 use glam::Vec3;
@@ -81,7 +82,7 @@ pub(super) fn unshadowed(sample: &Sample, lamp: Lamp, spot: Option<&Spot>) -> f3
     let offset = lamp.origin - sample.position;
     let squared = offset.length_squared();
     let cosine = sample.normal.dot(offset);
-    if cosine <= 0.0 || squared < 1.0 {
+    if cosine <= 0.0 || squared < NEAREST {
         return 0.0;
     }
     let cone = spot.map_or(1.0, |spot| {
@@ -107,20 +108,20 @@ pub(super) fn unshadowed(sample: &Sample, lamp: Lamp, spot: Option<&Spot>) -> f3
 pub(super) fn point_rows(
     bsp: &Bsp,
     occluders: &Occluders,
-    samples: &[Sample],
+    spread: &Spread<'_>,
     lamp: Lamp,
     spot: Option<&Spot>,
     range: f32,
 ) -> Vec<(u32, f32)> {
     // Samples that follow each other are neighbours as a rule, and in the shadow of the same triangle.
-    rows_again(bsp, occluders, samples, lamp, (spot, range), &mut [None])
+    rows_again(bsp, occluders, spread, lamp, (spot, range), &mut [None])
 }
 
 /// [`point_rows`], asking first what stopped earlier rays: `stopped` has a place for each sample, or for so many that take turns.
 pub(super) fn rows_again(
     bsp: &Bsp,
     occluders: &Occluders,
-    samples: &[Sample],
+    spread: &Spread<'_>,
     lamp: Lamp,
     (spot, range): (Option<&Spot>, f32),
     stopped: &mut [Option<u32>],
@@ -129,19 +130,16 @@ pub(super) fn rows_again(
     let origin = lamp.origin;
     let cluster = bsp.cluster_at(origin);
     let mut rows = Vec::new();
-    for (i, sample) in (0u32..).zip(samples) {
-        if sample.position.distance_squared(origin) > range * range {
+    for (i, sample) in spread.facing(origin, range) {
+        if !bsp.cluster_sees(cluster, sample.cluster) && !bsp.cluster_sees(sample.cluster, cluster)
+        {
             continue;
         }
         let light = unshadowed(sample, lamp, spot);
         let Some(last) = stopped.get_mut(i as usize % places) else {
             continue;
         };
-        if light > 0.0
-            && (bsp.cluster_sees(cluster, sample.cluster)
-                || bsp.cluster_sees(sample.cluster, cluster))
-            && !occluders.blocked_again(origin, sample.position, last)
-        {
+        if light > 0.0 && !occluders.blocked_again(origin, sample.position, last) {
             rows.push((i, light));
         }
     }
@@ -211,6 +209,7 @@ pub(super) fn known(
             }
         }
     }
+    let spread = Spread::new(samples);
     let points: Vec<u32> = (0..world.point_lights.len() as u32).collect();
     let rows = parallel::map(&points, |_, &index| {
         world
@@ -221,7 +220,7 @@ pub(super) fn known(
                 point_rows(
                     &world.bsp,
                     occluders,
-                    samples,
+                    &spread,
                     Lamp {
                         origin: light.origin,
                         falloff: light.falloff,

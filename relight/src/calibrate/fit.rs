@@ -11,6 +11,7 @@ use super::report::Agreement;
 use super::samples::{Sample, Site, Taking, light_of, mean};
 use super::solve::{self, Ambient, Effort};
 use super::splash::Splashes;
+use super::spread::Spread;
 use super::texels::TexelId;
 use super::{Occluders, Purpose, suns, views};
 use crate::exposure::{self, Exposure, Place};
@@ -268,7 +269,7 @@ impl Fit<'_> {
             let scene = Scene {
                 world: self.world,
                 occluders: self.occluders,
-                samples: &self.samples,
+                spread: Spread::new(&self.samples),
                 measured: &self.measured,
                 of_triangle: &self.of_triangle,
                 candidates,

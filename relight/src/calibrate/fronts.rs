@@ -7,6 +7,7 @@ use super::parallel;
 use super::place::{RANGE, Scene, lamp};
 use super::samples::{self, mean};
 use super::solve::Residual;
+use super::spread::Spread;
 use glam::Vec3;
 use std::collections::HashMap;
 
@@ -42,23 +43,25 @@ impl Fronts {
     /// Columns of lights in front of what stays unexplained, the worst first; such as reach nothing are left out.
     pub fn candidates(&mut self, scene: &Scene<'_>, state: &Residual) -> Vec<Column> {
         let places = places(scene, state);
-        let (first, more) = scene.samples.split_at(self.first.min(scene.samples.len()));
-        let rows = |samples, at| {
+        let samples = scene.spread.samples;
+        let (first, more) = samples.split_at(self.first.min(samples.len()));
+        let rows = |spread: &Spread<'_>, at| {
             let (bsp, occluders) = (&scene.world.bsp, scene.occluders);
-            point_rows(bsp, occluders, samples, lamp(at), None, RANGE)
+            point_rows(bsp, occluders, spread, lamp(at), None, RANGE)
         };
+        let (first_spread, more_spread) = (Spread::new(first), Spread::new(more));
         let new: Vec<Vec3> = (places.iter().copied())
             .filter(|at| !self.seen.contains_key(&key(*at)))
             .collect();
         let found = parallel::map(&new, |_, &at| Front {
-            rows: rows(first, at),
+            rows: rows(&first_spread, at),
             limit: scene.limit(lamp(at)),
         });
         self.seen.extend(new.into_iter().map(key).zip(found));
         let columns = parallel::map(&places, |_, &at| {
             let front = self.seen.get(&key(at))?;
             let after = |(i, a)| (first.len() as u32 + i, a);
-            let joined = rows(more, at).into_iter().map(after);
+            let joined = rows(&more_spread, at).into_iter().map(after);
             let rows: Vec<(u32, f32)> = front.rows.iter().copied().chain(joined).collect();
             (!rows.is_empty()).then(|| scene.limited(lamp(at), rows, Vec3::ZERO, front.limit))
         });
@@ -68,8 +71,7 @@ impl Fronts {
 
 /// Places in front of bright samples that are not explained, the worst first.
 fn places(scene: &Scene<'_>, state: &Residual) -> Vec<Vec3> {
-    let mut worst: Vec<(f32, usize)> = scene
-        .samples
+    let mut worst: Vec<(f32, usize)> = (scene.spread.samples)
         .iter()
         .zip(&state.rest)
         .enumerate()
@@ -79,7 +81,7 @@ fn places(scene: &Scene<'_>, state: &Residual) -> Vec<Vec3> {
         .collect();
     worst.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let fronts = worst.into_iter().flat_map(|(_, i)| {
-        let sample = scene.samples.get(i);
+        let sample = scene.spread.samples.get(i);
         DISTANCES.into_iter().filter_map(move |distance| {
             let sample = sample?;
             Some((sample.position, sample.position + sample.normal * distance))

@@ -39,6 +39,7 @@ mod compiler;
 mod crossings;
 mod ends;
 mod fit;
+mod fours;
 mod fronts;
 mod memory;
 mod nodes;
@@ -53,6 +54,7 @@ pub(crate) mod samples;
 mod skies;
 mod solve;
 mod splash;
+mod spread;
 mod suns;
 #[cfg(test)]
 mod tests;

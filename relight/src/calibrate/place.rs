@@ -14,6 +14,7 @@ use super::nodes::Measured;
 use super::parallel;
 use super::samples::{self, Sample, mean};
 use super::solve::{Ambient, Effort, Residual, norm, residual, solve};
+use super::spread::Spread;
 use super::texels;
 use crate::light::Falloff;
 use crate::world::RelitWorld;
@@ -69,7 +70,7 @@ pub(super) fn lamp(origin: Vec3) -> Lamp {
 pub(super) struct Scene<'a> {
     pub world: &'a RelitWorld,
     pub occluders: &'a Occluders,
-    pub samples: &'a [Sample],
+    pub spread: Spread<'a>,
     /// Where these are.
     pub measured: &'a Measured,
     /// For every triangle, the surface that it is of.
@@ -84,23 +85,15 @@ pub(super) struct Scene<'a> {
 
 impl Scene<'_> {
     fn rows(&self, lamp: Lamp, range: f32) -> Vec<(u32, f32)> {
-        let samples = self.samples;
-        point_rows(&self.world.bsp, self.occluders, samples, lamp, None, range)
+        let bsp = &self.world.bsp;
+        point_rows(bsp, self.occluders, &self.spread, lamp, None, range)
     }
 
     /// Samples used for fitting that a light of this intensity may matter to when it moves by up to `margin`; evenly
     /// thinned when they are many.
     fn influenced(&self, origin: Vec3, intensity: f32, margin: f32) -> Vec<u32> {
-        let all: Vec<u32> = (0u32..)
-            .zip(self.samples)
-            .filter(|(_, s)| {
-                let least = (s.level() + s.floor) * (INFLUENCE * PI);
-                let distance = (s.position.distance(origin) - margin).max(1.0);
-                let before = (origin - s.position).dot(s.normal) > -margin;
-                !s.held_out && before && intensity > least * distance * distance
-            })
-            .map(|(i, _)| i)
-            .collect();
+        let all = (self.spread).within_reach(origin, intensity, margin, INFLUENCE * PI);
+        let all: Vec<u32> = all.collect();
         let judges = all.len().min(JUDGES);
         (0..judges)
             .filter_map(|k| all.get(k * all.len() / judges.max(1)).copied())
@@ -245,7 +238,7 @@ pub(super) fn in_front(
     ambient: &mut Ambient,
     spacing: f32,
 ) {
-    let state = residual(scene.samples, columns, ambient.value);
+    let state = residual(scene.spread.samples, columns, ambient.value);
     let candidates = fronts.candidates(scene, &state);
     choose(scene, columns, fixed, ambient, (candidates, spacing * 0.5));
 }
@@ -266,7 +259,7 @@ fn choose(
         sparsity: 0.5,
         anew: false,
     };
-    let state = solve(scene.samples, columns, ambient, sparse, scene.least);
+    let state = solve(scene.spread.samples, columns, ambient, sparse, scene.least);
     let mut chosen = columns.split_off(placed);
     drop_useless(columns, known, &state, WORTH * 0.25);
     drop_useless(&mut chosen, 0, &state, WORTH * 0.25);
@@ -279,10 +272,10 @@ fn choose(
         sparsity: 0.2,
         anew: false,
     };
-    let mut state = solve(scene.samples, columns, ambient, refit, scene.least);
+    let mut state = solve(scene.spread.samples, columns, ambient, refit, scene.least);
     for step in [0.5, 0.25, 0.125] {
         look_around(scene, columns, known, &state, spacing * step);
-        state = solve(scene.samples, columns, ambient, refit, scene.least);
+        state = solve(scene.spread.samples, columns, ambient, refit, scene.least);
         drop_useless(columns, known, &state, WORTH * 0.5);
     }
     let whole = columns.len();
@@ -293,9 +286,9 @@ fn choose(
         sparsity: 0.1,
         anew: false,
     };
-    let state = solve(scene.samples, columns, ambient, settle, scene.least);
+    let state = solve(scene.spread.samples, columns, ambient, settle, scene.least);
     drop_useless(columns, known, &state, WORTH);
-    solve(scene.samples, columns, ambient, settle, scene.least);
+    solve(scene.spread.samples, columns, ambient, settle, scene.least);
 }
 
 /// Removes placed lights without which the error would hardly grow.
@@ -399,8 +392,9 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
     let around = scene.influenced(start.origin, mean(column.strength), step * 2.0);
     let judged: Vec<Sample> = around
         .iter()
-        .filter_map(|&i| scene.samples.get(i as usize).copied())
+        .filter_map(|&i| scene.spread.samples.get(i as usize).copied())
         .collect();
+    let near = Spread::new(&judged);
     // What this light would have to explain: the rest, and what it explains now.
     let mut rows = column.rows.iter().peekable();
     let wanted: Vec<(Vec3, f32)> = around
@@ -457,7 +451,7 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
     let mut stopped = vec![None; judged.len()];
     let mut seen = |lamp: Lamp| {
         let (bsp, all) = (&scene.world.bsp, (None, f32::INFINITY));
-        rows_again(bsp, scene.occluders, &judged, lamp, all, &mut stopped)
+        rows_again(bsp, scene.occluders, &near, lamp, all, &mut stopped)
     };
     let mut beside = scene.beside(start.origin);
     let mut best = (start, worth(&beside, start, &seen(start)));

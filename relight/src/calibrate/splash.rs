@@ -11,6 +11,7 @@ use super::columns::{Column, Lamp, Prior, Source, material_of, point_rows};
 use super::ends::{Piece, pieces_of};
 use super::parallel;
 use super::samples::Sample;
+use super::spread::Spread;
 use crate::light::{EmissionSource, Falloff, TriangleLight};
 use crate::world::RelitWorld;
 use glam::Vec3;
@@ -137,10 +138,11 @@ pub(super) fn columns(
     splashes: &[Splashes],
     lamps: &[Column],
 ) -> Vec<Column> {
+    let spread = Spread::new(samples);
     let column = |(index, splash): (u32, &Splashes)| {
         let of_point = |_, &(lamp, power): &(Lamp, f32)| {
             let bsp = &world.bsp;
-            let rows = point_rows(bsp, occluders, samples, lamp, None, f32::INFINITY);
+            let rows = point_rows(bsp, occluders, &spread, lamp, None, f32::INFINITY);
             rows.into_iter().map(|(i, a)| (i, a * power)).collect()
         };
         let rows: Vec<Vec<(u32, f32)>> = parallel::map(&splash.points, of_point);

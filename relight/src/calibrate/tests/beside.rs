@@ -52,9 +52,10 @@ fn texels_that_a_light_makes_too_bright_join_and_turn_it_down() {
         let falloff = Falloff::InverseSquare;
         let lamp = Lamp { origin, falloff };
         let range = f32::INFINITY;
+        let spread = spread::Spread::new(&samples);
         columns::Column {
             source: Source::Placed(lamp),
-            rows: columns::point_rows(&world.bsp, &occluders, &samples, lamp, None, range),
+            rows: columns::point_rows(&world.bsp, &occluders, &spread, lamp, None, range),
             pieces: Vec::new(),
             strength: Vec3::splat(strength),
             limit: Vec3::INFINITY,
@@ -70,6 +71,7 @@ fn texels_that_a_light_makes_too_bright_join_and_turn_it_down() {
         column(BESIDE, 1000.0),
     ];
     let mut fit = Fit {
+        looked_at: HashMap::new(),
         world: &world,
         occluders: &occluders,
         silent: &[],
@@ -105,7 +107,14 @@ fn texels_that_a_light_makes_too_bright_join_and_turn_it_down() {
             panic!("{column:?}");
         };
         let range = f32::INFINITY;
-        let whole = columns::point_rows(&world.bsp, &occluders, &fit.samples, lamp, None, range);
+        let whole = columns::point_rows(
+            &world.bsp,
+            &occluders,
+            &spread::Spread::new(&fit.samples),
+            lamp,
+            None,
+            range,
+        );
         assert_eq!(column.rows, whole);
     }
     fit.settle();

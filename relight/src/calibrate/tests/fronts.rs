@@ -17,7 +17,7 @@ fn what_places_see_is_kept_and_samples_that_join_are_looked_at() {
         let scene = Scene {
             world: &world,
             occluders: &occluders,
-            samples,
+            spread: spread::Spread::new(samples),
             measured: &measured,
             of_triangle: &of_triangle,
             candidates: 400,

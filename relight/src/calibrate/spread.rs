@@ -1,0 +1,148 @@
+//! Measurements laid out so that four at a time are asked whether a light can reach them.
+//!
+//! Most cannot: they face away, or are too far off. What can is looked at one by one.
+
+use super::fours::{self, Four, WIDE, dot, four, lanes, splat};
+use super::samples::Sample;
+use glam::{Vec3, Vec4};
+
+/// Nearer than this a light gives nothing, id units.
+pub(super) const NEAREST: f32 = 1.0;
+
+/// Four measurements.
+struct Group {
+    positions: Four,
+    normals: Four,
+    /// Light that matters, mean of the channels: infinite where measurements are held out, or not there.
+    levels: Vec4,
+}
+
+/// Measurements, and where they are.
+pub(super) struct Spread<'a> {
+    pub samples: &'a [Sample],
+    groups: Vec<Group>,
+}
+
+impl<'a> Spread<'a> {
+    /// Of these.
+    pub fn new(samples: &'a [Sample]) -> Spread<'a> {
+        let level = |sample: &Sample| match sample.held_out {
+            true => f32::INFINITY,
+            false => sample.level() + sample.floor,
+        };
+        let group = |of: &[Sample]| {
+            let mut levels = [f32::INFINITY; WIDE];
+            for (slot, sample) in levels.iter_mut().zip(of) {
+                *slot = level(sample);
+            }
+            Group {
+                positions: four(of.iter().map(|s| s.position)),
+                normals: four(of.iter().map(|s| s.normal)),
+                levels: Vec4::from_array(levels),
+            }
+        };
+        Spread {
+            samples,
+            groups: samples.chunks(WIDE).map(group).collect(),
+        }
+    }
+
+    /// Those whose fronts a light at a place within `range` shines on, in order.
+    pub fn facing(&self, origin: Vec3, range: f32) -> impl Iterator<Item = (u32, &Sample)> {
+        let from = splat(origin);
+        let (nearest, farthest) = (Vec4::splat(NEAREST), Vec4::splat(range * range));
+        self.those(move |group| {
+            let offset = fours::sub(&from, &group.positions);
+            let squared = dot(&offset, &offset);
+            let lit = dot(&group.normals, &offset).cmpgt(Vec4::ZERO);
+            (lit & squared.cmpge(nearest) & squared.cmple(farthest)).bitmask()
+        })
+    }
+
+    /// Those that are fitted to which a light may give `part` of their light, in order: a place within `margin` of its own is
+    /// before them, and no farther than its intensity reaches.
+    pub fn within_reach(
+        &self,
+        origin: Vec3,
+        intensity: f32,
+        margin: f32,
+        part: f32,
+    ) -> impl Iterator<Item = u32> {
+        let from = splat(origin);
+        let (behind, far) = (Vec4::splat(-margin), Vec4::splat(4.0 * margin * margin));
+        // Twice as far away as light is moved, half of the way is left at least; and a little for what is rounded.
+        let power = Vec4::splat(intensity * 4.001);
+        let near = self.those(move |group| {
+            let offset = fours::sub(&from, &group.positions);
+            let squared = dot(&offset, &offset);
+            let before = dot(&offset, &group.normals).cmpgt(behind);
+            let reached = (group.levels * part * squared).cmplt(power);
+            (before & (squared.cmple(far) | reached)).bitmask()
+        });
+        let reached = move |sample: &Sample| {
+            let least = (sample.level() + sample.floor) * part;
+            let distance = (sample.position.distance(origin) - margin).max(1.0);
+            !sample.held_out && intensity > least * distance * distance
+        };
+        near.filter(move |(_, sample)| reached(sample))
+            .map(|(i, _)| i)
+    }
+
+    /// Those that a mask tells of, in order.
+    fn those(&self, mask: impl Fn(&Group) -> u32) -> impl Iterator<Item = (u32, &Sample)> {
+        let groups = self.groups.iter().zip(self.samples.chunks(WIDE));
+        let first = (0u32..).step_by(WIDE);
+        first
+            .zip(groups)
+            .flat_map(move |(first, (group, samples))| {
+                let chosen = lanes(mask(group));
+                chosen.filter_map(move |lane| Some((first + lane as u32, samples.get(lane)?)))
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::random::Random;
+    use crate::calibrate::samples::tests::sample_at_place;
+
+    #[test]
+    fn four_at_a_time_are_those_that_one_by_one_are() {
+        let mut random = Random::new(11);
+        let mut anywhere = || Vec3::new(random.next(), random.next(), random.next()) * 400.0;
+        let mut samples: Vec<Sample> = (0..203).map(|_| sample_at_place(anywhere())).collect();
+        for (k, sample) in samples.iter_mut().enumerate() {
+            sample.normal = (anywhere() - 200.0).normalize();
+            sample.held_out = k % 5 == 0;
+        }
+        let spread = Spread::new(&samples);
+        let (mut lit, mut reached) = (0, 0);
+        for (margin, intensity) in [(8.0, 900.0), (30.0, 5000.0), (90.0, 20_000.0)] {
+            let origin = anywhere();
+            let facing = |s: &Sample| {
+                let offset = origin - s.position;
+                offset.length() <= 250.0 && s.normal.dot(offset) > 0.0
+            };
+            let all = || (0u32..).zip(&samples);
+            let wanted: Vec<u32> = all().filter(|(_, s)| facing(s)).map(|(i, _)| i).collect();
+            let found: Vec<u32> = spread.facing(origin, 250.0).map(|(i, _)| i).collect();
+            assert_eq!(found, wanted);
+            lit += found.len();
+            let part = 0.15;
+            let within = |s: &Sample| {
+                let least = (s.level() + s.floor) * part;
+                let distance = (s.position.distance(origin) - margin).max(1.0);
+                let before = (origin - s.position).dot(s.normal) > -margin;
+                !s.held_out && before && intensity > least * distance * distance
+            };
+            let wanted: Vec<u32> = all().filter(|(_, s)| within(s)).map(|(i, _)| i).collect();
+            let found: Vec<u32> = spread
+                .within_reach(origin, intensity, margin, part)
+                .collect();
+            assert_eq!(found, wanted);
+            reached += found.len();
+        }
+        assert!(lit > 50 && (20..400).contains(&reached), "{lit} {reached}");
+    }
+}
