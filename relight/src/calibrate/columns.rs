@@ -403,10 +403,15 @@ fn triangles_at(
             continue;
         }
         let seen = visible_part(occluders, sample, light, random);
-        if (one.surface, one.group) != (light.surface, group) {
+        let number = if light.ends_alone() {
+            index
+        } else {
+            light.surface
+        };
+        if (one.number, one.group) != (number, group) {
             one.heap_on(&mut heaps);
             one = Given {
-                surface: light.surface,
+                number,
                 group,
                 sky: light.is_sky,
                 ..Given::default()

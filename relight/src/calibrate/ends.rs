@@ -52,7 +52,7 @@ pub(super) fn pieces_of(rows: &[(u32, f32)]) -> Vec<Piece> {
     rows.iter().map(piece).collect()
 }
 
-/// What surfaces of a group that give about the same give to a sample, for strength 1.
+/// What the compiler's lights of a group that give about the same give to a sample, for strength 1.
 pub(super) struct Heap {
     /// The group.
     pub group: u32,
@@ -66,11 +66,11 @@ pub(super) struct Heap {
     pub given: f32,
 }
 
-/// What a surface gives to a sample, of a group and for strength 1.
+/// What one of the compiler's lights gives to a sample, of a group and for strength 1.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Given {
-    /// The surface.
-    pub surface: u32,
+    /// Which one of the group: of a triangle its number, of all quads of a sprite that of its surface.
+    pub number: u32,
     /// The group.
     pub group: u32,
     /// It is a sky, which does not end.

@@ -155,6 +155,11 @@ impl TriangleLight {
         (b - a).cross(c - a)
     }
 
+    /// Whether the compiler made a light of it alone, which has an end of its own; all quads of a sprite are one.
+    pub fn ends_alone(&self) -> bool {
+        self.triangle != u32::MAX
+    }
+
     /// Area in square id units.
     pub fn area(&self) -> f32 {
         self.cross().length() * 0.5

@@ -150,8 +150,8 @@ pub(super) fn triangle_bounds(light: &t::TriangleLight) -> t::LightBounds {
     }
 }
 
-/// For each light the L below which it gives nothing. The compiler let whole surfaces end: each of a surface's triangles
-/// ends at its part of that. Skies have no end.
+/// For each light the L below which it gives nothing. The compiler made a light of each triangle; of a sprite it made one,
+/// of which each quad ends at its part. Skies have no end.
 fn ends(source: &MapLightSource<'_>) -> Vec<f32> {
     if source.light_end <= 0.0 {
         return vec![0.0; source.triangles.len()];
@@ -164,6 +164,8 @@ fn ends(source: &MapLightSource<'_>) -> Vec<f32> {
         let whole = areas.get(&light.surface).copied().unwrap_or(0.0);
         if light.is_sky || whole <= 0.0 {
             0.0
+        } else if light.ends_alone() {
+            source.light_end
         } else {
             source.light_end * light.area() / whole
         }

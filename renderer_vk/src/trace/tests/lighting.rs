@@ -248,6 +248,36 @@ fn an_umbra_is_black_and_a_penumbra_is_between_with(gpu: &mut Gpu) {
 }
 
 #[test]
+fn triangles_end_alone_and_quads_together() {
+    Gpu::each(triangles_end_alone_and_quads_together_with);
+}
+
+fn triangles_end_alone_and_quads_together_with(gpu: &mut Gpu) {
+    let mut scene = floor();
+    let at = |x, y| Vec3::new(x, y, 90.0);
+    let (low, high) = (at(-4.0, -4.0), at(4.0, 4.0));
+    scene.light([low, at(-4.0, 4.0), high], Vec3::splat(400.0));
+    scene.light([low, high, at(4.0, -4.0)], Vec3::splat(400.0));
+    let brightest = |gpu: &mut Gpu, scene: &Scene| {
+        let (pixels, _) = gpu.render(scene, &sampled(LightSampling::All), 8);
+        pixels.iter().map(|p| p.x).fold(0.0, f32::max)
+    };
+    let whole = brightest(gpu, &scene);
+    assert!(whole > 0.1, "a test of nothing: {whole}");
+    // more than each of the two gives, and less than both
+    scene.light_end = 0.75 * whole;
+    let together = brightest(gpu, &scene);
+    assert!((together / whole - 1.0).abs() < 0.02, "{together} {whole}");
+    for (light, triangle) in scene.lights.iter_mut().zip(0..) {
+        light.triangle = triangle;
+    }
+    assert_eq!(brightest(gpu, &scene), 0.0);
+    scene.light_end = 0.25 * whole;
+    let alone = brightest(gpu, &scene);
+    assert!((alone / whole - 1.0).abs() < 0.02, "{alone} {whole}");
+}
+
+#[test]
 fn spheres_and_suns_give_their_irradiance() {
     Gpu::each(spheres_and_suns_give_their_irradiance_with);
 }
