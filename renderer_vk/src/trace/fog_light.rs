@@ -10,9 +10,10 @@ use glam::Vec3;
 use relight::light::{LightRef, LightShare};
 use shaders::types::Fog;
 
+use super::light_rows::listed_light;
 use super::light_tables::luminance;
-use super::light_weights::Listed;
-use super::lights::{MapLightSource, point_light, sphere_bounds, triangle_bounds, triangle_light};
+use super::light_weights::spread_point;
+use super::lights::MapLightSource;
 
 /// Places that a volume's light is the mean of.
 const PLACES: usize = 256;
@@ -20,21 +21,13 @@ const PLACES: usize = 256;
 /// Lights nearer than this to such a place are taken to be as far away, units: what they give grows without end there.
 const NEAREST: f32 = 16.0;
 
-/// A volume's places in the open below its surface.
-///
-/// Source: the additive recurrence by the root of x^4 = x + 1 (Roberts, The Unreasonable Effectiveness of Quasirandom
-/// Sequences, 2018).
+/// A volume's places below its surface.
 fn places(fog: &Fog) -> impl Iterator<Item = Vec3> {
-    let step = Vec3::new(0.819_172_5, 0.671_043_6, 0.549_700_5);
     let (mins, size) = (fog.mins, fog.maxs - fog.mins);
     let [x, y, z, distance] = fog.plane;
     let surface = (fog.has_surface != 0).then_some((Vec3::new(x, y, z), distance));
     (0..PLACES)
-        .map(move |i| {
-            #[allow(clippy::cast_precision_loss)] // a few hundred
-            let at = (step * i as f32 + 0.5).fract();
-            mins + size * at
-        })
+        .map(move |i| mins + size * spread_point(i))
         .filter(move |place| surface.is_none_or(|(normal, d)| normal.dot(*place) >= d))
 }
 
@@ -43,28 +36,10 @@ fn light_at(place: Vec3, cluster: i32, source: &MapLightSource<'_>) -> Vec3 {
     let shares = source.lists.shares(cluster);
     let given = |(turn, &entry): (usize, &u32)| {
         let visibility = shares.get(turn).unwrap_or(&LightShare::UNKNOWN).visible;
-        let (listed, color) = match source.lists.light(entry) {
-            LightRef::Triangle(index) => {
-                let light = source.triangles.get(index as usize)?;
-                let bounds = triangle_bounds(&triangle_light(light, 0.0, Vec3::ZERO));
-                let listed = Listed {
-                    number: 0,
-                    bounds,
-                    triangle: Some(light),
-                    visibility,
-                };
-                (listed, light.radiance)
-            }
-            LightRef::Point(index) => {
-                let light = point_light(source.points.get(index as usize)?, 0.0);
-                let listed = Listed {
-                    number: 0,
-                    bounds: sphere_bounds(&light),
-                    triangle: None,
-                    visibility,
-                };
-                (listed, light.radiance)
-            }
+        let listed = listed_light(source, entry, visibility, |_| Some(0))?;
+        let color = match source.lists.light(entry) {
+            LightRef::Triangle(index) => source.triangles.get(index as usize)?.radiance,
+            LightRef::Point(index) => source.points.get(index as usize)?.intensity,
         };
         let arrives = match source.occlusion {
             Some(occlusion) => {
@@ -126,18 +101,11 @@ mod tests {
 
     fn source<'a>(points: &'a [PointLight], lists: &'a LightLists) -> MapLightSource<'a> {
         MapLightSource {
-            triangles: &[],
             points,
-            suns: &[],
-            lists,
-            flickers: &[],
-            model_origins: &[],
-            ambient: Vec3::ZERO,
-            light_end: 0.0,
-            bsp: None,
-            occlusion: None,
+            ..MapLightSource::empty(lists)
         }
     }
+
     fn lists(points: usize) -> LightLists {
         let count = u32::try_from(points).unwrap_or(u32::MAX);
         LightLists {

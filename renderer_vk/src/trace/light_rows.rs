@@ -203,6 +203,32 @@ pub fn rows(
     (rows, slots)
 }
 
+/// A light of a list. `triangle_number`: the number of a triangle light, by its index; `None` leaves it out.
+pub fn listed_light<'a>(
+    source: &MapLightSource<'a>,
+    entry: u32,
+    visibility: f32,
+    triangle_number: impl Fn(usize) -> Option<u32>,
+) -> Option<Listed<'a>> {
+    Some(match source.lists.light(entry) {
+        LightRef::Triangle(index) => {
+            let light = source.triangles.get(index as usize)?;
+            Listed {
+                number: triangle_number(index as usize)?,
+                bounds: triangle_bounds(&triangle_light(light, 0.0, Vec3::ZERO)),
+                triangle: Some(light),
+                visibility,
+            }
+        }
+        LightRef::Point(index) => Listed {
+            number: number(c::LIGHT_SPHERE, index as usize),
+            bounds: sphere_bounds(&point_light(source.points.get(index as usize)?, 0.0)),
+            triangle: None,
+            visibility,
+        },
+    })
+}
+
 /// The lights of a cluster's list, or of all for -1.
 fn listed<'a>(
     source: &MapLightSource<'a>,
@@ -213,23 +239,8 @@ fn listed<'a>(
     let shares = lists.shares(cluster);
     let light = |(i, &entry): (usize, &u32)| {
         let share = shares.get(i).copied().unwrap_or(LightShare::UNKNOWN);
-        Some(match lists.light(entry) {
-            LightRef::Triangle(index) => {
-                let light = source.triangles.get(index as usize)?;
-                Listed {
-                    number: numbers.get(index as usize).copied().flatten()?,
-                    bounds: triangle_bounds(&triangle_light(light, 0.0, Vec3::ZERO)),
-                    triangle: Some(light),
-                    visibility: share.visible,
-                }
-            }
-            LightRef::Point(index) => Listed {
-                number: number(c::LIGHT_SPHERE, index as usize),
-                bounds: sphere_bounds(&point_light(source.points.get(index as usize)?, 0.0)),
-                triangle: None,
-                visibility: share.visible,
-            },
-        })
+        let number = |index| numbers.get(index).copied().flatten();
+        listed_light(source, entry, share.visible, number)
     };
     let entries = lists.row(cluster).iter().enumerate();
     entries.filter_map(light).collect()

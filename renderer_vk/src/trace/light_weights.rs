@@ -163,6 +163,16 @@ fn large_triangle(triangle: &TriangleLight, bounds: &t::LightBounds, point: Vec3
     }
 }
 
+/// One of points that are spread evenly over a cube of edge 1, however many are taken.
+///
+/// Source: the additive recurrence by the root of x^4 = x + 1 (Roberts, The Unreasonable Effectiveness of Quasirandom
+/// Sequences, 2018).
+pub fn spread_point(i: usize) -> Vec3 {
+    let step = Vec3::new(0.819_172_5, 0.671_043_6, 0.549_700_5);
+    #[allow(clippy::cast_precision_loss)] // some hundred
+    (step * i as f32 + 0.5).fract()
+}
+
 /// A point where lights are weighed, with normals and how much each counts.
 pub struct Place {
     point: Vec3,
@@ -171,18 +181,10 @@ pub struct Place {
 
 impl Place {
     /// Throughout a cell, for what faces any way.
-    ///
-    /// Source of the points: the additive recurrence by the root of x^4 = x + 1 (Roberts, The Unreasonable Effectiveness
-    /// of Quasirandom Sequences, 2018).
     pub fn throughout(cell: &Cell) -> Vec<Self> {
-        let step = Vec3::new(0.819_172_5, 0.671_043_6, 0.549_700_5);
-        let place = |i: usize| {
-            #[allow(clippy::cast_precision_loss)] // a handful
-            let at = (step * i as f32 + 0.5).fract();
-            Self {
-                point: cell.mins + (cell.maxs - cell.mins) * at,
-                normals: (0..FACINGS).map(|f| (direction(f), 1.0 / 6.0)).collect(),
-            }
+        let place = |i: usize| Self {
+            point: cell.mins + (cell.maxs - cell.mins) * spread_point(i),
+            normals: (0..FACINGS).map(|f| (direction(f), 1.0 / 6.0)).collect(),
         };
         (0..POINTS).map(place).collect()
     }

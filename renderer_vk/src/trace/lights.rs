@@ -82,6 +82,24 @@ pub struct MapLightSource<'a> {
     pub occlusion: Option<&'a Occlusion>,
 }
 
+impl<'a> MapLightSource<'a> {
+    /// No lights and nothing that is known of them but lists.
+    pub fn empty(lists: &'a LightLists) -> Self {
+        Self {
+            triangles: &[],
+            points: &[],
+            suns: &[],
+            lists,
+            flickers: &[],
+            model_origins: &[],
+            ambient: Vec3::ZERO,
+            light_end: 0.0,
+            bsp: None,
+            occlusion: None,
+        }
+    }
+}
+
 pub(super) fn count(n: usize) -> u32 {
     u32::try_from(n).unwrap_or(u32::MAX)
 }
@@ -334,19 +352,7 @@ impl MapLights {
     /// # Errors
     /// Out of memory.
     pub fn none(device: &Device) -> Result<Self, Error> {
-        let source = MapLightSource {
-            triangles: &[],
-            points: &[],
-            suns: &[],
-            lists: &LightLists::default(),
-            flickers: &[],
-            model_origins: &[],
-            ambient: Vec3::ZERO,
-            light_end: 0.0,
-            bsp: None,
-            occlusion: None,
-        };
-        Self::new(device, &source)
+        Self::new(device, &MapLightSource::empty(&LightLists::default()))
     }
 
     /// Finds from where each of the map's fog volumes may be seen.
