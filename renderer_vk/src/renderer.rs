@@ -208,6 +208,11 @@ impl Renderer {
         self.device.descriptor_writes()
     }
 
+    /// How many pipelines for draws were compiled so far; what is registered and drawn as expected adds none.
+    pub fn compiled_pipelines(&self) -> u64 {
+        self.device.compiled_pipelines()
+    }
+
     /// What the validation layer has said so far.
     pub fn validation_messages(&self) -> Vec<String> {
         self.device.validation_messages()

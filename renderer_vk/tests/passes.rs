@@ -213,3 +213,21 @@ fn passes_drawn_together_look_as_one_after_the_other() {
     let messages = renderer.validation_messages();
     assert!(messages.is_empty(), "validation: {messages:#?}");
 }
+
+#[test]
+fn what_is_registered_is_compiled_before_it_is_seen() {
+    let Some(mut renderer) = renderer() else {
+        return;
+    };
+    let ahead = renderer.compiled_pipelines();
+    assert!(ahead > 20, "{ahead}");
+    frame(&mut renderer, &Settings::default());
+    assert_eq!(renderer.compiled_pipelines(), ahead);
+    // and the count does tell what was not foreseen
+    let unforeseen = Settings {
+        measure_overdraw: true,
+        ..Settings::default()
+    };
+    frame(&mut renderer, &unforeseen);
+    assert!(renderer.compiled_pipelines() > ahead);
+}

@@ -1,7 +1,7 @@
 //! The device: everything else is made from it and holds it alive.
 
 use std::collections::{HashMap, HashSet};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::{ext, khr, vk};
@@ -73,6 +73,8 @@ pub(crate) struct DeviceInner {
     pub render_passes: Mutex<HashMap<RenderPassKey, vk::RenderPass>>,
     pub pipeline_cache: vk::PipelineCache,
     pub shared_pipelines: Shared,
+    /// Pipelines for draws compiled so far.
+    pub compiled: AtomicU64,
     pub timeline: vk::Semaphore,
     pub timings: Mutex<Vec<(String, f32)>>,
     /// Passes are timed.
@@ -128,6 +130,7 @@ impl Device {
             render_passes: Mutex::new(HashMap::new()),
             pipeline_cache: vk::PipelineCache::null(),
             shared_pipelines: Shared::default(),
+            compiled: AtomicU64::new(0),
             timeline: vk::Semaphore::null(),
             timings: Mutex::new(Vec::new()),
             measuring: AtomicBool::new(true),
@@ -238,6 +241,11 @@ impl Device {
     /// How many descriptors were written so far: as many as images, samplers and scenes were made, none by drawing.
     pub fn descriptor_writes(&self) -> u64 {
         self.0.bindless.writes.load(Ordering::Relaxed)
+    }
+
+    /// How many pipelines for draws were compiled so far.
+    pub fn compiled_pipelines(&self) -> u64 {
+        self.0.compiled.load(Ordering::Relaxed)
     }
 
     /// Whether fragment shaders can write to buffers.

@@ -1,6 +1,7 @@
 //! Graphics and compute pipelines. All have the same layout: the bindless set and 128 bytes of push constants.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use ash::vk;
 use shaders::Spirv;
@@ -193,6 +194,7 @@ impl GraphicsPipeline {
                 device: device.0.info.name.clone(),
             });
         }
+        device.0.compiled.fetch_add(1, Ordering::Relaxed);
         let constants = Constants::new(desc.constants);
         let constants = constants.info();
         let vertex = Module::new(device, desc.vertex)?;

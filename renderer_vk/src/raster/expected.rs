@@ -1,38 +1,90 @@
-//! The states that registered materials will be drawn with, so that pipelines are made while the game loads and not
-//! when a surface first comes into sight. What is not foreseen here (mirrors, fog, debugging aids) is made when used.
+//! What registered materials will be drawn with: pipelines are made and drawn with once while the game loads, and not
+//! when a surface first comes into sight. A pipeline alone is not all that a driver makes: Mesa's in software compiles
+//! shaders for blending, formats and samplers when these first meet in a draw. What is not foreseen here (mirrors,
+//! fog over blended stages, debugging aids) is made when used.
 
+use glam::{Vec2, Vec3};
 use shaders::types::constants as c;
-use shaders::types::{Draw, Instance};
+use shaders::types::{Draw, Instance, Vertex};
 
 use super::depth_first;
-use super::list::{faces, stage_depth};
+use super::groups::fog_state;
+use super::list::{Call, DepthRange, DrawList, faces, sky_state, stage_depth};
+use super::overlay::overlay_instance;
 use super::passes;
-use super::pipelines::{CullFaces, State};
+use super::pipelines::{CullFaces, Depth, State};
 use super::shading::{Shading, StageContext};
+use crate::assets::compile::sampler;
 use crate::assets::{LightmapClass, Material, RasterPass};
+use shaderscript::sort;
 
-/// Calls `found` with each state that `material` is drawn with in a view or in the overlay.
-pub fn states(stages: &StageContext<'_>, material: &Material, mut found: impl FnMut(State)) {
-    if material.sky.is_some() || material.defaulted {
-        return;
+/// What is known of a map before it is seen.
+#[derive(Clone, Copy, Debug)]
+pub struct ExpectedWorld {
+    /// Texture of one of its lightmap pages, or `NO_TEXTURE`. Which one it is makes no difference.
+    pub lightmap: u32,
+    /// It has fog volumes.
+    pub fog: bool,
+}
+
+impl DrawList {
+    /// Adds a call for each state that registered materials are drawn with in views and in the overlay: two triangles,
+    /// one for each way round, that cover the viewport at the far end of the depth range.
+    pub fn add_expected(&mut self, stages: StageContext<'_>, world: ExpectedWorld) {
+        let first_vertex = self.vertices.len() as u32;
+        for (x, y) in [(-1.0, -1.0), (3.0, -1.0), (-1.0, 3.0)] {
+            self.vertices.push(Vertex {
+                position: Vec3::new(x, y, 1.0),
+                normal: Vec3::Z,
+                st: Vec2::ZERO,
+                lightmap: Vec2::ZERO,
+                color: u32::MAX,
+            });
+        }
+        let first_index = self.indices.len() as u32;
+        let corners = [0, 1, 2, 0, 2, 1].map(|corner| first_vertex + corner);
+        self.indices.extend(corners);
+        let mut found = |state: State, draw: Draw| {
+            let index = self.draws.len() as u32;
+            self.draws.push(Draw {
+                dynamic_vertices: 1,
+                ..draw
+            });
+            self.calls.push(Call {
+                state,
+                range: DepthRange::Normal,
+                first_index,
+                index_count: corners.len() as u32,
+                draw: index,
+            });
+        };
+        for material in stages.materials.iter().filter(|m| !m.defaulted) {
+            if material.sky.is_some() {
+                sky(&stages, material, &mut found);
+            } else {
+                surfaces(&stages, material, world, &mut found);
+            }
+        }
+        lights(&stages, &mut found);
     }
+}
+
+/// Calls `found` with how the surfaces of a material are drawn, and its pictures if it is for the overlay.
+fn surfaces(
+    stages: &StageContext<'_>,
+    material: &Material,
+    world: ExpectedWorld,
+    mut found: impl FnMut(State, Draw),
+) {
     let flat = material.lightmap_class == LightmapClass::TwoD;
-    // any page does: which one it is makes no difference to a pipeline
     let lightmap = match material.lightmap_class {
-        LightmapClass::Page => 0,
+        LightmapClass::Page => world.lightmap,
         _ => c::NO_TEXTURE,
     };
-    let state = |passes: &[RasterPass]| {
+    let drawn = |passes: &[RasterPass]| {
         let first = passes.first()?;
-        let (shading, _) = stages.passes(
-            material,
-            passes,
-            &Instance::default(),
-            lightmap,
-            c::FOG_ADJUST_NONE,
-            Draw::default(),
-        );
-        Some(State {
+        let (shading, draw) = shaded(stages, material, passes, lightmap);
+        let state = State {
             blend: first.blend,
             depth: stage_depth(first),
             depth_write: first.depth_write,
@@ -40,43 +92,85 @@ pub fn states(stages: &StageContext<'_>, material: &Material, mut found: impl Fn
             offset: material.polygon_offset,
             wireframe: false,
             shading,
-        })
+        };
+        Some((state, draw))
     };
     for passes in passes::draws(&material.passes, false) {
         // pictures of the overlay are sprites and marks in views, too, unless no script says how
         if flat && passes.iter().any(|pass| !pass.depth_test) {
             continue;
         }
-        if let Some(in_view) = state(passes) {
-            found(in_view);
+        if let Some((in_view, draw)) = drawn(passes) {
+            found(in_view, draw);
             if depth_first::covers(material) {
-                found(depth_first::depth_alone(in_view.cull));
+                found(depth_first::depth_alone(in_view.cull), draw);
+            }
+            if world.fog && !flat && material.sort <= sort::OPAQUE {
+                let (shading, draw) = stages.fog(Draw {
+                    fog: 1,
+                    ..Draw::default()
+                });
+                found(fog_state(in_view, true, shading), draw);
             }
         }
     }
     for pass in material.passes.iter().filter(|_| flat) {
-        if let Some(state) = state(std::slice::from_ref(pass)) {
-            found(State {
+        if let Some((state, draw)) = drawn(std::slice::from_ref(pass)) {
+            let state = State {
                 depth_write: pass.depth_write && pass.depth_test,
                 cull: CullFaces::None,
                 offset: false,
                 ..state
-            });
+            };
+            found(state, draw);
         }
     }
 }
 
-/// Calls `found` with the states of dynamic lights on walls.
-pub fn light_states(mut found: impl FnMut(State)) {
+/// Calls `found` with how a sky is drawn.
+fn sky(stages: &StageContext<'_>, material: &Material, mut found: impl FnMut(State, Draw)) {
+    let faces = material.sky.as_ref().and_then(|sky| sky.faces.as_ref());
+    if let Some(&image) = faces.and_then(|images| images.first()) {
+        let (shading, draw) = stages.plain_image(image, sampler::CLAMP_MIP, Draw::default());
+        found(sky_state(None, false, CullFaces::None, shading), draw);
+    }
+    for passes in passes::draws(&material.passes, false) {
+        if let Some(first) = passes.first() {
+            let (shading, draw) = shaded(stages, material, passes, c::NO_TEXTURE);
+            let state = sky_state(first.blend, first.depth_write, CullFaces::None, shading);
+            found(state, draw);
+        }
+    }
+}
+
+/// Calls `found` with how dynamic lights fall on walls.
+fn lights(stages: &StageContext<'_>, mut found: impl FnMut(State, Draw)) {
+    let (shading, draw) = stages.light(Draw::default());
     for source in [c::BLEND_DST_COLOR, c::BLEND_ONE] {
-        found(State {
+        let state = State {
             blend: Some((source, c::BLEND_ONE)),
-            depth: super::pipelines::Depth::Equal,
+            depth: Depth::Equal,
             depth_write: false,
             cull: CullFaces::CounterClockwise,
             offset: false,
             wireframe: false,
-            shading: Shading::LIGHT,
-        });
+            shading,
+        };
+        found(state, draw);
     }
+}
+
+fn shaded(
+    stages: &StageContext<'_>,
+    material: &Material,
+    passes: &[RasterPass],
+    lightmap: u32,
+) -> (Shading, Draw) {
+    let (fog, instance) = (c::FOG_ADJUST_NONE, expected_instance());
+    stages.passes(material, passes, &instance, lightmap, fog, Draw::default())
+}
+
+/// What all expected calls are drawn as.
+pub fn expected_instance() -> Instance {
+    overlay_instance(0.0)
 }

@@ -106,6 +106,21 @@ impl GroupContext<'_> {
     }
 }
 
+/// How fog is drawn over what `plain` draws.
+pub(super) fn fog_state(plain: State, opaque: bool, shading: Shading) -> State {
+    State {
+        blend: Some((c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA)),
+        depth: if opaque {
+            Depth::Equal
+        } else {
+            Depth::LessEqual
+        },
+        depth_write: false,
+        shading,
+        ..plain
+    }
+}
+
 fn plain_draw(group: &Group) -> Draw {
     Draw {
         instance: group.common.instance,
@@ -340,17 +355,7 @@ impl DrawList {
             return;
         }
         let (shading, draw) = context.stages.fog(plain_draw(group));
-        let state = State {
-            blend: Some((c::BLEND_SRC_ALPHA, c::BLEND_ONE_MINUS_SRC_ALPHA)),
-            depth: if opaque {
-                Depth::Equal
-            } else {
-                Depth::LessEqual
-            },
-            depth_write: false,
-            shading,
-            ..context.plain_state(material)
-        };
+        let state = fog_state(context.plain_state(material), opaque, shading);
         let call = self.call(state, group.range, group.span, draw);
         self.fog.push(call);
     }

@@ -248,7 +248,7 @@ impl DrawList {
 }
 
 /// What is drawn at the far end of the depth range.
-fn sky_state(
+pub(super) fn sky_state(
     blend: Option<(u32, u32)>,
     depth_write: bool,
     cull: CullFaces,

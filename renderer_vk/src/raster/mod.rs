@@ -22,10 +22,13 @@ mod shadows;
 pub(crate) mod sky;
 mod target;
 
+use std::collections::HashSet;
+
 use glam::{Mat4, Vec3};
 use shaders::types::{Instance, MaterialBuffers, RasterLight, RasterView};
 
 pub use aids::{Aids, image_sheet};
+pub use expected::{ExpectedWorld, expected_instance};
 pub use flares::{FlareTest, Flares, window_to_clip};
 pub use list::{DrawList, Statics};
 pub use overlay::{Overlay, Picture2d, overlay_instance};
@@ -34,7 +37,9 @@ pub use shading::StageContext;
 pub use target::Target;
 
 use crate::api::DynamicLight;
-use crate::gpu::{self, Device, Format, Image, Recorder, Rendering, Viewport};
+use crate::gpu::{
+    self, Device, Format, Image, ImageDesc, ImageUsage, Recorder, Rendering, Viewport,
+};
 use crate::scene::{ShadowVolumes, View};
 use cover::Cover;
 use list::DepthRange;
@@ -140,26 +145,39 @@ impl Raster {
         self.overdraw.fragments()
     }
 
-    /// Makes the pipelines that the registered materials will need on a target.
+    /// Draws the calls of a list whose states are new into a picture of one pixel that nobody sees, so that a driver has
+    /// compiled all that they need when they are first drawn in a frame. Waits for that.
     ///
     /// # Errors
     /// The device is out of memory or cannot make a pipeline.
-    pub fn expect_materials(
+    pub fn warm_up(
         &mut self,
         target: TargetKind,
-        stages: StageContext<'_>,
+        list: &mut DrawList,
+        p: &ViewParameters<'_>,
     ) -> Result<(), gpu::Error> {
-        let mut result = Ok(());
-        let mut make = |state| {
-            if result.is_ok() {
-                result = self.pipelines.prepare(target, state);
-            }
-        };
-        for material in stages.materials.iter() {
-            expected::states(&stages, material, &mut make);
+        let mut seen = HashSet::new();
+        list.calls
+            .retain(|call| !self.pipelines.is_made(target, call.state) && seen.insert(call.state));
+        if list.calls.is_empty() {
+            return Ok(());
         }
-        expected::light_states(&mut make);
-        result
+        let image = |format, usage| {
+            let desc = ImageDesc {
+                samples: target.samples,
+                ..ImageDesc::new("warm-up", 1, 1, format, usage)
+            };
+            Image::new(&self.device, &desc)
+        };
+        let color = image(target.color, ImageUsage::COLOR)?;
+        let depth = image(target.depth, ImageUsage::DEPTH)?;
+        let target = Target {
+            color: &color,
+            depth: &depth,
+            mask: target.mask,
+        };
+        let device = self.device.clone();
+        device.immediate(|recorder| self.record(recorder, "warm-up", target, list, p))
     }
 
     /// Records a draw list as one pass called `name`.

@@ -92,12 +92,17 @@ impl Pipelines {
         }
     }
 
+    /// Whether the pipeline of `state` is there.
+    pub fn is_made(&self, target: TargetKind, state: State) -> bool {
+        self.made.contains_key(&(target, state))
+    }
+
     /// Makes the pipeline of `state` unless it is there.
     ///
     /// # Errors
     /// The device cannot make it.
     pub fn prepare(&mut self, target: TargetKind, state: State) -> Result<(), gpu::Error> {
-        if self.made.contains_key(&(target, state)) {
+        if self.is_made(target, state) {
             return Ok(());
         }
         let depth_alone = state.shading.mode == c::DRAW_DEPTH;

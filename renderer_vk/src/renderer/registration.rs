@@ -2,13 +2,16 @@
 
 use std::sync::Arc;
 
+use glam::{Mat4, Vec3};
 use relight::GameFiles;
+use shaders::types::constants::NO_TEXTURE;
 
 use super::Renderer;
+use crate::api::DynamicLight;
 use crate::assets::{Assets, LoadedFont};
 use crate::error::Error;
 use crate::gpu::ColorMask;
-use crate::raster;
+use crate::raster::{self, ViewParameters};
 use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::world::{EntityTokens, World};
@@ -44,9 +47,21 @@ impl Renderer {
 
     /// The game has registered everything: makes the pipelines that it will draw with.
     pub fn end_registration(&mut self) {
+        // what is not made now is made when it is drawn
+        if let Err(e) = self.warm_up() {
+            log::warn!("pipelines are not made ahead: {e}");
+        }
+        self.kept_pipelines.write(&self.device);
+    }
+
+    /// Draws once, out of sight, with everything that is registered.
+    fn warm_up(&mut self) -> Result<(), Error> {
         let format = self.picture_format();
-        let fits = self.targets.fit(&self.device, &self.settings, format);
-        let Some(assets) = &self.assets else { return };
+        self.targets.fit(&self.device, &self.settings, format)?;
+        let Some(assets) = &mut self.assets else {
+            return Ok(());
+        };
+        assets.prepare_frame(&self.settings)?;
         let target = raster::Target {
             color: self.targets.drawn(),
             depth: self.targets.depth(),
@@ -59,12 +74,37 @@ impl Renderer {
             light_spot: assets.textures.dynamic_light(),
             only_texture: None,
         };
-        // what is not made now is made when it is drawn
-        let made = self.raster.expect_materials(target.kind(), stages);
-        if let Err(e) = fits.and(made.map_err(Error::from)) {
-            log::warn!("pipelines are not made ahead: {e}");
-        }
-        self.kept_pipelines.write(&self.device);
+        let surfaces = self.world.iter().flat_map(|world| &world.surfaces);
+        let mut pages = surfaces.map(|surface| surface.lightmap);
+        let fogs = self.world.as_ref().filter(|world| !world.fogs.is_empty());
+        let world = raster::ExpectedWorld {
+            lightmap: pages.find(|&page| page != NO_TEXTURE).unwrap_or(NO_TEXTURE),
+            fog: fogs.is_some(),
+        };
+        self.list.clear();
+        self.list.add_expected(stages, world);
+        let parameters = ViewParameters {
+            world_to_clip: Mat4::IDENTITY,
+            near_world_to_clip: None,
+            clip_plane: [0.0; 4],
+            eye: Vec3::ZERO,
+            forward: Vec3::Z,
+            identity_light: self.settings.identity_light(),
+            materials: assets.materials.addresses(),
+            static_vertices: 0,
+            dynamic_vertices: None,
+            fogs: fogs.map_or(0, |world| world.fog_buffer.address()),
+            instances: &[raster::expected_instance()],
+            lights: &[DynamicLight::default()],
+            light_backs: true,
+            viewport: [0, 0, 1, 1],
+            clear_depth: true,
+            clear_color: None,
+            shadows: None,
+        };
+        self.raster
+            .warm_up(target.kind(), &mut self.list, &parameters)?;
+        Ok(())
     }
 
     /// Forgets every model, texture, material and the map. May be called again and again.
