@@ -1,0 +1,153 @@
+// What sends the eye's path elsewhere: portals, mirrors, what reflects as its stages say, glass and liquids.
+#ifndef RELIGHT_TRACE_TURN_GLSL
+#define RELIGHT_TRACE_TURN_GLSL
+#include "trace/path.glsl"
+#include "trace/dielectric.glsl"
+
+// The paths that have passed a portal after `paths` (scene/turned.rs counts alike).
+uint paths_through(uint paths, uint portal) {
+    uint count = VIEW.portal_count;
+    bool pairs = PATHS_PORTAL + count + count * count <= PATHS_MOST;
+    if (!pairs || paths < PATHS_PORTAL) return PATHS_PORTAL + portal <= 255u ? PATHS_PORTAL + portal : PATHS_DIRECT;
+    uint last = paths - PATHS_PORTAL;
+    if (last >= count) last = (last - count) % count;
+    return PATHS_PORTAL + count + last * count + portal;
+}
+
+// The portal that the surface belongs to, or portal_count.
+uint portal_at(SurfacePoint p) {
+    for (uint i = 0; i < VIEW.portal_count; i++) {
+        vec4 plane = Portals(VIEW.portals).at[i].plane;
+        if (abs(dot(plane.xyz, p.position) - plane.w) < 1.0 && abs(dot(plane.xyz, p.face_normal)) > 0.99) return i;
+    }
+    return VIEW.portal_count;
+}
+
+// Goes on as seen through the portal: reflected, or from the far camera.
+void pass_portal(inout Path path, SurfacePoint p, float t, uint index) {
+    PortalRecord portal = Portals(VIEW.portals).at[index];
+    if (portal.mirror != 0) {
+        vec3 n = portal.plane.xyz;
+        path.direction = normalize(path.direction - n * (2.0 * dot(n, path.direction)));
+        path.origin = offset_ray(p.position, dot(n, path.direction) < 0.0 ? -n : n);
+    } else {
+        vec3 local = p.position - portal.surface_origin;
+        vec3 origin = portal.camera_origin, direction = vec3(0.0);
+        for (int i = 0; i < 3; i++) {
+            origin += portal.camera_axis[i] * dot(local, portal.surface_axis[i]);
+            direction += portal.camera_axis[i] * dot(path.direction, portal.surface_axis[i]);
+        }
+        path.direction = normalize(direction);
+        path.origin = origin;
+    }
+    lit_plane = vec4(0.0);
+    path.last = last_through(path.last, index);
+    path.travelled += t;
+    path.solid_mask = MASK_SOLID | MASK_THIRD_SOLID | paths_through(path.solid_mask >> PATHS_BIT, index) << PATHS_BIT;
+    path.layer_mask = MASK_TRANSLUCENT | MASK_THIRD_TRANSLUCENT;
+}
+
+// Goes on from a surface point that lies `t` ahead, on the side of `normal`.
+void turn_path(inout Path path, SurfacePoint p, float t, vec3 normal, vec3 direction) {
+    path.origin = offset_ray(p.position, normal);
+    path.direction = direction;
+    path.travelled += t;
+    path.layer_mask &= ~MASK_FIRST_TRANSLUCENT;
+    path.events++;
+    lit_plane = vec4(0.0);
+}
+
+// Goes on mirrored at a surface that faces the path with `face`; `normal`: the same, bent as `bend` says.
+void reflect_path(inout Path path, SurfacePoint p, float t, vec3 face, vec3 normal, uint bend) {
+    vec3 mirrored = reflect(path.direction, normal);
+    if (dot(mirrored, face) <= 0.0) mirrored = reflect(path.direction, face);
+    path.last = last_reflected(path.last, vec4(face, dot(face, p.position)));
+    if (normal != face) path.bent = max(path.bent, bend);
+    turn_path(path, p, t, face, normalize(mirrored));
+    path.solid_mask |= MASK_SOLID | MASK_THIRD_SOLID;
+    path.layer_mask = MASK_TRANSLUCENT | MASK_THIRD_TRANSLUCENT;
+}
+
+// 1: a pass of its own, which follows the paths that were split once more, to what the pixels of the other field show.
+layout(constant_id = 2) const uint OTHER_FIELD = 0;
+
+// Whether the path follows what a surface reflects, and what either side's part is to be multiplied by. At the first
+// such surface the pixels take turns like the fields of a chessboard, so that each keeps showing one thing from frame to
+// frame; `composite` puts the fields together. In reference mode a pixel takes turns from frame to frame. Behind it
+// chance decides, by what each side may contribute. All three have the sum of both sides as their mean.
+bool follows_reflection(inout Path path, float reflected, float rest, out float weight) {
+    weight = 1.0;
+    if (!(reflected >= MIN_REFLECTION)) return false;
+    if (!(rest >= MIN_REFLECTION)) return true;
+    if (path.field == 0) {
+        bool accumulates = (VIEW.flags & VIEW_ACCUMULATE) != 0;
+        uint turn = uint(LAUNCH_PIXEL.x) + uint(LAUNCH_PIXEL.y) + (accumulates ? VIEW.seed : 0u);
+        path.field = 1u + ((turn + OTHER_FIELD) & 1u);
+        weight = 2.0;
+        return path.field == 2;
+    }
+    float chance = clamp(reflected / (reflected + rest), 0.1, 0.9);
+    bool follows = rng_next() < chance;
+    weight = 1.0 / (follows ? chance : 1.0 - chance);
+    return follows;
+}
+
+// Passes a surface that reflects as its stages say; true if the path was mirrored there.
+bool pass_shine(inout Path path, SurfacePoint p, Layer layer, float t) {
+    vec3 face = dot(p.face_normal, path.direction) > 0.0 ? -p.face_normal : p.face_normal;
+    vec3 normal = dot(p.normal, face) < 0.0 ? -p.normal : p.normal;
+    float weight;
+    float rest = min(max_component(layer.lit + layer.emission + layer.through), 1.0);
+    if (follows_reflection(path, max_component(layer.reflected), rest, weight)) {
+        NEEDS_RAYS(false)
+        path.transmittance *= layer.reflected;
+        path.weight *= weight;
+        reflect_path(path, p, t, face, normal, BENT_BY_SHAPE);
+        return true;
+    }
+    path.weight *= weight;
+    return false;
+}
+
+// Passes the surface of glass or of a liquid; true if the path was mirrored or refracted there. Glass in maps is panes:
+// the second face undoes what the first one bends (and is culled as a rule), so that a ray passes straight.
+bool pass_dielectric(inout Path path, SurfacePoint p, Material material, SeenLayer seen, float width, float t) {
+    Layer layer = seen.linear;
+    Dielectric dielectric = material.dielectric;
+    bool liquid = (material.flags & MATERIAL_LIQUID) != 0;
+    bool enters = dot(p.face_normal, path.direction) < 0.0;
+    vec3 face = enters ? p.face_normal : -p.face_normal;
+    vec3 normal = ripple_normal(face, p.position, dielectric.ripple, width, p.stage.time);
+    float cosine = -dot(normal, path.direction);
+    if (cosine <= 0.0) {
+        normal = face;
+        cosine = -dot(face, path.direction);
+    }
+    uint bend = dielectric.ripple > 0.0 ? BENT_BY_RIPPLES : BENT_BY_SHAPE;
+    float eta = !liquid || enters ? dielectric.index : 1.0 / dielectric.index;
+    float mirrored = fresnel(min(cosine, 1.0), eta);
+    if (!liquid && (material.flags & MATERIAL_TWO_SIDED) == 0) mirrored = fresnel_pane(mirrored);
+    vec3 reflected = mirrored + (1.0 - mirrored) * layer.reflected;
+    float rest = (1.0 - mirrored) * min(max_component(layer.lit + layer.emission + layer.through), 1.0);
+    float weight;
+    if (follows_reflection(path, max_component(reflected), rest, weight)) {
+        path.transmittance *= reflected;
+        path.weight *= weight;
+        reflect_path(path, p, t, face, normal, bend);
+        return true;
+    }
+    path.transmittance *= 1.0 - mirrored;
+    path.weight *= weight;
+    add_layer(path, p, seen, t);
+    path.transmittance *= dielectric.scale;
+    if (!liquid || is_over(path)) return false;
+    vec3 refracted = refract(path.direction, normal, 1.0 / eta);
+    // a ripple may turn the ray back: it goes on straight then
+    if (dot(refracted, face) >= 0.0) refracted = path.direction;
+    path.absorption = enters ? dielectric.absorption : vec3(0.0);
+    path.bent = max(path.bent, bend);
+    turn_path(path, p, t, -face, normalize(refracted));
+    return true;
+}
+
+#endif
