@@ -9,7 +9,7 @@
 // shown, as far as it is a part of the colour (as a mask of reactive pixels does it in AMD's FidelityFX Super Resolution 2).
 //
 // Colours are blended compressed, so that a bright sample does not outweigh all others at an edge, and clipped in YCoCg.
-#include "trace/color.glsl"
+#include "trace/denoise.glsl"
 #include "trace/exposure.glsl"
 #include "trace/motion.glsl"
 
@@ -40,6 +40,12 @@ const float REST_RANGE = 1.25, MOVING_RANGE = 1.0;
 const float IN_FRONT = 0.9;
 // Part of its length that the way to a surface may be off and still be the way to that surface.
 const float SAME_PATH = 0.04;
+// Part of the light that has to change within a frame.
+const float LEAST_CHANGE = 1.0e-3;
+// Pixels between the places that tell what has changed around a pixel.
+const int CHANGE_SPACING = 2;
+// By how much more or less light history is changed at most.
+const float MOST_RATIO = 8.0;
 
 // Nearly linear up to white, so that edges get the mean of both sides, and at most as much as four times white.
 vec3 compress(vec3 c, float exposure) { return c / (1.0 + max_component(c) * exposure); }
@@ -99,6 +105,36 @@ bool was_seen(vec2 place, float path, bool rests, bool takes_turns) {
         most = max(most, abs(then));
     }
     return rested || path > least - slack && path < most + slack;
+}
+
+// The history of a resting pixel as it would be in the light of now: times what the light has changed by since the last
+// frame. As each frame does so, all samples of the history come to have the light of now. The light's noise changes, too,
+// which the mean of the frames is to take out: so the change is that of the surface around.
+vec3 in_light_of_now(vec3 color, ivec2 pixel, float path) {
+    const uint KNOWN = DENOISE_HISTORY | DENOISE_GRADIENTS;
+    if ((VIEW.flags & VIEW_DENOISE) == 0 || (DENOISE.flags & KNOWN) != KNOWN) return color;
+    // 0 where nothing has changed, to the last digit
+    vec2 change = imageLoad(images_rg16f[DENOISE.gradient], pixel / STRATUM).xy;
+    if (max(change.x, change.y) < LEAST_CHANGE) return color;
+    vec3 now = vec3(1.0e-6), then = vec3(1.0e-6);
+    float slack = SAME_PATH * path + 1.0;
+    for (int y = -1; y <= 1; y++) {
+        for (int x = -1; x <= 1; x++) {
+            ivec2 at = clamp(pixel + CHANGE_SPACING * ivec2(x, y), ivec2(0), ivec2(VIEW.width, VIEW.height) - 1);
+            // of the same surface in both frames, which rests
+            vec2 paths = vec2(imageLoad(images_r16f[VIEW.motion.path], at).x, last_path_read(at));
+            if (any(greaterThan(abs(paths - path), vec2(slack)))) continue;
+            now += light_of(at);
+            then += light_read(VIEW.antialias.last_light, at);
+        }
+    }
+    GBufferPixel g = gbuffer_read(pixel);
+    if (g.path < 0.0) return color;
+    vec3 ratio = clamp(now / then, 1.0 / MOST_RATIO, MOST_RATIO);
+    // half of what such pixels show is the other field's
+    if (mark_field(mark_read(pixel)) > 0.0) ratio = mix(vec3(1.0), ratio, 0.5);
+    vec3 front = min(g.front * exp2(-VIEW.exposure_base), color);
+    return (color - front) * ratio + front;
 }
 
 void main() {
@@ -166,6 +202,7 @@ void main() {
     bool rests = motion.offset == vec2(0.0), is_fine = traced_size == output_size;
     if (known && was_seen(last_place * ratio, motion.last_path, rests, mark_field(motion.mark) > 0.0)) {
         vec4 history = last_bicubic(last_place, vec2(output_size));
+        if (rests) history.rgb = in_light_of_now(history.rgb, middle, path_read(middle));
         old = to_ycocg(compress(history.rgb, exposure));
         float range = rests ? REST_RANGE : MOVING_RANGE;
         vec3 off = old - mean;

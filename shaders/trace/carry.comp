@@ -36,6 +36,7 @@ void main() {
     float nearest = REACH;
     int found = -1;
     float found_path = 0.0;
+    bool rests = false;
     ivec2 place = ivec2(0);
     for (int i = 0; i < 9; i++) {
         ivec2 pixel = pixel_of(stratum, i);
@@ -52,11 +53,12 @@ void main() {
         nearest = distance;
         found = i;
         found_path = motion.z;
+        rests = motion.xy == vec2(0.0);
         place = unpack_place(packed);
     }
     uint record = NOT_CARRIED;
     bool moved;
-    if (found >= 0 && same_surface(kept_sample(place / STRATUM), pixel_of(stratum, found), found_path, moved))
+    if (found >= 0 && same_surface(kept_sample(place / STRATUM), pixel_of(stratum, found), found_path, moved) && !(moved && rests))
         record = pack_carried(found, moved, place);
     imageStore(uimages_r32ui[DENOISE.carried], stratum, uvec4(record));
 }

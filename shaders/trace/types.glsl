@@ -58,7 +58,7 @@ struct PostView {
 
 struct AntialiasView {
     vec2 jitter; uint output_width; uint output_height; uint image_picture; uint image_resolved; uint last_resolved;
-    uint sampler_index; uint history; float lens_radius; float focal_distance; float texture_scale; float anisotropy;
+    uint last_light; uint sampler_index; uint history; float lens_radius; float focal_distance; float texture_scale; float anisotropy; uint padding;
 };
 
 struct DenoiseView {

@@ -157,12 +157,14 @@ impl Antialias {
             },
             image_resolved: image,
             last_resolved: last,
+            last_light: 0, // filled in by the caller
             sampler_index: self.sampler,
             history: u32::from(self.history),
             lens_radius: if dof { 0.5 * settings.rt_aperture } else { 0.0 },
             focal_distance: settings.rt_focal_length.max(1.0),
             texture_scale: texture_scale(settings, output, jittered),
             anisotropy: settings.anisotropy,
+            padding: 0,
         })
     }
 

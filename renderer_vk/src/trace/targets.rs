@@ -56,8 +56,8 @@ pub struct Targets {
     /// `R16F`: length of the way to it, of this frame and the last; negative where it does not rest in the picture.
     pub path: [Image; 2],
     /// `R32Uint`, light: what comes straight from lamps and suns, without albedo. Written by `direct` and `suns`, where the
-    /// denoiser leaves the filtered light for `composite`.
-    pub direct: Image,
+    /// denoiser leaves the filtered light for `composite`; of this frame and the last.
+    pub direct: [Image; 2],
     /// Bounced light, likewise.
     pub indirect: Image,
     /// `indirect` holds zeros: nothing has to be written while nothing bounces.
@@ -97,7 +97,10 @@ impl Targets {
                 make("trace path", Format::R16F)?,
                 make("trace last path", Format::R16F)?,
             ],
-            direct: make("trace direct", Format::R32Uint)?,
+            direct: [
+                make("trace direct", Format::R32Uint)?,
+                make("trace last direct", Format::R32Uint)?,
+            ],
             indirect: make("trace indirect", Format::R32Uint)?,
             indirect_is_black: false,
             composite: make("trace composite", Format::Rgba16F)?,
@@ -128,5 +131,6 @@ impl Targets {
     /// What this frame has written becomes what the last one wrote.
     pub fn advance(&mut self) {
         self.path.swap(0, 1);
+        self.direct.swap(0, 1);
     }
 }

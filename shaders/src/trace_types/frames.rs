@@ -89,6 +89,8 @@ pub struct AntialiasView {
     pub image_resolved: u32,
     /// Texture of the last frame's.
     pub last_resolved: u32,
+    /// Light of the last frame, as the denoiser left it: R32UI.
+    pub last_light: u32,
     /// Linear sampler that clamps.
     pub sampler_index: u32,
     /// 1: there is a resolved picture of the last frame.
@@ -101,4 +103,6 @@ pub struct AntialiasView {
     pub texture_scale: f32,
     /// How much longer than wide the part of a texture may be that one look-up takes in; 1 and below: no longer.
     pub anisotropy: f32,
+    /// To a multiple of eight bytes.
+    pub padding: u32,
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use relight::light::{Falloff, PointLight};
-use shaders::trace_types::constants::DEBUG_SAMPLES;
+use shaders::trace_types::constants::{DEBUG_GRADIENTS, DEBUG_SAMPLES};
 
 use super::harness::{Gpu, Scene, rectangle, reference};
 use crate::api::DynamicLight;
@@ -97,4 +97,77 @@ fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther() {
     let beyond = changed.iter().skip(edge + (REACH + 1) * STRATUM);
     assert!(beyond.len() > 30);
     assert!(beyond.clone().all(|&n| n == 0), "beyond reach: {changed:?}");
+}
+
+#[test]
+fn what_rests_has_not_changed_whatever_place_in_the_pixel_is_seen() {
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    // boards that lean on the wall: beside their edges are surfaces as far away that are lit otherwise
+    let mut scene = halved_wall();
+    let white = scene.diffuse(0.8);
+    for i in 0..8u8 {
+        let corner = Vec3::new(199.0, -90.0 + 20.0 * f32::from(i), -9.0);
+        let edge = Vec3::new(-8.0, 8.0, 0.0);
+        scene.quad(rectangle(corner, Vec3::Z * 14.0, edge), white);
+    }
+    let seen = |rt_debug| Settings {
+        rt_accumulate: false,
+        rt_taa: true,
+        rt_denoiser: 1,
+        rt_debug,
+        ..reference()
+    };
+    let (_, picture) = gpu.render_views(&scene, &seen(0), 8, |_, _| {});
+    assert!(picture.iter().any(|p| p[0] > 20), "nothing is lit");
+    for frames in 3..8 {
+        let (_, change) = gpu.render_views(&scene, &seen(DEBUG_GRADIENTS), frames, |_, _| {});
+        let changed = change.iter().filter(|p| p[..3] != [0; 3]).count();
+        assert_eq!(changed, 0, "pixels that changed in frame {frames}");
+    }
+}
+
+#[test]
+fn antialiasing_keeps_nothing_of_light_that_fades() {
+    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
+        return;
+    };
+    // stripes hardly wider than pixels, which differ by more than the light of a few frames
+    let mut scene = halved_wall();
+    let colors = [0.2, 0.9].map(|albedo| scene.diffuse(albedo));
+    for (i, color) in (0..70u8).zip(colors.into_iter().cycle()) {
+        let corner = Vec3::new(199.0, 2.0 * f32::from(i), -50.0);
+        scene.quad(rectangle(corner, Vec3::Z * 100.0, Vec3::Y * 2.0), color);
+    }
+    let brightness = |gpu: &mut Gpu, rt_taa: bool, dims: bool| {
+        let settings = Settings {
+            rt_accumulate: false,
+            rt_taa,
+            rt_denoiser: 1,
+            // all of them, so that no noise is in the way
+            rt_num_random_dl: 0,
+            ..reference()
+        };
+        let lamp = |frame: u32, view: &mut ViewScene| {
+            let left = if dims {
+                0.94f32.powi(frame as i32)
+            } else {
+                1.0
+            };
+            view.dlights = vec![DynamicLight {
+                origin: Vec3::new(170.0, 60.0, 0.0),
+                radius: 200.0,
+                color: Vec3::splat(0.2 * left),
+                additive: false,
+            }];
+        };
+        let (light, _) = gpu.render_views(&scene, &settings, 32, lamp);
+        let left = |(i, light): (usize, &Vec3)| (i % WIDTH < WIDTH / 2).then_some(light.x);
+        light.iter().enumerate().filter_map(left).sum::<f32>()
+    };
+    let steady = brightness(&mut gpu, true, false) / brightness(&mut gpu, false, false);
+    let fading = brightness(&mut gpu, true, true) / brightness(&mut gpu, false, true);
+    println!("with antialiasing over without: steady {steady}, fading {fading}");
+    assert!((fading / steady - 1.0).abs() < 0.03, "{fading}, {steady}");
 }

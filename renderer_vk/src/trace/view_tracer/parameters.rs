@@ -95,7 +95,10 @@ impl ViewTracer {
                 last_path: targets.path[1].storage_index(),
                 ..motion
             },
-            antialias,
+            antialias: AntialiasView {
+                last_light: targets.direct[1].storage_index(),
+                ..antialias
+            },
             lights: lights.of_view(rec, view, settings)?,
             eye,
             forward,
@@ -134,14 +137,14 @@ impl ViewTracer {
             portal_count: u32::try_from(portals.len()).unwrap_or(u32::MAX),
             flare_count: flares.count,
             sun: sun_disc(view),
-            fog: self.fog.view(&targets.direct, &targets.composite),
+            fog: self.fog.view(&targets.direct[0], &targets.composite),
             max_depth: settings.rt_max_depth,
             bounces: settings.rt_bounces.min(2),
             image_position: targets.position.storage_index(),
             image_surface: targets.surface.storage_index(),
             image_shown: targets.shown.storage_index(),
             image_other: targets.other.storage_index(),
-            image_direct: targets.direct.storage_index(),
+            image_direct: targets.direct[0].storage_index(),
             image_indirect: targets.indirect.storage_index(),
             image_composite: targets.composite.storage_index(),
             image_accumulation: targets
