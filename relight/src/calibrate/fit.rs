@@ -13,7 +13,7 @@ use super::solve::{self, Ambient, Effort};
 use super::splash::Splashes;
 use super::spread::Spread;
 use super::texels::TexelId;
-use super::{Occluders, Purpose, suns, views};
+use super::{Occluders, Purpose, suns, views, ways};
 use crate::exposure::{self, Exposure, Place};
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::Vec3;
@@ -35,7 +35,9 @@ const LAST_LOOKS: u32 = 2;
 /// How many times the error at samples held out these texels may leave then: they are a small part of the map.
 const BESIDE: f32 = 1.02;
 
-/// Error, stops, of lights that fall off with the square of the distance, from which on linear ones are tried.
+/// Error, stops, of lights that fall off with the square of the distance, from which on linear ones are tried, as they are
+/// where less than half of the error of directives is gone. Elsewhere a few that reach far may agree a little better with the
+/// light of many lamps than these do.
 const MUCH: f32 = 0.25;
 
 /// More ambient light than the darkest texels have is believed when it leaves less than this part of the error at
@@ -328,10 +330,11 @@ impl Fit<'_> {
     }
 
     /// Puts in lights that may fall off linearly, as compilers can have it, in place of those of [`place`](Self::place),
-    /// where these leave much and samples that are held out get better by it. `start`: the state before them.
-    pub fn place_linear(&mut self, start: Start, candidates: usize) {
+    /// where these leave much and samples that are held out get better by it. `start`: the state before them. `directives`:
+    /// error of what these say, stops.
+    pub fn place_linear(&mut self, start: Start, candidates: usize, directives: f32) {
         let before = self.agreement().median_stops;
-        if before < MUCH {
+        if before < MUCH && before <= ways::halved(directives) {
             return;
         }
         let kept = self.start();

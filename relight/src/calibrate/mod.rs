@@ -15,7 +15,7 @@
 //!    (`crossings`), then in front of what stays unexplained (`fronts`), for as long as
 //!    that makes light agree better at what is held out. `fit` holds these steps together. `beside`: texels right beside
 //!    these lights join the measurements where they are too bright.
-//!    Where lights that fall off with the square of the distance leave much, once more with linear ones.
+//!    Where that leaves much, once more with lights that may fall off linearly, too.
 //! 6. `compiler`: all of that with less effort for light that was stored encoded, and for lights that end, to see whether
 //!    it explains more. `ways`: where the map says that corners were made darker, all of it is done both ways; with back
 //!    splashes and without; with more measurements where much is left. `memory`: what these have in common is traced once.
@@ -86,7 +86,7 @@ use std::collections::{HashMap, HashSet};
 use std::time::Instant;
 
 /// Number that changes whenever the same world would give another result.
-const VERSION: u32 = 25;
+const VERSION: u32 = 26;
 
 /// One in so many candidates comes from the directions of the light grid.
 const CROSSINGS: usize = 5;
@@ -332,7 +332,8 @@ fn find(
             return None;
         }
         if thorough {
-            fit.place_linear(start, options.candidates);
+            let directives = solution.report.before.median_stops;
+            fit.place_linear(start, options.candidates, directives);
         }
     } else {
         fit.settle();

@@ -74,8 +74,7 @@ pub(super) fn best(
     let Some((found, compiler)) = best else {
         return Solution::default();
     };
-    let halved = (found.report.before.median_stops * HALF).max(compiler::NOTHING);
-    if off(&found) <= halved || found.measured_more {
+    if off(&found) <= halved(found.report.before.median_stops) || found.measured_more {
         return found;
     }
     let splashes = found.report.splashes > 0;
@@ -108,6 +107,11 @@ impl Rival {
             pace: after.map(|left| left * BEHIND).collect(),
         }
     }
+}
+
+/// Error that calibration should leave at most, where directives leave this one, stops.
+pub(super) fn halved(directives: f32) -> f32 {
+    (directives * HALF).max(compiler::NOTHING)
 }
 
 /// Error at measurements held out, stops.
