@@ -43,3 +43,20 @@ fn lights_that_end_are_told_from_those_that_do_not() {
     }
     assert!(report.after.median_stops < 0.15, "{report:?}");
 }
+
+#[test]
+fn lights_that_end_are_looked_for_where_others_leave_more_than_half() {
+    // beside light from everywhere they are too weak to leave much
+    let weak = |at: Vec3, normal: Vec3| Vec3::splat(0.2) + 0.3 * from_linear(at, normal);
+    let mut world = room(false, Some(&weak));
+    let few = CalibrationOptions {
+        candidates: 100,
+        ..small()
+    };
+    let report = calibrate(&mut world, &few);
+    println!("{report:?}");
+    assert!(report.before.median_stops < 0.25, "{report:?}");
+    assert!(report.after.median_stops < 0.02, "{report:?}");
+    let ends = |light: &PointLight| matches!(light.falloff, Falloff::Linear { .. });
+    assert!(world.point_lights.iter().all(ends), "{report:?}");
+}
