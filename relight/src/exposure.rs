@@ -18,7 +18,7 @@ use crate::light::Shade;
 use crate::overbright::{self, luminance};
 use crate::world::RelitWorld;
 use glam::Vec3;
-use q3bsp::Bsp;
+use q3bsp::{Bsp, Lightmap};
 
 /// Every so many texels of a page one is taken.
 const STRIDE: usize = 7;
@@ -203,26 +203,32 @@ pub fn display_exposure(world: &RelitWorld) -> Exposure {
     if let Some(exposure) = world.exposure {
         return exposure;
     }
-    let found = of_stored(&world.bsp, |light| ratio(light, world.stored_gamma));
+    let found = of_stored(&world.bsp, &world.pages, |light| {
+        ratio(light, world.stored_gamma)
+    });
     Exposure::usual(found.unwrap_or(DEFAULT))
 }
 
 /// The exponent of the power law that the display's curve D comes to where a map shows its light: the mean of
-/// d ln D / d ln x over the light of its lightmaps, else of its vertices, on a texture of usual brightness.
-pub fn display_exponent(bsp: &Bsp) -> f32 {
-    of_stored(bsp, |light| exponent(light)).unwrap_or(DEFAULT_EXPONENT)
+/// d ln D / d ln x over the light of its lightmaps and of the `pages` beside it, else of its vertices, on a texture of usual
+/// brightness.
+pub(crate) fn display_exponent(bsp: &Bsp, pages: &[Lightmap]) -> f32 {
+    of_stored(bsp, pages, |light| exponent(light)).unwrap_or(DEFAULT_EXPONENT)
 }
 
 /// What is found of light on lightmaps, encoded; else on vertices.
 fn of_stored(
     bsp: &Bsp,
+    pages: &[Lightmap],
     find: impl Fn(&mut dyn Iterator<Item = [u8; 3]>) -> Option<f32>,
 ) -> Option<f32> {
-    let mut texels = bsp
-        .lightmaps
-        .iter()
-        .flat_map(|page| page.0.as_chunks::<3>().0.iter().step_by(STRIDE))
-        .map(|&texel| overbright::shift(texel, overbright::MAP_OVERBRIGHT_BITS));
+    let some = |page: &'_ Lightmap| {
+        let texels = page.0.as_chunks::<3>().0.iter().step_by(STRIDE);
+        texels.copied().collect::<Vec<_>>()
+    };
+    let own = (bsp.lightmaps.iter().flat_map(some))
+        .map(|texel| overbright::shift(texel, overbright::MAP_OVERBRIGHT_BITS));
+    let mut texels = own.chain(pages.iter().flat_map(some));
     let mut vertices = bsp.vertices.iter().map(|v| {
         let [r, g, b, _] = v.color;
         overbright::shift([r, g, b], overbright::MAP_OVERBRIGHT_BITS)

@@ -381,6 +381,10 @@ pub mod constants {
         STAGE_NO_LIGHTMAP = 64;
         /// The stage's picture, which stands for a reflection, is a lit haze over what lies behind, too.
         STAGE_HAZE = 128;
+        /// The stage's picture is baked light: an image with the coordinates of the lightmap.
+        STAGE_BAKED_LIGHT = 256;
+        /// The stage adds baked light of a style, which the traced look has as light sources.
+        STAGE_LIGHT_STYLE = 512;
         /// Seen from both sides.
         MATERIAL_TWO_SIDED = 1;
         /// Only the back side is seen.

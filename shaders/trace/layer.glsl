@@ -216,11 +216,14 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
     Layer layer = Layer(vec3(0.0), vec3(0.0), vec3(1.0), vec3(0.0), vec3(0.0));
     for (uint i = 0; i < material.stage_count; i++) {
         Stage stage = stages.at[material.stage_first + i];
+        // the light of a style comes from light sources of its own
+        if ((stage.flags & STAGE_LIGHT_STYLE) != 0) continue;
         vec4 color = stage_color(VIEW.materials, stage, instance, p.stage);
         Layer source = layer_nothing();
         float alpha;
-        if (stage.image_count == 0 && (stage.flags & STAGE_WHITE) == 0) {
-            // the lightmap: the light itself, as bright as the stage lets it through. Where there is none the eye sees the
+        bool lightmap = stage.image_count == 0 && (stage.flags & STAGE_WHITE) == 0;
+        if (lightmap || (stage.flags & STAGE_BAKED_LIGHT) != 0) {
+            // baked light: the light itself, as bright as the stage lets it through. Where there is none the eye sees the
             // engine's white picture; that light falls on nothing else, as it did not when the map was lit
             if ((stage.flags & STAGE_NO_LIGHTMAP) != 0 && seen != SEEN_BOUNCED) source.emission = color.rgb;
             else source.lit = color.rgb;

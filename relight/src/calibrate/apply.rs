@@ -1,8 +1,10 @@
 //! What was found, written into the world.
 
+use super::columns::Lamp;
 use super::{Solution, columns, splash};
 use crate::light::{self, DEFAULT_SUN_RADIUS, PointLight, SunLight};
 use crate::world::RelitWorld;
+use glam::Vec3;
 
 /// Radius of the balls that lights put in are drawn from, id units: they keep clear of surfaces by as much.
 const PLACED_RADIUS: f32 = super::place::CLEARANCE;
@@ -22,13 +24,7 @@ pub(super) fn apply(world: &mut RelitWorld, solution: &Solution) -> usize {
     columns::set_known(world, &solution.known);
     world.ambient = solution.ambient;
     let added = splashes.iter().chain(&solution.placed);
-    let added = added.map(|&(lamp, intensity)| PointLight {
-        origin: lamp.origin,
-        intensity,
-        radius: PLACED_RADIUS,
-        spot: None,
-        falloff: lamp.falloff,
-    });
+    let added = added.map(|&(lamp, intensity)| placed_light(lamp, intensity));
     world.point_lights.extend(added);
     let suns = solution
         .suns
@@ -52,4 +48,16 @@ pub(super) fn apply(world: &mut RelitWorld, solution: &Solution) -> usize {
     light::build_lists(world);
     world.report.point_lights = world.point_lights.len();
     splashes.len()
+}
+
+/// A light that was put in.
+pub(super) fn placed_light(lamp: Lamp, intensity: Vec3) -> PointLight {
+    PointLight {
+        origin: lamp.origin,
+        intensity,
+        radius: PLACED_RADIUS,
+        spot: None,
+        falloff: lamp.falloff,
+        pulse: None,
+    }
 }

@@ -277,7 +277,11 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
 
 /// Hash of everything that calibrating a world depends on.
 pub(super) fn key(world: &RelitWorld, options: &CalibrationOptions) -> u128 {
-    let mut hash = Hash::new();
+    key_from(Hash::new(), world, options)
+}
+
+/// The same of a part of the result that `hash` has begun to name.
+pub(super) fn key_from(mut hash: Hash, world: &RelitWorld, options: &CalibrationOptions) -> u128 {
     hash.number(u64::from(VERSION));
     hash.number(options.samples as u64);
     hash.number(options.candidates as u64);
@@ -306,7 +310,7 @@ impl Hash {
                 surface.model,
                 surface.first_index,
                 surface.num_indices,
-                surface.lightmap as u32,
+                surface.light_page as u32,
             ] {
                 self.number(u64::from(number));
             }
@@ -328,6 +332,12 @@ impl Hash {
                 self.vector(shade.mirrored);
             }
             self.vector(material.shown);
+            for style in &material.baked.styles {
+                self.bytes(format!("{style:?}").as_bytes());
+            }
+        }
+        for page in &world.pages {
+            self.bytes(&page.0);
         }
         for light in &world.lights {
             light.vertices.iter().for_each(|v| self.vector(*v));

@@ -21,6 +21,7 @@
 //!    splashes and without; with more measurements where much is left. `memory`: what these have in common is traced once.
 //! 7. The world's lights get their strengths, lost lights are added to
 //!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
+//! 8. `styles`: the same for the light of each style, which the compiler stored apart.
 //!
 //! `docs/calibration.md` has the equations and how well it does. [`residuals()`] tells how well any world's light agrees.
 //!
@@ -55,6 +56,7 @@ mod skies;
 mod solve;
 mod splash;
 mod spread;
+mod styles;
 mod suns;
 #[cfg(test)]
 mod tests;
@@ -198,6 +200,8 @@ pub fn calibrate_with(
     } else {
         solution.report.splashes = apply::apply(world, &solution);
     }
+    world.calibration = Some(solution.report.clone());
+    styles::add(world, options);
     solution.report.seconds = begin.elapsed().as_secs_f64();
     world.calibration = Some(solution.report.clone());
     solution.report

@@ -9,6 +9,7 @@ mod memory;
 mod more;
 mod said;
 mod splash;
+mod styles;
 
 use super::*;
 use crate::files::{MemoryFiles, SearchPath};
@@ -328,6 +329,7 @@ fn lights_stand_for_the_nearest_hidden_one() {
         radius: 4.0,
         spot: None,
         falloff: crate::light::Falloff::InverseSquare,
+        pulse: None,
     };
     let mut world = room(false, None);
     world.point_lights = vec![

@@ -3,6 +3,7 @@
 use super::parallel;
 use super::random::Random;
 use super::samples::{Gauge, HELD_OUT, Sample, decode, is_held_out, sample_at, shown, tells};
+use crate::overbright::MAP_OVERBRIGHT_BITS;
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
 use glam::{Vec2, Vec3};
 use q3bsp::Lightmap;
@@ -32,7 +33,7 @@ fn constant(world: &RelitWorld, surface: usize) -> bool {
 
 /// Whether a surface stores its light in a lightmap.
 pub(super) fn lit_by_texel(surface: &WorldSurface) -> bool {
-    surface.lightmap >= 0
+    surface.light_page >= 0
 }
 
 /// What is stored at a place.
@@ -43,6 +44,8 @@ pub(super) struct Stored {
     lone_black: bool,
     /// What the compiler multiplied light by before it stored it.
     scale: f32,
+    /// Steps of a page of the map that a step of this one is.
+    step: f32,
 }
 
 impl Stored {
@@ -52,6 +55,7 @@ impl Stored {
             rgb,
             lone_black: dark(rgb),
             scale: 1.0,
+            step: 1.0,
         }
     }
 
@@ -67,16 +71,22 @@ impl Stored {
 
     /// What the engine shows of it.
     pub(super) fn shown(&self) -> Vec3 {
-        shown(Vec3::from_array(self.rgb.map(f32::from)))
+        shown(self.steps())
     }
 
     /// The light that it stands for, irradiance / π.
     pub(super) fn light(&self, world: &RelitWorld) -> Vec3 {
-        decode(world, Vec3::from_array(self.rgb.map(f32::from)), self.scale)
+        decode(world, self.steps(), self.scale)
     }
 
-    /// A texel of a page, of a surface whose light was multiplied by `scale`.
-    fn texel(page: &Lightmap, x: usize, y: usize, scale: f32) -> Stored {
+    /// Steps of a page of the map.
+    fn steps(&self) -> Vec3 {
+        Vec3::from_array(self.rgb.map(f32::from)) * self.step
+    }
+
+    /// A texel of a page, of a surface whose light was multiplied by `scale`. `step`: steps of a page of the map that a
+    /// step of it is.
+    fn texel(page: &Lightmap, x: usize, y: usize, scale: f32, step: f32) -> Stored {
         let rgb = page.texel(x, y);
         let around = || {
             let sides = -BLACK_AROUND..=BLACK_AROUND;
@@ -98,6 +108,7 @@ impl Stored {
             rgb,
             lone_black: dark(rgb) && around().any(lit),
             scale,
+            step,
         }
     }
 }
@@ -195,8 +206,8 @@ impl<'a> Shares<'a> {
             if !lit_by_texel(surface) || !tells(world, surface) || !constant(world, index) {
                 continue;
             }
-            let page = usize::try_from(surface.lightmap).ok();
-            let page = page.and_then(|page| world.bsp.lightmaps.get(page));
+            let page = usize::try_from(surface.light_page).ok();
+            let page = page.and_then(|page| world.page(page));
             let side = page.map_or(0.0, |page| page.size() as f32);
             let first = surface.first_index as usize / 3;
             for triangle in first..first + surface.num_indices as usize / 3 {
@@ -290,8 +301,8 @@ fn texel_at(
     surface: &WorldSurface,
     at: Vec2,
 ) -> Option<Texel> {
-    let number = usize::try_from(surface.lightmap).ok()?;
-    let page = world.bsp.lightmaps.get(number)?;
+    let number = usize::try_from(surface.light_page).ok()?;
+    let page = world.page(number)?;
     let size = page.size() as f32;
     let cell = (at * size).floor();
     if !(cell.min_element() >= 0.0 && cell.max_element() < size) {
@@ -308,7 +319,13 @@ fn texel_at(
         id: [number as u32, cell.x as u32, cell.y as u32],
         place,
         material: surface.material,
-        stored: Stored::texel(page, cell.x as usize, cell.y as usize, scale),
+        stored: Stored::texel(
+            page,
+            cell.x as usize,
+            cell.y as usize,
+            scale,
+            step_of(world, number),
+        ),
     })
 }
 
@@ -321,16 +338,15 @@ pub(super) fn stored_at(
     at: Vec3,
 ) -> Option<Vec3> {
     let own = world.surfaces.get(surface)?;
-    let page = world
-        .bsp
-        .lightmaps
-        .get(usize::try_from(own.lightmap).ok()?)?;
+    let number = usize::try_from(own.light_page).ok()?;
+    let page = world.page(number)?;
     let cell = (page_place(world, surface, triangle, at)? * page.size() as f32).floor();
     if !(cell.min_element() >= 0.0 && cell.max_element() < page.size() as f32) {
         return None;
     }
     let scale = stored_scale(world, own);
-    let stored = Stored::texel(page, cell.x as usize, cell.y as usize, scale);
+    let step = step_of(world, number);
+    let stored = Stored::texel(page, cell.x as usize, cell.y as usize, scale, step);
     (!stored.lone_black && !stored.rgb.contains(&255)).then(|| stored.light(world))
 }
 
@@ -365,6 +381,14 @@ fn page_place(world: &RelitWorld, surface: usize, triangle: usize, at: Vec3) -> 
     let u = offset.cross(e2).dot(normal) / squared;
     let v = e1.cross(offset).dot(normal) / squared;
     Some(a.lightmap + (b.lightmap - a.lightmap) * u + (c.lightmap - a.lightmap) * v)
+}
+
+/// Steps of a page of the map that a step of a page is: pages that are shown as they are stored have finer ones.
+fn step_of(world: &RelitWorld, page: usize) -> f32 {
+    match world.is_shown_as_stored(page) {
+        true => 1.0 / (1 << MAP_OVERBRIGHT_BITS) as f32,
+        false => 1.0,
+    }
 }
 
 /// What the compiler multiplied a surface's light by before it stored it.
@@ -413,7 +437,7 @@ mod tests {
         // One lit texel, in the middle of the first row.
         texels[10 * 3..10 * 3 + 3].fill(90);
         let page = Lightmap(texels);
-        let lone = |x, y| Stored::texel(&page, x, y, 1.0).lone_black;
+        let lone = |x, y| Stored::texel(&page, x, y, 1.0, 1.0).lone_black;
         assert!(!lone(10, 0) && lone(9, 0) && lone(8, 2) && lone(12, 0));
         assert!(!lone(7, 0) && !lone(10, 3) && !lone(0, 0) && !lone(side - 1, side - 1));
     }

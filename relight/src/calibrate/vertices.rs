@@ -9,7 +9,7 @@ use q3bsp::SurfaceKind;
 
 /// Whether a surface stores its light at its vertices, which are the map's own.
 pub(super) fn lit(surface: &WorldSurface) -> bool {
-    surface.lightmap == q3bsp::lightmap_index::BY_VERTEX
+    surface.light_page == q3bsp::lightmap_index::BY_VERTEX
         && matches!(
             surface.kind,
             SurfaceKind::Planar | SurfaceKind::TriangleSoup

@@ -1,6 +1,6 @@
 //! What formats of other programs have no words for, as JSON: whole materials, entities with all their keys.
 
-use crate::world::WorldMaterial;
+use crate::world::{StyleLight, StyleStrength, WorldMaterial};
 use glam::{Vec2, Vec3};
 use q3bsp::Entity;
 use serde_json::{Map, Value, json};
@@ -29,6 +29,16 @@ pub fn material(material: &WorldMaterial) -> Value {
             "script".into(),
             json!(format!("{}:{}", place.file, place.line)),
         );
+    }
+    if !material.baked.styles.is_empty() {
+        let style = |style: &StyleLight| {
+            json!({
+                "strength": style_strength(style.strength),
+                "tcMod": style.tc_mods.iter().map(tc_mod).collect::<Vec<_>>(),
+            })
+        };
+        let styles: Vec<_> = material.baked.styles.iter().map(style).collect();
+        map.insert("lightStyles".into(), json!(styles));
     }
     if let Some(fault) = &material.resolved.fault {
         map.insert("fault".into(), json!(fault));
@@ -169,6 +179,14 @@ fn wave(wave: &Wave) -> Value {
         "phase": wave.phase,
         "frequency": wave.frequency,
     })
+}
+
+/// How strong the light of a style is: a number, or a wave.
+pub fn style_strength(strength: StyleStrength) -> Value {
+    match strength {
+        StyleStrength::Steady(factor) => json!(factor),
+        StyleStrength::Wave(w) => json!({"wave": wave(&w)}),
+    }
 }
 
 fn tc_mod(tc_mod: &TcMod) -> Value {

@@ -26,7 +26,7 @@ impl Atlas {
             .surfaces
             .iter()
             .filter(|s| s.num_indices > 0)
-            .map(|s| s.lightmap)
+            .map(|s| s.light_page)
             .filter(|&page| page_of(world, page).is_some());
         let mut cells: BTreeMap<i32, usize> = used.map(|page| (page, 0)).collect();
         for (place, cell) in cells.values_mut().enumerate() {
@@ -55,7 +55,7 @@ impl Atlas {
 
     /// Coordinates in the atlas of coordinates in a surface's page; 0 for surfaces without.
     pub fn place(&self, surface: &WorldSurface, page: Vec2) -> Vec2 {
-        let Some(&cell) = self.cells.get(&surface.lightmap) else {
+        let Some(&cell) = self.cells.get(&surface.light_page) else {
             return Vec2::ZERO;
         };
         let step = self.side + 2 * GUTTER;
@@ -106,5 +106,5 @@ impl Atlas {
 }
 
 fn page_of(world: &RelitWorld, page: i32) -> Option<&q3bsp::Lightmap> {
-    world.bsp.lightmaps.get(usize::try_from(page).ok()?)
+    world.page(usize::try_from(page).ok()?)
 }

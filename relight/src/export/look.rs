@@ -198,6 +198,12 @@ pub fn look(
         look.roughness = 0.0;
     }
     told_losses(shader, &mut look.lost);
+    if !material.baked.styles.is_empty() {
+        let styles = material.baked.styles.len();
+        look.lost.push(format!(
+            "baked light of {styles} light styles; the light of style 0 alone is shown"
+        ));
+    }
     let base = match class.class {
         SurfaceClass::CutOut => cut_out_stage(shader).or_else(|| base_stage(shader)),
         _ => base_stage(shader),

@@ -324,6 +324,7 @@ fn point(numbers: &[f32]) -> Result<PointLight, String> {
         radius: DEFAULT_POINT_LIGHT_RADIUS,
         spot: None,
         falloff: Falloff::InverseSquare,
+        pulse: None,
     })
 }
 

@@ -78,6 +78,7 @@ pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLi
             radius: DEFAULT_POINT_LIGHT_RADIUS,
             spot,
             falloff,
+            pulse: None,
         });
     }
     (points, suns)

@@ -14,7 +14,7 @@ use super::{
     AMBIENT_RADIANCE, Emission, EmissionSource, EmitterSummary, Finder, SURFACE_LIGHT_RADIANCE,
 };
 use super::{TriangleLight, surfaces};
-use crate::overbright;
+use crate::overbright::{self, MAP_OVERBRIGHT_BITS};
 use crate::world::{Flare, RelitWorld};
 use glam::Vec3;
 
@@ -117,15 +117,22 @@ fn lamp(world: &mut RelitWorld, flare: &Flare) {
 fn mean_lightmap(world: &RelitWorld) -> Vec3 {
     let mut sum = [0u64; 3];
     let mut count = 0u64;
-    for page in &world.bsp.lightmaps {
+    let pages = (0..).map_while(|number| Some((number, world.page(number)?)));
+    for (number, page) in pages {
+        // A step of a page that is shown as stored is a quarter of a step of the map's own.
+        let weight = match world.is_shown_as_stored(number) {
+            true => 1,
+            false => 1 << MAP_OVERBRIGHT_BITS,
+        };
         for texel in page.0.as_chunks::<3>().0 {
             for (sum, &byte) in sum.iter_mut().zip(texel) {
-                *sum += u64::from(byte);
+                *sum += u64::from(byte) * weight;
             }
             count += 1;
         }
     }
-    let mean = Vec3::from_array(sum.map(|s| (s as f64 / count.max(1) as f64) as f32));
+    let whole = (count.max(1) << MAP_OVERBRIGHT_BITS) as f64;
+    let mean = Vec3::from_array(sum.map(|s| (s as f64 / whole) as f32));
     if mean.max_element() >= 1.0 {
         mean
     } else {

@@ -56,6 +56,7 @@ mod kept;
 mod lists;
 mod looks;
 mod occlusion;
+mod pulse;
 mod receivers;
 mod report;
 mod sight;
@@ -73,6 +74,7 @@ pub use judge::{ListJudgement, judge, lists_by_geometry, lists_by_visibility};
 pub use lists::{LightLists, LightRef, LightShare};
 pub use looks::{DROPPED_LEAST, DROPPED_PART};
 pub use occlusion::Occlusion;
+pub use pulse::Pulse;
 pub use report::{EmitterSummary, LightReport};
 pub use sight::{ClusterSet, Sight};
 pub use sweep::{SweepReport, sweep};
@@ -176,7 +178,7 @@ impl TriangleLight {
     }
 }
 
-/// A light entity that the compiler left in the map.
+/// Light from a point: a light entity that the compiler left in the map, or a light that calibration put in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointLight {
     /// Position, id units.
@@ -190,6 +192,8 @@ pub struct PointLight {
     pub spot: Option<Spot>,
     /// How its light falls off with distance.
     pub falloff: Falloff,
+    /// How it changes in time about `intensity`, its mean; `None` for light that does not.
+    pub pulse: Option<Pulse>,
 }
 
 /// How the light of a point falls off with distance.

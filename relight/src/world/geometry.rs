@@ -35,6 +35,9 @@ pub struct WorldSurface {
     /// Lightmap page, or a negative [`q3bsp::lightmap_index`]. Triangle soups are always lit by vertex, and so
     /// are surfaces with an index that no page has.
     pub lightmap: i32,
+    /// Page of its main baked light ([`RelitWorld::page`](crate::RelitWorld::page)): an image that its script names, else as
+    /// `lightmap`.
+    pub light_page: i32,
     /// Brush model that it belongs to; 0 is the world.
     pub model: u32,
     /// First of its vertices.

@@ -2,6 +2,7 @@
 
 use super::geometry::{Flare, Geometry, NO_LIGHT, WorldModel, WorldSurface};
 use super::material::{WorldMaterial, lighting_of, lightmap_of};
+use super::pages::PageLoader;
 use super::{RelitWorld, fog};
 use crate::calibrate::{CalibrationOptions, calibrate};
 use crate::exposure::display_exponent;
@@ -137,12 +138,15 @@ impl RelitWorld {
             bsp.warnings.iter().map(|w| format!("{map}: {w}")).collect();
 
         begin(Stage::Materials);
+        let mut pages = PageLoader::new(files);
+        let (mut world_materials, material_of) =
+            resolve_materials(files, materials, &bsp, &mut pages);
+        warnings.extend(pages.warnings.iter().map(|w| format!("{map}: {w}")));
         let color_exponent = match options.light_color {
-            LightColor::Displayed => display_exponent(&bsp),
+            LightColor::Displayed => display_exponent(&bsp, &pages.pages),
             LightColor::Stored => 1.0,
         };
         let mut finder = light::Finder::new(files, color_exponent);
-        let (mut world_materials, material_of) = resolve_materials(files, materials, &bsp);
         let mut faulty: Vec<_> = world_materials
             .iter()
             .filter_map(|m| {
@@ -184,11 +188,17 @@ impl RelitWorld {
                     fog,
                 });
             }
+            let lightmap = lightmap_of(&bsp, index);
+            let external = world_materials
+                .get(material as usize)
+                .and_then(|m| m.baked.main);
             surfaces.push(WorldSurface {
                 kind: stored.kind,
                 material,
                 fog,
-                lightmap: lightmap_of(&bsp, index),
+                lightmap,
+                light_page: external
+                    .map_or(lightmap, |page| bsp.lightmaps.len() as i32 + page as i32),
                 model: model_of.get(index).copied().unwrap_or(0),
                 first_vertex: placed.first_vertex,
                 num_vertices: placed.num_vertices,
@@ -220,6 +230,7 @@ impl RelitWorld {
             vertices: geometry.vertices,
             triangle_lights: vec![NO_LIGHT; geometry.indices.len() / 3],
             indices: geometry.indices,
+            pages: pages.pages,
             flares,
             fogs,
             lights: Vec::new(),
@@ -345,6 +356,7 @@ fn resolve_materials(
     files: &dyn GameFiles,
     materials: &Materials,
     bsp: &Bsp,
+    pages: &mut PageLoader<'_>,
 ) -> (Vec<WorldMaterial>, Vec<u32>) {
     let mut known: HashMap<(String, u32, u32, _), u32> = HashMap::new();
     let mut list = Vec::new();
@@ -365,20 +377,8 @@ fn resolve_materials(
         );
         let material = *known.entry(key).or_insert_with(|| {
             let resolved = materials.resolve(files, name, lighting);
-            list.push(WorldMaterial {
-                name: name.to_owned(),
-                surface_flags,
-                content_flags,
-                lighting,
-                class: shaderscript::light::classify(&resolved.shader),
-                resolved,
-                albedo: Vec3::ZERO,
-                shades: Vec::new(),
-                holes: None,
-                shown: Vec3::ZERO,
-                emission: None,
-                flicker: None,
-            });
+            let flags = (surface_flags, content_flags);
+            list.push(WorldMaterial::new(name, flags, lighting, resolved, pages));
             (list.len() - 1) as u32
         });
         of_surface.push(material);

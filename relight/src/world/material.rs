@@ -1,6 +1,7 @@
 //! Materials of a world: each combination of name, flags and lighting that its surfaces use.
 
 use super::holes::Holes;
+use super::pages::{BakedPages, PageLoader};
 use crate::exposure::DEFAULT_EXPONENT;
 use crate::files::GameFiles;
 use crate::light::{Emission, Finder, Flicker, Shade};
@@ -23,8 +24,11 @@ pub struct WorldMaterial {
     pub content_flags: u32,
     /// How its surfaces are lit where the material itself leaves it open.
     pub lighting: ImplicitKind,
-    /// What is drawn, what the script says, and what is wrong.
+    /// What is drawn, what the script says, and what is wrong. Of baked light its stages have one `$lightmap` stage at the
+    /// most: the rest is in `baked`.
     pub resolved: Resolved,
+    /// Where its baked light lies, beside the pages of its surfaces.
+    pub baked: BakedPages,
     /// What it is to light, as it is drawn.
     pub class: LightClass,
     /// Part of incident light that it throws back, diffuse, mean over its texture, linear. Zero unless the world
@@ -46,6 +50,35 @@ pub struct WorldMaterial {
 }
 
 impl WorldMaterial {
+    /// A material of which light is not known yet. `flags`: `SURF_*` and `CONTENTS_*`.
+    pub(super) fn new(
+        name: &str,
+        flags: (u32, u32),
+        lighting: ImplicitKind,
+        mut resolved: Resolved,
+        pages: &mut PageLoader<'_>,
+    ) -> WorldMaterial {
+        let baked = pages.take(&mut resolved.shader);
+        WorldMaterial {
+            name: name.to_owned(),
+            surface_flags: flags.0,
+            content_flags: flags.1,
+            lighting: match baked.main {
+                Some(_) => ImplicitKind::Lightmapped,
+                None => lighting,
+            },
+            class: classify(&resolved.shader),
+            resolved,
+            baked,
+            albedo: Vec3::ZERO,
+            shades: Vec::new(),
+            holes: None,
+            shown: Vec3::ZERO,
+            emission: None,
+            flicker: None,
+        }
+    }
+
     /// A material by itself, understood as a map's would be: with the flags that its script gives, what it emits, what
     /// it throws back.
     pub fn by_name(
@@ -56,20 +89,9 @@ impl WorldMaterial {
     ) -> WorldMaterial {
         let resolved = materials.resolve(files, name, lighting);
         let definition = resolved.definition();
-        let mut material = WorldMaterial {
-            name: name.to_owned(),
-            surface_flags: definition.surface_flags,
-            content_flags: definition.content_flags,
-            lighting,
-            class: classify(&resolved.shader),
-            resolved,
-            albedo: Vec3::ZERO,
-            shades: Vec::new(),
-            holes: None,
-            shown: Vec3::ZERO,
-            emission: None,
-            flicker: None,
-        };
+        let flags = (definition.surface_flags, definition.content_flags);
+        let mut pages = PageLoader::new(files);
+        let mut material = WorldMaterial::new(name, flags, lighting, resolved, &mut pages);
         let mut finder = Finder::new(files, DEFAULT_EXPONENT);
         material.emission = finder.emission(&material);
         material.flicker = finder.flicker(&material);

@@ -6,6 +6,7 @@ mod holes;
 mod lighting;
 mod load;
 mod material;
+mod pages;
 #[cfg(test)]
 mod tests;
 
@@ -15,13 +16,14 @@ pub use holes::Holes;
 pub use lighting::Lighting;
 pub use load::{LoadError, Options, Progress, Stage};
 pub use material::WorldMaterial;
+pub use pages::{BakedPages, StyleLight, StyleStrength};
 
 use crate::calibrate::CalibrationReport;
 use crate::exposure::Exposure;
 use crate::light::{Flicker, LightLists, LightReport, PointLight, SunLight, TriangleLight};
 use crate::overbright;
 use glam::Vec3;
-use q3bsp::Bsp;
+use q3bsp::{Bsp, Lightmap};
 
 /// A map made ready for tracing and for drawing.
 ///
@@ -44,6 +46,9 @@ pub struct RelitWorld {
     pub indices: Vec<u32>,
     /// For every triangle of `indices`, the [`TriangleLight`] that it is, or [`NO_LIGHT`].
     pub triangle_lights: Vec<u32>,
+    /// Pages of baked light that scripts name, beside those in the map: as they are shown, without overbright bits. Page
+    /// numbers count on from the map's own.
+    pub pages: Vec<Lightmap>,
     /// Coronas.
     pub flares: Vec<Flare>,
     /// Fog volumes; a surface's `fog` is an index into this plus 1.
@@ -85,14 +90,30 @@ pub struct RelitWorld {
 }
 
 impl RelitWorld {
-    /// A lightmap page as it is drawn: RGB bytes, [`overbright::shift`]ed, rows from the top; `None` when there
-    /// is no such page.
+    /// A page of baked light as it is stored: of the map's own, then of [`pages`](Self::pages). `None` when there is no
+    /// such page.
+    pub fn page(&self, page: usize) -> Option<&Lightmap> {
+        let own = &self.bsp.lightmaps;
+        own.get(page)
+            .or_else(|| self.pages.get(page.checked_sub(own.len())?))
+    }
+
+    /// Whether a page is shown as it is stored, without overbright bits.
+    pub fn is_shown_as_stored(&self, page: usize) -> bool {
+        page >= self.bsp.lightmaps.len()
+    }
+
+    /// A page of baked light as it is drawn: RGB bytes, [`overbright::shift`]ed where it is one of the map's own, rows from
+    /// the top; `None` when there is no such page.
     pub fn lightmap(&self, page: usize) -> Option<Vec<u8>> {
-        let page = self.bsp.lightmaps.get(page)?;
-        let texels = page.0.as_chunks::<3>().0.iter();
+        let shift = match self.is_shown_as_stored(page) {
+            true => 0,
+            false => self.overbright_shift,
+        };
+        let texels = self.page(page)?.0.as_chunks::<3>().0.iter();
         Some(
             texels
-                .flat_map(|&texel| overbright::shift(texel, self.overbright_shift))
+                .flat_map(|&texel| overbright::shift(texel, shift))
                 .collect(),
         )
     }

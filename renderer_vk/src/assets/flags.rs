@@ -1,7 +1,7 @@
 //! What a material is to light, as `MATERIAL_*` bits.
 
 use shaders::types::constants as c;
-use shaderscript::light::{self, SurfaceClass};
+use shaderscript::light::{self, BakedLight, SurfaceClass};
 use shaderscript::{Deform, RgbGen, Shader, Stage, StageImage};
 
 use super::material::LightmapClass;
@@ -18,6 +18,15 @@ pub(super) fn shows_full_light(stage: &Stage) -> bool {
         RgbGen::LightingDiffuse | RgbGen::Vertex | RgbGen::ExactVertex
     );
     stage.image == StageImage::Lightmap && !lit
+}
+
+/// The `STAGE_*` bit of a stage that shows baked light. The lightmap of a draw needs none.
+pub(super) fn baked_light_flag(found: Option<BakedLight>, stage: &Stage) -> u32 {
+    match found {
+        Some(BakedLight::Style) => c::STAGE_LIGHT_STYLE,
+        Some(BakedLight::Main) if stage.image != StageImage::Lightmap => c::STAGE_BAKED_LIGHT,
+        _ => 0,
+    }
 }
 
 /// `MATERIAL_*` bits, from the material's directives alone.

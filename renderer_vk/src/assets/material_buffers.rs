@@ -112,9 +112,10 @@ impl Materials {
     }
 
     /// Texture and kind of sampler of a material whose stages come to one still image under light: the image alone
-    /// where light is computed or baked into vertices, or the image and the lightmap multiplied in either order.
+    /// where light is computed or baked into vertices, or the image and baked light multiplied in either order.
     pub(super) fn plain_image(&self, material: &Material) -> Option<(u32, u32)> {
-        let stages = self.stages(material);
+        let is_drawn = |s: &&types::Stage| s.flags & c::STAGE_LIGHT_STYLE == 0;
+        let stages: Vec<_> = self.stages(material).iter().filter(is_drawn).collect();
         let plain = |s: &types::Stage| {
             s.alpha_func == c::ALPHAFUNC_NONE
                 && s.flags & (c::STAGE_WHITE | c::STAGE_NO_LIGHTMAP) == 0
@@ -133,20 +134,21 @@ impl Materials {
         let still = |s: &types::Stage| {
             s.image_count == 1 && s.tc_gen == c::TCGEN_BASE && s.tc_mod_count == 0
         };
-        let image = match stages {
-            [one] if plain(one) && opaque(one) && still(one) => {
+        let is_light = |s: &types::Stage| s.image_count == 0 || s.flags & c::STAGE_BAKED_LIGHT != 0;
+        let image = match &stages[..] {
+            &[one] if plain(one) && opaque(one) && still(one) => {
                 let baked = material.flags & c::MATERIAL_VERTEX_LIGHT != 0
                     && [c::RGBGEN_VERTEX, c::RGBGEN_EXACT_VERTEX].contains(&one.rgb_gen);
                 (baked || one.rgb_gen == c::RGBGEN_LIGHTING_DIFFUSE).then_some(one)?
             }
-            [first, second]
+            &[first, second]
                 if [first, second].iter().all(|s| plain(s) && full(s))
                     && opaque(first)
                     && filter(second) =>
             {
-                match (first.image_count, second.image_count) {
-                    (0, 1) if still(second) => second,
-                    (1, 0) if still(first) => first,
+                match (is_light(first), is_light(second)) {
+                    (true, false) if still(second) => second,
+                    (false, true) if still(first) => first,
                     _ => return None,
                 }
             }

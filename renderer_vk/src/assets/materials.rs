@@ -301,6 +301,7 @@ impl Materials {
         }
         let stage_first = self.arrays.stages.len();
         let vertex_light = class == LightmapClass::Vertex;
+        let mut baked = shaderscript::light::baked_light(&shader.stages).into_iter();
         let mut videos = Vec::new();
         let mut kept = 0;
         for stage in &shader.stages {
@@ -310,7 +311,7 @@ impl Materials {
             match pushed {
                 Ok((index, video)) => {
                     kept += 1;
-                    let mut flags = 0;
+                    let mut flags = flags::baked_light_flag(baked.next().flatten(), stage);
                     if class != LightmapClass::Page && shows_full_light(stage) {
                         flags |= types::constants::STAGE_NO_LIGHTMAP;
                     }

@@ -14,6 +14,19 @@ t/wall
     blendFunc filter
     rgbGen identity }
 }
+t/page
+{
+  { map t/b.tga
+    tcGen lightmap
+    rgbGen identity }
+  { map $lightmap
+    blendFunc add
+    tcMod transform 1 0 0 1 0.5 0
+    rgbGen wave sin 0.5 0.5 0 1 }
+  { map t/a.tga
+    blendFunc filter
+    rgbGen identity }
+}
 t/flow
 {
   cull none
@@ -475,4 +488,13 @@ fn plain_materials_are_one_image_under_light() {
     };
     assert!(plain("t/wall", LightmapClass::Page), "image x lightmap");
     assert!(!plain("t/flow", LightmapClass::None), "animated");
+    assert!(
+        plain("t/page", LightmapClass::Vertex),
+        "image x page, styles aside"
+    );
+    let page = game.find("t/page", LightmapClass::Vertex, true);
+    let stages = game.materials.stages(game.materials.get(page));
+    let flags = c::STAGE_BAKED_LIGHT | c::STAGE_LIGHT_STYLE;
+    let flags: Vec<u32> = stages.iter().map(|s| s.flags & flags).collect();
+    assert_eq!(flags, [c::STAGE_BAKED_LIGHT, c::STAGE_LIGHT_STYLE, 0]);
 }

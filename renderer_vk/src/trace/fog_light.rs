@@ -122,6 +122,7 @@ mod tests {
             radius: 1.0,
             spot: None,
             falloff: Falloff::InverseSquare,
+            pulse: None,
         }
     }
 

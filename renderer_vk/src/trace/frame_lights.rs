@@ -1,4 +1,4 @@
-//! The lights of one view: emitters that flicker, as bright as they are now; emitting surfaces of brush models where
+//! The lights of one view: emitters that flicker and points that pulse, as bright as they are now; emitting surfaces of brush models where
 //! these are now; the game's dynamic lights; the flashlight; and which clusters they can reach.
 
 use std::f32::consts::PI;
@@ -139,7 +139,7 @@ impl MapLights {
             scale * flicker.copied().unwrap_or(1.0)
         };
         let mut frame = FrameLights {
-            // the lists name them by their place: they come first, and all of them
+            // the lists name these by their place: they come first, and all of them
             triangles: self
                 .changing
                 .iter()
@@ -148,6 +148,9 @@ impl MapLights {
                     end: changing.light.end * scale_of(changing),
                     ..changing.light
                 })
+                .collect(),
+            spheres: (self.pulsing.iter())
+                .map(|(light, pulse)| pulsed(light, scale * pulse.scale(time)))
                 .collect(),
             ..FrameLights::default()
         };
@@ -174,11 +177,13 @@ impl MapLights {
             lights.triangles[1] = arena.push(&frame.triangles)?;
             lights.bounds[1] = arena.push(&bounds)?;
         }
-        if !frame.reach.is_empty() {
-            let (rows, entries) = frame.rows(self.sight.count());
+        if !frame.spheres.is_empty() {
             let sphere_bounds: Vec<_> = frame.spheres.iter().map(sphere_bounds).collect();
             lights.spheres[1] = arena.push(&frame.spheres)?;
             lights.bounds[3] = arena.push(&sphere_bounds)?;
+        }
+        if !frame.reach.is_empty() {
+            let (rows, entries) = frame.rows(self.sight.count());
             lights.dynamic_rows = arena.push(&rows)?;
             lights.dynamic_lights = arena.push(&entries)?;
             lights.dynamic_row_count = count(rows.len());
@@ -201,6 +206,15 @@ impl MapLights {
         lights.candidates = settings.rt_candidates.max(1);
         lights.scale = scale;
         Ok(lights)
+    }
+}
+
+/// A point light at a part of its mean strength.
+fn pulsed(light: &t::SphereLight, scale: f32) -> t::SphereLight {
+    t::SphereLight {
+        radiance: light.radiance * scale,
+        end: light.end * scale,
+        ..*light
     }
 }
 

@@ -15,7 +15,7 @@ use super::light_facings::{FACINGS, Facings};
 use super::light_tables::{Entry, append_slots};
 use super::light_weights::{Arriving, Listed, Place, shares};
 use super::lights::{
-    MapLightSource, count, number, point_light, sphere_bounds, triangle_bounds, triangle_light,
+    MapLightSource, count, point_light, sphere_bounds, triangle_bounds, triangle_light,
 };
 use crate::at_once::{Late, Make, make_all};
 
@@ -221,7 +221,7 @@ pub fn listed_light<'a>(
             }
         }
         LightRef::Point(index) => Listed {
-            number: number(c::LIGHT_SPHERE, index as usize),
+            number: source.point_number(index as usize),
             bounds: sphere_bounds(&point_light(source.points.get(index as usize)?, 0.0)),
             triangle: None,
             visibility,

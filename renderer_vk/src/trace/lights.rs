@@ -6,7 +6,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use q3bsp::Bsp;
 use relight::light::{
-    ClusterSet, Flicker, LightLists, Occlusion, PointLight, Sight, SunLight, TriangleLight,
+    ClusterSet, Flicker, LightLists, Occlusion, PointLight, Pulse, Sight, SunLight, TriangleLight,
 };
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
@@ -38,6 +38,8 @@ pub struct MapLights {
     fog_reach: Vec<ClusterSet>,
     /// Lights of the world that change in time.
     pub(super) changing: Vec<ChangingLight>,
+    /// Points of the world that change in time, as they are in the mean.
+    pub(super) pulsing: Vec<(t::SphereLight, Pulse)>,
     /// Lights of brush models, in the models' space, by model.
     pub(super) moving: Vec<(u32, Vec<ChangingLight>)>,
     /// How lights change, each way once.
@@ -97,6 +99,16 @@ impl<'a> MapLightSource<'a> {
             bsp: None,
             occlusion: None,
         }
+    }
+
+    /// The number of a point light: those that change in time are in each view's own.
+    pub(super) fn point_number(&self, index: usize) -> u32 {
+        let pulses = |light: &&PointLight| light.pulse.is_some();
+        if self.points.get(index).as_ref().is_some_and(pulses) {
+            let before = self.points.iter().take(index).filter(pulses).count();
+            return number(c::LIGHT_CHANGING_SPHERE, before);
+        }
+        number(c::LIGHT_SPHERE, index)
     }
 }
 
@@ -325,6 +337,9 @@ impl MapLights {
             sight: source.bsp.map(Sight::new).unwrap_or_default(),
             fog_reach: Vec::new(),
             changing,
+            pulsing: (source.points.iter().zip(&spheres))
+                .filter_map(|(light, sphere)| Some((*sphere, light.pulse?)))
+                .collect(),
             moving,
             flickers,
             ambient: source.ambient,

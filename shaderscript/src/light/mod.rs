@@ -5,10 +5,12 @@
 //! anything.
 
 mod algebra;
+mod baked;
 mod dielectric;
 mod glow;
 
 pub use algebra::{LightLinear, StageSample, compose, compose_encoded, darkens_behind};
+pub use baked::{BakedLight, baked_light};
 pub use dielectric::{
     INDEX_GLASS, INDEX_SLIME, INDEX_WATER, filters_light, is_gloss, is_haze, is_reflection,
     refraction_index, ripple_slope,

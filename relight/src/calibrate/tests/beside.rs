@@ -29,6 +29,7 @@ fn spots_are_counted_where_a_point_makes_one() {
             radius: 4.0,
             spot: None,
             falloff: Falloff::InverseSquare,
+            pulse: None,
         }];
         spots(&world)
     };

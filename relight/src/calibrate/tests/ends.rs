@@ -35,6 +35,7 @@ fn lights_that_the_compiler_cut_off_end_there() {
         radius: 4.0,
         spot: None,
         falloff: crate::light::Falloff::InverseSquare,
+        pulse: None,
     });
     let found = recovery(&hidden, &world);
     println!("{found:?}");

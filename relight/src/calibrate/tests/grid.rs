@@ -54,6 +54,7 @@ fn found(world: &RelitWorld) -> Vec<(f32, f32)> {
             radius: 4.0,
             spot: None,
             falloff: crate::light::Falloff::InverseSquare,
+            pulse: None,
         })
         .collect();
     let found = hidden.iter().map(|h| {

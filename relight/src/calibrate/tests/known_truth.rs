@@ -215,6 +215,7 @@ fn taken_apart(light_color: LightColor) {
             radius: 4.0,
             spot: None,
             falloff: crate::light::Falloff::InverseSquare,
+            pulse: None,
         })
         .collect();
     let found = recovery(&hidden, &world);

@@ -220,6 +220,11 @@ impl Nodes {
             "type": "point",
         });
         put_translation(&mut node, turn(light.origin) * scale);
+        if let (Some(pulse), Value::Object(map)) = (light.pulse, &mut out) {
+            // the format's lights do not change: this one has its mean strength
+            let strength = extras::style_strength(pulse.strength());
+            map.insert("extras".into(), json!({ "strength": strength }));
+        }
         if let (Some(reach), Value::Object(map)) = (light.falloff.reach(), &mut out) {
             // the format has no linear falloff, but an end
             map.insert("range".into(), json!(reach * scale));

@@ -233,6 +233,7 @@ fn a_bounce_has_one_ray_for_lamps_and_sun_with(gpu: &mut Gpu) {
             radius: 4.0,
             spot: None,
             falloff: relight::light::Falloff::InverseSquare,
+            pulse: None,
         });
     }
     scene.suns.push(SunLight {
@@ -288,6 +289,7 @@ fn no_light_leaks_through_walls_with(gpu: &mut Gpu) {
             radius: 4.0,
             spot: None,
             falloff: relight::light::Falloff::InverseSquare,
+            pulse: None,
         });
         scene.suns.push(SunLight {
             direction: Vec3::new(-0.4, 0.3, 0.6).normalize(),

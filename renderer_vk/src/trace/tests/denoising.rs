@@ -41,6 +41,7 @@ fn room() -> Scene {
         radius: 4.0,
         spot: None,
         falloff: relight::light::Falloff::InverseSquare,
+        pulse: None,
     });
     scene
 }

@@ -36,6 +36,7 @@ fn fog_is_lit_by_what_lights_each_place_of_it_with(gpu: &mut Gpu) {
         radius,
         spot: None,
         falloff: relight::light::Falloff::InverseSquare,
+        pulse: None,
     });
     // the mean radiance over the sphere of directions, over what scatters at each place, shares the display as the fog's
     // own colour does

@@ -37,6 +37,7 @@ fn halved_wall() -> Scene {
         radius: 1.0,
         spot: None,
         falloff: Falloff::InverseSquare,
+        pulse: None,
     });
     scene
 }

@@ -1,7 +1,8 @@
 //! Direct and bounced light.
 
 use glam::Vec3;
-use relight::light::{PointLight, SunLight};
+use relight::light::{PointLight, Pulse, SunLight};
+use relight::world::StyleStrength;
 
 use super::bounces::seen;
 use super::harness::{Gpu, Scene, floor_point, lambert, rectangle, reference};
@@ -150,6 +151,7 @@ fn all_estimators_have_the_same_mean_with(gpu: &mut Gpu) {
         radius: 4.0,
         spot: None,
         falloff: relight::light::Falloff::InverseSquare,
+        pulse: None,
     });
     scene.dlights.push(DynamicLight {
         origin: Vec3::new(-60.0, -80.0, 0.0),
@@ -299,6 +301,7 @@ fn spheres_and_suns_give_their_irradiance_with(gpu: &mut Gpu) {
         radius: 4.0,
         spot: None,
         falloff: relight::light::Falloff::InverseSquare,
+        pulse: None,
     });
     check(gpu, &scene, &|p| 7000.0 * falloff(p) / std::f32::consts::PI);
     // where it gives too little it gives nothing; at the edge its size and the pixels' blur that
@@ -547,5 +550,46 @@ fn a_point_is_lit_by_the_list_of_its_cluster_with(gpu: &mut Gpu) {
                 assert!(pixel.x == 0.0 && pixel.y > 0.0, "{sampling:?} {p} {pixel}");
             }
         }
+    }
+}
+
+#[test]
+fn points_pulse_with_their_style() {
+    Gpu::each(points_pulse_with_their_style_with);
+}
+
+fn points_pulse_with_their_style_with(gpu: &mut Gpu) {
+    let wave = shaderscript::Wave {
+        function: shaderscript::WaveFunction::Square,
+        base: 0.5,
+        amplitude: 0.5,
+        phase: 0.0,
+        frequency: 1.0,
+    };
+    let (mean, pulse) = Pulse::of(StyleStrength::Wave(wave));
+    let at = [Vec3::new(20.0, 10.0, 90.0), Vec3::new(-30.0, 0.0, 80.0)];
+    let lamp = |origin, intensity, pulse| PointLight {
+        origin,
+        intensity: Vec3::splat(intensity),
+        radius: 4.0,
+        spot: None,
+        falloff: relight::light::Falloff::InverseSquare,
+        pulse,
+    };
+    let mut scene = floor();
+    scene.points.push(lamp(at[0], 7000.0 * mean, pulse));
+    scene.points.push(lamp(at[1], 3000.0, None));
+    for (time, strength) in [(250, 1.0), (750, 0.0)] {
+        scene.def.time_ms = time;
+        let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::All), 32);
+        let given = |p: Vec3, at: Vec3| {
+            let offset = at - p;
+            at.z / offset.length().powi(3) / std::f32::consts::PI
+        };
+        let difference = mean_difference(&pixels, |i| {
+            let p = floor_point(&scene, i % 32, i / 32);
+            strength * 7000.0 * given(p, at[0]) + 3000.0 * given(p, at[1])
+        });
+        assert!(difference < 0.01, "{time}: {difference}");
     }
 }

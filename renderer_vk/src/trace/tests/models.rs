@@ -94,6 +94,7 @@ fn under_a_roof(flags: u32) -> Scene {
         radius: 8.0,
         spot: None,
         falloff: Falloff::InverseSquare,
+        pulse: None,
     });
     scene
 }
