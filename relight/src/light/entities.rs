@@ -30,10 +30,7 @@ pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLi
         let Some(origin) = entity.vec3("origin") else {
             continue;
         };
-        let value = number(entity, &["_light", "light"]).unwrap_or(DEFAULT_LIGHT)
-            * number(entity, &["scale"])
-                .filter(|s| *s != 0.0)
-                .unwrap_or(1.0);
+        let value = value_of(entity);
         let color = color(entity);
         if !(value > 0.0 && value.is_finite()) || color == Vec3::ZERO {
             continue;
@@ -82,6 +79,18 @@ pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLi
         });
     }
     (points, suns)
+}
+
+/// The value of a light entity. q3map2 subtracts the light of negative ones.
+fn value_of(entity: &Entity) -> f32 {
+    let scale = number(entity, &["scale"]).filter(|s| *s != 0.0);
+    number(entity, &["_light", "light"]).unwrap_or(DEFAULT_LIGHT) * scale.unwrap_or(1.0)
+}
+
+/// Number of light entities that take light away (dark spots): no light source can.
+pub(crate) fn negative_lights(entities: &[Entity]) -> usize {
+    let lights = entities.iter().filter(|e| is_light(e.classname()));
+    lights.filter(|light| value_of(light) < 0.0).count()
 }
 
 /// Intensity and falloff of a linear light of a value and a `fade`.

@@ -81,7 +81,7 @@ pub use sweep::{SweepReport, sweep};
 
 pub(crate) use color::raise;
 pub(crate) use emission::Finder;
-pub(crate) use entities::{ambient, light_entities};
+pub(crate) use entities::{ambient, light_entities, negative_lights};
 pub(crate) use fallback::rescue;
 use lists::Clusters;
 pub(crate) use surfaces::{place, place_of, suns, take_out};

@@ -218,6 +218,12 @@ impl RelitWorld {
         }
         let (mut point_lights, mut suns) = light::light_entities(&entities);
         suns.extend(light::suns(&world_materials, &surfaces));
+        let negative = light::negative_lights(&entities);
+        if negative > 0 {
+            warnings.push(format!(
+                "{map}: ignored {negative} light entities with negative light; dark spots are not traced"
+            ));
+        }
         let points = point_lights.iter_mut().map(|l| &mut l.intensity);
         for strength in points.chain(suns.iter_mut().map(|s| &mut s.irradiance)) {
             *strength = light::raise(*strength, color_exponent);

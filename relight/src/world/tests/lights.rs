@@ -280,3 +280,23 @@ fn models_are_lit_from_where_their_entities_stand() {
         .collect();
     assert_eq!(row, [LightRef::Point(0)]);
 }
+
+#[test]
+fn negative_lights_are_left_out_with_a_warning() {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 1);
+    map.add_room(wall, Vec3::splat(-128.0), Vec3::splat(128.0));
+    let light = [("classname", "light"), ("origin", "0 0 0")];
+    map.add_entity(&[light[0], light[1], ("light", "300")]);
+    map.add_entity(&[light[0], light[1], ("light", "-100")]);
+    map.add_entity(&[light[0], light[1], ("light", "100"), ("scale", "-1")]);
+    let world = relight(map);
+    assert_eq!(world.point_lights.len(), 1);
+    let told = |w: &&String| w.contains("2 light entities with negative light");
+    assert_eq!(
+        world.warnings.iter().filter(told).count(),
+        1,
+        "{:?}",
+        world.warnings
+    );
+}
