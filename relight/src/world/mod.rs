@@ -1,5 +1,6 @@
 //! A map, relit: geometry in flat arrays, materials resolved, light sources found.
 
+pub mod coplanar;
 mod fog;
 mod geometry;
 mod holes;

@@ -55,6 +55,11 @@ t/faint
       blendFunc add
       rgbGen const ( 0.1 0.1 0.1 ) }
 }
+t/poster
+{
+    polygonOffset
+    { map t/orange.tga }
+}
 t/wall
 {
     { map $lightmap }

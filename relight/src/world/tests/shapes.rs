@@ -89,3 +89,25 @@ fn bent_planar_surfaces_keep_the_normals_of_their_vertices() {
         assert!(normal.abs_diff_eq(stored, 1e-6), "{normal}");
     }
 }
+
+#[test]
+fn posters_lie_on_their_walls() {
+    let mut map = MapBuilder::new();
+    let wall = map.add_shader("t/wall", 0, 1);
+    let poster = map.add_shader("t/poster", 0, 1);
+    let sky = map.add_shader("t/sky", surface_flags::SKY, 1);
+    map.add_cell(Vec3::splat(-64.0), Vec3::splat(64.0));
+    let on_wall = map.add_quad(poster, ceiling_lamp(16.0, 8.0));
+    let under = map.add_quad(wall, ceiling_lamp(32.0, 8.0));
+    let off = map.add_quad(poster, ceiling_lamp(16.0, -8.0));
+    let heaven = map.add_quad(sky, ceiling_lamp(32.0, -8.0));
+    let stacked = relight(map).stacked();
+    let place = |below, above| coplanar::Stacked {
+        below,
+        above,
+        on_back: false,
+    };
+    assert_eq!(stacked[on_wall], place(1, 0));
+    assert_eq!(stacked[under], place(0, 1));
+    assert_eq!((stacked[off], stacked[heaven]), (place(0, 0), place(0, 0)));
+}
