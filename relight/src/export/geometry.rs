@@ -56,6 +56,43 @@ pub struct Mesh {
     pub parts: Vec<Part>,
 }
 
+impl Part {
+    /// The triangles that are `picked`, moved along their vertices' normals, and which vertex here each of theirs was.
+    pub fn lifted(
+        &self,
+        by: f32,
+        picked: &dyn Fn([&WorldVertex; 3]) -> bool,
+    ) -> (Part, Vec<usize>) {
+        let mut numbers: HashMap<u32, u32> = HashMap::new();
+        let mut out = Part {
+            material: self.material,
+            vertices: Vec::new(),
+            indices: Vec::new(),
+        };
+        let mut from = Vec::new();
+        for corners in self.indices.as_chunks::<3>().0 {
+            let [Some(a), Some(b), Some(c)] = corners.map(|i| self.vertices.get(i as usize)) else {
+                continue;
+            };
+            if !picked([a, b, c]) {
+                continue;
+            }
+            for (&old, vertex) in corners.iter().zip([a, b, c]) {
+                let number = *numbers.entry(old).or_insert_with(|| {
+                    from.push(old as usize);
+                    out.vertices.push(WorldVertex {
+                        position: vertex.position + vertex.normal.normalize_or_zero() * by,
+                        ..*vertex
+                    });
+                    out.vertices.len() as u32 - 1
+                });
+                out.indices.push(number);
+            }
+        }
+        (out, from)
+    }
+}
+
 /// Everything drawn.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Geometry {

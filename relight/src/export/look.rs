@@ -5,6 +5,7 @@
 //! the rest is told in [`Look::lost`].
 
 use super::film::Film;
+use super::layers::draws_nothing;
 use super::losses::told_losses;
 use super::stack::{self, Moment, Part, tiling};
 use crate::world::WorldMaterial;
@@ -130,8 +131,8 @@ pub struct Look {
     pub reversed: bool,
     /// Whether colours of vertices multiply it, and whether these are light that the compiler found.
     pub vertex_color: Option<VertexColor>,
-    /// Whether alpha of vertices multiplies alpha.
-    pub vertex_alpha: bool,
+    /// Whether alpha of vertices, or what it leaves of 1, multiplies alpha.
+    pub vertex_alpha: Option<VertexAlpha>,
     /// Whether it is lit by lightmaps.
     pub lightmapped: bool,
     /// What glass and liquids do to light.
@@ -164,6 +165,39 @@ pub enum VertexColor {
     Paint,
 }
 
+/// What of alpha of vertices multiplies alpha.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum VertexAlpha {
+    /// Itself.
+    Own,
+    /// What it leaves of 1.
+    Inverse,
+}
+
+impl VertexAlpha {
+    /// What weighs a stage; `None` where neither does, or its alpha is not used.
+    pub fn weighing(stage: &Stage) -> Option<VertexAlpha> {
+        use BlendFactor::{OneMinusSrcAlpha, SrcAlpha, SrcAlphaSaturate};
+        let by_alpha = |f| matches!(f, SrcAlpha | OneMinusSrcAlpha | SrcAlphaSaturate);
+        let blends = |(source, destination)| by_alpha(source) || by_alpha(destination);
+        let used = stage.alpha_func.is_some() || stage.blend.is_some_and(blends);
+        match stage.alpha_gen {
+            _ if !used || stage.is_lightmap() => None,
+            AlphaGen::Vertex => Some(VertexAlpha::Own),
+            AlphaGen::OneMinusVertex => Some(VertexAlpha::Inverse),
+            _ => None,
+        }
+    }
+
+    /// What multiplies alpha at a vertex with the alpha `byte`.
+    pub fn weight(self, byte: u8) -> u8 {
+        match self {
+            VertexAlpha::Own => byte,
+            VertexAlpha::Inverse => 255 - byte,
+        }
+    }
+}
+
 /// Reads a material. `mean` gives the mean colour of an image, linear, with its alpha; `None` for one that is missing.
 /// `clear`: whether glass and liquids let light pass and refract it; else they are what their stages show. At a `moment`
 /// pictures are those of the mean, and what changes is in the factors.
@@ -187,7 +221,7 @@ pub fn look(
         two_sided: class.two_sided,
         reversed: shader.cull == Cull::Back,
         vertex_color: None,
-        vertex_alpha: false,
+        vertex_alpha: None,
         lightmapped,
         dielectric: None,
         mirror: class.class == SurfaceClass::Mirror,
@@ -210,6 +244,7 @@ pub fn look(
     };
     let Some((base, stage)) = base.and_then(|i| Some((i, shader.stages.get(i)?))) else {
         bare(shader, vertex_light, moment, &mut look);
+        look.vertex_alpha = shader.stages.iter().find_map(VertexAlpha::weighing);
         return look;
     };
     let group = group_of(shader, base, stage, &mut look.lost);
@@ -317,12 +352,14 @@ pub fn look(
 /// The stages that lie on the surface as the base stage does; what becomes of the others is told in `lost`.
 fn group_of(shader: &Shader, base: usize, stage: &Stage, lost: &mut Vec<String>) -> Vec<usize> {
     let mut group = Vec::new();
-    for (i, other) in shader.stages.iter().enumerate() {
+    let drawn = |(_, s): &(usize, &Stage)| !draws_nothing(s);
+    for (i, other) in shader.stages.iter().enumerate().filter(drawn) {
+        let by_vertex = VertexAlpha::weighing(other).is_some();
         let alike = i == base
             || other.is_lightmap()
-            || other.image == StageImage::White
+            || (other.image == StageImage::White && !by_vertex)
             || (tiling(other, &stage.tc_mods).is_some()
-                && !matches!(other.alpha_gen, AlphaGen::Vertex | AlphaGen::OneMinusVertex)
+                && !by_vertex
                 && other.image.names().len() <= 1);
         if alike {
             group.push(i);
@@ -330,6 +367,8 @@ fn group_of(shader: &Shader, base: usize, stage: &Stage, lost: &mut Vec<String>)
             lost.push(format!(
                 "stage {i}: a picture of the surroundings; said by roughness"
             ));
+        } else if by_vertex {
+            lost.push(format!("stage {i}: alpha of vertices weighs it; left out"));
         } else {
             lost.push(format!("stage {i}: lies on the surface in another way"));
         }
@@ -395,8 +434,7 @@ fn colors_of_vertices(shader: &Shader, group: &[usize], look: &mut Look) {
         look.lost
             .push("is lit by the reverse of vertex colours".to_owned());
     }
-    look.vertex_alpha =
-        stages().any(|s| s.alpha_gen == AlphaGen::Vertex && !s.is_lightmap() && s.blend.is_some());
+    look.vertex_alpha = stages().find_map(VertexAlpha::weighing);
 }
 
 /// Of what moves against the colour, or lies on it in another way, the first stage that adds light becomes the glow.

@@ -4,6 +4,7 @@
 //! * [`export`]: writes one map in a [`Format`]; a file appears whole or not at all.
 //! * `geometry`: what is drawn, joined by material, without what other programs stumble over.
 //! * `model_file`: models that entities name besides brushes.
+//! * `layers`: stages that alpha of vertices weighs, as materials of their own.
 //! * `look`: a material's stages as far as other programs can say them.
 //! * [`ImageStore`]: images as files, each made once for all maps.
 //!
@@ -20,6 +21,7 @@ mod geometry;
 mod gltf;
 mod images;
 pub mod json;
+mod layers;
 mod lightmaps;
 mod look;
 mod losses;

@@ -3,15 +3,27 @@
 use super::emission;
 use super::geometry::{self, Part};
 use super::images::Encoded;
+use super::layers::{Layer, layers};
 use super::look::{Alpha, Look, Slot, affine};
 use super::output::Output;
 use super::stack::Moment;
 use super::{Export, ExportError, ExportReport};
-use crate::world::WorldMaterial;
+use crate::world::{WorldMaterial, WorldVertex};
 use glam::Vec3;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::Arc;
+
+/// What is lost of a material that alpha of vertices lets fade.
+const FADES: &str = "fades by alpha of vertices, which OBJ lacks; it does not fade";
+/// What is lost of a layer that alpha of vertices weighs.
+const LAYERED: &str = "is weighed by alpha of vertices, which OBJ lacks; it is on triangles that it covers by half or more";
+
+/// Whether a layer covers half of a triangle or more.
+fn mostly(layer: &Layer<'_>, corners: [&WorldVertex; 3]) -> bool {
+    corners.into_iter().map(|v| layer.cover(v)).sum::<f32>() >= 1.5
+}
 
 /// Writes `NAME.obj`, `NAME.mtl` and the images.
 pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportReport, ExportError> {
@@ -35,22 +47,29 @@ pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportRe
         let Some(material) = world.materials.get(index as usize) else {
             continue;
         };
-        let look = source.look(
-            material,
-            radiances.get(index as usize).copied(),
-            true,
-            Moment::Mean,
-        );
-        let entry = material_entry(source, index, material, &look, &mut images)?;
-        materials.push_str(&entry);
-        for lost in &look.lost {
+        let mut made = Vec::new();
+        for layer in layers(material) {
+            let lowest = layer.stage().is_none();
+            let radiance = radiances.get(index as usize).copied();
+            let radiance = radiance.filter(|_| lowest);
+            let mut look = source.look(&layer.material, radiance, true, Moment::Mean);
+            layer.weigh(source, &mut look);
+            if look.vertex_alpha.is_some() && look.alpha != Alpha::Opaque {
+                look.lost
+                    .push(if lowest { FADES } else { LAYERED }.to_owned());
+            }
+            let entry = material_entry(source, index, &layer.material, &look, &mut images)?;
+            materials.push_str(&entry);
+            let name = &layer.material.name;
+            let lost = look.lost.iter();
             report
                 .warnings
-                .push(format!("material {}: {lost}", material.name));
+                .extend(lost.map(|l| format!("material {name}: {l}")));
+            made.push((layer, look));
+            report.materials += 1;
         }
-        looks.insert(index, look);
+        looks.insert(index, made);
     }
-    report.materials = looks.len();
     report.images = images.len();
 
     let mut text = String::new();
@@ -77,14 +96,23 @@ pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportRe
             }
         );
         for part in &mesh.parts {
-            let look = looks.get(&part.material);
-            let name = world
-                .materials
-                .get(part.material as usize)
-                .map_or("", |m| &m.name);
-            let _ = writeln!(text, "usemtl {}", material_name(part.material, name));
-            write_part(&mut text, part, look, origin, source.options.scale, first);
-            first += part.vertices.len();
+            let made = looks.get(&part.material).into_iter().flatten();
+            for (height, (layer, look)) in made.enumerate() {
+                let mut part = Cow::Borrowed(part);
+                if height > 0 {
+                    let (upper, _) = layer.raise(&part, height, look, &|c| mostly(layer, c));
+                    if upper.indices.is_empty() {
+                        continue;
+                    }
+                    report.triangles += upper.indices.len() / 3;
+                    report.vertices += upper.vertices.len();
+                    part = Cow::Owned(upper);
+                }
+                let name = material_name(part.material, &layer.material.name);
+                let _ = writeln!(text, "usemtl {name}");
+                write_part(&mut text, &part, look, origin, source.options.scale, first);
+                first += part.vertices.len();
+            }
         }
     }
     for image in images.values() {
@@ -110,17 +138,9 @@ fn material_name(index: u32, name: &str) -> String {
     format!("{name}.{index}")
 }
 
-fn write_part(
-    text: &mut String,
-    part: &Part,
-    look: Option<&Look>,
-    origin: Vec3,
-    scale: f32,
-    first: usize,
-) {
-    let tc_mods = look
-        .and_then(|l| l.color.as_ref())
-        .map_or(&[][..], |slot| &slot.tc_mods);
+fn write_part(text: &mut String, part: &Part, look: &Look, origin: Vec3, scale: f32, first: usize) {
+    let color = look.color.as_ref();
+    let tc_mods = color.map_or(&[][..], |slot| &slot.tc_mods);
     let ([s, t], translate) = affine(tc_mods, 0.0);
     let turn = |v: Vec3| Vec3::new(v.x, v.z, -v.y);
     for v in &part.vertices {
@@ -136,9 +156,9 @@ fn write_part(
         let n = turn(v.normal);
         let _ = writeln!(text, "vn {} {} {}", n.x, n.y, n.z);
     }
-    let reversed = look.is_some_and(|l| l.reversed);
     for &[a, b, c] in part.indices.as_chunks::<3>().0 {
-        let [a, b, c] = if reversed { [a, b, c] } else { [c, b, a] }.map(|i| first + i as usize);
+        let [a, b, c] =
+            if look.reversed { [a, b, c] } else { [c, b, a] }.map(|i| first + i as usize);
         let _ = writeln!(text, "f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}");
     }
 }

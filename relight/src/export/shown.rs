@@ -111,7 +111,7 @@ mod tests {
             two_sided: false,
             reversed: false,
             vertex_color: Some(VertexColor::Light),
-            vertex_alpha: false,
+            vertex_alpha: None,
             lightmapped: true,
             dielectric: None,
             mirror: false,

@@ -6,6 +6,7 @@ use super::primitive::primitive;
 use super::{Document, Made};
 use crate::export::ExportError;
 use crate::export::geometry::{Drawn, drawn};
+use crate::export::layers::Layer;
 use crate::export::model_file::{self, ModelName, ModelSurface};
 use crate::overbright;
 use crate::world::{RelitWorld, WorldMaterial, WorldVertex};
@@ -143,7 +144,7 @@ impl Document<'_> {
         let (mut look, multiplied) = look_in(source, &material, lighting);
         let shaded = shown && multiplied && lit;
         let pulse = make_moving(source, &material, lighting, &mut look, None);
-        let number = self.add_material(&material, &look, pulse.as_ref())?;
+        let number = self.add_material(&Layer::only(&material), &look, pulse.as_ref())?;
         let lost = look.lost.iter();
         self.warnings
             .extend(lost.map(|l| format!("material {name}: {l}")));

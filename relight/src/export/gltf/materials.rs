@@ -3,6 +3,7 @@
 use super::animation::{Motion, Track, film_track};
 use super::pulse::Pulse;
 use crate::export::images::Encoded;
+use crate::export::layers::Layer;
 use crate::export::look::{Alpha, Look, Picture, Slot, affine};
 use crate::export::{Export, ExportError, Lightmaps, extras};
 use crate::world::WorldMaterial;
@@ -114,10 +115,11 @@ impl Maker<'_> {
     pub fn material(
         &mut self,
         number: usize,
-        material: &WorldMaterial,
+        layer: &Layer<'_>,
         look: &Look,
         pulse: Option<&Pulse>,
     ) -> Result<Value, ExportError> {
+        let material = &*layer.material;
         let mut base = json!({
             "metallicFactor": f32::from(u8::from(look.mirror)),
             "roughnessFactor": look.roughness,
@@ -191,9 +193,12 @@ impl Maker<'_> {
         if !extensions.is_empty() {
             out.insert("extensions".into(), Value::Object(extensions));
         }
-        let mut told = extras::material(material);
+        let mut told = extras::material(layer.whole);
         if let (Value::Object(told), false) = (&mut told, look.lost.is_empty()) {
             told.insert("lost".into(), json!(look.lost));
+        }
+        if let (Value::Object(told), Some(stage)) = (&mut told, layer.stage()) {
+            told.insert("layer".into(), json!(stage));
         }
         let mut told = json!({"material": told});
         if let (Value::Object(told), Some(lightmap), true) = (&mut told, lightmap, shown) {

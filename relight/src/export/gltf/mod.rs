@@ -17,12 +17,13 @@ mod sky;
 
 use super::geometry::{self, Geometry, Part};
 use super::images::Encoded;
+use super::layers::{Layer, layers};
 use super::lightmaps::Atlas;
 use super::look::Look;
 use super::output::Output;
 use super::{Export, ExportError, ExportReport, ImagePlace, Lightmaps, emission, vertex_light};
 use crate::image::Image;
-use crate::world::{RelitWorld, WorldMaterial};
+use crate::world::{RelitWorld, WorldMaterial, WorldVertex};
 use buffer::Buffers;
 use glam::{Vec2, Vec3};
 use materials::{Maker, Sampling, Textures};
@@ -55,6 +56,8 @@ struct Document<'a> {
     meshes: Vec<Value>,
     nodes: Nodes,
     lightmap: Option<usize>,
+    /// Triangles and vertices of layers over others.
+    layered: (usize, usize),
     warnings: Vec<String>,
 }
 
@@ -64,6 +67,12 @@ struct Made {
     look: Look,
     /// Whether light in colours of vertices multiplies it.
     shaded: bool,
+}
+
+/// A layer of a material in the document.
+struct MadeLayer<'a> {
+    layer: Layer<'a>,
+    made: Made,
 }
 
 /// Light of vertices.
@@ -115,6 +124,7 @@ pub(super) fn write(
         meshes: Vec::new(),
         nodes: Nodes::default(),
         lightmap: None,
+        layered: (0, 0),
         warnings: Vec::new(),
     };
     let pages = atlas.map(|atlas| atlas.image(world)).transpose()?;
@@ -137,9 +147,9 @@ pub(super) fn write(
     }
     let report = ExportReport {
         files: Vec::new(),
-        triangles: geometry.triangles() + models.triangles,
+        triangles: geometry.triangles() + document.layered.0 + models.triangles,
         degenerate: geometry.degenerate + models.degenerate,
-        vertices: geometry.vertices() + models.vertices,
+        vertices: geometry.vertices() + document.layered.1 + models.vertices,
         materials: document.materials.len(),
         images: document.textures.images.len(),
         warnings: std::mem::take(&mut document.warnings),
@@ -158,7 +168,7 @@ impl Document<'_> {
     ) -> Result<Vec<Option<usize>>, ExportError> {
         let world = self.source.world;
         let radiances = emission::radiances(world);
-        let mut numbers: BTreeMap<u32, Made> = BTreeMap::new();
+        let mut numbers: BTreeMap<u32, Vec<MadeLayer<'_>>> = BTreeMap::new();
         let mut out = Vec::with_capacity(geometry.models.len());
         let mut lights = baked.iter().flat_map(|b| &b.colors);
         for (model, mesh) in geometry.models.iter().enumerate() {
@@ -178,28 +188,11 @@ impl Document<'_> {
                             mean.unwrap_or(Vec3::ONE)
                         });
                         let lighting = Lighting { radiance, shown };
-                        let (mut look, shaded) = look_in(self.source, material, lighting);
                         let bounds = geometry.coordinates(part.material);
-                        let pulse = make_moving(self.source, material, lighting, &mut look, bounds);
-                        let number = self.add_material(material, &look, pulse.as_ref())?;
-                        let lost = look.lost.iter();
-                        self.warnings
-                            .extend(lost.map(|l| format!("material {}: {l}", material.name)));
-                        place.insert(Made {
-                            number,
-                            look,
-                            shaded,
-                        })
+                        place.insert(self.add_layers(material, lighting, bounds)?)
                     }
                 };
-                primitives.push(primitive(
-                    &mut self.buffers,
-                    self.source,
-                    part,
-                    light.filter(|_| made.shaded),
-                    &made.look,
-                    made.number,
-                ));
+                primitives.extend(self.layer_primitives(part, light, made));
             }
             if primitives.is_empty() {
                 out.push(None);
@@ -217,14 +210,87 @@ impl Document<'_> {
         Ok(out)
     }
 
+    /// Adds a material for each layer of a map's. `bounds`: least and largest texture coordinates of its surfaces.
+    fn add_layers<'m>(
+        &mut self,
+        material: &'m WorldMaterial,
+        lighting: Lighting,
+        bounds: Option<(Vec2, Vec2)>,
+    ) -> Result<Vec<MadeLayer<'m>>, ExportError> {
+        let mut out = Vec::new();
+        for layer in layers(material) {
+            let radiance = lighting.radiance.filter(|_| layer.stage().is_none());
+            let lighting = Lighting {
+                radiance,
+                ..lighting
+            };
+            let (mut look, shaded) = look_in(self.source, &layer.material, lighting);
+            let pulse = make_moving(self.source, &layer.material, lighting, &mut look, bounds);
+            layer.weigh(self.source, &mut look);
+            let number = self.add_material(&layer, &look, pulse.as_ref())?;
+            let name = &layer.material.name;
+            let lost = look.lost.iter();
+            self.warnings
+                .extend(lost.map(|l| format!("material {name}: {l}")));
+            let shaded = shaded && vertex_light::is_lightmapped(&layer.material);
+            let made = Made {
+                number,
+                look,
+                shaded,
+            };
+            out.push(MadeLayer { layer, made });
+        }
+        Ok(out)
+    }
+
+    /// A part once for each layer of its material; `light`: of its vertices.
+    fn layer_primitives(
+        &mut self,
+        part: &Part,
+        light: Option<&[Vec3]>,
+        layers: &[MadeLayer<'_>],
+    ) -> Vec<Value> {
+        let mut out = Vec::with_capacity(layers.len());
+        for (height, MadeLayer { layer, made }) in layers.iter().enumerate() {
+            let light = light.filter(|_| made.shaded);
+            let (look, number) = (&made.look, made.number);
+            if height == 0 {
+                let base = primitive(&mut self.buffers, self.source, part, light, look, number);
+                out.push(base);
+                continue;
+            }
+            let seen = |corners: [&WorldVertex; 3]| corners.iter().any(|v| layer.cover(v) > 0.0);
+            let (upper, from) = layer.raise(part, height, look, &seen);
+            if upper.indices.is_empty() {
+                continue;
+            }
+            self.layered.0 += upper.indices.len() / 3;
+            self.layered.1 += upper.vertices.len();
+            let light: Option<Vec<Vec3>> = light.map(|light| {
+                let of = |&i: &usize| light.get(i).copied().unwrap_or(Vec3::ONE);
+                from.iter().map(of).collect()
+            });
+            let light = light.as_deref();
+            out.push(primitive(
+                &mut self.buffers,
+                self.source,
+                &upper,
+                light,
+                look,
+                number,
+            ));
+        }
+        out
+    }
+
     fn add_material(
         &mut self,
-        material: &WorldMaterial,
+        layer: &Layer<'_>,
         look: &Look,
         pulse: Option<&Pulse>,
     ) -> Result<usize, ExportError> {
         let number = self.materials.len();
-        let made = self.maker().material(number, material, look, pulse)?;
+        let made = self.maker().material(number, layer, look, pulse)?;
         self.materials.push(made);
         Ok(number)
     }

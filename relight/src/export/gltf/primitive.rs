@@ -90,7 +90,7 @@ fn colors(
         Some(VertexColor::Light) => keep,
         None => false,
     };
-    if !rgb && !look.vertex_alpha && light.is_none() {
+    if !rgb && look.vertex_alpha.is_none() && light.is_none() {
         return None;
     }
     let table = overbright::byte_table();
@@ -105,11 +105,9 @@ fn colors(
         };
         let light = light.map_or(Vec3::ONE, |l| l.get(i).copied().unwrap_or(Vec3::ONE));
         let color = (own * light).to_array().map(fraction);
-        let alpha = if look.vertex_alpha {
-            u16::from(a) * 257
-        } else {
-            u16::MAX
-        };
+        let alpha = look
+            .vertex_alpha
+            .map_or(u16::MAX, |of| u16::from(of.weight(a)) * 257);
         out.extend(color.into_iter().chain([alpha]).flat_map(u16::to_le_bytes));
     }
     Some(out)
