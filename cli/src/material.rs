@@ -140,7 +140,10 @@ pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
         ..Options::default()
     };
     let world = map.map(|map| RelitWorld::load(files, &materials, &map, options));
-    let world = world.transpose()?;
+    let mut world = world.transpose()?;
+    if let Some(world) = &mut world {
+        world.measure_materials(files);
+    }
     let mut told = Vec::new();
     let mut faults = 0;
     for name in &args.names {

@@ -60,3 +60,33 @@ fn what_is_missing_is_told_and_fails() {
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("neither a script nor an image"), "{text}");
 }
+
+#[test]
+fn a_map_s_material_throws_back_as_much_as_its_picture() {
+    let mut map = q3bsp::builder::MapBuilder::new();
+    let wall = map.add_shader("t/grey", 0, 1);
+    map.add_room(wall, glam::Vec3::splat(-128.0), glam::Vec3::splat(128.0));
+    let folder = tempfile::tempdir().unwrap();
+    let write = |path: &str, bytes: Vec<u8>| {
+        let path = folder.path().join(path);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    };
+    write("maps/m.bsp", map.build().write());
+    let head = [0u8, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 24, 0];
+    write("t/grey.tga", [&head[..], &[188; 3]].concat());
+    let albedo = |arguments: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_relight"))
+            .args(["material", "t/grey", "--json", "--game"])
+            .arg(folder.path())
+            .args(arguments)
+            .output()
+            .unwrap();
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        json[0]["light"]["albedo"][0].as_f64().unwrap()
+    };
+    let alone = albedo(&["--lighting", "vertex"]);
+    let used = albedo(&["--map", "m"]);
+    assert!((alone - 0.5).abs() < 0.02, "{alone}");
+    assert!((used - alone).abs() < 1e-3, "{used} for {alone}");
+}
