@@ -23,10 +23,10 @@ pub struct CamerasArgs {
     )]
     games: Vec<PathBuf>,
     /// Places of each map: the camera of the intermission first, then spawn points, evenly out of the map's list
-    #[arg(long, default_value_t = 3)]
+    #[arg(long, default_value_t = 3, value_parser = crate::numbers::count)]
     each: usize,
     /// Every how many maps of the list in alphabetical order, when none is named
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = crate::numbers::count)]
     every: usize,
     /// How many maps of that list are left out at its start
     #[arg(long, default_value_t = 0)]
@@ -73,7 +73,7 @@ pub fn run(args: &CamerasArgs) -> Result<()> {
             playable.push((map, places));
         }
     }
-    let step = if named { 1 } else { args.every.max(1) };
+    let step = if named { 1 } else { args.every };
     let skip = if named { 0 } else { args.skip };
     for (map, places) in playable.iter().skip(skip).step_by(step) {
         for Place { origin, yaw } in places {

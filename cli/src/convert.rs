@@ -24,6 +24,7 @@ use serde::Serialize;
 
 use crate::BAD_INPUT;
 use crate::brought::Brought;
+use crate::numbers::positive;
 use inputs::Input;
 
 /// Write maps for other programs
@@ -53,7 +54,7 @@ pub struct ConvertArgs {
     )]
     games: Vec<PathBuf>,
     /// Length of an id unit in the output
-    #[arg(long, default_value_t = METRES_PER_UNIT)]
+    #[arg(long, default_value_t = METRES_PER_UNIT, value_parser = positive)]
     scale: f32,
     /// What becomes of lightmaps; by default vertices, and strip where lights are asked for
     #[arg(long, value_enum)]
@@ -62,7 +63,7 @@ pub struct ConvertArgs {
     #[arg(long, value_enum)]
     lights: Option<LightChoice>,
     /// What all light is multiplied by; by default so much that the map is as bright as in the game
-    #[arg(long)]
+    #[arg(long, value_parser = positive)]
     exposure: Option<f32>,
     /// Where images go: as usual for the format, inside the file, into a folder beside it, or nowhere
     #[arg(long, value_enum, default_value_t = ImageChoice::Usual)]
@@ -81,7 +82,7 @@ pub struct ConvertArgs {
     #[arg(long)]
     sky_light: bool,
     /// Largest distance of a curve from its mesh, id units
-    #[arg(long, default_value_t = 4.0)]
+    #[arg(long, default_value_t = 4.0, value_parser = positive)]
     subdivisions: f32,
     /// Fit lights to the lightmaps first, find those again that the compiler left out (some seconds a map), and write
     /// them

@@ -38,10 +38,10 @@ pub struct EstimatorsArgs {
     #[arg(long, default_value = "512x384", value_parser = parse_size)]
     size: (u32, u32),
     /// Diffuse bounces
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=2))]
     bounces: u32,
     /// Candidates of resampled selection
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     candidates: Option<u32>,
     /// Leave out the pictures lit by every light of the map
     #[arg(long)]
@@ -50,7 +50,7 @@ pub struct EstimatorsArgs {
     #[arg(long, default_value_t = 0)]
     tiles: usize,
     /// Camera: X Y Z YAW PITCH; default: the map's intermission or first spawn point
-    #[arg(long, num_args = 4..=5, allow_negative_numbers = true, value_names = ["X", "Y", "Z", "YAW", "PITCH"])]
+    #[arg(long, num_args = 4..=5, value_parser = crate::numbers::finite, allow_negative_numbers = true, value_names = ["X", "Y", "Z", "YAW", "PITCH"])]
     camera: Option<Vec<f32>>,
     /// Vulkan device: part of its name
     #[arg(long)]

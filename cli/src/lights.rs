@@ -36,10 +36,10 @@ pub struct LightsArgs {
     #[arg(long, conflicts_with = "output")]
     judge: bool,
     /// Rays for a pair of light and cluster
-    #[arg(long, default_value_t = 128)]
+    #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..))]
     rays: u32,
     /// Clusters that are judged; they are spread evenly over the map's list
-    #[arg(long, default_value_t = 64)]
+    #[arg(long, default_value_t = 64, value_parser = crate::numbers::count)]
     clusters: usize,
     /// Do not fit lights to the map's lightmaps first (the game does)
     #[arg(long)]

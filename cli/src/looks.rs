@@ -27,13 +27,13 @@ pub struct LooksArgs {
     #[command(flatten)]
     chosen: Maps,
     /// Views of each map; those that the map has no places for are left out
-    #[arg(long, default_value_t = 6)]
+    #[arg(long, default_value_t = 6, value_parser = crate::numbers::count)]
     views: usize,
     /// Size of a picture in pixels
     #[arg(long, default_value = "320x240", value_parser = parse_size)]
     size: (u32, u32),
     /// Frames accumulated for a traced picture
-    #[arg(long, default_value_t = 32)]
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
     /// Draw frames as a game shows them, filtered; nothing accumulates
     #[arg(long)]

@@ -16,6 +16,7 @@ mod lights_picture;
 mod looks;
 mod material;
 mod measure;
+mod numbers;
 mod pictures;
 mod render;
 mod statistics;

@@ -14,7 +14,7 @@ mod table;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::Args;
 use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -26,6 +26,7 @@ use serde_json::{Value, json};
 use self::region::Regions;
 use self::stage::{Stage, Variant, variants};
 use crate::cameras::{EYES, Place, places};
+use crate::numbers;
 use crate::render::{parse_size, parse_view};
 use crate::statistics::{luminance, relative_bias, relative_error};
 use crate::view::{Camera, Maps, load, open};
@@ -42,7 +43,7 @@ pub struct MeasureArgs {
     #[command(flatten)]
     chosen: Maps,
     /// Places of each map
-    #[arg(long, default_value_t = 2)]
+    #[arg(long, default_value_t = 2, value_parser = numbers::count)]
     each: usize,
     /// Look from here in place of the rule's places, units and degrees; may be given more than once
     #[arg(long, value_name = "X,Y,Z,YAW,PITCH", value_parser = parse_view, allow_hyphen_values = true)]
@@ -51,7 +52,7 @@ pub struct MeasureArgs {
     #[arg(long, value_name = "MODEL")]
     hold: Option<String>,
     /// Horizontal angle of view, degrees: a small one shows details as a large picture does
-    #[arg(long, default_value_t = 90.0)]
+    #[arg(long, default_value_t = 90.0, value_parser = numbers::fov)]
     fov: f32,
     /// Stand still where the camera would turn and walk; game time runs all the same
     #[arg(long)]
@@ -66,16 +67,16 @@ pub struct MeasureArgs {
     #[arg(long, default_value = "1024x768", value_parser = parse_size)]
     size: (u32, u32),
     /// Frames of the reference
-    #[arg(long, default_value_t = 4096)]
+    #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..))]
     reference: u32,
     /// Frames that lead to a picture, and frames over which noise is taken
-    #[arg(long, default_value_t = 32)]
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(2..))]
     frames: u32,
     /// Diffuse bounces
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(..=2))]
     bounces: u32,
     /// Exposure in stops, on top of the one that the map starts with: for dark places
-    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, default_value_t = 0.0, value_parser = numbers::finite, allow_hyphen_values = true)]
     exposure: f32,
     /// Vulkan device: part of its name
     #[arg(long)]
@@ -339,9 +340,6 @@ fn ruled_cameras(entities: &[q3bsp::Entity], each: usize) -> Vec<Camera> {
 
 /// Runs the command.
 pub fn run(args: &MeasureArgs) -> Result<()> {
-    if args.frames < 2 || args.reference == 0 || args.each == 0 {
-        bail!("--frames is at least 2, --reference and --each at least 1");
-    }
     let mut all = serde_json::Map::new();
     for map in &args.chosen.maps {
         let (files, path) = open(map, &args.chosen.games)?;

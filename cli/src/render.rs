@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::numbers;
 use crate::pictures::write_png;
 use crate::timings::Timings;
 use crate::view::{Camera, load, open};
@@ -97,11 +98,11 @@ pub struct RenderArgs {
     #[arg(long, conflicts_with_all = ["view", "spawn"])]
     overview: bool,
     /// The same as --view, as words: X Y Z YAW PITCH
-    #[arg(long, num_args = 4..=5, allow_negative_numbers = true, conflicts_with_all = ["view", "spawn", "overview"],
-        value_names = ["X", "Y", "Z", "YAW", "PITCH"])]
+    #[arg(long, num_args = 4..=5, value_parser = numbers::finite, allow_negative_numbers = true,
+        conflicts_with_all = ["view", "spawn", "overview"], value_names = ["X", "Y", "Z", "YAW", "PITCH"])]
     camera: Option<Vec<f32>>,
-    /// Horizontal field of view, degrees
-    #[arg(long, default_value_t = 90.0)]
+    /// Horizontal field of view, degrees, from 1 to 170
+    #[arg(long, default_value_t = 90.0, value_parser = numbers::fov)]
     fov: f32,
     /// Samples that the traced look takes for each pixel: 64, where --frames says no other number
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
@@ -113,19 +114,20 @@ pub struct RenderArgs {
     #[arg(long, value_enum, default_value = "resampled")]
     sampling: Sampling,
     /// Lights looked at for each one that is chosen
-    #[arg(long, default_value_t = Settings::default().rt_candidates)]
+    #[arg(long, default_value_t = Settings::default().rt_candidates,
+        value_parser = clap::value_parser!(u32).range(1..))]
     candidates: u32,
     /// What follows the rays
     #[arg(long, value_enum, default_value = "auto")]
     tracer: Tracer,
-    /// Diffuse bounces of the traced look
-    #[arg(long, default_value_t = 1)]
+    /// Diffuse bounces of the traced look, 2 at most
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(..=2))]
     bounces: u32,
     /// Exposure in stops, on top of automatic exposure
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, value_parser = numbers::finite, allow_negative_numbers = true)]
     exposure: f32,
     /// Game time, seconds
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, value_parser = numbers::not_negative)]
     time: f32,
     /// Vulkan device: part of its name
     #[arg(long)]
@@ -151,22 +153,23 @@ pub struct RenderArgs {
     #[arg(long)]
     no_accumulation: bool,
     /// Move the camera by this much from frame to frame, so that the last frame is where it was asked for
-    #[arg(long, num_args = 4, allow_negative_numbers = true, value_names = ["X", "Y", "Z", "YAW"])]
+    #[arg(long, num_args = 4, value_parser = numbers::finite, allow_negative_numbers = true,
+        value_names = ["X", "Y", "Z", "YAW"])]
     step: Option<Vec<f32>>,
     /// Look into a step of the traced look: the numbers of the console variable rt_debug
     #[arg(long, default_value_t = 0)]
     debug: u32,
     /// Filter of frames that do not accumulate: 0 none, 1 A-SVGF, 2 sparse
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(..=2))]
     denoiser: u32,
     /// No temporal antialiasing of frames that do not accumulate
     #[arg(long)]
     no_taa: bool,
     /// Width and height that are traced over those of the picture, 0.25 to 1, for frames that do not accumulate
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, value_parser = numbers::traced_part)]
     scale: f32,
     /// Depth of field: diameter of the lens and distance that is sharp, units
-    #[arg(long, num_args = 2, value_names = ["DIAMETER", "DISTANCE"])]
+    #[arg(long, num_args = 2, value_parser = numbers::positive, value_names = ["DIAMETER", "DISTANCE"])]
     lens: Option<Vec<f32>>,
 }
 

@@ -57,7 +57,7 @@ pub fn open(map: &str, games: &[PathBuf]) -> anyhow::Result<(Arc<dyn GameFiles>,
             path.add_pk3(&file)?;
             match maps.as_slice() {
                 [one] => format!("maps/{one}"),
-                [] => bail!("{map}: no map in it"),
+                [] => bail!(no_maps(&map, &pack)),
                 many => bail!(
                     "{map}: several maps in it ({}); name one and give the pack's folder with --game",
                     many.join(", ")
@@ -78,6 +78,24 @@ pub fn open(map: &str, games: &[PathBuf]) -> anyhow::Result<(Arc<dyn GameFiles>,
         _ => format!("maps/{map}.bsp"),
     };
     Ok((with_map_files(path, MemoryFiles::new(), &name)?, name))
+}
+
+/// Says that a pack has no maps where a game reads them, where it has some, and what to do.
+pub fn no_maps(name: &str, pack: &Pk3) -> String {
+    let is_map = |path: &String| path.to_ascii_lowercase().ends_with(".bsp");
+    let Some(found) = pack.all_names().find(is_map) else {
+        return format!("{name}: no maps in it");
+    };
+    let inside = found.to_ascii_lowercase().rfind("/maps/");
+    match inside.and_then(|at| found.get(..at)) {
+        Some(folder) => format!(
+            "{name}: no maps in it where games read them: all lies below the folder {folder} ({found}); unpack it and pack \
+             what is inside of {folder}, so that the folder maps is at the top"
+        ),
+        None => format!(
+            "{name}: no maps in it where games read them: {found} is in no folder maps at the pack's top; move it there"
+        ),
+    }
 }
 
 /// The game's files with `front` before them, and what the map brings along where its format has no scripts.

@@ -4,6 +4,7 @@ mod common;
 
 use common::{map, relight};
 use q3bsp::{Bsp, Format, Lump};
+use std::process::Command;
 
 /// Every command that reads maps, on one file: the code, and the one line about it.
 fn told(bytes: &[u8]) -> String {
@@ -95,5 +96,111 @@ fn maps_become_json_and_map_files() {
         assert!(output.status.success(), "{output:?}");
         let text = std::fs::read_to_string(folder.path().join(name)).unwrap();
         assert!(text.contains(part), "{name}");
+    }
+}
+
+/// What the program says about a command that it refuses, in a folder without anything.
+fn refused(arguments: &[&str]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let output = relight(folder.path(), arguments);
+    assert!(!output.status.success(), "{arguments:?}: {output:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+#[test]
+fn numbers_that_make_no_sense_are_refused() {
+    const RENDER: &[&str] = &["render", "m", "-o", "out.png"];
+    const CONVERT: &[&str] = &["convert", "m", "-o", "out.glb"];
+    for (command, option, number, told) in [
+        (RENDER, "--fov", "0", "from 1 to 170 degrees"),
+        (RENDER, "--fov", "180", "from 1 to 170 degrees"),
+        (RENDER, "--fov", "NaN", "from 1 to 170 degrees"),
+        (RENDER, "--spp", "0", "0 is not in 1.."),
+        (RENDER, "--frames", "0", "0 is not in 1.."),
+        (RENDER, "--candidates", "0", "0 is not in 1.."),
+        (RENDER, "--bounces", "9", "9 is not in "),
+        (RENDER, "--denoiser", "3", "3 is not in "),
+        (RENDER, "--size", "0x10", "WIDTHxHEIGHT"),
+        (RENDER, "--exposure", "NaN", "a number"),
+        (RENDER, "--time", "inf", "a number"),
+        (RENDER, "--scale", "0.1", "from 0.25 to 1"),
+        (RENDER, "--scale", "inf", "from 0.25 to 1"),
+        (CONVERT, "--scale", "0", "above 0"),
+        (CONVERT, "--exposure", "inf", "above 0"),
+        (CONVERT, "--subdivisions", "NaN", "above 0"),
+        (&["measure", "m"], "--fov", "180", "from 1 to 170 degrees"),
+        (&["measure", "m"], "--frames", "1", "1 is not in 2.."),
+        (&["estimators", "m"], "--candidates", "0", "0 is not in 1.."),
+        (
+            &["lights", "m", "--judge"],
+            "--rays",
+            "0",
+            "0 is not in 1..",
+        ),
+        (&["lights", "m", "--judge"], "--clusters", "0", "from 1 on"),
+        (&["looks", "m"], "--views", "0", "from 1 on"),
+        (&["looks", "m"], "--frames", "0", "0 is not in 1.."),
+        (&["cameras"], "--every", "0", "from 1 on"),
+        (&["cameras"], "--each", "0", "from 1 on"),
+    ] {
+        let arguments: Vec<&str> = command.iter().copied().chain([option, number]).collect();
+        let text = refused(&arguments);
+        assert!(
+            text.contains(option) && text.contains(told),
+            "{arguments:?}: {text}"
+        );
+    }
+    for words in [
+        &["--camera", "0", "0", "NaN", "0"][..],
+        &["--step", "0", "0", "inf", "0"],
+        &["--lens", "NaN", "100"],
+        &["--lens", "4", "0"],
+    ] {
+        let arguments: Vec<&str> = RENDER.iter().chain(words).copied().collect();
+        let text = refused(&arguments);
+        assert!(text.contains(words[0]) && text.contains("number"), "{text}");
+    }
+}
+
+#[test]
+fn a_pack_with_everything_below_one_folder_names_the_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let pack = |name: &str, inside: &str| {
+        let file = std::fs::File::create(folder.path().join(name)).unwrap();
+        let mut zip = zip::ZipWriter::new(file);
+        let options = zip::write::SimpleFileOptions::default();
+        zip.start_file(inside, options).unwrap();
+        std::io::Write::write_all(&mut zip, &map(Format::Ibsp46)).unwrap();
+        zip.finish().unwrap();
+    };
+    pack("deep.pk3", "MyMap/Maps/x.bsp");
+    pack("flat.pk3", "x.bsp");
+    pack("none.pk3", "readme.txt");
+    std::fs::create_dir(folder.path().join("game")).unwrap();
+    for command in [
+        &["convert", "PACK", "-o", "out"][..],
+        &["info", "PACK"],
+        &["render", "PACK", "-o", "out.png"],
+    ] {
+        let told = |pack: &str| {
+            let words = command.iter().map(|w| if *w == "PACK" { pack } else { w });
+            let output = Command::new(env!("CARGO_BIN_EXE_relight"))
+                .current_dir(folder.path())
+                .args(words)
+                .args(["--game", "game"])
+                .output()
+                .unwrap();
+            assert!(!output.status.success(), "{command:?}: {output:?}");
+            String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned()
+        };
+        let deep = told("deep.pk3");
+        let named = deep.contains("below the folder MyMap (MyMap/Maps/x.bsp)");
+        assert!(
+            named && deep.contains("pack what is inside of MyMap"),
+            "{deep}"
+        );
+        let flat = told("flat.pk3");
+        assert!(flat.contains("x.bsp is in no folder maps"), "{flat}");
+        assert!(told("none.pk3").contains("no maps in it"));
     }
 }

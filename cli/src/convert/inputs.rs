@@ -5,6 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::view::no_maps;
 use anyhow::{Context, Result, bail};
 use relight::export::Format;
 use relight::{GameFiles, MemoryFiles, Overlay, Pk3, SearchPath};
@@ -115,7 +116,7 @@ pub fn find(files: &mut SearchPath, games: &[PathBuf], asked: &[String]) -> Resu
             let mut maps = pack.list("maps", ".bsp");
             maps.sort();
             if maps.is_empty() {
-                bail!("{name}: no maps in it");
+                bail!(no_maps(name, &pack));
             }
             inputs.extend(
                 maps.into_iter()

@@ -1,0 +1,70 @@
+//! Numbers of the command line that make sense.
+
+/// Reads a number that `fits`; `what` says which numbers do.
+fn number(text: &str, what: &str, fits: impl Fn(f32) -> bool) -> Result<f32, String> {
+    let parsed: Option<f32> = text.parse().ok();
+    let fitting = parsed.filter(|n| n.is_finite() && fits(*n));
+    fitting.ok_or_else(|| format!("it must be {what}"))
+}
+
+/// Any number but infinity and what is none.
+pub fn finite(text: &str) -> Result<f32, String> {
+    number(text, "a number", |_| true)
+}
+
+/// More than nothing.
+pub fn positive(text: &str) -> Result<f32, String> {
+    number(text, "a number above 0", |n| n > 0.0)
+}
+
+/// Nothing or more.
+pub fn not_negative(text: &str) -> Result<f32, String> {
+    number(text, "0 or a number above it", |n| n >= 0.0)
+}
+
+/// A horizontal field of view, degrees, that a flat picture can have.
+pub fn fov(text: &str) -> Result<f32, String> {
+    number(
+        text,
+        "an angle from 1 to 170 degrees, for example 90",
+        |n| (1.0..=170.0).contains(&n),
+    )
+}
+
+/// Part of a picture's width and height that is traced.
+pub fn traced_part(text: &str) -> Result<f32, String> {
+    number(text, "a number from 0.25 to 1", |n| {
+        (0.25..=1.0).contains(&n)
+    })
+}
+
+/// A whole number from 1 on.
+pub fn count(text: &str) -> Result<usize, String> {
+    let parsed: Option<usize> = text.parse().ok();
+    let fitting = parsed.filter(|n| *n > 0);
+    fitting.ok_or_else(|| "it must be a whole number from 1 on".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_numbers_that_make_sense_pass() {
+        assert_eq!(fov("90"), Ok(90.0));
+        for text in ["0", "180", "-90", "NaN", "inf", "wide", "170.1"] {
+            assert!(fov(text).is_err(), "{text}");
+        }
+        assert!(fov("180").unwrap_err().contains("1 to 170"));
+        assert_eq!(finite("-2.5"), Ok(-2.5));
+        assert!(finite("NaN").is_err() && finite("-inf").is_err());
+        assert!(positive("0").is_err() && positive("-1").is_err());
+        assert_eq!(positive("1e-3"), Ok(1e-3));
+        assert_eq!(not_negative("0"), Ok(0.0));
+        assert!(not_negative("-1").is_err());
+        assert!(traced_part("0.2").is_err() && traced_part("1.5").is_err());
+        assert_eq!(traced_part("0.5"), Ok(0.5));
+        assert!(count("0").is_err() && count("1.5").is_err() && count("-1").is_err());
+        assert_eq!(count("3"), Ok(3));
+    }
+}
