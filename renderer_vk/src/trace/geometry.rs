@@ -15,6 +15,7 @@ use super::cutout::Coverage;
 use super::doubled::doubled;
 use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use super::layer_boxes::{StaticLayer, bounds_of};
+use super::lifted::lifted;
 use super::surroundings::Surroundings;
 use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
 use crate::world::Bounds;
@@ -252,11 +253,12 @@ impl StaticGeometry {
             storage,
             &grouped.triangles,
         )?;
+        let positions = lifted(scene, materials);
         let structures = match tracer {
             Tracer::Pipeline | Tracer::Query => {
-                driver_structures(device, scene, &grouped, &triangles)?
+                driver_structures(device, &positions, &grouped, &triangles)?
             }
-            Tracer::Compute => own_structures(device, scene, &grouped, &triangles)?,
+            Tracer::Compute => own_structures(device, &positions, &grouped, &triangles)?,
         };
         static SERIALS: AtomicU64 = AtomicU64::new(1);
         Ok(Self {
@@ -283,7 +285,7 @@ impl StaticGeometry {
 /// Structures of the driver: built in one batch, compacted.
 fn driver_structures(
     device: &Device,
-    scene: &StaticScene<'_>,
+    positions: &[Vec3],
     grouped: &Grouped,
     triangles: &Buffer,
 ) -> Result<Vec<StaticBlas>, Error> {
@@ -291,8 +293,7 @@ fn driver_structures(
     let indices: Vec<[u32; 3]> = grouped.triangles.iter().map(|t| t.indices).collect();
     let index_buffer = Buffer::with_data(device, "trace static indices", input, &indices)?;
     // of their own, because only these need to be readable by builds
-    let positions: Vec<Vec3> = scene.vertices.iter().map(|v| v.position).collect();
-    let position_buffer = Buffer::with_data(device, "trace static positions", input, &positions)?;
+    let position_buffer = Buffer::with_data(device, "trace static positions", input, positions)?;
     let flags = BlasFlags {
         compact: true,
         ..BlasFlags::default()
@@ -308,7 +309,7 @@ fn driver_structures(
         geometries.push(BlasGeometry {
             vertex_address: position_buffer.address(),
             vertex_stride: size_of::<Vec3>() as u64,
-            max_vertex: u32::try_from(scene.vertices.len().saturating_sub(1)).unwrap_or(u32::MAX),
+            max_vertex: u32::try_from(positions.len().saturating_sub(1)).unwrap_or(u32::MAX),
             index_address: index_buffer.address() + (group.first * size_of::<[u32; 3]>()) as u64,
             triangle_count: u32::try_from(group.count).unwrap_or(u32::MAX),
             opaque: matches!(kind, Kind::Opaque | Kind::Sky),
@@ -340,17 +341,12 @@ fn driver_structures(
 /// Structures of our own.
 fn own_structures(
     device: &Device,
-    scene: &StaticScene<'_>,
+    positions: &[Vec3],
     grouped: &Grouped,
     triangles: &Buffer,
 ) -> Result<Vec<StaticBlas>, Error> {
     let mut structures = Vec::new();
-    let position = |i: u32| {
-        scene
-            .vertices
-            .get(i as usize)
-            .map_or(Vec3::ZERO, |v| v.position)
-    };
+    let position = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::ZERO);
     let mut together: BTreeMap<(u32, bool), Vec<(Kind, &Group)>> = BTreeMap::new();
     for ((model, kind), group) in &grouped.groups {
         let members = together.entry((*model, *kind == Kind::Translucent));

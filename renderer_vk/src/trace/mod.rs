@@ -27,6 +27,7 @@ pub mod geometry;
 mod indirect;
 pub mod input;
 pub mod layer_boxes;
+mod lifted;
 pub mod light_cells;
 pub mod light_facings;
 pub mod light_rows;

@@ -10,7 +10,7 @@ use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::trace::frame_lights::decode;
 
 /// An image of two texels beside each other.
-fn stripes(gpu: &Gpu, texels: [[u8; 4]; 2]) -> Image {
+pub(super) fn stripes(gpu: &Gpu, texels: [[u8; 4]; 2]) -> Image {
     let image = Image::new(
         &gpu.device,
         &ImageDesc::new("stripes", 2, 1, Format::Rgba8, ImageUsage::SAMPLED),

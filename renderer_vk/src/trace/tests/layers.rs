@@ -36,7 +36,7 @@ pub(super) fn displayed(color: [f32; 3]) -> Vec3 {
 }
 
 /// What constant layers (encoded colour, alpha), nearest first, show over a background (encoded): mixed as displayed.
-fn over(layers: &[([f32; 3], f32)], background: [f32; 3]) -> Vec3 {
+pub(super) fn over(layers: &[([f32; 3], f32)], background: [f32; 3]) -> Vec3 {
     let mixed = layers
         .iter()
         .rev()

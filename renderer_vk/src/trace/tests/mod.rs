@@ -4,6 +4,7 @@
 mod antialiasing;
 mod blooming;
 mod bounces;
+mod coplanar;
 mod cut_outs;
 mod denoising;
 mod dielectrics;
