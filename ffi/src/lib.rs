@@ -8,6 +8,8 @@
 //! - One exported symbol, [`GetRefAPI`]. Everything runs on the thread that called it; other threads are refused.
 //! - The library stays mapped after the engine unloads it (`-z nodelete`), because code that ever ran a thread cannot be
 //!   unmapped safely. So statics outlive an unload, and each `GetRefAPI` rebuilds all state. No thread outlives a call.
+//! - Before any service but `Printf` is called the engine is recognized ([`recognize`]): others speak the same version
+//!   number with other tables.
 //! - No panic and no Rust value that needs dropping is on the stack when the engine's `Error` is called, which leaves by
 //!   `longjmp` ([`boundary`]). Services that the engine itself may leave by `longjmp` can cost memory, never
 //!   consistency ([`session`]).
@@ -30,6 +32,7 @@ mod fallback;
 mod files;
 mod ioq3;
 mod logging;
+mod recognize;
 mod session;
 mod speeds;
 mod window;
@@ -37,7 +40,8 @@ mod window;
 use ioq3::abi::{refexport_t, refimport_t};
 use std::ffi::c_int;
 
-/// The engine's way in: takes the engine's functions, answers ours; null when the engine speaks another version.
+/// The engine's way in: takes the engine's functions, answers ours; null when the engine speaks another version
+/// or has other tables.
 ///
 /// # Safety
 /// `imports` must be null or point at the import table of an ioquake3 engine, and the call must come from the engine's

@@ -141,6 +141,19 @@ impl Engine {
         }
     }
 
+    /// Describes a cvar and looks whether the engine keeps that, as those with ioquake3's tables do. In the others of
+    /// its family the same entry of the table only looks for a variable of that name, and the member is another pointer
+    /// into the engine's memory.
+    pub fn cvar_keeps_description(self, cvar: *mut cvar_t, text: &CStr) -> bool {
+        self.cvar_describe(cvar, text);
+        // SAFETY: `cvar` came from `cvar_get`.
+        let kept = unsafe { (*cvar).description }.cast::<u8>();
+        let mut bytes = text.to_bytes_with_nul().iter().enumerate();
+        // SAFETY: bytes are read up to the first that differs: in a copy of the text its zero is the last one read, and
+        // what other engines keep here is a variable, which holds more bytes than agree with a text.
+        !kept.is_null() && bytes.all(|(i, &byte)| unsafe { *kept.add(i) } == byte)
+    }
+
     /// Integer value of any cvar; 0 if there is none.
     pub fn cvar_integer(self, name: &CStr) -> c_int {
         // SAFETY: the name lives through the call.

@@ -2,7 +2,7 @@
 //!
 //! Another engine gets a module like this one beside it, with its own tables and its own rules about windows; the
 //! scene structures in [`abi`] and everything outside this folder serve all of them. The version number that
-//! `GetRefAPI` gets does not tell engines apart (five of them use 8), so each will need a library name of its own.
+//! `GetRefAPI` gets does not tell engines apart (ten of them use 8); [`crate::recognize`] does.
 
 pub mod abi;
 mod convert;
@@ -19,7 +19,7 @@ pub use {
     lifecycle::shutdown as shutdown_for_tests,
 };
 
-use crate::{fallback, logging, session, window};
+use crate::{fallback, logging, recognize, session, window};
 use abi::{API_VERSION, refexport_t, refimport_t};
 use engine::Engine;
 use std::cell::UnsafeCell;
@@ -36,7 +36,7 @@ unsafe impl Sync for Borrowed {}
 static BORROWED: Borrowed = Borrowed(UnsafeCell::new(None));
 
 /// `GetRefAPI`: starts over with the engine behind `imports` and answers the table of our functions, or null when the
-/// engine speaks another version of the interface. Without usable Vulkan it answers the table of the engine's own
+/// engine speaks another version of the interface or has other tables. Without usable Vulkan it answers the table of the engine's own
 /// OpenGL renderer.
 ///
 /// # Safety
@@ -51,6 +51,11 @@ pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *c
     let engine = unsafe { Engine::install(table) };
     if api_version != API_VERSION {
         engine.say(&format!("Relight speaks version {API_VERSION} of the renderer interface, this engine wants {api_version}\n"));
+        return ptr::null();
+    }
+    // SAFETY: the engine's own table; it speaks our version.
+    if let Some(line) = unsafe { recognize::refusal(engine, imports) } {
+        engine.say(&format!("{line}\n"));
         return ptr::null();
     }
     logging::install();

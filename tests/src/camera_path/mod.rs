@@ -93,6 +93,7 @@ pub fn play(play: &Play) -> Result<(Report, Option<relight::compare::Rgb8>), Pla
         files: play.files.clone(),
         packs: play.packs.clone(),
         clock: Some(first.time_ms),
+        ..Options::default()
     };
     let mut engine = Engine::start_with(&play.library, options)?;
     engine.start_map(&play.map)?;

@@ -42,6 +42,20 @@ pub struct Message {
     pub text: String,
 }
 
+/// Whose services the renderer is offered, all under one version number.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tables {
+    /// 40 services.
+    #[default]
+    Ioquake3,
+    /// The same with four more at the end.
+    WorldOfPadman,
+    /// 39: without `Cvar_SetDescription`, and variables without a description.
+    OpenArena,
+    /// 56, most of them elsewhere.
+    Quake3e,
+}
+
 /// A picture of a film.
 #[derive(Clone)]
 pub(super) struct Film {
@@ -486,8 +500,43 @@ extern "C" fn low_physical_memory() -> c_int {
     0
 }
 
-/// The table that `GetRefAPI` gets.
-pub(super) fn table() -> refimport_t {
+/// A service of another engine's table where the renderer takes it for one of ioquake3's: ends the process, as the real
+/// one would.
+extern "C" fn wrong_service() {
+    panic!("a service of an unknown table was called");
+}
+
+/// The words of the table that `GetRefAPI` gets, with zeros behind them.
+pub(super) fn words(tables: Tables) -> [usize; 64] {
+    const SERVICES: usize = size_of::<refimport_t>() / size_of::<usize>();
+    // SAFETY: a structure of function pointers alone.
+    let ours = unsafe { std::mem::transmute::<refimport_t, [usize; SERVICES]>(table()) };
+    let wrong = (wrong_service as *const ()).expose_provenance();
+    let mut words = [0; 64];
+    let (print_and_error, rest) = ours.split_at(2);
+    match tables {
+        Tables::Ioquake3 => words[..SERVICES].copy_from_slice(&ours),
+        Tables::WorldOfPadman => {
+            words[..SERVICES].copy_from_slice(&ours);
+            words[SERVICES..SERVICES + 4].fill(wrong);
+        }
+        Tables::OpenArena => {
+            // up to Cvar_CheckRange the same; the next is Cvar_VariableIntegerValue
+            words[..12].copy_from_slice(&ours[..12]);
+            words[12..SERVICES - 1].fill(wrong);
+            words[12] = ours[13];
+        }
+        Tables::Quake3e => {
+            words[..2].copy_from_slice(print_and_error);
+            words[2] = rest[0];
+            words[3..56].fill(wrong);
+        }
+    }
+    words
+}
+
+/// The table of ioquake3.
+fn table() -> refimport_t {
     refimport_t {
         Printf: stand_in_printf,
         Error: stand_in_raise,

@@ -27,8 +27,8 @@ use thiserror::Error;
 use abi::{GetRefAPI, REF_API_VERSION, glconfig_t, refexport_t};
 pub use exports::View;
 use files::{Files, Packs};
-pub use imports::Message;
 use imports::{Film, State};
+pub use imports::{Message, Tables};
 
 /// An error that the renderer raised through the engine's `Error`.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -69,6 +69,8 @@ pub struct Options {
     /// What the engine's clock stands at, in milliseconds, until [`Engine::set_clock`] moves it. A clock that runs
     /// by itself where there is none.
     pub clock: Option<i32>,
+    /// The engine whose services are offered.
+    pub tables: Tables,
 }
 
 /// One engine process at a time: the library has one state.
@@ -78,6 +80,7 @@ static PROCESS: Mutex<()> = Mutex::new(());
 pub struct Engine {
     library: Option<Library>,
     source: Source,
+    tables: Tables,
     home: TempDir,
     _process: MutexGuard<'static, ()>,
 }
@@ -258,6 +261,7 @@ impl Engine {
         let mut engine = Self {
             library: None,
             source,
+            tables: options.tables,
             home,
             _process: process,
         };
@@ -280,10 +284,10 @@ impl Engine {
             }
         };
         // The engine passes a structure on its stack and the renderer has to copy it; ours is overwritten below.
-        let mut table = imports::table();
+        let mut table = imports::words(self.tables);
         let place = &raw mut table;
         // SAFETY: the table outlives the call.
-        let exports = call(move || unsafe { get_ref_api(REF_API_VERSION, place) })?;
+        let exports = call(move || unsafe { get_ref_api(REF_API_VERSION, place.cast()) })?;
         // SAFETY: nobody may read it any more, and zeros crash whoever calls through them.
         unsafe { std::ptr::write_bytes(place, 0, 1) };
         if exports.is_null() {

@@ -59,6 +59,7 @@ impl Stage {
                 files,
                 packs,
                 clock: Some(CLOCK),
+                ..Options::default()
             },
         )?;
         Ok(Self {

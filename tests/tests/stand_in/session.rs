@@ -3,7 +3,7 @@
 use super::support::{engine, engine_in_map};
 use glam::Vec3;
 use tests::engine::abi::refEntity_t;
-use tests::engine::{Engine, Options, View};
+use tests::engine::{Engine, LoadError, Options, Tables, View};
 use tests::maps::{self, HERE, ROOMS};
 
 fn text(characters: &[std::ffi::c_char]) -> String {
@@ -212,4 +212,36 @@ fn latched_and_live_settings_take_effect() {
     engine.set("r_lightmap", "1");
     assert_ne!(engine.picture(&view).unwrap(), normal, "r_lightmap is live");
     engine.assert_clean();
+}
+
+#[test]
+fn engines_with_other_tables_are_refused_before_their_services_are_called() {
+    let load = |tables| {
+        let library = tests::data::library();
+        let cvars = vec![("version".to_owned(), "OpenArena 0.8.8 oa2020".to_owned())];
+        let options = Options {
+            files: maps::files(),
+            tables,
+            cvars,
+            ..Options::default()
+        };
+        Engine::load(&library, options)
+    };
+    for (tables, found) in [
+        (Tables::OpenArena, "version \"OpenArena 0.8.8 oa2020\""),
+        (Tables::Quake3e, "52 services"),
+    ] {
+        let Err(LoadError::Refused(said)) = load(tables) else {
+            panic!("{tables:?} is served")
+        };
+        assert!(said.contains(found), "{said}");
+        assert!(said.contains("+set cl_renderer opengl1"), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+    for tables in [Tables::WorldOfPadman, Tables::Ioquake3] {
+        let mut engine = load(tables).expect("it has ioquake3's services");
+        engine.begin_registration().unwrap();
+        engine.start_map(ROOMS).unwrap();
+        engine.assert_clean();
+    }
 }

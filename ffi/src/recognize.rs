@@ -1,0 +1,311 @@
+//! Which engine loads us, found out before any of its services but `Printf` is called.
+//!
+//! Ten engines speak the same version number with seven different tables, and a service of another table is another
+//! function: in Quake3e `Cvar_Get` of ioquake3 is `Free`. So, in this order:
+//! 1. [`VARIABLE`] in the environment overrules the rest;
+//! 2. the executable's file holds text that one family of engines alone has ([`OTHERS`]);
+//! 3. what stands where ioquake3 has functions is no function, or functions go on far beyond ioquake3's table;
+//! 4. engines without these differences keep `Cvar_Get` and the first members of a variable in their places, and of
+//!    these only those with ioquake3's table keep a variable's description.
+//!
+//! What cannot be looked at (no `/proc`, an unreadable file) decides nothing.
+
+use crate::cvars::{Cvar, TABLE};
+use crate::ioq3::abi::refimport_t;
+use crate::ioq3::engine::Engine;
+use std::ops::Range;
+use std::sync::OnceLock;
+
+/// Environment variable: `ioquake3` takes any engine for one with ioquake3's tables.
+const VARIABLE: &str = "RELIGHT_ENGINE";
+
+/// Engines that speak our version number with other tables.
+struct Other {
+    name: &'static str,
+    /// Text in the executable's file, spelled backwards: a program that this library is linked into does not hold it.
+    backwards: &'static str,
+    /// `cl_renderer` of its own OpenGL renderer.
+    opengl: &'static str,
+}
+
+const OTHERS: &[Other] = &[
+    Other {
+        name: "Quake3e",
+        backwards: "E3Q_enecSoTthgiLraeniLddA_R_part",
+        opengl: "opengl",
+    },
+    Other {
+        name: "iortcw (single player)",
+        backwards: "s%_ps_reredner",
+        opengl: "opengl1",
+    },
+    Other {
+        name: "iortcw (multiplayer)",
+        backwards: "s%_pm_reredner",
+        opengl: "opengl1",
+    },
+    Other {
+        name: "lilium-voyager (Elite Force)",
+        backwards: "reredner_mhyovmuilil",
+        opengl: "opengl1",
+    },
+];
+
+/// Services in ioquake3's table.
+const SERVICES: usize = size_of::<refimport_t>() / size_of::<usize>();
+/// The first of these that this library calls; what follows may be anything.
+const CALLED: usize = 35;
+/// From so many functions in a row on, a table is not ioquake3's. World of Padman, whose table begins with ioquake3's,
+/// has 44; Quake3e 56. What happens to lie behind a table on the stack is rarely a function, and never eight times.
+const TOO_MANY: usize = 52;
+
+/// One line that says why this engine must not be served, and what to do; `None` for an engine with ioquake3's tables.
+///
+/// # Safety
+/// `imports` must point at the import table of an engine that speaks our version number, which must be the one that
+/// `engine` calls.
+pub unsafe fn refusal(engine: Engine, imports: *const refimport_t) -> Option<String> {
+    let wanted = std::env::var(VARIABLE).unwrap_or_default();
+    let (found, opengl) = match is_ours(&wanted) {
+        Some(true) => return None,
+        Some(false) => (format!("{VARIABLE} calls it {wanted}"), "opengl1"),
+        // SAFETY: the same contract.
+        None => unsafe { difference(engine, imports) }?,
+    };
+    Some(format!(
+        "Relight speaks to ioquake3 and engines with its tables; this engine has others ({found}). Start it with \
+         \"+set cl_renderer {opengl}\" to play without Relight; if it has ioquake3's tables all the same, set the \
+         environment variable {VARIABLE}=ioquake3"
+    ))
+}
+
+/// What the environment says about the engine, if anything.
+fn is_ours(variable: &str) -> Option<bool> {
+    (!variable.is_empty()).then(|| variable.eq_ignore_ascii_case("ioquake3"))
+}
+
+/// What is not as in ioquake3, and the `cl_renderer` of the engine's OpenGL renderer.
+///
+/// # Safety
+/// As for [`refusal`].
+unsafe fn difference(
+    engine: Engine,
+    imports: *const refimport_t,
+) -> Option<(String, &'static str)> {
+    if let Some(other) = executable() {
+        return Some((format!("it is {}", other.name), other.opengl));
+    }
+    // SAFETY: a table of ioquake3 has as many words; of the shorter ones of other engines (39, 38 words), which lie on
+    // the stack, we read one or two words of the caller's frame.
+    let services = unsafe { imports.cast::<[usize; SERVICES]>().read_unaligned() };
+    let code = code_ranges();
+    if !code.is_empty() {
+        let beyond = words_after(imports.wrapping_add(1).addr());
+        if let Some(found) = odd_table(&services, &beyond, &code) {
+            return Some((found, "opengl1"));
+        }
+    }
+    let spec = TABLE.get(Cvar::RayTrace as usize)?;
+    let variable = engine.cvar_get(spec.name, spec.default, spec.flags);
+    if variable.is_null() || engine.cvar_keeps_description(variable, spec.description) {
+        return None;
+    }
+    let version = engine.cvar_text(c"version");
+    Some((
+        format!("version \"{version}\" keeps no descriptions of variables"),
+        "opengl1",
+    ))
+}
+
+/// The engine that the file of the running program names, if it is one of [`OTHERS`]. Looked up once.
+fn executable() -> Option<&'static Other> {
+    static FOUND: OnceLock<Option<&'static Other>> = OnceLock::new();
+    *FOUND.get_or_init(|| {
+        let file = std::env::current_exe().ok()?;
+        marked(&std::fs::read(file).ok()?)
+    })
+}
+
+/// Which of [`OTHERS`] these bytes of a program name.
+fn marked(bytes: &[u8]) -> Option<&'static Other> {
+    OTHERS.iter().find(|other| {
+        let marker: Vec<u8> = other.backwards.bytes().rev().collect();
+        let first = marker.first();
+        bytes
+            .windows(marker.len())
+            .any(|text| text.first() == first && text == marker)
+    })
+}
+
+/// What in a table, and in the words after it, cannot be ioquake3's.
+fn odd_table(services: &[usize], beyond: &[usize], code: &[Range<usize>]) -> Option<String> {
+    let is_function = |word: usize| code.iter().any(|range| range.contains(&word));
+    let called = services.iter().take(CALLED);
+    for (number, &word) in called.enumerate() {
+        // null is "not there", which callers mind
+        if word != 0 && !is_function(word) {
+            return Some(format!("service {number} of its table is no function"));
+        }
+    }
+    let mut all = services.iter().chain(beyond);
+    let functions = all.position(|&word| !is_function(word));
+    let functions = functions.unwrap_or(services.len() + beyond.len());
+    (functions >= TOO_MANY)
+        .then(|| format!("its table has {functions} services or more, ioquake3's {SERVICES}"))
+}
+
+/// Addresses of the process that hold code; empty where that cannot be known.
+fn code_ranges() -> Vec<Range<usize>> {
+    let maps = std::fs::read("/proc/self/maps").unwrap_or_default();
+    code_in(&String::from_utf8_lossy(&maps))
+}
+
+/// The ranges of `/proc/self/maps` that may be executed.
+fn code_in(maps: &str) -> Vec<Range<usize>> {
+    let range = |line: &str| {
+        let (addresses, rest) = line.split_once(' ')?;
+        let (start, end) = addresses.split_once('-')?;
+        let number = |text| usize::from_str_radix(text, 16).ok();
+        let executable = rest.split(' ').next()?.contains('x');
+        executable.then_some(number(start)?..number(end)?)
+    };
+    maps.lines().filter_map(range).collect()
+}
+
+/// The words that follow a table on the stack, as far as they can be read; through the kernel, since they are not ours.
+#[cfg(unix)]
+fn words_after(address: usize) -> Vec<usize> {
+    use std::os::unix::fs::FileExt;
+    let mut bytes = [0; (TOO_MANY - SERVICES) * size_of::<usize>()];
+    let read = std::fs::File::open("/proc/self/mem")
+        .and_then(|memory| memory.read_at(&mut bytes, address as u64))
+        .unwrap_or(0);
+    let (words, _) = bytes.get(..read).unwrap_or_default().as_chunks();
+    words.iter().copied().map(usize::from_ne_bytes).collect()
+}
+
+#[cfg(not(unix))]
+fn words_after(_address: usize) -> Vec<usize> {
+    Vec::new()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn marker(other: &Other) -> String {
+        other.backwards.chars().rev().collect()
+    }
+
+    #[test]
+    fn executables_are_known_by_their_text() {
+        let quake3e = marker(&OTHERS[0]);
+        assert_eq!(
+            (quake3e.len(), &quake3e[..6], &quake3e[20..]),
+            (32, "trap_R", "tToScene_Q3E")
+        );
+        assert_eq!(marker(&OTHERS[1]), ["renderer", "sp", "%s"].join("_"));
+        for other in OTHERS {
+            let text = marker(other);
+            let image = [b"\x7fELF\0", text.as_bytes(), b"\0cl_renderer\0"].concat();
+            assert_eq!(marked(&image).map(|o| o.name), Some(other.name));
+            assert!(marked(text.as_bytes()).is_some(), "at the very end");
+            let cut = &image[..5 + text.len() - 1];
+            assert!(marked(cut).is_none(), "{text} is cut off");
+        }
+        for known in [
+            "",
+            "ioq3 1.36\0renderer_%s_x86_64.so\0",
+            "wop\0renderer_%s_x86_64.so\0trap_R_AddAdditiveLightToScene\0",
+        ] {
+            assert!(marked(known.as_bytes()).is_none(), "{known}");
+        }
+    }
+
+    #[test]
+    fn the_environment_overrules() {
+        assert_eq!(is_ours(""), None);
+        assert_eq!(is_ours("ioquake3"), Some(true));
+        assert_eq!(is_ours("IOQuake3"), Some(true));
+        assert_eq!(is_ours("quake3e"), Some(false));
+    }
+
+    #[test]
+    fn this_program_holds_no_marker() {
+        assert!(executable().is_none());
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn debians_engine_is_no_other() {
+        let path = "/usr/lib/ioquake3/ioquake3";
+        match std::fs::read(path) {
+            Ok(bytes) => assert!(marked(&bytes).is_none()),
+            Err(error) => println!("skipped: {path}: {error}"),
+        }
+    }
+
+    #[test]
+    fn tables_are_as_long_as_ioquake3s_or_a_little_longer() {
+        let code = [0x1000..0x2000, 0x5000..0x5001];
+        let table = [0x1800; SERVICES];
+        let odd = |beyond: &[usize]| odd_table(&table, beyond, &code);
+        assert_eq!(odd(&[]), None);
+        assert_eq!(odd(&[0x2000, 0x1000]), None, "the stack");
+        // World of Padman
+        assert_eq!(odd(&[0x1000, 0x1fff, 0x5000, 0x1000, 7]), None);
+        // Quake3e
+        let found = odd(&[0x1800; TOO_MANY - SERVICES]);
+        assert!(found.is_some_and(|found| found.contains("52 services")));
+    }
+
+    #[test]
+    fn what_is_called_must_be_a_function_or_null() {
+        let code = [0x1000..0x2000];
+        for (at, word, fine) in [
+            (8, 0, true),
+            (8, 0x2000, false),
+            (34, 1, false),
+            (35, 1, true),
+            (39, usize::MAX, true),
+        ] {
+            let mut table = [0x1000; SERVICES];
+            table[at] = word;
+            assert_eq!(odd_table(&table, &[], &code).is_none(), fine, "{at} {word}");
+        }
+    }
+
+    #[test]
+    fn code_is_what_may_be_executed() {
+        let maps = "\
+55d0a0000000-55d0a0001000 r--p 00000000 fe:01 1234   /usr/lib/ioquake3/ioquake3
+55d0a0001000-55d0a0003000 r-xp 00001000 fe:01 1234   /usr/lib/ioquake3/ioquake3
+nonsense
+7ffd00000000-7ffd00021000 rw-p 00000000 00:00 0      [stack]
+ffffffffff600000-ffffffffff601000 --xp 00000000 00:00 0 [vsyscall]";
+        assert_eq!(
+            code_in(maps),
+            [
+                0x55d0_a000_1000..0x55d0_a000_3000,
+                0xffff_ffff_ff60_0000..0xffff_ffff_ff60_1000
+            ]
+        );
+        assert!(code_in("").is_empty());
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn the_own_code_and_stack_can_be_looked_at() {
+        let function = code_in as *const ();
+        let code = code_ranges();
+        assert!(code.iter().any(|range| range.contains(&function.addr())));
+        let words = [1usize, 2, 3];
+        assert!(
+            !code
+                .iter()
+                .any(|range| range.contains(&words.as_ptr().addr()))
+        );
+        assert_eq!(words_after(words.as_ptr().addr())[..3], words);
+        assert_eq!(words_after(0), [0usize; 0]);
+    }
+}
