@@ -320,7 +320,8 @@ impl Hash {
         }
         for material in &world.materials {
             self.number(u64::from(material.is_sky()));
-            self.number(material.class.class as u64);
+            let passed = u64::from(material.class.passed);
+            self.number(material.class.class as u64 | passed << 8);
             self.number(u64::from(material.emission.is_some()));
             self.vector(material.albedo);
             if let Some(holes) = &material.holes {

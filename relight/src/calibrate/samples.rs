@@ -193,10 +193,11 @@ pub(crate) fn occluders(world: &RelitWorld) -> Occluders {
 }
 
 fn stops_light(material: &WorldMaterial) -> bool {
-    matches!(
+    let solid = matches!(
         material.class.class,
         SurfaceClass::Opaque | SurfaceClass::Mirror | SurfaceClass::Portal
-    ) || material.holes.is_some()
+    );
+    (solid && !material.class.passed) || material.holes.is_some()
 }
 
 /// Whether light on a surface tells of the lights around it.

@@ -7,6 +7,7 @@ mod known_truth;
 mod linear;
 mod memory;
 mod more;
+mod passed;
 mod said;
 mod splash;
 mod styles;
@@ -37,6 +38,42 @@ t/dim
     { map $lightmap }
     { map *white
       blendFunc filter }
+}
+t/shell
+{
+    surfaceparm trans
+    cull back
+    { map *white }
+}
+t/inverted
+{
+    surfaceparm trans
+    { map *white }
+}
+t/shellsides
+{
+    surfaceparm trans
+    cull none
+    { map *white }
+}
+t/shellshadow
+{
+    surfaceparm trans
+    surfaceparm alphashadow
+    cull back
+    { map *white }
+}
+t/shellfilter
+{
+    surfaceparm trans
+    surfaceparm lightfilter
+    cull back
+    { map *white }
+}
+t/hull
+{
+    cull back
+    { map *white }
 }
 t/lamp
 {

@@ -21,7 +21,8 @@ use crate::{
     shader::{Cull, Shader, sort},
     stage::{AlphaGen, BlendFactor, Stage, TcGen},
     surface_params::{
-        CONTENTS_FOG, CONTENTS_LAVA, CONTENTS_SLIME, CONTENTS_TRANSLUCENT, CONTENTS_WATER, SURF_SKY,
+        CONTENTS_FOG, CONTENTS_LAVA, CONTENTS_SLIME, CONTENTS_TRANSLUCENT, CONTENTS_WATER,
+        SURF_ALPHASHADOW, SURF_LIGHTFILTER, SURF_SKY,
     },
 };
 
@@ -65,6 +66,8 @@ pub struct LightClass {
     pub liquid: bool,
     /// Both sides are drawn.
     pub two_sided: bool,
+    /// The map compiler let light through it, though it is drawn: see [`is_passed`].
+    pub passed: bool,
     /// Every stage only adds light to the background.
     pub additive: bool,
     /// Every stage only multiplies the background.
@@ -124,6 +127,7 @@ pub fn classify(shader: &Shader) -> LightClass {
         glowing: is_glowing(shader),
         liquid,
         two_sided: shader.cull == Cull::None,
+        passed: class == SurfaceClass::Opaque && !liquid && is_passed(shader),
         additive: blends_with(|(_, destination)| destination == BlendFactor::One),
         filter: blends_with(|(source, destination)| {
             matches!(
@@ -141,6 +145,15 @@ pub fn classify(shader: &Shader) -> LightClass {
         }),
         environment,
     }
+}
+
+/// Whether light passes a material of one side: `surfaceparm trans` without `alphashadow` and `lightfilter`. Map compilers
+/// give such a material no shadow. Cel-shading shells are made so; they would shade the surfaces that they enclose. A
+/// material that shows both sides has the shadow of what the eye sees.
+fn is_passed(shader: &Shader) -> bool {
+    shader.cull != Cull::None
+        && shader.content_flags & CONTENTS_TRANSLUCENT != 0
+        && shader.surface_flags & (SURF_ALPHASHADOW | SURF_LIGHTFILTER) == 0
 }
 
 /// Whether the map compiler took a material for a source of light.
@@ -249,6 +262,20 @@ mod tests {
             SurfaceClass::Translucent
         );
         assert!(classify(&shader(&format!("{BASE}\n{ENVIRONMENT}"))).environment);
+    }
+
+    #[test]
+    fn light_passes_one_sided_surfaces_that_the_compiler_let_it_pass() {
+        let passed = |body: &str| classify(&shader(body)).passed;
+        let image = "{\nmap a\n}";
+        let trans = |more: &str| passed(&format!("surfaceparm trans\n{more}\n{image}"));
+        assert!(trans("") && trans("cull back") && trans("q3map_invert"));
+        assert!(!passed(image) && !passed(&format!("cull back\n{image}")));
+        assert!(!trans("cull none"));
+        assert!(!trans("surfaceparm alphashadow") && !trans("surfaceparm lightfilter"));
+        assert!(!trans("surfaceparm water") && !trans("sort portal"));
+        let cut_out = "surfaceparm trans\n{\nmap a\nalphaFunc GE128\n}";
+        assert!(!passed(cut_out), "it has its own shadow");
     }
 
     #[test]
