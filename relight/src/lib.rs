@@ -40,8 +40,6 @@ mod map_files;
 pub mod materials;
 pub mod overbright;
 pub mod sample;
-#[cfg(test)]
-mod test_data;
 pub mod world;
 
 pub use calibrate::{

@@ -1,9 +1,6 @@
 //! What is exported is the map: counted and measured against the map's own lumps, and read by the `gltf` crate, which
 //! nobody here wrote.
 
-#[path = "../src/test_data.rs"]
-mod test_data;
-
 use glam::{Vec2, Vec3};
 use q3bsp::{Bsp, SurfaceKind, surface_flags};
 use relight::export::{
@@ -398,7 +395,7 @@ const MAPS: [&str; 4] = ["aggressor", "am_lavaarena", "islandctf", "oa_dm3"];
 
 #[test]
 fn real_maps_are_exported_as_they_are() {
-    let Some(folder) = test_data::folder() else {
+    let Some(folder) = testdata::folder() else {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();
@@ -413,21 +410,15 @@ fn real_maps_are_exported_as_they_are() {
 #[test]
 #[ignore = "converts and reads back every map of every pack"]
 fn all_maps_are_exported_as_they_are() {
-    let Some(folder) = test_data::folder() else {
+    let Some(game) = testdata::game() else {
         return;
     };
-    let mut packs: Vec<PathBuf> = std::fs::read_dir(&folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|e| e == "pk3"))
-        .collect();
-    packs.sort();
     let mut count = 0;
-    for pack in packs {
-        let mut files = SearchPath::open(std::slice::from_ref(&folder)).unwrap();
+    for pack in game.all_packs() {
+        let mut files = SearchPath::open(std::slice::from_ref(&game.folder)).unwrap();
         // later packs replace maps of earlier ones; here each has its own
-        files.add_pk3(&pack).unwrap();
-        for map in Pk3::open(&pack).unwrap().list("maps", ".bsp") {
+        files.add_pk3(pack).unwrap();
+        for map in Pk3::open(pack).unwrap().list("maps", ".bsp") {
             let path = format!("maps/{map}");
             let written = write(&files, &path, Format::Glb, ExportOptions::default());
             agree(&written, &format!("{}:{path}", pack.display()));

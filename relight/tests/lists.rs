@@ -1,8 +1,5 @@
 //! Light lists against rays, on made-up maps whose matrix says that everything sees everything.
 
-#[path = "../src/test_data.rs"]
-mod test_data;
-
 use glam::Vec3;
 use q3bsp::builder::MapBuilder;
 use relight::light::{DROPPED_PART, judge, lists_by_geometry, lists_by_visibility, sweep};
@@ -169,7 +166,7 @@ fn what_rays_find_stays_in_the_lists() {
 
 #[test]
 fn on_a_real_map_lists_are_short_and_whole() {
-    let Some(folder) = test_data::folder() else {
+    let Some(folder) = testdata::folder() else {
         return;
     };
     let files = relight::SearchPath::open(&[folder]).expect("packs");

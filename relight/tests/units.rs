@@ -4,9 +4,6 @@
 //! lightmap's texels: of a map with its light entities kept, and of one that is lit by surfaces alone. Bounced
 //! light is not computed, so somewhat less is right for the second.
 
-#[path = "../src/test_data.rs"]
-mod test_data;
-
 use glam::Vec3;
 use relight::light::{LightColor, LightRef};
 use relight::{Materials, RelitWorld, SearchPath, WorldSurface};
@@ -135,7 +132,7 @@ fn direct(
 
 /// Median of computed over stored light, at texels that are neither black nor cut off.
 fn median_ratio(map: &str) -> Option<f32> {
-    let files = SearchPath::open(&[test_data::folder()?]).unwrap();
+    let files = SearchPath::open(&[testdata::folder()?]).unwrap();
     let (materials, _) = Materials::load(&files);
     let options = relight::Options {
         light_color: LightColor::Stored,

@@ -195,17 +195,7 @@ pub const PIXEL: &[u8] = &[
     0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 24, 0, 10, 20, 30,
 ];
 
-/// OpenArena's files; `None`, with a line that says so, without them, unless `RELIGHT_REQUIRE_DATA=1`.
+/// The files of OpenArena's own packs; `None`, with a line that says so, without them.
 pub fn openarena() -> Option<SearchPath> {
-    let folder = std::env::var("OPENARENA_DATA")
-        .unwrap_or_else(|_| "/usr/share/games/openarena/baseoa".into());
-    if std::path::Path::new(&folder).is_dir() {
-        return Some(SearchPath::open(&[folder]).unwrap());
-    }
-    assert!(
-        std::env::var("RELIGHT_REQUIRE_DATA").as_deref() != Ok("1"),
-        "{folder}: OpenArena's data is required"
-    );
-    println!("skipped: no OpenArena data in {folder}");
-    None
+    Some(SearchPath::open(&[testdata::folder()?]).unwrap())
 }

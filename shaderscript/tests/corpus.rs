@@ -1,4 +1,4 @@
-//! The scripts of OpenArena (0.8.5 data with the 0.8.8 patch), counted.
+//! The scripts of OpenArena (0.8.5 data with the 0.8.8 patch), counted; and what holds for those of any other pack.
 //!
 //! The expected numbers were found by an independent reader of the same archives; see each test.
 
@@ -11,9 +11,7 @@ use shaderscript::{
 };
 use std::{
     collections::{BTreeMap, HashSet},
-    fs::File,
-    io::Read,
-    path::{Path, PathBuf},
+    path::PathBuf,
 };
 
 /// One script file: archive, path in it, contents.
@@ -23,50 +21,28 @@ struct ScriptFile {
     text: Vec<u8>,
 }
 
-/// Every script file of every archive, highest-priority archive first; `None` when the data is not installed.
-fn all_files() -> Option<Vec<ScriptFile>> {
-    let folder = std::env::var_os("OPENARENA_DATA").map_or_else(
-        || PathBuf::from("/usr/share/games/openarena/baseoa"),
-        PathBuf::from,
-    );
-    let mut paks: Vec<PathBuf> = std::fs::read_dir(&folder)
-        .map(|entries| entries.flatten().map(|e| e.path()).collect())
-        .unwrap_or_default();
-    paks.retain(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("pk3")));
-    if paks.is_empty() {
-        assert!(
-            std::env::var_os("RELIGHT_REQUIRE_DATA").is_none_or(|v| v != "1"),
-            "no pk3 files in {}",
-            folder.display()
-        );
-        println!("skipped: no OpenArena data in {}", folder.display());
-        return None;
-    }
-    paks.sort();
-    paks.reverse();
-    Some(paks.iter().flat_map(|pak| scripts_of(pak)).collect())
-}
-
-fn scripts_of(pak: &Path) -> Vec<ScriptFile> {
-    let mut archive = zip::ZipArchive::new(File::open(pak).unwrap()).unwrap();
+/// Every script file of these archives, given lowest priority first; highest-priority archive first.
+fn files_of(packs: &[PathBuf]) -> Vec<ScriptFile> {
     let mut files = Vec::new();
-    for i in 0..archive.len() {
-        let mut entry = archive.by_index(i).unwrap();
-        let name = entry.name().unwrap().to_ascii_lowercase();
-        let direct = name
-            .strip_prefix("scripts/")
-            .is_some_and(|rest| rest.ends_with(".shader") && !rest.contains('/'));
-        if direct {
-            let mut text = Vec::new();
-            entry.read_to_end(&mut text).unwrap();
-            files.push(ScriptFile {
-                pak: pak.file_name().unwrap().to_string_lossy().into_owned(),
-                name,
-                text,
-            });
-        }
+    for pack in packs.iter().rev() {
+        testdata::for_each_file(std::slice::from_ref(pack), ".shader", |pak, name, text| {
+            let name = name.to_ascii_lowercase();
+            if name
+                .strip_prefix("scripts/")
+                .is_some_and(|rest| !rest.contains('/'))
+            {
+                let (pak, text) = (pak.to_owned(), text.to_vec());
+                files.push(ScriptFile { pak, name, text });
+            }
+        });
     }
     files
+}
+
+/// The game's own script files; `None` when the game is not installed, or is another version than the one counted.
+fn all_files() -> Option<Vec<ScriptFile>> {
+    let game = testdata::game().filter(|game| game.exact())?;
+    Some(files_of(&game.packs))
 }
 
 /// The files that the engine reads: of equal names the one from the archive of highest priority.
@@ -76,12 +52,12 @@ fn effective_files(files: &[ScriptFile]) -> Vec<&ScriptFile> {
 }
 
 fn library() -> Option<Library> {
-    let files = all_files()?;
-    Some(Library::new(
-        effective_files(&files)
-            .into_iter()
-            .map(|f| (&f.name, &f.text)),
-    ))
+    Some(library_of(&all_files()?))
+}
+
+fn library_of(files: &[ScriptFile]) -> Library {
+    let effective = effective_files(files);
+    Library::new(effective.into_iter().map(|f| (&f.name, &f.text)))
 }
 
 /// Counts `key(item)` over all items.
@@ -489,9 +465,16 @@ fn odd_constructs_are_tolerated() {
     assert!(warnings.iter().any(|w| w.contains("no destination factor")));
 }
 
+/// What holds for any material, whoever wrote it: those of the game alone, and with all other packs above them.
 #[test]
 fn every_material_can_be_evaluated() {
-    let Some(library) = library() else { return };
+    let Some(game) = testdata::game() else { return };
+    check_materials(&library_of(&files_of(&game.packs)));
+    let all: Vec<PathBuf> = game.all_packs().cloned().collect();
+    check_materials(&library_of(&files_of(&all)));
+}
+
+fn check_materials(library: &Library) {
     for shader in library.definitions() {
         let value = shader.sort_value();
         assert!(

@@ -20,19 +20,6 @@ pub fn skip(why: &str) {
     println!("skipped: {why}");
 }
 
-/// OpenArena's game folder (`OPENARENA_DATA`, or where Debian puts it), if it is there.
-pub fn game_data() -> Option<PathBuf> {
-    let folder = std::env::var_os("OPENARENA_DATA").map_or_else(
-        || PathBuf::from("/usr/share/games/openarena/baseoa"),
-        PathBuf::from,
-    );
-    if folder.join("pak0.pk3").is_file() {
-        return Some(folder);
-    }
-    skip(&format!("{} has no pak0.pk3", folder.display()));
-    None
-}
-
 /// The repository's top folder.
 pub fn repository() -> PathBuf {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));

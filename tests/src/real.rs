@@ -1,4 +1,5 @@
-//! Debian's own ioquake3 with OpenArena, run by `scripts/engine` without a display, on one thread of commands.
+//! Debian's own ioquake3 with OpenArena's own packs, run by `scripts/engine` without a display, on one thread of
+//! commands.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -47,7 +48,15 @@ pub fn available() -> bool {
         data::skip(&format!("{} is not installed", engine.display()));
         return false;
     }
-    data::game_data().is_some() && data::tool("Xvfb").is_some() && data::tool("cc").is_some()
+    testdata::game().is_some() && data::tool("Xvfb").is_some() && data::tool("cc").is_some()
+}
+
+/// The game without what else lies beside it, as `scripts/engine` takes it: links to its own packs and its code.
+fn base(game: &testdata::Game) -> PathBuf {
+    let installation = std::env::var_os("GAME_DIR")
+        .map_or_else(|| PathBuf::from("/usr/lib/openarena"), PathBuf::from);
+    testdata::engine_base(game, &installation)
+        .unwrap_or_else(|error| panic!("{}: {error}", installation.display()))
 }
 
 /// Commands that start `map` so that two runs draw the same frames, with the player flying where he was put.
@@ -121,6 +130,9 @@ impl Run {
             std::fs::write(&path, bytes).expect("a file in the temporary folder");
         }
         let mut script = Command::new(data::repository().join("scripts/engine"));
+        if let Some(game) = testdata::game() {
+            script.env("GAME_DIR", base(game));
+        }
         script
             .arg("--config")
             .arg(&config)

@@ -16,7 +16,6 @@ use super::*;
 use crate::files::{MemoryFiles, SearchPath};
 use crate::light::{LightColor, PointLight, SURFACE_LIGHT_RADIANCE};
 use crate::materials::Materials;
-use crate::test_data;
 use crate::world::{Options, Stage};
 use q3bsp::Bsp;
 use q3bsp::builder::MapBuilder;
@@ -581,7 +580,7 @@ fn a_folder_that_cannot_be_used_is_a_warning() {
 
 #[test]
 fn shipped_maps_agree_with_their_lightmaps() {
-    let Some(folder) = test_data::folder() else {
+    let Some(folder) = testdata::folder() else {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();

@@ -1,9 +1,6 @@
 //! A `.map` is the compiled map again: its brushes are made into solids as a compiler does it, and compared with the
 //! compiled map's own lumps.
 
-#[path = "../../src/test_data.rs"]
-mod test_data;
-
 mod read;
 mod solid;
 
@@ -13,7 +10,6 @@ use read::{Entity, Face, Patch};
 use relight::export::{Brushes, Export, ExportOptions, Format, ImageStore, export};
 use relight::{GameFiles, Materials, MemoryFiles, Options, Pk3, RelitWorld, SearchPath};
 use std::collections::HashMap;
-use std::path::PathBuf;
 
 /// A part of a repetition: a texel of an image of 512.
 const TEXEL: f64 = 1.0 / 512.0;
@@ -296,7 +292,7 @@ fn the_sample_map_comes_back() {
 
 #[test]
 fn real_maps_come_back() {
-    let Some(folder) = test_data::folder() else {
+    let Some(folder) = testdata::folder() else {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();
@@ -322,7 +318,7 @@ fn real_maps_come_back() {
 #[ignore = "needs a file saved by an editor"]
 fn a_file_saved_by_an_editor_is_the_map() {
     let (Some(folder), Ok(file), Ok(map)) = (
-        test_data::folder(),
+        testdata::folder(),
         std::env::var("MAP_FILE"),
         std::env::var("MAP"),
     ) else {
@@ -343,21 +339,15 @@ fn a_file_saved_by_an_editor_is_the_map() {
 #[test]
 #[ignore = "writes and reads back every map of every pack"]
 fn all_maps_come_back() {
-    let Some(folder) = test_data::folder() else {
+    let Some(game) = testdata::game() else {
         return;
     };
-    let mut packs: Vec<PathBuf> = std::fs::read_dir(&folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|e| e == "pk3"))
-        .collect();
-    packs.sort();
     let mut all = Agreement::default();
     let mut count = 0;
-    for pack in packs {
-        let mut files = SearchPath::open(std::slice::from_ref(&folder)).unwrap();
-        files.add_pk3(&pack).unwrap();
-        for map in Pk3::open(&pack).unwrap().list("maps", ".bsp") {
+    for pack in game.all_packs() {
+        let mut files = SearchPath::open(std::slice::from_ref(&game.folder)).unwrap();
+        files.add_pk3(pack).unwrap();
+        for map in Pk3::open(pack).unwrap().list("maps", ".bsp") {
             let (text, world) = write(&files, &format!("maps/{map}"), Brushes::Usual);
             let found = agreement(&text, &world);
             println!("{map}: {found:?}");

@@ -14,7 +14,7 @@ const USAGE: &str = "usage: camera_path MAP PATH [options]
 Loads the library as an engine does, plays the camera path of the file PATH (recorded in the game by rt_path) on MAP,
 and prints as JSON: milliseconds of each pass of the GPU, rays and rays a second, memory by purpose, frames a second.
 It needs no display and no engine. The library is the one that cargo builds beside this program, or RELIGHT_LIBRARY;
-the game's packs lie in OPENARENA_DATA, or where Debian puts them.
+the game's own packs lie in OPENARENA_DATA, or where Debian puts them.
 
   --size WxH        of the picture (default 1920x1080)
   --rt 0|1          the classic or the traced look (default 1)
@@ -63,7 +63,7 @@ fn read(arguments: &[String]) -> Result<(Play, Option<PathBuf>), String> {
     let text = std::fs::read_to_string(file).map_err(|e| format!("{file}: {e}"))?;
     let mut path = renderer_vk::path::parse(&text).map_err(|e| format!("{file}: {e}"))?;
     path.truncate(frames);
-    let folder = data::game_data().ok_or("the game's packs are needed")?;
+    let folder = testdata::folder().ok_or("the game's packs are needed")?;
     let packs = Packs::open(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let play = Play {
         library: data::library(),

@@ -8,7 +8,6 @@ use glam::Vec3;
 use relight::compare::Rgb8;
 
 use super::{Scene, textures};
-use crate::data;
 use crate::engine::files::Packs;
 use crate::engine::{Engine, LoadError, Options, Raised, View};
 
@@ -48,7 +47,7 @@ impl Stage {
         cvars.extend(scene.cvars.iter().chain(beside).copied().map(text));
         let mut files = textures::files();
         files.extend((scene.files)());
-        let packs = match data::game_data() {
+        let packs = match testdata::folder() {
             Some(folder) if scene.packs => Packs::open(&folder)?,
             _ => Packs::default(),
         };

@@ -7,7 +7,7 @@ use tests::engine::{Engine, Options, View};
 
 #[test]
 fn maps_of_the_game_in_both_looks() {
-    let Some(data) = tests::data::game_data() else {
+    let Some(data) = testdata::folder() else {
         return;
     };
     let packs = Packs::open(&data).unwrap();

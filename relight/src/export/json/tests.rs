@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::files::{GameFiles, MemoryFiles};
-use crate::{Materials, Options, SearchPath, sample, test_data};
+use crate::{Materials, Options, SearchPath, sample};
 use proptest::prelude::*;
 use q3bsp::builder::MapBuilder;
 use q3bsp::{DrawVert, Format, GridLayers, GridPoint, SurfaceLayers, VertexLayers};
@@ -127,7 +127,7 @@ fn the_sample_and_a_shipped_map_survive() {
     let bsp = Bsp::parse(&bytes).unwrap();
     let read = read_map(&document(&world(bsp))).unwrap();
     assert!(read.write() == bytes);
-    let Some(folder) = test_data::folder() else {
+    let Some(folder) = testdata::folder() else {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();

@@ -3,7 +3,7 @@
 use super::*;
 use crate::export::{ExportOptions, ImageStore};
 use crate::files::MemoryFiles;
-use crate::{Materials, Options, RelitWorld, SearchPath, test_data};
+use crate::{Materials, Options, RelitWorld, SearchPath};
 use glam::Vec2;
 use q3bsp::DrawVert;
 use q3bsp::builder::MapBuilder;
@@ -182,7 +182,7 @@ fn bevels_are_left_out_and_open_brushes_told() {
 
 #[test]
 fn a_shipped_map_is_read_by_a_foreign_parser() {
-    let Some(folder) = test_data::folder() else {
+    let Some(folder) = testdata::folder() else {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::Vec3;
-use relight::{GameFiles, SearchPath};
+use relight::GameFiles;
 
 use super::harness::Gpu;
 use crate::api::RefDef;
@@ -16,29 +16,12 @@ use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::raster::FlareTest;
 use crate::scene::{Look, Scene};
 use crate::settings::{Settings, TracerChoice};
+use crate::test_support::openarena;
 use crate::trace::TraceLook;
 use crate::trace::input::Tracer;
 use crate::world::World;
 
 const SIZE: [u32; 2] = [320, 240];
-
-/// The game's files, or `None` with a printed line.
-fn files() -> Option<Arc<dyn GameFiles>> {
-    let folder = std::env::var_os("OPENARENA_DATA").map_or_else(
-        || PathBuf::from("/usr/share/games/openarena/baseoa"),
-        PathBuf::from,
-    );
-    if !folder.is_dir() {
-        assert!(
-            std::env::var("RELIGHT_REQUIRE_DATA").as_deref() != Ok("1"),
-            "{} is absent",
-            folder.display()
-        );
-        println!("skipped: no OpenArena data in {}", folder.display());
-        return None;
-    }
-    Some(Arc::new(SearchPath::open(&[folder]).expect("packs")))
-}
 
 /// The view of the first spawn point.
 fn camera(world: &World) -> RefDef {
@@ -73,9 +56,10 @@ fn camera(world: &World) -> RefDef {
 
 #[test]
 fn maps_are_lit() {
-    let (Some(files), Some(mut gpu)) = (files(), Gpu::new(Tracer::Compute)) else {
+    let (Some(files), Some(mut gpu)) = (openarena(), Gpu::new(Tracer::Compute)) else {
         return;
     };
+    let files: Arc<dyn GameFiles> = Arc::new(files);
     let device = &gpu.device.clone();
     let frames: u32 = std::env::var("RELIGHT_TRACE_FRAMES")
         .ok()
@@ -168,9 +152,10 @@ fn maps_are_lit() {
 
 #[test]
 fn tracers_agree_on_maps() {
-    let (Some(files), Some(mut gpu)) = (files(), Gpu::new(Tracer::Pipeline)) else {
+    let (Some(files), Some(mut gpu)) = (openarena(), Gpu::new(Tracer::Pipeline)) else {
         return;
     };
+    let files: Arc<dyn GameFiles> = Arc::new(files);
     let device = &gpu.device.clone();
     let (scripts, _) = relight::Materials::load(&*files);
     let scripts = Arc::new(scripts);
