@@ -27,7 +27,7 @@ impl Format {
     }
 }
 
-/// A picture to write at the end of the frame.
+/// A picture to write.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Shot {
     /// The whole screen.
@@ -46,7 +46,7 @@ pub enum Shot {
     },
 }
 
-/// A video frame to hand to the engine at the end of the frame. The buffers are the engine's.
+/// A video frame to hand to the engine. The buffers are the engine's.
 #[derive(Clone, Copy, Debug)]
 pub struct VideoFrame {
     /// Pixels of the video.

@@ -4,7 +4,8 @@ use crate::boundary::{Failure, entry};
 use crate::capture::{Format, Shot, StillShot, still_arguments};
 use crate::costs::Report;
 use crate::cvars::Cvar;
-use crate::ioq3::engine::{Engine, valid_game_path};
+use crate::ioq3::engine::{Engine, valid_path_to_write};
+use crate::ioq3::lifecycle::take_captures_of_last_frame;
 use crate::session::{self, Front, with_renderer};
 use crate::window;
 use crate::window::modes::MODES;
@@ -12,6 +13,10 @@ use renderer_vk::Renderer;
 use std::ffi::{CStr, CString};
 
 type Function = unsafe extern "C" fn();
+
+/// What is wrong with a name that the engine would not write to.
+const NOT_A_NAME: &str =
+    "not a name for a file: it has to stay in the game's folder, in 63 characters at most";
 
 /// All commands. They exist between `BeginRegistration` and `Shutdown`: the engine keeps our function pointers.
 static COMMANDS: &[(&CStr, Function)] = &[
@@ -114,9 +119,9 @@ extern "C" fn stats() {
             return vec!["usage: rt_stats [json [FILE]]".into()];
         };
         if let Report::File(path) = &report
-            && valid_game_path(path).is_none()
+            && valid_path_to_write(path).is_none()
         {
-            return vec![format!("rt_stats: {path}: not a name for a file")];
+            return vec![format!("rt_stats: {path}: {NOT_A_NAME}")];
         }
         front.questions.ask(report);
         // counted from the next frame on; the answer comes when the GPU is done with it
@@ -168,8 +173,8 @@ extern "C" fn path() {
         let arguments = engine.arguments();
         let name = arguments.get(1).map_or("path", String::as_str);
         let file = format!("paths/{}.txt", name.strip_suffix(".txt").unwrap_or(name));
-        if valid_game_path(&file).is_none() {
-            engine.say(&format!("rt_path: {file}: not a name for a file\n"));
+        if valid_path_to_write(&file).is_none() {
+            engine.say(&format!("rt_path: {file}: {NOT_A_NAME}\n"));
             return Ok(());
         }
         let done = with_renderer(|_, front| {
@@ -185,10 +190,12 @@ extern "C" fn path() {
             ));
             return Ok(());
         };
-        if let Some(name) = valid_game_path(&file) {
-            engine.write_file(&name, lines.as_bytes());
-        }
-        engine.say(&format!("{file}: {} frames\n", lines.lines().count()));
+        let frames = lines.lines().count();
+        engine.say(&if engine.write_file(&file, lines.as_bytes()) {
+            format!("{file}: {frames} frames\n")
+        } else {
+            format!("{file} could not be written; its {frames} frames are lost\n")
+        });
         Ok(())
     });
 }
@@ -306,7 +313,7 @@ fn begin_still(
     })
 }
 
-/// Queues the picture; it is taken once the frame is drawn.
+/// Takes the picture of the frame that the player sees, or of the one that is being drawn.
 fn screenshot(format: Format) -> Result<(), Failure> {
     let Some(engine) = Engine::current() else {
         return Ok(());
@@ -320,7 +327,7 @@ fn screenshot(format: Format) -> Result<(), Failure> {
                 .map(|world| format!("levelshots/{}.tga", map_base_name(world))))
         })?;
         match path {
-            Some(path) => queue(engine, Shot::Level { path }),
+            Some(path) => return take(engine, Shot::Level { path }),
             None => engine.say("levelshot: no map is loaded\n"),
         }
         return Ok(());
@@ -334,31 +341,30 @@ fn screenshot(format: Format) -> Result<(), Failure> {
             |path: &str| CString::new(path).is_ok_and(|path| engine.home_file_exists(&path));
         session::with(|session| session.front.captures.next_path(format, exists)).flatten()
     };
-    match path {
-        Some(path) => queue(
-            engine,
-            Shot::Screen {
-                format,
-                path,
-                silent,
-            },
-        ),
-        None => engine.say("screenshot: all 10000 file names are taken\n"),
-    }
-    Ok(())
+    let Some(path) = path else {
+        engine.say("screenshot: all 10000 file names are taken\n");
+        return Ok(());
+    };
+    let shot = Shot::Screen {
+        format,
+        path,
+        silent,
+    };
+    take(engine, shot)
 }
 
-fn queue(engine: Engine, shot: Shot) {
+fn take(engine: Engine, shot: Shot) -> Result<(), Failure> {
     let (Shot::Screen { path, .. } | Shot::Level { path }) = &shot;
-    if valid_game_path(path).is_none() {
-        engine.say(&format!("screenshot: {path}: the name is too long\n"));
-        return;
+    if valid_path_to_write(path).is_none() {
+        engine.say(&format!("screenshot: {path}: {NOT_A_NAME}\n"));
+        return Ok(());
     }
     session::with(|session| {
         if session.front.registered {
             session.front.captures.shots.push(shot);
         }
     });
+    take_captures_of_last_frame(engine)
 }
 
 /// Quality of screenshots in percent.

@@ -46,7 +46,7 @@ pub struct Front {
     pub cvars: Option<Cvars>,
     /// As of the newest frame.
     pub settings: Settings,
-    /// Screenshots and video frames to take at the end of the frame.
+    /// Screenshots and video frames to take: those of a frame that is being drawn wait for its end.
     pub captures: Captures,
     /// What `rt_stats` and `rt_printPerfStats` want to know.
     pub questions: Questions,
@@ -58,8 +58,10 @@ pub struct Front {
     pub size: (u32, u32),
     /// As of when the window was opened.
     pub window: WindowFacts,
-    /// When the frame's first `BeginFrame` came.
+    /// When the frame's first `BeginFrame` came; `None` between frames.
     pub frame_start: Option<Instant>,
+    /// The renderer has finished a frame.
+    pub has_picture: bool,
     /// An entity without a place was reported already.
     pub warned_bad_origin: bool,
 }

@@ -266,15 +266,19 @@ impl Engine {
         copied
     }
 
-    /// Writes below the user's game folder. The engine reports its own failures.
-    pub fn write_file(self, name: &CStr, contents: &[u8]) {
-        if let (Some(f), Ok(length)) = (
+    /// Writes below the user's game folder. Returns whether the file is there then: the engine refuses some names and
+    /// has nothing to answer.
+    pub fn write_file(self, name: &str, contents: &[u8]) -> bool {
+        let (Some(name), Some(f), Ok(length)) = (
+            valid_path_to_write(name),
             self.get(|t| t.FS_WriteFile),
             c_int::try_from(contents.len()),
-        ) {
-            // SAFETY: name and contents live through the call.
-            unsafe { f(name.as_ptr(), contents.as_ptr().cast(), length) }
-        }
+        ) else {
+            return false;
+        };
+        // SAFETY: name and contents live through the call.
+        unsafe { f(name.as_ptr(), contents.as_ptr().cast(), length) };
+        self.home_file_exists(&name)
     }
 
     /// Whether the user's game folder has this file (packs are not searched).
@@ -398,6 +402,13 @@ pub fn valid_game_path(name: &str) -> Option<CString> {
     CString::new(name).ok()
 }
 
+/// A name that the engine writes to: a valid one that stays in the game's folder. The engine refuses the others, in a
+/// line of its own at best.
+pub fn valid_path_to_write(name: &str) -> Option<CString> {
+    let leaves = name.contains("..") || name.contains("::") || name.starts_with(['/', '\\']);
+    valid_game_path(name).filter(|_| !leaves)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -433,5 +444,13 @@ mod tests {
         assert!(valid_game_path("a\0b").is_none());
         assert!(valid_game_path(&"x".repeat(64)).is_none());
         assert!(valid_game_path(&"x".repeat(63)).is_some());
+    }
+
+    #[test]
+    fn only_names_inside_the_games_folder_are_written_to() {
+        for name in ["", "../a", "a/../../b", "a..b", "a::b", "/tmp/a", "\\a"] {
+            assert!(valid_path_to_write(name).is_none(), "{name}");
+        }
+        assert!(valid_path_to_write("screenshots/a.b.tga").is_some());
     }
 }

@@ -148,6 +148,7 @@ fn start_renderer(
             );
             session::with(|session| {
                 session.renderer = Some(renderer);
+                session.front.has_picture = false;
                 session.front.window = WindowFacts {
                     fullscreen: window::current().is_some_and(|window| window.is_fullscreen()),
                     gamma: !cvars.flag(Cvar::IgnoreHwGamma),
@@ -208,11 +209,12 @@ pub extern "C" fn shutdown(destroy_window: QBool) {
         let Some(engine) = Engine::current() else {
             return Ok(());
         };
-        // A screenshot asked for in the same breath as a new map shows the last picture there was.
+        // What was asked for within a frame that will not end shows what is drawn of it.
         if let Ok(outbox) = with_renderer(|renderer, front| {
             // The buffer of a video frame may be gone by now.
             front.captures.video = None;
             let mut outbox = Outbox::default();
+            outbox.lines.extend(give_up_still(renderer, front));
             take_captures(renderer, front, &mut outbox).map(|()| outbox)
         }) {
             deliver(engine, outbox);
@@ -339,6 +341,7 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
     take_captures(renderer, front, &mut outbox)?;
     renderer.set_hidden(window::current().is_some_and(|window| window.is_hidden()));
     let stats = renderer.end_frame().map_err(failure)?;
+    front.has_picture = true;
     outbox.back_end_ms = milliseconds(start.elapsed());
     outbox
         .lines
@@ -351,6 +354,16 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
         .files
         .extend(files.map(|(path, bytes)| (path, bytes, false)));
     Ok(outbox)
+}
+
+/// What the player is told about an accumulated picture that the end of the game comes before.
+fn give_up_still(renderer: &Renderer, front: &mut Front) -> Option<String> {
+    let shot = front.captures.still.take()?;
+    let (done, wanted) = renderer.still_progress()?;
+    Some(format!(
+        "rt_screenshot: {} was not made: only {done} of {wanted} samples were there when its map ended",
+        shot.path
+    ))
 }
 
 /// Tells how far an accumulated picture is, and takes it when it is finished.
@@ -372,6 +385,20 @@ fn finish_still(
     {
         (outbox.files).push((shot.path, capture::tga(&picture)?, false));
     }
+    Ok(())
+}
+
+/// Takes the pictures that were asked for between two frames: they show the frame before, which is what the player
+/// sees, whatever the next command does. Within a frame, or before the first one, they wait for its end.
+pub fn take_captures_of_last_frame(engine: Engine) -> Result<(), Failure> {
+    let outbox = with_renderer(|renderer, front| {
+        let mut outbox = Outbox::default();
+        if front.frame_start.is_none() && front.has_picture {
+            take_captures(renderer, front, &mut outbox)?;
+        }
+        Ok(outbox)
+    })?;
+    deliver(engine, outbox);
     Ok(())
 }
 
@@ -438,11 +465,10 @@ fn keep_video(frame: &VideoFrame, bytes: &[u8]) -> Option<(*mut u8, c_int)> {
 
 fn deliver(engine: Engine, outbox: Outbox) {
     for (path, bytes, silent) in outbox.files {
-        if let Some(name) = valid_game_path(&path) {
-            engine.write_file(&name, &bytes);
-            if !silent {
-                engine.say(&format!("Wrote {path}\n"));
-            }
+        if !engine.write_file(&path, &bytes) {
+            engine.say(&format!("{path} could not be written\n"));
+        } else if !silent {
+            engine.say(&format!("Wrote {path}\n"));
         }
     }
     for line in outbox.lines {
@@ -503,6 +529,9 @@ pub extern "C" fn take_video_frame(
     motion_jpeg: QBool,
 ) {
     entry(|| {
+        let Some(engine) = Engine::current() else {
+            return Ok(());
+        };
         with_renderer(|_, front| {
             if let (Ok(width @ 1..), Ok(height @ 1..), false) = (
                 u32::try_from(width),
@@ -517,6 +546,7 @@ pub extern "C" fn take_video_frame(
                 });
             }
             Ok(())
-        })
+        })?;
+        take_captures_of_last_frame(engine)
     });
 }

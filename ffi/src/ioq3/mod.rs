@@ -9,7 +9,7 @@ mod convert;
 pub mod engine;
 mod exports;
 mod layout;
-mod lifecycle;
+pub mod lifecycle;
 mod scene;
 
 pub use exports::EXPORTS;

@@ -419,8 +419,13 @@ extern "C" fn fs_write_file(name: *const c_char, bytes: *const c_void, length: c
     }
     // SAFETY: the renderer passes `length` readable bytes.
     let bytes = unsafe { std::slice::from_raw_parts(bytes.cast::<u8>(), length) };
+    if name.contains("..") || name.contains("::") {
+        // The real one refuses in a line that players overlook.
+        return violation(format!("FS_WriteFile({name:?})"));
+    }
     if let Some(Err(error)) = with(|s| s.files.write(&name, bytes)) {
-        violation(format!("FS_WriteFile({name:?}): {error}"));
+        let text = format!("Failed to open {name}: {error}\n");
+        with(|s| s.messages.push(Message { level: 0, text }));
     }
 }
 

@@ -3,7 +3,7 @@
 use super::support::{engine_in_map, image_of, text_of};
 use relight::compare::Rgb8;
 use tests::engine::{Engine, View};
-use tests::maps::HERE;
+use tests::maps::{HERE, ROOMS};
 
 #[test]
 fn screenshots_are_files() {
@@ -30,6 +30,115 @@ fn screenshots_are_files() {
     let levelshot = engine.read_file("levelshots/rooms.tga").unwrap();
     let levelshot = image_of(&levelshot, "tga");
     assert_eq!((levelshot.width(), levelshot.height()), (128, 128));
+    engine.assert_clean();
+}
+
+#[test]
+fn captures_show_the_frame_in_which_they_were_asked_for() {
+    let mut engine = engine_in_map();
+    let view = View::new(HERE, 30.0);
+    let shown = engine.picture(&view).unwrap();
+    let unlike = engine.picture(&View::new(HERE, 120.0)).unwrap();
+    assert!(relight::compare::compare(&shown, &unlike).unwrap().ssim < 0.9);
+    // one line of commands: the picture, then what draws frames of its own
+    engine.picture(&view).unwrap();
+    engine.take_messages();
+    engine.command("screenshot now").unwrap();
+    engine.command("screenshot silent").unwrap();
+    engine.command("screenshotJPEG now").unwrap();
+    engine.command("screenshot levelshot").unwrap();
+    let (mut capture, mut encode) = (vec![0; 320 * 240 * 8], vec![0; 320 * 240 * 8]);
+    (engine.take_video_frame(320, 240, &mut capture, &mut encode, true)).unwrap();
+    let lines = text_of(&engine.take_messages());
+    assert!(lines.contains("Wrote screenshots/now.tga"), "{lines}");
+    assert!(!lines.contains("shot0000"), "{lines}");
+    engine.start_map(ROOMS).unwrap();
+    engine.restart_video().unwrap();
+    engine.picture_of(|_| Ok(())).unwrap();
+    for name in ["now.tga", "shot0000.tga"] {
+        let file = engine.read_file(&format!("screenshots/{name}")).unwrap();
+        assert_eq!(image_of(&file, "tga"), shown, "{name}");
+    }
+    let film = engine.take_video();
+    assert_eq!(film.len(), 1);
+    let jpeg = engine.read_file("screenshots/now.jpg").unwrap();
+    for (name, bytes) in [("now.jpg", &jpeg), ("the film", &film[0])] {
+        let alike = relight::compare::compare(&shown, &image_of(bytes, "jpg")).unwrap();
+        assert!(alike.ssim > 0.9, "{name}: {alike:?}");
+    }
+    assert!(engine.read_file("levelshots/rooms.tga").is_some());
+    // before the first frame there is nothing to show: the picture waits for one
+    engine.command("screenshot first").unwrap();
+    engine.restart_video().unwrap();
+    engine.command("screenshot later").unwrap();
+    assert!(engine.read_file("screenshots/later.tga").is_none());
+    engine.picture_of(|_| Ok(())).unwrap();
+    assert!(engine.read_file("screenshots/first.tga").is_some());
+    assert!(engine.read_file("screenshots/later.tga").is_some());
+    engine.assert_clean();
+}
+
+#[test]
+fn what_is_not_written_is_not_called_written() {
+    let mut engine = engine_in_map();
+    engine.set("r_rt", "1");
+    let view = View::new(HERE, 30.0);
+    engine.picture(&view).unwrap();
+    engine.take_messages();
+    for command in [
+        "rt_stats json ../../x",
+        "rt_path ../../x",
+        "screenshot ../../x",
+        "screenshotJPEG a::b",
+    ] {
+        engine.command(command).unwrap();
+        let lines = text_of(&engine.take_messages());
+        assert!(
+            lines.contains("not a name for a file"),
+            "{command}: {lines}"
+        );
+    }
+    // a name that is fine, where the engine cannot write
+    std::fs::write(engine.home().join("stats"), b"no folder").unwrap();
+    std::fs::write(engine.home().join("paths"), b"no folder").unwrap();
+    std::fs::remove_dir_all(engine.home().join("screenshots")).unwrap();
+    std::fs::write(engine.home().join("screenshots"), b"no folder").unwrap();
+    for command in [
+        "rt_stats json stats/x",
+        "rt_path x",
+        "screenshot x",
+        "rt_path x",
+    ] {
+        engine.command(command).unwrap();
+    }
+    for _ in 0..5 {
+        engine.begin_frame(0).unwrap();
+        engine.end_frame().unwrap();
+    }
+    let lines = text_of(&engine.take_messages());
+    assert!(!lines.contains("Wrote"), "{lines}");
+    for file in ["stats/x.json", "paths/x.txt", "screenshots/x.tga"] {
+        let line = format!("{file} could not be written");
+        assert!(lines.contains(&line), "{line}: {lines}");
+    }
+    engine.assert_clean();
+}
+
+#[test]
+fn a_still_picture_that_its_map_does_not_live_to_see_is_told() {
+    let mut engine = engine_in_map();
+    engine.set("r_rt", "1");
+    let view = View::new(HERE, 30.0);
+    engine.picture(&view).unwrap();
+    engine.command("rt_screenshot 4000").unwrap();
+    engine.picture(&view).unwrap();
+    engine.take_messages();
+    engine.start_map(ROOMS).unwrap();
+    let lines = text_of(&engine.take_messages());
+    assert!(
+        lines.contains("rt_screenshot: screenshots/shot0000.tga was not made"),
+        "{lines}"
+    );
     engine.assert_clean();
 }
 
