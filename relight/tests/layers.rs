@@ -1,4 +1,5 @@
-//! Stages that alpha of vertices weighs are in exports as layers over the rest of their material.
+//! Stages that alpha of vertices weighs are in exports as layers over the rest of their material, and surfaces that lie on
+//! others rise from them.
 
 use glam::Vec3;
 use q3bsp::builder::MapBuilder;
@@ -257,4 +258,52 @@ fn obj_has_layers_where_they_cover_half_and_says_so() {
             .any(|w| w.contains("terrain.layer1") && w.contains("OBJ lacks")),
         "{told:?}"
     );
+}
+
+/// A floor with a poster, a decal over both, and a poster beside them; all in one plane but the last.
+fn posters() -> MemoryFiles {
+    let script = "t/floor\n{\n{\nmap t/rock.tga\n}\n}\n\
+        t/decal\n{\npolygonOffset\nsort 9\n{\nmap t/mud.tga\nblendFunc blend\n}\n}\n\
+        t/poster\n{\npolygonOffset\n{\nmap t/grass.tga\n}\n}\n";
+    let mut map = MapBuilder::new();
+    let square = |map: &mut MapBuilder, name: &str, x: f32, z: f32, half: f32| {
+        let shader = map.add_shader(name, 0, 0);
+        let corner = |i: f32, j: f32| Vec3::new(x + i * half, j * half, z);
+        let corners = [
+            corner(-1.0, -1.0),
+            corner(-1.0, 1.0),
+            corner(1.0, 1.0),
+            corner(1.0, -1.0),
+        ];
+        map.add_quad(shader, corners);
+    };
+    square(&mut map, "t/decal", 8.0, 8.0, 8.0);
+    square(&mut map, "t/floor", 0.0, 8.0, SIDE);
+    square(&mut map, "t/poster", 0.0, 8.0, 16.0);
+    square(&mut map, "t/poster", 0.0, 40.0, 16.0);
+    let mut files = files("", false);
+    files.insert("maps/t.bsp", map.build().write()).unwrap();
+    files.insert("scripts/t.shader", script).unwrap();
+    files
+}
+
+#[test]
+fn what_lies_on_others_rises_a_quarter_of_a_unit_for_each() {
+    let drawn = read(&write(&posters(), Format::Glb, Lightmaps::Vertices));
+    let heights = |name: &str| -> Vec<f32> {
+        let parts = drawn.iter().filter(|d| d.material == name);
+        let mut all: Vec<f32> = parts.flat_map(|d| d.heights.clone()).collect();
+        all.sort_by(f32::total_cmp);
+        all.dedup();
+        all
+    };
+    assert_eq!(heights("t/floor"), [8.0]);
+    assert_eq!(heights("t/poster"), [8.25, 40.0]);
+    assert_eq!(heights("t/decal"), [8.5]);
+    let written = write(&posters(), Format::Obj, Lightmaps::Vertices);
+    let text = std::fs::read_to_string(&written.path).unwrap();
+    for height in ["8", "8.25", "8.5", "40"] {
+        let at = |line: &str| line.starts_with("v ") && line.split(' ').nth(2) == Some(height);
+        assert!(text.lines().any(at), "{height} in {text}");
+    }
 }

@@ -1,13 +1,17 @@
 //! What of a map is drawn, joined by model and material.
 
+use crate::world::coplanar::Stacked;
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use q3bsp::surface_flags;
 use shaderscript::light::SurfaceClass;
 use std::collections::{BTreeMap, HashMap};
 
 /// Texture coordinates beyond this many repetitions are moved back by whole ones: far out, floats have no fraction left.
 const FAR: f32 = 256.0;
+
+/// How far a surface that lies in one plane with others rises for each that lies below it, id units.
+pub const RISE: f32 = 0.25;
 
 /// What becomes of surfaces of a material.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -182,7 +186,8 @@ pub fn gather(world: &RelitWorld, place: &dyn Fn(&WorldSurface, Vec2) -> Vec2) -
     let mut parts: BTreeMap<(u32, u32), Joiner> = BTreeMap::new();
     let mut sky: BTreeMap<u32, Joiner> = BTreeMap::new();
     let mut degenerate = 0;
-    for surface in &world.surfaces {
+    let stacked = world.stacked();
+    for (number, surface) in world.surfaces.iter().enumerate() {
         let Some(material) = world.materials.get(surface.material as usize) else {
             continue;
         };
@@ -192,13 +197,13 @@ pub fn gather(world: &RelitWorld, place: &dyn Fn(&WorldSurface, Vec2) -> Vec2) -
         let origin = world
             .models
             .get(surface.model as usize)
-            .map_or(glam::Vec3::ZERO, |model| model.origin);
+            .map_or(Vec3::ZERO, |model| model.origin);
         let (joiner, origin) = match drawn(material) {
             Drawn::No => continue,
             Drawn::Sky => (sky.entry(surface.material).or_default(), origin),
             Drawn::Yes => (
                 parts.entry((surface.model, surface.material)).or_default(),
-                glam::Vec3::ZERO,
+                Vec3::ZERO,
             ),
         };
         let shift = far_shift(world, surface, material);
@@ -207,18 +212,25 @@ pub fn gather(world: &RelitWorld, place: &dyn Fn(&WorldSurface, Vec2) -> Vec2) -
             .indices
             .get(first..first + surface.num_indices as usize)
             .unwrap_or_default();
+        let rises = rises(
+            world,
+            indices,
+            stacked.get(number).copied().unwrap_or_default(),
+        );
         for corners in indices.as_chunks::<3>().0 {
             let [Some(a), Some(b), Some(c)] = corners.map(|i| world.vertices.get(i as usize))
             else {
                 continue;
             };
-            if (b.position - a.position).cross(c.position - a.position) == glam::Vec3::ZERO {
+            if (b.position - a.position).cross(c.position - a.position) == Vec3::ZERO {
                 degenerate += 1;
                 continue;
             }
-            let corner = [a, b, c].map(|v| {
+            let corner = [0, 1, 2].map(|i| {
+                let v = [a, b, c][i];
+                let rise = rises.get(&corners[i]).copied().unwrap_or_default();
                 joiner.index(WorldVertex {
-                    position: v.position + origin,
+                    position: v.position + origin + rise,
                     st: v.st - shift,
                     lightmap: place(surface, v.lightmap),
                     ..*v
@@ -243,6 +255,24 @@ pub fn gather(world: &RelitWorld, place: &dyn Fn(&WorldSurface, Vec2) -> Vec2) -
     geometry
 }
 
+/// How far each vertex of a surface rises from what the surface lies on; none where it lies on nothing.
+fn rises(world: &RelitWorld, indices: &[u32], stacked: Stacked) -> BTreeMap<u32, Vec3> {
+    if stacked.below == 0 {
+        return BTreeMap::new();
+    }
+    let place = |i: u32| Some(world.vertices.get(i as usize)?.position);
+    let triangles = indices.as_chunks::<3>().0.iter();
+    let triangles = triangles.filter_map(|&numbers| match numbers.map(place) {
+        [Some(a), Some(b), Some(c)] => Some((numbers, [a, b, c])),
+        _ => None,
+    });
+    let mut rises = stacked.directions(triangles);
+    for rise in rises.values_mut() {
+        *rise *= RISE * stacked.below as f32;
+    }
+    rises
+}
+
 /// Joins triangles that are no map's, without those that have no area or coordinates that are no numbers, and tells how
 /// many these are. The part's material is 0.
 pub fn join(triangles: impl Iterator<Item = [WorldVertex; 3]>) -> (Part, usize) {
@@ -251,7 +281,7 @@ pub fn join(triangles: impl Iterator<Item = [WorldVertex; 3]>) -> (Part, usize) 
     for corners in triangles {
         let [a, b, c] = corners.map(|v| v.position);
         let front = (b - a).cross(c - a);
-        if front == glam::Vec3::ZERO || !front.is_finite() {
+        if front == Vec3::ZERO || !front.is_finite() {
             degenerate += 1;
             continue;
         }
