@@ -1,6 +1,6 @@
 //! Light of styles: lamps that a map's compiler stored apart, because games switch them or let them pulse.
 //!
-//! Each style has pages of its own ([`StyleLight`](crate::world::StyleLight)), so that its light is a second world with the same geometry: the pages
+//! Each style has pages of its own ([`StyleLight`]), so that its light is a second world with the same geometry: the pages
 //! take the place of the main light's, surfaces without the style are black, and lost lights are placed as ever. Styles of
 //! one strength are one world: nothing tells them apart. What was
 //! done to light before it was stored is known from the main light. The lights that are found pulse as the style does.

@@ -135,13 +135,13 @@ impl Materials {
             s.image_count == 1 && s.tc_gen == c::TCGEN_BASE && s.tc_mod_count == 0
         };
         let is_light = |s: &types::Stage| s.image_count == 0 || s.flags & c::STAGE_BAKED_LIGHT != 0;
-        let image = match &stages[..] {
-            &[one] if plain(one) && opaque(one) && still(one) => {
+        let image = match stages[..] {
+            [one] if plain(one) && opaque(one) && still(one) => {
                 let baked = material.flags & c::MATERIAL_VERTEX_LIGHT != 0
                     && [c::RGBGEN_VERTEX, c::RGBGEN_EXACT_VERTEX].contains(&one.rgb_gen);
                 (baked || one.rgb_gen == c::RGBGEN_LIGHTING_DIFFUSE).then_some(one)?
             }
-            &[first, second]
+            [first, second]
                 if [first, second].iter().all(|s| plain(s) && full(s))
                     && opaque(first)
                     && filter(second) =>
