@@ -94,17 +94,6 @@ pub fn picture(camera: &str, frames: u32, name: &str) -> Vec<String> {
     ]
 }
 
-/// [`picture`] of the same frame by this renderer: OpenGL ones read what was drawn before the command, this one what
-/// is drawn with it.
-pub fn own_picture(camera: &str, frames: u32, name: &str) -> Vec<String> {
-    vec![
-        format!("setviewpos {camera}"),
-        format!("wait {}", frames.saturating_sub(1) * 2),
-        format!("screenshot {name}"),
-        "wait 6".to_string(),
-    ]
-}
-
 impl Run {
     /// Runs the engine to its end.
     ///

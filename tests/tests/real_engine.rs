@@ -4,7 +4,7 @@
 
 use relight::compare::{Rgb8, compare};
 use tests::data::{is_set, keep_picture};
-use tests::real::{self, Run, own_picture, picture, start_map};
+use tests::real::{self, Run, picture, start_map};
 use tests::roq;
 
 /// Cameras: a map, its start as `x y z yaw`. Chosen for what they show: torches, sky, liquids, curves, models.
@@ -80,7 +80,7 @@ fn the_classic_look_is_the_engines_own() {
         let reference = reference.picture("shot");
         assert_plausible(reference, map);
         let mut commands = start_map(map);
-        commands.extend(own_picture(camera, 30, "shot"));
+        commands.extend(picture(camera, 30, "shot"));
         set(&mut commands, &["gfxinfo"]);
         let ours = run("vk", (640, 480), commands);
         ours.assert_clean();
