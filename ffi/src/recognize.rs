@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn what_is_called_must_be_a_function_or_null() {
-        let code = [0x1000..0x2000];
+        let code = std::slice::from_ref(&(0x1000..0x2000));
         for (at, word, fine) in [
             (8, 0, true),
             (8, 0x2000, false),
@@ -271,7 +271,7 @@ mod tests {
         ] {
             let mut table = [0x1000; SERVICES];
             table[at] = word;
-            assert_eq!(odd_table(&table, &[], &code).is_none(), fine, "{at} {word}");
+            assert_eq!(odd_table(&table, &[], code).is_none(), fine, "{at} {word}");
         }
     }
 
