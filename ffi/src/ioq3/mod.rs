@@ -1,8 +1,8 @@
 //! The front end for ioquake3 (Debian's 1.36 and HEAD: one ABI).
 //!
 //! Another engine gets a module like this one beside it, with its own tables and its own rules about windows; the
-//! scene structures in [`abi`] and everything outside this folder serve all of them. The version number that
-//! `GetRefAPI` gets does not tell engines apart (ten of them use 8); [`crate::recognize`] does.
+//! scene structures in [`abi`] and everything outside this folder serve all of them. Ten engines pass version 8 to
+//! `GetRefAPI`, with seven different tables; [`crate::recognize`] finds out which one calls.
 
 pub mod abi;
 mod convert;

@@ -1,9 +1,9 @@
 //! Light of styles: lamps that a map's compiler stored apart, because games switch them or let them pulse.
 //!
 //! Each style has pages of its own ([`StyleLight`]), so that its light is a second world with the same geometry: the pages
-//! take the place of the main light's, surfaces without the style are black, and lost lights are placed as ever. Styles of
-//! one strength are one world: nothing tells them apart. What was
-//! done to light before it was stored is known from the main light. The lights that are found pulse as the style does.
+//! take the place of the main light's, surfaces without the style are black, and calibration places lost lights as for the
+//! main light. Styles of equal strength are fitted together: scripts do not name the style of a stage. The gamma and the end
+//! of lights are those found for the main light. The placed lights follow the wave of their style.
 
 use super::Asked;
 use super::compiler::Compiler;

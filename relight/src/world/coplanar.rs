@@ -169,7 +169,7 @@ pub fn stack(sheets: &[Sheet]) -> Vec<Stacked> {
         let on_back = match cull {
             Cull::Front => false,
             Cull::Back => true,
-            // of what shows both faces, the one that what it lies on shows
+            // a two-sided surface shows the face that the surface below it shows
             Cull::None => (below().min_by_key(|(lower, _)| shows_both(*lower)))
                 .is_some_and(|&(lower, alike)| of(lower).on_back == alike),
         };

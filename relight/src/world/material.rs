@@ -50,7 +50,7 @@ pub struct WorldMaterial {
 }
 
 impl WorldMaterial {
-    /// A material of which light is not known yet. `flags`: `SURF_*` and `CONTENTS_*`.
+    /// A material before its emission and albedo are measured. `flags`: `SURF_*` and `CONTENTS_*`.
     pub(super) fn new(
         name: &str,
         flags: (u32, u32),

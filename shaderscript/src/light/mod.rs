@@ -148,8 +148,8 @@ pub fn classify(shader: &Shader) -> LightClass {
 }
 
 /// Whether light passes a material of one side: `surfaceparm trans` without `alphashadow` and `lightfilter`. Map compilers
-/// give such a material no shadow. Cel-shading shells are made so; they would shade the surfaces that they enclose. A
-/// material that shows both sides has the shadow of what the eye sees.
+/// give such a material no shadow. Cel-shading shells are such materials; with a shadow they would darken the surfaces that they
+/// enclose. Two-sided materials keep their shadow, because the eye sees what casts it.
 fn is_passed(shader: &Shader) -> bool {
     shader.cull != Cull::None
         && shader.content_flags & CONTENTS_TRANSLUCENT != 0
