@@ -1,4 +1,4 @@
-//! Stages that alpha of vertices weighs are in exports as layers over the rest of their material, and surfaces that lie on
+//! Stages weighted by vertex alpha are in exports as layers over the rest of their material, and surfaces that lie on
 //! others rise from them.
 
 use glam::Vec3;

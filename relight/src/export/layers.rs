@@ -1,4 +1,4 @@
-//! Stages that alpha of vertices weighs (terrain), as layers of their own over the rest of their material.
+//! Stages weighted by vertex alpha (terrain), as layers of their own over the rest of their material.
 //!
 //! No format here has a material that mixes two pictures by a weight of the vertices. Each such stage becomes a material
 //! of its own for further triangles, which lie [`LIFT`] above those of the layer below.
@@ -17,7 +17,7 @@ use std::borrow::Cow;
 /// Distance between layers along the normals of vertices, id units.
 pub const LIFT: f32 = 0.125;
 
-/// What a stage does where alpha of vertices weighs it.
+/// How a stage is combined with what is below it, weighted by vertex alpha.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Weight {
     /// It covers what is below by its alpha.
@@ -45,7 +45,7 @@ pub struct Layer<'a> {
     pub whole: &'a WorldMaterial,
     /// With the stages of this layer; the others draw nothing. Numbers of stages are those of the whole material.
     pub material: Cow<'a, WorldMaterial>,
-    /// The stage that alpha of vertices weighs, and how; `None` for the lowest layer.
+    /// The stage weighted by vertex alpha, and how; `None` for the lowest layer.
     weighed: Option<(usize, Weight)>,
 }
 
@@ -89,7 +89,7 @@ pub fn layers(material: &WorldMaterial) -> Vec<Layer<'_>> {
     layers
 }
 
-/// How alpha of vertices weighs a stage; `None` where it does not, or not so that a layer could say it.
+/// How vertex alpha weights a stage; `None` where it does not, or where no layer can express it.
 fn weight(stage: &Stage) -> Option<Weight> {
     use BlendFactor::{One, OneMinusSrcAlpha, SrcAlpha};
     VertexAlpha::weighing(stage)?;
@@ -168,12 +168,12 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// The stage that alpha of vertices weighs; `None` for the lowest layer.
+    /// The stage weighted by vertex alpha; `None` for the lowest layer.
     pub fn stage(&self) -> Option<usize> {
         self.weighed.map(|(stage, _)| stage)
     }
 
-    /// Makes the look of the layer's material one that alpha of vertices weighs.
+    /// Makes the look of the layer's material one weighted by vertex alpha.
     pub fn weigh(&self, source: &Export<'_>, look: &mut Look) {
         let Some((number, how)) = self.weighed else {
             return;

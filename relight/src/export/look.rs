@@ -131,7 +131,7 @@ pub struct Look {
     pub reversed: bool,
     /// Whether colours of vertices multiply it, and whether these are light that the compiler found.
     pub vertex_color: Option<VertexColor>,
-    /// Whether alpha of vertices, or what it leaves of 1, multiplies alpha.
+    /// Whether vertex alpha, or 1 - vertex alpha, multiplies alpha.
     pub vertex_alpha: Option<VertexAlpha>,
     /// Whether it is lit by lightmaps.
     pub lightmapped: bool,
@@ -165,7 +165,7 @@ pub enum VertexColor {
     Paint,
 }
 
-/// What of alpha of vertices multiplies alpha.
+/// Which function of vertex alpha multiplies alpha.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VertexAlpha {
     /// Itself.
@@ -368,7 +368,7 @@ fn group_of(shader: &Shader, base: usize, stage: &Stage, lost: &mut Vec<String>)
                 "stage {i}: a picture of the surroundings; said by roughness"
             ));
         } else if by_vertex {
-            lost.push(format!("stage {i}: alpha of vertices weighs it; left out"));
+            lost.push(format!("stage {i}: weighted by vertex alpha; left out"));
         } else {
             lost.push(format!("stage {i}: lies on the surface in another way"));
         }

@@ -4,7 +4,7 @@
 //! * [`export`]: writes one map in a [`Format`]; a file appears whole or not at all.
 //! * `geometry`: what is drawn, joined by material, without what other programs stumble over.
 //! * `model_file`: models that entities name besides brushes.
-//! * `layers`: stages that alpha of vertices weighs, as materials of their own.
+//! * `layers`: stages weighted by vertex alpha, as materials of their own.
 //! * `look`: a material's stages as far as other programs can say them.
 //! * [`ImageStore`]: images as files, each made once for all maps.
 //!

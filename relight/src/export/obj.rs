@@ -15,10 +15,10 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::Arc;
 
-/// What is lost of a material that alpha of vertices lets fade.
-const FADES: &str = "fades by alpha of vertices, which OBJ lacks; it does not fade";
-/// What is lost of a layer that alpha of vertices weighs.
-const LAYERED: &str = "is weighed by alpha of vertices, which OBJ lacks; it is on triangles that it covers by half or more";
+/// Warning for a material that fades by vertex alpha.
+const FADES: &str = "fades by vertex alpha, which OBJ lacks; it does not fade";
+/// Warning for a layer weighted by vertex alpha.
+const LAYERED: &str = "is weighted by vertex alpha, which OBJ lacks; it is on triangles that it covers by half or more";
 
 /// Whether a layer covers half of a triangle or more.
 fn mostly(layer: &Layer<'_>, corners: [&WorldVertex; 3]) -> bool {

@@ -90,7 +90,7 @@ pub fn color_of(stage: &Stage, moment: Moment) -> Vec4 {
             f32::from(g) / 255.0,
             f32::from(b) / 255.0,
         ));
-        // What alpha of vertices leaves of 1 is put in at the vertices, as that alpha is.
+        // 1 - vertex alpha is applied at the vertices, as vertex alpha is.
         let own = stage.alpha_gen != AlphaGen::OneMinusVertex;
         sum += color.extend(if own { f32::from(a) / 255.0 } else { 1.0 });
     }
