@@ -402,6 +402,8 @@ pub mod constants {
         MATERIAL_EMITTER = 2048;
         /// Nothing is drawn.
         MATERIAL_INVISIBLE = 4096;
+        /// Light passes it where it is the map's: the compiler gave it no shadow.
+        MATERIAL_PASSED = 8192;
         /// Drawn in front of everything near (first-person weapon).
         INSTANCE_DEPTH_HACK = 1;
         /// Only in the eye's own view, never in mirrors and shadows.

@@ -95,8 +95,8 @@ bool bvh_report(inout BvhWalk walk, Hit hit) {
         if (last < LAYER_NONE) walk.tmax = min(walk.tmax, last + 2.0 * layer_slack(last + layer_slack(last)));
         return false;
     }
-    bool tested = Geometries(VIEW.geometries).at[hit.geometry].kind == KIND_TESTED;
-    if (tested && !is_stopped_by(hit, walk.direction)) return false;
+    uint kind = Geometries(VIEW.geometries).at[hit.geometry].kind;
+    if ((kind == KIND_TESTED || kind == KIND_PASSED) && !is_stopped_by(hit, walk.direction)) return false;
     walk.hit = hit;
     walk.tmax = hit.t;
     return walk.mode == BVH_ANY;

@@ -108,7 +108,7 @@ struct TraceView {
 };
 
 // What a geometry's triangles are to a ray.
-const uint KIND_OPAQUE = 0, KIND_TESTED = 1, KIND_TRANSLUCENT = 2, KIND_SKY = 3;
+const uint KIND_OPAQUE = 0, KIND_TESTED = 1, KIND_TRANSLUCENT = 2, KIND_SKY = 3, KIND_PASSED = 4;
 // Edge of the tiles of pixels whose rays are sorted.
 const uint RAY_TILE = 16;
 // BvhNode.children: nothing; the bit of a leaf; where the number of its entries less one stands; the first of them.

@@ -61,6 +61,9 @@ pub fn material_flags(shader: &Shader, class: LightmapClass) -> u32 {
     if shader.deforms.iter().any(turns) {
         flags |= c::MATERIAL_TWO_SIDED;
     }
+    if found.passed {
+        flags |= c::MATERIAL_PASSED;
+    }
     if shader.polygon_offset {
         flags |= c::MATERIAL_POLYGON_OFFSET;
     }

@@ -289,7 +289,7 @@ impl Accel {
                 max_vertex: u32::try_from(positions.len().saturating_sub(1)).unwrap_or(u32::MAX),
                 index_address: rec.arena().push(&slot.indices)?,
                 triangle_count: u32::try_from(slot.triangles.len()).unwrap_or(u32::MAX),
-                opaque: matches!(slot.kind, Kind::Opaque | Kind::Sky),
+                opaque: slot.kind.is_untested(),
                 no_duplicate_any_hit: slot.kind == Kind::Translucent,
             }]);
         }

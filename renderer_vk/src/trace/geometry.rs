@@ -33,7 +33,7 @@ pub struct StaticBlas {
     /// BSP model.
     pub model: u32,
     /// The geometries in it. All that stops rays of a model is in one structure, because each that a ray meets is a walk
-    /// of its own; what is translucent is in another.
+    /// of its own; what is translucent and what light passes are in others, which fewer rays meet.
     pub parts: Vec<StaticPart>,
     /// The structure.
     pub structure: Structure,
@@ -83,6 +83,24 @@ pub struct StaticGeometry {
     triangle_records: Buffer,
 }
 
+/// Kinds that share a structure, whose instances have one mask.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Together {
+    Solid,
+    Translucent,
+    Passed,
+}
+
+impl Together {
+    fn of(kind: Kind) -> Self {
+        match kind {
+            Kind::Opaque | Kind::Tested | Kind::Sky => Self::Solid,
+            Kind::Translucent => Self::Translucent,
+            Kind::Passed => Self::Passed,
+        }
+    }
+}
+
 /// A group of surfaces that become one structure.
 struct Group {
     first: usize,
@@ -96,6 +114,14 @@ pub fn rank_bits(info: &MaterialInfo) -> u32 {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let rank = (info.sort * 8.0).clamp(0.0, 255.0) as u32;
     rank << shaders::trace_types::constants::TRIANGLE_RANK_SHIFT
+}
+
+/// Bits of the triangles of a kind: a hidden side of what light passes stops no ray of the eye either.
+pub fn sides(kind: Kind) -> u32 {
+    match kind {
+        Kind::Passed => TRIANGLE_ONE_SIDED,
+        _ => 0,
+    }
 }
 
 /// The CPU half: triangles grouped by model and kind, translucent ones in drawing order, indices beside them.
@@ -129,7 +155,7 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
     let mut sorted: BTreeMap<(u32, Kind), Members<'_>> = BTreeMap::new();
     for surface in &scene.surfaces {
         let (material, info) = materials.info(surface.material);
-        if let Some(kind) = Kind::of(info.flags) {
+        if let Some(kind) = Kind::in_light(info.flags, true) {
             let mut add = |kind, part| {
                 let list = sorted.entry((surface.model, kind)).or_default();
                 list.push((surface, material, info, part));
@@ -138,7 +164,7 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
                 // what has no hole need not be tested, and what is all hole is not there
                 add(Kind::Opaque, Portion::Covered(Coverage::Solid));
                 add(Kind::Tested, Portion::Covered(Coverage::Mixed));
-            } else if has_doubled(surface) {
+            } else if kind == Kind::Opaque && has_doubled(surface) {
                 add(Kind::Opaque, Portion::Doubled(false));
                 add(Kind::Tested, Portion::Doubled(true));
             } else {
@@ -192,7 +218,7 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
                 }
                 let sides = match part {
                     Portion::Doubled(true) => TRIANGLE_ONE_SIDED,
-                    _ => 0,
+                    _ => sides(key.1),
                 };
                 grouped.triangles.push(Triangle {
                     indices,
@@ -298,10 +324,10 @@ fn driver_structures(
         compact: true,
         ..BlasFlags::default()
     };
-    let mut parts: BTreeMap<(u32, bool), (Vec<StaticPart>, Vec<BlasGeometry>)> = BTreeMap::new();
+    let mut parts: BTreeMap<(u32, Together), (Vec<StaticPart>, Vec<BlasGeometry>)> =
+        BTreeMap::new();
     for ((model, kind), group) in &grouped.groups {
-        let translucent = *kind == Kind::Translucent;
-        let (members, geometries) = parts.entry((*model, translucent)).or_default();
+        let (members, geometries) = parts.entry((*model, Together::of(*kind))).or_default();
         members.push(StaticPart {
             kind: *kind,
             triangles: triangles.address() + (group.first * size_of::<Triangle>()) as u64,
@@ -312,13 +338,13 @@ fn driver_structures(
             max_vertex: u32::try_from(positions.len().saturating_sub(1)).unwrap_or(u32::MAX),
             index_address: index_buffer.address() + (group.first * size_of::<[u32; 3]>()) as u64,
             triangle_count: u32::try_from(group.count).unwrap_or(u32::MAX),
-            opaque: matches!(kind, Kind::Opaque | Kind::Sky),
-            no_duplicate_any_hit: translucent,
+            opaque: kind.is_untested(),
+            no_duplicate_any_hit: *kind == Kind::Translucent,
         });
     }
-    let blas = |(model, translucent)| {
-        let name = if translucent { "translucent" } else { "solid" };
-        Blas::new(device, &format!("trace model {model} {name}"), flags)
+    let blas = |(model, together)| {
+        let name = format!("trace model {model} {together:?}");
+        Blas::new(device, &name, flags)
     };
     let mut structures: Vec<Blas> = parts.keys().copied().map(blas).collect();
     let mut builds: Vec<BlasBuild<'_>> = (structures.iter_mut().zip(parts.values()))
@@ -347,9 +373,9 @@ fn own_structures(
 ) -> Result<Vec<StaticBlas>, Error> {
     let mut structures = Vec::new();
     let position = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::ZERO);
-    let mut together: BTreeMap<(u32, bool), Vec<(Kind, &Group)>> = BTreeMap::new();
+    let mut together: BTreeMap<(u32, Together), Vec<(Kind, &Group)>> = BTreeMap::new();
     for ((model, kind), group) in &grouped.groups {
-        let members = together.entry((*model, *kind == Kind::Translucent));
+        let members = together.entry((*model, Together::of(*kind)));
         members.or_default().push((*kind, group));
     }
     for ((model, _), groups) in together {

@@ -81,6 +81,8 @@ pub enum Kind {
     Translucent,
     /// Shows the sky.
     Sky,
+    /// Stops the eye's rays on the side that it shows; light passes it.
+    Passed,
 }
 
 impl Kind {
@@ -106,6 +108,27 @@ impl Kind {
         }
     }
 
+    /// As [`of`](Self::of), for a surface of the map (`world`) or of a model, which no compiler saw. Of what would stop every
+    /// ray, the map's light passes what its compiler let it pass; a model's light passes what shows its back alone: the
+    /// shell of a drawn outline, within which the model would be black.
+    pub fn in_light(flags: u32, world: bool) -> Option<Self> {
+        let passed = if world {
+            c::MATERIAL_PASSED
+        } else {
+            c::MATERIAL_CULL_BACK
+        };
+        let kept = flags & (c::MATERIAL_TWO_SIDED | c::MATERIAL_PORTAL) != 0;
+        match Self::of(flags) {
+            Some(Self::Opaque) if flags & passed != 0 && !kept => Some(Self::Passed),
+            kind => kind,
+        }
+    }
+
+    /// Whether all its triangles stop the rays that meet them, untested.
+    pub fn is_untested(self) -> bool {
+        matches!(self, Self::Opaque | Self::Sky)
+    }
+
     /// The value of `KIND_*` in GLSL.
     pub fn index(self) -> u32 {
         use shaders::trace_types::constants as t;
@@ -114,6 +137,7 @@ impl Kind {
             Self::Tested => t::KIND_TESTED,
             Self::Translucent => t::KIND_TRANSLUCENT,
             Self::Sky => t::KIND_SKY,
+            Self::Passed => t::KIND_PASSED,
         }
     }
 }

@@ -93,7 +93,7 @@ pub fn geometry(
         max_vertex: count(vertices.saturating_sub(1)),
         index_address,
         triangle_count: count(triangles),
-        opaque: matches!(kind, Kind::Opaque | Kind::Sky),
+        opaque: kind.is_untested(),
         no_duplicate_any_hit: kind == Kind::Translucent,
     }
 }

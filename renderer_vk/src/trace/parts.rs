@@ -12,7 +12,7 @@ use shaders::types::constants as c;
 use shaders::types::{Instance, Triangle};
 
 use super::cutout::Coverage;
-use super::geometry::rank_bits;
+use super::geometry::{rank_bits, sides};
 use super::input::{Kind, MaterialInfo, MaterialTable};
 use crate::scene::{DynamicMesh, MeshId, Shape, ViewScene, turned};
 
@@ -64,6 +64,9 @@ impl Seen {
             (Self::Always | Self::NoShadow, Kind::Translucent) => MASK_TRANSLUCENT,
             (Self::FirstPerson, Kind::Translucent) => MASK_FIRST_TRANSLUCENT,
             (Self::ThirdPerson, Kind::Translucent) => MASK_THIRD_TRANSLUCENT,
+            (Self::Always, Kind::Passed) => MASK_NO_SHADOW,
+            // what sees it sees its light's way, too: no mask is of mirrors alone
+            (Self::ThirdPerson, Kind::Passed) => 0,
             (Self::Always, _) => MASK_SOLID,
             (Self::FirstPerson, _) => MASK_FIRST_SOLID,
             (Self::ThirdPerson, _) => MASK_THIRD_SOLID,
@@ -204,7 +207,13 @@ pub struct Parts {
 
 impl Default for Parts {
     fn default() -> Self {
-        const KINDS: [Kind; 4] = [Kind::Opaque, Kind::Tested, Kind::Translucent, Kind::Sky];
+        const KINDS: [Kind; 5] = [
+            Kind::Opaque,
+            Kind::Tested,
+            Kind::Translucent,
+            Kind::Sky,
+            Kind::Passed,
+        ];
         let slots = Seen::ALL.into_iter().flat_map(|seen| {
             KINDS.map(|kind| Slot {
                 seen,
@@ -282,7 +291,7 @@ impl Parts {
     ) {
         let (Some(instance), Some(kind)) = (
             view.instances.get(mesh.instance as usize),
-            Kind::of(info.flags),
+            Kind::in_light(info.flags, mesh.world_surface.is_some()),
         ) else {
             return;
         };
@@ -298,7 +307,8 @@ impl Parts {
             0
         };
         let paths = u32::from(mesh.paths) << TRIANGLE_PATHS_SHIFT;
-        let flags = world | faces_eye | rank_bits(info) | paths;
+        let sides = sides(kind);
+        let flags = world | faces_eye | sides | rank_bits(info) | paths;
         // Seen from anywhere, the faces of something pressed flat lie in one plane, and which of them a ray meets first
         // is left to the last bits of its distance: it would flicker.
         if !is_solid(axes(instance)) {

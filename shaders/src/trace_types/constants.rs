@@ -5,6 +5,7 @@ pub const KIND_OPAQUE: u32 = 0;
 pub const KIND_TESTED: u32 = 1;
 pub const KIND_TRANSLUCENT: u32 = 2;
 pub const KIND_SKY: u32 = 3;
+pub const KIND_PASSED: u32 = 4;
 pub const RAY_TILE: u32 = 16;
 pub const BVH_NONE: u32 = 0xFFFF_FFFF;
 pub const BVH_LEAF: u32 = 0x8000_0000;

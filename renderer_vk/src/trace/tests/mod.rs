@@ -19,6 +19,7 @@ mod maps;
 mod models;
 mod motion;
 mod parts;
+mod sides;
 mod skies;
 mod structures;
 mod texture_filter;

@@ -1,0 +1,128 @@
+//! Sides: what the eye's rays and what light's rays meet of surfaces that show one side.
+
+use glam::Vec3;
+use relight::light::{Falloff, PointLight, SunLight};
+use shaders::types::constants as c;
+
+use super::harness::{Gpu, Scene, identity, reference, stage};
+use super::layers::screen;
+use crate::settings::Settings;
+
+/// A rectangle that fills the view, at distance x; it faces away from the eye.
+fn turned_away(x: f32) -> [Vec3; 4] {
+    let [a, b, c, d] = screen(x);
+    [a, d, c, b]
+}
+
+/// Where the light of a scene comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Source {
+    Lamp,
+    Sun,
+    Bounce,
+}
+
+/// A wall before the eye, and light that comes from behind the eye.
+fn lit_wall(from: Source) -> Scene {
+    let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 20.0, 16);
+    let wall = scene.diffuse(0.8);
+    scene.quad(screen(100.0), wall);
+    match from {
+        Source::Lamp => scene.points.push(PointLight {
+            origin: Vec3::new(-100.0, 0.0, 0.0),
+            intensity: Vec3::splat(20_000.0),
+            radius: 8.0,
+            spot: None,
+            falloff: Falloff::InverseSquare,
+            pulse: None,
+        }),
+        Source::Sun => scene.suns.push(SunLight {
+            direction: -Vec3::X,
+            irradiance: Vec3::ONE,
+            angular_radius: 0.001,
+            material: None,
+        }),
+        Source::Bounce => {
+            let glow = scene.material(&[stage::constant([1.0; 3])], c::MATERIAL_TWO_SIDED);
+            scene.quad(screen(-60.0), glow);
+        }
+    }
+    scene
+}
+
+/// What the eye sees, with a black shell close before the wall: corners, flags, and whether the map or a model has it.
+fn mean(gpu: &mut Gpu, from: Source, shell: Option<([Vec3; 4], u32, bool)>, bounces: u32) -> Vec3 {
+    let mut scene = lit_wall(from);
+    if let Some((corners, flags, world)) = shell {
+        let black = scene.material(&[stage::constant([0.0; 3])], flags);
+        if world {
+            scene.quad(corners, black);
+        } else {
+            scene.mesh(corners, black, identity());
+        }
+    }
+    let settings = Settings {
+        rt_bounces: if from == Source::Bounce { bounces } else { 0 },
+        ..reference()
+    };
+    gpu.mean(&scene, &settings, 32)
+}
+
+/// A shell whose shown side is turned to the wall, by its winding or by its `cull`.
+const BACK: u32 = c::MATERIAL_CULL_BACK;
+
+#[test]
+fn light_passes_what_the_compiler_let_it_pass() {
+    Gpu::each(light_passes_what_the_compiler_let_it_pass_with);
+}
+
+fn light_passes_what_the_compiler_let_it_pass_with(gpu: &mut Gpu) {
+    for (from, bounces) in [
+        (Source::Lamp, 0),
+        (Source::Sun, 0),
+        (Source::Bounce, 1),
+        (Source::Bounce, 2),
+    ] {
+        let free = mean(gpu, from, None, bounces);
+        assert!(free.min_element() > 0.02, "{from:?} {free}");
+        let passed = c::MATERIAL_PASSED;
+        for (corners, flags, world) in [
+            (screen(90.0), BACK | passed, true),
+            (turned_away(90.0), passed, true),
+            // no compiler saw a model: the shell of its outline shows its back
+            (screen(90.0), BACK, false),
+        ] {
+            let lit = mean(gpu, from, Some((corners, flags, world)), bounces);
+            let off = (lit / free - 1.0).abs().max_element();
+            assert!(
+                off < 0.03,
+                "{from:?} {bounces} {flags} {world}: {lit} {free}"
+            );
+        }
+        for (corners, flags, world) in [
+            // walls of the map stop light from both sides, and so do models that show their front
+            (screen(90.0), BACK, true),
+            (turned_away(90.0), 0, true),
+            (turned_away(90.0), passed, false),
+        ] {
+            let dark = mean(gpu, from, Some((corners, flags, world)), bounces);
+            assert_eq!(dark, Vec3::ZERO, "{from:?} {bounces} {flags} {world}");
+        }
+    }
+}
+
+#[test]
+fn the_eye_sees_the_shown_side_alone() {
+    Gpu::each(the_eye_sees_the_shown_side_alone_with);
+}
+
+fn the_eye_sees_the_shown_side_alone_with(gpu: &mut Gpu) {
+    for (corners, flags, world) in [
+        (screen(90.0), c::MATERIAL_PASSED, true),
+        (turned_away(90.0), BACK | c::MATERIAL_PASSED, true),
+        (turned_away(90.0), BACK, false),
+    ] {
+        let seen = mean(gpu, Source::Lamp, Some((corners, flags, world)), 0);
+        assert_eq!(seen, Vec3::ZERO, "{flags} {world}");
+    }
+}

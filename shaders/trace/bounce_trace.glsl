@@ -1,0 +1,15 @@
+// The ray of a bounce.
+#ifndef RELIGHT_TRACE_BOUNCE_TRACE_GLSL
+#define RELIGHT_TRACE_BOUNCE_TRACE_GLSL
+
+#include "trace/trace.glsl"
+
+// The nearest thing of the mask that light does not pass (Kind::Passed in renderer_vk/src/trace/input.rs). Few rays meet
+// what it passes; those are sent again without what casts no shadow.
+Hit trace_bounce(vec3 origin, vec3 direction, uint mask) {
+    Hit hit = trace_ray(origin, 0.0, direction, FAR, mask, false);
+    if (hit.geometry == NO_HIT || Geometries(VIEW.geometries).at[hit.geometry].kind != KIND_PASSED) return hit;
+    return trace_ray(origin, 0.0, direction, FAR, mask & ~MASK_NO_SHADOW, false);
+}
+
+#endif
