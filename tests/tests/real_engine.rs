@@ -233,7 +233,8 @@ fn a_session_with_everything() {
     set(&mut commands, &["set r_rt 1"]);
     commands.extend(picture(camera, 24, "traced"));
     set(&mut commands, &["set r_rt 0"]);
-    commands.extend(picture(camera, 4, "back"));
+    // as long after the camera was put there as the first one: the effect of the teleport has faded by then
+    commands.extend(picture(camera, 20, "back"));
     // another map, both looks, bots that fight
     set(
         &mut commands,
