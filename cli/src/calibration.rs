@@ -9,9 +9,10 @@ use relight::calibrate::{
     Agreement, CalibrationReport, FOUND_WITHIN, POWER_WITHIN, Recovery, Spots, hide_entities,
     recovery, spots,
 };
-use relight::{CalibrationCache, CalibrationOptions, Materials, Options, RelitWorld};
+use relight::{CalibrationCache, CalibrationOptions, Options, RelitWorld};
 use serde_json::{Value, json};
 
+use crate::scripts::load_scripts;
 use crate::view::{Maps, open};
 
 /// Tell how well traced light agrees with maps' lightmaps, before and after calibration
@@ -70,7 +71,7 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
     let mut reports = Vec::new();
     for map in &args.chosen.maps {
         let (files, path) = open(map, &args.chosen.games)?;
-        let (materials, _) = Materials::load(&*files);
+        let (materials, _) = load_scripts(&*files);
         let default = CalibrationOptions::default();
         let calibrate = CalibrationOptions {
             samples: args.samples.unwrap_or(default.samples),

@@ -25,6 +25,7 @@ use serde::Serialize;
 use crate::BAD_INPUT;
 use crate::brought::Brought;
 use crate::numbers::positive;
+use crate::scripts::load_scripts;
 use inputs::Input;
 
 /// Write maps for other programs
@@ -210,7 +211,7 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
         }
     };
     let outputs = inputs::outputs(&inputs, &args.output, format)?;
-    let (materials, _) = Materials::load(&files);
+    let (materials, _) = load_scripts(&files);
     let images = ImageStore::default();
     let shared = Shared {
         args,

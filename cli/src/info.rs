@@ -19,6 +19,7 @@ use serde::Serialize;
 use crate::BAD_INPUT;
 use crate::brought::Brought;
 use crate::convert::inputs::{self, Input};
+use crate::scripts::load_scripts;
 use describe::MapInfo;
 
 /// Tell what is in maps, and where their light comes from
@@ -88,7 +89,7 @@ pub fn run(args: &InfoArgs) -> Result<ExitCode> {
             bail!("no maps in {}", games.collect::<Vec<_>>().join(", "));
         }
     }
-    let (materials, _) = Materials::load(&files);
+    let (materials, _) = load_scripts(&files);
     let bar = ProgressBar::new(sources.len() as u64);
     bar.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}")?);
     let mut infos = Vec::new();

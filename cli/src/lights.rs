@@ -8,9 +8,10 @@ use clap::Args;
 use relight::light::{
     LightLists, ListJudgement, judge, lists_by_geometry, lists_by_visibility, sweep,
 };
-use relight::{CalibrationCache, CalibrationOptions, Materials, Options, RelitWorld};
+use relight::{CalibrationCache, CalibrationOptions, Options, RelitWorld};
 use serde_json::json;
 
+use crate::scripts::load_scripts;
 use crate::view::{Maps, open};
 
 /// Draw a map's lights from above, or judge its light lists by rays
@@ -71,7 +72,7 @@ pub fn run(args: &LightsArgs) -> Result<()> {
     }
     for map in &args.chosen.maps {
         let (files, map) = open(map, &args.chosen.games)?;
-        let (materials, _) = Materials::load(&*files);
+        let (materials, _) = load_scripts(&*files);
         let cache = args.cache.as_ref().map(CalibrationCache::new);
         let calibrate = (!args.no_calibration).then(|| CalibrationOptions {
             cache: cache.clone(),

@@ -19,6 +19,7 @@ mod measure;
 mod numbers;
 mod pictures;
 mod render;
+mod scripts;
 mod statistics;
 mod table;
 mod timings;

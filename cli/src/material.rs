@@ -7,11 +7,12 @@ use std::sync::Arc;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use relight::export::material_json;
-use relight::{GameFiles, Materials, Options, RelitWorld, SearchPath, WorldMaterial};
+use relight::{GameFiles, Options, RelitWorld, SearchPath, WorldMaterial};
 use serde::Serialize;
 use serde_json::Value;
 use shaderscript::{Diagnostic, ImplicitKind};
 
+use crate::scripts::load_scripts;
 use crate::view::open;
 
 /// Tell how a material is understood
@@ -134,7 +135,7 @@ pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
         None => (Arc::new(SearchPath::open(&args.games)?), None),
     };
     let files = &*files;
-    let (materials, diagnostics) = Materials::load(files);
+    let (materials, diagnostics) = load_scripts(files);
     let options = Options {
         calibrate: None,
         ..Options::default()

@@ -121,9 +121,10 @@ impl Materials {
         }
     }
 
-    /// Script files of which nothing is used, with the reason: they cannot be read, or their braces do not match.
-    pub fn unusable_files(&self) -> &[Diagnostic] {
-        &self.unusable
+    /// What is wrong with whole script files: nothing of them is used, because they cannot be read or their braces do
+    /// not match, or a comment takes the rest of them.
+    pub fn faults_of_files(&self) -> impl Iterator<Item = &Diagnostic> {
+        (self.unusable.iter()).chain(self.library.warnings_of_files())
     }
 
     /// Why the engine would not draw a script's definition.
@@ -134,7 +135,7 @@ impl Materials {
             return Some(at(reason.clone()));
         }
         let missing = script
-            .image_names()
+            .needed_images()
             .find(|image| !self.image_exists(files, image))?;
         Some(at(format!("image {missing} is missing")))
     }
@@ -168,7 +169,7 @@ mod tests {
 
     #[test]
     fn scripts_images_and_the_default() {
-        let script = b"t/good\n{\n{\nmap t/pixel.jpg\n}\n}\nt/gone\n{\nq3map_surfacelight 100\n{\nmap t/none\n}\n}\nt/bad\n{\nnonsense\n}\n";
+        let script = b"t/good\n{\n{\nmap t/pixel.jpg\n}\n}\nt/gone\n{\nq3map_surfacelight 100\n{\nmap t/none\n}\n}\nt/twice\n{\n{\nmap t/none\nmap t/pixel.tga\n}\n}\nt/bad\n{\nnonsense\n}\n";
         let files = files(&[("scripts/a.shader", script), ("t/pixel.tga", PIXEL)]);
         let (materials, _) = Materials::load(&files);
         let resolve = |name: &str| materials.resolve(&files, name, ImplicitKind::Lightmapped);
@@ -193,6 +194,10 @@ mod tests {
         );
         assert_eq!(gone.shader, Shader::default_material("t/gone"));
         assert_eq!(gone.definition().light.surface_light, Some(100.0));
+        assert_eq!(
+            resolve("t/twice").fault.unwrap(),
+            "scripts/a.shader:14: image t/none is missing"
+        );
         assert!(resolve("t/bad").fault.is_some());
         assert!(resolve("t/nothing").fault.unwrap().contains("neither"));
     }

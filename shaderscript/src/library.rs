@@ -92,6 +92,12 @@ impl Library {
         &self.dropped
     }
 
+    /// Warnings that are about whole files.
+    pub fn warnings_of_files(&self) -> impl Iterator<Item = &Diagnostic> {
+        let of_file = |d: &&Diagnostic| d.severity == Severity::Warning && d.shader.is_none();
+        self.diagnostics.iter().filter(of_file)
+    }
+
     /// What the engine would warn about in a definition; why it rejects one is in [`Shader::rejected`].
     pub fn warnings_of(&self, shader: &Shader) -> impl Iterator<Item = &Diagnostic> {
         let of = |diagnostic: &&Diagnostic| {
@@ -172,6 +178,29 @@ mod tests {
                 "bad:6:1: error: a: braces are not balanced up to the end of the file; the engine ignores the whole file"
             ]
         );
+    }
+
+    #[test]
+    fn a_comment_that_never_closes_is_told() {
+        let library = Library::new([
+            ("after", "b {\n{\nmap y\n}\n}\n"),
+            (
+                "open",
+                "a {\n{\nmap x\n}\n}\n /* from here on\n// */ // no\n/*",
+            ),
+            ("closed", "c {\n{\nmap z\n}\n} /* all */ // /* is well\n"),
+        ]);
+        assert_eq!(images(&library, "a"), ["x"]);
+        assert_eq!(images(&library, "b"), ["y"], "the engine loses it");
+        let told = |library: &Library| -> Vec<String> {
+            (library.warnings_of_files().map(ToString::to_string)).collect()
+        };
+        assert_eq!(told(&library).len(), 1);
+        assert!(told(&library)[0].starts_with("open:8:1: warning: this comment is never closed"));
+        assert!(told(&library)[0].ends_with("put */ where the comment ends"));
+        // a file that the engine drops cannot spoil others
+        let library = Library::new([("open", "a {\n{\nmap x\n/*\n}\n}\n")]);
+        assert_eq!((library.dropped().len(), told(&library).len()), (1, 0));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! A material as a script defines it.
 
-use crate::stage::{Stage, Wave};
+use crate::stage::{Stage, StageImage, Wave};
 use glam::Vec3;
 
 /// Named sort values: surfaces are drawn in rising order.
@@ -152,7 +152,17 @@ impl Shader {
         self.stages.iter().any(Stage::is_lightmap)
     }
 
-    /// Names of all image files that the stages need, in order, with repetitions.
+    /// Names of all image files that must exist for the engine to draw the material: those of its stages, and those
+    /// that a later line of a stage replaced.
+    pub fn needed_images(&self) -> impl Iterator<Item = &str> {
+        self.stages
+            .iter()
+            .flat_map(|stage| stage.replaced.iter().chain([&stage.image]))
+            .flat_map(StageImage::names)
+            .map(String::as_str)
+    }
+
+    /// Names of all image files that the stages draw, in order, with repetitions.
     pub fn image_names(&self) -> impl Iterator<Item = &str> {
         self.stages
             .iter()

@@ -31,6 +31,9 @@ pub struct Stage {
     pub no_mipmaps: bool,
     /// Image is not reduced by the player's `r_picmip` (`nopicmip` or `nomipmaps` came before the stage).
     pub no_picmip: bool,
+    /// Images of earlier lines of the stage. The last line's is drawn, but the engine loads all of them and draws the
+    /// default material when one is missing.
+    pub replaced: Vec<StageImage>,
     /// Line of the stage's opening brace, from 1; 0 for stages that no script wrote.
     pub line: u32,
 }
@@ -51,6 +54,7 @@ impl Default for Stage {
             tc_mods: Vec::new(),
             no_mipmaps: false,
             no_picmip: false,
+            replaced: Vec::new(),
             line: 0,
         }
     }

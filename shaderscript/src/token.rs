@@ -65,6 +65,8 @@ struct Bytes<'a> {
     quoted: bool,
     /// A line end was passed that has not been given out yet.
     newline: bool,
+    /// Where a comment starts that the text ends in.
+    unclosed: Option<Position>,
 }
 
 impl<'a> Bytes<'a> {
@@ -93,6 +95,7 @@ impl<'a> Bytes<'a> {
             }
             true
         } else if self.starts_with(b"/*") {
+            let start = self.position;
             while !self.rest.is_empty() && self.rest.first() != Some(&0) && !self.starts_with(b"*/")
             {
                 self.advance();
@@ -100,6 +103,8 @@ impl<'a> Bytes<'a> {
             if self.starts_with(b"*/") {
                 self.advance();
                 self.advance();
+            } else {
+                self.unclosed = Some(start);
             }
             true
         } else {
@@ -167,6 +172,7 @@ impl<'a> Lexer<'a> {
                 reading,
                 quoted: false,
                 newline: false,
+                unclosed: None,
             },
             fresh_line: true,
         }
@@ -256,6 +262,11 @@ impl<'a> Lexer<'a> {
             position,
             starts_line,
         })
+    }
+
+    /// Where the comment starts in which the text ended, once it is passed.
+    pub fn unclosed_comment(&self) -> Option<Position> {
+        self.bytes.unclosed
     }
 
     /// Reads the rest of the line, to be split by [`words`]; the line end is consumed.

@@ -562,3 +562,12 @@ fn line_ends_of_every_kind() {
         assert_eq!(script.shaders[0].stages[0].line, 4);
     }
 }
+
+#[test]
+fn a_later_image_of_a_stage_replaces_the_first_which_is_still_needed() {
+    let shader = shader("{\nclampmap b\nmap $lightmap\nanimMap 2 c d\nanimMap 2 e\nmap f\n}");
+    assert_eq!(shader.stages[0].image, StageImage::Map("f".into()));
+    assert_eq!(shader.image_names().collect::<Vec<_>>(), ["f"]);
+    let needed: Vec<_> = shader.needed_images().collect();
+    assert_eq!(needed, ["b", "c", "d", "e", "f"]);
+}

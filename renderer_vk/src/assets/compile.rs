@@ -170,6 +170,11 @@ impl StageArrays {
         source: &mut dyn ImageSource,
     ) -> Result<(u32, Option<Video>), String> {
         let mut video = None;
+        let start = self.images.len();
+        for replaced in stage.replaced.iter().filter(|i| !i.names().is_empty()) {
+            self.push_image(replaced, stage, implicit, videos, &mut video, source)?;
+            self.images.truncate(start);
+        }
         let image = self.push_image(&stage.image, stage, implicit, videos, &mut video, source)?;
         let mut out = types::Stage::zeroed();
         out.image_first = image.first;

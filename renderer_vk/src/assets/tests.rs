@@ -51,6 +51,18 @@ t/gone
   { map t/a.tga }
   { map t/nothing.tga }
 }
+t/twice
+{
+  { map t/nothing.tga
+    map t/a.tga }
+}
+t/second
+{
+  { map t/c.tga
+    clampmap t/b.tga
+    map $lightmap
+    map t/a.tga }
+}
 t/bad
 {
   frobnicate
@@ -285,6 +297,24 @@ fn what_the_game_fades_by_alpha_is_matter() {
         .map(|stage| stage.flags & c::STAGE_MATTER != 0)
         .collect();
     assert_eq!(matter, [true, true, false, false]);
+}
+
+#[test]
+fn a_stage_needs_the_images_of_all_its_lines_and_draws_the_last() {
+    let mut game = game();
+    let index = game.find("t/twice", LightmapClass::Page, true);
+    assert!(game.materials.get(index).defaulted);
+    let drawn =
+        (game.materials).find_or_default(&mut game.textures, "t/twice", LightmapClass::None);
+    assert_eq!(drawn, 0);
+    let index = game.find("t/second", LightmapClass::TwoD, true);
+    let second = game.materials.get(index).clone();
+    assert!(!second.defaulted);
+    let stages = game.materials.stages(&second);
+    assert_eq!((stages.len(), stages[0].image_count), (1, 1));
+    for name in ["t/a.tga", "t/b.tga", "t/c.tga"] {
+        assert!(game.textures.flags.contains_key(name), "{name} is loaded");
+    }
 }
 
 #[test]

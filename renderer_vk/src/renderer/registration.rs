@@ -33,7 +33,7 @@ impl Renderer {
         for diagnostic in diagnostics {
             log::debug!("{diagnostic}");
         }
-        for fault in scripts.unusable_files() {
+        for fault in scripts.faults_of_files() {
             log::warn!("{fault}");
         }
         self.assets = Some(Assets::new(

@@ -141,6 +141,11 @@ pub fn parse_script(file: &str, text: &[u8]) -> Script {
         definition.cut_before(lexer.remaining());
         shaders.push(DefinitionParser::new(definition, &name, &mut reporter).parse(closed));
     }
+    if let (Some(start), None) = (lexer.unclosed_comment(), &dropped) {
+        let lost = "this comment is never closed, so nothing after it is read, and the engine loses the scripts \
+                    that it reads after this file, too; put */ where the comment ends";
+        reporter.report(Severity::Warning, start, None, lost);
+    }
     Script {
         shaders,
         diagnostics: reporter.diagnostics,

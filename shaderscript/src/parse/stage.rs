@@ -18,6 +18,7 @@ const MAX_TC_MODS: usize = 4;
 /// A stage as far as it is read.
 struct Draft {
     image: Option<StageImage>,
+    replaced: Vec<StageImage>,
     /// `map $lightmap` occurred, even when another image came after it.
     lightmap_named: bool,
     blend: Option<(BlendFactor, BlendFactor)>,
@@ -34,12 +35,19 @@ struct Draft {
     tc_mods_ended: bool,
 }
 
+impl Draft {
+    fn set_image(&mut self, image: StageImage) {
+        self.replaced.extend(self.image.replace(image));
+    }
+}
+
 impl DefinitionParser<'_, '_, '_> {
     /// Reads a stage whose opening brace is read; `None` when it names no image.
     pub(super) fn stage(&mut self) -> Result<Option<Stage>, Rejection> {
         let line = self.at.line;
         let mut draft = Draft {
             image: None,
+            replaced: Vec::new(),
             lightmap_named: false,
             blend: None,
             alpha_func: None,
@@ -71,20 +79,19 @@ impl DefinitionParser<'_, '_, '_> {
         match token.text.to_ascii_lowercase().as_str() {
             "map" => {
                 let name = self.required("map")?;
-                draft.image = Some(
-                    if name.eq_ignore_ascii_case("$whiteimage") || name == "*white" {
-                        StageImage::White
-                    } else if name.eq_ignore_ascii_case("$lightmap") {
-                        draft.lightmap_named = true;
-                        StageImage::Lightmap
-                    } else {
-                        StageImage::Map(name)
-                    },
-                );
+                let image = if name.eq_ignore_ascii_case("$whiteimage") || name == "*white" {
+                    StageImage::White
+                } else if name.eq_ignore_ascii_case("$lightmap") {
+                    draft.lightmap_named = true;
+                    StageImage::Lightmap
+                } else {
+                    StageImage::Map(name)
+                };
+                draft.set_image(image);
             }
-            "clampmap" => draft.image = Some(StageImage::ClampMap(self.required("clampMap")?)),
+            "clampmap" => draft.set_image(StageImage::ClampMap(self.required("clampMap")?)),
             "animmap" => self.animation(draft)?,
-            "videomap" => draft.image = Some(StageImage::Video(self.required("videoMap")?)),
+            "videomap" => draft.set_image(StageImage::Video(self.required("videoMap")?)),
             "alphafunc" => {
                 const NAMES: [(&str, AlphaFunc); 3] = [
                     ("GT0", AlphaFunc::Gt0),
@@ -149,11 +156,10 @@ impl DefinitionParser<'_, '_, '_> {
             ));
         }
         // Without images the stage keeps the one that it had.
-        draft.image = if images.is_empty() {
-            before
-        } else {
-            Some(StageImage::Animation { frequency, images })
-        };
+        draft.image = before;
+        if !images.is_empty() {
+            draft.set_image(StageImage::Animation { frequency, images });
+        }
         Ok(())
     }
 
@@ -358,6 +364,7 @@ impl DefinitionParser<'_, '_, '_> {
         let overwrites = draft.blend == Some((BlendFactor::One, BlendFactor::Zero));
         Some(Stage {
             image: draft.image?,
+            replaced: draft.replaced,
             blend: if overwrites { None } else { draft.blend },
             alpha_func: draft.alpha_func,
             depth_write: draft.depth_write || overwrites,
