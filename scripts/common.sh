@@ -85,9 +85,35 @@ game_options=(
   +set cl_motd 0
 )
 
-# Names of the maps in the game's and the player's pk3s. A zip file keeps names uncompressed, so no
-# unpacker is needed.
+# map_names [PACK...]: names of the maps in packs, without any in the game's and the player's. A zip file keeps names
+# uncompressed, so no unpacker is needed; what lies in a folder of another folder is not where the engine looks.
 map_names() {
-  { grep -aoihE 'maps/[a-z0-9_+.-]+\.bsp' "$GAME_DATA"/*.pk3 "$HOME"/.openarena/baseoa/*.pk3 2>/dev/null || true; } |
-    tr '[:upper:]' '[:lower:]' | sed -e 's,^maps/,,' -e 's,\.bsp$,,' | sort -u
+  [ $# -gt 0 ] || set -- "$GAME_DATA"/*.pk3 "$HOME"/.openarena/baseoa/*.pk3
+  { LC_ALL=C grep -aoihE '[^/[:alnum:]_.-]maps/[a-z0-9_+.-]+\.bsp' -- "$@" 2>/dev/null || true; } |
+    tr '[:upper:]' '[:lower:]' | tr -d '\0' | LC_ALL=C sed -e 's,^.*maps/,,' -e 's,\.bsp$,,' | sort -u
+}
+
+# check_pack FILE: ends with what is wrong with a pack that somebody named.
+check_pack() {
+  [ -e "$1" ] || die "There is no file $1; is its path right?"
+  [ -f "$1" ] || die "$1 is no file; name one pack (.pk3)."
+  [ -r "$1" ] || die "$1 cannot be read; chmod +r lets it."
+  [ "$(head -c 2 -- "$1" | tr -d '\0')" = PK ] || die "$1 is no pack (a zip file named .pk3); download it again, or unpack the archive it came in."
+  [ -n "$(map_names "$1")" ] || die "$1 has no maps where the game reads them, in a folder maps at its top; relight info '$1' says what is in it."
+}
+
+# game_with PACK FOLDER: makes FOLDER the game's folder for every engine that is started from here on: links to all that
+# the game has, and to PACK under a name that comes last, so that its files win. Neither the game's folder nor the
+# player's is touched.
+game_with() {
+  local pack folder=$2 file
+  pack=$(realpath "$1")
+  rm -rf "$folder"
+  mkdir -p "$folder/baseoa"
+  for file in "$GAME_DIR"/baseoa/*; do
+    [ -e "$file" ] && ln -s "$file" "$folder/baseoa/"
+  done
+  ln -s "$pack" "$folder/baseoa/~given.pk3"
+  export GAME_DIR=$folder
+  game_options+=(+set fs_basepath "$folder")
 }
