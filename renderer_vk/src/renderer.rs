@@ -213,6 +213,12 @@ impl Renderer {
         self.device.compiled_pipelines()
     }
 
+    /// How many pipelines of any kind the driver holds; after a change of map, those that both maps need and the new
+    /// map's.
+    pub fn live_pipelines(&self) -> u64 {
+        self.device.live_pipelines()
+    }
+
     /// What the validation layer has said so far.
     pub fn validation_messages(&self) -> Vec<String> {
         self.device.validation_messages()

@@ -75,6 +75,8 @@ pub(crate) struct DeviceInner {
     pub shared_pipelines: Shared,
     /// Pipelines for draws compiled so far.
     pub compiled: AtomicU64,
+    /// Pipelines of any kind that were made and not yet destroyed.
+    pub live_pipelines: AtomicU64,
     pub timeline: vk::Semaphore,
     pub timings: Mutex<Vec<(String, f32)>>,
     /// Passes are timed.
@@ -131,6 +133,7 @@ impl Device {
             pipeline_cache: vk::PipelineCache::null(),
             shared_pipelines: Shared::default(),
             compiled: AtomicU64::new(0),
+            live_pipelines: AtomicU64::new(0),
             timeline: vk::Semaphore::null(),
             timings: Mutex::new(Vec::new()),
             measuring: AtomicBool::new(true),
@@ -246,6 +249,11 @@ impl Device {
     /// How many pipelines for draws were compiled so far.
     pub fn compiled_pipelines(&self) -> u64 {
         self.0.compiled.load(Ordering::Relaxed)
+    }
+
+    /// How many pipelines of any kind the driver holds: made, and not yet destroyed.
+    pub fn live_pipelines(&self) -> u64 {
+        self.0.live_pipelines.load(Ordering::Relaxed)
     }
 
     /// Whether fragment shaders can write to buffers.
@@ -429,8 +437,11 @@ impl DeviceInner {
                 // SAFETY: see above.
                 unsafe { raw.destroy_image_view(view, None) };
             }
-            // SAFETY: see above.
-            Garbage::Pipeline(p) => unsafe { raw.destroy_pipeline(p, None) },
+            Garbage::Pipeline(p) => {
+                self.live_pipelines.fetch_sub(1, Ordering::Relaxed);
+                // SAFETY: see above.
+                unsafe { raw.destroy_pipeline(p, None) }
+            }
             // SAFETY: see above.
             Garbage::CommandPool(p) => unsafe { raw.destroy_command_pool(p, None) },
             // SAFETY: see above.

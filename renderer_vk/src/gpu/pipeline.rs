@@ -84,6 +84,7 @@ pub(crate) struct Pipeline {
 impl Pipeline {
     pub fn own(device: &Device, raw: vk::Pipeline, name: &str) -> Self {
         device.0.name(raw, name);
+        device.0.live_pipelines.fetch_add(1, Ordering::Relaxed);
         Self {
             device: device.clone(),
             raw,

@@ -44,7 +44,7 @@ use crate::scene::{ShadowVolumes, View};
 use cover::Cover;
 use list::DepthRange;
 use overdraw::Overdraw;
-use pipelines::Pipelines;
+use pipelines::{Pipelines, State};
 use shadows::Shadows;
 use target::TargetKind;
 
@@ -145,8 +145,9 @@ impl Raster {
         self.overdraw.fragments()
     }
 
-    /// Draws the calls of a list whose states are new into a picture of one pixel that nobody sees, so that a driver has
-    /// compiled all that they need when they are first drawn in a frame. Waits for that.
+    /// Drops the pipelines of states that no call of a list has; draws the calls whose states are new into a picture of one
+    /// pixel that nobody sees, so that a driver has compiled all that they need when they are first drawn in a frame. Waits
+    /// for that.
     ///
     /// # Errors
     /// The device is out of memory or cannot make a pipeline.
@@ -156,6 +157,8 @@ impl Raster {
         list: &mut DrawList,
         p: &ViewParameters<'_>,
     ) -> Result<(), gpu::Error> {
+        let expected: HashSet<State> = list.calls.iter().map(|call| call.state).collect();
+        self.pipelines.keep(&expected);
         let mut seen = HashSet::new();
         list.calls
             .retain(|call| !self.pipelines.is_made(target, call.state) && seen.insert(call.state));

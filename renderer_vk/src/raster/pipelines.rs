@@ -1,6 +1,6 @@
 //! The pipelines of the classic look: one for each combination of state that a stage asks for, made when first used.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use shaders::types::constants as c;
 
@@ -67,7 +67,7 @@ fn factor(blend: u32) -> BlendFactor {
     }
 }
 
-/// All pipelines made so far.
+/// The pipelines made since the last call of [`keep`](Pipelines::keep), and those that it kept.
 pub struct Pipelines {
     device: Device,
     offset: (f32, f32),
@@ -90,6 +90,11 @@ impl Pipelines {
             self.offset = offset;
             self.made.retain(|(_, state), _| !state.offset);
         }
+    }
+
+    /// Drops the pipelines of all other states, those of earlier maps among them. Frames that still use one keep it.
+    pub fn keep(&mut self, states: &HashSet<State>) {
+        self.made.retain(|(_, state), _| states.contains(state));
     }
 
     /// Whether the pipeline of `state` is there.
