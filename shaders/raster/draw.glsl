@@ -2,6 +2,7 @@
 // push constants and the interface between them.
 #extension GL_EXT_buffer_reference2 : require
 #include "common/bindless.glsl"
+#include "common/fog.glsl"
 #include "common/material.glsl"
 
 layout(constant_id = 0) const uint MODE = 0;          // DRAW_*

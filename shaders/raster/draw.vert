@@ -25,17 +25,12 @@ vec2 fog_coordinates(uint number, vec3 world) {
     uint index = number - 1;
     vec3 eye = VIEW.eye;
     float s = dot(world - eye, VIEW.forward) / (8.0 * fogs.at[index].depth) + 1.0 / 512.0;
-    float below = 1.0, eye_below = 1.0;
-    bool outside = false;
+    float share = 1.0;
     if (fogs.at[index].has_surface != 0) {
         vec4 plane = fogs.at[index].plane;
-        below = dot(plane.xyz, world) - plane.w;
-        eye_below = dot(plane.xyz, eye) - plane.w;
-        outside = eye_below < 0.0;
+        share = fog_share(dot(plane.xyz, world) - plane.w, dot(plane.xyz, eye) - plane.w);
     }
-    float t;
-    if (outside) t = below < 1.0 ? 1.0 / 32.0 : 1.0 / 32.0 + (30.0 / 32.0) * below / (below - eye_below);
-    else t = below < 0.0 ? 1.0 / 32.0 : 31.0 / 32.0;
+    float t = 1.0 / 32.0 + (30.0 / 32.0) * share;
     return vec2(s, t);
 }
 

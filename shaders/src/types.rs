@@ -198,7 +198,7 @@ pub struct Fog {
     pub maxs: Vec3,
     /// Fog surface: `normal.p - distance` is the depth below it; only if `has_surface`.
     pub plane: [f32; 4],
-    /// 1 if the volume has a surface.
+    /// `FOG_SURFACE_*`; 0: the volume has none.
     pub has_surface: u32,
     /// Colour, as displayed (encoded).
     pub color: Vec3,
@@ -433,6 +433,8 @@ pub mod constants {
         /// Of a stage: its colour is white, the same for all vertices, or each vertex's own.
         COLOR_WHITE = 0; COLOR_FLAT = 1; COLOR_VERTEX = 2;
         FOG_ADJUST_NONE = 0; FOG_ADJUST_RGB = 1; FOG_ADJUST_ALPHA = 2; FOG_ADJUST_RGBA = 3;
+        /// A fog volume has no surface that one looks into it through, has one, has one that is drawn from within, too.
+        FOG_SURFACE_NONE = 0; FOG_SURFACE = 1; FOG_SURFACE_DRAWN = 2;
         /// The triangle belongs to the world (its vertex colours and lightmap are baked light).
         TRIANGLE_WORLD = 1;
         /// The triangle is turned to the eye: mirrors see it from behind, and see it all the same.

@@ -1,8 +1,10 @@
-// Fog volumes along a ray. Inside a volume's box and below its surface the engine's factor is sqrt(length / depth),
-// opaque at `depth`; here the length is that of the ray's own way through the volume.
+// Fog volumes. What the eye sees of them follows the engine: fog covers the surfaces that are stored with it, by their
+// distance from the eye along the view, and never a sky. Rays of bounced light, which no player sees, meet the volumes
+// themselves: inside a volume's box and below its surface by sqrt(length / depth).
 #ifndef RELIGHT_TRACE_FOG_GLSL
 #define RELIGHT_TRACE_FOG_GLSL
 
+#include "common/fog.glsl"
 #include "trace/boxes.glsl"
 #include "trace/color.glsl"
 #include "trace/geometry.glsl"
@@ -25,65 +27,49 @@ vec2 fog_range(Fog fog, vec3 origin, vec3 direction, vec3 inverse) {
     return vec2(enter, leave);
 }
 
-float fog_transmittance(Fog fog, vec2 range, float t) {
-    float inside = clamp(min(t, range.y) - range.x, 0.0, FAR);
-    return 1.0 - sqrt(min(inside / max(fog.depth, 1.0), 1.0));
+// The engine's factor: of what is displayed at a point, how much is fog. `depth`: of the point along the view, units;
+// `part`: of its way from the eye, how much lies in the fog.
+float fog_cover(Fog fog, float depth, float part) {
+    return sqrt(clamp(depth * part / max(fog.depth, 1.0), 0.0, 1.0));
 }
 
-// What a piece of a ray has of one volume. The fog's colour stands for all light that its author saw there; the part of it that
-// comes straight from lights is found at the points that are kept (fog_keep.glsl).
-struct FogPiece {
-    vec3 color;  // displayed
-    float ratio; // of what lies behind, what is left
-    float depth; // at which the fog is opaque, units
-    vec2 place;  // where on the ray's way through the volume the piece begins and ends, as parts of the depth
-    float enter; // where that way begins
-    vec3 own_light; // radiance at places in the volume in the mean, of the map's lights
-};
-
-// The volume whose piece was the last one.
-struct FogOrder {
-    float enter;
-    uint index;
-};
-
-FogOrder fog_begin() { return FogOrder(-1.0, 0u); }
-
-// The next piece between two distances on a ray; false: there is none. Volumes do not overlap, so each is taken whole,
-// nearest first.
-bool fog_next(vec3 origin, vec3 direction, vec3 inverse, float from, float to, inout FogOrder order, out FogPiece piece) {
-    uint count = VIEW.fog_count;
-    TraceFogs fogs = TraceFogs(VIEW.fogs);
-    vec2 best = vec2(FAR);
-    uint chosen = count;
-    for (uint i = 0; i < count; i++) {
-        vec2 range = fog_range(fogs.at[i], origin, direction, inverse);
-        if (range.x >= range.y || range.x >= to || range.y <= from) continue;
-        bool later = range.x > order.enter || (range.x == order.enter && i > order.index);
-        if (later && range.x < best.x) { best = range; chosen = i; }
+// The part of the way to a surface that lies below the fog's surface, as the engine finds it at the triangle's corners.
+// `eye`: where the eye would be if no mirror or portal lay between.
+float fog_part(Fog fog, SurfacePoint p, vec3 eye) {
+    if (fog.has_surface == 0) return 1.0;
+    float eye_below = dot(fog.plane.xyz, eye) - fog.plane.w;
+    Instance instance = instance_of(p.instance);
+    mat3 axis = mat3(instance.axis[0], instance.axis[1], instance.axis[2]);
+    float part = 0.0;
+    for (int i = 0; i < 3; i++) {
+        vec3 corner = axis * TraceVertices(p.vertices).at[p.triangle.indices[i]].position + instance.origin;
+        part += p.weights[i] * fog_share(dot(fog.plane.xyz, corner) - fog.plane.w, eye_below);
     }
-    if (chosen == count) return false;
-    Fog fog = fogs.at[chosen];
-    float before = fog_transmittance(fog, best, from);
-    piece.color = fog.color;
-    piece.ratio = before > 0.0 ? clamp(fog_transmittance(fog, best, to) / before, 0.0, 1.0) : 0.0;
-    piece.depth = max(fog.depth, 1.0);
-    piece.place = clamp((min(vec2(from, to), best.y) - best.x) / piece.depth, 0.0, 1.0);
-    piece.enter = best.x;
-    piece.own_light = fog.own_light;
-    order = FogOrder(best.x, chosen);
-    return true;
+    return part;
 }
 
 // Composes the fog before a distance on a ray of bounced light behind what is in front (`transmittance`, `radiance`): each
-// part by itself, in light. What the eye sees of fog is mixed as it is displayed (primary.rgen).
+// part by itself, in light. Volumes do not overlap, so each is taken whole, nearest first.
 void fog_in_light(vec3 origin, vec3 direction, float to, inout vec3 transmittance, inout vec3 radiance) {
     vec3 inverse = inverse_direction(direction);
-    FogOrder order = fog_begin();
-    FogPiece piece;
-    for (uint i = 0; i < VIEW.fog_count && fog_next(origin, direction, inverse, 0.0, to, order, piece); i++) {
-        radiance += transmittance * decode_display(piece.color) * (1.0 - piece.ratio);
-        transmittance *= piece.ratio;
+    uint count = VIEW.fog_count, last = 0;
+    float entered = -1.0;
+    TraceFogs fogs = TraceFogs(VIEW.fogs);
+    for (uint turn = 0; turn < count; turn++) {
+        vec2 best = vec2(FAR);
+        uint chosen = count;
+        for (uint i = 0; i < count; i++) {
+            vec2 range = fog_range(fogs.at[i], origin, direction, inverse);
+            if (range.x >= range.y || range.x >= to) continue;
+            bool later = range.x > entered || (range.x == entered && i > last);
+            if (later && range.x < best.x) { best = range; chosen = i; }
+        }
+        if (chosen == count) return;
+        float cover = fog_cover(fogs.at[chosen], min(to, best.y) - best.x, 1.0);
+        radiance += transmittance * decode_display(fogs.at[chosen].color) * cover;
+        transmittance *= 1.0 - cover;
+        entered = best.x;
+        last = chosen;
     }
 }
 

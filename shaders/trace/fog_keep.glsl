@@ -1,6 +1,6 @@
-// The point of fog whose light a pixel asks for. A path can pass fog in several places; one of them is kept, with a chance
-// that grows with what it contributes (reservoir sampling), and on it a distance with the density of the scattering
-// itself, so that what is left to know is the light there.
+// The point of fog whose light a pixel asks for. A path can see fog in several places; one of them is kept, with a chance
+// that grows with what it contributes (reservoir sampling), and on its way through the volume a distance with the density
+// of the scattering itself, so that what is left to know is the light there.
 #ifndef RELIGHT_TRACE_FOG_KEEP_GLSL
 #define RELIGHT_TRACE_FOG_KEEP_GLSL
 
@@ -15,14 +15,14 @@ layout(constant_id = 0) const uint LIT_FOG = 0;
 const float MOST_LIT = 0.5;
 
 // The map's own light in a volume in the mean, as it is displayed; `rt_lightScale` does not count, which is to be seen.
-vec3 fog_own_light(FogPiece piece) { return piece.own_light * exp2(VIEW.exposure_base); }
+vec3 fog_own_light(Fog fog) { return fog.own_light * exp2(VIEW.exposure_base); }
 
 // The part of the fog's colour that is the map's own straight light, in the mean of the volume.
-vec3 fog_lit_part(FogPiece piece) { return min(fog_own_light(piece), MOST_LIT); }
+vec3 fog_lit_part(Fog fog) { return min(fog_own_light(fog), MOST_LIT); }
 
 // What light is multiplied by, beside the fog's colour, so that the map's own comes to `lit` in the mean.
-vec3 fog_scattering(FogPiece piece, vec3 lit) {
-    vec3 own = fog_own_light(piece);
+vec3 fog_scattering(Fog fog, vec3 lit) {
+    vec3 own = fog_own_light(fog);
     return mix(vec3(1.0), lit / max(own, 1.0e-6), greaterThan(own, vec3(MOST_LIT)));
 }
 
@@ -32,17 +32,18 @@ vec3 fog_tint = vec3(0.0);    // of the kept place, as a multiple of its chance
 vec3 fog_point = vec3(0.0);
 float fog_distance = -1.0;    // from the eye along the way
 
-// `weight`: what the light of the piece is multiplied by; `travelled`: length of the path before its ray.
-void fog_keep(vec3 weight, FogPiece piece, vec3 origin, vec3 direction, float travelled) {
-    float chance = max(weight.r, max(weight.g, weight.b));
+// `weight`: what the light of the fog is multiplied by; `range`: where the ray is in it; `travelled`: length of the path
+// before its ray.
+void fog_keep(vec3 weight, vec2 range, vec3 origin, vec3 direction, float travelled) {
+    float chance = max_component(weight);
     if (!(chance > 0.0)) return;
     fog_weight += weight;
     fog_weight_sum += chance;
     if (fog_weight_sum > chance && rng_next() * fog_weight_sum >= chance) return;
     fog_tint = weight / chance;
-    // transmittance is 1 - sqrt(length / depth): even steps of it are squares of even steps
-    float root = mix(sqrt(piece.place.x), sqrt(piece.place.y), rng_next());
-    float t = piece.enter + root * root * piece.depth;
+    // fog grows with the root of the way in it: even steps of it are squares of even steps
+    float root = rng_next();
+    float t = mix(range.x, range.y, root * root);
     fog_point = origin + direction * t;
     fog_distance = travelled + t;
 }

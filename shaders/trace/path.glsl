@@ -134,15 +134,24 @@ struct SeenLayer {
     Layer linear;
     vec3 cover;
     vec3 own;
+    float clear; // the part of its light that fog leaves
 };
 
-// `mirrors`: whether rays go on to what the surface reflects; else the picture of the environment stands for it.
-SeenLayer seen_layer(SurfacePoint p, Material material, Footprint seen, bool mirrors) {
+// `mirrors`: whether rays go on to what the surface reflects; else the picture of the environment stands for it. `clear`:
+// what fog leaves of the layer, as it is displayed.
+SeenLayer seen_layer(SurfacePoint p, Material material, Footprint seen, bool mirrors, float clear) {
     Layer shown = run_stages(material, p, seen, mirrors ? SEEN_FOLLOWED : SEEN_LAST);
+    if (clear < 1.0) {
+        shown.lit *= clear;
+        shown.emission *= clear;
+        shown.haze *= clear;
+        shown.reflected *= clear;
+        shown.through = mix(vec3(1.0), shown.through, clear);
+    }
     Layer part = Layer(bounded_albedo(material, linear_part(shown.lit)), vec3(0.0), linear_part(shown.through), linear_part(shown.reflected), vec3(0.0));
     if (max_component(part.reflected) < MIN_REFLECTION) part.reflected = vec3(0.0);
     part.emission = linear_part(shown.emission + shown.haze);
-    return SeenLayer(part, max(shown.through, 0.0), part.lit * (shown_glow(material) + added_light(p)));
+    return SeenLayer(part, max(shown.through, 0.0), part.lit * (shown_glow(material) + added_light(p)), linear_part(vec3(clear)).x);
 }
 
 // Where the engine shows hardly any light and traced light falls, that would count for more than a display shows: in a

@@ -127,6 +127,7 @@ bool pass_dielectric(inout Path path, SurfacePoint p, Material material, SeenLay
     float eta = !liquid || enters ? dielectric.index : 1.0 / dielectric.index;
     float mirrored = fresnel(min(cosine, 1.0), eta);
     if (!liquid && (material.flags & MATERIAL_TWO_SIDED) == 0) mirrored = fresnel_pane(mirrored);
+    mirrored *= seen.clear;
     vec3 reflected = mirrored + (1.0 - mirrored) * layer.reflected;
     float rest = (1.0 - mirrored) * min(max_component(layer.lit + layer.emission + layer.through), 1.0);
     float weight;

@@ -4,7 +4,10 @@ use glam::Vec3;
 use q3bsp::{SurfaceKind, lightmap_index};
 use relight::RelitWorld;
 use relight::image::Image;
-use shaders::types::{self, Vertex, constants::NO_TEXTURE};
+use shaders::types::{
+    self, Vertex,
+    constants::{self as c, NO_TEXTURE},
+};
 
 use super::patch_lod::PatchLod;
 use super::visible::Tree;
@@ -169,7 +172,7 @@ impl WorldData {
             vertices,
             indices,
             models: brush_models(&relit),
-            fogs: relit.fogs.iter().map(fog).collect(),
+            fogs: fogs(&relit, &surfaces, materials),
             fog_materials,
             grid: relit.bsp.light_grid(),
             grid_points: super::grid::shifted_points(&relit.bsp, options.overbright_shift),
@@ -331,6 +334,23 @@ fn vertex(v: &relight::world::WorldVertex, options: &WorldOptions) -> Vertex {
         lightmap: v.lightmap,
         color: u32::from_le_bytes(color),
     }
+}
+
+/// The fog volumes. A surface of a volume that the engine draws, and that shows from both sides, veils what is seen from
+/// within.
+fn fogs(relit: &RelitWorld, surfaces: &[WorldSurface], materials: &Materials) -> Vec<types::Fog> {
+    let mut fogs: Vec<_> = relit.fogs.iter().map(fog).collect();
+    let veil = c::MATERIAL_FOG | c::MATERIAL_TWO_SIDED;
+    for surface in surfaces {
+        let volume = (surface.fog as usize).checked_sub(1);
+        let Some(fog) = volume.and_then(|volume| fogs.get_mut(volume)) else {
+            continue;
+        };
+        if fog.has_surface != 0 && materials.get(surface.material).flags & veil == veil {
+            fog.has_surface = c::FOG_SURFACE_DRAWN;
+        }
+    }
+    fogs
 }
 
 fn fog(fog: &relight::world::WorldFog) -> types::Fog {

@@ -72,6 +72,7 @@ pub const LIGHT_SPHERE: u32 = 2;
 pub const LIGHT_CHANGING_SPHERE: u32 = 3;
 pub const LIGHT_SUN: u32 = 4;
 pub const TRIANGLE_RANK_SHIFT: u32 = 8;
+pub const RANK_OPAQUE: u32 = 24;
 pub const TRIANGLE_PATHS_SHIFT: u32 = 16;
 pub const PATHS_ALL: u32 = 0;
 pub const PATHS_DIRECT: u32 = 1;

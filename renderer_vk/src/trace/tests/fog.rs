@@ -1,7 +1,8 @@
 //! Fog against closed forms.
 
 use glam::Vec3;
-use shaders::types::Fog;
+use shaders::trace_types::SkyRecord;
+use shaders::types::{Fog, constants as c};
 
 use super::harness::{Gpu, Scene, rectangle, reference, stage};
 use super::layers::{TRANSLUCENT, close, displayed, screen};
@@ -17,6 +18,7 @@ fn fog_is_lit_by_what_lights_each_place_of_it_with(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 1.0, 32);
     let black = scene.material(&[stage::constant([0.0; 3])], 0);
     scene.quad(screen(300.0), black);
+    scene.surfaces[0].fog = 1;
     let depth = 400.0;
     scene.fogs.push(Fog {
         mins: Vec3::new(100.0, -500.0, -500.0),
@@ -27,8 +29,8 @@ fn fog_is_lit_by_what_lights_each_place_of_it_with(gpu: &mut Gpu) {
         depth,
         own_light: Vec3::ZERO,
     });
-    // mixed as it is displayed: what is behind is black
-    let ambient = decode(Vec3::new(0.2, 0.4, 0.6) * (100.0f32 / depth).sqrt());
+    // mixed as it is displayed: what is behind is black; without a surface all the way counts, as in the engine
+    let ambient = decode(Vec3::new(0.2, 0.4, 0.6) * (300.0f32 / depth).sqrt());
     let (origin, radius, intensity) = (Vec3::new(130.0, 0.0, 30.0), 4.0f32, 9000.0f32);
     scene.points.push(relight::light::PointLight {
         origin,
@@ -43,8 +45,8 @@ fn fog_is_lit_by_what_lights_each_place_of_it_with(gpu: &mut Gpu) {
     let steps = 4000;
     let mut lit = 0.0;
     for i in 0..steps {
-        let root = (i as f32 + 0.5) / steps as f32 * (100.0 / depth).sqrt();
-        let place = Vec3::X * (100.0 + root * root * depth);
+        let root = (i as f32 + 0.5) / steps as f32;
+        let place = Vec3::X * (100.0 + root * root * 100.0);
         let squared = (origin - place).length_squared();
         let sine_squared = radius * radius / squared;
         let cosine = (1.0 - sine_squared).sqrt();
@@ -89,54 +91,139 @@ fn fog_is_lit_by_what_lights_each_place_of_it_with(gpu: &mut Gpu) {
     assert!(close(dark, ambient), "{dark} {ambient}");
 }
 
-#[test]
-fn fog_follows_the_way_through_its_volume() {
-    Gpu::each(fog_follows_the_way_through_its_volume_with);
+/// Fog from x = 100 to 200, below z = `top`.
+fn slab(has_surface: u32, top: f32) -> Fog {
+    Fog {
+        mins: Vec3::new(100.0, -500.0, -500.0),
+        maxs: Vec3::new(200.0, 500.0, top),
+        plane: [0.0, 0.0, -1.0, -top],
+        has_surface,
+        color: Vec3::from(TINT),
+        depth: 400.0,
+        own_light: Vec3::ZERO,
+    }
 }
 
-fn fog_follows_the_way_through_its_volume_with(gpu: &mut Gpu) {
+const TINT: [f32; 3] = [0.2, 0.4, 0.6];
+const BACK: [f32; 3] = [0.9, 0.5, 0.3];
+
+/// What is displayed behind fog by the engine's factor for a way of so many units in it.
+fn fogged(length: f32, shown: Vec3) -> Vec3 {
+    let factor = (length / 400.0).min(1.0).sqrt();
+    Vec3::from(TINT) * factor + shown * (1.0 - factor)
+}
+
+/// A wall at x = 300, seen straight on; it and the eye lie below the fog's surface.
+fn wall_behind_fog() -> Scene {
+    let eye = Vec3::new(0.0, 0.0, 50.0);
+    let mut scene = Scene::new(eye, eye + Vec3::X * 100.0, 1.0, 4);
+    let wall = scene.material(&[stage::constant(BACK)], 0);
+    scene.quad(screen(300.0), wall);
+    scene.fogs.push(slab(c::FOG_SURFACE, 250.0));
+    scene
+}
+
+#[track_caller]
+fn shows(gpu: &mut Gpu, scene: &Scene, displayed: Vec3) {
+    let (mean, exact) = (gpu.mean(scene, &reference(), 1), decode(displayed));
+    assert!(close(mean, exact), "{mean} {exact}");
+}
+
+#[test]
+fn fog_covers_surfaces_that_are_stored_with_it_alone() {
+    Gpu::each(fog_covers_surfaces_that_are_stored_with_it_alone_with);
+}
+
+fn fog_covers_surfaces_that_are_stored_with_it_alone_with(gpu: &mut Gpu) {
+    let back = displayed(BACK);
+    let mut scene = wall_behind_fog();
+    // what lies behind the volume but is stored without its fog
+    shows(gpu, &scene, back);
+    // stored with it, by the distance from an eye that is below the fog's surface, wherever the box is
+    scene.surfaces[0].fog = 1;
+    shows(gpu, &scene, fogged(300.0, back));
+    // an index without its fog
+    scene.surfaces[0].fog = 2;
+    shows(gpu, &scene, back);
+}
+
+#[test]
+fn fog_seen_from_above_counts_the_way_below_its_surface() {
+    Gpu::each(fog_seen_from_above_counts_the_way_below_its_surface_with);
+}
+
+fn fog_seen_from_above_counts_the_way_below_its_surface_with(gpu: &mut Gpu) {
+    // a floor at z = -100, straight below the eye: 180 of 300 units lie below the fog's surface at 80
+    let mut scene = Scene::new(Vec3::Z * 200.0, Vec3::X * 0.01, 1.0, 4);
+    let floor = scene.material(&[stage::constant(BACK)], 0);
+    let (x, y) = (Vec3::X * 400.0, Vec3::Y * 400.0);
+    scene.quad(rectangle(Vec3::new(-200.0, -200.0, -100.0), x, y), floor);
+    scene.surfaces[0].fog = 1;
+    scene.fogs.push(slab(c::FOG_SURFACE, 80.0));
+    shows(gpu, &scene, fogged(180.0, displayed(BACK)));
+    // a surface above the fog's
+    scene.fogs[0].plane[3] = 150.0;
+    shows(gpu, &scene, displayed(BACK));
+}
+
+#[test]
+fn fog_fades_layers_that_are_stored_with_it() {
+    Gpu::each(fog_fades_layers_that_are_stored_with_it_with);
+}
+
+fn fog_fades_layers_that_are_stored_with_it_with(gpu: &mut Gpu) {
+    let back = displayed(BACK);
+    let left = 1.0 - (125.0f32 / 400.0).sqrt();
+    let (veil, alpha) = ([0.1, 0.9, 0.1], 127.0 / 255.0);
+    for (layer, exact) in [
+        (
+            stage::blend(veil, 0.5),
+            displayed(veil) * (alpha * left) + back * (1.0 - alpha * left),
+        ),
+        (stage::add([0.1; 3]), displayed([0.1; 3]) * left + back),
+        // what multiplies the display is not faded
+        (stage::filter(veil), displayed(veil) * back),
+    ] {
+        let mut scene = wall_behind_fog();
+        let layer = scene.material(&[layer], TRANSLUCENT);
+        scene.quad(screen(125.0), layer);
+        scene.surfaces[1].fog = 1;
+        shows(gpu, &scene, exact);
+    }
+}
+
+#[test]
+fn skies_show_behind_fog_but_through_a_surface_that_is_drawn() {
+    Gpu::each(skies_show_behind_fog_but_through_a_surface_that_is_drawn_with);
+}
+
+fn skies_show_behind_fog_but_through_a_surface_that_is_drawn_with(gpu: &mut Gpu) {
+    // from within the fog, straight up: its surface is 60 units away, the sky above it
     let mut scene = Scene::new(
-        Vec3::new(0.0, 0.0, 50.0),
-        Vec3::new(100.0, 0.0, 50.0),
+        Vec3::new(150.0, 0.0, 20.0),
+        Vec3::new(150.0, 0.01, 500.0),
         1.0,
         4,
     );
-    let back = [0.9, 0.9, 0.9];
-    let wall = scene.material(&[stage::constant(back)], 0);
-    scene.quad(screen(300.0), wall);
-    // from x = 100 to 200, below z = 80
-    scene.fogs.push(Fog {
-        mins: Vec3::new(100.0, -500.0, -500.0),
-        maxs: Vec3::new(200.0, 500.0, 500.0),
-        plane: [0.0, 0.0, -1.0, -80.0],
-        has_surface: 1,
-        color: Vec3::new(0.2, 0.4, 0.6),
-        depth: 400.0,
-        own_light: Vec3::ZERO,
-    });
-    let fog_color = Vec3::new(0.2, 0.4, 0.6);
-    let back_shown = displayed(back);
-    // what is displayed of a wall behind so much of the fog
-    let behind = |length: f32, far: Vec3| {
-        let factor = (length / 400.0).min(1.0).sqrt();
-        fog_color * factor + far * (1.0 - factor)
+    let record = SkyRecord {
+        faces: [c::NO_TEXTURE; 6],
+        cloud_height: 512.0,
     };
-    let mean = gpu.mean(&scene, &reference(), 1);
-    assert!(close(mean, decode(behind(100.0, back_shown))), "{mean}");
-    // a layer in the middle: of the fog behind it the display shows what it leaves
-    let veil = [0.1, 0.9, 0.1];
-    let layer = scene.material(&[stage::blend(veil, 0.5)], TRANSLUCENT);
-    scene.quad(screen(125.0), layer);
-    let alpha = 127.0 / 255.0;
-    let (front, whole) = ((25.0f32 / 400.0).sqrt(), (100.0f32 / 400.0).sqrt());
-    let left = (1.0 - whole) / (1.0 - front);
-    let far = fog_color * (1.0 - left) + back_shown * left;
-    let exact = decode(behind(25.0, displayed(veil) * alpha + far * (1.0 - alpha)));
-    let mean = gpu.mean(&scene, &reference(), 1);
-    assert!(close(mean, exact), "{mean} {exact}");
-    // above its surface there is none
-    scene.surfaces.pop();
-    scene.def.view_origin.z = 100.0;
-    let mean = gpu.mean(&scene, &reference(), 1);
-    assert!(close(mean, decode(back_shown)), "{mean}");
+    let sky = scene.sky(&[stage::constant(BACK)], record);
+    scene.room(Vec3::splat(-300.0), Vec3::splat(300.0), sky);
+    for surface in &mut scene.surfaces {
+        surface.fog = 1;
+    }
+    scene.fogs.push(slab(c::FOG_SURFACE, 80.0));
+    let back = displayed(BACK);
+    shows(gpu, &scene, back);
+    scene.fogs[0].has_surface = c::FOG_SURFACE_DRAWN;
+    shows(gpu, &scene, fogged(60.0, back));
+    // from above the surface there is no veil, nor where the ray leaves the volume at its side
+    scene.def.view_origin.z = 200.0;
+    shows(gpu, &scene, back);
+    let forward = Vec3::new(2.0, 0.0, 1.0).normalize();
+    scene.def.view_axis = [forward, Vec3::Y, forward.cross(Vec3::Y)];
+    scene.def.view_origin.z = 20.0;
+    shows(gpu, &scene, back);
 }
