@@ -8,6 +8,7 @@ mod queries;
 mod registration;
 mod still;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::Vec3;
@@ -26,6 +27,8 @@ use crate::settings::Settings;
 use crate::stereo::Eye;
 use crate::targets::FrameTargets;
 use crate::trace::TraceLook;
+use crate::trace::input::Tracer;
+use crate::trace::pass_set::PassSet;
 use crate::world::{EntityTokens, Marker, World};
 
 use held::HeldViews;
@@ -72,6 +75,8 @@ pub struct Renderer {
     // dropped in this order: what the device owns comes before it
     still: StillRequest,
     trace: Option<TraceLook>,
+    /// Those of the traced look, once it was asked for.
+    trace_passes: Option<Arc<PassSet>>,
     world: Option<World>,
     scene: Scene,
     /// What `rt_pause` keeps on show.
@@ -168,6 +173,7 @@ impl Renderer {
         Ok(Self {
             still: StillRequest::default(),
             trace: None,
+            trace_passes: None,
             world: None,
             scene: Scene::default(),
             held: HeldViews::default(),
@@ -208,13 +214,12 @@ impl Renderer {
         self.device.descriptor_writes()
     }
 
-    /// How many pipelines for draws were compiled so far; what is registered and drawn as expected adds none.
+    /// How many pipelines of any kind were compiled so far; what is registered and drawn as expected adds none.
     pub fn compiled_pipelines(&self) -> u64 {
         self.device.compiled_pipelines()
     }
 
-    /// How many pipelines of any kind the driver holds; after a change of map, those that both maps need and the new
-    /// map's.
+    /// How many of them the driver holds: those of earlier maps alone are gone once the next is registered.
     pub fn live_pipelines(&self) -> u64 {
         self.device.live_pipelines()
     }
@@ -371,7 +376,11 @@ impl Renderer {
             && (world.light_by(self.settings.rt_lights, assets, self.calibrations.as_ref())
                 || self.trace.is_none())
         {
-            self.trace = Some(TraceLook::new(&self.device, world, assets, &self.settings)?);
+            let tracer = Tracer::of(self.device.info(), self.settings.rt_tracer);
+            let kept = self.trace_passes.take().filter(|p| p.tracer() == tracer);
+            let new = || Arc::new(PassSet::new(&self.device, tracer));
+            let passes = self.trace_passes.insert(kept.unwrap_or_else(new));
+            self.trace = Some(TraceLook::new(passes, world, assets)?);
         }
         Ok(self.trace.is_some())
     }

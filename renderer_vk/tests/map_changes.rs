@@ -3,16 +3,19 @@
 //! Without a device each test says so and passes, unless `RELIGHT_REQUIRE_GPU=1`.
 
 use std::fmt::Write as _;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::Vec3;
 use q3bsp::builder::MapBuilder;
 use relight::MemoryFiles;
 use renderer_vk::api::RefDef;
-use renderer_vk::{Renderer, RendererOptions, Settings};
+use renderer_vk::{MapLightChoice, Renderer, RendererOptions, Settings, TracerChoice};
 
 /// Materials of a map, each a room.
 const MATERIALS: usize = 4;
+
+/// The process's memory is that of all tests, so they take turns.
+static TURN: Mutex<()> = Mutex::new(());
 
 /// Factors of `blendFunc`, source and target.
 const SOURCES: [&str; 5] = [
@@ -87,7 +90,8 @@ fn files(number: usize) -> MemoryFiles {
 /// What is held once a map has been shown.
 #[derive(Clone, Copy, Debug)]
 struct Held {
-    /// Pipelines of any kind.
+    /// Pipelines of any kind: compiled so far, and held.
+    compiled: u64,
     pipelines: u64,
     /// Bytes of the device's memory in use, and taken from the driver.
     used: u64,
@@ -107,6 +111,7 @@ fn anonymous() -> u64 {
 /// Loads `count` maps one after the other, draws three frames of each, and says what was held then; `None`, with a
 /// printed line, without a device.
 fn changes(settings: &Settings, count: usize) -> Option<Vec<Held>> {
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let options = RendererOptions {
         validation: true,
         ..RendererOptions::headless(64, 48)
@@ -144,6 +149,7 @@ fn changes(settings: &Settings, count: usize) -> Option<Vec<Held>> {
         }
         let costs = renderer.costs();
         held.push(Held {
+            compiled: renderer.compiled_pipelines(),
             pipelines: renderer.live_pipelines(),
             used: costs.memory.iter().map(|(_, bytes)| bytes).sum(),
             reserved: costs.reserved,
@@ -186,10 +192,33 @@ fn assert_flat(held: &[Held], warm: usize, growth: u64) {
 }
 
 #[test]
-fn sixty_maps_in_the_classic_look_hold_no_more_than_ten() {
+fn classic_maps_hold_no_more_after_sixty_than_after_a_few() {
     let Some(held) = changes(&Settings::default(), 60) else {
         return;
     };
     // a driver's pipeline for draws takes 3 MB of Mesa's software driver: kept ones make it 300 MB
     assert_flat(&held, 3, 40);
+}
+
+#[test]
+fn traced_maps_share_the_passes() {
+    let settings = Settings {
+        rt: true,
+        rt_tracer: TracerChoice::Compute,
+        rt_lights: MapLightChoice::Prior,
+        ..Settings::default()
+    };
+    let Some(held) = changes(&settings, 15) else {
+        return;
+    };
+    assert_flat(&held, 3, 40);
+    // what a map's materials need, and none of the passes, which are 35 for the first map
+    for (number, maps) in held.windows(2).enumerate() {
+        let compiled = maps[1].compiled - maps[0].compiled;
+        let number = number + 1;
+        assert!(
+            compiled <= 2 * MATERIALS as u64,
+            "map {number} compiled {compiled} pipelines"
+        );
+    }
 }

@@ -73,9 +73,9 @@ pub(crate) struct DeviceInner {
     pub render_passes: Mutex<HashMap<RenderPassKey, vk::RenderPass>>,
     pub pipeline_cache: vk::PipelineCache,
     pub shared_pipelines: Shared,
-    /// Pipelines for draws compiled so far.
+    /// Pipelines of any kind compiled so far.
     pub compiled: AtomicU64,
-    /// Pipelines of any kind that were made and not yet destroyed.
+    /// Those of them that are not yet destroyed.
     pub live_pipelines: AtomicU64,
     pub timeline: vk::Semaphore,
     pub timings: Mutex<Vec<(String, f32)>>,
@@ -246,12 +246,12 @@ impl Device {
         self.0.bindless.writes.load(Ordering::Relaxed)
     }
 
-    /// How many pipelines for draws were compiled so far.
+    /// How many pipelines of any kind were compiled so far.
     pub fn compiled_pipelines(&self) -> u64 {
         self.0.compiled.load(Ordering::Relaxed)
     }
 
-    /// How many pipelines of any kind the driver holds: made, and not yet destroyed.
+    /// How many of them the driver holds.
     pub fn live_pipelines(&self) -> u64 {
         self.0.live_pipelines.load(Ordering::Relaxed)
     }

@@ -84,6 +84,7 @@ pub(crate) struct Pipeline {
 impl Pipeline {
     pub fn own(device: &Device, raw: vk::Pipeline, name: &str) -> Self {
         device.0.name(raw, name);
+        device.0.compiled.fetch_add(1, Ordering::Relaxed);
         device.0.live_pipelines.fetch_add(1, Ordering::Relaxed);
         Self {
             device: device.clone(),
@@ -195,7 +196,6 @@ impl GraphicsPipeline {
                 device: device.0.info.name.clone(),
             });
         }
-        device.0.compiled.fetch_add(1, Ordering::Relaxed);
         let constants = Constants::new(desc.constants);
         let constants = constants.info();
         let vertex = Module::new(device, desc.vertex)?;

@@ -60,10 +60,28 @@ pub fn traced_size(settings: &Settings, output: [u32; 2]) -> [u32; 2] {
     output.map(|side| ((side as f32 * scale).round() as u32).clamp(1, side.max(1)))
 }
 
-/// Resolves traced pictures to those of the window.
-pub struct Antialias {
+/// The two passes.
+pub struct AntialiasPasses {
     resolve: ComputePipeline,
     upscale: ComputePipeline,
+}
+
+impl AntialiasPasses {
+    /// Compiles the pipelines.
+    ///
+    /// # Errors
+    /// The driver refuses a pipeline.
+    pub fn new(device: &Device) -> Result<Self, Error> {
+        let pipeline = |name, spirv| ComputePipeline::new(device, name, spirv, &[]);
+        Ok(Self {
+            resolve: pipeline("trace_antialias", &shaders::TRACE_ANTIALIAS_COMP)?,
+            upscale: pipeline("trace_upscale", &shaders::TRACE_UPSCALE_COMP)?,
+        })
+    }
+}
+
+/// Resolves traced pictures to those of the window.
+pub struct Antialias {
     sampler: u32,
     /// This frame's and the last one's, while they are asked for.
     resolved: Option<[Image; 2]>,
@@ -74,15 +92,12 @@ pub struct Antialias {
 }
 
 impl Antialias {
-    /// Compiles the pipelines.
+    /// No picture is kept yet.
     ///
     /// # Errors
-    /// The driver refuses a pipeline.
+    /// The device has no room for the sampler.
     pub fn new(device: &Device) -> Result<Self, Error> {
-        let pipeline = |name, spirv| ComputePipeline::new(device, name, spirv, &[]);
         Ok(Self {
-            resolve: pipeline("trace_antialias", &shaders::TRACE_ANTIALIAS_COMP)?,
-            upscale: pipeline("trace_upscale", &shaders::TRACE_UPSCALE_COMP)?,
             sampler: device.sampler(&SamplerDesc {
                 filter: Filter::Linear,
                 mip: MipFilter::None,
@@ -172,11 +187,16 @@ impl Antialias {
     ///
     /// # Errors
     /// Out of memory.
-    pub fn record(&mut self, rec: &mut Recorder, view: u64) -> Result<(), Error> {
+    pub fn record(
+        &self,
+        passes: &AntialiasPasses,
+        rec: &mut Recorder,
+        view: u64,
+    ) -> Result<(), Error> {
         let (pipeline, name, group) = match self.method {
             Method::Plain => return Ok(()),
-            Method::Temporal => (&self.resolve, "trace_antialias", RESOLVE_GROUP),
-            Method::Upscale => (&self.upscale, "trace_upscale", UPSCALE_GROUP),
+            Method::Temporal => (&passes.resolve, "trace_antialias", RESOLVE_GROUP),
+            Method::Upscale => (&passes.upscale, "trace_upscale", UPSCALE_GROUP),
         };
         let Some([now, _]) = &self.resolved else {
             return Ok(());

@@ -1,5 +1,6 @@
 //! Bloom: a part of the light spread around where it comes from; `shaders/trace/bloom.glsl` says how.
 
+use super::pass_set::PassSet;
 use super::passes::{TILE, dispatch};
 use crate::gpu::{
     Buffer, BufferDesc, BufferUsage, ComputePipeline, Device, Error, Memory, Recorder,
@@ -12,10 +13,29 @@ const FIRST: u32 = 4;
 /// Pixels to the edge of what a group of the first pass averages.
 const GROUP: u32 = 64;
 
+/// The two passes.
+pub struct BloomPasses {
+    down: ComputePipeline,
+    up: ComputePipeline,
+}
+
+impl BloomPasses {
+    /// Compiles the pipelines.
+    ///
+    /// # Errors
+    /// The driver refuses a pipeline.
+    pub fn new(device: &Device) -> Result<Self, Error> {
+        let make = |shader| ComputePipeline::new(device, "trace_bloom", shader, &[]);
+        Ok(Self {
+            down: make(&shaders::TRACE_BLOOM_DOWN_COMP)?,
+            up: make(&shaders::TRACE_BLOOM_UP_COMP)?,
+        })
+    }
+}
+
 /// Reads `hdr`; writes the spread light, a texel for each 4 x 4 pixels. Nothing is made before it is first asked for.
 #[derive(Default)]
 pub struct Bloom {
-    pipelines: Option<[ComputePipeline; 2]>,
     /// With the size of the picture that it is for.
     texels: Option<([u32; 2], Buffer)>,
 }
@@ -24,7 +44,7 @@ impl Bloom {
     /// Address of the texels for a picture of a size; 0 with a strength of 0, which frees them.
     ///
     /// # Errors
-    /// The driver refuses a pipeline; out of memory.
+    /// Out of memory.
     pub fn prepare(
         &mut self,
         device: &Device,
@@ -34,13 +54,6 @@ impl Bloom {
         self.texels = (self.texels.take()).filter(|(of, _)| strength > 0.0 && *of == size);
         if strength <= 0.0 {
             return Ok(0);
-        }
-        if self.pipelines.is_none() {
-            let make = |name, shader| ComputePipeline::new(device, name, shader, &[]);
-            self.pipelines = Some([
-                make("trace_bloom", &shaders::TRACE_BLOOM_DOWN_COMP)?,
-                make("trace_bloom", &shaders::TRACE_BLOOM_UP_COMP)?,
-            ]);
         }
         let texels = match &self.texels {
             Some((_, texels)) => texels,
@@ -60,11 +73,12 @@ impl Bloom {
     /// Records the passes, once [`prepare`](Self::prepare) gave an address. `view`: device address of the `TraceView`.
     ///
     /// # Errors
-    /// Out of memory.
-    pub fn record(&self, rec: &mut Recorder, view: u64) -> Result<(), Error> {
-        let (Some([down, up]), Some((size, _))) = (&self.pipelines, &self.texels) else {
+    /// Out of memory, or the driver refuses a pipeline.
+    pub fn record(&self, passes: &PassSet, rec: &mut Recorder, view: u64) -> Result<(), Error> {
+        let Some((size, _)) = &self.texels else {
             return Ok(());
         };
+        let BloomPasses { down, up } = passes.get(&passes.bloom)?;
         dispatch(rec, "trace_bloom", down, view, *size, [GROUP; 2])?;
         dispatch(rec, "trace_bloom", up, view, *size, [TILE * FIRST; 2])
     }

@@ -18,31 +18,25 @@ pub const DEBUG_VIEWS: [&str; 11] = [
     "reflections",
 ];
 
-/// Reads the G-buffer and what the passes count; writes the view's rectangle of the target. Its pipeline is compiled
-/// when it is first asked for.
-#[derive(Default)]
-pub struct DebugView(Option<ComputePipeline>);
+/// Reads the G-buffer and what the passes count; writes the view's rectangle of the target.
+pub struct DebugView(ComputePipeline);
 
 impl DebugView {
+    /// Compiles the pipeline.
+    ///
+    /// # Errors
+    /// The driver refuses the pipeline.
+    pub fn new(device: &Device) -> Result<Self, Error> {
+        let shader = &shaders::TRACE_DEBUG_COMP;
+        let pipeline = ComputePipeline::new(device, "trace_debug", shader, &[])?;
+        Ok(Self(pipeline))
+    }
+
     /// Records the pass. `view`: device address of the `TraceView`; `size`: its pixels.
     ///
     /// # Errors
-    /// The driver refuses the pipeline; out of memory.
-    pub fn record(
-        &mut self,
-        device: &Device,
-        rec: &mut Recorder,
-        view: u64,
-        size: [u32; 2],
-    ) -> Result<(), Error> {
-        let pipeline = match &self.0 {
-            Some(pipeline) => pipeline,
-            None => {
-                let shader = &shaders::TRACE_DEBUG_COMP;
-                self.0
-                    .insert(ComputePipeline::new(device, "trace_debug", shader, &[])?)
-            }
-        };
-        dispatch(rec, "trace_debug", pipeline, view, size, [TILE; 2])
+    /// Out of memory.
+    pub fn record(&self, rec: &mut Recorder, view: u64, size: [u32; 2]) -> Result<(), Error> {
+        dispatch(rec, "trace_debug", &self.0, view, size, [TILE; 2])
     }
 }

@@ -122,9 +122,8 @@ struct Step {
     padding: u32,
 }
 
-/// The denoiser with its images.
-pub struct Denoiser {
-    device: Device,
+/// The passes of both filters.
+pub struct DenoisePasses {
     carry: ComputePipeline,
     gradient_sample: ComputePipeline,
     gradient: ComputePipeline,
@@ -135,16 +134,9 @@ pub struct Denoiser {
     wavelet: [[ComputePipeline; 3]; 2],
     sparse_temporal: ComputePipeline,
     sparse: [ComputePipeline; 3],
-    images: Option<Images>,
-    /// Stands for every image that is not there: software drivers look at the images of branches that are not taken.
-    nothing: Image,
-    /// The images hold the light of the last frame.
-    history: bool,
-    /// Off: history keeps its weight whatever the light does, as in the filter that this one came from. For comparison.
-    pub gradients: bool,
 }
 
-impl Denoiser {
+impl DenoisePasses {
     /// Compiles the pipelines.
     ///
     /// # Errors
@@ -172,7 +164,6 @@ impl Denoiser {
             ComputePipeline::new(device, "trace_sparse", code, &[(0, last)])
         };
         Ok(Self {
-            device: device.clone(),
             carry: compute("trace_carry", &shaders::TRACE_CARRY_COMP)?,
             gradient_sample: compute(
                 "trace_gradient_sample",
@@ -187,6 +178,30 @@ impl Denoiser {
                 &shaders::TRACE_SCATTER_TEMPORAL_COMP,
             )?,
             sparse: [sparse(0)?, sparse(0)?, sparse(1)?],
+        })
+    }
+}
+
+/// The denoiser's images.
+pub struct Denoiser {
+    device: Device,
+    images: Option<Images>,
+    /// Stands for every image that is not there: software drivers look at the images of branches that are not taken.
+    nothing: Image,
+    /// The images hold the light of the last frame.
+    history: bool,
+    /// Off: history keeps its weight whatever the light does, as in the filter that this one came from. For comparison.
+    pub gradients: bool,
+}
+
+impl Denoiser {
+    /// Without images until they are asked for.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn new(device: &Device) -> Result<Self, Error> {
+        Ok(Self {
+            device: device.clone(),
             images: None,
             nothing: make(device, "trace no light", [1, 1], Format::Rgba32Uint)?,
             history: false,
@@ -283,11 +298,16 @@ impl Denoiser {
     ///
     /// # Errors
     /// Out of memory.
-    pub fn choose_gradient_samples(&self, rec: &mut Recorder, view: u64) -> Result<(), Error> {
+    pub fn choose_gradient_samples(
+        &self,
+        passes: &DenoisePasses,
+        rec: &mut Recorder,
+        view: u64,
+    ) -> Result<(), Error> {
         match self.carries() {
             Some(images) => {
                 let strata = images.size.map(|s| s.div_ceil(STRATUM));
-                dispatch(rec, "trace_carry", &self.carry, view, strata, [TILE; 2])
+                dispatch(rec, "trace_carry", &passes.carry, view, strata, [TILE; 2])
             }
             None => Ok(()),
         }
@@ -301,6 +321,7 @@ impl Denoiser {
     /// Out of memory.
     pub fn filter(
         &self,
+        passes: &DenoisePasses,
         rec: &mut Recorder,
         view: u64,
         fresh: &Buffer,
@@ -313,27 +334,27 @@ impl Denoiser {
         if self.carries().is_some() {
             let strata = size.map(|s| s.div_ceil(STRATUM));
             let name = "trace_gradient_sample";
-            dispatch(rec, name, &self.gradient_sample, view, strata, [TILE; 2])?;
+            dispatch(rec, name, &passes.gradient_sample, view, strata, [TILE; 2])?;
             let name = "trace_gradient";
-            dispatch(rec, name, &self.gradient, view, strata, GRADIENT_TILE)?;
+            dispatch(rec, name, &passes.gradient, view, strata, GRADIENT_TILE)?;
             let name = "trace_gradient_wide";
-            dispatch(rec, name, &self.gradient_wide, view, strata, [TILE; 2])?;
+            dispatch(rec, name, &passes.gradient_wide, view, strata, [TILE; 2])?;
         }
         match images.tier {
             Tier::Adaptive => {
                 let tile = [TILE; 2];
-                let temporal = &self.temporal[usize::from(bounces)];
+                let temporal = &passes.temporal[usize::from(bounces)];
                 dispatch(rec, "trace_temporal", temporal, view, size, tile)?;
-                let wavelet = &self.wavelet[usize::from(bounces)];
+                let wavelet = &passes.wavelet[usize::from(bounces)];
                 steps(rec, "trace_wavelet", wavelet, view, images, fresh, WAVELET)
             }
             Tier::Sparse => {
                 let name = "trace_sparse_temporal";
-                dispatch(rec, name, &self.sparse_temporal, view, size, [TILE; 2])?;
+                dispatch(rec, name, &passes.sparse_temporal, view, size, [TILE; 2])?;
                 steps(
                     rec,
                     "trace_sparse",
-                    &self.sparse,
+                    &passes.sparse,
                     view,
                     images,
                     fresh,

@@ -9,6 +9,7 @@ use shaders::trace_types::FogView;
 use shaders::trace_types::constants as t;
 
 use super::input::Tracer;
+use super::pass_set::PassSet;
 use super::passes::{FogLight, TILE};
 use crate::gpu::{
     Access, ComputePipeline, Device, Error, Format, Image, ImageDesc, ImageUsage, Recorder,
@@ -67,13 +68,18 @@ impl Images {
     }
 }
 
-struct Passes {
+/// The two passes.
+pub struct FogPasses {
     light: FogLight,
     filter: ComputePipeline,
 }
 
-impl Passes {
-    fn new(device: &Device, tracer: Tracer) -> Result<Self, Error> {
+impl FogPasses {
+    /// Compiles the pipelines.
+    ///
+    /// # Errors
+    /// The driver refuses a pipeline.
+    pub fn new(device: &Device, tracer: Tracer) -> Result<Self, Error> {
         let (name, code) = ("trace_fog_filter", &shaders::TRACE_FOG_FILTER_COMP);
         Ok(Self {
             light: FogLight::new(device, tracer)?,
@@ -85,8 +91,6 @@ impl Passes {
 /// Lights fog; nothing is held while there is none.
 pub struct LitFog {
     device: Device,
-    tracer: Tracer,
-    passes: Option<Passes>,
     images: Option<Images>,
     /// The images hold the light of the last frame.
     history: bool,
@@ -95,23 +99,14 @@ pub struct LitFog {
 }
 
 impl LitFog {
-    /// Compiles the pipelines if there is fog (`has_fog`); else when it comes into sight, as images are made then.
-    ///
-    /// # Errors
-    /// The driver refuses a pipeline.
-    pub fn new(device: &Device, tracer: Tracer, has_fog: bool) -> Result<Self, Error> {
-        Ok(Self {
+    /// Without images until fog comes into sight.
+    pub fn new(device: &Device) -> Self {
+        Self {
             device: device.clone(),
-            tracer,
-            passes: if has_fog {
-                Some(Passes::new(device, tracer)?)
-            } else {
-                None
-            },
             images: None,
             history: false,
             unseen: 0,
-        })
+        }
     }
 
     /// To be called before a frame's parameters are gathered. `wanted`: the view has fog that is lit; `filtered`: its
@@ -119,7 +114,7 @@ impl LitFog {
     /// drawn, whose camera is known.
     ///
     /// # Errors
-    /// Out of memory, or the driver refuses a pipeline.
+    /// Out of memory.
     pub fn prepare(
         &mut self,
         wanted: bool,
@@ -142,9 +137,6 @@ impl LitFog {
             }
         }
         self.history &= goes_on && fits && wanted;
-        if wanted && self.passes.is_none() {
-            self.passes = Some(Passes::new(&self.device, self.tracer)?);
-        }
         Ok(())
     }
 
@@ -195,11 +187,12 @@ impl LitFog {
     /// the `TraceView`.
     ///
     /// # Errors
-    /// Out of memory.
-    pub fn record(&self, rec: &mut Recorder, view: u64) -> Result<(), Error> {
-        let (Some(images), Some(passes)) = (self.seen(), &self.passes) else {
+    /// Out of memory, or the driver refuses a pipeline.
+    pub fn record(&self, passes: &PassSet, rec: &mut Recorder, view: u64) -> Result<(), Error> {
+        let Some(images) = self.seen() else {
             return Ok(());
         };
+        let passes = passes.get(&passes.fog)?;
         passes.light.record(rec, view, images.cells)?;
         let Some(filtered) = &images.filtered else {
             return Ok(());

@@ -1,6 +1,7 @@
 //! The traced look of a loaded map: what the loaders made, as the tracer takes it.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
 
 use glam::Vec2;
 use shaders::trace_types::SkyRecord;
@@ -14,6 +15,7 @@ use super::fog_light;
 use super::geometry::StaticGeometry;
 use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use super::lights::{MapLightSource, MapLights};
+use super::pass_set::PassSet;
 use super::surroundings::Surroundings;
 use super::view_tracer::{TracedMap, ViewTracer};
 use relight::exposure::display_exposure;
@@ -118,7 +120,7 @@ pub struct TraceLook {
     pub(super) tracer: ViewTracer,
     /// Draws for the right eye, while there are two: what is kept from frame to frame is each eye's own.
     right: Option<Box<ViewTracer>>,
-    kind: Tracer,
+    passes: Arc<PassSet>,
     geometry: StaticGeometry,
     /// The map's, with the light in them.
     fogs: Vec<Fog>,
@@ -128,16 +130,11 @@ pub struct TraceLook {
 }
 
 impl TraceLook {
-    /// Compiles the passes and builds the map's acceleration structures and light lists.
+    /// Compiles what the passes lack and builds the map's acceleration structures and light lists.
     ///
     /// # Errors
     /// The device is out of memory or lost.
-    pub fn new(
-        device: &Device,
-        world: &World,
-        assets: &Assets,
-        settings: &Settings,
-    ) -> Result<Self, Error> {
+    pub fn new(passes: &Arc<PassSet>, world: &World, assets: &Assets) -> Result<Self, Error> {
         let relit = &world.data.relit;
         let model_origins: Vec<_> = relit.models.iter().map(|m| m.origin).collect();
         let flickers: Vec<_> = relit.lights.iter().map(|l| relit.flicker_of(l)).collect();
@@ -154,9 +151,9 @@ impl TraceLook {
             bsp: Some(&relit.bsp),
             occlusion: Some(&occlusion),
         };
-        let tracer = Tracer::of(device.info(), settings.rt_tracer);
-        let has_fog = !relit.bsp.fogs.is_empty();
-        let mut view_tracer = ViewTracer::new(device, tracer, has_fog)?;
+        passes.compile_ahead(!relit.bsp.fogs.is_empty())?;
+        let (device, tracer) = (passes.device(), passes.tracer());
+        let mut view_tracer = ViewTracer::new(passes)?;
         let exposure = display_exposure(relit);
         view_tracer.map_exposure = exposure;
         let fogs = fog_light::lit(&world.data.fogs, &source);
@@ -167,7 +164,7 @@ impl TraceLook {
         Ok(Self {
             tracer: view_tracer,
             right: None,
-            kind: tracer,
+            passes: Arc::clone(passes),
             geometry,
             fogs,
             lights,
@@ -195,7 +192,7 @@ impl TraceLook {
         let remapping = remapping(&assets.materials);
         if remapping != self.remapping {
             // triangles name their materials; this happens when a game changes a flag's or button's look
-            self.geometry = geometry(rec.device(), self.kind, world, &self.fogs, assets)?;
+            self.geometry = geometry(rec.device(), self.tracer(), world, &self.fogs, assets)?;
             self.remapping = remapping;
         }
         let map = TracedMap {
@@ -208,8 +205,7 @@ impl TraceLook {
             match &mut self.right {
                 Some(made) => made,
                 none => {
-                    let has_fog = !world.data.relit.bsp.fogs.is_empty();
-                    let mut made = ViewTracer::new(rec.device(), self.kind, has_fog)?;
+                    let mut made = ViewTracer::new(&self.passes)?;
                     made.map_exposure = self.tracer.map_exposure;
                     none.insert(Box::new(made))
                 }
@@ -248,7 +244,12 @@ impl TraceLook {
 
     /// What follows rays.
     pub fn tracer(&self) -> Tracer {
-        self.kind
+        self.passes.tracer()
+    }
+
+    /// The passes.
+    pub(super) fn passes(&self) -> &Arc<PassSet> {
+        &self.passes
     }
 
     /// Counts rays from the next view on, or no longer.

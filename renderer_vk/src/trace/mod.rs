@@ -38,6 +38,7 @@ pub mod look;
 pub mod motion;
 mod part_mesh;
 mod parts;
+pub mod pass_set;
 pub mod passes;
 mod shapes;
 pub mod still;

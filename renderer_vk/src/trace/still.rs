@@ -29,7 +29,7 @@ impl Still {
         size: [u32; 2],
         samples: u32,
     ) -> Result<Self, Error> {
-        let mut tracer = ViewTracer::new(device, look.tracer(), false)?;
+        let mut tracer = ViewTracer::new(look.passes())?;
         tracer.map_exposure = look.tracer.map_exposure;
         let [width, height] = size;
         let usage = ImageUsage::STORAGE | ImageUsage::COLOR;

@@ -3,6 +3,8 @@
 mod content;
 mod parameters;
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use shaders::trace_types::constants as t;
 use shaders::trace_types::{AntialiasView, PortalRecord, PostView};
@@ -11,20 +13,16 @@ use super::accel::Accel;
 use super::antialias::{Antialias, traced_size};
 use super::bloom::Bloom;
 use super::counters::{COUNTED, RayCounters};
-use super::debug::DebugView;
 use super::denoise::Denoiser;
 use super::fog::LitFog;
 use super::geometry::StaticGeometry;
-use super::indirect::IndirectLight;
-use super::input::{MaterialTable, Tracer};
+use super::indirect;
+use super::input::MaterialTable;
 use super::lights::MapLights;
 use super::motion::Motion;
-use super::passes::{
-    Choose, Composite, Direct, Exposure, EyeRays, FlareRays, OtherSide, PlainPrimary, Primary,
-    ToneMap,
-};
+use super::pass_set::PassSet;
+use super::passes::Exposure;
 use super::targets::Targets;
-use crate::at_once::{Late, Make, make_all};
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::ViewScene;
@@ -48,30 +46,12 @@ pub struct TracedMap<'a> {
 pub struct ViewTracer {
     pub(super) device: Device,
     pub(super) accel: Accel,
-    eye_rays: EyeRays,
-    primary: (PlainPrimary, Primary),
-    /// The same with lit fog, made when there is some.
-    fog_primary: Option<(PlainPrimary, Primary)>,
-    other_side: OtherSide,
+    passes: Arc<PassSet>,
     fog: LitFog,
-    choose: Choose,
-    /// Of one chosen light a pixel.
-    chosen_direct: Direct,
-    suns: Direct,
-    /// Of any number of lights, made when it is asked for.
-    direct: Option<Direct>,
-    indirect: IndirectLight,
-    /// Made when a view has flares.
-    flare_rays: Option<FlareRays>,
-    tracer: Tracer,
     pub(super) denoiser: Denoiser,
-    composite: Composite,
     antialias: Antialias,
-    exposure: Exposure,
-    tone_map: ToneMap,
     motion: Motion,
     bloom: Bloom,
-    debug: DebugView,
     counters: RayCounters,
     /// Channels of the target that are written: 1 red, 2 green, 4 blue.
     pub(super) channels: u32,
@@ -97,78 +77,21 @@ const LIGHT_ADAPTATION: f32 = 0.1;
 const DARK_ADAPTATION: f32 = 0.4;
 
 impl ViewTracer {
-    /// Compiles the pipelines and makes what stays from frame to frame. `has_fog`: the map has some; where this is not
-    /// known, its pipelines are made when it comes into sight.
+    /// Makes what stays from frame to frame.
     ///
     /// # Errors
-    /// The device refuses a pipeline, or is out of memory.
-    pub fn new(device: &Device, tracer: Tracer, has_fog: bool) -> Result<Self, Error> {
-        // drivers compile for a long time where they have not done it before
-        let eye_rays = Late::new(|| EyeRays::new(device, tracer));
-        let plain = Late::new(|| PlainPrimary::new(device));
-        let primary = Late::new(|| Primary::new(device, tracer));
-        let other_side = Late::new(|| OtherSide::new(device, tracer));
-        let choose = Late::new(|| Choose::new(device));
-        let chosen_direct = Late::new(|| Direct::of_chosen(device, tracer));
-        let suns = Late::new(|| Direct::of_suns(device, tracer));
-        let fog_plain = Late::new(|| PlainPrimary::with_lit_fog(device));
-        let fog_primary = Late::new(|| Primary::with_lit_fog(device, tracer));
-        let fog = Late::new(|| LitFog::new(device, tracer, has_fog));
-        let indirect = Late::new(|| IndirectLight::new(device, tracer, has_fog));
-        let denoiser = Late::new(|| Denoiser::new(device));
-        let composite = Late::new(|| Composite::new(device));
-        let antialias = Late::new(|| Antialias::new(device));
-        let exposure = Late::new(|| Exposure::new(device));
-        let tone_map = Late::new(|| ToneMap::new(device));
-        // those that take longest first
-        let mut things: Vec<&dyn Make> = Vec::new();
-        if has_fog {
-            things.extend([&fog_primary as &dyn Make, &fog_plain]);
-        }
-        things.extend([
-            &primary as &dyn Make,
-            &other_side,
-            &indirect,
-            &denoiser,
-            &plain,
-            &fog,
-            &chosen_direct,
-            &suns,
-            &eye_rays,
-            &choose,
-            &antialias,
-            &composite,
-            &exposure,
-            &tone_map,
-        ]);
-        make_all(&things);
+    /// The device is out of memory.
+    pub fn new(passes: &Arc<PassSet>) -> Result<Self, Error> {
+        let device = passes.device();
         Ok(Self {
             device: device.clone(),
-            accel: Accel::new(device, tracer),
-            eye_rays: eye_rays.take()?,
-            primary: (plain.take()?, primary.take()?),
-            fog_primary: if has_fog {
-                Some((fog_plain.take()?, fog_primary.take()?))
-            } else {
-                None
-            },
-            other_side: other_side.take()?,
-            fog: fog.take()?,
-            choose: choose.take()?,
-            chosen_direct: chosen_direct.take()?,
-            suns: suns.take()?,
-            direct: None,
-            indirect: indirect.take()?,
-            flare_rays: None,
-            tracer,
-            denoiser: denoiser.take()?,
-            composite: composite.take()?,
-            antialias: antialias.take()?,
-            exposure: exposure.take()?,
-            tone_map: tone_map.take()?,
+            passes: Arc::clone(passes),
+            accel: Accel::new(device, passes.tracer()),
+            fog: LitFog::new(device),
+            denoiser: Denoiser::new(device)?,
+            antialias: Antialias::new(device)?,
             motion: Motion::default(),
             bloom: Bloom::default(),
-            debug: DebugView::default(),
             counters: RayCounters::default(),
             channels: 7,
             count_rays: false,
@@ -273,12 +196,6 @@ impl ViewTracer {
         let goes_on = self.history.is_some();
         self.fog
             .prepare(has_fog && is_lit(settings), denoiser > 0, size, goes_on)?;
-        if self.fog.is_on() && self.fog_primary.is_none() {
-            self.fog_primary = Some((
-                PlainPrimary::with_lit_fog(&self.device)?,
-                Primary::with_lit_fog(&self.device, self.tracer)?,
-            ));
-        }
         let accumulated = self.accumulated_before(view, materials, settings);
         let accel = self
             .accel
@@ -329,59 +246,60 @@ impl ViewTracer {
         if let Some(targets) = &mut self.targets {
             targets.indirect_is_black &= settings.rt_bounces == 0;
         }
-        self.eye_rays.record(rec, address, size)?;
-        let fog_primary = self.fog_primary.as_ref().filter(|_| self.fog.is_on());
-        let (plain, primary) = fog_primary.unwrap_or(&self.primary);
-        plain.record(rec, address, size)?;
-        primary.record(rec, address, size)?;
+        let set = &*self.passes;
+        set.get(&set.eye_rays)?.record(rec, address, size)?;
+        let fog = usize::from(self.fog.is_on());
+        set.get(&set.plain[fog])?.record(rec, address, size)?;
+        set.get(&set.primary[fog])?.record(rec, address, size)?;
         if !settings.rt_accumulate {
-            self.other_side.record(rec, address, size)?;
+            set.get(&set.other_side)?.record(rec, address, size)?;
         }
         if params.flare_count > 0 {
-            let flare_rays = match &mut self.flare_rays {
-                Some(made) => made,
-                none => none.insert(FlareRays::new(&self.device, self.tracer)?),
-            };
+            let flare_rays = set.get(&set.flare_rays)?;
             flare_rays.record(rec, address, [params.flare_count, 1])?;
         }
-        self.denoiser.choose_gradient_samples(rec, address)?;
+        let denoise = set.get(&set.denoise)?;
+        self.denoiser
+            .choose_gradient_samples(denoise, rec, address)?;
         if is_lit(settings)
             && params.lights.selection == t::SELECT_RESAMPLED
             && params.lights.samples == 1
         {
-            self.choose.record(rec, address, size)?;
-            self.chosen_direct
-                .record_chosen(rec, "trace_direct", address, size)?;
+            set.get(&set.choose)?.record(rec, address, size)?;
+            let chosen = set.get(&set.chosen_direct)?;
+            chosen.record_chosen(rec, "trace_direct", address, size)?;
             if params.lights.sun_count > 0 {
-                self.suns.record_chosen(rec, "trace_suns", address, size)?;
+                let suns = set.get(&set.suns)?;
+                suns.record_chosen(rec, "trace_suns", address, size)?;
             }
         } else {
-            let direct = match &mut self.direct {
-                Some(made) => made,
-                none => none.insert(Direct::new(&self.device, self.tracer)?),
-            };
-            direct.record(rec, address, size)?;
+            set.get(&set.direct)?.record(rec, address, size)?;
         }
         if settings.rt_bounces == 0 {
-            self.darken_indirect(rec)?;
+            darken_indirect(&mut self.targets, rec)?;
         } else {
             let has_fog = params.fog_count > 0;
-            self.indirect
-                .record(rec, address, size, settings, has_fog)?;
+            indirect::record(set, rec, address, size, settings, has_fog)?;
         }
-        self.fog.record(rec, address)?;
+        self.fog.record(set, rec, address)?;
         self.counters.end(rec)?;
         if let Some(targets) = &self.targets {
-            self.denoiser
-                .filter(rec, address, &targets.texels, settings.rt_bounces > 0)?;
+            self.denoiser.filter(
+                denoise,
+                rec,
+                address,
+                &targets.texels,
+                settings.rt_bounces > 0,
+            )?;
         }
-        self.composite.record(rec, address, size)?;
-        self.antialias.record(rec, address)?;
-        self.exposure.record(rec, address, output)?;
-        self.bloom.record(rec, address)?;
-        self.tone_map.record(rec, address, output)?;
+        set.get(&set.composite)?.record(rec, address, size)?;
+        let antialias = set.get(&set.antialias)?;
+        self.antialias.record(antialias, rec, address)?;
+        set.get(&set.exposure)?.record(rec, address, output)?;
+        self.bloom.record(set, rec, address)?;
+        set.get(&set.tone_map)?.record(rec, address, output)?;
         if settings.rt_debug > 0 {
-            self.debug.record(&self.device, rec, address, output)?;
+            set.get(&set.debug)?.record(rec, address, output)?;
         }
         self.frame = self.frame.wrapping_add(1);
         self.last_time = view.time;
@@ -393,18 +311,6 @@ impl ViewTracer {
         }
         self.antialias.advance();
         self.exposure_started = true;
-        Ok(())
-    }
-
-    /// Bounced light becomes black, where it is not.
-    fn darken_indirect(&mut self, rec: &mut Recorder) -> Result<(), Error> {
-        if let Some(targets) = &mut self.targets
-            && !targets.indirect_is_black
-        {
-            let mut pass = rec.pass("trace_no_indirect", Access::TRANSFER, Access::TRANSFER)?;
-            pass.clear_image(&targets.indirect, [0.0; 4]);
-            targets.indirect_is_black = true;
-        }
         Ok(())
     }
 
@@ -443,6 +349,18 @@ impl ViewTracer {
         self.accumulated = (key, before.saturating_add(1));
         before
     }
+}
+
+/// Bounced light becomes black, where it is not.
+fn darken_indirect(targets: &mut Option<Targets>, rec: &mut Recorder) -> Result<(), Error> {
+    if let Some(targets) = targets
+        && !targets.indirect_is_black
+    {
+        let mut pass = rec.pass("trace_no_indirect", Access::TRANSFER, Access::TRANSFER)?;
+        pass.clear_image(&targets.indirect, [0.0; 4]);
+        targets.indirect_is_black = true;
+    }
+    Ok(())
 }
 
 /// Whether a view may see into fog: straight on, or by a portal wherever that leads. In what glass and shiny surfaces

@@ -19,6 +19,7 @@ use crate::settings::{Settings, TracerChoice};
 use crate::test_support::openarena;
 use crate::trace::TraceLook;
 use crate::trace::input::Tracer;
+use crate::trace::pass_set::PassSet;
 use crate::world::World;
 
 const SIZE: [u32; 2] = [320, 240];
@@ -77,13 +78,14 @@ fn maps_are_lit() {
         rt_accumulate: std::env::var_os("RELIGHT_TRACE_LIVE").is_none(),
         ..Settings::default()
     };
+    let passes = Arc::new(PassSet::new(device, gpu.tracer));
     for map in maps {
         let mut assets = Assets::new(device, Arc::clone(&files), Arc::clone(&scripts), &settings)
             .expect("assets");
         let mut world =
             World::load(device, &mut assets, &format!("maps/{map}"), &settings).expect("map");
         world.light_by(settings.rt_lights, &mut assets, None);
-        let mut look = TraceLook::new(device, &world, &assets, &settings).expect("structures");
+        let mut look = TraceLook::new(&passes, &world, &assets).expect("structures");
         assets
             .materials
             .upload(device, &assets.samplers)
@@ -176,12 +178,14 @@ fn tracers_agree_on_maps() {
                 rt_tracer,
                 ..Settings::default()
             };
+            let tracer = Tracer::of(device.info(), rt_tracer);
+            let passes = Arc::new(PassSet::new(device, tracer));
             let mut assets =
                 Assets::new(device, Arc::clone(&files), Arc::clone(&scripts), &settings)
                     .expect("assets");
             let world =
                 World::load(device, &mut assets, &format!("maps/{map}"), &settings).expect("map");
-            let mut look = TraceLook::new(device, &world, &assets, &settings).expect("structures");
+            let mut look = TraceLook::new(&passes, &world, &assets).expect("structures");
             assets
                 .materials
                 .upload(device, &assets.samplers)

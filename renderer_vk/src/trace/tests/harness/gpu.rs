@@ -1,5 +1,7 @@
 //! A device with the look under test, and the views that it draws.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::half;
@@ -14,6 +16,7 @@ use crate::scene::{View, ViewScene};
 use crate::settings::Settings;
 use crate::trace::counters::COUNTED;
 use crate::trace::input::Tracer;
+use crate::trace::pass_set::PassSet;
 use crate::trace::view_tracer::{TracedMap, ViewTracer};
 
 /// A device with its validation layer on and the look under test.
@@ -66,7 +69,7 @@ impl Gpu {
                 .expect("sampler");
         }
         Some(Self {
-            look: ViewTracer::new(&device, tracer, false).expect("pipelines"),
+            look: ViewTracer::new(&Arc::new(PassSet::new(&device, tracer))).expect("a device"),
             tracer,
             ring: FrameRing::new(&device, 2).expect("frames"),
             device,
