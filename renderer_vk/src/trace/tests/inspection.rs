@@ -162,7 +162,10 @@ fn debug_views_show_what_they_say() {
     let expected = (255.0 * (1.0 - (100f32.log2() - 3.0) / 10.0)) as u8;
     assert!(near(depth, [expected; 3]), "{depth:?}");
     let motion = view(4);
-    assert!(motion == [0; 3] || near(motion, [128, 0, 128]), "{motion:?}");
+    assert!(
+        motion == [0; 3] || near(motion, [128, 0, 128]),
+        "{motion:?}"
+    );
     let lights = view(6);
     // one light: a tenth of the way, three fifths of the way to blue
     assert!(near(lights, [15, 23, 138]), "{lights:?}");
