@@ -402,7 +402,7 @@ pub mod constants {
         MATERIAL_EMITTER = 2048;
         /// Nothing is drawn.
         MATERIAL_INVISIBLE = 4096;
-        /// Light passes it where it is the map's: the compiler gave it no shadow.
+        /// On the map's surfaces: casts no shadow, because the compiler gave it none.
         MATERIAL_PASSED = 8192;
         /// Drawn in front of everything near (first-person weapon).
         INSTANCE_DEPTH_HACK = 1;
@@ -433,7 +433,7 @@ pub mod constants {
         /// Of a stage: its colour is white, the same for all vertices, or each vertex's own.
         COLOR_WHITE = 0; COLOR_FLAT = 1; COLOR_VERTEX = 2;
         FOG_ADJUST_NONE = 0; FOG_ADJUST_RGB = 1; FOG_ADJUST_ALPHA = 2; FOG_ADJUST_RGBA = 3;
-        /// A fog volume has no surface that one looks into it through, has one, has one that is drawn from within, too.
+        /// A fog volume has no visible face, has one, or has one that the engine also draws when the eye is inside.
         FOG_SURFACE_NONE = 0; FOG_SURFACE = 1; FOG_SURFACE_DRAWN = 2;
         /// The triangle belongs to the world (its vertex colours and lightmap are baked light).
         TRIANGLE_WORLD = 1;

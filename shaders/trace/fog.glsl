@@ -27,14 +27,14 @@ vec2 fog_range(Fog fog, vec3 origin, vec3 direction, vec3 inverse) {
     return vec2(enter, leave);
 }
 
-// The engine's factor: of what is displayed at a point, how much is fog. `depth`: of the point along the view, units;
-// `part`: of its way from the eye, how much lies in the fog.
+// The engine's fog factor (R_FogFactor), 0 to 1: the fog's share of the displayed colour. `depth`: view depth of the point,
+// units; `part`: fraction of the segment from the eye to it that lies below the fog's surface.
 float fog_cover(Fog fog, float depth, float part) {
     return sqrt(clamp(depth * part / max(fog.depth, 1.0), 0.0, 1.0));
 }
 
-// The part of the way to a surface that lies below the fog's surface, as the engine finds it at the triangle's corners.
-// `eye`: where the eye would be if no mirror or portal lay between.
+// `part` of fog_cover for a point on a triangle: found at the corners, as the engine does, and interpolated. `eye`: the
+// eye's position unfolded through the mirrors and portals of the path.
 float fog_part(Fog fog, SurfacePoint p, vec3 eye) {
     if (fog.has_surface == 0) return 1.0;
     float eye_below = dot(fog.plane.xyz, eye) - fog.plane.w;

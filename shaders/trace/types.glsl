@@ -148,7 +148,7 @@ const uint LIGHT_KIND_SHIFT = 29;
 const uint LIGHT_TRIANGLE = 0, LIGHT_CHANGING_TRIANGLE = 1, LIGHT_SPHERE = 2, LIGHT_CHANGING_SPHERE = 3, LIGHT_SUN = 4;
 // Triangle.flags: bits from here on hold the drawing rank, sort value times 8, at most 255.
 const uint TRIANGLE_RANK_SHIFT = 8;
-// The greatest rank of what the engine draws as opaque.
+// Highest rank of an opaque material: sort 3 (SS_OPAQUE) times 8.
 const uint RANK_OPAQUE = 24;
 // The eight bits from here on say which paths of the eye meet it: all; those that have passed no portal; from PATHS_PORTAL
 // on those through one portal each, then, where the numbers up to PATHS_MOST do, those through two.

@@ -116,7 +116,7 @@ pub fn rank_bits(info: &MaterialInfo) -> u32 {
     rank << shaders::trace_types::constants::TRIANGLE_RANK_SHIFT
 }
 
-/// Bits of the triangles of a kind: a hidden side of what light passes stops no ray of the eye either.
+/// Flags of the triangles of a kind. `Kind::Passed` is one-sided: a camera ray goes on through its hidden face.
 pub fn sides(kind: Kind) -> u32 {
     match kind {
         Kind::Passed => TRIANGLE_ONE_SIDED,
