@@ -4,8 +4,8 @@
 
 #include "trace/trace.glsl"
 
-// The nearest thing of the mask that light does not pass (Kind::Passed in renderer_vk/src/trace/input.rs). Few rays meet
-// what it passes; those are sent again without what casts no shadow.
+// The nearest hit of the mask that is not Kind::Passed (renderer_vk/src/trace/input.rs). Few rays meet such a surface; those
+// are traced again without what casts no shadow.
 Hit trace_bounce(vec3 origin, vec3 direction, uint mask) {
     Hit hit = trace_ray(origin, 0.0, direction, FAR, mask, false);
     if (hit.geometry == NO_HIT || Geometries(VIEW.geometries).at[hit.geometry].kind != KIND_PASSED) return hit;

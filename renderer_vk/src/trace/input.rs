@@ -81,7 +81,7 @@ pub enum Kind {
     Translucent,
     /// Shows the sky.
     Sky,
-    /// Stops the eye's rays on the side that it shows; light passes it.
+    /// Stops camera rays on its visible side; shadow and bounce rays ignore it.
     Passed,
 }
 
@@ -108,9 +108,9 @@ impl Kind {
         }
     }
 
-    /// As [`of`](Self::of), for a surface of the map (`world`) or of a model, which no compiler saw. Of what would stop every
-    /// ray, the map's light passes what its compiler let it pass; a model's light passes what shows its back alone: the
-    /// shell of a drawn outline, within which the model would be black.
+    /// As [`of`](Self::of), with one-sided opaque surfaces that cast no shadow as [`Passed`](Self::Passed): those of the map
+    /// (`world`) to which the compiler gave no shadow, and those of models that show their back faces alone, because the
+    /// outline shell of a cel-shaded model would shade the model inside.
     pub fn in_light(flags: u32, world: bool) -> Option<Self> {
         let passed = if world {
             c::MATERIAL_PASSED

@@ -65,7 +65,7 @@ impl Seen {
             (Self::FirstPerson, Kind::Translucent) => MASK_FIRST_TRANSLUCENT,
             (Self::ThirdPerson, Kind::Translucent) => MASK_THIRD_TRANSLUCENT,
             (Self::Always, Kind::Passed) => MASK_NO_SHADOW,
-            // what sees it sees its light's way, too: no mask is of mirrors alone
+            // no mask is of mirror rays alone: every one that they have is shared with shadow rays
             (Self::ThirdPerson, Kind::Passed) => 0,
             (Self::Always, _) => MASK_SOLID,
             (Self::FirstPerson, _) => MASK_FIRST_SOLID,
