@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::frame::Item;
 use crate::gpu::{
     ColorMask, Device, DeviceInfo, DeviceOptions, FrameRing, SurfaceSource, Swapchain,
-    SwapchainDesc, Window,
+    SwapchainDesc, Window, give_back_freed_memory,
 };
 use crate::raster::{DrawList, Flares, Overlay, Present, Raster};
 use crate::scene::{Look, Scene};
@@ -381,6 +381,7 @@ impl Renderer {
             let new = || Arc::new(PassSet::new(&self.device, tracer));
             let passes = self.trace_passes.insert(kept.unwrap_or_else(new));
             self.trace = Some(TraceLook::new(passes, world, assets)?);
+            give_back_freed_memory();
         }
         Ok(self.trace.is_some())
     }

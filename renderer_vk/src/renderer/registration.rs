@@ -10,7 +10,7 @@ use super::Renderer;
 use crate::api::DynamicLight;
 use crate::assets::{Assets, LoadedFont};
 use crate::error::Error;
-use crate::gpu::ColorMask;
+use crate::gpu::{ColorMask, give_back_freed_memory};
 use crate::raster::{self, ViewParameters};
 use crate::scene::Scene;
 use crate::settings::Settings;
@@ -52,6 +52,7 @@ impl Renderer {
             log::warn!("pipelines are not made ahead: {e}");
         }
         self.kept_pipelines.write(&self.device);
+        give_back_freed_memory();
     }
 
     /// Draws once, out of sight, with everything that is registered.
