@@ -13,7 +13,7 @@ use crate::cameras::{EYES, places};
 use crate::chromaticity::ColorDifference;
 use crate::render::parse_size;
 use crate::statistics::luminance;
-use crate::view::{Camera, Maps, load, open};
+use crate::view::{Camera, Maps, load, map_name, open};
 
 /// Draw views in the classic look and traced, side by side, and compare how bright and how coloured they are
 ///
@@ -224,7 +224,7 @@ fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
     }
     if let Some(folder) = &args.output {
         for (number, pictures) in pictures.iter().enumerate() {
-            let file = folder.join(format!("{map}_{number}.png"));
+            let file = folder.join(format!("{}_{number}.png", map_name(&path)));
             save(&file, pictures, args.size)?;
         }
     }

@@ -16,6 +16,7 @@ mod lights_picture;
 mod looks;
 mod material;
 mod measure;
+mod messages;
 mod numbers;
 mod pictures;
 mod render;
@@ -80,6 +81,7 @@ fn end_with_the_reader() {
 
 fn main() -> ExitCode {
     end_with_the_reader();
+    messages::print_warnings();
     match run(Cli::parse().command) {
         Ok(code) => code,
         Err(error) => {

@@ -29,7 +29,7 @@ use crate::cameras::{EYES, Place, places};
 use crate::numbers;
 use crate::render::{parse_size, parse_view};
 use crate::statistics::{luminance, relative_bias, relative_error};
-use crate::view::{Camera, Maps, load, open};
+use crate::view::{Camera, Maps, load, map_name, open};
 
 /// Measure the traced look in real time against its reference
 ///
@@ -380,7 +380,7 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
             "{msg} {bar:30} {pos}/{len} frames, {eta} left",
         )?);
         for (index, camera) in cameras.iter().enumerate() {
-            let name = format!("{map}-{index}");
+            let name = format!("{}-{index}", map_name(&path));
             let result = place(&mut stage, args, &base, camera, &name, &bar)?;
             all.insert(name, result);
         }

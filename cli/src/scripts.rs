@@ -7,7 +7,7 @@ use shaderscript::Diagnostic;
 pub fn load_scripts(files: &dyn GameFiles) -> (Materials, Vec<Diagnostic>) {
     let (materials, faults) = Materials::load(files);
     for fault in materials.faults_of_files() {
-        eprintln!("{fault}");
+        log::warn!("{fault}");
     }
     (materials, faults)
 }

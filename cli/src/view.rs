@@ -80,6 +80,12 @@ pub fn open(map: &str, games: &[PathBuf]) -> anyhow::Result<(Arc<dyn GameFiles>,
     Ok((with_map_files(path, MemoryFiles::new(), &name)?, name))
 }
 
+/// The name of a map for files and tables, without its folders: `path` is what [`open`] returned.
+pub fn map_name(path: &str) -> &str {
+    let name = path.rsplit(['/', '\\']).next().unwrap_or(path);
+    name.strip_suffix(".bsp").unwrap_or(name)
+}
+
 /// Says that a pack has no maps where a game reads them, where it has some, and what to do.
 pub fn no_maps(name: &str, pack: &Pk3) -> String {
     let is_map = |path: &String| path.to_ascii_lowercase().ends_with(".bsp");

@@ -1,0 +1,55 @@
+//! Warnings of the libraries, on standard error.
+
+use std::collections::HashSet;
+use std::sync::{Mutex, PoisonError};
+
+use log::{LevelFilter, Log, Metadata, Record};
+
+/// Prints each warning once, one a line: several views of a map load the same files again.
+#[derive(Default)]
+struct Messages {
+    printed: Mutex<HashSet<String>>,
+}
+
+impl Messages {
+    /// Whether a message is new.
+    fn is_new(&self, message: &str) -> bool {
+        let mut printed = self.printed.lock().unwrap_or_else(PoisonError::into_inner);
+        !printed.contains(message) && printed.insert(message.to_owned())
+    }
+}
+
+impl Log for Messages {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        metadata.level() <= log::Level::Warn
+    }
+
+    fn log(&self, record: &Record<'_>) {
+        let message = record.args().to_string();
+        if self.enabled(record.metadata()) && self.is_new(&message) {
+            eprintln!("{message}");
+        }
+    }
+
+    fn flush(&self) {}
+}
+
+/// Prints warnings from here on.
+pub fn print_warnings() {
+    if log::set_boxed_logger(Box::<Messages>::default()).is_ok() {
+        log::set_max_level(LevelFilter::Warn);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_is_printed_once() {
+        let messages = Messages::default();
+        assert!(messages.is_new("a.shader:1: no such directive"));
+        assert!(messages.is_new("a.shader:2: no such directive"));
+        assert!(!messages.is_new("a.shader:1: no such directive"));
+    }
+}
