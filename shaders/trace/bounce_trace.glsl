@@ -7,9 +7,13 @@
 // The nearest hit of the mask that is not Kind::Passed (renderer_vk/src/trace/input.rs). Few rays meet such a surface; those
 // are traced again without what casts no shadow.
 Hit trace_bounce(vec3 origin, vec3 direction, uint mask) {
-    Hit hit = trace_ray(origin, 0.0, direction, FAR, mask, false);
-    if (hit.geometry == NO_HIT || Geometries(VIEW.geometries).at[hit.geometry].kind != KIND_PASSED) return hit;
-    return trace_ray(origin, 0.0, direction, FAR, mask & ~MASK_NO_SHADOW, false);
+    Hit hit;
+    for (uint i = 0; i < 2; i++) {
+        hit = trace_ray(origin, 0.0, direction, FAR, mask, false);
+        if (hit.geometry == NO_HIT || Geometries(VIEW.geometries).at[hit.geometry].kind != KIND_PASSED) break;
+        mask &= ~MASK_NO_SHADOW;
+    }
+    return hit;
 }
 
 #endif

@@ -54,9 +54,9 @@ vec3 displayed_factor(uint factor, vec4 source, vec3 destination) {
     }
 }
 
-// The cloud stages over what lies behind them. No light falls on a sky: it is a picture, and put together as the engine
+// The stages of clouds or of the sun over what lies behind them. No light falls on a sky: it is a picture, and put together as the engine
 // does it, in displayed colours.
-vec3 displayed_clouds(SurfacePoint p, Footprint width, vec3 below) {
+vec3 displayed_stages(SurfacePoint p, Footprint width, vec3 below) {
     Material material = material_of(p.triangle.material);
     Instance instance = instance_of(p.instance);
     Stages stages = Stages(VIEW.materials.stages);
@@ -70,21 +70,31 @@ vec3 displayed_clouds(SurfacePoint p, Footprint width, vec3 below) {
     return below;
 }
 
-// The picture of the sun over what lies behind it.
-vec3 displayed_sun(SurfacePoint p, vec3 d, float spread, vec3 below) {
+// Whether the clouds cover the direction; `p` becomes their point in it.
+bool clouds_at(inout SurfacePoint p, vec3 d, uint face, float height) {
+    if (face == 5u || material_of(p.triangle.material).stage_count == 0) return false;
+    p.stage.st = cloud_uv(d, height);
+    p.stage.lightmap = p.stage.st;
+    p.triangle.lightmap = NO_TEXTURE;
+    p.texel_scale = cloud_scale(d, p.stage.st, height);
+    return true;
+}
+
+// Whether the picture of the sun covers the direction; `p` becomes its point in it.
+bool sun_at(inout SurfacePoint p, vec3 d) {
     SunDisc sun = VIEW.sun;
     float ahead = dot(d, sun.direction);
-    if (sun.material == NO_TEXTURE || ahead <= 0.0) return below;
+    if (sun.material == NO_TEXTURE || ahead <= 0.0) return false;
     vec3 up = cross(sun.direction, sun.left);
     vec2 place = vec2(dot(d, sun.left), dot(d, up)) / (ahead * sun.size);
-    if (max(abs(place.x), abs(place.y)) > 1.0) return below;
+    if (max(abs(place.x), abs(place.y)) > 1.0) return false;
     p.triangle.material = sun.material;
     p.triangle.lightmap = NO_TEXTURE;
     p.stage.st = 0.5 - 0.5 * place;
     p.stage.color = vec4(1.0);
     p.stage.time = shader_time(material_of(sun.material), instance_of(p.instance));
     p.texel_scale = 0.5 / sun.size;
-    return displayed_clouds(p, round_footprint(spread), below);
+    return true;
 }
 
 // Displayed radiance of the sky in direction d. `p`: the sky surface that was hit; its lightmap index is the sky's.
@@ -102,14 +112,11 @@ vec3 sky_radiance(SurfacePoint p, vec3 d, float spread, bool with_sun) {
         float lod = max(log2(max(spread * 0.5 * max(size.x, size.y), 1.0e-6)), 0.0);
         color = textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[VIEW.sky_sampler]), uv, lod).rgb;
     }
-    if (face != 5u && material_of(p.triangle.material).stage_count > 0) {
-        p.stage.st = cloud_uv(d, sky.cloud_height);
-        p.stage.lightmap = p.stage.st;
-        p.triangle.lightmap = NO_TEXTURE;
-        p.texel_scale = cloud_scale(d, p.stage.st, sky.cloud_height);
-        color = displayed_clouds(p, round_footprint(spread), color);
+    // drivers inline functions: in a loop the stages are compiled once
+    for (uint picture = 0; picture < (with_sun ? 2 : 1); picture++) {
+        bool covers = picture == 0 ? clouds_at(p, d, face, sky.cloud_height) : sun_at(p, d);
+        if (covers) color = displayed_stages(p, round_footprint(spread), color);
     }
-    if (with_sun) color = displayed_sun(p, d, spread, color);
     return decode_display(color);
 }
 
