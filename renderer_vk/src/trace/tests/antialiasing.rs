@@ -13,6 +13,8 @@ use crate::settings::Settings;
 use crate::trace::input::Tracer;
 
 const SIZE: i32 = 64;
+/// Frames of a reference picture: one pixel of it is off by a sixteenth of what a single sample is off by.
+const TRUTH: u32 = 256;
 
 fn live() -> Settings {
     Settings {
@@ -95,7 +97,7 @@ fn temporal_antialiasing() {
 
 fn at_rest_it_comes_to_the_mean_of_many_samples(gpu: &mut Gpu) {
     let scene = checkerboard();
-    let (_, truth) = gpu.render(&scene, &reference(), 1024);
+    let (_, truth) = gpu.render(&scene, &reference(), TRUTH);
     let (_, jagged) = gpu.render(&scene, &plain(), 1);
     let (_, settled) = gpu.render(&scene, &live(), 64);
     let (raw, now) = (error(&jagged, &truth), error(&settled, &truth));
@@ -122,7 +124,7 @@ fn both_sides_of_a_reflection_come_to_rest(gpu: &mut Gpu) {
         let corner = Vec3::new(-120.0 + i as f32 * 28.0, -150.0, 1.0);
         scene.quad(rectangle(corner, Vec3::X * 28.0, Vec3::Y * 300.0), shiny);
     }
-    let (_, truth) = gpu.render(&scene, &reference(), 512);
+    let (_, truth) = gpu.render(&scene, &reference(), TRUTH);
     let (_, jagged) = gpu.render(&scene, &plain(), 1);
     let (_, settled) = gpu.render(&scene, &live(), 64);
     let (_, next) = gpu.render(&scene, &live(), 65);
@@ -137,7 +139,7 @@ fn both_sides_of_a_reflection_come_to_rest(gpu: &mut Gpu) {
 
 fn in_motion_it_stays_sharp(gpu: &mut Gpu) {
     let scene = checkerboard();
-    let (_, truth) = gpu.render(&scene, &reference(), 1024);
+    let (_, truth) = gpu.render(&scene, &reference(), TRUTH);
     let (_, jagged) = gpu.render(&scene, &plain(), 1);
     let (_, moved) = gpu.render_path(&scene, &live(), 48, |frame, def| {
         walk(def, &scene.def, 47.0 - frame as f32);
@@ -160,7 +162,7 @@ fn walk(def: &mut RefDef, arrived: &RefDef, left: f32) {
 fn a_mirror_shows_what_is_seen_from_behind_it(gpu: &mut Gpu) {
     const MIRROR: f32 = -130.0;
     let scene = checkerboard();
-    let (_, truth) = gpu.render(&scene, &reference(), 1024);
+    let (_, truth) = gpu.render(&scene, &reference(), TRUTH);
     let (frames, last) = (24, 23.0);
     let (_, directly) = gpu.render_path(&scene, &live(), frames, |frame, def| {
         walk(def, &scene.def, last - frame as f32);
@@ -201,7 +203,7 @@ fn ripples_leave_nothing_behind(gpu: &mut Gpu) {
         view.time = 7.0 - 0.016 * left;
         view.instances[0].time = view.time;
     };
-    let (_, truth) = gpu.render_views(&scene, &reference(), 1024, |_, view| run(view, 0.0));
+    let (_, truth) = gpu.render_views(&scene, &reference(), TRUTH, |_, view| run(view, 0.0));
     let (_, jagged) = gpu.render_views(&scene, &plain(), 1, |_, view| run(view, 0.0));
     for (moves, most) in [(1.0, 0.69), (0.0, 0.65)] {
         let (_, seen) = gpu.render_views(&scene, &live(), frames, |frame, view| {
@@ -229,7 +231,7 @@ fn what_moves_leaves_nothing_behind(gpu: &mut Gpu) {
         view.entities[0].origin = at(frame);
     };
     let last = 14;
-    let (_, truth) = gpu.render_views(&scene, &reference(), 1024, |_, view| {
+    let (_, truth) = gpu.render_views(&scene, &reference(), TRUTH, |_, view| {
         place(last as f32, view);
     });
     let (_, jagged) = gpu.render_views(&scene, &plain(), 1, |_, view| place(last as f32, view));
@@ -291,7 +293,7 @@ fn what_glows_and_moves_is_as_bright_as_it_is(gpu: &mut Gpu) {
 
 fn a_smaller_traced_picture_comes_to_the_full_one(gpu: &mut Gpu) {
     let scene = checkerboard();
-    let (_, truth) = gpu.render(&scene, &reference(), 1024);
+    let (_, truth) = gpu.render(&scene, &reference(), TRUTH);
     let half = |settings: Settings| Settings {
         rt_scale: 0.5,
         ..settings
@@ -443,7 +445,7 @@ fn what_is_thin_comes_to_rest(gpu: &mut Gpu) {
         let shape = rectangle(corner, Vec3::Z * 180.0, Vec3::Y * (0.12 * pixel));
         scene.quad(shape, wire);
     }
-    let (_, truth) = gpu.render(&scene, &reference(), 1024);
+    let (_, truth) = gpu.render(&scene, &reference(), TRUTH);
     let (first, last) = (48, 96);
     let mut frames: Vec<Vec<Vec3>> = Vec::new();
     let mut watch = |frame: u32, pixels: &[Vec3]| {

@@ -11,7 +11,7 @@ use crate::trace::frame_lights::decode;
 
 #[test]
 fn fog_is_lit_by_what_lights_each_place_of_it() {
-    Gpu::each(fog_is_lit_by_what_lights_each_place_of_it_with);
+    Gpu::any(fog_is_lit_by_what_lights_each_place_of_it_with);
 }
 
 fn fog_is_lit_by_what_lights_each_place_of_it_with(gpu: &mut Gpu) {
@@ -131,7 +131,7 @@ fn shows(gpu: &mut Gpu, scene: &Scene, displayed: Vec3) {
 
 #[test]
 fn fog_covers_surfaces_that_are_stored_with_it_alone() {
-    Gpu::each(fog_covers_surfaces_that_are_stored_with_it_alone_with);
+    Gpu::any(fog_covers_surfaces_that_are_stored_with_it_alone_with);
 }
 
 fn fog_covers_surfaces_that_are_stored_with_it_alone_with(gpu: &mut Gpu) {
@@ -149,7 +149,7 @@ fn fog_covers_surfaces_that_are_stored_with_it_alone_with(gpu: &mut Gpu) {
 
 #[test]
 fn fog_seen_from_above_counts_the_way_below_its_surface() {
-    Gpu::each(fog_seen_from_above_counts_the_way_below_its_surface_with);
+    Gpu::any(fog_seen_from_above_counts_the_way_below_its_surface_with);
 }
 
 fn fog_seen_from_above_counts_the_way_below_its_surface_with(gpu: &mut Gpu) {
@@ -168,7 +168,7 @@ fn fog_seen_from_above_counts_the_way_below_its_surface_with(gpu: &mut Gpu) {
 
 #[test]
 fn fog_fades_layers_that_are_stored_with_it() {
-    Gpu::each(fog_fades_layers_that_are_stored_with_it_with);
+    Gpu::any(fog_fades_layers_that_are_stored_with_it_with);
 }
 
 fn fog_fades_layers_that_are_stored_with_it_with(gpu: &mut Gpu) {
@@ -194,7 +194,7 @@ fn fog_fades_layers_that_are_stored_with_it_with(gpu: &mut Gpu) {
 
 #[test]
 fn skies_show_behind_fog_but_through_a_surface_that_is_drawn() {
-    Gpu::each(skies_show_behind_fog_but_through_a_surface_that_is_drawn_with);
+    Gpu::any(skies_show_behind_fog_but_through_a_surface_that_is_drawn_with);
 }
 
 fn skies_show_behind_fog_but_through_a_surface_that_is_drawn_with(gpu: &mut Gpu) {

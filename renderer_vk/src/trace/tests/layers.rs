@@ -93,7 +93,7 @@ fn layers_are_composed_in_order_however_many_there_are_with(gpu: &mut Gpu) {
 
 #[test]
 fn paints_of_one_body_are_mixed_as_displayed() {
-    Gpu::each(paints_of_one_body_are_mixed_as_displayed_with);
+    Gpu::any(paints_of_one_body_are_mixed_as_displayed_with);
 }
 
 fn paints_of_one_body_are_mixed_as_displayed_with(gpu: &mut Gpu) {
@@ -121,7 +121,7 @@ fn paints_of_one_body_are_mixed_as_displayed_with(gpu: &mut Gpu) {
 
 #[test]
 fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass() {
-    Gpu::each(one_to_eight_mixed_layers_are_exact_before_and_behind_glass_with);
+    Gpu::any(one_to_eight_mixed_layers_are_exact_before_and_behind_glass_with);
 }
 
 /// What lies on a path, from the eye on: the displayed sum of the layers so far.
@@ -229,7 +229,7 @@ fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass_with(gpu: &mut Gp
 
 #[test]
 fn light_behind_a_veil_counts_in_proportion() {
-    Gpu::each(light_behind_a_veil_counts_in_proportion_with);
+    Gpu::any(light_behind_a_veil_counts_in_proportion_with);
 }
 
 fn light_behind_a_veil_counts_in_proportion_with(gpu: &mut Gpu) {
@@ -258,7 +258,7 @@ fn light_behind_a_veil_counts_in_proportion_with(gpu: &mut Gpu) {
 
 #[test]
 fn light_over_a_layer_darkens_what_lies_behind_it() {
-    Gpu::each(light_over_a_layer_darkens_what_lies_behind_it_with);
+    Gpu::any(light_over_a_layer_darkens_what_lies_behind_it_with);
 }
 
 fn light_over_a_layer_darkens_what_lies_behind_it_with(gpu: &mut Gpu) {
@@ -282,7 +282,7 @@ fn light_over_a_layer_darkens_what_lies_behind_it_with(gpu: &mut Gpu) {
 
 #[test]
 fn a_lit_picture_on_a_pane_is_a_haze() {
-    Gpu::each(a_lit_picture_on_a_pane_is_a_haze_with);
+    Gpu::any(a_lit_picture_on_a_pane_is_a_haze_with);
 }
 
 fn a_lit_picture_on_a_pane_is_a_haze_with(gpu: &mut Gpu) {
@@ -314,7 +314,7 @@ fn a_lit_picture_on_a_pane_is_a_haze_with(gpu: &mut Gpu) {
 
 #[test]
 fn the_lightmap_of_what_has_none_is_white_and_lights_nothing() {
-    Gpu::each(the_lightmap_of_what_has_none_is_white_and_lights_nothing_with);
+    Gpu::any(the_lightmap_of_what_has_none_is_white_and_lights_nothing_with);
 }
 
 fn the_lightmap_of_what_has_none_is_white_and_lights_nothing_with(gpu: &mut Gpu) {
@@ -365,7 +365,7 @@ fn layers_in_one_plane_come_in_drawing_order_with(gpu: &mut Gpu) {
 
 #[test]
 fn lit_layers_and_what_is_behind_them_are_all_lit() {
-    Gpu::each(lit_layers_and_what_is_behind_them_are_all_lit_with);
+    Gpu::any(lit_layers_and_what_is_behind_them_are_all_lit_with);
 }
 
 fn lit_layers_and_what_is_behind_them_are_all_lit_with(gpu: &mut Gpu) {
@@ -400,7 +400,7 @@ fn matter(color: [f32; 3], alpha: f32) -> Stage {
 
 #[test]
 fn a_mark_shares_the_light_of_its_wall_without_noise() {
-    Gpu::each(a_mark_shares_the_light_of_its_wall_without_noise_with);
+    Gpu::any(a_mark_shares_the_light_of_its_wall_without_noise_with);
 }
 
 fn a_mark_shares_the_light_of_its_wall_without_noise_with(gpu: &mut Gpu) {
@@ -438,7 +438,7 @@ fn a_mark_shares_the_light_of_its_wall_without_noise_with(gpu: &mut Gpu) {
 
 #[test]
 fn smoke_is_as_bright_as_the_light_around_it() {
-    Gpu::each(smoke_is_as_bright_as_the_light_around_it_with);
+    Gpu::any(smoke_is_as_bright_as_the_light_around_it_with);
 }
 
 fn smoke_is_as_bright_as_the_light_around_it_with(gpu: &mut Gpu) {
