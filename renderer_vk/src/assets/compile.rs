@@ -159,6 +159,36 @@ struct FoundImage {
 pub type Video = (String, usize);
 
 impl StageArrays {
+    /// Looks for the images of a stage that is not drawn; `Err` with the name of one that is missing.
+    pub fn need_stage(
+        &mut self,
+        stage: &Stage,
+        videos: &mut VideoClients,
+        source: &mut dyn ImageSource,
+    ) -> Result<(), String> {
+        self.need_images(&stage.replaced, stage, None, videos, source)?;
+        let image = std::slice::from_ref(&stage.image);
+        self.need_images(image, stage, None, videos, source)
+    }
+
+    /// Looks for images as [`push_image`](Self::push_image) does, and appends nothing.
+    fn need_images(
+        &mut self,
+        images: &[StageImage],
+        stage: &Stage,
+        implicit: Option<ImageFlags>,
+        videos: &mut VideoClients,
+        source: &mut dyn ImageSource,
+    ) -> Result<(), String> {
+        let start = self.images.len();
+        for image in images.iter().filter(|i| !i.names().is_empty()) {
+            let found = self.push_image(image, stage, implicit, videos, &mut None, source);
+            self.images.truncate(start);
+            found?;
+        }
+        Ok(())
+    }
+
     /// Appends a stage and returns its index; `Err` with the name of an image that is missing, and nothing appended.
     ///
     /// `implicit` are the flags of a material that no script wrote; a script's stages say themselves.
@@ -169,12 +199,8 @@ impl StageArrays {
         videos: &mut VideoClients,
         source: &mut dyn ImageSource,
     ) -> Result<(u32, Option<Video>), String> {
+        self.need_images(&stage.replaced, stage, implicit, videos, source)?;
         let mut video = None;
-        let start = self.images.len();
-        for replaced in stage.replaced.iter().filter(|i| !i.names().is_empty()) {
-            self.push_image(replaced, stage, implicit, videos, &mut video, source)?;
-            self.images.truncate(start);
-        }
         let image = self.push_image(&stage.image, stage, implicit, videos, &mut video, source)?;
         let mut out = types::Stage::zeroed();
         out.image_first = image.first;

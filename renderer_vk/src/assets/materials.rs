@@ -283,6 +283,8 @@ impl Materials {
         if let Some(reason) = &shader.rejected {
             self.scripts.tell_fault(name, &format!("{place}: {reason}"));
         }
+        // the engine loads the images of all stages before it drops any
+        let written = shader.stages.clone();
         if !self.settings.detail_textures {
             shader.stages.retain(|stage| !stage.detail);
         }
@@ -298,6 +300,18 @@ impl Materials {
         let sort = shader.sort_value();
         if self.settings.vertex_light && !self.settings.menu && shader.stages.len() > 1 {
             shader = shaderscript::collapse_vertex_light(&shader, class == LightmapClass::None);
+        }
+        let mut missing = None;
+        if shader.stages.len() < written.len() {
+            let need = |stage: &shaderscript::Stage| {
+                self.arrays
+                    .need_stage(stage, &mut self.videos, source)
+                    .err()
+            };
+            missing = written.iter().find_map(need);
+            if missing.is_some() {
+                shader.stages.clear();
+            }
         }
         let stage_first = self.arrays.stages.len();
         let vertex_light = class == LightmapClass::Vertex;
@@ -334,17 +348,20 @@ impl Materials {
                     }));
                 }
                 Err(image) => {
-                    // menus and mods ask for pictures that do not exist all the time: only scripts are worth a warning
-                    if explicit {
-                        let fault = format!("{place}: image {image} is missing");
-                        self.scripts.tell_fault(name, &fault);
-                    } else {
-                        log::debug!("{name}: no script and no image of that name");
-                    }
-                    defaulted = true;
+                    missing = Some(image);
                     break;
                 }
             }
+        }
+        if let Some(image) = missing {
+            // menus and mods ask for pictures that do not exist all the time: only scripts are worth a warning
+            if explicit {
+                let fault = format!("{place}: image {image} is missing");
+                self.scripts.tell_fault(name, &fault);
+            } else {
+                log::debug!("{name}: no script and no image of that name");
+            }
+            defaulted = true;
         }
         shader.stages.truncate(kept);
         let sky = shader.sky.clone().map(|sky| {

@@ -74,6 +74,13 @@ t/detail
     detail
     blendFunc filter }
 }
+t/lost_detail
+{
+  { map t/a.tga }
+  { map t/nothing.tga
+    detail
+    blendFunc filter }
+}
 t/film
 {
   { videoMap film.roq }
@@ -417,6 +424,9 @@ fn settings_change_stages() {
     let mut game = Registration::with(files, plain);
     let one = game.find("t/detail", LightmapClass::None, true);
     assert_eq!(game.materials.get(one).stage_count, 1);
+    // a stage that is not drawn needs its image all the same
+    let lost = game.find("t/lost_detail", LightmapClass::None, true);
+    assert!(game.materials.get(lost).defaulted);
     let wall = game.find("t/wall", LightmapClass::Page, true);
     let material = game.materials.get(wall);
     assert_eq!(material.lightmap_class, LightmapClass::Vertex);
