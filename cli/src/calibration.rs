@@ -96,7 +96,7 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
         let found = hidden.map(|hidden| recovery(&hidden, &world));
         let spots = args.spots.then(|| spots(&world));
         for warning in &world.warnings {
-            log::warn!("{path}: {warning}");
+            log::warn!("{warning}");
         }
         let Some(report) = &world.calibration else {
             continue;

@@ -84,7 +84,7 @@ pub fn run(args: &LightsArgs) -> Result<()> {
         };
         let mut world = RelitWorld::load(&*files, &materials, &map, options)?;
         for warning in &world.warnings {
-            log::warn!("{map}: {warning}");
+            log::warn!("{warning}");
         }
         if !args.judge {
             world.measure_materials(&*files);
