@@ -5,7 +5,7 @@
 #include "trace/trace.glsl"
 
 // The nearest hit of the mask that is not Kind::Passed (renderer_vk/src/trace/input.rs). Few rays meet such a surface; those
-// are traced again without what casts no shadow.
+// are traced again without what casts no shadow. Drivers inline functions: in a loop the traversal is compiled once.
 Hit trace_bounce(vec3 origin, vec3 direction, uint mask) {
     Hit hit;
     for (uint i = 0; i < 2; i++) {

@@ -54,8 +54,8 @@ vec3 displayed_factor(uint factor, vec4 source, vec3 destination) {
     }
 }
 
-// The stages of clouds or of the sun over what lies behind them. No light falls on a sky: it is a picture, and put together as the engine
-// does it, in displayed colours.
+// The stages of clouds or of the sun over what lies behind them. No light falls on a sky: it is a picture, and put
+// together as the engine does it, in displayed colours.
 vec3 displayed_stages(SurfacePoint p, Footprint width, vec3 below) {
     Material material = material_of(p.triangle.material);
     Instance instance = instance_of(p.instance);

@@ -13,7 +13,7 @@ use crate::settings::Settings;
 use crate::trace::input::Tracer;
 
 const SIZE: i32 = 64;
-/// Frames of a reference picture: one pixel of it is off by a sixteenth of what a single sample is off by.
+/// Frames accumulated for a reference picture: its standard error is a sixteenth of that of one sample.
 const TRUTH: u32 = 256;
 
 fn live() -> Settings {

@@ -28,8 +28,8 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// Runs a test of what becomes of what rays meet, which all tracers share: with the tracer that any device has, or
-    /// with all of them where `RELIGHT_FULL=1` asks for it. Compiling the passes takes software drivers minutes a tracer.
+    /// Runs a test of shading, which all tracers share: with the compute tracer, which runs on every device; with every
+    /// tracer where `RELIGHT_FULL=1`. A software driver compiles the passes of one tracer for minutes.
     pub fn any(test: fn(&mut Gpu)) {
         if std::env::var("RELIGHT_FULL").as_deref() == Ok("1") {
             return Self::each(test);
@@ -39,7 +39,7 @@ impl Gpu {
         }
     }
 
-    /// Runs a test of what rays meet with every tracer that the device has.
+    /// Runs a test of ray traversal with every tracer that the device has.
     pub fn each(test: fn(&mut Gpu)) {
         for tracer in [Tracer::Pipeline, Tracer::Query, Tracer::Compute] {
             if let Some(mut gpu) = Self::new(tracer) {
