@@ -85,8 +85,8 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
             ..Options::default()
         };
         let mut world = RelitWorld::load(&*files, &materials, &path, options)?;
-        let hidden = args.hide_entities.then(|| hide_entities(&mut world));
         world.measure_materials(&*files);
+        let hidden = args.hide_entities.then(|| hide_entities(&mut world));
         let bar = ProgressBar::new(100).with_message(map.clone());
         bar.set_style(ProgressStyle::with_template("{bar:40} {pos} % {msg}")?);
         relight::calibrate_with(&mut world, &calibrate, &mut |done| {

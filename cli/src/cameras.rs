@@ -94,12 +94,7 @@ pub fn places(entities: &[q3bsp::Entity], count: usize) -> Vec<Place> {
     }
     let spawns: Vec<_> = entities
         .iter()
-        .filter(|e| {
-            let class = e.classname();
-            class == "info_player_deathmatch"
-                || class == "info_player_start"
-                || (class.starts_with("team_CTF_") && class.ends_with("spawn"))
-        })
+        .filter(|entity| relight::is_spawn_point(entity))
         .collect();
     let wanted = count.saturating_sub(places.len()).min(spawns.len());
     let chosen = (0..wanted).filter_map(|i| spawns.get(i * spawns.len() / wanted));

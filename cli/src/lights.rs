@@ -80,14 +80,18 @@ pub fn run(args: &LightsArgs) -> Result<()> {
         });
         let options = Options {
             calibrate,
+            by_hand: false,
             ..Options::default()
         };
         let mut world = RelitWorld::load(&*files, &materials, &map, options)?;
+        if !args.judge {
+            world.measure_materials(&*files);
+        }
+        world.light_by_hand(&*files);
         for warning in &world.warnings {
             log::warn!("{warning}");
         }
         if !args.judge {
-            world.measure_materials(&*files);
             sweep(&mut world, cache.as_ref());
             let pictures = pictures(args, &map);
             crate::lights_picture::draw(&world, &pictures)?;

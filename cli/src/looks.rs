@@ -47,7 +47,7 @@ pub struct LooksArgs {
     /// Folder to keep what calibration finds in
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
-    /// One JSON object a map, in place of a table
+    /// One JSON object a map, in place of a table; null for looks without a view
     #[arg(long)]
     json: bool,
 }
@@ -129,6 +129,10 @@ impl Sums {
     }
 
     fn print_line(&self, name: &str) {
+        if self.views == 0 {
+            println!("{name:20} {:5} {:>9}", 0, "–");
+            return;
+        }
         let [prior, calibrated] = self.brightness();
         let [by_prior, by_calibrated] = &self.color;
         println!(
@@ -145,6 +149,9 @@ impl Sums {
         let [prior, calibrated] = self.brightness();
         let [by_prior, by_calibrated] = &self.color;
         let look = |luminance: f64, color: &ColorDifference| {
+            if self.views == 0 {
+                return Value::Null;
+            }
             json!({
                 "luminance": luminance,
                 "color_distance": color.mean(),
@@ -175,7 +182,11 @@ fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
         ..Settings::default()
     };
     let (bsp, entities) = load(&mut renderer, files, &path, &settings(None))?;
-    let cameras: Vec<Camera> = places(&bsp.entities(), args.views)
+    let places = places(&bsp.entities(), args.views);
+    if places.is_empty() {
+        log::warn!("{path}: no picture; the game sets no player anywhere in it");
+    }
+    let cameras: Vec<Camera> = places
         .iter()
         .map(|place| Camera {
             origin: place.origin + glam::Vec3::Z * EYES,

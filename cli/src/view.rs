@@ -200,13 +200,8 @@ impl Camera {
     /// What players see where they appear, eyes 26 units above the place, in the order of the map.
     pub fn spawns(bsp: &Bsp) -> Vec<Self> {
         let entities = bsp.entities();
-        let spawns = entities.iter().filter(|entity| {
-            let class = entity.classname().to_ascii_lowercase();
-            (class.starts_with("info_player_") && class != "info_player_intermission")
-                || (class.starts_with("team_")
-                    && (class.ends_with("spawn") || class.ends_with("player")))
-        });
-        spawns
+        (entities.iter())
+            .filter(|entity| relight::is_spawn_point(entity))
             .filter_map(|entity| {
                 let turned = entity.vec3("angles").map(|angles| angles.y);
                 Some(Self {

@@ -51,7 +51,8 @@ const MOST_OVER: f32 = 2.0;
 /// From here on stored light may be cut off, encoded.
 const CUT_OFF: f32 = 0.99;
 
-/// Brightness of a texture, encoded: about the mean of lit surfaces in OpenArena's maps (0.13 to 0.33).
+/// Brightness of a texture, encoded, where nobody measured the map's own: about the mean of lit surfaces in OpenArena's maps
+/// (0.13 to 0.33).
 const TEXTURE: f32 = 0.2;
 /// Exponent of the display's curve on a map that has no light stored.
 pub(crate) const DEFAULT_EXPONENT: f32 = 1.4;
@@ -209,11 +210,21 @@ pub fn display_exposure(world: &RelitWorld) -> Exposure {
     Exposure::usual(found.unwrap_or(DEFAULT))
 }
 
+/// A part of a map's surfaces whose texture is equally bright.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Texture {
+    /// Luminance, encoded.
+    pub brightness: f32,
+    /// Square id units.
+    pub area: f32,
+}
+
 /// The exponent of the power law that the display's curve D comes to where a map shows its light: the mean of
-/// d ln D / d ln x over the light of its lightmaps and of the `pages` beside it, else of its vertices, on a texture of usual
+/// d ln D / d ln x over the light v of its lightmaps and of the `pages` beside it, else of its vertices, on each of its
+/// `textures` t, where x = t v. Each x has the weight x: what is brighter is seen better. No textures: one of usual
 /// brightness.
-pub(crate) fn display_exponent(bsp: &Bsp, pages: &[Lightmap]) -> f32 {
-    of_stored(bsp, pages, |light| exponent(light)).unwrap_or(DEFAULT_EXPONENT)
+pub(crate) fn display_exponent(bsp: &Bsp, pages: &[Lightmap], textures: &[Texture]) -> f32 {
+    of_stored(bsp, pages, |light| exponent(light, textures)).unwrap_or(DEFAULT_EXPONENT)
 }
 
 /// What is found of light on lightmaps, encoded; else on vertices.
@@ -253,13 +264,31 @@ fn ratio(colors: impl Iterator<Item = [u8; 3]>, gamma: f32) -> Option<f32> {
 }
 
 /// Mean of the curve's exponent; `None` where all is dark.
-fn exponent(colors: impl Iterator<Item = [u8; 3]>) -> Option<f32> {
-    let (mut sum, mut count) = (0.0_f64, 0usize);
+fn exponent(colors: impl Iterator<Item = [u8; 3]>, textures: &[Texture]) -> Option<f32> {
+    let usual = [Texture {
+        brightness: TEXTURE,
+        area: 1.0,
+    }];
+    let textures = match textures {
+        [] => &usual,
+        some => some,
+    };
+    let mut levels = [0.0_f64; 256];
     for value in colors.filter_map(level) {
-        sum += f64::from(overbright::exponent(value * TEXTURE));
-        count += 1;
+        if let Some(count) = levels.get_mut((value * 255.0).round() as usize) {
+            *count += 1.0;
+        }
     }
-    (count > 0).then(|| (sum / count as f64) as f32)
+    let (mut sum, mut whole) = (0.0, 0.0);
+    for (byte, count) in levels.iter().enumerate() {
+        for texture in textures {
+            let shown = (texture.brightness * byte as f32 / 255.0).min(1.0);
+            let weight = count * f64::from(texture.area) * f64::from(shown);
+            sum += weight * f64::from(overbright::exponent(shown));
+            whole += weight;
+        }
+    }
+    (whole > 0.0).then(|| (sum / whole) as f32)
 }
 
 #[cfg(test)]
@@ -378,10 +407,33 @@ mod tests {
         assert_eq!(ratio(std::iter::repeat_n([255; 3], 4), 1.0), Some(1.0));
         assert_eq!(ratio(std::iter::empty(), 1.0), None);
         assert_eq!(ratio(std::iter::repeat_n([1, 0, 0], 4), 1.0), None);
-        let curve = exponent(std::iter::repeat_n([128; 3], 10)).unwrap();
-        let x = value * TEXTURE;
-        let step = (overbright::to_linear(x * 1.01) / overbright::to_linear(x)).ln() / 1.01f32.ln();
-        assert!((curve - step).abs() < 0.01, "{curve} {step}");
-        assert_eq!(exponent(std::iter::empty()), None);
+    }
+
+    #[test]
+    fn the_exponent_is_the_slope_of_the_curve_at_what_is_shown() {
+        let value = 128.0_f32 / 255.0;
+        let slope = |x: f32| {
+            let [below, above] = [x / 1.01, x * 1.01].map(overbright::to_linear);
+            (above / below).ln() / (1.01f32 * 1.01).ln()
+        };
+        let found = |textures: &[(f32, f32)]| {
+            let textures: Vec<_> = (textures.iter())
+                .map(|&(brightness, area)| Texture { brightness, area })
+                .collect();
+            exponent(std::iter::repeat_n([128; 3], 10), &textures).unwrap()
+        };
+        let near =
+            |found: f32, meant: f32| assert!((found - meant).abs() < 2e-3, "{found} {meant}");
+        near(found(&[]), slope(value * TEXTURE));
+        near(found(&[(0.8, 3.0)]), slope(value * 0.8));
+        // Each part of the surfaces has the weight of its area, and of how bright it is shown.
+        let both = (3.0 * 0.2 * slope(value * 0.2) + 0.6 * slope(value * 0.6)) / (3.0 * 0.2 + 0.6);
+        near(found(&[(0.2, 3.0), (0.6, 1.0)]), both);
+        assert_eq!(exponent(std::iter::empty(), &[]), None);
+        let black = Texture {
+            brightness: 0.0,
+            area: 1.0,
+        };
+        assert_eq!(exponent(std::iter::once([128; 3]), &[black]), None);
     }
 }

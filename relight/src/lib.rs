@@ -40,6 +40,7 @@ mod map_files;
 pub mod materials;
 pub mod overbright;
 pub mod sample;
+mod spawns;
 pub mod world;
 
 pub use calibrate::{
@@ -50,4 +51,5 @@ pub use files::{FileError, GameFiles, MemoryFiles, Overlay, Pak, Pk3, SearchPath
 pub use light::{LightLists, LightReport, PointLight, SunLight, TriangleLight};
 pub use map_files::map_files;
 pub use materials::{Materials, Resolved};
+pub use spawns::is_spawn_point;
 pub use world::{LoadError, Options, RelitWorld, WorldMaterial, WorldSurface, WorldVertex};

@@ -6,6 +6,7 @@ use super::bvh::Occluders;
 use super::parallel;
 use super::random::Random;
 use super::samples::Sample;
+use crate::spawns::is_spawn_point;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::Entity;
@@ -32,12 +33,7 @@ struct View {
 fn views(entities: &[Entity]) -> Vec<View> {
     let all: Vec<View> = entities
         .iter()
-        .filter(|entity| {
-            let class = entity.classname();
-            class == "info_player_deathmatch"
-                || class == "info_player_start"
-                || (class.starts_with("team_CTF_") && class.ends_with("spawn"))
-        })
+        .filter(|entity| is_spawn_point(entity))
         .filter_map(|entity| {
             let eye = entity.vec3("origin")? + Vec3::Z * EYES;
             let turned = entity.vec3("angles").map(|angles| angles.y);

@@ -92,6 +92,18 @@ pub const GLOW_THRESHOLD: f32 = 0.11;
 /// Longest side of the copies of textures that means are taken from.
 const SAMPLE_SIDE: u32 = 64;
 
+/// What directives make a material emit: `q3map_surfacelight`, and of a sky `q3map_skylight`; `None` where they say nothing.
+pub(super) fn directed(material: &WorldMaterial) -> Option<(f32, f32)> {
+    let light = &material.resolved.definition().light;
+    let positive = |v: Option<f32>| v.filter(|v| v.is_finite() && *v > 0.0).unwrap_or(0.0);
+    let surface_light = positive(light.surface_light);
+    let dome = match material.is_sky() {
+        true => positive(light.sky_light.map(|(value, _)| value)),
+        false => 0.0,
+    };
+    (surface_light > 0.0 || dome > 0.0).then_some((surface_light, dome))
+}
+
 /// Finds what materials emit, keeping small copies of the images that it looked at.
 pub(crate) struct Finder<'a> {
     files: &'a dyn GameFiles,
@@ -113,14 +125,7 @@ impl<'a> Finder<'a> {
     pub fn emission(&mut self, material: &WorldMaterial) -> Option<Emission> {
         let definition = material.resolved.definition();
         let sky = material.is_sky();
-        let positive = |v: Option<f32>| v.filter(|v| v.is_finite() && *v > 0.0).unwrap_or(0.0);
-        let surface_light = positive(definition.light.surface_light);
-        let dome = if sky {
-            positive(definition.light.sky_light.map(|(value, _)| value))
-        } else {
-            0.0
-        };
-        if surface_light > 0.0 || dome > 0.0 {
+        if let Some((surface_light, dome)) = directed(material) {
             // A colour with the luminance that the compiler's has, which scales it to a largest channel of 1.
             let color = raise(self.light_color(definition), self.exponent);
             let (source, strength) = if sky {

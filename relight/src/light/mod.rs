@@ -79,7 +79,7 @@ pub use report::{EmitterSummary, LightReport};
 pub use sight::{ClusterSet, Sight};
 pub use sweep::{SweepReport, sweep};
 
-pub(crate) use color::raise;
+pub(crate) use color::{raise, recolor};
 pub(crate) use emission::Finder;
 pub(crate) use entities::{ambient, light_entities, negative_lights};
 pub(crate) use fallback::rescue;

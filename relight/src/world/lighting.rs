@@ -7,8 +7,8 @@ use crate::exposure::Exposure;
 use crate::light::{Emission, LightLists, LightReport, PointLight, SunLight, TriangleLight};
 use glam::Vec3;
 
-/// What light a world is in: everything that [`calibrate`](crate::calibrate()) and
-/// [`sweep`](crate::light::sweep()) change.
+/// What light a world is in: everything that [`measure_materials`](RelitWorld::measure_materials),
+/// [`calibrate`](crate::calibrate()) and [`sweep`](crate::light::sweep()) change of it.
 #[derive(Debug, Clone)]
 pub struct Lighting {
     lights: Vec<TriangleLight>,
@@ -23,6 +23,7 @@ pub struct Lighting {
     ambient: Vec3,
     report: LightReport,
     calibration: Option<CalibrationReport>,
+    color_exponent: f32,
     stored_gamma: f32,
     light_end: f32,
     exposure: Option<Exposure>,
@@ -44,6 +45,7 @@ impl RelitWorld {
             ambient: self.ambient,
             report: self.report.clone(),
             calibration: self.calibration.clone(),
+            color_exponent: self.color_exponent,
             stored_gamma: self.stored_gamma,
             light_end: self.light_end,
             exposure: self.exposure,
@@ -66,6 +68,7 @@ impl RelitWorld {
         self.ambient = lighting.ambient;
         self.report = lighting.report;
         self.calibration = lighting.calibration;
+        self.color_exponent = lighting.color_exponent;
         self.stored_gamma = lighting.stored_gamma;
         self.light_end = lighting.light_end;
         self.exposure = lighting.exposure;

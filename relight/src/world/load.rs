@@ -5,13 +5,13 @@ use super::material::{WorldMaterial, lighting_of, lightmap_of};
 use super::pages::PageLoader;
 use super::{RelitWorld, fog};
 use crate::calibrate::{CalibrationOptions, calibrate};
-use crate::exposure::display_exponent;
+use crate::exposure::{Texture, display_exponent};
 use crate::external_lightmaps::external_lightmaps;
 use crate::files::{FileError, GameFiles};
 use crate::image;
 use crate::light::{self, LightColor, LightReport, TriangleLight};
 use crate::materials::Materials;
-use crate::overbright::MAP_OVERBRIGHT_BITS;
+use crate::overbright::{self, MAP_OVERBRIGHT_BITS};
 use glam::{Vec3, Vec4};
 use q3bsp::{Bsp, Entity, SurfaceKind};
 use std::collections::HashMap;
@@ -143,7 +143,7 @@ impl RelitWorld {
             resolve_materials(files, materials, &bsp, &mut pages);
         warnings.extend(pages.warnings.iter().map(|w| format!("{map}: {w}")));
         let color_exponent = match options.light_color {
-            LightColor::Displayed => display_exponent(&bsp, &pages.pages),
+            LightColor::Displayed => display_exponent(&bsp, &pages.pages, &[]),
             LightColor::Stored => 1.0,
         };
         let mut finder = light::Finder::new(files, color_exponent);
@@ -248,6 +248,7 @@ impl RelitWorld {
             report: LightReport::default(),
             calibration: None,
             warnings,
+            light_color: options.light_color,
             color_exponent,
             stored_gamma: 1.0,
             light_end: 0.0,
@@ -278,8 +279,9 @@ impl RelitWorld {
         world
     }
 
-    /// Finds what calibration needs to know of materials: how much light they throw back, and what they show of their
-    /// own. Loading does this only when it is asked to calibrate.
+    /// Finds what calibration needs to know of materials: how much light they throw back, what they show of their own, and
+    /// which colours the lights that the map describes have on them. Loading does this only when it is asked to calibrate.
+    /// To be done before [lights by hand](Self::light_by_hand), whose colours are final.
     pub fn measure_materials(&mut self, files: &dyn GameFiles) {
         self.measure_materials_with(&mut light::Finder::new(files, self.color_exponent));
     }
@@ -294,6 +296,33 @@ impl RelitWorld {
                 finder.shown(material)
             };
         }
+        if self.light_color == LightColor::Displayed {
+            let exponent = display_exponent(&self.bsp, &self.pages, &self.textures());
+            light::recolor(self, exponent);
+        }
+    }
+
+    /// How bright the textures of the surfaces of the world are, as light shows them.
+    fn textures(&self) -> Vec<Texture> {
+        let mut areas = vec![0.0; self.materials.len()];
+        let lit = (self.surfaces.iter()).filter(|s| s.num_indices > 0 && s.model == 0);
+        for surface in lit {
+            if let Some(area) = areas.get_mut(surface.material as usize) {
+                *area += self.surface_area(surface);
+            }
+        }
+        // What glows throws back nothing where it glows: it counts for nothing there.
+        (self.materials.iter().zip(areas))
+            .filter(|(_, area)| area.is_finite() && *area > 0.0)
+            .flat_map(|(material, area)| {
+                let part = area / material.shades.len().max(1) as f32;
+                material.shades.iter().map(move |shade| Texture {
+                    brightness: overbright::luminance(shade.encoded),
+                    area: part,
+                })
+            })
+            .filter(|texture| texture.brightness.is_finite())
+            .collect()
     }
 
     /// Mean colour of each material's corners over its area, encoded; white where it has none.

@@ -21,7 +21,9 @@ pub use pages::{BakedPages, StyleLight, StyleStrength};
 
 use crate::calibrate::CalibrationReport;
 use crate::exposure::Exposure;
-use crate::light::{Flicker, LightLists, LightReport, PointLight, SunLight, TriangleLight};
+use crate::light::{
+    Flicker, LightColor, LightLists, LightReport, PointLight, SunLight, TriangleLight,
+};
 use crate::overbright;
 use glam::Vec3;
 use q3bsp::{Bsp, Lightmap};
@@ -72,6 +74,8 @@ pub struct RelitWorld {
     pub calibration: Option<CalibrationReport>,
     /// What was wrong and is made up for: missing materials, repaired values. Each thing once.
     pub warnings: Vec<String>,
+    /// Which colours stored light and directives mean.
+    pub light_color: LightColor,
     /// What ratios of the channels of stored light were raised to, to get the colours of light: see
     /// [`LightColor`](crate::light::LightColor).
     pub color_exponent: f32,

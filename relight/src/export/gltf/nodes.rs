@@ -3,6 +3,7 @@
 use crate::export::model_file::{self, ModelName};
 use crate::export::{Export, extras};
 use crate::light::{PointLight, SunLight};
+use crate::spawns::is_spawn_point;
 use glam::{EulerRot, Quat, Vec3};
 use q3bsp::Entity;
 use serde_json::{Map, Value, json};
@@ -145,12 +146,8 @@ impl Nodes {
         scale: f32,
         name: &str,
     ) -> Option<usize> {
-        let class = entity.classname().to_ascii_lowercase();
-        let intermission = class == "info_player_intermission";
-        let spawn = class.starts_with("info_player_")
-            || (class.starts_with("team_")
-                && (class.ends_with("spawn") || class.ends_with("player")));
-        if !intermission && !spawn {
+        let intermission = (entity.classname()).eq_ignore_ascii_case("info_player_intermission");
+        if !intermission && !is_spawn_point(entity) {
             return None;
         }
         let origin = entity.vec3("origin").unwrap_or(Vec3::ZERO);

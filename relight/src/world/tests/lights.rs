@@ -1,7 +1,11 @@
 //! What becomes light: emissive surfaces, skies, sprites, glow, flares, and which clusters see it.
 
-use super::{ceiling_lamp, relight};
-use crate::light::{EmissionSource, LightRef, POINT_LIGHT_INTENSITY, SURFACE_LIGHT_RADIANCE};
+use super::{ORANGE, ceiling_lamp, game, relight};
+use crate::light::{
+    EmissionSource, LightColor, LightRef, POINT_LIGHT_INTENSITY, SURFACE_LIGHT_RADIANCE, raise,
+};
+use crate::materials::Materials;
+use crate::overbright;
 use crate::world::*;
 use q3bsp::builder::MapBuilder;
 use q3bsp::surface_flags;
@@ -299,4 +303,88 @@ fn negative_lights_are_left_out_with_a_warning() {
         "{:?}",
         world.warnings
     );
+}
+
+#[test]
+fn lights_have_the_colours_that_show_on_the_maps_textures() {
+    // A room of walls of one texture, with a lamp of each kind that directives and entities describe, and one that glows.
+    let load = |light_color: LightColor, texture: u8| {
+        let mut files = game();
+        let mut tga = ORANGE.to_vec();
+        tga.truncate(18);
+        tga.extend([texture; 3]);
+        files.insert("t/grey.tga", tga).unwrap();
+        let script = "t/grey\n{\n{\nmap $lightmap\n}\n{\nmap t/grey.tga\nblendFunc filter\n}\n}\n";
+        files.insert("scripts/grey.shader", script).unwrap();
+        let (materials, _) = Materials::load(&files);
+        let mut map = MapBuilder::new();
+        let wall = map.add_shader("t/grey", 0, 1);
+        let (mins, maxs) = (Vec3::splat(-128.0), Vec3::splat(128.0));
+        let page = map.add_lightmap([40, 40, 40]);
+        for face in map.add_box_faces(wall, mins, maxs, true) {
+            map.set_lightmap(face, page);
+        }
+        map.add_cell(mins, maxs);
+        for (k, name) in ["t/lamp", "t/sprite", "t/sky", "t/glow"].iter().enumerate() {
+            let lamp = map.add_shader(name, 0, 1);
+            map.add_quad(lamp, ceiling_lamp(8.0, 20.0 + 30.0 * k as f32));
+        }
+        map.add_entity(&[
+            ("classname", "light"),
+            ("origin", "0 0 0"),
+            ("_color", "1 0.5 0.25"),
+        ]);
+        map.set_world_key("ambient", "20");
+        map.set_world_key("_color", "0.25 0.5 1");
+        let options = Options {
+            light_color,
+            calibrate: None,
+            ..Options::default()
+        };
+        let bsp = Bsp::parse(&map.build().write()).unwrap();
+        let mut world = RelitWorld::from_bsp(&files, &materials, "test", bsp, options);
+        world.measure_materials(&files);
+        world
+    };
+    // Each strength, and whether it is that of something that glows: it shows its own colour whatever the map's light is.
+    let all = |world: &RelitWorld| -> Vec<(bool, Vec3)> {
+        let glows = |source: EmissionSource| source == EmissionSource::Glow;
+        let lights = world.lights.iter().map(|l| (glows(l.source), l.radiance));
+        let emissions = world.materials.iter().filter_map(|m| m.emission);
+        let emissions = emissions.map(|e| (glows(e.source), e.strength));
+        let summaries = world.report.emitters.iter();
+        let summaries = summaries.map(|e| (glows(e.source), e.radiance));
+        let points = world.point_lights.iter().map(|l| (false, l.intensity));
+        let suns = world.suns.iter().map(|s| (false, s.irradiance));
+        (lights
+            .chain(emissions)
+            .chain(summaries)
+            .chain(points)
+            .chain(suns))
+        .chain([(false, world.ambient)])
+        .collect()
+    };
+    let plain = load(LightColor::Stored, 200);
+    assert_eq!(plain.color_exponent, 1.0);
+    assert!(plain.suns.len() == 1 && plain.point_lights.len() == 1);
+    assert!(plain.ambient != Vec3::ZERO);
+    let plain = all(&plain);
+    assert!(plain.iter().any(|(glows, _)| *glows));
+    for texture in [20, 80, 200] {
+        let world = load(LightColor::Displayed, texture);
+        // Light of 160 steps on the texture.
+        let shown = f32::from(texture) / 255.0 * 160.0 / 255.0;
+        let (found, meant) = (world.color_exponent, overbright::exponent(shown));
+        assert!((found - meant).abs() < 0.05, "{found} {meant}");
+        let strengths = all(&world);
+        assert_eq!(strengths.len(), plain.len());
+        for ((_, found), (glows, stored)) in strengths.into_iter().zip(&plain) {
+            let exponent = if *glows { 1.0 } else { world.color_exponent };
+            let meant = raise(*stored, exponent);
+            assert!(
+                (found - meant).length() < 1e-4 * meant.length(),
+                "{found} {meant}"
+            );
+        }
+    }
 }
