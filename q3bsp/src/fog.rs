@@ -20,6 +20,13 @@ pub struct FogVolume {
     pub shader: String,
 }
 
+impl FogVolume {
+    /// Whether it fills the world, because the map names no brush for it.
+    pub fn fills_world(&self) -> bool {
+        self.mins == Vec3::splat(-WORLD_EXTENT) && self.maxs == Vec3::splat(WORLD_EXTENT)
+    }
+}
+
 impl Bsp {
     /// The fog volumes. A fog without a brush fills the world. Bounds come from the first six sides of the brush, which compilers write as
     /// -x +x -y +y -z +z; numbers that are not finite become 0.

@@ -16,18 +16,39 @@ pub struct WorldFog {
     pub depth: f32,
 }
 
-/// The fogs of a map. Colour and depth come from `fogParms` of the fog's material; a material without them
-/// gives black fog of depth 1, as the engine's zeroed parameters do.
-pub(super) fn fogs(bsp: &Bsp, files: &dyn GameFiles, materials: &Materials) -> Vec<WorldFog> {
+/// Depth of a fog that hides nothing, id units.
+const CLEAR: f32 = 1.0e9;
+
+/// The fogs of a map, and what is wrong with them. Colour and depth come from `fogParms` of the fog's material. A fog
+/// without them is black and of depth 1 in a brush, as the engine's zeroed parameters are; where it fills the world, which
+/// the engine does not load, it hides nothing.
+pub(super) fn fogs(
+    bsp: &Bsp,
+    files: &dyn GameFiles,
+    materials: &Materials,
+) -> (Vec<WorldFog>, Vec<String>) {
+    let mut warnings = Vec::new();
     let fill = |volume: FogVolume| {
         let material =
             materials.resolve(files, &volume.shader, shaderscript::ImplicitKind::EntityLit);
         let fog = material.shader.fog;
+        let depth = match fog {
+            Some(fog) => fog.depth.max(1.0),
+            None if volume.fills_world() => {
+                warnings.push(format!(
+                    "left out the fog {} that fills the world; no script gives it fogParms",
+                    volume.shader
+                ));
+                CLEAR
+            }
+            None => 1.0,
+        };
         WorldFog {
             color: fog.map_or(Vec3::ZERO, |f| f.color),
-            depth: fog.map_or(1.0, |f| f.depth).max(1.0),
+            depth,
             volume,
         }
     };
-    bsp.fog_volumes().into_iter().map(fill).collect()
+    let fogs = bsp.fog_volumes().into_iter().map(fill).collect();
+    (fogs, warnings)
 }

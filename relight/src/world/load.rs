@@ -160,7 +160,8 @@ impl RelitWorld {
         faulty.sort();
         faulty.dedup();
         warnings.extend(faulty);
-        let fogs = fog::fogs(&bsp, files, materials);
+        let (fogs, faults) = fog::fogs(&bsp, files, materials);
+        warnings.extend(faults.iter().map(|fault| format!("{map}: {fault}")));
 
         begin(Stage::Geometry);
         let models = place_models(&bsp, &entities);

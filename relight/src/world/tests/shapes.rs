@@ -1,6 +1,7 @@
 //! Geometry: normals, patches, fogs.
 
-use super::{ceiling_lamp, relight};
+use super::{as_said, ceiling_lamp, game, relight};
+use crate::materials::Materials;
 use crate::world::*;
 use glam::Vec2;
 use q3bsp::builder::MapBuilder;
@@ -56,6 +57,31 @@ fn fogs_are_numbered_from_one() {
         (world.surfaces[inside].fog, world.surfaces[outside].fog),
         (1, 0)
     );
+}
+
+#[test]
+fn a_fog_that_nothing_describes_hides_nothing_where_it_fills_the_world() {
+    let with = |material: &str, brush: Option<i32>| {
+        let mut map = MapBuilder::new();
+        let haze = map.add_shader(material, 0, q3bsp::content_flags::FOG);
+        map.add_cell(Vec3::splat(-64.0), Vec3::splat(64.0));
+        map.add_fog_brush(haze, Vec3::splat(-64.0), Vec3::splat(64.0), 5);
+        let mut bsp = map.build();
+        if let Some(brush) = brush {
+            bsp.fogs[0].brush = brush;
+        }
+        let files = game();
+        let (materials, _) = Materials::load(&files);
+        let world = RelitWorld::from_bsp(&files, &materials, "test", bsp, as_said());
+        let told = |w: &String| w.contains("left out the fog") && w.contains(material);
+        let warned = world.warnings.iter().any(told);
+        (world.fogs[0].depth, warned)
+    };
+    assert_eq!(with("t/haze", None), (300.0, false));
+    assert_eq!(with("t/haze", Some(-1)), (300.0, false));
+    assert_eq!(with("0.2 0.25 0.3 0", None), (1.0, false));
+    let (depth, warned) = with("0.2 0.25 0.3 0", Some(-1));
+    assert!(depth > 1.0e6 && warned);
 }
 
 #[test]
