@@ -95,7 +95,7 @@ fn game() -> MemoryFiles {
 /// Lights as directives say, whatever the lightmaps tell.
 fn as_said() -> Options<'static> {
     Options {
-        light_color: crate::light::LightColor::Stored,
+        light_color: LightColor::Stored,
         calibrate: None,
         ..Options::default()
     }
