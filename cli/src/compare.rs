@@ -1,11 +1,12 @@
 //! `relight compare`: how alike pictures of one view are, and the pictures beside each other.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use image::RgbImage;
 use relight::compare::{Rgb8, compare, flip};
+
+use crate::pictures::{read, write};
 
 /// Options of `relight compare`.
 #[derive(Args, Debug)]
@@ -59,36 +60,4 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         write(path, &all)?;
     }
     Ok(())
-}
-
-/// Reads a picture file of any kind that the game knows, by its extension; alpha is dropped.
-pub(crate) fn read(path: &Path) -> Result<Rgb8> {
-    let file = path.display().to_string();
-    let extension = path
-        .extension()
-        .map(|e| e.to_string_lossy().to_lowercase())
-        .unwrap_or_default();
-    let bytes = std::fs::read(path).with_context(|| file.clone())?;
-    let picture = relight::image::decode(&file, &extension, &bytes)?;
-    let rgb = picture
-        .pixels()
-        .flat_map(|[r, g, b, _]| [r, g, b])
-        .collect();
-    Ok(Rgb8::new(
-        picture.width as usize,
-        picture.height as usize,
-        rgb,
-    )?)
-}
-
-/// Writes a picture as PNG.
-pub(crate) fn write(path: &Path, picture: &Rgb8) -> Result<()> {
-    let (width, height) = (
-        u32::try_from(picture.width())?,
-        u32::try_from(picture.height())?,
-    );
-    RgbImage::from_raw(width, height, picture.pixels().to_vec())
-        .context("the pictures beside each other are too large for one file")?
-        .save(path)
-        .with_context(|| path.display().to_string())
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use image::ImageEncoder;
+use relight::compare::Rgb8;
 
 /// Writes a file beside its place first, so that nobody sees half of one.
 ///
@@ -30,4 +31,39 @@ pub fn write_png(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()>
     let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
     encoder.write_image(rgb, width, height, image::ExtendedColorType::Rgb8)?;
     write_whole(path, &bytes)
+}
+
+/// Reads a picture file of any kind that the game knows, by its extension; alpha is dropped.
+///
+/// # Errors
+/// It cannot be read, or is no picture.
+pub fn read(path: &Path) -> Result<Rgb8> {
+    let file = path.display().to_string();
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default();
+    let bytes = std::fs::read(path).with_context(|| file.clone())?;
+    let picture = relight::image::decode(&file, &extension, &bytes)?;
+    let rgb = picture
+        .pixels()
+        .flat_map(|[r, g, b, _]| [r, g, b])
+        .collect();
+    Ok(Rgb8::new(
+        picture.width as usize,
+        picture.height as usize,
+        rgb,
+    )?)
+}
+
+/// Writes a picture as PNG.
+///
+/// # Errors
+/// It cannot be written, or is too large for a file.
+pub fn write(path: &Path, picture: &Rgb8) -> Result<()> {
+    let (width, height) = (
+        u32::try_from(picture.width())?,
+        u32::try_from(picture.height())?,
+    );
+    write_png(path, picture.pixels(), width, height)
 }

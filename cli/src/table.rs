@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use relight::compare::{Rgb8, compare, flip};
 
-use crate::compare::{read, write};
+use crate::pictures::{read, write};
 
 /// How much brighter differences are shown.
 const GAIN: u8 = 4;

@@ -14,6 +14,17 @@ pub struct LumpRange {
     pub length: i32,
 }
 
+/// A lump as the directory of a file has it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LumpEntry {
+    /// The lump.
+    pub lump: Lump,
+    /// Where it lies.
+    pub range: LumpRange,
+    /// Bytes per record; 1 for text, pictures and compressed data.
+    pub stride: usize,
+}
+
 /// Bytes that belong to no lump: an eighteenth directory entry, a compiler's banner, padding.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Gap {

@@ -53,7 +53,7 @@ mod validate;
 mod visibility;
 mod write;
 
-pub use container::{Container, Gap, LumpRange, Repair};
+pub use container::{Container, Gap, LumpEntry, LumpRange, Repair};
 pub use entities::Entity;
 pub use error::{Error, Lump, Warning};
 pub use flags::{content_flags, surface_flags};
@@ -65,7 +65,7 @@ pub use lumps::{
     Brush, BrushSide, DrawVert, Fog, GridPoint, LIGHTMAP_BYTES, LIGHTMAP_SIZE, Leaf, Lightmap,
     Model, Node, Plane, ShaderRef,
 };
-pub use parse::{LumpEntry, lump_entries};
+pub use parse::lump_entries;
 pub use patch::{MAX_GRID_SIZE, PatchMesh, tessellate_patch};
 pub use surface::{Surface, SurfaceKind, lightmap_index};
 pub use visibility::Visibility;

@@ -1,7 +1,7 @@
 //! Bytes to [`Bsp`]: the directory and the records. What they refer to is checked in `validate`.
 
 use crate::bytes::Fields;
-use crate::container::{Container, Gap, LumpRange, SLOTS};
+use crate::container::{Container, Gap, LumpEntry, LumpRange, SLOTS};
 use crate::error::{Error, Lump, Warning};
 use crate::format::{Announced, Format, announced};
 use crate::layers::{GridLayers, LayeredSide, LayeredSurface, LayeredVertex};
@@ -206,17 +206,6 @@ impl Bsp {
             _ => {}
         }
     }
-}
-
-/// A lump as the directory of a file has it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LumpEntry {
-    /// The lump.
-    pub lump: Lump,
-    /// Where it lies.
-    pub range: LumpRange,
-    /// Bytes per record; 1 for text, pictures and compressed data.
-    pub stride: usize,
 }
 
 /// The directory of a map file of any [`Format`], in its order.

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::bytes::Fields;
 use crate::iqm::IQM_WEIGHTS;
-use crate::iqm_parse::{Header, list};
+use crate::iqm_header::{Header, list};
 
 pub(crate) const ARRAY_BYTES: usize = 20;
 

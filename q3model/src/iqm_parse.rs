@@ -3,13 +3,11 @@
 use glam::Vec3;
 
 use crate::Error;
-use crate::bytes::{Fields, Region, TRIANGLE_BYTES, check_sharing, read_triangles};
+use crate::bytes::{Fields, TRIANGLE_BYTES, check_sharing, read_triangles};
 use crate::iqm::{IQM_WEIGHTS, Iqm, IqmChannels, IqmJoint, IqmPose, IqmSurface, IqmVertex};
 use crate::iqm_arrays::Arrays;
+use crate::iqm_header::{Header, list};
 
-pub(crate) const MAGIC: &[u8; 16] = b"INTERQUAKEMODEL\0";
-pub(crate) const VERSION: u32 = 2;
-pub(crate) const HEADER_BYTES: usize = 124;
 pub(crate) const MESH_BYTES: usize = 24;
 pub(crate) const JOINT_BYTES: usize = 48;
 pub(crate) const POSE_BYTES: usize = 88;
@@ -19,69 +17,6 @@ pub(crate) const BOUNDS_BYTES: usize = 32;
 const MAX_NAME: usize = 63;
 /// Bytes of a vertex in memory, at most; a file has half of that at least.
 const VERTEX_MEMORY: usize = 64;
-
-/// The header's numbers after magic and version.
-pub(crate) struct Header {
-    file_size: u32,
-    text: (u32, u32),
-    meshes: (u32, u32),
-    pub num_arrays: u32,
-    pub num_vertices: u32,
-    pub arrays_at: u32,
-    triangles: (u32, u32),
-    joints: (u32, u32),
-    poses: (u32, u32),
-    num_frames: u32,
-    numbers_per_frame: u32,
-    frames_at: u32,
-    bounds_at: u32,
-}
-
-impl Header {
-    fn read(bytes: &[u8]) -> Result<Header, Error> {
-        if let Some(start) = bytes.first_chunk::<20>() {
-            let mut f = Fields::new(start);
-            let magic: [u8; 16] = f.bytes();
-            let version = f.u32();
-            if &magic != MAGIC || version != VERSION {
-                return Err(Error::WrongFormat {
-                    found: format!("\"{}\" version {version}", magic.escape_ascii()),
-                    expected: "\"INTERQUAKEMODEL\" version 2",
-                });
-            }
-        }
-        let file = Region::new(bytes, 0);
-        let mut f = Fields::new(file.records(|| "the header".to_owned(), 0, 1, HEADER_BYTES)?);
-        let _magic_and_version: [u8; 20] = f.bytes();
-        let file_size = f.u32();
-        let _flags = f.u32();
-        let list = |f: &mut Fields<'_>| (f.u32(), f.u32());
-        let text = list(&mut f);
-        let meshes = list(&mut f);
-        let (num_arrays, num_vertices, arrays_at) = (f.u32(), f.u32(), f.u32());
-        let triangles = list(&mut f);
-        let _adjacency = f.u32();
-        let joints = list(&mut f);
-        let poses = list(&mut f);
-        // named ranges of frames: the game knows its own
-        let _animations = list(&mut f);
-        Ok(Header {
-            file_size,
-            text,
-            meshes,
-            num_arrays,
-            num_vertices,
-            arrays_at,
-            triangles,
-            joints,
-            poses,
-            num_frames: f.u32(),
-            numbers_per_frame: f.u32(),
-            frames_at: f.u32(),
-            bounds_at: f.u32(),
-        })
-    }
-}
 
 impl Iqm {
     /// Reads and validates a model. The engine's limits on the size of the file, on joints, and on vertices and
@@ -168,22 +103,6 @@ impl Iqm {
             bounds,
         })
     }
-}
-
-/// A list of records anywhere in the file.
-pub(crate) fn list<'a>(
-    bytes: &'a [u8],
-    what: &str,
-    offset: u32,
-    count: u32,
-    stride: usize,
-) -> Result<&'a [u8], Error> {
-    Region::new(bytes, 0).records(
-        || format!("{count} {what}"),
-        i32::try_from(offset).unwrap_or(i32::MAX),
-        count as usize,
-        stride,
-    )
 }
 
 struct Reader<'a> {

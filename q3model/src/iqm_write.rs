@@ -6,7 +6,8 @@ use crate::iqm::{Iqm, IqmVertex};
 use crate::iqm_arrays::{
     ARRAY_BYTES, BLEND_INDEXES, BLEND_WEIGHTS, COLOR, FLOAT, NORMAL, POSITION, TEXCOORD, UBYTE,
 };
-use crate::iqm_parse::{HEADER_BYTES, JOINT_BYTES, MAGIC, MESH_BYTES, POSE_BYTES, VERSION};
+use crate::iqm_header::{HEADER_BYTES, MAGIC, VERSION};
+use crate::iqm_parse::{JOINT_BYTES, MESH_BYTES, POSE_BYTES};
 use crate::write::{patch, put, put_count, put_floats, put_triangles, put_vec3};
 
 /// Where in the header the file's size and the lists are told.

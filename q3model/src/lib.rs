@@ -17,6 +17,7 @@ mod error;
 mod font;
 mod iqm;
 mod iqm_arrays;
+mod iqm_header;
 mod iqm_parse;
 mod iqm_write;
 mod md3;

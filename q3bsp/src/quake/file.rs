@@ -5,10 +5,9 @@ use super::records::{
     Versioned,
 };
 use crate::bytes::Fields;
-use crate::container::LumpRange;
+use crate::container::{LumpEntry, LumpRange};
 use crate::error::{Error, Lump};
 use crate::format::Format;
-use crate::parse::LumpEntry;
 use glam::Vec3;
 
 /// Lumps of Quake and GoldSrc in directory order.

@@ -1,0 +1,264 @@
+//! The rooms' arrows: which crate may use which, as ARCHITECTURE.md has it, and which modules of a crate use each other
+//! in a circle.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Modules of one crate that use each other in a circle, as long as they do: a circle may shrink and go, none may grow
+/// or come.
+const CIRCLES: [(&str, &[&str]); 2] = [
+    ("relight", &["calibrate", "exposure", "light", "world"]),
+    (
+        "ffi",
+        &[
+            "boundary",
+            "capture",
+            "commands",
+            "config",
+            "cvars",
+            "fallback",
+            "files",
+            "ioq3",
+            "logging",
+            "recognize",
+            "session",
+            "window",
+        ],
+    ),
+];
+
+type Uses = BTreeMap<String, BTreeSet<String>>;
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// The crates of the workspace.
+fn members() -> Vec<String> {
+    let manifest = read(&tests::data::repository().join("Cargo.toml"));
+    let line = manifest.lines().find(|l| l.starts_with("members"));
+    let names = line.expect("members").split('"').skip(1).step_by(2);
+    names.map(str::to_owned).collect()
+}
+
+/// Rows of ARCHITECTURE.md's table of crates: name, and those in its last column.
+fn table() -> Vec<(String, BTreeSet<String>)> {
+    let page = read(&tests::data::repository().join("ARCHITECTURE.md"));
+    let quoted = |cell: &str| -> Vec<String> {
+        let names = cell.split('`').skip(1).step_by(2);
+        names.map(|n| n.trim_end_matches('/').to_owned()).collect()
+    };
+    let rows = page
+        .lines()
+        .skip_while(|line| !line.starts_with("| room | holds | may use |"))
+        .skip(2)
+        .take_while(|line| line.starts_with('|'));
+    rows.map(|row| {
+        let cells: Vec<&str> = row.trim_matches('|').split('|').collect();
+        let [room, _, uses] = cells[..] else {
+            panic!("three cells: {row}")
+        };
+        let name = quoted(room).into_iter().next().expect("a crate's name");
+        (name, quoted(uses).into_iter().collect())
+    })
+    .collect()
+}
+
+#[test]
+fn crates_use_those_that_the_table_allows_and_none_above() {
+    let (members, table) = (members(), table());
+    let named: Vec<&String> = table.iter().map(|(name, _)| name).collect();
+    for member in &members {
+        assert!(named.contains(&member), "{member} has no row");
+    }
+    for (row, (name, allowed)) in table.iter().enumerate() {
+        for other in allowed {
+            let at = named.iter().position(|n| *n == other);
+            assert!(
+                at.is_some_and(|at| at < row),
+                "{name}: {other} is not above"
+            );
+        }
+        let manifest = read(&tests::data::repository().join(name).join("Cargo.toml"));
+        let used: BTreeSet<String> = manifest
+            .lines()
+            .skip_while(|line| line.trim() != "[dependencies]")
+            .skip(1)
+            .take_while(|line| !line.starts_with('['))
+            .filter_map(|line| line.split(['.', ' ', '=']).next())
+            .filter(|dependency| members.iter().any(|m| m == dependency))
+            .map(str::to_owned)
+            .collect();
+        assert_eq!(&used, allowed, "{name}: Cargo.toml and the table");
+    }
+}
+
+/// Source files of a crate, without its tests.
+fn sources(folder: &Path, into: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder of sources") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        if name == "tests" || name == "bin" {
+            continue;
+        }
+        if path.is_dir() {
+            sources(&path, into);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            into.push(path);
+        }
+    }
+}
+
+/// A source without comments and without the tests at its end.
+fn code(path: &Path) -> String {
+    let text = read(path);
+    let product = text.split("#[cfg(test)]\nmod tests").next();
+    let lines = product.unwrap_or_default().lines();
+    let bare = lines.map(|line| line.split("//").next().unwrap_or_default());
+    bare.collect::<Vec<_>>().join("\n")
+}
+
+/// Names that follow `prefix` in a source, those of a group in braces each.
+fn names_after(code: &str, prefix: &str) -> Vec<String> {
+    let word = |text: &str| -> String {
+        let letters = text.trim_start().chars();
+        letters
+            .take_while(|c| c.is_alphanumeric() || *c == '_')
+            .collect()
+    };
+    let mut names = Vec::new();
+    for (at, _) in code.match_indices(prefix) {
+        let rest = &code[at + prefix.len()..];
+        let Some(group) = rest.strip_prefix('{') else {
+            names.push(word(rest));
+            continue;
+        };
+        let mut depth = 0;
+        let mut start = true;
+        for (k, c) in group.char_indices() {
+            match c {
+                '{' => depth += 1,
+                '}' if depth == 0 => break,
+                '}' => depth -= 1,
+                ',' if depth == 0 => start = true,
+                c if start && depth == 0 && !c.is_whitespace() => {
+                    names.push(word(&group[k..]));
+                    start = false;
+                }
+                _ => {}
+            }
+        }
+    }
+    names
+}
+
+/// Which top-level modules of a crate use which others.
+fn uses(member: &str) -> Uses {
+    let root = tests::data::repository().join(member).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    let module_of = |path: &Path| {
+        let inside = path.strip_prefix(&root).expect("a file of the crate");
+        let first = inside.components().next().expect("a name");
+        let name = first.as_os_str().to_string_lossy();
+        name.trim_end_matches(".rs").to_owned()
+    };
+    let library = root.join("lib.rs");
+    let shown_by_root = if library.exists() {
+        read(&library)
+    } else {
+        String::new()
+    };
+    let for_tests = names_after(&shown_by_root, "#[cfg(test)]\nmod ");
+    files.retain(|path| !for_tests.contains(&module_of(path)));
+    let modules: BTreeSet<String> = files.iter().map(|path| module_of(path)).collect();
+    // What the crate's root shows under its own name belongs to the module that it comes from.
+    let mut shown: BTreeMap<String, String> = BTreeMap::new();
+    for module in &modules {
+        for name in names_after(&shown_by_root, &format!("use {module}::")) {
+            shown.insert(name, module.clone());
+        }
+    }
+    let mut uses = Uses::new();
+    for path in files {
+        let from = module_of(&path);
+        if from == "lib" || from == "main" {
+            continue;
+        }
+        for name in names_after(&code(&path), "crate::") {
+            let to = modules.get(&name).or_else(|| shown.get(&name));
+            if let Some(to) = to.filter(|to| **to != from) {
+                uses.entry(from.clone()).or_default().insert(to.clone());
+            }
+        }
+    }
+    uses
+}
+
+/// Sets of modules each of which reaches each other one.
+fn circles(uses: &Uses) -> Vec<BTreeSet<String>> {
+    let reached = |from: &String| {
+        let mut found = BTreeSet::new();
+        let mut next = vec![from];
+        while let Some(module) = next.pop() {
+            for to in uses.get(module).into_iter().flatten() {
+                if found.insert(to.clone()) {
+                    next.push(to);
+                }
+            }
+        }
+        found
+    };
+    let reach: BTreeMap<&String, BTreeSet<String>> = uses.keys().map(|m| (m, reached(m))).collect();
+    let mut found: Vec<BTreeSet<String>> = Vec::new();
+    for (module, there) in &reach {
+        let back = |other: &&String| reach.get(other).is_some_and(|r| r.contains(*module));
+        let circle: BTreeSet<String> = there.iter().filter(back).cloned().collect();
+        if circle.len() > 1 && !found.contains(&circle) {
+            found.push(circle);
+        }
+    }
+    found
+}
+
+#[test]
+fn no_new_circle_of_modules_comes_and_known_ones_only_shrink() {
+    let mut found = Vec::new();
+    for member in members() {
+        for circle in circles(&uses(&member)) {
+            found.push((member.clone(), circle));
+        }
+    }
+    let known = CIRCLES.map(|(member, modules)| {
+        let modules: BTreeSet<String> = modules.iter().map(|m| (*m).to_owned()).collect();
+        (member.to_owned(), modules)
+    });
+    for circle in &found {
+        assert!(known.contains(circle), "not known: {circle:?}");
+    }
+    for circle in &known {
+        assert!(
+            found.contains(circle),
+            "mended: take it out of CIRCLES, or name what is left of it: {circle:?}"
+        );
+    }
+}
+
+#[test]
+fn names_are_found_alone_and_in_groups() {
+    let code = "use crate::one::Two;\nuse crate::{three, four::{five, Six}, seven::Eight};\nlet x = crate::nine::ten();";
+    let found = names_after(code, "crate::");
+    assert_eq!(found, ["one", "three", "four", "seven", "nine"]);
+    let uses: Uses = [("a", "b"), ("b", "c"), ("c", "a"), ("c", "d"), ("d", "e")]
+        .into_iter()
+        .map(|(from, to)| (from.to_owned(), [to.to_owned()].into()))
+        .fold(
+            Uses::new(),
+            |mut all, (from, to): (String, BTreeSet<String>)| {
+                all.entry(from).or_default().extend(to);
+                all
+            },
+        );
+    let circle: BTreeSet<String> = ["a", "b", "c"].map(str::to_owned).into();
+    assert_eq!(circles(&uses), [circle]);
+}
