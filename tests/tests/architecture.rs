@@ -195,7 +195,7 @@ fn uses(member: &str) -> Uses {
     uses
 }
 
-/// Sets of modules each of which reaches each other one.
+/// Strongly connected components of more than one module.
 fn circles(uses: &Uses) -> Vec<BTreeSet<String>> {
     let reached = |from: &String| {
         let mut found = BTreeSet::new();
