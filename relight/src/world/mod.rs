@@ -77,7 +77,7 @@ pub struct RelitWorld {
     /// Which colours stored light and directives mean.
     pub light_color: LightColor,
     /// What ratios of the channels of stored light were raised to, to get the colours of light: see
-    /// [`LightColor`](crate::light::LightColor).
+    /// [`LightColor`].
     pub color_exponent: f32,
     /// Gamma g that the map's compiler encoded light with before it stored it, L^(1 / g); 1 where it stored light as it is,
     /// and where nobody [calibrated](crate::calibrate()) to find out. Light is counted in a unit in which what the engine
