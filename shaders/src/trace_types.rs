@@ -133,9 +133,12 @@ pub struct TraceView {
     pub target_height: u32,
     /// Clamped, with mip levels: for the images of sky boxes.
     pub sky_sampler: u32,
+    /// Distance of the faces of the box that the engine draws a sky on, units.
+    pub sky_distance: f32,
     /// Camera of the last frame.
     pub last_eye: Vec3,
     pub last_forward: Vec3,
     pub last_left: Vec3,
     pub last_up: Vec3,
+    pub padding: u32,
 }

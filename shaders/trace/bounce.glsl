@@ -75,7 +75,7 @@ bool bounce_meets(Hit hit, vec3 origin, vec3 direction, inout vec3 throughput, i
     // what is in the light lists is counted by sampling the lights, never twice
     bool in_lists = (material_of(p.triangle.material).flags & MATERIAL_EMITTER) != 0;
     if (p.kind == KIND_SKY) {
-        if (!in_lists) sum += throughput * sky_radiance(p, direction, BOUNCE_SPREAD, false);
+        if (!in_lists) sum += throughput * sky_radiance(p, direction, BOUNCE_SPREAD, false, vec4(0.0));
         return false;
     }
     Layer layer = evaluate_stages(p, round_footprint(t * BOUNCE_SPREAD));

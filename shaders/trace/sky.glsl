@@ -21,6 +21,19 @@ void sky_face(vec3 d, out uint face, out vec2 uv) {
     uv = vec2(st.x * 0.5 + 0.5, 0.5 - st.y * 0.5);
 }
 
+// The inverse: the point of the box [-1, 1]^3.
+vec3 sky_point(uint face, vec2 uv) {
+    vec2 st = vec2(uv.x * 2.0 - 1.0, 1.0 - uv.y * 2.0);
+    switch (face) {
+    case 0u: return vec3(1.0, -st.x, st.y);
+    case 1u: return vec3(st.x, 1.0, st.y);
+    case 2u: return vec3(-1.0, st.x, st.y);
+    case 3u: return vec3(-st.x, -1.0, st.y);
+    case 4u: return vec3(-st.y, -st.x, 1.0);
+    default: return vec3(st.y, -st.x, -1.0);
+    }
+}
+
 // Texture coordinates of the clouds: the point where the direction meets a sphere of radius 4096 + height around a
 // centre 4096 below the eye, its unit vector's arc cosines.
 vec2 cloud_uv(vec3 d, float height) {
@@ -54,9 +67,27 @@ vec3 displayed_factor(uint factor, vec4 source, vec3 destination) {
     }
 }
 
-// The stages of clouds or of the sun over what lies behind them. No light falls on a sky: it is a picture, and put
-// together as the engine does it, in displayed colours.
-vec3 displayed_stages(SurfacePoint p, Footprint width, vec3 below) {
+// Whether the engine lets fog take from what a material adds to the display: by how its first stage blends.
+bool fades_in_fog(Material material) {
+    if (material.stage_count == 0) return false;
+    Stage stage = Stages(VIEW.materials.stages).at[material.stage_first];
+    uint source = stage.blend_src, target = stage.blend_dst;
+    if (target == BLEND_ONE_MINUS_SRC_ALPHA) return source == BLEND_SRC_ALPHA || source == BLEND_ONE;
+    return (source == BLEND_ONE && target == BLEND_ONE) || (source == BLEND_ZERO && target == BLEND_ONE_MINUS_SRC_COLOR);
+}
+
+// What a blended stage draws behind fog that leaves `clear` of it, by how it blends.
+vec4 faded(Stage stage, vec4 source, float clear) {
+    if (stage.blend_dst == BLEND_ONE_MINUS_SRC_ALPHA && stage.blend_src == BLEND_SRC_ALPHA) return vec4(source.rgb, source.a * clear);
+    if (stage.blend_dst == BLEND_ONE_MINUS_SRC_ALPHA && stage.blend_src == BLEND_ONE) return source * clear;
+    bool fades = (stage.blend_src == BLEND_ONE && stage.blend_dst == BLEND_ONE)
+        || (stage.blend_src == BLEND_ZERO && stage.blend_dst == BLEND_ONE_MINUS_SRC_COLOR);
+    return fades ? vec4(source.rgb * clear, source.a) : source;
+}
+
+// The stages of clouds or of the sun over what lies behind them, behind fog that leaves `clear` of them. No light falls on
+// a sky: it is a picture, and put together as the engine does it, in displayed colours.
+vec3 displayed_stages(SurfacePoint p, Footprint width, vec3 below, float clear) {
     Material material = material_of(p.triangle.material);
     Instance instance = instance_of(p.instance);
     Stages stages = Stages(VIEW.materials.stages);
@@ -64,6 +95,7 @@ vec3 displayed_stages(SurfacePoint p, Footprint width, vec3 below) {
         Stage stage = stages.at[material.stage_first + i];
         vec4 source = clamp(stage_color(VIEW.materials, stage, instance, p.stage) * stage_texel(stage, p, instance, width), 0.0, 1.0);
         if (stage.alpha_func != ALPHAFUNC_NONE && !alpha_passes(stage.alpha_func, source.a)) continue;
+        source = faded(stage, source, clear);
         below = clamp(source.rgb * displayed_factor(stage.blend_src, source, below)
             + below * displayed_factor(stage.blend_dst, source, below), 0.0, 1.0);
     }
@@ -98,8 +130,9 @@ bool sun_at(inout SurfacePoint p, vec3 d) {
 }
 
 // Displayed radiance of the sky in direction d. `p`: the sky surface that was hit; its lightmap index is the sky's.
-// `with_sun`: with the picture of the sun, which is seen but gives no light: that is a light's.
-vec3 sky_radiance(SurfacePoint p, vec3 d, float spread, bool with_sun) {
+// `with_sun`: with the picture of the sun, which is seen but gives no light: that is a light's. `fog`: displayed colour of
+// the fog over the clouds, and its share.
+vec3 sky_radiance(SurfacePoint p, vec3 d, float spread, bool with_sun, vec4 fog) {
     if ((VIEW.flags & VIEW_FAST_SKY) != 0) return vec3(0.0);
     SkyRecord sky = Skies(VIEW.skies).at[p.triangle.lightmap];
     uint face;
@@ -115,7 +148,10 @@ vec3 sky_radiance(SurfacePoint p, vec3 d, float spread, bool with_sun) {
     // drivers inline functions: in a loop the stages are compiled once
     for (uint picture = 0; picture < (with_sun ? 2 : 1); picture++) {
         bool covers = picture == 0 ? clouds_at(p, d, face, sky.cloud_height) : sun_at(p, d);
-        if (covers) color = displayed_stages(p, round_footprint(spread), color);
+        if (!covers) continue;
+        float cover = picture == 0 ? fog.a : 0.0;
+        float clear = fades_in_fog(material_of(p.triangle.material)) ? 1.0 - cover : 1.0;
+        color = mix(displayed_stages(p, round_footprint(spread), color, clear), fog.rgb, cover);
     }
     return decode_display(color);
 }

@@ -103,8 +103,9 @@ struct TraceView {
     uint image_position; uint image_surface; uint image_shown; uint image_other; uint image_direct; uint image_indirect; uint image_composite;
     uint image_accumulation; uint image_motion; uint image_rays; uint image_target;
     float exposure_bias; float exposure_base; float exposure_middle; float exposure_blend; float exposure_blend_dark;
-    uint target_width; uint target_height; uint sky_sampler;
+    uint target_width; uint target_height; uint sky_sampler; float sky_distance;
     vec3 last_eye; vec3 last_forward; vec3 last_left; vec3 last_up;
+    uint padding;
 };
 
 // What a geometry's triangles are to a ray.

@@ -106,6 +106,13 @@ impl GroupContext<'_> {
     }
 }
 
+/// Whether fog is drawn over surfaces of a material that store `fog`, and if so, whether they are opaque.
+pub(super) fn fogged(material: &Material, fog: u32) -> Option<bool> {
+    let opaque = material.sort <= sort::OPAQUE;
+    let passes = opaque || material.flags & c::MATERIAL_FOG != 0;
+    (fog != 0 && passes).then_some(opaque)
+}
+
 /// How fog is drawn over what `plain` draws.
 pub(super) fn fog_state(plain: State, opaque: bool, shading: Shading) -> State {
     State {
@@ -275,13 +282,8 @@ impl DrawList {
         let (Some(instance), Some(pass)) = (context.instance(group), passes.first()) else {
             return;
         };
-        let first_blends = material.passes.first().is_some_and(|p| p.blend.is_some());
-        let fog_adjust = if group.common.fog != 0 && first_blends && material.sort > sort::OPAQUE {
-            fog_adjust(pass.blend)
-        } else {
-            c::FOG_ADJUST_NONE
-        };
         let draw = plain_draw(group);
+        let fog_adjust = fog_adjust(material, draw.fog, pass.blend);
         let lightmap = group.common.lightmap;
         let (mut shading, mut draw) =
             stages.passes(material, passes, instance, lightmap, fog_adjust, draw);
@@ -350,10 +352,9 @@ impl DrawList {
     }
 
     fn add_fog(&mut self, material: &Material, group: &Group, context: &GroupContext<'_>) {
-        let opaque = material.sort <= sort::OPAQUE;
-        if group.common.fog == 0 || !(opaque || material.flags & c::MATERIAL_FOG != 0) {
+        let Some(opaque) = fogged(material, group.common.fog) else {
             return;
-        }
+        };
         let (shading, draw) = context.stages.fog(plain_draw(group));
         let state = fog_state(context.plain_state(material), opaque, shading);
         let call = self.call(state, group.range, group.span, draw);

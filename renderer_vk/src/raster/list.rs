@@ -5,7 +5,7 @@ use shaders::types::{Draw, Instance, Vertex};
 
 use super::aids::Aids;
 use super::depth_first::Occluder;
-use super::groups::{Group, GroupContext};
+use super::groups::{Group, GroupContext, fog_state, fogged};
 use super::passes;
 use super::pipelines::{CullFaces, Depth, State};
 use super::shading::{Shading, StageContext};
@@ -191,7 +191,20 @@ impl DrawList {
         }
         let span = (first_index, self.indices.len() as u32 - first_index);
         if span.1 > 0 {
+            // the box has no fog
+            let fog = visible.fog;
+            let draw = Draw { fog, ..draw };
             self.add_sky_passes(material, world, CullFaces::None, span, draw, stages, aids);
+            if let Some(opaque) = fogged(material, fog) {
+                let (shading, draw) = stages.fog(draw);
+                let clouds = sky_state(None, false, CullFaces::None, shading);
+                self.push(
+                    fog_state(clouds, opaque, shading),
+                    aids.sky_range(),
+                    span,
+                    draw,
+                );
+            }
             if aids.edges {
                 self.push_edges(span, draw, CullFaces::None);
             }
@@ -231,7 +244,7 @@ impl DrawList {
                 passes,
                 world,
                 c::NO_TEXTURE,
-                c::FOG_ADJUST_NONE,
+                fog_adjust(material, draw.fog, pass.blend),
                 draw,
             );
             let state = sky_state(pass.blend, pass.depth_write, cull, shading);
@@ -305,8 +318,13 @@ pub(super) fn faces(cull: Cull, mirrored: bool) -> CullFaces {
     }
 }
 
-/// Which channels fog scales on a blended stage, by the way it blends.
-pub(super) fn fog_adjust(blend: Option<(u32, u32)>) -> u32 {
+/// Which channels fog scales on a blended stage, by the way it blends, if the material's first stage blends, too. Its sort
+/// makes no difference: blended stages that are drawn with the opaque ones, as the clouds of a sky, fade and are fogged.
+pub(super) fn fog_adjust(material: &Material, fog: u32, blend: Option<(u32, u32)>) -> u32 {
+    let first_blends = material.passes.first().is_some_and(|p| p.blend.is_some());
+    if fog == 0 || !first_blends {
+        return c::FOG_ADJUST_NONE;
+    }
     match blend {
         Some((c::BLEND_ONE, c::BLEND_ONE) | (c::BLEND_ZERO, c::BLEND_ONE_MINUS_SRC_COLOR)) => {
             c::FOG_ADJUST_RGB

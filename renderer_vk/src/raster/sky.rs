@@ -10,8 +10,6 @@ use crate::scene::{Cells, SKY_CELLS, SUN_SIZE, View, cube_point, perpendicular};
 
 /// Radius of the planet under the clouds, units.
 const PLANET_RADIUS: f32 = 4096.0;
-/// How far away the box and the sun are, as a part of the distance of the far plane; less than its corners.
-const DISTANCE: f32 = 1.0 / 1.75;
 
 /// Coordinates on the cloud layer in `direction` (any length), clouds `height` above the ground.
 pub fn cloud_coordinates(direction: Vec3, height: f32) -> Vec2 {
@@ -62,7 +60,7 @@ impl Mesh<'_> {
                     Coordinates::Clouds(height) => cloud_coordinates(point, height),
                 };
                 self.vertices.push(Vertex {
-                    position: view.origin + point * view.far * DISTANCE,
+                    position: view.origin + point * view.sky_distance(),
                     normal: -point.normalize(),
                     st,
                     lightmap: Vec2::ZERO,
@@ -86,7 +84,7 @@ impl Mesh<'_> {
     pub fn append_sun(&mut self, direction: Vec3, view: &View) -> (u32, u32) {
         let first_vertex = self.vertices.len() as u32;
         let first_index = self.indices.len() as u32;
-        let distance = view.far * DISTANCE;
+        let distance = view.sky_distance();
         let middle = view.origin + direction * distance;
         let left = perpendicular(direction) * distance * SUN_SIZE;
         let up = direction.cross(left);

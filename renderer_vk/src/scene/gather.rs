@@ -208,7 +208,7 @@ impl<'a> Gatherer<'a> {
         self.scratch.sort(&mut out.surfaces);
         // of skies that lie behind each other the one that is drawn last shows: they write no depth
         let materials = self.input.materials;
-        (out.skies).sort_unstable_by_key(|sky| materials.rank(sky.material));
+        (out.skies).sort_unstable_by_key(|sky| (materials.rank(sky.material), sky.fog));
         if self.input.settings.speeds != 0 && self.look == Look::Classic {
             out.statistics = self.count_view(out);
         }
@@ -258,13 +258,14 @@ impl<'a> Gatherer<'a> {
     /// Finds the visible surfaces and sets the far plane to the farthest corner of what is visible.
     fn find_visible(&mut self, world: &WorldData, pvs_origin: Vec3, out: &mut ViewScene) {
         let settings = self.input.settings;
-        let frustum: &[Vec4] = if self.culling { &self.frustum } else { &[] };
+        let frustum: &[Vec4] = if settings.no_cull { &[] } else { &self.frustum };
         self.visible.gather(
             world,
             &VisibleQuery {
                 pvs_origin,
                 area_mask: &self.def.area_mask,
                 frustum,
+                culls: self.culling,
                 no_vis: settings.no_vis,
                 locked: settings.lock_pvs,
                 show_cluster: settings.show_cluster,

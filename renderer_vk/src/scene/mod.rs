@@ -251,7 +251,7 @@ pub struct ViewScene {
     pub debug: DebugPolygons,
     /// Counts, when `r_speeds` asks for them.
     pub statistics: Statistics,
-    /// The skies in sight, each material once (classic look only).
+    /// The skies in sight, each material once with each fog (classic look only).
     pub skies: Vec<VisibleSky>,
     /// The sun's disc, when it is to be drawn wherever a sky is in sight.
     pub sun: Option<Sun>,

@@ -9,6 +9,8 @@ use glam::{Vec2, Vec3};
 pub const FACES: usize = 6;
 /// Cells of a face along each side.
 pub const CELLS: usize = 8;
+/// What covers less than about this share of a face covers nothing.
+const SMALLEST_SHARE: f32 = 1e-6;
 /// What lies nearer to the plane of the eye than this covers nothing, units.
 const NEAREST: f32 = 0.001;
 
@@ -65,6 +67,8 @@ pub struct SkyCoverage {
 pub struct VisibleSky {
     /// Index of the material (remapping already applied).
     pub material: u32,
+    /// Index of the fog that its surfaces store; 0: none.
+    pub fog: u32,
     /// Where it shows.
     pub coverage: SkyCoverage,
 }
@@ -89,6 +93,9 @@ impl SkyCoverage {
             polygon.clip(|p| p.z + p.x);
             polygon.clip(|p| p.z - p.y);
             polygon.clip(|p| p.z + p.y);
+            if polygon.covers_nothing() {
+                continue;
+            }
             for p in polygon.corners().iter().filter(|p| p.z >= NEAREST) {
                 let at = p.truncate() / p.z;
                 *low = low.min(at);
@@ -126,6 +133,19 @@ impl Polygon {
 
     fn corners(&self) -> &[Vec3] {
         self.points.get(..self.count).unwrap_or_default()
+    }
+
+    /// It has no area as seen from the eye: a triangle that touches a face of the cube with a corner or an edge alone.
+    fn covers_nothing(&self) -> bool {
+        let corners = self.corners();
+        let next = corners.iter().cycle().skip(1);
+        let twice_area: Vec3 = corners.iter().zip(next).map(|(a, b)| a.cross(*b)).sum();
+        let Some(first) = corners.first() else {
+            return true;
+        };
+        // the volume between it and the eye, in proportion to its extent
+        let extent = corners.iter().map(|p| p.length()).fold(0.0, f32::max);
+        twice_area.dot(*first).abs() <= SMALLEST_SHARE * extent.powi(3)
     }
 
     /// Keeps the part where `side` is not negative.
@@ -193,6 +213,21 @@ mod tests {
             assert_eq!((side.from, side.to), ([0, 5], [8, 8]), "face {face}");
         }
         assert_eq!(coverage.cells(5), None);
+    }
+
+    #[test]
+    fn what_touches_a_face_with_an_edge_covers_nothing_of_it() {
+        // two walls of a cube around the eye touch the ceiling with an edge each, whose box is all of the ceiling
+        let mut coverage = SkyCoverage::EMPTY;
+        for face in [0, 1] {
+            let at = |s: f32, t: f32| cube_point(face, s, t) * 256.0;
+            coverage.add([at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0)]);
+            coverage.add([at(-1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)]);
+        }
+        for face in 0..FACES {
+            let expected = (face < 2).then_some(Cells::ALL);
+            assert_eq!(coverage.cells(face), expected, "face {face}");
+        }
     }
 
     #[test]

@@ -152,7 +152,7 @@ impl SurfaceRun<'_> {
         };
         if drawn.is_sky() {
             if !self.no_sky {
-                self.add_sky(material, first_index, index_count, out);
+                self.add_sky((material, surface.fog), first_index, index_count, out);
             }
             return None;
         }
@@ -186,17 +186,25 @@ impl SurfaceRun<'_> {
 }
 
 impl SurfaceRun<'_> {
-    /// Adds triangles to what is seen of a sky.
-    fn add_sky(&self, material: u32, first_index: u32, index_count: u32, out: &mut ViewScene) {
+    /// Adds triangles to what is seen of a sky: of one material, the engine draws by itself what stores one fog.
+    fn add_sky(
+        &self,
+        (material, fog): (u32, u32),
+        first_index: u32,
+        index_count: u32,
+        out: &mut ViewScene,
+    ) {
         let Some(instance) = out.instances.get(self.instance as usize) else {
             return;
         };
         let eye = out.view.origin;
-        let at = match out.skies.iter().position(|sky| sky.material == material) {
+        let same = |sky: &VisibleSky| (sky.material, sky.fog) == (material, fog);
+        let at = match out.skies.iter().position(same) {
             Some(at) => at,
             None => {
                 out.skies.push(VisibleSky {
                     material,
+                    fog,
                     coverage: SkyCoverage::EMPTY,
                 });
                 out.skies.len() - 1

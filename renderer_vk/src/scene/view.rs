@@ -56,6 +56,12 @@ impl View {
         view
     }
 
+    /// Distance of the faces of the box that the engine draws a sky on, and of the sun; its corners lie before the far
+    /// plane.
+    pub fn sky_distance(&self) -> f32 {
+        self.far / 1.75
+    }
+
     /// Recomputes the matrix after a change of the other fields.
     pub fn update(&mut self) {
         self.world_to_clip = self.project(self.stereo);

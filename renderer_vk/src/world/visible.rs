@@ -233,6 +233,8 @@ pub struct VisibleQuery<'a> {
     pub area_mask: &'a [u8; 32],
     /// Planes pointing inwards; empty for everything around.
     pub frustum: &'a [Vec4],
+    /// Surfaces outside of the frustum are left out.
+    pub culls: bool,
     /// Everything is potentially visible (`r_novis`).
     pub no_vis: bool,
     /// The clusters of the last call stay (`r_lockpvs`); everything, if there was none.
@@ -246,7 +248,7 @@ pub struct VisibleQuery<'a> {
 pub struct VisibleSet {
     /// Visible surfaces of the world (model 0), in the engine's order, each once.
     pub surfaces: Vec<u32>,
-    /// Bounds of the visible leafs; `Bounds::EMPTY` when there are none.
+    /// Bounds of the visible leafs in the frustum; `Bounds::EMPTY` when there are none.
     pub bounds: Bounds,
     /// Leafs in sight of the last call.
     pub leafs: u32,
@@ -282,6 +284,7 @@ impl VisibleSet {
             self.surface_stamps.fill(0);
             self.stamp = 1;
         }
+        let culled = |bounds: &Bounds| query.culls && outside(bounds, query.frustum);
         self.pending.clear();
         self.pending.push(tree.root());
         while let Some(child) = self.pending.pop() {
@@ -292,7 +295,7 @@ impl VisibleSet {
                     let Some(node) = tree.nodes.get(index as usize).filter(|_| marked) else {
                         continue;
                     };
-                    if outside(&node.bounds, query.frustum) {
+                    if culled(&node.bounds) {
                         continue;
                     }
                     self.pending.push(node.children[1]);
@@ -305,6 +308,8 @@ impl VisibleSet {
                     };
                     if !outside(&leaf.bounds, query.frustum) {
                         self.bounds = self.bounds.with(leaf.bounds.mins).with(leaf.bounds.maxs);
+                    }
+                    if !culled(&leaf.bounds) {
                         self.leafs += 1;
                         self.add_leaf(world, index);
                     }

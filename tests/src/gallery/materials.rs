@@ -271,7 +271,11 @@ fn fogged(shape: Shape) -> Board {
     ];
     let single = blends.map(|b| format!("{{\nmap g/alpha.tga\n{b}\n}}"));
     let over = blends.map(|b| format!("{{\nmap g/base.tga\n}}\n{{\nmap g/env.tga\n{b}\n}}"));
-    let mut board = Board::new(4, shape, single.into_iter().chain(over));
+    // drawn with the opaque ones, blended stages fade and are not fogged
+    let early = ["blendFunc add", "blendFunc blend"]
+        .map(|b| format!("sort opaque\n{{\nmap g/alpha.tga\n{b}\n}}"));
+    let tiles = single.into_iter().chain(over).chain(early);
+    let mut board = Board::new(4, shape, tiles);
     board.script = "m/fog\n{\nsurfaceparm fog\nfogparms ( 0.6 0.2 0.3 ) 300\n}\n".into();
     board
 }

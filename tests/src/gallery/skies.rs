@@ -10,7 +10,7 @@ use crate::maps::tga;
 
 const MAP: &str = "maps/sky.bsp";
 
-/// A box of which a side is missing, clouds alone, clouds over a box, and a sky that is in no map: the height of its
+/// A box of which a side is missing, clouds alone, clouds over a box, the same in a fog, and a sky that is in no map: the height of its
 /// clouds is that of all, for it is read last.
 const SCRIPT: &str = "
 sky/box
@@ -53,6 +53,21 @@ sky/boxless
         map g/env.tga
     }
 }
+sky/foggy
+{
+    surfaceparm sky
+    skyParms s/box 128 -
+    {
+        map s/cloud.tga
+        blendFunc blend
+        tcMod scale 3 3
+    }
+}
+sky/mist
+{
+    surfaceparm fog
+    fogparms ( 0.7 0.3 0.1 ) 900
+}
 sky/low
 {
     surfaceparm sky
@@ -63,7 +78,9 @@ sky/low
 }
 ";
 
-const SKIES: [&str; 4] = ["sky/box", "sky/clouds", "sky/both", "sky/boxless"];
+const SKIES: [&str; 5] = ["sky/box", "sky/clouds", "sky/both", "sky/boxless", FOGGY];
+/// Half of its surfaces are stored with a fog, which lies over the clouds there.
+const FOGGY: &str = "sky/foggy";
 
 fn files() -> Vec<File> {
     let mut map = MapBuilder::new();
@@ -73,7 +90,16 @@ fn files() -> Vec<File> {
     for (i, name) in SKIES.iter().enumerate() {
         let at = Vec3::X * (i as f32 * 4096.0);
         let sky = map.add_shader(name, 4, 1);
-        map.add_room(sky, at - 256.0, at + 256.0);
+        let (low, high) = (at - 256.0, at + 256.0);
+        let sides = map.add_box_faces(sky, low, high, true);
+        map.add_cell(low, high);
+        if *name == FOGGY {
+            let mist = map.add_shader("sky/mist", 0, 0);
+            let fog = map.add_fog_brush(mist, low, Vec3::new(high.x, high.y, -20.0), 5);
+            for side in [1, 3, 4] {
+                map.set_fog(sides[side], fog);
+            }
+        }
         // a post before the sky, and a wall with a window
         let window = |low: Vec3, high: Vec3| (at + low, at + high);
         for (low, high) in [

@@ -227,3 +227,58 @@ fn skies_show_behind_fog_but_through_a_surface_that_is_drawn_with(gpu: &mut Gpu)
     scene.def.view_origin.z = 20.0;
     shows(gpu, &scene, back);
 }
+
+#[test]
+fn clouds_are_behind_the_fog_that_their_sky_is_stored_with() {
+    Gpu::any(clouds_are_behind_the_fog_that_their_sky_is_stored_with_with);
+}
+
+fn clouds_are_behind_the_fog_that_their_sky_is_stored_with_with(gpu: &mut Gpu) {
+    let record = SkyRecord {
+        faces: [c::NO_TEXTURE; 6],
+        cloud_height: 512.0,
+    };
+    // below the fog's surface, down to the cells of a side of the sky's box that lie below it, too
+    let (eye, at) = (
+        Vec3::new(150.0, 0.0, 20.0),
+        Vec3::new(250.0, 0.0, 20.0 - 37.5),
+    );
+    // the engine draws clouds on a box at the far plane's distance / 1.75
+    let distance = Scene::new(eye, at, 1.0, 4).view().view.sky_distance();
+    let depth = 3.0 * distance;
+    let cover = ((at - eye).length() / (at.x - eye.x) * distance / depth).sqrt();
+    let (veil, alpha) = ([0.1, 0.9, 0.1], 127.0 / 255.0);
+    let left = 1.0 - cover;
+    for (clouds, exact) in [
+        (stage::constant(BACK), displayed(BACK) * left),
+        // what blends fades before the fog is laid over it; nothing is behind it
+        (
+            stage::blend(veil, 0.5),
+            displayed(veil) * (alpha * left) * left,
+        ),
+    ] {
+        let mut scene = Scene::new(eye, at, 1.0, 4);
+        let sky = scene.sky(&[clouds], record);
+        scene.room(Vec3::splat(-300.0), Vec3::splat(300.0), sky);
+        for surface in &mut scene.surfaces {
+            surface.fog = 1;
+        }
+        let fog = Fog {
+            depth,
+            ..slab(c::FOG_SURFACE, 80.0)
+        };
+        scene.fogs.push(fog);
+        shows(gpu, &scene, exact + fog.color * cover);
+        // stored without a fog, they have none
+        for surface in &mut scene.surfaces {
+            surface.fog = 0;
+        }
+        let without = exact / left;
+        let without = if clouds.blend_src == c::BLEND_SRC_ALPHA {
+            without / left
+        } else {
+            without
+        };
+        shows(gpu, &scene, without);
+    }
+}

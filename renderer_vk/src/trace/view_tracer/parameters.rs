@@ -161,10 +161,12 @@ impl ViewTracer {
             target_width: target.width(),
             target_height: target.height(),
             sky_sampler: materials.sky_sampler(),
+            sky_distance: camera.sky_distance(),
             last_eye,
             last_forward,
             last_left,
             last_up,
+            padding: 0,
             denoise: (self.denoiser).view(self.frame.wrapping_sub(1), &targets.texels),
         })
     }
