@@ -14,7 +14,7 @@ use crate::materials::Materials;
 use crate::overbright::{self, MAP_OVERBRIGHT_BITS};
 use glam::{Vec3, Vec4};
 use q3bsp::{Bsp, Entity, SurfaceKind};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 /// Why a map could not be relit.
 #[derive(Debug, thiserror::Error)]
@@ -147,19 +147,7 @@ impl RelitWorld {
             LightColor::Stored => 1.0,
         };
         let mut finder = light::Finder::new(files, color_exponent);
-        let mut faulty: Vec<_> = world_materials
-            .iter()
-            .filter_map(|m| {
-                Some(format!(
-                    "{map}: material {}: {}",
-                    m.name,
-                    m.resolved.fault.as_ref()?
-                ))
-            })
-            .collect();
-        faulty.sort();
-        faulty.dedup();
-        warnings.extend(faulty);
+        warnings.extend(material_faults(map, &world_materials));
         let (fogs, faults) = fog::fogs(&bsp, files, materials);
         warnings.extend(faults.iter().map(|fault| format!("{map}: {fault}")));
 
@@ -457,4 +445,22 @@ fn model_of_surfaces(bsp: &Bsp) -> Vec<u32> {
         }
     }
     of_surface
+}
+
+/// What is wrong with materials, each thing once.
+fn material_faults(map: &str, materials: &[WorldMaterial]) -> BTreeSet<String> {
+    let fault = |m: &WorldMaterial| {
+        let fault = m.resolved.fault.as_ref()?;
+        Some(format!("{map}: material {}: {fault}", m.name))
+    };
+    materials.iter().filter_map(fault).collect()
+}
+
+impl RelitWorld {
+    /// What was wrong as the map was loaded, beside faults of materials: a game warns of those as it registers them.
+    pub fn map_warnings(&self) -> impl Iterator<Item = &String> {
+        let of_materials = material_faults(&self.name, &self.materials);
+        let others = move |warning: &&String| !of_materials.contains(*warning);
+        self.warnings.iter().filter(others)
+    }
 }

@@ -282,8 +282,8 @@ impl World {
         let files = std::sync::Arc::clone(assets.textures.files());
         let options = WorldOptions::new(settings);
         let relit = RelitWorld::load(&*files, &assets.scripts, name, options.relight())?;
-        for warning in &relit.bsp.warnings {
-            log::warn!("{name}: {warning}");
+        for warning in relit.map_warnings() {
+            log::warn!("{warning}");
         }
         if !relit.bsp.light_grid.is_empty() && relit.bsp.light_grid().is_none() {
             log::warn!(

@@ -66,6 +66,8 @@ fn a_fog_that_nothing_describes_hides_nothing_where_it_fills_the_world() {
         let haze = map.add_shader(material, 0, q3bsp::content_flags::FOG);
         map.add_cell(Vec3::splat(-64.0), Vec3::splat(64.0));
         map.add_fog_brush(haze, Vec3::splat(-64.0), Vec3::splat(64.0), 5);
+        let missing = map.add_shader("t/nowhere", 0, 0);
+        map.add_quad(missing, ceiling_lamp(64.0, 0.0));
         let mut bsp = map.build();
         if let Some(brush) = brush {
             bsp.fogs[0].brush = brush;
@@ -75,6 +77,11 @@ fn a_fog_that_nothing_describes_hides_nothing_where_it_fills_the_world() {
         let world = RelitWorld::from_bsp(&files, &materials, "test", bsp, as_said());
         let told = |w: &String| w.contains("left out the fog") && w.contains(material);
         let warned = world.warnings.iter().any(told);
+        // a game warns of what is wrong with the map, and of materials as it registers them
+        let (of_map, all) = (world.map_warnings().count(), world.warnings.len());
+        let faults = world.materials.iter().filter(|m| m.resolved.fault.is_some());
+        assert_eq!(of_map, usize::from(warned));
+        assert_eq!(all - of_map, faults.count());
         (world.fogs[0].depth, warned)
     };
     assert_eq!(with("t/haze", None), (300.0, false));
