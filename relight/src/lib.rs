@@ -28,6 +28,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)
 )]
 
+mod cache;
 pub mod calibrate;
 pub mod compare;
 pub mod export;
@@ -38,14 +39,14 @@ pub mod image;
 pub mod light;
 mod map_files;
 pub mod materials;
+mod occluders;
 pub mod overbright;
 pub mod sample;
 mod spawns;
 pub mod world;
 
-pub use calibrate::{
-    CalibrationCache, CalibrationOptions, CalibrationReport, calibrate, calibrate_with,
-};
+pub use cache::CalibrationCache;
+pub use calibrate::{CalibrationOptions, CalibrationReport, calibrate, calibrate_with};
 pub use external_lightmaps::external_lightmaps;
 pub use files::{FileError, GameFiles, MemoryFiles, Overlay, Pak, Pk3, SearchPath};
 pub use light::{LightLists, LightReport, PointLight, SunLight, TriangleLight};

@@ -7,12 +7,12 @@
 //! they add: it tells nothing that could be relied on. Light that surfaces throw back is in neither.
 
 use super::CalibrationOptions;
-use super::bvh::Occluders;
-use super::parallel;
-use super::random::Random;
 use super::samples::{Sample, Site, decode, floor, light_of, mean, pick, shown};
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
+use support::parallel;
+use support::random::Random;
 
 /// Least distance of a point from surfaces, id units: compilers move points that lie in something, and do not tell.
 const CLEARANCE: f32 = 8.0;

@@ -11,11 +11,13 @@ use super::fit::Fit;
 use super::samples::{self, Gauge, Sample, Taking};
 use super::spread::Spread;
 use super::texels::{self, Texel, TexelId};
-use super::{Occluders, Purpose, parallel, said, splash};
+use super::{Purpose, said, splash};
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use std::collections::HashSet;
 use std::f32::consts::{PI, TAU};
+use support::parallel;
 
 /// How far around a light texels are looked at, id units: farther off there are measurements enough.
 pub(super) const NEAR: f32 = 128.0;
@@ -234,7 +236,7 @@ pub struct Spots {
 
 /// Looks for spots of light beside the point lights of a world as it is, calibrated or not, that its lightmaps do not have.
 pub fn spots(world: &RelitWorld) -> Spots {
-    let occluders = samples::occluders(world);
+    let occluders = Occluders::of_world(world);
     let taking = Taking {
         dirt: said::believed_dirt(world),
         ..Default::default()

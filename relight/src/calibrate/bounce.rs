@@ -7,14 +7,14 @@
 //!
 //! Bounced rays also find surfaces that shine without being in light lists: pictures of skies, faint glows.
 
-use super::bvh::{Hit, Occluders};
-use super::parallel;
-use super::random::Random;
 use super::samples::{Sample, Site};
+use crate::occluders::{Hit, Occluders};
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::{IVec3, Vec3};
 use std::collections::HashMap;
 use std::f32::consts::TAU;
+use support::parallel;
+use support::random::Random;
 
 /// Rays per sample: a square of this many strata a side.
 const SIDE: u32 = 6;

@@ -7,13 +7,13 @@ use super::columns::Lamp;
 use super::report::Agreement;
 use super::samples::Evidence;
 use super::{CalibrationOptions, Solution, VERSION};
+use crate::cache::{CacheError, CalibrationCache, add_world, read_file};
 use crate::exposure::Exposure;
 use crate::light::Falloff;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use std::fmt::Write as _;
-use std::io;
-use std::path::{Path, PathBuf};
+use support::hash::Hash;
 
 /// First words of a file.
 const MAGIC: &str = "relight-calibration";
@@ -21,90 +21,29 @@ const MAGIC: &str = "relight-calibration";
 /// How the names of its files end.
 const KIND: &str = "light";
 
-/// A folder of results.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct CalibrationCache {
-    folder: PathBuf,
-}
-
-/// Why a kept result could not be used, or not be kept.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum CacheError {
-    #[error("{}: cannot be read: {source}", path.display())]
-    Read { path: PathBuf, source: io::Error },
-    #[error("{}: cannot be written: {source}", path.display())]
-    Write { path: PathBuf, source: io::Error },
-    #[error("{}: line {line}: {what}; the map is calibrated again", path.display())]
-    Damaged {
-        path: PathBuf,
-        line: usize,
-        what: &'static str,
-    },
-    #[error("{}: {what}; the lists of lights are swept again", path.display())]
-    Lists { path: PathBuf, what: &'static str },
-}
-
-impl CalibrationCache {
-    /// Results in a folder, which is made when the first is kept.
-    pub fn new(folder: impl Into<PathBuf>) -> CalibrationCache {
-        CalibrationCache {
-            folder: folder.into(),
-        }
-    }
-
-    /// The folder.
-    pub fn folder(&self) -> &Path {
-        &self.folder
-    }
-
-    /// The file of a result of some kind.
-    pub(crate) fn path(&self, key: u128, kind: &str) -> PathBuf {
-        self.folder.join(format!("{key:032x}.{kind}"))
-    }
-
-    /// A kept result for `known` known sources; `None` when there is none.
-    pub(super) fn read(&self, key: u128, known: usize) -> Result<Option<Solution>, CacheError> {
-        let path = self.path(key, KIND);
-        let Some(bytes) = read_file(&path)? else {
-            return Ok(None);
-        };
-        match parse(&String::from_utf8_lossy(&bytes), known) {
-            Ok(solution) => Ok(Some(solution)),
-            Err((line, what)) => Err(CacheError::Damaged { path, line, what }),
-        }
-    }
-
-    /// Keeps a result.
-    pub(super) fn write(&self, key: u128, solution: &Solution) -> Result<(), CacheError> {
-        self.write_file(self.path(key, KIND), print(solution).as_bytes())
-    }
-
-    /// Writes a file of the folder. It appears whole or not at all.
-    pub(crate) fn write_file(&self, path: PathBuf, bytes: &[u8]) -> Result<(), CacheError> {
-        let unfinished = path.with_extension(format!("{}.part", std::process::id()));
-        let write = || {
-            std::fs::create_dir_all(&self.folder)?;
-            std::fs::write(&unfinished, bytes)?;
-            std::fs::rename(&unfinished, &path)
-        };
-        write().map_err(|source| {
-            // What is left of a failed attempt; that it may not be there is fine.
-            let _ = std::fs::remove_file(&unfinished);
-            CacheError::Write { path, source }
-        })
+/// A kept result for `known` known sources; `None` when there is none.
+pub(super) fn read(
+    cache: &CalibrationCache,
+    key: u128,
+    known: usize,
+) -> Result<Option<Solution>, CacheError> {
+    let path = cache.path(key, KIND);
+    let Some(bytes) = read_file(&path)? else {
+        return Ok(None);
+    };
+    match parse(&String::from_utf8_lossy(&bytes), known) {
+        Ok(solution) => Ok(Some(solution)),
+        Err((line, what)) => Err(CacheError::Damaged { path, line, what }),
     }
 }
 
-/// The bytes of a file; `None` when there is none.
-pub(crate) fn read_file(path: &Path) -> Result<Option<Vec<u8>>, CacheError> {
-    match std::fs::read(path) {
-        Ok(bytes) => Ok(Some(bytes)),
-        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(source) => Err(CacheError::Read {
-            path: path.into(),
-            source,
-        }),
-    }
+/// Keeps a result.
+pub(super) fn write(
+    cache: &CalibrationCache,
+    key: u128,
+    solution: &Solution,
+) -> Result<(), CacheError> {
+    cache.write_file(cache.path(key, KIND), print(solution).as_bytes())
 }
 
 /// Text of a result. Rust prints the shortest number that reads back as the same one.
@@ -287,101 +226,6 @@ pub(super) fn key_from(mut hash: Hash, world: &RelitWorld, options: &Calibration
     hash.number(options.candidates as u64);
     hash.number(options.seed);
     hash.number(u64::from(options.bounces));
-    hash.world(world);
+    add_world(&mut hash, world);
     hash.finish()
-}
-
-/// Two 64-bit lanes of multiply and rotate. Chance collisions matter here, enemies do not: who can write the folder
-/// can write anything into it.
-pub(crate) struct Hash(u64, u64);
-
-impl Hash {
-    pub(crate) fn new() -> Hash {
-        Hash(0xCBF2_9CE4_8422_2325, 0x9E37_79B9_7F4A_7C15)
-    }
-
-    /// What light in a world depends on: its geometry, its materials, its lights.
-    pub(crate) fn world(&mut self, world: &RelitWorld) {
-        // The file's own bytes: light, geometry, visibility. The entities hold the grid's size.
-        self.bytes(&world.bsp.write());
-        for surface in &world.surfaces {
-            for number in [
-                surface.material,
-                surface.model,
-                surface.first_index,
-                surface.num_indices,
-                surface.light_page as u32,
-            ] {
-                self.number(u64::from(number));
-            }
-        }
-        for vertex in &world.vertices {
-            self.vector(vertex.position);
-        }
-        for material in &world.materials {
-            self.number(u64::from(material.is_sky()));
-            let passed = u64::from(material.class.passed);
-            self.number(material.class.class as u64 | passed << 8);
-            self.number(u64::from(material.emission.is_some()));
-            self.vector(material.albedo);
-            if let Some(holes) = &material.holes {
-                self.bytes(&holes.bytes());
-            }
-            for shade in &material.shades {
-                self.vector(shade.linear);
-                self.vector(shade.encoded);
-                self.vector(shade.mirrored);
-            }
-            self.vector(material.shown);
-            for style in &material.baked.styles {
-                self.bytes(format!("{style:?}").as_bytes());
-            }
-        }
-        for page in &world.pages {
-            self.bytes(&page.0);
-        }
-        for light in &world.lights {
-            light.vertices.iter().for_each(|v| self.vector(*v));
-            self.vector(light.radiance);
-            self.number(u64::from(light.surface) << 8 | u64::from(light.two_sided));
-            self.number(light.source as u64);
-        }
-        for light in &world.point_lights {
-            self.vector(light.origin);
-            self.vector(light.intensity);
-            self.number(u64::from(light.falloff.reach().unwrap_or(0.0).to_bits()));
-        }
-        for sun in &world.suns {
-            self.vector(sun.direction);
-            self.vector(sun.irradiance);
-        }
-        self.vector(world.ambient);
-        self.number(u64::from(world.color_exponent.to_bits()));
-    }
-
-    pub(crate) fn number(&mut self, number: u64) {
-        self.0 = (self.0 ^ number).wrapping_mul(0x0000_0100_0000_01B3);
-        self.0 ^= self.0 >> 29;
-        self.1 = (self.1.rotate_left(23) ^ number).wrapping_mul(0xD6E8_FEB8_6659_FD93);
-    }
-
-    pub(crate) fn vector(&mut self, v: Vec3) {
-        let [x, y, z] = v.to_array().map(|c| u64::from(c.to_bits()));
-        self.number(x << 32 | y);
-        self.number(z);
-    }
-
-    pub(crate) fn bytes(&mut self, bytes: &[u8]) {
-        self.number(bytes.len() as u64);
-        let (whole, rest) = bytes.as_chunks::<8>();
-        whole
-            .iter()
-            .for_each(|b| self.number(u64::from_le_bytes(*b)));
-        rest.iter().for_each(|b| self.number(u64::from(*b)));
-    }
-
-    pub(crate) fn finish(mut self) -> u128 {
-        self.number(0x5851_F42D_4C95_7F2D);
-        u128::from(self.0) << 64 | u128::from(self.1)
-    }
 }

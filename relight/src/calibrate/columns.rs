@@ -3,18 +3,18 @@
 //! A column holds, for every sample that its source reaches, the light (irradiance / π) there for a source of
 //! strength 1; the strength is what is looked for, channel by channel. Shadow rays decide what is reached.
 
-use super::bvh::Occluders;
 use super::ends::{Given, Heap, Piece, pieces_of};
-use super::parallel;
-use super::random::Random;
 use super::samples::{Sample, Site};
 use super::spread::{NEAREST, Spread};
 use crate::light::{EmissionSource, EmitterSummary, Falloff, LightRef, Spot, TriangleLight};
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::Bsp;
 use std::collections::HashMap;
 use std::f32::consts::{PI, TAU};
+use support::parallel;
+use support::random::Random;
 
 /// Contributions below this part of a sample are traced only sometimes, and then count for more (Russian roulette).
 const ROULETTE: f32 = 0.02;

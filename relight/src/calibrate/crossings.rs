@@ -6,11 +6,11 @@
 //! see them are candidates.
 
 use super::air::AirPoint;
-use super::bvh::Occluders;
-use super::parallel;
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::{IVec3, Vec3};
 use std::collections::{BTreeMap, HashMap};
+use support::parallel;
 
 /// How far apart points of a pair are, in spacings of the grid, about: as many as make a cell of the lookup.
 const NEIGHBOURS: f32 = 2.0;

@@ -3,13 +3,13 @@
 //! Where much stays unexplained, places come up again in later rounds: what they see is kept.
 
 use super::columns::{Column, point_rows};
-use super::parallel;
 use super::place::{RANGE, Scene, lamp};
 use super::samples::{self, mean};
 use super::solve::Residual;
 use super::spread::Spread;
 use glam::Vec3;
 use std::collections::HashMap;
+use support::parallel;
 
 /// Distances from a sample at which candidates are put in front of it, id units.
 const DISTANCES: [f32; 4] = [12.0, 28.0, 60.0, 120.0];

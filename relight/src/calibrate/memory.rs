@@ -3,10 +3,10 @@
 
 use super::Evidence;
 use super::bounce::Transfer;
-use super::bvh::Occluders;
 use super::crossings::Crossing;
 use super::place::Candidates;
 use super::samples::{self, Sample, Site, Taking};
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use std::sync::Arc;

@@ -33,25 +33,21 @@ mod air;
 mod apply;
 mod beside;
 mod bounce;
-pub(crate) mod bvh;
-pub(crate) mod cache;
+mod cache;
 mod columns;
 mod compiler;
 mod crossings;
 mod ends;
 mod fit;
-mod fours;
 mod fronts;
 mod memory;
 mod nodes;
-pub(crate) mod parallel;
 mod place;
-pub(crate) mod random;
 mod recovery;
 mod report;
 mod residuals;
 mod said;
-pub(crate) mod samples;
+mod samples;
 mod skies;
 mod solve;
 mod splash;
@@ -66,15 +62,15 @@ mod views;
 mod ways;
 
 pub use beside::{Spots, spots};
-pub use cache::CalibrationCache;
 pub use recovery::{FOUND_WITHIN, POWER_WITHIN, Recovery, hide_entities, recovery};
 pub use report::{Agreement, CalibrationReport};
 pub use residuals::{Residual, residuals};
 pub use samples::Evidence;
 
+use crate::cache::CalibrationCache;
 use crate::exposure::Exposure;
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
-use bvh::Occluders;
 use columns::{Lamp, Source};
 use compiler::Compiler;
 use fit::Fit;
@@ -171,7 +167,7 @@ pub fn calibrate_with(
     let silent = skies::silent(world);
     skies::open(world, &silent);
     let kept = match (&options.cache, key) {
-        (Some(cache), Some(key)) => cache.read(key, columns::count(world)),
+        (Some(cache), Some(key)) => cache::read(cache, key, columns::count(world)),
         _ => Ok(None),
     };
     let mut solution = match kept {
@@ -186,7 +182,7 @@ pub fn calibrate_with(
             let solution = ways::best(world, &silent, options, progress);
             progress(1.0);
             if let (Some(cache), Some(key)) = (&options.cache, key)
-                && let Err(problem) = cache.write(key, &solution)
+                && let Err(problem) = cache::write(cache, key, &solution)
             {
                 world.warnings.push(problem.to_string());
             }
@@ -243,7 +239,7 @@ fn find(
 ) -> Option<Solution> {
     progress(0.0);
     let thorough = !matches!(purpose, Purpose::Trial(_));
-    let occluders = samples::occluders(world);
+    let occluders = Occluders::of_world(world);
     // Where lights end, black tells little. Trials do not know yet whether they do, and measure alike to be compared.
     let taking = Taking {
         count: options.samples,

@@ -5,21 +5,21 @@
 //! better place. Then bright samples that are still not explained put candidates in front of themselves, and the same
 //! is done once more.
 
-use super::bvh::Occluders;
 use super::columns::{Column, Lamp, Source, point_rows, rows_again, unshadowed};
 use super::crossings::Crossing;
 use super::ends::pieces_of;
 use super::fronts::Fronts;
 use super::nodes::Measured;
-use super::parallel;
 use super::samples::{self, Sample, mean};
 use super::solve::{Ambient, Effort, Residual, norm, residual, solve};
 use super::spread::Spread;
 use super::texels;
 use crate::light::Falloff;
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use std::f32::consts::PI;
+use support::parallel;
 
 /// Least distance of a light from surfaces, id units: its ball must not reach into them.
 pub(super) const CLEARANCE: f32 = 8.0;

@@ -3,6 +3,7 @@
 use super::bounce::Transfer;
 use super::samples::Taking;
 use super::{CalibrationOptions, columns, said, samples, skies, solve};
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
 
@@ -48,7 +49,7 @@ impl Residual {
 /// other places, though a few that were fitted may be among them. Empty for worlds that store no light. The world must have been loaded to be calibrated, or its
 /// [materials measured](RelitWorld::measure_materials).
 pub fn residuals(world: &RelitWorld, options: &CalibrationOptions) -> Vec<Residual> {
-    let occluders = samples::occluders(world);
+    let occluders = Occluders::of_world(world);
     let taking = Taking {
         count: options.samples,
         seed: options.seed,

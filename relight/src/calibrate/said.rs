@@ -6,8 +6,8 @@
 //!
 //! Source: meaning and defaults are q3map2's.
 
-use super::bvh::Occluders;
 use super::compiler;
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::Entity;

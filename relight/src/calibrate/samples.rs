@@ -4,17 +4,15 @@
 //! [`light`](mod@crate::light)), to the power of the compiler's gamma. Its colour is what the engine shows: [`LightColor`](crate::light::LightColor).
 
 use super::air;
-use super::bvh::{CutOut, Occluders};
-use super::random::{self, Random};
 use super::said::Dirt;
-use super::texels::{self, Stored, corners, lit_by_texel};
+use super::texels::{self, Stored, lit_by_texel};
 use super::vertices;
 use crate::light;
-use crate::world::{RelitWorld, WorldMaterial, WorldSurface};
+use crate::occluders::Occluders;
+use crate::world::{RelitWorld, WorldSurface};
 use glam::Vec3;
 use shaderscript::light::SurfaceClass;
-use std::collections::HashMap;
-use std::sync::Arc;
+use support::random::{self, Random};
 
 /// Radiance of white for a stored value of 1, where light is stored as it is.
 pub(super) const STORED_UNIT: f32 = 4.0 / 255.0;
@@ -158,46 +156,6 @@ impl Evidence {
         ];
         all.into_iter().find(|e| e.label() == label)
     }
-}
-
-/// Triangles that stop light: those of the world itself that are opaque, and cut-outs where these are there, if anybody
-/// knows where that is. Tagged with their number.
-pub(crate) fn occluders(world: &RelitWorld) -> Occluders {
-    let drawn = world.surfaces.iter().filter(|s| {
-        let material = world.materials.get(s.material as usize);
-        s.model == 0 && material.is_some_and(|m| m.is_sky() || stops_light(m))
-    });
-    let mut holes_of = HashMap::new();
-    for surface in &world.surfaces {
-        let material = world.materials.get(surface.material as usize);
-        if let Some(holes) = material.and_then(|m| m.holes.as_ref()) {
-            let first = surface.first_index / 3;
-            holes_of.extend((first..first + surface.num_indices / 3).map(|t| (t, holes)));
-        }
-    }
-    Occluders::new(drawn.flat_map(|surface| {
-        let material = world.materials.get(surface.material as usize);
-        let sky = material.is_some_and(WorldMaterial::is_sky);
-        let first = surface.first_index as usize / 3;
-        (first..first + surface.num_indices as usize / 3)
-            .filter_map(move |t| Some((world.triangle(t)?, sky, t as u32)))
-    }))
-    .cut(|tag| {
-        let holes = holes_of.get(&tag)?;
-        let [a, b, c] = corners(world, tag as usize)?;
-        Some(CutOut {
-            st: [a.st, b.st, c.st],
-            holes: Arc::clone(holes),
-        })
-    })
-}
-
-fn stops_light(material: &WorldMaterial) -> bool {
-    let solid = matches!(
-        material.class.class,
-        SurfaceClass::Opaque | SurfaceClass::Mirror | SurfaceClass::Portal
-    );
-    (solid && !material.class.passed) || material.holes.is_some()
 }
 
 /// Whether light on a surface tells of the lights around it.

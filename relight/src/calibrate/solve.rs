@@ -12,9 +12,9 @@
 //! descent with an L1 penalty.
 
 use super::columns::Column;
-use super::parallel;
 use super::samples::{Sample, mean};
 use glam::{Vec3, Vec4};
+use support::parallel;
 
 /// |log ratio| up to which a sample counts in full.
 const HUBER: f32 = 0.3;
@@ -299,8 +299,8 @@ fn improve_ambient(samples: &[Sample], ambient: &mut Ambient, rest: &mut [Vec4])
 mod tests {
     use super::*;
     use crate::calibrate::columns::{Lamp, Source};
-    use crate::calibrate::random::Random;
     use crate::light::Falloff;
+    use support::random::Random;
 
     #[test]
     fn columns_looked_at_together_become_what_they_become_one_by_one() {

@@ -6,16 +6,16 @@
 //!
 //! Source: what q3map2's documentation calls `q3map_backsplash` and `q3map_lightSubdivide`, and its defaults.
 
-use super::bvh::Occluders;
 use super::columns::{Column, Lamp, Prior, Source, material_of, point_rows};
 use super::ends::{Piece, pieces_of};
-use super::parallel;
 use super::samples::Sample;
 use super::spread::Spread;
 use crate::light::{EmissionSource, Falloff, TriangleLight};
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use std::collections::BTreeMap;
+use support::parallel;
 
 /// Part of a piece's light that its splash gives, per cent, and how far in front of it, id units, where the material tells
 /// neither.

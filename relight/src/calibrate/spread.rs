@@ -2,9 +2,9 @@
 //!
 //! Most cannot: they face away, or are too far off. What can is looked at one by one.
 
-use super::fours::{self, Four, WIDE, dot, four, lanes, splat};
 use super::samples::Sample;
 use glam::{Vec3, Vec4};
+use support::simd4::{self, Four, WIDE, dot, four, lanes, splat};
 
 /// Nearer than this a light gives nothing, id units.
 pub(super) const NEAREST: f32 = 1.0;
@@ -52,7 +52,7 @@ impl<'a> Spread<'a> {
         let from = splat(origin);
         let (nearest, farthest) = (Vec4::splat(NEAREST), Vec4::splat(range * range));
         self.those(move |group| {
-            let offset = fours::sub(&from, &group.positions);
+            let offset = simd4::sub(&from, &group.positions);
             let squared = dot(&offset, &offset);
             let lit = dot(&group.normals, &offset).cmpgt(Vec4::ZERO);
             (lit & squared.cmpge(nearest) & squared.cmple(farthest)).bitmask()
@@ -73,7 +73,7 @@ impl<'a> Spread<'a> {
         // Twice as far away as light is moved, half of the way is left at least; and a little for what is rounded.
         let power = Vec4::splat(intensity * 4.001);
         let near = self.those(move |group| {
-            let offset = fours::sub(&from, &group.positions);
+            let offset = simd4::sub(&from, &group.positions);
             let squared = dot(&offset, &offset);
             let before = dot(&offset, &group.normals).cmpgt(behind);
             let reached = (group.levels * part * squared).cmplt(power);
@@ -104,8 +104,8 @@ impl<'a> Spread<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::random::Random;
     use crate::calibrate::samples::tests::sample_at_place;
+    use support::random::Random;
 
     #[test]
     fn four_at_a_time_are_those_that_one_by_one_are() {

@@ -18,6 +18,7 @@ use q3bsp::Lightmap;
 use shaderscript::eval;
 use std::cell::Cell;
 use std::collections::BTreeMap;
+use support::hash::Hash;
 
 /// Finds the lights of each style, after the main light was found, and adds them to the world.
 pub(super) fn add(world: &mut RelitWorld, options: &CalibrationOptions) {
@@ -89,11 +90,11 @@ fn put_out(world: &mut RelitWorld) {
 /// The solution of a style's world: kept, or found.
 fn solve(world: &mut RelitWorld, options: &CalibrationOptions, number: usize) -> Option<Solution> {
     let key = options.cache.as_ref().map(|cache| {
-        let mut hash = cache::Hash::new();
+        let mut hash = Hash::new();
         hash.number(number as u64);
         (cache, cache::key_from(hash, world, options))
     });
-    let kept = key.map_or(Ok(None), |(cache, key)| cache.read(key, 0));
+    let kept = key.map_or(Ok(None), |(cache, key)| cache::read(cache, key, 0));
     match kept {
         Ok(Some(solution)) => return Some(solution),
         Ok(None) => {}
@@ -121,7 +122,7 @@ fn solve(world: &mut RelitWorld, options: &CalibrationOptions, number: usize) ->
         &mut |_| (),
     )?;
     if let Some((cache, key)) = key
-        && let Err(problem) = cache.write(key, &solution)
+        && let Err(problem) = cache::write(cache, key, &solution)
     {
         world.warnings.push(problem.to_string());
     }

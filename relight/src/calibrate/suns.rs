@@ -4,13 +4,13 @@
 //! nothing in the shadows. So directions all over the upper half of the sphere are tried against what known lights
 //! leave unexplained, and the best is turned until it explains most.
 
-use super::bvh::Occluders;
 use super::columns::{Column, Source, sun_rows};
-use super::parallel;
 use super::samples::Sample;
 use super::solve::{Ambient, Effort, Residual, norm, residual, solve};
+use crate::occluders::Occluders;
 use glam::Vec3;
 use std::f32::consts::TAU;
+use support::parallel;
 
 /// Directions tried at first, evenly over the upper half of the sphere.
 const DIRECTIONS: u32 = 320;

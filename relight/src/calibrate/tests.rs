@@ -17,6 +17,7 @@ use super::*;
 use crate::files::{MemoryFiles, SearchPath};
 use crate::light::{LightColor, PointLight, SURFACE_LIGHT_RADIANCE};
 use crate::materials::Materials;
+use crate::occluders::Occluders;
 use crate::world::{Options, Stage};
 use q3bsp::Bsp;
 use q3bsp::builder::MapBuilder;
@@ -282,7 +283,7 @@ fn bounced_light_in_an_even_room_is_albedo_times_light() {
     for material in &mut world.materials {
         material.albedo = albedo;
     }
-    let occluders = samples::occluders(&world);
+    let occluders = Occluders::of_world(&world);
     let (samples, evidence) = samples::take(&world, &occluders, &taking(500));
     assert_eq!(evidence, Evidence::Lightmaps);
     assert!(samples.len() > 400);

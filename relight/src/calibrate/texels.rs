@@ -1,13 +1,13 @@
 //! Texels of lightmaps as measurements: where in space they lie, and what they store.
 
-use super::parallel;
-use super::random::Random;
 use super::samples::{Gauge, HELD_OUT, Sample, decode, is_held_out, sample_at, shown, tells};
 use crate::overbright::MAP_OVERBRIGHT_BITS;
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
 use glam::{Vec2, Vec3};
 use q3bsp::Lightmap;
 use std::collections::HashSet;
+use support::parallel;
+use support::random::Random;
 
 /// How far around a black texel others are black as well where no light falls, texels.
 const BLACK_AROUND: i32 = 2;
@@ -211,7 +211,7 @@ impl<'a> Shares<'a> {
             let side = page.map_or(0.0, |page| page.size() as f32);
             let first = surface.first_index as usize / 3;
             for triangle in first..first + surface.num_indices as usize / 3 {
-                let Some(corners) = corners(world, triangle) else {
+                let Some(corners) = world.corners(triangle) else {
                     continue;
                 };
                 let [a, b, c] = corners.map(|c| c.position);
@@ -289,7 +289,7 @@ fn texel(
     surface: &WorldSurface,
     random: &mut Random,
 ) -> Option<Texel> {
-    let [a, b, c] = corners(world, triangle)?.map(|c| c.lightmap);
+    let [a, b, c] = world.corners(triangle)?.map(|c| c.lightmap);
     let (u, v) = random.in_triangle();
     texel_at(world, triangle, surface, a + (b - a) * u + (c - a) * v)
 }
@@ -313,7 +313,7 @@ fn texel_at(
     let others = first..first + surface.num_indices as usize / 3;
     let place = std::iter::once(triangle)
         .chain(others)
-        .find_map(|t| place_of(corners(world, t)?, middle, size))?;
+        .find_map(|t| place_of(world.corners(t)?, middle, size))?;
     let scale = stored_scale(world, surface);
     Some(Texel {
         id: [number as u32, cell.x as u32, cell.y as u32],
@@ -367,7 +367,7 @@ fn page_place(world: &RelitWorld, surface: usize, triangle: usize, at: Vec3) -> 
     if !lit_by_texel(own) || !tells(world, own) || !constant(world, surface) {
         return None;
     }
-    let [a, b, c] = corners(world, triangle)?;
+    let [a, b, c] = world.corners(triangle)?;
     let (e1, e2, offset) = (
         b.position - a.position,
         c.position - a.position,
@@ -395,13 +395,6 @@ fn step_of(world: &RelitWorld, page: usize) -> f32 {
 fn stored_scale(world: &RelitWorld, surface: &WorldSurface) -> f32 {
     let material = world.materials.get(surface.material as usize);
     material.map_or(1.0, WorldMaterial::stored_scale)
-}
-
-/// Vertices of a triangle.
-pub(super) fn corners(world: &RelitWorld, triangle: usize) -> Option<[&WorldVertex; 3]> {
-    let [a, b, c] = *world.indices.as_chunks::<3>().0.get(triangle)?;
-    let vertex = |i: u32| world.vertices.get(i as usize);
-    Some([vertex(a)?, vertex(b)?, vertex(c)?])
 }
 
 /// Position and normal of a place in a lightmap page of `size` texels a side, in texels, if the triangle covers it.

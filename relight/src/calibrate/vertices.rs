@@ -1,11 +1,11 @@
 //! Light at the vertices of surfaces that have no lightmap, as measurements.
 
-use super::parallel;
-use super::random::Random;
 use super::samples::{Gauge, Sample, pick, sample_at, tells};
 use super::texels::Stored;
 use crate::world::WorldSurface;
 use q3bsp::SurfaceKind;
+use support::parallel;
+use support::random::Random;
 
 /// Whether a surface stores its light at its vertices, which are the map's own.
 pub(super) fn lit(surface: &WorldSurface) -> bool {

@@ -2,14 +2,14 @@
 //! and others are never seen.
 
 use super::bounce::{Near, surfaces_of_triangles};
-use super::bvh::Occluders;
-use super::parallel;
-use super::random::Random;
 use super::samples::Sample;
+use crate::occluders::Occluders;
 use crate::spawns::is_spawn_point;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::Entity;
+use support::parallel;
+use support::random::Random;
 
 /// Most places that are looked from.
 const VIEWS: usize = 128;

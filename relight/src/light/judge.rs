@@ -11,9 +11,10 @@ use super::looks::DROPPED_PART;
 use super::receivers::{Target, receivers};
 use super::solid::through_solid;
 use super::{LightLists, lists_of};
-use crate::calibrate::random::Random;
-use crate::calibrate::{parallel, samples};
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
+use support::parallel;
+use support::random::Random;
 
 /// Lists against rays: see [`judge`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -64,7 +65,7 @@ pub fn judge(
     step: usize,
 ) -> Vec<ListJudgement> {
     let clusters = world.light_lists.clusters();
-    let occluders = samples::occluders(world);
+    let occluders = Occluders::of_world(world);
     let receivers = receivers(world, clusters, 64, 16, 0x0dd5);
     let chosen: Vec<usize> = (0..clusters).step_by(step.max(1)).collect();
     let total = (world.lights.len() + world.point_lights.len()) as u32;

@@ -11,9 +11,9 @@
 
 use super::sweep::SweepReport;
 use super::{LightLists, LightShare};
-use crate::calibrate::CalibrationCache;
-use crate::calibrate::cache::{CacheError, Hash, read_file};
+use crate::cache::{CacheError, CalibrationCache, add_world, read_file};
 use crate::world::RelitWorld;
+use support::hash::Hash;
 
 /// Number that changes whenever the same world would give other lists.
 const VERSION: u32 = 2;
@@ -32,7 +32,7 @@ const KIND: &str = "lists";
 fn key(world: &RelitWorld) -> u128 {
     let mut hash = Hash::new();
     hash.number(u64::from(VERSION));
-    hash.world(world);
+    add_world(&mut hash, world);
     for &index in &world.indices {
         hash.number(u64::from(index));
     }

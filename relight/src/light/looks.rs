@@ -2,11 +2,11 @@
 //! is in [`sweep`](mod@super::sweep).
 
 use super::receivers::{Receiver, Target, luminance};
-use crate::calibrate::bvh::Occluders;
-use crate::calibrate::parallel;
-use crate::calibrate::random::Random;
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
+use support::parallel;
+use support::random::Random;
 
 /// Part of a cluster's light that may be left out of its list. The step of a display in sRGB from one code to the next
 /// is about 2.4 / (code + 14) of the light: 0.9 % at the bright end and more below. This is a quarter of it at the most.

@@ -2,8 +2,7 @@
 
 use glam::Vec3;
 
-use crate::calibrate::bvh::Occluders;
-use crate::calibrate::samples;
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 
 /// What stops light in a map: all that does not move, cut-outs where these are there, and skies.
@@ -12,7 +11,7 @@ pub struct Occlusion(Occluders);
 impl Occlusion {
     /// Of a world.
     pub fn new(world: &RelitWorld) -> Self {
-        Self(samples::occluders(world))
+        Self(Occluders::of_world(world))
     }
 
     /// Whether nothing is between two points. `last`: what was in the way of an earlier ray, which is asked first.

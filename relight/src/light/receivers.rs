@@ -1,11 +1,11 @@
 //! Where light is gathered in clusters, and lights as rays from there see them.
 
 use super::{LightRef, PointLight, TriangleLight};
-use crate::calibrate::parallel;
-use crate::calibrate::random::Random;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use std::f32::consts::PI;
+use support::parallel;
+use support::random::Random;
 
 /// How far off its surface a point lies, id units.
 const LIFT: f32 = 0.5;

@@ -35,11 +35,12 @@
 use super::looks::{Pair, Row, boxes, keep, look_again, look_at_all, mark_beside};
 use super::receivers::{luminance, receivers};
 use super::{LightLists, LightShare, kept};
-use crate::calibrate::CalibrationCache;
-use crate::calibrate::random::Random;
-use crate::calibrate::{parallel, samples};
+use crate::cache::CalibrationCache;
+use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use std::time::Instant;
+use support::parallel;
+use support::random::Random;
 
 /// Points of a cluster on surfaces, and in the open.
 const ON_SURFACES: usize = 96;
@@ -91,7 +92,7 @@ pub fn sweep(world: &mut RelitWorld, cache: Option<&CalibrationCache>) -> SweepR
 pub(super) fn fresh(world: &RelitWorld, entries: usize, budget: u64) -> (LightLists, SweepReport) {
     let old = &world.light_lists;
     let clusters = old.clusters();
-    let occluders = samples::occluders(world);
+    let occluders = Occluders::of_world(world);
     let receivers = receivers(world, clusters, ON_SURFACES, IN_THE_OPEN, 0x5eed);
     let ambient = luminance(world.ambient);
     let allowed = |length: usize| {

@@ -134,6 +134,13 @@ impl RelitWorld {
         Some(std::array::from_fn(|k| position(&corners[k])))
     }
 
+    /// Vertices of a triangle of [`indices`](Self::indices); `None` past the end.
+    pub(crate) fn corners(&self, triangle: usize) -> Option<[&WorldVertex; 3]> {
+        let [a, b, c] = *self.indices.as_chunks::<3>().0.get(triangle)?;
+        let vertex = |i: u32| self.vertices.get(i as usize);
+        Some([vertex(a)?, vertex(b)?, vertex(c)?])
+    }
+
     /// How a light changes in time; `None` for most.
     pub fn flicker_of(&self, light: &TriangleLight) -> Option<&Flicker> {
         let surface = self.surfaces.get(light.surface as usize)?;

@@ -4,6 +4,7 @@ use super::*;
 use crate::calibrate::beside::spots;
 use crate::calibrate::fronts::Fronts;
 use crate::light::Falloff;
+use crate::occluders::Occluders;
 
 /// Light of a point in the middle of the room.
 fn from_middle(at: Vec3, normal: Vec3) -> Vec3 {
@@ -45,7 +46,7 @@ fn spots_are_counted_where_a_point_makes_one() {
 #[test]
 fn texels_that_a_light_makes_too_bright_join_and_turn_it_down() {
     let world = room(false, Some(&from_middle));
-    let occluders = samples::occluders(&world);
+    let occluders = Occluders::of_world(&world);
     let taking = taking(200);
     let (samples, _) = samples::take(&world, &occluders, &taking);
     let again = Cell::new(false);

@@ -3,12 +3,13 @@
 use super::*;
 use crate::calibrate::fronts::Fronts;
 use crate::calibrate::place::Scene;
+use crate::occluders::Occluders;
 use samples::Sample;
 
 #[test]
 fn what_places_see_is_kept_and_samples_that_join_are_looked_at() {
     let world = room(false, Some(&from_hidden));
-    let occluders = samples::occluders(&world);
+    let occluders = Occluders::of_world(&world);
     let (all, _) = samples::take(&world, &occluders, &taking(800));
     let first = all.len() - 100;
     let measured = Measured::new(&all);

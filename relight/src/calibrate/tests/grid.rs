@@ -1,6 +1,7 @@
 //! A room whose light grid is known, baked as a compiler does.
 
 use super::*;
+use crate::occluders::Occluders;
 use q3bsp::GridPoint;
 
 /// What a compiler stores at a point of the grid: the mean of the ways to the lights, weighted by their light, the light
@@ -113,7 +114,7 @@ fn what_is_lit_by_vertex_is_measured_beside_texels() {
         vertex.color = [r, g, b, 255];
     }
     let world = relit(&map.build());
-    let occluders = samples::occluders(&world);
+    let occluders = Occluders::of_world(&world);
     let (samples, evidence) = samples::take(&world, &occluders, &taking(4000));
     assert_eq!(evidence, Evidence::Lightmaps);
     let on_pane =

@@ -1,6 +1,7 @@
 //! Texels are fitted or held out, and each is measured at most once.
 
 use super::*;
+use crate::occluders::Occluders;
 use proptest::prelude::*;
 use samples::Sample;
 use std::collections::HashSet;
@@ -19,7 +20,7 @@ fn coarse(side: u32, first: u32) -> RelitWorld {
 }
 
 fn taken(world: &RelitWorld, count: usize, seed: u64) -> Vec<Sample> {
-    let occluders = samples::occluders(world);
+    let occluders = Occluders::of_world(world);
     let taking = Taking {
         seed,
         ..taking(count)

@@ -1,6 +1,7 @@
 //! What ways of looking for light have in common.
 
 use super::*;
+use crate::occluders::Occluders;
 
 #[test]
 fn what_is_remembered_is_what_would_be_traced_again() {
@@ -8,7 +9,7 @@ fn what_is_remembered_is_what_would_be_traced_again() {
     for material in &mut world.materials {
         material.albedo = Vec3::splat(0.5);
     }
-    let occluders = samples::occluders(&world);
+    let occluders = Occluders::of_world(&world);
     let mut memory = Memory::default();
     let mut taken = Vec::new();
     for gamma in [1.0, 2.2, 1.0] {

@@ -2,8 +2,8 @@
 
 use super::splash::from_lamp;
 use super::*;
-use crate::calibrate::random::lot;
 use crate::calibrate::ways::{HALF, Rival, UNEXPLAINED, Ways};
+use support::random::lot;
 
 /// How far off what any light could explain texels are, stops.
 const NOISE: f32 = 0.2;

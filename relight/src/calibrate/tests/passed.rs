@@ -1,6 +1,7 @@
 //! What light passes although it is drawn.
 
 use super::*;
+use crate::occluders::Occluders;
 
 #[test]
 fn shadow_rays_pass_what_the_compiler_let_light_pass() {
@@ -20,7 +21,7 @@ fn shadow_rays_pass_what_the_compiler_let_light_pass() {
         let mut world = relit(&map.build());
         // the room's ceiling lies below the upper end
         world.surfaces.retain(|s| s.material != 0);
-        let occluders = samples::occluders(&world);
+        let occluders = Occluders::of_world(&world);
         for (from, to) in [(above, below), (below, above)] {
             let stopped = occluders.blocked(from, to, false);
             assert_eq!(stopped, stops, "{material} from {from}");

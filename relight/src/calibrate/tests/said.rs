@@ -1,6 +1,7 @@
 //! Maps that say how their light was computed.
 
 use super::*;
+use crate::occluders::Occluders;
 
 /// How far surfaces make a place dirty, id units.
 const DEPTH: f32 = 128.0;
@@ -103,7 +104,7 @@ fn texels_held_out_are_of_all_alike() {
         }
     };
     let world = saying(&[], &near);
-    let occluders = samples::occluders(&world);
+    let occluders = Occluders::of_world(&world);
     let take = |few_black| {
         let taking = Taking {
             few_black,

@@ -79,7 +79,10 @@ fn a_fog_that_nothing_describes_hides_nothing_where_it_fills_the_world() {
         let warned = world.warnings.iter().any(told);
         // a game warns of what is wrong with the map, and of materials as it registers them
         let (of_map, all) = (world.map_warnings().count(), world.warnings.len());
-        let faults = world.materials.iter().filter(|m| m.resolved.fault.is_some());
+        let faults = world
+            .materials
+            .iter()
+            .filter(|m| m.resolved.fault.is_some());
         assert_eq!(of_map, usize::from(warned));
         assert_eq!(all - of_map, faults.count());
         (world.fogs[0].depth, warned)

@@ -1,7 +1,7 @@
 //! Rays that are known to meet something, or not.
 
 use super::*;
-use crate::calibrate::random::Random;
+use support::random::Random;
 
 /// Where a ray meets a single triangle, one number at a time.
 fn alone([a, b, c]: [Vec3; 3], sky: bool, tag: u32, from: Vec3, ray: Vec3) -> Option<Hit> {

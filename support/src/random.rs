@@ -1,7 +1,8 @@
 //! A small random generator, so that one map gives one result everywhere.
 
 /// PCG-like: a 64-bit linear congruential generator, of which the high bits are used after a mix.
-pub(crate) struct Random(u64);
+#[derive(Debug, Clone)]
+pub struct Random(u64);
 
 impl Random {
     /// A generator of its own for every seed.
@@ -33,7 +34,7 @@ impl Random {
 }
 
 /// Evenly in 0..1, 1 excluded, of anything that has a name: with one seed the same at all times.
-pub(crate) fn lot(seed: u64, name: &[u32]) -> f32 {
+pub fn lot(seed: u64, name: &[u32]) -> f32 {
     let drawn = |so_far: u64, word: &u32| {
         let mixed = (so_far ^ u64::from(*word)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
         mixed ^ (mixed >> 29)

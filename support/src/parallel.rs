@@ -12,7 +12,7 @@ fn threads() -> usize {
 }
 
 /// `f` of every item, in order. The result does not depend on the number of threads.
-pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(usize, &T) -> R + Sync) -> Vec<R> {
+pub fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(usize, &T) -> R + Sync) -> Vec<R> {
     let threads = threads();
     let piece = items.len().div_ceil(threads * PIECES).max(1);
     let queue = Mutex::new(items.chunks(piece).enumerate());
@@ -53,7 +53,7 @@ pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(usize, &T) -> R + Sy
 }
 
 /// Does `f` to every item.
-pub(crate) fn each<T: Send>(items: &mut [T], f: impl Fn(&mut T) + Sync) {
+pub fn each<T: Send>(items: &mut [T], f: impl Fn(&mut T) + Sync) {
     let threads = threads();
     let piece = items.len().div_ceil(threads * PIECES).max(1);
     if threads == 1 || items.len() <= piece {

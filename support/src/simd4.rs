@@ -1,15 +1,15 @@
-//! Four vectors at once, an axis at a time.
+//! Four vectors at once, one register for each axis (structure of arrays).
 
 use glam::{Vec3, Vec4};
 
 /// How many.
-pub(super) const WIDE: usize = 4;
+pub const WIDE: usize = 4;
 
 /// Four vectors, an axis at a time.
-pub(super) type Four = [Vec4; 3];
+pub type Four = [Vec4; 3];
 
 /// Up to four vectors; zero for those that are not there.
-pub(super) fn four(vectors: impl Iterator<Item = Vec3>) -> Four {
+pub fn four(vectors: impl Iterator<Item = Vec3>) -> Four {
     let mut axes = [Vec4::ZERO; 3];
     for (lane, vector) in vectors.take(WIDE).enumerate() {
         for (axis, value) in axes.iter_mut().zip(vector.to_array()) {
@@ -20,24 +20,27 @@ pub(super) fn four(vectors: impl Iterator<Item = Vec3>) -> Four {
 }
 
 /// The same one four times.
-pub(super) fn splat(vector: Vec3) -> Four {
+pub fn splat(vector: Vec3) -> Four {
     vector.to_array().map(Vec4::splat)
 }
 
 /// One of four vectors.
-pub(super) fn at(four: &Four, lane: usize) -> Vec3 {
+pub fn at(four: &Four, lane: usize) -> Vec3 {
     Vec3::from(four.map(|axis| axis[lane]))
 }
 
-pub(super) fn sub(a: &Four, b: &Four) -> Four {
+/// Differences, lane by lane.
+pub fn sub(a: &Four, b: &Four) -> Four {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-pub(super) fn dot(a: &Four, b: &Four) -> Vec4 {
+/// Dot products, lane by lane.
+pub fn dot(a: &Four, b: &Four) -> Vec4 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-pub(super) fn cross(a: &Four, b: &Four) -> Four {
+/// Cross products, lane by lane.
+pub fn cross(a: &Four, b: &Four) -> Four {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -46,7 +49,7 @@ pub(super) fn cross(a: &Four, b: &Four) -> Four {
 }
 
 /// The bits of a mask.
-pub(super) fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
+pub fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = mask.trailing_zeros();
         mask &= mask.wrapping_sub(1);

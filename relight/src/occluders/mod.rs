@@ -4,14 +4,15 @@
 //! Source: Möller and Trumbore 1997 for the triangle, the slab test for boxes, Dammertz et al. 2008 for four at a time.
 
 mod build;
+mod of_world;
 #[cfg(test)]
 mod tests;
 
-use super::fours::{Four, WIDE, at, cross, dot, four, lanes, splat, sub};
 use crate::world::Holes;
 use build::Binary;
 use glam::{Vec2, Vec3, Vec4};
 use std::sync::Arc;
+use support::simd4::{Four, WIDE, at, cross, dot, four, lanes, splat, sub};
 
 /// Nodes of a walk that are kept without taking from the heap: more than maps need as a rule.
 const STACK: usize = 48;

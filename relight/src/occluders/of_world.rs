@@ -1,0 +1,49 @@
+//! What stops light in a world.
+
+use super::{CutOut, Occluders};
+use crate::world::{RelitWorld, WorldMaterial};
+use shaderscript::light::SurfaceClass;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+impl Occluders {
+    /// Triangles that stop light: those of the world itself that are opaque, and cut-outs where these are there, if anybody
+    /// knows where that is. Tagged with their number.
+    pub(crate) fn of_world(world: &RelitWorld) -> Occluders {
+        let drawn = world.surfaces.iter().filter(|s| {
+            let material = world.materials.get(s.material as usize);
+            s.model == 0 && material.is_some_and(|m| m.is_sky() || stops_light(m))
+        });
+        let mut holes_of = HashMap::new();
+        for surface in &world.surfaces {
+            let material = world.materials.get(surface.material as usize);
+            if let Some(holes) = material.and_then(|m| m.holes.as_ref()) {
+                let first = surface.first_index / 3;
+                holes_of.extend((first..first + surface.num_indices / 3).map(|t| (t, holes)));
+            }
+        }
+        Occluders::new(drawn.flat_map(|surface| {
+            let material = world.materials.get(surface.material as usize);
+            let sky = material.is_some_and(WorldMaterial::is_sky);
+            let first = surface.first_index as usize / 3;
+            (first..first + surface.num_indices as usize / 3)
+                .filter_map(move |t| Some((world.triangle(t)?, sky, t as u32)))
+        }))
+        .cut(|tag| {
+            let holes = holes_of.get(&tag)?;
+            let [a, b, c] = world.corners(tag as usize)?;
+            Some(CutOut {
+                st: [a.st, b.st, c.st],
+                holes: Arc::clone(holes),
+            })
+        })
+    }
+}
+
+fn stops_light(material: &WorldMaterial) -> bool {
+    let solid = matches!(
+        material.class.class,
+        SurfaceClass::Opaque | SurfaceClass::Mirror | SurfaceClass::Portal
+    );
+    (solid && !material.class.passed) || material.holes.is_some()
+}

@@ -1,0 +1,17 @@
+//! General tools that know nothing of maps or of rendering.
+//!
+//! * [`parallel`]: a function of every item, on all cores.
+//! * [`random`]: a small generator that gives the same numbers everywhere.
+//! * [`hash`]: 128-bit names for results that are kept.
+//! * [`simd4`]: four vectors at once.
+
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)
+)]
+
+pub mod hash;
+pub mod parallel;
+pub mod random;
+pub mod simd4;
