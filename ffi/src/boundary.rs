@@ -4,6 +4,41 @@
 //! The engine's `Error` does a `longjmp` to its main loop, and before that calls `Shutdown`, `BeginRegistration` and
 //! more of our functions. So a failing call first ends completely: the closure's frame is gone with its destructors
 //! run, the state is back in its cell, the message lies in a static buffer.
+//!
+//! # Call contract
+//! Each function that the engine calls (an *export*: the table of exports, console commands, callbacks) is an
+//! `unsafe extern "C" fn`. Its `# Safety` section says what it needs of its own arguments. These hold for all exports:
+//! - **Thread.** The engine calls on the thread that called `GetRefAPI`. On any other thread [`entry`] does nothing and
+//!   answers 0; no argument is read.
+//! - **Memory.** An export uses a pointer during the call alone, unless its section says otherwise; nobody else writes
+//!   to that memory meanwhile. The memory of game modules has no alignment, so exports read and write unaligned.
+//! - **Null.** A pointer may be null unless its section says otherwise. A null input has a value that the section
+//!   states; a null output is not written.
+//! - **No return.** The call may end in the engine's `Error`, a `longjmp`. Every frame between the engine's `setjmp`
+//!   and the export must then be a *plain old frame* (RFC 2945): one without a pending destructor or `catch_unwind`. C
+//!   frames are. Rust code that calls an export must be.
+//! - **Time.** Before `BeginRegistration` and after `Shutdown` nothing is registered: exports answer what they answer
+//!   for a thing that does not exist.
+//!
+//! # Plain frames
+//! Why exports are `extern "C"` and not `extern "C-unwind"`:
+//! - The ABI string decides about unwinding. Nothing unwinds across this boundary: [`guarded`] catches every panic, and
+//!   the engine is C, without exceptions. With `"C"` a panic that escaped all the same would abort the process; with
+//!   `"C-unwind"` it would unwind the engine's C frames.
+//! - `longjmp` is no matter of the ABI string. RFC 2945 treats both alike: to cross a frame with a pending destructor
+//!   or `catch_unwind` is undefined; to cross a plain old frame is not specified yet. The Rust Reference (*Behavior
+//!   considered undefined*, Rust runtime) forbids to deallocate a frame before the destructors of its variables ran,
+//!   so a frame that has none to run may go.
+//!
+//! So [`entry`] calls `Error` from plain frames alone: its own, where `R: Copy` and the closure was moved away, and
+//! that of the export, which owns nothing but the closure that it hands to [`entry`].
+//!
+//! # Services that do not return
+//! The engine also leaves by `longjmp` from inside a service that a call of ours asked for: a broken pack in
+//! `FS_ReadFile`, a full hunk. That crosses [`guarded`] and frames with destructors, which RFC 2945 leaves undefined,
+//! and no renderer can prevent it. It works because `longjmp` of the C libraries on Linux restores registers and looks
+//! at no frame between: what the frames owned leaks, and [`session`] starts over where one had taken the state. On a
+//! system whose `longjmp` unwinds (Windows) this would have to be decided anew.
 
 use crate::ioq3::abi::error_level;
 use crate::ioq3::engine::Engine;
@@ -49,7 +84,7 @@ const MESSAGE_BYTES: usize = 4096;
 
 struct Message(UnsafeCell<[u8; MESSAGE_BYTES]>);
 
-// SAFETY: touched on the engine's main thread alone (`entry` refuses other threads first).
+// SAFETY: `keep_message` alone uses it, on the engine's main thread (`entry` refuses other threads first).
 unsafe impl Sync for Message {}
 
 static MESSAGE: Message = Message(UnsafeCell::new([0; MESSAGE_BYTES]));
@@ -80,6 +115,9 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
 
 /// Runs one call of the engine. `R` has no destructor, so that nothing is alive when the engine's error is called.
 ///
+/// For exports alone, as their last expression, from a frame that owns nothing: it may not return
+/// ([plain frames](self#plain-frames)).
+///
 /// An error or a panic of `f` becomes the engine's error, from which this does not return. A panic costs the renderer
 /// its state: the next `BeginRegistration` starts a new one. Calls from another thread than the one that called
 /// `GetRefAPI` are refused.
@@ -91,9 +129,8 @@ pub fn entry<R: Copy + Default>(f: impl FnOnce() -> Result<R, Failure>) -> R {
         Ok(value) => value,
         Err((level, message)) => {
             if let Some(error) = Engine::current().and_then(Engine::error_function) {
-                // SAFETY: the engine's variadic error with a literal format and one NUL-terminated static string. It
-                // leaves by longjmp: the only frames it passes are this one and the exported function's, and
-                // neither has anything left to drop.
+                // SAFETY: the engine's variadic error with a literal format and one NUL-terminated static string. Its
+                // longjmp crosses this frame and the export's, which are plain ("Plain frames" above).
                 unsafe { error(level, c"%s".as_ptr(), message) };
             }
             // Only an engine without an error function comes here.

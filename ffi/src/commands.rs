@@ -12,6 +12,12 @@ use crate::window::modes::MODES;
 use renderer_vk::Renderer;
 use std::ffi::{CStr, CString};
 
+/// A command as the engine calls it.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract): the engine runs commands out of its command buffer, on its main
+/// thread, from C frames. There are no arguments; the words of the command are asked for
+/// ([`Engine::arguments`]). Words that a command cannot use are answered with a line on the console.
 type Function = unsafe extern "C" fn();
 
 /// What is wrong with a name that the engine would not write to.
@@ -65,24 +71,24 @@ fn print_lines(make: impl FnOnce(&mut Renderer, &mut Front, &[String]) -> Vec<St
     });
 }
 
-extern "C" fn image_list() {
+unsafe extern "C" fn image_list() {
     print_lines(|renderer, _, _| renderer.image_list());
 }
 
-extern "C" fn shader_list() {
+unsafe extern "C" fn shader_list() {
     // Any argument asks for the order in which they are drawn.
     print_lines(|renderer, _, arguments| renderer.shader_list(arguments.len() > 1));
 }
 
-extern "C" fn skin_list() {
+unsafe extern "C" fn skin_list() {
     print_lines(|renderer, _, _| renderer.skin_list());
 }
 
-extern "C" fn model_list() {
+unsafe extern "C" fn model_list() {
     print_lines(|renderer, _, _| renderer.model_list());
 }
 
-extern "C" fn mode_list() {
+unsafe extern "C" fn mode_list() {
     // Not a list of what is registered: it works before anything is.
     entry(|| {
         let Some(engine) = Engine::current() else {
@@ -97,7 +103,7 @@ extern "C" fn mode_list() {
     });
 }
 
-extern "C" fn timings() {
+unsafe extern "C" fn timings() {
     print_lines(|renderer, _, _| {
         let passes = renderer.timings();
         if passes.is_empty() {
@@ -113,7 +119,7 @@ extern "C" fn timings() {
     });
 }
 
-extern "C" fn stats() {
+unsafe extern "C" fn stats() {
     print_lines(|renderer, front, arguments| {
         let Some(report) = Report::of(arguments.get(1..).unwrap_or_default()) else {
             return vec!["usage: rt_stats [json [FILE]]".into()];
@@ -131,10 +137,18 @@ extern "C" fn stats() {
 }
 
 /// With a word: sets the variable of the same name, which a command hides from the console. Without: what lights there are.
-extern "C" fn lights() {
-    let word = Engine::current().and_then(|engine| Some((engine, engine.arguments().pop()?)));
-    if let Some((engine, word)) = word.filter(|(engine, _)| engine.arguments().len() == 2) {
-        engine.cvar_set(c"rt_lights", &word);
+unsafe extern "C" fn lights() {
+    let was_set = entry(|| {
+        let Some(engine) = Engine::current() else {
+            return Ok(false);
+        };
+        let arguments = engine.arguments();
+        if let [_, word] = &arguments[..] {
+            engine.cvar_set(c"rt_lights", word);
+        }
+        Ok(arguments.len() == 2)
+    });
+    if was_set {
         return;
     }
     print_lines(|renderer, _, _| {
@@ -165,7 +179,7 @@ extern "C" fn lights() {
     });
 }
 
-extern "C" fn path() {
+unsafe extern "C" fn path() {
     entry(|| {
         let Some(engine) = Engine::current() else {
             return Ok(());
@@ -200,7 +214,7 @@ extern "C" fn path() {
     });
 }
 
-extern "C" fn gfx_info() {
+unsafe extern "C" fn gfx_info() {
     print_lines(|renderer, front, _| {
         let info = renderer.device_info();
         let strings = crate::config::DeviceStrings::new(info);
@@ -252,7 +266,7 @@ extern "C" fn gfx_info() {
     });
 }
 
-extern "C" fn minimize() {
+unsafe extern "C" fn minimize() {
     entry(|| {
         if let Some(window) = window::current() {
             window.minimize();
@@ -261,11 +275,11 @@ extern "C" fn minimize() {
     });
 }
 
-extern "C" fn screenshot_tga() {
+unsafe extern "C" fn screenshot_tga() {
     entry(|| screenshot(Format::Tga));
 }
 
-extern "C" fn screenshot_jpeg() {
+unsafe extern "C" fn screenshot_jpeg() {
     entry(|| screenshot(Format::Jpeg));
 }
 
@@ -275,7 +289,7 @@ fn map_base_name(world: &str) -> &str {
     file.rsplit_once('.').map_or(file, |(base, _)| base)
 }
 
-extern "C" fn still() {
+unsafe extern "C" fn still() {
     entry(|| {
         let Some(engine) = Engine::current() else {
             return Ok(());

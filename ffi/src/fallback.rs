@@ -114,14 +114,14 @@ pub unsafe fn load(
     api_version: c_int,
     table: *const refimport_t,
 ) -> Option<refexport_t> {
-    // SAFETY: the same contract.
+    // SAFETY: `table` is the engine's import table by this function's contract.
     unsafe { load_from(&folders(), engine, api_version, table) }
 }
 
 /// [`load`] out of given folders.
 ///
 /// # Safety
-/// As for [`load`].
+/// `table` must be the engine's import table, as `GetRefAPI` got it, or what the renderers in `folders` take for one.
 unsafe fn load_from(
     folders: &[PathBuf],
     engine: Engine,
@@ -154,12 +154,12 @@ unsafe fn load_from(
                 // Someone installed us under that name.
                 continue;
             }
-            // SAFETY: by the caller's promise; it copies the table.
+            // SAFETY: `table` is what this renderer takes by this function's contract; it copies the table.
             let exports = unsafe { get_ref_api(api_version, table) };
             if exports.is_null() {
                 continue;
             }
-            // SAFETY: the renderer's static table.
+            // SAFETY: not null, so it is the renderer's static table, which lives as long as its library.
             let mut exports = unsafe { exports.read_unaligned() };
             engine.say(&format!("Relight: using {} instead\n", path.display()));
             *substitute() = Some(Substitute {
@@ -175,10 +175,15 @@ unsafe fn load_from(
 
 /// `Shutdown` of the substitute, and the end of its library when the engine is done with it: the engine unloads only
 /// us, and the substitute must start afresh next time.
-extern "C" fn shutdown(destroy_window: QBool) {
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract), except that nothing of ours runs: the substitute may end in the
+/// engine's `Error`, which crosses this frame while it owns nothing. Any number but 0 ends the substitute; none of its
+/// functions may be called afterwards.
+unsafe extern "C" fn shutdown(destroy_window: QBool) {
     let function = substitute().as_ref().map(|substitute| substitute.shutdown);
     if let Some(function) = function {
-        // SAFETY: the substitute's own function, still loaded.
+        // SAFETY: the substitute's own `Shutdown`; its library is closed below at the earliest.
         unsafe { function(destroy_window) };
     }
     if destroy_window != 0 {
@@ -238,10 +243,10 @@ mod tests {
         assert!(!loaded());
         for _ in 0..2 {
             let exports = load(8).map(|exports| exports.Shutdown).unwrap();
-            // SAFETY: our own function.
+            // SAFETY: `shutdown` with a substitute that calls no service of the engine: it returns.
             unsafe { exports(0) };
             assert!(loaded());
-            // SAFETY: our own function.
+            // SAFETY: `shutdown`, which returns here; no function of the substitute is called afterwards.
             unsafe { exports(1) };
             assert!(!loaded(), "its statics must not outlive it");
         }

@@ -44,14 +44,19 @@ use std::ffi::c_int;
 /// or has other tables.
 ///
 /// # Safety
-/// `imports` must be null or point at the import table of an ioquake3 engine, and the call must come from the engine's
-/// main thread while none of our functions runs.
+/// - `imports` must be null (then the answer is null) or point at the import table of an ioquake3 engine. The table is
+///   copied: it need not outlive the call. Its functions must stay callable for as long as the process lives.
+/// - The call must come from the engine's main thread while none of our functions runs.
+///
+/// The answer is static and valid until the next `GetRefAPI`. The functions in it keep to the *call contract* in the
+/// head of `boundary`.
 #[allow(non_snake_case)] // the engine looks for this name
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn GetRefAPI(
     api_version: c_int,
     imports: *const refimport_t,
 ) -> *const refexport_t {
-    // SAFETY: the same contract.
+    // SAFETY: `imports` is null or an ioquake3 engine's table, and the thread is the main one, by this function's
+    // contract.
     unsafe { ioq3::get_ref_api(api_version, imports) }
 }

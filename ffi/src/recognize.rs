@@ -69,7 +69,7 @@ pub unsafe fn refusal(engine: Engine, imports: *const refimport_t) -> Option<Str
     let (found, opengl) = match is_ours(&wanted) {
         Some(true) => return None,
         Some(false) => (format!("{VARIABLE} calls it {wanted}"), "opengl1"),
-        // SAFETY: the same contract.
+        // SAFETY: `imports` is the table of an engine with our version number by this function's contract.
         None => unsafe { difference(engine, imports) }?,
     };
     Some(format!(
@@ -87,7 +87,8 @@ fn is_ours(variable: &str) -> Option<bool> {
 /// What is not as in ioquake3, and the `cl_renderer` of the engine's OpenGL renderer.
 ///
 /// # Safety
-/// As for [`refusal`].
+/// `imports` must point at the import table of an engine that speaks our version number, which must be the one that
+/// `engine` calls.
 unsafe fn difference(
     engine: Engine,
     imports: *const refimport_t,

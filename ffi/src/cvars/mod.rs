@@ -59,7 +59,7 @@ impl Cvars {
 
     /// The value as a number, with anything that is not finite taken for 0.
     pub fn value(&self, cvar: Cvar) -> f32 {
-        // SAFETY: as in `integer`.
+        // SAFETY: a non-null result of the engine's Cvar_Get stays a variable for as long as the process lives.
         let value = self
             .handle(cvar)
             .map_or(0.0, |handle| unsafe { (*handle).value });
@@ -73,7 +73,8 @@ impl Cvars {
 
     /// The value as text.
     pub fn string(&self, cvar: Cvar) -> String {
-        // SAFETY: as in `integer`; the string is the engine's and is copied before anything can change it.
+        // SAFETY: a non-null result of the engine's Cvar_Get stays a variable for as long as the process lives. Its
+        // text is NUL-terminated and copied before anything can change it.
         self.handle(cvar).map_or_else(String::new, |handle| unsafe {
             string_from((*handle).string)
         })
@@ -81,7 +82,7 @@ impl Cvars {
 
     /// Whether the value changed since [`Cvars::seen`] was last called.
     pub fn modified(&self, cvar: Cvar) -> bool {
-        // SAFETY: as in `integer`.
+        // SAFETY: a non-null result of the engine's Cvar_Get stays a variable for as long as the process lives.
         self.handle(cvar)
             .is_some_and(|handle| unsafe { (*handle).modified } != 0)
     }
@@ -90,7 +91,8 @@ impl Cvars {
     pub fn seen(&self, cvar: Cvar) {
         if let Some(handle) = self.handle(cvar) {
             const NO: QBool = 0;
-            // SAFETY: as in `integer`; clearing this member is what the engine expects of a variable's owner.
+            // SAFETY: a non-null result of the engine's Cvar_Get stays a variable for as long as the process lives. To
+            // clear this member is what the engine expects of a variable's owner, on its main thread.
             unsafe { (*handle).modified = NO }
         }
     }

@@ -158,7 +158,7 @@ pub unsafe fn vector(from: *const Vec3C) -> Vec3 {
     if from.is_null() {
         return Vec3::ZERO;
     }
-    // SAFETY: by the caller's promise; game code gives no better alignment than a float's, if that.
+    // SAFETY: not null, so it points at three floats by this function's contract; game code may not even align floats.
     unsafe { from.read_unaligned() }.into()
 }
 
@@ -168,7 +168,7 @@ pub unsafe fn vector(from: *const Vec3C) -> Vec3 {
 /// `to` must be null or have room for three floats.
 pub unsafe fn write_vector(to: *mut Vec3C, vector: Vec3) {
     if !to.is_null() {
-        // SAFETY: by the caller's promise.
+        // SAFETY: not null, so it has room for three floats by this function's contract.
         unsafe { to.write_unaligned(vector.to_array()) }
     }
 }

@@ -51,7 +51,8 @@ impl Engine {
     /// Every function of the table must be callable with the signature that the engine's ABI gives it for as long as
     /// the process lives, and this must run on the engine's main thread while no other call of ours runs.
     pub unsafe fn install(table: refimport_t) -> Engine {
-        // SAFETY: nobody else reads or writes, by the caller's promise.
+        // SAFETY: no other call of ours runs, and this is the main thread, by this function's contract: nobody else
+        // reads or writes the table.
         unsafe { *IMPORTS.0.get() = Some(table) };
         Engine(())
     }
@@ -325,7 +326,8 @@ impl Engine {
     /// `length` bytes must be readable at `data`.
     pub unsafe fn write_avi_frame(self, data: *const c_uchar, length: c_int) {
         if let Some(f) = self.get(|t| t.CL_WriteAVIVideoFrame) {
-            // SAFETY: by the caller's promise.
+            // SAFETY: `data` has `length` readable bytes by this function's contract; the engine copies them to its
+            // file.
             unsafe { f(data, length) }
         }
     }
@@ -336,7 +338,7 @@ impl Engine {
     /// `window` must be an `SDL_Window` of the process's SDL, valid until [`Engine::input_shutdown`].
     pub unsafe fn input_init(self, window: *mut c_void) {
         if let Some(f) = self.get(|t| t.IN_Init) {
-            // SAFETY: by the caller's promise.
+            // SAFETY: `window` is an SDL window that stays open until `input_shutdown` by this function's contract.
             unsafe { f(window) }
         }
     }
@@ -377,7 +379,7 @@ impl Engine {
 /// # Safety
 /// `text` must be null or point at a NUL-terminated string.
 pub unsafe fn string_from(text: *const c_char) -> String {
-    // SAFETY: by the caller's promise; copied at once.
+    // SAFETY: null or NUL-terminated by this function's contract; copied at once, so nothing borrows it later.
     unsafe { text_of(text) }.into_owned()
 }
 
@@ -389,7 +391,7 @@ pub unsafe fn text_of<'a>(text: *const c_char) -> Cow<'a, str> {
     if text.is_null() {
         return Cow::Borrowed("");
     }
-    // SAFETY: by the caller's promise.
+    // SAFETY: not null, so NUL-terminated and unchanged while the answer is used, by this function's contract.
     unsafe { CStr::from_ptr(text) }.to_string_lossy()
 }
 

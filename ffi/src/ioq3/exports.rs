@@ -38,13 +38,17 @@ pub static EXPORTS: refexport_t = refexport_t {
 };
 
 /// Calls every function of the table with arguments as odd as an engine's mistakes.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract).
 #[cfg(test)]
-pub fn call_everything() {
+pub unsafe fn call_everything() {
     use std::ptr::{null, null_mut};
     let re = &EXPORTS;
     let pixels = [0u8; 4];
     let mut buffer = [1; 4];
-    // SAFETY: null where a pointer is not needed, else our own memory of the right size.
+    // SAFETY: pointers are null, C strings, or our own memory of the stated size, which outlives the call. The frame
+    // owns nothing that needs dropping, should a call end in the engine's error.
     unsafe {
         (re.RegisterModel)(c"a".as_ptr());
         (re.RegisterSkin)(null());

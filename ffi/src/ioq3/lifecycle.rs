@@ -60,7 +60,11 @@ fn cache_folder(engine: Engine) -> Option<PathBuf> {
 }
 
 /// `re.BeginRegistration`.
-pub extern "C" fn begin_registration(out: *mut glconfig_t) {
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `out` must be null or have room for a `glconfig_t`. Without a
+/// device or a window the call ends in the engine's `Error` and writes nothing.
+pub unsafe extern "C" fn begin_registration(out: *mut glconfig_t) {
     entry(|| {
         session::abandon_if_taken();
         let Some(engine) = Engine::current() else {
@@ -81,7 +85,7 @@ pub extern "C" fn begin_registration(out: *mut glconfig_t) {
         })
         .flatten();
         if let (Some(config), false) = (info, out.is_null()) {
-            // SAFETY: the engine's own structure of this type.
+            // SAFETY: not null, so it has room for a `glconfig_t` by this function's contract.
             unsafe { out.write_unaligned(config) };
         }
         // The input code reads nothing of ours, but it is the engine's: no state is held.
@@ -203,7 +207,11 @@ fn describe(renderer: &Renderer, front: &mut Front) -> glconfig_t {
 }
 
 /// `re.Shutdown`. Twice in a row, before any registration and from inside an error of the engine are all fine.
-pub extern "C" fn shutdown(destroy_window: QBool) {
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). Any number but 0 closes the window; the engine's input code,
+/// which is told first, must not use it from then on. Buffers that [`take_video_frame`] was given are forgotten.
+pub unsafe extern "C" fn shutdown(destroy_window: QBool) {
     entry(|| {
         session::abandon_if_taken();
         let Some(engine) = Engine::current() else {
@@ -245,7 +253,10 @@ pub extern "C" fn shutdown(destroy_window: QBool) {
 }
 
 /// `re.EndRegistration`.
-pub extern "C" fn end_registration() {
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract); there are no arguments.
+pub unsafe extern "C" fn end_registration() {
     entry(|| {
         with_renderer(|renderer, _| {
             renderer.end_registration();
@@ -255,7 +266,10 @@ pub extern "C" fn end_registration() {
 }
 
 /// `re.BeginFrame`.
-pub extern "C" fn begin_frame(stereo: c_int) {
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). A number that is no `stereoFrame_t` counts as both eyes.
+pub unsafe extern "C" fn begin_frame(stereo: c_int) {
     entry(|| {
         let Some(engine) = Engine::current() else {
             return Ok(());
@@ -296,7 +310,12 @@ struct Outbox {
 }
 
 /// `re.EndFrame`.
-pub extern "C" fn end_frame(front_end_ms: *mut c_int, back_end_ms: *mut c_int) {
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `front_end_ms` and `back_end_ms` must each be null or have room
+/// for an integer. The buffer of a video frame that [`take_video_frame`] was given must still be there: the frame's
+/// picture is encoded into it here.
+pub unsafe extern "C" fn end_frame(front_end_ms: *mut c_int, back_end_ms: *mut c_int) {
     entry(|| {
         let Some(engine) = Engine::current() else {
             return Ok(());
@@ -312,7 +331,7 @@ pub extern "C" fn end_frame(front_end_ms: *mut c_int, back_end_ms: *mut c_int) {
             (back_end_ms, outbox.back_end_ms),
         ] {
             if !to.is_null() {
-                // SAFETY: the engine's own integer.
+                // SAFETY: not null, so it has room for an integer by this function's contract.
                 unsafe { to.write_unaligned(value) };
             }
         }
@@ -458,7 +477,8 @@ fn keep_video(frame: &VideoFrame, bytes: &[u8]) -> Option<(*mut u8, c_int)> {
     if frame.encode_buffer.is_null() || bytes.len() > room {
         return None;
     }
-    // SAFETY: the engine's buffer has `width * height * 4` bytes and is its own until the frame is handed over.
+    // SAFETY: by the contract of `take_video_frame` the buffer has `width * height * 4` bytes, of which `bytes` needs
+    // no more, and stays until the frame ends. Our bytes lie elsewhere.
     unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), frame.encode_buffer, bytes.len()) };
     Some((frame.encode_buffer, length))
 }
@@ -475,7 +495,7 @@ fn deliver(engine: Engine, outbox: Outbox) {
         engine.say(&format!("{line}\n"));
     }
     if let Some((data, length)) = outbox.video {
-        // SAFETY: the engine's own buffer, filled with `length` bytes just now.
+        // SAFETY: `keep_video` just filled the engine's buffer with `length` bytes.
         unsafe { engine.write_avi_frame(data, length) };
     }
 }
@@ -521,7 +541,12 @@ fn run_videos(engine: Engine) -> Result<(), Failure> {
 
 /// `re.TakeVideoFrame`. The header of the engine calls the first two height and width, but the engine passes the width
 /// first.
-pub extern "C" fn take_video_frame(
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `encode_buffer` must be null or have room for
+/// `width * height * 4` bytes and **outlive the call**: within a frame it is filled by [`end_frame`], or forgotten by
+/// [`shutdown`]. A null buffer or a side below 1 asks for nothing. The capture buffer is not used.
+pub unsafe extern "C" fn take_video_frame(
     width: c_int,
     height: c_int,
     _capture: *mut u8,

@@ -40,12 +40,14 @@ static BORROWED: Borrowed = Borrowed(UnsafeCell::new(None));
 /// OpenGL renderer.
 ///
 /// # Safety
-/// `imports` must be null or point at the import table of an ioquake3 engine.
+/// `imports` must be null or point at the import table of an ioquake3 engine, whose functions stay callable for as long
+/// as the process lives. The call must come from the engine's main thread while none of our functions runs.
 pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *const refexport_t {
     if imports.is_null() {
         return ptr::null();
     }
-    // SAFETY: by the caller's promise. The table lies on the engine's stack, so it is copied.
+    // SAFETY: not null, so it is an engine's table by this function's contract. It lies on the engine's stack, so it is
+    // copied.
     let table = unsafe { imports.read_unaligned() };
     // SAFETY: an engine calls this on its main thread, with none of our functions running.
     let engine = unsafe { Engine::install(table) };
@@ -53,7 +55,7 @@ pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *c
         engine.say(&format!("Relight speaks version {API_VERSION} of the renderer interface, this engine wants {api_version}\n"));
         return ptr::null();
     }
-    // SAFETY: the engine's own table; it speaks our version.
+    // SAFETY: the table of the engine that was installed above, and that engine speaks our version.
     if let Some(line) = unsafe { recognize::refusal(engine, imports) } {
         engine.say(&format!("{line}\n"));
         return ptr::null();
@@ -71,7 +73,7 @@ pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *c
         Err(_) => format!("looking for Vulkan failed{}", logging::take_panic_place()),
     };
     engine.say(&format!("Relight needs Vulkan 1.2: {problem}\n"));
-    // SAFETY: `table` is the engine's.
+    // SAFETY: `table` is a copy of the engine's import table, which renderers copy in their turn.
     match unsafe { fallback::load(engine, api_version, &table) } {
         Some(exports) => {
             // SAFETY: main thread; the engine copies the table at once.

@@ -21,36 +21,72 @@ const MAX_MARK_POINTS: usize = 64;
 const MAX_RAW_SIDE: c_int = 1 << 14;
 
 /// Runs a registration of something by name.
-fn register(name: *const c_char, f: impl FnOnce(&mut Renderer, &str) -> i32) -> c_int {
+///
+/// # Safety
+/// `name` must be null or a NUL-terminated string.
+unsafe fn register(name: *const c_char, f: impl FnOnce(&mut Renderer, &str) -> i32) -> c_int {
     entry(|| {
-        // SAFETY: the engine passes a C string.
+        // SAFETY: null or NUL-terminated by this function's contract; copied at once.
         let name = unsafe { string_from(name) };
         with_renderer(|renderer, _| Ok(f(renderer, &name)))
     })
 }
 
-pub extern "C" fn register_model(name: *const c_char) -> c_int {
-    register(name, |renderer, name| renderer.register_model(name))
+/// `re.RegisterModel`. A name without a model answers 0.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `name` must be null, which counts as an empty name, or a
+/// NUL-terminated string.
+pub unsafe extern "C" fn register_model(name: *const c_char) -> c_int {
+    // SAFETY: the name that the engine asks for, null or NUL-terminated by this function's contract.
+    unsafe { register(name, |renderer, name| renderer.register_model(name)) }
 }
 
-pub extern "C" fn register_skin(name: *const c_char) -> c_int {
-    register(name, |renderer, name| renderer.register_skin(name))
+/// `re.RegisterSkin`. A name without a skin answers 0.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `name` must be null, which counts as an empty name, or a
+/// NUL-terminated string.
+pub unsafe extern "C" fn register_skin(name: *const c_char) -> c_int {
+    // SAFETY: the name that the engine asks for, null or NUL-terminated by this function's contract.
+    unsafe { register(name, |renderer, name| renderer.register_skin(name)) }
 }
 
-pub extern "C" fn register_shader(name: *const c_char) -> c_int {
-    register(name, |renderer, name| renderer.register_shader(name, true))
+/// `re.RegisterShader`. A name without a material or an image answers 0.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `name` must be null, which counts as an empty name, or a
+/// NUL-terminated string.
+pub unsafe extern "C" fn register_shader(name: *const c_char) -> c_int {
+    // SAFETY: the name that the engine asks for, null or NUL-terminated by this function's contract.
+    unsafe { register(name, |renderer, name| renderer.register_shader(name, true)) }
 }
 
-pub extern "C" fn register_shader_no_mip(name: *const c_char) -> c_int {
-    register(name, |renderer, name| renderer.register_shader(name, false))
+/// `re.RegisterShaderNoMip`. A name without a material or an image answers 0.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `name` must be null, which counts as an empty name, or a
+/// NUL-terminated string.
+pub unsafe extern "C" fn register_shader_no_mip(name: *const c_char) -> c_int {
+    // SAFETY: the name that the engine asks for, null or NUL-terminated by this function's contract.
+    unsafe { register(name, |renderer, name| renderer.register_shader(name, false)) }
 }
 
-pub extern "C" fn register_font(_name: *const c_char, point_size: c_int, out: *mut fontInfo_t) {
+/// `re.RegisterFont`. Where there is no font of that size, `out` keeps what it holds.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `out` must be null or have room for a `fontInfo_t`. The name is
+/// not read.
+pub unsafe extern "C" fn register_font(
+    _name: *const c_char,
+    point_size: c_int,
+    out: *mut fontInfo_t,
+) {
     entry(|| {
         with_renderer(|renderer, _| {
             // The file is found by the size alone, whatever the font is called.
             match renderer.register_font(point_size) {
-                // SAFETY: the engine's own structure of this type.
+                // SAFETY: not null, so it has room for a `fontInfo_t` by this function's contract.
                 Some(font) if !out.is_null() => unsafe {
                     out.write_unaligned(*convert::font(&font))
                 },
@@ -62,9 +98,14 @@ pub extern "C" fn register_font(_name: *const c_char, point_size: c_int, out: *m
     });
 }
 
-pub extern "C" fn load_world(name: *const c_char) {
+/// `re.LoadWorld`. A map that cannot be loaded, or a second one, ends in the engine's `Error`.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `name` must be null, which counts as an empty name, or a
+/// NUL-terminated string.
+pub unsafe extern "C" fn load_world(name: *const c_char) {
     entry(|| {
-        // SAFETY: the engine passes a C string.
+        // SAFETY: null or NUL-terminated by this function's contract; copied at once.
         let name = unsafe { string_from(name) };
         with_renderer(|renderer, front| {
             if renderer.world_name().is_some() {
@@ -80,10 +121,18 @@ pub extern "C" fn load_world(name: *const c_char) {
     });
 }
 
-/// The engine's copy of the map's visibility. The renderer reads the same data from the map itself.
-pub extern "C" fn set_world_vis_data(_vis: *const c_uchar) {}
+/// `re.SetWorldVisData`, the engine's copy of the map's visibility. The renderer reads the same data from the map
+/// itself.
+///
+/// # Safety
+/// Nothing is asked of the caller: the pointer is not used, and the call always returns.
+pub unsafe extern "C" fn set_world_vis_data(_vis: *const c_uchar) {}
 
-pub extern "C" fn clear_scene() {
+/// `re.ClearScene`.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract); there are no arguments.
+pub unsafe extern "C" fn clear_scene() {
     entry(|| {
         draw(|renderer, _| {
             renderer.clear_scene();
@@ -92,12 +141,19 @@ pub extern "C" fn clear_scene() {
     });
 }
 
-pub extern "C" fn add_ref_entity(from: *const refEntity_t) {
+/// `re.AddRefEntityToScene`. An entity with a NaN in its origin is left out; one of an unknown type ends in the
+/// engine's `Error`.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `from` must be null, which adds nothing, or point at a
+/// `refEntity_t`, whose members may hold any value. It is copied.
+pub unsafe extern "C" fn add_ref_entity(from: *const refEntity_t) {
     entry(|| {
         if from.is_null() {
             return Ok(());
         }
-        // SAFETY: the engine passes an entity, perhaps out of a game module's memory, which aligns nothing.
+        // SAFETY: not null, so it points at an entity by this function's contract, perhaps in a game module's memory,
+        // which aligns nothing. All of its members are numbers: any bytes are a value.
         let from = unsafe { from.read_unaligned() };
         draw(|renderer, front| {
             if from.origin.iter().any(|v| v.is_nan()) {
@@ -121,7 +177,17 @@ pub extern "C" fn add_ref_entity(from: *const refEntity_t) {
     });
 }
 
-pub extern "C" fn add_poly(shader: c_int, num_verts: c_int, verts: *const polyVert_t, num: c_int) {
+/// `re.AddPolyToScene`: `num` polygons of `num_verts` corners each. Material 0 is reported and left out.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `verts` must be null, or point at `num * num_verts`
+/// corners one behind the other, which are copied. Null, or a count below 1, adds nothing.
+pub unsafe extern "C" fn add_poly(
+    shader: c_int,
+    num_verts: c_int,
+    verts: *const polyVert_t,
+    num: c_int,
+) {
     entry(|| {
         let (Ok(per_poly @ 1..), Ok(polygons @ 1..), false) = (
             usize::try_from(num_verts),
@@ -138,7 +204,7 @@ pub extern "C" fn add_poly(shader: c_int, num_verts: c_int, verts: *const polyVe
             return Ok(());
         };
         let corner = |i: usize| {
-            // SAFETY: the engine promises `num` polygons of `num_verts` corners each, and `i` is below their product.
+            // SAFETY: `verts` has `num * num_verts` corners by this function's contract, and `i` is below that.
             convert::poly_vert(&unsafe { verts.add(i).read_unaligned() })
         };
         draw(|renderer, _| {
@@ -160,9 +226,13 @@ pub extern "C" fn add_poly(shader: c_int, num_verts: c_int, verts: *const polyVe
     });
 }
 
-fn add_light_of(origin: *const Vec3C, radius: f32, color: Vec3, additive: bool) {
+/// Adds a light.
+///
+/// # Safety
+/// `origin` must be null or point at three floats.
+unsafe fn add_light_of(origin: *const Vec3C, radius: f32, color: Vec3, additive: bool) {
     entry(|| {
-        // SAFETY: the engine passes a vector.
+        // SAFETY: null or three floats by this function's contract.
         let origin = unsafe { convert::vector(origin) };
         draw(|renderer, _| {
             // Also false for a radius that is no number.
@@ -179,32 +249,50 @@ fn add_light_of(origin: *const Vec3C, radius: f32, color: Vec3, additive: bool) 
     });
 }
 
-pub extern "C" fn add_light(
+/// `re.AddLightToScene`.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `origin` must be null, which counts as the world's origin, or
+/// point at three floats. A radius that is not above 0 and a place or colour that is not finite add nothing.
+pub unsafe extern "C" fn add_light(
     origin: *const Vec3C,
     radius: c_float,
     r: c_float,
     g: c_float,
     b: c_float,
 ) {
-    add_light_of(origin, radius, Vec3::new(r, g, b), false);
+    // SAFETY: the light's place, null or three floats by this function's contract.
+    unsafe { add_light_of(origin, radius, Vec3::new(r, g, b), false) };
 }
 
-pub extern "C" fn add_additive_light(
+/// `re.AddAdditiveLightToScene`.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `origin` must be null, which counts as the world's origin, or
+/// point at three floats. A radius that is not above 0 and a place or colour that is not finite add nothing.
+pub unsafe extern "C" fn add_additive_light(
     origin: *const Vec3C,
     radius: c_float,
     r: c_float,
     g: c_float,
     b: c_float,
 ) {
-    add_light_of(origin, radius, Vec3::new(r, g, b), true);
+    // SAFETY: the light's place, null or three floats by this function's contract.
+    unsafe { add_light_of(origin, radius, Vec3::new(r, g, b), true) };
 }
 
-pub extern "C" fn render_scene(from: *const refdef_t) {
+/// `re.RenderScene`. A view of the map without a map ends in the engine's `Error`.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `from` must be null, which draws nothing, or point at a
+/// `refdef_t`, whose members may hold any value. It is copied.
+pub unsafe extern "C" fn render_scene(from: *const refdef_t) {
     entry(|| {
         if from.is_null() {
             return Ok(());
         }
-        // SAFETY: the engine passes a view, perhaps out of a game module's memory.
+        // SAFETY: not null, so it points at a view by this function's contract, perhaps in a game module's memory. All
+        // of its members are numbers: any bytes are a value.
         let view = convert::view(&unsafe { from.read_unaligned() });
         draw(|renderer, front| {
             if front
@@ -231,7 +319,11 @@ pub extern "C" fn render_scene(from: *const refdef_t) {
     });
 }
 
-/// A polygon of the engine's collision code.
+/// A polygon of the engine's collision code: the callback of `ri.CM_DrawDebugSurface`.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `points` must be null, which draws nothing, or point at `count`
+/// vectors of three floats, of which the first 64 are looked at. A count below 0 counts as 0.
 unsafe extern "C" fn debug_polygon(color: c_int, count: c_int, points: *mut c_float) {
     entry(|| {
         let count = usize::try_from(count).unwrap_or(0).min(MAX_MARK_POINTS);
@@ -240,7 +332,7 @@ unsafe extern "C" fn debug_polygon(color: c_int, count: c_int, points: *mut c_fl
         }
         let mut corners = [Vec3::ZERO; MAX_MARK_POINTS];
         for (i, corner) in corners.iter_mut().enumerate().take(count) {
-            // SAFETY: the engine passes `count` vectors.
+            // SAFETY: not null, so it has `count` vectors by this function's contract, and `i` is below `count`.
             *corner = unsafe { convert::vector(points.cast::<Vec3C>().add(i)) };
         }
         draw(|renderer, _| {
@@ -251,9 +343,14 @@ unsafe extern "C" fn debug_polygon(color: c_int, count: c_int, points: *mut c_fl
     });
 }
 
-pub extern "C" fn set_color(rgba: *const [c_float; 4]) {
+/// `re.SetColor`. Null is white.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `rgba` must be null or point at four floats, which may have
+/// any value.
+pub unsafe extern "C" fn set_color(rgba: *const [c_float; 4]) {
     entry(|| {
-        // SAFETY: the engine passes four floats or null.
+        // SAFETY: read where it is not null, which makes it four floats by this function's contract.
         let color = (!rgba.is_null()).then(|| unsafe { rgba.read_unaligned() });
         draw(|renderer, _| {
             renderer.set_color(color);
@@ -262,9 +359,14 @@ pub extern "C" fn set_color(rgba: *const [c_float; 4]) {
     });
 }
 
+/// `re.DrawStretchPic`.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract); there are no pointers. A handle without a material draws the
+/// default one.
 #[rustfmt::skip]
 #[allow(clippy::too_many_arguments)] // the engine's signature
-pub extern "C" fn stretch_pic(x: c_float, y: c_float, w: c_float, h: c_float, s1: c_float, t1: c_float, s2: c_float, t2: c_float, shader: c_int) {
+pub unsafe extern "C" fn stretch_pic(x: c_float, y: c_float, w: c_float, h: c_float, s1: c_float, t1: c_float, s2: c_float, t2: c_float, shader: c_int) {
     entry(|| {
         draw(|renderer, _| {
             renderer.stretch_pic(x, y, w, h, s1, t1, s2, t2, shader);
@@ -287,20 +389,25 @@ unsafe fn raw_pixels<'a>(
         return None;
     }
     let (cols, rows) = (u32::try_from(cols).ok()?, u32::try_from(rows).ok()?);
-    // SAFETY: by the caller's promise. At most 2^14 * 2^14 * 4 = 2^30 bytes.
+    // SAFETY: not null, so it holds that many bytes by this function's contract: 2^14 * 2^14 * 4 = 2^30 at most.
     let pixels = unsafe { std::slice::from_raw_parts(data, cols as usize * rows as usize * 4) };
     Some((cols, rows, pixels))
 }
 
+/// `re.DrawStretchRaw`. Sides that are no powers of two end in the engine's `Error`.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `data` must be null, which draws nothing, or hold
+/// `cols * rows` pixels of four bytes. They are copied. Sides above 16384 and a client below 0 draw nothing.
 #[rustfmt::skip]
 #[allow(clippy::too_many_arguments)] // the engine's signature
-pub extern "C" fn stretch_raw(x: c_int, y: c_int, w: c_int, h: c_int, cols: c_int, rows: c_int, data: *const c_uchar, client: c_int, dirty: QBool) {
+pub unsafe extern "C" fn stretch_raw(x: c_int, y: c_int, w: c_int, h: c_int, cols: c_int, rows: c_int, data: *const c_uchar, client: c_int, dirty: QBool) {
     entry(|| {
         // Decided before a byte is read: the engine's own renderer stops on such sizes too.
         if [cols, rows].iter().any(|&n| n <= 0 || !n.cast_unsigned().is_power_of_two()) {
             return Err(Failure::drop(format!("a raw picture of {cols}x{rows} pixels: both must be powers of two")));
         }
-        // SAFETY: the engine passes that many pixels, and keeps them during the call.
+        // SAFETY: null or `cols * rows` pixels by this function's contract, for as long as the call lasts.
         let pixels = unsafe { raw_pixels(cols, rows, data) };
         draw(|renderer, _| match (pixels, usize::try_from(client)) {
             (Some((cols, rows, rgba)), Ok(client)) => renderer.stretch_raw(x, y, w, h, cols, rows, rgba, client, dirty != 0).map_err(failure),
@@ -309,7 +416,12 @@ pub extern "C" fn stretch_raw(x: c_int, y: c_int, w: c_int, h: c_int, cols: c_in
     });
 }
 
-pub extern "C" fn upload_cinematic(
+/// `re.UploadCinematic`, which the engine also calls from inside `ri.CIN_UploadCinematic`.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `data` must be null, which uploads nothing, or hold
+/// `cols * rows` pixels of four bytes. They are copied. Sides out of 1 to 16384 and a handle below 0 upload nothing.
+pub unsafe extern "C" fn upload_cinematic(
     _w: c_int,
     _h: c_int,
     cols: c_int,
@@ -319,7 +431,7 @@ pub extern "C" fn upload_cinematic(
     dirty: QBool,
 ) {
     entry(|| {
-        // SAFETY: the engine passes that many pixels, and keeps them during the call.
+        // SAFETY: null or the video's `cols * rows` pixels by this function's contract, for as long as the call lasts.
         let pixels = unsafe { raw_pixels(cols, rows, data) };
         with_renderer(
             |renderer, front| match (pixels, front.cinematics.client_of(handle)) {
@@ -332,14 +444,19 @@ pub extern "C" fn upload_cinematic(
     });
 }
 
-pub extern "C" fn light_for_point(
+/// `re.LightForPoint`. Without a map, or in one without a light grid, this answers 0 and writes nothing.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `point` must be null, which counts as the world's origin, or
+/// point at three floats. `ambient`, `directed` and `direction` must each be null or have room for three floats.
+pub unsafe extern "C" fn light_for_point(
     point: *const Vec3C,
     ambient: *mut Vec3C,
     directed: *mut Vec3C,
     direction: *mut Vec3C,
 ) -> c_int {
     entry(|| {
-        // SAFETY: the engine passes a vector.
+        // SAFETY: null or three floats by this function's contract.
         let point = unsafe { convert::vector(point) };
         with_renderer(|renderer, _| {
             let Some(light) = renderer.light_for_point(point) else {
@@ -350,7 +467,7 @@ pub extern "C" fn light_for_point(
                 (directed, light.directed),
                 (direction, light.direction),
             ] {
-                // SAFETY: the engine's own vectors.
+                // SAFETY: each is null or has room for three floats by this function's contract.
                 unsafe { convert::write_vector(to, value) };
             }
             Ok(1)
@@ -358,9 +475,19 @@ pub extern "C" fn light_for_point(
     })
 }
 
+/// `re.MarkFragments`: the number of fragments written.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract).
+/// - `points` must be null or point at `num_points` vectors, of which the first 64 are looked at.
+/// - `projection` must be null, which counts as no direction, or point at three floats.
+/// - `point_buffer` must be null or have room for `max_points` vectors, `fragment_buffer` for `max_fragments`
+///   fragments.
+///
+/// Null where points or a buffer should be, or a count below 1, answers 0 and writes nothing.
 #[rustfmt::skip]
 #[allow(clippy::too_many_arguments)] // the engine's signature
-pub extern "C" fn mark_fragments(num_points: c_int, points: *const Vec3C, projection: *const Vec3C, max_points: c_int, point_buffer: *mut Vec3C, max_fragments: c_int, fragment_buffer: *mut markFragment_t) -> c_int {
+pub unsafe extern "C" fn mark_fragments(num_points: c_int, points: *const Vec3C, projection: *const Vec3C, max_points: c_int, point_buffer: *mut Vec3C, max_fragments: c_int, fragment_buffer: *mut markFragment_t) -> c_int {
     entry(|| {
         let sizes = (usize::try_from(num_points), usize::try_from(max_points), usize::try_from(max_fragments));
         let (Ok(count @ 1..), Ok(max_points @ 1..), Ok(max_fragments @ 1..)) = sizes else { return Ok(0) };
@@ -369,16 +496,16 @@ pub extern "C" fn mark_fragments(num_points: c_int, points: *const Vec3C, projec
         }
         let mut polygon = [Vec3::ZERO; MAX_MARK_POINTS];
         for (i, place) in polygon.iter_mut().enumerate().take(count) {
-            // SAFETY: the engine promises `num_points` vectors.
+            // SAFETY: not null, so it has `num_points` vectors by this function's contract, and `i` is below that.
             *place = unsafe { convert::vector(points.add(i)) };
         }
         let polygon = polygon.get(..count).unwrap_or(&polygon);
-        // SAFETY: the engine passes a vector.
+        // SAFETY: null or three floats by this function's contract.
         let projection = unsafe { convert::vector(projection) };
         with_renderer(|renderer, _| {
             let (points, fragments) = renderer.mark_fragments(polygon, projection, max_points, max_fragments);
             for (i, point) in points.iter().take(max_points).enumerate() {
-                // SAFETY: the engine's buffer has room for `max_points`.
+                // SAFETY: not null, so it has room for `max_points` by this function's contract, and `i` is below that.
                 unsafe { convert::write_vector(point_buffer.add(i), *point) };
             }
             let mut written = 0;
@@ -387,7 +514,8 @@ pub extern "C" fn mark_fragments(num_points: c_int, points: *const Vec3C, projec
                 if fragment.first_point.checked_add(fragment.num_points).is_none_or(|end| end > points.len().min(max_points)) {
                     break;
                 }
-                // SAFETY: the engine's buffer has room for `max_fragments`, of which `written` are used.
+                // SAFETY: not null, so it has room for `max_fragments` by this function's contract, and `written` is
+                // below that.
                 unsafe { fragment_buffer.add(written).write_unaligned(convert::mark_fragment(fragment)) };
                 written += 1;
             }
@@ -396,7 +524,12 @@ pub extern "C" fn mark_fragments(num_points: c_int, points: *const Vec3C, projec
     })
 }
 
-pub extern "C" fn lerp_tag(
+/// `re.LerpTag`. A model or tag that does not exist answers 0 and writes the identity at the origin.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `name` must be null, which counts as an empty name, or a
+/// NUL-terminated string. `out` must be null or have room for an `orientation_t`. Frames may have any number.
+pub unsafe extern "C" fn lerp_tag(
     out: *mut orientation_t,
     model: c_int,
     start: c_int,
@@ -405,26 +538,30 @@ pub extern "C" fn lerp_tag(
     name: *const c_char,
 ) -> c_int {
     entry(|| {
-        // SAFETY: the engine passes a C string.
+        // SAFETY: null or NUL-terminated by this function's contract, and used within the call.
         let name = unsafe { text_of(name) };
         let tag =
             with_renderer(|renderer, _| Ok(renderer.lerp_tag(model, start, end, frac, &name)))?;
         if !out.is_null() {
-            // SAFETY: the engine's own structure of this type.
+            // SAFETY: not null, so it has room for an `orientation_t` by this function's contract.
             unsafe { out.write_unaligned(convert::orientation(tag)) };
         }
         Ok(c_int::from(tag.is_some()))
     })
 }
 
-pub extern "C" fn model_bounds(model: c_int, mins: *mut Vec3C, maxs: *mut Vec3C) {
+/// `re.ModelBounds`. A model that does not exist has both corners at the origin.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `mins` and `maxs` must each be null or have room for three
+/// floats.
+pub unsafe extern "C" fn model_bounds(model: c_int, mins: *mut Vec3C, maxs: *mut Vec3C) {
     entry(|| {
         let (low, high) = with_renderer(|renderer, _| Ok(renderer.model_bounds(model)))?;
-        // SAFETY: the engine's own vectors.
-        unsafe {
-            convert::write_vector(mins, low);
-            convert::write_vector(maxs, high);
-        }
+        // SAFETY: null or room for three floats by this function's contract.
+        unsafe { convert::write_vector(mins, low) };
+        // SAFETY: null or room for three floats by this function's contract.
+        unsafe { convert::write_vector(maxs, high) };
         Ok(())
     });
 }
@@ -450,16 +587,22 @@ fn number(text: &str) -> f32 {
     best
 }
 
-pub extern "C" fn remap_shader(old: *const c_char, new: *const c_char, time_offset: *const c_char) {
+/// `re.RemapShader`. A name without a material changes nothing.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). Each of the three must be null or a NUL-terminated string.
+/// Null counts as an empty name, a null `time_offset` as none.
+pub unsafe extern "C" fn remap_shader(
+    old: *const c_char,
+    new: *const c_char,
+    time_offset: *const c_char,
+) {
     entry(|| {
-        // SAFETY: the engine passes C strings; the last may be null.
-        let (old, new, offset) = unsafe {
-            (
-                string_from(old),
-                string_from(new),
-                (!time_offset.is_null()).then(|| string_from(time_offset)),
-            )
-        };
+        let [old, new, offset] = [old, new, time_offset].map(|text| {
+            // SAFETY: null or NUL-terminated by this function's contract; copied at once.
+            (!text.is_null()).then(|| unsafe { string_from(text) })
+        });
+        let [old, new] = [old, new].map(Option::unwrap_or_default);
         with_renderer(|renderer, _| {
             renderer.remap_shader(&old, &new, offset.map(|text| number(&text)));
             Ok(())
@@ -467,7 +610,12 @@ pub extern "C" fn remap_shader(old: *const c_char, new: *const c_char, time_offs
     });
 }
 
-pub extern "C" fn get_entity_token(buffer: *mut c_char, size: c_int) -> QBool {
+/// `re.GetEntityToken`: the next word of the map's entities, cut to fit. At their end this answers 0 and an empty text.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `buffer` must be null or have room for `size` bytes. Null or a
+/// size below 1 answers 0 and writes nothing.
+pub unsafe extern "C" fn get_entity_token(buffer: *mut c_char, size: c_int) -> QBool {
     entry(|| {
         let (Ok(room @ 1..), false) = (usize::try_from(size), buffer.is_null()) else {
             return Ok(0);
@@ -475,22 +623,27 @@ pub extern "C" fn get_entity_token(buffer: *mut c_char, size: c_int) -> QBool {
         let token = with_renderer(|renderer, _| Ok(renderer.entity_token()))?;
         let bytes = token.as_deref().unwrap_or("").as_bytes();
         let length = bytes.len().min(room - 1);
-        // SAFETY: the engine's buffer has `size` bytes: `length` of text and a zero.
-        unsafe {
-            std::ptr::copy_nonoverlapping(bytes.as_ptr().cast(), buffer, length);
-            *buffer.add(length) = 0;
-        }
+        // SAFETY: not null, so it has room for `size` bytes by this function's contract, and `length` is below that.
+        // The token is a copy of ours.
+        unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr().cast(), buffer, length) };
+        // SAFETY: `length` is below the `size` bytes that the buffer has room for.
+        unsafe { buffer.add(length).write(0) };
         Ok(QBool::from(token.is_some()))
     })
 }
 
-pub extern "C" fn in_pvs(from: *const Vec3C, to: *const Vec3C) -> QBool {
+/// `re.inPVS`. Without a map this answers 0.
+///
+/// # Safety
+/// The [call contract](crate::boundary#call-contract). `from` and `to` must each be null, which counts as the world's
+/// origin, or point at three floats.
+pub unsafe extern "C" fn in_pvs(from: *const Vec3C, to: *const Vec3C) -> QBool {
     entry(|| {
         let Some(engine) = Engine::current() else {
             return Ok(0);
         };
-        // SAFETY: the engine passes vectors.
-        let (from, to) = unsafe { (convert::vector(from), convert::vector(to)) };
+        // SAFETY: each is null or three floats by this function's contract.
+        let [from, to] = [from, to].map(|point| unsafe { convert::vector(point) });
         let clusters = with_renderer(|renderer, _| {
             Ok(renderer
                 .world_name()

@@ -31,7 +31,7 @@ pub struct Window {
 
 struct OpenWindow(Cell<Option<Window>>);
 
-// SAFETY: used on the engine's main thread alone.
+// SAFETY: exports alone come here, through `boundary::entry`, which refuses all threads but the engine's main one.
 unsafe impl Sync for OpenWindow {}
 
 static OPEN: OpenWindow = OpenWindow(Cell::new(None));
@@ -229,7 +229,7 @@ fn open_once(engine: Engine, cvars: &Cvars, sdl: Sdl, wish: Wish) -> Result<Wind
             engine.say(&format!("{error}; the display keeps its mode\n"));
         }
     }
-    // SAFETY: `raw` was just made by this SDL.
+    // SAFETY: this SDL made `raw` a few lines above, for Vulkan, and nobody closed it.
     let size = unsafe { sdl.drawable_size(raw) }.unwrap_or((mode.width, mode.height));
     let aspect = if size == (mode.width, mode.height) {
         mode.aspect
@@ -247,7 +247,7 @@ fn open_once(engine: Engine, cvars: &Cvars, sdl: Sdl, wish: Wish) -> Result<Wind
 }
 
 fn publish_sizes(engine: Engine, sdl: Sdl, window: &Window) {
-    // SAFETY: the window is open.
+    // SAFETY: the caller, `open`, made the window just now.
     let display = unsafe { sdl.display_of(window.raw) };
     let desktop = sdl
         .desktop(display)
@@ -294,7 +294,7 @@ impl Window {
     /// When SDL has no Vulkan for this window.
     pub fn source(&self) -> Result<gpu::Window, SdlError> {
         let (sdl, raw) = (self.sdl, self.raw);
-        // SAFETY: the window is open.
+        // SAFETY: the window is open: whoever has a `Window` got it from `current` or `open` in this call.
         let extensions = unsafe { sdl.instance_extensions(raw) }?;
         let entry = sdl.vulkan_entry()?;
         let create = Box::new(move |instance| {
@@ -320,25 +320,29 @@ impl Window {
 
     /// Whether it is off the screen: minimised or not shown yet.
     pub fn is_hidden(&self) -> bool {
-        // SAFETY: as in `is_fullscreen`.
+        // SAFETY: SDL reads the flags of a window that is open: whoever has a `Window` got it from `current` in this
+        // call.
         unsafe { self.sdl.is_hidden(self.raw) }
     }
 
     /// Hz; 0 if unknown.
     pub fn refresh_rate(&self) -> c_int {
-        // SAFETY: as in `is_fullscreen`.
+        // SAFETY: SDL reads the mode of a window that is open: whoever has a `Window` got it from `current` in this
+        // call.
         unsafe { self.sdl.refresh_rate(self.raw) }
     }
 
     /// Takes it off the screen until the player brings it back.
     pub fn minimize(&self) {
-        // SAFETY: as in `is_fullscreen`.
+        // SAFETY: the window is open: whoever has a `Window` got it from `current` in this call, and nothing closed it
+        // since.
         unsafe { self.sdl.minimize(self.raw) }
     }
 
     /// Drawable size in pixels as it is now.
     pub fn drawable_size(&self) -> Option<(u32, u32)> {
-        // SAFETY: as in `is_fullscreen`.
+        // SAFETY: SDL reads the size of a window that is open: whoever has a `Window` got it from `current` or `open`
+        // in this call.
         unsafe { self.sdl.drawable_size(self.raw) }
     }
 
@@ -347,7 +351,8 @@ impl Window {
     /// # Errors
     /// What SDL says.
     pub fn switch_fullscreen(&self, on: bool) -> Result<(), SdlError> {
-        // SAFETY: as in `is_fullscreen`.
+        // SAFETY: the window is open: whoever has a `Window` got it from `current` in this call, and nothing closed it
+        // since.
         unsafe { self.sdl.switch_fullscreen(self.raw, on) }
     }
 }

@@ -176,8 +176,10 @@ impl Sdl {
     }
 
     fn error(&self, call: &'static str) -> SdlError {
-        // SAFETY: SDL answers its own NUL-terminated buffer; copied at once.
-        let message = unsafe { crate::ioq3::engine::string_from((self.get_error)()) };
+        // SAFETY: SDL takes this call at any time.
+        let text = unsafe { (self.get_error)() };
+        // SAFETY: SDL's own NUL-terminated buffer, which its next error changes; copied at once.
+        let message = unsafe { crate::ioq3::engine::string_from(text) };
         SdlError::Call { call, message }
     }
 
@@ -186,36 +188,39 @@ impl Sdl {
     /// # Errors
     /// When no display can be reached.
     pub fn start_video(&self) -> Result<String, SdlError> {
-        // SAFETY: plain calls on the main thread.
-        unsafe {
-            if (self.was_init)(INIT_VIDEO) == 0 && (self.init_subsystem)(INIT_VIDEO) != 0 {
-                return Err(self.error("SDL_Init"));
-            }
-            Ok(crate::ioq3::engine::string_from((self.video_driver)()))
+        // SAFETY: SDL takes any set of subsystems, at any time.
+        let runs = unsafe { (self.was_init)(INIT_VIDEO) } != 0;
+        // SAFETY: on the engine's main thread, where the engine's own calls of SDL come from too.
+        if !runs && unsafe { (self.init_subsystem)(INIT_VIDEO) } != 0 {
+            return Err(self.error("SDL_Init"));
         }
+        // SAFETY: SDL takes this call at any time.
+        let driver = unsafe { (self.video_driver)() };
+        // SAFETY: null, or SDL's own static NUL-terminated name; copied at once.
+        Ok(unsafe { crate::ioq3::engine::string_from(driver) })
     }
 
     /// Ends SDL's video. No window may be left.
     pub fn stop_video(&self) {
-        // SAFETY: plain call on the main thread.
+        // SAFETY: on the engine's main thread; SDL counts who started its video, and ends it for the last one.
         unsafe { (self.quit_subsystem)(INIT_VIDEO) }
     }
 
     /// Size of the desktop of a display, if SDL knows it.
     pub fn desktop(&self, display: c_int) -> Option<DisplayMode> {
         let mut mode = DisplayMode::default();
-        // SAFETY: SDL fills the structure.
+        // SAFETY: SDL takes any index and fills the structure for a good one.
         (unsafe { (self.desktop_mode)(display, &mut mode) } == 0).then_some(mode)
     }
 
     /// Sizes that a display offers in full screen.
     pub fn display_sizes(&self, display: c_int) -> Vec<(u32, u32)> {
-        // SAFETY: plain call; a bad index gives a negative count.
+        // SAFETY: SDL takes any index; a bad one gives a negative count.
         let count = unsafe { (self.num_display_modes)(display) };
         (0..count)
             .filter_map(|index| {
                 let mut mode = DisplayMode::default();
-                // SAFETY: SDL fills the structure.
+                // SAFETY: `index` is below SDL's count of modes; SDL fills the structure.
                 let known = unsafe { (self.display_mode)(display, index, &mut mode) } == 0;
                 known.then_some((u32::try_from(mode.w).ok()?, u32::try_from(mode.h).ok()?))
             })
@@ -263,7 +268,7 @@ impl Sdl {
     /// # Safety
     /// `window` must be a window of this SDL that is not used again.
     pub unsafe fn destroy(&self, window: WindowPtr) {
-        // SAFETY: by the caller's promise.
+        // SAFETY: `window` is an open window of this SDL by this function's contract, and nobody uses it from now on.
         unsafe { (self.destroy_window)(window) }
     }
 
@@ -272,7 +277,7 @@ impl Sdl {
     /// # Safety
     /// `window` must be a window of this SDL.
     pub unsafe fn minimize(&self, window: WindowPtr) {
-        // SAFETY: by the caller's promise.
+        // SAFETY: `window` is an open window of this SDL by this function's contract.
         unsafe { (self.minimize_window)(window) }
     }
 
@@ -281,7 +286,7 @@ impl Sdl {
     /// # Safety
     /// `window` must be a window of this SDL.
     pub unsafe fn is_fullscreen(&self, window: WindowPtr) -> bool {
-        // SAFETY: by the caller's promise.
+        // SAFETY: `window` is an open window of this SDL by this function's contract; its flags are a number.
         unsafe { (self.window_flags)(window) & flags::FULLSCREEN != 0 }
     }
 
@@ -290,7 +295,7 @@ impl Sdl {
     /// # Safety
     /// `window` must be a window of this SDL.
     pub unsafe fn is_hidden(&self, window: WindowPtr) -> bool {
-        // SAFETY: by the caller's promise.
+        // SAFETY: `window` is an open window of this SDL by this function's contract; its flags are a number.
         unsafe { (self.window_flags)(window) & (flags::HIDDEN | flags::MINIMIZED) != 0 }
     }
 
@@ -303,11 +308,12 @@ impl Sdl {
     /// `window` must be a window of this SDL.
     pub unsafe fn switch_fullscreen(&self, window: WindowPtr, on: bool) -> Result<(), SdlError> {
         let flags = if on { flags::FULLSCREEN } else { 0 };
-        // SAFETY: by the caller's promise.
+        // SAFETY: `window` is an open window of this SDL by this function's contract.
         if unsafe { (self.set_fullscreen)(window, flags) } != 0 {
             return Err(self.error("SDL_SetWindowFullscreen"));
         }
-        // SAFETY: plain call; the new size is known once the window system's answer is in.
+        // SAFETY: no arguments; video runs, since there is a window. The new size is known once the window system's
+        // answer is in.
         unsafe { (self.pump_events)() };
         Ok(())
     }
@@ -332,7 +338,7 @@ impl Sdl {
             refresh_rate: refresh,
             ..DisplayMode::default()
         };
-        // SAFETY: by the caller's promise; SDL copies the structure.
+        // SAFETY: `window` is an open window of this SDL by this function's contract; SDL copies the structure.
         if unsafe { (self.set_window_mode)(window, &mode) } == 0 {
             Ok(())
         } else {
@@ -346,7 +352,7 @@ impl Sdl {
     /// `window` must be a window of this SDL.
     pub unsafe fn refresh_rate(&self, window: WindowPtr) -> c_int {
         let mut mode = DisplayMode::default();
-        // SAFETY: by the caller's promise; SDL fills the structure.
+        // SAFETY: `window` is an open window of this SDL by this function's contract; SDL fills the structure.
         if unsafe { (self.window_mode)(window, &mut mode) } == 0 {
             mode.refresh_rate
         } else {
@@ -359,7 +365,7 @@ impl Sdl {
     /// # Safety
     /// `window` must be a window of this SDL.
     pub unsafe fn display_of(&self, window: WindowPtr) -> c_int {
-        // SAFETY: by the caller's promise.
+        // SAFETY: `window` is an open window of this SDL by this function's contract.
         unsafe { (self.display_index)(window) }.max(0)
     }
 
@@ -369,7 +375,7 @@ impl Sdl {
     /// `window` must be a window of this SDL.
     pub unsafe fn drawable_size(&self, window: WindowPtr) -> Option<(u32, u32)> {
         let (mut width, mut height) = (0, 0);
-        // SAFETY: by the caller's promise; SDL fills both.
+        // SAFETY: `window` is an open window made for Vulkan by this function's contract; SDL fills both numbers.
         unsafe { (self.vulkan_drawable_size)(window, &mut width, &mut height) };
         let size = (u32::try_from(width).ok()?, u32::try_from(height).ok()?);
         (size.0 > 0 && size.1 > 0).then_some(size)
@@ -384,7 +390,8 @@ impl Sdl {
     /// `window` must be a window of this SDL, made for Vulkan.
     pub unsafe fn instance_extensions(&self, window: WindowPtr) -> Result<Vec<CString>, SdlError> {
         let mut count = 0;
-        // SAFETY: by the caller's promise; without a list SDL only counts.
+        // SAFETY: `window` is an open window made for Vulkan by this function's contract; without a list SDL only
+        // counts.
         if unsafe { (self.vulkan_extensions)(window, &mut count, ptr::null_mut()) } == 0 {
             return Err(self.error("SDL_Vulkan_GetInstanceExtensions"));
         }
@@ -407,7 +414,7 @@ impl Sdl {
     /// # Errors
     /// When SDL has no Vulkan.
     pub fn vulkan_entry(&self) -> Result<*const c_void, SdlError> {
-        // SAFETY: plain call.
+        // SAFETY: no arguments; SDL answers null where it has loaded no Vulkan.
         let entry = unsafe { (self.vulkan_loader)() };
         if entry.is_null() {
             Err(self.error("SDL_Vulkan_GetVkGetInstanceProcAddr"))
@@ -427,7 +434,8 @@ impl Sdl {
     pub unsafe fn create_surface(&self, window: WindowPtr, instance: u64) -> Result<u64, SdlError> {
         let mut surface = 0;
         let instance = ptr::with_exposed_provenance_mut(usize::try_from(instance).unwrap_or(0));
-        // SAFETY: by the caller's promise. A VkSurfaceKHR has 64 bits everywhere.
+        // SAFETY: window and instance are live and match by this function's contract. A VkSurfaceKHR has 64 bits
+        // everywhere.
         if unsafe { (self.vulkan_surface)(window, instance, &mut surface) } == 0 {
             return Err(self.error("SDL_Vulkan_CreateSurface"));
         }
