@@ -40,44 +40,13 @@
 //! at no frame between: what the frames owned leaks, and [`session`] starts over where one had taken the state. On a
 //! system whose `longjmp` unwinds (Windows) this would have to be decided anew.
 
-use crate::ioq3::abi::error_level;
-use crate::ioq3::engine::Engine;
-use crate::{logging, session};
+use crate::engine::error_level;
+use crate::failure::Failure;
+use crate::{engine, logging, session};
 use std::any::Any;
 use std::cell::UnsafeCell;
 use std::ffi::{c_char, c_int};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-
-/// Why a call cannot do what the engine asked, in a way that the engine has to hear about.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Failure {
-    /// One of [`error_level`].
-    pub level: c_int,
-    /// For the player: what failed, where, and if possible what to do.
-    pub message: String,
-    /// The renderer did not survive it: the next registration makes a new one.
-    pub discard: bool,
-}
-
-impl Failure {
-    /// Back to the menu.
-    pub fn drop(message: impl ToString) -> Self {
-        Self {
-            level: error_level::DROP,
-            message: message.to_string(),
-            discard: false,
-        }
-    }
-
-    /// The process has to end.
-    pub fn fatal(message: impl ToString) -> Self {
-        Self {
-            level: error_level::FATAL,
-            message: message.to_string(),
-            discard: false,
-        }
-    }
-}
 
 /// The engine copies at most this much of a message.
 const MESSAGE_BYTES: usize = 4096;
@@ -128,7 +97,7 @@ pub fn entry<R: Copy + Default>(f: impl FnOnce() -> Result<R, Failure>) -> R {
     match guarded(f) {
         Ok(value) => value,
         Err((level, message)) => {
-            if let Some(error) = Engine::current().and_then(Engine::error_function) {
+            if let Some(error) = engine::current().and_then(|engine| engine.error_function()) {
                 // SAFETY: the engine's variadic error with a literal format and one NUL-terminated static string. Its
                 // longjmp crosses this frame and the export's, which are plain ("Plain frames" above).
                 unsafe { error(level, c"%s".as_ptr(), message) };

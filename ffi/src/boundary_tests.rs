@@ -1,9 +1,11 @@
 //! The boundary against an error function that really leaves by `longjmp`.
 
-use crate::boundary::{Failure, entry};
+use crate::boundary::entry;
 use crate::c_tests::{compile, scratch, source};
-use crate::ioq3::abi::{error_level, refimport_t};
-use crate::ioq3::engine::Engine;
+use crate::engine::{self, error_level};
+use crate::failure::Failure;
+use crate::ioq3::abi::refimport_t;
+use crate::ioq3::services::Ioq3;
 use crate::session;
 use libloading::Library;
 use std::ffi::{CStr, c_char, c_int};
@@ -41,7 +43,7 @@ impl TestEngine {
         unsafe {
             table.Printf = Some(*library.get(b"test_printf\0").unwrap());
             table.Error = Some(*library.get(b"test_error\0").unwrap());
-            Engine::install(table);
+            Ioq3::install(table);
         }
         session::reset();
         let engine = Self {
@@ -98,7 +100,7 @@ impl Drop for TestEngine {
     fn drop(&mut self) {
         // Nobody may print through a library that is closed.
         // SAFETY: zero is "not there" for each entry.
-        unsafe { Engine::install(std::mem::zeroed()) };
+        unsafe { Ioq3::install(std::mem::zeroed()) };
     }
 }
 
@@ -214,7 +216,9 @@ fn the_engine_may_shut_us_down_from_inside_its_error() {
 extern "C" fn taken_and_left() {
     session::with(|session| {
         session.front.size = (1, 1);
-        let error = Engine::current().and_then(Engine::error_function).unwrap();
+        let error = engine::current()
+            .and_then(|engine| engine.error_function())
+            .unwrap();
         // SAFETY: the test's error function; it leaves by longjmp, as a service of the engine may.
         unsafe { error(error_level::DROP, c"%s".as_ptr(), c"out of memory".as_ptr()) };
     });

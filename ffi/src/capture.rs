@@ -3,10 +3,12 @@
 //! The pixels handed in are what the screen shows, gamma and all, rows from the top. File names and shapes follow the
 //! engine's own renderer.
 
-use crate::boundary::Failure;
-use crate::ioq3::abi::AVI_LINE_PADDING;
+use crate::failure::Failure;
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 use renderer_vk::api::Picture;
+
+/// Rows of a video frame are padded to a multiple of this.
+const AVI_LINE_PADDING: usize = 4;
 
 /// File format of a screenshot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

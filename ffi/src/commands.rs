@@ -1,11 +1,12 @@
 //! Console commands.
 
-use crate::boundary::{Failure, entry};
+use crate::boundary::entry;
 use crate::capture::{Format, Shot, StillShot, still_arguments};
 use crate::costs::Report;
 use crate::cvars::Cvar;
-use crate::ioq3::engine::{Engine, valid_path_to_write};
-use crate::ioq3::lifecycle::take_captures_of_last_frame;
+use crate::delivery::take_captures_of_last_frame;
+use crate::engine::{self, Engine, valid_path_to_write};
+use crate::failure::Failure;
 use crate::session::{self, Front, with_renderer};
 use crate::window;
 use crate::window::modes::MODES;
@@ -17,7 +18,7 @@ use std::ffi::{CStr, CString};
 /// # Safety
 /// The [call contract](crate::boundary#call-contract): the engine runs commands out of its command buffer, on its main
 /// thread, from C frames. There are no arguments; the words of the command are asked for
-/// ([`Engine::arguments`]). Words that a command cannot use are answered with a line on the console.
+/// ([`engine::Services::arguments`]). Words that a command cannot use are answered with a line on the console.
 type Function = unsafe extern "C" fn();
 
 /// What is wrong with a name that the engine would not write to.
@@ -59,7 +60,7 @@ pub fn remove(engine: Engine) {
 /// Runs a command that prints lines. The lines are printed with the state back in its place.
 fn print_lines(make: impl FnOnce(&mut Renderer, &mut Front, &[String]) -> Vec<String>) {
     entry(|| {
-        let Some(engine) = Engine::current() else {
+        let Some(engine) = engine::current() else {
             return Ok(());
         };
         let arguments = engine.arguments();
@@ -91,7 +92,7 @@ unsafe extern "C" fn model_list() {
 unsafe extern "C" fn mode_list() {
     // Not a list of what is registered: it works before anything is.
     entry(|| {
-        let Some(engine) = Engine::current() else {
+        let Some(engine) = engine::current() else {
             return Ok(());
         };
         engine.say("\n");
@@ -139,7 +140,7 @@ unsafe extern "C" fn stats() {
 /// With a word: sets the variable of the same name, which a command hides from the console. Without: what lights there are.
 unsafe extern "C" fn lights() {
     let was_set = entry(|| {
-        let Some(engine) = Engine::current() else {
+        let Some(engine) = engine::current() else {
             return Ok(false);
         };
         let arguments = engine.arguments();
@@ -181,7 +182,7 @@ unsafe extern "C" fn lights() {
 
 unsafe extern "C" fn path() {
     entry(|| {
-        let Some(engine) = Engine::current() else {
+        let Some(engine) = engine::current() else {
             return Ok(());
         };
         let arguments = engine.arguments();
@@ -291,7 +292,7 @@ fn map_base_name(world: &str) -> &str {
 
 unsafe extern "C" fn still() {
     entry(|| {
-        let Some(engine) = Engine::current() else {
+        let Some(engine) = engine::current() else {
             return Ok(());
         };
         let arguments = engine.arguments();
@@ -329,7 +330,7 @@ fn begin_still(
 
 /// Takes the picture of the frame that the player sees, or of the one that is being drawn.
 fn screenshot(format: Format) -> Result<(), Failure> {
-    let Some(engine) = Engine::current() else {
+    let Some(engine) = engine::current() else {
         return Ok(());
     };
     let arguments = engine.arguments();
@@ -379,22 +380,6 @@ fn take(engine: Engine, shot: Shot) -> Result<(), Failure> {
         }
     });
     take_captures_of_last_frame(engine)
-}
-
-/// Quality of screenshots in percent.
-pub fn screenshot_quality(front: &Front) -> i32 {
-    front
-        .cvars
-        .as_ref()
-        .map_or(90, |cvars| cvars.integer(Cvar::ScreenshotJpegQuality))
-}
-
-/// Quality of video frames in percent.
-pub fn video_quality(front: &Front) -> i32 {
-    front
-        .cvars
-        .as_ref()
-        .map_or(90, |cvars| cvars.integer(Cvar::AviMotionJpegQuality))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The engine's file system behind the renderer's own trait.
 
-use crate::ioq3::engine::{Engine, valid_game_path};
+use crate::engine::{Engine, valid_game_path};
 use crate::session;
 use relight::{FileError, GameFiles};
 use std::ffi::CString;

@@ -8,14 +8,19 @@
 //! - One exported symbol, [`GetRefAPI`]. Everything runs on the thread that called it; other threads are refused.
 //! - The library stays mapped after the engine unloads it (`-z nodelete`), because code that ever ran a thread cannot be
 //!   unmapped safely. So statics outlive an unload, and each `GetRefAPI` rebuilds all state. No thread outlives a call.
-//! - Before any service but `Printf` is called the engine is recognized ([`recognize`]): others speak the same version
-//!   number with other tables.
+//! - Before any service but `Printf` is called the engine is recognized (`ioq3::recognize`): others speak the same
+//!   version number with other tables.
 //! - No panic and no Rust value that needs dropping is on the stack when the engine's `Error` is called, which leaves by
 //!   `longjmp` ([`boundary`]). Services that the engine itself may leave by `longjmp` can cost memory, never
 //!   consistency ([`session`]).
 //! - Without a usable Vulkan device, found out in `GetRefAPI`, the engine's own OpenGL renderer is loaded from beside
-//!   this library and works in our place ([`fallback`]). If the device fails only later, with the real window, the
+//!   this library and works in our place (`ioq3::fallback`). If the device fails only later, with the real window, the
 //!   game ends with a message that says how to start without us: at that point the engine offers no way back.
+//!
+//! # Modules
+//! [`engine`] is at the bottom: the services that the engine offers, as a trait. All other modules but [`ioq3`] use the
+//! engine through it and know no structure of the engine's ABI. [`ioq3`] is at the top: it implements the services over
+//! ioquake3's table and holds the exports.
 
 mod boundary;
 #[cfg(test)]
@@ -28,11 +33,12 @@ mod commands;
 mod config;
 mod costs;
 mod cvars;
-mod fallback;
+mod delivery;
+mod engine;
+mod failure;
 mod files;
 mod ioq3;
 mod logging;
-mod recognize;
 mod session;
 mod speeds;
 mod window;

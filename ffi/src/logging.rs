@@ -3,9 +3,8 @@
 //! The engine's print function belongs to the main thread. A record from another thread waits in a list until the call
 //! that started the thread ends.
 
-use crate::ioq3::abi::print;
-use crate::ioq3::engine::Engine;
-use crate::session;
+use crate::engine::print;
+use crate::{engine, session};
 use log::{Level, LevelFilter, Log, Metadata, Record};
 use std::ffi::c_int;
 use std::panic;
@@ -49,7 +48,7 @@ impl Log for EngineLog {
         let level = level_of(record.level());
         let line = line_of(record.level(), &record.args().to_string());
         if session::on_main_thread() {
-            if let Some(engine) = Engine::current() {
+            if let Some(engine) = engine::current() {
                 engine.print(level, &line);
             }
         } else {
@@ -90,7 +89,7 @@ pub fn take_panic_place() -> String {
 /// Prints what other threads logged.
 pub fn flush() {
     let waiting = std::mem::take(&mut *WAITING.lock().unwrap_or_else(PoisonError::into_inner));
-    if let Some(engine) = Engine::current() {
+    if let Some(engine) = engine::current() {
         for (level, line) in waiting {
             engine.print(level, &line);
         }

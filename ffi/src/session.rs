@@ -5,11 +5,11 @@
 //! come from an error that the engine met inside a service that the first call had asked for, so that the first call
 //! will never return. What it had taken is then lost (leaked, in truth) and the window it presented to is replaced.
 
-use crate::boundary::Failure;
 use crate::capture::Captures;
 use crate::cinematics::Cinematics;
 use crate::costs::Questions;
-use crate::cvars::Cvars;
+use crate::cvars::{Cvars, WindowFacts};
+use crate::failure::Failure;
 use crate::window;
 use renderer_vk::{Renderer, Settings};
 use std::cell::{Cell, UnsafeCell};
@@ -25,16 +25,6 @@ pub struct Session {
     pub renderer: Option<Renderer>,
     /// The rest.
     pub front: Front,
-}
-
-/// What is decided when the window is opened, whatever the settings become: the engine's own renderer looks at them
-/// there and no more.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct WindowFacts {
-    /// It fills the screen.
-    pub fullscreen: bool,
-    /// `r_gamma` works on the finished picture, not on textures (`r_ignorehwgamma 0`).
-    pub gamma: bool,
 }
 
 /// What the front end knows.

@@ -3,11 +3,10 @@
 mod settings;
 pub mod table;
 
-pub use settings::{apply, apply_at_registration, write_back_clamps};
+pub use settings::{WindowFacts, apply, apply_at_registration, write_back_clamps};
 pub use table::{Cvar, TABLE};
 
-use crate::ioq3::abi::{QBool, cvar_t};
-use crate::ioq3::engine::{Engine, string_from};
+use crate::engine::{Engine, Variable};
 
 /// What may be asked of a cvar's number.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,10 +19,11 @@ pub struct Range {
     pub integral: bool,
 }
 
-/// The engine's variables behind [`TABLE`], by position. They are the engine's memory and live as long as the process.
+/// The engine's variables behind [`TABLE`], by position.
 #[derive(Debug)]
 pub struct Cvars {
-    handles: Vec<*mut cvar_t>,
+    engine: Engine,
+    handles: Vec<Option<Variable>>,
 }
 
 impl Cvars {
@@ -32,37 +32,32 @@ impl Cvars {
         let handles = TABLE
             .iter()
             .map(|spec| {
-                let cvar = engine.cvar_get(spec.name, spec.default, spec.flags);
+                let cvar = engine.cvar_get(spec.name, spec.default, spec.flags)?;
                 if let Some(range) = spec.range {
                     engine.cvar_check_range(cvar, range.min, range.max, range.integral);
                 }
                 engine.cvar_describe(cvar, spec.description);
-                cvar
+                Some(cvar)
             })
             .collect();
-        Cvars { handles }
+        Cvars { engine, handles }
     }
 
-    fn handle(&self, cvar: Cvar) -> Option<*mut cvar_t> {
-        self.handles
-            .get(cvar as usize)
-            .copied()
-            .filter(|handle| !handle.is_null())
+    fn handle(&self, cvar: Cvar) -> Option<Variable> {
+        self.handles.get(cvar as usize).copied().flatten()
     }
 
     /// The value as an integer, as the engine parsed it; 0 if the engine has no such cvar.
     pub fn integer(&self, cvar: Cvar) -> i32 {
-        // SAFETY: a non-null result of the engine's Cvar_Get, valid as long as the process, changed on this thread only.
         self.handle(cvar)
-            .map_or(0, |handle| unsafe { (*handle).integer })
+            .map_or(0, |handle| self.engine.cvar_as_integer(handle))
     }
 
     /// The value as a number, with anything that is not finite taken for 0.
     pub fn value(&self, cvar: Cvar) -> f32 {
-        // SAFETY: a non-null result of the engine's Cvar_Get stays a variable for as long as the process lives.
         let value = self
             .handle(cvar)
-            .map_or(0.0, |handle| unsafe { (*handle).value });
+            .map_or(0.0, |handle| self.engine.cvar_as_number(handle));
         if value.is_finite() { value } else { 0.0 }
     }
 
@@ -73,27 +68,20 @@ impl Cvars {
 
     /// The value as text.
     pub fn string(&self, cvar: Cvar) -> String {
-        // SAFETY: a non-null result of the engine's Cvar_Get stays a variable for as long as the process lives. Its
-        // text is NUL-terminated and copied before anything can change it.
-        self.handle(cvar).map_or_else(String::new, |handle| unsafe {
-            string_from((*handle).string)
-        })
+        self.handle(cvar)
+            .map_or_else(String::new, |handle| self.engine.cvar_string(handle))
     }
 
     /// Whether the value changed since [`Cvars::seen`] was last called.
     pub fn modified(&self, cvar: Cvar) -> bool {
-        // SAFETY: a non-null result of the engine's Cvar_Get stays a variable for as long as the process lives.
         self.handle(cvar)
-            .is_some_and(|handle| unsafe { (*handle).modified } != 0)
+            .is_some_and(|handle| self.engine.cvar_modified(handle))
     }
 
     /// Marks the change as consumed.
     pub fn seen(&self, cvar: Cvar) {
         if let Some(handle) = self.handle(cvar) {
-            const NO: QBool = 0;
-            // SAFETY: a non-null result of the engine's Cvar_Get stays a variable for as long as the process lives. To
-            // clear this member is what the engine expects of a variable's owner, on its main thread.
-            unsafe { (*handle).modified = NO }
+            self.engine.cvar_seen(handle);
         }
     }
 

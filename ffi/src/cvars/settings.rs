@@ -1,9 +1,18 @@
 //! From console variables to the renderer's settings.
 
 use super::{Cvar, Cvars};
-use crate::ioq3::engine::Engine;
-use crate::session::WindowFacts;
+use crate::engine::Engine;
 use renderer_vk::{LightSelection, MapLightChoice, Settings, TracerChoice, is_texture_mode};
+
+/// What is decided when the window is opened, whatever the settings become: the engine's own renderer looks at them
+/// there and no more.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WindowFacts {
+    /// It fills the screen.
+    pub fullscreen: bool,
+    /// `r_gamma` works on the finished picture, not on textures (`r_ignorehwgamma 0`).
+    pub gamma: bool,
+}
 
 /// A count: negative is 0.
 fn count(cvars: &Cvars, cvar: Cvar) -> u32 {

@@ -2,7 +2,7 @@
 //! flags, so that menus, configurations and mods find what they expect; then ours.
 
 use super::Range;
-use crate::ioq3::abi::cvar_flags::{ARCHIVE, CHEAT, LATCH, NONE, ROM, TEMP};
+use crate::engine::cvar_flags::{ARCHIVE, CHEAT, LATCH, NONE, ROM, TEMP};
 use std::ffi::{CStr, c_int};
 
 /// How a cvar is registered.

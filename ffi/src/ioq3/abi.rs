@@ -12,38 +12,6 @@ pub type QBool = c_int;
 /// `vec3_t` inside a structure.
 pub type Vec3C = [c_float; 3];
 
-/// `printParm_t`.
-#[allow(missing_docs)]
-pub mod print {
-    use std::ffi::c_int;
-    pub const ALL: c_int = 0;
-    pub const DEVELOPER: c_int = 1;
-    pub const WARNING: c_int = 2;
-    pub const ERROR: c_int = 3;
-}
-
-/// `errorParm_t`: what `ri.Error` does.
-#[allow(missing_docs)]
-pub mod error_level {
-    use std::ffi::c_int;
-    /// The process ends.
-    pub const FATAL: c_int = 0;
-    /// Back to the menu.
-    pub const DROP: c_int = 1;
-}
-
-/// `cvar_t::flags`.
-#[allow(missing_docs)]
-pub mod cvar_flags {
-    use std::ffi::c_int;
-    pub const NONE: c_int = 0;
-    pub const ARCHIVE: c_int = 0x1;
-    pub const LATCH: c_int = 0x20;
-    pub const ROM: c_int = 0x40;
-    pub const TEMP: c_int = 0x100;
-    pub const CHEAT: c_int = 0x200;
-}
-
 /// `cbufExec_t`: run when the engine next empties its command buffer.
 pub const EXEC_APPEND: c_int = 2;
 /// `stereoFrame_t` of the first eye.
@@ -55,10 +23,6 @@ pub const STEREO_RIGHT: c_int = 2;
 pub const RT_MAX_REF_ENTITY_TYPE: c_int = 8;
 /// `CIN_*` bits for a video that a material shows: again and again, without sound.
 pub const CIN_MATERIAL: c_int = 2 | 8 | 16;
-/// Game paths have to be shorter than this, in bytes.
-pub const MAX_QPATH: usize = 64;
-/// Rows of a video frame are padded to a multiple of this.
-pub const AVI_LINE_PADDING: usize = 4;
 
 abi_struct! {
     /// An entity to draw.

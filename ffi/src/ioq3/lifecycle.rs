@@ -1,16 +1,18 @@
 //! Registration, frames and shutdown: when the window, the device and the assets come and go.
 
 use super::abi::{QBool, glconfig_t};
-use super::engine::{Engine, valid_game_path};
-use crate::boundary::{Failure, entry};
-use crate::capture::{self, Format, Shot, VideoFrame};
-use crate::cvars::{self, Cvar, Cvars};
+use super::glconfig;
+use crate::boundary::entry;
+use crate::capture::{self, VideoFrame};
+use crate::commands;
+use crate::cvars::{self, Cvar, Cvars, WindowFacts};
+use crate::delivery::{Outbox, deliver, take_captures, take_captures_of_last_frame};
+use crate::engine::{self, Engine, valid_game_path};
+use crate::failure::Failure;
 use crate::files::EngineFiles;
-use crate::session::{self, Front, WindowFacts, with_renderer};
+use crate::session::{self, Front, with_renderer};
 use crate::window::{self, Window};
-use crate::{commands, config};
-use renderer_vk::api::Picture;
-use renderer_vk::{Error, Eye, Renderer, RendererOptions, gpu};
+use renderer_vk::{Eye, Renderer, RendererOptions};
 use std::ffi::c_int;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -29,21 +31,6 @@ pub fn probe(engine: Engine) -> Result<(), String> {
 
 fn wanted_device(cvars: &Cvars) -> Option<String> {
     Some(cvars.string(Cvar::Device)).filter(|name| !name.is_empty())
-}
-
-/// An error of the renderer as the engine has to hear it. What the device did not survive takes the renderer with it.
-pub fn failure(error: Error) -> Failure {
-    let discard = match &error {
-        Error::Gpu(error) => !matches!(
-            error,
-            gpu::Error::Full { .. } | gpu::Error::Unsupported { .. } | gpu::Error::Usage { .. }
-        ),
-        _ => false,
-    };
-    Failure {
-        discard,
-        ..Failure::drop(error)
-    }
 }
 
 /// Where the game writes its own files: what was found out about a map, and compiled pipelines, are kept in a folder of
@@ -67,7 +54,7 @@ fn cache_folder(engine: Engine) -> Option<PathBuf> {
 pub unsafe extern "C" fn begin_registration(out: *mut glconfig_t) {
     entry(|| {
         session::abandon_if_taken();
-        let Some(engine) = Engine::current() else {
+        let Some(engine) = engine::current() else {
             return Ok(());
         };
         let cvars = Cvars::register(engine);
@@ -195,7 +182,7 @@ fn make_renderer(
 fn describe(renderer: &Renderer, front: &mut Front) -> glconfig_t {
     let size = renderer.size();
     let window = window::current();
-    let screen = config::Screen {
+    let screen = glconfig::Screen {
         size,
         aspect: window.map_or(size.0 as f32 / size.1 as f32, |window| window.aspect),
         refresh_rate: window.map_or(0, |window| window.refresh_rate()),
@@ -203,7 +190,7 @@ fn describe(renderer: &Renderer, front: &mut Front) -> glconfig_t {
         gamma: front.window.gamma,
     };
     front.size = screen.size;
-    config::glconfig(renderer.device_info(), screen)
+    glconfig::glconfig(renderer.device_info(), screen)
 }
 
 /// `re.Shutdown`. Twice in a row, before any registration and from inside an error of the engine are all fine.
@@ -214,7 +201,7 @@ fn describe(renderer: &Renderer, front: &mut Front) -> glconfig_t {
 pub unsafe extern "C" fn shutdown(destroy_window: QBool) {
     entry(|| {
         session::abandon_if_taken();
-        let Some(engine) = Engine::current() else {
+        let Some(engine) = engine::current() else {
             return Ok(());
         };
         // What was asked for within a frame that will not end shows what is drawn of it.
@@ -271,7 +258,7 @@ pub unsafe extern "C" fn end_registration() {
 /// The [call contract](crate::boundary#call-contract). A number that is no `stereoFrame_t` counts as both eyes.
 pub unsafe extern "C" fn begin_frame(stereo: c_int) {
     entry(|| {
-        let Some(engine) = Engine::current() else {
+        let Some(engine) = engine::current() else {
             return Ok(());
         };
         with_renderer(|renderer, front| {
@@ -299,16 +286,6 @@ pub unsafe extern "C" fn begin_frame(stereo: c_int) {
     });
 }
 
-/// What is to be handed to the engine once the frame is done and the state is back in its cell.
-#[derive(Default)]
-struct Outbox {
-    files: Vec<(String, Vec<u8>, bool)>,
-    video: Option<(*mut u8, c_int)>,
-    lines: Vec<String>,
-    front_end_ms: c_int,
-    back_end_ms: c_int,
-}
-
 /// `re.EndFrame`.
 ///
 /// # Safety
@@ -317,7 +294,7 @@ struct Outbox {
 /// picture is encoded into it here.
 pub unsafe extern "C" fn end_frame(front_end_ms: *mut c_int, back_end_ms: *mut c_int) {
     entry(|| {
-        let Some(engine) = Engine::current() else {
+        let Some(engine) = engine::current() else {
             return Ok(());
         };
         // what rt_pause holds includes the pictures on its walls
@@ -359,7 +336,7 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
         .map_or(0, |begin| milliseconds(start - begin));
     take_captures(renderer, front, &mut outbox)?;
     renderer.set_hidden(window::current().is_some_and(|window| window.is_hidden()));
-    let stats = renderer.end_frame().map_err(failure)?;
+    let stats = renderer.end_frame().map_err(Failure::from)?;
     front.has_picture = true;
     outbox.back_end_ms = milliseconds(start.elapsed());
     outbox
@@ -399,105 +376,12 @@ fn finish_still(
         // the map it was of is gone
         None => front.captures.still = None,
     }
-    if let Some(picture) = renderer.take_still().map_err(failure)?
+    if let Some(picture) = renderer.take_still().map_err(Failure::from)?
         && let Some(shot) = front.captures.still.take()
     {
         (outbox.files).push((shot.path, capture::tga(&picture)?, false));
     }
     Ok(())
-}
-
-/// Takes the pictures that were asked for between two frames: they show the frame before, which is what the player
-/// sees, whatever the next command does. Within a frame, or before the first one, they wait for its end.
-pub fn take_captures_of_last_frame(engine: Engine) -> Result<(), Failure> {
-    let outbox = with_renderer(|renderer, front| {
-        let mut outbox = Outbox::default();
-        if front.frame_start.is_none() && front.has_picture {
-            take_captures(renderer, front, &mut outbox)?;
-        }
-        Ok(outbox)
-    })?;
-    deliver(engine, outbox);
-    Ok(())
-}
-
-/// Takes the pictures that were asked for, of what is drawn so far.
-fn take_captures(
-    renderer: &mut Renderer,
-    front: &mut Front,
-    outbox: &mut Outbox,
-) -> Result<(), Failure> {
-    let shots = std::mem::take(&mut front.captures.shots);
-    let video = front.captures.video.take();
-    // Like everything else that is drawn, pictures are left out.
-    if front.settings.skip_back_end {
-        return Ok(());
-    }
-    if shots.is_empty() && video.is_none() {
-        return Ok(());
-    }
-    let picture = renderer.read_pixels().map_err(failure)?;
-    for shot in shots {
-        take_shot(&picture, &shot, commands::screenshot_quality(front), outbox)?;
-    }
-    if let Some(frame) = video {
-        let bytes = capture::video_frame(&picture, &frame, commands::video_quality(front))?;
-        outbox.video = keep_video(&frame, &bytes);
-    }
-    Ok(())
-}
-
-fn take_shot(
-    picture: &Picture,
-    shot: &Shot,
-    quality: i32,
-    outbox: &mut Outbox,
-) -> Result<(), Failure> {
-    let (path, bytes, silent) = match shot {
-        Shot::Screen {
-            format: Format::Tga,
-            path,
-            silent,
-        } => (path, capture::tga(picture)?, *silent),
-        Shot::Screen {
-            format: Format::Jpeg,
-            path,
-            silent,
-        } => (path, capture::jpeg(picture, quality)?, *silent),
-        Shot::Level { path } => (path, capture::tga(&capture::level_shot(picture))?, false),
-    };
-    outbox.files.push((path.clone(), bytes, silent));
-    Ok(())
-}
-
-/// Copies an encoded frame into the engine's buffer, so that nothing of ours is alive when the engine writes it.
-fn keep_video(frame: &VideoFrame, bytes: &[u8]) -> Option<(*mut u8, c_int)> {
-    let room = frame.width as usize * frame.height as usize * 4;
-    let length = c_int::try_from(bytes.len()).ok()?;
-    if frame.encode_buffer.is_null() || bytes.len() > room {
-        return None;
-    }
-    // SAFETY: by the contract of `take_video_frame` the buffer has `width * height * 4` bytes, of which `bytes` needs
-    // no more, and stays until the frame ends. Our bytes lie elsewhere.
-    unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), frame.encode_buffer, bytes.len()) };
-    Some((frame.encode_buffer, length))
-}
-
-fn deliver(engine: Engine, outbox: Outbox) {
-    for (path, bytes, silent) in outbox.files {
-        if !engine.write_file(&path, &bytes) {
-            engine.say(&format!("{path} could not be written\n"));
-        } else if !silent {
-            engine.say(&format!("Wrote {path}\n"));
-        }
-    }
-    for line in outbox.lines {
-        engine.say(&format!("{line}\n"));
-    }
-    if let Some((data, length)) = outbox.video {
-        // SAFETY: `keep_video` just filled the engine's buffer with `length` bytes.
-        unsafe { engine.write_avi_frame(data, length) };
-    }
 }
 
 /// Lets the engine decode the videos that are in view. It calls `UploadCinematic` from inside, so the state is in its
@@ -554,7 +438,7 @@ pub unsafe extern "C" fn take_video_frame(
     motion_jpeg: QBool,
 ) {
     entry(|| {
-        let Some(engine) = Engine::current() else {
+        let Some(engine) = engine::current() else {
             return Ok(());
         };
         with_renderer(|_, front| {

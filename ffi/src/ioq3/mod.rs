@@ -1,16 +1,20 @@
 //! The front end for ioquake3 (Debian's 1.36 and HEAD: one ABI).
 //!
 //! Another engine gets a module like this one beside it, with its own tables and its own rules about windows; the
-//! scene structures in [`abi`] and everything outside this folder serve all of them. Ten engines pass version 8 to
-//! `GetRefAPI`, with seven different tables; [`crate::recognize`] finds out which one calls.
+//! scene structures in [`abi`] and everything outside this folder, which calls the engine through [`Services`], serve
+//! all of them. Ten engines pass version 8 to `GetRefAPI`, with seven different tables; [`recognize`] finds out which
+//! one calls.
 
 pub mod abi;
 mod convert;
-pub mod engine;
 mod exports;
+mod fallback;
+mod glconfig;
 mod layout;
-pub mod lifecycle;
+mod lifecycle;
+mod recognize;
 mod scene;
+pub mod services;
 
 pub use exports::EXPORTS;
 #[cfg(test)]
@@ -19,9 +23,10 @@ pub use {
     lifecycle::shutdown as shutdown_for_tests,
 };
 
-use crate::{fallback, logging, recognize, session, window};
+use crate::engine::Services;
+use crate::{logging, session, window};
 use abi::{API_VERSION, refexport_t, refimport_t};
-use engine::Engine;
+use services::Ioq3;
 use std::cell::UnsafeCell;
 use std::ffi::c_int;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -36,8 +41,8 @@ unsafe impl Sync for Borrowed {}
 static BORROWED: Borrowed = Borrowed(UnsafeCell::new(None));
 
 /// `GetRefAPI`: starts over with the engine behind `imports` and answers the table of our functions, or null when the
-/// engine speaks another version of the interface or has other tables. Without usable Vulkan it answers the table of the engine's own
-/// OpenGL renderer.
+/// engine speaks another version of the interface or has other tables. Without usable Vulkan it answers the table of
+/// the engine's own OpenGL renderer.
 ///
 /// # Safety
 /// `imports` must be null or point at the import table of an ioquake3 engine, whose functions stay callable for as long
@@ -50,7 +55,7 @@ pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *c
     // copied.
     let table = unsafe { imports.read_unaligned() };
     // SAFETY: an engine calls this on its main thread, with none of our functions running.
-    let engine = unsafe { Engine::install(table) };
+    let engine = unsafe { Ioq3::install(table) };
     if api_version != API_VERSION {
         engine.say(&format!("Relight speaks version {API_VERSION} of the renderer interface, this engine wants {api_version}\n"));
         return ptr::null();

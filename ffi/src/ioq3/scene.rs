@@ -4,10 +4,10 @@ use super::abi::{
     QBool, Vec3C, fontInfo_t, markFragment_t, orientation_t, polyVert_t, refEntity_t, refdef_t,
 };
 use super::convert;
-use super::engine::{Engine, string_from, text_of};
-use super::lifecycle::failure;
-use crate::boundary::{Failure, entry};
+use crate::boundary::entry;
 use crate::cvars::{self, Cvar, Cvars};
+use crate::engine::{self, string_from, text_of};
+use crate::failure::Failure;
 use crate::session::{draw, with_renderer};
 use glam::Vec3;
 use renderer_vk::Renderer;
@@ -116,7 +116,7 @@ pub unsafe extern "C" fn load_world(name: *const c_char) {
                 cvars::apply(cvars, front.window, &mut front.settings);
                 renderer.set_settings(&front.settings);
             }
-            renderer.load_world(&name).map_err(failure)
+            renderer.load_world(&name).map_err(Failure::from)
         })
     });
 }
@@ -307,12 +307,12 @@ pub unsafe extern "C" fn render_scene(from: *const refdef_t) {
             {
                 lines.push_str(&PathPoint::of(&view).line());
             }
-            renderer.render_scene(&view).map_err(failure)
+            renderer.render_scene(&view).map_err(Failure::from)
         })?;
         // it calls back for each polygon, so the state is in its cell meanwhile
         let debugs = |cvars: &Cvars| cvars.flag(Cvar::DebugSurface);
         let wanted = with_renderer(|_, front| Ok(front.cvars.as_ref().is_some_and(debugs)))?;
-        if let Some(engine) = Engine::current().filter(|_| wanted) {
+        if let Some(engine) = engine::current().filter(|_| wanted) {
             engine.draw_debug_surface(debug_polygon);
         }
         Ok(())
@@ -410,7 +410,7 @@ pub unsafe extern "C" fn stretch_raw(x: c_int, y: c_int, w: c_int, h: c_int, col
         // SAFETY: null or `cols * rows` pixels by this function's contract, for as long as the call lasts.
         let pixels = unsafe { raw_pixels(cols, rows, data) };
         draw(|renderer, _| match (pixels, usize::try_from(client)) {
-            (Some((cols, rows, rgba)), Ok(client)) => renderer.stretch_raw(x, y, w, h, cols, rows, rgba, client, dirty != 0).map_err(failure),
+            (Some((cols, rows, rgba)), Ok(client)) => renderer.stretch_raw(x, y, w, h, cols, rows, rgba, client, dirty != 0).map_err(Failure::from),
             _ => Ok(()),
         })
     });
@@ -437,7 +437,7 @@ pub unsafe extern "C" fn upload_cinematic(
             |renderer, front| match (pixels, front.cinematics.client_of(handle)) {
                 (Some((cols, rows, rgba)), Some(client)) => renderer
                     .upload_cinematic(cols, rows, rgba, client, dirty != 0)
-                    .map_err(failure),
+                    .map_err(Failure::from),
                 _ => Ok(()),
             },
         )
@@ -639,7 +639,7 @@ pub unsafe extern "C" fn get_entity_token(buffer: *mut c_char, size: c_int) -> Q
 /// origin, or point at three floats.
 pub unsafe extern "C" fn in_pvs(from: *const Vec3C, to: *const Vec3C) -> QBool {
     entry(|| {
-        let Some(engine) = Engine::current() else {
+        let Some(engine) = engine::current() else {
             return Ok(0);
         };
         // SAFETY: each is null or three floats by this function's contract.

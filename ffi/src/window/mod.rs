@@ -7,7 +7,7 @@ pub mod modes;
 pub mod sdl;
 
 use crate::cvars::{Cvar, Cvars};
-use crate::ioq3::engine::Engine;
+use crate::engine::Engine;
 use modes::{Custom, Mode};
 use renderer_vk::gpu;
 use sdl::{Sdl, SdlError, WindowPtr};

@@ -179,7 +179,7 @@ impl Sdl {
         // SAFETY: SDL takes this call at any time.
         let text = unsafe { (self.get_error)() };
         // SAFETY: SDL's own NUL-terminated buffer, which its next error changes; copied at once.
-        let message = unsafe { crate::ioq3::engine::string_from(text) };
+        let message = unsafe { crate::engine::string_from(text) };
         SdlError::Call { call, message }
     }
 
@@ -197,7 +197,7 @@ impl Sdl {
         // SAFETY: SDL takes this call at any time.
         let driver = unsafe { (self.video_driver)() };
         // SAFETY: null, or SDL's own static NUL-terminated name; copied at once.
-        Ok(unsafe { crate::ioq3::engine::string_from(driver) })
+        Ok(unsafe { crate::engine::string_from(driver) })
     }
 
     /// Ends SDL's video. No window may be left.

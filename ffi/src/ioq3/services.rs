@@ -1,10 +1,10 @@
-//! The engine's services, with the raw pointers and the C strings kept inside.
+//! The services of ioquake3's table, with the raw pointers and the C strings kept inside.
 //!
 //! Every service may leave by `longjmp` when the engine meets an error of its own. The calls here keep nothing on the
 //! stack that needs a destructor for correctness; what can leak in such a case is memory alone.
 
-use super::abi::{self, cvar_t, print, refimport_t};
-use std::borrow::Cow;
+use super::abi::{self, QBool, cvar_t, refimport_t};
+use crate::engine::{self, Services, Variable, string_from, valid_path_to_write};
 use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_float, c_int, c_uchar, c_void};
 use std::ptr;
@@ -18,9 +18,16 @@ unsafe impl Sync for Imports {}
 
 static IMPORTS: Imports = Imports(UnsafeCell::new(None));
 
-/// The engine that loaded us. A token: the table itself is a static, replaced by each `GetRefAPI`.
+/// An engine with ioquake3's table. A token: the table itself is a static, replaced by each `GetRefAPI`.
 #[derive(Clone, Copy, Debug)]
-pub struct Engine(());
+pub struct Ioq3(());
+
+static IOQ3: Ioq3 = Ioq3(());
+
+/// A cvar as ioquake3 lays it out.
+fn raw(cvar: Variable) -> *mut cvar_t {
+    cvar.as_ptr().cast()
+}
 
 /// Hands the pieces of `text` to `f`, each short enough for the engine's print buffer and NUL-terminated.
 ///
@@ -44,24 +51,18 @@ fn in_c_pieces(text: &str, mut f: impl FnMut(*const c_char)) {
     }
 }
 
-impl Engine {
-    /// Takes over the engine's table.
+impl Ioq3 {
+    /// Takes over the engine's table and installs its services.
     ///
     /// # Safety
     /// Every function of the table must be callable with the signature that the engine's ABI gives it for as long as
     /// the process lives, and this must run on the engine's main thread while no other call of ours runs.
-    pub unsafe fn install(table: refimport_t) -> Engine {
+    pub unsafe fn install(table: refimport_t) -> &'static Ioq3 {
         // SAFETY: no other call of ours runs, and this is the main thread, by this function's contract: nobody else
         // reads or writes the table.
         unsafe { *IMPORTS.0.get() = Some(table) };
-        Engine(())
-    }
-
-    /// The engine of the newest `GetRefAPI`, if there was one.
-    pub fn current() -> Option<Engine> {
-        // SAFETY: main thread only; nobody holds a reference into the cell (`table` copies).
-        let known = unsafe { (*IMPORTS.0.get()).is_some() };
-        known.then_some(Engine(()))
+        engine::install(&IOQ3);
+        &IOQ3
     }
 
     /// One function of the table.
@@ -70,8 +71,22 @@ impl Engine {
         unsafe { (*IMPORTS.0.get()).as_ref().and_then(pick) }
     }
 
-    /// Prints. `level` is one of [`mod@print`].
-    pub fn print(self, level: c_int, text: &str) {
+    /// Describes a cvar and looks whether the engine keeps that, as those with ioquake3's tables do. In the others of
+    /// its family the same entry of the table only looks for a variable of that name, and the member is another pointer
+    /// into the engine's memory.
+    pub fn cvar_keeps_description(self, cvar: Variable, text: &CStr) -> bool {
+        self.cvar_describe(cvar, text);
+        // SAFETY: the engine's own variable; in the others of the family, too, it has a member in this place.
+        let kept = unsafe { (*raw(cvar)).description }.cast::<u8>();
+        let mut bytes = text.to_bytes_with_nul().iter().enumerate();
+        // SAFETY: bytes are read up to the first that differs: in a copy of the text its zero is the last one read, and
+        // what other engines keep here is a variable, which holds more bytes than agree with a text.
+        !kept.is_null() && bytes.all(|(i, &byte)| unsafe { *kept.add(i) } == byte)
+    }
+}
+
+impl Services for Ioq3 {
+    fn print(&self, level: c_int, text: &str) {
         if let Some(printf) = self.get(|t| t.Printf) {
             in_c_pieces(text, |piece| {
                 // SAFETY: the engine's variadic print with a literal format and one NUL-terminated string.
@@ -80,43 +95,24 @@ impl Engine {
         }
     }
 
-    /// Prints to the console and the log.
-    pub fn say(self, text: &str) {
-        self.print(print::ALL, text);
-    }
-
-    /// The engine's error function. Calling it never returns to the caller.
-    pub fn error_function(self) -> Option<unsafe extern "C" fn(c_int, *const c_char, ...)> {
+    fn error_function(&self) -> Option<unsafe extern "C" fn(c_int, *const c_char, ...)> {
         self.get(|t| t.Error)
     }
 
-    /// Engine time in milliseconds (scaled by `timescale`).
-    pub fn milliseconds(self) -> c_int {
+    fn milliseconds(&self) -> c_int {
         // SAFETY: no arguments.
         self.get(|t| t.Milliseconds).map_or(0, |f| unsafe { f() })
     }
 
-    /// Finds or makes a cvar; applies its latched value. Null when the engine has no such service.
-    pub fn cvar_get(self, name: &CStr, default: &CStr, flags: c_int) -> *mut cvar_t {
+    fn cvar_get(&self, name: &CStr, default: &CStr, flags: c_int) -> Option<Variable> {
+        let get = self.get(|t| t.Cvar_Get)?;
         // SAFETY: both strings live through the call; the engine copies them.
-        self.get(|t| t.Cvar_Get)
-            .map_or(ptr::null_mut(), |f| unsafe {
-                f(name.as_ptr(), default.as_ptr(), flags)
-            })
+        let cvar = unsafe { get(name.as_ptr(), default.as_ptr(), flags) };
+        // SAFETY: null, or a `cvar_t` of the engine, which keeps its cvars for as long as the process lives.
+        unsafe { Variable::new(cvar.cast()) }
     }
 
-    /// The text of a variable that belongs to the engine; empty where there is none.
-    pub fn cvar_text(self, name: &CStr) -> String {
-        let cvar = self.cvar_get(name, c"", 0);
-        if cvar.is_null() {
-            return String::new();
-        }
-        // SAFETY: not null, so it is a variable that lives as long as the process; its text is copied at once.
-        unsafe { string_from((*cvar).string) }
-    }
-
-    /// Sets a cvar, whatever its flags.
-    pub fn cvar_set(self, name: &CStr, value: &str) {
+    fn cvar_set(&self, name: &CStr, value: &str) {
         let Ok(value) = CString::new(value) else {
             return;
         };
@@ -126,60 +122,69 @@ impl Engine {
         }
     }
 
-    /// Keeps a cvar within a range from now on.
-    pub fn cvar_check_range(self, cvar: *mut cvar_t, min: f32, max: f32, integral: bool) {
-        if let (Some(f), false) = (self.get(|t| t.Cvar_CheckRange), cvar.is_null()) {
-            // SAFETY: `cvar` came from `cvar_get`, whose results live as long as the process.
-            unsafe { f(cvar, min, max, integral.into()) }
+    fn cvar_as_integer(&self, cvar: Variable) -> c_int {
+        // SAFETY: a `cvar_t` of the engine, which changes it on this thread alone: nothing writes while this reads.
+        unsafe { (*raw(cvar)).integer }
+    }
+
+    fn cvar_as_number(&self, cvar: Variable) -> f32 {
+        // SAFETY: a `cvar_t` of the engine, which changes it on this thread alone: nothing writes while this reads.
+        unsafe { (*raw(cvar)).value }
+    }
+
+    fn cvar_string(&self, cvar: Variable) -> String {
+        // SAFETY: a `cvar_t` of the engine, which changes it on this thread alone; its text is NUL-terminated
+        // and is copied before anything can change it.
+        unsafe { string_from((*raw(cvar)).string) }
+    }
+
+    fn cvar_modified(&self, cvar: Variable) -> bool {
+        // SAFETY: a `cvar_t` of the engine, which changes it on this thread alone: nothing writes while this reads.
+        unsafe { (*raw(cvar)).modified != 0 }
+    }
+
+    fn cvar_seen(&self, cvar: Variable) {
+        const NO: QBool = 0;
+        // SAFETY: a `cvar_t` of the engine, which changes it on this thread alone. To clear this member is what
+        // the engine expects of a cvar's owner.
+        unsafe { (*raw(cvar)).modified = NO }
+    }
+
+    fn cvar_check_range(&self, cvar: Variable, min: f32, max: f32, integral: bool) {
+        if let Some(f) = self.get(|t| t.Cvar_CheckRange) {
+            // SAFETY: `cvar` is one of the engine's own.
+            unsafe { f(raw(cvar), min, max, integral.into()) }
         }
     }
 
-    /// Sets the text that the console shows for a cvar.
-    pub fn cvar_describe(self, cvar: *mut cvar_t, text: &CStr) {
-        if let (Some(f), false) = (self.get(|t| t.Cvar_SetDescription), cvar.is_null()) {
-            // SAFETY: `cvar` came from `cvar_get`; the engine copies the text.
-            unsafe { f(cvar, text.as_ptr()) }
+    fn cvar_describe(&self, cvar: Variable, text: &CStr) {
+        if let Some(f) = self.get(|t| t.Cvar_SetDescription) {
+            // SAFETY: `cvar` is one of the engine's own; the engine copies the text.
+            unsafe { f(raw(cvar), text.as_ptr()) }
         }
     }
 
-    /// Describes a cvar and looks whether the engine keeps that, as those with ioquake3's tables do. In the others of
-    /// its family the same entry of the table only looks for a variable of that name, and the member is another pointer
-    /// into the engine's memory.
-    pub fn cvar_keeps_description(self, cvar: *mut cvar_t, text: &CStr) -> bool {
-        self.cvar_describe(cvar, text);
-        // SAFETY: `cvar` came from `cvar_get`.
-        let kept = unsafe { (*cvar).description }.cast::<u8>();
-        let mut bytes = text.to_bytes_with_nul().iter().enumerate();
-        // SAFETY: bytes are read up to the first that differs: in a copy of the text its zero is the last one read, and
-        // what other engines keep here is a variable, which holds more bytes than agree with a text.
-        !kept.is_null() && bytes.all(|(i, &byte)| unsafe { *kept.add(i) } == byte)
-    }
-
-    /// Integer value of any cvar; 0 if there is none.
-    pub fn cvar_integer(self, name: &CStr) -> c_int {
+    fn cvar_integer(&self, name: &CStr) -> c_int {
         // SAFETY: the name lives through the call.
         self.get(|t| t.Cvar_VariableIntegerValue)
             .map_or(0, |f| unsafe { f(name.as_ptr()) })
     }
 
-    /// Adds a console command. If there is one of that name, the old function stays.
-    pub fn add_command(self, name: &CStr, function: unsafe extern "C" fn()) {
+    fn add_command(&self, name: &CStr, function: unsafe extern "C" fn()) {
         if let Some(f) = self.get(|t| t.Cmd_AddCommand) {
             // SAFETY: the name is copied; the function is one of ours and stays mapped (-z nodelete).
             unsafe { f(name.as_ptr(), Some(function)) }
         }
     }
 
-    /// Removes a console command; one that is not there is no error.
-    pub fn remove_command(self, name: &CStr) {
+    fn remove_command(&self, name: &CStr) {
         if let Some(f) = self.get(|t| t.Cmd_RemoveCommand) {
             // SAFETY: the name lives through the call.
             unsafe { f(name.as_ptr()) }
         }
     }
 
-    /// The words of the command that runs now; the first is its name.
-    pub fn arguments(self) -> Vec<String> {
+    fn arguments(&self) -> Vec<String> {
         // SAFETY: no arguments.
         let count = self.get(|t| t.Cmd_Argc).map_or(0, |f| unsafe { f() });
         let Some(argv) = self.get(|t| t.Cmd_Argv) else {
@@ -193,16 +198,14 @@ impl Engine {
             .collect()
     }
 
-    /// Appends to the engine's command buffer.
-    pub fn append_command(self, text: &CStr) {
+    fn append_command(&self, text: &CStr) {
         if let Some(f) = self.get(|t| t.Cmd_ExecuteText) {
             // SAFETY: the text is copied. Appended text runs later, not from inside this call.
             unsafe { f(abi::EXEC_APPEND, text.as_ptr()) }
         }
     }
 
-    /// Asks the collision model's visibility whether `from` sees `to`, both clusters of the loaded map.
-    pub fn cluster_sees(self, from: i32, to: i32) -> bool {
+    fn cluster_sees(&self, from: i32, to: i32) -> bool {
         let (Some(f), Ok(bit)) = (self.get(|t| t.CM_ClusterPVS), usize::try_from(to)) else {
             return false;
         };
@@ -214,10 +217,7 @@ impl Engine {
         }
     }
 
-    /// Reads a game file whole. `None` if it is not there.
-    ///
-    /// The name must have passed [`valid_game_path`].
-    pub fn read_file(self, name: &CStr) -> Option<Vec<u8>> {
+    fn read_file(&self, name: &CStr) -> Option<Vec<u8>> {
         let read = self.get(|t| t.FS_ReadFile)?;
         let free = self.get(|t| t.FS_FreeFile)?;
         let mut buffer: *mut c_void = ptr::null_mut();
@@ -235,15 +235,13 @@ impl Engine {
         contents
     }
 
-    /// Whether a game file is there, in packs or folders, without reading it.
-    pub fn has_file(self, name: &CStr) -> bool {
+    fn has_file(&self, name: &CStr) -> bool {
         // SAFETY: with no buffer to fill the engine only looks.
         self.get(|t| t.FS_ReadFile)
             .is_some_and(|f| unsafe { f(name.as_ptr(), ptr::null_mut()) } >= 0)
     }
 
-    /// Files of a folder, in the engine's order.
-    pub fn list_files(self, directory: &CStr, extension: &CStr) -> Vec<String> {
+    fn list_files(&self, directory: &CStr, extension: &CStr) -> Vec<String> {
         let (Some(list), Some(free)) = (
             self.get(|t| t.FS_ListFiles),
             self.get(|t| t.FS_FreeFileList),
@@ -267,9 +265,7 @@ impl Engine {
         copied
     }
 
-    /// Writes below the user's game folder. Returns whether the file is there then: the engine refuses some names and
-    /// has nothing to answer.
-    pub fn write_file(self, name: &str, contents: &[u8]) -> bool {
+    fn write_file(&self, name: &str, contents: &[u8]) -> bool {
         let (Some(name), Some(f), Ok(length)) = (
             valid_path_to_write(name),
             self.get(|t| t.FS_WriteFile),
@@ -282,15 +278,13 @@ impl Engine {
         self.home_file_exists(&name)
     }
 
-    /// Whether the user's game folder has this file (packs are not searched).
-    pub fn home_file_exists(self, name: &CStr) -> bool {
+    fn home_file_exists(&self, name: &CStr) -> bool {
         // SAFETY: the name lives through the call.
         self.get(|t| t.FS_FileExists)
             .is_some_and(|f| unsafe { f(name.as_ptr()) } != 0)
     }
 
-    /// Starts a video for a material. `None` if it cannot be played.
-    pub fn play_cinematic(self, name: &CStr) -> Option<c_int> {
+    fn play_cinematic(&self, name: &CStr) -> Option<c_int> {
         // SAFETY: the name lives through the call. The size only matters to videos that the engine draws itself.
         let handle = self
             .get(|t| t.CIN_PlayCinematic)
@@ -298,8 +292,7 @@ impl Engine {
         (handle >= 0).then_some(handle)
     }
 
-    /// Lets a video go on to the present and upload its picture. The engine calls `UploadCinematic` from inside.
-    pub fn run_cinematic(self, handle: c_int) {
+    fn run_cinematic(&self, handle: c_int) {
         if let (Some(run), Some(upload)) = (
             self.get(|t| t.CIN_RunCinematic),
             self.get(|t| t.CIN_UploadCinematic),
@@ -312,19 +305,14 @@ impl Engine {
         }
     }
 
-    /// Lets the collision code show what it wants to; it calls `polygon` from inside, for each.
-    pub fn draw_debug_surface(self, polygon: unsafe extern "C" fn(c_int, c_int, *mut c_float)) {
+    fn draw_debug_surface(&self, polygon: unsafe extern "C" fn(c_int, c_int, *mut c_float)) {
         if let Some(f) = self.get(|t| t.CM_DrawDebugSurface) {
             // SAFETY: the function has the type that the engine calls.
             unsafe { f(Some(polygon)) }
         }
     }
 
-    /// Appends a frame to the video that the engine records.
-    ///
-    /// # Safety
-    /// `length` bytes must be readable at `data`.
-    pub unsafe fn write_avi_frame(self, data: *const c_uchar, length: c_int) {
+    unsafe fn write_avi_frame(&self, data: *const c_uchar, length: c_int) {
         if let Some(f) = self.get(|t| t.CL_WriteAVIVideoFrame) {
             // SAFETY: `data` has `length` readable bytes by this function's contract; the engine copies them to its
             // file.
@@ -332,35 +320,28 @@ impl Engine {
         }
     }
 
-    /// Gives the window to the engine's input code.
-    ///
-    /// # Safety
-    /// `window` must be an `SDL_Window` of the process's SDL, valid until [`Engine::input_shutdown`].
-    pub unsafe fn input_init(self, window: *mut c_void) {
+    unsafe fn input_init(&self, window: *mut c_void) {
         if let Some(f) = self.get(|t| t.IN_Init) {
             // SAFETY: `window` is an SDL window that stays open until `input_shutdown` by this function's contract.
             unsafe { f(window) }
         }
     }
 
-    /// Takes the window away from the engine's input code.
-    pub fn input_shutdown(self) {
+    fn input_shutdown(&self) {
         if let Some(f) = self.get(|t| t.IN_Shutdown) {
             // SAFETY: no arguments.
             unsafe { f() }
         }
     }
 
-    /// Lets the input code start again on the same window.
-    pub fn input_restart(self) {
+    fn input_restart(&self) {
         if let Some(f) = self.get(|t| t.IN_Restart) {
             // SAFETY: no arguments.
             unsafe { f() }
         }
     }
 
-    /// Tells the engine that video is about to start. Does nothing in today's engines.
-    pub fn video_init_hook(self, safe: bool) {
+    fn video_init_hook(&self, safe: bool) {
         if let Some(f) = self.get(|t| {
             if safe {
                 t.Sys_GLimpSafeInit
@@ -372,43 +353,6 @@ impl Engine {
             unsafe { f() }
         }
     }
-}
-
-/// Copies a C string; null is empty. Bytes that are not UTF-8 are replaced.
-///
-/// # Safety
-/// `text` must be null or point at a NUL-terminated string.
-pub unsafe fn string_from(text: *const c_char) -> String {
-    // SAFETY: null or NUL-terminated by this function's contract; copied at once, so nothing borrows it later.
-    unsafe { text_of(text) }.into_owned()
-}
-
-/// A C string where it lies; null is empty. Bytes that are not UTF-8 are replaced, in a copy.
-///
-/// # Safety
-/// `text` must be null or point at a NUL-terminated string, which must stay as it is for as long as the answer is used.
-pub unsafe fn text_of<'a>(text: *const c_char) -> Cow<'a, str> {
-    if text.is_null() {
-        return Cow::Borrowed("");
-    }
-    // SAFETY: not null, so NUL-terminated and unchanged while the answer is used, by this function's contract.
-    unsafe { CStr::from_ptr(text) }.to_string_lossy()
-}
-
-/// A name that can be handed to the engine's file functions: not empty, shorter than the engine's limit for game
-/// paths, without NUL. An empty name would end the process.
-pub fn valid_game_path(name: &str) -> Option<CString> {
-    if name.is_empty() || name.len() >= abi::MAX_QPATH {
-        return None;
-    }
-    CString::new(name).ok()
-}
-
-/// A name that the engine writes to: a valid one that stays in the game's folder. The engine refuses the others, in a
-/// line of its own at best.
-pub fn valid_path_to_write(name: &str) -> Option<CString> {
-    let leaves = name.contains("..") || name.contains("::") || name.starts_with(['/', '\\']);
-    valid_game_path(name).filter(|_| !leaves)
 }
 
 #[cfg(test)]
@@ -438,21 +382,5 @@ mod tests {
         // SAFETY: NUL-terminated by `in_c_pieces`.
         in_c_pieces("a\0b", |piece| seen = unsafe { string_from(piece) });
         assert_eq!(seen, "a?b");
-    }
-
-    #[test]
-    fn names_that_the_engine_would_die_of_are_refused() {
-        assert!(valid_game_path("").is_none());
-        assert!(valid_game_path("a\0b").is_none());
-        assert!(valid_game_path(&"x".repeat(64)).is_none());
-        assert!(valid_game_path(&"x".repeat(63)).is_some());
-    }
-
-    #[test]
-    fn only_names_inside_the_games_folder_are_written_to() {
-        for name in ["", "../a", "a/../../b", "a..b", "a::b", "/tmp/a", "\\a"] {
-            assert!(valid_path_to_write(name).is_none(), "{name}");
-        }
-        assert!(valid_path_to_write("screenshots/a.b.tga").is_some());
     }
 }

@@ -10,9 +10,10 @@
 //!
 //! What cannot be looked at (no `/proc`, an unreadable file) decides nothing.
 
+use super::abi::refimport_t;
+use super::services::Ioq3;
 use crate::cvars::{Cvar, TABLE};
-use crate::ioq3::abi::refimport_t;
-use crate::ioq3::engine::Engine;
+use crate::engine::Services;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -64,7 +65,7 @@ const TOO_MANY: usize = 52;
 /// # Safety
 /// `imports` must point at the import table of an engine that speaks our version number, which must be the one that
 /// `engine` calls.
-pub unsafe fn refusal(engine: Engine, imports: *const refimport_t) -> Option<String> {
+pub unsafe fn refusal(engine: &Ioq3, imports: *const refimport_t) -> Option<String> {
     let wanted = std::env::var(VARIABLE).unwrap_or_default();
     let (found, opengl) = match is_ours(&wanted) {
         Some(true) => return None,
@@ -89,10 +90,7 @@ fn is_ours(variable: &str) -> Option<bool> {
 /// # Safety
 /// `imports` must point at the import table of an engine that speaks our version number, which must be the one that
 /// `engine` calls.
-unsafe fn difference(
-    engine: Engine,
-    imports: *const refimport_t,
-) -> Option<(String, &'static str)> {
+unsafe fn difference(engine: &Ioq3, imports: *const refimport_t) -> Option<(String, &'static str)> {
     if let Some(other) = executable() {
         return Some((format!("it is {}", other.name), other.opengl));
     }
@@ -107,8 +105,8 @@ unsafe fn difference(
         }
     }
     let spec = TABLE.get(Cvar::RayTrace as usize)?;
-    let variable = engine.cvar_get(spec.name, spec.default, spec.flags);
-    if variable.is_null() || engine.cvar_keeps_description(variable, spec.description) {
+    let variable = engine.cvar_get(spec.name, spec.default, spec.flags)?;
+    if engine.cvar_keeps_description(variable, spec.description) {
         return None;
     }
     let version = engine.cvar_text(c"version");

@@ -3,8 +3,8 @@
 //! The engine asks for `GetRefAPI` before any window exists, and does not try another library once ours is loaded. So
 //! that is where the other renderer is loaded and its functions are answered instead of ours.
 
-use crate::ioq3::abi::{QBool, refexport_t, refimport_t};
-use crate::ioq3::engine::Engine;
+use super::abi::{QBool, refexport_t, refimport_t};
+use crate::engine::Engine;
 use libloading::Library;
 use std::ffi::c_int;
 use std::path::PathBuf;
@@ -217,7 +217,7 @@ mod tests {
         let Some(_engine) = TestEngine::start("fallback") else {
             return;
         };
-        let engine = Engine::current().unwrap();
+        let engine = crate::engine::current().unwrap();
         let folder = scratch("substitute");
         let library = folder.join(&file_names()[0]);
         let report = folder.join("report");

@@ -1,0 +1,136 @@
+//! The way of a captured picture to the engine: taken from the renderer, encoded, and handed over once the renderer's
+//! state is back in its cell.
+
+use crate::capture::{self, Format, Shot, VideoFrame};
+use crate::cvars::Cvar;
+use crate::engine::Engine;
+use crate::failure::Failure;
+use crate::session::{Front, with_renderer};
+use renderer_vk::Renderer;
+use renderer_vk::api::Picture;
+use std::ffi::c_int;
+
+/// What is to be handed to the engine once the frame is done and the state is back in its cell.
+#[derive(Default)]
+pub struct Outbox {
+    /// Path below the user's game folder, contents, and whether to say nothing about it.
+    pub files: Vec<(String, Vec<u8>, bool)>,
+    /// The engine's buffer and how many bytes of it the frame fills.
+    pub video: Option<(*mut u8, c_int)>,
+    /// For the console, without the line's end.
+    pub lines: Vec<String>,
+    /// What the game took for the frame.
+    pub front_end_ms: c_int,
+    /// What the renderer took to end it.
+    pub back_end_ms: c_int,
+}
+
+/// Takes the pictures that were asked for between two frames: they show the frame before, which is what the player
+/// sees, whatever the next command does. Within a frame, or before the first one, they wait for its end.
+pub fn take_captures_of_last_frame(engine: Engine) -> Result<(), Failure> {
+    let outbox = with_renderer(|renderer, front| {
+        let mut outbox = Outbox::default();
+        if front.frame_start.is_none() && front.has_picture {
+            take_captures(renderer, front, &mut outbox)?;
+        }
+        Ok(outbox)
+    })?;
+    deliver(engine, outbox);
+    Ok(())
+}
+
+/// Takes the pictures that were asked for, of what is drawn so far.
+pub fn take_captures(
+    renderer: &mut Renderer,
+    front: &mut Front,
+    outbox: &mut Outbox,
+) -> Result<(), Failure> {
+    let shots = std::mem::take(&mut front.captures.shots);
+    let video = front.captures.video.take();
+    // Like everything else that is drawn, pictures are left out.
+    if front.settings.skip_back_end {
+        return Ok(());
+    }
+    if shots.is_empty() && video.is_none() {
+        return Ok(());
+    }
+    let picture = renderer.read_pixels().map_err(Failure::from)?;
+    for shot in shots {
+        take_shot(&picture, &shot, screenshot_quality(front), outbox)?;
+    }
+    if let Some(frame) = video {
+        let bytes = capture::video_frame(&picture, &frame, video_quality(front))?;
+        outbox.video = keep_video(&frame, &bytes);
+    }
+    Ok(())
+}
+
+fn take_shot(
+    picture: &Picture,
+    shot: &Shot,
+    quality: i32,
+    outbox: &mut Outbox,
+) -> Result<(), Failure> {
+    let (path, bytes, silent) = match shot {
+        Shot::Screen {
+            format: Format::Tga,
+            path,
+            silent,
+        } => (path, capture::tga(picture)?, *silent),
+        Shot::Screen {
+            format: Format::Jpeg,
+            path,
+            silent,
+        } => (path, capture::jpeg(picture, quality)?, *silent),
+        Shot::Level { path } => (path, capture::tga(&capture::level_shot(picture))?, false),
+    };
+    outbox.files.push((path.clone(), bytes, silent));
+    Ok(())
+}
+
+/// Copies an encoded frame into the engine's buffer, so that nothing of ours is alive when the engine writes it.
+fn keep_video(frame: &VideoFrame, bytes: &[u8]) -> Option<(*mut u8, c_int)> {
+    let room = frame.width as usize * frame.height as usize * 4;
+    let length = c_int::try_from(bytes.len()).ok()?;
+    if frame.encode_buffer.is_null() || bytes.len() > room {
+        return None;
+    }
+    // SAFETY: by the contract of `take_video_frame` the buffer has `width * height * 4` bytes, of which `bytes` needs
+    // no more, and stays until the frame ends. Our bytes lie elsewhere.
+    unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), frame.encode_buffer, bytes.len()) };
+    Some((frame.encode_buffer, length))
+}
+
+/// Writes files and prints lines. The renderer is in its cell meanwhile: the engine may call back.
+pub fn deliver(engine: Engine, outbox: Outbox) {
+    for (path, bytes, silent) in outbox.files {
+        if !engine.write_file(&path, &bytes) {
+            engine.say(&format!("{path} could not be written\n"));
+        } else if !silent {
+            engine.say(&format!("Wrote {path}\n"));
+        }
+    }
+    for line in outbox.lines {
+        engine.say(&format!("{line}\n"));
+    }
+    if let Some((data, length)) = outbox.video {
+        // SAFETY: `keep_video` just filled the engine's buffer with `length` bytes.
+        unsafe { engine.write_avi_frame(data, length) };
+    }
+}
+
+/// Quality of screenshots in percent.
+fn screenshot_quality(front: &Front) -> i32 {
+    front
+        .cvars
+        .as_ref()
+        .map_or(90, |cvars| cvars.integer(Cvar::ScreenshotJpegQuality))
+}
+
+/// Quality of video frames in percent.
+fn video_quality(front: &Front) -> i32 {
+    front
+        .cvars
+        .as_ref()
+        .map_or(90, |cvars| cvars.integer(Cvar::AviMotionJpegQuality))
+}
