@@ -11,12 +11,11 @@
 //! Automatic exposure brings a picture a little nearer to a usual one of its map: how bright that is
 //! ([`Exposure::middle`]) is taken from the same pixels.
 //!
-//! Without such light ([`display_exposure`] of a world that nobody calibrated) there is the mean of D(v) over the mean of
+//! Without such light ([`display_exposure`](crate::RelitWorld::display_exposure) of a world that nobody calibrated) there is the mean of D(v) over the mean of
 //! v; where the map's compiler stored light with a gamma g, that light is v^g, and the mean is over that.
 
-use crate::light::Shade;
+use crate::emitters::Shade;
 use crate::overbright::{self, luminance};
-use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::{Bsp, Lightmap};
 
@@ -199,14 +198,10 @@ fn surroundings(pixels: &[(Vec3, Vec3, f32)]) -> Vec3 {
     own / (1.0 - mirrored.min(Vec3::splat(MOST_MIRRORED)))
 }
 
-/// The exposure of a map: what calibration found; else from its lightmaps, or from the colours of its vertices.
-pub fn display_exposure(world: &RelitWorld) -> Exposure {
-    if let Some(exposure) = world.exposure {
-        return exposure;
-    }
-    let found = of_stored(&world.bsp, &world.pages, |light| {
-        ratio(light, world.stored_gamma)
-    });
+/// The exposure of a map whose light nobody calibrated: from its lightmaps, or from the colours of its vertices. `pages`: of
+/// lightmaps beside it; `gamma`: what its compiler encoded light with.
+pub(crate) fn of_stored_light(bsp: &Bsp, pages: &[Lightmap], gamma: f32) -> Exposure {
+    let found = of_stored(bsp, pages, |light| ratio(light, gamma));
     Exposure::usual(found.unwrap_or(DEFAULT))
 }
 

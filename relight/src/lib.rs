@@ -2,6 +2,7 @@
 //!
 //! * [`mod@calibrate`]: lights fitted to the map's own lightmaps, and those found again that its compiler stripped.
 //! * [`compare`]: two pictures of one view compared.
+//! * [`emitters`]: what emits light, in physical units.
 //! * [`export`]: maps written for other programs.
 //! * [`exposure`]: how bright a map is meant to look.
 //! * [`files`]: game files behind one trait: packs, folders, an engine, memory.
@@ -10,7 +11,7 @@
 //! * [`overbright`]: the one place that knows overbright bits, gamma and sRGB.
 //! * [`sample`]: a small made-up game, to show and test things without game data.
 //! * [`world`]: a map with flat geometry, resolved materials and its light sources.
-//! * [`light`]: light sources, their units, and the lists of them per cluster.
+//! * [`light`]: light sources found in a map, and the lists of them per cluster.
 //!
 //! ```no_run
 //! use relight::{Materials, RelitWorld, SearchPath};
@@ -31,12 +32,14 @@
 mod cache;
 pub mod calibrate;
 pub mod compare;
+pub mod emitters;
 pub mod export;
 pub mod exposure;
 mod external_lightmaps;
 pub mod files;
 pub mod image;
 pub mod light;
+mod load;
 mod map_files;
 pub mod materials;
 mod occluders;
@@ -46,11 +49,14 @@ mod spawns;
 pub mod world;
 
 pub use cache::CalibrationCache;
-pub use calibrate::{CalibrationOptions, CalibrationReport, calibrate, calibrate_with};
+pub use calibrate::{CalibrationOptions, calibrate, calibrate_with};
+pub use emitters::{
+    CalibrationReport, LightLists, LightReport, PointLight, SunLight, TriangleLight,
+};
 pub use external_lightmaps::external_lightmaps;
 pub use files::{FileError, GameFiles, MemoryFiles, Overlay, Pak, Pk3, SearchPath};
-pub use light::{LightLists, LightReport, PointLight, SunLight, TriangleLight};
+pub use load::{LoadError, Options, Progress, Stage};
 pub use map_files::map_files;
 pub use materials::{Materials, Resolved};
 pub use spawns::is_spawn_point;
-pub use world::{LoadError, Options, RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
+pub use world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};

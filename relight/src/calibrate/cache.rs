@@ -4,10 +4,10 @@
 //! checked as any input is: a damaged one counts as absent, with a warning.
 
 use super::columns::Lamp;
-use super::report::Agreement;
-use super::samples::Evidence;
 use super::{CalibrationOptions, Solution, VERSION};
 use crate::cache::{CacheError, CalibrationCache, add_world, read_file};
+use crate::emitters::Agreement;
+use crate::emitters::Evidence;
 use crate::exposure::Exposure;
 use crate::light::Falloff;
 use crate::world::RelitWorld;

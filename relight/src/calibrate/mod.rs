@@ -61,11 +61,10 @@ mod vertices;
 mod views;
 mod ways;
 
+pub use crate::emitters::{Agreement, CalibrationReport, Evidence};
 pub use beside::{Spots, spots};
 pub use recovery::{FOUND_WITHIN, POWER_WITHIN, Recovery, hide_entities, recovery};
-pub use report::{Agreement, CalibrationReport};
 pub use residuals::{Residual, residuals};
-pub use samples::Evidence;
 
 use crate::cache::CalibrationCache;
 use crate::exposure::Exposure;

@@ -7,6 +7,7 @@ use super::air;
 use super::said::Dirt;
 use super::texels::{self, Stored, lit_by_texel};
 use super::vertices;
+use crate::emitters::Evidence;
 use crate::light;
 use crate::occluders::Occluders;
 use crate::world::{RelitWorld, WorldSurface};
@@ -119,43 +120,6 @@ pub(super) fn decode(world: &RelitWorld, stored: Vec3, scale: f32) -> Vec3 {
 pub(super) fn shown(stored: Vec3) -> Vec3 {
     let light = stored * STORED_UNIT;
     light / light.max_element().max(1.0)
-}
-
-/// What measurements were taken from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Evidence {
-    /// Lightmap texels.
-    Lightmaps,
-    /// Colours of vertices: the map has no lightmaps.
-    Vertices,
-    /// Points of the light grid: neither lightmaps nor lit vertices.
-    Grid,
-    /// Nothing that tells of light.
-    #[default]
-    Nothing,
-}
-
-impl Evidence {
-    /// A short name for tables and files.
-    pub fn label(self) -> &'static str {
-        match self {
-            Evidence::Lightmaps => "lightmaps",
-            Evidence::Vertices => "vertices",
-            Evidence::Grid => "grid",
-            Evidence::Nothing => "nothing",
-        }
-    }
-
-    /// The evidence of a [`label`](Self::label).
-    pub(super) fn from_label(label: &str) -> Option<Evidence> {
-        let all = [
-            Evidence::Lightmaps,
-            Evidence::Vertices,
-            Evidence::Grid,
-            Evidence::Nothing,
-        ];
-        all.into_iter().find(|e| e.label() == label)
-    }
 }
 
 /// Whether light on a surface tells of the lights around it.

@@ -8,8 +8,8 @@
 use super::Asked;
 use super::compiler::Compiler;
 use super::memory::Memory;
-use super::samples::Evidence;
 use super::{CalibrationOptions, Purpose, Solution, apply, cache, find};
+use crate::emitters::Evidence;
 use crate::light::{self, PointLight, Pulse};
 use crate::overbright::MAP_OVERBRIGHT_BITS;
 use crate::world::{NO_LIGHT, RelitWorld, StyleLight, StyleStrength, WorldSurface};

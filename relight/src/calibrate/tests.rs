@@ -18,7 +18,7 @@ use crate::files::{MemoryFiles, SearchPath};
 use crate::light::{LightColor, PointLight, SURFACE_LIGHT_RADIANCE};
 use crate::materials::Materials;
 use crate::occluders::Occluders;
-use crate::world::{Options, Stage};
+use crate::{Options, Stage};
 use q3bsp::Bsp;
 use q3bsp::builder::MapBuilder;
 use std::f32::consts::PI;

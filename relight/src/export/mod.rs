@@ -163,7 +163,7 @@ pub struct ExportOptions {
     /// Whether lights that the format knows (points, spots, suns) are written, and lamps glow as strongly as the light
     /// that they are. With lightmaps all light is there twice.
     pub lights: bool,
-    /// What all light is multiplied by; the map's own [`display_exposure`](crate::exposure::display_exposure) where it
+    /// What all light is multiplied by; the map's own [`display_exposure`](RelitWorld::display_exposure) where it
     /// is `None`.
     pub exposure: Option<f32>,
     /// What becomes of the sky.
@@ -179,7 +179,7 @@ impl Export<'_> {
     /// What all light is multiplied by.
     fn exposure(&self) -> f32 {
         let found = self.options.exposure;
-        found.unwrap_or_else(|| crate::exposure::display_exposure(self.world).scale)
+        found.unwrap_or_else(|| self.world.display_exposure().scale)
     }
 }
 

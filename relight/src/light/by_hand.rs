@@ -332,9 +332,9 @@ fn point(numbers: &[f32]) -> Result<PointLight, String> {
 mod tests {
     use super::super::TriangleLight;
     use super::*;
+    use crate::Options;
     use crate::materials::Materials;
     use crate::sample;
-    use crate::world::Options;
 
     const TEXT: &str = "# lamps of the hall
 point 8 16 24  300  1 0.5 0   6   // above the door

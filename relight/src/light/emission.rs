@@ -11,9 +11,9 @@
 //!
 //! Source: q3map2's choice of the light image; the stage algebra is [`shaderscript::light`]'s.
 
-use super::color::raise;
 use super::entities::normalise;
-use super::glow::{Shade, mean_emission, shades};
+use super::glow::{mean_emission, shades};
+use super::{Emission, EmissionSource, Flicker, Shade, changes, raise};
 use super::{POINT_LIGHT_INTENSITY, SKY_LIGHT_RADIANCE, SURFACE_LIGHT_RADIANCE};
 use crate::files::GameFiles;
 use crate::image::{self, Image};
@@ -23,50 +23,6 @@ use glam::Vec3;
 use shaderscript::light::SurfaceClass;
 use shaderscript::{Cull, Deform, Shader};
 use std::collections::HashMap;
-
-/// Why a surface emits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum EmissionSource {
-    /// `q3map_surfacelight`.
-    SurfaceLight,
-    /// `q3map_surfacelight` or `q3map_skylight` of a sky.
-    Sky,
-    /// `q3map_surfacelight` of a sprite that turns to the viewer.
-    Sprite,
-    /// Its stages show it glowing.
-    Glow,
-    /// A flare marks a lamp here.
-    Flare,
-}
-
-impl EmissionSource {
-    /// A short name for tables.
-    pub fn label(self) -> &'static str {
-        match self {
-            EmissionSource::SurfaceLight => "surfacelight",
-            EmissionSource::Sky => "sky",
-            EmissionSource::Sprite => "sprite",
-            EmissionSource::Glow => "glow",
-            EmissionSource::Flare => "flare",
-        }
-    }
-}
-
-/// Light that a material emits.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Emission {
-    /// Why.
-    pub source: EmissionSource,
-    /// Radiance, linear, display units. Of [`EmissionSource::Sprite`]: radiant intensity of each surface, into
-    /// every direction.
-    pub strength: Vec3,
-    /// Whether both sides emit, because both are drawn.
-    pub two_sided: bool,
-    /// Whether it is the back that emits, because only the back is drawn.
-    pub reversed: bool,
-    /// Whether its quads turn to the viewer.
-    pub turns_to_viewer: bool,
-}
 
 impl Emission {
     /// Emission of a material, from the sides that are drawn. Sky emits to its front whatever its script says:
@@ -263,5 +219,20 @@ impl<'a> Finder<'a> {
             self.images.insert(name.to_owned(), small);
         }
         self.images.get(name)?.as_ref()
+    }
+}
+
+impl Finder<'_> {
+    /// How the light of an emitting material changes in time; `None` for most.
+    pub fn flicker(&mut self, material: &WorldMaterial) -> Option<Flicker> {
+        material.emission?;
+        let shader = &material.resolved.shader;
+        if material.resolved.fault.is_some() || !shader.stages.iter().any(changes) {
+            return None;
+        }
+        for name in shader.image_names() {
+            self.image(name);
+        }
+        Flicker::of(shader, |name| self.kept(name))
     }
 }

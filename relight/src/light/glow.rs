@@ -1,5 +1,6 @@
 //! What a stack of stages shows of its own, without any light falling on it, and what it shows of the light that does.
 
+use super::Shade;
 use crate::image::Image;
 use crate::overbright;
 use crate::overbright::luminance;
@@ -21,17 +22,6 @@ const SHADES: usize = 16;
 const TIMES: [f64; 12] = [
     0.0, 0.31, 0.73, 1.07, 1.39, 1.83, 2.21, 2.69, 3.17, 3.71, 4.33, 5.09,
 ];
-
-/// One of the brightnesses of a material's texture: what it shows of the light that falls on it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shade {
-    /// Part of the light that is thrown back, linear: the albedo.
-    pub linear: Vec3,
-    /// What the engine multiplies stored light by, as encoded for the display.
-    pub encoded: Vec3,
-    /// How much of its surroundings it mirrors besides, linear.
-    pub mirrored: Vec3,
-}
 
 /// Mean emission of a material's stages over texture and time, linear; zero for stages that only reflect.
 ///

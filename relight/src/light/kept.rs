@@ -221,9 +221,9 @@ pub(super) fn kept(
 mod tests {
     use super::super::sweep::{fresh, sweep};
     use super::*;
+    use crate::Options;
     use crate::files::MemoryFiles;
     use crate::materials::Materials;
-    use crate::world::Options;
     use glam::Vec3;
     use q3bsp::builder::MapBuilder;
     use std::path::Path;

@@ -5,131 +5,11 @@
 //! the whole cluster lies behind a one-sided light.
 
 use super::sight::{ClusterSet, Sight, furthest_in_front};
-use super::{PointLight, TriangleLight};
+use super::{LightLists, PointLight, TriangleLight};
 use crate::world::WorldSurface;
 use glam::Vec3;
 use q3bsp::Bsp;
 use std::collections::HashMap;
-
-/// Lights per cluster, in compressed rows.
-///
-/// Row `c` holds the lights of cluster `c`; one more row at the end holds all lights, for points outside of
-/// every cluster. An entry below the number of triangle lights is an index of one of them; the others are
-/// point lights: see [`LightLists::light`]. Entries of a row ascend. Suns are in no list: they matter
-/// wherever the sky can be seen.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct LightLists {
-    /// Start of every row in `lights`, and the end of the last: clusters + 2 values.
-    pub offsets: Vec<u32>,
-    /// The rows.
-    pub lights: Vec<u32>,
-    /// Number of triangle lights: entries from here on are point lights.
-    pub triangle_lights: u32,
-    /// For each cluster whether suns can reach it: see [`LightLists::sees_sky`].
-    pub sky: Vec<bool>,
-    /// For each entry of `lights` what it gives to its row's cluster; empty before [`sweep`](super::sweep()).
-    pub shares: Vec<LightShare>,
-}
-
-/// What a light gives to a cluster.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LightShare {
-    /// Light without shadows: mean irradiance / π, luminance. 0: not known.
-    pub bare: f32,
-    /// About which part of that arrives, above 0.
-    pub visible: f32,
-}
-
-impl LightShare {
-    /// Nothing is known.
-    pub const UNKNOWN: LightShare = LightShare {
-        bare: 0.0,
-        visible: 1.0,
-    };
-}
-
-/// What an entry of [`LightLists`] stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LightRef {
-    /// Index into [`RelitWorld::lights`](crate::RelitWorld::lights).
-    Triangle(u32),
-    /// Index into [`RelitWorld::point_lights`](crate::RelitWorld::point_lights).
-    Point(u32),
-}
-
-impl LightLists {
-    /// What each entry of a [`row`](Self::row) gives to its cluster; empty where nothing is known.
-    pub fn shares(&self, cluster: i32) -> &[LightShare] {
-        let range = self.range(cluster);
-        self.shares.get(range).unwrap_or_default()
-    }
-
-    /// Number of clusters; their rows come first.
-    pub fn clusters(&self) -> usize {
-        self.offsets.len().saturating_sub(2)
-    }
-
-    /// The entries for a cluster, as [`Bsp::cluster_at`] gives it; all lights for -1 and for clusters
-    /// that do not exist.
-    pub fn row(&self, cluster: i32) -> &[u32] {
-        self.lights.get(self.range(cluster)).unwrap_or_default()
-    }
-
-    /// Appends the last row, of all lights, as `old` has it: nothing is known of what they give to a point in no
-    /// cluster.
-    pub(super) fn end_with_all(&mut self, old: &LightLists) {
-        let all = old.row(-1);
-        self.lights.extend(all);
-        let unknown = std::iter::repeat_n(LightShare::UNKNOWN, all.len());
-        self.shares.extend(unknown);
-        self.offsets.push(self.lights.len() as u32);
-    }
-
-    /// Where a row is in `lights`.
-    fn range(&self, cluster: i32) -> std::ops::Range<usize> {
-        let row = usize::try_from(cluster)
-            .ok()
-            .filter(|&c| c < self.clusters())
-            .unwrap_or(self.clusters());
-        match self.offsets.get(row..row + 2) {
-            Some(&[start, end]) => start as usize..end as usize,
-            _ => 0..0,
-        }
-    }
-
-    /// Whether light from the sky, and so that of suns, can come to a cluster: whether it can see a cluster with a
-    /// surface of sky in it. True for clusters that nothing is known of.
-    pub fn sees_sky(&self, cluster: i32) -> bool {
-        let known = usize::try_from(cluster).ok().and_then(|c| self.sky.get(c));
-        known.copied().unwrap_or(true)
-    }
-
-    /// What an entry stands for.
-    pub fn light(&self, entry: u32) -> LightRef {
-        match entry.checked_sub(self.triangle_lights) {
-            None => LightRef::Triangle(entry),
-            Some(point) => LightRef::Point(point),
-        }
-    }
-
-    /// Mean number of lights over the clusters; of the list of all lights for a map without clusters.
-    pub fn mean_length(&self) -> f64 {
-        let clusters = self.clusters();
-        match clusters {
-            0 => self.lights.len() as f64,
-            _ => f64::from(self.offsets.get(clusters).copied().unwrap_or(0)) / clusters as f64,
-        }
-    }
-
-    /// Longest of the clusters' lists.
-    pub fn longest(&self) -> usize {
-        let lengths = self.offsets.windows(2).map(|w| (w[1] - w[0]) as usize);
-        match self.clusters() {
-            0 => self.lights.len(),
-            clusters => lengths.take(clusters).max().unwrap_or(0),
-        }
-    }
-}
 
 /// Bounds of a cluster: those of its leafs.
 #[derive(Clone, Copy)]
@@ -316,6 +196,7 @@ impl Clusters {
 
 #[cfg(test)]
 mod tests {
+    use super::super::LightRef;
     use super::*;
 
     #[test]

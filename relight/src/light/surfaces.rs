@@ -1,7 +1,9 @@
 //! From emitting materials to triangle lights, and from sky materials to suns.
 
-use super::emission::{Emission, EmissionSource};
-use super::{DEFAULT_SUN_RADIUS, EmitterSummary, SUN_IRRADIANCE, SunLight, TriangleLight};
+use super::{
+    DEFAULT_SUN_RADIUS, Emission, EmissionSource, EmitterSummary, SUN_IRRADIANCE, SunLight,
+    TriangleLight,
+};
 use crate::world::{NO_LIGHT, RelitWorld, WorldMaterial, WorldSurface};
 use glam::Vec3;
 

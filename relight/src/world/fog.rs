@@ -22,7 +22,7 @@ const CLEAR: f32 = 1.0e9;
 /// The fogs of a map, and what is wrong with them. Colour and depth come from `fogParms` of the fog's material. A fog
 /// without them is black and of depth 1 in a brush, as the engine's zeroed parameters are; where it fills the world, which
 /// the engine does not load, it hides nothing.
-pub(super) fn fogs(
+pub(crate) fn fogs(
     bsp: &Bsp,
     files: &dyn GameFiles,
     materials: &Materials,

@@ -91,13 +91,13 @@ pub struct Flare {
 
 /// Vertices and triangles while they are gathered.
 #[derive(Default)]
-pub(super) struct Geometry {
+pub(crate) struct Geometry {
     pub vertices: Vec<WorldVertex>,
     pub indices: Vec<u32>,
 }
 
 /// Where one surface's geometry lies, and what follows from it.
-pub(super) struct Placed {
+pub(crate) struct Placed {
     pub first_vertex: u32,
     pub num_vertices: u32,
     pub first_index: u32,

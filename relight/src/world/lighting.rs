@@ -2,9 +2,10 @@
 //! the light that calibration found.
 
 use super::RelitWorld;
-use crate::calibrate::CalibrationReport;
+use crate::emitters::{
+    CalibrationReport, Emission, LightLists, LightReport, PointLight, SunLight, TriangleLight,
+};
 use crate::exposure::Exposure;
-use crate::light::{Emission, LightLists, LightReport, PointLight, SunLight, TriangleLight};
 use glam::Vec3;
 
 /// What light a world is in: everything that [`measure_materials`](RelitWorld::measure_materials),

@@ -2,10 +2,8 @@
 
 use super::holes::Holes;
 use super::pages::{BakedPages, PageLoader};
-use crate::exposure::DEFAULT_EXPONENT;
-use crate::files::GameFiles;
-use crate::light::{Emission, Finder, Flicker, Shade};
-use crate::materials::{Materials, Resolved};
+use crate::emitters::{self, Emission, Flicker, Shade};
+use crate::materials::Resolved;
 use glam::Vec3;
 use q3bsp::{Bsp, SurfaceKind, lightmap_index};
 use shaderscript::ImplicitKind;
@@ -51,7 +49,7 @@ pub struct WorldMaterial {
 
 impl WorldMaterial {
     /// A material before its emission and albedo are measured. `flags`: `SURF_*` and `CONTENTS_*`.
-    pub(super) fn new(
+    pub(crate) fn new(
         name: &str,
         flags: (u32, u32),
         lighting: ImplicitKind,
@@ -79,36 +77,6 @@ impl WorldMaterial {
         }
     }
 
-    /// A material by itself, understood as a map's would be: with the flags that its script gives, what it emits, what
-    /// it throws back.
-    pub fn by_name(
-        files: &dyn GameFiles,
-        materials: &Materials,
-        name: &str,
-        lighting: ImplicitKind,
-    ) -> WorldMaterial {
-        let resolved = materials.resolve(files, name, lighting);
-        let definition = resolved.definition();
-        let flags = (definition.surface_flags, definition.content_flags);
-        let mut pages = PageLoader::new(files);
-        let mut material = WorldMaterial::new(name, flags, lighting, resolved, &mut pages);
-        let mut finder = Finder::new(files, DEFAULT_EXPONENT);
-        material.emission = finder.emission(&material);
-        material.flicker = finder.flicker(&material);
-        material.throw_back(&mut finder, [255; 4]);
-        material.shown = finder.shown(&material);
-        material
-    }
-
-    /// Finds what it throws back of light, and where it lets it through. `corners`: the mean colour of its corners.
-    pub(super) fn throw_back(&mut self, finder: &mut Finder<'_>, corners: [u8; 4]) {
-        self.shades = finder.shades(self, corners);
-        self.holes = finder.holes(self).map(Arc::new);
-        let count = self.shades.len().max(1) as f32;
-        let mean = self.shades.iter().map(|s| s.linear).sum::<Vec3>() / count;
-        self.albedo = (mean.min(Vec3::ONE) * self.stored_scale()).min(Vec3::ONE);
-    }
-
     /// What the compiler multiplied light by before it stored it in lightmaps of this material: by so much less than the
     /// light that falls on them lightmapped surfaces show.
     ///
@@ -117,7 +85,7 @@ impl WorldMaterial {
     pub fn stored_scale(&self) -> f32 {
         let says = self.resolved.definition().light.lightmap_brightness;
         let lightmapped = self.lighting == ImplicitKind::Lightmapped;
-        crate::light::stored_scale(says.filter(|_| lightmapped))
+        emitters::stored_scale(says.filter(|_| lightmapped))
     }
 
     /// Whether it is sky, for the map or for its script.
@@ -128,7 +96,7 @@ impl WorldMaterial {
 
 /// The lightmap index that the engine uses for a surface: triangle soups are lit by vertex, and so is what
 /// names a page that is not there or a code that does not exist.
-pub(super) fn lightmap_of(bsp: &Bsp, index: usize) -> i32 {
+pub(crate) fn lightmap_of(bsp: &Bsp, index: usize) -> i32 {
     let Some(surface) = bsp.surfaces.get(index) else {
         return lightmap_index::BY_VERTEX;
     };
@@ -144,7 +112,7 @@ pub(super) fn lightmap_of(bsp: &Bsp, index: usize) -> i32 {
 }
 
 /// The implicit material that belongs to a lightmap index.
-pub(super) fn lighting_of(lightmap: i32) -> ImplicitKind {
+pub(crate) fn lighting_of(lightmap: i32) -> ImplicitKind {
     match lightmap {
         0.. => ImplicitKind::Lightmapped,
         lightmap_index::NONE => ImplicitKind::EntityLit,

@@ -1,29 +1,26 @@
 //! A map, relit: geometry in flat arrays, materials resolved, light sources found.
 
 pub mod coplanar;
-mod fog;
-mod geometry;
+pub(crate) mod fog;
+pub(crate) mod geometry;
 mod holes;
 mod lighting;
-mod load;
-mod material;
-mod pages;
-#[cfg(test)]
-mod tests;
+pub(crate) mod material;
+pub(crate) mod pages;
 
+pub use crate::emitters::StyleStrength;
 pub use fog::WorldFog;
 pub use geometry::{Flare, NO_LIGHT, WorldModel, WorldSurface, WorldVertex};
 pub use holes::Holes;
 pub use lighting::Lighting;
-pub use load::{LoadError, Options, Progress, Stage};
 pub use material::WorldMaterial;
-pub use pages::{BakedPages, StyleLight, StyleStrength};
+pub use pages::{BakedPages, StyleLight};
 
-use crate::calibrate::CalibrationReport;
-use crate::exposure::Exposure;
-use crate::light::{
-    Flicker, LightColor, LightLists, LightReport, PointLight, SunLight, TriangleLight,
+use crate::emitters::{
+    CalibrationReport, Flicker, LightColor, LightLists, LightReport, PointLight, SunLight,
+    TriangleLight,
 };
+use crate::exposure::{self, Exposure};
 use crate::overbright;
 use glam::Vec3;
 use q3bsp::{Bsp, Lightmap};
@@ -88,7 +85,7 @@ pub struct RelitWorld {
     /// [calibration](crate::calibrate()).
     pub light_end: f32,
     /// Exposure at which the world's light, on the map's textures, is as bright in the mean as the engine shows the map:
-    /// found by [calibration](crate::calibrate()). `None`: see [`display_exposure`](crate::exposure::display_exposure).
+    /// found by [calibration](crate::calibrate()). `None`: see [`display_exposure`](Self::display_exposure).
     pub exposure: Option<Exposure>,
     /// Shift that was applied to vertex colours; see [`overbright`].
     pub overbright_shift: u32,
@@ -148,6 +145,13 @@ impl RelitWorld {
             .get(surface.material as usize)?
             .flicker
             .as_ref()
+    }
+
+    /// The exposure that the map is shown with: what calibration found; else from its lightmaps, or from the colours of its
+    /// vertices.
+    pub fn display_exposure(&self) -> Exposure {
+        let stored = || exposure::of_stored_light(&self.bsp, &self.pages, self.stored_gamma);
+        self.exposure.unwrap_or_else(stored)
     }
 
     /// Number of light sources of all kinds.

@@ -4,12 +4,12 @@
 //! `$lightmap` stage, whose page is an image, and the stages of styles are taken out, so that whoever reads a material finds
 //! one light and the albedo under it.
 
+use crate::emitters::StyleStrength;
 use crate::files::GameFiles;
 use crate::image::{self, Image};
 use q3bsp::Lightmap;
-use shaderscript::eval;
 use shaderscript::light::{BakedLight, baked_light};
-use shaderscript::{RgbGen, Shader, Stage, StageImage, TcMod, Wave};
+use shaderscript::{Shader, Stage, StageImage, TcMod};
 use std::collections::HashMap;
 
 /// Baked light of a material beside the page that each of its surfaces names in the map.
@@ -32,45 +32,8 @@ pub struct StyleLight {
     pub strength: StyleStrength,
 }
 
-/// The factor on a style's light.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum StyleStrength {
-    /// The same at all times.
-    Steady(f32),
-    /// A wave of time.
-    Wave(Wave),
-}
-
-impl StyleStrength {
-    fn of(stage: &Stage) -> StyleStrength {
-        match stage.rgb_gen {
-            RgbGen::Wave(wave) if wave.amplitude == 0.0 => {
-                StyleStrength::Steady(wave.base.clamp(0.0, 1.0))
-            }
-            RgbGen::Wave(wave) => StyleStrength::Wave(wave),
-            RgbGen::Const(color) => {
-                StyleStrength::Steady((color.element_sum() / 3.0).clamp(0.0, 1.0))
-            }
-            _ => StyleStrength::Steady(1.0),
-        }
-    }
-
-    /// The factor at a shader time in seconds, 0..1.
-    pub fn at(self, time: f64) -> f32 {
-        let factor = match self {
-            StyleStrength::Steady(factor) => factor,
-            StyleStrength::Wave(wave) => eval::wave(&wave, time),
-        };
-        if factor.is_finite() {
-            factor.clamp(0.0, 1.0)
-        } else {
-            0.0
-        }
-    }
-}
-
 /// The pages that scripts name, each once.
-pub(super) struct PageLoader<'a> {
+pub(crate) struct PageLoader<'a> {
     files: &'a dyn GameFiles,
     known: HashMap<String, Option<u32>>,
     pub pages: Vec<Lightmap>,
@@ -153,6 +116,7 @@ mod tests {
     use super::*;
     use crate::files::MemoryFiles;
     use glam::Vec2;
+    use shaderscript::eval;
     use shaderscript::parse_script;
 
     fn tga(width: u8, height: u8, bytes: &[u8]) -> Vec<u8> {

@@ -18,7 +18,6 @@ use super::lights::{MapLightSource, MapLights};
 use super::pass_set::PassSet;
 use super::surroundings::Surroundings;
 use super::view_tracer::{TracedMap, ViewTracer};
-use relight::exposure::display_exposure;
 use relight::light::Occlusion;
 
 use crate::assets::compile::sampler;
@@ -154,7 +153,7 @@ impl TraceLook {
         passes.compile_ahead(!relit.bsp.fogs.is_empty())?;
         let (device, tracer) = (passes.device(), passes.tracer());
         let mut view_tracer = ViewTracer::new(passes)?;
-        let exposure = display_exposure(relit);
+        let exposure = relit.display_exposure();
         view_tracer.map_exposure = exposure;
         let fogs = fog_light::lit(&world.data.fogs, &source);
         let geometry = geometry(device, tracer, world, &fogs, assets)?;

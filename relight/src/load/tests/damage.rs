@@ -1,7 +1,8 @@
 //! Damaged maps.
 
 use super::{ceiling_lamp, game, relight};
-use crate::light::TriangleLight;
+use crate::light::{LightsByHand, POINT_LIGHT_INTENSITY, TriangleLight};
+use crate::load::*;
 use crate::materials::Materials;
 use crate::world::*;
 use glam::Vec2;
@@ -209,7 +210,7 @@ fn lights_beyond_arithmetic_are_brought_into_range() {
     assert_eq!(world.lights.len(), 2);
     assert_eq!(world.warnings.len(), 1, "{:?}", world.warnings);
 
-    let (file, wrong) = crate::light::LightsByHand::parse(
+    let (file, wrong) = LightsByHand::parse(
         "scale surfaces 1e38\nambient 3e38 1 1 1\nspot 0 0 0 300 1 1 1 0 0 3e38 30",
     );
     assert_eq!(
@@ -232,5 +233,5 @@ fn lights_beyond_arithmetic_are_brought_into_range() {
     // what overflowed on the way is none; the weak one is as it was
     let [strong, weak] = [0, 1].map(|at| world.point_lights[at].intensity);
     assert!(strong.x > 1.0e9);
-    assert_eq!(weak, Vec3::X * 300.0 * crate::light::POINT_LIGHT_INTENSITY);
+    assert_eq!(weak, Vec3::X * 300.0 * POINT_LIGHT_INTENSITY);
 }

@@ -1,6 +1,7 @@
 //! Geometry: normals, patches, fogs.
 
 use super::{as_said, ceiling_lamp, game, relight};
+use crate::load::*;
 use crate::materials::Materials;
 use crate::world::*;
 use glam::Vec2;

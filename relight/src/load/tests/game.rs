@@ -2,6 +2,7 @@
 
 use crate::calibrate::CalibrationOptions;
 use crate::files::{GameFiles, Pk3, SearchPath};
+use crate::load::*;
 use crate::materials::Materials;
 use crate::world::*;
 

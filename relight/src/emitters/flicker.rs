@@ -1,11 +1,9 @@
 //! Lights that change in time: what the stages of an emitting material show at a moment, over what they show in the
 //! mean.
 
-use super::Finder;
 use crate::image::Image;
 use crate::overbright;
 use crate::overbright::luminance;
-use crate::world::WorldMaterial;
 use glam::{Vec3, Vec4};
 use shaderscript::eval::{self, ColorContext};
 use shaderscript::light::{StageSample, compose};
@@ -35,7 +33,7 @@ pub struct Flicker {
 }
 
 /// Whether something about a stage depends on time.
-fn changes(stage: &Stage) -> bool {
+pub(crate) fn changes(stage: &Stage) -> bool {
     stage.image.names().len() > 1
         || matches!(stage.rgb_gen, RgbGen::Wave(_))
         || matches!(stage.alpha_gen, AlphaGen::Wave(_))
@@ -43,7 +41,10 @@ fn changes(stage: &Stage) -> bool {
 
 impl Flicker {
     /// How a material's stages flicker; `None` if they do not. `image` gives a picture by its name.
-    fn of<'a>(shader: &Shader, mut image: impl FnMut(&str) -> Option<&'a Image>) -> Option<Self> {
+    pub(crate) fn of<'a>(
+        shader: &Shader,
+        mut image: impl FnMut(&str) -> Option<&'a Image>,
+    ) -> Option<Self> {
         if !shader.stages.iter().any(changes) {
             return None;
         }
@@ -143,21 +144,6 @@ fn mean_of_cell(picture: Option<&Image>, x: u32, y: u32) -> Vec4 {
         }
     }
     sum / count.max(1.0)
-}
-
-impl Finder<'_> {
-    /// How the light of an emitting material changes in time; `None` for most.
-    pub fn flicker(&mut self, material: &WorldMaterial) -> Option<Flicker> {
-        material.emission?;
-        let shader = &material.resolved.shader;
-        if material.resolved.fault.is_some() || !shader.stages.iter().any(changes) {
-            return None;
-        }
-        for name in shader.image_names() {
-            self.image(name);
-        }
-        Flicker::of(shader, |name| self.kept(name))
-    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use super::{ORANGE, ceiling_lamp, game, relight};
 use crate::light::{
     EmissionSource, LightColor, LightRef, POINT_LIGHT_INTENSITY, SURFACE_LIGHT_RADIANCE, raise,
 };
+use crate::load::*;
 use crate::materials::Materials;
 use crate::overbright;
 use crate::world::*;

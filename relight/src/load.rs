@@ -1,9 +1,8 @@
 //! From a map's bytes to a [`RelitWorld`].
 
-use super::geometry::{Flare, Geometry, NO_LIGHT, WorldModel, WorldSurface};
-use super::material::{WorldMaterial, lighting_of, lightmap_of};
-use super::pages::PageLoader;
-use super::{RelitWorld, fog};
+#[cfg(test)]
+mod tests;
+
 use crate::calibrate::{CalibrationOptions, calibrate};
 use crate::exposure::{Texture, display_exponent};
 use crate::external_lightmaps::external_lightmaps;
@@ -12,6 +11,10 @@ use crate::image;
 use crate::light::{self, LightColor, LightReport, TriangleLight};
 use crate::materials::Materials;
 use crate::overbright::{self, MAP_OVERBRIGHT_BITS};
+use crate::world::geometry::Geometry;
+use crate::world::material::{lighting_of, lightmap_of};
+use crate::world::pages::PageLoader;
+use crate::world::{Flare, NO_LIGHT, RelitWorld, WorldMaterial, WorldModel, WorldSurface, fog};
 use glam::{Vec3, Vec4};
 use q3bsp::{Bsp, Entity, SurfaceKind};
 use std::collections::{BTreeSet, HashMap};

@@ -1,10 +1,48 @@
 //! Lights of styles, whose strength is a wave of time.
 
-use crate::world::StyleStrength;
+use shaderscript::eval;
+use shaderscript::{RgbGen, Stage, Wave};
 
 /// Times that the mean of a wave is taken over, and their distance in seconds.
 const TIMES: u32 = 256;
 const TIME_STEP: f64 = 0.137;
+
+/// The factor on a style's light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StyleStrength {
+    /// The same at all times.
+    Steady(f32),
+    /// A wave of time.
+    Wave(Wave),
+}
+
+impl StyleStrength {
+    pub(crate) fn of(stage: &Stage) -> StyleStrength {
+        match stage.rgb_gen {
+            RgbGen::Wave(wave) if wave.amplitude == 0.0 => {
+                StyleStrength::Steady(wave.base.clamp(0.0, 1.0))
+            }
+            RgbGen::Wave(wave) => StyleStrength::Wave(wave),
+            RgbGen::Const(color) => {
+                StyleStrength::Steady((color.element_sum() / 3.0).clamp(0.0, 1.0))
+            }
+            _ => StyleStrength::Steady(1.0),
+        }
+    }
+
+    /// The factor at a shader time in seconds, 0..1.
+    pub fn at(self, time: f64) -> f32 {
+        let factor = match self {
+            StyleStrength::Steady(factor) => factor,
+            StyleStrength::Wave(wave) => eval::wave(&wave, time),
+        };
+        if factor.is_finite() {
+            factor.clamp(0.0, 1.0)
+        } else {
+            0.0
+        }
+    }
+}
 
 /// How a light's strength changes in time, about its mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,7 +78,7 @@ impl Pulse {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shaderscript::{Wave, WaveFunction};
+    use shaderscript::WaveFunction;
 
     #[test]
     fn strength_is_told_about_its_mean() {
