@@ -8,12 +8,12 @@ impl Random {
     /// A generator of its own for every seed.
     pub fn new(seed: u64) -> Random {
         let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0xD1B5_4A32_D192_ED03);
-        random.next();
+        random.uniform();
         random
     }
 
     /// Evenly in 0..1, 1 excluded.
-    pub fn next(&mut self) -> f32 {
+    pub fn uniform(&mut self) -> f32 {
         self.0 = self
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -24,7 +24,7 @@ impl Random {
 
     /// Barycentric coordinates of the second and third corner, evenly over a triangle.
     pub fn in_triangle(&mut self) -> (f32, f32) {
-        let (u, v) = (self.next(), self.next());
+        let (u, v) = (self.uniform(), self.uniform());
         if u + v > 1.0 {
             (1.0 - u, 1.0 - v)
         } else {
@@ -39,5 +39,5 @@ pub fn lot(seed: u64, name: &[u32]) -> f32 {
         let mixed = (so_far ^ u64::from(*word)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
         mixed ^ (mixed >> 29)
     };
-    Random::new(name.iter().fold(seed, drawn)).next()
+    Random::new(name.iter().fold(seed, drawn)).uniform()
 }

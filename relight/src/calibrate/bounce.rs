@@ -146,8 +146,8 @@ fn seen(
     let mut row: Vec<(u32, Vec3)> = Vec::new();
     let part = 1.0 / (SIDE * SIDE) as f32;
     for stratum in 0..SIDE * SIDE {
-        let x = ((stratum % SIDE) as f32 + random.next()) / SIDE as f32;
-        let y = ((stratum / SIDE) as f32 + random.next()) / SIDE as f32;
+        let x = ((stratum % SIDE) as f32 + random.uniform()) / SIDE as f32;
+        let y = ((stratum / SIDE) as f32 + random.uniform()) / SIDE as f32;
         // Density cosine / π: the mean of radiance is irradiance / π (Malley's method).
         let (sin, cos) = (x * TAU).sin_cos();
         let radius = y.sqrt();
@@ -287,7 +287,8 @@ mod tests {
     #[test]
     fn the_nearest_sample_of_its_plane_stands_for_a_place() {
         let mut random = Random::new(7);
-        let mut anywhere = || Vec3::new(random.next(), random.next(), random.next()) * 500.0;
+        let mut anywhere =
+            || Vec3::new(random.uniform(), random.uniform(), random.uniform()) * 500.0;
         let samples: Vec<Sample> = (0..400).map(|_| sample_at_place(anywhere())).collect();
         let near = Near::new(&samples);
         let mut elsewhere = 0;

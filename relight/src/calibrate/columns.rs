@@ -399,7 +399,7 @@ fn triangles_at(
             continue;
         }
         let chance = (expected / (scale * ROULETTE)).min(1.0);
-        if chance < 1.0 && random.next() >= chance {
+        if chance < 1.0 && random.uniform() >= chance {
             continue;
         }
         let seen = visible_part(occluders, sample, light, random);

@@ -313,7 +313,7 @@ pub(super) fn pick(len: usize, count: usize, random: &mut Random) -> impl Iterat
     (0..count).map(move |i| {
         let low = i * len / count.max(1);
         let high = (i + 1) * len / count.max(1);
-        low + (((high - low) as f32 * random.next()) as usize).min(high.saturating_sub(low + 1))
+        low + (((high - low) as f32 * random.uniform()) as usize).min(high.saturating_sub(low + 1))
     })
 }
 

@@ -308,8 +308,8 @@ mod tests {
         let origin = Vec3::ZERO;
         let falloff = Falloff::InverseSquare;
         let mut rows = || -> Vec<(u32, f32)> {
-            let chosen: Vec<u32> = (0..50).filter(|_| random.next() < 0.3).collect();
-            chosen.into_iter().map(|i| (i, random.next())).collect()
+            let chosen: Vec<u32> = (0..50).filter(|_| random.uniform() < 0.3).collect();
+            chosen.into_iter().map(|i| (i, random.uniform())).collect()
         };
         let columns: Vec<Column> = (0..60)
             .map(|_| Column {
@@ -322,7 +322,7 @@ mod tests {
             })
             .collect();
         let rest: Vec<Vec4> = (0..50)
-            .map(|_| Vec4::new(random.next(), random.next(), random.next(), 1.0))
+            .map(|_| Vec4::new(random.uniform(), random.uniform(), random.uniform(), 1.0))
             .collect();
         let heard: Vec<Heard> = columns.iter().map(|c| Heard::of(c, &rest)).collect();
         let all: Vec<usize> = (0..columns.len()).collect();

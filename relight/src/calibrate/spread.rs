@@ -110,7 +110,8 @@ mod tests {
     #[test]
     fn four_at_a_time_are_those_that_one_by_one_are() {
         let mut random = Random::new(11);
-        let mut anywhere = || Vec3::new(random.next(), random.next(), random.next()) * 400.0;
+        let mut anywhere =
+            || Vec3::new(random.uniform(), random.uniform(), random.uniform()) * 400.0;
         let mut samples: Vec<Sample> = (0..203).map(|_| sample_at_place(anywhere())).collect();
         for (k, sample) in samples.iter_mut().enumerate() {
             sample.normal = (anywhere() - 200.0).normalize();

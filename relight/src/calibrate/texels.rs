@@ -140,7 +140,7 @@ pub(super) fn take(
     let mut taken = HashSet::new();
     for stratum in 0..strata {
         for _ in 0..TRIES {
-            let at = (stratum as f64 + f64::from(random.next())) / strata as f64;
+            let at = (stratum as f64 + f64::from(random.uniform())) / strata as f64;
             let Some(found) = shares.texel_at(at, random) else {
                 continue;
             };
@@ -155,7 +155,7 @@ pub(super) fn take(
     }
     if thinned {
         let dark = |s: &Sample| s.value == Vec3::ZERO;
-        samples.retain(|s| s.held_out || !dark(s) || random.next() * BLACK_THINNED < 1.0);
+        samples.retain(|s| s.held_out || !dark(s) || random.uniform() * BLACK_THINNED < 1.0);
     }
     parallel::each(&mut samples, |sample| gauge.clean(sample));
     samples

@@ -62,8 +62,8 @@ pub(super) fn seen(
         let mut random = Random::new(0x5EE0_0000 + i as u64);
         let aside = view.forward.cross(Vec3::Z);
         let pixel = |ray: usize| {
-            let x = (ray as f32 + random.next()) / rays as f32 * 2.0 - 1.0;
-            let y = (random.next() * 2.0 - 1.0) * HALF_HEIGHT;
+            let x = (ray as f32 + random.uniform()) / rays as f32 * 2.0 - 1.0;
+            let y = (random.uniform() * 2.0 - 1.0) * HALF_HEIGHT;
             let ray = view.forward + aside * x + Vec3::Z * y;
             let hit = occluders.nearest(view.eye, ray, f32::INFINITY);
             let hit = hit.filter(|hit| hit.front && !hit.sky)?;

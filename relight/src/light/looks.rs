@@ -104,7 +104,7 @@ fn look(
 ) -> (Pair, u32) {
     let (mut bare, mut arrived, mut rays, mut hits, mut tries) = (0.0, 0.0, 0u32, 0u32, 0u32);
     let mut peak = 0.0f32;
-    let start = (random.next() * receivers.len() as f32) as usize;
+    let start = (random.uniform() * receivers.len() as f32) as usize;
     while rays < most && tries < 2 * most && (hits == 0 || rays < ENOUGH) {
         let Some(receiver) = receivers.get((start + tries as usize) % receivers.len()) else {
             break;

@@ -100,7 +100,7 @@ fn on_drawn(
         if points.len() == count {
             break;
         }
-        let at = random.next() * total;
+        let at = random.uniform() * total;
         let found = triangles
             .partition_point(|(end, _)| *end <= at)
             .min(triangles.len() - 1);
@@ -138,7 +138,7 @@ fn in_boxes(
         let Some(&(low, high)) = boxes.get(attempt % boxes.len()) else {
             break;
         };
-        let at = Vec3::new(random.next(), random.next(), random.next());
+        let at = Vec3::new(random.uniform(), random.uniform(), random.uniform());
         let position = low + (high - low) * at;
         if inside(position) {
             points.push(Receiver {
@@ -198,7 +198,8 @@ impl<'a> Target<'a> {
                 (point, power * facing * cosine(to) / (PI * squared))
             }
             Target::Point(light) => {
-                let around = Vec3::new(random.next(), random.next(), random.next()) * 2.0 - 1.0;
+                let around =
+                    Vec3::new(random.uniform(), random.uniform(), random.uniform()) * 2.0 - 1.0;
                 let point = light.origin + around.clamp_length_max(1.0) * light.radius;
                 let offset = light.origin - receiver.position;
                 let squared = offset

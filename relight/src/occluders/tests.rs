@@ -24,8 +24,9 @@ fn alone([a, b, c]: [Vec3; 3], sky: bool, tag: u32, from: Vec3, ray: Vec3) -> Op
 #[test]
 fn agrees_with_trying_every_triangle() {
     let mut random = Random::new(7);
-    let mut point =
-        |scale: f32| (Vec3::new(random.next(), random.next(), random.next()) - 0.5) * scale;
+    let mut point = |scale: f32| {
+        (Vec3::new(random.uniform(), random.uniform(), random.uniform()) - 0.5) * scale
+    };
     let input: Vec<([Vec3; 3], bool, u32)> = (0..500)
         .map(|tag| {
             let at = point(100.0);
