@@ -48,7 +48,7 @@ struct LitSample {
     float path;
     vec3 face_normal;
     vec3 normal;
-    vec2 light; // luminance of direct and indirect light, as halfs hold it; negative: not known
+    vec2 light; // luminance of direct and indirect light, rounded to 16-bit floats; negative: not known
 };
 
 void keep_nothing(ivec2 stratum) { imageStore(uimages_rgba32ui[DENOISE.samples], stratum, uvec4(NOT_CARRIED)); }

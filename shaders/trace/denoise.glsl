@@ -38,7 +38,7 @@ float dither(ivec2 pixel, uint stream) {
 // reflection that takes turns with what lies behind it: the two may be walls side by side, and lit otherwise. It is the
 // highest bit of the normal's z, so that to compare normals is to compare it, too. 0: nothing to light.
 const float NEAREST_DEPTH = 1.0e-3, FARTHEST_DEPTH = 60000.0;
-// Keeps inverses of all depths within the normal numbers of halfs.
+// Keeps inverses of all depths within the normal range of 16-bit floats.
 const float INVERSE_SCALE = 32.0;
 
 uint pack_depth(float depth) { return packHalf2x16(vec2(INVERSE_SCALE / clamp(depth, NEAREST_DEPTH, FARTHEST_DEPTH), 0.0)); }
@@ -113,7 +113,7 @@ vec3 light_of_texel(float level, float green, float red) {
 const float MOST_LEVEL = 16000.0;
 
 // Colours over the level, as bytes of which 128 is grey: the low ones of both halves, and the high ones.
-const uint CODES = 0x00FF00FFu, CODE_BASE = 0x64006400u; // halfs from 1024 on count ones
+const uint CODES = 0x00FF00FFu, CODE_BASE = 0x64006400u; // 16-bit floats step by 1 from 1024 on
 
 const float CODE_GREY = 1024.0 + 128.0, CODE_SCALE = 1.0 / 127.0;
 

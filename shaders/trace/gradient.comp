@@ -8,11 +8,11 @@
 const int ACROSS = 16, DOWN = 8, BORDER = 6, WIDE = ACROSS + 2 * BORDER, HIGH = DOWN + 2 * BORDER;
 layout(local_size_x = ACROSS, local_size_y = DOWN) in;
 
-// change and size of direct light, of indirect light, as halfs; each step reads one and writes the other
+// change and size of direct light, of indirect light, as 16-bit floats; each step reads one and writes the other
 shared uvec2 tiles[2][WIDE * HIGH];
 shared uint guides[WIDE * HIGH];
-// logarithms of the luminance that the last frame was left with, of both, as halfs: bright light that has not changed
-// must not hide that dim light beside it has
+// logarithms of the luminance that the last frame was left with, of both, as 16-bit floats: bright light that has not
+// changed must not hide that dim light beside it has
 shared uint levels[WIDE * HIGH];
 // logarithms of the inverse depths
 shared float depths[WIDE * HIGH];

@@ -1,7 +1,8 @@
 #version 460
 // The temporal gradient of each stratum's own sample: how much its light differs from the light that the same sample had
 // in the last frame (Schied et al. 2018, section 4.2). What gradient.comp spreads, in one texel: change and size of direct
-// light, of indirect light, and the logarithms of the luminance that the last frame was left with, as halfs; the guide.
+// light, of indirect light, and the logarithms of the luminance that the last frame was left with, as 16-bit floats; the
+// guide.
 #include "trace/sparse.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
