@@ -12,8 +12,9 @@ use relight::calibrate::{
 use relight::{CalibrationCache, CalibrationOptions, Options, RelitWorld};
 use serde_json::{Value, json};
 
+use crate::game::Maps;
 use crate::scripts::load_scripts;
-use crate::view::{Maps, open};
+use crate::view::open;
 
 /// Tell how well traced light agrees with maps' lightmaps, before and after calibration
 ///
@@ -32,7 +33,7 @@ pub struct CalibrationArgs {
     /// Seed of the choice of measurements
     #[arg(long)]
     seed: Option<u64>,
-    /// Folder to keep results in
+    /// Keep what calibration finds in this folder, and take it from there
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
     /// Hide the light entities that maps kept, and tell how many of them are found again
@@ -41,7 +42,7 @@ pub struct CalibrationArgs {
     /// Tell how many lightmap texels beside point lights these make too bright
     #[arg(long)]
     spots: bool,
-    /// One JSON object a map, in place of a table
+    /// Print JSON in place of a table: one object a map
     #[arg(long)]
     json: bool,
 }
@@ -70,7 +71,7 @@ pub fn run(args: &CalibrationArgs) -> Result<()> {
     }
     let mut reports = Vec::new();
     for map in &args.chosen.maps {
-        let (files, path) = open(map, &args.chosen.games)?;
+        let (files, path) = open(map, &args.chosen.game)?;
         let (materials, _) = load_scripts(&*files);
         let default = CalibrationOptions::default();
         let calibrate = CalibrationOptions {

@@ -1,37 +1,39 @@
 //! `relight cameras`: places to look at maps from, chosen by a rule.
 
-use std::path::PathBuf;
-
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use glam::Vec3;
-use relight::{GameFiles, SearchPath};
+use relight::GameFiles;
+
+use crate::game::Game;
+use crate::view::{map_name, open};
 
 /// The game puts players this much above their spawn point.
 const SPAWN_LIFT: f32 = 9.0;
 /// Height of the eyes above the player's origin.
 pub const EYES: f32 = 26.0;
 
-/// Options of `relight cameras`.
+/// List places to look at maps from: intermission cameras and spawn points
+///
+/// Prints a line for each: the map, a tab, and X Y Z YAW as the game's setviewpos takes them. The eye is 26 units above.
+///
+/// Examples: relight cameras oa_dm1; relight cameras --views 1 --every 3
 #[derive(Args, Debug)]
 pub struct CamerasArgs {
-    /// Game folder with packs; give several in rising priority
-    #[arg(
-        long = "game",
-        value_name = "DIR",
-        default_value = "/usr/share/games/openarena/baseoa"
-    )]
-    games: Vec<PathBuf>,
-    /// Places of each map: the camera of the intermission first, then spawn points, evenly out of the map's list
-    #[arg(long, default_value_t = 3, value_parser = crate::numbers::count)]
-    each: usize,
+    #[command(flatten)]
+    game: Game,
+    /// Views of each map: the camera of the intermission first, then spawn points, evenly out of the map's list
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = crate::numbers::count)]
+    views: usize,
     /// Every how many maps of the list in alphabetical order, when none is named
     #[arg(long, default_value_t = 1, value_parser = crate::numbers::count)]
     every: usize,
     /// How many maps of that list are left out at its start
     #[arg(long, default_value_t = 0)]
     skip: usize,
-    /// Maps by name. Without any: all maps of the game folders where a player can appear
+    /// Maps: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) with one map, or pack.pk3:maps/x.bsp. Without
+    /// any: all maps of the game where a player can appear
+    #[arg(value_name = "MAP")]
     maps: Vec<String>,
 }
 
@@ -44,43 +46,54 @@ pub struct Place {
 }
 
 /// Prints a line for each place: the map, a tab, `x y z yaw` for the game's `setviewpos`.
+///
+/// # Errors
+/// A map cannot be read, or one that is named has no place for a player.
 pub fn run(args: &CamerasArgs) -> Result<()> {
-    let files = SearchPath::open(&args.games)?;
-    let named = !args.maps.is_empty();
-    let mut maps = args.maps.clone();
-    if !named {
-        let bsps = files.list("maps", ".bsp");
-        maps = bsps
-            .iter()
+    let mut found = Vec::new();
+    if args.maps.is_empty() {
+        let files = args.game.files()?;
+        let listed = files.list("maps", ".bsp");
+        let mut maps: Vec<String> = (listed.iter())
             .filter_map(|file| file.strip_suffix(".bsp"))
             .map(str::to_lowercase)
             .collect();
         maps.sort();
         maps.dedup();
-    }
-    let mut playable = Vec::new();
-    for map in maps {
-        let path = format!("maps/{map}.bsp");
-        let Some(bytes) = files.read(&path)? else {
-            bail!("{path} is not in the game folders");
-        };
-        let bsp = q3bsp::Bsp::parse(&bytes).with_context(|| path.clone())?;
-        let places = places(&bsp.entities(), args.each);
-        if places.is_empty() && named {
-            bail!("{path}: no player can appear there");
+        for map in maps {
+            let places = places_of(&files, &format!("maps/{map}.bsp"), args.views)?;
+            if !places.is_empty() {
+                found.push((map, places));
+            }
         }
-        if !places.is_empty() {
-            playable.push((map, places));
+        found = (found.into_iter().skip(args.skip))
+            .step_by(args.every)
+            .collect();
+    } else {
+        for map in &args.maps {
+            let (files, path) = open(map, &args.game)?;
+            let places = places_of(&*files, &path, args.views)?;
+            if places.is_empty() {
+                bail!("{path}: no player can appear there");
+            }
+            found.push((map_name(&path).to_owned(), places));
         }
     }
-    let step = if named { 1 } else { args.every };
-    let skip = if named { 0 } else { args.skip };
-    for (map, places) in playable.iter().skip(skip).step_by(step) {
+    for (map, places) in found {
         for Place { origin, yaw } in places {
             println!("{map}\t{} {} {} {yaw}", origin.x, origin.y, origin.z);
         }
     }
     Ok(())
+}
+
+/// The places of one map.
+fn places_of(files: &dyn GameFiles, path: &str, count: usize) -> Result<Vec<Place>> {
+    let Some(bytes) = files.read(path)? else {
+        bail!("{path} is not in the game folders");
+    };
+    let bsp = q3bsp::Bsp::parse(&bytes).with_context(|| path.to_owned())?;
+    Ok(places(&bsp.entities(), count))
 }
 
 /// The intermission's camera and spawn points, `count` at most.

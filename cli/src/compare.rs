@@ -8,7 +8,12 @@ use relight::compare::{Rgb8, compare, flip};
 
 use crate::pictures::{read, write};
 
-/// Options of `relight compare`.
+/// Tell how alike pictures of one view are
+///
+/// Prints a line for each picture: structural similarity (1: the same), mean FLIP (0: the same), mean absolute and root
+/// mean square difference (0 to 255), share of pixels that differ by more than 8, mean luminance of both; of folders a table.
+///
+/// Examples: relight compare reference.png other.png --side-by-side both.png; relight compare opengl1 vk --worst-to worst
 #[derive(Args, Debug)]
 pub struct CompareArgs {
     /// The picture to compare with (PNG, JPEG or TGA), or a folder of pictures

@@ -22,9 +22,10 @@ use relight::{
 };
 use serde::Serialize;
 
-use crate::BAD_INPUT;
 use crate::brought::Brought;
+use crate::game::Game;
 use crate::numbers::positive;
+use crate::outcome::{BAD_INPUT, one_sentence};
 use crate::scripts::load_scripts;
 use inputs::Input;
 
@@ -38,22 +39,17 @@ use inputs::Input;
 /// relight convert pak1-maps.pk3:maps/kaos.bsp my.bsp -o out --format gltf
 #[derive(Args, Debug)]
 pub struct ConvertArgs {
-    /// Maps: a .bsp file, a pack (.pk3) for all maps in it, pack.pk3:maps/x.bsp, or the name of a map of the game
-    #[arg(required = true, value_name = "INPUT")]
+    /// Maps: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) for all maps in it, or pack.pk3:maps/x.bsp
+    #[arg(required = true, value_name = "MAP")]
     inputs: Vec<String>,
     /// File to write, or for several maps the folder; maps of several packs get a folder each
-    #[arg(short, long, value_name = "OUT")]
+    #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// Format; by default that of OUT's extension, else the first
+    /// Format; default: that of the output's extension, else the first
     #[arg(long, value_parser = parse_format)]
     format: Option<Format>,
-    /// Game folder with packs, for images and scripts; give several in rising priority
-    #[arg(
-        long = "game",
-        value_name = "DIR",
-        default_value = "/usr/share/games/openarena/baseoa"
-    )]
-    games: Vec<PathBuf>,
+    #[command(flatten)]
+    game: Game,
     /// Length of an id unit in the output
     #[arg(long, default_value_t = METRES_PER_UNIT, value_parser = positive)]
     scale: f32,
@@ -65,7 +61,7 @@ pub struct ConvertArgs {
     lights: Option<LightChoice>,
     /// What all light is multiplied by; by default so much that the map is as bright as in the game
     #[arg(long, value_parser = positive)]
-    exposure: Option<f32>,
+    light_scale: Option<f32>,
     /// Where images go: as usual for the format, inside the file, into a folder beside it, or nowhere
     #[arg(long, value_enum, default_value_t = ImageChoice::Usual)]
     images: ImageChoice,
@@ -202,11 +198,11 @@ struct Shared<'a> {
 /// Converts the maps.
 pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
     let format = format_of(args)?;
-    let mut files = SearchPath::open(&args.games)?;
-    let inputs = match inputs::find(&mut files, &args.games, &args.inputs) {
+    let mut files = args.game.files()?;
+    let inputs = match inputs::find(&mut files, &args.game.paths, &args.inputs) {
         Ok(inputs) => inputs,
         Err(problem) => {
-            eprintln!("{}", crate::one_sentence(&problem));
+            eprintln!("{}", one_sentence(&problem));
             return Ok(ExitCode::from(BAD_INPUT));
         }
     };
@@ -289,7 +285,7 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
     let failure = |bad_input: bool| {
         move |error: anyhow::Error| Failure {
             map: input.to_string(),
-            error: crate::one_sentence(&error),
+            error: one_sentence(&error),
             bad_input,
         }
     };
@@ -345,7 +341,7 @@ fn convert(shared: &Shared, input: &Input, output: &Path) -> Result<Converted, F
                 BrushChoice::Classic => Brushes::Classic,
             },
             lights,
-            exposure: args.exposure,
+            exposure: args.light_scale,
             sky: match args.sky {
                 SkyChoice::Box => Sky::Box,
                 SkyChoice::Panorama => Sky::Panorama,

@@ -16,9 +16,10 @@ use relight::{
 };
 use serde::Serialize;
 
-use crate::BAD_INPUT;
 use crate::brought::Brought;
 use crate::convert::inputs::{self, Input};
+use crate::game::Game;
+use crate::outcome::{BAD_INPUT, one_sentence};
 use crate::scripts::load_scripts;
 use describe::MapInfo;
 
@@ -31,14 +32,9 @@ use describe::MapInfo;
 /// Examples: relight info oa_dm1; relight info pak1-maps.pk3; relight info my.bsp --json
 #[derive(Args, Debug)]
 pub struct InfoArgs {
-    /// Game folder with packs; give several in rising priority (the base game first, the mod after it)
-    #[arg(
-        long = "game",
-        value_name = "DIR",
-        default_value = "/usr/share/games/openarena/baseoa"
-    )]
-    games: Vec<PathBuf>,
-    /// Print JSON instead of a table
+    #[command(flatten)]
+    game: Game,
+    /// Print JSON in place of a table
     #[arg(long)]
     json: bool,
     /// A table also for a single map
@@ -53,9 +49,9 @@ pub struct InfoArgs {
     /// Keep what calibration finds in this folder, and take it from there
     #[arg(long, value_name = "DIR", requires = "calibrate")]
     cache: Option<PathBuf>,
-    /// Maps by name (oa_dm1), by game path (maps/oa_dm1.bsp) or by file; packs (.pk3) stand for all maps in
-    /// them, pack.pk3:maps/x.bsp for one. Without any: all maps of the game folders
-    #[arg(value_name = "MAP|PK3")]
+    /// Maps: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) for all maps in it, or pack.pk3:maps/x.bsp.
+    /// Without any: all maps of the game
+    #[arg(value_name = "MAP")]
     maps: Vec<String>,
 }
 
@@ -68,15 +64,15 @@ struct Failure {
 
 /// Loads the maps and prints what is in them. Exit code 2 when one of them cannot be read.
 pub fn run(args: &InfoArgs) -> Result<ExitCode> {
-    let mut files = SearchPath::open(&args.games)?;
+    let mut files = args.game.files()?;
     let mut sources = Vec::new();
     let mut failures = Vec::new();
     for name in &args.maps {
-        match inputs::find(&mut files, &args.games, std::slice::from_ref(name)) {
+        match inputs::find(&mut files, &args.game.paths, std::slice::from_ref(name)) {
             Ok(found) => sources.extend(found),
             Err(error) => failures.push(Failure {
                 map: name.clone(),
-                error: crate::one_sentence(&error),
+                error: one_sentence(&error),
             }),
         }
     }
@@ -85,7 +81,7 @@ pub fn run(args: &InfoArgs) -> Result<ExitCode> {
         maps.sort();
         sources.extend(maps.iter().map(|map| Input::Game(format!("maps/{map}"))));
         if sources.is_empty() {
-            let games = args.games.iter().map(|g| g.display().to_string());
+            let games = args.game.paths.iter().map(|g| g.display().to_string());
             bail!("no maps in {}", games.collect::<Vec<_>>().join(", "));
         }
     }
@@ -100,7 +96,7 @@ pub fn run(args: &InfoArgs) -> Result<ExitCode> {
             Ok(info) => infos.push(info),
             Err(error) => failures.push(Failure {
                 map: name,
-                error: crate::one_sentence(&error),
+                error: one_sentence(&error),
             }),
         }
         bar.inc(1);

@@ -1,17 +1,17 @@
 //! `relight material`: how a material is understood.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use relight::export::material_json;
-use relight::{GameFiles, Options, RelitWorld, SearchPath, WorldMaterial};
+use relight::{GameFiles, Options, RelitWorld, WorldMaterial};
 use serde::Serialize;
 use serde_json::Value;
 use shaderscript::{Diagnostic, ImplicitKind};
 
+use crate::game::Game;
 use crate::scripts::load_scripts;
 use crate::view::open;
 
@@ -27,13 +27,8 @@ pub struct MaterialArgs {
     /// Names as maps and models write them
     #[arg(required = true, value_name = "NAME")]
     names: Vec<String>,
-    /// Game folder with packs; give several in rising priority
-    #[arg(
-        long = "game",
-        value_name = "DIR",
-        default_value = "/usr/share/games/openarena/baseoa"
-    )]
-    games: Vec<PathBuf>,
+    #[command(flatten)]
+    game: Game,
     /// A map that uses the materials: with its flags and the way that it lights them. Of formats that have materials
     /// of their own (Quake, Quake II) it brings these along; so does a pack
     #[arg(long, value_name = "MAP")]
@@ -41,7 +36,7 @@ pub struct MaterialArgs {
     /// How the surface is lit that it is used on, which decides what a bare image becomes; not asked where the map tells
     #[arg(long, value_enum, default_value_t = Lighting::Lightmap)]
     lighting: Lighting,
-    /// Print JSON
+    /// Print JSON in place of text
     #[arg(long)]
     json: bool,
 }
@@ -129,10 +124,10 @@ struct Line {
 pub fn run(args: &MaterialArgs) -> Result<ExitCode> {
     let (files, map): (Arc<dyn GameFiles>, _) = match &args.map {
         Some(map) => {
-            let (files, name) = open(map, &args.games)?;
+            let (files, name) = open(map, &args.game)?;
             (files, Some(name))
         }
-        None => (Arc::new(SearchPath::open(&args.games)?), None),
+        None => (Arc::new(args.game.files()?), None),
     };
     let files = &*files;
     let (materials, diagnostics) = load_scripts(files);

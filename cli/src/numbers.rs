@@ -22,6 +22,16 @@ pub fn not_negative(text: &str) -> Result<f32, String> {
     number(text, "0 or a number above it", |n| n >= 0.0)
 }
 
+/// Finite numbers with commas or spaces between; `None` where something else is among them.
+pub fn list(text: &str) -> Option<Vec<f32>> {
+    let words = text
+        .split(|c: char| c == ',' || c.is_whitespace())
+        .filter(|word| !word.is_empty());
+    words
+        .map(|word| word.parse().ok().filter(|n: &f32| n.is_finite()))
+        .collect()
+}
+
 /// A horizontal field of view, degrees, that a flat picture can have.
 pub fn fov(text: &str) -> Result<f32, String> {
     number(
@@ -66,5 +76,7 @@ mod tests {
         assert_eq!(traced_part("0.5"), Ok(0.5));
         assert!(count("0").is_err() && count("1.5").is_err() && count("-1").is_err());
         assert_eq!(count("3"), Ok(3));
+        assert_eq!(list("1,-2 3.5"), Some(vec![1.0, -2.0, 3.5]));
+        assert!(list("1,x").is_none() && list("1,inf").is_none());
     }
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::game::Game;
 use crate::numbers;
 use crate::pictures::write_png;
 use crate::timings::Timings;
@@ -53,41 +54,30 @@ pub enum Tracer {
 ///
 /// A picture appears whole or not at all. Exit code: 0, or 2 when the map cannot be read, or 1 for everything else.
 ///
-/// Examples: relight render oa_dm1 -o oa_dm1.png; relight render my.bsp --spawn 2 --classic -o spawn.png;
+/// Examples: relight render oa_dm1 -o oa_dm1.png; relight render my.bsp --spawn 2 --look classic -o spawn.png;
 /// relight render oa_dm1 --view 100,-50,80,90,10 --spp 256 --size 640x480 -o view.png;
 /// relight render oa_dm1 --path flight.txt --frames 120 --spp 16 -o flight.png (flight_0000.png, flight_0001.png, …)
 #[derive(Args, Debug)]
 pub struct RenderArgs {
-    /// The map: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp or .pk3 file, or pack.pk3:maps/x.bsp
-    #[arg(required_unless_present = "sample")]
+    /// The map: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) with one map, or pack.pk3:maps/x.bsp
+    #[arg(required_unless_present = "sample", value_name = "MAP")]
     map: Option<String>,
     /// Render the built-in sample map
     #[arg(long, conflicts_with = "map")]
     sample: bool,
-    /// Game folder with pk3s; may be given more than once, the last has precedence
-    #[arg(
-        long,
-        value_name = "DIR",
-        default_value = "/usr/share/games/openarena/baseoa"
-    )]
-    game: Vec<PathBuf>,
+    #[command(flatten)]
+    game: Game,
     /// Where the picture goes (PNG)
-    #[arg(short, long)]
+    #[arg(short, long, value_name = "PATH")]
     output: PathBuf,
-    /// How the picture is made; traced where nothing is said
+    /// How the picture is made; default: traced, and classic with --overview
     #[arg(long, value_enum)]
     look: Option<Look>,
-    /// The same as --look classic
-    #[arg(long, conflicts_with_all = ["look", "traced"])]
-    classic: bool,
-    /// The same as --look traced
-    #[arg(long, conflicts_with = "look")]
-    traced: bool,
     /// Size in pixels
-    #[arg(long, default_value = "1280x720", value_parser = parse_size)]
+    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x720", value_parser = parse_size)]
     size: (u32, u32),
-    /// Where to look from, units and degrees: x,y,z, and yaw and pitch (down) where they are not 0; by default from the
-    /// map's intermission or first spawn point
+    /// Where to look from, units and degrees: x,y,z, and yaw and pitch (down) where they are not 0; default: the map's
+    /// intermission or first spawn point
     #[arg(long, value_parser = parse_view, allow_hyphen_values = true, value_name = "X,Y,Z,YAW,PITCH")]
     view: Option<Camera>,
     /// Look from a place where players appear, counted from 0 in the map's order
@@ -97,18 +87,15 @@ pub struct RenderArgs {
     /// place on the way there that is inside, under the sky
     #[arg(long, conflicts_with_all = ["view", "spawn"])]
     overview: bool,
-    /// The same as --view, as words: X Y Z YAW PITCH
-    #[arg(long, num_args = 4..=5, value_parser = numbers::finite, allow_negative_numbers = true,
-        conflicts_with_all = ["view", "spawn", "overview"], value_names = ["X", "Y", "Z", "YAW", "PITCH"])]
-    camera: Option<Vec<f32>>,
     /// Horizontal field of view, degrees, from 1 to 170
     #[arg(long, default_value_t = 90.0, value_parser = numbers::fov)]
     fov: f32,
-    /// Samples that the traced look takes for each pixel: 64, where --frames says no other number
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    /// Frames that are drawn for a picture, each with a sample a pixel: 64 by default. The classic look draws more than one
+    /// only with --timings or --stats
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// With --path: pictures, evenly along the path, --spp samples each. Without: frames that are drawn for one picture
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    /// Pictures of a --path, evenly along it; each is drawn --spp times
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
     /// How traced light chooses lights
     #[arg(long, value_enum, default_value = "resampled")]
@@ -130,7 +117,7 @@ pub struct RenderArgs {
     #[arg(long, default_value_t = 0.0, value_parser = numbers::not_negative)]
     time: f32,
     /// Vulkan device: part of its name
-    #[arg(long)]
+    #[arg(long, value_name = "NAME")]
     device: Option<String>,
     /// Switch Vulkan's validation layer on; any message is an error
     #[arg(long)]
@@ -144,18 +131,17 @@ pub struct RenderArgs {
     stats: bool,
     /// Camera path, a frame a line, as the console command rt_path records it: a series of pictures with --frames;
     /// without, its frames are drawn one after the other, as a game would, and the last is the picture
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["camera", "view", "spawn", "overview", "turn"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["view", "spawn", "overview", "turn"])]
     path: Option<PathBuf>,
     /// Turn the camera once round over the frames, so that they show different things
     #[arg(long)]
     turn: bool,
-    /// Measure frames as a game would send them: nothing accumulates
+    /// Draw frames as a game shows them: nothing accumulates
     #[arg(long)]
     no_accumulation: bool,
     /// Move the camera by this much from frame to frame, so that the last frame is where it was asked for
-    #[arg(long, num_args = 4, value_parser = numbers::finite, allow_negative_numbers = true,
-        value_names = ["X", "Y", "Z", "YAW"])]
-    step: Option<Vec<f32>>,
+    #[arg(long, value_parser = parse_step, allow_hyphen_values = true, value_name = "X,Y,Z,YAW")]
+    step: Option<[f32; 4]>,
     /// Look into a step of the traced look: the numbers of the console variable rt_debug
     #[arg(long, default_value_t = 0)]
     debug: u32,
@@ -167,10 +153,10 @@ pub struct RenderArgs {
     no_taa: bool,
     /// Width and height that are traced over those of the picture, 0.25 to 1, for frames that do not accumulate
     #[arg(long, default_value_t = 1.0, value_parser = numbers::traced_part)]
-    scale: f32,
+    render_scale: f32,
     /// Depth of field: diameter of the lens and distance that is sharp, units
-    #[arg(long, num_args = 2, value_parser = numbers::positive, value_names = ["DIAMETER", "DISTANCE"])]
-    lens: Option<Vec<f32>>,
+    #[arg(long, value_parser = parse_lens, value_name = "DIAMETER,DISTANCE")]
+    lens: Option<[f32; 2]>,
 }
 
 /// `WIDTHxHEIGHT`.
@@ -197,13 +183,7 @@ fn read_path(file: &Path) -> anyhow::Result<Vec<PathPoint>> {
 
 /// `X,Y,Z[,YAW[,PITCH]]`, or with spaces between.
 pub fn parse_view(text: &str) -> Result<Camera, String> {
-    let words = text
-        .split(|c: char| c == ',' || c.is_whitespace())
-        .filter(|word| !word.is_empty());
-    let numbers: Option<Vec<f32>> = words
-        .map(|word| word.parse().ok().filter(|n: &f32| n.is_finite()))
-        .collect();
-    match numbers.as_deref() {
+    match numbers::list(text).as_deref() {
         Some([x, y, z, rest @ ..]) if rest.len() <= 2 => Ok(Camera {
             origin: Vec3::new(*x, *y, *z),
             yaw: rest.first().copied().unwrap_or(0.0),
@@ -211,6 +191,19 @@ pub fn parse_view(text: &str) -> Result<Camera, String> {
         }),
         _ => Err("a view is X,Y,Z,YAW,PITCH, for example 100,-50,80,90,10".into()),
     }
+}
+
+/// `X,Y,Z,YAW`.
+fn parse_step(text: &str) -> Result<[f32; 4], String> {
+    let step = numbers::list(text).and_then(|step| step.try_into().ok());
+    step.ok_or_else(|| "a step is X,Y,Z,YAW, for example 4,0,0,-1".to_owned())
+}
+
+/// `DIAMETER,DISTANCE`.
+fn parse_lens(text: &str) -> Result<[f32; 2], String> {
+    let lens = numbers::list(text).and_then(|lens| lens.try_into().ok());
+    lens.filter(|lens: &[f32; 2]| lens.iter().all(|n| *n > 0.0))
+        .ok_or_else(|| "a lens is DIAMETER,DISTANCE, numbers above 0, for example 4,200".to_owned())
 }
 
 /// The frame that is drawn: where of what, and whether a picture is written after it.
@@ -225,11 +218,7 @@ impl RenderArgs {
             true => Look::Classic,
             false => Look::Traced,
         };
-        match (self.classic, self.traced) {
-            (true, _) => Look::Classic,
-            (false, true) => Look::Traced,
-            (false, false) => self.look.unwrap_or(usual),
-        }
+        self.look.unwrap_or(usual)
     }
 
     fn settings(&self) -> Settings {
@@ -248,7 +237,7 @@ impl RenderArgs {
             rt_exposure: self.exposure,
             rt_denoiser: self.denoiser,
             rt_taa: !self.no_taa,
-            rt_scale: self.scale,
+            rt_scale: self.render_scale,
             rt_dof: self.lens.is_some(),
             rt_num_random_dl: match self.sampling {
                 Sampling::Uniform | Sampling::Resampled => 1,
@@ -260,9 +249,9 @@ impl RenderArgs {
             },
             ..Settings::default()
         };
-        if let Some([diameter, distance]) = self.lens.as_deref() {
-            settings.rt_aperture = *diameter;
-            settings.rt_focal_length = *distance;
+        if let Some([diameter, distance]) = self.lens {
+            settings.rt_aperture = diameter;
+            settings.rt_focal_length = distance;
         }
         settings
     }
@@ -271,13 +260,6 @@ impl RenderArgs {
         let bsp = &world.bsp;
         if let Some(view) = self.view {
             return Ok(view);
-        }
-        if let Some([x, y, z, yaw, rest @ ..]) = self.camera.as_deref() {
-            return Ok(Camera {
-                origin: Vec3::new(*x, *y, *z),
-                yaw: *yaw,
-                pitch: rest.first().copied().unwrap_or(0.0),
-            });
         }
         if self.overview {
             let camera = Camera::overview(world, self.size, self.fov)
@@ -303,10 +285,9 @@ impl RenderArgs {
 
     /// Frames for one picture.
     fn samples(&self) -> u32 {
-        let asked = self.spp.or(self.frames.filter(|_| self.path.is_none()));
         match self.look() {
-            Look::Traced => asked.unwrap_or(64),
-            Look::Classic if self.timings || self.stats => asked.unwrap_or(64),
+            Look::Traced => self.spp.unwrap_or(64),
+            Look::Classic if self.timings || self.stats => self.spp.unwrap_or(64),
             Look::Classic => 1,
         }
     }
@@ -360,9 +341,9 @@ impl RenderArgs {
                 };
                 def.view_axis = turned.axis();
             }
-            if let Some([x, y, z, yaw]) = self.step.as_deref() {
+            if let Some([x, y, z, yaw]) = self.step {
                 let before = (frames - 1 - frame) as f32;
-                def.view_origin -= Vec3::new(*x, *y, *z) * before;
+                def.view_origin -= Vec3::new(x, y, z) * before;
                 let turned = Camera {
                     yaw: camera.yaw - yaw * before,
                     ..camera
@@ -390,6 +371,11 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         .is_some_and(|e| e.eq_ignore_ascii_case("png"));
     if !png {
         bail!("{}: pictures are .png", args.output.display());
+    }
+    if args.frames.is_some() && args.path.is_none() {
+        bail!(
+            "--frames is the number of pictures of a --path; --spp is that of frames drawn for one picture"
+        );
     }
     let (files, map) = if args.sample {
         (

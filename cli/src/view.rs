@@ -1,48 +1,26 @@
-//! Maps from the command line, and places to look at them from.
+//! Maps that are opened, and places to look at them from.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::beside::beside;
+use crate::game::Game;
 use anyhow::{Context, bail};
-use clap::Args;
 use glam::Vec3;
 use q3bsp::{Bsp, Format};
 use relight::{GameFiles, LoadError, MemoryFiles, Overlay, Pk3, RelitWorld, SearchPath, map_files};
 use renderer_vk::api::{EntityKind, RefDef, RefEntity};
 use renderer_vk::{Renderer, Settings};
 
-/// Which maps a command is about.
-#[derive(Args, Debug)]
-pub struct Maps {
-    /// Maps by name
-    #[arg(required = true)]
-    pub maps: Vec<String>,
-    /// Game folder with packs, or one pack (.pk3); give several in rising priority
-    #[arg(
-        long = "game",
-        value_name = "DIR",
-        default_value = "/usr/share/games/openarena/baseoa"
-    )]
-    pub games: Vec<PathBuf>,
-}
-
 /// Where the game's files and the map come from.
 ///
-/// `map`: a name (oa_dm1), maps/oa_dm1.bsp, or a .bsp or .pk3 file; `games`: folders with packs and single packs, the last has
-/// precedence. With a .bsp file come the lights and lightmaps beside it, if there are any.
+/// `map`: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp or .pk3 file, or pack.pk3:maps/x.bsp. With a .bsp file come the lights and
+/// lightmaps beside it, if there are any.
 ///
 /// # Errors
 /// A folder or the file cannot be read, or a pack has not exactly one map.
-pub fn open(map: &str, games: &[PathBuf]) -> anyhow::Result<(Arc<dyn GameFiles>, String)> {
-    let mut path = SearchPath::new();
-    for game in games {
-        if game.is_file() {
-            path.add_pk3(game)?;
-        } else {
-            path.add_game_folder(game)?;
-        }
-    }
+pub fn open(map: &str, game: &Game) -> anyhow::Result<(Arc<dyn GameFiles>, String)> {
+    let mut path = game.files()?;
     let map = map.to_owned();
     if let Some((pack, inside)) = map.split_once(".pk3:") {
         path.add_pk3(Path::new(&format!("{pack}.pk3")))?;
@@ -75,6 +53,7 @@ pub fn open(map: &str, games: &[PathBuf]) -> anyhow::Result<(Arc<dyn GameFiles>,
             return Ok((with_map_files(path, front, &name)?, name));
         }
         _ if map.starts_with("maps/") => map,
+        _ if map.ends_with(".bsp") && !map.contains('/') => format!("maps/{map}"),
         _ => format!("maps/{map}.bsp"),
     };
     Ok((with_map_files(path, MemoryFiles::new(), &name)?, name))

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{map, relight};
+use common::{map, relight, run};
 use q3bsp::{Bsp, Format, Lump};
 use std::process::Command;
 
@@ -99,10 +99,10 @@ fn maps_become_json_and_map_files() {
     }
 }
 
-/// What the program says about a command that it refuses, in a folder without anything.
-fn refused(arguments: &[&str]) -> String {
+/// What a program says about a command that it refuses, in a folder without anything.
+fn refused(program: &str, arguments: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
-    let output = relight(folder.path(), arguments);
+    let output = run(program, folder.path(), arguments);
     assert!(!output.status.success(), "{arguments:?}: {output:?}");
     String::from_utf8(output.stderr).unwrap()
 }
@@ -123,43 +123,45 @@ fn numbers_that_make_no_sense_are_refused() {
         (RENDER, "--size", "0x10", "WIDTHxHEIGHT"),
         (RENDER, "--exposure", "NaN", "a number"),
         (RENDER, "--time", "inf", "a number"),
-        (RENDER, "--scale", "0.1", "from 0.25 to 1"),
-        (RENDER, "--scale", "inf", "from 0.25 to 1"),
+        (RENDER, "--render-scale", "0.1", "from 0.25 to 1"),
+        (RENDER, "--render-scale", "inf", "from 0.25 to 1"),
         (CONVERT, "--scale", "0", "above 0"),
-        (CONVERT, "--exposure", "inf", "above 0"),
+        (CONVERT, "--light-scale", "inf", "above 0"),
         (CONVERT, "--subdivisions", "NaN", "above 0"),
-        (&["measure", "m"], "--fov", "180", "from 1 to 170 degrees"),
-        (&["measure", "m"], "--frames", "1", "1 is not in 2.."),
-        (&["estimators", "m"], "--candidates", "0", "0 is not in 1.."),
-        (
-            &["lights", "m", "--judge"],
-            "--rays",
-            "0",
-            "0 is not in 1..",
-        ),
-        (&["lights", "m", "--judge"], "--clusters", "0", "from 1 on"),
-        (&["looks", "m"], "--views", "0", "from 1 on"),
-        (&["looks", "m"], "--frames", "0", "0 is not in 1.."),
         (&["cameras"], "--every", "0", "from 1 on"),
-        (&["cameras"], "--each", "0", "from 1 on"),
+        (&["cameras"], "--views", "0", "from 1 on"),
+        (RENDER, "--view", "0,0,NaN,0", "X,Y,Z,YAW,PITCH"),
+        (RENDER, "--step", "0,0,inf,0", "X,Y,Z,YAW"),
+        (RENDER, "--step", "1,2,3", "X,Y,Z,YAW"),
+        (RENDER, "--lens", "NaN,100", "numbers above 0"),
+        (RENDER, "--lens", "4,0", "numbers above 0"),
     ] {
-        let arguments: Vec<&str> = command.iter().copied().chain([option, number]).collect();
-        let text = refused(&arguments);
-        assert!(
-            text.contains(option) && text.contains(told),
-            "{arguments:?}: {text}"
-        );
+        refused_option(env!("CARGO_BIN_EXE_relight"), command, option, number, told);
     }
-    for words in [
-        &["--camera", "0", "0", "NaN", "0"][..],
-        &["--step", "0", "0", "inf", "0"],
-        &["--lens", "NaN", "100"],
-        &["--lens", "4", "0"],
+    for (command, option, number, told) in [
+        ("measure", "--fov", "180", "from 1 to 170 degrees"),
+        ("measure", "--frames", "1", "1 is not in 2.."),
+        ("measure", "--views", "0", "from 1 on"),
+        ("estimators", "--candidates", "0", "0 is not in 1.."),
+        ("estimators", "--view", "0,0", "X,Y,Z,YAW,PITCH"),
+        ("light-lists", "--rays", "0", "0 is not in 1.."),
+        ("light-lists", "--clusters", "0", "from 1 on"),
+        ("looks", "--views", "0", "from 1 on"),
+        ("looks", "--frames", "0", "0 is not in 1.."),
     ] {
-        let arguments: Vec<&str> = RENDER.iter().chain(words).copied().collect();
-        let text = refused(&arguments);
-        assert!(text.contains(words[0]) && text.contains("number"), "{text}");
+        let lab = env!("CARGO_BIN_EXE_relight-lab");
+        refused_option(lab, &[command, "m"], option, number, told);
     }
+}
+
+/// Checks that a program refuses a value of an option, by the option's name and with what it takes.
+fn refused_option(program: &str, command: &[&str], option: &str, value: &str, told: &str) {
+    let arguments = [command, &[option, value]].concat();
+    let text = refused(program, &arguments);
+    assert!(
+        text.contains(option) && text.contains(told),
+        "{arguments:?}: {text}"
+    );
 }
 
 #[test]

@@ -128,3 +128,18 @@ fn lightmaps_beside_a_map_are_its_lightmaps() {
         assert!(lightmaps["surfaces_with_page"].as_u64().unwrap() > 0);
     }
 }
+
+#[test]
+fn a_game_may_be_one_pack() {
+    let folder = tempfile::tempdir().unwrap();
+    let pack = folder.path().join("room.pk3");
+    let mut zip = zip::ZipWriter::new(std::fs::File::create(&pack).unwrap());
+    let options = zip::write::SimpleFileOptions::default();
+    zip.start_file("maps/room.bsp", options).unwrap();
+    std::io::Write::write_all(&mut zip, &map()).unwrap();
+    zip.finish().unwrap();
+    let output = info(&pack, &["--json"]);
+    assert!(output.status.success(), "{output:?}");
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(json["maps"][0]["map"], "maps/room.bsp");
+}

@@ -16,9 +16,14 @@ pub fn map(format: Format) -> Vec<u8> {
     bsp.write()
 }
 
-/// Runs the program in a folder that is its game, too.
+/// Runs `relight` in a folder that is its game, too.
 pub fn relight(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_relight"))
+    run(env!("CARGO_BIN_EXE_relight"), folder, arguments)
+}
+
+/// Runs a program in a folder that is its game, too.
+pub fn run(program: &str, folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(program)
         .current_dir(folder)
         .args(arguments)
         .args(["--game", "."])

@@ -1,4 +1,4 @@
-//! `relight measure`: how near the traced look comes in real time to its own reference, without an engine or a display.
+//! `relight-lab measure`: how near the traced look comes in real time to its own reference, without an engine or a display.
 //!
 //! Truth is the mean of many frames with all the sampling switched to its unbiased form (`rt_accumulate`). Every picture
 //! has the exposure that the map starts with, so that differences are those of the light. Cameras follow from the map
@@ -25,11 +25,12 @@ use serde_json::{Value, json};
 
 use self::region::Regions;
 use self::stage::{Stage, Variant, variants};
+use super::statistics::{luminance, relative_bias, relative_error};
 use crate::cameras::{EYES, Place, places};
+use crate::game::Maps;
 use crate::numbers;
 use crate::render::{parse_size, parse_view};
-use crate::statistics::{luminance, relative_bias, relative_error};
-use crate::view::{Camera, Maps, load, map_name, open};
+use crate::view::{Camera, load, map_name, open};
 
 /// Measure the traced look in real time against its reference
 ///
@@ -37,21 +38,22 @@ use crate::view::{Camera, Maps, load, map_name, open};
 /// antialiased, and a baseline with uniform light selection and a denoiser without gradients), noise over time of a
 /// resting view, frames until a light that was switched off is gone, and what a moving light leaves behind.
 ///
-/// Example: relight measure oa_dm1 kaos2 --reference 4096 -o out/measure
+/// Example: relight-lab measure oa_dm1 kaos2 --reference 4096 -o out/measure
 #[derive(Args, Debug)]
 pub struct MeasureArgs {
     #[command(flatten)]
     chosen: Maps,
-    /// Places of each map
-    #[arg(long, default_value_t = 2, value_parser = numbers::count)]
-    each: usize,
-    /// Look from here in place of the rule's places, units and degrees; may be given more than once
+    /// Views of each map: the camera of the intermission first, then spawn points, evenly out of the map's list
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = numbers::count)]
+    views: usize,
+    /// Where to look from, units and degrees: x,y,z, and yaw and pitch (down) where they are not 0; may be given more than
+    /// once; default: the views that --views counts
     #[arg(long, value_name = "X,Y,Z,YAW,PITCH", value_parser = parse_view, allow_hyphen_values = true)]
     view: Vec<Camera>,
     /// A model in the hands: its file in the game's data
     #[arg(long, value_name = "MODEL")]
     hold: Option<String>,
-    /// Horizontal angle of view, degrees: a small one shows details as a large picture does
+    /// Horizontal field of view, degrees, from 1 to 170
     #[arg(long, default_value_t = 90.0, value_parser = numbers::fov)]
     fov: f32,
     /// Stand still where the camera would turn and walk; game time runs all the same
@@ -64,27 +66,27 @@ pub struct MeasureArgs {
     #[arg(long)]
     no_lights: bool,
     /// Size in pixels
-    #[arg(long, default_value = "1024x768", value_parser = parse_size)]
+    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1024x768", value_parser = parse_size)]
     size: (u32, u32),
     /// Frames of the reference
     #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..))]
     reference: u32,
     /// Frames that lead to a picture, and frames over which noise is taken
-    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(2..))]
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(2..))]
     frames: u32,
-    /// Diffuse bounces
+    /// Diffuse bounces of the traced look, 2 at most
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(..=2))]
     bounces: u32,
     /// Exposure in stops, on top of the one that the map starts with: for dark places
     #[arg(long, default_value_t = 0.0, value_parser = numbers::finite, allow_hyphen_values = true)]
     exposure: f32,
     /// Vulkan device: part of its name
-    #[arg(long)]
+    #[arg(long, value_name = "NAME")]
     device: Option<String>,
     /// Folder for the pictures of every variant beside the reference, and of which pixels show reflections and the like
-    #[arg(short, long)]
+    #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
-    /// Print JSON instead of a table
+    /// Print JSON in place of a table
     #[arg(long)]
     json: bool,
 }
@@ -342,7 +344,7 @@ fn ruled_cameras(entities: &[q3bsp::Entity], each: usize) -> Vec<Camera> {
 pub fn run(args: &MeasureArgs) -> Result<()> {
     let mut all = serde_json::Map::new();
     for map in &args.chosen.maps {
-        let (files, path) = open(map, &args.chosen.games)?;
+        let (files, path) = open(map, &args.chosen.game)?;
         let mut renderer = Renderer::new(RendererOptions {
             device: args.device.clone(),
             ..RendererOptions::headless(args.size.0, args.size.1)
@@ -366,7 +368,7 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
             stand: args.stand,
         };
         let cameras = match args.view.is_empty() {
-            true => ruled_cameras(&bsp.entities(), args.each),
+            true => ruled_cameras(&bsp.entities(), args.views),
             false => args.view.clone(),
         };
         let (variants, frames) = (variants(&base).len() as u64, u64::from(args.frames));

@@ -1,4 +1,4 @@
-//! `relight estimators`: whether every way to choose lights comes to the same picture, and how noisy each one is.
+//! `relight-lab estimators`: whether every way to choose lights comes to the same picture, and how noisy each one is.
 
 use anyhow::{Context, Result};
 use clap::Args;
@@ -7,8 +7,9 @@ use renderer_vk::api::RefEntity;
 use renderer_vk::{LightSelection, Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
 
-use crate::render::parse_size;
-use crate::view::{Camera, Maps, load, open};
+use crate::game::Maps;
+use crate::render::{parse_size, parse_view};
+use crate::view::{Camera, load, open};
 
 /// Compare the ways to choose lights: all of them have the same mean
 ///
@@ -23,39 +24,41 @@ use crate::view::{Camera, Maps, load, open};
 /// noisiest squares follow: where, how bright beside the picture, the difference and the standard error of its mean.
 /// Noise after more frames can be told from these: the standard error falls at least with the root of the frames.
 ///
-/// Example: relight estimators oa_dm1 --frames 4096 --size 512x384
+/// Example: relight-lab estimators oa_dm1 --frames 4096 --size 512x384
 #[derive(Args, Debug)]
 pub struct EstimatorsArgs {
     #[command(flatten)]
     chosen: Maps,
     /// Frames of each estimator
-    #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
     /// Frames of the reference; default: a sixteenth of the others', at least 16
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     reference: Option<u32>,
     /// Size in pixels
-    #[arg(long, default_value = "512x384", value_parser = parse_size)]
+    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "512x384", value_parser = parse_size)]
     size: (u32, u32),
-    /// Diffuse bounces
+    /// Diffuse bounces of the traced look, 2 at most
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=2))]
     bounces: u32,
-    /// Candidates of resampled selection
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
-    candidates: Option<u32>,
+    /// Lights looked at for each one that is chosen
+    #[arg(long, default_value_t = Settings::default().rt_candidates,
+        value_parser = clap::value_parser!(u32).range(1..))]
+    candidates: u32,
     /// Leave out the pictures lit by every light of the map
     #[arg(long)]
     no_unculled: bool,
     /// Print the noisiest squares of each estimator, so many
     #[arg(long, default_value_t = 0)]
     tiles: usize,
-    /// Camera: X Y Z YAW PITCH; default: the map's intermission or first spawn point
-    #[arg(long, num_args = 4..=5, value_parser = crate::numbers::finite, allow_negative_numbers = true, value_names = ["X", "Y", "Z", "YAW", "PITCH"])]
-    camera: Option<Vec<f32>>,
+    /// Where to look from, units and degrees: x,y,z, and yaw and pitch (down) where they are not 0; default: the map's
+    /// intermission or first spawn point
+    #[arg(long, value_parser = parse_view, allow_hyphen_values = true, value_name = "X,Y,Z,YAW,PITCH")]
+    view: Option<Camera>,
     /// Vulkan device: part of its name
-    #[arg(long)]
+    #[arg(long, value_name = "NAME")]
     device: Option<String>,
-    /// Print a JSON object for each map and estimator
+    /// Print JSON in place of a table: one object a map and estimator
     #[arg(long)]
     json: bool,
 }
@@ -278,7 +281,7 @@ fn row(line: &Value) {
 /// Runs the command: a table for each map, or one JSON object a map and estimator.
 pub fn run(args: &EstimatorsArgs) -> Result<()> {
     for map in &args.chosen.maps {
-        let (files, map) = open(map, &args.chosen.games)?;
+        let (files, map) = open(map, &args.chosen.game)?;
         let base = Settings {
             rt: true,
             rt_accumulate: true,
@@ -287,7 +290,7 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
             // what differs is to be the light alone
             rt_antialiasing: false,
             rt_num_random_dl: 1,
-            rt_candidates: args.candidates.unwrap_or(Settings::default().rt_candidates),
+            rt_candidates: args.candidates,
             ..Settings::default()
         };
         let (width, height) = args.size;
@@ -297,15 +300,8 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
         })
         .context("no picture without a Vulkan device")?;
         let (bsp, entities) = load(&mut renderer, files, &map, &base)?;
-        let camera = match args.camera.as_deref() {
-            Some([x, y, z, yaw, rest @ ..]) => Camera {
-                origin: glam::Vec3::new(*x, *y, *z),
-                yaw: *yaw,
-                pitch: rest.first().copied().unwrap_or(0.0),
-            },
-            _ => Camera::of_map(&bsp)
-                .context("the map has no place to look from; give one with --camera")?,
-        };
+        let camera = (args.view.or_else(|| Camera::of_map(&bsp)))
+            .context("the map has no place to look from; give one with --view")?;
         let mut stage = Stage {
             renderer,
             entities,

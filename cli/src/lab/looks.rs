@@ -1,4 +1,4 @@
-//! `relight looks`: one view in the classic look and traced, with lights as directives say and calibrated, side by side.
+//! `relight-lab looks`: one view in the classic look and traced, with lights as directives say and calibrated, side by side.
 
 use std::path::PathBuf;
 
@@ -9,11 +9,12 @@ use renderer_vk::api::RefDef;
 use renderer_vk::{MapLightChoice, Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
 
+use super::chromaticity::ColorDifference;
+use super::statistics::luminance;
 use crate::cameras::{EYES, places};
-use crate::chromaticity::ColorDifference;
+use crate::game::Maps;
 use crate::render::parse_size;
-use crate::statistics::luminance;
-use crate::view::{Camera, Maps, load, map_name, open};
+use crate::view::{Camera, load, map_name, open};
 
 /// Draw views in the classic look and traced, side by side, and compare how bright and how coloured they are
 ///
@@ -21,33 +22,36 @@ use crate::view::{Camera, Maps, load, map_name, open};
 /// calibrated: the mean luminance of the traced pictures over that of the classic ones; the mean distance of their
 /// colours in CIE 1976 (u', v'), times 1000; and their mean saturation over that of the classic ones.
 ///
-/// Example: relight looks oa_dm1 fan --views 4 --output out
+/// Example: relight-lab looks oa_dm1 fan --views 4 --output out
 #[derive(Args, Debug)]
 pub struct LooksArgs {
     #[command(flatten)]
     chosen: Maps,
-    /// Views of each map; those that the map has no places for are left out
-    #[arg(long, default_value_t = 6, value_parser = crate::numbers::count)]
+    /// Views of each map: the camera of the intermission first, then spawn points, evenly out of the map's list
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = crate::numbers::count)]
     views: usize,
-    /// Size of a picture in pixels
-    #[arg(long, default_value = "320x240", value_parser = parse_size)]
+    /// Size in pixels
+    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "320x240", value_parser = parse_size)]
     size: (u32, u32),
     /// Frames accumulated for a traced picture
-    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
-    /// Draw frames as a game shows them, filtered; nothing accumulates
+    /// Draw frames as a game shows them: nothing accumulates
     #[arg(long)]
     no_accumulation: bool,
     /// Leave automatic exposure out
     #[arg(long)]
     fixed_exposure: bool,
     /// Folder for pictures: classic, traced by directives, traced calibrated, from left to right
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
-    /// Folder to keep what calibration finds in
+    /// Keep what calibration finds in this folder, and take it from there
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
-    /// One JSON object a map, in place of a table; null for looks without a view
+    /// Vulkan device: part of its name
+    #[arg(long, value_name = "NAME")]
+    device: Option<String>,
+    /// Print JSON in place of a table: one object a map, null for looks without a view
     #[arg(long)]
     json: bool,
 }
@@ -169,10 +173,13 @@ impl Sums {
 
 /// The views of one map in each look.
 fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
-    let (files, path) = open(map, &args.chosen.games)?;
+    let (files, path) = open(map, &args.chosen.game)?;
     let (width, height) = args.size;
-    let mut renderer = Renderer::new(RendererOptions::headless(width, height))
-        .context("no picture without a Vulkan device")?;
+    let mut renderer = Renderer::new(RendererOptions {
+        device: args.device.clone(),
+        ..RendererOptions::headless(width, height)
+    })
+    .context("no picture without a Vulkan device")?;
     renderer.keep_calibrations(args.cache.clone());
     let settings = |look: Option<MapLightChoice>| Settings {
         rt: look.is_some(),

@@ -4,7 +4,7 @@ use anyhow::Result;
 use relight::compare::{Rgb8, flip_map, ssim_map};
 use serde_json::{Map, Value, json};
 
-use crate::statistics::{marked_mean, temporal_noise};
+use crate::lab::statistics::{marked_mean, temporal_noise};
 
 /// The true picture, and which of its pixels are told of apart.
 pub struct Regions {

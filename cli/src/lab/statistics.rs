@@ -1,4 +1,4 @@
-//! What `relight measure` takes from pictures.
+//! What `relight-lab measure` takes from pictures.
 
 use glam::Vec3;
 use relight::compare::Rgb8;

@@ -1,0 +1,65 @@
+//! The subcommands of `relight`.
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+
+use crate::outcome::parse;
+use crate::{calibration, cameras, compare, convert, info, lights, material, render};
+
+/// Maps of id Tech 3 games: what is in them, converted, relit
+#[derive(Parser, Debug)]
+#[command(name = "relight", version)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+// Each is described where its arguments are: a comment here would hide the rest of that description.
+#[derive(Subcommand, Debug)]
+enum Command {
+    Calibration(calibration::CalibrationArgs),
+    Cameras(cameras::CamerasArgs),
+    Compare(compare::CompareArgs),
+    Convert(convert::ConvertArgs),
+    Info(info::InfoArgs),
+    Lights(lights::LightsArgs),
+    Material(material::MaterialArgs),
+    Render(render::RenderArgs),
+}
+
+/// What earlier versions had: subcommand, the option or nothing for the subcommand itself, and what replaces it.
+const REPLACED: [(&str, &str, &str); 13] = [
+    ("cameras", "--each", "--views"),
+    ("convert", "--exposure", "--light-scale"),
+    ("estimators", "", "relight-lab estimators"),
+    ("lights", "--judge", "relight-lab light-lists"),
+    ("lights", "--picture", "--output"),
+    ("looks", "", "relight-lab looks"),
+    ("measure", "", "relight-lab measure"),
+    ("render", "--camera", "--view X,Y,Z,YAW,PITCH"),
+    ("render", "--classic", "--look classic"),
+    ("render", "--lens", "--lens DIAMETER,DISTANCE"),
+    ("render", "--scale", "--render-scale"),
+    ("render", "--step", "--step X,Y,Z,YAW"),
+    ("render", "--traced", "--look traced"),
+];
+
+/// Runs the subcommand that the arguments of the process name.
+///
+/// # Errors
+/// What the subcommand says.
+pub fn run() -> Result<ExitCode> {
+    match parse::<Cli>(&REPLACED).command {
+        Command::Calibration(args) => calibration::run(&args),
+        Command::Cameras(args) => cameras::run(&args),
+        Command::Compare(args) => compare::run(&args),
+        Command::Convert(args) => return convert::run(&args),
+        Command::Info(args) => return info::run(&args),
+        Command::Lights(args) => lights::run(&args),
+        Command::Material(args) => return material::run(&args),
+        Command::Render(args) => render::run(&args),
+    }?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,49 @@
+//! The game and the maps that a command line names.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use relight::{FileError, SearchPath};
+
+// No documentation comments on these two: clap would show them in place of a subcommand's own description.
+
+// The game whose files a command reads.
+#[derive(Args, Debug)]
+pub struct Game {
+    /// Game folder with packs, or one pack (.pk3); give several in rising priority (the base game first, the mod after
+    /// it)
+    #[arg(
+        long = "game",
+        value_name = "DIR",
+        default_value = "/usr/share/games/openarena/baseoa"
+    )]
+    pub paths: Vec<PathBuf>,
+}
+
+impl Game {
+    /// The game's files.
+    ///
+    /// # Errors
+    /// A folder or a pack cannot be read.
+    pub fn files(&self) -> Result<SearchPath, FileError> {
+        let mut files = SearchPath::new();
+        for path in &self.paths {
+            if path.is_file() {
+                files.add_pk3(path)?;
+            } else {
+                files.add_game_folder(path)?;
+            }
+        }
+        Ok(files)
+    }
+}
+
+// The maps that a command reads, and their game.
+#[derive(Args, Debug)]
+pub struct Maps {
+    /// Maps: a name (oa_dm1), maps/oa_dm1.bsp, a .bsp file, a pack (.pk3) with one map, or pack.pk3:maps/x.bsp
+    #[arg(required = true, value_name = "MAP")]
+    pub maps: Vec<String>,
+    #[command(flatten)]
+    pub game: Game,
+}

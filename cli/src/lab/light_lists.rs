@@ -1,0 +1,112 @@
+//! `relight-lab light-lists`: how good maps' light lists are, judged by rays.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::Result;
+use clap::Args;
+use relight::light::{
+    LightLists, ListJudgement, judge, lists_by_geometry, lists_by_visibility, sweep,
+};
+use relight::{CalibrationCache, CalibrationOptions, Options, RelitWorld};
+use serde_json::json;
+
+use crate::game::Maps;
+use crate::scripts::load_scripts;
+use crate::view::open;
+
+/// Judge maps' light lists by rays, and print JSON: one object a map and kind of list
+///
+/// A pair of a light and a visibility cluster is visible when a ray from some point of the cluster to some
+/// point of the light arrives: when it meets no opaque triangle, nor runs through the solid of the map (pairs that are
+/// visible through the solid alone, where nothing is drawn on a wall, are counted apart). Prints for lists from the
+/// potentially visible sets alone, with geometry, and swept by rays: recall (visible pairs that are listed, of all visible
+/// ones, and of those that give more than a fifth of a percent of their cluster's light: the bound below which lights are
+/// left out), precision (visible pairs, of those listed) and its ratio to that of the potentially visible sets, the part of
+/// all arriving light that lights give which are not listed, the largest such part of a cluster, and the lists' lengths.
+/// The rays are others than those that the lists were swept with.
+///
+/// Example: relight-lab light-lists oa_dm1 kaos2 --rays 256
+#[derive(Args, Debug)]
+pub struct LightListsArgs {
+    #[command(flatten)]
+    chosen: Maps,
+    /// Rays for a pair of light and cluster
+    #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..))]
+    rays: u32,
+    /// Clusters that are judged; they are spread evenly over the map's list
+    #[arg(long, default_value_t = 64, value_parser = crate::numbers::count)]
+    clusters: usize,
+    /// Do not fit lights to the map's lightmaps first (the game does)
+    #[arg(long)]
+    no_calibration: bool,
+    /// Keep what calibration and rays find in this folder, and take it from there
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A map cannot be found or read.
+pub fn run(args: &LightListsArgs) -> Result<()> {
+    for map in &args.chosen.maps {
+        let (files, map) = open(map, &args.chosen.game)?;
+        let (materials, _) = load_scripts(&*files);
+        let cache = args.cache.as_ref().map(CalibrationCache::new);
+        let calibrate = (!args.no_calibration).then(|| CalibrationOptions {
+            cache: cache.clone(),
+            ..CalibrationOptions::default()
+        });
+        let options = Options {
+            calibrate,
+            by_hand: false,
+            ..Options::default()
+        };
+        let mut world = RelitWorld::load(&*files, &materials, &map, options)?;
+        world.light_by_hand(&*files);
+        for warning in &world.warnings {
+            log::warn!("{warning}");
+        }
+        let begin = Instant::now();
+        let visible = lists_by_visibility(&world);
+        let visible_seconds = begin.elapsed().as_secs_f64();
+        let begin = Instant::now();
+        let geometric = lists_by_geometry(&world);
+        let geometric_seconds = begin.elapsed().as_secs_f64();
+        let swept = sweep(&mut world, cache.as_ref());
+        let lists: [(&str, &LightLists, f64); 3] = [
+            ("pvs", &visible, visible_seconds),
+            ("pvs+geometry", &geometric, geometric_seconds),
+            ("pvs+geometry+rays", &world.light_lists, swept.seconds),
+        ];
+        eprintln!("{map}: {swept:?}");
+        let clusters = world.light_lists.clusters();
+        let step = clusters.div_ceil(args.clusters.max(1));
+        let judged = judge(&world, &lists.map(|l| l.1), args.rays, step);
+        let plain = judged.first().map_or(0.0, ListJudgement::precision);
+        for ((name, lists, seconds), judged) in lists.iter().zip(judged) {
+            let line = json!({
+                "map": map,
+                "lists": name,
+                "lights": world.lights.len() + world.point_lights.len(),
+                "clusters": clusters,
+                "recall": judged.recall(),
+                "recall_of_mattering": judged.recall_of_mattering(),
+                "precision": judged.precision(),
+                "precision_over_pvs": judged.precision() / plain.max(1.0e-9),
+                "light_lost": 1.0 - judged.light_found,
+                "worst_cluster_lost": judged.worst_loss,
+                "mean_length": lists.mean_length(),
+                "longest": lists.longest(),
+                "seconds": seconds,
+                "pairs_judged": judged.pairs,
+                "pairs_visible": judged.visible,
+                "pairs_visible_through_solid": judged.through_solid,
+                "pairs_mattering": judged.mattering,
+            });
+            println!("{line}");
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,154 @@
+//! What the two commands offer, and what they say to spellings of earlier versions.
+
+use std::process::{Command, Output};
+
+const RELIGHT: &str = env!("CARGO_BIN_EXE_relight");
+const LAB: &str = env!("CARGO_BIN_EXE_relight-lab");
+
+fn output(program: &str, arguments: &[&str]) -> Output {
+    Command::new(program).args(arguments).output().unwrap()
+}
+
+/// The subcommands that a program's help lists.
+fn listed(program: &str) -> Vec<String> {
+    let help = output(program, &["--help"]);
+    assert!(help.status.success(), "{help:?}");
+    let text = String::from_utf8(help.stdout).unwrap();
+    let list = text
+        .split("Commands:\n")
+        .nth(1)
+        .expect("a list of commands");
+    let rows = list.lines().take_while(|line| line.starts_with("  "));
+    rows.filter_map(|row| row.split_whitespace().next())
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn help_lists_the_commands_of_users_and_those_of_the_lab_apart() {
+    let users = [
+        "calibration",
+        "cameras",
+        "compare",
+        "convert",
+        "info",
+        "lights",
+        "material",
+        "render",
+        "help",
+    ];
+    assert_eq!(listed(RELIGHT), users);
+    let lab = ["estimators", "light-lists", "looks", "measure", "help"];
+    assert_eq!(listed(LAB), lab);
+}
+
+#[test]
+fn replaced_spellings_are_refused_with_the_new_one() {
+    const RENDER: [&str; 4] = ["render", "m", "-o", "m.png"];
+    let render = |option: &[&'static str]| [&RENDER, option].concat();
+    for (program, arguments, told) in [
+        (
+            RELIGHT,
+            render(&["--classic"]),
+            "relight render --classic is now --look classic",
+        ),
+        (
+            RELIGHT,
+            render(&["--traced"]),
+            "relight render --traced is now --look traced",
+        ),
+        (
+            RELIGHT,
+            render(&["--camera", "0", "-1", "2", "90", "-5"]),
+            "relight render --camera is now --view X,Y,Z,YAW,PITCH",
+        ),
+        (
+            RELIGHT,
+            render(&["--scale=0.5"]),
+            "relight render --scale is now --render-scale",
+        ),
+        (
+            RELIGHT,
+            render(&["--step", "1", "-2", "3", "4"]),
+            "relight render --step is now --step X,Y,Z,YAW",
+        ),
+        (
+            RELIGHT,
+            render(&["--lens", "4", "100"]),
+            "relight render --lens is now --lens DIAMETER,DISTANCE",
+        ),
+        (
+            RELIGHT,
+            vec!["convert", "m", "-o", "m.glb", "--exposure", "2"],
+            "relight convert --exposure is now --light-scale",
+        ),
+        (
+            RELIGHT,
+            vec!["cameras", "--each", "1"],
+            "relight cameras --each is now --views",
+        ),
+        (
+            RELIGHT,
+            vec!["lights", "m", "--judge", "--rays", "256"],
+            "relight lights --judge is now relight-lab light-lists",
+        ),
+        (
+            RELIGHT,
+            vec!["lights", "m", "--picture", "m.svg"],
+            "relight lights --picture is now --output",
+        ),
+        (
+            RELIGHT,
+            vec!["looks", "m"],
+            "relight looks is now relight-lab looks",
+        ),
+        (
+            RELIGHT,
+            vec!["measure", "m"],
+            "relight measure is now relight-lab measure",
+        ),
+        (
+            RELIGHT,
+            vec!["estimators", "m"],
+            "relight estimators is now relight-lab estimators",
+        ),
+        (
+            LAB,
+            vec!["estimators", "m", "--camera", "0", "0", "0", "0"],
+            "relight-lab estimators --camera is now --view X,Y,Z,YAW,PITCH",
+        ),
+        (
+            LAB,
+            vec!["measure", "m", "--each", "1"],
+            "relight-lab measure --each is now --views",
+        ),
+    ] {
+        let refused = output(program, &arguments);
+        assert_eq!(refused.status.code(), Some(2), "{arguments:?}: {refused:?}");
+        let text = String::from_utf8(refused.stderr).unwrap();
+        assert_eq!(text, format!("error: {told}\n"), "{arguments:?}");
+    }
+}
+
+#[test]
+fn what_was_never_there_is_refused_by_its_name() {
+    for (arguments, told) in [
+        (
+            &["render", "m", "-o", "m.png", "--nothing"][..],
+            "'--nothing'",
+        ),
+        // an option of another subcommand, and a value like one that was replaced
+        (&["info", "--classic"], "'--classic'"),
+        (&["nothing"], "'nothing'"),
+        (
+            &["render", "m", "-o", "m.png", "--look", "nothing"],
+            "classic, traced",
+        ),
+        (&["render", "m", "-o", "m.png", "--frames", "9"], "--spp"),
+    ] {
+        let refused = output(RELIGHT, arguments);
+        assert!(!refused.status.success(), "{arguments:?}: {refused:?}");
+        let text = String::from_utf8(refused.stderr).unwrap();
+        assert!(text.contains(told) && !text.contains("is now"), "{text}");
+    }
+}
