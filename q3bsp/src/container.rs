@@ -77,4 +77,11 @@ impl Container {
             _ => &[],
         }
     }
+
+    /// Keeps what follows the last whole record of a lump of the directory.
+    pub(crate) fn set_trailing(&mut self, lump: Lump, rest: &[u8]) {
+        if let Some(slot) = self.trailing.get_mut(lump.index()) {
+            *slot = rest.to_vec();
+        }
+    }
 }

@@ -143,10 +143,8 @@ impl std::fmt::Display for Format {
 
 const fn with_eighteenth(lump: Lump) -> [Lump; 18] {
     let mut lumps = [lump; 18];
-    let mut at = 0;
-    while at < Lump::ALL.len() {
-        lumps[at] = Lump::ALL[at];
-        at += 1;
+    if let Some((common, _)) = lumps.split_first_chunk_mut() {
+        *common = Lump::ALL;
     }
     lumps
 }

@@ -55,7 +55,8 @@ impl Bsp {
         let total = counts
             .iter()
             .try_fold(1usize, |total, &count| total.checked_mul(count))?;
-        let whole = self.container.trailing[Lump::LightGrid.index()].is_empty();
+        let rest = self.container.trailing.get(Lump::LightGrid.index());
+        let whole = rest.is_none_or(Vec::is_empty);
         let finite = origin.is_finite() && size.is_finite();
         (total == self.light_grid.len() && whole && finite).then_some(LightGridLayout {
             origin,

@@ -95,7 +95,7 @@ impl Bsp {
 
         let (visibility, rest, oddity) = Visibility::decode(data(Lump::Visibility));
         self.visibility = visibility;
-        self.container.trailing[Lump::Visibility.index()] = rest.to_vec();
+        self.container.set_trailing(Lump::Visibility, rest);
         self.warnings.extend(oddity);
         Ok(())
     }
@@ -155,7 +155,7 @@ impl Bsp {
 
     fn keep_trailing(&mut self, lump: Lump, rest: &[u8], action: &'static str) {
         if !rest.is_empty() {
-            self.container.trailing[lump.index()] = rest.to_vec();
+            self.container.set_trailing(lump, rest);
             self.warnings.push(Warning {
                 lump,
                 element: None,
@@ -172,7 +172,7 @@ impl Bsp {
         let mut ranges: Vec<(usize, usize, Lump)> = lumps
             .iter()
             .filter_map(|&lump| {
-                let range = self.container.lumps[lump.index()];
+                let range = self.container.lumps.get(lump.index())?;
                 let start = usize::try_from(range.offset).ok()?;
                 let length = usize::try_from(range.length).ok()?;
                 (length > 0).then_some((start, start + length, lump))

@@ -26,7 +26,8 @@ impl Bsp {
                 .ok()
                 .and_then(|plane| self.planes.get(plane));
             let in_front = plane.is_some_and(|plane: &Plane| plane.distance(p) > 0.0);
-            at = node.children[usize::from(!in_front)];
+            let [front, back] = node.children;
+            at = if in_front { front } else { back };
             if at < 0 {
                 return usize::try_from(-1 - at).unwrap_or(0);
             }

@@ -194,10 +194,10 @@ impl Bsp {
         let mut seen = vec![false; self.nodes.len()];
         let mut pending = vec![0usize];
         while let Some(at) = pending.pop() {
-            let Some(node) = self.nodes.get(at) else {
+            let (Some(node), Some(seen)) = (self.nodes.get(at), seen.get_mut(at)) else {
                 continue;
             };
-            if std::mem::replace(&mut seen[at], true) {
+            if std::mem::replace(seen, true) {
                 return Err(Error::Value {
                     lump: Lump::Nodes,
                     element: at,

@@ -12,6 +12,7 @@
 //! Source: behaviour of ioquake3's first OpenGL renderer (1.36, November 2022), the one Debian ships.
 
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), deny(clippy::indexing_slicing))]
 
 pub mod eval;
 pub mod light;

@@ -1,6 +1,7 @@
 //! Vertex normals of a patch from its own grid, wrapping where opposite edges meet.
 
 use super::PatchMesh;
+use crate::lumps::DrawVert;
 use glam::Vec3;
 
 /// Steps to the eight neighbours, (column, row), around the point.
@@ -25,21 +26,29 @@ const MAX_STEPS: isize = 3;
 /// the grid has no area, the interpolated normal of the control points stays, or z.
 pub(super) fn recompute(mesh: &mut PatchMesh) {
     let (width, height) = (mesh.width, mesh.height);
-    let position = |row: usize, column: usize| mesh.vertices[row * width + column].position;
-    let meets = |a: Vec3, b: Vec3| a.distance_squared(b) <= 1.0;
-    let wrap_width = (0..height).all(|row| meets(position(row, 0), position(row, width - 1)));
-    let wrap_height =
-        (0..width).all(|column| meets(position(0, column), position(height - 1, column)));
+    let position = |row: usize, column: usize| {
+        let vertex = mesh.vertices.get(row * width + column)?;
+        Some(vertex.position)
+    };
+    let meets = |a: &DrawVert, b: &DrawVert| a.position.distance_squared(b.position) <= 1.0;
+    let mut rows = mesh.vertices.chunks_exact(width);
+    let wrap_width = rows.clone().all(|row| {
+        let ends = row.first().zip(row.last());
+        ends.is_some_and(|(a, b)| meets(a, b))
+    });
+    let wrap_height = match (rows.next(), rows.next_back()) {
+        (Some(first), Some(last)) => first.iter().zip(last).all(|(a, b)| meets(a, b)),
+        _ => false,
+    };
 
     let mut normals = Vec::with_capacity(mesh.vertices.len());
-    for row in 0..height {
-        for column in 0..width {
-            let base = position(row, column);
+    for (row, points) in mesh.vertices.chunks_exact(width).enumerate() {
+        for (column, point) in points.iter().enumerate() {
             let around = NEIGHBOURS.map(|(dx, dy)| {
                 for step in 1..=MAX_STEPS {
                     let x = place(column, dx * step, width, wrap_width)?;
                     let y = place(row, dy * step, height, wrap_height)?;
-                    let edge = position(y, x) - base;
+                    let edge = position(y, x)? - point.position;
                     let length = edge.length();
                     if length >= DEGENERATE {
                         return Some(edge / length);
@@ -48,13 +57,12 @@ pub(super) fn recompute(mesh: &mut PatchMesh) {
                 None
             });
             let mut sum = Vec3::ZERO;
-            for (k, edge) in around.iter().enumerate() {
-                if let (Some(edge), Some(next)) = (edge, around[(k + 1) % around.len()]) {
+            for (edge, next) in around.iter().zip(around.iter().cycle().skip(1)) {
+                if let (Some(edge), Some(next)) = (edge, next) {
                     sum += next.cross(*edge).normalize_or_zero();
                 }
             }
-            let own = mesh.vertices[row * width + column].normal;
-            normals.push(sum.normalize_or(own.normalize_or(Vec3::Z)));
+            normals.push(sum.normalize_or(point.normal.normalize_or(Vec3::Z)));
         }
     }
     for (vertex, normal) in mesh.vertices.iter_mut().zip(normals) {

@@ -1,6 +1,7 @@
 //! Patches that touch get the same points on their common edges.
 
 use super::{MAX_GRID_SIZE, PatchMesh, normals};
+use crate::lumps::DrawVert;
 use glam::Vec3;
 use std::collections::BTreeMap;
 
@@ -77,81 +78,89 @@ impl PatchMesh {
         }
     }
 
-    fn edge_point(&self, edge: Edge, k: usize) -> Vec3 {
+    /// `None` beyond the end of the edge.
+    fn edge_point(&self, edge: Edge, k: usize) -> Option<Vec3> {
         let (row, column) = match (edge.along_row, edge.last) {
             (true, false) => (0, k),
             (true, true) => (self.height - 1, k),
             (false, false) => (k, 0),
             (false, true) => (k, self.width - 1),
         };
-        self.vertices[row * self.width + column].position
+        let vertex = self.vertices.get(row * self.width + column)?;
+        Some(vertex.position)
     }
 
-    fn edge_error(&self, edge: Edge, k: usize) -> f32 {
-        let errors = if edge.along_row {
+    /// Errors of the points of an edge.
+    fn edge_errors(&self, edge: Edge) -> &[f32] {
+        if edge.along_row {
             &self.column_errors
         } else {
             &self.row_errors
-        };
-        errors[k]
+        }
+    }
+
+    fn edge_errors_mut(&mut self, edge: Edge) -> &mut Vec<f32> {
+        if edge.along_row {
+            &mut self.column_errors
+        } else {
+            &mut self.row_errors
+        }
     }
 
     /// Whether two inner points of an edge coincide: it is bent back on itself or collapsed.
     fn edge_is_merged(&self, edge: Edge) -> bool {
         let last = self.edge_length(edge) - 1;
         (1..last).any(|i| {
-            (i + 1..last).any(|j| same(self.edge_point(edge, i), self.edge_point(edge, j)))
+            let point = self.edge_point(edge, i);
+            (i + 1..last).any(|j| {
+                let both = point.zip(self.edge_point(edge, j));
+                both.is_some_and(|(a, b)| same(a, b))
+            })
         })
     }
 
-    /// Inserts a line of points before line `at` of those that cross `edge`, half way between its
-    /// neighbours, except for the point on the edge itself.
-    fn insert_line(&mut self, edge: Edge, at: usize, point: Vec3, error: f32) {
+    /// The vertices with a line of points inserted before line `at` of those that cross `edge`, half way between its
+    /// neighbours, except for the point on the edge itself. `None` unless the line has a neighbour on either side.
+    fn with_line(&self, edge: Edge, at: usize, point: Vec3) -> Option<Vec<DrawVert>> {
         let (width, height) = (self.width, self.height);
-        let new_width = width + usize::from(edge.along_row);
-        let new_height = height + usize::from(!edge.along_row);
-        let mut vertices = Vec::with_capacity(new_width * new_height);
-        for row in 0..new_height {
-            for column in 0..new_width {
-                let (line, across) = if edge.along_row {
-                    (column, row)
-                } else {
-                    (row, column)
-                };
-                let old = |line: usize| {
-                    let at = if edge.along_row {
-                        row * width + line
-                    } else {
-                        line * width + column
-                    };
-                    self.vertices[at]
-                };
-                vertices.push(if line == at {
-                    let mut new = old(line - 1).halfway(&old(line));
-                    let on_edge = if edge.last {
-                        across + 1 == if edge.along_row { height } else { width }
-                    } else {
-                        across == 0
-                    };
-                    if on_edge {
-                        new.position = point;
-                    }
-                    new
-                } else {
-                    old(if line < at { line } else { line - 1 })
-                });
+        let between = |across: usize, count: usize, before: &DrawVert, after: &DrawVert| {
+            let mut new = before.halfway(after);
+            if across == if edge.last { count - 1 } else { 0 } {
+                new.position = point;
             }
-        }
-        self.vertices = vertices;
-        self.width = new_width;
-        self.height = new_height;
-        let errors = if edge.along_row {
-            &mut self.column_errors
-        } else {
-            &mut self.row_errors
+            new
         };
-        errors.insert(at, error);
+        let mut vertices = Vec::with_capacity(self.vertices.len() + width.max(height));
+        if edge.along_row {
+            for (row, points) in self.vertices.chunks_exact(width).enumerate() {
+                let (head, tail) = points.split_at_checked(at)?;
+                vertices.extend_from_slice(head);
+                vertices.push(between(row, height, head.last()?, tail.first()?));
+                vertices.extend_from_slice(tail);
+            }
+        } else {
+            let (head, tail) = self.vertices.split_at_checked(at * width)?;
+            let before = head.get(head.len().checked_sub(width)?..)?;
+            let after = tail.get(..width)?;
+            vertices.extend_from_slice(head);
+            let pairs = before.iter().zip(after).enumerate();
+            vertices.extend(pairs.map(|(column, (a, b))| between(column, width, a, b)));
+            vertices.extend_from_slice(tail);
+        }
+        Some(vertices)
+    }
+
+    /// Inserts the line of [`Self::with_line`]; false when there is no room for it.
+    fn insert_line(&mut self, edge: Edge, at: usize, point: Vec3, error: f32) -> bool {
+        let Some(vertices) = self.with_line(edge, at, point) else {
+            return false;
+        };
+        self.vertices = vertices;
+        self.width += usize::from(edge.along_row);
+        self.height += usize::from(!edge.along_row);
+        self.edge_errors_mut(edge).insert(at, error);
         normals::recompute(self);
+        true
     }
 }
 
@@ -236,7 +245,8 @@ fn stitch_group(grids: &mut [Grid<'_>], budget: &mut Budget) {
     while changed {
         changed = false;
         for from in 0..grids.len() {
-            if std::mem::replace(&mut grids[from].done, true) {
+            let done = grids.get_mut(from).map(|grid| &mut grid.done);
+            if done.is_none_or(|done| std::mem::replace(done, true)) {
                 continue;
             }
             changed = true;
@@ -244,33 +254,44 @@ fn stitch_group(grids: &mut [Grid<'_>], budget: &mut Budget) {
                 if !budget.take(|budget| &mut budget.comparisons, 1) {
                     return;
                 }
-                while grids[from].touches(&grids[to])
-                    && budget.compare(grids[from].mesh, grids[to].mesh)
+                while let Some(missing) = meeting(grids, from, to, budget)
+                    .and_then(|(from, to)| missing_point(from.mesh, to.mesh))
+                    && let Some(grid) = grids.get_mut(to)
                 {
-                    let Some(missing) = missing_point(grids[from].mesh, grids[to].mesh) else {
-                        break;
-                    };
                     let Missing {
                         edge,
                         at,
                         point,
                         error,
                     } = missing;
-                    grids[to].mesh.insert_line(edge, at, point, error);
+                    if !grid.mesh.insert_line(edge, at, point, error) {
+                        break;
+                    }
                     let across = if edge.along_row {
-                        grids[to].mesh.height
+                        grid.mesh.height
                     } else {
-                        grids[to].mesh.width
+                        grid.mesh.width
                     };
                     if !budget.take(|budget| &mut budget.new_vertices, across as u64) {
                         return;
                     }
-                    grids[to].measure();
-                    grids[to].done = false;
+                    grid.measure();
+                    grid.done = false;
                 }
             }
         }
     }
+}
+
+/// Two grids, if they touch and the budget allows to compare their edges.
+fn meeting<'a, 'b>(
+    grids: &'a [Grid<'b>],
+    from: usize,
+    to: usize,
+    budget: &mut Budget,
+) -> Option<(&'a Grid<'b>, &'a Grid<'b>)> {
+    let (from, to) = (grids.get(from)?, grids.get(to)?);
+    (from.touches(to) && budget.compare(from.mesh, to.mesh)).then_some((from, to))
 }
 
 /// A point that one grid lacks on one of its edges.
@@ -295,14 +316,14 @@ fn missing_point(from: &PatchMesh, to: &PatchMesh) -> Option<Missing> {
                 } else {
                     (step, step + 1, step + 2)
                 };
-                let start_point = from.edge_point(from_edge, k);
-                let end_point = from.edge_point(from_edge, end);
+                let start_point = from.edge_point(from_edge, k)?;
+                let end_point = from.edge_point(from_edge, end)?;
                 for edge in EDGES {
                     if to.edge_length(edge) >= MAX_GRID_SIZE {
                         continue;
                     }
                     for l in 0..to.edge_length(edge) - 1 {
-                        let (here, next) = (to.edge_point(edge, l), to.edge_point(edge, l + 1));
+                        let (here, next) = (to.edge_point(edge, l)?, to.edge_point(edge, l + 1)?);
                         if same(start_point, here)
                             && same(end_point, next)
                             && (here - next).abs().max_element() >= NO_ROOM
@@ -310,8 +331,8 @@ fn missing_point(from: &PatchMesh, to: &PatchMesh) -> Option<Missing> {
                             return Some(Missing {
                                 edge,
                                 at: l + 1,
-                                point: from.edge_point(from_edge, middle),
-                                error: from.edge_error(from_edge, middle),
+                                point: from.edge_point(from_edge, middle)?,
+                                error: *from.edge_errors(from_edge).get(middle)?,
                             });
                         }
                     }
@@ -329,20 +350,21 @@ fn share_errors(grids: &mut [Grid<'_>], budget: &mut Budget) {
         grid.done = false;
     }
     for first in 0..grids.len() {
-        if std::mem::replace(&mut grids[first].done, true) {
+        let done = grids.get_mut(first).map(|grid| &mut grid.done);
+        if done.is_none_or(|done| std::mem::replace(done, true)) {
             continue;
         }
         let mut path = vec![(first, first + 1)];
         while let Some((from, next)) = path.pop() {
             let hit = (next..grids.len()).find(|&to| {
-                !grids[to].done
+                grids.get(to).is_some_and(|grid| !grid.done)
                     && budget.take(|budget| &mut budget.comparisons, 1)
-                    && grids[from].touches(&grids[to])
-                    && budget.compare(grids[from].mesh, grids[to].mesh)
-                    && copy_errors(from, to, grids)
+                    && share_between(from, to, grids, budget)
             });
             if let Some(to) = hit {
-                grids[to].done = true;
+                if let Some(grid) = grids.get_mut(to) {
+                    grid.done = true;
+                }
                 path.push((from, to + 1));
                 path.push((to, first + 1));
             }
@@ -350,36 +372,49 @@ fn share_errors(grids: &mut [Grid<'_>], budget: &mut Budget) {
     }
 }
 
-fn copy_errors(from: usize, to: usize, grids: &mut [Grid<'_>]) -> bool {
+/// Gives points of `to` the errors of the same points of `from`; false when they share none.
+fn share_between(from: usize, to: usize, grids: &mut [Grid<'_>], budget: &mut Budget) -> bool {
+    let copies = match meeting(grids, from, to, budget) {
+        Some((from, to)) => shared_errors(from.mesh, to.mesh),
+        None => return false,
+    };
+    let Some(grid) = grids.get_mut(to) else {
+        return false;
+    };
+    for &(edge, l, error) in &copies {
+        if let Some(slot) = grid.mesh.edge_errors_mut(edge).get_mut(l) {
+            *slot = error;
+        }
+    }
+    !copies.is_empty()
+}
+
+/// For inner points of the edges of `b` that `a` has, too: the edge, the number on it, and the error in `a`.
+fn shared_errors(a: &PatchMesh, b: &PatchMesh) -> Vec<(Edge, usize, f32)> {
     let mut copies = Vec::new();
-    let (a, b) = (&*grids[from].mesh, &*grids[to].mesh);
     for from_edge in EDGES {
         if a.edge_is_merged(from_edge) {
             continue;
         }
-        for k in 1..a.edge_length(from_edge) - 1 {
-            let point = a.edge_point(from_edge, k);
+        let last = a.edge_length(from_edge) - 1;
+        let errors = a.edge_errors(from_edge).iter().enumerate();
+        for (k, &error) in errors.take(last).skip(1) {
+            let Some(point) = a.edge_point(from_edge, k) else {
+                continue;
+            };
             for edge in EDGES {
                 if b.edge_is_merged(edge) {
                     continue;
                 }
                 for l in 1..b.edge_length(edge) - 1 {
-                    if same(point, b.edge_point(edge, l)) {
-                        copies.push((edge, l, a.edge_error(from_edge, k)));
+                    if b.edge_point(edge, l)
+                        .is_some_and(|other| same(point, other))
+                    {
+                        copies.push((edge, l, error));
                     }
                 }
             }
         }
     }
-    let touched = !copies.is_empty();
-    for (edge, l, error) in copies {
-        let mesh = &mut *grids[to].mesh;
-        let errors = if edge.along_row {
-            &mut mesh.column_errors
-        } else {
-            &mut mesh.row_errors
-        };
-        errors[l] = error;
-    }
-    touched
+    copies
 }

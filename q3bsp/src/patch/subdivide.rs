@@ -92,6 +92,12 @@ fn transposed(columns: &Columns, height: usize) -> Columns {
 /// Returns one error per column. Slots do not move with columns inserted later, as in the engine.
 fn subdivide(columns: &mut Columns, subdivisions: f32) -> Vec<f32> {
     let mut errors = vec![0.0; columns.len().max(MAX_GRID_SIZE)];
+    let mut set = |at: usize, error: f32| {
+        // The table has room for as many columns as there will be.
+        if let Some(slot) = errors.get_mut(at) {
+            *slot = error;
+        }
+    };
     let mut j = 0;
     while let Some([a, b, c]) = columns.get(j..j + 3) {
         let distance = a
@@ -101,13 +107,13 @@ fn subdivide(columns: &mut Columns, subdivisions: f32) -> Vec<f32> {
             .map(|((a, b), c)| chord_distance(a.position, b.position, c.position))
             .fold(0.0, f32::max);
         if distance < COLLINEAR {
-            errors[j + 1] = REMOVE;
+            set(j + 1, REMOVE);
             j += 2;
         } else if columns.len() + 2 > MAX_GRID_SIZE || distance <= subdivisions {
-            errors[j + 1] = 1.0 / distance;
+            set(j + 1, 1.0 / distance);
             j += 2;
         } else {
-            errors[j + 2] = 1.0 / distance;
+            set(j + 2, 1.0 / distance);
             let left = halfway(a, b);
             let right = halfway(b, c);
             let middle = halfway(&left, &right);
@@ -138,9 +144,11 @@ fn halfway(a: &[DrawVert], b: &[DrawVert]) -> Vec<DrawVert> {
 /// Moves every odd point of a line of control points onto the curve; even ones are on it.
 fn put_on_curve(line: &mut [DrawVert]) {
     for at in (1..line.len().saturating_sub(1)).step_by(2) {
-        let next = line[at].halfway(&line[at + 1]);
-        let previous = line[at].halfway(&line[at - 1]);
-        line[at] = next.halfway(&previous);
+        if let Some([before, point, after]) = line.get_mut(at - 1..=at + 1) {
+            let next = point.halfway(after);
+            let previous = point.halfway(before);
+            *point = next.halfway(&previous);
+        }
     }
 }
 

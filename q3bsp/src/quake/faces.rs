@@ -220,11 +220,12 @@ impl QuakeMap {
             let (Some(extent), Some((_, x, y))) = (&extent, place(layer)) else {
                 return Vec2::ZERO;
             };
-            let at = |axis: usize, start: i32| {
-                let cell = coordinates[axis] / LUXEL - extent.first[axis];
+            let at = |coordinate: f64, first: f64, start: i32| {
+                let cell = coordinate / LUXEL - first;
                 ((f64::from(start) + cell + 0.5) / PAGE as f64) as f32
             };
-            Vec2::new(at(0, x), at(1, y))
+            let ([s, t], [first_s, first_t]) = (*coordinates, extent.first);
+            Vec2::new(at(s, first_s, x), at(t, first_t, y))
         };
         let vertices = corners
             .iter()
@@ -247,11 +248,16 @@ impl QuakeMap {
         for (slot, (style, _)) in surface_layers.lightmap_styles.iter_mut().zip(&charts) {
             *slot = *style;
         }
-        for layer in 0..3 {
-            if let Some((page, x, y)) = place(layer + 1) {
-                surface_layers.lightmaps[layer] = page;
-                surface_layers.lightmap_x[layer] = x;
-                surface_layers.lightmap_y[layer] = y;
+        let SurfaceLayers {
+            lightmaps,
+            lightmap_x,
+            lightmap_y,
+            ..
+        } = &mut surface_layers;
+        let places = lightmaps.iter_mut().zip(lightmap_x).zip(lightmap_y);
+        for (layer, ((page, x), y)) in places.enumerate() {
+            if let Some(found) = place(layer + 1) {
+                (*page, *x, *y) = found;
             }
         }
         Ok(Polygon {
@@ -283,27 +289,30 @@ impl QuakeMap {
 
 /// The grid lines that enclose a face: every 16 units of texture. `None` for a face that has no finite extent.
 fn extent_of(texture: &[[f64; 2]]) -> Option<Extent> {
-    let mut first = [0.0; 2];
-    let mut size = [0; 2];
-    for axis in 0..2 {
-        let values = texture.iter().map(|st| st[axis] / LUXEL);
+    let along = |axis: fn(&[f64; 2]) -> f64| {
+        let values = texture.iter().map(|st| axis(st) / LUXEL);
         let low = values.clone().fold(f64::INFINITY, f64::min).floor();
         let high = values.fold(f64::NEG_INFINITY, f64::max).ceil();
         let span = high - low;
         // Beyond this no lump could hold the texels.
-        if !(0.0..65_536.0).contains(&span) {
-            return None;
-        }
-        first[axis] = low;
-        size[axis] = span as usize + 1;
-    }
-    Some(Extent { first, size })
+        let fits = (0.0..65_536.0).contains(&span);
+        fits.then(|| (low, span as usize + 1))
+    };
+    let (first_s, width) = along(|&[s, _]| s)?;
+    let (first_t, height) = along(|&[_, t]| t)?;
+    Some(Extent {
+        first: [first_s, first_t],
+        size: [width, height],
+    })
 }
 
 fn mean_of(texels: &[[u8; 3]]) -> [u8; 3] {
     let count = texels.len().max(1) as u64;
-    [0, 1, 2].map(|channel| {
-        let sum: u64 = texels.iter().map(|t| u64::from(t[channel])).sum();
-        (sum / count) as u8
-    })
+    let mut sums = [0u64; 3];
+    for texel in texels {
+        for (sum, &channel) in sums.iter_mut().zip(texel) {
+            *sum += u64::from(channel);
+        }
+    }
+    sums.map(|sum| (sum / count) as u8)
 }

@@ -179,7 +179,7 @@ fn autosprite(vertices: &mut Vec<DeformVertex>, indices: &mut Vec<u32>, context:
         left *= scale;
         up *= scale;
     }
-    for quad in old.chunks_exact(4) {
+    for quad in old.as_chunks::<4>().0 {
         let center = quad.iter().map(|v| v.position).sum::<Vec3>() * 0.25;
         // The engine's constant for 1 / sqrt 2.
         let radius = quad[0].position.distance(center) * 0.707;
@@ -196,30 +196,33 @@ fn autosprite(vertices: &mut Vec<DeformVertex>, indices: &mut Vec<u32>, context:
 }
 
 fn autosprite2(vertices: &mut [DeformVertex], indices: &[u32], forward: Vec3) {
-    const EDGES: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-    for (number, quad) in vertices.chunks_exact_mut(4).enumerate() {
+    for (number, quad) in vertices.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+        let [a, b, c, d] = quad.map(|vertex| vertex.position);
+        let [a, b, c, d] = [(0, a), (1, b), (2, c), (3, d)];
+        let edges = [(a, b), (a, c), (a, d), (b, c), (b, d), (c, d)];
         // The two shortest edges are the ends. Strict comparisons keep the engine's choice among equals.
-        let mut shortest = [(f32::INFINITY, EDGES[0]); 2];
-        for edge in EDGES {
-            let length = quad[edge.0]
-                .position
-                .distance_squared(quad[edge.1].position);
+        let mut shortest = [(f32::INFINITY, edges[0]); 2];
+        for edge in edges {
+            let ((_, from), (_, to)) = edge;
+            let length = from.distance_squared(to);
             if length < shortest[0].0 {
                 shortest = [(length, edge), shortest[0]];
             } else if length < shortest[1].0 {
                 shortest[1] = (length, edge);
             }
         }
-        let middle = |(a, b): (usize, usize)| 0.5 * (quad[a].position + quad[b].position);
-        let middles = [middle(shortest[0].1), middle(shortest[1].1)];
+        let middles = shortest.map(|(_, ((_, from), (_, to)))| 0.5 * (from + to));
         let minor = (middles[1] - middles[0]).cross(forward).normalize_or_zero();
-        for ((length, (a, b)), middle) in shortest.into_iter().zip(middles) {
+        for ((length, ((a, _), (b, _))), middle) in shortest.into_iter().zip(middles) {
             let mut half = minor * (0.5 * length.sqrt());
             if follows(indices, number, a, b) {
                 half = -half;
             }
-            quad[a].position = middle + half;
-            quad[b].position = middle - half;
+            for (corner, position) in [(a, middle + half), (b, middle - half)] {
+                if let Some(vertex) = quad.get_mut(corner) {
+                    vertex.position = position;
+                }
+            }
         }
     }
 }
@@ -262,7 +265,7 @@ fn text_quads(
     indices: &mut Vec<u32>,
     context: &DeformContext,
 ) {
-    let Some(quad) = vertices.get(..4) else {
+    let Some(quad) = vertices.first_chunk::<4>() else {
         return;
     };
     let normal = quad[0].normal;

@@ -18,19 +18,20 @@ struct Tables {
 /// glibc's `rand()` with seed 1: an additive feedback generator of degree 31 with taps 3 and 31, whose first words come
 /// from the minimal standard generator (multiplier 16807, modulus 2^31 - 1) and whose first 310 outputs are dropped.
 struct Random {
+    /// The next word to change comes first.
     words: [u32; 31],
-    next: usize,
 }
 
 impl Random {
     fn new() -> Self {
         let mut word = 1_u64;
-        let words = std::array::from_fn(|_| {
+        let mut words: [u32; 31] = std::array::from_fn(|_| {
             let here = word as u32;
             word = word * 16_807 % 0x7FFF_FFFF;
             here
         });
-        let mut random = Self { words, next: 3 };
+        words.rotate_left(3);
+        let mut random = Self { words };
         for _ in 0..310 {
             random.number();
         }
@@ -39,11 +40,9 @@ impl Random {
 
     /// The next number below 2^31.
     fn number(&mut self) -> u32 {
-        let tap = self.words[(self.next + 28) % 31];
-        let word = &mut self.words[self.next];
-        *word = word.wrapping_add(tap);
-        let number = *word >> 1;
-        self.next = (self.next + 1) % 31;
+        self.words[0] = self.words[0].wrapping_add(self.words[28]);
+        let number = self.words[0] >> 1;
+        self.words.rotate_left(1);
         number
     }
 
@@ -93,13 +92,18 @@ pub fn noise4(x: f32, y: f32, z: f32, t: f64) -> f32 {
     let (iy, fy) = cell(f64::from(y));
     let (iz, fz) = cell(f64::from(z));
     let (it, ft) = cell(t);
-    let permuted = |i: i64| i64::from(tables.permutation[(i & 255) as usize]);
+    // Masked to the length of the tables, so that the entry exists.
+    let permuted = |i: i64| {
+        let entry = tables.permutation.get((i & 255) as usize);
+        entry.map_or(0, |&entry| i64::from(entry))
+    };
     let corner = |dx: i64, dy: i64, dz: i64, dt: i64| {
         let at = |i: i64, d: i64| i.wrapping_add(d);
         let index = permuted(at(ix, dx).wrapping_add(permuted(
             at(iy, dy).wrapping_add(permuted(at(iz, dz).wrapping_add(permuted(at(it, dt))))),
         )));
-        tables.values[index as usize & 255]
+        let value = tables.values.get((index & 255) as usize);
+        value.copied().unwrap_or(0.0)
     };
     let lerp = |a: f32, b: f32, f: f32| a * (1.0 - f) + b * f;
     let plane = |dz: i64, dt: i64| {

@@ -32,10 +32,11 @@ pub fn sine(turns: f64) -> f32 {
 
 /// Table entry of a shape; `index` counts modulo 1024. Noise has no table and gives 0.
 pub fn shape(function: WaveFunction, index: usize) -> f32 {
+    // Below the length of the table, so that the entry exists.
     let index = index % TABLE_SIZE;
     let ramp = index as f32 / TABLE_SIZE as f32;
     match function {
-        WaveFunction::Sin => sine_table()[index],
+        WaveFunction::Sin => sine_table().get(index).copied().unwrap_or(0.0),
         WaveFunction::Square => {
             if index < TABLE_SIZE / 2 {
                 1.0
