@@ -33,6 +33,7 @@ impl<'a> Fields<'a> {
         u16::from_le_bytes(self.bytes())
     }
 
+    #[cfg(feature = "quake")]
     pub(crate) fn i16(&mut self) -> i16 {
         i16::from_le_bytes(self.bytes())
     }

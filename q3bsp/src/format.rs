@@ -19,7 +19,7 @@ pub enum Format {
     Rbsp,
     /// `FBSP` version 1: QFusion (Warsow, Warfork). As `RBSP` with lightmap pages of 512 × 512 texels.
     Fbsp,
-    /// `IBSP` version 38: Quake II. Written as `FBSP`, as are all that follow: see [`crate::quake::QuakeMap`].
+    /// `IBSP` version 38: Quake II. Written as `FBSP`, as are all that follow: see `quake::QuakeMap`.
     Quake2,
     /// `QBSP` version 38: Quake II with 32-bit indices.
     Qbism,
@@ -49,7 +49,7 @@ impl Format {
         Format::GoldSrc,
     ];
 
-    /// Whether the file holds faces with edges instead of surfaces: the formats of [`crate::quake`].
+    /// Whether the file holds faces with edges instead of surfaces: the formats of the module `quake`.
     pub fn is_quake(self) -> bool {
         matches!(
             self,
@@ -63,6 +63,7 @@ impl Format {
     }
 
     /// Whether it is Quake II's or its extension.
+    #[cfg(feature = "quake")]
     pub(crate) fn is_quake2(self) -> bool {
         matches!(self, Format::Quake2 | Format::Qbism)
     }

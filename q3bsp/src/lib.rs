@@ -1,7 +1,7 @@
 //! id Tech 3 maps: bytes to typed, validated data and back.
 //!
 //! Read are `IBSP` 46 (Quake III and its mods), `IBSP` 47 (RTCW, Enemy Territory, Quake Live), `RBSP` 1 (Raven's games),
-//! `FBSP` 1 (QFusion), and, converted, the maps of Quake, GoldSrc and Quake II ([`quake`]), all into the same [`Bsp`];
+//! `FBSP` 1 (QFusion), and, converted, the maps of Quake, GoldSrc and Quake II (feature `quake`), all into the same [`Bsp`];
 //! [`Bsp::format`] tells which it was.
 //!
 //! [`Bsp::parse`] checks everything that a reader would otherwise have to check again: the directory,
@@ -51,6 +51,7 @@ mod layers;
 mod lumps;
 mod parse;
 mod patch;
+#[cfg(feature = "quake")]
 pub mod quake;
 mod surface;
 mod tree;
@@ -121,11 +122,14 @@ pub struct Bsp {
     /// Lump 17 of Quake Live.
     pub advertisements: Vec<Advertisement>,
     /// How a map of Quake's formats draws its textures; see [`Bsp::material_script`]. Empty in other formats.
+    #[cfg(feature = "quake")]
     pub texture_uses: Vec<quake::TextureUse>,
     /// Textures that a map of Quake's formats holds.
+    #[cfg(feature = "quake")]
     pub embedded_textures: Vec<quake::EmbeddedTexture>,
     /// Whether the texture coordinates of vertices are in texels, because the format does not store the sizes of
     /// textures (Quake II): see [`Bsp::resolve_texture_sizes`].
+    #[cfg(feature = "quake")]
     pub texel_coordinates: bool,
     /// What the file looked like around the data.
     pub container: Container,

@@ -6,6 +6,7 @@ use crate::error::{Error, Lump, Warning};
 use crate::format::{Announced, Format, announced};
 use crate::layers::{GridLayers, LayeredSide, LayeredSurface, LayeredVertex};
 use crate::lumps::{GridPoint, Lightmap, Record, ShaderRef};
+#[cfg(feature = "quake")]
 use crate::quake::QuakeMap;
 use crate::{Bsp, Visibility};
 
@@ -18,9 +19,12 @@ impl Bsp {
     /// are in [`Bsp::warnings`].
     pub fn parse(bytes: &[u8]) -> Result<Bsp, Error> {
         let format = match announced(bytes) {
+            #[cfg(feature = "quake")]
             Announced::Known(format) if format.is_quake() => {
                 return QuakeMap::parse(bytes)?.to_bsp();
             }
+            #[cfg(not(feature = "quake"))]
+            Announced::Known(format) if format.is_quake() => return Err(left_out(format)),
             Announced::Known(format) => format,
             Announced::Foreign(found) => return Err(Error::WrongFormat { found }),
             Announced::Nothing => {
@@ -223,8 +227,13 @@ pub fn lump_entries(bytes: &[u8]) -> Result<Vec<LumpEntry>, Error> {
             });
         }
     };
+    #[cfg(feature = "quake")]
     if format.is_quake() {
         return Ok(QuakeMap::parse(bytes)?.lump_entries());
+    }
+    #[cfg(not(feature = "quake"))]
+    if format.is_quake() {
+        return Err(left_out(format));
     }
     let ranges = directory(bytes, format)?;
     let entry = |(&lump, range)| LumpEntry {
@@ -233,6 +242,14 @@ pub fn lump_entries(bytes: &[u8]) -> Result<Vec<LumpEntry>, Error> {
         stride: format.stride(lump),
     };
     Ok(format.lumps().iter().zip(ranges).map(entry).collect())
+}
+
+/// That a file has a format whose reader was not compiled.
+#[cfg(not(feature = "quake"))]
+fn left_out(format: Format) -> Error {
+    Error::WrongFormat {
+        found: format!("{format}, which needs the feature `quake`"),
+    }
 }
 
 /// Reads the header and checks that every lump lies inside the file.
