@@ -8,12 +8,15 @@ use q3bsp::{
     Advertisement, Bsp, Error, Format, GridLayers, GridPoint, Lightmap, Lump, SurfaceKind,
     SurfaceLayers, VertexLayers, content_flags, surface_flags,
 };
-use sample::{sample, survive, vert};
+use sample::{sample, vert};
+use survive::survive;
 
 #[path = "common/exercise.rs"]
 mod exercise;
 #[path = "common/sample.rs"]
 mod sample;
+#[path = "common/survive.rs"]
+mod survive;
 
 const FORMATS: [Format; 5] = [
     Format::Ibsp46,

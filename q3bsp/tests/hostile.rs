@@ -2,13 +2,16 @@
 
 use proptest::prelude::*;
 use q3bsp::{Bsp, DrawVert, Error, Lump, tessellate_patch};
-use sample::{sample, survive, vert};
+use sample::{sample, vert};
 use std::sync::LazyLock;
+use survive::survive;
 
 #[path = "common/exercise.rs"]
 mod exercise;
 #[path = "common/sample.rs"]
 mod sample;
+#[path = "common/survive.rs"]
+mod survive;
 
 static SAMPLE: LazyLock<Vec<u8>> = LazyLock::new(|| sample().write());
 

@@ -3,145 +3,16 @@
 
 use std::sync::LazyLock;
 
-use glam::{Quat, Vec2, Vec3, Vec4};
+use glam::{Quat, Vec3};
 use proptest::prelude::*;
-use q3model::{
-    BoneMatrix, Frame, Iqm, IqmJoint, IqmPose, IqmSurface, IqmVertex, Mdr, MdrSurface, MdrTag,
-    MdrVertex, MdrWeight,
-};
+use q3model::{Iqm, IqmPose, IqmVertex, Mdr};
+use samples::{iqm, mdr, pose};
+use survive::{survive_iqm, survive_mdr};
 
-fn moved(x: f32, y: f32, z: f32) -> BoneMatrix {
-    let mut bone = BoneMatrix::IDENTITY;
-    for (row, value) in bone.rows.iter_mut().zip([x, y, z]) {
-        row.w = value;
-    }
-    bone
-}
-
-/// A quarter turn about z.
-fn turned() -> BoneMatrix {
-    BoneMatrix {
-        rows: [-Vec4::Y, Vec4::X, Vec4::Z],
-    }
-}
-
-fn mdr() -> Mdr {
-    let frame = |name: &str| Frame {
-        mins: Vec3::splat(-1.0),
-        maxs: Vec3::splat(1.0),
-        local_origin: Vec3::Z,
-        radius: 2.0,
-        name: name.to_owned(),
-    };
-    let weight = |bone, weight, x| MdrWeight {
-        bone,
-        weight,
-        offset: Vec3::X * x,
-    };
-    let vertex = |first_weight, num_weights| MdrVertex {
-        normal: Vec3::X,
-        st: Vec2::new(0.25, 0.75),
-        first_weight,
-        num_weights,
-    };
-    let surface = |name: &str, corners: &[[u32; 3]]| MdrSurface {
-        name: name.to_owned(),
-        shader: "models/a".to_owned(),
-        triangles: corners.to_vec(),
-        vertices: vec![vertex(0, 1), vertex(1, 2), vertex(3, 0), vertex(3, 1)],
-        weights: vec![
-            weight(0, 1.0, 4.0),
-            weight(0, 0.25, 4.0),
-            weight(1, 0.75, 8.0),
-            weight(1, 1.0, 0.0),
-        ],
-    };
-    Mdr {
-        name: "models/a.mdr".to_owned(),
-        frames: vec![frame("one"), frame("two")],
-        bones: vec![
-            BoneMatrix::IDENTITY,
-            moved(1.0, 2.0, 3.0),
-            moved(10.0, 0.0, 0.0),
-            turned(),
-        ],
-        num_bones: 2,
-        lods: vec![
-            vec![
-                surface("body", &[[0, 1, 2], [2, 1, 3]]),
-                surface("hat", &[[0, 1, 2]]),
-            ],
-            vec![surface("body", &[[0, 1, 2]])],
-        ],
-        tags: vec![
-            MdrTag {
-                name: "tag_head".to_owned(),
-                bone: 1,
-            },
-            MdrTag {
-                name: "tag_root".to_owned(),
-                bone: 0,
-            },
-        ],
-    }
-}
-
-fn pose(x: f32, turn: f32) -> IqmPose {
-    IqmPose {
-        translate: Vec3::new(x, 0.0, 0.0),
-        rotate: Quat::from_rotation_z(turn),
-        scale: Vec3::ONE,
-    }
-}
-
-fn iqm() -> Iqm {
-    let vertex = |x: f32, joints: [u8; 4], weights: [f32; 4]| IqmVertex {
-        position: Vec3::X * x,
-        normal: Vec3::X,
-        st: Vec2::new(0.25, 0.75),
-        color: [1, 2, 3, 4],
-        joints,
-        weights,
-    };
-    let joint = |name: &str, parent, x| IqmJoint {
-        name: name.to_owned(),
-        parent,
-        pose: pose(x, 0.0),
-    };
-    let mut model = Iqm {
-        surfaces: vec![
-            IqmSurface {
-                name: "body".to_owned(),
-                material: "models/a".to_owned(),
-                first_vertex: 0,
-                num_vertices: 3,
-                triangles: vec![[0, 1, 2], [2, 1, 0]],
-            },
-            IqmSurface {
-                name: "hat".to_owned(),
-                material: String::new(),
-                first_vertex: 1,
-                num_vertices: 3,
-                triangles: vec![[0, 1, 2]],
-            },
-        ],
-        vertices: vec![
-            vertex(4.0, [0; 4], [1.0, 0.0, 0.0, 0.0]),
-            vertex(12.0, [1, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]),
-            vertex(12.0, [0, 1, 0, 0], [0.5, 0.5, 0.0, 0.0]),
-            vertex(7.0, [0; 4], [0.0; 4]),
-        ],
-        joints: vec![joint("root", None, 0.0), joint("tag_arm", Some(0), 10.0)],
-        bounds: vec![(Vec3::splat(-16.0), Vec3::splat(16.0)); 2],
-        ..Iqm::default()
-    };
-    let quarter = std::f32::consts::FRAC_PI_2;
-    model.set_frames(&[
-        vec![pose(0.0, 0.0), pose(10.0, 0.0)],
-        vec![pose(0.0, quarter), pose(10.0, quarter)],
-    ]);
-    model
-}
+#[path = "common/samples.rs"]
+mod samples;
+#[path = "common/survive.rs"]
+mod survive;
 
 fn posed(model: &Iqm, new: usize, old: usize, back: f32) -> Vec<Vec3> {
     let mut matrices = Vec::new();
@@ -160,58 +31,6 @@ fn near(a: Vec3, b: Vec3) -> bool {
 static MDR: LazyLock<Vec<u8>> = LazyLock::new(|| mdr().write(false));
 static SMALL_MDR: LazyLock<Vec<u8>> = LazyLock::new(|| mdr().write(true));
 static IQM: LazyLock<Vec<u8>> = LazyLock::new(|| iqm().write());
-
-fn survive_mdr(bytes: &[u8]) -> bool {
-    let Ok(model) = Mdr::parse(bytes) else {
-        return false;
-    };
-    assert!(!model.frames.is_empty() && !model.lods.is_empty());
-    let mut bones = Vec::new();
-    model.pose(0, model.frames.len() - 1, 0.5, &mut bones);
-    assert_eq!(bones.len(), model.num_bones);
-    for surface in model.lods.iter().flatten() {
-        for &corner in surface.triangles.iter().flatten() {
-            surface.skinned(&surface.vertices[corner as usize], &bones);
-        }
-        assert!(
-            surface
-                .weights
-                .iter()
-                .all(|w| (w.bone as usize) < bones.len())
-        );
-    }
-    for tag in &model.tags {
-        assert!(model.lerp_tag(&tag.name, -5, i32::MAX, 0.5).is_some());
-    }
-    assert!(model.write(true).len() <= 5 * bytes.len() + 1000);
-    true
-}
-
-fn survive_iqm(bytes: &[u8]) -> bool {
-    let Ok(model) = Iqm::parse(bytes) else {
-        return false;
-    };
-    let mut matrices = Vec::new();
-    let last = model.num_frames.saturating_sub(1);
-    model.pose(&model.skeleton(), 0, last, 0.5, &mut matrices);
-    assert!(matrices.is_empty() || matrices.len() == model.joints.len());
-    for surface in &model.surfaces {
-        let vertices = model.surface_vertices(surface);
-        assert_eq!(vertices.len(), surface.num_vertices);
-        for &corner in surface.triangles.iter().flatten() {
-            vertices[corner as usize].skinned(&matrices);
-        }
-    }
-    for joint in &model.joints {
-        assert!(
-            model
-                .lerp_tag(&joint.name, i32::MIN, i32::MAX, 0.5)
-                .is_some()
-        );
-    }
-    assert!(model.write().len() <= 8 * bytes.len() + 1000);
-    true
-}
 
 #[test]
 fn written_models_read_back() {

@@ -1,11 +1,14 @@
 //! Whatever the input, reading and evaluating neither panics nor loses its bearings.
 
-use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 use shaderscript::{
-    Library, Shader, eval, light, parse_script,
+    parse_script,
     token::{Lexer, MAX_TOKEN_BYTES, Reading},
 };
+use survive::survive;
+
+#[path = "common/survive.rs"]
+mod survive;
 
 /// Words that mean something, so that random texts get past the first one.
 const WORDS: &[&str] = &[
@@ -109,54 +112,6 @@ fn script_text() -> impl Strategy<Value = Vec<u8>> {
     prop_oneof![words, prop::collection::vec(any::<u8>(), 0..400)]
 }
 
-/// Calls everything that takes a material.
-fn use_everything(shader: &Shader, time: f64) {
-    let _ = shader.sort_value();
-    let _ = shaderscript::collapse(shader);
-    let _ = shaderscript::collapse_vertex_light(shader, false);
-    let _ = light::classify(shader);
-    let _ = light::base_stage(shader);
-    let _ = light::compose(&shader.stages, &[], true);
-    let context = eval::ColorContext {
-        time: shader.shader_time(time, 0.0, 0.0),
-        ..eval::ColorContext::default()
-    };
-    for stage in &shader.stages {
-        assert!(stage.image.frame(time) < stage.image.names().len().max(1));
-        let _ = eval::vertex_color(stage, &context, Vec3::ONE, Vec3::Z, [1, 2, 3, 4]);
-        let st = eval::tex_coord(
-            &stage.tc_gen,
-            Vec2::ONE,
-            Vec2::ZERO,
-            Vec3::ONE,
-            Vec3::Z,
-            Vec3::X,
-        );
-        let _ = eval::apply_tc_mods(&stage.tc_mods, st, Vec3::ONE, time, Vec2::ONE);
-    }
-    for count in [0, 3, 4, 9] {
-        let vertex = eval::DeformVertex {
-            position: Vec3::new(count as f32, 2.0, 3.0),
-            normal: Vec3::Z,
-            st: Vec2::ONE,
-            color: [255; 4],
-        };
-        let mut vertices = vec![vertex; count];
-        let mut indices: Vec<u32> = (0..count as u32 / 3 * 3).collect();
-        eval::deform(
-            &shader.deforms,
-            &mut vertices,
-            &mut indices,
-            &eval::DeformContext {
-                time,
-                texts: &[b"some", b"text", b"", b"\xff\0x"],
-                ..eval::DeformContext::default()
-            },
-        );
-        assert!(indices.iter().all(|&i| (i as usize) < vertices.len()));
-    }
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
 
@@ -165,22 +120,7 @@ proptest! {
         text in script_text(),
         time in prop_oneof![Just(0.0), -1e6..1e6, Just(f64::MAX)],
     ) {
-        let script = parse_script("f", &text);
-        let lines = 1 + text.iter().filter(|b| matches!(b, b'\n' | b'\r')).count();
-        for diagnostic in &script.diagnostics {
-            prop_assert!((1..=lines as u32).contains(&diagnostic.line));
-            prop_assert!(diagnostic.column >= 1);
-            prop_assert!(diagnostic.to_string().starts_with("f:"));
-        }
-        for shader in &script.shaders {
-            prop_assert!(!shader.name.is_empty());
-            use_everything(shader, time);
-        }
-        let library = Library::new([("f", &text)]);
-        prop_assert_eq!(
-            library.definitions().len(),
-            if script.dropped.is_some() { 0 } else { script.shaders.len() }
-        );
+        survive(&text, time);
     }
 
     #[test]

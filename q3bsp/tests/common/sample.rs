@@ -4,8 +4,6 @@ use glam::{Vec2, Vec3};
 use q3bsp::builder::MapBuilder;
 use q3bsp::{Bsp, DrawVert, GridPoint, content_flags};
 
-use crate::exercise::exercise;
-
 pub fn vert(x: f32, y: f32, z: f32) -> DrawVert {
     DrawVert {
         position: Vec3::new(x, y, z),
@@ -59,19 +57,4 @@ pub fn sample() -> Bsp {
         longitude: 30,
         latitude: 40,
     })
-}
-
-/// Reads; a map must work and be written back as it was.
-pub fn survive(bytes: &[u8]) -> bool {
-    match Bsp::parse(bytes) {
-        Ok(bsp) => {
-            exercise(&bsp);
-            assert!(bsp.write() == bytes, "not written back as it was");
-            true
-        }
-        Err(error) => {
-            assert!(!error.to_string().is_empty());
-            false
-        }
-    }
 }
