@@ -7,6 +7,7 @@ pub(crate) const SLOTS: usize = 18;
 
 /// Where a lump lies in the file, as the directory says. Empty lumps may have any offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LumpRange {
     /// Bytes from the start of the file.
     pub offset: i32,
@@ -16,6 +17,7 @@ pub struct LumpRange {
 
 /// A lump as the directory of a file has it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LumpEntry {
     /// The lump.
     pub lump: Lump,
@@ -27,6 +29,7 @@ pub struct LumpEntry {
 
 /// Bytes that belong to no lump: an eighteenth directory entry, a compiler's banner, padding.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gap {
     /// Bytes from the start of the file.
     pub offset: usize,
@@ -37,6 +40,7 @@ pub struct Gap {
 /// A value that was replaced on reading. [`crate::Bsp::write`] puts the original back as long as the
 /// replacement is still there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Repair {
     /// The lump.
     pub lump: Lump,
@@ -53,6 +57,7 @@ pub struct Repair {
 /// The layout of the file a [`crate::Bsp`] was read from. The default (no file) makes
 /// [`crate::Bsp::write`] use the compilers' usual order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Container {
     /// The directory, by [`Lump::index`].
     pub lumps: [LumpRange; SLOTS],

@@ -5,6 +5,7 @@ use glam::Vec3;
 
 /// Key and value pairs in file order, duplicates included.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Entity {
     /// The pairs; bytes that are not UTF-8 are replaced.
     pub pairs: Vec<(String, String)>,

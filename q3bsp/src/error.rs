@@ -1,9 +1,12 @@
 //! What can be wrong with a map, and where.
 
+use std::borrow::Cow;
 use std::fmt;
 
 /// The lumps: the seventeen of `IBSP` in directory order, then those that other formats add.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 #[allow(missing_docs)] // the names are the format's own
 pub enum Lump {
     Entities,
@@ -266,17 +269,18 @@ impl Error {
 
 /// Something odd that was tolerated, as the engine does, and what was made of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Warning {
     /// The lump.
     pub lump: Lump,
     /// Index of the record in its lump; `None` when the lump as a whole is meant.
     pub element: Option<usize>,
     /// Name of the field.
-    pub field: &'static str,
+    pub field: Cow<'static, str>,
     /// What it holds.
     pub value: i64,
     /// What was made of it.
-    pub action: &'static str,
+    pub action: Cow<'static, str>,
 }
 
 impl fmt::Display for Warning {

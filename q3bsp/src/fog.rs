@@ -8,6 +8,7 @@ const WORLD_EXTENT: f32 = 131_072.0;
 
 /// A fog volume, in the order of [`Bsp::fogs`], so that [`crate::Surface::fog`] indexes it.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FogVolume {
     /// Smallest corner, id units.
     pub mins: Vec3,

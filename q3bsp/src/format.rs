@@ -5,6 +5,8 @@ use crate::error::Lump;
 
 /// A map format. All are read into the same [`crate::Bsp`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Format {
     /// `IBSP` version 46: Quake III Arena and the games and mods made with its engine.
     #[default]

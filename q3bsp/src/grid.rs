@@ -10,6 +10,7 @@ const DEFAULT_SIZE: Vec3 = Vec3::new(64.0, 64.0, 128.0);
 
 /// Where the points of [`Bsp::light_grid`] are: x fastest, then y, then z.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LightGridLayout {
     /// Position of the first point, id units.
     pub origin: Vec3,
@@ -21,6 +22,7 @@ pub struct LightGridLayout {
 
 /// Light at a place, raw 0 to 255 before over-bright shift, `r_ambientScale` and `r_directedScale`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GridSample {
     /// Light from everywhere.
     pub ambient: Vec3,

@@ -17,6 +17,7 @@ pub const NO_STYLE: u8 = 255;
 /// Everything beyond the first layer. All lists are empty in formats without styles; a list that is shorter than the
 /// one it goes with stands for defaults when it is written.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Layers {
     /// For each of [`crate::Bsp::surfaces`].
     pub surfaces: Vec<SurfaceLayers>,
@@ -68,6 +69,7 @@ impl Layers {
 
 /// Styles of a surface, and the lightmaps of its layers 1 to 3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SurfaceLayers {
     /// Styles of the four lightmaps.
     pub lightmap_styles: [u8; 4],
@@ -97,6 +99,7 @@ impl Default for SurfaceLayers {
 
 /// Layers 1 to 3 of a vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VertexLayers {
     /// Coordinates in the lightmap pages, 0 to 1.
     pub lightmap: [Vec2; 3],
@@ -106,6 +109,7 @@ pub struct VertexLayers {
 
 /// A point of the light grid with its four layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GridLayers {
     /// Light from everywhere, per layer.
     pub ambient: [[u8; 3]; 4],
@@ -333,6 +337,7 @@ impl Record for LayeredSide {
 
 /// A rectangle that Quake Live showed an advertisement on.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Advertisement {
     /// Number of the cell in the advertiser's system.
     pub cell: i32,
@@ -341,6 +346,7 @@ pub struct Advertisement {
     /// Its corners, id units.
     pub corners: [Vec3; 4],
     /// The model field as stored: a NUL-terminated name such as `*12`.
+    #[cfg_attr(feature = "serde", serde(with = "crate::bytes::name_as_list"))]
     pub model: [u8; 64],
 }
 

@@ -15,6 +15,9 @@
 //! normals, and they must survive writing); [`DrawVert::finite`] gives the cleaned vertex, and
 //! everything derived here (patches, fog volumes, grid samples) is finite.
 //!
+//! With the feature `serde` the data types are `Serialize` and `Deserialize`; a deserialized map has to pass
+//! [`Bsp::validate`] before its indices may be used.
+//!
 //! ```no_run
 //! let bytes = std::fs::read("maps/example.bsp")?;
 //! let bsp = q3bsp::Bsp::parse(&bytes)?;
@@ -59,6 +62,8 @@ mod validate;
 mod visibility;
 mod write;
 
+pub use glam;
+
 pub use container::{Container, Gap, LumpEntry, LumpRange, Repair};
 pub use entities::Entity;
 pub use error::{Error, Lump, Warning};
@@ -79,6 +84,7 @@ pub use visibility::Visibility;
 /// A whole map, owned. Indices in the fields are valid after [`Bsp::parse`]; code that changes the
 /// fields by hand takes over that duty ([`Bsp::validate`] checks it again).
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bsp {
     /// The format that the map was read from and is written in.
     pub format: Format,

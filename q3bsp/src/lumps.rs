@@ -16,10 +16,12 @@ pub(crate) trait Record: Sized {
 
 /// Lump 1: a shader name with the flags that the map compiler saw.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShaderRef {
     /// Name without extension, as written, to the first NUL; bytes that are not UTF-8 are replaced.
     pub name: String,
     /// The field as stored; compilers left garbage behind the NUL.
+    #[cfg_attr(feature = "serde", serde(with = "crate::bytes::name_as_list"))]
     pub raw_name: [u8; 64],
     /// See [`crate::surface_flags`].
     pub surface_flags: u32,
@@ -84,6 +86,7 @@ impl Record for ShaderRef {
 
 /// Lump 2: the plane of points p with `normal · p = dist`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Plane {
     /// Unit normal.
     pub normal: Vec3,
@@ -114,6 +117,7 @@ impl Record for Plane {
 
 /// Lump 3: an inner node of the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Node {
     /// Index of the splitting plane.
     pub plane: i32,
@@ -146,6 +150,7 @@ impl Record for Node {
 
 /// Lump 4: a convex cell of space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Leaf {
     /// Visibility cluster, below [`crate::Bsp::num_clusters`]; -1 for solid space and outside.
     pub cluster: i32,
@@ -204,6 +209,7 @@ impl Record for i32 {
 
 /// Lump 7: the world or a brush model.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Model {
     /// Smallest corner. For model 0 these are the compiler's bounds, which the light grid is laid out
     /// by; geometry may lie outside.
@@ -244,6 +250,7 @@ impl Record for Model {
 
 /// Lump 8: the intersection of the half-spaces `normal · p <= dist` of its sides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Brush {
     /// First side. Compilers write the six axial sides first: -x +x -y +y -z +z.
     pub first_side: i32,
@@ -271,6 +278,7 @@ impl Record for Brush {
 
 /// Lump 9: one side of a brush.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BrushSide {
     /// Plane, normal outwards.
     pub plane: i32,
@@ -294,6 +302,7 @@ impl Record for BrushSide {
 
 /// Lump 10: a vertex, or a control point of a patch. Values are as stored and may be NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DrawVert {
     /// Position, id units.
     pub position: Vec3,
@@ -367,10 +376,12 @@ impl Record for DrawVert {
 
 /// Lump 12: a fog volume as stored.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Fog {
     /// Shader whose `fogParms` give colour and depth.
     pub shader: String,
     /// The name field as stored.
+    #[cfg_attr(feature = "serde", serde(with = "crate::bytes::name_as_list"))]
     pub raw_shader: [u8; 64],
     /// The brush, which has at least six sides; -1 for fog that fills the world.
     pub brush: i32,
@@ -405,6 +416,7 @@ pub const LIGHTMAP_BYTES: usize = LIGHTMAP_SIZE * LIGHTMAP_SIZE * 3;
 /// Lump 14: one square page of texels, red green blue, first row first, before the over-bright shift. All pages of a
 /// map have the same size, that of its format ([`crate::Bsp::lightmap_size`]).
 #[derive(Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Lightmap(
     /// The bytes.
     pub Box<[u8]>,
@@ -436,6 +448,7 @@ impl Lightmap {
 
 /// Lump 15: light that arrives at one point of the grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GridPoint {
     /// Light from everywhere; all zero when the point is inside a wall.
     pub ambient: [u8; 3],

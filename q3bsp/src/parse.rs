@@ -132,9 +132,9 @@ impl Bsp {
             self.warnings.push(Warning {
                 lump: Lump::LightArray,
                 element: layers.grid_indices.iter().position(beyond),
-                field: "number of indices beyond the lightgrid, of which this is the first,",
+                field: "number of indices beyond the lightgrid, of which this is the first,".into(),
                 value: count as i64,
-                action: "taken as points in walls",
+                action: "taken as points in walls".into(),
             });
         }
         Ok((self.layers.spread_grid(), rest))
@@ -163,9 +163,9 @@ impl Bsp {
             self.warnings.push(Warning {
                 lump,
                 element: None,
-                field: "number of bytes after the last record",
+                field: "number of bytes after the last record".into(),
                 value: rest.len() as i64,
-                action,
+                action: action.into(),
             });
         }
     }
@@ -189,9 +189,9 @@ impl Bsp {
                 self.warnings.push(Warning {
                     lump,
                     element: None,
-                    field: "offset",
+                    field: "offset".into(),
                     value: start as i64,
-                    action: "inside the header or another lump; read all the same",
+                    action: "inside the header or another lump; read all the same".into(),
                 });
             } else {
                 self.push_gap(bytes, covered, start);

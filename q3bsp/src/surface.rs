@@ -6,6 +6,7 @@ use glam::Vec3;
 
 /// What a [`Surface`] is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum SurfaceKind {
     /// A flat polygon with its triangles; stored 1.
     Planar,
@@ -62,6 +63,7 @@ pub mod lightmap_index {
 
 /// Lump 13: something drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Surface {
     /// Shader index.
     pub shader: i32,

@@ -58,9 +58,9 @@ impl Repairs<'_> {
         self.warnings.push(Warning {
             lump: self.lump,
             element: Some(element),
-            field,
+            field: field.into(),
             value: i64::from(*slot),
-            action,
+            action: action.into(),
         });
         self.repairs.push(Repair {
             lump: self.lump,
@@ -457,9 +457,10 @@ impl Bsp {
                 self.warnings.push(Warning {
                     lump,
                     element: Some(first),
-                    field: "number of records with NaN or infinity, of which this is the first,",
+                    field: "number of records with NaN or infinity, of which this is the first,"
+                        .into(),
                     value: count as i64,
-                    action: "kept as they are",
+                    action: "kept as they are".into(),
                 });
             }
         }

@@ -2,9 +2,11 @@
 
 use crate::Bsp;
 use crate::error::{Lump, Warning};
+use std::borrow::Cow;
 
 /// Lump 16: a bit matrix. Not symmetric in most shipped maps.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Visibility {
     /// Number of clusters, which is the number of rows; at least 1.
     pub clusters: usize,
@@ -81,9 +83,9 @@ impl Visibility {
             Some(Warning {
                 lump: Lump::Visibility,
                 element: None,
-                field,
+                field: Cow::Borrowed(field),
                 value,
-                action: "the lump is ignored: everything sees everything",
+                action: Cow::Borrowed("the lump is ignored: everything sees everything"),
             })
         };
         if data.is_empty() {

@@ -4,6 +4,7 @@ use glam::{Vec3, Vec4};
 
 /// A transform as three rows of four: what a position's x, y and z are made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BoneMatrix {
     /// Rows; the fourth column is the translation.
     pub rows: [Vec4; 3],

@@ -13,6 +13,7 @@ const GLYPH_BYTES: usize = 80;
 
 /// A font.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FontInfo {
     /// By byte value; always [`GLYPHS_PER_FONT`].
     pub glyphs: Vec<Glyph>,
@@ -24,6 +25,7 @@ pub struct FontInfo {
 
 /// One character, sizes in pixels.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Glyph {
     /// Rows.
     pub height: i32,

@@ -14,6 +14,7 @@ const NEARLY_EQUAL: f32 = 0.999_999;
 
 /// A model.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Iqm {
     /// Parts of the model, each drawn with one shader.
     pub surfaces: Vec<IqmSurface>,
@@ -36,6 +37,7 @@ pub struct Iqm {
 
 /// Triangles that share a shader.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct IqmSurface {
     /// Name that skins refer to, lower case.
     pub name: String,
@@ -51,6 +53,7 @@ pub struct IqmSurface {
 
 /// A vertex in the pose that the model was bound in.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct IqmVertex {
     /// Position, id units.
     pub position: Vec3,
@@ -68,6 +71,7 @@ pub struct IqmVertex {
 
 /// A joint as it was when the model was bound.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct IqmJoint {
     /// Name, compared with regard to case.
     pub name: String,
@@ -79,6 +83,7 @@ pub struct IqmJoint {
 
 /// Place of a joint in its parent's space.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct IqmPose {
     /// Id units.
     pub translate: Vec3,
@@ -90,6 +95,7 @@ pub struct IqmPose {
 
 /// The joints of a model when it was bound, in the model's space ([`Iqm::skeleton`]).
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct IqmSkeleton {
     bind: Vec<BoneMatrix>,
     /// What undoes them, provided that joints are scaled evenly.
@@ -99,6 +105,7 @@ pub struct IqmSkeleton {
 /// How the poses of one joint are stored: number `c` of its pose is `offset[c]` and, if bit `c` of the mask is set,
 /// `scale[c]` times the next stored number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct IqmChannels {
     /// Which numbers change from frame to frame.
     pub mask: u32,

@@ -34,6 +34,8 @@ mod mdr_write;
 mod skin;
 mod write;
 
+pub use glam;
+
 pub use bone::BoneMatrix;
 pub use error::Error;
 pub use font::{FONT_FILE_BYTES, FontInfo, GLYPHS_PER_FONT, Glyph};

@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 
 /// A model of one level of detail.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Md3 {
     /// Path that the exporter wrote; nothing depends on it.
     pub name: String,
@@ -19,6 +20,7 @@ pub struct Md3 {
 
 /// Bounds of one key-frame.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Frame {
     /// Smallest corner, id units.
     pub mins: Vec3,
@@ -34,6 +36,7 @@ pub struct Frame {
 
 /// A named coordinate frame.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tag {
     /// Name, compared with regard to case.
     pub name: String,
@@ -45,6 +48,7 @@ pub struct Tag {
 
 /// Where a tag is between two frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TagPose {
     /// Position, id units.
     pub origin: Vec3,
@@ -54,6 +58,7 @@ pub struct TagPose {
 
 /// Triangles that share a shader.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Surface {
     /// Name that skins refer to: lower case, a trailing `_` with one character (the exporters' level of
     /// detail) removed.
@@ -82,6 +87,7 @@ impl Surface {
 
 /// A vertex of one frame, eight bytes as in the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct PackedVertex {
     /// Position in 1/64 id units.

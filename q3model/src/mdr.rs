@@ -6,6 +6,7 @@ use crate::{BoneMatrix, Frame, TagPose};
 
 /// A model with all its levels of detail.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Mdr {
     /// Path that the exporter wrote; nothing depends on it.
     pub name: String,
@@ -23,6 +24,7 @@ pub struct Mdr {
 
 /// A bone with a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MdrTag {
     /// Name, compared with regard to case.
     pub name: String,
@@ -32,6 +34,7 @@ pub struct MdrTag {
 
 /// Triangles that share a shader.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MdrSurface {
     /// Name that skins refer to, lower case.
     pub name: String,
@@ -47,6 +50,7 @@ pub struct MdrSurface {
 
 /// A vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MdrVertex {
     /// Normal before bones turn it.
     pub normal: Vec3,
@@ -60,6 +64,7 @@ pub struct MdrVertex {
 
 /// What a vertex has of a bone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MdrWeight {
     /// Less than [`Mdr::num_bones`].
     pub bone: u32,

@@ -2,6 +2,7 @@
 
 /// The entries of a `.skin` file, in file order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Skin {
     /// The entries; those for tags are left out.
     pub surfaces: Vec<SkinSurface>,
@@ -9,6 +10,7 @@ pub struct Skin {
 
 /// One entry.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SkinSurface {
     /// Surface name, lower case.
     pub surface: String,

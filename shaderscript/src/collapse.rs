@@ -10,6 +10,7 @@ use crate::{
 
 /// How the two images of a pass are combined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Combine {
     /// There is one image.
     None,
@@ -24,6 +25,7 @@ pub enum Combine {
 /// Colour, alpha test, depth test and depth write are those of stage `first`; each image keeps its own texture
 /// coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pass {
     /// Index of the (first) stage.
     pub first: usize,

@@ -4,6 +4,7 @@ use std::fmt;
 
 /// How bad a fault is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Severity {
     /// Worth telling an author; nothing is drawn differently.
     Note,
@@ -27,6 +28,7 @@ impl fmt::Display for Severity {
 ///
 /// Displays as `file:line:column: severity: shader: message`, the form editors jump to.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Diagnostic {
     /// Name of the script file, as given by the caller.
     pub file: String,

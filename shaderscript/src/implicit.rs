@@ -7,6 +7,7 @@ use crate::{
 
 /// Where an image without a script is used; decides how it is lit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ImplicitKind {
     /// On a model: lit by the light grid.
     EntityLit,

@@ -27,6 +27,8 @@ mod parse;
 mod shader;
 mod stage;
 
+pub use glam;
+
 pub use collapse::{Combine, Pass, collapse, collapse_vertex_light};
 pub use diagnostic::{Diagnostic, Severity};
 pub use implicit::ImplicitKind;

@@ -31,6 +31,7 @@ pub mod sort {
 
 /// Where a definition stands.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Location {
     /// Script file, as named by the caller; empty for materials that no script wrote.
     pub file: String,
@@ -40,6 +41,7 @@ pub struct Location {
 
 /// A material.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Shader {
     /// Name as written; compared without case.
     pub name: String,
@@ -173,6 +175,7 @@ impl Shader {
 
 /// Which faces are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Cull {
     /// Front faces are drawn: the default.
     Front,
@@ -184,6 +187,7 @@ pub enum Cull {
 
 /// A change of a surface's vertices. See [`eval::deform`](crate::eval::deform) for the formulas.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Deform {
     /// Along the normal.
     Wave {
@@ -227,6 +231,7 @@ pub enum Deform {
 
 /// `skyParms`.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sky {
     /// Far box: base name of six images with the suffixes `_rt _bk _lf _ft _up _dn`.
     pub outer: Option<String>,
@@ -238,6 +243,7 @@ pub struct Sky {
 
 /// `fogParms`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Fog {
     /// Colour as written, nominally 0 to 1, in display space.
     pub color: Vec3,
@@ -247,6 +253,7 @@ pub struct Fog {
 
 /// `q3map_sun` or `q3map_sunExt`: light from infinitely far.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sun {
     /// Colour as written; only its ratios count.
     pub color: Vec3,
@@ -279,6 +286,7 @@ impl Sun {
 
 /// What a material tells the map compiler about light.
 #[derive(Clone, Debug, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LightDirectives {
     /// `q3map_surfacelight`: light that the surface emits per area, in the compiler's units. Lines whose
     /// argument is no number do not count.
@@ -309,6 +317,7 @@ pub struct LightDirectives {
 
 /// A line that the engine does not interpret.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct UnknownDirective {
     /// Keyword as written.
     pub keyword: String,

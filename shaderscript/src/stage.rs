@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 
 /// One drawing pass of a [`Shader`](crate::Shader), with all defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stage {
     /// What is sampled.
     pub image: StageImage,
@@ -69,6 +70,7 @@ impl Stage {
 
 /// The image of a stage. Names are as written in the script.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum StageImage {
     /// A repeating image.
     Map(String),
@@ -119,6 +121,7 @@ impl StageImage {
 
 /// Factor of a blend equation, as OpenGL defines it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum BlendFactor {
     /// 0.
     Zero,
@@ -146,6 +149,7 @@ pub enum BlendFactor {
 
 /// Alpha test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum AlphaFunc {
     /// Passes where alpha > 0.
     Gt0,
@@ -168,6 +172,7 @@ impl AlphaFunc {
 
 /// Depth test of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum DepthFunc {
     /// Drawn where nothing is nearer.
     LessEqual,
@@ -179,6 +184,7 @@ pub enum DepthFunc {
 
 /// Source of a stage's colour.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum RgbGen {
     /// White.
     Identity,
@@ -204,6 +210,7 @@ pub enum RgbGen {
 
 /// Source of a stage's alpha.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum AlphaGen {
     /// 1.
     Identity,
@@ -230,6 +237,7 @@ pub enum AlphaGen {
 
 /// Source of texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum TcGen {
     /// The vertex's texture coordinates.
     Base,
@@ -243,6 +251,7 @@ pub enum TcGen {
 
 /// One change of texture coordinates. See [`eval::apply_tc_mods`](crate::eval::apply_tc_mods) for the formulas.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum TcMod {
     /// Wobble by position.
     Turbulent {
@@ -276,6 +285,7 @@ pub enum TcMod {
 
 /// A periodic function of time: `base + f(phase + time * frequency) * amplitude`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Wave {
     /// Shape.
     pub function: WaveFunction,
@@ -291,6 +301,7 @@ pub struct Wave {
 
 /// Shape of a wave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum WaveFunction {
     /// Sine.
     Sin,

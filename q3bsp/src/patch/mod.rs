@@ -21,6 +21,7 @@ const MAX_TOTAL_VERTICES: usize = 4 << 20;
 
 /// A tessellated patch. All numbers are finite.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PatchMesh {
     /// Number of columns, at least 2.
     pub width: usize,

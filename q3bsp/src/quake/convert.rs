@@ -252,9 +252,11 @@ impl QuakeMap {
             bsp.warnings.push(Warning {
                 lump: Lump::Faces,
                 element: None,
-                field: "number of lightmaps that are larger than 512 × 512 or share bytes without end",
+                field:
+                    "number of lightmaps that are larger than 512 × 512 or share bytes without end"
+                        .into(),
                 value: too_large,
-                action: "the faces get their mean",
+                action: "the faces get their mean".into(),
             });
         }
         Ok(())

@@ -55,6 +55,7 @@ const QUAKE2_LUMPS: [Lump; 19] = [
 /// A map of Quake, GoldSrc or Quake II as it is stored. Nothing in it is checked but the directory and the sizes of
 /// records; [`QuakeMap::to_bsp`] checks the rest.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct QuakeMap {
     /// Which of the formats.
     pub format: Format,

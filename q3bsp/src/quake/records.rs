@@ -75,6 +75,7 @@ fn put_signed(out: &mut Vec<u8>, value: i32, wide: bool) {
 
 /// A plane: points p with `normal · p = dist`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct QuakePlane {
     /// Unit normal.
     pub normal: Vec3,
@@ -104,6 +105,7 @@ impl Versioned for QuakePlane {
 
 /// An inner node of the tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct QuakeNode {
     /// Splitting plane.
     pub plane: i32,
@@ -153,6 +155,7 @@ impl Versioned for QuakeNode {
 
 /// How a texture lies on a face.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Texinfo {
     /// Axis and offset of the horizontal coordinate, texels: `x y z offset`.
     pub s: [f32; 4],
@@ -217,6 +220,7 @@ impl Versioned for Texinfo {
 
 /// A polygon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Face {
     /// Plane.
     pub plane: u32,
@@ -269,6 +273,7 @@ impl Versioned for Face {
 
 /// A convex cell of space.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct QuakeLeaf {
     /// What fills it: in Quake -1 nothing, -2 stone, -3 water, -4 slime, -5 lava, -6 sky; in Quake II flags.
     pub contents: i32,
@@ -341,6 +346,7 @@ impl Versioned for QuakeLeaf {
 
 /// An edge between two vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Edge(
     /// Start and end.
     pub [u32; 2],
@@ -362,6 +368,7 @@ impl Versioned for Edge {
 
 /// The world or a brush model.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct QuakeModel {
     /// Smallest corner, id units.
     pub mins: Vec3,
@@ -418,6 +425,7 @@ impl Versioned for QuakeModel {
 
 /// Quake II: a brush.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct QuakeBrush {
     /// First side.
     pub first_side: i32,
@@ -447,6 +455,7 @@ impl Versioned for QuakeBrush {
 
 /// Quake II: a side of a brush.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct QuakeBrushSide {
     /// Plane, normal outwards.
     pub plane: u32,

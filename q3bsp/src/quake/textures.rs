@@ -36,6 +36,7 @@ pub mod quake2_flags {
 
 /// A texture with a palette index per texel, from inside a map.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EmbeddedTexture {
     /// Name as stored, lower case.
     pub name: String,
@@ -104,6 +105,7 @@ impl EmbeddedTexture {
 /// A material of a converted map: a texture together with the way it is drawn, which Quake's formats tell by the first
 /// letter of its name and Quake II by flags.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TextureUse {
     /// Name of the material, as in [`crate::ShaderRef::name`].
     pub material: String,
@@ -128,7 +130,23 @@ pub struct TextureUse {
     /// Picture of what glows, added after light.
     pub glow: Option<String>,
     /// Words of `surfaceparm` that say what it is.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "known_parameters"))]
     pub parameters: Vec<&'static str>,
+}
+
+/// The words that conversion uses for [`TextureUse::parameters`]; another one is an error.
+#[cfg(feature = "serde")]
+fn known_parameters<'de, D: serde::Deserializer<'de>>(
+    from: D,
+) -> Result<Vec<&'static str>, D::Error> {
+    use serde::{Deserialize, de::Error};
+    const KNOWN: &[&str] = &["sky", "nolightmap", "trans", "water", "lava", "slime"];
+    let words = Vec::<String>::deserialize(from)?;
+    let known = |word: &String| {
+        let found = KNOWN.iter().copied().find(|known| known == word);
+        found.ok_or_else(|| D::Error::unknown_variant(word, KNOWN))
+    };
+    words.iter().map(known).collect()
 }
 
 /// What a texture name of 16 or 32 bytes says, lower case.
@@ -168,9 +186,9 @@ impl QuakeMap {
                     warnings.push(Warning {
                         lump: Lump::Textures,
                         element: Some(element),
-                        field: "offset",
+                        field: "offset".into(),
                         value: i64::from(offset),
-                        action: "no texture is there; taken as missing",
+                        action: "no texture is there; taken as missing".into(),
                     });
                 }
                 texture

@@ -36,9 +36,9 @@ fn warning(field: &'static str, value: i64, action: &'static str) -> Warning {
     Warning {
         lump: Lump::Visibility,
         element: None,
-        field,
+        field: field.into(),
         value,
-        action,
+        action: action.into(),
     }
 }
 

@@ -24,6 +24,7 @@ use definition::DefinitionParser;
 
 /// What one file defines.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Script {
     /// All definitions in order, rejected and repeated ones too.
     pub shaders: Vec<Shader>,

@@ -1,0 +1,83 @@
+//! The feature `serde`: what was serialized is deserialized again.
+
+use q3bsp::quake::QuakeMap;
+use q3bsp::{Advertisement, Bsp, Format, glam::Vec3};
+
+#[path = "quake/room.rs"]
+#[allow(dead_code, reason = "the tests of these formats take all of it")]
+mod room;
+#[path = "common/sample.rs"]
+mod sample;
+
+fn through_json(bsp: &Bsp) -> Bsp {
+    serde_json::from_str(&serde_json::to_string(bsp).unwrap()).unwrap()
+}
+
+#[test]
+fn maps_keep_their_bytes_and_warnings() {
+    for format in [Format::Ibsp46, Format::QuakeLive, Format::Rbsp] {
+        let mut bsp = sample::sample();
+        bsp.format = format;
+        // A repair and its warning.
+        bsp.surfaces[0].fog = 7;
+        if format == Format::QuakeLive {
+            bsp.advertisements = vec![Advertisement {
+                cell: 5,
+                normal: Vec3::Z,
+                corners: [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE],
+                model: [b'*'; 64],
+            }];
+        }
+        let bytes = bsp.write();
+        let bsp = Bsp::parse(&bytes).unwrap();
+        let mut read = through_json(&bsp);
+        assert!(read.write() == bytes, "{format}");
+        assert_eq!(read.warnings, bsp.warnings);
+        assert_eq!(read.warnings.len(), 1);
+        read.validate().unwrap();
+    }
+}
+
+#[test]
+fn converted_maps_keep_what_their_formats_add() {
+    for format in room::FORMATS {
+        let map = room::room(format);
+        let json = serde_json::to_string(&map).unwrap();
+        assert_eq!(serde_json::from_str::<QuakeMap>(&json).unwrap(), map);
+        let bsp = map.to_bsp().unwrap();
+        let read = through_json(&bsp);
+        assert!(!read.texture_uses.is_empty());
+        assert_eq!(read.texture_uses, bsp.texture_uses);
+        assert_eq!(read.embedded_textures, bsp.embedded_textures);
+        assert_eq!(read.texel_coordinates, bsp.texel_coordinates);
+    }
+}
+
+#[test]
+fn what_no_map_can_hold_is_an_error() {
+    let json = serde_json::to_string(&room::room(Format::Quake).to_bsp().unwrap()).unwrap();
+    for (from, to, error) in [
+        (
+            "\"nolightmap\"",
+            "\"sparkles\"",
+            "unknown variant `sparkles`",
+        ),
+        (
+            "\"raw_name\":[",
+            "\"raw_name\":[1,",
+            "invalid length 65, expected 64 bytes",
+        ),
+        (
+            "\"format\":\"Quake\"",
+            "\"format\":\"Doom\"",
+            "unknown variant `Doom`",
+        ),
+    ] {
+        assert!(json.contains(from), "{from}");
+        let broken = json.replacen(from, to, 1);
+        let found = serde_json::from_str::<Bsp>(&broken)
+            .unwrap_err()
+            .to_string();
+        assert!(found.starts_with(error), "{found}");
+    }
+}
