@@ -150,3 +150,8 @@ impl Bsp {
         first.unwrap_or_else(|| self.format.lightmap_size())
     }
 }
+
+/// The example of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

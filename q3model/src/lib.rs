@@ -46,3 +46,8 @@ pub use iqm::{
 pub use md3::{Frame, Md3, PackedVertex, Surface, Tag, TagPose};
 pub use mdr::{Mdr, MdrSurface, MdrTag, MdrVertex, MdrWeight};
 pub use skin::{Skin, SkinSurface};
+
+/// The example of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

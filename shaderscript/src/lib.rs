@@ -41,3 +41,8 @@ pub use stage::{
     AlphaFunc, AlphaGen, BlendFactor, DepthFunc, RgbGen, Stage, StageImage, TcGen, TcMod, Wave,
     WaveFunction,
 };
+
+/// The example of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
