@@ -58,7 +58,7 @@ impl LightLists {
         self.offsets.len().saturating_sub(2)
     }
 
-    /// The entries for a cluster, as [`Bsp::cluster_at`] gives it; all lights for -1 and for clusters
+    /// The entries for a cluster, as [`q3bsp::Bsp::cluster_at`] gives it; all lights for -1 and for clusters
     /// that do not exist.
     pub fn row(&self, cluster: i32) -> &[u32] {
         self.lights.get(self.range(cluster)).unwrap_or_default()
