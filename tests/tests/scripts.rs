@@ -11,6 +11,8 @@ fn shell(line: &str, file: &Path, folder: &Path) -> Output {
         .args(["-c", &format!(". '{}'\n{line}", common.display()), "bash"])
         .args([file, folder])
         .env("GAME_DIR", folder)
+        // bash warns of a locale that the machine lacks
+        .env("LC_ALL", "C")
         .output()
         .expect("bash runs")
 }
