@@ -10,8 +10,16 @@
 //!
 //! An output is compiled again only when the text that it was made from (the file, what it includes, its
 //! definitions, this script's version) has another hash than the one kept in `OUT_DIR`.
+//!
+//! What Rust and GLSL share is written in Rust, in `src/types` and `src/trace_types`. This script writes the same
+//! structures and constants as GLSL to `OUT_DIR/glsl/generated`; shaders include `generated/types.glsl` or
+//! `generated/trace_types.glsl`. The other way round, it reads the ids of specialization constants out of the GLSL and
+//! writes them as Rust constants.
 
-use std::collections::BTreeSet;
+#[path = "build/shared.rs"]
+mod shared;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -22,6 +30,12 @@ use glslang::{
     Compiler, CompilerOptions, Shader, ShaderInput, ShaderMessage, ShaderSource, ShaderStage,
     SourceLanguage, SpirvVersion, Target, VulkanVersion,
 };
+
+/// Rust modules whose structures and constants GLSL has too, with the generated file that each one includes.
+const SHARED: [(&str, Option<&str>); 2] = [
+    ("types", None),
+    ("trace_types", Some("generated/types.glsl")),
+];
 
 /// Part of every content hash: raise it when the way of compiling changes.
 const SCRIPT_VERSION: &str = "3 vulkan1.2 spirv1.5 glslang 0.9.1";
@@ -59,6 +73,15 @@ fn main() {
 
     let mut jobs = Vec::new();
     let mut errors = String::new();
+    let layouts = match share(&root, &out) {
+        Ok(layouts) => layouts,
+        Err(e) => {
+            let _ = writeln!(errors, "{e}");
+            String::new()
+        }
+    };
+    let constant_ids = constant_ids(&root, &files, &mut errors);
+    let roots = Roots([&root, &out.join("glsl")]);
     for file in &files {
         let extension = file.rsplit('.').next().unwrap_or_default();
         if STAGES.iter().any(|s| s.0 == extension) {
@@ -86,7 +109,7 @@ fn main() {
 
     let mut generated = String::new();
     for job in &jobs {
-        if let Err(e) = build(&root, &out, job) {
+        if let Err(e) = build(&roots, &out, job) {
             let _ = writeln!(errors, "{e}");
         }
         let stage = STAGES
@@ -117,71 +140,124 @@ fn main() {
     }
     generated.push_str("];\n");
 
-    let layouts = layouts(&root);
     assert!(errors.is_empty(), "shader compilation failed\n{errors}");
-    for (file, text) in [("modules.rs", generated), ("layouts.rs", layouts)] {
-        let file = out.join(file);
-        if !fs::read_to_string(&file).is_ok_and(|old| old == text) {
-            fs::write(file, text).expect("OUT_DIR can be written");
-        }
+    for (file, text) in [
+        ("modules.rs", generated),
+        ("layouts.rs", layouts),
+        ("constant_ids.rs", constant_ids),
+    ] {
+        write_if_changed(&out.join(file), &text).expect("OUT_DIR can be written");
     }
 }
 
-/// A table of the public structures of the `*types.rs` files with the sizes and offsets that the compiler gives them,
-/// for the test that compares them with SPIR-V. Nobody has to keep a list of fields that way.
-fn layouts(root: &Path) -> String {
+/// Writes a file unless it has this text already, so that what depends on it is not built again.
+fn write_if_changed(file: &Path, text: &str) -> std::io::Result<()> {
+    if fs::read_to_string(file).is_ok_and(|old| old == text) {
+        return Ok(());
+    }
+    fs::write(file, text)
+}
+
+/// Writes the GLSL of what Rust shares. Returns a table of the shared structures with the sizes and offsets that the
+/// Rust compiler gives them, for the test that compares them with SPIR-V.
+fn share(root: &Path, out: &Path) -> Result<String, String> {
+    let folder = out.join("glsl/generated");
+    fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let mut table = String::from(
         "/// Name, size, and name and offset of each field.\npub const LAYOUTS: &[Layout] = &[\n",
     );
-    for (module, text) in ["types", "trace_types"].map(|m| (m, texts(root, m))) {
-        let mut structure: Option<&str> = None;
-        for line in text.lines() {
-            let line = line.trim();
-            if let Some(name) = line
-                .strip_prefix("pub struct ")
-                .and_then(|rest| rest.strip_suffix('{'))
-            {
-                let name = name.trim();
-                structure = Some(name);
+    let mut known = BTreeSet::new();
+    for (name, base) in SHARED {
+        let module = read_shared(root, name)?;
+        let text = module
+            .glsl(name, base, &mut known)
+            .map_err(|e| format!("shaders/src/{name}: {e}"))?;
+        let file = folder.join(format!("{name}.glsl"));
+        write_if_changed(&file, &text).map_err(|e| format!("{}: {e}", file.display()))?;
+        for structure in &module.structures {
+            let path = format!("crate::{name}::{}", structure.name);
+            let _ = writeln!(
+                table,
+                "    (\"{}\", size_of::<{path}>(), &[",
+                structure.name
+            );
+            for field in &structure.fields {
+                let field = &field.name;
                 let _ = writeln!(
                     table,
-                    "    (\"{name}\", size_of::<crate::{module}::{name}>(), &["
+                    "        (\"{field}\", std::mem::offset_of!({path}, {field})),"
                 );
-            } else if let Some(name) = structure {
-                if line == "}" {
-                    table.push_str("    ]),\n");
-                    structure = None;
-                } else if let Some((field, _)) = line
-                    .strip_prefix("pub ")
-                    .and_then(|rest| rest.split_once(':'))
-                {
-                    let _ = writeln!(
-                        table,
-                        "        (\"{field}\", std::mem::offset_of!(crate::{module}::{name}, {field})),"
-                    );
-                }
             }
+            table.push_str("    ]),\n");
         }
     }
     table.push_str("];\n");
-    table
+    Ok(table)
 }
 
-/// The text of a module of this crate and of the modules in its folder, whose structures it publishes as its own.
-fn texts(root: &Path, module: &str) -> String {
-    let folder = root.join("src").join(module);
+/// What a module of this crate and the modules in its folder share.
+fn read_shared(root: &Path, name: &str) -> Result<shared::Module, String> {
+    let folder = root.join("src").join(name);
     let mut files: Vec<PathBuf> = fs::read_dir(&folder)
-        .into_iter()
-        .flatten()
+        .map_err(|e| format!("{}: {e}", folder.display()))?
         .flatten()
         .map(|entry| entry.path())
         .collect();
     files.sort();
     files.insert(0, folder.with_extension("rs"));
-    let texts = files
-        .into_iter()
-        .map(|file| fs::read_to_string(file).unwrap_or_default());
-    texts.collect()
+    let mut module = shared::Module::default();
+    for file in files {
+        let text = fs::read_to_string(&file).map_err(|e| format!("{}: {e}", file.display()))?;
+        module
+            .read(&text)
+            .map_err(|e| format!("{}: {e}", file.display()))?;
+    }
+    Ok(module)
+}
+
+/// Rust constants for the ids of specialization constants: `trace/turn.glsl` becomes the module `trace::turn`. Two files
+/// with the same folder and stem do not compile if both have such constants.
+fn constant_ids(root: &Path, files: &[String], errors: &mut String) -> String {
+    let mut folders: BTreeMap<&str, String> = BTreeMap::new();
+    let mut all = String::new();
+    for file in files {
+        let text = fs::read_to_string(root.join(file)).unwrap_or_default();
+        let constants = match shared::specialization_constants(&text) {
+            Ok(constants) if constants.is_empty() => continue,
+            Ok(constants) => constants,
+            Err(e) => {
+                let _ = writeln!(errors, "shaders/{file}:{e}");
+                continue;
+            }
+        };
+        let (folder, name) = file.split_once('/').unwrap_or(("", file));
+        let stem = symbol_of(name.split('.').next().unwrap_or_default()).to_ascii_lowercase();
+        let ids = folders.entry(folder).or_default();
+        let _ = writeln!(
+            ids,
+            "    /// Specialization constants of `{file}`.\n    pub mod {stem} {{"
+        );
+        for (constant, id) in constants {
+            let _ = writeln!(
+                ids,
+                "        /// Id of `{constant}`.\n        pub const {constant}: u32 = {id};"
+            );
+            let _ = writeln!(all, "    (\"{constant}\", {id}),");
+        }
+        ids.push_str("    }\n");
+    }
+    let mut text = String::new();
+    for (folder, ids) in folders {
+        let _ = writeln!(
+            text,
+            "/// Specialization constants of the shaders in `{folder}`.\npub mod {folder} {{\n{ids}}}"
+        );
+    }
+    let _ = writeln!(
+        text,
+        "/// Name and id of every one.\n#[cfg(test)]\npub(crate) const ALL: &[(&str, u32)] = &[\n{all}];"
+    );
+    text
 }
 
 /// Collects the paths of all GLSL files below `folder`, relative to `root`, with `/`.
@@ -288,24 +364,39 @@ fn slashes(path: &Path) -> String {
     parts.join("/")
 }
 
-/// Finds an included file: relative to the includer first, then to the shader root.
-fn resolve(root: &Path, includer: &str, header: &str) -> Option<String> {
-    let beside = Path::new(includer)
-        .parent()
-        .map(|p| slashes(&p.join(header)));
-    let from_root = slashes(Path::new(header));
-    beside
-        .into_iter()
-        .chain([from_root])
-        .find(|candidate| root.join(candidate).is_file())
+/// Folders that hold GLSL: the shader root, and what this script has written.
+struct Roots<'a>([&'a Path; 2]);
+
+impl Roots<'_> {
+    /// The text of a file below the first root that has it.
+    fn read(&self, file: &str) -> std::io::Result<String> {
+        let [written, generated] = self.0.map(|root| root.join(file));
+        fs::read_to_string(if written.is_file() {
+            written
+        } else {
+            generated
+        })
+    }
+
+    /// Finds an included file: relative to the includer first, then to the roots.
+    fn resolve(&self, includer: &str, header: &str) -> Option<String> {
+        let beside = Path::new(includer)
+            .parent()
+            .map(|p| slashes(&p.join(header)));
+        let from_root = slashes(Path::new(header));
+        beside
+            .into_iter()
+            .chain([from_root])
+            .find(|candidate| self.0.iter().any(|root| root.join(candidate).is_file()))
+    }
 }
 
 /// Adds the text of `file` and of everything that it may include to `text`.
-fn gather(root: &Path, file: &str, seen: &mut BTreeSet<String>, text: &mut String) {
+fn gather(roots: &Roots, file: &str, seen: &mut BTreeSet<String>, text: &mut String) {
     if !seen.insert(file.to_owned()) {
         return;
     }
-    let Ok(source) = fs::read_to_string(root.join(file)) else {
+    let Ok(source) = roots.read(file) else {
         return;
     };
     let _ = writeln!(text, "{file}\n{source}");
@@ -317,8 +408,8 @@ fn gather(root: &Path, file: &str, seen: &mut BTreeSet<String>, text: &mut Strin
             continue;
         };
         let name = rest.trim().trim_matches(|c| matches!(c, '"' | '<' | '>'));
-        if let Some(found) = resolve(root, file, name) {
-            gather(root, &found, seen, text);
+        if let Some(found) = roots.resolve(file, name) {
+            gather(roots, &found, seen, text);
         }
     }
 }
@@ -332,7 +423,7 @@ fn hash(text: &str) -> u64 {
 
 /// Answers glslang's `#include` lines.
 struct Includes<'a> {
-    root: &'a Path,
+    roots: &'a Roots<'a>,
     file: &'a str,
 }
 
@@ -350,23 +441,23 @@ impl IncludeHandler for Includes<'_> {
         } else {
             includer
         };
-        let name = resolve(self.root, includer, header)?;
-        let data = fs::read_to_string(self.root.join(&name)).ok()?;
+        let name = self.roots.resolve(includer, header)?;
+        let data = self.roots.read(&name).ok()?;
         Some(IncludeResult { name, data })
     }
 }
 
 /// Compiles one module unless its output is up to date.
-fn build(root: &Path, out: &Path, job: &Job) -> Result<(), String> {
+fn build(roots: &Roots, out: &Path, job: &Job) -> Result<(), String> {
     let mut text = format!("{SCRIPT_VERSION} {} {:?}\n", job.stage, job.defines);
-    gather(root, &job.file, &mut BTreeSet::new(), &mut text);
+    gather(roots, &job.file, &mut BTreeSet::new(), &mut text);
     let key = format!("{:016x}", hash(&text));
     let module = out.join(format!("{}.spv", job.symbol));
     let stamp = out.join(format!("{}.hash", job.symbol));
     if module.is_file() && fs::read_to_string(&stamp).is_ok_and(|old| old == key) {
         return Ok(());
     }
-    let words = compile(root, job)?;
+    let words = compile(roots, job)?;
     let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
     fs::write(&module, bytes)
         .and_then(|()| fs::write(&stamp, key))
@@ -374,10 +465,11 @@ fn build(root: &Path, out: &Path, job: &Job) -> Result<(), String> {
 }
 
 /// GLSL to SPIR-V words, or glslang's messages with the file's name in them.
-fn compile(root: &Path, job: &Job) -> Result<Vec<u32>, String> {
+fn compile(roots: &Roots, job: &Job) -> Result<Vec<u32>, String> {
     let compiler = Compiler::acquire().ok_or("glslang did not start")?;
-    let text =
-        fs::read_to_string(root.join(&job.file)).map_err(|e| format!("{}: {e}", job.file))?;
+    let text = roots
+        .read(&job.file)
+        .map_err(|e| format!("{}: {e}", job.file))?;
     if text.contains('\0') {
         return Err(format!("{}: a NUL byte in the source", job.file));
     }
@@ -405,7 +497,7 @@ fn compile(root: &Path, job: &Job) -> Result<Vec<u32>, String> {
     let text = with_includes(&text);
     let source = ShaderSource::from(text.as_str());
     let mut includes = Includes {
-        root,
+        roots,
         file: &job.file,
     };
     let explain = |e: GlslangError| explain(&job.file, &e);

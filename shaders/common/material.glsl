@@ -4,7 +4,7 @@
 #define RELIGHT_MATERIAL_GLSL
 
 #extension GL_EXT_buffer_reference2 : require
-#include "types.glsl"
+#include "generated/types.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Materials { Material at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Stages { Stage at[]; };

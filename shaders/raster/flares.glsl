@@ -1,6 +1,6 @@
 // What the shaders of flares share.
 #extension GL_EXT_buffer_reference2 : require
-#include "common/types.glsl"
+#include "generated/types.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Flares { Flare at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer FlareStates { FlareState at[]; };

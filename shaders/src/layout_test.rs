@@ -1,5 +1,6 @@
-//! The structures and constants that GLSL and Rust share must be the same on both sides: member names and offsets are
-//! read out of the compiled SPIR-V and compared with what the Rust compiler made.
+//! The structures that GLSL and Rust share must have the same layout on both sides: member names and offsets are read
+//! out of the compiled SPIR-V and compared with those of the Rust compiler. The same for specialization constants: names
+//! and ids.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -142,68 +143,55 @@ fn structures_have_the_same_layout_in_glsl_and_rust() {
     );
 }
 
-/// `NAME = number` pairs of a source text, of names in capitals.
-fn constants(text: &str) -> BTreeMap<String, u64> {
-    let code: String = text
-        .lines()
-        .map(|line| line.split("//").next().unwrap_or_default())
-        .collect::<Vec<_>>()
-        .join("\n");
-    let mut result = BTreeMap::new();
-    for part in code.split([',', ';', '{', '}']) {
-        let Some((left, right)) = part.split_once('=') else {
-            continue;
-        };
-        let name = left
-            .trim()
-            .trim_end_matches(": u32")
-            .trim_end_matches(": u8")
-            .rsplit(char::is_whitespace)
-            .next()
-            .unwrap_or_default();
-        let capitals = name.starts_with(|c: char| c.is_ascii_uppercase())
-            && name
-                .chars()
-                .all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_');
-        let number = right.trim().replace('_', "");
-        let number = number.trim_end_matches(['u', 'U']);
-        let value = match number.strip_prefix("0x") {
-            Some(hex) => u64::from_str_radix(hex, 16),
-            None => number.parse(),
-        };
-        if let (true, Ok(value)) = (capitals, value) {
-            result.insert(name.to_owned(), value);
-        }
-    }
-    result
+/// Name and id of each specialization constant of a module.
+fn specialization_constants(words: &[u32]) -> Vec<(String, u32)> {
+    let module = rspirv::dr::load_words(words).expect("the module is valid SPIR-V");
+    let names: BTreeMap<u32, &String> = module
+        .debug_names
+        .iter()
+        .filter_map(|i| match (i.class.opcode, &i.operands[..]) {
+            (Op::Name, [Operand::IdRef(id), Operand::LiteralString(name)]) => Some((*id, name)),
+            _ => None,
+        })
+        .collect();
+    module
+        .annotations
+        .iter()
+        .filter_map(|i| match &i.operands[..] {
+            [
+                Operand::IdRef(id),
+                Operand::Decoration(Decoration::SpecId),
+                Operand::LiteralBit32(number),
+            ] => Some((names.get(id)?.to_string(), *number)),
+            _ => None,
+        })
+        .collect()
 }
 
 #[test]
-fn constants_have_the_same_values_in_glsl_and_rust() {
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    let read = |file: &str| std::fs::read_to_string(root.join(file)).unwrap();
-    for (glsl_file, rust_file) in [
-        ("common/types.glsl", "src/types.rs"),
-        ("trace/types.glsl", "src/trace_types/constants.rs"),
-    ] {
-        let (glsl, rust) = (constants(&read(glsl_file)), constants(&read(rust_file)));
-        assert!(
-            glsl.len() > 10,
-            "{glsl_file}: only {} constants found",
-            glsl.len()
-        );
-        for (name, value) in &glsl {
-            assert_eq!(
-                rust.get(name),
-                Some(value),
-                "{name} of {glsl_file} in {rust_file}"
-            );
-        }
-        for name in rust.keys() {
+fn specialization_constants_have_the_ids_that_rust_has() {
+    let mut seen = BTreeSet::new();
+    for module in crate::ALL {
+        let mut taken = BTreeSet::new();
+        for (name, id) in specialization_constants(module.words()) {
             assert!(
-                glsl.contains_key(name),
-                "{name} of {rust_file} is not in {glsl_file}"
+                crate::constant_ids::ALL.contains(&(name.as_str(), id)),
+                "{name} has id {id} in {}, which Rust has not",
+                module.name()
             );
+            assert!(
+                taken.insert(id),
+                "two constants have id {id} in {}",
+                module.name()
+            );
+            seen.insert((name, id));
         }
     }
+    for (name, id) in crate::constant_ids::ALL {
+        assert!(
+            seen.contains(&((*name).to_owned(), *id)),
+            "{name} with id {id} is in no module"
+        );
+    }
+    assert!(!seen.is_empty());
 }

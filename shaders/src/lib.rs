@@ -3,6 +3,10 @@
 //! The sources lie beside this crate's manifest, one folder for each group of passes; the build script compiles
 //! them for Vulkan 1.2 and gives each module a static here, named after folder and file: `raster/draw.vert` is
 //! [`RASTER_DRAW_VERT`](crate). See `build.rs` for variants.
+//!
+//! What both languages share is written once. Structures and constants stand in [`types`] and [`trace_types`], and the
+//! build script writes their GLSL. Specialization constants stand in GLSL, and the build script writes their ids as
+//! [`constant_ids`].
 
 #![forbid(unsafe_code)]
 
@@ -65,5 +69,17 @@ impl std::fmt::Debug for Spirv {
 
 include!(concat!(env!("OUT_DIR"), "/modules.rs"));
 
+/// Ids of specialization constants, by the folder and the name of the file that declares them.
+pub mod constant_ids {
+    include!(concat!(env!("OUT_DIR"), "/constant_ids.rs"));
+}
+
 #[cfg(test)]
 mod layout_test;
+
+#[cfg(test)]
+#[path = "../build/shared.rs"]
+mod shared;
+
+#[cfg(test)]
+mod shared_test;

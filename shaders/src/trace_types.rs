@@ -1,5 +1,5 @@
-//! The structures of the traced look that Rust and GLSL share; `shaders/trace/types.glsl` has the same ones under the
-//! same names, `layout(scalar)`. Radiance is linear, in units where a white diffuse surface of outgoing radiance 1
+//! The structures of the traced look that Rust and GLSL share. The build script writes them as
+//! `generated/trace_types.glsl`, `layout(scalar)`. Radiance is linear, in units where a white diffuse surface of outgoing radiance 1
 //! shows as display white; space is the world's unless said otherwise. Addresses are buffer device addresses.
 
 pub mod constants;

@@ -1,10 +1,12 @@
-//! The structures that Rust and GLSL share. `shaders/common/types.glsl` has the same ones under the same names;
-//! a test reads the member offsets out of the compiled SPIR-V and compares them with these.
+//! The structures that Rust and GLSL share. The build script writes them as `generated/types.glsl`; a test reads the
+//! member offsets out of the compiled SPIR-V and compares them with these.
 //!
 //! Everything is `layout(scalar)`: a `Vec3` takes 12 bytes and aligns to 4; a `vec4` is `[f32; 4]` here, because
 //! glam's `Vec4` aligns to 16. Addresses are buffer device addresses.
 
 #![allow(clippy::struct_excessive_bools)]
+
+pub mod constants;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
@@ -256,7 +258,7 @@ pub struct RasterView {
     pub lights: u64,
 }
 
-/// As many stages go into one draw of the classic look.
+/// As many stages go into one draw of the classic look; `usize`, which GLSL has no use for.
 pub const DRAW_STAGES: usize = constants::DRAW_STAGES as usize;
 
 /// One draw call of the classic look. What the shaders are specialised for is not in it.
@@ -344,104 +346,4 @@ pub struct FlareState {
     pub visible: u32,
     /// Since when, milliseconds of the view's time.
     pub since: i32,
-}
-
-/// Names of constants used on both sides.
-pub mod constants {
-    macro_rules! constants { ($($(#[$doc:meta])* $name:ident = $value:expr;)*) => { $($(#[$doc])* #[allow(missing_docs)] pub const $name: u32 = $value;)* } }
-    constants! {
-        /// No texture.
-        NO_TEXTURE = 0xFFFF_FFFF;
-        WAVE_SIN = 0; WAVE_SQUARE = 1; WAVE_TRIANGLE = 2; WAVE_SAWTOOTH = 3; WAVE_INVERSE_SAWTOOTH = 4; WAVE_NOISE = 5;
-        TCMOD_TURBULENT = 0; TCMOD_SCALE = 1; TCMOD_SCROLL = 2; TCMOD_STRETCH = 3; TCMOD_TRANSFORM = 4; TCMOD_ROTATE = 5;
-        TCMOD_ENTITY_TRANSLATE = 6;
-        TCGEN_BASE = 0; TCGEN_LIGHTMAP = 1; TCGEN_ENVIRONMENT = 2; TCGEN_VECTOR = 3;
-        RGBGEN_IDENTITY = 0; RGBGEN_IDENTITY_LIGHTING = 1; RGBGEN_WAVE = 2; RGBGEN_CONST = 3; RGBGEN_ENTITY = 4;
-        RGBGEN_ONE_MINUS_ENTITY = 5; RGBGEN_VERTEX = 6; RGBGEN_EXACT_VERTEX = 7; RGBGEN_ONE_MINUS_VERTEX = 8;
-        RGBGEN_LIGHTING_DIFFUSE = 9;
-        ALPHAGEN_IDENTITY = 0; ALPHAGEN_CONST = 1; ALPHAGEN_WAVE = 2; ALPHAGEN_ENTITY = 3; ALPHAGEN_ONE_MINUS_ENTITY = 4;
-        ALPHAGEN_VERTEX = 5; ALPHAGEN_ONE_MINUS_VERTEX = 6; ALPHAGEN_LIGHTING_SPECULAR = 7; ALPHAGEN_PORTAL = 8;
-        ALPHAFUNC_NONE = 0; ALPHAFUNC_GT0 = 1; ALPHAFUNC_LT128 = 2; ALPHAFUNC_GE128 = 3;
-        BLEND_ZERO = 0; BLEND_ONE = 1; BLEND_DST_COLOR = 2; BLEND_ONE_MINUS_DST_COLOR = 3; BLEND_SRC_ALPHA = 4;
-        BLEND_ONE_MINUS_SRC_ALPHA = 5; BLEND_DST_ALPHA = 6; BLEND_ONE_MINUS_DST_ALPHA = 7; BLEND_SRC_ALPHA_SATURATE = 8;
-        BLEND_SRC_COLOR = 9; BLEND_ONE_MINUS_SRC_COLOR = 10;
-        /// The stage's image is white.
-        STAGE_WHITE = 1;
-        /// The stage writes depth.
-        STAGE_DEPTH_WRITE = 2;
-        /// The stage tests depth for equality.
-        STAGE_DEPTH_EQUAL = 4;
-        /// The stage's picture stands for a reflection of the surroundings.
-        STAGE_REFLECTION = 8;
-        /// Covers what lies behind by an alpha that the game fades: smoke, blood. It does not glow.
-        STAGE_MATTER = 16;
-        /// The stage's picture, which stands for a reflection, shows the light at the surface, too.
-        STAGE_GLOSS = 32;
-        /// The stage shows the lightmap of a surface that has none: the engine takes a white picture.
-        STAGE_NO_LIGHTMAP = 64;
-        /// The stage's picture, which stands for a reflection, is a lit haze over what lies behind, too.
-        STAGE_HAZE = 128;
-        /// The stage's picture is baked light: an image with the coordinates of the lightmap.
-        STAGE_BAKED_LIGHT = 256;
-        /// The stage adds baked light of a style, which the traced look has as light sources.
-        STAGE_LIGHT_STYLE = 512;
-        /// Seen from both sides.
-        MATERIAL_TWO_SIDED = 1;
-        /// Only the back side is seen.
-        MATERIAL_CULL_BACK = 2;
-        /// Has an alpha-tested stage that decides what is solid.
-        MATERIAL_CUT_OUT = 4;
-        /// Its first stage blends: what lies behind shows through.
-        MATERIAL_TRANSLUCENT = 8;
-        MATERIAL_SKY = 16; MATERIAL_PORTAL = 32; MATERIAL_FOG = 64; MATERIAL_LIQUID = 128; MATERIAL_GLASS = 256;
-        /// Vertex colours are baked light (world surfaces), not part of the material.
-        MATERIAL_VERTEX_LIGHT = 512;
-        /// Drawn with a depth offset (decals).
-        MATERIAL_POLYGON_OFFSET = 1024;
-        /// Gives light (is in the light list).
-        MATERIAL_EMITTER = 2048;
-        /// Nothing is drawn.
-        MATERIAL_INVISIBLE = 4096;
-        /// On the map's surfaces: casts no shadow, because the compiler gave it none.
-        MATERIAL_PASSED = 8192;
-        /// Drawn in front of everything near (first-person weapon).
-        INSTANCE_DEPTH_HACK = 1;
-        /// Only in the eye's own view, never in mirrors and shadows.
-        INSTANCE_FIRST_PERSON = 2;
-        /// Only in mirrors and shadows.
-        INSTANCE_THIRD_PERSON = 4;
-        INSTANCE_NO_SHADOW = 8;
-        /// The light grid does not light it: the world, sprites and beams, pictures.
-        INSTANCE_UNLIT = 16;
-        /// A crosshair: in stereo it stays where the view has it.
-        INSTANCE_CROSSHAIR = 32;
-        /// A sprite: hangs in the air where the light is `ambient`. Of the traced look alone.
-        INSTANCE_SUSPENDED = 64;
-        /// A draw of a material's stage.
-        DRAW_STAGE = 0;
-        /// A dynamic light's blob over a surface.
-        DRAW_LIGHT = 1;
-        /// The fog over an opaque surface.
-        DRAW_FOG = 2;
-        /// Depth alone, before everything else.
-        DRAW_DEPTH = 3;
-        /// See [`super::DRAW_STAGES`].
-        DRAW_STAGES = 4;
-        /// How a stage of a draw goes onto those before it: it is the first or there is none; it multiplies, is added or
-        /// is shown instead, as a second texture of the same pass; it is blended, as a pass of its own.
-        COMBINE_NONE = 0; COMBINE_MODULATE = 1; COMBINE_ADD = 2; COMBINE_REPLACE = 3; COMBINE_BLEND = 4;
-        /// Of a stage: its colour is white, the same for all vertices, or each vertex's own.
-        COLOR_WHITE = 0; COLOR_FLAT = 1; COLOR_VERTEX = 2;
-        FOG_ADJUST_NONE = 0; FOG_ADJUST_RGB = 1; FOG_ADJUST_ALPHA = 2; FOG_ADJUST_RGBA = 3;
-        /// A fog volume has no visible face, has one, or has one that the engine also draws when the eye is inside.
-        FOG_SURFACE_NONE = 0; FOG_SURFACE = 1; FOG_SURFACE_DRAWN = 2;
-        /// The triangle belongs to the world (its vertex colours and lightmap are baked light).
-        TRIANGLE_WORLD = 1;
-        /// The triangle is turned to the eye: mirrors see it from behind, and see it all the same.
-        TRIANGLE_FACES_EYE = 2;
-        /// The triangle has an opposite in its plane, and rays that come from its back are left to that.
-        TRIANGLE_ONE_SIDED = 4;
-        /// The triangle keeps its shape: its geometry names its instance, and `instance` is the number of its surface.
-        TRIANGLE_STATIC = 8;
-    }
 }

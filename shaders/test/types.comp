@@ -3,8 +3,8 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_buffer_reference2 : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#include "common/types.glsl"
-#include "trace/types.glsl"
+#include "generated/types.glsl"
+#include "generated/trace_types.glsl"
 
 layout(local_size_x = 1) in;
 

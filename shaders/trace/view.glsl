@@ -4,7 +4,7 @@
 
 #include "common/bindless.glsl"
 #include "common/material.glsl"
-#include "trace/types.glsl"
+#include "generated/trace_types.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer TraceViews { TraceView view; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Geometries { GeometryRecord at[]; };

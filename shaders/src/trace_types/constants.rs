@@ -1,18 +1,33 @@
-//! Names of constants used on both sides.
-#![allow(missing_docs)] // see types.glsl
+//! Constants of the traced look that Rust and GLSL share. The build script writes them as
+//! `generated/trace_types.glsl`.
+#![allow(missing_docs)] // of a group the first one's comment describes all
 
+/// What a geometry's triangles are to a ray.
 pub const KIND_OPAQUE: u32 = 0;
 pub const KIND_TESTED: u32 = 1;
 pub const KIND_TRANSLUCENT: u32 = 2;
 pub const KIND_SKY: u32 = 3;
 pub const KIND_PASSED: u32 = 4;
+
+/// Edge of the tiles of pixels whose rays are sorted.
 pub const RAY_TILE: u32 = 16;
+
+/// `BvhNode::children`: nothing.
 pub const BVH_NONE: u32 = 0xFFFF_FFFF;
+
+/// `BvhNode::children`: the bit of a leaf.
 pub const BVH_LEAF: u32 = 0x8000_0000;
+
+/// `BvhNode::children` of a leaf: the bit where the number of its entries less one begins.
 pub const BVH_COUNT_SHIFT: u32 = 28;
+
+/// `BvhNode::children` of a leaf: the bits of its first entry.
 pub const BVH_FIRST: u32 = 0x0FFF_FFFF;
+
 /// Entries that a walk of one level keeps for later at most.
 pub const BVH_STACK: u32 = 48;
+
+/// Masks of top-level instances.
 pub const MASK_SOLID: u8 = 0x01;
 pub const MASK_TRANSLUCENT: u8 = 0x02;
 pub const MASK_SKY: u8 = 0x04;
@@ -21,7 +36,11 @@ pub const MASK_FIRST_TRANSLUCENT: u8 = 0x10;
 pub const MASK_THIRD_SOLID: u8 = 0x20;
 pub const MASK_THIRD_TRANSLUCENT: u8 = 0x40;
 pub const MASK_NO_SHADOW: u8 = 0x80;
+
+/// Bits of `TriangleLight::flags`.
 pub const LIGHT_TWO_SIDED: u32 = 1;
+
+/// Bits of `TraceView::flags`.
 pub const VIEW_JITTER: u32 = 1;
 pub const VIEW_FIRST_PERSON: u32 = 2;
 pub const VIEW_ACCUMULATE: u32 = 4;
@@ -33,6 +52,8 @@ pub const VIEW_HISTORY: u32 = 128;
 pub const VIEW_DENOISE: u32 = 256;
 /// Bounced light is gathered for one of each 2 × 2 pixels, which take turns.
 pub const VIEW_SPARSE_BOUNCE: u32 = 512;
+
+/// The views of `rt_debug`: `PostView::debug`.
 pub const DEBUG_ALBEDO: u32 = 1;
 pub const DEBUG_NORMALS: u32 = 2;
 pub const DEBUG_DEPTH: u32 = 3;
@@ -44,6 +65,8 @@ pub const DEBUG_VARIANCE: u32 = 8;
 pub const DEBUG_GRADIENTS: u32 = 9;
 pub const DEBUG_RAYS: u32 = 10;
 pub const DEBUG_SPECULAR: u32 = 11;
+
+/// Counted passes.
 pub const COUNT_EYE: u32 = 0;
 pub const COUNT_PRIMARY: u32 = 1;
 pub const COUNT_DIRECT: u32 = 2;
@@ -51,34 +74,67 @@ pub const COUNT_INDIRECT: u32 = 3;
 pub const COUNT_BOUNCE: u32 = 4;
 pub const COUNT_BOUNCE_LIGHT: u32 = 5;
 pub const COUNT_SUNS: u32 = 6;
+
+/// Counters of each counted pass.
 pub const COUNTER_ROWS: u32 = 64;
+
+/// No storage image.
 pub const NO_IMAGE: u32 = 0xFFFF_FFFF;
+
+/// Bits of `DenoiseView::flags`: the last frame's light is there; its samples are lit again; the cheap filter.
 pub const DENOISE_HISTORY: u32 = 1;
 pub const DENOISE_GRADIENTS: u32 = 2;
 pub const DENOISE_SPARSE: u32 = 4;
+
+/// Bits of `FogView::flags`: fog is lit; its light is filtered; the last frame's is there.
 pub const FOG_LIT: u32 = 1;
 pub const FOG_FILTERED: u32 = 2;
 pub const FOG_HISTORY: u32 = 4;
+
+/// How a light is chosen: `LightView::selection`.
 pub const SELECT_UNIFORM: u32 = 0;
 pub const SELECT_RESAMPLED: u32 = 1;
-pub const FACINGS: u32 = 6;
-pub const WEAK_RAYS: u32 = 3;
 pub const SELECT_ALL: u32 = 2;
+
+/// Rays of an estimate by all lights for the weak ones of a list.
+pub const WEAK_RAYS: u32 = 3;
+
+/// Bits of `LightView::flags`.
 pub const LIGHTS_SOFT: u32 = 1;
+
+/// Light lists of each cell: one for each side of a cube that normals point to.
+pub const FACINGS: u32 = 6;
+
+/// The upper bits of a light's number, from this one on, are its kind; the others are its index among its kind.
 pub const LIGHT_KIND_SHIFT: u32 = 29;
+
+/// Kinds of lights.
 pub const LIGHT_TRIANGLE: u32 = 0;
 pub const LIGHT_CHANGING_TRIANGLE: u32 = 1;
 pub const LIGHT_SPHERE: u32 = 2;
 pub const LIGHT_CHANGING_SPHERE: u32 = 3;
 pub const LIGHT_SUN: u32 = 4;
+
+/// `Triangle::flags`: bits from here on hold the drawing rank, sort value times 8, at most 255.
 pub const TRIANGLE_RANK_SHIFT: u32 = 8;
+
+/// Highest rank of an opaque material: sort 3 (`SS_OPAQUE`) times 8.
 pub const RANK_OPAQUE: u32 = 24;
+
+/// `Triangle::flags`: the eight bits from here on say which paths of the eye meet it, as `PATHS_*`.
 pub const TRIANGLE_PATHS_SHIFT: u32 = 16;
+
+/// All paths; those that have passed no portal; from `PATHS_PORTAL` on those through one portal each, then, where the
+/// numbers up to `PATHS_MOST` do, those through two.
 pub const PATHS_ALL: u32 = 0;
 pub const PATHS_DIRECT: u32 = 1;
 pub const PATHS_PORTAL: u32 = 2;
 pub const PATHS_MOST: u32 = 32;
+
+/// `LastInstance::known`: never seen before, placed elsewhere, placed as now.
 pub const LAST_UNKNOWN: u32 = 0;
 pub const LAST_MOVED: u32 = 1;
 pub const LAST_SAME: u32 = 2;
+
+/// No instance of its own: the triangle names it.
 pub const NO_INSTANCE: u32 = 0xFFFF_FFFF;
