@@ -97,11 +97,11 @@ void main() {
     mean.red = (red - CODE_GREY * level_sum) * (CODE_SCALE * scale);
     if (LAST != 0) {
         vec3 light = light_of_texel(mean.level.x + mean.level.y, mean.green.x + mean.green.y, mean.red.x + mean.red.y);
-        light_write(VIEW.image_direct, pixel, light, dither(pixel, 2));
+        light_write(VIEW.image_direct, pixel, light, dither(pixel, DITHER_FILTERED));
         return;
     }
     // those around, which weigh because they are alike, vary as much
     mean.variance = variance * squares * (scale * scale);
     mean.guide = guide;
-    LightTexels(push.target).at[place] = pack_texel(mean, dither(pixel, 2));
+    LightTexels(push.target).at[place] = pack_texel(mean, dither(pixel, DITHER_FILTERED));
 }

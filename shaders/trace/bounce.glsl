@@ -37,7 +37,7 @@ PathVertex first_vertex(LightTask task) {
 
 // Begins the random numbers of a pixel's bounced light; returns one for its rounding.
 float bounce_random(LightTask task) {
-    rng_begin(uvec2(task.pixel), sparse_index(task.seed), 2);
+    rng_begin(uvec2(task.pixel), sparse_index(task.seed), STREAM_BOUNCE);
     return rng_independent();
 }
 

@@ -18,7 +18,7 @@ void main() {
         LightTask task = light_task(pixel);
         GBufferPixel g = task.surface;
         if (g.path >= 0.0) {
-            rng_begin(uvec2(task.pixel), task.seed, 1);
+            rng_begin(uvec2(task.pixel), task.seed, STREAM_LIGHT);
             random = rng_independent();
             LightSet set = lights_at(g.position, g.face_normal, g.normal);
             if (set_count(set) > set.suns) {

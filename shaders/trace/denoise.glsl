@@ -23,7 +23,7 @@ bool inside(ivec2 pixel) {
     return pixel.x >= 0 && pixel.y >= 0 && pixel.x < int(VIEW.width) && pixel.y < int(VIEW.height);
 }
 
-// A number in [0, 1) that differs from pixel to pixel, frame to frame and `stream` to stream.
+// A number in [0, 1) that differs from pixel to pixel, frame to frame and `stream` (DITHER_*) to stream.
 float dither(ivec2 pixel, uint stream) {
     uint x = uint(pixel.x) * 0x9E3779B1u ^ uint(pixel.y) * 0x85EBCA77u ^ (VIEW.seed * 64u + stream) * 0xC2B2AE3Du;
     x ^= x >> 15;

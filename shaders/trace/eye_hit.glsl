@@ -6,8 +6,6 @@
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer EyeHits { uvec4 at[]; };
 
-// The random numbers of a pixel's path begin with those of its ray.
-const uint EYE_STREAM = 0;
 // What every path sees, and what the eye's own ray sees.
 const uint MASK_ALWAYS = MASK_SKY | MASK_NO_SHADOW, EYE_MASK = MASK_SOLID | MASK_ALWAYS;
 

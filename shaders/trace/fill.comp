@@ -65,6 +65,6 @@ void main() {
             if (weight > 0.0) light /= weight;
             else if (any_weight > 0.0) light = any_light / any_weight;
         }
-        light_write(VIEW.image_indirect, pixel, light, dither(pixel, 5));
+        light_write(VIEW.image_indirect, pixel, light, dither(pixel, DITHER_FILLED));
     }
 }

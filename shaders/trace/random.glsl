@@ -22,6 +22,7 @@ uint pcg_hash(uint x) { return pcg_permute(pcg_step(x)); }
 uint rng_state; // of pixel and pass; a step for each sequence
 uint rng_index; // the frame, its bits reversed
 
+// `stream`: STREAM_*.
 void rng_begin(uvec2 pixel, uint frame, uint stream) {
     rng_state = pcg_hash(pixel.x + pcg_hash(pixel.y + pcg_hash(stream)));
     rng_index = bitfieldReverse(frame);

@@ -28,7 +28,7 @@ void main() {
     float light_scale = 1.5 * sqrt(frames);
     float plane_scale = 1.0 / (0.01 + 2.0 * VIEW.pixel_spread * float(push.spacing));
 
-    float turn = 2.0 * PI * dither(pixel, 4 + push.spacing);
+    float turn = 2.0 * PI * dither(pixel, DITHER_TURN + push.spacing);
     vec3 sum = middle.light;
     float total = 1.0;
     for (int i = 0; i < 8; i++) {
@@ -49,6 +49,6 @@ void main() {
         total += weight;
     }
     middle.light = sum / total;
-    if (LAST != 0) light_write(VIEW.image_direct, pixel, middle.light, dither(pixel, 2));
-    else sparse_write(push.target, pixel, middle, dither(pixel, 2));
+    if (LAST != 0) light_write(VIEW.image_direct, pixel, middle.light, dither(pixel, DITHER_FILTERED));
+    else sparse_write(push.target, pixel, middle, dither(pixel, DITHER_FILTERED));
 }

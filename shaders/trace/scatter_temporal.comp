@@ -46,8 +46,8 @@ void main() {
     } else {
         frames = 0.0;
     }
-    float random = dither(pixel, 0);
+    float random = dither(pixel, DITHER_FRESH);
     texel.guide = pack_sparse_guide(depth, normal, reflection != 0u, uint(frames + 1.0 + random));
-    sparse_write(DENOISE.fresh, pixel, texel, dither(pixel, 1));
+    sparse_write(DENOISE.fresh, pixel, texel, dither(pixel, DITHER_PAST));
     imageStore(images_rg16f[DENOISE.slope], pixel, vec4(slope, 0.0, 0.0));
 }

@@ -12,7 +12,7 @@ const float WEAK_SUN = 1.0 / 64.0;
 
 // Its light without shadows; none where no ray is to be sent. The same for every pass that asks.
 LightSample sun_sample(LightTask task) {
-    rng_begin(uvec2(task.pixel), task.seed, 4);
+    rng_begin(uvec2(task.pixel), task.seed, STREAM_SUN);
     vec2 u = rng_next2();
     LightChoice sun = choose_sun(VIEW.lights.sun_count, u.x);
     LightSample s = sample_light(sun.light, task.surface.position, task.surface.normal, u);

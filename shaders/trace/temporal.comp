@@ -110,11 +110,11 @@ uint choice_of(ivec2 stratum) {
     if ((DENOISE.flags & DENOISE_GRADIENTS) != 0) c = carried_at(stratum);
     // one whose turn it is where bounced light is not gathered everywhere: in each direction there are one or two
     bool sparse = (VIEW.flags & VIEW_SPARSE_BOUNCE) != 0;
-    int random = int(4.0 * dither(stratum, 3));
+    int random = int(4.0 * dither(stratum, DITHER_SAMPLE));
     ivec2 corner = stratum * STRATUM, first, choice;
-    first.y = sparse ? (turn(0).y + corner.y) & 1 : int(dither(stratum, 7) < 0.5);
+    first.y = sparse ? (turn(0).y + corner.y) & 1 : int(dither(stratum, DITHER_SAMPLE_ROW) < 0.5);
     choice.y = first.y + (first.y == 0 && (random & 2) != 0 ? 2 : 0);
-    first.x = sparse ? (turn((corner.y + choice.y) / CELL).x + corner.x) & 1 : int(dither(stratum, 6) < 0.5);
+    first.x = sparse ? (turn((corner.y + choice.y) / CELL).x + corner.x) & 1 : int(dither(stratum, DITHER_SAMPLE_COLUMN) < 0.5);
     choice.x = first.x + (first.x == 0 && (random & 1) != 0 ? 2 : 0);
     int index = choice.y * STRATUM + choice.x;
     if (c.valid && c.index == index) {
@@ -206,8 +206,8 @@ void main() {
     // of the mean over the frames: what has settled is left as it is
     light.variance = variance / min(frames, 2.0 / MIN_WEIGHT - 1.0);
 
-    LightTexels(DENOISE.fresh).at[place_of(pixel)] = pack_texel(light, dither(pixel, 0));
+    LightTexels(DENOISE.fresh).at[place_of(pixel)] = pack_texel(light, dither(pixel, DITHER_FRESH));
     imageStore(images_rg16f[DENOISE.slope], pixel, vec4(slope, 0.0, 0.0));
-    float random = dither(pixel, 1);
+    float random = dither(pixel, DITHER_PAST);
     Pasts(DENOISE.past).at[place_of(pixel)] = pack_past(frames, variance, fract(random + vec4(0.0, 0.25, 0.5, 0.75)));
 }

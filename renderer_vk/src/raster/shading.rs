@@ -2,6 +2,7 @@
 //! evaluated here, once, and neither per vertex nor per fragment.
 
 use glam::Vec2;
+use shaders::constant_ids::raster::draw as id;
 use shaders::types::constants as c;
 use shaders::types::{DRAW_STAGES, Draw, Instance};
 use shaderscript::{AlphaGen, RgbGen, TcMod, WaveFunction, eval};
@@ -115,19 +116,19 @@ impl Shading {
     /// The specialization constants: id and value.
     pub fn constants(&self) -> [(u32, u32); CONSTANTS] {
         [
-            (0, self.mode),
-            (1, self.fog_adjust),
-            (2, self.clip.into()),
-            (3, self.textures),
-            (4, self.tc_mods),
-            (5, self.combine.0),
-            (6, self.blend_source.0),
-            (7, self.blend_target.0),
-            (8, self.alpha_func.0),
-            (9, self.color.0),
-            (10, self.rgb_gen.0),
-            (11, self.alpha_gen.0),
-            (12, self.tc_gen.0),
+            (id::MODE, self.mode),
+            (id::FOG_ADJUST, self.fog_adjust),
+            (id::CLIP, self.clip.into()),
+            (id::TEXTURES, self.textures),
+            (id::TC_MODS, self.tc_mods),
+            (id::COMBINE, self.combine.0),
+            (id::BLEND_SOURCE, self.blend_source.0),
+            (id::BLEND_TARGET, self.blend_target.0),
+            (id::ALPHA_FUNC, self.alpha_func.0),
+            (id::COLOR, self.color.0),
+            (id::RGB_GEN, self.rgb_gen.0),
+            (id::ALPHA_GEN, self.alpha_gen.0),
+            (id::TC_GEN, self.tc_gen.0),
         ]
     }
 }

@@ -12,6 +12,7 @@
 //!
 //! `rt_denoiser 2` costs about a third: a running mean over frames, and three passes of few scattered taps.
 
+use shaders::constant_ids::trace as ids;
 use shaders::trace_types::DenoiseView;
 use shaders::trace_types::constants as t;
 
@@ -145,10 +146,15 @@ impl DenoisePasses {
         let compute = |name, code| ComputePipeline::new(device, name, code, &[]);
         let temporal = |bounces| {
             let code = &shaders::TRACE_TEMPORAL_COMP;
-            ComputePipeline::new(device, "trace_temporal", code, &[(0, bounces)])
+            let constants = [(ids::temporal::BOUNCES, bounces)];
+            ComputePipeline::new(device, "trace_temporal", code, &constants)
         };
         let wavelet = |bounces, noisy, last| {
-            let constants = [(0, bounces), (1, noisy), (2, last)];
+            let constants = [
+                (ids::atrous::BOUNCES, bounces),
+                (ids::atrous::NOISY_VARIANCE, noisy),
+                (ids::atrous::LAST, last),
+            ];
             let code = &shaders::TRACE_ATROUS_COMP;
             ComputePipeline::new(device, "trace_wavelet", code, &constants)
         };
@@ -161,7 +167,8 @@ impl DenoisePasses {
         };
         let sparse = |last| {
             let code = &shaders::TRACE_SCATTER_COMP;
-            ComputePipeline::new(device, "trace_sparse", code, &[(0, last)])
+            let constants = [(ids::scatter::LAST, last)];
+            ComputePipeline::new(device, "trace_sparse", code, &constants)
         };
         Ok(Self {
             carry: compute("trace_carry", &shaders::TRACE_CARRY_COMP)?,

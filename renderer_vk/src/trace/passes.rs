@@ -2,7 +2,8 @@
 //! All of them read their inputs and outputs from one `TraceView`, whose address `record` is given.
 
 use shaders::Spirv;
-use shaders::trace_types::constants::RAY_TILE;
+use shaders::constant_ids::trace::{bounce, direct, fog_keep, turn};
+use shaders::trace_types::constants::{CHOSEN_LIGHTS, CHOSEN_SUNS, RAY_TILE};
 
 use super::input::Tracer;
 use crate::gpu::{
@@ -177,8 +178,7 @@ impl Primary {
     /// # Errors
     /// The driver refuses the pipeline.
     pub fn with_lit_fog(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-        // LIT_FOG in fog_keep.glsl
-        Self::with(device, tracer, &[(0, 1)])
+        Self::with(device, tracer, &[(fog_keep::LIT_FOG, 1)])
     }
 }
 
@@ -192,8 +192,7 @@ impl PlainPrimary {
     /// # Errors
     /// The driver refuses the pipeline.
     pub fn with_lit_fog(device: &Device) -> Result<Self, Error> {
-        // LIT_FOG in fog_keep.glsl
-        Self::with(device, &[(0, 1)])
+        Self::with(device, &[(fog_keep::LIT_FOG, 1)])
     }
 }
 
@@ -203,8 +202,7 @@ ray_pass!(
     /// besides what the eye's paths read.
     OtherSide, "trace_other_side", TRACE_PRIMARY_RGEN,
     TRACE_PRIMARY_RGEN_COMPUTE, TRACE_PRIMARY_RGEN_QUERY,
-    // OTHER_FIELD in primary.rgen
-    &[(2, 1)]
+    &[(turn::OTHER_FIELD, 1)]
 );
 
 ray_pass!(
@@ -223,8 +221,7 @@ impl Direct {
     /// # Errors
     /// The driver refuses the pipeline.
     pub fn of_chosen(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-        // CHOSEN in direct.rgen
-        Self::with(device, tracer, &[(0, 1)])
+        Self::with(device, tracer, &[(direct::CHOSEN, CHOSEN_LIGHTS)])
     }
 
     /// The pass after that, which adds the light of suns.
@@ -232,8 +229,7 @@ impl Direct {
     /// # Errors
     /// The driver refuses the pipeline.
     pub fn of_suns(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-        // CHOSEN in direct.rgen
-        Self::with(device, tracer, &[(0, 2)])
+        Self::with(device, tracer, &[(direct::CHOSEN, CHOSEN_SUNS)])
     }
 
     /// Records the pass for rays in the order that [`Choose`] has left them in.
@@ -272,8 +268,7 @@ impl Indirect {
     /// # Errors
     /// The driver refuses the pipeline.
     pub fn with_fog(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-        // HAS_FOG in bounce.glsl
-        Self::with(device, tracer, &[(1, 1)])
+        Self::with(device, tracer, &[(bounce::HAS_FOG, 1)])
     }
 }
 
@@ -294,8 +289,7 @@ impl BounceMeets {
     /// # Errors
     /// The driver refuses the pipeline.
     pub fn with_fog(device: &Device) -> Result<Self, Error> {
-        // HAS_FOG in bounce.glsl
-        Self::with(device, &[(1, 1)])
+        Self::with(device, &[(bounce::HAS_FOG, 1)])
     }
 }
 ray_pass!(

@@ -46,11 +46,11 @@ fn compute_writes_a_storage_image_and_reads_by_address() {
     let Some(device) = device(true) else { return };
     let mut ring = FrameRing::new(&device, 2).unwrap();
     assert!(FrameRing::new(&device, 2).is_err(), "one ring per device");
-    let pipeline =
-        ComputePipeline::new(&device, "fill", &shaders::TEST_FILL_COMP, &[(3, 5)]).unwrap();
+    let added = [(shaders::constant_ids::test::fill::ADDED, 5)];
+    let pipeline = ComputePipeline::new(&device, "fill", &shaders::TEST_FILL_COMP, &added).unwrap();
     // Another compilation of the same file, asked for by a comment in it.
     let twice =
-        ComputePipeline::new(&device, "twice", &shaders::TEST_FILL_COMP_TWICE, &[(3, 5)]).unwrap();
+        ComputePipeline::new(&device, "twice", &shaders::TEST_FILL_COMP_TWICE, &added).unwrap();
     let image = Image::new(
         &device,
         &ImageDesc::new(

@@ -136,5 +136,41 @@ pub const LAST_UNKNOWN: u32 = 0;
 pub const LAST_MOVED: u32 = 1;
 pub const LAST_SAME: u32 = 2;
 
+/// Streams of a pixel's random numbers (`rng_begin` in `random.glsl`): the path from the eye.
+pub const STREAM_EYE: u32 = 0;
+/// The choice of a light for a visible surface.
+pub const STREAM_LIGHT: u32 = 1;
+/// Bounced light.
+pub const STREAM_BOUNCE: u32 = 2;
+/// Light in fog, of a cell in place of a pixel.
+pub const STREAM_FOG: u32 = 3;
+/// The choice of a point on a sun, the same in each pass that makes it.
+pub const STREAM_SUN: u32 = 4;
+/// The pass of suns, apart from that choice.
+pub const STREAM_SUN_PASS: u32 = 5;
+
+/// Streams of the denoiser's random numbers (`dither` in `denoise.glsl`): rounding of this frame's light in the history;
+/// of the number of frames with `rt_denoiser 2`.
+pub const DITHER_FRESH: u32 = 0;
+/// Rounding of the number of frames and the variance; of the light with `rt_denoiser 2`.
+pub const DITHER_PAST: u32 = 1;
+/// Rounding of filtered light.
+pub const DITHER_FILTERED: u32 = 2;
+/// Which pixel of a stratum is lit again in the next frame.
+pub const DITHER_SAMPLE: u32 = 3;
+/// Turn of the taps with `rt_denoiser 2`: this plus the distance of the step's taps in pixels.
+pub const DITHER_TURN: u32 = 4;
+/// Rounding of bounced light between the pixels that have it.
+pub const DITHER_FILLED: u32 = 5;
+/// Column and row of the first candidate for that pixel.
+pub const DITHER_SAMPLE_COLUMN: u32 = 6;
+pub const DITHER_SAMPLE_ROW: u32 = 7;
+
+/// Whose light the pass of direct light adds (`CHOSEN` in `direct.rgen`): of lights that it chooses itself; of those that
+/// `choose.comp` has chosen; of suns.
+pub const CHOSEN_HERE: u32 = 0;
+pub const CHOSEN_LIGHTS: u32 = 1;
+pub const CHOSEN_SUNS: u32 = 2;
+
 /// No instance of its own: the triangle names it.
 pub const NO_INSTANCE: u32 = 0xFFFF_FFFF;
