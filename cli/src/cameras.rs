@@ -4,14 +4,10 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use glam::Vec3;
 use relight::GameFiles;
+use relight::viewpoints::{self, EYE_HEIGHT, Viewpoint};
 
 use crate::game::Game;
 use crate::view::{map_name, open};
-
-/// The game puts players this much above their spawn point.
-const SPAWN_LIFT: f32 = 9.0;
-/// Height of the eyes above the player's origin.
-pub const EYES: f32 = 26.0;
 
 /// List places to look at maps from: intermission cameras and spawn points
 ///
@@ -98,43 +94,16 @@ fn places_of(files: &dyn GameFiles, path: &str, count: usize) -> Result<Vec<Plac
 
 /// The intermission's camera and spawn points, `count` at most.
 pub fn places(entities: &[q3bsp::Entity], count: usize) -> Vec<Place> {
-    let mut places = Vec::new();
-    let intermission = entities
-        .iter()
-        .find(|e| e.classname() == "info_player_intermission");
-    if let Some(entity) = intermission {
-        places.push(place(entity, entities, -EYES));
-    }
-    let spawns: Vec<_> = entities
-        .iter()
-        .filter(|entity| relight::is_spawn_point(entity))
-        .collect();
-    let wanted = count.saturating_sub(places.len()).min(spawns.len());
-    let chosen = (0..wanted).filter_map(|i| spawns.get(i * spawns.len() / wanted));
-    places.extend(chosen.map(|e| place(e, entities, SPAWN_LIFT)));
-    places.truncate(count);
-    places
-}
-
-fn place(entity: &q3bsp::Entity, entities: &[q3bsp::Entity], lift: f32) -> Place {
-    let origin = entity.vec3("origin").unwrap_or_default();
-    // a camera with a target looks at it
-    let target = entity.get("target").and_then(|name| {
-        let named = |e: &&q3bsp::Entity| e.get("targetname") == Some(name);
-        entities.iter().find(named)?.vec3("origin")
-    });
-    let turn = || {
-        let angles = entity.vec3("angles").map(|angles| angles.y);
-        angles.or(entity.number("angle")).unwrap_or(0.0)
+    let mut views: Vec<Viewpoint> = viewpoints::intermission(entities).into_iter().collect();
+    let spawns: Vec<_> = viewpoints::spawn_views(entities).collect();
+    let wanted = count.saturating_sub(views.len()).min(spawns.len());
+    views.extend((0..wanted).filter_map(|i| spawns.get(i * spawns.len() / wanted)));
+    views.truncate(count);
+    let place = |view: Viewpoint| Place {
+        origin: (view.eye - Vec3::Z * EYE_HEIGHT).round(),
+        yaw: view.yaw.round(),
     };
-    let yaw = target.map_or_else(turn, |target| {
-        let to = target - origin;
-        to.y.atan2(to.x).to_degrees()
-    });
-    Place {
-        origin: (origin + Vec3::Z * lift).round(),
-        yaw: yaw.round(),
-    }
+    views.into_iter().map(place).collect()
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use crate::game::Game;
 use anyhow::{Context, bail};
 use glam::Vec3;
 use q3bsp::{Bsp, Format};
+use relight::viewpoints::{self, Viewpoint};
 use relight::{GameFiles, LoadError, MemoryFiles, Overlay, Pk3, RelitWorld, SearchPath, map_files};
 use renderer_vk::api::{EntityKind, RefDef, RefEntity};
 use renderer_vk::{Renderer, Settings};
@@ -121,6 +122,17 @@ pub struct Camera {
     pub pitch: f32,
 }
 
+impl From<Viewpoint> for Camera {
+    fn from(view: Viewpoint) -> Self {
+        let Viewpoint { eye, yaw, pitch } = view;
+        Self {
+            origin: eye,
+            yaw,
+            pitch,
+        }
+    }
+}
+
 impl Camera {
     /// Forward, left, up.
     pub fn axis(&self) -> [Vec3; 3] {
@@ -149,46 +161,18 @@ impl Camera {
         }
     }
 
-    /// The intermission's view, or that of the first spawn point, eyes 26 units above it.
+    /// The intermission's view, or that of the first spawn point.
     pub fn of_map(bsp: &Bsp) -> Option<Self> {
         let entities = bsp.entities();
-        let view = entities
-            .iter()
-            .find(|e| e.classname() == "info_player_intermission");
-        let Some(view) = view else {
-            return Camera::spawns(bsp).into_iter().next();
-        };
-        let origin = view.vec3("origin")?;
-        let target = view.get("target").and_then(|name| {
-            entities
-                .iter()
-                .find(|e| e.get("targetname") == Some(name))
-                .and_then(|e| e.vec3("origin"))
-        });
-        let (mut yaw, mut pitch) = (view.number("angle").unwrap_or(0.0), 0.0);
-        if let Some(angles) = view.vec3("angles") {
-            (pitch, yaw) = (angles.x, angles.y);
-        }
-        if let Some(to) = target.map(|t| t - origin).filter(|to| to.length() > 1.0) {
-            yaw = to.y.atan2(to.x).to_degrees();
-            pitch = -to.z.atan2(to.truncate().length()).to_degrees();
-        }
-        Some(Self { origin, yaw, pitch })
+        let view = viewpoints::intermission(&entities);
+        view.or_else(|| viewpoints::spawn_views(&entities).next())
+            .map(Self::from)
     }
 
-    /// What players see where they appear, eyes 26 units above the place, in the order of the map.
+    /// What players see where they appear, in the order of the map.
     pub fn spawns(bsp: &Bsp) -> Vec<Self> {
-        let entities = bsp.entities();
-        (entities.iter())
-            .filter(|entity| relight::is_spawn_point(entity))
-            .filter_map(|entity| {
-                let turned = entity.vec3("angles").map(|angles| angles.y);
-                Some(Self {
-                    origin: entity.vec3("origin")? + Vec3::Z * 26.0,
-                    yaw: turned.or(entity.number("angle")).unwrap_or(0.0),
-                    pitch: 0.0,
-                })
-            })
+        viewpoints::spawn_views(&bsp.entities())
+            .map(Self::from)
             .collect()
     }
 

@@ -10,6 +10,7 @@
 //! * [`materials`]: scripts and implicit materials by name.
 //! * [`overbright`]: the one place that knows overbright bits, gamma and sRGB.
 //! * [`sample`]: a small made-up game, to show and test things without game data.
+//! * [`viewpoints`]: where players appear, and what they see there.
 //! * [`world`]: a map with flat geometry, resolved materials and its light sources.
 //! * [`light`]: light sources found in a map, and the lists of them per cluster.
 //!
@@ -45,7 +46,7 @@ pub mod materials;
 mod occluders;
 pub mod overbright;
 pub mod sample;
-mod spawns;
+pub mod viewpoints;
 pub mod world;
 
 pub use cache::CalibrationCache;
@@ -58,5 +59,5 @@ pub use files::{FileError, GameFiles, MemoryFiles, Overlay, Pak, Pk3, SearchPath
 pub use load::{LoadError, Options, Progress, Stage};
 pub use map_files::map_files;
 pub use materials::{Materials, Resolved};
-pub use spawns::is_spawn_point;
+pub use viewpoints::is_spawn_point;
 pub use world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};

@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 use relight::compare::Rgb8;
+use relight::viewpoints::EYE_HEIGHT;
 use renderer_vk::api::RefDef;
 use renderer_vk::{MapLightChoice, Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
 
 use super::chromaticity::ColorDifference;
 use super::statistics::luminance;
-use crate::cameras::{EYES, places};
+use crate::cameras::places;
 use crate::game::Maps;
 use crate::render::parse_size;
 use crate::view::{Camera, load, map_name, open};
@@ -196,7 +197,7 @@ fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
     let cameras: Vec<Camera> = places
         .iter()
         .map(|place| Camera {
-            origin: place.origin + glam::Vec3::Z * EYES,
+            origin: place.origin + glam::Vec3::Z * EYE_HEIGHT,
             yaw: place.yaw,
             pitch: 0.0,
         })

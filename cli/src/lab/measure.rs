@@ -19,6 +19,7 @@ use clap::Args;
 use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use relight::compare::{Rgb8, compare};
+use relight::viewpoints::EYE_HEIGHT;
 use renderer_vk::api::DynamicLight;
 use renderer_vk::{Renderer, RendererOptions, Settings};
 use serde_json::{Value, json};
@@ -26,7 +27,7 @@ use serde_json::{Value, json};
 use self::region::Regions;
 use self::stage::{Stage, Variant, variants};
 use super::statistics::{luminance, relative_bias, relative_error};
-use crate::cameras::{EYES, Place, places};
+use crate::cameras::{Place, places};
 use crate::game::Maps;
 use crate::numbers;
 use crate::render::{parse_size, parse_view};
@@ -333,7 +334,7 @@ fn save(folder: &Path, name: &str, picture: &Rgb8) -> Result<()> {
 /// The places of `relight cameras`, seen with a player's eyes.
 fn ruled_cameras(entities: &[q3bsp::Entity], each: usize) -> Vec<Camera> {
     let eyes = |at: &Place| Camera {
-        origin: at.origin + Vec3::Z * EYES,
+        origin: at.origin + Vec3::Z * EYE_HEIGHT,
         yaw: at.yaw,
         pitch: 0.0,
     };

@@ -4,7 +4,7 @@
 use super::bounce::{Near, surfaces_of_triangles};
 use super::samples::Sample;
 use crate::occluders::Occluders;
-use crate::spawns::is_spawn_point;
+use crate::viewpoints::is_spawn_point;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::Entity;

@@ -3,15 +3,13 @@
 use crate::export::model_file::{self, ModelName};
 use crate::export::{Export, extras};
 use crate::light::{PointLight, SunLight};
-use crate::spawns::is_spawn_point;
+use crate::viewpoints::{self, is_spawn_point};
 use glam::{EulerRot, Quat, Vec3};
 use q3bsp::Entity;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::f32::consts::FRAC_PI_2;
 
-/// Height of a player's eyes above a place where players appear, id units.
-const EYES: f32 = 26.0;
 /// Vertical field of view of the game's 90 degrees at 4:3, radians.
 const VIEW: f32 = 1.287_002_2;
 
@@ -146,22 +144,14 @@ impl Nodes {
         scale: f32,
         name: &str,
     ) -> Option<usize> {
-        let intermission = (entity.classname()).eq_ignore_ascii_case("info_player_intermission");
+        let intermission = viewpoints::is_intermission(entity);
         if !intermission && !is_spawn_point(entity) {
             return None;
         }
         let origin = entity.vec3("origin").unwrap_or(Vec3::ZERO);
         // cameras look along -z, entities along x
         let mut turned = Quat::from_rotation_y(-FRAC_PI_2);
-        let target = entity.get("target").filter(|_| intermission).and_then(|t| {
-            entities
-                .iter()
-                .find(|e| {
-                    e.get("targetname")
-                        .is_some_and(|n| n.eq_ignore_ascii_case(t))
-                })?
-                .vec3("origin")
-        });
+        let target = viewpoints::target(entity, entities).filter(|_| intermission);
         let aim = target.map(|t| turn(t - origin).normalize_or_zero());
         if let Some(aim) = aim.filter(|a| a.is_finite() && *a != Vec3::ZERO) {
             let yaw = (-aim.x).atan2(-aim.z);
@@ -178,7 +168,8 @@ impl Nodes {
         node.insert("name".into(), json!(format!("{name}_camera")));
         node.insert("camera".into(), json!(self.cameras.len() - 1));
         if !intermission {
-            put_translation(&mut node, Vec3::Y * (EYES * scale));
+            let eyes = viewpoints::SPAWN_LIFT + viewpoints::EYE_HEIGHT;
+            put_translation(&mut node, Vec3::Y * (eyes * scale));
         }
         put_rotation(&mut node, turned);
         Some(self.add(Value::Object(node)))
