@@ -5,6 +5,7 @@ mod common;
 use common::{map, relight, run};
 use q3bsp::{Bsp, Format, Lump};
 use std::process::Command;
+use testkit::Random;
 
 /// Every command that reads maps, on one file: the code, and the one line about it.
 fn told(bytes: &[u8]) -> String {
@@ -74,14 +75,7 @@ fn foreign_and_random_files_are_told() {
         let text = told(bytes);
         assert!(text.contains(part), "{part}: {text}");
     }
-    let mut state = 1u32;
-    let noise: Vec<u8> = (0..5000)
-        .map(|_| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 24) as u8
-        })
-        .collect();
-    told(&noise);
+    told(&Random::new(1).bytes(5000));
 }
 
 #[test]

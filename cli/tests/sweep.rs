@@ -5,6 +5,7 @@ mod common;
 
 use common::{map, relight};
 use q3bsp::Format;
+use testkit::Random;
 
 const COMMANDS: [&[&str]; 8] = [
     &["info", "bad.bsp"],
@@ -35,15 +36,6 @@ fn refusal(bytes: &[u8], arguments: &[&str], what: &str) -> Option<String> {
     let left = std::fs::read_dir(folder.path()).unwrap().count();
     assert_eq!(left, 1, "{what}: {arguments:?}: files were left behind");
     Some(text)
-}
-
-fn noise(seed: u32, count: usize) -> Vec<u8> {
-    let mut state = seed;
-    let byte = |_| {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 24) as u8
-    };
-    (0..count).map(byte).collect()
 }
 
 #[test]
@@ -79,8 +71,9 @@ fn noise_in_a_map_is_refused_or_harmless() {
         if arguments.first() == Some(&"render") || arguments.first() == Some(&"lights") {
             continue;
         }
-        let at = 8 + (noise(seed, 4)[0] as usize) * (whole.len() - 80) / 255;
-        bytes[at..at + 64].copy_from_slice(&noise(seed, 64));
+        let mut random = Random::new(seed);
+        let at = 8 + (random.bytes(1)[0] as usize) * (whole.len() - 80) / 255;
+        bytes[at..at + 64].copy_from_slice(&random.bytes(64));
         let what = format!("noise {seed} at {at}");
         refused += usize::from(refusal(&bytes, arguments, &what).is_some());
     }
@@ -91,14 +84,14 @@ fn noise_in_a_map_is_refused_or_harmless() {
 fn what_is_no_map_is_refused_by_every_command() {
     let headers: [&[u8]; 5] = [b"IBSP", b"RBSP", b"FBSP", b"BSP2", b"\x1d\0\0\0"];
     for (seed, header) in (1..).zip(headers) {
-        let bytes = [header, &noise(seed, 3000)].concat();
+        let bytes = [header, &Random::new(seed).bytes(3000)].concat();
         for arguments in COMMANDS {
             let what = format!("{header:?} and noise");
             let text = refusal(&bytes, arguments, &what);
             assert!(text.is_some(), "{what}: {arguments:?} takes it");
         }
     }
-    for bytes in [&[][..], &[0; 4], &[0; 5000], &noise(9, 5000)] {
+    for bytes in [&[][..], &[0; 4], &[0; 5000], &Random::new(9).bytes(5000)] {
         for arguments in COMMANDS {
             let what = format!("{} bytes", bytes.len());
             let text = refusal(bytes, arguments, &what);

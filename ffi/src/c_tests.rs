@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use testkit::Need;
+
 /// A file of this crate's sources.
 pub fn source(relative: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -10,8 +12,8 @@ pub fn source(relative: &str) -> PathBuf {
         .join(relative)
 }
 
-/// Compiles `input` with extra arguments. `None`, with a printed line, when there is no C compiler; where everything
-/// has to be tested (`RELIGHT_REQUIRE_DATA=1`) that is a failure.
+/// Compiles `input` with extra arguments. `None`, with a report of a skipped test, when there is no C compiler;
+/// with `RELIGHT_REQUIRE_DATA=1` that is a failure.
 pub fn compile(input: &Path, output: &Path, arguments: &[&str]) -> Option<()> {
     let result = Command::new("cc")
         .args(arguments)
@@ -30,11 +32,7 @@ pub fn compile(input: &Path, output: &Path, arguments: &[&str]) -> Option<()> {
             Some(())
         }
         Err(error) => {
-            assert!(
-                std::env::var_os("RELIGHT_REQUIRE_DATA").is_none_or(|value| value != "1"),
-                "no C compiler: {error}"
-            );
-            println!("skipped: no C compiler ({error})");
+            testkit::absent(Need::Data, format!("no C compiler: {error}"));
             None
         }
     }

@@ -24,11 +24,11 @@ struct Totals {
 
 #[test]
 fn every_map_is_read_and_written_back() {
-    let Some(game) = testdata::game() else { return };
+    let Some(game) = testkit::game() else { return };
     let mut totals = Totals::default();
     let mut names = BTreeSet::new();
     let mut warned = Vec::new();
-    let maps = testdata::for_each_file(&game.packs, ".bsp", |pak, name, bytes| {
+    let maps = testkit::for_each_file(&game.packs, ".bsp", |pak, name, bytes| {
         let bsp = match Bsp::parse(bytes) {
             Ok(bsp) => bsp,
             Err(error) => panic!("{pak}/{name}: {error}"),
@@ -110,11 +110,11 @@ fn every_map_is_read_and_written_back() {
 /// What the file says elsewhere about directions agrees with winding, patch normals, tree and grid.
 #[test]
 fn geometry_is_the_right_way_round() {
-    let Some(game) = testdata::game() else { return };
+    let Some(game) = testkit::game() else { return };
     let (mut planar, mut planar_agree) = (0u32, 0u32);
     let (mut patch, mut patch_agree) = (0u32, 0u32);
     let (mut spawns, mut spawns_inside, mut spawns_lit) = (0u32, 0u32, 0u32);
-    let maps = testdata::for_each_file(&game.packs, ".bsp", |_, _, bytes| {
+    let maps = testkit::for_each_file(&game.packs, ".bsp", |_, _, bytes| {
         let bsp = Bsp::parse(bytes).unwrap();
         for s in &bsp.surfaces {
             let vertices = bsp.surface_vertices(s);
@@ -200,8 +200,8 @@ fn check_mesh(mesh: &PatchMesh) {
 /// What holds for any map, whoever made it. What is no map is refused, with a line that names it.
 #[test]
 fn maps_of_other_packs_are_read_and_written_back() {
-    let Some(game) = testdata::game() else { return };
-    let maps = testdata::for_each_file(&game.others, ".bsp", |pack, name, bytes| {
+    let Some(game) = testkit::game() else { return };
+    let maps = testkit::for_each_file(&game.others, ".bsp", |pack, name, bytes| {
         let bsp = match Bsp::parse(bytes) {
             Ok(bsp) => bsp,
             Err(error) => return println!("{pack}/{name} is refused: {error}"),
@@ -222,7 +222,7 @@ fn maps_of_other_packs_are_read_and_written_back() {
 
 #[test]
 fn patches_are_tessellated_as_the_engine_does() {
-    let Some(game) = testdata::game() else { return };
+    let Some(game) = testkit::game() else { return };
     // (subdivisions, vertices and triangles before and after stitching)
     let known = [
         (4.0, (139_410, 152_476), Some((140_096, 153_280))),
@@ -234,7 +234,7 @@ fn patches_are_tessellated_as_the_engine_does() {
     let mut plain = [(0, 0); 3];
     let mut stitched = [(0, 0); 3];
     let mut single = Vec::new();
-    let maps = testdata::for_each_file(&game.packs, ".bsp", |pak, name, bytes| {
+    let maps = testkit::for_each_file(&game.packs, ".bsp", |pak, name, bytes| {
         let bsp = Bsp::parse(bytes).unwrap();
         for (setting, (subdivisions, ..)) in known.iter().enumerate() {
             let mut own = (0, 0, 0);

@@ -5,11 +5,11 @@ use std::collections::BTreeSet;
 
 #[test]
 fn every_model_is_read_and_survives_writing() {
-    let Some(game) = testdata::game() else { return };
+    let Some(game) = testkit::game() else { return };
     let (mut most_frames, mut most_surfaces, mut most_tags) = (0, 0, 0);
     let mut beyond_the_engine = BTreeSet::new();
     let mut names = BTreeSet::new();
-    let models = testdata::for_each_file(&game.packs, ".md3", |pak, name, bytes| {
+    let models = testkit::for_each_file(&game.packs, ".md3", |pak, name, bytes| {
         let model = match Md3::parse(bytes) {
             Ok(model) => model,
             Err(error) => panic!("{pak}/{name}: {error}"),
@@ -49,11 +49,11 @@ fn every_model_is_read_and_survives_writing() {
 
 #[test]
 fn every_skin_is_read() {
-    let Some(game) = testdata::game() else { return };
+    let Some(game) = testkit::game() else { return };
     let mut names = BTreeSet::new();
     let mut entries = 0;
     let mut empty = Vec::new();
-    let skins = testdata::for_each_file(&game.packs, ".skin", |_, name, bytes| {
+    let skins = testkit::for_each_file(&game.packs, ".skin", |_, name, bytes| {
         names.insert(name.to_ascii_lowercase());
         let skin = Skin::parse(bytes);
         entries += skin.surfaces.len();
@@ -72,15 +72,15 @@ fn every_skin_is_read() {
 /// What holds for any model and skin, whoever made it. What is no model is refused, with a line that names it.
 #[test]
 fn models_and_skins_of_other_packs_are_read() {
-    let Some(game) = testdata::game() else { return };
+    let Some(game) = testkit::game() else { return };
     let models =
-        testdata::for_each_file(&game.others, ".md3", |pack, name, bytes| {
+        testkit::for_each_file(&game.others, ".md3", |pack, name, bytes| {
             match Md3::parse(bytes) {
                 Ok(model) => check_model(&model, &format!("{pack}/{name}")),
                 Err(error) => println!("{pack}/{name} is refused: {error}"),
             }
         });
-    let skins = testdata::for_each_file(&game.others, ".skin", |_, name, bytes| {
+    let skins = testkit::for_each_file(&game.others, ".skin", |_, name, bytes| {
         check_skin(&Skin::parse(bytes), name);
     });
     println!("{models} models, {skins} skins");

@@ -358,16 +358,13 @@ fn each_window(a: &Rgb8, b: &Rgb8, channel: usize, mut found: impl FnMut(f64)) {
 
 #[cfg(test)]
 mod tests {
+    use testkit::Random;
+
     use super::*;
 
     /// A repeatable picture without structure shared between seeds.
-    fn noise(width: usize, height: usize, mut seed: u32) -> Rgb8 {
-        let pixels = (0..width * height * 3)
-            .map(|_| {
-                seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                (seed >> 24) as u8
-            })
-            .collect();
+    fn noise(width: usize, height: usize, seed: u64) -> Rgb8 {
+        let pixels = Random::new(seed).bytes(width * height * 3);
         Rgb8::new(width, height, pixels).unwrap()
     }
 

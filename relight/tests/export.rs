@@ -406,7 +406,7 @@ const MAPS: [&str; 4] = ["aggressor", "am_lavaarena", "islandctf", "oa_dm3"];
 
 #[test]
 fn real_maps_are_exported_as_they_are() {
-    let Some(folder) = testdata::folder() else {
+    let Some(folder) = testkit::folder() else {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();
@@ -421,7 +421,7 @@ fn real_maps_are_exported_as_they_are() {
 #[test]
 #[ignore = "converts and reads back every map of every pack"]
 fn all_maps_are_exported_as_they_are() {
-    let Some(game) = testdata::game() else {
+    let Some(game) = testkit::game() else {
         return;
     };
     let mut count = 0;

@@ -9,6 +9,7 @@ use relight::light::{LightColor, LightRef};
 use relight::{Materials, RelitWorld, SearchPath, WorldSurface};
 use shaderscript::light::SurfaceClass;
 use std::f32::consts::PI;
+use testkit::Random;
 
 /// Triangles that stop light, tried one after the other.
 struct Occluders(Vec<([Vec3; 3], bool)>);
@@ -52,28 +53,10 @@ impl Occluders {
     }
 }
 
-struct Random(u64);
-
-impl Random {
-    /// 0..1, exclusive.
-    fn next(&mut self) -> f32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1u64 << 24) as f32
-    }
-
-    /// Barycentric coordinates of a point in a triangle, evenly.
-    fn barycentric(&mut self) -> Vec3 {
-        let (u, v) = (self.next(), self.next());
-        let (u, v) = if u + v > 1.0 {
-            (1.0 - u, 1.0 - v)
-        } else {
-            (u, v)
-        };
-        Vec3::new(1.0 - u - v, u, v)
-    }
+/// Barycentric coordinates of a point in a triangle, evenly.
+fn barycentric(random: &mut Random) -> Vec3 {
+    let (u, v) = random.in_triangle();
+    Vec3::new(1.0 - u - v, u, v)
 }
 
 /// Direct light at a point, as the outgoing radiance of white.
@@ -90,7 +73,7 @@ fn direct(
             LightRef::Triangle(index) => {
                 let light = &world.lights[index as usize];
                 for _ in 0..2 {
-                    let b = random.barycentric();
+                    let b = barycentric(random);
                     let [p, q, r] = light.vertices;
                     let point = p * b.x + q * b.y + r * b.z;
                     let (distance, direction) = ((point - at).length(), (point - at).normalize());
@@ -132,7 +115,7 @@ fn direct(
 
 /// Median of computed over stored light, at texels that are neither black nor cut off.
 fn median_ratio(map: &str) -> Option<f32> {
-    let files = SearchPath::open(&[testdata::folder()?]).unwrap();
+    let files = SearchPath::open(&[testkit::folder()?]).unwrap();
     let (materials, _) = Materials::load(&files);
     let options = relight::Options {
         light_color: LightColor::Stored,
@@ -147,17 +130,17 @@ fn median_ratio(map: &str) -> Option<f32> {
             && world.materials[s.material as usize].emission.is_none()
     };
     let surfaces: Vec<&WorldSurface> = world.surfaces.iter().filter(lit).collect();
-    let mut random = Random(12345);
+    let mut random = Random::new(12345);
     let mut ratios = Vec::new();
     while ratios.len() < 200 {
-        let surface = surfaces[(random.next() * surfaces.len() as f32) as usize];
-        let triangle = (random.next() * (surface.num_indices / 3) as f32) as usize;
+        let surface = surfaces[(random.uniform() * surfaces.len() as f32) as usize];
+        let triangle = (random.uniform() * (surface.num_indices / 3) as f32) as usize;
         let first = surface.first_index as usize + triangle * 3;
         let corners: Vec<_> = world.indices[first..first + 3]
             .iter()
             .map(|&i| world.vertices[i as usize])
             .collect();
-        let b = random.barycentric().to_array();
+        let b = barycentric(&mut random).to_array();
         let mix = |of: &dyn Fn(usize) -> Vec3| (0..3).map(|k| of(k) * b[k]).sum::<Vec3>();
         let texel = mix(&|k| corners[k].lightmap.extend(0.0)) * 128.0;
         let (x, y) = ((texel.x as usize).min(127), (texel.y as usize).min(127));

@@ -195,7 +195,7 @@ pub const PIXEL: &[u8] = &[
     0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 24, 0, 10, 20, 30,
 ];
 
-/// The files of OpenArena's own packs; `None`, with a line that says so, without them.
+/// The files of OpenArena's own packs; `None`, with a report of a skipped test, without them.
 pub fn openarena() -> Option<SearchPath> {
-    Some(SearchPath::open(&[testdata::folder()?]).unwrap())
+    Some(SearchPath::open(&[testkit::folder()?]).unwrap())
 }

@@ -1,6 +1,6 @@
 //! Assets and worlds on whatever Vulkan device there is, with the validation layer where it is installed.
 //!
-//! Without a device each test says so and passes, unless `RELIGHT_REQUIRE_GPU=1`.
+//! Without a device each test is skipped; with `RELIGHT_REQUIRE_GPU=1` it fails.
 
 use std::sync::Arc;
 
@@ -12,22 +12,14 @@ use renderer_vk::gpu::{Device, DeviceOptions, SurfaceSource};
 use renderer_vk::scene::{Geometry, Look, Scene};
 use renderer_vk::world::{World, WorldError};
 
-/// A headless device, or `None` with a printed line.
+/// A headless device, or `None` with a report of a skipped test.
 fn device() -> Option<Device> {
     let options = DeviceOptions {
         app_name: "asset tests".to_owned(),
         validation: true,
         ..DeviceOptions::default()
     };
-    match Device::new(&options, SurfaceSource::Headless) {
-        Ok(device) => Some(device),
-        Err(e) => {
-            let required = std::env::var("RELIGHT_REQUIRE_GPU").is_ok_and(|v| v == "1");
-            assert!(!required, "a GPU is required: {e}");
-            println!("skipped: {e}");
-            None
-        }
-    }
+    testkit::device(Device::new(&options, SurfaceSource::Headless))
 }
 
 fn assets(device: &Device, files: MemoryFiles, settings: &Settings) -> Assets {

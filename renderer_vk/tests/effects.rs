@@ -1,6 +1,6 @@
 //! Effects of the classic look, drawn by a whole renderer without a window: shadows, flares, smooth edges, stereo.
 //!
-//! Without a device each test says so and passes, unless `RELIGHT_REQUIRE_GPU=1`.
+//! Without a device each test is skipped; with `RELIGHT_REQUIRE_GPU=1` it fails.
 
 use std::sync::Arc;
 
@@ -48,15 +48,7 @@ impl Stage {
             validation: true,
             ..RendererOptions::headless(SIDE, SIDE)
         };
-        let mut renderer = match make(options) {
-            Ok(renderer) => renderer,
-            Err(e) => {
-                let required = std::env::var("RELIGHT_REQUIRE_GPU").is_ok_and(|v| v == "1");
-                assert!(!required, "a GPU is required: {e}");
-                println!("skipped: {e}");
-                return None;
-            }
-        };
+        let mut renderer = testkit::device(make(options))?;
         let mut map = MapBuilder::new();
         let wall = map.add_shader("t/wall", 0, 0);
         map.add_room(wall, Vec3::splat(-256.0), Vec3::splat(256.0));

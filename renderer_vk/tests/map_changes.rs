@@ -1,6 +1,6 @@
 //! What a renderer holds over many changes of map: its own objects, and the memory of its process.
 //!
-//! Without a device each test says so and passes, unless `RELIGHT_REQUIRE_GPU=1`.
+//! Without a device each test is skipped; with `RELIGHT_REQUIRE_GPU=1` it fails.
 
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -118,15 +118,7 @@ fn changes(settings: &Settings, count: usize) -> Option<Vec<Held>> {
         validation: true,
         ..RendererOptions::headless(64, 48)
     };
-    let mut renderer = match Renderer::new(options) {
-        Ok(renderer) => renderer,
-        Err(e) => {
-            let required = std::env::var("RELIGHT_REQUIRE_GPU").is_ok_and(|v| v == "1");
-            assert!(!required, "a GPU is required: {e}");
-            println!("skipped: {e}");
-            return None;
-        }
-    };
+    let mut renderer = testkit::device(Renderer::new(options))?;
     renderer.set_settings(settings);
     let mut held = Vec::new();
     for number in 0..count {

@@ -1,5 +1,7 @@
 //! A small random generator, so that one map gives one result everywhere.
 
+use glam::Vec3;
+
 /// PCG-like: a 64-bit linear congruential generator, of which the high bits are used after a mix.
 #[derive(Debug, Clone)]
 pub struct Random(u64);
@@ -12,14 +14,39 @@ impl Random {
         random
     }
 
-    /// Evenly in 0..1, 1 excluded.
-    pub fn uniform(&mut self) -> f32 {
+    /// 32 bits, evenly.
+    pub fn bits(&mut self) -> u32 {
         self.0 = self
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
         let mixed = (self.0 ^ (self.0 >> 22)) >> 29;
-        (mixed & 0xFF_FFFF) as f32 / (1u32 << 24) as f32
+        (mixed & 0xFFFF_FFFF) as u32
+    }
+
+    /// Evenly in 0..1, 1 excluded.
+    pub fn uniform(&mut self) -> f32 {
+        (self.bits() & 0xFF_FFFF) as f32 / (1u32 << 24) as f32
+    }
+
+    /// Evenly in -1..1, 1 excluded.
+    pub fn signed(&mut self) -> f32 {
+        self.uniform() * 2.0 - 1.0
+    }
+
+    /// Each coordinate evenly in -1..1, 1 excluded.
+    pub fn signed_point(&mut self) -> Vec3 {
+        Vec3::new(self.signed(), self.signed(), self.signed())
+    }
+
+    /// That many bytes, evenly.
+    pub fn bytes(&mut self, count: usize) -> Vec<u8> {
+        (0..count).map(|_| self.bits() as u8).collect()
+    }
+
+    /// An index into `count` things, of which there are less than 2^32; 0 if there are none.
+    pub fn below(&mut self, count: usize) -> usize {
+        self.bits() as usize % count.max(1)
     }
 
     /// Barycentric coordinates of the second and third corner, evenly over a triangle.

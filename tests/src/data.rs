@@ -1,24 +1,12 @@
 //! Where the things are that tests need, and what happens when they are not there: a test that lacks something is
-//! skipped with a line that says so, and fails instead when `RELIGHT_REQUIRE_DATA=1` (data, tools) or
-//! `RELIGHT_REQUIRE_GPU=1` (a Vulkan device) promises that nothing is lacking.
+//! skipped, and fails instead when `RELIGHT_REQUIRE_DATA=1` (data, tools) or `RELIGHT_REQUIRE_GPU=1` (a Vulkan device)
+//! requires it.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// Whether the environment variable is 1.
-pub fn is_set(variable: &str) -> bool {
-    std::env::var(variable).is_ok_and(|v| v == "1")
-}
-
-/// Says that a test is skipped because of `why`; a failure where everything has to be there.
-pub fn skip(why: &str) {
-    assert!(
-        !is_set("RELIGHT_REQUIRE_DATA"),
-        "{why}, and RELIGHT_REQUIRE_DATA=1"
-    );
-    println!("skipped: {why}");
-}
+use testkit::Need;
 
 /// The repository's top folder.
 pub fn repository() -> PathBuf {
@@ -74,7 +62,7 @@ pub fn engine_renderer(name: &str) -> Option<PathBuf> {
     if file.is_file() {
         return Some(file);
     }
-    skip(&format!("{} is not there", file.display()));
+    testkit::absent(Need::Data, format!("{} is absent", file.display()));
     None
 }
 
@@ -85,7 +73,7 @@ pub fn tool(name: &str) -> Option<PathBuf> {
         .map(|dir| dir.join(name))
         .find(|file| file.is_file());
     if found.is_none() {
-        skip(&format!("{name} is not installed"));
+        testkit::absent(Need::Data, format!("{name} is not installed"));
     }
     found
 }

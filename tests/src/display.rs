@@ -13,7 +13,7 @@ pub struct Display {
 }
 
 impl Display {
-    /// Starts a server; `None`, with a line that says so, where Xvfb is not installed.
+    /// Starts a server; `None`, with a report of a skipped test, where Xvfb is not installed.
     ///
     /// # Panics
     /// When it is installed and does not start.

@@ -41,21 +41,22 @@ pub struct Outcome {
 /// Software rendering takes every core, so runs take turns.
 static TURN: Mutex<()> = Mutex::new(());
 
-/// Whether the engine, the game and a display in memory are here; says so if not.
+/// Whether the engine, the game and a display in memory are here; otherwise the test is reported as skipped.
 pub fn available() -> bool {
     let engine = PathBuf::from("/usr/lib/ioquake3/ioquake3");
     if !engine.is_file() {
-        data::skip(&format!("{} is not installed", engine.display()));
+        let why = format!("{} is not installed", engine.display());
+        testkit::absent(testkit::Need::Data, why);
         return false;
     }
-    testdata::game().is_some() && data::tool("Xvfb").is_some() && data::tool("cc").is_some()
+    testkit::game().is_some() && data::tool("Xvfb").is_some() && data::tool("cc").is_some()
 }
 
 /// The game without what else lies beside it, as `scripts/engine` takes it: links to its own packs and its code.
-fn base(game: &testdata::Game) -> PathBuf {
+fn base(game: &testkit::Game) -> PathBuf {
     let installation = std::env::var_os("GAME_DIR")
         .map_or_else(|| PathBuf::from("/usr/lib/openarena"), PathBuf::from);
-    testdata::engine_base(game, &installation)
+    testkit::engine_base(game, &installation)
         .unwrap_or_else(|error| panic!("{}: {error}", installation.display()))
 }
 
@@ -119,7 +120,7 @@ impl Run {
             std::fs::write(&path, bytes).expect("a file in the temporary folder");
         }
         let mut script = Command::new(data::repository().join("scripts/engine"));
-        if let Some(game) = testdata::game() {
+        if let Some(game) = testkit::game() {
             script.env("GAME_DIR", base(game));
         }
         script

@@ -11,7 +11,7 @@ use tests::gallery::{run, scenes};
 #[test]
 fn scenes_look_as_in_opengl1() {
     let mut scenes = scenes();
-    if !data::is_set("RELIGHT_FULL") {
+    if !testkit::is_set("RELIGHT_FULL") {
         scenes.retain(|s| s.quick);
     }
     // Both processes play what was built for this test.

@@ -2,6 +2,7 @@
 
 #![forbid(unsafe_code)]
 
+use testkit::Random;
 use tests::engine::{Engine, Options, View};
 use tests::gallery::tube;
 use tests::maps::{self, HERE, ROOMS};
@@ -97,12 +98,8 @@ fn a_map_of_another_kind_is_named() {
 fn bytes_turned_over_never_stop_the_process() {
     let whole = maps::files().remove(0).1;
     let mut engine = engine_with(vec![]);
-    let mut seed = 12345u32;
-    let mut random = || {
-        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        seed >> 8
-    };
-    let rounds = if tests::data::is_set("RELIGHT_FULL") {
+    let mut random = Random::new(12345);
+    let rounds = if testkit::is_set("RELIGHT_FULL") {
         400
     } else {
         40
@@ -111,13 +108,13 @@ fn bytes_turned_over_never_stop_the_process() {
         let mut bytes = whole.clone();
         for _ in 0..8 {
             // most damage in the header and the small lumps at the front
-            let range = if random() % 2 == 0 {
+            let range = if random.below(2) == 0 {
                 2048.min(bytes.len())
             } else {
                 bytes.len()
             };
-            let at = random() as usize % range;
-            bytes[at] = random() as u8;
+            let at = random.below(range);
+            bytes[at] = random.bits() as u8;
         }
         engine.insert_file("maps/damaged.bsp", bytes);
         if engine.start_map("maps/damaged.bsp").is_ok() {
@@ -213,11 +210,7 @@ fn broken_skeletons_are_refused_or_drawn() {
     let mut engine = engine_with(vec![]);
     engine.start_map(ROOMS).unwrap();
     let view = View::new(HERE, 0.0);
-    let mut numbers = 12345u32;
-    let mut next = || {
-        numbers = numbers.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (numbers >> 8) as usize
-    };
+    let mut random = Random::new(12345);
     let kinds = [
         ("mdr", tube::mdr(false)),
         ("mdr", tube::mdr(true)),
@@ -237,8 +230,8 @@ fn broken_skeletons_are_refused_or_drawn() {
         for part in 0..60 {
             let mut bytes = whole.clone();
             for _ in 0..8 {
-                let at = next() % bytes.len();
-                bytes[at] = next() as u8;
+                let at = random.below(bytes.len());
+                bytes[at] = random.bits() as u8;
             }
             let name = format!("models/poked{number}-{part}.{kind}");
             engine.insert_file(&name, bytes);

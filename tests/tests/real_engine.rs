@@ -3,7 +3,7 @@
 #![forbid(unsafe_code)]
 
 use relight::compare::{Rgb8, compare};
-use tests::data::{is_set, keep_picture};
+use tests::data::keep_picture;
 use tests::real::{self, Run, picture, start_map};
 use tests::roq;
 
@@ -343,7 +343,11 @@ fn many_restarts_and_map_changes() {
     if !real::available() {
         return;
     }
-    let rounds = if is_set("RELIGHT_FULL") { 40 } else { 3 };
+    let rounds = if testkit::is_set("RELIGHT_FULL") {
+        40
+    } else {
+        3
+    };
     let mut commands = vec!["set timescale 1000".to_string()];
     for round in 0..rounds {
         let map = VIEWS[round % VIEWS.len()].0;

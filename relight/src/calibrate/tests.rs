@@ -589,7 +589,7 @@ fn a_folder_that_cannot_be_used_is_a_warning() {
 
 #[test]
 fn shipped_maps_agree_with_their_lightmaps() {
-    let Some(folder) = testdata::folder() else {
+    let Some(folder) = testkit::folder() else {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();

@@ -287,7 +287,7 @@ fn means() {
 /// Calls `visit` with name, extension in lower case, and bytes of every image of these packs.
 fn for_each_image(packs: &[std::path::PathBuf], mut visit: impl FnMut(&str, &str, Vec<u8>)) {
     for extension in EXTENSIONS {
-        testdata::for_each_file(packs, &format!(".{extension}"), |_, name, bytes| {
+        testkit::for_each_file(packs, &format!(".{extension}"), |_, name, bytes| {
             visit(name, extension, bytes.to_vec());
         });
     }
@@ -296,7 +296,7 @@ fn for_each_image(packs: &[std::path::PathBuf], mut visit: impl FnMut(&str, &str
 /// Every image of OpenArena decodes, TGAs as `image` decodes them once their top-down bit is cleared.
 #[test]
 fn openarena_images_decode() {
-    let Some(game) = testdata::game() else {
+    let Some(game) = testkit::game() else {
         return;
     };
     let mut count = std::collections::BTreeMap::<String, usize>::new();
@@ -331,7 +331,7 @@ fn openarena_images_decode() {
 /// What holds for any image, whoever made it: it has all of its texels, or is refused with a line that names it.
 #[test]
 fn images_of_other_packs_decode_or_are_refused() {
-    let Some(game) = testdata::game() else {
+    let Some(game) = testkit::game() else {
         return;
     };
     let (mut decoded, mut refused) = (0, 0);

@@ -292,7 +292,7 @@ fn the_sample_map_comes_back() {
 
 #[test]
 fn real_maps_come_back() {
-    let Some(folder) = testdata::folder() else {
+    let Some(folder) = testkit::folder() else {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();
@@ -318,11 +318,11 @@ fn real_maps_come_back() {
 #[ignore = "needs a file saved by an editor"]
 fn a_file_saved_by_an_editor_is_the_map() {
     let (Some(folder), Ok(file), Ok(map)) = (
-        testdata::folder(),
+        testkit::folder(),
         std::env::var("MAP_FILE"),
         std::env::var("MAP"),
     ) else {
-        println!("skipped: MAP_FILE and MAP name the file and its map");
+        testkit::skip("MAP_FILE and MAP name the file and its map");
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();
@@ -339,7 +339,7 @@ fn a_file_saved_by_an_editor_is_the_map() {
 #[test]
 #[ignore = "writes and reads back every map of every pack"]
 fn all_maps_come_back() {
-    let Some(game) = testdata::game() else {
+    let Some(game) = testkit::game() else {
         return;
     };
     let mut all = Agreement::default();

@@ -474,18 +474,10 @@ mod tests {
     use super::super::{Access, DeviceOptions, FrameRing, Rendering, SurfaceSource};
     use super::*;
 
-    /// A device with a surface that no window system stands behind, or `None` with a printed line.
+    /// A device with a surface that no window system stands behind, or `None` with a report of a skipped test.
     fn device() -> Option<Device> {
-        let required = std::env::var("RELIGHT_REQUIRE_GPU").is_ok_and(|v| v == "1");
         // SAFETY: the library is a Vulkan loader by its name.
-        let entry = match unsafe { ash::Entry::load() } {
-            Ok(entry) => entry,
-            Err(e) => {
-                assert!(!required, "{e}");
-                println!("skipped: {e}");
-                return None;
-            }
-        };
+        let entry = testkit::device(unsafe { ash::Entry::load() })?;
         let mut create = |raw: vk::Instance| {
             // SAFETY: the instance was just made by this loader.
             let instance = unsafe { ash::Instance::load(entry.static_fn(), raw) };
@@ -509,13 +501,8 @@ mod tests {
             validation: true,
             ..DeviceOptions::default()
         };
-        let device = match Device::new(&options, source) {
-            Ok(device) => Some(device),
-            Err(e) => {
-                println!("skipped: {e}");
-                None
-            }
-        };
+        // Not every driver has such surfaces, so that a test without one is skipped even where a device is required.
+        let device = Device::new(&options, source).map_err(testkit::skip).ok();
         // The device needs the loader for as long as it lives.
         std::mem::forget(entry);
         device

@@ -113,6 +113,8 @@ impl Fill<'_> {
 
 #[cfg(test)]
 mod tests {
+    use testkit::Random;
+
     use super::*;
 
     /// A walk from a start, as the shader walks.
@@ -142,13 +144,10 @@ mod tests {
         // most of the way is spared, and where two leafs meet a walk is left
         assert!(grid.starts.iter().filter(|s| **s < 0).count() * 2 > grid.starts.len());
         assert!(grid.starts.iter().any(|s| *s > 0));
-        let mut state = 1_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 16_777_216.0
-        };
+        let mut random = Random::new(1);
         for _ in 0..20_000 {
-            let point = low + Vec3::new(random(), random(), random()) * extent;
+            let point =
+                low + Vec3::new(random.uniform(), random.uniform(), random.uniform()) * extent;
             let at = ((point - grid.origin) * grid.scale).as_uvec3();
             let index = (at.z * grid.size.y + at.y) * grid.size.x + at.x;
             let start = grid.starts[index as usize];

@@ -282,6 +282,7 @@ impl Cells {
 mod tests {
     use super::*;
     use q3bsp::builder::MapBuilder;
+    use testkit::Random;
 
     /// Walks as the shaders do.
     fn cell_at(cells: &Cells, p: Vec3) -> i32 {
@@ -308,11 +309,8 @@ mod tests {
         let bsp = halls();
         let cells = Cells::new(&bsp, 2, |_| 10);
         assert!(cells.cells.len() > 10, "{}", cells.cells.len());
-        let mut seed = 1u32;
-        let mut random = |most: f32| {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (seed >> 8) as f32 / (1 << 24) as f32 * most
-        };
+        let mut random = Random::new(1);
+        let mut random = |most: f32| random.uniform() * most;
         for _ in 0..2000 {
             let p = Vec3::new(random(2300.0), random(320.0), random(110.0)) - 5.0;
             let (cluster, cell) = (bsp.cluster_at(p), cell_at(&cells, p));

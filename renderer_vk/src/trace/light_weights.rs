@@ -302,6 +302,7 @@ mod tests {
     use q3bsp::builder::MapBuilder;
     use relight::light::EmissionSource;
     use relight::{Materials, MemoryFiles, Options, RelitWorld};
+    use testkit::Random;
 
     fn lamp(at: Vec3, towards: Vec3, radiance: f32) -> TriangleLight {
         let (x, y) = towards.normalize().any_orthonormal_pair();
@@ -406,12 +407,8 @@ mod tests {
 
     #[test]
     fn what_is_left_out_gives_nothing() {
-        let mut seed = 1u32;
-        let mut random = || {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (seed >> 8) as f32 / (1 << 24) as f32 * 2.0 - 1.0
-        };
-        let mut vector = || Vec3::new(random(), random(), random());
+        let mut random = Random::new(1);
+        let mut vector = || random.signed_point();
         let cell = Cell {
             cluster: 0,
             mins: Vec3::splat(-20.0),

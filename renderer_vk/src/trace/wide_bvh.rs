@@ -186,22 +186,14 @@ fn quantize(children: &[Child]) -> BvhNode {
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
+    use testkit::Random;
 
     use super::super::bvh::{LEAF, build, build_triangles};
     use super::*;
 
-    /// Numbers between -1 and 1 that are the same in every run.
-    fn numbers(seed: u32) -> impl FnMut() -> f32 {
-        let mut state = seed;
-        move || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 8_388_608.0 - 1.0
-        }
-    }
-
-    fn boxes(seed: u32, count: usize, spread: f32, size: f32) -> Vec<Aabb> {
-        let mut next = numbers(seed);
-        let mut point = |scale: f32| Vec3::new(next(), next(), next()) * scale;
+    fn boxes(seed: u64, count: usize, spread: f32, size: f32) -> Vec<Aabb> {
+        let mut random = Random::new(seed);
+        let mut point = |scale: f32| random.signed_point() * scale;
         (0..count)
             .map(|_| {
                 let low = point(spread) + Vec3::new(300.0, -8000.0, 0.0);
@@ -352,10 +344,10 @@ mod tests {
 
     #[test]
     fn a_fitted_hierarchy_is_hit_where_a_fresh_one_is() {
-        let mut next = numbers(11);
+        let mut random = Random::new(11);
         for round in 0..20 {
             let count = 1 + round * 13;
-            let mut point = |scale: f32| Vec3::new(next(), next(), next()) * scale;
+            let mut point = |scale: f32| random.signed_point() * scale;
             let mut corners: Vec<[Vec3; 3]> = (0..count)
                 .map(|_| {
                     let middle = point(50.0);

@@ -4,6 +4,7 @@ use super::support::{collect, device, finish};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use renderer_vk::gpu::*;
+use testkit::Random;
 
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -30,14 +31,14 @@ fn directions() -> Vec<Vec3> {
             all.push(v.normalize());
         }
     }
-    let mut state = 1u32;
-    let mut next = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 8) as f32 / 8_388_608.0 - 1.0
-    };
-    all.extend((0..20_000).map(|_| Vec3::new(next(), next(), next()).normalize()));
+    let mut random = Random::new(1);
+    all.extend((0..20_000).map(|_| random.signed_point().normalize()));
     // nearly along an axis
-    all.extend((0..2000).map(|_| Vec3::new(next() * 1.0e-7, 1.0, next() * 1.0e-6).normalize()));
+    all.extend(
+        (0..2000).map(|_| {
+            (random.signed_point() * Vec3::new(1.0e-7, 0.0, 1.0e-6) + Vec3::Y).normalize()
+        }),
+    );
     all
 }
 

@@ -246,7 +246,7 @@ fn stencils_count_and_masks_hold_channels_back() {
 fn several_samples_are_averaged_along_edges() {
     let Some(device) = device(true) else { return };
     if !device.supports_samples(Format::Rgba8, 4) || !device.supports_samples(Format::D32F, 4) {
-        println!("skipped: no multisampling");
+        testkit::skip("the device has no multisampling");
         return;
     }
     let image = |name, format, usage, samples| {

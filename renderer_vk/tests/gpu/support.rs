@@ -3,7 +3,7 @@
 use bytemuck::Pod;
 use renderer_vk::gpu::*;
 
-/// A headless device, or `None` with a printed line.
+/// A headless device, or `None` with a report of a skipped test.
 pub(super) fn device(allow_ray_tracing: bool) -> Option<Device> {
     made(DeviceOptions {
         allow_ray_tracing,
@@ -25,15 +25,7 @@ fn made(options: DeviceOptions) -> Option<Device> {
         validation: true,
         ..options
     };
-    match Device::new(&options, SurfaceSource::Headless) {
-        Ok(device) => Some(device),
-        Err(e) => {
-            let required = std::env::var("RELIGHT_REQUIRE_GPU").is_ok_and(|v| v == "1");
-            assert!(!required, "a GPU is required: {e}");
-            println!("skipped: {e}");
-            None
-        }
-    }
+    testkit::device(Device::new(&options, SurfaceSource::Headless))
 }
 
 /// Whatever a test did, the validation layer must have been silent and nothing may be left behind.

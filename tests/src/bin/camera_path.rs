@@ -63,7 +63,7 @@ fn read(arguments: &[String]) -> Result<(Play, Option<PathBuf>), String> {
     let text = std::fs::read_to_string(file).map_err(|e| format!("{file}: {e}"))?;
     let mut path = renderer_vk::path::parse(&text).map_err(|e| format!("{file}: {e}"))?;
     path.truncate(frames);
-    let folder = testdata::folder().ok_or("the game's packs are needed")?;
+    let folder = testkit::folder().ok_or("the game's packs are needed")?;
     let packs = Packs::open(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let play = Play {
         library: data::library(),

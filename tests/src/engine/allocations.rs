@@ -17,7 +17,7 @@ fn note(size: usize) {
     // A thread that ends has no counter any more.
     let taken = TAKEN.try_with(|taken| taken.take()).ok().flatten();
     if let Some(so_far) = taken {
-        if crate::data::is_set("RELIGHT_VERBOSE") {
+        if testkit::is_set("RELIGHT_VERBOSE") {
             let trace = std::backtrace::Backtrace::force_capture();
             eprintln!("{size} bytes are taken by\n{trace}");
         }

@@ -150,7 +150,7 @@ pub(super) fn violation(what: String) {
 #[unsafe(no_mangle)]
 extern "C" fn stand_in_print(level: c_int, message: *const c_char) {
     let text = text(message);
-    if crate::data::is_set("RELIGHT_VERBOSE") {
+    if testkit::is_set("RELIGHT_VERBOSE") {
         eprint!("[{level}] {text}");
     }
     with(|s| s.messages.push(Message { level, text }));

@@ -47,9 +47,9 @@ impl Stage {
         cvars.extend(scene.cvars.iter().chain(beside).copied().map(text));
         let mut files = textures::files();
         files.extend((scene.files)());
-        let packs = match testdata::folder() {
-            Some(folder) if scene.packs => Packs::open(&folder)?,
-            _ => Packs::default(),
+        let packs = match scene.packs.then(testkit::folder).flatten() {
+            Some(folder) => Packs::open(&folder)?,
+            None => Packs::default(),
         };
         let engine = Engine::start_with(
             library,

@@ -7,14 +7,14 @@ use tests::engine::{Engine, Options, View};
 
 #[test]
 fn maps_of_the_game_in_both_looks() {
-    let Some(data) = testdata::folder() else {
+    let Some(data) = testkit::folder() else {
         return;
     };
     let packs = Packs::open(&data).unwrap();
     let few = ["oa_dm1", "am_galmevish", "oa_ctf2"]
         .map(str::to_string)
         .to_vec();
-    let full = tests::data::is_set("RELIGHT_FULL");
+    let full = testkit::is_set("RELIGHT_FULL");
     let mut engine = Engine::start(Options {
         packs: packs.clone(),
         ..Options::default()

@@ -127,7 +127,7 @@ fn the_sample_and_a_shipped_map_survive() {
     let bsp = Bsp::parse(&bytes).unwrap();
     let read = read_map(&document(&world(bsp))).unwrap();
     assert!(read.write() == bytes);
-    let Some(folder) = testdata::folder() else {
+    let Some(folder) = testkit::folder() else {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();

@@ -182,7 +182,7 @@ fn bevels_are_left_out_and_open_brushes_told() {
 
 #[test]
 fn a_shipped_map_is_read_by_a_foreign_parser() {
-    let Some(folder) = testdata::folder() else {
+    let Some(folder) = testkit::folder() else {
         return;
     };
     let files = SearchPath::open(&[folder]).unwrap();

@@ -8,6 +8,7 @@ use crate::world::*;
 use glam::Vec2;
 use q3bsp::builder::MapBuilder;
 use q3bsp::{DrawVert, lightmap_index};
+use testkit::Random;
 
 #[test]
 fn damaged_geometry_is_made_whole() {
@@ -109,18 +110,12 @@ fn damage_does_no_harm() {
     let files = game();
     let (materials, _) = Materials::load(&files);
     let whole = rich_map();
-    let mut state = 1u64;
-    let mut random = |below: usize| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize % below
-    };
+    let mut random = Random::new(1);
     let mut relit = 0;
     for round in 0..600 {
         let mut bytes = whole.clone();
         for _ in 0..1 + round % 4 {
-            let at = random(bytes.len() / 4) * 4;
+            let at = random.below(bytes.len() / 4) * 4;
             let values = [
                 0u32,
                 1,
@@ -132,7 +127,7 @@ fn damage_does_no_harm() {
                 0x8000_0000,
                 17,
             ];
-            let value = values[random(values.len())].to_le_bytes();
+            let value = values[random.below(values.len())].to_le_bytes();
             bytes[at..at + 4].copy_from_slice(&value);
         }
         let Ok(bsp) = Bsp::parse(&bytes) else {

@@ -10,7 +10,7 @@ use crate::world::*;
 /// places where entities stand, against the visibility matrix itself.
 #[test]
 fn every_openarena_map_has_light() {
-    let Some(game) = testdata::game() else {
+    let Some(game) = testkit::game() else {
         return;
     };
     let files = SearchPath::open(&[&game.folder]).unwrap();
@@ -33,7 +33,7 @@ fn every_openarena_map_has_light() {
 /// What holds for any map, whoever made it. What is no map is refused, with a line that names it.
 #[test]
 fn maps_of_other_packs_are_finite_and_whole() {
-    let Some(game) = testdata::game() else {
+    let Some(game) = testkit::game() else {
         return;
     };
     for pack in &game.others {

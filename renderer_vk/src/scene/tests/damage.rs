@@ -5,6 +5,7 @@ use crate::Error;
 use crate::api::{DynamicLight, EntityKind, PolyVert, RefDef, RefEntity};
 use crate::scene::{Look, Scene};
 use glam::Vec3;
+use testkit::Random;
 
 #[test]
 fn bad_entities_do_no_harm() {
@@ -55,16 +56,12 @@ fn bad_entities_do_no_harm() {
     assert!(matches!(failed, Err(Error::EntityKind { .. })));
 }
 
-/// Numbers of a linear congruential generator, often the ones that break things.
-struct Numbers(u64);
+/// Random numbers, often the ones that break things.
+struct Numbers(Random);
 
 impl Numbers {
     fn next(&mut self) -> u32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        (self.0 >> 33) as u32
+        self.0.bits()
     }
 
     fn float(&mut self) -> f32 {
@@ -95,7 +92,7 @@ fn random_scenes_stay_within_their_arrays() {
     let world = room(&mut game);
     game.model("m/thing.md3");
     game.settings.shadows = 3;
-    let mut numbers = Numbers(1);
+    let mut numbers = Numbers(Random::new(1));
     let mut scene = Scene::new();
     for round in 0..200 {
         for _ in 0..20 {

@@ -1,4 +1,7 @@
-//! OpenArena's packs as tests see them.
+//! What the tests of several crates share: game data or a skipped test ([`game`], [`folder`]), a Vulkan device or a
+//! skipped test ([`device()`]), the report of a skipped test ([`skip`]), and a seeded random generator ([`Random`]).
+//!
+//! # Game data
 //!
 //! A game folder holds whatever its owner put there: more packages, a player's own maps. Tests that count therefore
 //! take the game's own packs, named in [`PACKS`] with their sizes, through [`folder`] or [`Game::packs`]; they check
@@ -6,9 +9,11 @@
 //! file.
 //!
 //! `OPENARENA_DATA` names the installed folder, otherwise Debian's is taken. Without `pak0.pk3` in it, tests are
-//! skipped with a line that says so; with `RELIGHT_REQUIRE_DATA=1` they fail.
+//! skipped; with `RELIGHT_REQUIRE_DATA=1` they fail.
 
 #![forbid(unsafe_code)]
+
+mod skips;
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -19,6 +24,9 @@ use std::sync::OnceLock;
 
 use zip::ZipArchive;
 use zip::result::ZipError;
+
+pub use skips::{Need, absent, assert_optional, device, is_set, skip};
+pub use support::random::Random;
 
 #[cfg(not(unix))]
 use std::fs::hard_link as link;
@@ -91,7 +99,7 @@ impl Game {
     }
 }
 
-/// The installed game, or `None` with a line that says so. The first call of a process prints which packs tests use,
+/// The installed game, or `None` with a report of a skipped test. The first call of a process prints which packs tests use,
 /// past the capture of the test harness.
 ///
 /// # Panics
@@ -111,9 +119,7 @@ pub fn game() -> Option<&'static Game> {
     });
     if found.is_none() {
         let why = format!("{} has no {}", installed.display(), PACKS[0].0);
-        let required = std::env::var("RELIGHT_REQUIRE_DATA").is_ok_and(|v| v == "1");
-        assert!(!required, "{why}, and RELIGHT_REQUIRE_DATA=1");
-        println!("skipped: {why}");
+        absent(Need::Data, why);
     }
     found.as_ref()
 }
@@ -246,7 +252,7 @@ fn links_to(sources: &[&Path]) -> io::Result<PathBuf> {
         _ => folder,
     };
     Ok(profile
-        .join("testdata")
+        .join("testkit")
         .join(format!("{:016x}", key.finish())))
 }
 
@@ -285,7 +291,7 @@ mod tests {
 
     /// An empty folder of this process.
     fn empty(name: &str) -> PathBuf {
-        let folder = std::env::temp_dir().join(format!("testdata-{}-{name}", std::process::id()));
+        let folder = std::env::temp_dir().join(format!("testkit-{}-{name}", std::process::id()));
         let _ = fs::remove_dir_all(&folder);
         fs::create_dir_all(&folder).unwrap();
         folder
