@@ -2,9 +2,14 @@
 
 use glam::Vec3;
 
-use super::harness::{Gpu, Scene, rectangle, reference};
+use super::harness::{Gpu, Scene, gpu_tests, rectangle, reference};
 use crate::settings::Settings;
-use crate::trace::input::Tracer;
+
+gpu_tests! {
+    compute: [
+        bloom_keeps_even_light_and_the_sum_of_uneven_light,
+    ],
+}
 
 const SIZE: i32 = 150;
 
@@ -15,11 +20,7 @@ fn linear(picture: &[[u8; 4]]) -> Vec<f32> {
     picture.iter().map(decode).collect()
 }
 
-#[test]
-fn bloom_keeps_even_light_and_the_sum_of_uneven_light() {
-    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
-        return;
-    };
+fn bloom_keeps_even_light_and_the_sum_of_uneven_light(gpu: &mut Gpu) {
     let settings = |bloom| Settings {
         rt_bloom: bloom,
         rt_illumination: false,

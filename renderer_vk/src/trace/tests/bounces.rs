@@ -7,9 +7,26 @@ use relight::light::{PointLight, SunLight};
 use shaders::types::{Dielectric, constants as c};
 
 use super::dielectrics::square;
-use super::harness::{Gpu, Scene, encode, floor_point, lambert, rectangle, stage, through_byte};
+use super::harness::{
+    Gpu, Scene, encode, floor_point, gpu_tests, lambert, rectangle, stage, through_byte,
+};
 use crate::settings::{LightSelection, Settings};
 use crate::trace::frame_lights::decode;
+
+gpu_tests! {
+    any: [
+        a_furnace_sums_its_bounces,
+        what_stores_a_part_of_its_light_throws_back_that_part,
+        gloss_throws_back_what_its_picture_shows,
+        a_red_wall_colours_the_floor,
+        a_bounce_has_one_ray_for_lamps_and_sun,
+        bounced_light_passes_fog,
+    ],
+    each: [
+        no_light_leaks_through_walls,
+        bounced_light_passes_tinted_glass,
+    ],
+}
 
 fn bounced(bounces: u32) -> Settings {
     Settings {
@@ -46,12 +63,7 @@ pub(super) fn seen(glow: f32, albedo: f32, light: f32) -> f32 {
     whole * (glow / slope(own_glow) + albedo * light / slope(own_lit))
 }
 
-#[test]
-fn a_furnace_sums_its_bounces() {
-    Gpu::any(a_furnace_sums_its_bounces_with);
-}
-
-fn a_furnace_sums_its_bounces_with(gpu: &mut Gpu) {
+fn a_furnace_sums_its_bounces(gpu: &mut Gpu) {
     // every wall glows with e and reflects a: after n bounces it shows e (1 + a + ... + a^n). Of the three albedos one
     // is below the least chance of going on, one above, and one loses no path at all
     for albedo in [0.1, 0.5, 1.0] {
@@ -92,12 +104,7 @@ fn a_furnace_sums_its_bounces_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn what_stores_a_part_of_its_light_throws_back_that_part() {
-    Gpu::any(what_stores_a_part_of_its_light_throws_back_that_part_with);
-}
-
-fn what_stores_a_part_of_its_light_throws_back_that_part_with(gpu: &mut Gpu) {
+fn what_stores_a_part_of_its_light_throws_back_that_part(gpu: &mut Gpu) {
     // the furnace with an albedo of a half: of light come back that part of it, but never more than all; what glows stays
     for (scale, part) in [(1.0, 0.5), (0.25, 0.125), (64.0, 1.0)] {
         let mut scene = Scene::new(
@@ -122,12 +129,7 @@ fn what_stores_a_part_of_its_light_throws_back_that_part_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn gloss_throws_back_what_its_picture_shows() {
-    Gpu::any(gloss_throws_back_what_its_picture_shows_with);
-}
-
-fn gloss_throws_back_what_its_picture_shows_with(gpu: &mut Gpu) {
+fn gloss_throws_back_what_its_picture_shows(gpu: &mut Gpu) {
     // a small white patch in a furnace whose walls are nothing but gloss: of their glow g it finds g and, with a second
     // bounce, g a, where a is the mean of their picture
     let texels: Vec<u8> = [40u8, 216].iter().flat_map(|&v| [v, v, v, 255]).collect();
@@ -165,12 +167,7 @@ fn gloss_throws_back_what_its_picture_shows_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn a_red_wall_colours_the_floor() {
-    Gpu::any(a_red_wall_colours_the_floor_with);
-}
-
-fn a_red_wall_colours_the_floor_with(gpu: &mut Gpu) {
+fn a_red_wall_colours_the_floor(gpu: &mut Gpu) {
     let color = [encode(0.6), encode(0.2), encode(0.05)];
     let mut scene = Scene::new(
         Vec3::new(-60.0, 0.0, 40.0),
@@ -206,12 +203,7 @@ fn a_red_wall_colours_the_floor_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn a_bounce_has_one_ray_for_lamps_and_sun() {
-    Gpu::any(a_bounce_has_one_ray_for_lamps_and_sun_with);
-}
-
-fn a_bounce_has_one_ray_for_lamps_and_sun_with(gpu: &mut Gpu) {
+fn a_bounce_has_one_ray_for_lamps_and_sun(gpu: &mut Gpu) {
     // what sees the sun, what only sees lamps, what sees both: a sunlit floor, part of it under a roof with lamps below
     let mut scene = Scene::new(
         Vec3::new(-150.0, 0.0, 40.0),
@@ -265,12 +257,7 @@ fn a_bounce_has_one_ray_for_lamps_and_sun_with(gpu: &mut Gpu) {
     );
 }
 
-#[test]
-fn no_light_leaks_through_walls() {
-    Gpu::each(no_light_leaks_through_walls_with);
-}
-
-fn no_light_leaks_through_walls_with(gpu: &mut Gpu) {
+fn no_light_leaks_through_walls(gpu: &mut Gpu) {
     // a bright room beside a dark one, a wall of one unit between them, the sun outside of both
     for culling in [0, c::MATERIAL_TWO_SIDED] {
         let mut scene = Scene::new(
@@ -317,12 +304,7 @@ fn no_light_leaks_through_walls_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn bounced_light_passes_fog() {
-    Gpu::any(bounced_light_passes_fog_with);
-}
-
-fn bounced_light_passes_fog_with(gpu: &mut Gpu) {
+fn bounced_light_passes_fog(gpu: &mut Gpu) {
     // below a slab of fog under a glowing ceiling, all without end: from the direction at the angle t to the normal the
     // floor gets fog * f + glow * (1 - f), f = sqrt(thickness / cos t / depth), weighed by 2 cos t sin t
     let (glow, tint) = (0.8, Vec3::new(0.1, 0.5, 0.2));
@@ -364,12 +346,7 @@ fn bounced_light_passes_fog_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn bounced_light_passes_tinted_glass() {
-    Gpu::each(bounced_light_passes_tinted_glass_with);
-}
-
-fn bounced_light_passes_tinted_glass_with(gpu: &mut Gpu) {
+fn bounced_light_passes_tinted_glass(gpu: &mut Gpu) {
     // a white floor under a glowing ceiling, all without end, and tinted glass between them
     let (glow, tint) = (0.8, Vec3::new(0.9, 0.2, 0.1));
     let mut scene = Scene::new(Vec3::Z * 20.0, Vec3::new(0.1, 0.0, 0.0), 20.0, 32);

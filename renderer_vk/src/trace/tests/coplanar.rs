@@ -4,8 +4,14 @@ use glam::Vec3;
 use shaders::types::constants as c;
 
 use super::cut_outs::stripes;
-use super::harness::{Gpu, Scene, mirror_at, rectangle, reference, stage, through_byte};
+use super::harness::{Gpu, Scene, gpu_tests, mirror_at, rectangle, reference, stage, through_byte};
 use super::layers::{TRANSLUCENT, close, over};
+
+gpu_tests! {
+    each: [
+        posters_lie_before_their_wall_in_the_order_of_the_engine,
+    ],
+}
 
 const OFFSET: u32 = c::MATERIAL_POLYGON_OFFSET;
 const BACK: [f32; 3] = [0.2, 0.4, 0.8];
@@ -23,12 +29,7 @@ fn patch(x: f32, [y, z]: [f32; 2], half: f32) -> [Vec3; 4] {
     }
 }
 
-#[test]
-fn posters_lie_before_their_wall_in_the_order_of_the_engine() {
-    Gpu::each(posters_lie_before_their_wall_in_the_order_of_the_engine_with);
-}
-
-fn posters_lie_before_their_wall_in_the_order_of_the_engine_with(gpu: &mut Gpu) {
+fn posters_lie_before_their_wall_in_the_order_of_the_engine(gpu: &mut Gpu) {
     let image = stripes(gpu, [[255; 4], [255, 255, 255, 0]]);
     for (mirrored, wall_first) in [(false, false), (false, true), (true, false), (true, true)] {
         // 200 units from the eye either way

@@ -4,10 +4,17 @@ use glam::Vec3;
 use shaders::types::Stage;
 use shaders::types::constants as c;
 
-use super::harness::{Gpu, Scene, rectangle, reference, stage, through_byte};
+use super::harness::{Gpu, Scene, gpu_tests, rectangle, reference, stage, through_byte};
 use super::layers::{close, displayed, scene, screen};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::trace::frame_lights::decode;
+
+gpu_tests! {
+    each: [
+        cut_outs_have_holes_for_eyes_and_shadows,
+        paint_with_holes_lets_its_wall_through,
+    ],
+}
 
 /// An image of two texels beside each other.
 pub(super) fn stripes(gpu: &Gpu, texels: [[u8; 4]; 2]) -> Image {
@@ -22,12 +29,7 @@ pub(super) fn stripes(gpu: &Gpu, texels: [[u8; 4]; 2]) -> Image {
     image
 }
 
-#[test]
-fn cut_outs_have_holes_for_eyes_and_shadows() {
-    Gpu::each(cut_outs_have_holes_for_eyes_and_shadows_with);
-}
-
-fn cut_outs_have_holes_for_eyes_and_shadows_with(gpu: &mut Gpu) {
+fn cut_outs_have_holes_for_eyes_and_shadows(gpu: &mut Gpu) {
     let image = stripes(gpu, [[255; 4], [255, 255, 255, 0]]);
     // left half white and solid, right half a hole
     let mut scene = scene();
@@ -88,14 +90,9 @@ fn cut_outs_have_holes_for_eyes_and_shadows_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn paint_with_holes_lets_its_wall_through() {
-    Gpu::each(paint_with_holes_lets_its_wall_through_with);
-}
-
 /// Nearly in the plane of its wall, as the depth offset of such a material asks for: behind a ray that stopped at the
 /// paint there would be no wall left.
-fn paint_with_holes_lets_its_wall_through_with(gpu: &mut Gpu) {
+fn paint_with_holes_lets_its_wall_through(gpu: &mut Gpu) {
     let image = stripes(gpu, [[255, 128, 64, 255], [255, 128, 64, 0]]);
     let back = [0.2, 0.4, 0.3];
     let mut painted = Stage {

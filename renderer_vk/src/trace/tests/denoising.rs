@@ -4,11 +4,27 @@ use glam::Vec3;
 use relight::light::PointLight;
 use shaders::types::{Dielectric, constants as c};
 
-use super::harness::{Gpu, Scene, identity, rectangle, reference, stage};
+use super::harness::{Gpu, Scene, gpu_tests, identity, rectangle, reference, stage};
 use crate::api::DynamicLight;
 use crate::scene::ViewScene;
 use crate::settings::Settings;
-use crate::trace::input::Tracer;
+
+gpu_tests! {
+    any: [
+        filtered_frames_come_near_the_reference,
+        what_comes_into_sight_has_no_history,
+    ],
+    compute: [
+        light_that_is_switched_is_seen_soon,
+        a_moving_light_leaves_no_trail,
+        a_light_that_fades_is_followed,
+        a_broken_number_does_not_spread,
+        a_picture_at_rest_is_quiet,
+        the_cheap_filter_comes_near_the_truth,
+        both_sides_of_water_keep_their_light,
+        even_light_keeps_its_level_and_color,
+    ],
+}
 
 /// A room with a pillar, a lamp and a small light that throws soft and hard shadows.
 fn room() -> Scene {
@@ -72,12 +88,7 @@ fn compare(pixels: &[Vec3], truth: &[Vec3]) -> (f32, f32) {
     )
 }
 
-#[test]
-fn filtered_frames_come_near_the_reference() {
-    Gpu::any(filtered_frames_come_near_the_reference_with);
-}
-
-fn filtered_frames_come_near_the_reference_with(gpu: &mut Gpu) {
+fn filtered_frames_come_near_the_reference(gpu: &mut Gpu) {
     let scene = room();
     let settings = Settings {
         rt_bounces: 1,
@@ -112,12 +123,7 @@ fn filtered_frames_come_near_the_reference_with(gpu: &mut Gpu) {
     assert!(error < 0.3 * raw_error, "{error} {raw_error}");
 }
 
-#[test]
-fn what_comes_into_sight_has_no_history() {
-    Gpu::any(what_comes_into_sight_has_no_history_with);
-}
-
-fn what_comes_into_sight_has_no_history_with(gpu: &mut Gpu) {
+fn what_comes_into_sight_has_no_history(gpu: &mut Gpu) {
     // a wall slides over everything: what it shows must not come from what was there before
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, 32);
     let white = scene.diffuse(1.0);
@@ -211,11 +217,7 @@ fn frames_until_true(
     late + 1
 }
 
-#[test]
-fn light_that_is_switched_is_seen_soon() {
-    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
-        return;
-    };
+fn light_that_is_switched_is_seen_soon(gpu: &mut Gpu) {
     let scene = room();
     let lit = |view: &mut ViewScene| view.dlights = vec![lamp(Vec3::new(0.0, -60.0, 20.0))];
     let (dark_truth, _) = gpu.render(&scene, &truth_settings(), 128);
@@ -232,12 +234,12 @@ fn light_that_is_switched_is_seen_soon() {
             lit(view);
         }
     };
-    let scratch = frames_until_true(&mut gpu, &scene, 24, 0, |_, _| {}, &dark_truth);
+    let scratch = frames_until_true(gpu, &scene, 24, 0, |_, _| {}, &dark_truth);
     assert_eq!(scratch, 1);
-    let off_frames = frames_until_true(&mut gpu, &scene, 48, 24, off, &dark_truth);
-    let on_frames = frames_until_true(&mut gpu, &scene, 48, 24, on, &lit_truth);
+    let off_frames = frames_until_true(gpu, &scene, 48, 24, off, &dark_truth);
+    let on_frames = frames_until_true(gpu, &scene, 48, 24, on, &lit_truth);
     gpu.use_gradients(false);
-    let off_without = frames_until_true(&mut gpu, &scene, 64, 24, off, &dark_truth);
+    let off_without = frames_until_true(gpu, &scene, 64, 24, off, &dark_truth);
     println!(
         "off after {off_frames} frames, on after {on_frames}, off without gradients after {off_without}"
     );
@@ -246,11 +248,7 @@ fn light_that_is_switched_is_seen_soon() {
     assert!(off_without > 6 * off_frames, "{off_without}");
 }
 
-#[test]
-fn a_moving_light_leaves_no_trail() {
-    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
-        return;
-    };
+fn a_moving_light_leaves_no_trail(gpu: &mut Gpu) {
     let scene = room();
     // from one end of the room to the other, as a rocket flies
     let fly = |frame: u32, view: &mut ViewScene| {
@@ -272,11 +270,7 @@ fn a_moving_light_leaves_no_trail() {
     assert!((mean - 1.0).abs() < 0.04, "{mean}");
 }
 
-#[test]
-fn a_light_that_fades_is_followed() {
-    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
-        return;
-    };
+fn a_light_that_fades_is_followed(gpu: &mut Gpu) {
     // by a twelfth each frame: little enough to be taken for noise, and after some frames far from what it was
     let scene = room();
     let fade = |frame: u32, view: &mut ViewScene| {
@@ -300,11 +294,7 @@ fn a_light_that_fades_is_followed() {
     );
 }
 
-#[test]
-fn a_broken_number_does_not_spread() {
-    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
-        return;
-    };
+fn a_broken_number_does_not_spread(gpu: &mut Gpu) {
     for bad in [f32::INFINITY, f32::NAN] {
         // a lamp that is there in one frame alone, and gives what is no number
         let mut scene = room();
@@ -355,11 +345,7 @@ fn a_broken_number_does_not_spread() {
     }
 }
 
-#[test]
-fn a_picture_at_rest_is_quiet() {
-    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
-        return;
-    };
+fn a_picture_at_rest_is_quiet(gpu: &mut Gpu) {
     let scene = room();
     let (truth, _) = gpu.render(&scene, &truth_settings(), 256);
     let mut sums = vec![(0.0f32, 0.0f32); truth.len()];
@@ -391,11 +377,7 @@ fn a_picture_at_rest_is_quiet() {
     assert!(error < 0.05, "{error}");
 }
 
-#[test]
-fn the_cheap_filter_comes_near_the_truth() {
-    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
-        return;
-    };
+fn the_cheap_filter_comes_near_the_truth(gpu: &mut Gpu) {
     let scene = room();
     let sparse = Settings {
         rt_denoiser: 2,
@@ -422,11 +404,7 @@ fn the_cheap_filter_comes_near_the_truth() {
 
 /// A wall that stands in water, lit above it and dark below it: what the water mirrors and what lies in it are side by side
 /// in the picture, as far away and turned alike, and differ in their light alone.
-#[test]
-fn both_sides_of_water_keep_their_light() {
-    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
-        return;
-    };
+fn both_sides_of_water_keep_their_light(gpu: &mut Gpu) {
     let mut scene = Scene::new(
         Vec3::new(-60.0, 0.0, 40.0),
         Vec3::new(100.0, 0.0, -20.0),
@@ -482,11 +460,7 @@ fn both_sides_of_water_keep_their_light() {
 }
 
 /// Light that is the same everywhere comes out of the filter, over many frames, as it went in: of any color, dim and bright.
-#[test]
-fn even_light_keeps_its_level_and_color() {
-    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
-        return;
-    };
+fn even_light_keeps_its_level_and_color(gpu: &mut Gpu) {
     let colors = [[1.0, 0.3, 0.05], [0.0, 1.0, 0.0], [0.02, 0.1, 1.0]].map(Vec3::from);
     for light in [1.0e-3, 1.0, 1.0e3].map(|level| colors.map(|color| color * level)) {
         for light in light {

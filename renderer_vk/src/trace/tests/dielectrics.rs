@@ -3,10 +3,25 @@
 use glam::Vec3;
 use shaders::types::constants as c;
 use shaders::types::{Dielectric, Stage};
+use testkit::Random;
 
-use super::harness::{Gpu, Scene, encode, rectangle, reference, stage, through_byte};
+use super::harness::{Gpu, Scene, encode, gpu_tests, rectangle, reference, stage, through_byte};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::settings::Settings;
+
+gpu_tests! {
+    any: [
+        water_reflects_by_fresnel_and_absorbs_by_beer,
+        from_below_water_reflects_everything_beyond_its_angle,
+        a_pane_reflects_from_both_faces,
+        ripples_keep_the_light_that_a_surface_sends_on,
+        an_environment_stage_shows_what_is_around,
+        gloss_shows_the_light_by_its_picture_and_mirrors,
+        the_texture_of_what_shines_is_seen_in_every_pixel,
+        a_shiny_pixel_alone_is_as_bright_as_its_surface,
+        light_takes_on_the_colour_of_what_it_passes,
+    ],
+}
 
 pub(super) const LIQUID: u32 = c::MATERIAL_LIQUID | c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
 const SIDE: usize = 24;
@@ -91,12 +106,7 @@ fn compare(gpu: &mut Gpu, scene: &Scene, settings: &Settings, exact: impl Fn(f32
     assert!(worst < 0.01, "{worst}");
 }
 
-#[test]
-fn water_reflects_by_fresnel_and_absorbs_by_beer() {
-    Gpu::any(water_reflects_by_fresnel_and_absorbs_by_beer_with);
-}
-
-fn water_reflects_by_fresnel_and_absorbs_by_beer_with(gpu: &mut Gpu) {
+fn water_reflects_by_fresnel_and_absorbs_by_beer(gpu: &mut Gpu) {
     let [above, below] = [ABOVE, BELOW].map(|v| through_byte(encode(v)));
     let water = Dielectric {
         index: 1.33,
@@ -122,12 +132,7 @@ fn water_reflects_by_fresnel_and_absorbs_by_beer_with(gpu: &mut Gpu) {
     compare(gpu, &scene, &live, exact);
 }
 
-#[test]
-fn from_below_water_reflects_everything_beyond_its_angle() {
-    Gpu::any(from_below_water_reflects_everything_beyond_its_angle_with);
-}
-
-fn from_below_water_reflects_everything_beyond_its_angle_with(gpu: &mut Gpu) {
+fn from_below_water_reflects_everything_beyond_its_angle(gpu: &mut Gpu) {
     let [above, below] = [ABOVE, BELOW].map(|v| through_byte(encode(v)));
     let water = Dielectric {
         index: 1.33,
@@ -152,12 +157,7 @@ fn from_below_water_reflects_everything_beyond_its_angle_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn a_pane_reflects_from_both_faces() {
-    Gpu::any(a_pane_reflects_from_both_faces_with);
-}
-
-fn a_pane_reflects_from_both_faces_with(gpu: &mut Gpu) {
+fn a_pane_reflects_from_both_faces(gpu: &mut Gpu) {
     let [above, below] = [ABOVE, BELOW].map(|v| through_byte(encode(v)));
     let glass = Dielectric {
         index: 1.5,
@@ -179,12 +179,7 @@ fn a_pane_reflects_from_both_faces_with(gpu: &mut Gpu) {
     });
 }
 
-#[test]
-fn ripples_keep_the_light_that_a_surface_sends_on() {
-    Gpu::any(ripples_keep_the_light_that_a_surface_sends_on_with);
-}
-
-fn ripples_keep_the_light_that_a_surface_sends_on_with(gpu: &mut Gpu) {
+fn ripples_keep_the_light_that_a_surface_sends_on(gpu: &mut Gpu) {
     // the same radiance on both sides: whatever way a ray takes, it finds it
     let water = Dielectric {
         index: 1.33,
@@ -212,12 +207,7 @@ pub(super) fn square(gpu: &Gpu, side: u32, texels: &[u8]) -> Image {
     image
 }
 
-#[test]
-fn an_environment_stage_shows_what_is_around() {
-    Gpu::any(an_environment_stage_shows_what_is_around_with);
-}
-
-fn an_environment_stage_shows_what_is_around_with(gpu: &mut Gpu) {
+fn an_environment_stage_shows_what_is_around(gpu: &mut Gpu) {
     let above = through_byte(encode(ABOVE));
     let image = square(gpu, 1, &[128, 128, 128, 255]);
     // a body of one colour, shiny by a quarter of what is around
@@ -239,12 +229,7 @@ fn an_environment_stage_shows_what_is_around_with(gpu: &mut Gpu) {
     compare(gpu, &scene, &ended, |_| 1.0);
 }
 
-#[test]
-fn gloss_shows_the_light_by_its_picture_and_mirrors() {
-    Gpu::any(gloss_shows_the_light_by_its_picture_and_mirrors_with);
-}
-
-fn gloss_shows_the_light_by_its_picture_and_mirrors_with(gpu: &mut Gpu) {
+fn gloss_shows_the_light_by_its_picture_and_mirrors(gpu: &mut Gpu) {
     let above = through_byte(encode(ABOVE));
     let image = square(gpu, 1, &[128, 128, 128, 255]);
     let (body, picture) = (64.0 / 255.0, 128.0 / 255.0);
@@ -273,18 +258,12 @@ fn gloss_shows_the_light_by_its_picture_and_mirrors_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn the_texture_of_what_shines_is_seen_in_every_pixel() {
-    Gpu::any(the_texture_of_what_shines_is_seen_in_every_pixel_with);
-}
-
-fn the_texture_of_what_shines_is_seen_in_every_pixel_with(gpu: &mut Gpu) {
+fn the_texture_of_what_shines_is_seen_in_every_pixel(gpu: &mut Gpu) {
     // about a texel a pixel, each of another grey
-    let mut state = 1u32;
+    let mut random = Random::new(1);
     let texels: Vec<u8> = (0..32 * 32)
         .flat_map(|_| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let grey = 40 + (state >> 24) as u8 / 2;
+            let grey = 40 + random.below(128) as u8;
             [grey, grey, grey, 255]
         })
         .collect();
@@ -330,12 +309,7 @@ fn is_seen_in_every_pixel(gpu: &mut Gpu, scene: &Scene) {
     }
 }
 
-#[test]
-fn a_shiny_pixel_alone_is_as_bright_as_its_surface() {
-    Gpu::any(a_shiny_pixel_alone_is_as_bright_as_its_surface_with);
-}
-
-fn a_shiny_pixel_alone_is_as_bright_as_its_surface_with(gpu: &mut Gpu) {
+fn a_shiny_pixel_alone_is_as_bright_as_its_surface(gpu: &mut Gpu) {
     let image = Image::new(
         &gpu.device,
         &ImageDesc::new("environment", 1, 1, Format::Rgba8, ImageUsage::SAMPLED),
@@ -371,12 +345,7 @@ fn a_shiny_pixel_alone_is_as_bright_as_its_surface_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn light_takes_on_the_colour_of_what_it_passes() {
-    Gpu::any(light_takes_on_the_colour_of_what_it_passes_with);
-}
-
-fn light_takes_on_the_colour_of_what_it_passes_with(gpu: &mut Gpu) {
+fn light_takes_on_the_colour_of_what_it_passes(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::new(0.0, 0.0, 50.0), Vec3::ZERO, 60.0, SIDE as i32);
     let white = scene.diffuse(1.0);
     scene.quad(level(0.0, true), white);

@@ -4,17 +4,23 @@ use glam::Vec3;
 use shaders::trace_types::SkyRecord;
 use shaders::types::{Fog, constants as c};
 
-use super::harness::{Gpu, Scene, rectangle, reference, stage};
+use super::harness::{Gpu, Scene, gpu_tests, rectangle, reference, stage};
 use super::layers::{TRANSLUCENT, close, displayed, screen};
 use crate::settings::Settings;
 use crate::trace::frame_lights::decode;
 
-#[test]
-fn fog_is_lit_by_what_lights_each_place_of_it() {
-    Gpu::any(fog_is_lit_by_what_lights_each_place_of_it_with);
+gpu_tests! {
+    any: [
+        fog_is_lit_by_what_lights_each_place_of_it,
+        fog_covers_surfaces_that_are_stored_with_it_alone,
+        fog_seen_from_above_counts_the_way_below_its_surface,
+        fog_fades_layers_that_are_stored_with_it,
+        skies_show_behind_fog_but_through_a_surface_that_is_drawn,
+        clouds_are_behind_the_fog_that_their_sky_is_stored_with,
+    ],
 }
 
-fn fog_is_lit_by_what_lights_each_place_of_it_with(gpu: &mut Gpu) {
+fn fog_is_lit_by_what_lights_each_place_of_it(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 1.0, 32);
     let black = scene.material(&[stage::constant([0.0; 3])], 0);
     scene.quad(screen(300.0), black);
@@ -129,12 +135,7 @@ fn shows(gpu: &mut Gpu, scene: &Scene, displayed: Vec3) {
     assert!(close(mean, exact), "{mean} {exact}");
 }
 
-#[test]
-fn fog_covers_surfaces_that_are_stored_with_it_alone() {
-    Gpu::any(fog_covers_surfaces_that_are_stored_with_it_alone_with);
-}
-
-fn fog_covers_surfaces_that_are_stored_with_it_alone_with(gpu: &mut Gpu) {
+fn fog_covers_surfaces_that_are_stored_with_it_alone(gpu: &mut Gpu) {
     let back = displayed(BACK);
     let mut scene = wall_behind_fog();
     // what lies behind the volume but is stored without its fog
@@ -147,12 +148,7 @@ fn fog_covers_surfaces_that_are_stored_with_it_alone_with(gpu: &mut Gpu) {
     shows(gpu, &scene, back);
 }
 
-#[test]
-fn fog_seen_from_above_counts_the_way_below_its_surface() {
-    Gpu::any(fog_seen_from_above_counts_the_way_below_its_surface_with);
-}
-
-fn fog_seen_from_above_counts_the_way_below_its_surface_with(gpu: &mut Gpu) {
+fn fog_seen_from_above_counts_the_way_below_its_surface(gpu: &mut Gpu) {
     // a floor at z = -100, straight below the eye: 180 of 300 units lie below the fog's surface at 80
     let mut scene = Scene::new(Vec3::Z * 200.0, Vec3::X * 0.01, 1.0, 4);
     let floor = scene.material(&[stage::constant(BACK)], 0);
@@ -166,12 +162,7 @@ fn fog_seen_from_above_counts_the_way_below_its_surface_with(gpu: &mut Gpu) {
     shows(gpu, &scene, displayed(BACK));
 }
 
-#[test]
-fn fog_fades_layers_that_are_stored_with_it() {
-    Gpu::any(fog_fades_layers_that_are_stored_with_it_with);
-}
-
-fn fog_fades_layers_that_are_stored_with_it_with(gpu: &mut Gpu) {
+fn fog_fades_layers_that_are_stored_with_it(gpu: &mut Gpu) {
     let back = displayed(BACK);
     let left = 1.0 - (125.0f32 / 400.0).sqrt();
     let (veil, alpha) = ([0.1, 0.9, 0.1], 127.0 / 255.0);
@@ -192,12 +183,7 @@ fn fog_fades_layers_that_are_stored_with_it_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn skies_show_behind_fog_but_through_a_surface_that_is_drawn() {
-    Gpu::any(skies_show_behind_fog_but_through_a_surface_that_is_drawn_with);
-}
-
-fn skies_show_behind_fog_but_through_a_surface_that_is_drawn_with(gpu: &mut Gpu) {
+fn skies_show_behind_fog_but_through_a_surface_that_is_drawn(gpu: &mut Gpu) {
     // from within the fog, straight up: its surface is 60 units away, the sky above it
     let mut scene = Scene::new(
         Vec3::new(150.0, 0.0, 20.0),
@@ -228,12 +214,7 @@ fn skies_show_behind_fog_but_through_a_surface_that_is_drawn_with(gpu: &mut Gpu)
     shows(gpu, &scene, back);
 }
 
-#[test]
-fn clouds_are_behind_the_fog_that_their_sky_is_stored_with() {
-    Gpu::any(clouds_are_behind_the_fog_that_their_sky_is_stored_with_with);
-}
-
-fn clouds_are_behind_the_fog_that_their_sky_is_stored_with_with(gpu: &mut Gpu) {
+fn clouds_are_behind_the_fog_that_their_sky_is_stored_with(gpu: &mut Gpu) {
     let record = SkyRecord {
         faces: [c::NO_TEXTURE; 6],
         cloud_height: 512.0,

@@ -4,11 +4,18 @@ use glam::Vec3;
 use relight::light::{Falloff, PointLight};
 use shaders::trace_types::constants::{DEBUG_GRADIENTS, DEBUG_SAMPLES};
 
-use super::harness::{Gpu, Scene, rectangle, reference};
+use super::harness::{Gpu, Scene, gpu_tests, rectangle, reference};
 use crate::api::DynamicLight;
 use crate::scene::ViewScene;
 use crate::settings::Settings;
-use crate::trace::input::Tracer;
+
+gpu_tests! {
+    compute: [
+        a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther,
+        what_rests_has_not_changed_whatever_place_in_the_pixel_is_seen,
+        antialiasing_keeps_nothing_of_light_that_fades,
+    ],
+}
 
 const WIDTH: usize = 192;
 const HEIGHT: usize = 24;
@@ -42,11 +49,7 @@ fn halved_wall() -> Scene {
     scene
 }
 
-#[test]
-fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther() {
-    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
-        return;
-    };
+fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther(gpu: &mut Gpu) {
     let scene = halved_wall();
     let settings = Settings {
         rt_accumulate: false,
@@ -100,11 +103,7 @@ fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther() {
     assert!(beyond.clone().all(|&n| n == 0), "beyond reach: {changed:?}");
 }
 
-#[test]
-fn what_rests_has_not_changed_whatever_place_in_the_pixel_is_seen() {
-    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
-        return;
-    };
+fn what_rests_has_not_changed_whatever_place_in_the_pixel_is_seen(gpu: &mut Gpu) {
     // boards that lean on the wall: beside their edges are surfaces as far away that are lit otherwise
     let mut scene = halved_wall();
     let white = scene.diffuse(0.8);
@@ -129,11 +128,7 @@ fn what_rests_has_not_changed_whatever_place_in_the_pixel_is_seen() {
     }
 }
 
-#[test]
-fn antialiasing_keeps_nothing_of_light_that_fades() {
-    let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
-        return;
-    };
+fn antialiasing_keeps_nothing_of_light_that_fades(gpu: &mut Gpu) {
     // stripes hardly wider than pixels, which differ by more than the light of a few frames
     let mut scene = halved_wall();
     let colors = [0.2, 0.9].map(|albedo| scene.diffuse(albedo));
@@ -167,8 +162,8 @@ fn antialiasing_keeps_nothing_of_light_that_fades() {
         let left = |(i, light): (usize, &Vec3)| (i % WIDTH < WIDTH / 2).then_some(light.x);
         light.iter().enumerate().filter_map(left).sum::<f32>()
     };
-    let steady = brightness(&mut gpu, true, false) / brightness(&mut gpu, false, false);
-    let fading = brightness(&mut gpu, true, true) / brightness(&mut gpu, false, true);
+    let steady = brightness(gpu, true, false) / brightness(gpu, false, false);
+    let fading = brightness(gpu, true, true) / brightness(gpu, false, true);
     println!("with antialiasing over without: steady {steady}, fading {fading}");
     assert!((fading / steady - 1.0).abs() < 0.03, "{fading}, {steady}");
 }

@@ -4,8 +4,19 @@ use glam::Vec3;
 use relight::light::SunLight;
 use shaders::types::constants as c;
 
-use super::harness::{Gpu, Scene, identity, rectangle, reference, stage};
+use super::harness::{Gpu, Scene, gpu_tests, identity, rectangle, reference, stage};
 use crate::settings::{LightSelection, Settings};
+
+gpu_tests! {
+    each: [
+        rays_are_counted_exactly_and_only_when_asked,
+        only_rays_near_something_translucent_ask_for_layers,
+        a_ray_finds_several_layers,
+    ],
+    compute: [
+        debug_views_show_what_they_say,
+    ],
+}
 
 const SIZE: u32 = 32;
 
@@ -27,119 +38,106 @@ fn lit_floor() -> Scene {
     scene
 }
 
-#[test]
-fn rays_are_counted_exactly_and_only_when_asked() {
-    Gpu::each(|gpu| {
-        let scene = lit_floor();
-        let settings = |bounces| Settings {
-            rt_num_random_dl: 0,
-            rt_bounces: bounces,
-            ..reference()
-        };
-        gpu.render(&scene, &settings(0), 4);
-        assert_eq!(gpu.rays(), None);
-        gpu.count_rays(true);
-        gpu.render(&scene, &settings(0), 4);
-        let rays = gpu.rays().expect("counted");
-        let pixels = u64::from(SIZE * SIZE);
-        // for each pixel one for the floor and one to the light; nothing translucent is there to ask for
-        assert_eq!(rays, [pixels, 0, pixels, 0, 0, 0, 0]);
-        gpu.render(&scene, &settings(1), 4);
-        // the floor sees nothing but emptiness
-        let rays = gpu.rays().expect("counted");
-        assert_eq!(rays, [pixels, 0, pixels, pixels, 0, 0, 0]);
-        // one of 2 x 2 pixels in a picture that is denoised, by other passes
-        let denoised = Settings {
-            rt_accumulate: false,
-            rt_denoiser: 1,
-            ..settings(1)
-        };
-        gpu.render(&scene, &denoised, 4);
-        let rays = gpu.rays().expect("counted");
-        assert_eq!(rays, [pixels, 0, pixels, 0, pixels / 4, 0, 0]);
-        // of what is chosen for each pixel, and of a sun beside it
-        let mut sunny = lit_floor();
-        sunny.suns.push(SunLight {
-            direction: Vec3::Z,
-            irradiance: Vec3::ONE,
-            angular_radius: 0.01,
-            material: None,
-        });
-        let chosen = Settings {
-            rt_num_random_dl: 1,
-            rt_light_selection: LightSelection::Resampled,
-            ..settings(0)
-        };
-        gpu.render(&sunny, &chosen, 4);
-        let rays = gpu.rays().expect("counted");
-        assert_eq!(rays, [pixels, 0, pixels, 0, 0, 0, pixels]);
-        gpu.count_rays(false);
-        gpu.render(&scene, &settings(0), 1);
-        assert_eq!(gpu.rays(), None);
-    });
-}
-
-#[test]
-fn only_rays_near_something_translucent_ask_for_layers() {
-    Gpu::each(|gpu| {
-        gpu.count_rays(true);
-        let settings = Settings {
-            rt_num_random_dl: 0,
-            rt_bounces: 0,
-            ..reference()
-        };
-        let pixels = u64::from(SIZE * SIZE);
-        let mut asked = |moves: bool, side: f32, below: bool| {
-            let mut scene = lit_floor();
-            let flags = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
-            let pane = scene.material(&[stage::blend([0.5; 3], 0.5)], flags);
-            let corner = Vec3::new(0.0, 0.0, if below { -10.0 } else { 10.0 });
-            let points = rectangle(corner, Vec3::X * side, Vec3::Y * side);
-            if moves {
-                scene.mesh(points, pane, identity());
-            } else {
-                scene.quad(points, pane);
-            }
-            gpu.render(&scene, &settings, 4);
-            let [eye, primary, ..] = gpu.rays().expect("counted");
-            eye + primary
-        };
-        for moves in [false, true] {
-            // a part of the picture
-            let some = asked(moves, 5.0, false);
-            assert!(some > pixels && some < 2 * pixels, "{some} of {pixels}");
-            assert_eq!(asked(moves, 5.0, true), pixels, "behind the floor");
-        }
-    });
-}
-
-#[test]
-fn a_ray_finds_several_layers() {
-    Gpu::each(|gpu| {
-        gpu.count_rays(true);
-        let pixels = u64::from(SIZE * SIZE);
-        let mut asked = |layers: u32| {
-            let mut scene = lit_floor();
-            let flags = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
-            let pane = scene.material(&[stage::blend([0.5; 3], 0.1)], flags);
-            for i in 0..layers {
-                let corner = Vec3::new(-500.0, -500.0, 1.0 + i as f32);
-                let points = rectangle(corner, Vec3::X * 1000.0, Vec3::Y * 1000.0);
-                scene.quad(points, pane);
-            }
-            gpu.render(&scene, &reference(), 4);
-            gpu.rays().expect("counted")[1] / pixels
-        };
-        // a ray for layers finds two, and one that finds fewer is the last
-        assert_eq!([1, 3, 4, 8].map(&mut asked), [1, 2, 3, 5]);
-    });
-}
-
-#[test]
-fn debug_views_show_what_they_say() {
-    let Some(mut gpu) = Gpu::new(crate::trace::input::Tracer::Compute) else {
-        return;
+fn rays_are_counted_exactly_and_only_when_asked(gpu: &mut Gpu) {
+    let scene = lit_floor();
+    let settings = |bounces| Settings {
+        rt_num_random_dl: 0,
+        rt_bounces: bounces,
+        ..reference()
     };
+    gpu.render(&scene, &settings(0), 4);
+    assert_eq!(gpu.rays(), None);
+    gpu.count_rays(true);
+    gpu.render(&scene, &settings(0), 4);
+    let rays = gpu.rays().expect("counted");
+    let pixels = u64::from(SIZE * SIZE);
+    // for each pixel one for the floor and one to the light; nothing translucent is there to ask for
+    assert_eq!(rays, [pixels, 0, pixels, 0, 0, 0, 0]);
+    gpu.render(&scene, &settings(1), 4);
+    // the floor sees nothing but emptiness
+    let rays = gpu.rays().expect("counted");
+    assert_eq!(rays, [pixels, 0, pixels, pixels, 0, 0, 0]);
+    // one of 2 x 2 pixels in a picture that is denoised, by other passes
+    let denoised = Settings {
+        rt_accumulate: false,
+        rt_denoiser: 1,
+        ..settings(1)
+    };
+    gpu.render(&scene, &denoised, 4);
+    let rays = gpu.rays().expect("counted");
+    assert_eq!(rays, [pixels, 0, pixels, 0, pixels / 4, 0, 0]);
+    // of what is chosen for each pixel, and of a sun beside it
+    let mut sunny = lit_floor();
+    sunny.suns.push(SunLight {
+        direction: Vec3::Z,
+        irradiance: Vec3::ONE,
+        angular_radius: 0.01,
+        material: None,
+    });
+    let chosen = Settings {
+        rt_num_random_dl: 1,
+        rt_light_selection: LightSelection::Resampled,
+        ..settings(0)
+    };
+    gpu.render(&sunny, &chosen, 4);
+    let rays = gpu.rays().expect("counted");
+    assert_eq!(rays, [pixels, 0, pixels, 0, 0, 0, pixels]);
+    gpu.count_rays(false);
+    gpu.render(&scene, &settings(0), 1);
+    assert_eq!(gpu.rays(), None);
+}
+
+fn only_rays_near_something_translucent_ask_for_layers(gpu: &mut Gpu) {
+    gpu.count_rays(true);
+    let settings = Settings {
+        rt_num_random_dl: 0,
+        rt_bounces: 0,
+        ..reference()
+    };
+    let pixels = u64::from(SIZE * SIZE);
+    let mut asked = |moves: bool, side: f32, below: bool| {
+        let mut scene = lit_floor();
+        let flags = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
+        let pane = scene.material(&[stage::blend([0.5; 3], 0.5)], flags);
+        let corner = Vec3::new(0.0, 0.0, if below { -10.0 } else { 10.0 });
+        let points = rectangle(corner, Vec3::X * side, Vec3::Y * side);
+        if moves {
+            scene.mesh(points, pane, identity());
+        } else {
+            scene.quad(points, pane);
+        }
+        gpu.render(&scene, &settings, 4);
+        let [eye, primary, ..] = gpu.rays().expect("counted");
+        eye + primary
+    };
+    for moves in [false, true] {
+        // a part of the picture
+        let some = asked(moves, 5.0, false);
+        assert!(some > pixels && some < 2 * pixels, "{some} of {pixels}");
+        assert_eq!(asked(moves, 5.0, true), pixels, "behind the floor");
+    }
+}
+
+fn a_ray_finds_several_layers(gpu: &mut Gpu) {
+    gpu.count_rays(true);
+    let pixels = u64::from(SIZE * SIZE);
+    let mut asked = |layers: u32| {
+        let mut scene = lit_floor();
+        let flags = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
+        let pane = scene.material(&[stage::blend([0.5; 3], 0.1)], flags);
+        for i in 0..layers {
+            let corner = Vec3::new(-500.0, -500.0, 1.0 + i as f32);
+            let points = rectangle(corner, Vec3::X * 1000.0, Vec3::Y * 1000.0);
+            scene.quad(points, pane);
+        }
+        gpu.render(&scene, &reference(), 4);
+        gpu.rays().expect("counted")[1] / pixels
+    };
+    // a ray for layers finds two, and one that finds fewer is the last
+    assert_eq!([1, 3, 4, 8].map(&mut asked), [1, 2, 3, 5]);
+}
+
+fn debug_views_show_what_they_say(gpu: &mut Gpu) {
     let scene = lit_floor();
     let mut view = |number| {
         let settings = Settings {

@@ -5,9 +5,28 @@ use shaders::types::Stage;
 use shaders::types::constants as c;
 
 use super::dielectrics::square;
-use super::harness::{Gpu, Scene, encode, identity, rectangle, reference, stage};
+use super::harness::{Gpu, Scene, encode, gpu_tests, identity, rectangle, reference, stage};
 use crate::settings::Settings;
 use crate::trace::frame_lights::decode;
+
+gpu_tests! {
+    any: [
+        paints_of_one_body_are_mixed_as_displayed,
+        one_to_eight_mixed_layers_are_exact_before_and_behind_glass,
+        light_behind_a_veil_counts_in_proportion,
+        light_over_a_layer_darkens_what_lies_behind_it,
+        a_lit_picture_on_a_pane_is_a_haze,
+        the_lightmap_of_what_has_none_is_white_and_lights_nothing,
+        lit_layers_and_what_is_behind_them_are_all_lit,
+        a_mark_shares_the_light_of_its_wall_without_noise,
+        smoke_is_as_bright_as_the_light_around_it,
+    ],
+    each: [
+        layers_are_composed_in_order_however_many_there_are,
+        layers_in_one_plane_come_in_drawing_order,
+        sprites_are_seen_from_behind,
+    ],
+}
 
 pub(super) const TRANSLUCENT: u32 = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED;
 
@@ -51,12 +70,7 @@ pub(super) fn close(a: Vec3, b: Vec3) -> bool {
     (a - b).abs().max_element() < 5.0e-4 + b.max_element() / 256.0
 }
 
-#[test]
-fn layers_are_composed_in_order_however_many_there_are() {
-    Gpu::each(layers_are_composed_in_order_however_many_there_are_with);
-}
-
-fn layers_are_composed_in_order_however_many_there_are_with(gpu: &mut Gpu) {
+fn layers_are_composed_in_order_however_many_there_are(gpu: &mut Gpu) {
     let red = [0.9, 0.1, 0.1];
     let green = [0.1, 0.8, 0.2];
     let blue = [0.2, 0.1, 1.0];
@@ -91,12 +105,7 @@ fn layers_are_composed_in_order_however_many_there_are_with(gpu: &mut Gpu) {
     assert!(close(mean, exact), "{mean} {exact}");
 }
 
-#[test]
-fn paints_of_one_body_are_mixed_as_displayed() {
-    Gpu::any(paints_of_one_body_are_mixed_as_displayed_with);
-}
-
-fn paints_of_one_body_are_mixed_as_displayed_with(gpu: &mut Gpu) {
+fn paints_of_one_body_are_mixed_as_displayed(gpu: &mut Gpu) {
     let (below, above, alpha) = ([0.2, 0.6, 0.1], [0.9, 0.1, 0.1], 63.0 / 255.0);
     let mixed = |i: usize| byte(below[i]) * (1.0 - alpha) + byte(above[i]) * alpha;
     let exact = decode(Vec3::from_array([0, 1, 2].map(mixed)));
@@ -117,11 +126,6 @@ fn paints_of_one_body_are_mixed_as_displayed_with(gpu: &mut Gpu) {
         let mean = gpu.mean(&scene, &reference(), 1);
         assert!(close(mean, wanted), "{mean} {wanted}");
     }
-}
-
-#[test]
-fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass() {
-    Gpu::any(one_to_eight_mixed_layers_are_exact_before_and_behind_glass_with);
 }
 
 /// What lies on a path, from the eye on: the displayed sum of the layers so far.
@@ -163,7 +167,7 @@ impl Displayed {
     }
 }
 
-fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass_with(gpu: &mut Gpu) {
+fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass(gpu: &mut Gpu) {
     let back = [0.5, 0.6, 0.4];
     let color = |i: usize| [0.2 + 0.08 * i as f32, 0.9 - 0.1 * i as f32, 0.5];
     let one = |path: Displayed, i: usize| {
@@ -227,12 +231,7 @@ fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass_with(gpu: &mut Gp
     }
 }
 
-#[test]
-fn light_behind_a_veil_counts_in_proportion() {
-    Gpu::any(light_behind_a_veil_counts_in_proportion_with);
-}
-
-fn light_behind_a_veil_counts_in_proportion_with(gpu: &mut Gpu) {
+fn light_behind_a_veil_counts_in_proportion(gpu: &mut Gpu) {
     // a lit wall behind a veil that glows: as bright as the display mixes both where the light is the engine's, and linear
     // in light whatever that is, so that means of noisy frames are means of the picture
     let (veil, alpha) = ([0.3, 0.2, 0.5], 0.25);
@@ -256,12 +255,7 @@ fn light_behind_a_veil_counts_in_proportion_with(gpu: &mut Gpu) {
     );
 }
 
-#[test]
-fn light_over_a_layer_darkens_what_lies_behind_it() {
-    Gpu::any(light_over_a_layer_darkens_what_lies_behind_it_with);
-}
-
-fn light_over_a_layer_darkens_what_lies_behind_it_with(gpu: &mut Gpu) {
+fn light_over_a_layer_darkens_what_lies_behind_it(gpu: &mut Gpu) {
     // water whose stages multiply what is behind, and their lightmap that, too: the light that the engine shows at the water
     let (back, tint, stored) = ([0.9, 0.8, 0.5], [0.9, 0.7, 0.8], [153, 102, 204]);
     let mut scene = scene();
@@ -280,12 +274,7 @@ fn light_over_a_layer_darkens_what_lies_behind_it_with(gpu: &mut Gpu) {
     assert!(close(mean, exact), "{mean} {exact}");
 }
 
-#[test]
-fn a_lit_picture_on_a_pane_is_a_haze() {
-    Gpu::any(a_lit_picture_on_a_pane_is_a_haze_with);
-}
-
-fn a_lit_picture_on_a_pane_is_a_haze_with(gpu: &mut Gpu) {
+fn a_lit_picture_on_a_pane_is_a_haze(gpu: &mut Gpu) {
     let (back, stored) = ([0.3, 0.4, 0.5], [153, 102, 204]);
     let texel = [90, 60, 30];
     let image = square(gpu, 1, &[texel[0], texel[1], texel[2], 255]);
@@ -312,12 +301,7 @@ fn a_lit_picture_on_a_pane_is_a_haze_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn the_lightmap_of_what_has_none_is_white_and_lights_nothing() {
-    Gpu::any(the_lightmap_of_what_has_none_is_white_and_lights_nothing_with);
-}
-
-fn the_lightmap_of_what_has_none_is_white_and_lights_nothing_with(gpu: &mut Gpu) {
+fn the_lightmap_of_what_has_none_is_white_and_lights_nothing(gpu: &mut Gpu) {
     let color = [0.3, 0.5, 0.7];
     let mut white = stage::light();
     white.flags |= c::STAGE_NO_LIGHTMAP;
@@ -341,12 +325,7 @@ fn the_lightmap_of_what_has_none_is_white_and_lights_nothing_with(gpu: &mut Gpu)
     assert_eq!(gpu.mean(&dark, &settings, 4), Vec3::ZERO);
 }
 
-#[test]
-fn layers_in_one_plane_come_in_drawing_order() {
-    Gpu::each(layers_in_one_plane_come_in_drawing_order_with);
-}
-
-fn layers_in_one_plane_come_in_drawing_order_with(gpu: &mut Gpu) {
+fn layers_in_one_plane_come_in_drawing_order(gpu: &mut Gpu) {
     let (first, second, back) = ([0.9, 0.1, 0.1], [0.1, 0.8, 0.2], [0.5, 0.5, 0.5]);
     let mut scene = scene();
     let wall = scene.material(&[stage::constant(back)], 0);
@@ -363,12 +342,7 @@ fn layers_in_one_plane_come_in_drawing_order_with(gpu: &mut Gpu) {
     assert!(close(mean, exact), "{mean} {exact}");
 }
 
-#[test]
-fn lit_layers_and_what_is_behind_them_are_all_lit() {
-    Gpu::any(lit_layers_and_what_is_behind_them_are_all_lit_with);
-}
-
-fn lit_layers_and_what_is_behind_them_are_all_lit_with(gpu: &mut Gpu) {
+fn lit_layers_and_what_is_behind_them_are_all_lit(gpu: &mut Gpu) {
     // two lit layers of one half over a lit wall: all of them share the light of what the display shows, in the mean
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 16);
     scene.ambient = Vec3::splat(0.8);
@@ -398,12 +372,7 @@ fn matter(color: [f32; 3], alpha: f32) -> Stage {
     }
 }
 
-#[test]
-fn a_mark_shares_the_light_of_its_wall_without_noise() {
-    Gpu::any(a_mark_shares_the_light_of_its_wall_without_noise_with);
-}
-
-fn a_mark_shares_the_light_of_its_wall_without_noise_with(gpu: &mut Gpu) {
+fn a_mark_shares_the_light_of_its_wall_without_noise(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 16);
     scene.ambient = Vec3::splat(0.8);
     let wall = scene.diffuse(0.5);
@@ -436,12 +405,7 @@ fn a_mark_shares_the_light_of_its_wall_without_noise_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn smoke_is_as_bright_as_the_light_around_it() {
-    Gpu::any(smoke_is_as_bright_as_the_light_around_it_with);
-}
-
-fn smoke_is_as_bright_as_the_light_around_it_with(gpu: &mut Gpu) {
+fn smoke_is_as_bright_as_the_light_around_it(gpu: &mut Gpu) {
     let back = [0.5, 0.6, 0.4];
     let grey = [0.7, 0.7, 0.6];
     let around = Vec3::new(0.6, 0.3, 0.1);
@@ -466,12 +430,7 @@ fn smoke_is_as_bright_as_the_light_around_it_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn sprites_are_seen_from_behind() {
-    Gpu::each(sprites_are_seen_from_behind_with);
-}
-
-fn sprites_are_seen_from_behind_with(gpu: &mut Gpu) {
+fn sprites_are_seen_from_behind(gpu: &mut Gpu) {
     let [back, front] = [[0.2, 0.3, 0.1], [0.6, 0.2, 0.4]];
     for (flags, seen) in [
         (c::INSTANCE_UNLIT | c::INSTANCE_SUSPENDED, displayed(front)),

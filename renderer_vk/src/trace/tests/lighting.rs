@@ -5,9 +5,25 @@ use relight::light::{PointLight, Pulse, SunLight};
 use relight::world::StyleStrength;
 
 use super::bounces::seen;
-use super::harness::{Gpu, Scene, floor_point, lambert, rectangle, reference};
+use super::harness::{Gpu, Scene, floor_point, gpu_tests, lambert, rectangle, reference};
 use crate::api::DynamicLight;
 use crate::settings::{LightSelection, Settings};
+
+gpu_tests! {
+    any: [
+        one_triangle_gives_the_irradiance_of_the_closed_form,
+        all_estimators_have_the_same_mean,
+        triangles_end_alone_and_quads_together,
+        spheres_and_suns_give_their_irradiance,
+        a_white_room_bounces_what_its_walls_give,
+        bounced_light_of_listed_lights_is_counted_once,
+        a_point_is_lit_by_the_list_of_its_cluster,
+        points_pulse_with_their_style,
+    ],
+    each: [
+        an_umbra_is_black_and_a_penumbra_is_between,
+    ],
+}
 
 /// The ways to choose lights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,12 +76,7 @@ fn mean_difference(a: &[Vec3], b: impl Fn(usize) -> f32) -> f32 {
     sum / a.len() as f32
 }
 
-#[test]
-fn one_triangle_gives_the_irradiance_of_the_closed_form() {
-    Gpu::any(one_triangle_gives_the_irradiance_of_the_closed_form_with);
-}
-
-fn one_triangle_gives_the_irradiance_of_the_closed_form_with(gpu: &mut Gpu) {
+fn one_triangle_gives_the_irradiance_of_the_closed_form(gpu: &mut Gpu) {
     // near: sampled by solid angle; far and small: sampled by area
     for triangle in [
         [
@@ -108,12 +119,7 @@ fn one_triangle_gives_the_irradiance_of_the_closed_form_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn all_estimators_have_the_same_mean() {
-    Gpu::any(all_estimators_have_the_same_mean_with);
-}
-
-fn all_estimators_have_the_same_mean_with(gpu: &mut Gpu) {
+fn all_estimators_have_the_same_mean(gpu: &mut Gpu) {
     let mut scene = Scene::new(
         Vec3::new(-180.0, 0.0, 60.0),
         Vec3::new(100.0, 0.0, -20.0),
@@ -194,12 +200,7 @@ fn all_estimators_have_the_same_mean_with(gpu: &mut Gpu) {
     assert!(resampled < 0.5 * uniform, "{resampled} {uniform}");
 }
 
-#[test]
-fn an_umbra_is_black_and_a_penumbra_is_between() {
-    Gpu::each(an_umbra_is_black_and_a_penumbra_is_between_with);
-}
-
-fn an_umbra_is_black_and_a_penumbra_is_between_with(gpu: &mut Gpu) {
+fn an_umbra_is_black_and_a_penumbra_is_between(gpu: &mut Gpu) {
     let triangle = [
         Vec3::new(-5.0, -5.0, 200.0),
         Vec3::new(0.0, 5.0, 200.0),
@@ -249,12 +250,7 @@ fn an_umbra_is_black_and_a_penumbra_is_between_with(gpu: &mut Gpu) {
     assert!(umbra > 50 && partial > 20, "{umbra} {partial}");
 }
 
-#[test]
-fn triangles_end_alone_and_quads_together() {
-    Gpu::any(triangles_end_alone_and_quads_together_with);
-}
-
-fn triangles_end_alone_and_quads_together_with(gpu: &mut Gpu) {
+fn triangles_end_alone_and_quads_together(gpu: &mut Gpu) {
     let mut scene = floor();
     let at = |x, y| Vec3::new(x, y, 90.0);
     let (low, high) = (at(-4.0, -4.0), at(4.0, 4.0));
@@ -279,12 +275,7 @@ fn triangles_end_alone_and_quads_together_with(gpu: &mut Gpu) {
     assert!((alone / whole - 1.0).abs() < 0.02, "{alone} {whole}");
 }
 
-#[test]
-fn spheres_and_suns_give_their_irradiance() {
-    Gpu::any(spheres_and_suns_give_their_irradiance_with);
-}
-
-fn spheres_and_suns_give_their_irradiance_with(gpu: &mut Gpu) {
+fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
     let check = |gpu: &mut Gpu, scene: &Scene, exact: &dyn Fn(Vec3) -> f32| {
         let (pixels, _) = gpu.render(scene, &sampled(LightSampling::Resampled), 32);
         let difference = mean_difference(&pixels, |i| exact(floor_point(scene, i % 32, i / 32)));
@@ -383,12 +374,7 @@ fn spheres_and_suns_give_their_irradiance_with(gpu: &mut Gpu) {
     check(gpu, &scene, &|_| 0.25);
 }
 
-#[test]
-fn a_white_room_bounces_what_its_walls_give() {
-    Gpu::any(a_white_room_bounces_what_its_walls_give_with);
-}
-
-fn a_white_room_bounces_what_its_walls_give_with(gpu: &mut Gpu) {
+fn a_white_room_bounces_what_its_walls_give(gpu: &mut Gpu) {
     // every wall glows with radiance e and reflects rho: one bounce adds rho * e, two add rho² * e more
     let mut scene = Scene::new(
         Vec3::new(-20.0, 10.0, 5.0),
@@ -429,12 +415,7 @@ fn a_white_room_bounces_what_its_walls_give_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn bounced_light_of_listed_lights_is_counted_once() {
-    Gpu::any(bounced_light_of_listed_lights_is_counted_once_with);
-}
-
-fn bounced_light_of_listed_lights_is_counted_once_with(gpu: &mut Gpu) {
+fn bounced_light_of_listed_lights_is_counted_once(gpu: &mut Gpu) {
     // a floor lit by a wall that the sun lights: by form factor of the wall, seen from the floor's point
     let mut scene = Scene::new(
         Vec3::new(-60.0, 0.0, 40.0),
@@ -490,12 +471,7 @@ fn bounced_light_of_listed_lights_is_counted_once_with(gpu: &mut Gpu) {
     assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
 }
 
-#[test]
-fn a_point_is_lit_by_the_list_of_its_cluster() {
-    Gpu::any(a_point_is_lit_by_the_list_of_its_cluster_with);
-}
-
-fn a_point_is_lit_by_the_list_of_its_cluster_with(gpu: &mut Gpu) {
+fn a_point_is_lit_by_the_list_of_its_cluster(gpu: &mut Gpu) {
     // two cells side by side without a wall between them: what differs is the lists alone
     let mut map = q3bsp::builder::MapBuilder::new();
     let far = map.add_cell(
@@ -553,12 +529,7 @@ fn a_point_is_lit_by_the_list_of_its_cluster_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn points_pulse_with_their_style() {
-    Gpu::any(points_pulse_with_their_style_with);
-}
-
-fn points_pulse_with_their_style_with(gpu: &mut Gpu) {
+fn points_pulse_with_their_style(gpu: &mut Gpu) {
     let wave = shaderscript::Wave {
         function: shaderscript::WaveFunction::Square,
         base: 0.5,

@@ -6,9 +6,26 @@ use glam::Vec3;
 use relight::light::SunLight;
 use shaders::types::{Instance, constants as c};
 
-use super::harness::{Gpu, Scene, floor_point, identity, lambert, rectangle, reference, stage};
+use super::harness::{
+    Gpu, Scene, floor_point, gpu_tests, identity, lambert, rectangle, reference, stage,
+};
 use crate::api::DynamicLight;
 use crate::settings::{LightSelection, Settings};
+
+gpu_tests! {
+    any: [
+        an_edge_hides_the_part_of_a_light_that_lies_behind_it,
+        the_suns_disc_makes_a_penumbra_of_its_own_width,
+        in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky,
+        the_flashlight_lights_a_spot_before_the_eye,
+        estimators_differ_by_noise_alone,
+        a_chosen_ray_goes_where_it_was_sent,
+        errors_fall_faster_than_those_of_independent_frames,
+    ],
+    each: [
+        lights_of_a_brush_model_go_where_it_goes,
+    ],
+}
 
 const SIDE: usize = 32;
 
@@ -63,12 +80,7 @@ fn clipped(polygon: &[Vec3], normal: Vec3, point: Vec3) -> Vec<Vec3> {
     out
 }
 
-#[test]
-fn an_edge_hides_the_part_of_a_light_that_lies_behind_it() {
-    Gpu::any(an_edge_hides_the_part_of_a_light_that_lies_behind_it_with);
-}
-
-fn an_edge_hides_the_part_of_a_light_that_lies_behind_it_with(gpu: &mut Gpu) {
+fn an_edge_hides_the_part_of_a_light_that_lies_behind_it(gpu: &mut Gpu) {
     let triangle = [
         Vec3::new(-40.0, -30.0, 300.0),
         Vec3::new(0.0, 45.0, 300.0),
@@ -123,12 +135,7 @@ fn an_edge_hides_the_part_of_a_light_that_lies_behind_it_with(gpu: &mut Gpu) {
     assert!(dark > 300);
 }
 
-#[test]
-fn the_suns_disc_makes_a_penumbra_of_its_own_width() {
-    Gpu::any(the_suns_disc_makes_a_penumbra_of_its_own_width_with);
-}
-
-fn the_suns_disc_makes_a_penumbra_of_its_own_width_with(gpu: &mut Gpu) {
+fn the_suns_disc_makes_a_penumbra_of_its_own_width(gpu: &mut Gpu) {
     let radius = 0.1f32;
     let mut scene = floor_from_above(40.0);
     let white = scene.diffuse(1.0);
@@ -166,12 +173,7 @@ fn the_suns_disc_makes_a_penumbra_of_its_own_width_with(gpu: &mut Gpu) {
     assert!(worst < 0.13, "{worst}");
 }
 
-#[test]
-fn in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky() {
-    Gpu::any(in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky_with);
-}
-
-fn in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky_with(gpu: &mut Gpu) {
+fn in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky(gpu: &mut Gpu) {
     let mut scene = floor_from_above(40.0);
     let (low, high) = (
         Vec3::new(-200.0, -150.0, 0.0),
@@ -216,12 +218,7 @@ fn in_a_furnace_of_sky_a_white_floor_is_as_bright_as_the_sky_with(gpu: &mut Gpu)
     }
 }
 
-#[test]
-fn the_flashlight_lights_a_spot_before_the_eye() {
-    Gpu::any(the_flashlight_lights_a_spot_before_the_eye_with);
-}
-
-fn the_flashlight_lights_a_spot_before_the_eye_with(gpu: &mut Gpu) {
+fn the_flashlight_lights_a_spot_before_the_eye(gpu: &mut Gpu) {
     let scene = floor_from_above(80.0);
     assert_eq!(gpu.mean(&scene, &all_lights(), 1), Vec3::ZERO);
     let settings = Settings {
@@ -248,12 +245,7 @@ fn the_flashlight_lights_a_spot_before_the_eye_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn lights_of_a_brush_model_go_where_it_goes() {
-    Gpu::each(lights_of_a_brush_model_go_where_it_goes_with);
-}
-
-fn lights_of_a_brush_model_go_where_it_goes_with(gpu: &mut Gpu) {
+fn lights_of_a_brush_model_go_where_it_goes(gpu: &mut Gpu) {
     let triangle = [
         Vec3::new(-5.0, -5.0, 60.0),
         Vec3::new(0.0, 5.0, 60.0),
@@ -341,12 +333,7 @@ fn crowd() -> Scene {
     scene
 }
 
-#[test]
-fn estimators_differ_by_noise_alone() {
-    Gpu::any(estimators_differ_by_noise_alone_with);
-}
-
-fn estimators_differ_by_noise_alone_with(gpu: &mut Gpu) {
+fn estimators_differ_by_noise_alone(gpu: &mut Gpu) {
     // pixels are independent and without bias their differences have the mean zero: then the sum of differences over
     // the root of the sum of their squares is normally distributed with a deviation of one, in the picture and in each
     // square of it. Four and a half deviations happen to one picture of some hundred thousand.
@@ -385,12 +372,7 @@ fn estimators_differ_by_noise_alone_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn a_chosen_ray_goes_where_it_was_sent() {
-    Gpu::any(a_chosen_ray_goes_where_it_was_sent_with);
-}
-
-fn a_chosen_ray_goes_where_it_was_sent_with(gpu: &mut Gpu) {
+fn a_chosen_ray_goes_where_it_was_sent(gpu: &mut Gpu) {
     // a small lamp, far away, in a hole that is hardly wider: what turns a ray by a hundred-thousandth lets it miss the hole
     const HEIGHT: f32 = 4000.0;
     const LAMP: f32 = 0.125;
@@ -427,12 +409,7 @@ fn a_chosen_ray_goes_where_it_was_sent_with(gpu: &mut Gpu) {
     assert!(off.abs() < 0.01, "{off}");
 }
 
-#[test]
-fn errors_fall_faster_than_those_of_independent_frames() {
-    Gpu::any(errors_fall_faster_than_those_of_independent_frames_with);
-}
-
-fn errors_fall_faster_than_those_of_independent_frames_with(gpu: &mut Gpu) {
+fn errors_fall_faster_than_those_of_independent_frames(gpu: &mut Gpu) {
     let scene = crowd();
     let (truth, _) = gpu.render(&scene, &all_lights(), 48);
     for (selection, bound) in [

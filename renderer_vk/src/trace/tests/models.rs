@@ -4,10 +4,20 @@ use glam::Vec3;
 use relight::light::{Falloff, PointLight};
 use shaders::types::{Instance, Stage, constants as c};
 
-use super::harness::{Gpu, Scene, identity, rectangle, reference, stage};
+use super::harness::{Gpu, Scene, gpu_tests, identity, rectangle, reference, stage};
 use super::layers::{displayed, screen};
 use crate::settings::Settings;
 use crate::trace::frame_lights::decode;
+
+gpu_tests! {
+    any: [
+        models_have_the_light_that_the_engine_adds,
+    ],
+    each: [
+        who_carries_a_weapon_casts_no_shadow_on_it,
+        who_carries_a_weapon_is_not_in_the_way_of_bounced_light,
+    ],
+}
 
 const PAINT: [f32; 3] = [0.8, 0.4, 0.2];
 
@@ -24,12 +34,7 @@ fn close(a: Vec3, b: Vec3) -> bool {
     (a - b).abs().max_element() < 3.0e-3
 }
 
-#[test]
-fn models_have_the_light_that_the_engine_adds() {
-    Gpu::any(models_have_the_light_that_the_engine_adds_with);
-}
-
-fn models_have_the_light_that_the_engine_adds_with(gpu: &mut Gpu) {
+fn models_have_the_light_that_the_engine_adds(gpu: &mut Gpu) {
     let traced = 0.3;
     let scene_of = |stages: &[Stage], instance: Instance| {
         let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 16);
@@ -99,12 +104,7 @@ fn under_a_roof(flags: u32) -> Scene {
     scene
 }
 
-#[test]
-fn who_carries_a_weapon_casts_no_shadow_on_it() {
-    Gpu::each(who_carries_a_weapon_casts_no_shadow_on_it_with);
-}
-
-fn who_carries_a_weapon_casts_no_shadow_on_it_with(gpu: &mut Gpu) {
+fn who_carries_a_weapon_casts_no_shadow_on_it(gpu: &mut Gpu) {
     // one light in two passes, and all of them in one
     for rt_num_random_dl in [1, 0] {
         let settings = Settings {
@@ -124,12 +124,7 @@ fn who_carries_a_weapon_casts_no_shadow_on_it_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn who_carries_a_weapon_is_not_in_the_way_of_bounced_light() {
-    Gpu::each(who_carries_a_weapon_is_not_in_the_way_of_bounced_light_with);
-}
-
-fn who_carries_a_weapon_is_not_in_the_way_of_bounced_light_with(gpu: &mut Gpu) {
+fn who_carries_a_weapon_is_not_in_the_way_of_bounced_light(gpu: &mut Gpu) {
     // a glowing wall behind the eye, and a body between
     let scene_of = |flags: u32| {
         let mut scene = armed();

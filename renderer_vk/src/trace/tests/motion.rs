@@ -6,11 +6,17 @@ use shaders::trace_types::constants::{LAST_MOVED, LAST_SAME, LAST_UNKNOWN};
 use shaders::types::Instance;
 use shaders::types::constants as c;
 
-use super::harness::{Gpu, Scene, identity, mirror_at, rectangle, reference, stage};
+use super::harness::{Gpu, Scene, gpu_tests, identity, mirror_at, rectangle, reference, stage};
 use crate::api::{EntityKind, RefDef};
 use crate::scene::{Portal, View, ViewEntity, ViewScene};
 use crate::settings::Settings;
 use crate::trace::motion::Motion;
+
+gpu_tests! {
+    any: [
+        motion_is_that_of_the_projection,
+    ],
+}
 
 const SIZE: i32 = 24;
 
@@ -68,16 +74,13 @@ fn check(gpu: &Gpu, first: &RefDef, expected: impl Fn(Vec3) -> Option<Vec3>) -> 
     known
 }
 
-#[test]
-fn motion_is_that_of_the_projection() {
+fn motion_is_that_of_the_projection(gpu: &mut Gpu) {
     // one test, because compiling the pipelines takes longer than all of these
-    Gpu::any(|gpu| {
-        what_rests_moves_as_the_camera_does(gpu);
-        meshes_move_with_their_entities_and_by_their_vertices(gpu);
-        what_a_mirror_shows_moves_like_its_mirror_image(gpu);
-        what_a_portal_shows_moves_as_if_it_stood_there(gpu);
-        the_sky_turns_but_does_not_come_nearer(gpu);
-    });
+    what_rests_moves_as_the_camera_does(gpu);
+    meshes_move_with_their_entities_and_by_their_vertices(gpu);
+    what_a_mirror_shows_moves_like_its_mirror_image(gpu);
+    what_a_portal_shows_moves_as_if_it_stood_there(gpu);
+    the_sky_turns_but_does_not_come_nearer(gpu);
 }
 
 fn room() -> Scene {

@@ -4,9 +4,16 @@ use glam::Vec3;
 use relight::light::{Falloff, PointLight, SunLight};
 use shaders::types::constants as c;
 
-use super::harness::{Gpu, Scene, identity, reference, stage};
+use super::harness::{Gpu, Scene, gpu_tests, identity, reference, stage};
 use super::layers::screen;
 use crate::settings::Settings;
+
+gpu_tests! {
+    each: [
+        light_passes_what_the_compiler_let_it_pass,
+        the_eye_sees_the_shown_side_alone,
+    ],
+}
 
 /// A rectangle that fills the view, at distance x; it faces away from the eye.
 fn turned_away(x: f32) -> [Vec3; 4] {
@@ -71,12 +78,7 @@ fn mean(gpu: &mut Gpu, from: Source, shell: Option<([Vec3; 4], u32, bool)>, boun
 /// A shell whose shown side is turned to the wall, by its winding or by its `cull`.
 const BACK: u32 = c::MATERIAL_CULL_BACK;
 
-#[test]
-fn light_passes_what_the_compiler_let_it_pass() {
-    Gpu::each(light_passes_what_the_compiler_let_it_pass_with);
-}
-
-fn light_passes_what_the_compiler_let_it_pass_with(gpu: &mut Gpu) {
+fn light_passes_what_the_compiler_let_it_pass(gpu: &mut Gpu) {
     for (from, bounces) in [
         (Source::Lamp, 0),
         (Source::Sun, 0),
@@ -111,12 +113,7 @@ fn light_passes_what_the_compiler_let_it_pass_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn the_eye_sees_the_shown_side_alone() {
-    Gpu::each(the_eye_sees_the_shown_side_alone_with);
-}
-
-fn the_eye_sees_the_shown_side_alone_with(gpu: &mut Gpu) {
+fn the_eye_sees_the_shown_side_alone(gpu: &mut Gpu) {
     for (corners, flags, world) in [
         (screen(90.0), c::MATERIAL_PASSED, true),
         (turned_away(90.0), BACK | c::MATERIAL_PASSED, true),

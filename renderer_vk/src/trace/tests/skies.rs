@@ -4,10 +4,18 @@ use glam::{Vec2, Vec3};
 use shaders::trace_types::SkyRecord;
 use shaders::types::constants as c;
 
-use super::harness::{Gpu, Scene, encode, identity, rectangle, reference, stage};
+use super::harness::{Gpu, Scene, encode, gpu_tests, identity, rectangle, reference, stage};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::scene::Sun;
 use crate::settings::Settings;
+
+gpu_tests! {
+    any: [
+        clouds_are_as_sharp_as_a_pixel_is_small,
+        the_sun_is_a_square_in_its_direction,
+        what_the_visible_set_holds_shows_through_a_sky,
+    ],
+}
 
 /// Texels on each side of the picture.
 const SIDE: u32 = 1024;
@@ -43,12 +51,7 @@ fn coordinates(d: Vec3) -> Vec2 {
     Vec2::new(v.x.acos(), v.y.acos())
 }
 
-#[test]
-fn clouds_are_as_sharp_as_a_pixel_is_small() {
-    Gpu::any(clouds_are_as_sharp_as_a_pixel_is_small_with);
-}
-
-fn clouds_are_as_sharp_as_a_pixel_is_small_with(gpu: &mut Gpu) {
+fn clouds_are_as_sharp_as_a_pixel_is_small(gpu: &mut Gpu) {
     const SIZE: usize = 16;
     const FOV: f32 = 40.0;
     let image = levels(gpu);
@@ -91,12 +94,7 @@ fn clouds_are_as_sharp_as_a_pixel_is_small_with(gpu: &mut Gpu) {
     }
 }
 
-#[test]
-fn the_sun_is_a_square_in_its_direction() {
-    Gpu::any(the_sun_is_a_square_in_its_direction_with);
-}
-
-fn the_sun_is_a_square_in_its_direction_with(gpu: &mut Gpu) {
+fn the_sun_is_a_square_in_its_direction(gpu: &mut Gpu) {
     const SIZE: usize = 32;
     let direction = Vec3::new(0.8, 0.3, 0.5).normalize();
     let mut scene = Scene::new(Vec3::ZERO, Vec3::new(100.0, 30.0, 55.0), 30.0, SIZE as i32);
@@ -147,12 +145,7 @@ fn the_sun_is_a_square_in_its_direction_with(gpu: &mut Gpu) {
     assert!(inside > 100 && inside < SIZE * SIZE / 2, "{inside}");
 }
 
-#[test]
-fn what_the_visible_set_holds_shows_through_a_sky() {
-    Gpu::any(what_the_visible_set_holds_shows_through_a_sky_with);
-}
-
-fn what_the_visible_set_holds_shows_through_a_sky_with(gpu: &mut Gpu) {
+fn what_the_visible_set_holds_shows_through_a_sky(gpu: &mut Gpu) {
     const SIZE: usize = 16;
     let colors = [
         [0.0, 0.0, 0.4],

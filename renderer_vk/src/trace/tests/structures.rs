@@ -5,34 +5,28 @@ use std::sync::Arc;
 use glam::{Mat3, Vec2, Vec3};
 use shaders::types::constants as c;
 use shaders::types::{Instance, Vertex};
+use testkit::Random;
 
-use super::harness::{Gpu, Scene, identity, reference, stage};
+use super::harness::{Gpu, Scene, gpu_tests, identity, reference, stage};
 use crate::scene::{DynamicMesh, MeshId, RigidMesh, Shape};
 use crate::settings::Settings;
 use crate::trace::accel::Accel;
 use crate::trace::input::Tracer;
 
-/// Numbers between 0 and 1 that are the same in every run.
-struct Numbers(u32);
-
-impl Numbers {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (self.0 >> 8) as f32 / 16_777_216.0
-    }
-
-    fn point(&mut self) -> Vec3 {
-        Vec3::new(self.next(), self.next(), self.next()) * 2.0 - 1.0
-    }
+gpu_tests! {
+    each: [
+        kept_structures_show_what_built_ones_show,
+        what_is_not_a_number_hits_nothing_and_breaks_nothing,
+    ],
 }
 
 /// Triangles here and there within a cube of 40 units, some of them degenerate.
-fn shards(seed: u32, triangles: usize) -> (Vec<Vertex>, Vec<u32>) {
-    let mut numbers = Numbers(seed);
+fn shards(seed: u64, triangles: usize) -> (Vec<Vertex>, Vec<u32>) {
+    let mut random = Random::new(seed);
     let mut vertices = Vec::new();
     for i in 0..triangles {
-        let middle = numbers.point() * 20.0;
-        let mut corners = [0; 3].map(|_| middle + numbers.point() * 12.0);
+        let middle = random.signed_point() * 20.0;
+        let mut corners = [0; 3].map(|_| middle + random.signed_point() * 12.0);
         match i % 16 {
             0 => corners[2] = corners[1],
             8 => corners = [middle; 3],
@@ -100,13 +94,13 @@ fn add(
     scene.meshes.push(mesh);
 }
 
-fn turned(numbers: &mut Numbers) -> Instance {
-    let turn = Mat3::from_rotation_y(numbers.next() * 6.0)
-        * Mat3::from_rotation_x(numbers.next() * 6.0)
-        * (0.4 + numbers.next());
+fn turned(random: &mut Random) -> Instance {
+    let turn = Mat3::from_rotation_y(random.uniform() * 6.0)
+        * Mat3::from_rotation_x(random.uniform() * 6.0)
+        * (0.4 + random.uniform());
     Instance {
         axis: [turn.x_axis, turn.y_axis, turn.z_axis],
-        origin: numbers.point() * Vec3::new(60.0, 90.0, 70.0),
+        origin: random.signed_point() * Vec3::new(60.0, 90.0, 70.0),
         ..identity()
     }
 }
@@ -137,12 +131,7 @@ fn settings() -> Settings {
     }
 }
 
-#[test]
-fn kept_structures_show_what_built_ones_show() {
-    Gpu::each(kept_structures_show_what_built_ones_show_with);
-}
-
-fn kept_structures_show_what_built_ones_show_with(gpu: &mut Gpu) {
+fn kept_structures_show_what_built_ones_show(gpu: &mut Gpu) {
     let mut last: Option<Vec<Vec3>> = None;
     // poses from near to far from the first: fitted, and after the leaps built anew
     for (pose, stretch) in [1.0, 1.05, 1.2, 6.0, 0.3].into_iter().enumerate() {
@@ -155,14 +144,14 @@ fn kept_structures_show_what_built_ones_show_with(gpu: &mut Gpu) {
                 c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED,
             );
             for model in 0..3u32 {
-                let (mut vertices, indices) = shards(model + 7, 24);
-                let mut numbers = Numbers(pose as u32);
+                let (mut vertices, indices) = shards(u64::from(model) + 7, 24);
+                let mut random = Random::new(pose as u64);
                 for vertex in &mut vertices {
-                    let shake = numbers.point() * 4.0 * pose as f32;
+                    let shake = random.signed_point() * 4.0 * pose as f32;
                     vertex.position = vertex.position * Vec3::new(stretch, 1.0, 1.0) + shake;
                 }
                 let rigid = Arc::new(RigidMesh::new(vertices, indices));
-                let mut places = Numbers(model);
+                let mut places = Random::new(u64::from(model));
                 for entity in 0..3 {
                     let material = if entity == 2 { veil } else { solid };
                     let instance = turned(&mut places);
@@ -194,17 +183,15 @@ fn kept_structures_show_what_built_ones_show_with(gpu: &mut Gpu) {
 
 #[test]
 fn a_thousand_entities_of_one_model_share_one_structure() {
-    for tracer in [Tracer::Pipeline, Tracer::Compute] {
-        let Some(mut gpu) = Gpu::new(tracer) else {
-            continue;
-        };
+    Gpu::with(&[Tracer::Pipeline, Tracer::Compute], |mut gpu| {
+        let tracer = gpu.tracer;
         let mut scene = stage_scene();
         let solid = scene.diffuse(0.8);
         let (vertices, indices) = shards(3, 200);
         let rigid = Arc::new(RigidMesh::new(vertices, indices));
-        let mut numbers = Numbers(1);
+        let mut random = Random::new(1);
         for _ in 0..1000 {
-            let instance = turned(&mut numbers);
+            let instance = turned(&mut random);
             add(&mut scene, How::Rigid, &rigid, 1, solid, instance);
         }
         // small deformed surfaces of the map are built together, a large one is fitted
@@ -240,15 +227,10 @@ fn a_thousand_entities_of_one_model_share_one_structure() {
         }
         gpu.device.wait_idle().expect("done");
         gpu.check_messages();
-    }
+    });
 }
 
-#[test]
-fn what_is_not_a_number_hits_nothing_and_breaks_nothing() {
-    Gpu::each(what_is_not_a_number_hits_nothing_and_breaks_nothing_with);
-}
-
-fn what_is_not_a_number_hits_nothing_and_breaks_nothing_with(gpu: &mut Gpu) {
+fn what_is_not_a_number_hits_nothing_and_breaks_nothing(gpu: &mut Gpu) {
     let empty = gpu.render(&stage_scene(), &settings(), 1).0;
     for how in [How::Changing, How::Animated] {
         for bad in [f32::NAN, f32::INFINITY, 3.0e38] {
@@ -290,22 +272,20 @@ fn what_is_not_a_number_hits_nothing_and_breaks_nothing_with(gpu: &mut Gpu) {
 
 #[test]
 fn maps_come_and_go_without_a_trace() {
-    for tracer in [Tracer::Pipeline, Tracer::Compute] {
-        let Some(mut gpu) = Gpu::new(tracer) else {
-            continue;
-        };
+    Gpu::with(&[Tracer::Pipeline, Tracer::Compute], |mut gpu| {
+        let tracer = gpu.tracer;
         let mut reports = Vec::new();
         for map in 0..200u32 {
             let mut scene = stage_scene();
             let solid = scene.diffuse(0.8);
-            let mut numbers = Numbers(map);
+            let mut random = Random::new(u64::from(map));
             let uploaded = scene.upload(&gpu.device, tracer);
             let mut accel = Accel::new(&gpu.device, tracer);
             for frame in 0..2 {
                 let (vertices, indices) = shards(frame, 30);
                 let mesh = Arc::new(RigidMesh::new(vertices, indices));
                 for how in [How::Changing, How::Animated, How::Rigid] {
-                    add(&mut scene, how, &mesh, 1, solid, turned(&mut numbers));
+                    add(&mut scene, how, &mesh, 1, solid, turned(&mut random));
                 }
                 let mut rec = gpu.ring.begin().expect("frame");
                 accel
@@ -324,5 +304,5 @@ fn maps_come_and_go_without_a_trace() {
         }
         assert_eq!(reports[10], reports[199]);
         gpu.check_messages();
-    }
+    });
 }

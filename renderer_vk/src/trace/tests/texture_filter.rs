@@ -1,6 +1,7 @@
 //! Textures on slanted surfaces against the mean of many samples.
 
 use glam::Vec3;
+use testkit::Random;
 
 use super::harness::{Gpu, Scene, rectangle, reference, stage};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
@@ -12,12 +13,11 @@ const SIDE: u32 = 256;
 
 /// Stripes of four texels along s, light or dark without a pattern, and if asked all smaller levels.
 fn image(gpu: &Gpu, levels: bool) -> Image {
-    let mut state = 1u32;
+    let mut random = Random::new(1);
     let stripes: Vec<u8> = (0..SIDE / 4)
         .map(|_| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             // little contrast: means of what is displayed are then nearly those of light
-            if state >> 31 == 0 { 110 } else { 145 }
+            if random.below(2) == 0 { 110 } else { 145 }
         })
         .collect();
     let mut level: Vec<u8> = (0..SIDE * SIDE)

@@ -6,12 +6,30 @@ use shaders::types::Instance;
 use shaders::types::constants as c;
 
 use super::harness::{
-    Gpu, Scene, encode, identity, mirror_at, plane, rectangle, reference, stage, through_byte,
+    Gpu, Scene, encode, gpu_tests, identity, mirror_at, plane, rectangle, reference, stage,
+    through_byte,
 };
 use crate::scene::Portal;
 use crate::settings::Settings;
 use crate::trace::frame_lights::decode;
 use crate::trace::input::Tracer;
+
+gpu_tests! {
+    any: [
+        a_mirror_shows_what_is_behind_the_eye_and_who_looks,
+        what_turns_to_the_eye_is_met_on_its_own_way,
+        back_faces_do_not_show,
+        of_two_faces_in_one_plane_the_one_that_shows_is_met,
+        the_sky_is_where_its_stages_say_and_lets_the_sun_in,
+        display_white_keeps_its_brightness,
+        exposure_adapts_to_surfaces_alone,
+        frames_can_be_made_again_bit_by_bit,
+    ],
+    each: [
+        only_the_fronts_of_a_weapon_are_seen,
+        a_portal_shows_what_its_camera_sees,
+    ],
+}
 
 const RED: [f32; 3] = [0.9, 0.1, 0.1];
 const GREEN: [f32; 3] = [0.1, 0.8, 0.2];
@@ -43,12 +61,7 @@ fn screen(x: f32) -> [Vec3; 4] {
     }
 }
 
-#[test]
-fn a_mirror_shows_what_is_behind_the_eye_and_who_looks() {
-    Gpu::any(a_mirror_shows_what_is_behind_the_eye_and_who_looks_with);
-}
-
-fn a_mirror_shows_what_is_behind_the_eye_and_who_looks_with(gpu: &mut Gpu) {
+fn a_mirror_shows_what_is_behind_the_eye_and_who_looks(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
     let red = scene.material(&[stage::constant(RED)], 0);
     // a clean mirror: its one stage leaves half of what it shows
@@ -93,12 +106,7 @@ fn a_mirror_shows_what_is_behind_the_eye_and_who_looks_with(gpu: &mut Gpu) {
     assert!(close(mean, linear(BLUE)), "{mean}");
 }
 
-#[test]
-fn only_the_fronts_of_a_weapon_are_seen() {
-    Gpu::each(only_the_fronts_of_a_weapon_are_seen_with);
-}
-
-fn only_the_fronts_of_a_weapon_are_seen_with(gpu: &mut Gpu) {
+fn only_the_fronts_of_a_weapon_are_seen(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
     let red = scene.material(&[stage::constant(RED)], 0);
     let green = scene.material(&[stage::constant(GREEN)], 0);
@@ -119,12 +127,7 @@ fn only_the_fronts_of_a_weapon_are_seen_with(gpu: &mut Gpu) {
     assert!(close(mean, linear(BLUE)), "{mean}");
 }
 
-#[test]
-fn what_turns_to_the_eye_is_met_on_its_own_way() {
-    Gpu::any(what_turns_to_the_eye_is_met_on_its_own_way_with);
-}
-
-fn what_turns_to_the_eye_is_met_on_its_own_way_with(gpu: &mut Gpu) {
+fn what_turns_to_the_eye_is_met_on_its_own_way(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
     let red = scene.material(&[stage::constant(RED)], 0);
     let green = scene.material(&[stage::constant(GREEN)], 0);
@@ -183,12 +186,7 @@ fn what_turns_to_the_eye_is_met_on_its_own_way_with(gpu: &mut Gpu) {
     assert!(close(mean, linear(GREEN)), "{mean}");
 }
 
-#[test]
-fn a_portal_shows_what_its_camera_sees() {
-    Gpu::each(a_portal_shows_what_its_camera_sees_with);
-}
-
-fn a_portal_shows_what_its_camera_sees_with(gpu: &mut Gpu) {
+fn a_portal_shows_what_its_camera_sees(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
     let portal = scene.material(&[stage::add([0.0; 3])], c::MATERIAL_PORTAL);
     let green = scene.material(&[stage::constant(GREEN)], 0);
@@ -215,12 +213,7 @@ fn a_portal_shows_what_its_camera_sees_with(gpu: &mut Gpu) {
     assert!(close(mean, linear(GREEN)), "{mean}");
 }
 
-#[test]
-fn back_faces_do_not_show() {
-    Gpu::any(back_faces_do_not_show_with);
-}
-
-fn back_faces_do_not_show_with(gpu: &mut Gpu) {
+fn back_faces_do_not_show(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
     let red = scene.material(&[stage::constant(RED)], 0);
     let green = scene.material(&[stage::constant(GREEN)], 0);
@@ -241,12 +234,7 @@ fn back_faces_do_not_show_with(gpu: &mut Gpu) {
     assert!(close(gpu.mean(&scene, &reference(), 1), linear(RED)));
 }
 
-#[test]
-fn of_two_faces_in_one_plane_the_one_that_shows_is_met() {
-    Gpu::any(of_two_faces_in_one_plane_the_one_that_shows_is_met_with);
-}
-
-fn of_two_faces_in_one_plane_the_one_that_shows_is_met_with(gpu: &mut Gpu) {
+fn of_two_faces_in_one_plane_the_one_that_shows_is_met(gpu: &mut Gpu) {
     // no plane along an axis, so that distances to it are rounded in all sorts of ways
     let normal = Vec3::new(-0.8, 0.47, -0.371).normalize();
     let across = normal.cross(Vec3::Z).normalize() * 400.0;
@@ -269,12 +257,7 @@ fn of_two_faces_in_one_plane_the_one_that_shows_is_met_with(gpu: &mut Gpu) {
     assert_eq!(wrong.count(), 0);
 }
 
-#[test]
-fn the_sky_is_where_its_stages_say_and_lets_the_sun_in() {
-    Gpu::any(the_sky_is_where_its_stages_say_and_lets_the_sun_in_with);
-}
-
-fn the_sky_is_where_its_stages_say_and_lets_the_sun_in_with(gpu: &mut Gpu) {
+fn the_sky_is_where_its_stages_say_and_lets_the_sun_in(gpu: &mut Gpu) {
     let mut scene = Scene::new(
         Vec3::new(0.0, 0.0, 50.0),
         Vec3::new(100.0, 0.0, 50.0),
@@ -343,12 +326,7 @@ fn the_sky_is_where_its_stages_say_and_lets_the_sun_in_with(gpu: &mut Gpu) {
     assert_eq!(pixels[15 * 32 + 16], Vec3::ZERO);
 }
 
-#[test]
-fn display_white_keeps_its_brightness() {
-    Gpu::any(display_white_keeps_its_brightness_with);
-}
-
-fn display_white_keeps_its_brightness_with(gpu: &mut Gpu) {
+fn display_white_keeps_its_brightness(gpu: &mut Gpu) {
     for (value, expected) in [(0.05, 0.05), (0.5, 0.5), (1.0, 0.852_8)] {
         let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
         let wall = scene.material(&[stage::constant([encode(value); 3])], 0);
@@ -378,12 +356,7 @@ fn display_white_keeps_its_brightness_with(gpu: &mut Gpu) {
     );
 }
 
-#[test]
-fn exposure_adapts_to_surfaces_alone() {
-    Gpu::any(exposure_adapts_to_surfaces_alone_with);
-}
-
-fn exposure_adapts_to_surfaces_alone_with(gpu: &mut Gpu) {
+fn exposure_adapts_to_surfaces_alone(gpu: &mut Gpu) {
     let automatic = Settings {
         rt_auto_exposure: true,
         ..reference()
@@ -414,12 +387,7 @@ fn exposure_adapts_to_surfaces_alone_with(gpu: &mut Gpu) {
     assert!((halves[0] - halves[1]).abs() < 1.1, "{halves:?}");
 }
 
-#[test]
-fn frames_can_be_made_again_bit_by_bit() {
-    Gpu::any(frames_can_be_made_again_bit_by_bit_with);
-}
-
-fn frames_can_be_made_again_bit_by_bit_with(gpu: &mut Gpu) {
+fn frames_can_be_made_again_bit_by_bit(gpu: &mut Gpu) {
     let mut scene = Scene::new(
         Vec3::new(-20.0, 10.0, 5.0),
         Vec3::new(50.0, 20.0, -30.0),

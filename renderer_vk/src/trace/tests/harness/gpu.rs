@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
+use testkit::Need;
 
 use super::half;
 use super::scene::Scene;
@@ -19,6 +20,23 @@ use crate::trace::input::Tracer;
 use crate::trace::pass_set::PassSet;
 use crate::trace::view_tracer::{TracedMap, ViewTracer};
 
+/// The tests of a file, in its module `on_gpu`: a `#[test]` for each named function of the file, which takes a
+/// `&mut Gpu` and is run by [`Gpu::any`], [`Gpu::each`] or [`Gpu::compute`]. The compiler reports a function that no
+/// list names as unused.
+macro_rules! gpu_tests {
+    ($($run:ident: [$($name:ident),+ $(,)?]),+ $(,)?) => {
+        mod on_gpu {
+            $($(
+                #[test]
+                fn $name() {
+                    $crate::trace::tests::harness::Gpu::$run(super::$name);
+                }
+            )+)+
+        }
+    };
+}
+pub(crate) use gpu_tests;
+
 /// A device with its validation layer on and the look under test.
 pub struct Gpu {
     pub device: Device,
@@ -31,9 +49,14 @@ impl Gpu {
     /// Runs a test of shading, which all tracers share: with the compute tracer, which runs on every device; with every
     /// tracer where `RELIGHT_FULL=1`. A software driver compiles the passes of one tracer for minutes.
     pub fn any(test: fn(&mut Gpu)) {
-        if std::env::var("RELIGHT_FULL").as_deref() == Ok("1") {
+        if testkit::is_set("RELIGHT_FULL") {
             return Self::each(test);
         }
+        Self::compute(test);
+    }
+
+    /// Runs a test with the compute tracer alone.
+    pub fn compute(test: fn(&mut Gpu)) {
         if let Some(mut gpu) = Self::new(Tracer::Compute) {
             test(&mut gpu);
         }
@@ -41,16 +64,40 @@ impl Gpu {
 
     /// Runs a test of ray traversal with every tracer that the device has.
     pub fn each(test: fn(&mut Gpu)) {
-        for tracer in [Tracer::Pipeline, Tracer::Query, Tracer::Compute] {
-            if let Some(mut gpu) = Self::new(tracer) {
-                println!("{tracer:?}");
-                test(&mut gpu);
+        Self::with(
+            &[Tracer::Pipeline, Tracer::Query, Tracer::Compute],
+            |mut gpu| test(&mut gpu),
+        );
+    }
+
+    /// Runs a test with those of `tracers` that the device has. Without any of them the test is skipped.
+    pub fn with(tracers: &[Tracer], test: impl Fn(Gpu)) {
+        let mut absent = Vec::new();
+        for &tracer in tracers {
+            match Self::open(tracer) {
+                Ok(gpu) => {
+                    println!("{tracer:?}");
+                    test(gpu);
+                }
+                Err(why) => {
+                    testkit::assert_optional(Need::Gpu, &why);
+                    println!("{tracer:?} is left out: {why}");
+                    absent.push(why);
+                }
             }
+        }
+        if absent.len() == tracers.len() {
+            testkit::skip(absent.join("; "));
         }
     }
 
-    /// `None`, with a printed line, where there is no device for the tracer.
+    /// `None`, with a report of a skipped test, where there is no device for the tracer.
     pub fn new(tracer: Tracer) -> Option<Self> {
+        testkit::device(Self::open(tracer))
+    }
+
+    /// The reason, where there is no device for the tracer.
+    fn open(tracer: Tracer) -> Result<Self, String> {
         let options = DeviceOptions {
             validation: true,
             // without the tracer's extensions, so that it is shown to need none
@@ -61,11 +108,7 @@ impl Gpu {
             Ok(device) if tracer.is_possible(device.info()) => device,
             other => {
                 let name = |d: Device| format!("{} does not trace rays", d.info().name);
-                let why = other.map_or_else(|e| e.to_string(), name);
-                let required = std::env::var("RELIGHT_REQUIRE_GPU").as_deref() == Ok("1");
-                assert!(!required, "{why}");
-                println!("skipped: {why}");
-                return None;
+                return Err(other.map_or_else(|e| e.to_string(), name));
             }
         };
         for wrap in [Wrap::Repeat, Wrap::Clamp] {
@@ -79,7 +122,7 @@ impl Gpu {
                 })
                 .expect("sampler");
         }
-        Some(Self {
+        Ok(Self {
             look: ViewTracer::new(&Arc::new(PassSet::new(&device, tracer))).expect("a device"),
             tracer,
             ring: FrameRing::new(&device, 2).expect("frames"),

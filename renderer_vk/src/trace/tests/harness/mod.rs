@@ -12,6 +12,7 @@ use crate::scene::Portal;
 use crate::settings::Settings;
 
 pub use gpu::Gpu;
+pub(crate) use gpu::gpu_tests;
 pub use relight::overbright::from_linear as encode;
 pub use scene::Scene;
 
