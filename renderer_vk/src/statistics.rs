@@ -306,11 +306,30 @@ mod tests {
 
     #[test]
     fn json_is_well_formed_whatever_the_names() {
-        let json = costs().json();
-        assert!(json.contains(r#""device": "a \"device\"\u000a""#));
-        assert!(json.contains(r#""name": "overlay", "ms": 0.5000, "rays": null"#));
-        assert_eq!(json.matches('{').count(), json.matches('}').count());
-        assert!(!json.contains(",\n  ]") && !json.contains(",\n  }"));
+        let costs = costs();
+        let json: serde_json::Value = serde_json::from_str(&costs.json()).unwrap();
+        assert_eq!(json["device"], costs.device);
+        assert_eq!(json["device"], "a \"device\"\n");
+        assert_eq!(json["passes"].as_array().map(Vec::len), Some(2));
+        let overlay = &json["passes"][1];
+        assert_eq!(
+            (&overlay["name"], &overlay["ms"]),
+            (&"overlay".into(), &0.5.into())
+        );
+        assert!(overlay["rays"].is_null());
+        assert_eq!(
+            (&json["total"]["ms"], &json["total"]["rays"]),
+            (&3.5.into(), &6000.into())
+        );
+        assert_eq!(
+            json["memory"].as_object().map(|m| m.len()),
+            Some(costs.memory.len() + 1)
+        );
+        // neither a pass nor a tracer
+        let empty = Costs::default().json();
+        let empty: serde_json::Value = serde_json::from_str(&empty).unwrap();
+        assert_eq!(empty["passes"], serde_json::json!([]));
+        assert!(empty["tracer"].is_null());
     }
 
     #[test]

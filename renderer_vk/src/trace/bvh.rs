@@ -481,16 +481,30 @@ mod tests {
 
     #[test]
     fn what_is_not_finite_is_left_out() {
-        let bad = [Vec3::ZERO, Vec3::new(f32::NAN, 0.0, 0.0), Vec3::ONE];
-        assert!(
-            build_triangles(&[bad]).is_none() || !build_triangles(&[bad]).unwrap().nodes.is_empty()
-        );
-        let far = [Vec3::ZERO, Vec3::splat(f32::INFINITY), Vec3::ONE];
-        assert!(build_triangles(&[far]).is_none());
         let good = [Vec3::ZERO, Vec3::X, Vec3::Y];
-        assert_eq!(
-            build_triangles(&[far, good]).unwrap().triangles[0].primitive,
-            1
-        );
+        for corner in 0..3 {
+            for value in [f32::INFINITY, f32::NEG_INFINITY] {
+                let mut far = good;
+                far[corner] = Vec3::splat(value);
+                assert!(build_triangles(&[far]).is_none(), "{far:?}");
+                let found = build_triangles(&[far, good]).unwrap();
+                let primitives: Vec<u32> = found.triangles.iter().map(|t| t.primitive).collect();
+                assert_eq!(primitives, [1], "{far:?}");
+                assert_eq!(found.bounds, box_of(&good), "{far:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_triangle_without_a_place_does_not_hide_the_one_beside_it() {
+        let good = [Vec3::ONE, Vec3::ONE + Vec3::X, Vec3::ONE + Vec3::Y];
+        for corner in 0..3 {
+            let mut bad = good;
+            bad[corner].x = f32::NAN;
+            let found = build_triangles(&[bad, good]).unwrap();
+            let hits = found.triangles.iter().filter(|t| t.primitive == 1);
+            assert_eq!(hits.count(), 1, "{bad:?}");
+            assert_eq!(found.bounds, box_of(&good), "{bad:?}");
+        }
     }
 }
