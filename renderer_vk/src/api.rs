@@ -179,3 +179,31 @@ pub struct Picture {
     /// `width * height * 3` bytes.
     pub rgb: Vec<u8>,
 }
+
+/// A rectangle of the window that a material is stretched over (`DrawStretchPic`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StretchedPicture {
+    /// Left top corner, window pixels.
+    pub position: Vec2,
+    /// Width and height, window pixels; with one of them negative the picture's back is seen.
+    pub size: Vec2,
+    /// Texture coordinates of the left top corner.
+    pub st1: Vec2,
+    /// Texture coordinates of the right bottom corner.
+    pub st2: Vec2,
+}
+
+/// Pixels of a cinematic (`DrawStretchRaw`, `UploadCinematic`).
+#[derive(Clone, Copy, Debug)]
+pub struct CinematicFrame<'a> {
+    /// Width in pixels.
+    pub cols: u32,
+    /// Height in pixels.
+    pub rows: u32,
+    /// RGBA8, rows from the top.
+    pub rgba: &'a [u8],
+    /// The engine's number of the cinematic. Each has a texture of its own.
+    pub client: usize,
+    /// The pixels are new. Otherwise a texture of the same size keeps its own.
+    pub dirty: bool,
+}

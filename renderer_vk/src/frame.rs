@@ -11,7 +11,7 @@ use crate::raster::{
 };
 use crate::scene::ViewScene;
 use crate::settings::Settings;
-use crate::trace::TraceLook;
+use crate::trace::{MapView, TraceLook};
 use crate::world::World;
 
 /// What the game asked for, in its order.
@@ -84,16 +84,16 @@ impl<'a> FrameContext<'a> {
             return Ok(());
         };
         let test = self.flares.begin(recorder, scene)?;
-        trace.record(
-            recorder,
+        let view = MapView {
             scene,
             world,
-            self.assets,
-            self.settings,
-            self.color,
-            test,
-            self.mask,
-        )?;
+            assets: self.assets,
+            settings: self.settings,
+            target: self.color,
+            flares: test,
+            mask: self.mask,
+        };
+        trace.record(recorder, view)?;
         if test.count == 0 {
             return Ok(());
         }

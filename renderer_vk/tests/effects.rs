@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 use q3bsp::builder::MapBuilder;
 use q3model::{Frame, Md3, PackedVertex, Surface};
 use relight::MemoryFiles;
-use renderer_vk::api::{EntityKind, Picture, RefDef, RefEntity};
+use renderer_vk::api::{EntityKind, Picture, RefDef, RefEntity, StretchedPicture};
 use renderer_vk::{Error, Eye, Renderer, RendererOptions, Settings};
 
 /// Side of the picture, pixels.
@@ -387,9 +387,13 @@ fn no_descriptor_is_written_while_drawing() {
             time_ms: 1000 + frame * 25,
             ..def()
         };
-        stage
-            .renderer
-            .stretch_pic(0.0, 0.0, 9.0, 9.0, 0.0, 0.0, 1.0, 1.0, picture);
+        let corner = StretchedPicture {
+            position: Vec2::ZERO,
+            size: Vec2::splat(9.0),
+            st1: Vec2::ZERO,
+            st2: Vec2::ONE,
+        };
+        stage.renderer.stretch_pic(&corner, picture);
         stage.frame(&def, &entities);
         counts.push(stage.renderer.descriptor_writes());
     }

@@ -9,9 +9,9 @@ use crate::cvars::{self, Cvar, Cvars};
 use crate::engine::{self, string_from, text_of};
 use crate::failure::Failure;
 use crate::session::{draw, with_renderer};
-use glam::Vec3;
+use glam::{IVec2, Vec2, Vec3};
 use renderer_vk::Renderer;
-use renderer_vk::api::{DynamicLight, PolyVert, rdflags};
+use renderer_vk::api::{CinematicFrame, DynamicLight, PolyVert, StretchedPicture, rdflags};
 use renderer_vk::path::PathPoint;
 use std::ffi::{c_char, c_float, c_int, c_uchar};
 
@@ -369,7 +369,9 @@ pub unsafe extern "C" fn set_color(rgba: *const [c_float; 4]) {
 pub unsafe extern "C" fn stretch_pic(x: c_float, y: c_float, w: c_float, h: c_float, s1: c_float, t1: c_float, s2: c_float, t2: c_float, shader: c_int) {
     entry(|| {
         draw(|renderer, _| {
-            renderer.stretch_pic(x, y, w, h, s1, t1, s2, t2, shader);
+            let (position, size) = (Vec2::new(x, y), Vec2::new(w, h));
+            let (st1, st2) = (Vec2::new(s1, t1), Vec2::new(s2, t2));
+            renderer.stretch_pic(&StretchedPicture { position, size, st1, st2 }, shader);
             Ok(())
         })
     });
@@ -410,7 +412,10 @@ pub unsafe extern "C" fn stretch_raw(x: c_int, y: c_int, w: c_int, h: c_int, col
         // SAFETY: null or `cols * rows` pixels by this function's contract, for as long as the call lasts.
         let pixels = unsafe { raw_pixels(cols, rows, data) };
         draw(|renderer, _| match (pixels, usize::try_from(client)) {
-            (Some((cols, rows, rgba)), Ok(client)) => renderer.stretch_raw(x, y, w, h, cols, rows, rgba, client, dirty != 0).map_err(Failure::from),
+            (Some((cols, rows, rgba)), Ok(client)) => {
+                let frame = CinematicFrame { cols, rows, rgba, client, dirty: dirty != 0 };
+                renderer.stretch_raw(IVec2::new(x, y), IVec2::new(w, h), &frame).map_err(Failure::from)
+            }
             _ => Ok(()),
         })
     });
@@ -435,9 +440,16 @@ pub unsafe extern "C" fn upload_cinematic(
         let pixels = unsafe { raw_pixels(cols, rows, data) };
         with_renderer(
             |renderer, front| match (pixels, front.cinematics.client_of(handle)) {
-                (Some((cols, rows, rgba)), Some(client)) => renderer
-                    .upload_cinematic(cols, rows, rgba, client, dirty != 0)
-                    .map_err(Failure::from),
+                (Some((cols, rows, rgba)), Some(client)) => {
+                    let frame = CinematicFrame {
+                        cols,
+                        rows,
+                        rgba,
+                        client,
+                        dirty: dirty != 0,
+                    };
+                    renderer.upload_cinematic(&frame).map_err(Failure::from)
+                }
                 _ => Ok(()),
             },
         )

@@ -73,4 +73,5 @@ pub use select::{DeviceInfo, DeviceKind, RayTracingLimits};
 pub use shaders::Spirv;
 pub use swapchain::{Swapchain, SwapchainDesc};
 pub use tlas::{Instance, Tlas};
+pub use upload::ImageRegion;
 pub use window::{CreateSurface, Window};

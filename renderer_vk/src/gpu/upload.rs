@@ -319,6 +319,23 @@ impl DeviceInner {
     }
 }
 
+/// A rectangle of one level and layer of an image, texels. For compressed formats it starts at a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImageRegion {
+    /// Mip level; 0 is the largest.
+    pub mip: u32,
+    /// Array layer.
+    pub layer: u32,
+    /// Left edge.
+    pub x: u32,
+    /// Upper edge.
+    pub y: u32,
+    /// Width.
+    pub width: u32,
+    /// Height.
+    pub height: u32,
+}
+
 impl Device {
     /// Brings `bytes` into a device buffer at `offset`. The copy runs before the commands of the frame that is being
     /// recorded, or of the next one.
@@ -357,36 +374,35 @@ impl Device {
         bytes: &[u8],
     ) -> Result<(), Error> {
         let (width, height) = target.mip_size(mip);
-        self.upload_image_part(target, mip, layer, [0, 0, width, height], bytes)
+        let whole = ImageRegion {
+            mip,
+            layer,
+            x: 0,
+            y: 0,
+            width,
+            height,
+        };
+        self.upload_image_region(target, whole, bytes)
     }
 
-    /// Brings texels into a rectangle of one level of layer 0. For compressed formats the rectangle is in texels and
-    /// starts at a block.
+    /// Brings texels into a rectangle of one level and layer.
     ///
     /// # Errors
     /// As [`upload_image`](Self::upload_image), and a rectangle that is not inside.
-    #[allow(clippy::too_many_arguments)]
-    pub fn upload_image_rect(
+    pub fn upload_image_region(
         &self,
         target: &Image,
-        mip: u32,
-        x: u32,
-        y: u32,
-        width: u32,
-        height: u32,
+        region: ImageRegion,
         bytes: &[u8],
     ) -> Result<(), Error> {
-        self.upload_image_part(target, mip, 0, [x, y, width, height], bytes)
-    }
-
-    fn upload_image_part(
-        &self,
-        target: &Image,
-        mip: u32,
-        layer: u32,
-        [x, y, width, height]: [u32; 4],
-        bytes: &[u8],
-    ) -> Result<(), Error> {
+        let ImageRegion {
+            mip,
+            layer,
+            x,
+            y,
+            width,
+            height,
+        } = region;
         let (mip_width, mip_height) = target.mip_size(mip);
         let inside = |start: u32, size: u32, whole: u32| {
             size > 0 && start.checked_add(size).is_some_and(|end| end <= whole)

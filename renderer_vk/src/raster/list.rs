@@ -55,6 +55,21 @@ pub struct Statics<'a> {
     pub indices: &'a [u32],
 }
 
+/// Triangles of a sky or of the sun, with what all their stages are drawn with.
+#[derive(Clone, Copy)]
+struct SkyPart<'a> {
+    /// Of the sky, or of the sun.
+    material: &'a Material,
+    /// The world's instance: its time is that of the stages.
+    world: &'a Instance,
+    /// Which faces are left out.
+    cull: CullFaces,
+    /// First index in [`DrawList::indices`], and number of indices.
+    span: (u32, u32),
+    /// Of the draw, what does not depend on the stage.
+    draw: Draw,
+}
+
 /// The draw calls of a view and the arrays that they read. Kept between frames so that nothing is allocated anew.
 #[derive(Default)]
 pub struct DrawList {
@@ -194,7 +209,15 @@ impl DrawList {
             // the box has no fog
             let fog = visible.fog;
             let draw = Draw { fog, ..draw };
-            self.add_sky_passes(material, world, CullFaces::None, span, draw, stages, aids);
+            let cull = CullFaces::None;
+            let part = SkyPart {
+                material,
+                world,
+                cull,
+                span,
+                draw,
+            };
+            self.add_sky_passes(part, stages, aids);
             if let Some(opaque) = fogged(material, fog) {
                 let (shading, draw) = stages.fog(draw);
                 let clouds = sky_state(None, false, CullFaces::None, shading);
@@ -223,20 +246,24 @@ impl DrawList {
             ..Draw::default()
         };
         let cull = faces(material.shader.cull, scene.view.mirrored);
-        self.add_sky_passes(material, world, cull, span, draw, stages, aids);
+        let part = SkyPart {
+            material,
+            world,
+            cull,
+            span,
+            draw,
+        };
+        self.add_sky_passes(part, stages, aids);
     }
 
-    #[allow(clippy::too_many_arguments)]
-    fn add_sky_passes(
-        &mut self,
-        material: &Material,
-        world: &Instance,
-        cull: CullFaces,
-        span: (u32, u32),
-        draw: Draw,
-        stages: StageContext<'_>,
-        aids: Aids,
-    ) {
+    fn add_sky_passes(&mut self, part: SkyPart<'_>, stages: StageContext<'_>, aids: Aids) {
+        let SkyPart {
+            material,
+            world,
+            cull,
+            span,
+            draw,
+        } = part;
         for passes in passes::draws(&material.passes, aids.passes_alone()) {
             let Some(pass) = passes.first() else { continue };
             let (shading, draw) = stages.passes(

@@ -1,8 +1,9 @@
 //! 2D pictures: what lies over the views, and films.
 
-use glam::Vec2;
+use glam::{IVec2, Vec2};
 
 use super::Renderer;
+use crate::api::{CinematicFrame, StretchedPicture};
 use crate::assets::desaturate;
 use crate::error::Error;
 use crate::raster::Picture2d;
@@ -19,54 +20,38 @@ impl Renderer {
     }
 
     /// Draws a material in a rectangle of window pixels.
-    #[allow(clippy::too_many_arguments)]
-    pub fn stretch_pic(
-        &mut self,
-        x: f32,
-        y: f32,
-        w: f32,
-        h: f32,
-        s1: f32,
-        t1: f32,
-        s2: f32,
-        t2: f32,
-        shader: i32,
-    ) {
+    pub fn stretch_pic(&mut self, picture: &StretchedPicture, shader: i32) {
         let Some(assets) = &self.assets else { return };
         let material = assets.materials.resolve(assets.material_of_handle(shader));
         self.overlay.add(
             material,
             &Picture2d {
-                position: Vec2::new(x, y),
-                size: Vec2::new(w, h),
-                st1: Vec2::new(s1, t1),
-                st2: Vec2::new(s2, t2),
+                position: picture.position,
+                size: picture.size,
+                st1: picture.st1,
+                st2: picture.st2,
                 color: self.color_2d,
             },
         );
     }
 
-    /// Draws RGBA8 pixels, stretched to a rectangle of the window.
+    /// Draws a cinematic's pixels, stretched to a rectangle of the window: its left top corner and its size, pixels.
     ///
     /// # Errors
     /// The picture's size is not a power of two, or the data is too short.
-    #[allow(clippy::too_many_arguments)]
     pub fn stretch_raw(
         &mut self,
-        x: i32,
-        y: i32,
-        w: i32,
-        h: i32,
-        cols: u32,
-        rows: u32,
-        rgba: &[u8],
-        client: usize,
-        dirty: bool,
+        position: IVec2,
+        size: IVec2,
+        frame: &CinematicFrame<'_>,
     ) -> Result<(), Error> {
+        let CinematicFrame {
+            cols, rows, client, ..
+        } = *frame;
         if !cols.is_power_of_two() || !rows.is_power_of_two() {
             return Err(Error::NotPowerOfTwo { cols, rows });
         }
-        self.upload_cinematic(cols, rows, rgba, client, dirty)?;
+        self.upload_cinematic(frame)?;
         let Some(texture) = (self.assets.as_mut()).map(|a| a.textures.queue_scratch(client)) else {
             return Ok(());
         };
@@ -74,8 +59,8 @@ impl Renderer {
         self.overlay.add_film(
             texture,
             &Picture2d {
-                position: Vec2::new(x as f32, y as f32),
-                size: Vec2::new(w as f32, h as f32),
+                position: position.as_vec2(),
+                size: size.as_vec2(),
                 st1: half,
                 st2: Vec2::ONE - half,
                 color: u32::MAX,
@@ -88,14 +73,14 @@ impl Renderer {
     ///
     /// # Errors
     /// The data is shorter than the size says, or the device is out of memory.
-    pub fn upload_cinematic(
-        &mut self,
-        cols: u32,
-        rows: u32,
-        rgba: &[u8],
-        client: usize,
-        dirty: bool,
-    ) -> Result<(), Error> {
+    pub fn upload_cinematic(&mut self, frame: &CinematicFrame<'_>) -> Result<(), Error> {
+        let CinematicFrame {
+            cols,
+            rows,
+            rgba,
+            client,
+            dirty,
+        } = *frame;
         match &mut self.assets {
             Some(assets) => Ok(assets.update_scratch(client, cols, rows, rgba, dirty)?),
             None => Ok(()),

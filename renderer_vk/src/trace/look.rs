@@ -114,6 +114,25 @@ fn geometry(
     Ok(geometry)
 }
 
+/// A view of the loaded map, with what it is drawn from and to.
+#[derive(Clone, Copy)]
+pub struct MapView<'a> {
+    /// What the view shows.
+    pub scene: &'a ViewScene,
+    /// The loaded map.
+    pub world: &'a World,
+    /// Textures, materials and models.
+    pub assets: &'a Assets,
+    /// Settings of the frame.
+    pub settings: &'a Settings,
+    /// The image that the view's rectangle is in: RGBA8, usable as storage image.
+    pub target: &'a Image,
+    /// Flares of the view that rays test.
+    pub flares: FlareTest,
+    /// Channels of the target that are written.
+    pub mask: ColorMask,
+}
+
 /// The traced look of one map.
 pub struct TraceLook {
     pub(super) tracer: ViewTracer,
@@ -171,23 +190,20 @@ impl TraceLook {
         })
     }
 
-    /// Records all passes of a view into its rectangle of `target` (RGBA8, usable as storage image), and finds which of
-    /// its flares are seen. `mask`: channels of the target that are written.
+    /// Records all passes of a view into its rectangle of the target, and finds which of its flares are seen.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
-    #[allow(clippy::too_many_arguments)] // what a view depends on
-    pub fn record(
-        &mut self,
-        rec: &mut Recorder,
-        view: &ViewScene,
-        world: &World,
-        assets: &Assets,
-        settings: &Settings,
-        target: &Image,
-        flares: FlareTest,
-        mask: ColorMask,
-    ) -> Result<(), Error> {
+    pub fn record(&mut self, rec: &mut Recorder, view: MapView<'_>) -> Result<(), Error> {
+        let MapView {
+            scene,
+            world,
+            assets,
+            settings,
+            target,
+            flares,
+            mask,
+        } = view;
         let remapping = remapping(&assets.materials);
         if remapping != self.remapping {
             // triangles name their materials; this happens when a game changes a flag's or button's look
@@ -199,7 +215,7 @@ impl TraceLook {
             lights: &self.lights,
             flares,
         };
-        let slope = view.view.stereo.slope;
+        let slope = scene.view.stereo.slope;
         let tracer = if slope < 0.0 {
             match &mut self.right {
                 Some(made) => made,
@@ -217,7 +233,7 @@ impl TraceLook {
         };
         let bit = |on: bool, bit: u32| if on { bit } else { 0 };
         tracer.channels = bit(mask.red, 1) | bit(mask.green, 2) | bit(mask.blue, 4);
-        tracer.record_view(rec, view, Some(map), assets, settings, target)
+        tracer.record_view(rec, scene, Some(map), assets, settings, target)
     }
 
     /// Records all passes of a view by another tracer than the one whose picture is shown.

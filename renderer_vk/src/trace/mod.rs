@@ -47,7 +47,7 @@ pub mod targets;
 pub mod view_tracer;
 mod wide_bvh;
 
-pub use look::TraceLook;
+pub use look::{MapView, TraceLook};
 
 #[cfg(test)]
 mod tests;

@@ -157,12 +157,20 @@ fn textures_are_sampled_by_index_with_all_their_levels() {
     assert!(device.upload_image(&image, 1, 0, &[0; 15]).is_err());
     assert!(device.upload_image(&image, 3, 0, &[0; 4]).is_err());
     // A rectangle of one texel over the first upload.
+    let texel = |x, y| ImageRegion {
+        mip: 0,
+        layer: 0,
+        x,
+        y,
+        width: 1,
+        height: 1,
+    };
     device
-        .upload_image_rect(&image, 0, 3, 2, 1, 1, &[1, 2, 3, 4])
+        .upload_image_region(&image, texel(3, 2), &[1, 2, 3, 4])
         .unwrap();
     assert!(
         device
-            .upload_image_rect(&image, 0, 4, 0, 1, 1, &[0; 4])
+            .upload_image_region(&image, texel(4, 0), &[0; 4])
             .is_err()
     );
     let nearest = device

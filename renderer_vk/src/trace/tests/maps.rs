@@ -17,9 +17,9 @@ use crate::raster::FlareTest;
 use crate::scene::{Look, Scene};
 use crate::settings::{Settings, TracerChoice};
 use crate::test_support::openarena;
-use crate::trace::TraceLook;
 use crate::trace::input::Tracer;
 use crate::trace::pass_set::PassSet;
+use crate::trace::{MapView, TraceLook};
 use crate::world::World;
 
 const SIZE: [u32; 2] = [320, 240];
@@ -107,13 +107,15 @@ fn maps_are_lit() {
             let mut rec = gpu.ring.begin().expect("frame");
             look.record(
                 &mut rec,
-                &view,
-                &world,
-                &assets,
-                &settings,
-                &target,
-                FlareTest::default(),
-                ColorMask::ALL,
+                MapView {
+                    scene: &view,
+                    world: &world,
+                    assets: &assets,
+                    settings: &settings,
+                    target: &target,
+                    flares: FlareTest::default(),
+                    mask: ColorMask::ALL,
+                },
             )
             .expect("recorded");
             gpu.ring.end(rec).expect("submitted");
@@ -210,13 +212,15 @@ fn tracers_agree_on_maps() {
                 let mut rec = gpu.ring.begin().expect("frame");
                 look.record(
                     &mut rec,
-                    &view,
-                    &world,
-                    &assets,
-                    &settings,
-                    &target,
-                    FlareTest::default(),
-                    ColorMask::ALL,
+                    MapView {
+                        scene: &view,
+                        world: &world,
+                        assets: &assets,
+                        settings: &settings,
+                        target: &target,
+                        flares: FlareTest::default(),
+                        mask: ColorMask::ALL,
+                    },
                 )
                 .expect("recorded");
                 gpu.ring.end(rec).expect("submitted");
