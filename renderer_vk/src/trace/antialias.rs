@@ -13,6 +13,8 @@ use crate::gpu::{
 };
 use crate::settings::Settings;
 
+use super::targets::Targets;
+
 /// Pixels along each edge of a group of the two passes, see their `local_size`.
 const RESOLVE_GROUP: u32 = 16;
 const UPSCALE_GROUP: u32 = 8;
@@ -119,8 +121,8 @@ impl Antialias {
         self.frame = 0;
     }
 
-    /// Makes ready for a view of the size `output`. `picture`: the image that is the picture if nothing is resolved;
-    /// `history`: the last frame saw the same scene.
+    /// Makes ready for a view of the size `output`. `targets`: the images that it is traced to; `history`: the last frame
+    /// saw the same scene.
     ///
     /// # Errors
     /// Out of memory.
@@ -129,7 +131,7 @@ impl Antialias {
         device: &Device,
         settings: &Settings,
         output: [u32; 2],
-        picture: &Image,
+        targets: &Targets,
         history: bool,
     ) -> Result<AntialiasView, Error> {
         let method = Method::of(settings, output);
@@ -168,11 +170,11 @@ impl Antialias {
             image_picture: if self.resolved.is_some() {
                 image
             } else {
-                picture.storage_index()
+                targets.picture().storage_index()
             },
             image_resolved: image,
             last_resolved: last,
-            last_light: 0, // filled in by the caller
+            last_light: targets.direct[1].storage_index(),
             sampler_index: self.sampler,
             history: u32::from(self.history),
             lens_radius: if dof { 0.5 * settings.rt_aperture } else { 0.0 },

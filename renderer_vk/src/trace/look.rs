@@ -17,7 +17,7 @@ use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Trac
 use super::lights::{MapLightSource, MapLights};
 use super::pass_set::PassSet;
 use super::surroundings::Surroundings;
-use super::view_tracer::{TracedMap, ViewTracer};
+use super::view_tracer::{TracedMap, TracedView, ViewTracer};
 use relight::light::Occlusion;
 
 use crate::assets::compile::sampler;
@@ -233,7 +233,14 @@ impl TraceLook {
         };
         let bit = |on: bool, bit: u32| if on { bit } else { 0 };
         tracer.channels = bit(mask.red, 1) | bit(mask.green, 2) | bit(mask.blue, 4);
-        tracer.record_view(rec, scene, Some(map), assets, settings, target)
+        let view = TracedView {
+            scene,
+            map: Some(map),
+            materials: assets,
+            settings,
+            target,
+        };
+        tracer.record_view(rec, view)
     }
 
     /// Records all passes of a view by another tracer than the one whose picture is shown.
@@ -254,7 +261,14 @@ impl TraceLook {
             lights: &self.lights,
             flares: FlareTest::default(),
         };
-        tracer.record_view(rec, view, Some(map), assets, settings, target)
+        let view = TracedView {
+            scene: view,
+            map: Some(map),
+            materials: assets,
+            settings,
+            target,
+        };
+        tracer.record_view(rec, view)
     }
 
     /// What follows rays.

@@ -17,6 +17,7 @@ use shaders::trace_types::constants::{LAST_MOVED, LAST_SAME};
 use shaders::trace_types::{LastInstance, MotionView, PortalRecord};
 use shaders::types::{Instance, Vertex};
 
+use super::targets::Targets;
 use crate::api::{EntityKind, renderfx};
 use crate::gpu::{Error, Recorder};
 use crate::scene::{DynamicMesh, ViewEntity, ViewScene};
@@ -94,7 +95,7 @@ pub(super) struct Followed {
 
 impl Motion {
     /// Compares a view with the one before and keeps it for the next. `vertices`: device address of the view's
-    /// vertices. The images of the answer are not set; `still` speaks of the portals alone.
+    /// vertices; `camera_rests`: the camera is where it was.
     ///
     /// # Errors
     /// Out of memory.
@@ -104,6 +105,8 @@ impl Motion {
         view: &ViewScene,
         portals: &[PortalRecord],
         vertices: u64,
+        targets: &Targets,
+        camera_rests: bool,
     ) -> Result<MotionView, Error> {
         let found = self.follow(view, portals);
         Ok(MotionView {
@@ -112,9 +115,10 @@ impl Motion {
             last_positions: rec.arena().push(&found.positions)?,
             last_instances: rec.arena().push(&found.instances)?,
             last_portals: rec.arena().push(&found.portals)?,
-            still: u32::from(found.portals == portals),
+            still: u32::from(camera_rests && found.portals == portals),
             time_stands: u32::from(found.time_stands),
-            ..MotionView::default()
+            path: targets.path[0].storage_index(),
+            last_path: targets.path[1].storage_index(),
         })
     }
 

@@ -2,7 +2,6 @@
 
 use glam::{Vec3, Vec4};
 use q3bsp::Bsp;
-use shaders::trace_types::TransportView;
 
 use crate::assets::Assets;
 use crate::gpu::{Buffer, BufferUsage, Device, Error};
@@ -85,13 +84,14 @@ impl Surroundings {
         })
     }
 
-    /// As shaders read it, without layers.
-    pub fn view(&self) -> TransportView {
-        TransportView {
-            filters: self.boxes.as_ref().map_or(0, Buffer::address),
-            filter_count: self.count,
-            ..TransportView::default()
-        }
+    /// Device address of the boxes around surfaces that colour light; 0: there are none.
+    pub fn filters(&self) -> u64 {
+        self.boxes.as_ref().map_or(0, Buffer::address)
+    }
+
+    /// Number of these boxes.
+    pub fn filter_count(&self) -> u32 {
+        self.count
     }
 
     /// Absorption of the liquid around a point, per unit of length; zero outside of liquids.

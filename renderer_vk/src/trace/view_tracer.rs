@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use shaders::trace_types::constants as t;
-use shaders::trace_types::{AntialiasView, PortalRecord, PostView};
+use shaders::trace_types::{PortalRecord, PostView, TraceView};
 
 use super::accel::Accel;
 use super::antialias::{Antialias, traced_size};
@@ -29,7 +29,7 @@ use crate::scene::ViewScene;
 use crate::settings::Settings;
 use crate::world::outside;
 use content::content_hash;
-use parameters::{camera_frame, portal_record};
+use parameters::{Prepared, camera_frame, portal_record};
 
 /// The map that a view shows.
 #[derive(Clone, Copy)]
@@ -40,6 +40,21 @@ pub struct TracedMap<'a> {
     pub lights: &'a MapLights,
     /// Flares of the view that rays are to test.
     pub flares: FlareTest,
+}
+
+/// A view, with what it is drawn from and to.
+#[derive(Clone, Copy)]
+pub struct TracedView<'a> {
+    /// What the view shows.
+    pub scene: &'a ViewScene,
+    /// The map, if one is loaded; views without world leave it out.
+    pub map: Option<TracedMap<'a>>,
+    /// Materials of everything that rays meet.
+    pub materials: &'a dyn MaterialTable,
+    /// Settings of the frame.
+    pub settings: &'a Settings,
+    /// The image that the view's rectangle is in: RGBA8, usable as storage image.
+    pub target: &'a Image,
 }
 
 /// Draws views by tracing rays.
@@ -141,98 +156,103 @@ impl ViewTracer {
         self.exposure_started = false;
     }
 
-    /// Records all passes of a view into its rectangle of `target` (RGBA8, usable as storage image). A view without
-    /// area is left out.
+    /// Records all passes of a view into its rectangle of the target. A view without area is left out.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
-    pub fn record_view(
+    pub fn record_view(&mut self, rec: &mut Recorder, view: TracedView<'_>) -> Result<(), Error> {
+        let Some(output) = size_in(view.target, view.scene.view.viewport) else {
+            return Ok(());
+        };
+        let view = TracedView {
+            map: view.map.filter(|_| view.scene.has_world),
+            ..view
+        };
+        let mut targets = self.take_targets(traced_size(view.settings, output))?;
+        let recorded = self.record_to(&mut targets, rec, &view, output);
+        self.targets = Some(targets);
+        recorded
+    }
+
+    /// Takes the images of a size in pixels out; those of another size go, with the history in them.
+    fn take_targets(&mut self, size: [u32; 2]) -> Result<Targets, Error> {
+        let fits = |t: &mut Targets| [t.width, t.height] == size;
+        if let Some(targets) = self.targets.take_if(fits) {
+            return Ok(targets);
+        }
+        let targets = Targets::new(&self.device, size[0], size[1])?;
+        self.targets = None;
+        self.history = None;
+        self.accumulated = (0, 0);
+        Ok(targets)
+    }
+
+    fn record_to(
         &mut self,
+        targets: &mut Targets,
         rec: &mut Recorder,
-        view: &ViewScene,
-        map: Option<TracedMap<'_>>,
-        materials: &dyn MaterialTable,
-        settings: &Settings,
-        target: &Image,
+        view: &TracedView<'_>,
+        output: [u32; 2],
     ) -> Result<(), Error> {
-        let [x, y, width, height] = view.view.viewport;
-        let (Ok(width), Ok(height)) = (u32::try_from(width), u32::try_from(height)) else {
-            return Ok(());
-        };
-        // what lies outside of the target is not traced, unless the view begins to its left or above
-        let room = |size: u32, start: i32| {
-            i64::from(size) - i64::from(start.min(0)) - i64::from(start.max(0))
-        };
-        if width == 0
-            || height == 0
-            || room(target.width(), x) <= 0
-            || room(target.height(), y) <= 0
-        {
-            return Ok(());
-        }
-        let output = [width, height];
-        let size = traced_size(settings, output);
-        if self
-            .targets
-            .as_ref()
-            .is_none_or(|t| [t.width, t.height] != size)
-        {
-            self.targets = Some(Targets::new(&self.device, size[0], size[1])?);
-            self.history = None;
-            self.accumulated = (0, 0);
-        }
-        if let Some(targets) = &mut self.targets {
-            targets.fit(&self.device, settings.rt_accumulate)?;
-        }
+        let settings = view.settings;
+        targets.fit(&self.device, settings.rt_accumulate)?;
+        let params = self.prepare(targets, rec, view, output)?;
+        targets.indirect_is_black &= settings.rt_bounces == 0;
+        self.record_passes(targets, rec, settings, output, &params)?;
+        self.frame = self.frame.wrapping_add(1);
+        self.last_time = view.scene.time;
+        self.history = (!settings.rt_accumulate).then(|| camera_frame(view.scene));
+        self.denoiser.advance();
+        self.fog.advance();
+        targets.advance();
+        self.antialias.advance();
+        self.exposure_started = true;
+        Ok(())
+    }
+
+    /// Makes everything ready that the passes of a view read, for a picture of the size `output`.
+    fn prepare(
+        &mut self,
+        targets: &Targets,
+        rec: &mut Recorder,
+        view: &TracedView<'_>,
+        output: [u32; 2],
+    ) -> Result<TraceView, Error> {
+        let TracedView {
+            scene,
+            map,
+            materials,
+            settings,
+            ..
+        } = *view;
+        let size = [targets.width, targets.height];
+        let goes_on = self.history.is_some();
         let denoiser = if settings.rt_accumulate {
             0
         } else {
             settings.rt_denoiser
         };
-        self.denoiser
-            .prepare(denoiser, size, self.history.is_some())?;
-        let map = map.filter(|_| view.has_world);
-        let has_fog = map.is_some_and(|m| fog_in_sight(&m, view));
-        let goes_on = self.history.is_some();
+        self.denoiser.prepare(denoiser, size, goes_on)?;
+        let has_fog = map.is_some_and(|m| fog_in_sight(&m, scene));
         self.fog
             .prepare(has_fog && is_lit(settings), denoiser > 0, size, goes_on)?;
-        let accumulated = self.accumulated_before(view, materials, settings);
+        let accumulated = self.accumulated_before(scene, materials, settings);
         let accel = self
             .accel
-            .record(rec, view, map.map(|m| m.geometry), materials)?;
+            .record(rec, scene, map.map(|m| m.geometry), materials)?;
         let portals: Vec<PortalRecord> = if settings.no_portals {
             Vec::new()
         } else {
-            view.portals.iter().map(portal_record).collect()
+            scene.portals.iter().map(portal_record).collect()
         };
-        let mut motion = self.motion.record(rec, view, &portals, accel.vertices)?;
-        motion.still &= u32::from(self.history == Some(camera_frame(view)));
+        let camera_rests = self.history == Some(camera_frame(scene));
+        let vertices = accel.vertices;
+        let motion = (self.motion).record(rec, scene, &portals, vertices, targets, camera_rests)?;
         let show_rays = settings.rt_debug == t::DEBUG_RAYS;
         let counting = (self.counters).begin(rec, size, self.count_rays, show_rays)?;
-        let antialias = match &self.targets {
-            Some(targets) => self.antialias.prepare(
-                &self.device,
-                settings,
-                output,
-                targets.picture(),
-                self.history.is_some(),
-            )?,
-            None => AntialiasView::default(),
-        };
-        let mut params = self.params(
-            rec,
-            view,
-            map,
-            materials,
-            settings,
-            target,
-            accel,
-            accumulated,
-            &portals,
-            motion,
-            antialias,
-        )?;
-        params.post = PostView {
+        let antialias =
+            (self.antialias).prepare(&self.device, settings, output, targets, goes_on)?;
+        let post = PostView {
             counters: counting.address,
             bloom: self
                 .bloom
@@ -240,12 +260,30 @@ impl ViewTracer {
             bloom_strength: settings.rt_bloom.clamp(0.0, 1.0),
             debug: settings.rt_debug,
         };
-        params.image_rays = counting.image;
-        let address = rec.arena().push(&[params])?;
+        let prepared = Prepared {
+            targets,
+            accel,
+            accumulated,
+            portals: &portals,
+            motion,
+            antialias,
+            post,
+            image_rays: counting.image,
+        };
+        self.params(rec, view, &prepared)
+    }
 
-        if let Some(targets) = &mut self.targets {
-            targets.indirect_is_black &= settings.rt_bounces == 0;
-        }
+    /// Records the passes in their order. `output`: size of the picture.
+    fn record_passes(
+        &mut self,
+        targets: &mut Targets,
+        rec: &mut Recorder,
+        settings: &Settings,
+        output: [u32; 2],
+        params: &TraceView,
+    ) -> Result<(), Error> {
+        let address = rec.arena().push(std::slice::from_ref(params))?;
+        let size = [targets.width, targets.height];
         let set = &*self.passes;
         set.get(&set.eye_rays)?.record(rec, address, size)?;
         let fog = usize::from(self.fog.is_on());
@@ -276,22 +314,16 @@ impl ViewTracer {
             set.get(&set.direct)?.record(rec, address, size)?;
         }
         if settings.rt_bounces == 0 {
-            darken_indirect(&mut self.targets, rec)?;
+            darken_indirect(targets, rec)?;
         } else {
             let has_fog = params.fog_count > 0;
             indirect::record(set, rec, address, size, settings, has_fog)?;
         }
         self.fog.record(set, rec, address)?;
         self.counters.end(rec)?;
-        if let Some(targets) = &self.targets {
-            self.denoiser.filter(
-                denoise,
-                rec,
-                address,
-                &targets.texels,
-                settings.rt_bounces > 0,
-            )?;
-        }
+        let (texels, bounces) = (&targets.texels, settings.rt_bounces > 0);
+        self.denoiser
+            .filter(denoise, rec, address, texels, bounces)?;
         set.get(&set.composite)?.record(rec, address, size)?;
         let antialias = set.get(&set.antialias)?;
         self.antialias.record(antialias, rec, address)?;
@@ -301,16 +333,6 @@ impl ViewTracer {
         if settings.rt_debug > 0 {
             set.get(&set.debug)?.record(rec, address, output)?;
         }
-        self.frame = self.frame.wrapping_add(1);
-        self.last_time = view.time;
-        self.history = (!settings.rt_accumulate).then(|| camera_frame(view));
-        self.denoiser.advance();
-        self.fog.advance();
-        if let Some(targets) = &mut self.targets {
-            targets.advance();
-        }
-        self.antialias.advance();
-        self.exposure_started = true;
         Ok(())
     }
 
@@ -352,15 +374,25 @@ impl ViewTracer {
 }
 
 /// Bounced light becomes black, where it is not.
-fn darken_indirect(targets: &mut Option<Targets>, rec: &mut Recorder) -> Result<(), Error> {
-    if let Some(targets) = targets
-        && !targets.indirect_is_black
-    {
+fn darken_indirect(targets: &mut Targets, rec: &mut Recorder) -> Result<(), Error> {
+    if !targets.indirect_is_black {
         let mut pass = rec.pass("trace_no_indirect", Access::TRANSFER, Access::TRANSFER)?;
         pass.clear_image(&targets.indirect, [0.0; 4]);
         targets.indirect_is_black = true;
     }
     Ok(())
+}
+
+/// Width and height of a viewport; `None` where nothing of it is in the target.
+fn size_in(target: &Image, viewport: [i32; 4]) -> Option<[u32; 2]> {
+    let [x, y, width, height] = viewport;
+    let (width, height) = (u32::try_from(width).ok()?, u32::try_from(height).ok()?);
+    // what lies outside of the target is not traced, unless the view begins to its left or above
+    let room =
+        |size: u32, start: i32| i64::from(size) - i64::from(start.min(0)) - i64::from(start.max(0));
+    let seen =
+        width > 0 && height > 0 && room(target.width(), x) > 0 && room(target.height(), y) > 0;
+    seen.then_some([width, height])
 }
 
 /// Whether a view may see into fog: straight on, or by a portal wherever that leads. In what glass and shiny surfaces

@@ -18,7 +18,7 @@ use crate::settings::Settings;
 use crate::trace::counters::COUNTED;
 use crate::trace::input::Tracer;
 use crate::trace::pass_set::PassSet;
-use crate::trace::view_tracer::{TracedMap, ViewTracer};
+use crate::trace::view_tracer::{TracedMap, TracedView, ViewTracer};
 
 /// The tests of a file, in its module `on_gpu`: a `#[test]` for each named function of the file, which takes a
 /// `&mut Gpu` and is run by [`Gpu::any`], [`Gpu::each`] or [`Gpu::compute`]. The compiler reports a function that no
@@ -205,11 +205,13 @@ impl Gpu {
             self.look
                 .record_view(
                     &mut rec,
-                    &view,
-                    Some(map),
-                    &uploaded.materials,
-                    settings,
-                    &target,
+                    TracedView {
+                        scene: &view,
+                        map: Some(map),
+                        materials: &uploaded.materials,
+                        settings,
+                        target: &target,
+                    },
                 )
                 .expect("recorded");
             self.ring.end(rec).expect("submitted");
