@@ -196,7 +196,7 @@ fn as_json(
         "map": map,
         "evidence": report.evidence.label(),
         "gamma": report.gamma,
-        "ends": report.ends,
+        "ends": report.has_cutoff,
         "dirty": report.dirty,
         "samples": report.samples,
         "held_out": report.held_out,

@@ -243,7 +243,7 @@ impl RelitWorld {
             light_color: options.light_color,
             color_exponent,
             stored_gamma: 1.0,
-            light_end: 0.0,
+            light_cutoff: 0.0,
             exposure: None,
             overbright_shift: options.overbright_shift,
             bsp,

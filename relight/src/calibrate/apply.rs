@@ -7,7 +7,7 @@ use crate::world::RelitWorld;
 use glam::Vec3;
 
 /// Radius of the balls that lights put in are drawn from, id units: they keep clear of surfaces by as much.
-const PLACED_RADIUS: f32 = super::place::CLEARANCE;
+const PLACED_RADIUS: f32 = super::placement::CLEARANCE;
 
 /// Sets strengths, adds lights, and builds the light lists anew. Of the lights that it adds, the first are back splashes:
 /// returns how many.

@@ -77,10 +77,10 @@ impl Transfer {
         let first = self.rows.len();
         let found = parallel::map(more, |i, sample| {
             let mut random = Random::new(0xB0_0000 + (first + i) as u64);
-            if sample.site == Site::Air {
+            if sample.site == Site::LightGrid {
                 return Found::default();
             }
-            seen(
+            trace_from(
                 world,
                 occluders,
                 &of_triangle,
@@ -132,7 +132,7 @@ impl Transfer {
 }
 
 /// What the rays of a sample find. `lit`: samples that stand for what is seen.
-fn seen(
+fn trace_from(
     world: &RelitWorld,
     occluders: &Occluders,
     of_triangle: &[u32],

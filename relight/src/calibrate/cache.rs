@@ -63,9 +63,9 @@ fn print(solution: &Solution) -> String {
     );
     let _ = writeln!(text, "before {}", agreement(&report.before));
     let _ = writeln!(text, "after {}", agreement(&report.after));
-    let ends = if report.ends { " ends" } else { "" };
+    let has_cutoff = if report.has_cutoff { " ends" } else { "" };
     let dirty = if report.dirty { " dirty" } else { "" };
-    let _ = writeln!(text, "gamma {}{ends}{dirty}", report.gamma);
+    let _ = writeln!(text, "gamma {}{has_cutoff}{dirty}", report.gamma);
     let _ = writeln!(text, "ambient {}", three(solution.ambient));
     if let Some(Exposure { scale, middle }) = solution.exposure {
         let _ = writeln!(text, "exposure {scale} {middle}");
@@ -148,7 +148,7 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
                     _ => return Err(wrong("not a gamma")),
                 };
                 solution.report.gamma = *gamma;
-                (solution.report.ends, solution.report.dirty) = match more {
+                (solution.report.has_cutoff, solution.report.dirty) = match more {
                     [] => (false, false),
                     ["ends"] => (true, false),
                     ["dirty"] => (false, true),

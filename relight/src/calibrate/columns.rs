@@ -3,9 +3,9 @@
 //! A column holds, for every sample that its source reaches, the light (irradiance / π) there for a source of
 //! strength 1; the strength is what is looked for, channel by channel. Shadow rays decide what is reached.
 
-use super::ends::{Given, Heap, Piece, pieces_of};
+use super::cutoff::{Contribution, ContributionBucket, Piece, pieces_of};
+use super::sample_soa::{NEAREST, SampleSoa};
 use super::samples::{Sample, Site};
-use super::spread::{NEAREST, Spread};
 use crate::light::{EmissionSource, EmitterSummary, Falloff, LightRef, Spot, TriangleLight};
 use crate::occluders::Occluders;
 use crate::world::RelitWorld;
@@ -97,7 +97,7 @@ pub(super) fn unshadowed(sample: &Sample, lamp: Lamp, spot: Option<&Spot>) -> f3
     });
     let distance = squared.sqrt();
     let mut given = lamp.falloff.irradiance(distance, cosine / distance);
-    if sample.site == Site::Air && lamp.falloff != Falloff::InverseSquare {
+    if sample.site == Site::LightGrid && lamp.falloff != Falloff::InverseSquare {
         // The grid's light is what comes, then weighted by the cosine: not the other way around.
         given = lamp.falloff.irradiance(distance, 1.0) * cosine / distance;
     }
@@ -108,20 +108,20 @@ pub(super) fn unshadowed(sample: &Sample, lamp: Lamp, spot: Option<&Spot>) -> f3
 pub(super) fn point_rows(
     bsp: &Bsp,
     occluders: &Occluders,
-    spread: &Spread<'_>,
+    soa: &SampleSoa<'_>,
     lamp: Lamp,
     spot: Option<&Spot>,
     range: f32,
 ) -> Vec<(u32, f32)> {
     // Samples that follow each other are neighbours as a rule, and in the shadow of the same triangle.
-    rows_again(bsp, occluders, spread, lamp, (spot, range), &mut [None])
+    point_rows_hinted(bsp, occluders, soa, lamp, (spot, range), &mut [None])
 }
 
 /// [`point_rows`], asking first what stopped earlier rays: `stopped` has a place for each sample, or for so many that take turns.
-pub(super) fn rows_again(
+pub(super) fn point_rows_hinted(
     bsp: &Bsp,
     occluders: &Occluders,
-    spread: &Spread<'_>,
+    soa: &SampleSoa<'_>,
     lamp: Lamp,
     (spot, range): (Option<&Spot>, f32),
     stopped: &mut [Option<u32>],
@@ -130,7 +130,7 @@ pub(super) fn rows_again(
     let origin = lamp.origin;
     let cluster = bsp.cluster_at(origin);
     let mut rows = Vec::new();
-    for (i, sample) in spread.facing(origin, range) {
+    for (i, sample) in soa.facing(origin, range) {
         if !bsp.cluster_sees(cluster, sample.cluster) && !bsp.cluster_sees(sample.cluster, cluster)
         {
             continue;
@@ -139,7 +139,7 @@ pub(super) fn rows_again(
         let Some(last) = stopped.get_mut(i as usize % places) else {
             continue;
         };
-        if light > 0.0 && !occluders.blocked_again(origin, sample.position, last) {
+        if light > 0.0 && !occluders.blocked_hinted(origin, sample.position, last) {
             rows.push((i, light));
         }
     }
@@ -166,16 +166,22 @@ pub(super) fn sun_rows(
         .collect()
 }
 
-/// Columns of the lights that the map's directives tell of. `silent`: materials of skies that they tell nothing of.
+/// Columns of the lights that the map's directives tell of. `unknown_skies`: materials of skies that they tell nothing of.
 pub(super) fn known(
     world: &RelitWorld,
     occluders: &Occluders,
     samples: &[Sample],
-    silent: &[u32],
+    unknown_skies: &[u32],
 ) -> Vec<Column> {
     let (groups, of_light) = group(world);
-    let ends = world.light_end > 0.0;
-    let pieces_if = |rows: &[(u32, f32)]| if ends { pieces_of(rows) } else { Vec::new() };
+    let has_cutoff = world.light_cutoff > 0.0;
+    let pieces_if = |rows: &[(u32, f32)]| {
+        if has_cutoff {
+            pieces_of(rows)
+        } else {
+            Vec::new()
+        }
+    };
     let found = parallel::map(samples, |i, sample| {
         let mut random = Random::new(0x7121 + i as u64);
         triangles_at(world, occluders, sample, &of_light, &mut random)
@@ -188,28 +194,28 @@ pub(super) fn known(
             pieces: Vec::new(),
             strength: g.strength,
             limit: Vec3::INFINITY,
-            prior: (!silent.contains(&g.material)).then(|| prior_of(g.strength, g.evidence)),
+            prior: (!unknown_skies.contains(&g.material)).then(|| prior_of(g.strength, g.evidence)),
         })
         .collect();
     for (i, given) in (0u32..).zip(found) {
-        for heap in given {
-            let Some(column) = columns.get_mut(heap.group as usize) else {
+        for bucket in given {
+            let Some(column) = columns.get_mut(bucket.group as usize) else {
                 continue;
             };
             match column.rows.last_mut() {
-                Some((last, sum)) if *last == i => *sum += heap.given,
-                _ => column.rows.push((i, heap.given)),
+                Some((last, sum)) if *last == i => *sum += bucket.given,
+                _ => column.rows.push((i, bucket.given)),
             }
-            if ends {
+            if has_cutoff {
                 column.pieces.push(Piece {
                     sample: i,
-                    bare: heap.bare / heap.count,
-                    given: heap.given,
+                    unshadowed: bucket.unshadowed / bucket.count,
+                    given: bucket.given,
                 });
             }
         }
     }
-    let spread = Spread::new(samples);
+    let soa = SampleSoa::new(samples);
     let points: Vec<u32> = (0..world.point_lights.len() as u32).collect();
     let rows = parallel::map(&points, |_, &index| {
         world
@@ -220,7 +226,7 @@ pub(super) fn known(
                 point_rows(
                     &world.bsp,
                     occluders,
-                    &spread,
+                    &soa,
                     Lamp {
                         origin: light.origin,
                         falloff: light.falloff,
@@ -379,9 +385,9 @@ fn triangles_at(
     sample: &Sample,
     of_light: &[(u32, f32)],
     random: &mut Random,
-) -> Vec<Heap> {
-    let mut heaps: Vec<Heap> = Vec::new();
-    let mut one = Given::default();
+) -> Vec<ContributionBucket> {
+    let mut buckets: Vec<ContributionBucket> = Vec::new();
+    let mut one = Contribution::default();
     let scale = sample.level() + sample.floor;
     for &entry in world.light_lists.row(sample.cluster) {
         let LightRef::Triangle(index) = world.light_lists.light(entry) else {
@@ -403,26 +409,26 @@ fn triangles_at(
             continue;
         }
         let seen = visible_part(occluders, sample, light, random);
-        let number = if light.ends_alone() {
+        let number = if light.has_own_cutoff() {
             index
         } else {
             light.surface
         };
         if (one.number, one.group) != (number, group) {
-            one.heap_on(&mut heaps);
-            one = Given {
+            one.add_to(&mut buckets);
+            one = Contribution {
                 number,
                 group,
                 sky: light.is_sky,
-                ..Given::default()
+                ..Contribution::default()
             };
         }
-        one.bare += geometric * part;
+        one.unshadowed += geometric * part;
         one.arrives += geometric * part * seen / chance;
     }
-    one.heap_on(&mut heaps);
-    heaps.sort_by_key(|heap| heap.group);
-    heaps
+    one.add_to(&mut buckets);
+    buckets.sort_by_key(|bucket| bucket.group);
+    buckets
 }
 
 /// Part of a triangle that a sample sees: one ray to the middle, or several to a large one.

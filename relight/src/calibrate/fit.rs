@@ -1,18 +1,18 @@
 //! The state of a fit, and its steps: strengths, ambient and bounced light, which depend on each other.
 
-use super::air;
 use super::bounce::Transfer;
+use super::candidate_grid::MeasuredSpace;
 use super::columns::Column;
-use super::crossings::Crossing;
-use super::fronts::Fronts;
-use super::nodes::Measured;
-use super::place::{self, Candidates, Scene};
-use super::samples::{Sample, Site, Taking, light_of, mean};
+use super::light_grid;
+use super::placement::{self, Candidates, Scene};
+use super::residual_candidates::ResidualCandidates;
+use super::sample_soa::SampleSoa;
+use super::samples::{Sample, SamplingOptions, Site, light_of, mean};
 use super::solve::{self, Ambient, Effort};
 use super::splash::Splashes;
-use super::spread::Spread;
 use super::texels::TexelId;
-use super::{Purpose, suns, views, ways};
+use super::triangulation::Crossing;
+use super::{FitMode, hypotheses, spawn_views, suns};
 use crate::emitters::Agreement;
 use crate::exposure::{self, Exposure, Place};
 use crate::occluders::Occluders;
@@ -25,28 +25,28 @@ use std::sync::Arc;
 pub(super) const ROUNDS: usize = 4;
 
 /// Lights are looked for again while that leaves less than this part of the error at samples held out.
-const ENOUGH: f32 = 0.985;
+const ROUND_GAIN: f32 = 0.985;
 
 /// Linear falloff is believed when it leaves less than this part of the error at samples held out.
-const LINEAR: f32 = 0.97;
+const LINEAR_KEPT: f32 = 0.97;
 
 /// Times that texels beside lights are looked at once these stay where they are.
-const LAST_LOOKS: u32 = 2;
+const NEAR_LIGHT_PASSES: u32 = 2;
 
 /// How many times the error at samples held out these texels may leave then: they are a small part of the map.
-const BESIDE: f32 = 1.02;
+const NEAR_LIGHT_TOLERANCE: f32 = 1.02;
 
 /// Error, stops, of lights that fall off with the square of the distance, from which on linear ones are tried, as they are
 /// where less than half of the error of directives is gone. Elsewhere a few that reach far may agree a little better with the
 /// light of many lamps than these do.
-const MUCH: f32 = 0.25;
+const LINEAR_TRIED_ABOVE: f32 = 0.25;
 
 /// More ambient light than the darkest texels have is believed when it leaves less than this part of the error at
 /// samples held out: then these texels are dark for another reason.
 const MORE_AMBIENT: f32 = 0.93;
 
 /// Back splashes are believed when they leave less than this part of the error at samples held out.
-const SPLASHED: f32 = 0.95;
+const SPLASHES_KEPT: f32 = 0.95;
 
 /// How many times the error that is asked for leaves no hope after the first round that lights are looked for, and after each
 /// other one.
@@ -70,31 +70,31 @@ const NEXT: Effort = Effort {
 
 /// A state to come back to.
 #[derive(Clone)]
-pub(super) struct Start {
+pub(super) struct SavedState {
     columns: Vec<Column>,
     ambient: Ambient,
     samples: Vec<Sample>,
     transfer: Transfer,
-    beside: HashSet<TexelId>,
+    near_light_texels: HashSet<TexelId>,
 }
 
 /// What lights that are put in have to come up to.
-struct Rivals {
+struct ErrorLimits {
     /// Error that is asked for, stops.
-    asked: f32,
+    target: f32,
     /// Error that another way left after each round, and a little more.
-    pace: Vec<f32>,
+    per_round: Vec<f32>,
     /// Most times that lights are looked for.
     rounds: usize,
 }
 
-impl Rivals {
+impl ErrorLimits {
     /// Error after a round that leaves no hope.
-    fn hopeless(&self, round: usize) -> f32 {
-        match (self.pace.get(round), round) {
-            (Some(pace), _) => *pace,
-            (None, 0) => self.asked * HOPELESS.0,
-            (None, _) => self.asked * HOPELESS.1,
+    fn abandon_above(&self, round: usize) -> f32 {
+        match (self.per_round.get(round), round) {
+            (Some(per_round), _) => *per_round,
+            (None, 0) => self.target * HOPELESS.0,
+            (None, _) => self.target * HOPELESS.1,
         }
     }
 }
@@ -104,18 +104,18 @@ pub(super) struct Fit<'a> {
     pub world: &'a RelitWorld,
     pub occluders: &'a Occluders,
     /// Skies of which directives tell nothing.
-    pub silent: &'a [u32],
+    pub unknown_skies: &'a [u32],
     /// For every triangle, the surface that it is of.
     pub of_triangle: Vec<u32>,
     /// How measurements are taken.
-    pub taking: Taking,
+    pub sampling: SamplingOptions,
     pub samples: Vec<Sample>,
     /// Texels that joined them, beside lights that were put in.
-    pub beside: HashSet<TexelId>,
+    pub near_light_texels: HashSet<TexelId>,
     /// What was measured beside lights before, by texel and triangle.
-    pub looked_at: HashMap<(TexelId, u32), Option<Sample>>,
+    pub near_light_measurements: HashMap<(TexelId, u32), Option<Sample>>,
     /// Where texels, or what tells in their place, are measured.
-    pub measured: Measured,
+    pub measured: MeasuredSpace,
     pub transfer: Transfer,
     /// Back splashes that there may be.
     pub splashes: Vec<Splashes>,
@@ -125,15 +125,15 @@ pub(super) struct Fit<'a> {
     /// Places that the light grid's directions meet at.
     pub crossings: Vec<Crossing>,
     /// Candidates all over open space, once they were tried: they see the first measurements alike each time.
-    pub tried: Option<Arc<Candidates>>,
+    pub grid_candidates: Option<Arc<Candidates>>,
     /// Places in front of samples that were candidates before.
-    pub fronts: Fronts,
+    pub residual_candidates: ResidualCandidates,
     /// Error at samples held out after each round of lights that fall off with the square of the distance.
     pub rounds: Vec<f32>,
     /// Light at which lights end.
-    pub least: f32,
+    pub cutoff: f32,
     /// What it is for: what will not do that need not be looked for to the end.
-    pub purpose: Purpose<'a>,
+    pub mode: FitMode<'a>,
 }
 
 impl Fit<'_> {
@@ -167,7 +167,7 @@ impl Fit<'_> {
                 shades: material.map_or(&[], |m| &m.shades),
             })
         };
-        let seen = views::seen(self.world, self.occluders, &self.samples);
+        let seen = spawn_views::visible_samples(self.world, self.occluders, &self.samples);
         let seen = seen.into_iter();
         exposure::matching(seen.filter_map(|(sample, material)| place(sample as usize, material)))
             .or_else(|| {
@@ -179,10 +179,10 @@ impl Fit<'_> {
     /// Takes bounced light from the strengths as they are. `pictures`: with what pictures of skies give.
     pub fn rebounce(&mut self, pictures: bool) {
         let direct = solve::direct(&self.samples, &self.columns);
-        self.bounce_of(&direct, pictures);
+        self.set_bounce(&direct, pictures);
     }
 
-    fn bounce_of(&mut self, light: &[Vec3], pictures: bool) {
+    fn set_bounce(&mut self, light: &[Vec3], pictures: bool) {
         let bounced = self.transfer.of(light, pictures);
         for (sample, bounce) in self.samples.iter_mut().zip(bounced) {
             sample.bounce = bounce;
@@ -190,33 +190,33 @@ impl Fit<'_> {
     }
 
     /// Fits known sources, and a sun where none is known.
-    pub fn known(&mut self) {
+    pub fn fit_known(&mut self) {
         // What was measured is a better first guess of what is thrown back than what is believed of lights.
         let measured: Vec<Vec3> = self.samples.iter().map(|s| s.value).collect();
-        self.bounce_of(&measured, false);
+        self.set_bounce(&measured, false);
         let (columns, ambient) = (&mut self.columns, &mut self.ambient);
         solve::solve(&self.samples, columns, ambient, FIRST, 0.0);
         if self.occluders.any_sky() {
             suns::find(self.occluders, &self.samples, columns, ambient, FIRST, 0.0);
         }
-        if self.least > 0.0 {
-            solve::solve(&self.samples, columns, ambient, NEXT, self.least);
+        if self.cutoff > 0.0 {
+            solve::solve(&self.samples, columns, ambient, NEXT, self.cutoff);
         }
     }
 
     /// Adds back splashes where they explain what known lights do not. Whether some were added.
-    pub fn splash(&mut self, splashes: Vec<Column>) -> bool {
-        let start = self.start();
+    pub fn try_splashes(&mut self, splashes: Vec<Column>) -> bool {
+        let state = self.state();
         self.settle();
         let without = self.agreement().median_stops;
         let known = self.columns.len();
         self.columns.extend(splashes);
         self.settle();
-        let believed = self.agreement().median_stops < without * SPLASHED;
-        let state = solve::residual(&self.samples, &self.columns, self.ambient.value);
-        place::drop_useless(&mut self.columns, known, &state, place::WORTH);
+        let believed = self.agreement().median_stops < without * SPLASHES_KEPT;
+        let residual = solve::residual(&self.samples, &self.columns, self.ambient.value);
+        placement::drop_useless(&mut self.columns, known, &residual, placement::WORTH);
         let splashes = self.columns.split_off(known);
-        self.back_to(start);
+        self.restore(state);
         let added = believed && !splashes.is_empty();
         if added {
             self.columns.extend(splashes);
@@ -233,23 +233,25 @@ impl Fit<'_> {
                 &mut self.columns,
                 &mut self.ambient,
                 NEXT,
-                self.least,
+                self.cutoff,
             );
         }
         self.rebounce(false);
     }
 
     /// What lights that are put in have to come up to.
-    fn rivals(&self, linear: bool) -> Rivals {
-        let (asked, pace, rounds) = match self.purpose {
+    fn error_limits(&self, linear: bool) -> ErrorLimits {
+        let (target, per_round, rounds) = match self.mode {
             // they are worth having if they agree better than what there is
             _ if linear => (f32::INFINITY, self.rounds.clone(), ROUNDS),
-            Purpose::Trial(rounds) => (f32::INFINITY, Vec::new(), rounds),
-            Purpose::Enough(asked) => (asked.stops, asked.pace.to_vec(), ROUNDS),
+            FitMode::Trial(rounds) => (f32::INFINITY, Vec::new(), rounds),
+            FitMode::Full(acceptance) => {
+                (acceptance.stops, acceptance.round_limits.to_vec(), ROUNDS)
+            }
         };
-        Rivals {
-            asked,
-            pace,
+        ErrorLimits {
+            target,
+            per_round,
             rounds,
         }
     }
@@ -257,41 +259,49 @@ impl Fit<'_> {
     /// Puts in point lights for as long as samples that are held out get better by it.
     /// `linear`: such that may fall off linearly, too. `progress` gets the part of the most rounds that are done.
     /// Whether what is asked for was not come near to.
-    pub fn place(
+    pub fn place_lights(
         &mut self,
         candidates: usize,
         linear: bool,
         progress: &mut dyn FnMut(f32),
     ) -> bool {
         let fixed = self.columns.len();
-        let rivals = self.rivals(linear);
+        let error_limits = self.error_limits(linear);
         let mut spacing = 0.0;
         let mut best = f32::INFINITY;
-        for round in 0..rivals.rounds {
+        for round in 0..error_limits.rounds {
             let kept = (self.columns.clone(), self.ambient);
             let scene = Scene {
                 world: self.world,
                 occluders: self.occluders,
-                spread: Spread::new(&self.samples),
+                soa: SampleSoa::new(&self.samples),
                 measured: &self.measured,
                 of_triangle: &self.of_triangle,
                 candidates,
                 linear,
-                least: self.least,
+                cutoff: self.cutoff,
             };
             let (columns, ambient) = (&mut self.columns, &mut self.ambient);
             if round == 0 {
-                let tried = self
-                    .tried
-                    .get_or_insert_with(|| Arc::new(place::over_space(&scene, &self.crossings)));
-                spacing = tried.spacing;
-                place::out_of(&scene, tried, columns, fixed, ambient);
+                let grid_candidates = self.grid_candidates.get_or_insert_with(|| {
+                    Arc::new(placement::over_open_space(&scene, &self.crossings))
+                });
+                spacing = grid_candidates.spacing;
+                placement::place_from_grid(&scene, grid_candidates, columns, fixed, ambient);
             } else {
-                place::in_front(&scene, &mut self.fronts, columns, fixed, ambient, spacing);
+                placement::place_at_residuals(
+                    &scene,
+                    &mut self.residual_candidates,
+                    columns,
+                    fixed,
+                    ambient,
+                    spacing,
+                );
             }
             self.settle();
             let direct = solve::direct(&self.samples, &self.columns);
-            if round == 0 && air::believe(self.world, &mut self.samples, &direct) {
+            if round == 0 && light_grid::trust_if_consistent(self.world, &mut self.samples, &direct)
+            {
                 self.settle();
             }
             // The first round, over all space, takes as long as the others together.
@@ -301,74 +311,74 @@ impl Fit<'_> {
                 (self.columns, self.ambient) = kept;
                 self.rebounce(false);
             }
-            let done = found > best * ENOUGH;
+            let done = found > best * ROUND_GAIN;
             best = best.min(found);
             if !linear {
                 self.rounds.push(best);
             }
-            if best > rivals.hopeless(round) {
+            if best > error_limits.abandon_above(round) {
                 return true;
             }
             if done {
                 break;
             }
-            self.look_beside(fixed);
+            self.add_near_light_texels(fixed);
         }
         // What is moved or grows to make up for what was too bright may be too bright elsewhere.
-        for _ in 0..LAST_LOOKS {
-            let kept = self.start();
-            if !self.look_beside(fixed) {
+        for _ in 0..NEAR_LIGHT_PASSES {
+            let kept = self.state();
+            if !self.add_near_light_texels(fixed) {
                 break;
             }
             self.settle();
             let found = self.agreement().median_stops;
-            if found > best * BESIDE {
-                self.back_to(kept);
+            if found > best * NEAR_LIGHT_TOLERANCE {
+                self.restore(kept);
                 break;
             }
         }
-        best > rivals.asked
+        best > error_limits.target
     }
 
-    /// Puts in lights that may fall off linearly, as compilers can have it, in place of those of [`place`](Self::place),
-    /// where these leave much and samples that are held out get better by it. `start`: the state before them. `directives`:
+    /// Puts in lights that may fall off linearly, as compilers can have it, in place of those of [`place_lights`](Self::place_lights),
+    /// where these leave much and samples that are held out get better by it. `state`: the state before them. `directives`:
     /// error of what these say, stops.
-    pub fn place_linear(&mut self, start: Start, candidates: usize, directives: f32) {
+    pub fn try_linear_falloff(&mut self, state: SavedState, candidates: usize, directives: f32) {
         let before = self.agreement().median_stops;
-        if before < MUCH && before <= ways::halved(directives) {
+        if before < LINEAR_TRIED_ABOVE && before <= hypotheses::error_target(directives) {
             return;
         }
-        let kept = self.start();
-        self.back_to(start);
-        let hopeless = self.place(candidates, true, &mut |_| ());
-        if hopeless || self.agreement().median_stops > before * LINEAR {
-            self.back_to(kept);
+        let kept = self.state();
+        self.restore(state);
+        let abandoned = self.place_lights(candidates, true, &mut |_| ());
+        if abandoned || self.agreement().median_stops > before * LINEAR_KEPT {
+            self.restore(kept);
         }
     }
 
-    /// What [`place`](Self::place) begins with.
-    pub fn start(&self) -> Start {
-        Start {
+    /// What [`place_lights`](Self::place_lights) begins with.
+    pub fn state(&self) -> SavedState {
+        SavedState {
             columns: self.columns.clone(),
             ambient: self.ambient,
             samples: self.samples.clone(),
             transfer: self.transfer.clone(),
-            beside: self.beside.clone(),
+            near_light_texels: self.near_light_texels.clone(),
         }
     }
 
     /// Goes back to a state.
-    fn back_to(&mut self, start: Start) {
-        (self.columns, self.ambient) = (start.columns, start.ambient);
-        (self.samples, self.transfer) = (start.samples, start.transfer);
-        self.beside = start.beside;
+    fn restore(&mut self, state: SavedState) {
+        (self.columns, self.ambient) = (state.columns, state.ambient);
+        (self.samples, self.transfer) = (state.samples, state.transfer);
+        self.near_light_texels = state.near_light_texels;
     }
 
     /// Leaves the measurements in the air out again where samples held out say so.
-    pub fn with_or_without_air(&mut self) {
+    pub fn drop_light_grid_if_worse(&mut self) {
         let kept = (self.columns.clone(), self.ambient);
         let before = self.agreement().median_stops;
-        let trusted = air::trust(&mut self.samples, 0.0);
+        let trusted = light_grid::trust(&mut self.samples, 0.0);
         if !trusted {
             return;
         }
@@ -380,7 +390,7 @@ impl Fit<'_> {
     }
 
     /// Lets the ambient term grow to what the darker of the lit texels have, where that explains much more.
-    pub fn more_ambient(&mut self) {
+    pub fn raise_ambient(&mut self) {
         let kept = (self.columns.clone(), self.ambient);
         let before = self.agreement().median_stops;
         self.ambient.limit = quantile(&self.samples, 0.2, light_of(self.world, 1.0));

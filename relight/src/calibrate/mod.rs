@@ -12,13 +12,13 @@
 //!    and what is the same everywhere is ambient, within limits. `suns` looks for a sun where none is known, `splash`
 //!    puts weak lights in front of lamps, as compilers do.
 //! 5. `place`: candidates for lost lights all over open space, and where the directions of the light grid meet
-//!    (`crossings`), then in front of what stays unexplained (`fronts`), for as long as
-//!    that makes light agree better at what is held out. `fit` holds these steps together. `beside`: texels right beside
+//!    (`crossings`), then in front of what stays unexplained (`residual_candidates`), for as long as
+//!    that makes light agree better at what is held out. `fit` holds these steps together. `near_light`: texels right beside
 //!    these lights join the measurements where they are too bright.
 //!    Where that leaves much, once more with lights that may fall off linearly, too.
 //! 6. `compiler`: all of that with less effort for light that was stored encoded, and for lights that end, to see whether
-//!    it explains more. `ways`: where the map says that corners were made darker, all of it is done both ways; with back
-//!    splashes and without; with more measurements where much is left. `memory`: what these have in common is traced once.
+//!    it explains more. `hypotheses`: where the map says that corners were made darker, all of it is done both ways; with back
+//!    splashes and without; with more measurements where much is left. `traced`: what these have in common is traced once.
 //! 7. The world's lights get their strengths, lost lights are added to
 //!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
 //! 8. `styles`: the same for the light of each style, which the compiler stored apart.
@@ -29,40 +29,40 @@
 //!
 //! Source: the idea is that of Schoeneman et al., *Painting with Light*, SIGGRAPH 1993.
 
-mod air;
 mod apply;
-mod beside;
 mod bounce;
 mod cache;
+mod candidate_grid;
 mod columns;
 mod compiler;
-mod crossings;
-mod ends;
+mod compiler_command_line;
+mod cutoff;
 mod fit;
-mod fronts;
-mod memory;
-mod nodes;
-mod place;
+mod hypotheses;
+mod light_grid;
+mod near_light;
+mod placement;
 mod recovery;
 mod report;
+mod residual_candidates;
 mod residuals;
-mod said;
+mod sample_soa;
 mod samples;
 mod skies;
 mod solve;
+mod spawn_views;
 mod splash;
-mod spread;
 mod styles;
 mod suns;
 #[cfg(test)]
 mod tests;
 mod texels;
+mod trace_cache;
+mod triangulation;
 mod vertices;
-mod views;
-mod ways;
 
 pub use crate::emitters::{Agreement, CalibrationReport, Evidence};
-pub use beside::{Spots, spots};
+pub use near_light::{Spots, spots};
 pub use recovery::{FOUND_WITHIN, POWER_WITHIN, Recovery, hide_entities, recovery};
 pub use residuals::{Residual, residuals};
 
@@ -70,17 +70,17 @@ use crate::cache::CalibrationCache;
 use crate::exposure::Exposure;
 use crate::occluders::Occluders;
 use crate::world::RelitWorld;
+use candidate_grid::MeasuredSpace;
 use columns::{Lamp, Source};
 use compiler::Compiler;
 use fit::Fit;
-use fronts::Fronts;
 use glam::Vec3;
-use memory::{Looked, Memory};
-use nodes::Measured;
-use samples::Taking;
+use residual_candidates::ResidualCandidates;
+use samples::SamplingOptions;
 use std::cell::Cell;
 use std::collections::{HashMap, HashSet};
 use std::time::Instant;
+use trace_cache::{CandidateKey, TraceCache};
 
 /// Number that changes whenever the same world would give another result.
 const VERSION: u32 = 27;
@@ -163,8 +163,8 @@ pub fn calibrate_with(
 ) -> CalibrationReport {
     let begin = Instant::now();
     let key = options.cache.as_ref().map(|_| cache::key(world, options));
-    let silent = skies::silent(world);
-    skies::open(world, &silent);
+    let unknown_skies = skies::unknown_skies(world);
+    skies::open(world, &unknown_skies);
     let kept = match (&options.cache, key) {
         (Some(cache), Some(key)) => cache::read(cache, key, columns::count(world)),
         _ => Ok(None),
@@ -178,7 +178,7 @@ pub fn calibrate_with(
             if let Err(problem) = missing {
                 world.warnings.push(problem.to_string());
             }
-            let solution = ways::best(world, &silent, options, progress);
+            let solution = hypotheses::best(world, &unknown_skies, options, progress);
             progress(1.0);
             if let (Some(cache), Some(key)) = (&options.cache, key)
                 && let Err(problem) = cache::write(cache, key, &solution)
@@ -188,10 +188,10 @@ pub fn calibrate_with(
             solution
         }
     };
-    Compiler::of(&solution.report).tell(world);
+    Compiler::of(&solution.report).apply_to(world);
     world.exposure = solution.exposure;
     if solution.report.evidence == Evidence::Nothing {
-        skies::close(world, &silent);
+        skies::close(world, &unknown_skies);
     } else {
         solution.report.splashes = apply::apply(world, &solution);
     }
@@ -204,59 +204,59 @@ pub fn calibrate_with(
 
 /// What a solution is for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Purpose<'a> {
+enum FitMode<'a> {
     /// To compare one compiler with another: without the light grid and linear falloff. Lights are looked for so many times
     /// at most.
     Trial(usize),
     /// To be kept if it agrees well enough.
-    Enough(Asked<'a>),
+    Full(Acceptance<'a>),
 }
 
 /// When a solution is good enough to be kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Asked<'a> {
+struct Acceptance<'a> {
     /// Most error that is left at measurements held out, stops.
     stops: f32,
     /// What may be left after each round: another way that has more is given up.
-    pace: &'a [f32],
+    round_limits: &'a [f32],
     /// Told as soon as it is known: whether there are back splashes.
     splashes: &'a Cell<bool>,
 }
 
-/// Solves for a world's light. `silent`: skies of which directives tell nothing. `compiler`: what was done to light, which
-/// the world knows but for dirt. `memory`: what was traced for the same world before.
+/// Solves for a world's light. `unknown_skies`: skies of which directives tell nothing. `compiler`: what was done to light, which
+/// the world knows but for dirt. `traced`: what was traced for the same world before.
 ///
 /// `None` as soon as it is known not to do what it is for.
 fn find(
     world: &RelitWorld,
-    silent: &[u32],
+    unknown_skies: &[u32],
     options: &CalibrationOptions,
     compiler: Compiler,
-    purpose: Purpose<'_>,
-    memory: &mut Memory,
+    mode: FitMode<'_>,
+    traced: &mut TraceCache,
     progress: &mut dyn FnMut(f32),
 ) -> Option<Solution> {
     progress(0.0);
-    let thorough = !matches!(purpose, Purpose::Trial(_));
+    let thorough = !matches!(mode, FitMode::Trial(_));
     let occluders = Occluders::of_world(world);
     // Where lights end, black tells little. Trials do not know yet whether they do, and measure alike to be compared.
-    let taking = Taking {
+    let sampling = SamplingOptions {
         count: options.samples,
         seed: options.seed,
-        few_black: !thorough || world.light_end > 0.0,
+        few_black: !thorough || world.light_cutoff > 0.0,
         dirt: compiler.dirt,
     };
-    let (mut samples, evidence) = memory.take(world, &occluders, &taking);
+    let (mut samples, evidence) = traced.take(world, &occluders, &sampling);
     let texels = samples.len();
-    let measured = Measured::new(&samples);
+    let measured = MeasuredSpace::new(&samples);
     let mut crossings = Vec::new();
     if thorough && evidence == Evidence::Lightmaps {
-        let points = air::points(world, &occluders, |at| measured.holds(at));
-        crossings = crossings::find(world, &points, &occluders, options.candidates / CROSSINGS);
-        samples.extend(air::more_samples(world, &points, options));
+        let points = light_grid::points(world, &occluders, |at| measured.holds(at));
+        crossings = triangulation::find(world, &points, &occluders, options.candidates / CROSSINGS);
+        samples.extend(light_grid::additional_samples(world, &points, options));
     }
     progress(0.05);
-    let mut columns = columns::known(world, &occluders, &samples, silent);
+    let mut columns = columns::known(world, &occluders, &samples, unknown_skies);
     let known = columns.len();
     let mut solution = Solution {
         known: columns.iter().map(|c| c.strength).collect(),
@@ -267,7 +267,7 @@ fn find(
             held_out: samples.iter().filter(|s| s.held_out).count(),
             known,
             gamma: world.stored_gamma,
-            ends: world.light_end > 0.0,
+            has_cutoff: world.light_cutoff > 0.0,
             dirty: compiler.dirt.is_some(),
             ..Default::default()
         },
@@ -276,23 +276,23 @@ fn find(
     if samples.is_empty() {
         return Some(solution);
     }
-    let unlisted = |material| silent.contains(&material);
+    let unlisted = |material| unknown_skies.contains(&material);
     progress(0.15);
-    let looked = Looked::of(world, &samples, &crossings, options.candidates);
-    let transfer = memory.transfer(world, &occluders, &samples, options.bounces, unlisted);
+    let candidate_key = CandidateKey::of(world, &samples, &crossings, options.candidates);
+    let transfer = traced.transfer(world, &occluders, &samples, options.bounces, unlisted);
     for column in columns.iter_mut().filter(|c| c.prior.is_none()) {
         column.strength = Vec3::ZERO;
     }
     let mut fit = Fit {
         world,
         occluders: &occluders,
-        silent,
+        unknown_skies,
         of_triangle: bounce::surfaces_of_triangles(world),
-        taking,
-        beside: HashSet::new(),
-        looked_at: HashMap::new(),
-        tried: memory.tried(&looked),
-        fronts: Fronts::new(samples.len()),
+        sampling,
+        near_light_texels: HashSet::new(),
+        near_light_measurements: HashMap::new(),
+        grid_candidates: traced.candidates(&candidate_key),
+        residual_candidates: ResidualCandidates::new(samples.len()),
         rounds: Vec::new(),
         splashes: match compiler.splashes {
             true => splash::of(world),
@@ -304,44 +304,44 @@ fn find(
         transfer,
         columns,
         crossings,
-        least: world.light_end,
-        purpose,
+        cutoff: world.light_cutoff,
+        mode,
     };
     let first = std::mem::replace(&mut fit.ambient.value, world.ambient);
     fit.rebounce(true);
     solution.report.before = fit.agreement();
     fit.ambient.value = first;
     progress(0.25);
-    fit.known();
+    fit.fit_known();
     progress(0.3);
     let own = splash::columns(world, &occluders, &fit.samples, &fit.splashes, &fit.columns);
-    let splashed = fit.splash(own);
-    if let Purpose::Enough(asked) = purpose {
-        asked.splashes.set(splashed);
+    let splashed = fit.try_splashes(own);
+    if let FitMode::Full(acceptance) = mode {
+        acceptance.splashes.set(splashed);
     }
     progress(0.35);
     if options.candidates > 0 {
-        let start = fit.start();
+        let state_before = fit.state();
         let part_of = if thorough { 0.4 } else { 0.55 };
-        let hopeless = fit.place(options.candidates, false, &mut |part| {
+        let abandoned = fit.place_lights(options.candidates, false, &mut |part| {
             progress(0.35 + part_of * part);
         });
-        memory.keep_tried(looked, fit.tried.clone());
-        if hopeless {
+        traced.keep_candidates(candidate_key, fit.grid_candidates.clone());
+        if abandoned {
             return None;
         }
         if thorough {
             let directives = solution.report.before.median_stops;
-            fit.place_linear(start, options.candidates, directives);
+            fit.try_linear_falloff(state_before, options.candidates, directives);
         }
     } else {
         fit.settle();
     }
     progress(0.9);
     if thorough && options.candidates > 0 {
-        fit.with_or_without_air();
+        fit.drop_light_grid_if_worse();
     }
-    fit.more_ambient();
+    fit.raise_ambient();
     progress(1.0);
     solution.report.after = fit.agreement();
     solution.overall = fit.agreement_overall();

@@ -1,8 +1,8 @@
 //! Light as it would be traced beside stored light, place by place, of a world as it is: calibrated or not.
 
 use super::bounce::Transfer;
-use super::samples::Taking;
-use super::{CalibrationOptions, columns, said, samples, skies, solve};
+use super::samples::SamplingOptions;
+use super::{CalibrationOptions, columns, compiler_command_line, samples, skies, solve};
 use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
@@ -50,20 +50,20 @@ impl Residual {
 /// [materials measured](RelitWorld::measure_materials).
 pub fn residuals(world: &RelitWorld, options: &CalibrationOptions) -> Vec<Residual> {
     let occluders = Occluders::of_world(world);
-    let taking = Taking {
+    let sampling = SamplingOptions {
         count: options.samples,
         seed: options.seed,
         few_black: false,
-        dirt: said::believed_dirt(world),
+        dirt: compiler_command_line::dirt_of_calibrated(world),
     };
-    let (samples, _) = samples::take(world, &occluders, &taking);
-    let silent = skies::silent(world);
-    let mut columns = columns::known(world, &occluders, &samples, &silent);
+    let (samples, _) = samples::take(world, &occluders, &sampling);
+    let unknown_skies = skies::unknown_skies(world);
+    let mut columns = columns::known(world, &occluders, &samples, &unknown_skies);
     for column in &mut columns {
-        column.end_at(world.light_end);
+        column.apply_cutoff(world.light_cutoff);
     }
     let direct = solve::direct(&samples, &columns);
-    let unlisted = |material| silent.contains(&material);
+    let unlisted = |material| unknown_skies.contains(&material);
     let transfer = Transfer::new(world, &occluders, &samples, options.bounces, unlisted);
     let bounced = transfer.of(&direct, true);
     let lit = direct.into_iter().zip(bounced);

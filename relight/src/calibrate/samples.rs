@@ -3,8 +3,8 @@
 //! Light is counted as the outgoing radiance of a white surface, irradiance / π: a stored byte v is v 4 / 255 (see
 //! [`light`](mod@crate::light)), to the power of the compiler's gamma. Its colour is what the engine shows: [`LightColor`](crate::light::LightColor).
 
-use super::air;
-use super::said::Dirt;
+use super::compiler_command_line::Dirt;
+use super::light_grid;
 use super::texels::{self, Stored, lit_by_texel};
 use super::vertices;
 use crate::emitters::Evidence;
@@ -44,7 +44,7 @@ pub(super) enum Site {
     /// On a surface, which all light falls on.
     Surface,
     /// In the open, at a point of the light grid: only light that comes straight from lights ([`super::air`]).
-    Air,
+    LightGrid,
 }
 
 /// One measurement.
@@ -88,7 +88,7 @@ impl Sample {
     pub fn ambient(&self) -> f32 {
         match self.site {
             Site::Surface => 1.0,
-            Site::Air => 0.0,
+            Site::LightGrid => 0.0,
         }
     }
 }
@@ -123,7 +123,7 @@ pub(super) fn shown(stored: Vec3) -> Vec3 {
 }
 
 /// Whether light on a surface tells of the lights around it.
-pub(super) fn tells(world: &RelitWorld, surface: &WorldSurface) -> bool {
+pub(super) fn is_measurable(world: &RelitWorld, surface: &WorldSurface) -> bool {
     let material = world.materials.get(surface.material as usize);
     surface.model == 0
         && surface.num_indices > 0
@@ -136,7 +136,10 @@ pub(super) fn tells(world: &RelitWorld, surface: &WorldSurface) -> bool {
 
 /// Area of surfaces that tell of light.
 fn area(world: &RelitWorld, is: fn(&WorldSurface) -> bool) -> f64 {
-    let told = world.surfaces.iter().filter(|s| is(s) && tells(world, s));
+    let told = world
+        .surfaces
+        .iter()
+        .filter(|s| is(s) && is_measurable(world, s));
     let triangles = told.flat_map(|surface| {
         let first = surface.first_index as usize / 3;
         first..first + surface.num_indices as usize / 3
@@ -149,7 +152,7 @@ fn area(world: &RelitWorld, is: fn(&WorldSurface) -> bool) -> f64 {
 }
 
 /// What measurements on surfaces are taken of, and what is known of how light was stored there.
-pub(super) struct Gauge<'a> {
+pub(super) struct SampleContext<'a> {
     pub world: &'a RelitWorld,
     pub occluders: &'a Occluders,
     /// How corners were made darker.
@@ -158,19 +161,23 @@ pub(super) struct Gauge<'a> {
     pub seed: u64,
 }
 
-impl<'a> Gauge<'a> {
+impl<'a> SampleContext<'a> {
     /// What measurements are taken of in a way.
-    pub fn new(world: &'a RelitWorld, occluders: &'a Occluders, taking: &Taking) -> Gauge<'a> {
-        Gauge {
+    pub fn new(
+        world: &'a RelitWorld,
+        occluders: &'a Occluders,
+        sampling: &SamplingOptions,
+    ) -> SampleContext<'a> {
+        SampleContext {
             world,
             occluders,
-            dirt: taking.dirt,
-            seed: taking.seed,
+            dirt: sampling.dirt,
+            seed: sampling.seed,
         }
     }
 
     /// Takes what the compiler's dirt did out of a measurement at a [place](sample_at): it was made as dark as that.
-    pub fn clean(&self, sample: &mut Sample) {
+    pub fn remove_dirt(&self, sample: &mut Sample) {
         let Some(dirt) = self.dirt else {
             return;
         };
@@ -182,7 +189,7 @@ impl<'a> Gauge<'a> {
 
 /// How measurements are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Taking {
+pub(super) struct SamplingOptions {
     /// How many, about.
     pub count: usize,
     /// Seed of their choice.
@@ -197,12 +204,12 @@ pub(super) struct Taking {
 pub(super) fn take(
     world: &RelitWorld,
     occluders: &Occluders,
-    taking: &Taking,
+    sampling: &SamplingOptions,
 ) -> (Vec<Sample>, Evidence) {
-    let mut random = Random::new(taking.seed);
-    let gauge = Gauge::new(world, occluders, taking);
-    let count = taking.count;
-    let lightmaps = texels::take(&gauge, count, taking.few_black, &mut random);
+    let mut random = Random::new(sampling.seed);
+    let context = SampleContext::new(world, occluders, sampling);
+    let count = sampling.count;
+    let lightmaps = texels::take(&context, count, sampling.few_black, &mut random);
     // A few lightmapped scraps say nothing about the rest.
     if lightmaps.len() >= 16 {
         let mut samples = lightmaps;
@@ -212,22 +219,22 @@ pub(super) fn take(
         let [by_vertex, by_texel] = [vertices::lit, lit_by_texel].map(|is| area(world, is));
         let share = by_vertex / (by_vertex + by_texel).max(1.0);
         let beside = (count as f64 * share) as usize;
-        samples.extend(vertices::take(&gauge, beside, &mut random));
+        samples.extend(vertices::take(&context, beside, &mut random));
         return (samples, Evidence::Lightmaps);
     }
     let lit = |s: &[Sample]| s.iter().any(|s| s.level() > 0.0 && !s.saturated);
-    let vertices = vertices::take(&gauge, count, &mut random);
+    let vertices = vertices::take(&context, count, &mut random);
     if vertices.len() >= 16 && lit(&vertices) {
-        return (hold_out(vertices, taking.seed), Evidence::Vertices);
+        return (hold_out(vertices, sampling.seed), Evidence::Vertices);
     }
-    let grid = air::samples(
+    let grid = light_grid::samples(
         world,
-        &air::points(world, occluders, |_| true),
+        &light_grid::points(world, occluders, |_| true),
         count,
         &mut random,
     );
     if grid.len() >= 16 && lit(&grid) {
-        return (hold_out(grid, taking.seed), Evidence::Grid);
+        return (hold_out(grid, sampling.seed), Evidence::Grid);
     }
     (Vec::new(), Evidence::Nothing)
 }
@@ -255,20 +262,20 @@ fn hold_out(mut samples: Vec<Sample>, seed: u64) -> Vec<Sample> {
 
 /// Whether what has this name is kept out of fitting.
 pub(super) fn is_held_out(seed: u64, name: &[u32]) -> bool {
-    random::lot(seed, name) * (HELD_OUT as f32) < 1.0
+    random::hashed_uniform(seed, name) * (HELD_OUT as f32) < 1.0
 }
 
 /// A measurement at a place, unless the place is outside of the map or inside of something. It is yet to be
 /// [cleaned](Gauge::clean).
 pub(super) fn sample_at(
-    gauge: &Gauge<'_>,
+    context: &SampleContext<'_>,
     (on, normal): (Vec3, Vec3),
     material: u32,
     stored: Stored,
 ) -> Option<Sample> {
-    let Gauge {
+    let SampleContext {
         world, occluders, ..
-    } = *gauge;
+    } = *context;
     let position = on + normal * LIFT;
     let cluster = world.bsp.cluster_at(position);
     if cluster < 0 || world.bsp.is_in_drawn_brush(position, INSIDE) {

@@ -9,7 +9,7 @@ use crate::world::RelitWorld;
 use glam::Vec3;
 
 /// Materials of skies that nothing says the light of.
-pub(super) fn silent(world: &RelitWorld) -> Vec<u32> {
+pub(super) fn unknown_skies(world: &RelitWorld) -> Vec<u32> {
     (0u32..)
         .zip(&world.materials)
         .filter(|(_, m)| m.is_sky() && m.emission.is_none())

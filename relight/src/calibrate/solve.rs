@@ -115,12 +115,12 @@ pub(super) fn solve(
     columns: &mut [Column],
     ambient: &mut Ambient,
     effort: Effort,
-    least: f32,
+    cutoff: f32,
 ) -> Residual {
     let mut state = residual(samples, columns, ambient.value);
     for round in 0..effort.rounds {
-        if least > 0.0 {
-            parallel::each(columns, |column| column.end_at(least));
+        if cutoff > 0.0 {
+            parallel::each(columns, |column| column.apply_cutoff(cutoff));
         }
         if round > 0 {
             state = residual(samples, columns, ambient.value);
@@ -138,20 +138,20 @@ pub(super) fn solve(
         }
         let both = state.rest.iter().zip(&state.weights);
         let mut rest: Vec<Vec4> = both.map(|(rest, weight)| rest.extend(*weight)).collect();
-        let heard = parallel::map(columns, |_, column| Heard::of(column, &rest));
+        let active = parallel::map(columns, |_, column| ActiveRows::of(column, &rest));
         for sweep in 0..effort.sweeps {
             // Lights that are out seldom come back: they are looked at now and then.
             let all = sweep % 4 == 0 || sweep + 1 == effort.sweeps;
-            let looked_at: Vec<usize> = (columns.iter().zip(&heard).enumerate())
-                .filter(|(_, (column, heard))| (all || is_lit(column)) && heard.norm > 0.0)
+            let visited: Vec<usize> = (columns.iter().zip(&active).enumerate())
+                .filter(|(_, (column, active))| (all || is_lit(column)) && active.norm > 0.0)
                 .map(|(index, _)| index)
                 .collect();
-            sweep_over(columns, &heard, &looked_at, &mut rest, effort.sparsity);
+            sweep_over(columns, &active, &visited, &mut rest, effort.sparsity);
             improve_ambient(samples, ambient, &mut rest);
         }
     }
-    if least > 0.0 {
-        parallel::each(columns, |column| column.end_at(least));
+    if cutoff > 0.0 {
+        parallel::each(columns, |column| column.apply_cutoff(cutoff));
     }
     residual(samples, columns, ambient.value)
 }
@@ -163,19 +163,19 @@ pub(super) fn norm(column: &Column, weights: &[f32]) -> f32 {
 }
 
 /// What a column says to the samples that tell something.
-struct Heard {
+struct ActiveRows {
     rows: Vec<(u32, f32)>,
     /// Weighted square of its length.
     norm: f32,
 }
 
-impl Heard {
-    fn of(column: &Column, rest: &[Vec4]) -> Heard {
+impl ActiveRows {
+    fn of(column: &Column, rest: &[Vec4]) -> ActiveRows {
         let weight = |i: u32| rest.get(i as usize).map_or(0.0, |rest| rest.w);
         let rows = column.rows.iter().copied();
         let rows: Vec<(u32, f32)> = rows.filter(|(i, _)| weight(*i) != 0.0).collect();
         let norm = rows.iter().map(|&(i, a)| weight(i) * a * a).sum();
-        Heard { rows, norm }
+        ActiveRows { rows, norm }
     }
 }
 
@@ -189,30 +189,30 @@ const AT_ONCE: usize = 4;
 /// Sets columns, one after the other, to their best strengths while all others stay. `rest`: with what each sample weighs.
 fn sweep_over(
     columns: &mut [Column],
-    heard: &[Heard],
-    looked_at: &[usize],
+    active: &[ActiveRows],
+    visited: &[usize],
     rest: &mut [Vec4],
     sparsity: f32,
 ) {
     let mut done = 0;
-    while let Some(left) = looked_at.get(done..).filter(|left| !left.is_empty()) {
+    while let Some(left) = visited.get(done..).filter(|left| !left.is_empty()) {
         // What is lit is about to change all sums.
         let is_out = |i: &&usize| columns.get(**i).is_some_and(|c| !is_lit(c));
         let out = left.iter().take(AT_ONCE).take_while(is_out).count();
         let (now, _) = left.split_at(out.max(1));
         let mut rows: [&[(u32, f32)]; AT_ONCE] = [&[]; AT_ONCE];
         for (rows, index) in rows.iter_mut().zip(now) {
-            *rows = heard.get(*index).map_or(&[], |heard| &heard.rows);
+            *rows = active.get(*index).map_or(&[], |active| &active.rows);
         }
         for (&index, sum) in now.iter().zip(sums(rows, rest)) {
             done += 1;
-            let (Some(column), Some(heard)) = (columns.get_mut(index), heard.get(index)) else {
+            let (Some(column), Some(active)) = (columns.get_mut(index), active.get(index)) else {
                 continue;
             };
-            let change = improve(column, heard.norm, sum.truncate(), sparsity);
+            let change = improve(column, active.norm, sum.truncate(), sparsity);
             if change != Vec3::ZERO {
                 let change = change.extend(0.0);
-                for &(i, a) in &heard.rows {
+                for &(i, a) in &active.rows {
                     if let Some(rest) = rest.get_mut(i as usize) {
                         *rest -= change * a;
                     }
@@ -324,14 +324,14 @@ mod tests {
         let rest: Vec<Vec4> = (0..50)
             .map(|_| Vec4::new(random.uniform(), random.uniform(), random.uniform(), 1.0))
             .collect();
-        let heard: Vec<Heard> = columns.iter().map(|c| Heard::of(c, &rest)).collect();
+        let active: Vec<ActiveRows> = columns.iter().map(|c| ActiveRows::of(c, &rest)).collect();
         let all: Vec<usize> = (0..columns.len()).collect();
         let (mut together, mut rest_together) = (columns.clone(), rest.clone());
         let (mut alone, mut rest_alone) = (columns, rest);
         for _ in 0..3 {
-            sweep_over(&mut together, &heard, &all, &mut rest_together, 0.4);
+            sweep_over(&mut together, &active, &all, &mut rest_together, 0.4);
             for index in &all {
-                sweep_over(&mut alone, &heard, &[*index], &mut rest_alone, 0.4);
+                sweep_over(&mut alone, &active, &[*index], &mut rest_alone, 0.4);
             }
         }
         let strengths = |columns: &[Column]| -> Vec<Vec3> {

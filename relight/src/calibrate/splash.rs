@@ -7,9 +7,9 @@
 //! Source: what q3map2's documentation calls `q3map_backsplash` and `q3map_lightSubdivide`, and its defaults.
 
 use super::columns::{Column, Lamp, Prior, Source, material_of, point_rows};
-use super::ends::{Piece, pieces_of};
+use super::cutoff::{Piece, pieces_of};
+use super::sample_soa::SampleSoa;
 use super::samples::Sample;
-use super::spread::Spread;
 use crate::light::{EmissionSource, Falloff, TriangleLight};
 use crate::occluders::Occluders;
 use crate::world::RelitWorld;
@@ -105,8 +105,8 @@ pub(super) fn of(world: &RelitWorld) -> Vec<Splashes> {
     let mut found: BTreeMap<u32, Splashes> = BTreeMap::new();
     for ((material, _), pieces) in lamps {
         let directives = world.materials.get(material as usize);
-        let said = directives.and_then(|m| m.resolved.definition().light.backsplash);
-        let (percent, distance) = said.unwrap_or(USUAL);
+        let backsplash = directives.and_then(|m| m.resolved.definition().light.backsplash);
+        let (percent, distance) = backsplash.unwrap_or(USUAL);
         if !(percent > 0.0 && percent.is_finite() && distance.is_finite()) {
             continue;
         }
@@ -138,11 +138,11 @@ pub(super) fn columns(
     splashes: &[Splashes],
     lamps: &[Column],
 ) -> Vec<Column> {
-    let spread = Spread::new(samples);
+    let soa = SampleSoa::new(samples);
     let column = |(index, splash): (u32, &Splashes)| {
         let of_point = |_, &(lamp, power): &(Lamp, f32)| {
             let bsp = &world.bsp;
-            let rows = point_rows(bsp, occluders, &spread, lamp, None, f32::INFINITY);
+            let rows = point_rows(bsp, occluders, &soa, lamp, None, f32::INFINITY);
             rows.into_iter().map(|(i, a)| (i, a * power)).collect()
         };
         let rows: Vec<Vec<(u32, f32)>> = parallel::map(&splash.points, of_point);
@@ -155,7 +155,7 @@ pub(super) fn columns(
         Column {
             source: Source::Splash(index),
             rows: sums(&pieces),
-            pieces: match world.light_end > 0.0 {
+            pieces: match world.light_cutoff > 0.0 {
                 true => pieces,
                 false => Vec::new(),
             },

@@ -5,10 +5,10 @@
 //! main light. Styles of equal strength are fitted together: scripts do not name the style of a stage. The gamma and the end
 //! of lights are those found for the main light. The placed lights follow the wave of their style.
 
-use super::Asked;
+use super::Acceptance;
 use super::compiler::Compiler;
-use super::memory::Memory;
-use super::{CalibrationOptions, Purpose, Solution, apply, cache, find};
+use super::trace_cache::TraceCache;
+use super::{CalibrationOptions, FitMode, Solution, apply, cache, find};
 use crate::emitters::Evidence;
 use crate::light::{self, PointLight, Pulse};
 use crate::overbright::MAP_OVERBRIGHT_BITS;
@@ -61,10 +61,10 @@ fn lights_of(
 ) -> Vec<PointLight> {
     let lighting = world.lighting();
     let grid = std::mem::take(&mut world.bsp.light_grid);
-    let layer = Layer::put(world, strength);
-    put_out(world);
+    let layer = Layer::install(world, strength);
+    remove_lights(world);
     let solution = solve(world, options, number);
-    layer.take_back(world);
+    layer.restore(world);
     world.bsp.light_grid = grid;
     world.set_lighting(lighting);
     let placed = solution.filter(|s| s.report.evidence == Evidence::Lightmaps);
@@ -76,7 +76,7 @@ fn lights_of(
 }
 
 /// Leaves a world without any known light.
-fn put_out(world: &mut RelitWorld) {
+fn remove_lights(world: &mut RelitWorld) {
     world.lights.clear();
     world.triangle_lights.fill(NO_LIGHT);
     for surface in &mut world.surfaces {
@@ -105,20 +105,20 @@ fn solve(world: &mut RelitWorld, options: &CalibrationOptions, number: usize) ->
         splashes: false,
         ..compiler
     };
-    let asked = Asked {
+    let acceptance = Acceptance {
         stops: f32::INFINITY,
-        pace: &[],
+        round_limits: &[],
         splashes: &Cell::new(false),
     };
-    let mut memory = Memory::default();
-    let purpose = Purpose::Enough(asked);
+    let mut traced = TraceCache::default();
+    let mode = FitMode::Full(acceptance);
     let solution = find(
         world,
         &[],
         options,
         compiler,
-        purpose,
-        &mut memory,
+        mode,
+        &mut traced,
         &mut |_| (),
     )?;
     if let Some((cache, key)) = key
@@ -139,7 +139,7 @@ struct Layer {
 
 impl Layer {
     /// Puts all light of a strength in the place of the main light, texel by texel; where there is none pages are black.
-    fn put(world: &mut RelitWorld, strength: StyleStrength) -> Layer {
+    fn install(world: &mut RelitWorld, strength: StyleStrength) -> Layer {
         let own = world.bsp.lightmaps.len();
         let layer = Layer {
             pages: world.surfaces.iter().map(|s| s.light_page).collect(),
@@ -176,7 +176,7 @@ impl Layer {
     }
 
     /// Puts the main light back.
-    fn take_back(self, world: &mut RelitWorld) {
+    fn restore(self, world: &mut RelitWorld) {
         for (surface, page) in world.surfaces.iter_mut().zip(self.pages) {
             surface.light_page = page;
         }

@@ -16,7 +16,7 @@ use support::parallel;
 const DIRECTIONS: u32 = 320;
 
 /// Samples that directions are judged by at first.
-const JUDGES: usize = 1600;
+const SUBSET: usize = 1600;
 
 /// Squared error (samples that are off by a factor e) that a sun must take away for each sample used for fitting.
 const WORTH: f32 = 0.004;
@@ -35,7 +35,7 @@ pub(super) fn find(
     columns: &mut Vec<Column>,
     ambient: &mut Ambient,
     effort: Effort,
-    least: f32,
+    cutoff: f32,
 ) {
     let worthwhile = WORTH * samples.iter().filter(|s| !s.held_out).count() as f32;
     let state = residual(samples, columns, ambient.value);
@@ -43,11 +43,11 @@ pub(super) fn find(
     if columns.iter().any(|c| shines(&c)) {
         return;
     }
-    let judges = thinned(samples);
-    let Some(first) = best_of(occluders, samples, &judges, &state) else {
+    let subset = fitted_subset(samples);
+    let Some(first) = best_direction(occluders, samples, &subset, &state) else {
         return;
     };
-    let mut direction = turned(occluders, samples, &judges, &state, first);
+    let mut direction = refine(occluders, samples, &subset, &state, first);
     let known = columns.len();
     // All else gives way to what is found; then the direction can be told better.
     for turns in [2, 1, 0] {
@@ -60,13 +60,13 @@ pub(super) fn find(
             limit: Vec3::INFINITY,
             prior: None,
         });
-        let mut state = solve(samples, columns, ambient, effort, least);
+        let mut state = solve(samples, columns, ambient, effort, cutoff);
         let Some(sun) = columns.last() else {
             return;
         };
         if worth(sun, &state) < worthwhile {
             columns.truncate(known);
-            solve(samples, columns, ambient, effort, least);
+            solve(samples, columns, ambient, effort, cutoff);
             return;
         }
         if turns == 0 {
@@ -77,7 +77,7 @@ pub(super) fn find(
                 *rest += sun.strength * a;
             }
         }
-        direction = turned(occluders, samples, &judges, &state, direction);
+        direction = refine(occluders, samples, &subset, &state, direction);
     }
 }
 
@@ -87,29 +87,29 @@ fn worth(column: &Column, state: &Residual) -> f32 {
 }
 
 /// Samples used for fitting, evenly thinned.
-fn thinned(samples: &[Sample]) -> Vec<u32> {
+fn fitted_subset(samples: &[Sample]) -> Vec<u32> {
     let all: Vec<u32> = (0u32..)
         .zip(samples)
         .filter(|(_, s)| !s.held_out)
         .map(|(i, _)| i)
         .collect();
-    let count = all.len().min(JUDGES);
+    let count = all.len().min(SUBSET);
     (0..count)
         .filter_map(|k| all.get(k * all.len() / count.max(1)).copied())
         .collect()
 }
 
 /// Error that a sun of the best strength takes away at some samples.
-fn gain(
+fn explained_error(
     occluders: &Occluders,
     samples: &[Sample],
-    judges: &[u32],
+    subset: &[u32],
     state: &Residual,
     direction: Vec3,
 ) -> f32 {
     let mut gradient = Vec3::ZERO;
     let mut norm = 0.0;
-    for &i in judges {
+    for &i in subset {
         let at = i as usize;
         let (Some(sample), Some(rest), Some(&weight)) =
             (samples.get(at), state.rest.get(at), state.weights.get(at))
@@ -132,10 +132,10 @@ fn gain(
 }
 
 /// The best of directions spread over the upper half of the sphere; `None` when none explains anything.
-fn best_of(
+fn best_direction(
     occluders: &Occluders,
     samples: &[Sample],
-    judges: &[u32],
+    subset: &[u32],
     state: &Residual,
 ) -> Option<Vec3> {
     // A spiral with equal steps of height spreads points evenly over a sphere.
@@ -148,10 +148,10 @@ fn best_of(
             Vec3::new(radius * cos, radius * sin, z)
         })
         .collect();
-    let gains = parallel::map(&directions, |_, &d| {
-        gain(occluders, samples, judges, state, d)
+    let explained = parallel::map(&directions, |_, &d| {
+        explained_error(occluders, samples, subset, state, d)
     });
-    let best = gains
+    let best = explained
         .into_iter()
         .zip(directions)
         .max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -159,21 +159,26 @@ fn best_of(
 }
 
 /// A direction turned to where a sun explains most.
-fn turned(
+fn refine(
     occluders: &Occluders,
     samples: &[Sample],
-    judges: &[u32],
+    subset: &[u32],
     state: &Residual,
     first: Vec3,
 ) -> Vec3 {
-    let mut best = (gain(occluders, samples, judges, state, first), first);
+    let mut best = (
+        explained_error(occluders, samples, subset, state, first),
+        first,
+    );
     for turn in TURNS {
         for _ in 0..4 {
             let (u, v) = best.1.any_orthonormal_pair();
             let around = [u, -u, v, -v, u + v, u - v, -u + v, -u - v]
                 .map(|d| (best.1 + d.normalize_or_zero() * turn).normalize_or(best.1));
-            let gains = parallel::map(&around, |_, &d| gain(occluders, samples, judges, state, d));
-            let found = gains
+            let explained = parallel::map(&around, |_, &d| {
+                explained_error(occluders, samples, subset, state, d)
+            });
+            let found = explained
                 .into_iter()
                 .zip(around)
                 .filter(|(_, d)| d.z >= LOWEST)

@@ -1,17 +1,17 @@
-mod beside;
 mod colour;
-mod ends;
-mod fronts;
-mod grid;
+mod compiler_command_line;
+mod cutoff;
 mod held_out;
+mod hypotheses;
 mod known_truth;
+mod light_grid;
 mod linear;
-mod memory;
-mod more;
+mod near_light;
 mod passed;
-mod said;
+mod residual_candidates;
 mod splash;
 mod styles;
+mod trace_cache;
 
 use super::*;
 use crate::files::{MemoryFiles, SearchPath};
@@ -222,8 +222,8 @@ fn from_hidden(at: Vec3, normal: Vec3) -> Vec3 {
 }
 
 /// So many measurements.
-fn taking(count: usize) -> Taking {
-    Taking {
+fn sampling(count: usize) -> SamplingOptions {
+    SamplingOptions {
         count,
         seed: 1,
         ..Default::default()
@@ -284,7 +284,7 @@ fn bounced_light_in_an_even_room_is_albedo_times_light() {
         material.albedo = albedo;
     }
     let occluders = Occluders::of_world(&world);
-    let (samples, evidence) = samples::take(&world, &occluders, &taking(500));
+    let (samples, evidence) = samples::take(&world, &occluders, &sampling(500));
     assert_eq!(evidence, Evidence::Lightmaps);
     assert!(samples.len() > 400);
     let direct: Vec<Vec3> = samples.iter().map(|s| s.value).collect();

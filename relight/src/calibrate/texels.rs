@@ -1,6 +1,8 @@
 //! Texels of lightmaps as measurements: where in space they lie, and what they store.
 
-use super::samples::{Gauge, HELD_OUT, Sample, decode, is_held_out, sample_at, shown, tells};
+use super::samples::{
+    HELD_OUT, Sample, SampleContext, decode, is_held_out, is_measurable, sample_at, shown,
+};
 use crate::overbright::MAP_OVERBRIGHT_BITS;
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
 use glam::{Vec2, Vec3};
@@ -20,7 +22,7 @@ const MOSTLY_BLACK: f32 = 0.5;
 const BLACK_THINNED: f32 = 3.0;
 
 /// Texels that tell how many are black.
-const LOOKS: usize = 2000;
+const BLACK_PROBES: usize = 2000;
 
 /// Points tried in each stratum before it is given up.
 const TRIES: usize = 8;
@@ -122,32 +124,36 @@ fn dark(rgb: [u8; 3]) -> bool {
 /// and the seed alone, so that no other choice of measurements fits one of them. `few_black`: of those that are fitted, fewer
 /// are black where most of the map is.
 pub(super) fn take(
-    gauge: &Gauge<'_>,
+    context: &SampleContext<'_>,
     count: usize,
     few_black: bool,
     random: &mut Random,
 ) -> Vec<Sample> {
-    let mut shares = Shares::new(gauge.world, count);
-    let black = if few_black { shares.part_black() } else { 0.0 };
+    let mut density_map = SampleDensity::new(context.world, count);
+    let black = if few_black {
+        density_map.part_black()
+    } else {
+        0.0
+    };
     let thinned = black > MOSTLY_BLACK;
     if thinned {
         let fitted = 1.0 - 1.0 / HELD_OUT as f32;
         let measured = 1.0 - black * fitted * (1.0 - 1.0 / BLACK_THINNED);
-        shares = Shares::new(gauge.world, (count as f32 / measured) as usize);
+        density_map = SampleDensity::new(context.world, (count as f32 / measured) as usize);
     }
-    let strata = shares.total() as usize;
+    let strata = density_map.total() as usize;
     let mut samples = Vec::with_capacity(strata);
     let mut taken = HashSet::new();
     for stratum in 0..strata {
         for _ in 0..TRIES {
             let at = (stratum as f64 + f64::from(random.uniform())) / strata as f64;
-            let Some(found) = shares.texel_at(at, random) else {
+            let Some(found) = density_map.texel_at(at, random) else {
                 continue;
             };
             if !taken.insert(found.id) {
                 continue;
             }
-            if let Some(sample) = found.sample(gauge) {
+            if let Some(sample) = found.sample(context) {
                 samples.push(sample);
                 break;
             }
@@ -157,7 +163,7 @@ pub(super) fn take(
         let dark = |s: &Sample| s.value == Vec3::ZERO;
         samples.retain(|s| s.held_out || !dark(s) || random.uniform() * BLACK_THINNED < 1.0);
     }
-    parallel::each(&mut samples, |sample| gauge.clean(sample));
+    parallel::each(&mut samples, |sample| context.remove_dirt(sample));
     samples
 }
 
@@ -175,35 +181,35 @@ pub(super) struct Texel {
 
 impl Texel {
     /// What it tells; `None` where nothing can be measured.
-    pub fn measured(self, gauge: &Gauge<'_>) -> Option<Sample> {
-        let mut sample = self.sample(gauge)?;
-        gauge.clean(&mut sample);
+    pub fn measured(self, context: &SampleContext<'_>) -> Option<Sample> {
+        let mut sample = self.sample(context)?;
+        context.remove_dirt(&mut sample);
         Some(sample)
     }
 
     /// The same, yet to be cleaned.
-    fn sample(self, gauge: &Gauge<'_>) -> Option<Sample> {
-        let mut sample = sample_at(gauge, self.place, self.material, self.stored)?;
-        sample.held_out = is_held_out(gauge.seed, &self.id);
+    fn sample(self, context: &SampleContext<'_>) -> Option<Sample> {
+        let mut sample = sample_at(context, self.place, self.material, self.stored)?;
+        sample.held_out = is_held_out(context.seed, &self.id);
         Some(sample)
     }
 }
 
 /// How many measurements each triangle gets whose texels tell of light: by area, but no more than it has texels. Else what
 /// lies far around a map, in texels as large as rooms, would take the place of the map's own.
-struct Shares<'a> {
+struct SampleDensity<'a> {
     world: &'a RelitWorld,
     /// Measurements up to the end of a triangle, the triangle, its surface.
     triangles: Vec<(f64, usize, &'a WorldSurface)>,
 }
 
-impl<'a> Shares<'a> {
+impl<'a> SampleDensity<'a> {
     /// Shares of about `count` measurements.
-    fn new(world: &'a RelitWorld, count: usize) -> Shares<'a> {
+    fn new(world: &'a RelitWorld, count: usize) -> SampleDensity<'a> {
         let mut sizes = Vec::new();
         let mut triangles = Vec::new();
         for (index, surface) in world.surfaces.iter().enumerate() {
-            if !lit_by_texel(surface) || !tells(world, surface) || !constant(world, index) {
+            if !lit_by_texel(surface) || !is_measurable(world, surface) || !constant(world, index) {
                 continue;
             }
             let page = usize::try_from(surface.light_page).ok();
@@ -231,7 +237,7 @@ impl<'a> Shares<'a> {
             end += (area * density).min(texels);
             (end, triangle, surface)
         });
-        Shares {
+        SampleDensity {
             world,
             triangles: triangles.collect(),
         }
@@ -253,15 +259,15 @@ impl<'a> Shares<'a> {
     /// The part of texels that is black.
     fn part_black(&self) -> f32 {
         let mut random = Random::new(0xB1AC);
-        let (mut looks, mut blacks) = (0.0f32, 0.0);
-        for k in 0..LOOKS {
-            let part = (k as f64 + 0.5) / LOOKS as f64;
+        let (mut probes, mut blacks) = (0.0f32, 0.0);
+        for k in 0..BLACK_PROBES {
+            let part = (k as f64 + 0.5) / BLACK_PROBES as f64;
             if let Some(texel) = self.texel_at(part, &mut random) {
-                looks += 1.0;
+                probes += 1.0;
                 blacks += f32::from(u8::from(dark(texel.stored.rgb)));
             }
         }
-        blacks / looks.max(1.0)
+        blacks / probes.max(1.0)
     }
 }
 
@@ -364,7 +370,7 @@ pub(super) fn texel_on(
 /// Where in its page (0 to 1) a place on a triangle lies; `None` for surfaces that tell of no light.
 fn page_place(world: &RelitWorld, surface: usize, triangle: usize, at: Vec3) -> Option<Vec2> {
     let own = world.surfaces.get(surface)?;
-    if !lit_by_texel(own) || !tells(world, own) || !constant(world, surface) {
+    if !lit_by_texel(own) || !is_measurable(world, own) || !constant(world, surface) {
         return None;
     }
     let [a, b, c] = world.corners(triangle)?;

@@ -1,6 +1,6 @@
 //! Light at the vertices of surfaces that have no lightmap, as measurements.
 
-use super::samples::{Gauge, Sample, pick, sample_at, tells};
+use super::samples::{Sample, SampleContext, is_measurable, pick, sample_at};
 use super::texels::Stored;
 use crate::world::WorldSurface;
 use q3bsp::SurfaceKind;
@@ -17,11 +17,11 @@ pub(super) fn lit(surface: &WorldSurface) -> bool {
 }
 
 /// Lit vertices of surfaces without a page. Each stands for itself, however large its surface is.
-pub(super) fn take(gauge: &Gauge<'_>, count: usize, random: &mut Random) -> Vec<Sample> {
-    let world = gauge.world;
+pub(super) fn take(context: &SampleContext<'_>, count: usize, random: &mut Random) -> Vec<Sample> {
+    let world = context.world;
     let mut all = Vec::new();
     for (index, surface) in world.surfaces.iter().enumerate() {
-        if !lit(surface) || !tells(world, surface) {
+        if !lit(surface) || !is_measurable(world, surface) {
             continue;
         }
         let stored = world.bsp.surfaces.get(index);
@@ -38,8 +38,8 @@ pub(super) fn take(gauge: &Gauge<'_>, count: usize, random: &mut Random) -> Vec<
         .filter_map(|i| all.get(i).copied())
         .collect();
     let found = parallel::map(&chosen, |_, &(place, material, stored)| {
-        let mut sample = sample_at(gauge, place, material, stored)?;
-        gauge.clean(&mut sample);
+        let mut sample = sample_at(context, place, material, stored)?;
+        context.remove_dirt(&mut sample);
         Some(sample)
     });
     found.into_iter().flatten().collect()

@@ -114,7 +114,7 @@ impl TriangleLight {
     }
 
     /// Whether the compiler made a light of it alone, which has an end of its own; all quads of a sprite are one.
-    pub fn ends_alone(&self) -> bool {
+    pub fn has_own_cutoff(&self) -> bool {
         self.triangle != u32::MAX
     }
 

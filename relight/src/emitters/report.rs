@@ -128,8 +128,8 @@ pub struct CalibrationReport {
     /// Gamma that the compiler encoded light with before it stored it: see
     /// [`RelitWorld::stored_gamma`](crate::RelitWorld::stored_gamma).
     pub gamma: f32,
-    /// Whether the map's lights end where they give little: see [`RelitWorld::light_end`](crate::RelitWorld::light_end).
-    pub ends: bool,
+    /// Whether the map's lights end where they give little: see [`RelitWorld::light_cutoff`](crate::RelitWorld::light_cutoff).
+    pub has_cutoff: bool,
     /// Whether the compiler made corners darker (its *dirt*): what it stored is compared with light made as dark.
     pub dirty: bool,
     /// Agreement of the light that directives tell of: direct, ambient and bounced.
@@ -154,7 +154,7 @@ impl Default for CalibrationReport {
             splashes: 0,
             suns: 0,
             gamma: 1.0,
-            ends: false,
+            has_cutoff: false,
             dirty: false,
             before: Agreement::default(),
             after: Agreement::default(),

@@ -117,7 +117,7 @@ fn look(
             continue;
         }
         rays += 1;
-        if !occluders.blocked_again(receiver.position, point, last) {
+        if !occluders.blocked_hinted(receiver.position, point, last) {
             hits += 1;
             arrived += light;
         }

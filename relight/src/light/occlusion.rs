@@ -16,7 +16,7 @@ impl Occlusion {
 
     /// Whether nothing is between two points. `last`: what was in the way of an earlier ray, which is asked first.
     pub fn is_free(&self, from: Vec3, to: Vec3, last: &mut Option<u32>) -> bool {
-        !self.0.blocked_again(from, to, last)
+        !self.0.blocked_hinted(from, to, last)
     }
 
     /// Whether the first thing in a direction is a sky, within what a float can tell.

@@ -252,7 +252,7 @@ impl Occluders {
 
     /// As [`blocked`](Self::blocked) where sky counts; `last` is what stopped an earlier ray: it is asked first, for
     /// rays from about one place to another are often stopped by the same triangle.
-    pub fn blocked_again(&self, from: Vec3, to: Vec3, last: &mut Option<u32>) -> bool {
+    pub fn blocked_hinted(&self, from: Vec3, to: Vec3, last: &mut Option<u32>) -> bool {
         let ray = Ray::new(from, to - from);
         if last.is_some_and(|leaf| self.stops(leaf, &ray, false)) {
             return true;

@@ -120,7 +120,7 @@ fn light_passes_holes() {
             let (above, below) = (Vec3::new(x, 0.3, 1.0), Vec3::new(x, 0.3, -1.0));
             let mut last = Some(0);
             let open = !tree.blocked(above, below, false);
-            assert_eq!(open, !tree.blocked_again(above, below, &mut last));
+            assert_eq!(open, !tree.blocked_hinted(above, below, &mut last));
             open
         };
         assert_eq!(

@@ -26,7 +26,7 @@ pub struct Lighting {
     calibration: Option<CalibrationReport>,
     color_exponent: f32,
     stored_gamma: f32,
-    light_end: f32,
+    light_cutoff: f32,
     exposure: Option<Exposure>,
 }
 
@@ -48,7 +48,7 @@ impl RelitWorld {
             calibration: self.calibration.clone(),
             color_exponent: self.color_exponent,
             stored_gamma: self.stored_gamma,
-            light_end: self.light_end,
+            light_cutoff: self.light_cutoff,
             exposure: self.exposure,
         }
     }
@@ -71,7 +71,7 @@ impl RelitWorld {
         self.calibration = lighting.calibration;
         self.color_exponent = lighting.color_exponent;
         self.stored_gamma = lighting.stored_gamma;
-        self.light_end = lighting.light_end;
+        self.light_cutoff = lighting.light_cutoff;
         self.exposure = lighting.exposure;
     }
 }

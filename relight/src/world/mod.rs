@@ -83,7 +83,7 @@ pub struct RelitWorld {
     /// Light, irradiance / π without shadows, that a surface must get from one light to get any: compilers that save time
     /// leave out what adds less than a step of light. 0: lights have no end. Suns and skies have none. Found by
     /// [calibration](crate::calibrate()).
-    pub light_end: f32,
+    pub light_cutoff: f32,
     /// Exposure at which the world's light, on the map's textures, is as bright in the mean as the engine shows the map:
     /// found by [calibration](crate::calibrate()). `None`: see [`display_exposure`](Self::display_exposure).
     pub exposure: Option<Exposure>,

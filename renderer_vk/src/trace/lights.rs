@@ -77,7 +77,7 @@ pub struct MapLightSource<'a> {
     /// Radiance of the even light from everywhere.
     pub ambient: Vec3,
     /// Light, irradiance / π, that a surface must get from one light to get any; 0: lights have no end.
-    pub light_end: f32,
+    pub light_cutoff: f32,
     /// The map's tree; `None`: every point gets the list of all lights.
     pub bsp: Option<&'a Bsp>,
     /// What is in the way of light; `None`: only what the lists know of that is known.
@@ -95,7 +95,7 @@ impl<'a> MapLightSource<'a> {
             flickers: &[],
             model_origins: &[],
             ambient: Vec3::ZERO,
-            light_end: 0.0,
+            light_cutoff: 0.0,
             bsp: None,
             occlusion: None,
         }
@@ -183,7 +183,7 @@ pub(super) fn triangle_bounds(light: &t::TriangleLight) -> t::LightBounds {
 /// For each light the L below which it gives nothing. The compiler made a light of each triangle; of a sprite it made one,
 /// of which each quad ends at its part. Skies have no end.
 fn ends(source: &MapLightSource<'_>) -> Vec<f32> {
-    if source.light_end <= 0.0 {
+    if source.light_cutoff <= 0.0 {
         return vec![0.0; source.triangles.len()];
     }
     let mut areas: HashMap<u32, f32> = HashMap::new();
@@ -194,10 +194,10 @@ fn ends(source: &MapLightSource<'_>) -> Vec<f32> {
         let whole = areas.get(&light.surface).copied().unwrap_or(0.0);
         if light.is_sky || whole <= 0.0 {
             0.0
-        } else if light.ends_alone() {
-            source.light_end
+        } else if light.has_own_cutoff() {
+            source.light_cutoff
         } else {
-            source.light_end * light.area() / whole
+            source.light_cutoff * light.area() / whole
         }
     };
     source.triangles.iter().map(part).collect()
@@ -278,7 +278,7 @@ impl MapLights {
             }
         }
         let spheres: Vec<t::SphereLight> = (source.points.iter())
-            .map(|light| point_light(light, source.light_end))
+            .map(|light| point_light(light, source.light_cutoff))
             .collect();
         let suns: Vec<t::SunLight> = source
             .suns

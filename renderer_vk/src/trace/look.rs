@@ -165,7 +165,7 @@ impl TraceLook {
             flickers: &flickers,
             model_origins: &model_origins,
             ambient: relit.ambient,
-            light_end: relit.light_end,
+            light_cutoff: relit.light_cutoff,
             bsp: Some(&relit.bsp),
             occlusion: Some(&occlusion),
         };

@@ -21,11 +21,11 @@ fn coarse(side: u32, first: u32) -> RelitWorld {
 
 fn taken(world: &RelitWorld, count: usize, seed: u64) -> Vec<Sample> {
     let occluders = Occluders::of_world(world);
-    let taking = Taking {
+    let sampling = SamplingOptions {
         seed,
-        ..taking(count)
+        ..sampling(count)
     };
-    let (samples, evidence) = samples::take(world, &occluders, &taking);
+    let (samples, evidence) = samples::take(world, &occluders, &sampling);
     assert_eq!(evidence, Evidence::Lightmaps);
     samples
 }

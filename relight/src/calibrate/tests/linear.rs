@@ -57,6 +57,6 @@ fn lights_that_end_are_looked_for_where_others_leave_more_than_half() {
     println!("{report:?}");
     assert!(report.before.median_stops < 0.25, "{report:?}");
     assert!(report.after.median_stops < 0.02, "{report:?}");
-    let ends = |light: &PointLight| matches!(light.falloff, Falloff::Linear { .. });
-    assert!(world.point_lights.iter().all(ends), "{report:?}");
+    let has_cutoff = |light: &PointLight| matches!(light.falloff, Falloff::Linear { .. });
+    assert!(world.point_lights.iter().all(has_cutoff), "{report:?}");
 }

@@ -92,8 +92,8 @@ fn splashes_are_no_entities_that_were_found() {
 fn what_nothing_explains_is_measured_twice_and_progress_never_falls() {
     // No light is like that: each texel by chance.
     let noise = |at: Vec3, _: Vec3| {
-        let lot = support::random::lot(3, &at.to_array().map(f32::to_bits));
-        Vec3::splat(4.0 * 0.01f32.powf(lot))
+        let hashed_uniform = support::random::hashed_uniform(3, &at.to_array().map(f32::to_bits));
+        Vec3::splat(4.0 * 0.01f32.powf(hashed_uniform))
     };
     let mut world = room(true, Some(&noise));
     let mut told = Vec::new();

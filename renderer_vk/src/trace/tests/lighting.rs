@@ -263,14 +263,14 @@ fn triangles_end_alone_and_quads_together(gpu: &mut Gpu) {
     let whole = brightest(gpu, &scene);
     assert!(whole > 0.1, "a test of nothing: {whole}");
     // more than each of the two gives, and less than both
-    scene.light_end = 0.75 * whole;
+    scene.light_cutoff = 0.75 * whole;
     let together = brightest(gpu, &scene);
     assert!((together / whole - 1.0).abs() < 0.02, "{together} {whole}");
     for (light, triangle) in scene.lights.iter_mut().zip(0..) {
         light.triangle = triangle;
     }
     assert_eq!(brightest(gpu, &scene), 0.0);
-    scene.light_end = 0.25 * whole;
+    scene.light_cutoff = 0.25 * whole;
     let alone = brightest(gpu, &scene);
     assert!((alone / whole - 1.0).abs() < 0.02, "{alone} {whole}");
 }
@@ -298,7 +298,7 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
     // where it gives too little it gives nothing; at the edge its size and the pixels' blur that
     let full = |p: Vec3| 7000.0 * falloff(p) / std::f32::consts::PI;
     let end = full(Vec3::new(at.x + 20.0, at.y, 0.0));
-    scene.light_end = end;
+    scene.light_cutoff = end;
     let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::Resampled), 32);
     let (mut dark, mut lit) = (0, 0);
     for (i, pixel) in pixels.iter().enumerate() {
@@ -316,7 +316,7 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
         }
     }
     assert!(dark > 20 && lit > 5, "{dark} {lit}");
-    scene.light_end = 0.0;
+    scene.light_cutoff = 0.0;
     // a linear one: E = 8 I / R² (cos - d / R)
     let linear = relight::light::Falloff::Linear { reach: 160.0 };
     scene.points[0].falloff = linear;

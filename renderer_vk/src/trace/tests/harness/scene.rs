@@ -31,7 +31,7 @@ pub struct Scene {
     pub points: Vec<PointLight>,
     pub suns: Vec<SunLight>,
     pub ambient: Vec3,
-    pub light_end: f32,
+    pub light_cutoff: f32,
     pub fogs: Vec<Fog>,
     /// Boxes around what colours light.
     pub filters: Vec<[Vec3; 2]>,
@@ -69,7 +69,7 @@ impl Scene {
             points: Vec::new(),
             suns: Vec::new(),
             ambient: Vec3::ZERO,
-            light_end: 0.0,
+            light_cutoff: 0.0,
             fogs: Vec::new(),
             filters: Vec::new(),
             instances: vec![Instance {
@@ -294,7 +294,7 @@ impl Scene {
             flickers: &[],
             model_origins: &[],
             ambient: self.ambient,
-            light_end: self.light_end,
+            light_cutoff: self.light_cutoff,
             bsp: self.tree.as_ref().map(|t| &t.0),
             occlusion: None,
         };

@@ -22,19 +22,19 @@ const FARTHEST: f32 = 1.0e6;
 const LEAST_PART: f32 = 1.0 / 1500.0;
 
 /// Nodes that are looked at for each candidate, about, at most: so much work for maps of any size.
-const LOOKED_AT: f32 = 60.0;
+const NODES_PER_CANDIDATE: f32 = 60.0;
 
 /// The part of space that a map's measurements tell of.
-pub(super) struct Measured {
+pub(super) struct MeasuredSpace {
     /// Blocks, in order.
     blocks: Vec<IVec3>,
     mins: Vec3,
     maxs: Vec3,
 }
 
-impl Measured {
+impl MeasuredSpace {
     /// Where these are.
-    pub fn new(samples: &[Sample]) -> Measured {
+    pub fn new(samples: &[Sample]) -> MeasuredSpace {
         let mut counts: HashMap<IVec3, f32> = HashMap::new();
         let (mut mins, mut maxs) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let near = |s: &&Sample| s.position.abs().max_element() < FARTHEST;
@@ -55,7 +55,7 @@ impl Measured {
             .map(|(block, _)| block)
             .collect();
         blocks.sort_by_key(IVec3::to_array);
-        Measured { blocks, mins, maxs }
+        MeasuredSpace { blocks, mins, maxs }
     }
 
     /// Whether measurements are near a place.
@@ -76,7 +76,9 @@ impl Measured {
         let most = most.max(1);
         // A first guess from the volume, then what is open decides.
         let volume = self.blocks.len() as f32 * BLOCK.powi(3);
-        let mut spacing = (volume / (LOOKED_AT * most as f32)).cbrt().max(SPACING);
+        let mut spacing = (volume / (NODES_PER_CANDIDATE * most as f32))
+            .cbrt()
+            .max(SPACING);
         loop {
             let mut places = self.nodes(spacing);
             places.retain(|&at| world.bsp.cluster_at(at) >= 0);
@@ -124,7 +126,7 @@ mod tests {
         let on_floor = (0..1600).map(|k| Vec3::new((k % 40) as f32, (k / 40) as f32, 0.0) * 16.0);
         let far = [-9000.0, 9000.0, -3.0e38, 3.0e38].map(Vec3::splat);
         let samples: Vec<_> = on_floor.chain(far).map(sample_at_place).collect();
-        let measured = Measured::new(&samples);
+        let measured = MeasuredSpace::new(&samples);
         assert!(measured.holds(Vec3::new(320.0, 320.0, 100.0)));
         assert!(!measured.holds(far[0]) && !measured.holds(Vec3::new(3000.0, 3000.0, 0.0)));
         let nodes = measured.nodes(64.0);

@@ -25,8 +25,8 @@ fn lights_that_the_compiler_cut_off_end_there() {
     let mut world = room(false, Some(&from_ending));
     let report = calibrate(&mut world, &small());
     println!("{report:?}");
-    assert!(report.ends && report.gamma == 1.0, "{report:?}");
-    assert!((world.light_end - END).abs() < 1e-6);
+    assert!(report.has_cutoff && report.gamma == 1.0, "{report:?}");
+    assert!((world.light_cutoff - END).abs() < 1e-6);
     // Weak light is a few steps, which are rounded.
     assert!(report.after.median_stops < 0.1, "{report:?}");
     let hidden = HIDDEN.map(|(origin, intensity)| PointLight {
@@ -58,5 +58,8 @@ fn lights_that_the_compiler_cut_off_end_there() {
 fn lights_that_have_no_end_get_none() {
     let mut world = room(false, Some(&from_hidden));
     let report = calibrate(&mut world, &small());
-    assert!(!report.ends && world.light_end == 0.0, "{report:?}");
+    assert!(
+        !report.has_cutoff && world.light_cutoff == 0.0,
+        "{report:?}"
+    );
 }

@@ -5,7 +5,7 @@
 //! whose light is as bright as the distances say, vote for the middle between the ways; places with many votes whose voters
 //! see them are candidates.
 
-use super::air::AirPoint;
+use super::light_grid::LitGridPoint;
 use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::{IVec3, Vec3};
@@ -16,16 +16,16 @@ use support::parallel;
 const NEIGHBOURS: f32 = 2.0;
 
 /// Least sine of the angle between two ways that tell where they meet.
-const APART: f32 = 0.08;
+const MIN_SINE: f32 = 0.08;
 
 /// How near two ways must come to each other, id units, and as a part of the longer one: directions are bytes.
 const MISS: (f32, f32) = (6.0, 0.03);
 
 /// Ways that are believed, id units.
-const WAY: (f32, f32) = (16.0, 1024.0);
+const RAY_LENGTH: (f32, f32) = (16.0, 1024.0);
 
 /// How unlike an inverse square the light of two points may be: a factor.
-const UNLIKE: f32 = 1.6;
+const MAX_INTENSITY_RATIO: f32 = 1.6;
 
 /// Side of the cells that votes are counted in, id units.
 const CELL: f32 = 24.0;
@@ -34,11 +34,11 @@ const CELL: f32 = 24.0;
 const VOTES: usize = 4;
 
 /// Votes of a candidate that are asked whether they see it.
-const ASKED: usize = 16;
+const SAMPLED_VOTES: usize = 16;
 
 /// How far apart the middle half of what points tell of a light's intensity may lie, a factor: light from far away is
 /// the same at all of them, and then what they tell is not.
-const TOLD: f32 = 1.5;
+const MAX_INTENSITY_SPREAD: f32 = 1.5;
 
 /// A place that ways meet at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,7 +60,7 @@ fn middle(votes: &[Vote]) -> Vec3 {
 /// The places with most votes, best first, at most `most`.
 pub(super) fn find(
     world: &RelitWorld,
-    points: &[AirPoint],
+    points: &[LitGridPoint],
     occluders: &Occluders,
     most: usize,
 ) -> Vec<Crossing> {
@@ -70,7 +70,7 @@ pub(super) fn find(
 
 /// [`find`] for points of a grid of some spacing, id units.
 fn triangulate(
-    points: &[AirPoint],
+    points: &[LitGridPoint],
     spacing: Vec3,
     occluders: &Occluders,
     most: usize,
@@ -96,7 +96,7 @@ fn triangulate(
                     };
                     let later = near.iter().filter(|&&j| j as usize > i);
                     votes.extend(later.filter_map(|&j| {
-                        let (meeting, weight) = meet(point, points.get(j as usize)?)?;
+                        let (meeting, weight) = meeting_point(point, points.get(j as usize)?)?;
                         Some((meeting, weight, [i as u32, j]))
                     }));
                 }
@@ -136,9 +136,10 @@ fn triangulate(
         if found.iter().any(|f| f.origin.distance(origin) < CELL) {
             continue;
         }
-        let asked = near.len().min(ASKED);
-        let some = (0..asked).filter_map(|k| near.get(k * near.len() / asked.max(1)));
-        let seen = some
+        let sampled_votes = near.len().min(SAMPLED_VOTES);
+        let some =
+            (0..sampled_votes).filter_map(|k| near.get(k * near.len() / sampled_votes.max(1)));
+        let visible = some
             .filter(|(_, _, pair)| {
                 pair.iter().all(|&i| {
                     let point = points.get(i as usize);
@@ -146,48 +147,52 @@ fn triangulate(
                 })
             })
             .count();
-        if seen * 2 < asked || asked == 0 {
+        if visible * 2 < sampled_votes || sampled_votes == 0 {
             continue;
         }
-        let mut told: Vec<Vec3> = near
+        let mut estimates: Vec<Vec3> = near
             .iter()
             .filter_map(|(_, _, [i, _])| points.get(*i as usize))
             .map(|p| intensity(p, origin))
             .collect();
-        told.sort_by(|a, b| a.element_sum().total_cmp(&b.element_sum()));
+        estimates.sort_by(|a, b| a.element_sum().total_cmp(&b.element_sum()));
         let quarter = |k: usize| {
-            told.get(told.len() * k / 4)
+            estimates
+                .get(estimates.len() * k / 4)
                 .map_or(0.0, |t| t.element_sum())
         };
-        if quarter(3) > quarter(1) * TOLD {
+        if quarter(3) > quarter(1) * MAX_INTENSITY_SPREAD {
             continue;
         }
         found.push(Crossing {
             origin,
-            intensity: told.get(told.len() / 2).copied().unwrap_or(Vec3::ZERO),
+            intensity: estimates
+                .get(estimates.len() / 2)
+                .copied()
+                .unwrap_or(Vec3::ZERO),
         });
     }
     found
 }
 
 /// What a point tells of the intensity of a light at a place.
-fn intensity(point: &AirPoint, origin: Vec3) -> Vec3 {
+fn intensity(point: &LitGridPoint, origin: Vec3) -> Vec3 {
     point.light * (std::f32::consts::PI * point.position.distance_squared(origin))
 }
 
 /// The middle between the ways of two points where they come nearest to each other, if they are of one light.
 /// And what that weighs.
-fn meet(a: &AirPoint, b: &AirPoint) -> Option<(Vec3, f32)> {
+fn meeting_point(a: &LitGridPoint, b: &LitGridPoint) -> Option<(Vec3, f32)> {
     let offset = b.position - a.position;
     let cosine = a.direction.dot(b.direction);
     let squared = 1.0 - cosine * cosine;
-    if squared < APART * APART {
+    if squared < MIN_SINE * MIN_SINE {
         return None;
     }
     let (along_a, along_b) = (offset.dot(a.direction), offset.dot(b.direction));
     let far_a = (along_a - along_b * cosine) / squared;
     let far_b = (along_a * cosine - along_b) / squared;
-    let within = |t: f32| t > WAY.0 && t < WAY.1;
+    let within = |t: f32| t > RAY_LENGTH.0 && t < RAY_LENGTH.1;
     if !within(far_a) || !within(far_b) {
         return None;
     }
@@ -199,9 +204,10 @@ fn meet(a: &AirPoint, b: &AirPoint) -> Option<(Vec3, f32)> {
         return None;
     }
     let middle = (at_a + at_b) * 0.5;
-    let (told_a, told_b) = (intensity(a, middle), intensity(b, middle));
-    let alike = |x: f32, y: f32| x <= y * UNLIKE && y <= x * UNLIKE;
-    alike(told_a.element_sum(), told_b.element_sum()).then_some((middle, (far_a * far_b).recip()))
+    let (intensity_a, intensity_b) = (intensity(a, middle), intensity(b, middle));
+    let alike = |x: f32, y: f32| x <= y * MAX_INTENSITY_RATIO && y <= x * MAX_INTENSITY_RATIO;
+    alike(intensity_a.element_sum(), intensity_b.element_sum())
+        .then_some((middle, (far_a * far_b).recip()))
 }
 
 #[cfg(test)]
@@ -210,7 +216,7 @@ mod tests {
     use std::f32::consts::PI;
 
     /// Points of a grid in the open that point lights of one intensity shine on, and a sun.
-    fn points(lights: &[(Vec3, f32)], sun: f32) -> Vec<AirPoint> {
+    fn points(lights: &[(Vec3, f32)], sun: f32) -> Vec<LitGridPoint> {
         let mut points = Vec::new();
         for k in 0..10 * 10 * 4 {
             let cell = Vec3::new((k % 10) as f32, (k / 10 % 10) as f32, (k / 100) as f32);
@@ -221,19 +227,25 @@ mod tests {
                 let light = intensity / offset.length_squared() / PI;
                 parts.push((offset.normalize(), light));
             }
-            let sum: Vec3 = parts.iter().map(|(way, light)| *way * *light).sum();
+            let sum: Vec3 = parts
+                .iter()
+                .map(|(direction_to, light)| *direction_to * *light)
+                .sum();
             // A byte for each angle.
             let turn = std::f32::consts::TAU / 256.0;
             let byte = |angle: f32| (angle / turn).round() * turn;
-            let way = sum.normalize_or(Vec3::Z);
-            let (down, round) = (byte(way.z.acos()), byte(way.y.atan2(way.x)));
+            let direction_to = sum.normalize_or(Vec3::Z);
+            let (down, round) = (
+                byte(direction_to.z.acos()),
+                byte(direction_to.y.atan2(direction_to.x)),
+            );
             let (out, up) = down.sin_cos();
             let direction = Vec3::new(round.cos() * out, round.sin() * out, up);
             let directed: f32 = parts
                 .iter()
-                .map(|(way, light)| light * way.dot(direction).max(0.0))
+                .map(|(direction_to, light)| light * direction_to.dot(direction).max(0.0))
                 .sum();
-            points.push(AirPoint {
+            points.push(LitGridPoint {
                 position,
                 cluster: 0,
                 direction,
@@ -245,7 +257,7 @@ mod tests {
         points
     }
 
-    fn found(points: &[AirPoint]) -> Vec<Crossing> {
+    fn found(points: &[LitGridPoint]) -> Vec<Crossing> {
         let nothing = Occluders::new(std::iter::empty());
         triangulate(points, Vec3::new(64.0, 64.0, 128.0), &nothing, 100)
     }

@@ -3,9 +3,9 @@
 
 use super::Evidence;
 use super::bounce::Transfer;
-use super::crossings::Crossing;
-use super::place::Candidates;
-use super::samples::{self, Sample, Site, Taking};
+use super::placement::Candidates;
+use super::samples::{self, Sample, SamplingOptions, Site};
+use super::triangulation::Crossing;
 use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
@@ -13,30 +13,30 @@ use std::sync::Arc;
 
 /// What was traced for other ways.
 #[derive(Default)]
-pub(super) struct Memory {
-    taken: Vec<Taken>,
-    seen: Vec<Seen>,
-    tried: Option<(Looked, Arc<Candidates>)>,
+pub(super) struct TraceCache {
+    samples: Vec<CachedSamples>,
+    transfers: Vec<CachedTransfer>,
+    candidates: Option<(CandidateKey, Arc<Candidates>)>,
 }
 
 /// What candidates all over open space, and what they see, depend on.
 #[derive(PartialEq)]
-pub(super) struct Looked {
+pub(super) struct CandidateKey {
     holes: bool,
     measured: Vec<(Vec3, Vec3)>,
     crossings: Vec<Vec3>,
     most: usize,
 }
 
-impl Looked {
+impl CandidateKey {
     /// At most so many candidates for some measurements, and where directions of the light grid meet.
     pub fn of(
         world: &RelitWorld,
         samples: &[Sample],
         crossings: &[Crossing],
         most: usize,
-    ) -> Looked {
-        Looked {
+    ) -> CandidateKey {
+        CandidateKey {
             holes: holes(world),
             measured: samples.iter().map(|s| (s.position, s.normal)).collect(),
             crossings: crossings.iter().map(|c| c.origin).collect(),
@@ -46,8 +46,8 @@ impl Looked {
 }
 
 /// Measurements, and all that they depend on.
-struct Taken {
-    taking: Taking,
+struct CachedSamples {
+    sampling: SamplingOptions,
     gamma: f32,
     holes: bool,
     samples: Vec<Sample>,
@@ -55,7 +55,7 @@ struct Taken {
 }
 
 /// What measurements on surfaces see of each other.
-struct Seen {
+struct CachedTransfer {
     samples: Vec<Sample>,
     bounces: u32,
     holes: bool,
@@ -67,16 +67,16 @@ fn holes(world: &RelitWorld) -> bool {
     world.materials.iter().any(|m| m.holes.is_some())
 }
 
-impl Memory {
+impl TraceCache {
     /// Candidates that were tried for the same.
-    pub fn tried(&self, looked: &Looked) -> Option<Arc<Candidates>> {
-        let (of, tried) = self.tried.as_ref()?;
-        (of == looked).then(|| Arc::clone(tried))
+    pub fn candidates(&self, key: &CandidateKey) -> Option<Arc<Candidates>> {
+        let (of, candidates) = self.candidates.as_ref()?;
+        (of == key).then(|| Arc::clone(candidates))
     }
 
     /// Keeps candidates, the last ones alone: they are much, and ways that look alike mostly follow each other.
-    pub fn keep_tried(&mut self, looked: Looked, tried: Option<Arc<Candidates>>) {
-        self.tried = tried.map(|tried| (looked, tried));
+    pub fn keep_candidates(&mut self, key: CandidateKey, candidates: Option<Arc<Candidates>>) {
+        self.candidates = candidates.map(|candidates| (key, candidates));
     }
 
     /// [`samples::take`].
@@ -84,16 +84,16 @@ impl Memory {
         &mut self,
         world: &RelitWorld,
         occluders: &Occluders,
-        taking: &Taking,
+        sampling: &SamplingOptions,
     ) -> (Vec<Sample>, Evidence) {
         let (gamma, holes) = (world.stored_gamma, holes(world));
-        let same = |t: &&Taken| (&t.taking, t.gamma, t.holes) == (taking, gamma, holes);
-        if let Some(known) = self.taken.iter().find(same) {
-            return (known.samples.clone(), known.evidence);
+        let same = |t: &&CachedSamples| (&t.sampling, t.gamma, t.holes) == (sampling, gamma, holes);
+        if let Some(cached) = self.samples.iter().find(same) {
+            return (cached.samples.clone(), cached.evidence);
         }
-        let (samples, evidence) = samples::take(world, occluders, taking);
-        self.taken.push(Taken {
-            taking: *taking,
+        let (samples, evidence) = samples::take(world, occluders, sampling);
+        self.samples.push(CachedSamples {
+            sampling: *sampling,
             gamma,
             holes,
             samples: samples.clone(),
@@ -115,18 +115,18 @@ impl Memory {
         let surfaces = samples.partition_point(|s| s.site == Site::Surface);
         let (surfaces, air) = samples.split_at(surfaces);
         let place = |s: &Sample| (s.position, s.normal);
-        let same = |seen: &&Seen| {
-            (seen.bounces, seen.holes) == (bounces, holes)
-                && seen
+        let same = |cached: &&CachedTransfer| {
+            (cached.bounces, cached.holes) == (bounces, holes)
+                && cached
                     .samples
                     .iter()
                     .map(place)
                     .eq(surfaces.iter().map(place))
         };
-        let known = self.seen.iter().find(same).map(|s| s.transfer.clone());
-        let mut transfer = known.unwrap_or_else(|| {
+        let cached = self.transfers.iter().find(same).map(|s| s.transfer.clone());
+        let mut transfer = cached.unwrap_or_else(|| {
             let transfer = Transfer::new(world, occluders, surfaces, bounces, &unlisted);
-            self.seen.push(Seen {
+            self.transfers.push(CachedTransfer {
                 samples: surfaces.to_vec(),
                 bounces,
                 holes,

@@ -115,7 +115,7 @@ fn what_is_lit_by_vertex_is_measured_beside_texels() {
     }
     let world = relit(&map.build());
     let occluders = Occluders::of_world(&world);
-    let (samples, evidence) = samples::take(&world, &occluders, &taking(4000));
+    let (samples, evidence) = samples::take(&world, &occluders, &sampling(4000));
     assert_eq!(evidence, Evidence::Lightmaps);
     let on_pane =
         |s: &&samples::Sample| (s.position.z - 40.0).abs() < 2.0 && s.position.x.abs() < 41.0;

@@ -49,7 +49,7 @@ fn views(entities: &[Entity]) -> Vec<View> {
 
 /// What players see where they are set: (measurement, material) for each of many pixels of such pictures that show a
 /// surface which light falls on. Empty for maps without such places.
-pub(super) fn seen(
+pub(super) fn visible_samples(
     world: &RelitWorld,
     occluders: &Occluders,
     samples: &[Sample],

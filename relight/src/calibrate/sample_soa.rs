@@ -18,14 +18,14 @@ struct Group {
 }
 
 /// Measurements, and where they are.
-pub(super) struct Spread<'a> {
+pub(super) struct SampleSoa<'a> {
     pub samples: &'a [Sample],
     groups: Vec<Group>,
 }
 
-impl<'a> Spread<'a> {
+impl<'a> SampleSoa<'a> {
     /// Of these.
-    pub fn new(samples: &'a [Sample]) -> Spread<'a> {
+    pub fn new(samples: &'a [Sample]) -> SampleSoa<'a> {
         let level = |sample: &Sample| match sample.held_out {
             true => f32::INFINITY,
             false => sample.level() + sample.floor,
@@ -41,7 +41,7 @@ impl<'a> Spread<'a> {
                 levels: Vec4::from_array(levels),
             }
         };
-        Spread {
+        SampleSoa {
             samples,
             groups: samples.chunks(WIDE).map(group).collect(),
         }
@@ -51,7 +51,7 @@ impl<'a> Spread<'a> {
     pub fn facing(&self, origin: Vec3, range: f32) -> impl Iterator<Item = (u32, &Sample)> {
         let from = splat(origin);
         let (nearest, farthest) = (Vec4::splat(NEAREST), Vec4::splat(range * range));
-        self.those(move |group| {
+        self.masked(move |group| {
             let offset = simd4::sub(&from, &group.positions);
             let squared = dot(&offset, &offset);
             let lit = dot(&group.normals, &offset).cmpgt(Vec4::ZERO);
@@ -72,7 +72,7 @@ impl<'a> Spread<'a> {
         let (behind, far) = (Vec4::splat(-margin), Vec4::splat(4.0 * margin * margin));
         // Twice as far away as light is moved, half of the way is left at least; and a little for what is rounded.
         let power = Vec4::splat(intensity * 4.001);
-        let near = self.those(move |group| {
+        let near = self.masked(move |group| {
             let offset = simd4::sub(&from, &group.positions);
             let squared = dot(&offset, &offset);
             let before = dot(&offset, &group.normals).cmpgt(behind);
@@ -89,7 +89,7 @@ impl<'a> Spread<'a> {
     }
 
     /// Those that a mask tells of, in order.
-    fn those(&self, mask: impl Fn(&Group) -> u32) -> impl Iterator<Item = (u32, &Sample)> {
+    fn masked(&self, mask: impl Fn(&Group) -> u32) -> impl Iterator<Item = (u32, &Sample)> {
         let groups = self.groups.iter().zip(self.samples.chunks(WIDE));
         let first = (0u32..).step_by(WIDE);
         first
@@ -117,7 +117,7 @@ mod tests {
             sample.normal = (anywhere() - 200.0).normalize();
             sample.held_out = k % 5 == 0;
         }
-        let spread = Spread::new(&samples);
+        let soa = SampleSoa::new(&samples);
         let (mut lit, mut reached) = (0, 0);
         for (margin, intensity) in [(8.0, 900.0), (30.0, 5000.0), (90.0, 20_000.0)] {
             let origin = anywhere();
@@ -127,7 +127,7 @@ mod tests {
             };
             let all = || (0u32..).zip(&samples);
             let wanted: Vec<u32> = all().filter(|(_, s)| facing(s)).map(|(i, _)| i).collect();
-            let found: Vec<u32> = spread.facing(origin, 250.0).map(|(i, _)| i).collect();
+            let found: Vec<u32> = soa.facing(origin, 250.0).map(|(i, _)| i).collect();
             assert_eq!(found, wanted);
             lit += found.len();
             let part = 0.15;
@@ -138,9 +138,7 @@ mod tests {
                 !s.held_out && before && intensity > least * distance * distance
             };
             let wanted: Vec<u32> = all().filter(|(_, s)| within(s)).map(|(i, _)| i).collect();
-            let found: Vec<u32> = spread
-                .within_reach(origin, intensity, margin, part)
-                .collect();
+            let found: Vec<u32> = soa.within_reach(origin, intensity, margin, part).collect();
             assert_eq!(found, wanted);
             reached += found.len();
         }

@@ -21,21 +21,21 @@ const CLEARANCE: f32 = 8.0;
 const MOST: usize = 24_000;
 
 /// One measurement in the air for so many on surfaces.
-const PART: usize = 4;
+const SURFACE_PER_GRID_SAMPLE: usize = 4;
 
 /// How much a measurement in the air tells beside one on a surface: of several lights only the sum, one direction's.
 const TRUST: f32 = 0.3;
 
 /// How far the middle half of what is stored over what is computed may spread for the grid to be believed, a factor:
 /// about as far as in maps whose lights are known.
-const SPREAD: f32 = 2.0;
+const MAX_QUARTILE_RATIO: f32 = 2.0;
 
 /// Stored light too dark to be compared, steps of a byte.
 const DARK: f32 = 4.0;
 
 /// A point of the light grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct AirPoint {
+pub(super) struct LitGridPoint {
     pub position: Vec3,
     /// Visibility cluster that it lies in.
     pub cluster: i32,
@@ -54,7 +54,7 @@ pub(super) fn points(
     world: &RelitWorld,
     occluders: &Occluders,
     wanted: impl Fn(Vec3) -> bool,
-) -> Vec<AirPoint> {
+) -> Vec<LitGridPoint> {
     let Some(layout) = world.bsp.light_grid() else {
         return Vec::new();
     };
@@ -83,7 +83,7 @@ pub(super) fn points(
         {
             return None;
         }
-        Some(AirPoint {
+        Some(LitGridPoint {
             position,
             cluster: world.bsp.cluster_at(position),
             direction,
@@ -98,7 +98,7 @@ pub(super) fn points(
 /// About `count` measurements, evenly out of points.
 pub(super) fn samples(
     world: &RelitWorld,
-    points: &[AirPoint],
+    points: &[LitGridPoint],
     count: usize,
     random: &mut Random,
 ) -> Vec<Sample> {
@@ -106,7 +106,7 @@ pub(super) fn samples(
     pick(points.len(), count, random)
         .filter_map(|i| points.get(i))
         .map(|point| Sample {
-            site: Site::Air,
+            site: Site::LightGrid,
             position: point.position,
             normal: point.direction,
             value: point.light,
@@ -124,14 +124,19 @@ pub(super) fn samples(
 }
 
 /// Measurements in the air beside those on surfaces. None of them tells anything before it is known how strong the
-/// compiler stored light in the air: [`believe`].
-pub(super) fn more_samples(
+/// compiler stored light in the air: [`trust_if_consistent`].
+pub(super) fn additional_samples(
     world: &RelitWorld,
-    points: &[AirPoint],
+    points: &[LitGridPoint],
     options: &CalibrationOptions,
 ) -> Vec<Sample> {
     let mut random = Random::new(options.seed ^ 0xA1);
-    let mut found = samples(world, points, options.samples / PART, &mut random);
+    let mut found = samples(
+        world,
+        points,
+        options.samples / SURFACE_PER_GRID_SAMPLE,
+        &mut random,
+    );
     for sample in &mut found {
         sample.trust = 0.0;
     }
@@ -141,21 +146,25 @@ pub(super) fn more_samples(
 /// Makes measurements in the air count if `direct`, the light that comes straight from lights that explain what is stored
 /// on surfaces, explains them up to a factor, by which stored light is divided. (Compilers scale the grid, and may have
 /// added thrown back light to surfaces alone.) Whether they count now.
-pub(super) fn believe(world: &RelitWorld, samples: &mut [Sample], direct: &[Vec3]) -> bool {
+pub(super) fn trust_if_consistent(
+    world: &RelitWorld,
+    samples: &mut [Sample],
+    direct: &[Vec3],
+) -> bool {
     let dark = light_of(world, DARK);
     let mut ratios: Vec<f32> = samples
         .iter()
         .zip(direct)
-        .filter(|(s, _)| s.site == Site::Air && !s.saturated && s.level() > dark)
+        .filter(|(s, _)| s.site == Site::LightGrid && !s.saturated && s.level() > dark)
         .map(|(s, light)| s.level() / mean(*light).max(dark * 0.1))
         .collect();
     ratios.sort_by(f32::total_cmp);
     let quarter = |k: usize| ratios.get(ratios.len() * k / 4).copied().unwrap_or(0.0);
     let (low, scale, high) = (quarter(1), quarter(2), quarter(3));
-    if !(low > 0.0 && high <= low * SPREAD) {
+    if !(low > 0.0 && high <= low * MAX_QUARTILE_RATIO) {
         return false;
     }
-    for sample in samples.iter_mut().filter(|s| s.site == Site::Air) {
+    for sample in samples.iter_mut().filter(|s| s.site == Site::LightGrid) {
         sample.value /= scale;
     }
     trust(samples, TRUST);
@@ -164,10 +173,10 @@ pub(super) fn believe(world: &RelitWorld, samples: &mut [Sample], direct: &[Vec3
 
 /// Sets how much measurements in the air tell. Whether they told anything before.
 pub(super) fn trust(samples: &mut [Sample], trust: f32) -> bool {
-    let mut told = false;
-    for sample in samples.iter_mut().filter(|s| s.site == Site::Air) {
-        told |= sample.trust > 0.0;
+    let mut was_trusted = false;
+    for sample in samples.iter_mut().filter(|s| s.site == Site::LightGrid) {
+        was_trusted |= sample.trust > 0.0;
         sample.trust = trust;
     }
-    told
+    was_trusted
 }

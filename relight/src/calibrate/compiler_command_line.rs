@@ -28,7 +28,7 @@ pub(super) struct CommandLine {
     /// Gamma that light was encoded with; 1 for none.
     pub gamma: f32,
     /// Whether lights end where they give little.
-    pub ends: bool,
+    pub has_cutoff: bool,
     /// How corners were made darker, if they were.
     pub dirt: Option<Dirt>,
 }
@@ -63,12 +63,12 @@ pub(super) fn command_line(entities: &[Entity]) -> Option<CommandLine> {
     };
     Some(CommandLine {
         gamma: or("-gamma", 1.0).filter(|g| compiler::possible(*g))?,
-        ends: is("-fast") || is("-faster"),
+        has_cutoff: is("-fast") || is("-faster"),
         dirt: match is("-dirty") {
             true => Some(Dirt {
-                depth: or("-dirtdepth", Dirt::USUAL.depth)?,
-                gain: or("-dirtgain", Dirt::USUAL.gain)?,
-                scale: or("-dirtscale", Dirt::USUAL.scale)?,
+                depth: or("-dirtdepth", Dirt::DEFAULT.depth)?,
+                gain: or("-dirtgain", Dirt::DEFAULT.gain)?,
+                scale: or("-dirtscale", Dirt::DEFAULT.scale)?,
             }),
             false => None,
         },
@@ -76,7 +76,7 @@ pub(super) fn command_line(entities: &[Entity]) -> Option<CommandLine> {
 }
 
 /// The dirt of a calibrated map, if it was taken for dirty.
-pub(super) fn believed_dirt(world: &RelitWorld) -> Option<Dirt> {
+pub(super) fn dirt_of_calibrated(world: &RelitWorld) -> Option<Dirt> {
     let report = world.calibration.as_ref()?;
     report.dirty.then(|| dirt(&world.bsp.entities()))
 }
@@ -85,12 +85,12 @@ pub(super) fn believed_dirt(world: &RelitWorld) -> Option<Dirt> {
 pub(super) fn dirt(entities: &[Entity]) -> Dirt {
     command_line(entities)
         .and_then(|line| line.dirt)
-        .unwrap_or(Dirt::USUAL)
+        .unwrap_or(Dirt::DEFAULT)
 }
 
 impl Dirt {
     /// What the compiler does if nothing else is said.
-    pub const USUAL: Dirt = Dirt {
+    pub const DEFAULT: Dirt = Dirt {
         depth: 128.0,
         gain: 1.0,
         scale: 1.0,
@@ -128,22 +128,22 @@ mod tests {
         q3bsp::entities::parse(format!("{{ \"classname\" \"worldspawn\" {pairs} }}").as_bytes()).0
     }
 
-    fn said(line: &str) -> Option<CommandLine> {
+    fn parsed(line: &str) -> Option<CommandLine> {
         command_line(&world(&format!("\"{COMMAND_LINES}\" \"{line}\"")))
     }
 
     #[test]
     fn the_last_computation_of_light_counts() {
         assert_eq!(command_line(&world("")), None);
-        assert_eq!(said("-meta -patchmeta; -vis -fast"), None);
+        assert_eq!(parsed("-meta -patchmeta; -vis -fast"), None);
         let plain = CommandLine {
             gamma: 1.0,
-            ends: false,
+            has_cutoff: false,
             dirt: None,
         };
-        assert_eq!(said("-meta; -vis -fast; -light -bounce 8"), Some(plain));
+        assert_eq!(parsed("-meta; -vis -fast; -light -bounce 8"), Some(plain));
         // A word that is no option is none.
-        assert_eq!(said("-light -dirt"), Some(plain));
+        assert_eq!(parsed("-light -dirt"), Some(plain));
         let line =
             "-vis; -light -gamma 2.2; -light -fast -gamma 1.5 -dirty -dirtdepth 64 -samples 3";
         let dirt = Dirt {
@@ -153,24 +153,24 @@ mod tests {
         };
         let expected = CommandLine {
             gamma: 1.5,
-            ends: true,
+            has_cutoff: true,
             dirt: Some(dirt),
         };
-        assert_eq!(said(line), Some(expected));
+        assert_eq!(parsed(line), Some(expected));
         for wrong in [
             "-light -gamma",
             "-light -gamma x",
             "-light -gamma -1",
             "-light -gamma 1e9",
         ] {
-            assert_eq!(said(wrong), None, "{wrong}");
+            assert_eq!(parsed(wrong), None, "{wrong}");
         }
-        assert_eq!(said("-light -dirty -dirtdepth nan"), None);
+        assert_eq!(parsed("-light -dirty -dirtdepth nan"), None);
     }
 
     #[test]
     fn corners_are_dirty_and_open_ground_is_not() {
-        let dirt = Dirt::USUAL;
+        let dirt = Dirt::DEFAULT;
         // A wall along y at x = 0, as high as rays go.
         let (a, b, c) = (
             Vec3::new(0.0, -999.0, -999.0),

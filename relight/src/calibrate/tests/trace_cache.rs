@@ -10,16 +10,16 @@ fn what_is_remembered_is_what_would_be_traced_again() {
         material.albedo = Vec3::splat(0.5);
     }
     let occluders = Occluders::of_world(&world);
-    let mut memory = Memory::default();
+    let mut traced = TraceCache::default();
     let mut taken = Vec::new();
     for gamma in [1.0, 2.2, 1.0] {
         world.stored_gamma = gamma;
-        let (samples, evidence) = memory.take(&world, &occluders, &taking(300));
-        let anew = samples::take(&world, &occluders, &taking(300));
+        let (samples, evidence) = traced.take(&world, &occluders, &sampling(300));
+        let anew = samples::take(&world, &occluders, &sampling(300));
         assert_eq!((&samples, evidence), (&anew.0, anew.1));
         let light: Vec<Vec3> = samples.iter().map(|s| s.value).collect();
         let bounced = |transfer: bounce::Transfer| transfer.of(&light, false);
-        let known = bounced(memory.transfer(&world, &occluders, &samples, 1, |_| false));
+        let known = bounced(traced.transfer(&world, &occluders, &samples, 1, |_| false));
         let new = bounce::Transfer::new(&world, &occluders, &samples, 1, |_| false);
         assert_eq!(known, bounced(new));
         assert!(known.iter().any(|light| light.max_element() > 0.0));
@@ -28,6 +28,6 @@ fn what_is_remembered_is_what_would_be_traced_again() {
     assert!(taken[0] != taken[1] && taken[0] == taken[2]);
     // Elsewhere something else is seen.
     let elsewhere = &taken[0][..200];
-    let known = memory.transfer(&world, &occluders, elsewhere, 1, |_| false);
+    let known = traced.transfer(&world, &occluders, elsewhere, 1, |_| false);
     assert_eq!(known.of(&vec![Vec3::ONE; 200], false).len(), 200);
 }

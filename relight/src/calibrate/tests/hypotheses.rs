@@ -2,8 +2,8 @@
 
 use super::splash::from_lamp;
 use super::*;
-use crate::calibrate::ways::{HALF, Rival, UNEXPLAINED, Ways};
-use support::random::lot;
+use crate::calibrate::hypotheses::{HALF, Hypotheses, Incumbent, UNEXPLAINED};
+use support::random::hashed_uniform;
 
 /// How far off what any light could explain texels are, stops.
 const NOISE: f32 = 0.2;
@@ -13,7 +13,11 @@ fn noisy() -> RelitWorld {
     let lamp = from_lamp(0.0);
     let light = |at: Vec3, normal: Vec3| {
         let name = at.to_array().map(f32::to_bits);
-        let off = if lot(1, &name) < 0.5 { -NOISE } else { NOISE };
+        let off = if hashed_uniform(1, &name) < 0.5 {
+            -NOISE
+        } else {
+            NOISE
+        };
         lamp(at, normal) * (off.exp2() / splash::FACTOR)
     };
     room(true, Some(&light))
@@ -35,16 +39,18 @@ fn where_directives_are_nearly_right_more_is_measured_and_the_better_is_kept() {
         let mut world = noisy();
         let way = |splashes: bool| Compiler {
             gamma: report.gamma,
-            ends: report.ends,
+            has_cutoff: report.has_cutoff,
             dirt: None,
             splashes,
         };
-        assert!(report.gamma == 1.0 && !report.ends && !report.dirty);
+        assert!(report.gamma == 1.0 && !report.has_cutoff && !report.dirty);
         let nothing = &mut |_| ();
-        let mut ways = Ways::new(&mut world, &[], &options, nothing);
-        let once = ways.with(way(true));
+        let mut hypotheses = Hypotheses::new(&mut world, &[], &options, nothing);
+        let once = hypotheses.with(way(true));
         let (cell, same) = (Cell::new(true), way(once.report.splashes > 0));
-        let more = ways.measured_more(same, None, &cell, &|| 1.0).unwrap();
+        let more = hypotheses
+            .measured_more(same, None, &cell, &|| 1.0)
+            .unwrap();
         assert!(!once.measured_more && more.measured_more);
         assert!(more.report.samples > once.report.samples * 3 / 2);
         let off = [once, more].map(|s| s.report.after.median_stops);
@@ -56,29 +62,30 @@ fn where_directives_are_nearly_right_more_is_measured_and_the_better_is_kept() {
 fn what_falls_behind_a_rival_is_given_up() {
     let mut world = room(false, Some(&from_hidden));
     let (options, nothing) = (small(), &mut |_| ());
-    let mut ways = Ways::new(&mut world, &[], &options, nothing);
+    let mut hypotheses = Hypotheses::new(&mut world, &[], &options, nothing);
     let plain = Compiler {
         gamma: 1.0,
-        ends: false,
+        has_cutoff: false,
         dirt: None,
         splashes: false,
     };
     let cell = Cell::new(false);
-    let mut more = |rival: Option<&Rival>| ways.measured_more(plain, rival, &cell, &|| 1.0);
+    let mut more =
+        |incumbent: Option<&Incumbent>| hypotheses.measured_more(plain, incumbent, &cell, &|| 1.0);
     let found = more(None).unwrap();
     assert!(!found.rounds.is_empty() && found.measured_more);
-    let rival = || {
-        let mut rival = Rival::of(&found);
-        rival.stops *= 1.1;
-        rival
+    let incumbent = || {
+        let mut incumbent = Incumbent::of(&found);
+        incumbent.stops *= 1.1;
+        incumbent
     };
     // it keeps up with itself
-    let again = more(Some(&rival())).unwrap();
+    let again = more(Some(&incumbent())).unwrap();
     assert_eq!(again.rounds, found.rounds);
-    let mut faster = rival();
-    faster.pace[0] = found.rounds[0] * 0.9;
+    let mut faster = incumbent();
+    faster.round_limits[0] = found.rounds[0] * 0.9;
     assert!(more(Some(&faster)).is_none());
-    let mut better = rival();
+    let mut better = incumbent();
     better.stops = found.report.after.median_stops * 0.9;
     assert!(more(Some(&better)).is_none());
 }

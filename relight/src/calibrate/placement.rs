@@ -5,15 +5,15 @@
 //! better place. Then bright samples that are still not explained put candidates in front of themselves, and the same
 //! is done once more.
 
-use super::columns::{Column, Lamp, Source, point_rows, rows_again, unshadowed};
-use super::crossings::Crossing;
-use super::ends::pieces_of;
-use super::fronts::Fronts;
-use super::nodes::Measured;
+use super::candidate_grid::MeasuredSpace;
+use super::columns::{Column, Lamp, Source, point_rows, point_rows_hinted, unshadowed};
+use super::cutoff::pieces_of;
+use super::residual_candidates::ResidualCandidates;
+use super::sample_soa::SampleSoa;
 use super::samples::{self, Sample, mean};
 use super::solve::{Ambient, Effort, Residual, norm, residual, solve};
-use super::spread::Spread;
 use super::texels;
+use super::triangulation::Crossing;
 use crate::light::Falloff;
 use crate::occluders::Occluders;
 use crate::world::RelitWorld;
@@ -31,7 +31,7 @@ pub(super) const RANGE: f32 = 700.0;
 pub(super) const WORTH: f32 = 0.6;
 
 /// Samples that a light is moved by: so many tell where it is.
-const JUDGES: usize = 240;
+const MOVE_SAMPLES: usize = 240;
 
 /// Part of a sample's light that a light must be able to give, to be moved by it.
 const INFLUENCE: f32 = 0.05;
@@ -70,9 +70,9 @@ pub(super) fn lamp(origin: Vec3) -> Lamp {
 pub(super) struct Scene<'a> {
     pub world: &'a RelitWorld,
     pub occluders: &'a Occluders,
-    pub spread: Spread<'a>,
+    pub soa: SampleSoa<'a>,
     /// Where these are.
-    pub measured: &'a Measured,
+    pub measured: &'a MeasuredSpace,
     /// For every triangle, the surface that it is of.
     pub of_triangle: &'a [u32],
     /// Most candidates at a time.
@@ -80,53 +80,57 @@ pub(super) struct Scene<'a> {
     /// Whether lights may fall off linearly, too.
     pub linear: bool,
     /// Light at which lights end.
-    pub least: f32,
+    pub cutoff: f32,
 }
 
 impl Scene<'_> {
     fn rows(&self, lamp: Lamp, range: f32) -> Vec<(u32, f32)> {
         let bsp = &self.world.bsp;
-        point_rows(bsp, self.occluders, &self.spread, lamp, None, range)
+        point_rows(bsp, self.occluders, &self.soa, lamp, None, range)
     }
 
     /// Samples used for fitting that a light of this intensity may matter to when it moves by up to `margin`; evenly
     /// thinned when they are many.
     fn influenced(&self, origin: Vec3, intensity: f32, margin: f32) -> Vec<u32> {
-        let all = (self.spread).within_reach(origin, intensity, margin, INFLUENCE * PI);
+        let all = (self.soa).within_reach(origin, intensity, margin, INFLUENCE * PI);
         let all: Vec<u32> = all.collect();
-        let judges = all.len().min(JUDGES);
-        (0..judges)
-            .filter_map(|k| all.get(k * all.len() / judges.max(1)).copied())
+        let count = all.len().min(MOVE_SAMPLES);
+        (0..count)
+            .filter_map(|k| all.get(k * all.len() / count.max(1)).copied())
             .collect()
     }
 
     /// The most that a light may be, by the light that lightmaps store on the surfaces right beside it. There it
     /// is brightest, and measurements are too sparse to tell of such spots.
     pub(super) fn limit(&self, lamp: Lamp) -> Vec3 {
-        limit_by(&self.beside(lamp.origin), lamp)
+        limit_by(&self.near(lamp.origin), lamp)
     }
 
     /// The surfaces right beside a place.
-    fn beside(&self, origin: Vec3) -> Vec<Beside> {
+    fn near(&self, origin: Vec3) -> Vec<NearSurface> {
         let floor = samples::floor(self.world);
         let corners = (0..8u8).map(|k| {
             let side = |bit: u8| if k & bit == 0 { -1.0 } else { 1.0 };
             Vec3::new(side(1), side(2), side(4)).normalize()
         });
-        let look = |ray: Vec3| {
+        let trace = |ray: Vec3| {
             let hit = self.occluders.nearest(origin, ray, NEAR)?;
             let triangle = hit.tag as usize;
             let surface = self.of_triangle.get(triangle).map(|s| *s as usize);
             let at = origin + ray * hit.t;
             let stored = surface.and_then(|s| texels::stored_at(self.world, s, triangle, at));
             let cosine = -hit.normal.dot(ray);
-            (hit.front && cosine > 0.1).then_some(Beside {
+            (hit.front && cosine > 0.1).then_some(NearSurface {
                 stored: stored? + floor,
                 distance: hit.t,
                 cosine,
             })
         };
-        AROUND.into_iter().chain(corners).filter_map(look).collect()
+        AROUND
+            .into_iter()
+            .chain(corners)
+            .filter_map(trace)
+            .collect()
     }
 
     fn column(&self, lamp: Lamp, rows: Vec<(u32, f32)>, strength: Vec3) -> Column {
@@ -143,7 +147,7 @@ impl Scene<'_> {
     ) -> Column {
         Column {
             source: Source::Placed(lamp),
-            pieces: if self.least > 0.0 {
+            pieces: if self.cutoff > 0.0 {
                 pieces_of(&rows)
             } else {
                 Vec::new()
@@ -170,7 +174,7 @@ impl Scene<'_> {
 }
 
 /// A surface right beside a place.
-struct Beside {
+struct NearSurface {
     /// Light that it stores, and what is too little to tell apart.
     stored: Vec3,
     distance: f32,
@@ -178,15 +182,12 @@ struct Beside {
 }
 
 /// The most that a light may be, by the surfaces beside it.
-fn limit_by(beside: &[Beside], lamp: Lamp) -> Vec3 {
-    let most = |beside: &Beside| {
-        let given = lamp.falloff.irradiance(beside.distance, beside.cosine);
-        (given > 0.0).then(|| beside.stored * (EXCESS * PI / given))
+fn limit_by(near: &[NearSurface], lamp: Lamp) -> Vec3 {
+    let most = |near: &NearSurface| {
+        let given = lamp.falloff.irradiance(near.distance, near.cosine);
+        (given > 0.0).then(|| near.stored * (EXCESS * PI / given))
     };
-    beside
-        .iter()
-        .filter_map(most)
-        .fold(Vec3::INFINITY, Vec3::min)
+    near.iter().filter_map(most).fold(Vec3::INFINITY, Vec3::min)
 }
 
 /// Candidates all over open space.
@@ -198,7 +199,7 @@ pub(super) struct Candidates {
 }
 
 /// Candidates out of a grid over open space, and where directions of the light grid meet.
-pub(super) fn over_space(scene: &Scene<'_>, crossings: &[Crossing]) -> Candidates {
+pub(super) fn over_open_space(scene: &Scene<'_>, crossings: &[Crossing]) -> Candidates {
     let open = |at| scene.open(at);
     let (mut nodes, spacing) = scene.measured.grid(scene.world, scene.candidates, open);
     nodes.extend(
@@ -216,7 +217,7 @@ pub(super) fn over_space(scene: &Scene<'_>, crossings: &[Crossing]) -> Candidate
 }
 
 /// Adds lights out of candidates to `columns`, of which the first `fixed` stay.
-pub(super) fn out_of(
+pub(super) fn place_from_grid(
     scene: &Scene<'_>,
     candidates: &Candidates,
     columns: &mut Vec<Column>,
@@ -226,25 +227,25 @@ pub(super) fn out_of(
     let of = parallel::map(&candidates.places, |_, (at, rows)| {
         scene.column(lamp(*at), rows.clone(), Vec3::ZERO)
     });
-    choose(scene, columns, fixed, ambient, (of, candidates.spacing));
+    select_and_refine(scene, columns, fixed, ambient, (of, candidates.spacing));
 }
 
 /// Adds lights in front of what stays unexplained.
-pub(super) fn in_front(
+pub(super) fn place_at_residuals(
     scene: &Scene<'_>,
-    fronts: &mut Fronts,
+    residual_candidates: &mut ResidualCandidates,
     columns: &mut Vec<Column>,
     fixed: usize,
     ambient: &mut Ambient,
     spacing: f32,
 ) {
-    let state = residual(scene.spread.samples, columns, ambient.value);
-    let candidates = fronts.candidates(scene, &state);
-    choose(scene, columns, fixed, ambient, (candidates, spacing * 0.5));
+    let state = residual(scene.soa.samples, columns, ambient.value);
+    let candidates = residual_candidates.candidates(scene, &state);
+    select_and_refine(scene, columns, fixed, ambient, (candidates, spacing * 0.5));
 }
 
 /// Of candidates and lights placed so far keeps the best, merged, moved and solved anew.
-fn choose(
+fn select_and_refine(
     scene: &Scene<'_>,
     columns: &mut Vec<Column>,
     known: usize,
@@ -259,7 +260,7 @@ fn choose(
         sparsity: 0.5,
         anew: false,
     };
-    let state = solve(scene.spread.samples, columns, ambient, sparse, scene.least);
+    let state = solve(scene.soa.samples, columns, ambient, sparse, scene.cutoff);
     let mut chosen = columns.split_off(placed);
     drop_useless(columns, known, &state, WORTH * 0.25);
     drop_useless(&mut chosen, 0, &state, WORTH * 0.25);
@@ -272,10 +273,10 @@ fn choose(
         sparsity: 0.2,
         anew: false,
     };
-    let mut state = solve(scene.spread.samples, columns, ambient, refit, scene.least);
+    let mut state = solve(scene.soa.samples, columns, ambient, refit, scene.cutoff);
     for step in [0.5, 0.25, 0.125] {
-        look_around(scene, columns, known, &state, spacing * step);
-        state = solve(scene.spread.samples, columns, ambient, refit, scene.least);
+        move_lights(scene, columns, known, &state, spacing * step);
+        state = solve(scene.soa.samples, columns, ambient, refit, scene.cutoff);
         drop_useless(columns, known, &state, WORTH * 0.5);
     }
     let whole = columns.len();
@@ -286,9 +287,9 @@ fn choose(
         sparsity: 0.1,
         anew: false,
     };
-    let state = solve(scene.spread.samples, columns, ambient, settle, scene.least);
+    let state = solve(scene.soa.samples, columns, ambient, settle, scene.cutoff);
     drop_useless(columns, known, &state, WORTH);
-    solve(scene.spread.samples, columns, ambient, settle, scene.least);
+    solve(scene.soa.samples, columns, ambient, settle, scene.cutoff);
 }
 
 /// Removes placed lights without which the error would hardly grow.
@@ -367,7 +368,7 @@ fn reaches() -> impl Iterator<Item = f32> {
 }
 
 /// Moves every placed light by up to two steps to where it would explain more, all others held.
-fn look_around(
+fn move_lights(
     scene: &Scene<'_>,
     columns: &mut [Column],
     known: usize,
@@ -377,7 +378,7 @@ fn look_around(
     let Some(placed) = columns.get_mut(known..) else {
         return;
     };
-    let moved = parallel::map(placed, |_, column| better(scene, column, state, step));
+    let moved = parallel::map(placed, |_, column| best_move(scene, column, state, step));
     for (column, moved) in placed.iter_mut().zip(moved) {
         if let Some(moved) = moved {
             *column = moved;
@@ -385,16 +386,16 @@ fn look_around(
     }
 }
 
-fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Option<Column> {
+fn best_move(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Option<Column> {
     let Source::Placed(start) = column.source else {
         return None;
     };
     let around = scene.influenced(start.origin, mean(column.strength), step * 2.0);
-    let judged: Vec<Sample> = around
+    let affected: Vec<Sample> = around
         .iter()
-        .filter_map(|&i| scene.spread.samples.get(i as usize).copied())
+        .filter_map(|&i| scene.soa.samples.get(i as usize).copied())
         .collect();
-    let near = Spread::new(&judged);
+    let near = SampleSoa::new(&affected);
     // What this light would have to explain: the rest, and what it explains now.
     let mut rows = column.rows.iter().peekable();
     let wanted: Vec<(Vec3, f32)> = around
@@ -413,7 +414,7 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
         })
         .collect();
     // Error taken away by a light at a place with the strength that is best there, and that strength.
-    let worth = |beside: &[Beside], lamp: Lamp, rows: &[(u32, f32)]| {
+    let worth = |near: &[NearSurface], lamp: Lamp, rows: &[(u32, f32)]| {
         let mut gradient = Vec3::ZERO;
         let mut norm = 0.0;
         for &(i, a) in rows {
@@ -423,11 +424,11 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
             }
         }
         if norm > 0.0 {
-            let limit = limit_by(beside, lamp);
+            let limit = limit_by(near, lamp);
             let strength = (gradient / norm).max(Vec3::ZERO).min(limit);
-            if scene.least > 0.0 && strength.max_element() > 0.0 {
+            if scene.cutoff > 0.0 && strength.max_element() > 0.0 {
                 // Again with what such a light would have left.
-                let least = scene.least / strength.max_element();
+                let least = scene.cutoff / strength.max_element();
                 let (mut gradient, mut norm) = (Vec3::ZERO, 0.0);
                 for &(i, a) in rows.iter().filter(|(_, a)| *a > least) {
                     if let Some((wanted, weight)) = wanted.get(i as usize) {
@@ -448,13 +449,13 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
         }
     };
     // What stops light on its way to a sample stops it as well from a place beside.
-    let mut stopped = vec![None; judged.len()];
+    let mut stopped = vec![None; affected.len()];
     let mut seen = |lamp: Lamp| {
         let (bsp, all) = (&scene.world.bsp, (None, f32::INFINITY));
-        rows_again(bsp, scene.occluders, &near, lamp, all, &mut stopped)
+        point_rows_hinted(bsp, scene.occluders, &near, lamp, all, &mut stopped)
     };
-    let mut beside = scene.beside(start.origin);
-    let mut best = (start, worth(&beside, start, &seen(start)));
+    let mut near = scene.near(start.origin);
+    let mut best = (start, worth(&near, start, &seen(start)));
     for _ in 0..2 {
         let from = best.0;
         for direction in AROUND {
@@ -467,10 +468,10 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
                 continue;
             }
             let moved = Lamp { origin: at, ..from };
-            let beside_it = scene.beside(at);
-            let found = worth(&beside_it, moved, &seen(moved));
+            let near_there = scene.near(at);
+            let found = worth(&near_there, moved, &seen(moved));
             if found.0 > best.1.0 * 1.001 {
-                (best, beside) = ((moved, found), beside_it);
+                (best, near) = ((moved, found), near_there);
             }
         }
         if best.0 == from {
@@ -485,9 +486,9 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
         for (falloff, more) in std::iter::once((Falloff::InverseSquare, 1.0)).chain(linear) {
             let kind = Lamp { falloff, ..square };
             let given =
-                |&(i, _): &(u32, f32)| Some((i, unshadowed(judged.get(i as usize)?, kind, None)));
+                |&(i, _): &(u32, f32)| Some((i, unshadowed(affected.get(i as usize)?, kind, None)));
             let rows: Vec<(u32, f32)> = seen.iter().filter_map(given).collect();
-            let found = worth(&beside, kind, &rows);
+            let found = worth(&near, kind, &rows);
             if found.0 > best.1.0 * more {
                 best = (kind, found);
             }
@@ -496,6 +497,6 @@ fn better(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) -> Op
     let (lamp, (_, strength)) = best;
     (lamp != start).then(|| {
         let rows = scene.rows(lamp, f32::INFINITY);
-        scene.limited(lamp, rows, strength, limit_by(&beside, lamp))
+        scene.limited(lamp, rows, strength, limit_by(&near, lamp))
     })
 }

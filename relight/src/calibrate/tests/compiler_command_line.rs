@@ -64,8 +64,8 @@ fn dirty_corners_are_taken_for_dirt() {
     let hidden: Vec3 = HIDDEN.iter().map(|(_, i)| *i).sum();
     assert!((total / hidden - 1.0).abs().max_element() < 0.1, "{total}");
     // Taken for light it is light that is missing.
-    let (clean, _) = found("-meta; -vis; -light -gamma 1");
-    assert!(clean > off * 1.5, "{clean} {off}");
+    let (remove_dirt, _) = found("-meta; -vis; -light -gamma 1");
+    assert!(remove_dirt > off * 1.5, "{remove_dirt} {off}");
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn what_the_map_says_of_its_compiler_is_not_looked_for() {
     let mut world = saying(&[line], &encoded);
     let report = calibrate(&mut world, &small());
     println!("{report:?}");
-    assert_eq!((report.gamma, report.ends), (gamma, false));
+    assert_eq!((report.gamma, report.has_cutoff), (gamma, false));
     assert_eq!(world.stored_gamma, gamma);
     let total: Vec3 = world.point_lights.iter().map(|l| l.intensity).sum();
     let hidden: Vec3 = HIDDEN.iter().map(|(_, i)| *i).sum();
@@ -106,11 +106,11 @@ fn texels_held_out_are_of_all_alike() {
     let world = saying(&[], &near);
     let occluders = Occluders::of_world(&world);
     let take = |few_black| {
-        let taking = Taking {
+        let sampling = SamplingOptions {
             few_black,
-            ..taking(4000)
+            ..sampling(4000)
         };
-        samples::take(&world, &occluders, &taking).0
+        samples::take(&world, &occluders, &sampling).0
     };
     let part_black = |samples: &[samples::Sample], held_out: bool| {
         let chosen = samples.iter().filter(|s| s.held_out == held_out);

@@ -6,12 +6,12 @@
 
 use super::bounce::surfaces_of_triangles;
 use super::columns::{self, Column, Lamp, Source, point_rows, sun_rows};
-use super::ends::pieces_of;
+use super::cutoff::pieces_of;
 use super::fit::Fit;
-use super::samples::{self, Gauge, Sample, Taking};
-use super::spread::Spread;
+use super::sample_soa::SampleSoa;
+use super::samples::{self, Sample, SampleContext, SamplingOptions};
 use super::texels::{self, Texel, TexelId};
-use super::{Purpose, said, splash};
+use super::{FitMode, compiler_command_line, splash};
 use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
@@ -23,7 +23,7 @@ use support::parallel;
 pub(super) const NEAR: f32 = 128.0;
 
 /// Directions from each light that are looked into.
-const LOOKS: usize = 160;
+const RAYS: usize = 160;
 
 /// Texels that lights make so many times as bright as they are join the measurements.
 const EXCESS: f32 = 1.3;
@@ -38,10 +38,10 @@ const TRUST: f32 = 0.3;
 const PART: f32 = 0.05;
 
 /// Directions from each light that [`spots`] looks into.
-const COUNTED: usize = 512;
+const SPOT_RAYS: usize = 512;
 
 /// How many times as bright as it is a texel has to be made to be a spot: a stop.
-const SPOT: f32 = 2.0;
+const SPOT_RATIO: f32 = 2.0;
 
 /// Even directions over the sphere.
 ///
@@ -58,8 +58,8 @@ fn directions(count: usize) -> impl Iterator<Item = Vec3> {
 
 /// Measurements of texels that are seen from a place within [`NEAR`], by about so many rays, each once: of those that are wanted
 /// and tell how bright it is there. What is not is not measured. `measure` gets the triangle, too: surfaces may share a texel.
-pub(super) fn around(
-    gauge: &Gauge<'_>,
+pub(super) fn texels_around(
+    context: &SampleContext<'_>,
     of_triangle: &[u32],
     origin: Vec3,
     rays: usize,
@@ -67,15 +67,15 @@ pub(super) fn around(
     mut measure: impl FnMut(Texel, usize) -> Option<Sample>,
 ) -> Vec<(TexelId, Sample)> {
     let mut taken = HashSet::new();
-    let look = |ray: Vec3| {
-        let hit = gauge.occluders.nearest(origin, ray, NEAR)?;
+    let trace = |ray: Vec3| {
+        let hit = context.occluders.nearest(origin, ray, NEAR)?;
         let triangle = hit.tag as usize;
         let surface = *of_triangle.get(triangle)? as usize;
         if !hit.front || hit.sky {
             return None;
         }
         let at = origin + ray * hit.t;
-        let texel = texels::texel_on(gauge.world, surface, triangle, at)?;
+        let texel = texels::texel_on(context.world, surface, triangle, at)?;
         let (id, stored) = (texel.id, &texel.stored);
         if stored.saturated() || stored.lone_black() || taken.contains(&id) || !wanted(&id) {
             return None;
@@ -84,35 +84,36 @@ pub(super) fn around(
         taken.insert(id);
         Some((id, sample))
     };
-    directions(rays).filter_map(look).collect()
+    directions(rays).filter_map(trace).collect()
 }
 
 impl Fit<'_> {
     /// Lets texels right beside lights that were put in join the measurements where these make them too bright. `fixed`:
     /// how many of the sources were there before. Whether some did.
-    pub fn look_beside(&mut self, fixed: usize) -> bool {
-        if matches!(self.purpose, Purpose::Trial(_)) {
+    pub fn add_near_light_texels(&mut self, fixed: usize) -> bool {
+        if matches!(self.mode, FitMode::Trial(_)) {
             return false;
         }
-        let gauge = Gauge::new(self.world, self.occluders, &self.taking);
+        let context = SampleContext::new(self.world, self.occluders, &self.sampling);
         let placed: Vec<(Lamp, Vec3)> = self.columns.iter().skip(fixed).filter_map(lit).collect();
         let per_light = parallel::map(&placed, |_, &(lamp, _)| {
-            let usable =
-                |id: &TexelId| !samples::is_held_out(gauge.seed, id) && !self.beside.contains(id);
+            let usable = |id: &TexelId| {
+                !samples::is_held_out(context.seed, id) && !self.near_light_texels.contains(id)
+            };
             let mut new = Vec::new();
             let measure = |texel: Texel, triangle| {
                 let key = (texel.id, triangle as u32);
-                let known = self.looked_at.get(&key).copied();
+                let known = self.near_light_measurements.get(&key).copied();
                 known.unwrap_or_else(|| {
-                    let sample = texel.measured(&gauge);
+                    let sample = texel.measured(&context);
                     new.push((key, sample));
                     sample
                 })
             };
             let (of_triangle, origin) = (&self.of_triangle, lamp.origin);
-            let found = around(&gauge, of_triangle, origin, LOOKS, usable, measure);
+            let found = texels_around(&context, of_triangle, origin, RAYS, usable, measure);
             let samples: Vec<Sample> = found.iter().map(|(_, s)| *s).collect();
-            let given = given_by(self.world, self.occluders, &samples, &placed, self.least);
+            let given = light_from(self.world, self.occluders, &samples, &placed, self.cutoff);
             let mut bright: Vec<(f32, TexelId, Sample)> = found
                 .into_iter()
                 .zip(given)
@@ -125,9 +126,9 @@ impl Fit<'_> {
         });
         let mut more = Vec::new();
         for (bright, new) in per_light {
-            self.looked_at.extend(new);
+            self.near_light_measurements.extend(new);
             for (_, id, sample) in bright {
-                if self.beside.insert(id) {
+                if self.near_light_texels.insert(id) {
                     more.push(Sample {
                         trust: TRUST,
                         ..sample
@@ -138,19 +139,19 @@ impl Fit<'_> {
         if more.is_empty() {
             return false;
         }
-        self.join(&more);
+        self.add_samples(&more);
         true
     }
 
     /// Adds measurements to those that sources are fitted to.
-    fn join(&mut self, more: &[Sample]) {
-        let (world, occluders, silent) = (self.world, self.occluders, self.silent);
+    fn add_samples(&mut self, more: &[Sample]) {
+        let (world, occluders, unknown_skies) = (self.world, self.occluders, self.unknown_skies);
         let first = self.samples.len() as u32;
-        let mut known = columns::known(world, occluders, more, silent).into_iter();
+        let mut known = columns::known(world, occluders, more, unknown_skies).into_iter();
         let splashes = splash::columns(world, occluders, more, &self.splashes, &[]);
-        let spread = Spread::new(more);
+        let soa = SampleSoa::new(more);
         for column in &mut self.columns {
-            let rows = |lamp| point_rows(&world.bsp, occluders, &spread, lamp, None, f32::INFINITY);
+            let rows = |lamp| point_rows(&world.bsp, occluders, &soa, lamp, None, f32::INFINITY);
             let (rows, pieces) = match column.source {
                 Source::Group(..) | Source::Entity(_) | Source::Sun(_) => match known.next() {
                     Some(found) => (found.rows, found.pieces),
@@ -163,7 +164,7 @@ impl Fit<'_> {
                 Source::FoundSun(direction) => (sun_rows(occluders, more, direction), Vec::new()),
                 Source::Placed(lamp) => {
                     let rows = rows(lamp);
-                    let pieces = match self.least > 0.0 {
+                    let pieces = match self.cutoff > 0.0 {
                         true => pieces_of(&rows),
                         false => Vec::new(),
                     };
@@ -179,7 +180,7 @@ impl Fit<'_> {
                 piece
             }));
         }
-        let unlisted = |material| silent.contains(&material);
+        let unlisted = |material| unknown_skies.contains(&material);
         let lit = &self.samples;
         self.transfer.add(world, occluders, lit, more, unlisted);
         self.samples.extend_from_slice(more);
@@ -195,18 +196,18 @@ fn lit(column: &Column) -> Option<(Lamp, Vec3)> {
 }
 
 /// Light, mean of the channels, irradiance / π, that lights give to samples which lie near to each other.
-fn given_by(
+fn light_from(
     world: &RelitWorld,
     occluders: &Occluders,
     samples: &[Sample],
     lights: &[(Lamp, Vec3)],
-    least: f32,
+    cutoff: f32,
 ) -> Vec<f32> {
     let mut sums = vec![0.0; samples.len()];
     let Some(first) = samples.first() else {
         return sums;
     };
-    let spread = Spread::new(samples);
+    let soa = SampleSoa::new(samples);
     for &(lamp, strength) in lights {
         // what gives less than a part of what is stored does not make it too bright
         let power = samples::mean(strength);
@@ -214,10 +215,10 @@ fn given_by(
         if lamp.origin.distance(first.position) > reach + NEAR * 2.0 {
             continue;
         }
-        let rows = point_rows(&world.bsp, occluders, &spread, lamp, None, f32::INFINITY);
+        let rows = point_rows(&world.bsp, occluders, &soa, lamp, None, f32::INFINITY);
         for (i, a) in rows {
-            let ends = strength.max_element() * a <= least;
-            if let Some(sum) = sums.get_mut(i as usize).filter(|_| !ends) {
+            let is_cut_off = strength.max_element() * a <= cutoff;
+            if let Some(sum) = sums.get_mut(i as usize).filter(|_| !is_cut_off) {
                 *sum += power * a;
             }
         }
@@ -237,11 +238,11 @@ pub struct Spots {
 /// Looks for spots of light beside the point lights of a world as it is, calibrated or not, that its lightmaps do not have.
 pub fn spots(world: &RelitWorld) -> Spots {
     let occluders = Occluders::of_world(world);
-    let taking = Taking {
-        dirt: said::believed_dirt(world),
+    let sampling = SamplingOptions {
+        dirt: compiler_command_line::dirt_of_calibrated(world),
         ..Default::default()
     };
-    let gauge = Gauge::new(world, &occluders, &taking);
+    let context = SampleContext::new(world, &occluders, &sampling);
     let of_triangle = surfaces_of_triangles(world);
     let lights: Vec<(Lamp, Vec3)> = (world.point_lights.iter())
         .filter(|light| light.spot.is_none())
@@ -251,13 +252,20 @@ pub fn spots(world: &RelitWorld) -> Spots {
         })
         .collect();
     let found = parallel::map(&lights, |_, &(lamp, _)| {
-        let measure = |texel: Texel, _| texel.measured(&gauge);
+        let measure = |texel: Texel, _| texel.measured(&context);
         let every = |_: &TexelId| true;
-        let found = around(&gauge, &of_triangle, lamp.origin, COUNTED, every, measure);
+        let found = texels_around(
+            &context,
+            &of_triangle,
+            lamp.origin,
+            SPOT_RAYS,
+            every,
+            measure,
+        );
         let samples: Vec<Sample> = found.iter().map(|(_, s)| *s).collect();
-        let given = given_by(world, &occluders, &samples, &lights, world.light_end);
+        let given = light_from(world, &occluders, &samples, &lights, world.light_cutoff);
         let bright = samples.iter().zip(given);
-        let bright = bright.map(|(s, given)| given + s.floor > SPOT * (s.level() + s.floor));
+        let bright = bright.map(|(s, given)| given + s.floor > SPOT_RATIO * (s.level() + s.floor));
         let found: Vec<(TexelId, bool)> = found.into_iter().map(|(id, _)| id).zip(bright).collect();
         found
     });

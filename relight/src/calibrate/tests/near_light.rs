@@ -1,8 +1,8 @@
 //! Texels beside lights that are put in.
 
 use super::*;
-use crate::calibrate::beside::spots;
-use crate::calibrate::fronts::Fronts;
+use crate::calibrate::near_light::spots;
+use crate::calibrate::residual_candidates::ResidualCandidates;
 use crate::light::Falloff;
 use crate::occluders::Occluders;
 
@@ -47,17 +47,17 @@ fn spots_are_counted_where_a_point_makes_one() {
 fn texels_that_a_light_makes_too_bright_join_and_turn_it_down() {
     let world = room(false, Some(&from_middle));
     let occluders = Occluders::of_world(&world);
-    let taking = taking(200);
-    let (samples, _) = samples::take(&world, &occluders, &taking);
+    let sampling = sampling(200);
+    let (samples, _) = samples::take(&world, &occluders, &sampling);
     let again = Cell::new(false);
     let column = |origin: Vec3, strength: f32| {
         let falloff = Falloff::InverseSquare;
         let lamp = Lamp { origin, falloff };
         let range = f32::INFINITY;
-        let spread = spread::Spread::new(&samples);
+        let soa = sample_soa::SampleSoa::new(&samples);
         columns::Column {
             source: Source::Placed(lamp),
-            rows: columns::point_rows(&world.bsp, &occluders, &spread, lamp, None, range),
+            rows: columns::point_rows(&world.bsp, &occluders, &soa, lamp, None, range),
             pieces: Vec::new(),
             strength: Vec3::splat(strength),
             limit: Vec3::INFINITY,
@@ -73,32 +73,32 @@ fn texels_that_a_light_makes_too_bright_join_and_turn_it_down() {
         column(BESIDE, 1000.0),
     ];
     let mut fit = Fit {
-        looked_at: HashMap::new(),
+        near_light_measurements: HashMap::new(),
         world: &world,
         occluders: &occluders,
-        silent: &[],
+        unknown_skies: &[],
         of_triangle: bounce::surfaces_of_triangles(&world),
-        taking,
-        beside: HashSet::new(),
-        measured: Measured::new(&samples),
+        sampling,
+        near_light_texels: HashSet::new(),
+        measured: MeasuredSpace::new(&samples),
         transfer: bounce::Transfer::new(&world, &occluders, &samples, 0, |_| false),
         splashes: Vec::new(),
         columns,
         ambient: dark,
         crossings: Vec::new(),
-        tried: None,
-        least: 0.0,
-        fronts: Fronts::new(samples.len()),
+        grid_candidates: None,
+        cutoff: 0.0,
+        residual_candidates: ResidualCandidates::new(samples.len()),
         rounds: Vec::new(),
-        purpose: Purpose::Enough(Asked {
+        mode: FitMode::Full(Acceptance {
             stops: 1.0,
-            pace: &[],
+            round_limits: &[],
             splashes: &again,
         }),
         samples,
     };
     let before = fit.samples.len();
-    assert!(fit.look_beside(0));
+    assert!(fit.add_near_light_texels(0));
     let joined = fit.samples.len() - before;
     assert!(joined > 3, "{joined}");
     let near = |s: &samples::Sample| s.position.distance(BESIDE) < 140.0 && !s.held_out;
@@ -112,7 +112,7 @@ fn texels_that_a_light_makes_too_bright_join_and_turn_it_down() {
         let whole = columns::point_rows(
             &world.bsp,
             &occluders,
-            &spread::Spread::new(&fit.samples),
+            &sample_soa::SampleSoa::new(&fit.samples),
             lamp,
             None,
             range,
@@ -123,5 +123,5 @@ fn texels_that_a_light_makes_too_bright_join_and_turn_it_down() {
     let [right, wrong] = [0, 1].map(|i| fit.columns[i].strength.x);
     assert!((right / 20_000.0 - 1.0).abs() < 0.05, "{right}");
     assert!(wrong < 100.0, "{wrong}");
-    assert!(!fit.look_beside(0));
+    assert!(!fit.add_near_light_texels(0));
 }

@@ -6,8 +6,8 @@
 //! known to agree no better.
 
 use super::compiler::{self, Compiler};
-use super::memory::Memory;
-use super::{Asked, CalibrationOptions, Purpose, Solution, find};
+use super::trace_cache::TraceCache;
+use super::{Acceptance, CalibrationOptions, FitMode, Solution, find};
 use crate::world::RelitWorld;
 use std::cell::Cell;
 
@@ -33,12 +33,12 @@ const SPLASHES_KEPT: f32 = 0.95;
 const BEHIND: f32 = 1.03;
 
 /// What ways have in common.
-pub(super) struct Ways<'a> {
+pub(super) struct Hypotheses<'a> {
     world: &'a mut RelitWorld,
-    silent: &'a [u32],
+    unknown_skies: &'a [u32],
     options: &'a CalibrationOptions,
     progress: &'a mut dyn FnMut(f32),
-    memory: Memory,
+    traced: TraceCache,
     /// The part that is done.
     reached: f32,
     /// Ways to be tried after this one, at most.
@@ -48,33 +48,35 @@ pub(super) struct Ways<'a> {
 /// The solution that agrees best, of what the compiler may have done.
 pub(super) fn best(
     world: &mut RelitWorld,
-    silent: &[u32],
+    unknown_skies: &[u32],
     options: &CalibrationOptions,
     progress: &mut dyn FnMut(f32),
 ) -> Solution {
     let mut reached = 0.0;
-    let mut memory = Memory::default();
-    let compilers = compiler::find(world, silent, options, &mut memory, &mut |part| {
+    let mut traced = TraceCache::default();
+    let compilers = compiler::find(world, unknown_skies, options, &mut traced, &mut |part| {
         reached = part * COMPILER_PART;
         progress(reached);
     });
-    let mut ways = Ways {
-        memory,
+    let mut hypotheses = Hypotheses {
+        traced,
         reached,
         left: 2 * compilers.len(),
-        ..Ways::new(world, silent, options, progress)
+        ..Hypotheses::new(world, unknown_skies, options, progress)
     };
     let mut best: Option<(Solution, Compiler)> = None;
     for compiler in compilers {
-        let found = ways.with_splashes_or_plain(compiler);
-        if (best.as_ref()).is_none_or(|(best, _)| off(&found) < off(best)) {
+        let found = hypotheses.fit_with_and_without_splashes(compiler);
+        if (best.as_ref()).is_none_or(|(best, _)| held_out_error(&found) < held_out_error(best)) {
             best = Some((found, compiler));
         }
     }
     let Some((found, compiler)) = best else {
         return Solution::default();
     };
-    if off(&found) <= halved(found.report.before.median_stops) || found.measured_more {
+    if held_out_error(&found) <= error_target(found.report.before.median_stops)
+        || found.measured_more
+    {
         return found;
     }
     let splashes = found.report.splashes > 0;
@@ -82,64 +84,64 @@ pub(super) fn best(
         splashes,
         ..compiler
     };
-    let rival = Rival::of(&found);
-    let again = ways.measured_more(same, Some(&rival), &Cell::new(splashes), &|| 1.0);
+    let incumbent = Incumbent::of(&found);
+    let again = hypotheses.measured_more(same, Some(&incumbent), &Cell::new(splashes), &|| 1.0);
     match again {
-        Some(again) if off(&again) < off(&found) => again,
+        Some(again) if held_out_error(&again) < held_out_error(&found) => again,
         _ => found,
     }
 }
 
 /// What another way has to come up to.
-pub(super) struct Rival {
+pub(super) struct Incumbent {
     /// Most error that may be left, stops.
     pub stops: f32,
     /// Most that may be left after each round.
-    pub pace: Vec<f32>,
+    pub round_limits: Vec<f32>,
 }
 
-impl Rival {
+impl Incumbent {
     /// No more than a solution has.
-    pub fn of(found: &Solution) -> Rival {
+    pub fn of(found: &Solution) -> Incumbent {
         let after = found.rounds.iter();
-        Rival {
-            stops: off(found),
-            pace: after.map(|left| left * BEHIND).collect(),
+        Incumbent {
+            stops: held_out_error(found),
+            round_limits: after.map(|left| left * BEHIND).collect(),
         }
     }
 }
 
 /// Error that calibration should leave at most, where directives leave this one, stops.
-pub(super) fn halved(directives: f32) -> f32 {
-    (directives * HALF).max(compiler::NOTHING)
+pub(super) fn error_target(directives: f32) -> f32 {
+    (directives * HALF).max(compiler::NO_ERROR)
 }
 
 /// Error at measurements held out, stops.
-fn off(solution: &Solution) -> f32 {
+fn held_out_error(solution: &Solution) -> f32 {
     solution.report.after.median_stops
 }
 
-impl<'a> Ways<'a> {
+impl<'a> Hypotheses<'a> {
     /// None tried yet, and none planned.
     pub fn new(
         world: &'a mut RelitWorld,
-        silent: &'a [u32],
+        unknown_skies: &'a [u32],
         options: &'a CalibrationOptions,
         progress: &'a mut dyn FnMut(f32),
-    ) -> Ways<'a> {
-        Ways {
+    ) -> Hypotheses<'a> {
+        Hypotheses {
             world,
-            silent,
+            unknown_skies,
             options,
             progress,
-            memory: Memory::default(),
+            traced: TraceCache::default(),
             reached: 0.0,
             left: 0,
         }
     }
 
     /// What is found with a compiler's back splashes, or without where these are not needed.
-    fn with_splashes_or_plain(&mut self, compiler: Compiler) -> Solution {
+    fn fit_with_and_without_splashes(&mut self, compiler: Compiler) -> Solution {
         self.left = self.left.saturating_sub(2);
         let splashed = self.with(compiler);
         if splashed.report.splashes == 0 {
@@ -149,7 +151,7 @@ impl<'a> Ways<'a> {
             splashes: false,
             ..compiler
         };
-        splashed_or_plain(splashed, self.with(plain))
+        prefer(splashed, self.with(plain))
     }
 
     /// What is found with the measurements that it takes.
@@ -161,12 +163,12 @@ impl<'a> Ways<'a> {
             let tries = left + 1 + usize::from(splashes.get());
             begin + (TRIED_PART - begin) / tries as f32
         };
-        let asked = Asked {
+        let acceptance = Acceptance {
             stops: UNEXPLAINED,
-            pace: &[],
+            round_limits: &[],
             splashes: &splashes,
         };
-        let first = self.find(compiler, self.options, asked, end);
+        let first = self.find(compiler, self.options, acceptance, end);
         first
             .or_else(|| self.measured_more(compiler, None, &splashes, end))
             .unwrap_or_default()
@@ -176,7 +178,7 @@ impl<'a> Ways<'a> {
     pub fn measured_more(
         &mut self,
         compiler: Compiler,
-        rival: Option<&Rival>,
+        incumbent: Option<&Incumbent>,
         splashes: &Cell<bool>,
         end: &dyn Fn() -> f32,
     ) -> Option<Solution> {
@@ -185,12 +187,12 @@ impl<'a> Ways<'a> {
             cache: None,
             ..*self.options
         };
-        let asked = Asked {
-            stops: rival.map_or(f32::INFINITY, |rival| rival.stops),
-            pace: rival.map_or(&[], |rival| &rival.pace[..]),
+        let acceptance = Acceptance {
+            stops: incumbent.map_or(f32::INFINITY, |incumbent| incumbent.stops),
+            round_limits: incumbent.map_or(&[], |incumbent| &incumbent.round_limits[..]),
             splashes,
         };
-        let found = self.find(compiler, &options, asked, end)?;
+        let found = self.find(compiler, &options, acceptance, end)?;
         Some(Solution {
             measured_more: true,
             ..found
@@ -202,32 +204,33 @@ impl<'a> Ways<'a> {
         &mut self,
         compiler: Compiler,
         options: &CalibrationOptions,
-        asked: Asked<'_>,
+        acceptance: Acceptance<'_>,
         end: &dyn Fn() -> f32,
     ) -> Option<Solution> {
-        compiler.tell(self.world);
+        compiler.apply_to(self.world);
         let begin = self.reached;
-        let (reached, tell) = (&mut self.reached, &mut self.progress);
+        let (reached, report) = (&mut self.reached, &mut self.progress);
         find(
             self.world,
-            self.silent,
+            self.unknown_skies,
             options,
             compiler,
-            Purpose::Enough(asked),
-            &mut self.memory,
+            FitMode::Full(acceptance),
+            &mut self.traced,
             &mut |part| {
                 *reached = reached.max(begin + part * (end() - begin));
-                tell(*reached);
+                report(*reached);
             },
         )
     }
 }
 
 /// What splashes explain, lights that are put in explain as well in many a map, and with fewer.
-fn splashed_or_plain(splashed: Solution, plain: Solution) -> Solution {
+fn prefer(splashed: Solution, plain: Solution) -> Solution {
     let added = |solution: &Solution| solution.report.splashes + solution.report.placed;
-    let fewer = added(&splashed) <= added(&plain) && off(&splashed) <= off(&plain);
-    if fewer || off(&splashed) < off(&plain) * SPLASHES_KEPT {
+    let fewer =
+        added(&splashed) <= added(&plain) && held_out_error(&splashed) <= held_out_error(&plain);
+    if fewer || held_out_error(&splashed) < held_out_error(&plain) * SPLASHES_KEPT {
         splashed
     } else {
         plain
