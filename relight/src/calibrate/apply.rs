@@ -1,4 +1,4 @@
-//! What was found, written into the world.
+//! Writes a solution into the world.
 
 use super::columns::Lamp;
 use super::{Solution, columns, splash};
@@ -6,11 +6,11 @@ use crate::light::{self, DEFAULT_SUN_RADIUS, PointLight, SunLight};
 use crate::world::RelitWorld;
 use glam::Vec3;
 
-/// Radius of the balls that lights put in are drawn from, id units: they keep clear of surfaces by as much.
+/// Radius of placed lights, id units: the clearance that placement keeps from surfaces.
 const PLACED_RADIUS: f32 = super::placement::CLEARANCE;
 
-/// Sets strengths, adds lights, and builds the light lists anew. Of the lights that it adds, the first are back splashes:
-/// returns how many.
+/// Sets the strengths, appends placed lights and suns, and rebuilds the light lists. Back splashes come first among
+/// the appended point lights; returns their number.
 pub(super) fn apply(world: &mut RelitWorld, solution: &Solution) -> usize {
     let splashes: Vec<_> = splash::of(world)
         .into_iter()
@@ -39,7 +39,7 @@ pub(super) fn apply(world: &mut RelitWorld, solution: &Solution) -> usize {
     world.report.suns = world.suns.len();
     let dark = world.lights.iter().any(|l| l.radiance.max_element() <= 0.0);
     if dark {
-        // What gives no light need not be looked at.
+        // Dark triangle lights are removed from the lists.
         light::take_out(world, |_| false);
     }
     if splashes.is_empty() && solution.placed.is_empty() && !dark {
@@ -50,7 +50,7 @@ pub(super) fn apply(world: &mut RelitWorld, solution: &Solution) -> usize {
     splashes.len()
 }
 
-/// A light that was put in.
+/// The point light for a placed [`Lamp`].
 pub(super) fn placed_light(lamp: Lamp, intensity: Vec3) -> PointLight {
     PointLight {
         origin: lamp.origin,

@@ -1,11 +1,11 @@
-//! Light that comes by way of other surfaces, as tracing adds it.
+//! Reflected light at the samples, as the tracer will add it.
 //!
-//! What a surface throws back is its albedo times the light on it, and the light on it is known at measurements: what
-//! a ray from a measurement hits is lit like the measurement nearest to there. So bounced light is a matrix times the
-//! light at all measurements, made once; each further bounce is the matrix once more. It is the tracer's own light
-//! that is thrown back, not the stored one: what is fitted is what will be seen.
+//! A surface reflects its albedo times its irradiance. Rays from each sample find the surfaces that light it; the
+//! irradiance of a hit point is that of the nearest sample. One bounce is therefore a sparse matrix times the light
+//! at all samples; a further bounce is another product. The matrix is applied to the fitted light, not to the
+//! stored light, because the fit predicts what the tracer will show.
 //!
-//! Bounced rays also find surfaces that shine without being in light lists: pictures of skies, faint glows.
+//! Bounce rays also find surfaces that emit without being in a light list: sky images and faint glows.
 
 use super::samples::{Sample, Site};
 use crate::occluders::{Hit, Occluders};
@@ -16,36 +16,36 @@ use std::f32::consts::TAU;
 use support::parallel;
 use support::random::Random;
 
-/// Rays per sample: a square of this many strata a side.
+/// Strata along each side of the unit square; a sample sends the square of this number of rays.
 const SIDE: u32 = 6;
 
-/// Side of the cells that samples are looked up in, id units.
+/// Side of the cells of the sample lookup, id units.
 const CELL: f32 = 96.0;
 
-/// How far off its plane a sample stands for a place, id units.
+/// Distance from the plane of a hit above which a sample is a worse match, id units.
 const OFF_PLANE: f32 = 16.0;
 
-/// Least cosine between the normals of a place and of the sample that stands for it.
+/// Smallest cosine between the normals of a hit and of its sample.
 const SAME_NORMAL: f32 = 0.7;
 
-/// From light at measurements to light that is thrown from there to measurements.
+/// Transfer matrix from light at samples to reflected light at samples.
 #[derive(Clone)]
 pub(super) struct Transfer {
-    /// For each sample: samples that light what it sees, and which part of their light comes here.
+    /// For each sample: the samples that stand for what it sees, and the part of their light that arrives here.
     rows: Vec<Vec<(u32, Vec3)>>,
-    /// Light from pictures of skies that are in no list.
+    /// Radiance of sky images that are in no light list, averaged over the hemisphere.
     skies: Vec<Vec3>,
-    /// Light from other surfaces that shine and are in no list.
+    /// Radiance of other emitting surfaces that are in no light list, likewise.
     glows: Vec<Vec3>,
     /// Diffuse bounces.
     bounces: u32,
 }
 
-/// What the rays of one sample found.
+/// Row, sky radiance and glow radiance of one sample.
 type Found = (Vec<(u32, Vec3)>, Vec3, Vec3);
 
 impl Transfer {
-    /// Traces what each sample sees. `unlisted` tells of a sky's material whether tracing finds its picture.
+    /// Traces the rays of all samples. `unlisted`: whether a sky material is found by its image only.
     pub fn new(
         world: &RelitWorld,
         occluders: &Occluders,
@@ -63,7 +63,7 @@ impl Transfer {
         transfer
     }
 
-    /// Traces what further samples see; what they see is lit as at `lit`, the first of all samples.
+    /// Traces the rays of further samples; what they hit is lit as at `lit`, the first of all samples.
     pub fn add(
         &mut self,
         world: &RelitWorld,
@@ -98,7 +98,7 @@ impl Transfer {
         }
     }
 
-    /// Bounced light at each sample where lights give `direct`; `pictures`: and what pictures of skies give.
+    /// Reflected light at each sample for the direct light `direct`. `pictures`: with the light of sky images.
     pub fn of(&self, direct: &[Vec3], pictures: bool) -> Vec<Vec3> {
         let none = Vec3::ZERO;
         let shown: Vec<Vec3> = (self.skies.iter().zip(&self.glows))
@@ -131,7 +131,7 @@ impl Transfer {
     }
 }
 
-/// What the rays of a sample find. `lit`: samples that stand for what is seen.
+/// Traces the rays of one sample. `lit`: the samples that stand for hit points.
 fn trace_from(
     world: &RelitWorld,
     occluders: &Occluders,
@@ -148,7 +148,7 @@ fn trace_from(
     for stratum in 0..SIDE * SIDE {
         let x = ((stratum % SIDE) as f32 + random.uniform()) / SIDE as f32;
         let y = ((stratum / SIDE) as f32 + random.uniform()) / SIDE as f32;
-        // Density cosine / π: the mean of radiance is irradiance / π (Malley's method).
+        // Cosine-weighted directions: the mean of radiance is irradiance over π (Malley's method).
         let (sin, cos) = (x * TAU).sin_cos();
         let radius = y.sqrt();
         let ray = u * (radius * cos) + v * (radius * sin) + sample.normal * (1.0 - y).sqrt();
@@ -184,7 +184,7 @@ fn trace_from(
     (row, sky, glow)
 }
 
-/// For every triangle, the surface that it is of.
+/// Surface index of each triangle.
 pub(super) fn surfaces_of_triangles(world: &RelitWorld) -> Vec<u32> {
     let mut of_triangle = vec![u32::MAX; world.indices.len() / 3];
     for (index, surface) in (0u32..).zip(&world.surfaces) {
@@ -195,7 +195,7 @@ pub(super) fn surfaces_of_triangles(world: &RelitWorld) -> Vec<u32> {
     of_triangle
 }
 
-/// The material that a ray met, and its index.
+/// Index of the material that a ray hit, and the material.
 fn material_of<'a>(
     world: &'a RelitWorld,
     of_triangle: &[u32],
@@ -206,7 +206,7 @@ fn material_of<'a>(
     Some((index, world.materials.get(index as usize)?))
 }
 
-/// A cell and those around it, near ones first: what is found soon leaves others out.
+/// A cell and its neighbours by distance, so that near samples prune far cells.
 const AROUND: [IVec3; 27] = around();
 
 const fn around() -> [IVec3; 27] {
@@ -228,7 +228,7 @@ const fn around() -> [IVec3; 27] {
     cells
 }
 
-/// Samples by place.
+/// Samples by cell.
 pub(super) struct Near(HashMap<IVec3, Vec<u32>>);
 
 impl Near {
@@ -241,7 +241,8 @@ impl Near {
         Near(cells)
     }
 
-    /// The sample that stands for a place: the nearest of nearly the same plane, or else of the same normal.
+    /// The sample that stands for a hit point: the nearest one of a similar normal; samples off the plane count as
+    /// twice as far.
     pub fn find(&self, samples: &[Sample], at: Vec3, normal: Vec3) -> Option<u32> {
         let middle = cell(at);
         let mut best = None;
@@ -285,7 +286,7 @@ mod tests {
     use crate::calibrate::samples::tests::sample_at_place;
 
     #[test]
-    fn the_nearest_sample_of_its_plane_stands_for_a_place() {
+    fn the_nearest_sample_of_the_plane_is_found() {
         let mut random = Random::new(7);
         let mut anywhere =
             || Vec3::new(random.uniform(), random.uniform(), random.uniform()) * 500.0;

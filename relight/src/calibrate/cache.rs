@@ -1,7 +1,7 @@
-//! Results of calibration, kept in a folder.
+//! Cached calibration results.
 //!
-//! A file's name is the hash of all that its result depends on, so that a file is right or not there. Its text is
-//! checked as any input is: a damaged one counts as absent, with a warning.
+//! The file name is the hash of everything that the result depends on, so a file is either current or absent. A
+//! damaged file counts as absent and gives a warning.
 
 use super::columns::Lamp;
 use super::{CalibrationOptions, Solution, VERSION};
@@ -15,13 +15,13 @@ use glam::Vec3;
 use std::fmt::Write as _;
 use support::hash::Hash;
 
-/// First words of a file.
+/// First word of a file.
 const MAGIC: &str = "relight-calibration";
 
-/// How the names of its files end.
+/// Extension of the files.
 const KIND: &str = "light";
 
-/// A kept result for `known` known sources; `None` when there is none.
+/// The cached result for a world with `known` known sources, if there is one.
 pub(super) fn read(
     cache: &CalibrationCache,
     key: u128,
@@ -37,7 +37,7 @@ pub(super) fn read(
     }
 }
 
-/// Keeps a result.
+/// Writes a result to the cache.
 pub(super) fn write(
     cache: &CalibrationCache,
     key: u128,
@@ -46,7 +46,7 @@ pub(super) fn write(
     cache.write_file(cache.path(key, KIND), print(solution).as_bytes())
 }
 
-/// Text of a result. Rust prints the shortest number that reads back as the same one.
+/// Text of a result. Rust prints the shortest number that parses to the same value.
 fn print(solution: &Solution) -> String {
     let mut text = String::new();
     let report = &solution.report;
@@ -95,7 +95,7 @@ fn print(solution: &Solution) -> String {
     text
 }
 
-/// Reads what [`print()`] wrote; else the line that is wrong, and how.
+/// Parses the text of [`print()`]. The error is a line number and a message.
 fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
     let mut lines = text.lines().enumerate();
     let header = lines.next().map(|(_, l)| l.split_whitespace());
@@ -126,7 +126,7 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
             }),
             _ => None,
         };
-        // Light is never negative.
+        // Strengths are not negative.
         let light = |v: &[f32]| match *v {
             [x, y, z] if finite && v.iter().all(|n| *n >= 0.0) => Ok(Vec3::new(x, y, z)),
             _ => Err(wrong("not three strengths")),
@@ -214,12 +214,12 @@ fn parse(text: &str, known: usize) -> Result<Solution, (usize, &'static str)> {
     Ok(solution)
 }
 
-/// Hash of everything that calibrating a world depends on.
+/// Hash of everything that a calibration depends on.
 pub(super) fn key(world: &RelitWorld, options: &CalibrationOptions) -> u128 {
     key_from(Hash::new(), world, options)
 }
 
-/// The same of a part of the result that `hash` has begun to name.
+/// [`key`] continued from a hash that already names a part of the result.
 pub(super) fn key_from(mut hash: Hash, world: &RelitWorld, options: &CalibrationOptions) -> u128 {
     hash.number(u64::from(VERSION));
     hash.number(options.samples as u64);

@@ -1,39 +1,39 @@
-//! Where lost lights are looked for first: the nodes of a grid over open space.
+//! Grid of candidate positions over open space.
 //!
-//! The grid lies where measurements are. Some maps stand in the middle of a box tens of times as wide as themselves; a grid over
-//! all of that would be too coarse for the map itself.
+//! The grid covers the space near samples only. Some maps stand in a box tens of times their own size; a grid over
+//! the whole box would be too coarse.
 
 use super::samples::Sample;
 use crate::world::RelitWorld;
 use glam::{IVec3, Vec3};
 use std::collections::HashMap;
 
-/// Grid spacing to begin with, id units.
+/// Smallest grid spacing, id units.
 const SPACING: f32 = 64.0;
 
-/// Side of the blocks that measurements are counted in, id units.
+/// Side of the blocks in which samples are counted, id units.
 const BLOCK: f32 = 256.0;
 
-/// Nothing that is measured farther from the middle is looked at, id units: engines end long before, and counting blocks
-/// must not overflow.
+/// Largest coordinate of a sample that is counted, id units: far beyond any engine's limit, and block indices
+/// cannot overflow.
 const FARTHEST: f32 = 1.0e6;
 
-/// The part of all measurements that lies in a block or in those around it, at least, where lights are looked for.
+/// Smallest part of all samples in a block and its neighbours for the block to get candidates.
 const LEAST_PART: f32 = 1.0 / 1500.0;
 
-/// Nodes that are looked at for each candidate, about, at most: so much work for maps of any size.
+/// Largest number of nodes tested for each candidate: bounds the work for maps of any size.
 const NODES_PER_CANDIDATE: f32 = 60.0;
 
-/// The part of space that a map's measurements tell of.
+/// The blocks of space that have samples nearby.
 pub(super) struct MeasuredSpace {
-    /// Blocks, in order.
+    /// Blocks, sorted.
     blocks: Vec<IVec3>,
     mins: Vec3,
     maxs: Vec3,
 }
 
 impl MeasuredSpace {
-    /// Where these are.
+    /// The space near these samples.
     pub fn new(samples: &[Sample]) -> MeasuredSpace {
         let mut counts: HashMap<IVec3, f32> = HashMap::new();
         let (mut mins, mut maxs) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
@@ -58,7 +58,7 @@ impl MeasuredSpace {
         MeasuredSpace { blocks, mins, maxs }
     }
 
-    /// Whether measurements are near a place.
+    /// Whether a position has samples nearby.
     pub fn holds(&self, at: Vec3) -> bool {
         let block = block_of(at).to_array();
         self.blocks
@@ -66,7 +66,7 @@ impl MeasuredSpace {
             .is_ok()
     }
 
-    /// Nodes of a grid over the parts of it that are `open`, as fine as `most` allows, and the grid's spacing.
+    /// Grid nodes that are `open`, as fine as `most` allows, and the grid spacing, id units.
     pub fn grid(
         &self,
         world: &RelitWorld,
@@ -74,7 +74,7 @@ impl MeasuredSpace {
         open: impl Fn(Vec3) -> bool,
     ) -> (Vec<Vec3>, f32) {
         let most = most.max(1);
-        // A first guess from the volume, then what is open decides.
+        // The volume gives a first guess; the count of open nodes corrects it.
         let volume = self.blocks.len() as f32 * BLOCK.powi(3);
         let mut spacing = (volume / (NODES_PER_CANDIDATE * most as f32))
             .cbrt()
@@ -122,7 +122,7 @@ mod tests {
     use crate::calibrate::samples::tests::sample_at_place;
 
     #[test]
-    fn a_box_far_around_does_not_make_the_grid_coarse() {
+    fn a_distant_box_does_not_coarsen_the_grid() {
         let on_floor = (0..1600).map(|k| Vec3::new((k % 40) as f32, (k / 40) as f32, 0.0) * 16.0);
         let far = [-9000.0, 9000.0, -3.0e38, 3.0e38].map(Vec3::splat);
         let samples: Vec<_> = on_floor.chain(far).map(sample_at_place).collect();
@@ -135,7 +135,7 @@ mod tests {
         distinct.sort_by_key(|at| at.to_array().map(f32::to_bits));
         distinct.dedup();
         assert_eq!(distinct.len(), nodes.len());
-        // A cube of three blocks a side more than the floor's, at 4 nodes a block's side.
+        // Three blocks a side more than the floor, 4 nodes along the side of a block.
         let blocks = 5.0 * 5.0 * 3.0;
         assert!(
             (nodes.len() as f32 / (blocks * 64.0) - 1.0).abs() < 0.15,

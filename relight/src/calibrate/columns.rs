@@ -1,7 +1,7 @@
-//! What each source of light would give to each measurement: the columns of the linear system.
+//! The columns of the linear system: irradiance that each light source gives to each sample.
 //!
-//! A column holds, for every sample that its source reaches, the light (irradiance / π) there for a source of
-//! strength 1; the strength is what is looked for, channel by channel. Shadow rays decide what is reached.
+//! A column holds, for every sample that its source reaches, the irradiance over π of a source of strength 1. The
+//! fit finds the strength, channel by channel. Shadow rays decide what a source reaches.
 
 use super::cutoff::{Contribution, ContributionBucket, Piece, pieces_of};
 use super::sample_soa::{NEAREST, SampleSoa};
@@ -16,68 +16,70 @@ use std::f32::consts::{PI, TAU};
 use support::parallel;
 use support::random::Random;
 
-/// Contributions below this part of a sample are traced only sometimes, and then count for more (Russian roulette).
+/// Contribution, as a part of a sample's light, below which a shadow ray is sent at random and weighted by its
+/// probability (Russian roulette).
 const ROULETTE: f32 = 0.02;
 
-/// Shadow rays to a triangle that is large as seen from a sample.
+/// Shadow rays to a large triangle.
 const RAYS: u32 = 6;
 
-/// Solid angle, or what comes near to it, above which a triangle is large.
+/// Area over squared distance from which a triangle is large, an approximate solid angle, sr.
 const LARGE: f32 = 0.15;
 
-/// Which source a column is for.
+/// Light source of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Source {
-    /// All triangle lights of one material and evidence.
+    /// All triangle lights of one material and emission source.
     Group(u32, EmissionSource),
     /// A light entity of the map.
     Entity(u32),
     /// A sun.
     Sun(u32),
-    /// A light put in by calibration.
+    /// A light placed by calibration.
     Placed(Lamp),
-    /// The back splashes of a material's lamps: index into [`splash::of`](super::splash::of).
+    /// The back splashes of one material: index into [`splash::of`](super::splash::of).
     Splash(u32),
-    /// A sun put in by calibration: the direction to it.
+    /// A sun found by calibration: unit vector towards it.
     FoundSun(Vec3),
 }
 
-/// A point that light comes from.
+/// Position and falloff of a point light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lamp {
     pub origin: Vec3,
     pub falloff: Falloff,
 }
 
-/// What is believed of a strength before looking at samples.
+/// Prior of a strength.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Prior {
-    /// What the map's directives say.
+    /// Strength by the map's directives.
     pub value: Vec3,
-    /// Least strength.
+    /// Smallest strength.
     pub low: Vec3,
     /// Largest strength.
     pub high: Vec3,
 }
 
-/// A source of light with what it gives.
+/// A light source and its contribution to the samples.
 #[derive(Debug, Clone)]
 pub(super) struct Column {
     /// The source.
     pub source: Source,
-    /// (sample, light there for strength 1), by rising sample.
+    /// (sample, irradiance over π for strength 1), by ascending sample.
     pub rows: Vec<(u32, f32)>,
-    /// Where lights end: what its lights give, by how much each gives, as if they did not.
+    /// With a light cutoff: contributions without it, by the size of each single light's contribution.
     pub pieces: Vec<Piece>,
-    /// Its strength: radiance of a group's brightest triangle, intensity of points, irradiance of suns.
+    /// Strength: radiance of a group's brightest triangle, radiant intensity of a point light, irradiance of a sun.
     pub strength: Vec3,
-    /// The most it may be.
+    /// Upper bound of the strength.
     pub limit: Vec3,
-    /// `None` for lights put in, and for skies that nothing tells the light of.
+    /// `None` for placed lights and for skies without directives.
     pub prior: Option<Prior>,
 }
 
-/// Light per intensity at a sample, and 0 where the light is behind it or out of a spot's cone. No shadows.
+/// Irradiance over π at a sample for intensity 1, without shadows; 0 behind the sample's surface and outside a
+/// spot's cone.
 pub(super) fn unshadowed(sample: &Sample, lamp: Lamp, spot: Option<&Spot>) -> f32 {
     let offset = lamp.origin - sample.position;
     let squared = offset.length_squared();
@@ -98,13 +100,13 @@ pub(super) fn unshadowed(sample: &Sample, lamp: Lamp, spot: Option<&Spot>) -> f3
     let distance = squared.sqrt();
     let mut given = lamp.falloff.irradiance(distance, cosine / distance);
     if sample.site == Site::LightGrid && lamp.falloff != Falloff::InverseSquare {
-        // The grid's light is what comes, then weighted by the cosine: not the other way around.
+        // The light grid weights the incoming light by the cosine after the falloff.
         given = lamp.falloff.irradiance(distance, 1.0) * cosine / distance;
     }
     given * cone / PI
 }
 
-/// The column of a point light, as far as it reaches.
+/// Rows of a point light up to a distance of `range`.
 pub(super) fn point_rows(
     bsp: &Bsp,
     occluders: &Occluders,
@@ -113,11 +115,12 @@ pub(super) fn point_rows(
     spot: Option<&Spot>,
     range: f32,
 ) -> Vec<(u32, f32)> {
-    // Samples that follow each other are neighbours as a rule, and in the shadow of the same triangle.
+    // Consecutive samples are mostly neighbours, shadowed by the same triangle.
     point_rows_hinted(bsp, occluders, soa, lamp, (spot, range), &mut [None])
 }
 
-/// [`point_rows`], asking first what stopped earlier rays: `stopped` has a place for each sample, or for so many that take turns.
+/// [`point_rows`] with occlusion hints: `stopped` has the last occluder for each sample, or for each residue class
+/// of samples.
 pub(super) fn point_rows_hinted(
     bsp: &Bsp,
     occluders: &Occluders,
@@ -146,14 +149,14 @@ pub(super) fn point_rows_hinted(
     rows
 }
 
-/// Light from a sun of irradiance 1 at a sample; `None` where it does not shine.
+/// Irradiance over π of a sun of irradiance 1 at a sample; `None` in shadow.
 pub(super) fn sun_at(occluders: &Occluders, sample: &Sample, direction: Vec3) -> Option<f32> {
     let cosine = sample.normal.dot(direction);
     let hit = || occluders.nearest(sample.position, direction, f32::INFINITY);
     (cosine > 0.0 && hit().is_none_or(|hit| hit.sky)).then_some(cosine / PI)
 }
 
-/// The column of a sun.
+/// Rows of a sun.
 pub(super) fn sun_rows(
     occluders: &Occluders,
     samples: &[Sample],
@@ -166,7 +169,8 @@ pub(super) fn sun_rows(
         .collect()
 }
 
-/// Columns of the lights that the map's directives tell of. `unknown_skies`: materials of skies that they tell nothing of.
+/// Columns of the lights that the map's directives and entities describe. `unknown_skies`: materials of skies
+/// without directives.
 pub(super) fn known(
     world: &RelitWorld,
     occluders: &Occluders,
@@ -256,7 +260,7 @@ pub(super) fn known(
             prior: Some(prior_of(sun.irradiance, EmissionSource::SurfaceLight)),
         });
     }
-    // Directives tell of light before the compiler's gamma: of less of the display's curve than was taken for granted.
+    // Directives give light before the compiler's gamma, so their colour exponent is the display's divided by it.
     if world.stored_gamma != 1.0 {
         let color = |light| crate::light::raise(light, world.stored_gamma.recip());
         for column in &mut columns {
@@ -273,12 +277,12 @@ pub(super) fn known(
     columns
 }
 
-/// Number of columns that [`known`] makes.
+/// Number of columns of [`known`].
 pub(super) fn count(world: &RelitWorld) -> usize {
     group(world).0.len() + world.point_lights.len() + world.suns.len()
 }
 
-/// Gives the lights that the map's directives tell of their strengths, in the order of [`known`]'s columns.
+/// Sets the strengths of the known lights, in the order of [`known`].
 pub(super) fn set_known(world: &mut RelitWorld, strengths: &[Vec3]) {
     let (groups, of_light) = group(world);
     let mut strengths = strengths.iter().copied();
@@ -295,7 +299,7 @@ pub(super) fn set_known(world: &mut RelitWorld, strengths: &[Vec3]) {
             .get_mut(group.material as usize)
             .and_then(|m| m.emission.as_mut());
         if let Some(emission) = emission.filter(|e| e.source == group.evidence) {
-            // Of sprites this is an intensity: the same part of the whole as before.
+            // The strength of a sprite is an intensity: the ratio to the group stays.
             let whole = match emission.source {
                 EmissionSource::Sprite => whole / emission.strength.max_element().max(1e-30),
                 _ => 1.0,
@@ -316,8 +320,8 @@ pub(super) fn set_known(world: &mut RelitWorld, strengths: &[Vec3]) {
     }
 }
 
-/// Directives say what they mean up to the compiler's options, which scale all lights of a kind. A glow or a flare,
-/// which the compiler took no light from, may fade to nothing.
+/// Prior for a directive. Compiler options scale all lights of a kind, so the bounds are wide; a glow or flare,
+/// which the compiler did not use as a light, may fall to zero.
 fn prior_of(value: Vec3, evidence: EmissionSource) -> Prior {
     let (low, high) = match evidence {
         EmissionSource::Glow | EmissionSource::Flare => (0.0, 8.0),
@@ -331,7 +335,7 @@ fn prior_of(value: Vec3, evidence: EmissionSource) -> Prior {
     }
 }
 
-/// Triangle lights that share a strength.
+/// Triangle lights with a common strength.
 struct Group {
     material: u32,
     evidence: EmissionSource,
@@ -339,7 +343,7 @@ struct Group {
     strength: Vec3,
 }
 
-/// The groups, and for every light the group that it is in and its strength as a part of the group's.
+/// The groups, and for every light its group and its radiance relative to the group's strength.
 fn group(world: &RelitWorld) -> (Vec<Group>, Vec<(u32, f32)>) {
     let mut known: HashMap<(u32, EmissionSource), u32> = HashMap::new();
     let mut groups: Vec<Group> = Vec::new();
@@ -370,7 +374,7 @@ fn group(world: &RelitWorld) -> (Vec<Group>, Vec<(u32, f32)>) {
     (groups, of_light)
 }
 
-/// Material of the surface that a light lies on.
+/// Material of a light's surface.
 pub(super) fn material_of(world: &RelitWorld, light: &TriangleLight) -> u32 {
     world
         .surfaces
@@ -378,7 +382,7 @@ pub(super) fn material_of(world: &RelitWorld, light: &TriangleLight) -> u32 {
         .map_or(u32::MAX, |s| s.material)
 }
 
-/// Light of each group at a sample, for strength 1.
+/// Contribution of each group at a sample for strength 1.
 fn triangles_at(
     world: &RelitWorld,
     occluders: &Occluders,
@@ -431,7 +435,7 @@ fn triangles_at(
     buckets
 }
 
-/// Part of a triangle that a sample sees: one ray to the middle, or several to a large one.
+/// Visible fraction of a triangle: one ray to its centroid, or several to a large triangle.
 fn visible_part(
     occluders: &Occluders,
     sample: &Sample,
@@ -464,9 +468,9 @@ fn visible_part(
     if rays > 0.0 { open / rays } else { 0.0 }
 }
 
-/// Irradiance from a triangle of radiance 1, cut at the sample's horizon, without shadows.
+/// Irradiance from a triangle of radiance 1, clipped at the sample's horizon, without shadows.
 ///
-/// Source: Lambert's formula for polygons, sum over edges of angle times cosine over 2.
+/// Source: Lambert's formula for polygons: half the sum over the edges of angle times cosine.
 fn lambert(sample: &Sample, light: &TriangleLight) -> f32 {
     let [a, b, c] = light.vertices.map(|v| v - sample.position);
     let facing = -(b - a).cross(c - a).dot(a);
@@ -477,7 +481,7 @@ fn lambert(sample: &Sample, light: &TriangleLight) -> f32 {
     if heights.iter().all(|h| *h <= 0.0) {
         return 0.0;
     }
-    // Small and far: the middle stands for all of it.
+    // Small and distant: the centroid stands for the triangle.
     let middle = (a + b + c) / 3.0;
     let squared = middle.length_squared();
     let extent = (a - middle)
@@ -542,7 +546,7 @@ mod tests {
     }
 
     #[test]
-    fn irradiance_agrees_with_adding_up_small_pieces() {
+    fn irradiance_agrees_with_numerical_integration() {
         let sample = Sample {
             site: Site::Surface,
             position: Vec3::ZERO,

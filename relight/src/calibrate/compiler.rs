@@ -1,15 +1,16 @@
-//! What the map's compiler did to light: with which gamma it encoded it, whether it let lights end, whether it made corners
-//! darker.
+//! What the map compiler did to light before storing it: gamma, light cutoff, dirt.
 //!
-//! Compilers store light as it is unless told otherwise; told so (`-gamma`), they store (L / 255)^(1 / g). Light is linear in
-//! its sources only as it was before: taken for linear, bright light is too weak
-//! beside dim light, suns are turned down, and lights are put in to fill what is left. To save time (`-fast`) they leave
-//! out of a texel what a light adds less than a step of light to, so that all light of many weak lights has an end. And they
-//! may multiply it by the part of the surroundings that is open (`-dirty`). Some maps say what was done ([`compiler_command_line`]); else a
-//! map is fitted with less effort for some gammas, with lights that end, and with dirt, and one of them is believed where it leaves
-//! much less unexplained *of what is stored*, of gammas another leaves less as well, and the light that directives tell of
-//! does not speak against it. Compared is the error at all texels, fitted ones too: these fits have the same freedom, and a
-//! fifth of the texels would leave the choice to chance.
+//! * *Gamma* (`-gamma`): the compiler stores (L / 255)^(1 / g). Irradiance is linear in the lights only before this
+//!   step. Taken as linear, bright light is too weak relative to dim light: the fit weakens suns and adds lights to
+//!   fill the residual.
+//! * *Light cutoff* (`-fast`): the compiler leaves out a light where it adds less than one step of light, so many
+//!   weak lights end early.
+//! * *Dirt* (`-dirty`): the compiler multiplies light by ambient occlusion.
+//!
+//! If the map has the compiler's command line ([`compiler_command_line`]), it decides. Otherwise fits with fewer
+//! samples (trials) test gammas, the cutoff and dirt. A setting is accepted if it lowers the error of *stored*
+//! light clearly; a gamma also needs a second gamma to lower it, and must not contradict the directives. Trials
+//! have equal freedom, so they are compared at all texels: a fifth of the texels is too noisy.
 
 use super::compiler_command_line::{self, CommandLine, Dirt};
 use super::fit::ROUNDS;
@@ -17,57 +18,56 @@ use super::trace_cache::TraceCache;
 use super::{CalibrationCache, CalibrationOptions, CalibrationReport, Evidence, FitMode, Solution};
 use crate::world::RelitWorld;
 
-/// Gammas tried: about the display's own, and two between it and none.
+/// Gammas that are tried: about the display's, and two between it and 1.
 const TRIED_GAMMAS: [f32; 3] = [1.4, 1.8, 2.2];
 
-/// The one that is tried first: were light encoded with any of them, it would explain more than none.
+/// Gamma that is tried first: if light was encoded with any of them, this one lowers the error.
 const FIRST_GAMMA: f32 = 1.8;
 
-/// Part of the error without gamma that the best may leave to be believed.
+/// Ratio to the error without gamma that the best gamma must reach.
 const GAMMA_KEPT: f32 = 0.87;
 
-/// Part that one more of them may leave, and the first, for the others to be tried.
+/// Ratio that the first and a second gamma must reach.
 const GAMMA_SUPPORTED: f32 = 0.92;
 
-/// Gammas that explain light nearly as well as the best, a factor of the error: of these the largest is believed, as the
-/// display's own is what compilers are told as a rule.
+/// Ratio to the best error within which gammas count as equal. The largest of them is taken: compilers are usually
+/// set to the display's gamma.
 const GAMMA_ALIKE: f32 = 1.07;
 
-/// Part of the error without gamma that may be left with all that is found.
+/// Ratio to the best error without gamma, with or without cutoff, that the final choice must reach.
 const GAMMA_KEPT_IN_ALL: f32 = 0.92;
 
-/// Part of the error of lights without an end that such with an end may leave to be believed.
+/// Ratio to the error without cutoff that the cutoff must reach.
 const CUTOFF_KEPT: f32 = 0.95;
 
-/// Part of the error without dirt that dirt which no command line tells of leaves, where fits with less effort cannot tell
-/// whether it is there. What leaves less is dirty, what leaves more is not.
+/// Ratio of the errors with and without dirt in which trials cannot decide. Below it there is dirt, above it none.
 const DIRT_IN_DOUBT: std::ops::RangeInclusive<f32> = 0.88..=1.1;
 
-/// Part of the error of lights without an end that such with an end leave, where these fits cannot tell.
+/// The same for the light cutoff.
 const CUTOFF_IN_DOUBT: std::ops::RangeInclusive<f32> = CUTOFF_KEPT..=1.08;
 
-/// Part of the error that dirt or an end leaves then, with all measurements and candidates, to be believed.
+/// Error ratio that dirt or a cutoff must then reach in fits with all samples and candidates.
 const ALL_SAMPLES_KEPT: f32 = 0.96;
 
-/// Times that lights are looked for to tell.
+/// Rounds of placement in these fits.
 const ALL_SAMPLES_ROUNDS: usize = 2;
 
-/// How many times as far off as without gamma what directives say may be: it was the compiler that read them.
+/// Largest ratio of the directives' error with a gamma to that without one: the compiler read the directives.
 const CONTRADICTED: f32 = 1.5;
 
-/// Error that leaves nothing to be explained, stops.
+/// Error that needs no further explanation, stops.
 pub(super) const NO_ERROR: f32 = 0.01;
 
-/// Least measurements of a trial.
+/// Smallest number of samples of a trial.
 const TRIAL_SAMPLES: usize = 1000;
 
-/// Light, in steps of 1 / 255 as compilers count it before their gamma, at which lights end.
+/// Light cutoff in steps of 1 / 255 before the compiler's gamma.
 const CUTOFF_STEPS: f32 = 1.0;
 
-/// Gammas that a compiler can be told.
+/// Plausible gammas of a compiler.
 const POSSIBLE: std::ops::RangeInclusive<f32> = 0.5..=4.0;
 
-/// Whether a number can be the gamma of a compiler.
+/// Whether a number is a plausible gamma.
 pub(super) fn possible(gamma: f32) -> bool {
     POSSIBLE.contains(&gamma)
 }
@@ -75,18 +75,18 @@ pub(super) fn possible(gamma: f32) -> bool {
 /// What a compiler did to light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Compiler {
-    /// What it encoded light with; 1 for nothing.
+    /// Encoding gamma; 1 for none.
     pub gamma: f32,
-    /// Whether its lights end.
+    /// Whether lights have a cutoff.
     pub has_cutoff: bool,
-    /// How it made corners darker.
+    /// Ambient occlusion, if any.
     pub dirt: Option<Dirt>,
-    /// Whether weak lights may stand in front of lamps ([`splash`](super::splash)).
+    /// Whether the fit may use back splashes ([`splash`](super::splash)).
     pub splashes: bool,
 }
 
 impl Compiler {
-    /// Stores light as it is.
+    /// A compiler that stores light unchanged.
     const PLAIN: Compiler = Compiler {
         gamma: 1.0,
         has_cutoff: false,
@@ -94,7 +94,7 @@ impl Compiler {
         splashes: true,
     };
 
-    /// What was found before, as far as the world knows of it.
+    /// The settings of a finished calibration that the world has.
     pub fn of(report: &CalibrationReport) -> Compiler {
         Compiler {
             gamma: report.gamma,
@@ -103,13 +103,13 @@ impl Compiler {
         }
     }
 
-    /// Lets the world know.
+    /// Sets the world's gamma and light cutoff.
     pub fn apply_to(self, world: &mut RelitWorld) {
         (world.stored_gamma, world.light_cutoff) = (self.gamma, self.light_cutoff());
     }
 
-    /// The value of [`RelitWorld::light_cutoff`]. A stored byte of 255 is light of 4 (the engine's overbright shift), to the
-    /// power of gamma: a step of what was encoded is a 255th of that.
+    /// The value of [`RelitWorld::light_cutoff`]. A stored byte of 255 is light 4 (the overbright shift) to the
+    /// power of gamma; one step before encoding is 1 / 255 of it.
     fn light_cutoff(self) -> f32 {
         if self.has_cutoff {
             CUTOFF_STEPS / 255.0 * 4.0f32.powf(self.gamma)
@@ -119,11 +119,10 @@ impl Compiler {
     }
 }
 
-/// What a world's compiler did: what the map says of it, else what explains its light. Where it is two things, light has to
-/// be found with both to tell. `progress` gets the part that is done.
+/// The settings that remain possible for a world's compiler: those of its command line, else those that explain its
+/// light best. Where there are two, both must be fitted to completion. `progress` gets the completed part.
 ///
-/// Cut-outs let all light through here: that single rays are let through by a grate or not is noise, which a wrong gamma
-/// would seem to explain.
+/// Trials treat cut-outs as fully transparent: the noise of single rays through a grate would favour a wrong gamma.
 pub(super) fn find(
     world: &mut RelitWorld,
     unknown_skies: &[u32],
@@ -160,8 +159,8 @@ pub(super) fn find(
     vec![found]
 }
 
-/// What a command line says. Dirt may not be there: not all maps look like what their command lines say of it, and fits with
-/// less effort take for dirt what they lack lights for.
+/// The settings of a command line, with and without its dirt: some maps do not look as their command line says, and
+/// trials mistake missing lights for dirt.
 fn from_command_line(line: CommandLine) -> Vec<Compiler> {
     let with = |dirt| Compiler {
         gamma: line.gamma,
@@ -173,7 +172,7 @@ fn from_command_line(line: CommandLine) -> Vec<Compiler> {
     dirty.into_iter().chain([with(None)]).collect()
 }
 
-/// Fits with less effort.
+/// Fits with fewer samples and candidates.
 struct Trials<'a> {
     world: &'a mut RelitWorld,
     unknown_skies: &'a [u32],
@@ -181,20 +180,20 @@ struct Trials<'a> {
     less: CalibrationOptions,
     traced: &'a mut TraceCache,
     progress: &'a mut dyn FnMut(f32),
-    /// Those that are done, and their errors.
+    /// Finished trials: [error of the directives, error of the fit], stops.
     done: Vec<(Compiler, Option<[f32; 2]>)>,
-    /// Fits with all measurements, and their errors.
+    /// Finished fits with all samples, and their errors, stops.
     with_all_samples: Vec<(Compiler, f32)>,
 }
 
 impl Trials<'_> {
-    /// Error of what directives say, and of what is fitted.
+    /// Errors of the directives and of the fit for a setting, stops.
     fn error(&mut self, compiler: Compiler) -> Option<[f32; 2]> {
         if let Some((_, errors)) = self.done.iter().find(|(tried, _)| *tried == compiler) {
             return *errors;
         }
         (self.progress)(self.done.len() as f32 / (4.0 + TRIED_GAMMAS.len() as f32));
-        // What is stored on surfaces decides, with lights that fall off as light does.
+        // Trials use surface samples and inverse-square lights only.
         let less = self.less.clone();
         let found = self.fit(compiler, &less, FitMode::Trial(ROUNDS))?;
         let errors = [found.report.before.median_stops, found.overall.median_stops];
@@ -203,7 +202,7 @@ impl Trials<'_> {
         errors
     }
 
-    /// A fit for a compiler.
+    /// A fit with a setting.
     fn fit(
         &mut self,
         compiler: Compiler,
@@ -225,7 +224,7 @@ impl Trials<'_> {
         found
     }
 
-    /// What explains the map's light best, if it does so by far.
+    /// The setting that explains the stored light best, if it is clearly better.
     fn from_stored_light(&mut self) -> Option<Compiler> {
         let clean = self.gamma_and_cutoff()?;
         let dirty = Compiler {
@@ -261,14 +260,14 @@ impl Trials<'_> {
         Some(found)
     }
 
-    /// Part of the error with one compiler that another leaves.
+    /// Error with setting `of` over error with setting `with`.
     fn error_ratio(&mut self, of: Compiler, with: Compiler) -> Option<f32> {
         let [[_, of], [_, with]] = [self.error(of)?, self.error(with)?];
         Some(of / with)
     }
 
-    /// Whether one leaves less of the error than another with all measurements and candidates, where fits with less effort
-    /// cannot tell: what they lack lights for hides what the compiler did.
+    /// Whether one setting has a clearly lower error than another with all samples and candidates; for cases that
+    /// trials cannot decide, because the error of missing lights hides the compiler's.
     fn is_better_with_all_samples(&mut self, one: Compiler, than: Compiler) -> bool {
         let mut error = |compiler| {
             if let Some((_, error)) = self
@@ -286,7 +285,7 @@ impl Trials<'_> {
         error(one) < error(than) * ALL_SAMPLES_KEPT
     }
 
-    /// The gamma, and whether lights end.
+    /// Decides the gamma and the cutoff.
     fn gamma_and_cutoff(&mut self) -> Option<Compiler> {
         let [directives, without_cutoff] =
             self.error(Compiler::PLAIN).filter(|[_, e]| *e > NO_ERROR)?;
@@ -302,10 +301,10 @@ impl Trials<'_> {
         let fallback = self.world.report.fallback;
         let mut trial = |compiler: Compiler| {
             let [before, after] = self.error(compiler)?;
-            // A map without any light has what loading put there in its place.
+            // In a map without any light, loading added a fallback, which is no evidence.
             (fallback || before <= directives * CONTRADICTED).then_some(after)
         };
-        // Like is compared with like: ends that belong to one gamma mislead with another.
+        // Gammas are compared without a cutoff: the cutoff depends on the gamma.
         let with = |gamma| Compiler {
             gamma,
             ..Compiler::PLAIN

@@ -1,10 +1,9 @@
-//! What a map says of how its light was computed.
+//! Compiler settings from the command line that q3map2 stores in worldspawn.
 //!
-//! q3map2 writes the command lines of its stages into the world's entity. What is said there need not be found out: with
-//! which gamma light was stored, whether lights end. It may also say that corners were made darker (*dirt*: ambient
-//! occlusion, by which all light is multiplied).
+//! q3map2 writes the command lines of its stages into the worldspawn entity. They state the gamma, whether lights
+//! have a cutoff, and *dirt*: ambient occlusion by which all light of a texel is multiplied.
 //!
-//! Source: meaning and defaults are q3map2's.
+//! Source: meanings and defaults are q3map2's.
 
 use super::compiler;
 use crate::occluders::Occluders;
@@ -13,39 +12,39 @@ use glam::Vec3;
 use q3bsp::Entity;
 use std::f32::consts::TAU;
 
-/// Key of the world's entity that holds the command lines, one after the other.
+/// Worldspawn key with the command lines of all stages, separated by semicolons.
 const COMMAND_LINES: &str = "_q3map2_cmdline";
 
-/// Rays around the normal that dirt is found by: angles from it, degrees, and how many at each.
+/// Rays of the ambient occlusion: angles from the normal, degrees, and rays at each angle.
 const DIRT_RINGS: ([f32; 3], u32) = ([14.5, 43.5, 72.5], 16);
 
-/// Least part of light that is believed to be left by dirt.
+/// Smallest part of light that dirt leaves: bounds the division.
 const LEAST_PART: f32 = 0.1;
 
-/// What the command line of the stage that computed light says.
+/// Settings of the light stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct CommandLine {
-    /// Gamma that light was encoded with; 1 for none.
+    /// Encoding gamma; 1 for none.
     pub gamma: f32,
-    /// Whether lights end where they give little.
+    /// Whether lights have a cutoff.
     pub has_cutoff: bool,
-    /// How corners were made darker, if they were.
+    /// Ambient occlusion, if any.
     pub dirt: Option<Dirt>,
 }
 
-/// Ambient occlusion as the compiler multiplies all light of a texel by.
+/// Ambient occlusion by which the compiler multiplies all light of a texel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Dirt {
-    /// How far surfaces matter, id units.
+    /// Distance within which surfaces occlude, id units.
     depth: f32,
-    /// Exponent of the part of the surroundings that is near.
+    /// Exponent of the occlusion.
     gain: f32,
-    /// How much of that is taken away.
+    /// Factor of the occlusion.
     scale: f32,
 }
 
-/// The command line that light was computed with: the last one, for light is computed anew. `None` where none is kept, or
-/// one that cannot be.
+/// The settings of the last light stage, which computed the stored light. `None` without a command line or with an
+/// invalid number.
 pub(super) fn command_line(entities: &[Entity]) -> Option<CommandLine> {
     let stages = entities.first()?.last(COMMAND_LINES)?.split(';');
     let words = |stage: &'_ str| stage.split_ascii_whitespace().map(str::to_owned).collect();
@@ -75,13 +74,13 @@ pub(super) fn command_line(entities: &[Entity]) -> Option<CommandLine> {
     })
 }
 
-/// The dirt of a calibrated map, if it was taken for dirty.
+/// The dirt of a calibrated map, if calibration found dirt.
 pub(super) fn dirt_of_calibrated(world: &RelitWorld) -> Option<Dirt> {
     let report = world.calibration.as_ref()?;
     report.dirty.then(|| dirt(&world.bsp.entities()))
 }
 
-/// The dirt of a map that has some: what its command line tells, else what is usual.
+/// The dirt of a map that has some: from its command line, else the default.
 pub(super) fn dirt(entities: &[Entity]) -> Dirt {
     command_line(entities)
         .and_then(|line| line.dirt)
@@ -89,14 +88,14 @@ pub(super) fn dirt(entities: &[Entity]) -> Dirt {
 }
 
 impl Dirt {
-    /// What the compiler does if nothing else is said.
+    /// q3map2's defaults.
     pub const DEFAULT: Dirt = Dirt {
         depth: 128.0,
         gain: 1.0,
         scale: 1.0,
     };
 
-    /// Part of the light at a place that is stored.
+    /// Part of the light at a position that was stored, 0.1 to 1.
     pub fn part_stored(&self, occluders: &Occluders, position: Vec3, normal: Vec3) -> f32 {
         let (u, v) = normal.any_orthonormal_pair();
         let (angles, count) = DIRT_RINGS;
@@ -133,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_computation_of_light_counts() {
+    fn the_last_light_stage_counts() {
         assert_eq!(command_line(&world("")), None);
         assert_eq!(parsed("-meta -patchmeta; -vis -fast"), None);
         let plain = CommandLine {
@@ -169,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_are_dirty_and_open_ground_is_not() {
+    fn corners_are_occluded_and_open_ground_is_not() {
         let dirt = Dirt::DEFAULT;
         // A wall along y at x = 0, as high as rays go.
         let (a, b, c) = (

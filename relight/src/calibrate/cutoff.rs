@@ -1,29 +1,30 @@
-//! Lights that end: compilers leave out what a light adds less than a step of light to.
+//! The light cutoff: compilers leave out a light where it adds less than one step of light.
 //!
-//! Where a light ends hangs on its strength, which is what is looked for. So besides what a column gives, what its lights
-//! give one by one is kept, heaped by how much that is, and the column is put together anew from what has not ended.
+//! The distance of the cutoff depends on the strength, which the fit is looking for. So a column also keeps its
+//! contributions without a cutoff, bucketed by the contribution of a single light, and its rows are rebuilt for the
+//! current strength.
 
 use super::columns::Column;
 
-/// What lights that give about the same give to a sample.
+/// Contribution to a sample of lights with about the same contribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Piece {
     /// The sample.
     pub sample: u32,
-    /// Light without shadows that one of them gives, for strength 1.
+    /// Unshadowed irradiance over π of one of them, for strength 1.
     pub unshadowed: f32,
-    /// Light that arrives from all of them, for strength 1.
+    /// Irradiance over π that arrives from all of them, for strength 1.
     pub given: f32,
 }
 
 impl Column {
-    /// Lets each of its lights end where, at the strength that it has, it gives no more than `cutoff`.
+    /// Rebuilds the rows from the lights whose contribution at the current strength exceeds `cutoff`.
     pub fn apply_cutoff(&mut self, cutoff: f32) {
         if self.pieces.is_empty() {
             return;
         }
         let strength = self.strength.max_element();
-        // What is not lit yet has not ended anywhere.
+        // At strength 0 nothing is cut off.
         let cutoff = if strength > 0.0 {
             cutoff / strength
         } else {
@@ -42,7 +43,7 @@ impl Column {
     }
 }
 
-/// Rows of one light as pieces.
+/// Pieces of a single light.
 pub(super) fn pieces_of(rows: &[(u32, f32)]) -> Vec<Piece> {
     let piece = |&(sample, given): &(u32, f32)| Piece {
         sample,
@@ -52,37 +53,37 @@ pub(super) fn pieces_of(rows: &[(u32, f32)]) -> Vec<Piece> {
     rows.iter().map(piece).collect()
 }
 
-/// What the compiler's lights of a group that give about the same give to a sample, for strength 1.
+/// Lights of a group with about the same contribution to a sample, for strength 1.
 pub(super) struct ContributionBucket {
     /// The group.
     pub group: u32,
-    /// Power of two of what one of them gives without shadows; of skies, which do not end, all the same.
+    /// Power of two of the unshadowed contribution of one light; the same for all of a sky, which has no cutoff.
     size: i32,
-    /// How many.
+    /// Number of lights.
     pub count: f32,
-    /// Light of all of them without shadows.
+    /// Unshadowed irradiance over π of all of them.
     pub unshadowed: f32,
-    /// Light that arrives.
+    /// Irradiance over π that arrives.
     pub given: f32,
 }
 
-/// What one of the compiler's lights gives to a sample, of a group and for strength 1.
+/// Contribution of one of the compiler's lights to a sample, for strength 1.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Contribution {
-    /// Which one of the group: of a triangle its number, of all quads of a sprite that of its surface.
+    /// Identity within the group: a triangle's index, or the surface of all quads of a sprite.
     pub number: u32,
     /// The group.
     pub group: u32,
-    /// It is a sky, which does not end.
+    /// Whether it is sky, which has no cutoff.
     pub sky: bool,
-    /// Light without shadows.
+    /// Unshadowed irradiance over π.
     pub unshadowed: f32,
-    /// Light that arrives.
+    /// Irradiance over π that arrives.
     pub arrives: f32,
 }
 
 impl Contribution {
-    /// Joins those of its group that give about as much.
+    /// Adds the light to the bucket of its group and size.
     pub fn add_to(self, buckets: &mut Vec<ContributionBucket>) {
         if self.arrives <= 0.0 {
             return;

@@ -1,4 +1,5 @@
-//! The state of a fit, and its steps: strengths, ambient and bounced light, which depend on each other.
+//! The state of a fit and its steps. Strengths, ambient term and reflected light depend on each other and are
+//! updated in turns.
 
 use super::bounce::Transfer;
 use super::candidate_grid::MeasuredSpace;
@@ -21,38 +22,38 @@ use glam::Vec3;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-/// Most times that lights are looked for.
+/// Largest number of rounds of placement.
 pub(super) const ROUNDS: usize = 4;
 
-/// Lights are looked for again while that leaves less than this part of the error at samples held out.
+/// Another round follows while a round lowers the held-out error below this part.
 const ROUND_GAIN: f32 = 0.985;
 
-/// Linear falloff is believed when it leaves less than this part of the error at samples held out.
+/// Part of the held-out error that linear falloff may leave to be kept.
 const LINEAR_KEPT: f32 = 0.97;
 
-/// Times that texels beside lights are looked at once these stay where they are.
+/// Largest number of passes over near-light texels after the last round.
 const NEAR_LIGHT_PASSES: u32 = 2;
 
-/// How many times the error at samples held out these texels may leave then: they are a small part of the map.
+/// Largest growth of the held-out error in these passes, a factor: near-light texels are a small part of the map.
 const NEAR_LIGHT_TOLERANCE: f32 = 1.02;
 
-/// Error, stops, of lights that fall off with the square of the distance, from which on linear ones are tried, as they are
-/// where less than half of the error of directives is gone. Elsewhere a few that reach far may agree a little better with the
-/// light of many lamps than these do.
+/// Held-out error of inverse-square lights from which linear falloff is tried, stops; it is also tried where the
+/// fit leaves more than half of the directives' error. Below that a few linear lights of long reach can fit many
+/// inverse-square lamps slightly better.
 const LINEAR_TRIED_ABOVE: f32 = 0.25;
 
-/// More ambient light than the darkest texels have is believed when it leaves less than this part of the error at
-/// samples held out: then these texels are dark for another reason.
+/// Part of the held-out error that a larger ambient limit may leave to be kept. The darkest texels are then dark
+/// for another reason.
 const MORE_AMBIENT: f32 = 0.93;
 
-/// Back splashes are believed when they leave less than this part of the error at samples held out.
+/// Part of the held-out error that back splashes may leave to be kept.
 const SPLASHES_KEPT: f32 = 0.95;
 
-/// How many times the error that is asked for leaves no hope after the first round that lights are looked for, and after each
-/// other one.
+/// A fit is abandoned if its error exceeds this factor times the required one: after the first round, and after
+/// each later round.
 const HOPELESS: (f32, f32) = (1.3, 1.1);
 
-/// Strengths from a rough guess.
+/// Effort for strengths from a rough guess.
 const FIRST: Effort = Effort {
     rounds: 8,
     sweeps: 12,
@@ -60,7 +61,7 @@ const FIRST: Effort = Effort {
     anew: true,
 };
 
-/// Strengths from nearly right ones.
+/// Effort for strengths from nearly correct ones.
 const NEXT: Effort = Effort {
     rounds: 3,
     sweeps: 8,
@@ -68,7 +69,7 @@ const NEXT: Effort = Effort {
     anew: false,
 };
 
-/// A state to come back to.
+/// A state to return to.
 #[derive(Clone)]
 pub(super) struct SavedState {
     columns: Vec<Column>,
@@ -78,18 +79,18 @@ pub(super) struct SavedState {
     near_light_texels: HashSet<TexelId>,
 }
 
-/// What lights that are put in have to come up to.
+/// Errors at which placement is abandoned.
 struct ErrorLimits {
-    /// Error that is asked for, stops.
+    /// Required error, stops.
     target: f32,
-    /// Error that another way left after each round, and a little more.
+    /// Error of the best fit so far after each round, with a tolerance, stops.
     per_round: Vec<f32>,
-    /// Most times that lights are looked for.
+    /// Largest number of rounds.
     rounds: usize,
 }
 
 impl ErrorLimits {
-    /// Error after a round that leaves no hope.
+    /// Error after a round above which the fit is abandoned, stops.
     fn abandon_above(&self, round: usize) -> f32 {
         match (self.per_round.get(round), round) {
             (Some(per_round), _) => *per_round,
@@ -103,47 +104,47 @@ impl ErrorLimits {
 pub(super) struct Fit<'a> {
     pub world: &'a RelitWorld,
     pub occluders: &'a Occluders,
-    /// Skies of which directives tell nothing.
+    /// Materials of skies without directives.
     pub unknown_skies: &'a [u32],
-    /// For every triangle, the surface that it is of.
+    /// Surface index of each triangle.
     pub of_triangle: Vec<u32>,
-    /// How measurements are taken.
+    /// How samples are taken.
     pub sampling: SamplingOptions,
     pub samples: Vec<Sample>,
-    /// Texels that joined them, beside lights that were put in.
+    /// Texels beside placed lights that joined the samples.
     pub near_light_texels: HashSet<TexelId>,
-    /// What was measured beside lights before, by texel and triangle.
+    /// Measurements of texels beside lights, by texel and triangle, for reuse.
     pub near_light_measurements: HashMap<(TexelId, u32), Option<Sample>>,
-    /// Where texels, or what tells in their place, are measured.
+    /// The part of space near samples.
     pub measured: MeasuredSpace,
     pub transfer: Transfer,
-    /// Back splashes that there may be.
+    /// Possible back splashes.
     pub splashes: Vec<Splashes>,
-    /// Known sources first.
+    /// Columns; known sources come first.
     pub columns: Vec<Column>,
     pub ambient: Ambient,
-    /// Places that the light grid's directions meet at.
+    /// Candidates from the directions of the light grid.
     pub crossings: Vec<Crossing>,
-    /// Candidates all over open space, once they were tried: they see the first measurements alike each time.
+    /// Candidates over open space with their rows; the first samples of a fit do not change.
     pub grid_candidates: Option<Arc<Candidates>>,
-    /// Places in front of samples that were candidates before.
+    /// Candidates in front of samples with a residual, of earlier rounds.
     pub residual_candidates: ResidualCandidates,
-    /// Error at samples held out after each round of lights that fall off with the square of the distance.
+    /// Held-out error after each round with inverse-square lights, stops.
     pub rounds: Vec<f32>,
-    /// Light at which lights end.
+    /// Light cutoff, irradiance over π.
     pub cutoff: f32,
-    /// What it is for: what will not do that need not be looked for to the end.
+    /// What the fit is for, and when it is abandoned.
     pub mode: FitMode<'a>,
 }
 
 impl Fit<'_> {
-    /// Light at the samples as it is computed now.
+    /// Agreement of the current fit at held-out samples.
     pub fn agreement(&self) -> Agreement {
         let computed = solve::predict(&self.samples, &self.columns, self.ambient.value);
         Agreement::of(self.world, &self.samples, &computed)
     }
 
-    /// [`agreement`](Self::agreement) with all texels, those that are fitted, too.
+    /// [`agreement`](Self::agreement) at all texels, fitted ones included.
     pub fn agreement_overall(&self) -> Agreement {
         let computed = solve::predict(&self.samples, &self.columns, self.ambient.value);
         let mut samples = self.samples.clone();
@@ -153,8 +154,8 @@ impl Fit<'_> {
         Agreement::of(self.world, &samples, &computed)
     }
 
-    /// Exposure at which light as it is now is as bright as the engine shows the map, in the mean of what players see where
-    /// they are set; over the map's area where nothing tells where that is.
+    /// Exposure at which the current fit is as bright as the engine shows the map, averaged over the views from the
+    /// spawn points; without spawn points over the map's area.
     pub fn exposure(&self) -> Option<Exposure> {
         let computed = solve::predict(&self.samples, &self.columns, self.ambient.value);
         let place = |sample: usize, material: u32| {
@@ -176,7 +177,7 @@ impl Fit<'_> {
             })
     }
 
-    /// Takes bounced light from the strengths as they are. `pictures`: with what pictures of skies give.
+    /// Computes reflected light from the current strengths. `pictures`: with the light of sky images.
     pub fn rebounce(&mut self, pictures: bool) {
         let direct = solve::direct(&self.samples, &self.columns);
         self.set_bounce(&direct, pictures);
@@ -189,9 +190,9 @@ impl Fit<'_> {
         }
     }
 
-    /// Fits known sources, and a sun where none is known.
+    /// Fits the known sources, and a sun if none is known.
     pub fn fit_known(&mut self) {
-        // What was measured is a better first guess of what is thrown back than what is believed of lights.
+        // Measured light is a better first estimate of the reflected light than the prior of the lights.
         let measured: Vec<Vec3> = self.samples.iter().map(|s| s.value).collect();
         self.set_bounce(&measured, false);
         let (columns, ambient) = (&mut self.columns, &mut self.ambient);
@@ -204,7 +205,7 @@ impl Fit<'_> {
         }
     }
 
-    /// Adds back splashes where they explain what known lights do not. Whether some were added.
+    /// Adds back splashes if they explain light that known sources do not. Returns whether any were added.
     pub fn try_splashes(&mut self, splashes: Vec<Column>) -> bool {
         let state = self.state();
         self.settle();
@@ -224,7 +225,7 @@ impl Fit<'_> {
         added
     }
 
-    /// Fits strengths and the light that they throw back to each other, in turns.
+    /// Updates strengths and reflected light in turns.
     pub fn settle(&mut self) {
         for _ in 0..3 {
             self.rebounce(false);
@@ -239,10 +240,10 @@ impl Fit<'_> {
         self.rebounce(false);
     }
 
-    /// What lights that are put in have to come up to.
+    /// The errors at which placement is abandoned. `linear`: linear falloff is allowed.
     fn error_limits(&self, linear: bool) -> ErrorLimits {
         let (target, per_round, rounds) = match self.mode {
-            // they are worth having if they agree better than what there is
+            // Linear lights must beat the inverse-square lights.
             _ if linear => (f32::INFINITY, self.rounds.clone(), ROUNDS),
             FitMode::Trial(rounds) => (f32::INFINITY, Vec::new(), rounds),
             FitMode::Full(acceptance) => {
@@ -256,9 +257,10 @@ impl Fit<'_> {
         }
     }
 
-    /// Puts in point lights for as long as samples that are held out get better by it.
-    /// `linear`: such that may fall off linearly, too. `progress` gets the part of the most rounds that are done.
-    /// Whether what is asked for was not come near to.
+    /// Places point lights in rounds while the held-out error falls. `linear`: linear falloff is allowed.
+    /// `progress` gets the completed part of the rounds.
+    ///
+    /// Returns true if the required error was missed.
     pub fn place_lights(
         &mut self,
         candidates: usize,
@@ -304,7 +306,7 @@ impl Fit<'_> {
             {
                 self.settle();
             }
-            // The first round, over all space, takes as long as the others together.
+            // The first round, over all open space, takes as long as the others together.
             progress(0.5 + 0.5 * round as f32 / (ROUNDS - 1) as f32);
             let found = self.agreement().median_stops;
             if found > best {
@@ -324,7 +326,7 @@ impl Fit<'_> {
             }
             self.add_near_light_texels(fixed);
         }
-        // What is moved or grows to make up for what was too bright may be too bright elsewhere.
+        // Lights that move or grow to compensate may be too bright at other texels.
         for _ in 0..NEAR_LIGHT_PASSES {
             let kept = self.state();
             if !self.add_near_light_texels(fixed) {
@@ -340,9 +342,9 @@ impl Fit<'_> {
         best > error_limits.target
     }
 
-    /// Puts in lights that may fall off linearly, as compilers can have it, in place of those of [`place_lights`](Self::place_lights),
-    /// where these leave much and samples that are held out get better by it. `state`: the state before them. `directives`:
-    /// error of what these say, stops.
+    /// Repeats placement with linear falloff allowed if inverse-square lights leave a large error, and keeps the
+    /// result if the held-out error falls. `state`: the state before placement. `directives`: error of the
+    /// directives, stops.
     pub fn try_linear_falloff(&mut self, state: SavedState, candidates: usize, directives: f32) {
         let before = self.agreement().median_stops;
         if before < LINEAR_TRIED_ABOVE && before <= hypotheses::error_target(directives) {
@@ -356,7 +358,7 @@ impl Fit<'_> {
         }
     }
 
-    /// What [`place_lights`](Self::place_lights) begins with.
+    /// Copies the state that placement changes.
     pub fn state(&self) -> SavedState {
         SavedState {
             columns: self.columns.clone(),
@@ -367,14 +369,14 @@ impl Fit<'_> {
         }
     }
 
-    /// Goes back to a state.
+    /// Returns to a saved state.
     fn restore(&mut self, state: SavedState) {
         (self.columns, self.ambient) = (state.columns, state.ambient);
         (self.samples, self.transfer) = (state.samples, state.transfer);
         self.near_light_texels = state.near_light_texels;
     }
 
-    /// Leaves the measurements in the air out again where samples held out say so.
+    /// Drops the light-grid samples if the held-out error does not grow without them.
     pub fn drop_light_grid_if_worse(&mut self) {
         let kept = (self.columns.clone(), self.ambient);
         let before = self.agreement().median_stops;
@@ -389,7 +391,7 @@ impl Fit<'_> {
         }
     }
 
-    /// Lets the ambient term grow to what the darker of the lit texels have, where that explains much more.
+    /// Raises the ambient limit to the 20 % quantile of the lit texels, if that lowers the error clearly.
     pub fn raise_ambient(&mut self) {
         let kept = (self.columns.clone(), self.ambient);
         let before = self.agreement().median_stops;
@@ -402,11 +404,11 @@ impl Fit<'_> {
     }
 }
 
-/// Where the ambient term starts, and how far it may go: what the darkest twentieth has, for no texel has less than the
-/// compiler's ambient and minimum light. More would hide lights, and fill shadows.
+/// Initial value and limit of the ambient term. The limit is the 5 % quantile of the fitted samples: every texel
+/// has at least the compiler's ambient and minimum light. A larger limit would replace lights and fill shadows.
 pub(super) fn first_ambient(world: &RelitWorld, samples: &[Sample]) -> Ambient {
     let dark = quantile(samples, 0.05, 0.0);
-    // Without any light, loading took the mean of all light for ambient.
+    // Without any light loading set the ambient term to the mean of the lightmaps.
     let start = if world.light_count() == 0 {
         Vec3::ZERO
     } else {
@@ -418,7 +420,7 @@ pub(super) fn first_ambient(world: &RelitWorld, samples: &[Sample]) -> Ambient {
     }
 }
 
-/// What a part of the samples that are fitted and not below `least` are darker than, channel by channel.
+/// Quantile of the fitted surface samples of at least `least`, channel by channel.
 fn quantile(samples: &[Sample], part: f32, least: f32) -> Vec3 {
     let chosen: Vec<Vec3> = samples
         .iter()

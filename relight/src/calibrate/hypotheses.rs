@@ -1,9 +1,9 @@
-//! The ways in which a map's light is looked for: with what its compiler may have done, with back splashes and without, with
-//! more measurements. What agrees best at texels held out is kept.
+//! Hypotheses: the combinations of compiler settings, back splashes and sample counts that are fitted. The one with
+//! the smallest error at held-out samples is kept.
 //!
-//! Ways are gone to the end, because what an early round leaves tells little: how dark corners are, and what splashes
-//! explain, hangs on ambient light, which is let grow last. More measurements of the same are given up as soon as they are
-//! known to agree no better.
+//! Every hypothesis is fitted to completion; early residuals mislead because the ambient term is released last, and
+//! dirt and back splashes trade off against it. A repetition with more samples is abandoned as soon as it cannot
+//! beat the best fit.
 
 use super::compiler::{self, Compiler};
 use super::trace_cache::TraceCache;
@@ -11,41 +11,41 @@ use super::{Acceptance, CalibrationOptions, FitMode, Solution, find};
 use crate::world::RelitWorld;
 use std::cell::Cell;
 
-/// Part of the time that looking for what the compiler did takes, about.
+/// Part of the time that the search for the compiler's settings takes.
 const COMPILER_PART: f32 = 0.3;
 
-/// Part of the time after which what was planned is tried: more measurements may follow.
+/// Part of the time after which the planned hypotheses are done; a fit with more samples may follow.
 const TRIED_PART: f32 = 0.85;
 
-/// Error at measurements held out, stops, that asks for more measurements: light of many small lights takes more to tell.
+/// Held-out error above which more samples are taken, stops: many small lights need more evidence.
 pub(super) const UNEXPLAINED: f32 = 0.3;
 
-/// Part of the error of what directives say that asks for more measurements, too, where more of it is left.
+/// Part of the directives' error above which more samples are taken.
 pub(super) const HALF: f32 = 0.5;
 
-/// So many times as many.
+/// Factor of the number of samples.
 const MORE_SAMPLES: usize = 2;
 
-/// Part of the error without back splashes that they may leave to be kept, where they are more lights.
+/// Part of the error without back splashes that they may leave to be kept if they are more lights.
 const SPLASHES_KEPT: f32 = 0.95;
 
-/// How far behind a way may fall that still comes up to another in the end, a factor of the error after a round.
+/// Largest ratio of the errors after a round at which a fit may still catch up with the best one.
 const BEHIND: f32 = 1.03;
 
-/// What ways have in common.
+/// State shared by all hypotheses.
 pub(super) struct Hypotheses<'a> {
     world: &'a mut RelitWorld,
     unknown_skies: &'a [u32],
     options: &'a CalibrationOptions,
     progress: &'a mut dyn FnMut(f32),
     traced: TraceCache,
-    /// The part that is done.
+    /// Completed part.
     reached: f32,
-    /// Ways to be tried after this one, at most.
+    /// Upper bound of the hypotheses to follow.
     left: usize,
 }
 
-/// The solution that agrees best, of what the compiler may have done.
+/// The best solution over the possible compiler settings.
 pub(super) fn best(
     world: &mut RelitWorld,
     unknown_skies: &[u32],
@@ -92,16 +92,16 @@ pub(super) fn best(
     }
 }
 
-/// What another way has to come up to.
+/// The best fit so far, which another fit must beat.
 pub(super) struct Incumbent {
-    /// Most error that may be left, stops.
+    /// Its error, stops.
     pub stops: f32,
-    /// Most that may be left after each round.
+    /// Largest error after each round, stops.
     pub round_limits: Vec<f32>,
 }
 
 impl Incumbent {
-    /// No more than a solution has.
+    /// The limits of a solution.
     pub fn of(found: &Solution) -> Incumbent {
         let after = found.rounds.iter();
         Incumbent {
@@ -111,18 +111,18 @@ impl Incumbent {
     }
 }
 
-/// Error that calibration should leave at most, where directives leave this one, stops.
+/// Error that calibration should reach for this error of the directives, stops.
 pub(super) fn error_target(directives: f32) -> f32 {
     (directives * HALF).max(compiler::NO_ERROR)
 }
 
-/// Error at measurements held out, stops.
+/// Error at held-out samples, stops.
 fn held_out_error(solution: &Solution) -> f32 {
     solution.report.after.median_stops
 }
 
 impl<'a> Hypotheses<'a> {
-    /// None tried yet, and none planned.
+    /// No hypothesis fitted, none planned.
     pub fn new(
         world: &'a mut RelitWorld,
         unknown_skies: &'a [u32],
@@ -140,7 +140,7 @@ impl<'a> Hypotheses<'a> {
         }
     }
 
-    /// What is found with a compiler's back splashes, or without where these are not needed.
+    /// The better solution with and without back splashes; one fit if the first uses none.
     fn fit_with_and_without_splashes(&mut self, compiler: Compiler) -> Solution {
         self.left = self.left.saturating_sub(2);
         let splashed = self.with(compiler);
@@ -154,9 +154,9 @@ impl<'a> Hypotheses<'a> {
         prefer(splashed, self.with(plain))
     }
 
-    /// What is found with the measurements that it takes.
+    /// The solution for a setting, with more samples if it needs them.
     pub fn with(&mut self, compiler: Compiler) -> Solution {
-        // it is tried once more without splashes, unless there are none
+        // A second fit without back splashes follows if the first uses them.
         let splashes = Cell::new(compiler.splashes);
         let (begin, left) = (self.reached, self.left);
         let end = &|| {
@@ -174,7 +174,7 @@ impl<'a> Hypotheses<'a> {
             .unwrap_or_default()
     }
 
-    /// [`with`](Self::with) more measurements. `None` as soon as it is known to agree no better than its rival.
+    /// [`with`](Self::with) more samples. `None` as soon as it cannot beat the incumbent.
     pub fn measured_more(
         &mut self,
         compiler: Compiler,
@@ -199,7 +199,7 @@ impl<'a> Hypotheses<'a> {
         })
     }
 
-    /// [`find`] that takes progress to `end`, as far as that is known.
+    /// [`find`] with progress scaled up to `end`, as far as that is known.
     fn find(
         &mut self,
         compiler: Compiler,
@@ -225,7 +225,8 @@ impl<'a> Hypotheses<'a> {
     }
 }
 
-/// What splashes explain, lights that are put in explain as well in many a map, and with fewer.
+/// Prefers the fit without back splashes unless they lower the error clearly or need fewer lights: in many maps
+/// placed lights explain the same light.
 fn prefer(splashed: Solution, plain: Solution) -> Solution {
     let added = |solution: &Solution| solution.report.splashes + solution.report.placed;
     let fewer =

@@ -1,10 +1,10 @@
-//! Measurements of the light in the air: the points of the light grid, which lights what moves.
+//! Samples from the light grid, which lights moving models.
 //!
-//! At each point the compiler adds up what comes straight from each light, weighted by the cosine between the way to
-//! the light and a direction that is the mean of these ways: that is the point's *directed* light, and so what a surface
-//! there would get from lights that faced this direction. (In six maps whose lights are known well, that is what is
-//! stored within 5 %.) Its *ambient* light is a quarter of all the rest or of all light, as compilers differ, and whatever
-//! they add: it tells nothing that could be relied on. Light that surfaces throw back is in neither.
+//! At each point the compiler sums the unshadowed direct light of every visible light, weighted by the cosine
+//! between the direction to the light and the mean of these directions. That sum is the point's *directed* light:
+//! the irradiance (over π) of a surface that faces the mean direction. On six maps with known lights the stored
+//! values agree with this within 5 %. The *ambient* light of a point is a quarter of the remaining or of all light,
+//! depending on the compiler, plus constants; it is not used. Neither contains reflected light.
 
 use super::CalibrationOptions;
 use super::samples::{Sample, Site, decode, floor, light_of, mean, pick, shown};
@@ -14,42 +14,44 @@ use glam::Vec3;
 use support::parallel;
 use support::random::Random;
 
-/// Least distance of a point from surfaces, id units: compilers move points that lie in something, and do not tell.
+/// Smallest distance of a usable point from surfaces, id units: compilers move points that lie in solid without
+/// recording it.
 const CLEARANCE: f32 = 8.0;
 
-/// Most points that are asked for their surroundings: more of them come in strata.
+/// Largest number of points that are tested by rays; larger grids are stratified.
 const MOST: usize = 24_000;
 
-/// One measurement in the air for so many on surfaces.
+/// Surface samples for one light-grid sample.
 const SURFACE_PER_GRID_SAMPLE: usize = 4;
 
-/// How much a measurement in the air tells beside one on a surface: of several lights only the sum, one direction's.
+/// Weight of a light-grid sample relative to a surface sample: it stores the sum of several lights in one
+/// direction.
 const TRUST: f32 = 0.3;
 
-/// How far the middle half of what is stored over what is computed may spread for the grid to be believed, a factor:
-/// about as far as in maps whose lights are known.
+/// Largest ratio of the upper to the lower quartile of stored over computed light at which the grid is used: about
+/// the ratio in maps whose lights are known.
 const MAX_QUARTILE_RATIO: f32 = 2.0;
 
-/// Stored light too dark to be compared, steps of a byte.
+/// Stored light below which ratios are not formed, steps of a byte.
 const DARK: f32 = 4.0;
 
-/// A point of the light grid.
+/// A lit point of the light grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LitGridPoint {
     pub position: Vec3,
-    /// Visibility cluster that it lies in.
+    /// PVS cluster of the position.
     pub cluster: i32,
-    /// Unit vector to where light comes from.
+    /// Unit vector towards the light.
     pub direction: Vec3,
     /// Directed light, irradiance / π.
     pub light: Vec3,
-    /// The same as the display shows it on white.
+    /// Directed light as the display shows it on white, encoded.
     pub shown: Vec3,
-    /// Some channel is at its end.
+    /// Whether a channel is 255.
     pub saturated: bool,
 }
 
-/// Lit points that lie in the open where that is `wanted`, in the order of the map's.
+/// Lit points with [`CLEARANCE`] for which `wanted` holds, in the order of the map.
 pub(super) fn points(
     world: &RelitWorld,
     occluders: &Occluders,
@@ -95,7 +97,7 @@ pub(super) fn points(
     found.into_iter().flatten().collect()
 }
 
-/// About `count` measurements, evenly out of points.
+/// About `count` samples, evenly chosen from `points`.
 pub(super) fn samples(
     world: &RelitWorld,
     points: &[LitGridPoint],
@@ -123,8 +125,8 @@ pub(super) fn samples(
         .collect()
 }
 
-/// Measurements in the air beside those on surfaces. None of them tells anything before it is known how strong the
-/// compiler stored light in the air: [`trust_if_consistent`].
+/// Light-grid samples to be added to surface samples. Their trust is 0 until [`trust_if_consistent`] finds the
+/// scale of the grid.
 pub(super) fn additional_samples(
     world: &RelitWorld,
     points: &[LitGridPoint],
@@ -143,9 +145,9 @@ pub(super) fn additional_samples(
     found
 }
 
-/// Makes measurements in the air count if `direct`, the light that comes straight from lights that explain what is stored
-/// on surfaces, explains them up to a factor, by which stored light is divided. (Compilers scale the grid, and may have
-/// added thrown back light to surfaces alone.) Whether they count now.
+/// Gives the light-grid samples weight if `direct`, the direct light of a fit to the surfaces, explains them up to
+/// one factor; divides them by this factor. (Compilers scale the grid, and may add reflected light to surfaces
+/// only.) Returns whether they now count.
 pub(super) fn trust_if_consistent(
     world: &RelitWorld,
     samples: &mut [Sample],
@@ -171,7 +173,7 @@ pub(super) fn trust_if_consistent(
     true
 }
 
-/// Sets how much measurements in the air tell. Whether they told anything before.
+/// Sets the trust of all light-grid samples; returns whether they counted before.
 pub(super) fn trust(samples: &mut [Sample], trust: f32) -> bool {
     let mut was_trusted = false;
     for sample in samples.iter_mut().filter(|s| s.site == Site::LightGrid) {

@@ -1,33 +1,38 @@
-//! Calibration: the strengths of a map's lights, and lights that its compiler threw away, from its lightmaps.
+//! Calibration: fits the powers of a map's lights to its lightmaps and places the lights that its compiler
+//! stripped.
 //!
-//! Compilers strip light entities, and leave their scale factors nowhere; what they computed is still there, as
-//! lightmaps. Light is linear in the strengths of lights, so that finding them is a linear problem: *inverse lighting*.
+//! Compilers strip light entities and do not record their scale factors, but the lightmaps hold the result of both.
+//! Irradiance is linear in the powers of the lights, so finding the powers is a linear problem (*inverse
+//! lighting*).
 //!
-//! 1. `samples`: measurements, spread over the map's area. Some are held out, to judge by. `air`: and the light in the
-//!    air, from the light grid.
-//! 2. `columns`: shadow rays tell what each known light gives to each sample. Skies that no directive tells the light of
-//!    count as known lights of unknown strength (`skies`).
-//! 3. `bounce`: which part of the light at samples others throw there, as tracing will.
-//! 4. `solve` fits strengths by sparse non-negative least squares of logarithmic error. What directives say is a prior,
-//!    and what is the same everywhere is ambient, within limits. `suns` looks for a sun where none is known, `splash`
-//!    puts weak lights in front of lamps, as compilers do.
-//! 5. `place`: candidates for lost lights all over open space, and where the directions of the light grid meet
-//!    (`crossings`), then in front of what stays unexplained (`residual_candidates`), for as long as
-//!    that makes light agree better at what is held out. `fit` holds these steps together. `near_light`: texels right beside
-//!    these lights join the measurements where they are too bright.
-//!    Where that leaves much, once more with lights that may fall off linearly, too.
-//! 6. `compiler`: all of that with less effort for light that was stored encoded, and for lights that end, to see whether
-//!    it explains more. `hypotheses`: where the map says that corners were made darker, all of it is done both ways; with back
-//!    splashes and without; with more measurements where much is left. `traced`: what these have in common is traced once.
-//! 7. The world's lights get their strengths, lost lights are added to
-//!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights), light lists are built anew.
-//! 8. `styles`: the same for the light of each style, which the compiler stored apart.
+//! 1. `samples` takes measurements, stratified by area: `texels` of lightmaps, `vertices` of surfaces lit by
+//!    vertex. One in five is held out and states the error. `light_grid` adds the map's light grid.
+//! 2. `columns` traces shadow rays: the irradiance that each known light of strength 1 gives to each sample.
+//!    `skies` adds skies that no directive describes, as lights of unknown strength.
+//! 3. `bounce` traces the transfer matrix: the part of a sample's light that other surfaces reflect onto it, as the
+//!    tracer will compute it.
+//! 4. `solve` fits the strengths by sparse non-negative least squares of the logarithmic error. Directives act as a
+//!    prior; a bounded ambient term is fitted with the lights. `suns` searches for a sun where no directive gives
+//!    one, `splash` adds the compiler's back splashes.
+//! 5. `placement` searches for stripped lights. Candidates are the nodes of a grid over open space
+//!    (`candidate_grid`), the points where directions of the light grid meet (`triangulation`), and points in front
+//!    of samples with a large residual (`residual_candidates`). Rounds continue while the held-out error falls.
+//!    `near_light` adds texels beside placed lights that the fit makes too bright. If a large error is left, the
+//!    search is repeated with linear falloff allowed. `fit` runs these steps.
+//! 6. `compiler` decides what the compiler did to light: gamma, light cutoff, dirt. It reads the command line
+//!    stored in the map (`compiler_command_line`) or fits with fewer samples for each possibility. `hypotheses`
+//!    fits the remaining combinations to completion and keeps the best. `trace_cache` shares rays between fits.
+//! 7. `apply` sets the fitted strengths, appends the placed lights to
+//!    [`RelitWorld::point_lights`](crate::RelitWorld::point_lights) and rebuilds the light lists.
+//! 8. `styles` repeats the fit for each light style, which the compiler stored separately.
 //!
-//! `docs/calibration.md` has the equations and how well it does. [`residuals()`] tells how well any world's light agrees.
+//! `docs/calibration.md` has the equations and the measured errors. [`residuals()`] compares any world's light with
+//! its stored light.
 //!
-//! Results can be kept ([`CalibrationCache`]): they depend on the world alone, on no clock and no thread.
+//! A result depends on the world and the options alone, on no clock and no thread count, so it can be cached
+//! ([`CalibrationCache`]).
 //!
-//! Source: the idea is that of Schoeneman et al., *Painting with Light*, SIGGRAPH 1993.
+//! Source: Schoeneman et al., *Painting with Light*, SIGGRAPH 1993, for inverse lighting.
 
 mod apply;
 mod bounce;
@@ -82,29 +87,29 @@ use std::collections::{HashMap, HashSet};
 use std::time::Instant;
 use trace_cache::{CandidateKey, TraceCache};
 
-/// Number that changes whenever the same world would give another result.
+/// Version of the results; to be incremented when the same world gives another result.
 const VERSION: u32 = 27;
 
-/// One in so many candidates comes from the directions of the light grid.
+/// Light-grid candidates: at most one for this many grid nodes.
 const CROSSINGS: usize = 5;
 
-/// How a world is calibrated.
+/// Settings of a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationOptions {
-    /// Measurements taken, about.
+    /// Approximate number of samples.
     pub samples: usize,
-    /// Most places tried at a time for lost lights; 0 places none.
+    /// Largest number of candidate positions in a round; 0 places no lights.
     pub candidates: usize,
-    /// Seed of the choice of measurements.
+    /// Seed of the choice of samples.
     pub seed: u64,
-    /// Diffuse bounces that tracing will add.
+    /// Diffuse bounces that the tracer computes.
     pub bounces: u32,
-    /// Where results are kept.
+    /// Cache of results; `None` computes anew.
     pub cache: Option<CalibrationCache>,
 }
 
 impl Default for CalibrationOptions {
-    /// What takes a few seconds for a map.
+    /// Settings that take a few seconds a map.
     fn default() -> Self {
         CalibrationOptions {
             samples: 6000,
@@ -116,46 +121,46 @@ impl Default for CalibrationOptions {
     }
 }
 
-/// What calibration finds: everything that it changes in a world.
+/// Result of a calibration: everything that it changes in a world.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Solution {
-    /// Strength of each known light source, in the order of [`columns::known`].
+    /// Strength of each known source, in the order of [`columns::known`].
     known: Vec<Vec3>,
-    /// Lights put in: where and how, intensity.
+    /// Placed lights: position and falloff, radiant intensity.
     placed: Vec<(Lamp, Vec3)>,
-    /// Strengths of back splashes, in the order of [`splash::of`].
+    /// Strength of the back splashes of each material, in the order of [`splash::of`].
     splashes: Vec<Vec3>,
-    /// Suns put in: direction to it, irradiance.
+    /// Suns found: unit vector towards the sun, irradiance.
     suns: Vec<(Vec3, Vec3)>,
     ambient: Vec3,
-    /// How bright this light is to be shown: see [`RelitWorld::exposure`].
+    /// Exposure for this light: see [`RelitWorld::exposure`].
     exposure: Option<Exposure>,
     report: CalibrationReport,
-    /// Agreement at all texels, those that were fitted, too: two fits alike are compared by it with less noise.
+    /// Error at all texels, fitted ones included: less noise for a comparison of fits with equal freedom.
     overall: Agreement,
-    /// Found with more measurements than asked for.
+    /// Whether it was fitted to more samples than the options ask for.
     measured_more: bool,
-    /// Error at measurements held out after each round of points, stops.
+    /// Error at held-out samples after each round of placement, stops.
     rounds: Vec<f32>,
 }
 
 impl Solution {
-    /// Number of sources.
+    /// Number of sources of all kinds.
     fn lights(&self) -> usize {
         self.known.len() + self.placed.len() + self.splashes.len() + self.suns.len()
     }
 }
 
-/// Fits a world's lights to the light that its compiler stored, and puts in lights that the compiler threw away.
+/// Fits a world's lights to the light that its compiler stored, and places the lights that the compiler stripped.
 ///
-/// Without lightmaps, vertex colours of lit surfaces tell, then the light grid; without those the world stays as it
-/// is. What goes wrong with the cache is a warning of the world's.
+/// The samples are lightmap texels, else vertex colours of lit surfaces, else points of the light grid; a world
+/// without any of these stays unchanged. Cache failures become warnings of the world.
 pub fn calibrate(world: &mut RelitWorld, options: &CalibrationOptions) -> CalibrationReport {
     calibrate_with(world, options, &mut |_| ())
 }
 
-/// [`calibrate`] that tells how far it is: `progress` gets the part that is done, 0 to 1, now and then, on this thread;
-/// nothing when the result was kept.
+/// [`calibrate`] with progress reports: `progress` gets the completed part, 0 to 1, on the calling thread. It is
+/// not called when the result comes from the cache.
 pub fn calibrate_with(
     world: &mut RelitWorld,
     options: &CalibrationOptions,
@@ -202,31 +207,30 @@ pub fn calibrate_with(
     solution.report
 }
 
-/// What a solution is for.
+/// What a fit is for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum FitMode<'a> {
-    /// To compare one compiler with another: without the light grid and linear falloff. Lights are looked for so many times
-    /// at most.
+    /// Comparison of compiler settings: no light grid, no linear falloff, at most this many rounds of placement.
     Trial(usize),
-    /// To be kept if it agrees well enough.
+    /// Complete fit, abandoned when it cannot reach this error.
     Full(Acceptance<'a>),
 }
 
-/// When a solution is good enough to be kept.
+/// Error that a complete fit must reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Acceptance<'a> {
-    /// Most error that is left at measurements held out, stops.
+    /// Largest error at held-out samples, stops.
     stops: f32,
-    /// What may be left after each round: another way that has more is given up.
+    /// Largest error after each round, stops; above it the fit is abandoned.
     round_limits: &'a [f32],
-    /// Told as soon as it is known: whether there are back splashes.
+    /// Output: whether the fit uses back splashes; set as soon as it is decided.
     splashes: &'a Cell<bool>,
 }
 
-/// Solves for a world's light. `unknown_skies`: skies of which directives tell nothing. `compiler`: what was done to light, which
-/// the world knows but for dirt. `traced`: what was traced for the same world before.
+/// Fits a world's light. `unknown_skies`: materials of skies without directives. `compiler`: what the compiler did
+/// to light; the world has all of it but dirt. `traced`: rays of earlier fits of the same world.
 ///
-/// `None` as soon as it is known not to do what it is for.
+/// `None` when the fit was abandoned.
 fn find(
     world: &RelitWorld,
     unknown_skies: &[u32],
@@ -239,7 +243,8 @@ fn find(
     progress(0.0);
     let thorough = !matches!(mode, FitMode::Trial(_));
     let occluders = Occluders::of_world(world);
-    // Where lights end, black tells little. Trials do not know yet whether they do, and measure alike to be compared.
+    // With a light cutoff a black texel is weak evidence. Trials with and without a cutoff must use the same
+    // samples.
     let sampling = SamplingOptions {
         count: options.samples,
         seed: options.seed,

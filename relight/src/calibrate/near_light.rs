@@ -1,8 +1,8 @@
-//! Texels right beside point lights.
+//! Samples beside placed lights.
 //!
-//! A point is brightest on the surface beside it, in a spot that falls between measurements. So once lights have been put
-//! in, the texels around each are looked at, and those that they make too bright join the measurements: what follows is
-//! fitted to them, too.
+//! A point light is brightest on the nearest surface, in a spot smaller than the distance between samples. After
+//! lights have been placed, rays from each of them find the texels around it; texels that the fit makes too bright
+//! join the samples, and the following fits include them.
 
 use super::bounce::surfaces_of_triangles;
 use super::columns::{self, Column, Lamp, Source, point_rows, sun_rows};
@@ -19,33 +19,33 @@ use std::collections::HashSet;
 use std::f32::consts::{PI, TAU};
 use support::parallel;
 
-/// How far around a light texels are looked at, id units: farther off there are measurements enough.
+/// Radius around a light in which texels are tested, id units: farther away the ordinary samples are dense enough.
 pub(super) const NEAR: f32 = 128.0;
 
-/// Directions from each light that are looked into.
+/// Rays from each placed light.
 const RAYS: usize = 160;
 
-/// Texels that lights make so many times as bright as they are join the measurements.
+/// Ratio of fitted to stored light from which a texel joins the samples.
 const EXCESS: f32 = 1.3;
 
-/// Most texels that join for each light.
+/// Most texels that join for one light.
 const MOST: usize = 12;
 
-/// How much one of them tells, beside other measurements: they stand for less of the map.
+/// Weight of such a texel relative to other samples: it stands for less area.
 const TRUST: f32 = 0.3;
 
-/// Part of stored light below which a light does not matter to what is too bright.
+/// Part of stored light below which a light is ignored when looking for texels that are too bright.
 const PART: f32 = 0.05;
 
-/// Directions from each light that [`spots`] looks into.
+/// Rays from each light for [`spots`].
 const SPOT_RAYS: usize = 512;
 
-/// How many times as bright as it is a texel has to be made to be a spot: a stop.
+/// Ratio of computed to stored light from which a texel counts as a spot: one stop.
 const SPOT_RATIO: f32 = 2.0;
 
-/// Even directions over the sphere.
+/// Evenly distributed directions over the sphere.
 ///
-/// Source: González 2010, the lattice of the golden ratio.
+/// Source: González 2010, the Fibonacci lattice.
 fn directions(count: usize) -> impl Iterator<Item = Vec3> {
     let golden = TAU / (1.0 + 5.0f32.sqrt()) * 2.0;
     (0..count).map(move |k| {
@@ -56,8 +56,8 @@ fn directions(count: usize) -> impl Iterator<Item = Vec3> {
     })
 }
 
-/// Measurements of texels that are seen from a place within [`NEAR`], by about so many rays, each once: of those that are wanted
-/// and tell how bright it is there. What is not is not measured. `measure` gets the triangle, too: surfaces may share a texel.
+/// Samples of the texels within [`NEAR`] that rays from `origin` hit, each texel once, if `wanted` accepts it and
+/// it is a usable measurement. `measure` also gets the triangle, because surfaces may share a texel.
 pub(super) fn texels_around(
     context: &SampleContext<'_>,
     of_triangle: &[u32],
@@ -88,8 +88,8 @@ pub(super) fn texels_around(
 }
 
 impl Fit<'_> {
-    /// Lets texels right beside lights that were put in join the measurements where these make them too bright. `fixed`:
-    /// how many of the sources were there before. Whether some did.
+    /// Adds texels beside placed lights that the fit makes too bright to the samples. `fixed`: number of leading
+    /// columns that are not placed lights. Returns whether any was added.
     pub fn add_near_light_texels(&mut self, fixed: usize) -> bool {
         if matches!(self.mode, FitMode::Trial(_)) {
             return false;
@@ -143,7 +143,7 @@ impl Fit<'_> {
         true
     }
 
-    /// Adds measurements to those that sources are fitted to.
+    /// Adds samples, with their rows in every column and in the transfer matrix.
     fn add_samples(&mut self, more: &[Sample]) {
         let (world, occluders, unknown_skies) = (self.world, self.occluders, self.unknown_skies);
         let first = self.samples.len() as u32;
@@ -187,7 +187,7 @@ impl Fit<'_> {
     }
 }
 
-/// A light that was put in and is lit.
+/// The lamp and strength of a column that is a placed light with light.
 fn lit(column: &Column) -> Option<(Lamp, Vec3)> {
     match column.source {
         Source::Placed(lamp) if column.strength != Vec3::ZERO => Some((lamp, column.strength)),
@@ -195,7 +195,7 @@ fn lit(column: &Column) -> Option<(Lamp, Vec3)> {
     }
 }
 
-/// Light, mean of the channels, irradiance / π, that lights give to samples which lie near to each other.
+/// Irradiance over π, mean of the channels, of several lights at samples that lie close together.
 fn light_from(
     world: &RelitWorld,
     occluders: &Occluders,
@@ -209,7 +209,7 @@ fn light_from(
     };
     let soa = SampleSoa::new(samples);
     for &(lamp, strength) in lights {
-        // what gives less than a part of what is stored does not make it too bright
+        // A light below this part of the stored light cannot make it too bright.
         let power = samples::mean(strength);
         let reach = (power / (PI * PART * (first.level() + first.floor).max(1e-6))).sqrt();
         if lamp.origin.distance(first.position) > reach + NEAR * 2.0 {
@@ -226,16 +226,16 @@ fn light_from(
     sums
 }
 
-/// How point lights light the texels beside them.
+/// Texels beside point lights, and how many of them are too bright.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spots {
-    /// Texels within 128 units of a point light, of those that tell how bright it was.
+    /// Texels within 128 units of a point light that are usable measurements.
     pub texels: usize,
-    /// Of these, such that point lights alone make more than a stop too bright.
+    /// Those that point lights alone make brighter than stored by more than one stop.
     pub too_bright: usize,
 }
 
-/// Looks for spots of light beside the point lights of a world as it is, calibrated or not, that its lightmaps do not have.
+/// Counts the texels that the point lights of a world, calibrated or not, make too bright.
 pub fn spots(world: &RelitWorld) -> Spots {
     let occluders = Occluders::of_world(world);
     let sampling = SamplingOptions {

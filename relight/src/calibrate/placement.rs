@@ -1,9 +1,9 @@
-//! Finding the lights that the map compiler threw away.
+//! Placement of the lights that the compiler stripped.
 //!
-//! First every node of a grid over open space is a candidate, and the sparse solution chooses among them. A light
-//! between nodes is chosen as several of them: near ones that see each other become one, and each looks around for a
-//! better place. Then bright samples that are still not explained put candidates in front of themselves, and the same
-//! is done once more.
+//! In the first round every node of a grid over open space is a candidate, and the sparse solver selects among
+//! them. A light between nodes is selected as several of them: nearby selected lights that see each other are
+//! merged, and each light moves to a better position. In later rounds candidates lie in front of samples with a
+//! large residual.
 
 use super::candidate_grid::MeasuredSpace;
 use super::columns::{Column, Lamp, Source, point_rows, point_rows_hinted, unshadowed};
@@ -21,25 +21,25 @@ use glam::Vec3;
 use std::f32::consts::PI;
 use support::parallel;
 
-/// Least distance of a light from surfaces, id units: its ball must not reach into them.
+/// Smallest distance of a light from surfaces, id units: its sphere must not reach into them.
 pub(super) const CLEARANCE: f32 = 8.0;
 
-/// How far candidates are tried, id units. Lights that are kept reach as far as they are seen.
+/// Range of candidates, id units. Lights that are kept have no range limit.
 pub(super) const RANGE: f32 = 700.0;
 
-/// Squared error (samples that are off by a factor e) that a light must take away to be kept.
+/// Squared logarithmic error that a light must remove to be kept; 1 is one sample that is off by a factor of e.
 pub(super) const WORTH: f32 = 0.6;
 
-/// Samples that a light is moved by: so many tell where it is.
+/// Largest number of samples by which a light is moved.
 const MOVE_SAMPLES: usize = 240;
 
-/// Part of a sample's light that a light must be able to give, to be moved by it.
+/// Part of a sample's light that a light must be able to give for the sample to affect its move.
 const INFLUENCE: f32 = 0.05;
 
-/// Reaches of lights with linear falloff that are tried, id units: the least, the largest, and by what factor they grow.
+/// Reaches of linear lights that are tried, id units: smallest, largest, ratio of successive ones.
 const REACHES: (f32, f32, f32) = (128.0, 2048.0, 1.4);
 
-/// How much more error than with an inverse square linear falloff must take away to be believed, a factor.
+/// Ratio of the removed error to that of inverse-square falloff from which linear falloff is taken.
 const LINEAR_WORTH: f32 = 1.15;
 
 const AROUND: [Vec3; 6] = [
@@ -51,14 +51,14 @@ const AROUND: [Vec3; 6] = [
     Vec3::NEG_Z,
 ];
 
-/// How far around a light surfaces are asked how bright it may be, id units: farther off there are measurements enough.
+/// Radius in which surfaces bound a light's strength, id units: farther away samples are dense enough.
 const NEAR: f32 = 64.0;
 
-/// How much more light than is stored there a light may give to the surface beside it: texels are wide, and where
-/// exactly it was is not known.
+/// Largest ratio of a light's contribution to the stored light on the surface beside it: texels are wide, and the
+/// position is inexact.
 const EXCESS: f32 = 1.5;
 
-/// A light as light is.
+/// An inverse-square point light at `origin`.
 pub(super) fn lamp(origin: Vec3) -> Lamp {
     Lamp {
         origin,
@@ -66,20 +66,20 @@ pub(super) fn lamp(origin: Vec3) -> Lamp {
     }
 }
 
-/// What placing lights needs to know.
+/// Inputs of placement.
 pub(super) struct Scene<'a> {
     pub world: &'a RelitWorld,
     pub occluders: &'a Occluders,
     pub soa: SampleSoa<'a>,
-    /// Where these are.
+    /// The part of space near samples.
     pub measured: &'a MeasuredSpace,
-    /// For every triangle, the surface that it is of.
+    /// Surface index of each triangle.
     pub of_triangle: &'a [u32],
-    /// Most candidates at a time.
+    /// Largest number of candidates in a round.
     pub candidates: usize,
-    /// Whether lights may fall off linearly, too.
+    /// Whether linear falloff is allowed.
     pub linear: bool,
-    /// Light at which lights end.
+    /// Light cutoff, irradiance over π.
     pub cutoff: f32,
 }
 
@@ -89,8 +89,8 @@ impl Scene<'_> {
         point_rows(bsp, self.occluders, &self.soa, lamp, None, range)
     }
 
-    /// Samples used for fitting that a light of this intensity may matter to when it moves by up to `margin`; evenly
-    /// thinned when they are many.
+    /// Fitted samples that a light of this intensity may affect when it moves by up to `margin`; evenly thinned to
+    /// [`MOVE_SAMPLES`].
     fn influenced(&self, origin: Vec3, intensity: f32, margin: f32) -> Vec<u32> {
         let all = (self.soa).within_reach(origin, intensity, margin, INFLUENCE * PI);
         let all: Vec<u32> = all.collect();
@@ -100,13 +100,13 @@ impl Scene<'_> {
             .collect()
     }
 
-    /// The most that a light may be, by the light that lightmaps store on the surfaces right beside it. There it
-    /// is brightest, and measurements are too sparse to tell of such spots.
+    /// Upper bound of a light's strength from the lightmaps of the surfaces beside it, where it is brightest and
+    /// samples are too sparse.
     pub(super) fn limit(&self, lamp: Lamp) -> Vec3 {
         limit_by(&self.near(lamp.origin), lamp)
     }
 
-    /// The surfaces right beside a place.
+    /// The surfaces beside a position, found by 14 rays.
     fn near(&self, origin: Vec3) -> Vec<NearSurface> {
         let floor = samples::floor(self.world);
         let corners = (0..8u8).map(|k| {
@@ -137,7 +137,7 @@ impl Scene<'_> {
         self.limited(lamp, rows, strength, self.limit(lamp))
     }
 
-    /// The column of a light at a place that may be so much.
+    /// The column of a placed light with this upper bound.
     pub(super) fn limited(
         &self,
         lamp: Lamp,
@@ -159,7 +159,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Whether a light fits at a place: in the map, and clear of surfaces.
+    /// Whether a light fits at a position: inside the map and clear of surfaces.
     pub(super) fn open(&self, origin: Vec3) -> bool {
         self.world.bsp.cluster_at(origin) >= 0
             && !self.world.bsp.is_in_drawn_brush(origin, 0.0)
@@ -173,15 +173,15 @@ impl Scene<'_> {
     }
 }
 
-/// A surface right beside a place.
+/// A surface beside a position.
 struct NearSurface {
-    /// Light that it stores, and what is too little to tell apart.
+    /// Stored irradiance over π plus the measurement floor.
     stored: Vec3,
     distance: f32,
     cosine: f32,
 }
 
-/// The most that a light may be, by the surfaces beside it.
+/// Upper bound of a light's strength by the surfaces beside it.
 fn limit_by(near: &[NearSurface], lamp: Lamp) -> Vec3 {
     let most = |near: &NearSurface| {
         let given = lamp.falloff.irradiance(near.distance, near.cosine);
@@ -190,15 +190,15 @@ fn limit_by(near: &[NearSurface], lamp: Lamp) -> Vec3 {
     near.iter().filter_map(most).fold(Vec3::INFINITY, Vec3::min)
 }
 
-/// Candidates all over open space.
+/// Candidates over open space.
 pub(super) struct Candidates {
-    /// Where they are, and what they give to measurements for strength 1; such as reach nothing are left out.
+    /// Position and rows for strength 1; candidates without rows are left out.
     places: Vec<(Vec3, Vec<(u32, f32)>)>,
-    /// The grid's spacing.
+    /// Grid spacing, id units.
     pub spacing: f32,
 }
 
-/// Candidates out of a grid over open space, and where directions of the light grid meet.
+/// Candidates at the nodes of a grid over open space and where directions of the light grid meet.
 pub(super) fn over_open_space(scene: &Scene<'_>, crossings: &[Crossing]) -> Candidates {
     let open = |at| scene.open(at);
     let (mut nodes, spacing) = scene.measured.grid(scene.world, scene.candidates, open);
@@ -216,7 +216,7 @@ pub(super) fn over_open_space(scene: &Scene<'_>, crossings: &[Crossing]) -> Cand
     }
 }
 
-/// Adds lights out of candidates to `columns`, of which the first `fixed` stay.
+/// Adds lights from grid candidates to `columns`; the first `fixed` columns stay.
 pub(super) fn place_from_grid(
     scene: &Scene<'_>,
     candidates: &Candidates,
@@ -230,7 +230,7 @@ pub(super) fn place_from_grid(
     select_and_refine(scene, columns, fixed, ambient, (of, candidates.spacing));
 }
 
-/// Adds lights in front of what stays unexplained.
+/// Adds lights in front of samples with a large residual.
 pub(super) fn place_at_residuals(
     scene: &Scene<'_>,
     residual_candidates: &mut ResidualCandidates,
@@ -244,7 +244,7 @@ pub(super) fn place_at_residuals(
     select_and_refine(scene, columns, fixed, ambient, (candidates, spacing * 0.5));
 }
 
-/// Of candidates and lights placed so far keeps the best, merged, moved and solved anew.
+/// Selects the best of candidates and placed lights, merges and moves them, and fits their strengths.
 fn select_and_refine(
     scene: &Scene<'_>,
     columns: &mut Vec<Column>,
@@ -292,7 +292,7 @@ fn select_and_refine(
     solve(scene.soa.samples, columns, ambient, settle, scene.cutoff);
 }
 
-/// Removes placed lights without which the error would hardly grow.
+/// Removes placed lights that remove less than `worth` of the error.
 pub(super) fn drop_useless(columns: &mut Vec<Column>, known: usize, state: &Residual, worth: f32) {
     let mut index = 0;
     columns.retain(|column| {
@@ -303,8 +303,8 @@ pub(super) fn drop_useless(columns: &mut Vec<Column>, known: usize, state: &Resi
     });
 }
 
-/// Makes one light of those that are near to each other and see each other, strongest first. The first `whole` of the columns
-/// reach as far as they are seen: such of them as stay alone stay as they are.
+/// Merges lights within `radius` that see each other, strongest first. The rows of the first `whole` columns have
+/// no range limit; such a light keeps its rows if it does not move.
 fn merge(scene: &Scene<'_>, columns: &mut Vec<Column>, known: usize, radius: f32, whole: usize) {
     let mut placed: Vec<(Lamp, Column, bool)> = (known..)
         .zip(columns.drain(known..))
@@ -344,7 +344,7 @@ fn merge(scene: &Scene<'_>, columns: &mut Vec<Column>, known: usize, radius: f32
         let centre = if total > 0.0 { centre / total } else { origin };
         let moved =
             centre.distance(origin) > 1e-3 && scene.open(centre) && scene.sees(origin, centre);
-        // It falls off as the strongest of them does.
+        // The merged light has the falloff of the strongest.
         let origin = if moved { centre } else { origin };
         merged.push((Lamp { origin, ..*lamp }, strength, (!moved).then_some(i)));
     }
@@ -361,13 +361,13 @@ fn merge(scene: &Scene<'_>, columns: &mut Vec<Column>, known: usize, radius: f32
     columns.extend(parallel::map(&merged, |_, light| traced(light)));
 }
 
-/// Reaches that are tried.
+/// The reaches of linear lights that are tried.
 fn reaches() -> impl Iterator<Item = f32> {
     let next = |reach: &f32| Some(reach * REACHES.2).filter(|r| *r <= REACHES.1);
     std::iter::successors(Some(REACHES.0), next)
 }
 
-/// Moves every placed light by up to two steps to where it would explain more, all others held.
+/// Moves every placed light by up to two steps to where it removes more error, with all others fixed.
 fn move_lights(
     scene: &Scene<'_>,
     columns: &mut [Column],
@@ -396,7 +396,7 @@ fn best_move(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) ->
         .filter_map(|&i| scene.soa.samples.get(i as usize).copied())
         .collect();
     let near = SampleSoa::new(&affected);
-    // What this light would have to explain: the rest, and what it explains now.
+    // Target of this light: the residual plus its own contribution.
     let mut rows = column.rows.iter().peekable();
     let wanted: Vec<(Vec3, f32)> = around
         .iter()
@@ -413,7 +413,7 @@ fn best_move(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) ->
             (rest + own, state.weights.get(at).copied().unwrap_or(0.0))
         })
         .collect();
-    // Error taken away by a light at a place with the strength that is best there, and that strength.
+    // Removed error and strength of the best light at a position.
     let worth = |near: &[NearSurface], lamp: Lamp, rows: &[(u32, f32)]| {
         let mut gradient = Vec3::ZERO;
         let mut norm = 0.0;
@@ -427,7 +427,7 @@ fn best_move(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) ->
             let limit = limit_by(near, lamp);
             let strength = (gradient / norm).max(Vec3::ZERO).min(limit);
             if scene.cutoff > 0.0 && strength.max_element() > 0.0 {
-                // Again with what such a light would have left.
+                // Recomputed without the samples beyond the cutoff.
                 let least = scene.cutoff / strength.max_element();
                 let (mut gradient, mut norm) = (Vec3::ZERO, 0.0);
                 for &(i, a) in rows.iter().filter(|(_, a)| *a > least) {
@@ -448,7 +448,7 @@ fn best_move(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) ->
             (0.0, Vec3::ZERO)
         }
     };
-    // What stops light on its way to a sample stops it as well from a place beside.
+    // An occluder of one position probably occludes its neighbour.
     let mut stopped = vec![None; affected.len()];
     let mut seen = |lamp: Lamp| {
         let (bsp, all) = (&scene.world.bsp, (None, f32::INFINITY));
@@ -460,7 +460,7 @@ fn best_move(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) ->
         let from = best.0;
         for direction in AROUND {
             let at = from.origin + direction * step;
-            // there and back again
+            // Skips the way back.
             if at.distance(start.origin) < step * 0.5 {
                 continue;
             }
@@ -479,7 +479,7 @@ fn best_move(scene: &Scene<'_>, column: &Column, state: &Residual, step: f32) ->
         }
     }
     if scene.linear {
-        // What it sees does not depend on how its light falls off.
+        // Visibility does not depend on the falloff.
         let square = lamp(best.0.origin);
         let seen = seen(square);
         let linear = reaches().map(|reach| (Falloff::Linear { reach }, LINEAR_WORTH));

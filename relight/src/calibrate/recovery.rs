@@ -1,40 +1,40 @@
-//! How well calibration finds lights again whose truth is known: those of maps that kept their light entities.
+//! Measures how well calibration finds known lights: those of maps that kept their light entities.
 
 use crate::light::{self, PointLight};
 use crate::world::RelitWorld;
 use glam::Vec3;
 
-/// How far off a light may be to count as found, id units.
+/// Largest distance of a found light from the true one, id units.
 pub const FOUND_WITHIN: f32 = 32.0;
 
-/// How far the intensity may be off to count as found well, as a part of it.
+/// Largest relative error of the intensity of a light that counts as found well.
 pub const POWER_WITHIN: f32 = 0.15;
 
-/// How far off a light is still taken for the one that it stands for, id units.
+/// Largest distance at which a placed light is assigned to a hidden one, id units.
 const SAME_WITHIN: f32 = 96.0;
 
-/// Lights that were hidden, and what was found of them.
+/// Hidden lights, and how many calibration found.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Recovery {
-    /// Lights that were hidden.
+    /// Hidden lights.
     pub hidden: usize,
-    /// Of these, found within [`FOUND_WITHIN`]: several lights found near one count as one at their centre.
+    /// Hidden lights found within [`FOUND_WITHIN`]: placed lights near one count as one at their centroid.
     pub found: usize,
-    /// Of these, with an intensity within [`POWER_WITHIN`].
+    /// Found lights with an intensity within [`POWER_WITHIN`].
     pub found_well: usize,
-    /// Median distance of those found from the truth, id units.
+    /// Median distance of the found lights from the true ones, id units.
     pub median_distance: f32,
-    /// Part of the hidden lights' intensity that lies at those found.
+    /// Part of the hidden intensity that was found.
     pub power_found: f32,
-    /// Intensity of all lights put in over that of all hidden ones.
+    /// Intensity of all placed lights over that of all hidden ones.
     pub power_ratio: f32,
-    /// Lights put in that stand for none of the hidden ones.
+    /// Placed lights that are assigned to no hidden light.
     pub invented: usize,
-    /// Part of the intensity put in that is theirs.
+    /// Their part of the placed intensity.
     pub power_invented: f32,
 }
 
-/// Takes out the light that entities tell of, as most compilers do: returns its point lights.
+/// Removes the light of entities, as most compilers do, and returns the point lights.
 pub fn hide_entities(world: &mut RelitWorld) -> Vec<PointLight> {
     let hidden = std::mem::take(&mut world.point_lights);
     world.suns.retain(|sun| sun.material.is_some());
@@ -45,12 +45,12 @@ pub fn hide_entities(world: &mut RelitWorld) -> Vec<PointLight> {
     hidden
 }
 
-/// Compares the point lights that `world` was given since with those that were hidden.
+/// Compares the point lights that calibration placed in `world` with the hidden ones.
 pub fn recovery(hidden: &[PointLight], world: &RelitWorld) -> Recovery {
     let level = |light: &PointLight| light.intensity.element_sum() / 3.0;
     let mut gathered = vec![(Vec3::ZERO, 0.0f32); hidden.len()];
     let (mut invented, mut power_invented, mut power_placed) = (0, 0.0, 0.0);
-    // Those of lamps are no one's entities.
+    // Back splashes stand for no entity.
     let splashes = world.calibration.as_ref().map_or(0, |c| c.splashes);
     for placed in world.point_lights.iter().skip(splashes) {
         let power = level(placed);

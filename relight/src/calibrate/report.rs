@@ -1,18 +1,18 @@
-//! How well traced light agrees with stored light.
+//! Agreement of computed light with stored light.
 
 use super::samples::{Sample, light_of, mean};
 use crate::emitters::Agreement;
 use crate::world::RelitWorld;
 use glam::Vec3;
 
-/// Stored light below which ratios mean nothing, steps of a byte.
+/// Stored light below which ratios are not formed, steps of a byte.
 const DARK: f32 = 2.0;
 
-/// Least computed light in a ratio, steps of a byte: black counts as this.
+/// Smallest computed light in a ratio, steps of a byte.
 const BLACK: f32 = 0.25;
 
 impl Agreement {
-    /// Of samples that are held out, not cut off and not all dark.
+    /// Over held-out samples that are neither saturated nor dark.
     pub(super) fn of(world: &RelitWorld, samples: &[Sample], computed: &[Vec3]) -> Agreement {
         let (dark, black) = (light_of(world, DARK), light_of(world, BLACK));
         let judged = || {

@@ -1,6 +1,6 @@
-//! Candidates for lost lights in front of samples that stay unexplained.
+//! Candidates for lights in front of samples with a large residual.
 //!
-//! Where much stays unexplained, places come up again in later rounds: what they see is kept.
+//! Positions recur in later rounds; their rows are kept.
 
 use super::columns::{Column, point_rows};
 use super::placement::{RANGE, Scene, lamp};
@@ -11,28 +11,28 @@ use glam::Vec3;
 use std::collections::HashMap;
 use support::parallel;
 
-/// Distances from a sample at which candidates are put in front of it, id units.
+/// Distances of candidates from their sample, id units.
 const DISTANCES: [f32; 4] = [12.0, 28.0, 60.0, 120.0];
 
-/// What stays unexplained of a sample's light, a part of it, that asks for a light in front of it.
+/// Residual relative to the stored light from which a sample gets candidates.
 const UNEXPLAINED: f32 = 0.25;
 
-/// Places that were looked at, and what they see of the first samples of a fit, which stay the same.
+/// Candidate positions with their rows for the first samples of a fit, which do not change.
 pub(super) struct ResidualCandidates {
     first: usize,
     known: HashMap<[u32; 3], CachedRows>,
 }
 
-/// A place that was looked at.
+/// Rows and limit of a candidate.
 struct CachedRows {
-    /// (sample, light there for strength 1).
+    /// (sample, irradiance over π for strength 1).
     rows: Vec<(u32, f32)>,
-    /// The most that a light may be there.
+    /// Upper bound of the strength.
     limit: Vec3,
 }
 
 impl ResidualCandidates {
-    /// None so far, of a fit with so many samples at first.
+    /// No candidates; the fit starts with `first` samples.
     pub fn new(first: usize) -> ResidualCandidates {
         ResidualCandidates {
             first,
@@ -40,7 +40,8 @@ impl ResidualCandidates {
         }
     }
 
-    /// Columns of lights in front of what stays unexplained, the worst first; such as reach nothing are left out.
+    /// Columns of candidates in front of samples with a large residual, worst sample first. Candidates that reach
+    /// no sample are left out.
     pub fn candidates(&mut self, scene: &Scene<'_>, state: &Residual) -> Vec<Column> {
         let positions = positions_in_front(scene, state);
         let samples = scene.soa.samples;
@@ -69,7 +70,7 @@ impl ResidualCandidates {
     }
 }
 
-/// Places in front of bright samples that are not explained, the worst first.
+/// Open positions in front of samples with a large residual, worst sample first.
 fn positions_in_front(scene: &Scene<'_>, state: &Residual) -> Vec<Vec3> {
     let mut worst: Vec<(f32, usize)> = (scene.soa.samples)
         .iter()
@@ -94,7 +95,7 @@ fn positions_in_front(scene: &Scene<'_>, state: &Residual) -> Vec<Vec3> {
         .collect()
 }
 
-/// What tells places apart.
+/// Key of a position.
 fn key(at: Vec3) -> [u32; 3] {
     at.to_array().map(f32::to_bits)
 }

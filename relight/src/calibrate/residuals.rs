@@ -1,4 +1,4 @@
-//! Light as it would be traced beside stored light, place by place, of a world as it is: calibrated or not.
+//! Computed and stored light at single positions of a world, calibrated or not.
 
 use super::bounce::Transfer;
 use super::samples::SamplingOptions;
@@ -7,47 +7,47 @@ use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
 
-/// A place where light is stored, and what lights give there. All light is irradiance / π, the outgoing radiance of a
-/// white surface.
+/// Stored and computed light at a position. All light is irradiance over π, the outgoing radiance of a white
+/// surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residual {
-    /// A little off the surface.
+    /// Slightly above the surface, id units.
     pub position: Vec3,
     /// Unit normal.
     pub normal: Vec3,
-    /// Material of the surface, index into [`RelitWorld::materials`]; `u32::MAX` for points of the light grid.
+    /// Index into [`RelitWorld::materials`]; `u32::MAX` for points of the light grid.
     pub material: u32,
-    /// Light that the map stores, without the compiler's dirt.
+    /// Stored light with the compiler's dirt removed.
     pub stored: Vec3,
-    /// Light that comes straight from lights.
+    /// Direct light.
     pub direct: Vec3,
-    /// Light that comes by way of other surfaces.
+    /// Reflected light.
     pub bounced: Vec3,
-    /// Light that is the same everywhere.
+    /// Ambient term.
     pub ambient: Vec3,
     /// Light of one step of a stored byte.
     pub step: f32,
-    /// Some channel of the stored light is at its end: there was at least that much.
+    /// Whether a channel of the stored light is 255: the light was at least that.
     pub saturated: bool,
 }
 
 impl Residual {
-    /// All light that lights give.
+    /// Sum of direct, reflected and ambient light.
     pub fn computed(&self) -> Vec3 {
         self.direct + self.bounced + self.ambient
     }
 
-    /// Stops that computed light is above stored light, means of the channels; light of less than one step of a stored
-    /// byte counts as one.
+    /// Computed over stored light, means of the channels, stops; light below one step of a byte counts as one step.
     pub fn stops(&self) -> f32 {
         let level = |v: Vec3| samples::mean(v).max(self.step);
         (level(self.computed()) / level(self.stored)).log2()
     }
 }
 
-/// Compares light at about `options.samples` places, chosen by `options.seed`. With another seed than fitting had they are
-/// other places, though a few that were fitted may be among them. Empty for worlds that store no light. The world must have been loaded to be calibrated, or its
-/// [materials measured](RelitWorld::measure_materials).
+/// Compares light at about `options.samples` positions chosen by `options.seed`. Another seed than that of the fit
+/// gives other positions, a few of which may have been fitted. Empty for worlds without stored light.
+///
+/// The world's [materials must be measured](RelitWorld::measure_materials), which loading for calibration does.
 pub fn residuals(world: &RelitWorld, options: &CalibrationOptions) -> Vec<Residual> {
     let occluders = Occluders::of_world(world);
     let sampling = SamplingOptions {

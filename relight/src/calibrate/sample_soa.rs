@@ -1,30 +1,30 @@
-//! Measurements laid out so that four at a time are asked whether a light can reach them.
+//! Samples as a structure of arrays: four at a time are tested for distance and orientation towards a light.
 //!
-//! Most cannot: they face away, or are too far off. What can is looked at one by one.
+//! Most samples fail the test; the rest are processed one by one.
 
 use super::samples::Sample;
 use glam::{Vec3, Vec4};
 use support::simd4::{self, Four, WIDE, dot, four, lanes, splat};
 
-/// Nearer than this a light gives nothing, id units.
+/// Squared distance below which a light gives nothing, square id units.
 pub(super) const NEAREST: f32 = 1.0;
 
-/// Four measurements.
+/// Four samples.
 struct Group {
     positions: Four,
     normals: Four,
-    /// Light that matters, mean of the channels: infinite where measurements are held out, or not there.
+    /// Stored light plus floor, mean of the channels; infinite for held-out samples and empty lanes.
     levels: Vec4,
 }
 
-/// Measurements, and where they are.
+/// Samples and their structure of arrays.
 pub(super) struct SampleSoa<'a> {
     pub samples: &'a [Sample],
     groups: Vec<Group>,
 }
 
 impl<'a> SampleSoa<'a> {
-    /// Of these.
+    /// The structure for these samples.
     pub fn new(samples: &'a [Sample]) -> SampleSoa<'a> {
         let level = |sample: &Sample| match sample.held_out {
             true => f32::INFINITY,
@@ -47,7 +47,7 @@ impl<'a> SampleSoa<'a> {
         }
     }
 
-    /// Those whose fronts a light at a place within `range` shines on, in order.
+    /// Samples within `range` that face a light at `origin`, in order.
     pub fn facing(&self, origin: Vec3, range: f32) -> impl Iterator<Item = (u32, &Sample)> {
         let from = splat(origin);
         let (nearest, farthest) = (Vec4::splat(NEAREST), Vec4::splat(range * range));
@@ -59,8 +59,8 @@ impl<'a> SampleSoa<'a> {
         })
     }
 
-    /// Those that are fitted to which a light may give `part` of their light, in order: a place within `margin` of its own is
-    /// before them, and no farther than its intensity reaches.
+    /// Fitted samples to which a light of this intensity, moved by up to `margin`, may give `part` of their light,
+    /// in order.
     pub fn within_reach(
         &self,
         origin: Vec3,
@@ -70,7 +70,8 @@ impl<'a> SampleSoa<'a> {
     ) -> impl Iterator<Item = u32> {
         let from = splat(origin);
         let (behind, far) = (Vec4::splat(-margin), Vec4::splat(4.0 * margin * margin));
-        // Twice as far away as light is moved, half of the way is left at least; and a little for what is rounded.
+        // Beyond twice the move, at least half of the distance remains; the factor 4 covers it, and .001 the
+        // rounding.
         let power = Vec4::splat(intensity * 4.001);
         let near = self.masked(move |group| {
             let offset = simd4::sub(&from, &group.positions);
@@ -88,7 +89,7 @@ impl<'a> SampleSoa<'a> {
             .map(|(i, _)| i)
     }
 
-    /// Those that a mask tells of, in order.
+    /// Samples whose bit is set in the mask of their group, in order.
     fn masked(&self, mask: impl Fn(&Group) -> u32) -> impl Iterator<Item = (u32, &Sample)> {
         let groups = self.groups.iter().zip(self.samples.chunks(WIDE));
         let first = (0u32..).step_by(WIDE);
@@ -108,7 +109,7 @@ mod tests {
     use support::random::Random;
 
     #[test]
-    fn four_at_a_time_are_those_that_one_by_one_are() {
+    fn four_at_a_time_equal_one_by_one() {
         let mut random = Random::new(11);
         let mut anywhere =
             || Vec3::new(random.uniform(), random.uniform(), random.uniform()) * 400.0;

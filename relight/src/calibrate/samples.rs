@@ -1,7 +1,8 @@
-//! Measurements of light: what the map compiler stored, and where in space it did.
+//! Samples: light that the map compiler stored, and its position in space.
 //!
-//! Light is counted as the outgoing radiance of a white surface, irradiance / π: a stored byte v is v 4 / 255 (see
-//! [`light`](mod@crate::light)), to the power of the compiler's gamma. Its colour is what the engine shows: [`LightColor`](crate::light::LightColor).
+//! Light is the outgoing radiance of a white surface, irradiance over π: a stored byte v is (v 4 / 255)^g with the
+//! compiler's gamma g (see [`light`](mod@crate::light)). Its colour is what the engine shows:
+//! [`LightColor`](crate::light::LightColor).
 
 use super::compiler_command_line::Dirt;
 use super::light_grid;
@@ -15,66 +16,66 @@ use glam::Vec3;
 use shaderscript::light::SurfaceClass;
 use support::random::{self, Random};
 
-/// Radiance of white for a stored value of 1, where light is stored as it is.
+/// Radiance of white for a stored value of 1 with gamma 1.
 pub(super) const STORED_UNIT: f32 = 4.0 / 255.0;
 
-/// Steps of a stored byte that are too few to tell apart.
+/// Measurement floor, steps of a byte.
 const FLOOR: f32 = 2.0;
 
-/// How far off its surface light is gathered, id units.
+/// Distance of a sample from its surface, id units.
 const LIFT: f32 = 1.0;
 
-/// How far inside of a brush a place is not seen any more, id units.
+/// Depth inside a brush from which a position is invalid, id units, negative inside.
 const INSIDE: f32 = -0.5;
 
-/// How much a black texel tells that may be black for another reason than the lack of light: compilers leave texels
-/// black where the point that they measured at lay inside of something, and some maps are full of them.
+/// Trust of a black texel next to lit ones. Compilers leave texels black whose sample point lay in solid, and some
+/// maps have many.
 const TRUST_IN_BLACK: f32 = 0.2;
 
-/// What all black measurements together may weigh beside those that are lit. Where most of a map is black, its lights had
-/// an end (linear falloff, spots), which lights of the square of the distance have not: then black would put them out.
+/// Largest total weight of black samples over that of lit ones. In a mostly black map lights had a limited reach
+/// (linear falloff, spots) that inverse-square lights lack; unbounded, black samples would switch them off.
 const BLACK_OVER_LIT: f32 = 0.1;
 
-/// One of so many measurements is not fitted, to judge by.
+/// One sample in this many is held out.
 pub(super) const HELD_OUT: usize = 5;
 
-/// Where a measurement was taken.
+/// Where a sample was taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Site {
-    /// On a surface, which all light falls on.
+    /// On a surface: all light.
     Surface,
-    /// In the open, at a point of the light grid: only light that comes straight from lights ([`super::air`]).
+    /// At a point of the light grid: direct light only ([`super::light_grid`]).
     LightGrid,
 }
 
-/// One measurement.
+/// A measurement of light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sample {
-    /// Where it was taken.
+    /// Surface or light grid.
     pub site: Site,
-    /// A little off the surface.
+    /// Slightly above the surface, id units.
     pub position: Vec3,
     /// Unit normal.
     pub normal: Vec3,
-    /// Light, irradiance / π.
+    /// Stored light, irradiance over π.
     pub value: Vec3,
-    /// What the engine shows of it on a white surface, encoded for the display, at most 1.
+    /// The same as the engine shows it on white, display-encoded, at most 1.
     pub shown: Vec3,
-    /// Part of it that comes by way of other surfaces, irradiance / π: see [`bounce`](super::bounce).
+    /// Computed reflected light, irradiance over π: see [`bounce`](super::bounce).
     pub bounce: Vec3,
-    /// Visibility cluster that it lies in.
+    /// PVS cluster of the position.
     pub cluster: i32,
     /// Material of the surface; `u32::MAX` for none.
     pub material: u32,
-    /// Some channel is at its end: there was at least that much light.
+    /// Whether a channel is 255: the light was at least that.
     pub saturated: bool,
-    /// The part of it that the compiler stored: it made corners darker ([`Dirt`]).
+    /// Part of the light that the compiler stored ([`Dirt`]); 1 without dirt.
     pub part: f32,
-    /// Light that is too little to tell apart, added to both sides of a ratio, irradiance / π.
+    /// Measurement floor, added to both sides of a ratio, irradiance over π.
     pub floor: f32,
-    /// How much it tells, at most 1.
+    /// Weight, at most 1.
     pub trust: f32,
-    /// Kept out of fitting, to judge by.
+    /// Whether it is excluded from the fit, to state the error.
     pub held_out: bool,
 }
 
@@ -84,7 +85,7 @@ impl Sample {
         mean(self.value)
     }
 
-    /// The part of light from everywhere that is in it.
+    /// Factor of the ambient term.
     pub fn ambient(&self) -> f32 {
         match self.site {
             Site::Surface => 1.0,
@@ -98,31 +99,32 @@ pub(super) fn mean(value: Vec3) -> f32 {
     value.element_sum() / 3.0
 }
 
-/// Light, irradiance / π, of so many steps of a stored byte.
+/// Light of a number of steps of a stored byte, irradiance over π.
 pub(super) fn light_of(world: &RelitWorld, steps: f32) -> f32 {
     (steps * STORED_UNIT).powf(world.stored_gamma)
 }
 
-/// Light that is too little to tell apart: two steps of a stored byte, and more where steps in the dark are finer than
-/// their light is known.
+/// Measurement floor: two steps of a byte; with gamma more steps, as dark steps are then finer than the light is
+/// known.
 pub(super) fn floor(world: &RelitWorld) -> f32 {
     light_of(world, FLOOR * world.stored_gamma)
 }
 
-/// Light of a stored colour: bytes were gamma-encoded by the compiler, and it was multiplied by `scale` before that. Its
-/// colour is what the engine shows of the stored one.
+/// Light of a stored colour: inverts the compiler's gamma and the `scale` applied before it, and raises the colour
+/// to what the engine shows.
 pub(super) fn decode(world: &RelitWorld, stored: Vec3, scale: f32) -> Vec3 {
     let light = stored.map(|channel| light_of(world, channel)) / scale;
     light::raise(light, world.color_exponent / world.stored_gamma)
 }
 
-/// What the engine shows of stored bytes: four times as much, less where a channel would run over.
+/// Stored bytes as the engine shows them: times 4, scaled down where a channel exceeds 1.
 pub(super) fn shown(stored: Vec3) -> Vec3 {
     let light = stored * STORED_UNIT;
     light / light.max_element().max(1.0)
 }
 
-/// Whether light on a surface tells of the lights around it.
+/// Whether the stored light of a surface is evidence of the lights around it: opaque or cut-out, not emitting, not
+/// sky, of the world model.
 pub(super) fn is_measurable(world: &RelitWorld, surface: &WorldSurface) -> bool {
     let material = world.materials.get(surface.material as usize);
     surface.model == 0
@@ -134,7 +136,7 @@ pub(super) fn is_measurable(world: &RelitWorld, surface: &WorldSurface) -> bool 
         })
 }
 
-/// Area of surfaces that tell of light.
+/// Area of measurable surfaces, square id units.
 fn area(world: &RelitWorld, is: fn(&WorldSurface) -> bool) -> f64 {
     let told = world
         .surfaces
@@ -151,18 +153,18 @@ fn area(world: &RelitWorld, is: fn(&WorldSurface) -> bool) -> f64 {
     areas.sum()
 }
 
-/// What measurements on surfaces are taken of, and what is known of how light was stored there.
+/// Inputs for samples on surfaces.
 pub(super) struct SampleContext<'a> {
     pub world: &'a RelitWorld,
     pub occluders: &'a Occluders,
-    /// How corners were made darker.
+    /// The compiler's ambient occlusion.
     dirt: Option<Dirt>,
-    /// Seed of the choice of what is held out.
+    /// Seed of the held-out choice.
     pub seed: u64,
 }
 
 impl<'a> SampleContext<'a> {
-    /// What measurements are taken of in a way.
+    /// The inputs for these options.
     pub fn new(
         world: &'a RelitWorld,
         occluders: &'a Occluders,
@@ -176,7 +178,7 @@ impl<'a> SampleContext<'a> {
         }
     }
 
-    /// Takes what the compiler's dirt did out of a measurement at a [place](sample_at): it was made as dark as that.
+    /// Divides a [sample](sample_at) by the part of its light that the compiler's dirt left.
     pub fn remove_dirt(&self, sample: &mut Sample) {
         let Some(dirt) = self.dirt else {
             return;
@@ -187,20 +189,21 @@ impl<'a> SampleContext<'a> {
     }
 }
 
-/// How measurements are taken.
+/// How samples are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct SamplingOptions {
-    /// How many, about.
+    /// Approximate number.
     pub count: usize,
-    /// Seed of their choice.
+    /// Seed of the choice.
     pub seed: u64,
-    /// Fewer of those that are fitted are black where most of the map is; those held out are of all texels alike.
+    /// Whether black texels are thinned among the fitted samples of a mostly black map. Held-out samples are never
+    /// thinned.
     pub few_black: bool,
-    /// How corners were made darker.
+    /// The compiler's ambient occlusion.
     pub dirt: Option<Dirt>,
 }
 
-/// Measurements, spread evenly over the map's area.
+/// Samples, stratified by the map's area.
 pub(super) fn take(
     world: &RelitWorld,
     occluders: &Occluders,
@@ -210,12 +213,11 @@ pub(super) fn take(
     let context = SampleContext::new(world, occluders, sampling);
     let count = sampling.count;
     let lightmaps = texels::take(&context, count, sampling.few_black, &mut random);
-    // A few lightmapped scraps say nothing about the rest.
+    // Fewer lightmapped samples do not represent the map.
     if lightmaps.len() >= 16 {
         let mut samples = lightmaps;
         balance(&mut samples);
-        // What the map lights by vertex tells as much of its light as texels of the same area; agreement is told by
-        // texels alone.
+        // Surfaces lit by vertex get samples in proportion to their area. Texels alone state the error.
         let [by_vertex, by_texel] = [vertices::lit, lit_by_texel].map(|is| area(world, is));
         let share = by_vertex / (by_vertex + by_texel).max(1.0);
         let beside = (count as f64 * share) as usize;
@@ -239,7 +241,7 @@ pub(super) fn take(
     (Vec::new(), Evidence::Nothing)
 }
 
-/// Bounds what black measurements that are fitted weigh together.
+/// Bounds the total weight of black fitted samples.
 fn balance(samples: &mut [Sample]) {
     let black = |s: &Sample| s.value == Vec3::ZERO;
     let fitted = || samples.iter().filter(|s| !s.held_out);
@@ -251,7 +253,7 @@ fn balance(samples: &mut [Sample]) {
     }
 }
 
-/// Keeps one of so many out of fitting: at a place all of them or none.
+/// Marks held-out samples; samples at one position are held out together.
 fn hold_out(mut samples: Vec<Sample>, seed: u64) -> Vec<Sample> {
     for sample in &mut samples {
         let place = sample.position.to_array().map(f32::to_bits);
@@ -260,13 +262,13 @@ fn hold_out(mut samples: Vec<Sample>, seed: u64) -> Vec<Sample> {
     samples
 }
 
-/// Whether what has this name is kept out of fitting.
+/// Whether the sample of this identity is held out.
 pub(super) fn is_held_out(seed: u64, name: &[u32]) -> bool {
     random::hashed_uniform(seed, name) * (HELD_OUT as f32) < 1.0
 }
 
-/// A measurement at a place, unless the place is outside of the map or inside of something. It is yet to be
-/// [cleaned](Gauge::clean).
+/// A sample at a position, unless the position is outside the map or in solid. Its
+/// [dirt](SampleContext::remove_dirt) is not yet removed.
 pub(super) fn sample_at(
     context: &SampleContext<'_>,
     (on, normal): (Vec3, Vec3),
@@ -281,7 +283,7 @@ pub(super) fn sample_at(
     if cluster < 0 || world.bsp.is_in_drawn_brush(position, INSIDE) {
         return None;
     }
-    // What is seen from behind all around is something that this place is inside of.
+    // A position that sees back faces in most directions lies inside something.
     let (u, v) = normal.any_orthonormal_pair();
     let around = [normal, normal + u, normal - u, normal + v, normal - v];
     let is_back = |ray: &Vec3| {
@@ -314,7 +316,7 @@ pub(super) fn sample_at(
     })
 }
 
-/// Indices below `len`, in order: all, or one of each of `count` equal stretches.
+/// Ascending indices below `len`: all, or one from each of `count` equal ranges.
 pub(super) fn pick(len: usize, count: usize, random: &mut Random) -> impl Iterator<Item = usize> {
     let count = count.min(len);
     (0..count).map(move |i| {
@@ -328,7 +330,7 @@ pub(super) fn pick(len: usize, count: usize, random: &mut Random) -> impl Iterat
 pub(super) mod tests {
     use super::*;
 
-    /// A measurement of some light at a place.
+    /// A sample with some light at a position.
     pub fn sample_at_place(position: Vec3) -> Sample {
         Sample {
             position,
@@ -355,7 +357,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn black_never_outweighs_what_is_lit() {
+    fn black_samples_never_outweigh_lit_ones() {
         let lit = || std::iter::repeat_n(sample(0.5, 1.0), 100);
         let trusts = |black: usize, trust: f32| {
             let mut samples: Vec<Sample> = lit().collect();

@@ -1,14 +1,14 @@
 //! Skies without directives, as lights.
 //!
-//! Where no directive says how much light a sky gives, bounced rays find its picture, whose brightness says nothing
-//! about light. Calibration takes such skies into the lists of lights, with a strength that stored light decides:
-//! often none at all.
+//! Where no directive gives a sky's light, bounce rays see its image, whose brightness says nothing about the
+//! compiler's light. Calibration adds such skies to the light lists with an unknown strength, which the fit decides
+//! and which is often zero.
 
 use crate::light::{self, Emission, EmissionSource};
 use crate::world::RelitWorld;
 use glam::Vec3;
 
-/// Materials of skies that nothing says the light of.
+/// Materials of skies without directives.
 pub(super) fn unknown_skies(world: &RelitWorld) -> Vec<u32> {
     (0u32..)
         .zip(&world.materials)
@@ -17,14 +17,14 @@ pub(super) fn unknown_skies(world: &RelitWorld) -> Vec<u32> {
         .collect()
 }
 
-/// Makes lights of them, as bright as they look.
+/// Makes them lights, as bright as their image.
 pub(super) fn open(world: &mut RelitWorld, skies: &[u32]) {
     if skies.is_empty() {
         return;
     }
     for &sky in skies {
         if let Some(material) = world.materials.get_mut(sky as usize) {
-            // Black pictures give light, too; the strength is only where fitting starts.
+            // The strength is only the start of the fit; a black image may belong to a sky that gives light.
             let shown = material.shown.max(Vec3::splat(0.01));
             material.emission = Some(Emission::of(material, EmissionSource::Sky, shown));
         }
@@ -33,7 +33,7 @@ pub(super) fn open(world: &mut RelitWorld, skies: &[u32]) {
     light::build_lists(world);
 }
 
-/// Makes none of them a light again.
+/// Removes them from the lights.
 pub(super) fn close(world: &mut RelitWorld, skies: &[u32]) {
     if skies.is_empty() {
         return;

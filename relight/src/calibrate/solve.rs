@@ -1,14 +1,13 @@
 //! Non-negative least squares for the strengths of lights.
 //!
-//! Wanted is the smallest |log(computed / stored)| of most samples. Near the solution that is a least squares problem
-//! in which a sample weighs so much that the slope of its square is that of its logarithm's square, and less when it
-//! is far off (Huber); weights and solution take
-//! turns (iteratively reweighted least squares), the solution by coordinate descent: with all other strengths held,
-//! the best of one is a quotient of two sums, cut at its bounds.
+//! The objective is the absolute logarithmic error |log(computed / stored)| with outliers limited. It is solved by
+//! iteratively reweighted least squares: each sample has the weight at which the gradient of its squared error
+//! equals that of its squared logarithmic error, reduced for outliers by the Huber loss. For fixed weights,
+//! coordinate descent sets one strength at a time to its optimum, a quotient of two sums clamped to its bounds.
 //!
-//! A penalty on strength, measured by the column's length, makes few lights explain what many could (L1, "lasso").
+//! An L1 penalty on the strength times the length of the column (lasso) makes few lights explain what many could.
 //!
-//! Source: Holland and Welsch 1977 for the reweighting, Huber 1964 for the loss, Friedman et al. 2007 for coordinate
+//! Source: Holland and Welsch 1977 for reweighting, Huber 1964 for the loss, Friedman et al. 2007 for coordinate
 //! descent with an L1 penalty.
 
 use super::columns::Column;
@@ -16,43 +15,43 @@ use super::samples::{Sample, mean};
 use glam::{Vec3, Vec4};
 use support::parallel;
 
-/// |log ratio| up to which a sample counts in full.
+/// |log ratio| up to which a sample has its full weight.
 const HUBER: f32 = 0.3;
 
-/// Weight of what directives say, counted in samples that are off by a factor e.
+/// Weight of the prior, in samples that are off by a factor of e.
 const PRIOR_WEIGHT: f32 = 0.5;
 
-/// The constant part of all samples.
+/// The ambient term.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ambient {
-    /// Radiance from everywhere.
+    /// Radiance from all directions.
     pub value: Vec3,
-    /// Its largest value.
+    /// Upper bound.
     pub limit: Vec3,
 }
 
-/// How long and how to solve.
+/// Effort of a solution.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Effort {
-    /// Times that weights are computed anew.
+    /// Reweighting rounds.
     pub rounds: usize,
-    /// Sweeps over all columns in each.
+    /// Coordinate-descent sweeps in each round.
     pub sweeps: usize,
-    /// Penalty on placed lights.
+    /// L1 penalty on placed lights.
     pub sparsity: f32,
-    /// Whether what there is so far is a guess that weights should not come from.
+    /// Whether the current strengths are a guess from which the first weights must not be computed.
     pub anew: bool,
 }
 
-/// State of a solution: light not yet explained, and what each sample weighs.
+/// Residuals and weights of a state.
 pub(super) struct Residual {
-    /// Stored less computed.
+    /// Stored minus computed light, irradiance over π.
     pub rest: Vec<Vec3>,
-    /// Weights; 0 for samples held out.
+    /// Weights; 0 for held-out samples.
     pub weights: Vec<f32>,
 }
 
-/// Computed light at every sample: ambient, bounced and direct.
+/// Computed light at every sample: direct, reflected and ambient.
 pub(super) fn predict(samples: &[Sample], columns: &[Column], ambient: Vec3) -> Vec<Vec3> {
     let mut light: Vec<Vec3> = samples
         .iter()
@@ -62,14 +61,14 @@ pub(super) fn predict(samples: &[Sample], columns: &[Column], ambient: Vec3) -> 
     light
 }
 
-/// Direct light alone, without ambient.
+/// Direct light at every sample.
 pub(super) fn direct(samples: &[Sample], columns: &[Column]) -> Vec<Vec3> {
     let mut light = vec![Vec3::ZERO; samples.len()];
     add(columns, &mut light);
     light
 }
 
-/// Adds what columns give.
+/// Adds the contributions of columns.
 fn add(columns: &[Column], light: &mut [Vec3]) {
     for column in columns {
         if column.strength == Vec3::ZERO {
@@ -83,7 +82,7 @@ fn add(columns: &[Column], light: &mut [Vec3]) {
     }
 }
 
-/// Residual and weights of what is there now.
+/// Residuals and weights of the current state.
 pub(super) fn residual(samples: &[Sample], columns: &[Column], ambient: Vec3) -> Residual {
     let computed = predict(samples, columns, ambient);
     let pairs = || samples.iter().zip(&computed);
@@ -100,7 +99,7 @@ fn weight(sample: &Sample, computed: f32) -> f32 {
     }
     let (c, s) = (computed.max(0.0) + sample.floor, stored + sample.floor);
     let off = (c / s).ln();
-    // The slope of off² / 2 at c is off / c; that of w (c - s)² / 2 is the same with this w.
+    // The gradient of off² / 2 at c is off / c; that of w (c - s)² / 2 is the same with this w.
     let slope = if off.abs() < 1e-3 {
         1.0 / (c * s)
     } else {
@@ -109,7 +108,7 @@ fn weight(sample: &Sample, computed: f32) -> f32 {
     slope * (HUBER / off.abs().max(HUBER)) * sample.trust
 }
 
-/// Fits the strengths of `columns` and the ambient term.
+/// Fits the strengths of `columns` and the ambient term. `cutoff`: light cutoff, irradiance over π; 0 for none.
 pub(super) fn solve(
     samples: &[Sample],
     columns: &mut [Column],
@@ -125,8 +124,8 @@ pub(super) fn solve(
         if round > 0 {
             state = residual(samples, columns, ambient.value);
         } else if effort.anew {
-            // Nothing is known yet: every sample by its own level. Not by its square: what lies in the dark for another
-            // reason than the lights' weakness would decide all.
+            // First weights from the stored level, not from its square: samples that are dark for other reasons
+            // than weak lights would dominate.
             let known = || samples.iter().filter(|s| s.trust > 0.0).map(Sample::level);
             let mean = known().sum::<f32>() / known().count().max(1) as f32;
             for (weight, sample) in state.weights.iter_mut().zip(samples) {
@@ -140,7 +139,7 @@ pub(super) fn solve(
         let mut rest: Vec<Vec4> = both.map(|(rest, weight)| rest.extend(*weight)).collect();
         let active = parallel::map(columns, |_, column| ActiveRows::of(column, &rest));
         for sweep in 0..effort.sweeps {
-            // Lights that are out seldom come back: they are looked at now and then.
+            // Dark lights seldom return: they are visited in every fourth sweep only.
             let all = sweep % 4 == 0 || sweep + 1 == effort.sweeps;
             let visited: Vec<usize> = (columns.iter().zip(&active).enumerate())
                 .filter(|(_, (column, active))| (all || is_lit(column)) && active.norm > 0.0)
@@ -156,16 +155,16 @@ pub(super) fn solve(
     residual(samples, columns, ambient.value)
 }
 
-/// Weighted square of a column's length.
+/// Weighted squared length of a column.
 pub(super) fn norm(column: &Column, weights: &[f32]) -> f32 {
     let weight = |i: u32| weights.get(i as usize).copied().unwrap_or(0.0);
     column.rows.iter().map(|&(i, a)| weight(i) * a * a).sum()
 }
 
-/// What a column says to the samples that tell something.
+/// Rows of a column at samples of non-zero weight.
 struct ActiveRows {
     rows: Vec<(u32, f32)>,
-    /// Weighted square of its length.
+    /// Weighted squared length.
     norm: f32,
 }
 
@@ -183,10 +182,10 @@ fn is_lit(column: &Column) -> bool {
     column.strength != Vec3::ZERO
 }
 
-/// Columns that are out whose sums are taken at once: one alone waits for each addition before the next.
+/// Dark columns whose sums are computed together, so that additions overlap.
 const AT_ONCE: usize = 4;
 
-/// Sets columns, one after the other, to their best strengths while all others stay. `rest`: with what each sample weighs.
+/// Sets each column in turn to its optimal strength with all others fixed. `rest`: residual, and the weight in w.
 fn sweep_over(
     columns: &mut [Column],
     active: &[ActiveRows],
@@ -196,7 +195,7 @@ fn sweep_over(
 ) {
     let mut done = 0;
     while let Some(left) = visited.get(done..).filter(|left| !left.is_empty()) {
-        // What is lit is about to change all sums.
+        // A lit column changes the residual, and so the sums of the others.
         let is_out = |i: &&usize| columns.get(**i).is_some_and(|c| !is_lit(c));
         let out = left.iter().take(AT_ONCE).take_while(is_out).count();
         let (now, _) = left.split_at(out.max(1));
@@ -217,14 +216,14 @@ fn sweep_over(
                         *rest -= change * a;
                     }
                 }
-                // The other sums are no more what they were.
+                // The other sums are out of date.
                 break;
             }
         }
     }
 }
 
-/// For each column, the sum of what is left at its rows, weighted by what these weigh and by what it gives there.
+/// Gradient of each column: the sum of residual times weight times contribution.
 fn sums(rows: [&[(u32, f32)]; AT_ONCE], rest: &[Vec4]) -> [Vec4; AT_ONCE] {
     let mut sums = [Vec4::ZERO; AT_ONCE];
     let term = |(i, a): (u32, f32)| {
@@ -246,7 +245,7 @@ fn sums(rows: [&[(u32, f32)]; AT_ONCE], rest: &[Vec4]) -> [Vec4; AT_ONCE] {
     sums
 }
 
-/// Sets a column to its best strength while all others stay, and tells by how much that changes it.
+/// Sets a column to its optimal strength with all others fixed; returns the change.
 fn improve(column: &mut Column, norm: f32, gradient: Vec3, sparsity: f32) -> Vec3 {
     let best = match &column.prior {
         Some(prior) => {
@@ -303,7 +302,7 @@ mod tests {
     use support::random::Random;
 
     #[test]
-    fn columns_looked_at_together_become_what_they_become_one_by_one() {
+    fn batched_columns_equal_sequential_ones() {
         let mut random = Random::new(3);
         let origin = Vec3::ZERO;
         let falloff = Falloff::InverseSquare;

@@ -1,5 +1,5 @@
-//! What players see of a map, at measurements: these are spread over the map's area, of which some parts fill the screen
-//! and others are never seen.
+//! Views from spawn points. Samples are stratified by area; these views weight them by how much of the screen they
+//! fill.
 
 use super::bounce::{Near, surfaces_of_triangles};
 use super::samples::Sample;
@@ -11,25 +11,25 @@ use q3bsp::Entity;
 use support::parallel;
 use support::random::Random;
 
-/// Most places that are looked from.
+/// Largest number of views.
 const VIEWS: usize = 128;
 
-/// Rays from all places together.
+/// Rays of all views together.
 const RAYS: usize = 16_384;
 
-/// Height of the eyes above where a player is set, id units.
+/// Height of the camera above the spawn point, id units.
 const EYES: f32 = 35.0;
 
-/// Half the height of a picture of 4 : 3 that is 90 degrees wide, at distance 1.
+/// Half the height of a 4 : 3 view with a horizontal field of view of 90 degrees, at distance 1.
 const HALF_HEIGHT: f32 = 0.75;
 
-/// A place where the game sets players, and the way that they look.
+/// Camera at a spawn point.
 struct View {
     eye: Vec3,
     forward: Vec3,
 }
 
-/// The views of the players' places.
+/// The views from the spawn points.
 fn views(entities: &[Entity]) -> Vec<View> {
     let all: Vec<View> = entities
         .iter()
@@ -47,8 +47,7 @@ fn views(entities: &[Entity]) -> Vec<View> {
     all.into_iter().step_by(step).collect()
 }
 
-/// What players see where they are set: (measurement, material) for each of many pixels of such pictures that show a
-/// surface which light falls on. Empty for maps without such places.
+/// (sample, material) for each of many pixels that show a lit surface. Empty for maps without spawn points.
 pub(super) fn visible_samples(
     world: &RelitWorld,
     occluders: &Occluders,

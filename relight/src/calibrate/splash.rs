@@ -1,10 +1,11 @@
-//! Light that lamps throw at what is beside them.
+//! Back splashes: weak point lights that compilers place in front of area lights.
 //!
-//! A surface gives nothing to what lies behind its plane, and little to what lies beside it. So compilers put a weak point
-//! light in front of each piece of a surface that shines, its *back splash*, unless the piece is so large that it was cut.
-//! What part of the piece's light it gives is the same for all of a material: they are one source of one strength.
+//! A surface light gives nothing behind its plane and little beside it. So compilers place a weak point light in
+//! front of each piece of an emitting surface, its *back splash*, unless the piece is larger than the subdivision
+//! size. All back splashes of a material have the same ratio to their piece's light: they are one source with one
+//! strength.
 //!
-//! Source: what q3map2's documentation calls `q3map_backsplash` and `q3map_lightSubdivide`, and its defaults.
+//! Source: `q3map_backsplash` and `q3map_lightSubdivide` in q3map2's documentation, and their defaults.
 
 use super::columns::{Column, Lamp, Prior, Source, material_of, point_rows};
 use super::cutoff::{Piece, pieces_of};
@@ -17,44 +18,43 @@ use glam::Vec3;
 use std::collections::BTreeMap;
 use support::parallel;
 
-/// Part of a piece's light that its splash gives, per cent, and how far in front of it, id units, where the material tells
-/// neither.
+/// Default back splash: per cent of the piece's light, and distance from it, id units.
 const USUAL: (f32, f32) = (5.0, 23.0);
 
-/// Side of the largest piece that is not cut where the material does not tell, id units.
+/// Default subdivision size, id units.
 const CUT_ABOVE: f32 = 999.0;
 
-/// Triangles that are one lamp, up to this side, have one splash here for all, id units.
+/// Largest side of adjacent triangles that share one back splash here, id units.
 const JOINED: f32 = 128.0;
 
-/// Least cosine between triangles of one lamp.
+/// Smallest cosine between the normals of such triangles.
 const SAME_NORMAL: f32 = 0.9;
 
-/// How many times as strong as is usual beside such lamps splashes may be.
+/// Largest strength of back splashes relative to their directive.
 const STRONGEST: f32 = 4.0;
 
-/// Splashes of a material's lamps.
+/// Back splashes of one material.
 pub(super) struct Splashes {
     /// The material.
     material: u32,
-    /// Intensity of a splash for 1 of its lamp's.
+    /// Intensity of a back splash relative to that of its lamp.
     part: f32,
-    /// Where they are, and their intensities for a strength of 1, which is the radiance of the lamps times the part.
+    /// Positions, and intensities for strength 1; the strength is the radiance of the lamps times `part`.
     pub points: Vec<(Lamp, f32)>,
 }
 
-/// Triangles of one lamp.
+/// Adjacent triangles that share one back splash.
 struct LampSurface {
     triangles: Vec<[Vec3; 3]>,
-    /// Sum of middles, by area.
+    /// Area-weighted sum of the centroids.
     middle: Vec3,
-    /// Sum of normals, by area.
+    /// Area-weighted sum of the normals.
     normal: Vec3,
     area: f32,
 }
 
 impl LampSurface {
-    /// Whether a triangle is of this lamp.
+    /// Whether a triangle belongs to this lamp.
     fn takes(&self, light: &TriangleLight) -> bool {
         let shared = |own: &[Vec3; 3]| own.iter().filter(|v| light.vertices.contains(v)).count();
         let all = self.triangles.iter().chain([&light.vertices]).flatten();
@@ -64,14 +64,14 @@ impl LampSurface {
     }
 }
 
-/// The longest side of the box around points.
+/// Longest side of the bounding box of points, id units.
 fn side<'a>(points: impl Iterator<Item = &'a Vec3>) -> f32 {
     let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let (low, high) = points.fold(none, |(low, high), p| (low.min(*p), high.max(*p)));
     (high - low).max_element()
 }
 
-/// The splashes of a world's lamps, by material.
+/// Back splashes of a world, by material.
 pub(super) fn of(world: &RelitWorld) -> Vec<Splashes> {
     let mut lamps: BTreeMap<(u32, u32), Vec<LampSurface>> = BTreeMap::new();
     for light in &world.lights {
@@ -130,7 +130,7 @@ pub(super) fn of(world: &RelitWorld) -> Vec<Splashes> {
     found.into_values().collect()
 }
 
-/// Their columns; what is believed of them beforehand is by the strengths that `lamps` have now.
+/// Columns of back splashes; their prior follows from the current strengths of `lamps`.
 pub(super) fn columns(
     world: &RelitWorld,
     occluders: &Occluders,
@@ -171,7 +171,7 @@ pub(super) fn columns(
     (0u32..).zip(splashes).map(column).collect()
 }
 
-/// What pieces, by rising sample, give together.
+/// Rows from pieces sorted by sample.
 fn sums(pieces: &[Piece]) -> Vec<(u32, f32)> {
     let mut rows: Vec<(u32, f32)> = Vec::new();
     for piece in pieces {

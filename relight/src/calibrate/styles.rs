@@ -1,9 +1,10 @@
-//! Light of styles: lamps that a map's compiler stored apart, because games switch them or let them pulse.
+//! Light styles: light that the compiler stored separately, because games switch or animate it.
 //!
-//! Each style has pages of its own ([`StyleLight`]), so that its light is a second world with the same geometry: the pages
-//! take the place of the main light's, surfaces without the style are black, and calibration places lost lights as for the
-//! main light. Styles of equal strength are fitted together: scripts do not name the style of a stage. The gamma and the end
-//! of lights are those found for the main light. The placed lights follow the wave of their style.
+//! Each style has its own lightmap pages ([`StyleLight`]), so its light is a second world with the same geometry:
+//! its pages replace those of the main light, surfaces without the style become black, and calibration places
+//! lights as for the main light. Styles of equal strength are fitted together, because scripts do not name the
+//! style of a stage. Gamma and light cutoff are those of the main light. The placed lights follow the wave of their
+//! style.
 
 use super::Acceptance;
 use super::compiler::Compiler;
@@ -20,7 +21,7 @@ use std::cell::Cell;
 use std::collections::BTreeMap;
 use support::hash::Hash;
 
-/// Finds the lights of each style, after the main light was found, and adds them to the world.
+/// Fits the light of each style after the main light, and adds it to the world.
 pub(super) fn add(world: &mut RelitWorld, options: &CalibrationOptions) {
     let mut found = Vec::new();
     for (number, strength) in strengths(world).into_iter().enumerate() {
@@ -41,7 +42,7 @@ pub(super) fn add(world: &mut RelitWorld, options: &CalibrationOptions) {
     light::build_lists(world);
 }
 
-/// The different strengths of the styles that drawn surfaces have, in the order of materials.
+/// The distinct strengths of all styles on drawn surfaces, in the order of materials.
 fn strengths(world: &RelitWorld) -> Vec<StyleStrength> {
     let mut found: Vec<StyleStrength> = Vec::new();
     for style in world.materials.iter().flat_map(|m| &m.baked.styles) {
@@ -52,7 +53,7 @@ fn strengths(world: &RelitWorld) -> Vec<StyleStrength> {
     found
 }
 
-/// The lights of one style at full strength. The world is as before.
+/// The lights of one style at full strength. The world is restored.
 fn lights_of(
     world: &mut RelitWorld,
     options: &CalibrationOptions,
@@ -75,7 +76,7 @@ fn lights_of(
         .collect()
 }
 
-/// Leaves a world without any known light.
+/// Removes all known lights of a world.
 fn remove_lights(world: &mut RelitWorld) {
     world.lights.clear();
     world.triangle_lights.fill(NO_LIGHT);
@@ -87,7 +88,7 @@ fn remove_lights(world: &mut RelitWorld) {
     world.ambient = Vec3::ZERO;
 }
 
-/// The solution of a style's world: kept, or found.
+/// The solution of a style's world, cached or fitted.
 fn solve(world: &mut RelitWorld, options: &CalibrationOptions, number: usize) -> Option<Solution> {
     let key = options.cache.as_ref().map(|cache| {
         let mut hash = Hash::new();
@@ -129,23 +130,23 @@ fn solve(world: &mut RelitWorld, options: &CalibrationOptions, number: usize) ->
     Some(solution)
 }
 
-/// Pages of a style's light in the place of a world's own.
+/// The pages of a style in place of the main light's.
 struct Layer {
-    /// The page that each surface had.
+    /// Original page of each surface.
     pages: Vec<i32>,
-    /// Number of the world's pages before.
+    /// Original number of pages of the world.
     count: usize,
 }
 
 impl Layer {
-    /// Puts all light of a strength in the place of the main light, texel by texel; where there is none pages are black.
+    /// Replaces the main light by all light of one strength, texel by texel; pages without it are black.
     fn install(world: &mut RelitWorld, strength: StyleStrength) -> Layer {
         let own = world.bsp.lightmaps.len();
         let layer = Layer {
             pages: world.surfaces.iter().map(|s| s.light_page).collect(),
             count: world.pages.len(),
         };
-        // one for each page of the main light, of the same size
+        // One page for each page of the main light, of the same size.
         let mut pages: BTreeMap<i32, Vec<u8>> = BTreeMap::new();
         for surface in &world.surfaces {
             let main = usize::try_from(surface.light_page).ok();
@@ -175,7 +176,7 @@ impl Layer {
         layer
     }
 
-    /// Puts the main light back.
+    /// Restores the main light.
     fn restore(self, world: &mut RelitWorld) {
         for (surface, page) in world.surfaces.iter_mut().zip(self.pages) {
             surface.light_page = page;
@@ -184,7 +185,7 @@ impl Layer {
     }
 }
 
-/// Writes the sum of some styles' light to a page, where a surface has its main light. `size`: of the page.
+/// Writes the sum of the styles' light to the texels of one surface. `size`: texels along the side of the page.
 fn fill(
     world: &RelitWorld,
     surface: &WorldSurface,
@@ -200,7 +201,7 @@ fn fill(
     let (low, high) = places.fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(low, high), at| {
         (low.min(at), high.max(at))
     });
-    // a texel around it, for those that the edge runs through
+    // One texel of margin, for texels that the edge crosses.
     let range = |low: f32, high: f32| {
         let cell =
             |at: f32, by: f32| (at * size as f32 + by).floor().clamp(0.0, size as f32) as usize;
@@ -221,7 +222,7 @@ fn fill(
     }
 }
 
-/// What is shown of a style's light at a place of the main light's page, 0 to 255 and more.
+/// A style's light as shown at a position of the main light's page, 0 to 255 and above.
 fn shown_at(world: &RelitWorld, surface: &WorldSurface, style: &StyleLight, at: Vec2) -> [u32; 3] {
     let number = match style.page {
         Some(page) => Some(world.bsp.lightmaps.len() + page as usize),

@@ -1,8 +1,8 @@
-//! Finding suns that no directive tells of.
+//! Search for a sun without a directive.
 //!
-//! A sun leaves a pattern that nothing else does: the cosine to one direction wherever that direction sees sky, and
-//! nothing in the shadows. So directions all over the upper half of the sphere are tried against what known lights
-//! leave unexplained, and the best is turned until it explains most.
+//! A sun leaves a unique pattern: the cosine to one direction wherever that direction sees sky, and nothing in
+//! shadow. Directions over the upper hemisphere are tried against the residual of the known lights, and the best
+//! one is refined.
 
 use super::columns::{Column, Source, sun_rows};
 use super::samples::Sample;
@@ -12,23 +12,23 @@ use glam::Vec3;
 use std::f32::consts::TAU;
 use support::parallel;
 
-/// Directions tried at first, evenly over the upper half of the sphere.
+/// Directions tried first, evenly over the upper hemisphere.
 const DIRECTIONS: u32 = 320;
 
-/// Samples that directions are judged by at first.
+/// Samples by which directions are compared.
 const SUBSET: usize = 1600;
 
-/// Squared error (samples that are off by a factor e) that a sun must take away for each sample used for fitting.
+/// Squared logarithmic error that a sun must remove for each fitted sample.
 const WORTH: f32 = 0.004;
 
-/// Least height of a sun over the horizon, sine.
+/// Smallest elevation of a sun, sine.
 const LOWEST: f32 = 0.03;
 
-/// Turns of the best direction, radians, one after the other.
+/// Step sizes of the refinement, radians.
 const TURNS: [f32; 5] = [0.07, 0.035, 0.018, 0.009, 0.0045];
 
-/// Adds a sun to `columns` where there is none that shines, if it is worth it. Each sun costs tracing a ray of its own,
-/// and what is left beside one is seldom another one.
+/// Adds a sun to `columns` if none shines and it removes enough error. At most one is added: each sun costs the
+/// tracer a ray, and the residual beside a sun is seldom another sun.
 pub(super) fn find(
     occluders: &Occluders,
     samples: &[Sample],
@@ -49,7 +49,7 @@ pub(super) fn find(
     };
     let mut direction = refine(occluders, samples, &subset, &state, first);
     let known = columns.len();
-    // All else gives way to what is found; then the direction can be told better.
+    // Refitting the other sources improves the residual for the direction.
     for turns in [2, 1, 0] {
         columns.truncate(known);
         columns.push(Column {
@@ -81,12 +81,12 @@ pub(super) fn find(
     }
 }
 
-/// Squared error that a source takes away.
+/// Squared error that a source removes.
 fn worth(column: &Column, state: &Residual) -> f32 {
     norm(column, &state.weights) * column.strength.length_squared() / 3.0
 }
 
-/// Samples used for fitting, evenly thinned.
+/// Fitted samples, evenly thinned.
 fn fitted_subset(samples: &[Sample]) -> Vec<u32> {
     let all: Vec<u32> = (0u32..)
         .zip(samples)
@@ -99,7 +99,7 @@ fn fitted_subset(samples: &[Sample]) -> Vec<u32> {
         .collect()
 }
 
-/// Error that a sun of the best strength takes away at some samples.
+/// Error that a sun of the best strength removes at the samples of a subset.
 fn explained_error(
     occluders: &Occluders,
     samples: &[Sample],
@@ -131,14 +131,14 @@ fn explained_error(
     }
 }
 
-/// The best of directions spread over the upper half of the sphere; `None` when none explains anything.
+/// The best of evenly distributed directions of the upper hemisphere; `None` if none removes error.
 fn best_direction(
     occluders: &Occluders,
     samples: &[Sample],
     subset: &[u32],
     state: &Residual,
 ) -> Option<Vec3> {
-    // A spiral with equal steps of height spreads points evenly over a sphere.
+    // A Fibonacci spiral with equal steps of height distributes points evenly over the sphere.
     let golden = (5.0f32.sqrt() - 1.0) / 2.0;
     let directions: Vec<Vec3> = (0..DIRECTIONS)
         .map(|i| {
@@ -158,7 +158,7 @@ fn best_direction(
     (best.0 > 0.0).then_some(best.1)
 }
 
-/// A direction turned to where a sun explains most.
+/// Moves a direction to a local optimum.
 fn refine(
     occluders: &Occluders,
     samples: &[Sample],

@@ -104,7 +104,7 @@ const LAMP_CORNERS: [Vec3; 4] = [
     Vec3::new(180.0, 30.0, 250.0),
 ];
 
-/// Whether a way goes through the pillar.
+/// Whether a segment passes through the pillar.
 fn in_pillar(from: Vec3, to: Vec3) -> bool {
     let inverse = (to - from).recip();
     let a = (PILLAR[0] - from) * inverse;
@@ -367,7 +367,7 @@ fn a_lamp_of_another_strength_gets_it_back() {
 }
 
 #[test]
-fn lights_stand_for_the_nearest_hidden_one() {
+fn placed_lights_are_assigned_to_the_nearest_hidden_one() {
     let at = |x: f32, power: f32| PointLight {
         origin: Vec3::new(x, 0.0, 0.0),
         intensity: Vec3::splat(power),
@@ -394,7 +394,7 @@ fn lights_stand_for_the_nearest_hidden_one() {
 }
 
 #[test]
-fn walls_that_store_less_than_their_light_tell_all_of_it() {
+fn scaled_lightmaps_are_measured_at_full_light() {
     let mut world = room_of("t/dim", false, Some(&from_hidden));
     world.measure_materials(&MemoryFiles::new());
     let wall = world.materials.iter().find(|m| m.name == "t/dim").unwrap();
@@ -413,7 +413,7 @@ fn walls_that_store_less_than_their_light_tell_all_of_it() {
 
 #[test]
 fn light_that_was_stored_encoded_is_decoded_again() {
-    // Stored is what the engine shows of it: v, of which v^g is the light.
+    // The stored value is what the engine shows, v; the light is v^g.
     for gamma in [1.0f32, 2.2] {
         let encoded = |at: Vec3, n: Vec3| from_hidden(at, n).powf(gamma.recip());
         let mut world = room(false, Some(&encoded));
@@ -430,7 +430,7 @@ fn light_that_was_stored_encoded_is_decoded_again() {
         let hidden: Vec3 = HIDDEN.iter().map(|(_, i)| *i).sum();
         let off = (total / hidden - 1.0).abs().max_element();
         assert!(off < 0.1, "{gamma}: {total}");
-        // The light that directives tell of is counted as it is stored.
+        // Directives give light on the scale of stored light.
         let there_and_back = world.lighting();
         world.stored_gamma = 5.0;
         world.set_lighting(there_and_back);
@@ -457,7 +457,7 @@ fn without_stored_light_nothing_changes() {
 }
 
 #[test]
-fn the_light_grid_tells_when_nothing_else_does() {
+fn the_light_grid_is_used_without_other_stored_light() {
     let mut map = MapBuilder::new();
     let wall = map.add_shader("t/wall", 0, 1);
     map.add_room(wall, ROOM[0], ROOM[1]);

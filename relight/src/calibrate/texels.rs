@@ -1,4 +1,4 @@
-//! Texels of lightmaps as measurements: where in space they lie, and what they store.
+//! Lightmap texels as samples: their position in space and their stored light.
 
 use super::samples::{
     HELD_OUT, Sample, SampleContext, decode, is_held_out, is_measurable, sample_at, shown,
@@ -11,47 +11,46 @@ use std::collections::HashSet;
 use support::parallel;
 use support::random::Random;
 
-/// How far around a black texel others are black as well where no light falls, texels.
+/// Neighbourhood in which all texels of an unlit black texel are black, texels.
 const BLACK_AROUND: i32 = 2;
 
-/// Where more than this part of a map's texels is black, black ones can be measured less often: the map may lie in a dark
-/// box much larger than itself.
+/// Part of black texels above which they are thinned: the map may stand in a dark box much larger than itself.
 const MOSTLY_BLACK: f32 = 0.5;
 
-/// One of so many black texels is measured there.
+/// One black texel in this many stays.
 const BLACK_THINNED: f32 = 3.0;
 
-/// Texels that tell how many are black.
+/// Texels that estimate the black part.
 const BLACK_PROBES: usize = 2000;
 
-/// Points tried in each stratum before it is given up.
+/// Points tried in a stratum before it is skipped.
 const TRIES: usize = 8;
 
-/// Whether a surface's first layer of light is the one that never changes (style 0).
+/// Whether the first light layer of a surface is the constant one (style 0).
 fn constant(world: &RelitWorld, surface: usize) -> bool {
     let layers = world.bsp.layers.surfaces.get(surface);
     layers.is_none_or(|l| l.lightmap_styles.first() == Some(&0))
 }
 
-/// Whether a surface stores its light in a lightmap.
+/// Whether a surface has a lightmap.
 pub(super) fn lit_by_texel(surface: &WorldSurface) -> bool {
     surface.light_page >= 0
 }
 
-/// What is stored at a place.
+/// Stored light of a texel or vertex.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stored {
     rgb: [u8; 3],
-    /// Black, and not all around it is.
+    /// Whether it is black and a neighbour is not.
     lone_black: bool,
-    /// What the compiler multiplied light by before it stored it.
+    /// Factor that the compiler applied before storing.
     scale: f32,
-    /// Steps of a page of the map that a step of this one is.
+    /// Size of a step of this page in steps of the map's own pages.
     step: f32,
 }
 
 impl Stored {
-    /// A value that tells nothing of what is around it.
+    /// A value without neighbours.
     pub(super) fn alone(rgb: [u8; 3]) -> Stored {
         Stored {
             rgb,
@@ -61,33 +60,33 @@ impl Stored {
         }
     }
 
-    /// Whether it is black while something near it is not.
+    /// Whether it is black while a neighbour is not.
     pub(super) fn lone_black(&self) -> bool {
         self.lone_black
     }
 
-    /// Whether some channel is at its end.
+    /// Whether a channel is 255.
     pub(super) fn saturated(&self) -> bool {
         self.rgb.contains(&255)
     }
 
-    /// What the engine shows of it.
+    /// Display-encoded colour as the engine shows it.
     pub(super) fn shown(&self) -> Vec3 {
         shown(self.steps())
     }
 
-    /// The light that it stands for, irradiance / π.
+    /// Light, irradiance over π.
     pub(super) fn light(&self, world: &RelitWorld) -> Vec3 {
         decode(world, self.steps(), self.scale)
     }
 
-    /// Steps of a page of the map.
+    /// Value in steps of the map's own pages.
     fn steps(&self) -> Vec3 {
         Vec3::from_array(self.rgb.map(f32::from)) * self.step
     }
 
-    /// A texel of a page, of a surface whose light was multiplied by `scale`. `step`: steps of a page of the map that a
-    /// step of it is.
+    /// A texel of a page, of a surface whose light was multiplied by `scale`. `step`: size of a step of the page in
+    /// steps of the map's own pages.
     fn texel(page: &Lightmap, x: usize, y: usize, scale: f32, step: f32) -> Stored {
         let rgb = page.texel(x, y);
         let around = || {
@@ -115,14 +114,14 @@ impl Stored {
     }
 }
 
-/// Whether a stored colour is less than a step of all its channels.
+/// Whether a stored colour is below one step in the mean.
 fn dark(rgb: [u8; 3]) -> bool {
     rgb.map(u32::from).iter().sum::<u32>() < 3
 }
 
-/// Texels of lightmaps, stratified by area, each at most once. One of so many is held out: which ones is a matter of the texel
-/// and the seed alone, so that no other choice of measurements fits one of them. `few_black`: of those that are fitted, fewer
-/// are black where most of the map is.
+/// Texels, stratified by area, each at most once. Whether a texel is held out depends on the texel and the seed
+/// only, so no other choice of samples fits it. `few_black`: thin the black texels among the fitted ones in a
+/// mostly black map.
 pub(super) fn take(
     context: &SampleContext<'_>,
     count: usize,
@@ -170,24 +169,24 @@ pub(super) fn take(
 /// Page, column and row of a texel.
 pub(super) type TexelId = [u32; 3];
 
-/// A texel that light is measured at.
+/// A texel to be sampled.
 pub(super) struct Texel {
     pub id: TexelId,
-    /// Its middle and the normal there.
+    /// Centre and normal.
     place: (Vec3, Vec3),
     material: u32,
     pub stored: Stored,
 }
 
 impl Texel {
-    /// What it tells; `None` where nothing can be measured.
+    /// Its sample; `None` where the position is invalid.
     pub fn measured(self, context: &SampleContext<'_>) -> Option<Sample> {
         let mut sample = self.sample(context)?;
         context.remove_dirt(&mut sample);
         Some(sample)
     }
 
-    /// The same, yet to be cleaned.
+    /// The same with the dirt not yet removed.
     fn sample(self, context: &SampleContext<'_>) -> Option<Sample> {
         let mut sample = sample_at(context, self.place, self.material, self.stored)?;
         sample.held_out = is_held_out(context.seed, &self.id);
@@ -195,16 +194,16 @@ impl Texel {
     }
 }
 
-/// How many measurements each triangle gets whose texels tell of light: by area, but no more than it has texels. Else what
-/// lies far around a map, in texels as large as rooms, would take the place of the map's own.
+/// Number of samples for each measurable triangle: proportional to its area, at most its number of texels.
+/// Otherwise distant surroundings with huge texels would take the samples of the map itself.
 struct SampleDensity<'a> {
     world: &'a RelitWorld,
-    /// Measurements up to the end of a triangle, the triangle, its surface.
+    /// Cumulative number of samples, triangle, surface.
     triangles: Vec<(f64, usize, &'a WorldSurface)>,
 }
 
 impl<'a> SampleDensity<'a> {
-    /// Shares of about `count` measurements.
+    /// The distribution of about `count` samples.
     fn new(world: &'a RelitWorld, count: usize) -> SampleDensity<'a> {
         let mut sizes = Vec::new();
         let mut triangles = Vec::new();
@@ -243,12 +242,12 @@ impl<'a> SampleDensity<'a> {
         }
     }
 
-    /// All measurements.
+    /// Number of samples.
     fn total(&self) -> f64 {
         self.triangles.last().map_or(0.0, |(end, ..)| *end)
     }
 
-    /// A random texel of the triangle at a part of all measurements.
+    /// A random texel of the triangle at a fraction of all samples.
     fn texel_at(&self, part: f64, random: &mut Random) -> Option<Texel> {
         let at = part * self.total();
         let found = self.triangles.partition_point(|(end, ..)| *end <= at);
@@ -256,7 +255,7 @@ impl<'a> SampleDensity<'a> {
         texel(self.world, triangle, surface, random)
     }
 
-    /// The part of texels that is black.
+    /// Part of texels that are black.
     fn part_black(&self) -> f32 {
         let mut random = Random::new(0xB1AC);
         let (mut probes, mut blacks) = (0.0f32, 0.0);
@@ -271,13 +270,14 @@ impl<'a> SampleDensity<'a> {
     }
 }
 
-/// Measurements per area that make so many of triangles with these areas and texels, none of which gets more than it has texels.
+/// Samples per area so that triangles of these areas and texel counts get `count` in total, none more than its
+/// texels.
 fn density(sizes: &[[f64; 2]], count: f64) -> f64 {
     let mut by_texel_size: Vec<[f64; 2]> = sizes.to_vec();
     by_texel_size.sort_by(|[a, s], [b, t]| (s / a).total_cmp(&(t / b)));
     let mut wanted = count;
     let mut area: f64 = sizes.iter().map(|[area, _]| area).sum();
-    // Those with the largest texels run out first; what they cannot give is left to the others.
+    // Triangles with the largest texels saturate first; the others get the rest.
     for [own, texels] in by_texel_size {
         if area <= 0.0 || wanted * own <= texels * area {
             return (wanted / area.max(f64::MIN_POSITIVE)).max(0.0);
@@ -288,7 +288,7 @@ fn density(sizes: &[[f64; 2]], count: f64) -> f64 {
     f64::INFINITY
 }
 
-/// The texel that a random point of a triangle falls into. `None` when the middle is beyond the surface: compilers move such texels.
+/// The texel at a random point of a triangle. `None` if its centre is off the surface: compilers move such texels.
 fn texel(
     world: &RelitWorld,
     triangle: usize,
@@ -300,7 +300,7 @@ fn texel(
     texel_at(world, triangle, surface, a + (b - a) * u + (c - a) * v)
 }
 
-/// The texel at a place of its page (0 to 1).
+/// The texel at a page position (0 to 1).
 fn texel_at(
     world: &RelitWorld,
     triangle: usize,
@@ -335,8 +335,8 @@ fn texel_at(
     })
 }
 
-/// Light that the lightmap stores where a ray met a triangle; `None` where it tells nothing: of other surfaces, of texels
-/// at their end and of black ones that are alone.
+/// Light that the lightmap stores at a hit point; `None` where it is no evidence: unmeasurable surfaces, saturated
+/// texels, lone black texels.
 pub(super) fn stored_at(
     world: &RelitWorld,
     surface: usize,
@@ -356,7 +356,7 @@ pub(super) fn stored_at(
     (!stored.lone_black && !stored.rgb.contains(&255)).then(|| stored.light(world))
 }
 
-/// The texel where a ray met a triangle; `None` where it tells nothing.
+/// The texel at a hit point; `None` where it is no evidence.
 pub(super) fn texel_on(
     world: &RelitWorld,
     surface: usize,
@@ -367,7 +367,7 @@ pub(super) fn texel_on(
     texel_at(world, triangle, world.surfaces.get(surface)?, place)
 }
 
-/// Where in its page (0 to 1) a place on a triangle lies; `None` for surfaces that tell of no light.
+/// Page position (0 to 1) of a point on a triangle; `None` for surfaces that are not measurable.
 fn page_place(world: &RelitWorld, surface: usize, triangle: usize, at: Vec3) -> Option<Vec2> {
     let own = world.surfaces.get(surface)?;
     if !lit_by_texel(own) || !is_measurable(world, own) || !constant(world, surface) {
@@ -389,7 +389,7 @@ fn page_place(world: &RelitWorld, surface: usize, triangle: usize, at: Vec3) -> 
     Some(a.lightmap + (b.lightmap - a.lightmap) * u + (c.lightmap - a.lightmap) * v)
 }
 
-/// Steps of a page of the map that a step of a page is: pages that are shown as they are stored have finer ones.
+/// Size of a step of a page in steps of the map's own pages: pages that are shown as stored have finer steps.
 fn step_of(world: &RelitWorld, page: usize) -> f32 {
     match world.is_shown_as_stored(page) {
         true => 1.0 / (1 << MAP_OVERBRIGHT_BITS) as f32,
@@ -397,13 +397,14 @@ fn step_of(world: &RelitWorld, page: usize) -> f32 {
     }
 }
 
-/// What the compiler multiplied a surface's light by before it stored it.
+/// Factor that the compiler applied to a surface's light before storing.
 fn stored_scale(world: &RelitWorld, surface: &WorldSurface) -> f32 {
     let material = world.materials.get(surface.material as usize);
     material.map_or(1.0, WorldMaterial::stored_scale)
 }
 
-/// Position and normal of a place in a lightmap page of `size` texels a side, in texels, if the triangle covers it.
+/// Position and normal of a page position, in texels, if the triangle covers it. `size`: texels along the side of
+/// the page.
 fn place_of([a, b, c]: [&WorldVertex; 3], at: Vec2, size: f32) -> Option<(Vec3, Vec3)> {
     let (e1, e2) = (
         (b.lightmap - a.lightmap) * size,
@@ -430,7 +431,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn black_counts_where_all_around_is_black() {
+    fn black_texels_are_trusted_in_black_surroundings() {
         let side = q3bsp::LIGHTMAP_SIZE;
         let mut texels = vec![0u8; side * side * 3].into_boxed_slice();
         // One lit texel, in the middle of the first row.

@@ -1,5 +1,5 @@
-//! What ways of looking for a map's light have in common: which measurements are taken, what these see of each other,
-//! and which of them candidates for lost lights see. Most ways take the same, so that it is traced once.
+//! Rays shared between the fits of one world: samples, transfer matrices and candidate rows. Most fits use the same
+//! ones.
 
 use super::Evidence;
 use super::bounce::Transfer;
@@ -11,7 +11,7 @@ use crate::world::RelitWorld;
 use glam::Vec3;
 use std::sync::Arc;
 
-/// What was traced for other ways.
+/// Results of rays of earlier fits.
 #[derive(Default)]
 pub(super) struct TraceCache {
     samples: Vec<CachedSamples>,
@@ -19,7 +19,7 @@ pub(super) struct TraceCache {
     candidates: Option<(CandidateKey, Arc<Candidates>)>,
 }
 
-/// What candidates all over open space, and what they see, depend on.
+/// Everything that the candidates over open space and their rows depend on.
 #[derive(PartialEq)]
 pub(super) struct CandidateKey {
     holes: bool,
@@ -29,7 +29,7 @@ pub(super) struct CandidateKey {
 }
 
 impl CandidateKey {
-    /// At most so many candidates for some measurements, and where directions of the light grid meet.
+    /// The key for these samples, at most `most` candidates and these crossings.
     pub fn of(
         world: &RelitWorld,
         samples: &[Sample],
@@ -45,7 +45,7 @@ impl CandidateKey {
     }
 }
 
-/// Measurements, and all that they depend on.
+/// Samples, and everything that they depend on.
 struct CachedSamples {
     sampling: SamplingOptions,
     gamma: f32,
@@ -54,7 +54,7 @@ struct CachedSamples {
     evidence: Evidence,
 }
 
-/// What measurements on surfaces see of each other.
+/// The transfer matrix of surface samples.
 struct CachedTransfer {
     samples: Vec<Sample>,
     bounces: u32,
@@ -68,18 +68,19 @@ fn holes(world: &RelitWorld) -> bool {
 }
 
 impl TraceCache {
-    /// Candidates that were tried for the same.
+    /// The candidates for this key, if they are the kept ones.
     pub fn candidates(&self, key: &CandidateKey) -> Option<Arc<Candidates>> {
         let (of, candidates) = self.candidates.as_ref()?;
         (of == key).then(|| Arc::clone(candidates))
     }
 
-    /// Keeps candidates, the last ones alone: they are much, and ways that look alike mostly follow each other.
+    /// Keeps the candidates of the last fit only: they are large, and fits with the same key mostly follow each
+    /// other.
     pub fn keep_candidates(&mut self, key: CandidateKey, candidates: Option<Arc<Candidates>>) {
         self.candidates = candidates.map(|candidates| (key, candidates));
     }
 
-    /// [`samples::take`].
+    /// [`samples::take`] with reuse.
     pub fn take(
         &mut self,
         world: &RelitWorld,
@@ -102,7 +103,8 @@ impl TraceCache {
         (samples, evidence)
     }
 
-    /// [`Transfer::new`]: what is seen hangs on where measurements are, not on how bright. Those in the air come last.
+    /// [`Transfer::new`] with reuse: the matrix depends on the positions of the samples, not on their light.
+    /// Light-grid samples come last and get no row of their own.
     pub fn transfer(
         &mut self,
         world: &RelitWorld,

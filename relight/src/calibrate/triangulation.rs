@@ -1,9 +1,9 @@
-//! Places where the directions of the light grid meet: where lights probably are.
+//! Candidates for lights from the directions of the light grid.
 //!
-//! A point of the grid tells where its light comes from. Where one light outshines all others, that is the way to it, and
-//! the ways of points near each other meet there (triangulation). Pairs of neighbouring points whose ways nearly meet, and
-//! whose light is as bright as the distances say, vote for the middle between the ways; places with many votes whose voters
-//! see them are candidates.
+//! A point of the grid stores the direction of its light. Where one light dominates, that is the direction to it,
+//! and the lines from neighbouring points meet at the light (triangulation). Pairs of neighbours vote for the
+//! midpoint of the closest approach of their lines if the lines nearly meet and the ratio of their light agrees
+//! with the inverse square. Positions with many votes, visible from the voters, become candidates.
 
 use super::light_grid::LitGridPoint;
 use crate::occluders::Occluders;
@@ -12,52 +12,53 @@ use glam::{IVec3, Vec3};
 use std::collections::{BTreeMap, HashMap};
 use support::parallel;
 
-/// How far apart points of a pair are, in spacings of the grid, about: as many as make a cell of the lookup.
+/// Largest distance between the points of a pair, in grid spacings: the cell size of the lookup.
 const NEIGHBOURS: f32 = 2.0;
 
-/// Least sine of the angle between two ways that tell where they meet.
+/// Smallest sine of the angle between two lines.
 const MIN_SINE: f32 = 0.08;
 
-/// How near two ways must come to each other, id units, and as a part of the longer one: directions are bytes.
+/// Largest distance between two lines: absolute, id units, and relative to the longer one. Directions are stored in
+/// bytes.
 const MISS: (f32, f32) = (6.0, 0.03);
 
-/// Ways that are believed, id units.
+/// Shortest and longest distance to a light, id units.
 const RAY_LENGTH: (f32, f32) = (16.0, 1024.0);
 
-/// How unlike an inverse square the light of two points may be: a factor.
+/// Largest ratio of the intensities that two points imply.
 const MAX_INTENSITY_RATIO: f32 = 1.6;
 
-/// Side of the cells that votes are counted in, id units.
+/// Side of the cells in which votes are counted, id units.
 const CELL: f32 = 24.0;
 
-/// Least votes of a candidate.
+/// Smallest number of votes of a candidate.
 const VOTES: usize = 4;
 
-/// Votes of a candidate that are asked whether they see it.
+/// Votes that are tested for visibility.
 const SAMPLED_VOTES: usize = 16;
 
-/// How far apart the middle half of what points tell of a light's intensity may lie, a factor: light from far away is
-/// the same at all of them, and then what they tell is not.
+/// Largest ratio of the upper to the lower quartile of the implied intensities. Distant light is equal at all
+/// points, so the implied intensities differ.
 const MAX_INTENSITY_SPREAD: f32 = 1.5;
 
-/// A place that ways meet at.
+/// A position at which lines meet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
     pub origin: Vec3,
-    /// Intensity that points around tell of, their median.
+    /// Median of the radiant intensities that the points imply.
     pub intensity: Vec3,
 }
 
-/// A vote: the place, its weight, and the two points. What is near tells more: other lights are weaker there.
+/// A vote: position, weight, the two points. Near points weigh more, because other lights matter less there.
 type Vote = (Vec3, f32, [u32; 2]);
 
-/// Where votes are in the mean.
+/// Weighted mean of the votes' positions.
 fn middle(votes: &[Vote]) -> Vec3 {
     let weight: f32 = votes.iter().map(|v| v.1).sum();
     votes.iter().map(|v| v.0 * v.1).sum::<Vec3>() / weight.max(f32::MIN_POSITIVE)
 }
 
-/// The places with most votes, best first, at most `most`.
+/// The positions with the most votes, best first, at most `most`.
 pub(super) fn find(
     world: &RelitWorld,
     points: &[LitGridPoint],
@@ -68,7 +69,7 @@ pub(super) fn find(
     triangulate(points, spacing, occluders, most)
 }
 
-/// [`find`] for points of a grid of some spacing, id units.
+/// [`find`] for points of a grid of the given spacing, id units.
 fn triangulate(
     points: &[LitGridPoint],
     spacing: Vec3,
@@ -104,13 +105,13 @@ fn triangulate(
         }
         votes
     });
-    // Sorted cells, so that the result depends on nothing but the points.
+    // A sorted map makes the result independent of the order of threads.
     let mut counted: BTreeMap<[i32; 3], Vec<Vote>> = BTreeMap::new();
     for vote in votes.into_iter().flatten() {
         let cell = cell_of(vote.0, CELL).to_array();
         counted.entry(cell).or_default().push(vote);
     }
-    // A light between cells has its votes in several: neighbours count with each.
+    // The votes of one light may fall into several cells: neighbours count.
     let around = |[x, y, z]: [i32; 3]| {
         (0..27).map(move |k| [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1])
     };
@@ -175,13 +176,12 @@ fn triangulate(
     found
 }
 
-/// What a point tells of the intensity of a light at a place.
+/// Radiant intensity that a point implies for an inverse-square light at a position.
 fn intensity(point: &LitGridPoint, origin: Vec3) -> Vec3 {
     point.light * (std::f32::consts::PI * point.position.distance_squared(origin))
 }
 
-/// The middle between the ways of two points where they come nearest to each other, if they are of one light.
-/// And what that weighs.
+/// Midpoint of the closest approach of two points' lines, if one light explains both, and its weight.
 fn meeting_point(a: &LitGridPoint, b: &LitGridPoint) -> Option<(Vec3, f32)> {
     let offset = b.position - a.position;
     let cosine = a.direction.dot(b.direction);
@@ -215,7 +215,7 @@ mod tests {
     use super::*;
     use std::f32::consts::PI;
 
-    /// Points of a grid in the open that point lights of one intensity shine on, and a sun.
+    /// Points of a grid in the open, lit by point lights and a sun.
     fn points(lights: &[(Vec3, f32)], sun: f32) -> Vec<LitGridPoint> {
         let mut points = Vec::new();
         for k in 0..10 * 10 * 4 {
@@ -231,7 +231,7 @@ mod tests {
                 .iter()
                 .map(|(direction_to, light)| *direction_to * *light)
                 .sum();
-            // A byte for each angle.
+            // Directions are stored as two bytes.
             let turn = std::f32::consts::TAU / 256.0;
             let byte = |angle: f32| (angle / turn).round() * turn;
             let direction_to = sum.normalize_or(Vec3::Z);
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn lights_are_where_ways_meet() {
+    fn lights_are_found_where_lines_meet() {
         let lights = [
             (Vec3::new(101.0, 83.0, 209.0), 40_000.0),
             (Vec3::new(470.0, 493.0, 77.0), 60_000.0),
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sun_is_nowhere() {
+    fn a_sun_gives_no_candidates() {
         assert_eq!(found(&points(&[], 1.0)), []);
     }
 }

@@ -1,4 +1,4 @@
-//! Light at the vertices of surfaces that have no lightmap, as measurements.
+//! Vertex light of surfaces without a lightmap, as samples.
 
 use super::samples::{Sample, SampleContext, is_measurable, pick, sample_at};
 use super::texels::Stored;
@@ -7,7 +7,7 @@ use q3bsp::SurfaceKind;
 use support::parallel;
 use support::random::Random;
 
-/// Whether a surface stores its light at its vertices, which are the map's own.
+/// Whether a surface is lit by vertex and its vertices are the map's own.
 pub(super) fn lit(surface: &WorldSurface) -> bool {
     surface.light_page == q3bsp::lightmap_index::BY_VERTEX
         && matches!(
@@ -16,7 +16,7 @@ pub(super) fn lit(surface: &WorldSurface) -> bool {
         )
 }
 
-/// Lit vertices of surfaces without a page. Each stands for itself, however large its surface is.
+/// Lit vertices, each with equal probability regardless of the size of its surface.
 pub(super) fn take(context: &SampleContext<'_>, count: usize, random: &mut Random) -> Vec<Sample> {
     let world = context.world;
     let mut all = Vec::new();

@@ -1,4 +1,4 @@
-//! The colours of lights, against those that the engine shows.
+//! Colours of fitted lights against those that the engine shows.
 
 use super::*;
 use crate::overbright;

@@ -1,4 +1,4 @@
-//! Maps that say how their light was computed.
+//! Maps that store their compiler's command line.
 
 use super::*;
 use crate::occluders::Occluders;
@@ -50,7 +50,7 @@ fn left_by_dirt(at: Vec3, normal: Vec3) -> f32 {
 }
 
 #[test]
-fn dirty_corners_are_taken_for_dirt() {
+fn dirt_is_found_without_a_command_line() {
     let dirty = |at: Vec3, normal: Vec3| from_hidden(at, normal) * left_by_dirt(at, normal);
     let found = |line: &str| {
         let mut world = saying(&[("_q3map2_cmdline", line)], &dirty);
@@ -69,7 +69,7 @@ fn dirty_corners_are_taken_for_dirt() {
 }
 
 #[test]
-fn dirt_that_is_told_of_may_not_be_there() {
+fn dirt_of_the_command_line_is_dropped_if_absent() {
     let line = ("_q3map2_cmdline", "-light -dirty");
     let mut world = saying(&[line], &from_hidden);
     let report = calibrate(&mut world, &small());
@@ -78,7 +78,7 @@ fn dirt_that_is_told_of_may_not_be_there() {
 }
 
 #[test]
-fn what_the_map_says_of_its_compiler_is_not_looked_for() {
+fn the_command_line_replaces_the_search() {
     // No trial has this gamma.
     let gamma = 1.5f32;
     let encoded = |at: Vec3, normal: Vec3| from_hidden(at, normal).powf(gamma.recip());
@@ -94,7 +94,7 @@ fn what_the_map_says_of_its_compiler_is_not_looked_for() {
 }
 
 #[test]
-fn texels_held_out_are_of_all_alike() {
+fn held_out_texels_are_not_thinned() {
     // Black but for what lies near one light.
     let near = |at: Vec3, normal: Vec3| {
         let (origin, _) = HIDDEN[0];

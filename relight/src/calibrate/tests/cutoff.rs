@@ -1,4 +1,4 @@
-//! A room lit by weak lights of which the compiler left out what adds less than a step of light.
+//! A room lit by weak lights; the compiler left out contributions below one step of light.
 
 use super::*;
 
@@ -21,7 +21,7 @@ fn from_ending(at: Vec3, normal: Vec3) -> Vec3 {
 }
 
 #[test]
-fn lights_that_the_compiler_cut_off_end_there() {
+fn a_cutoff_of_the_compiler_is_found() {
     let mut world = room(false, Some(&from_ending));
     let report = calibrate(&mut world, &small());
     println!("{report:?}");
@@ -55,7 +55,7 @@ fn lights_that_the_compiler_cut_off_end_there() {
 }
 
 #[test]
-fn lights_that_have_no_end_get_none() {
+fn lights_without_a_cutoff_get_none() {
     let mut world = room(false, Some(&from_hidden));
     let report = calibrate(&mut world, &small());
     assert!(

@@ -78,7 +78,7 @@ fn a_fifth_is_held_out_and_another_seed_holds_out_others() {
 }
 
 #[test]
-fn a_surface_tells_no_more_than_it_has_texels() {
+fn a_surface_gets_at_most_one_sample_a_texel() {
     // The first face is the floor or a wall of the room: a large part of its area.
     let world = coarse(48, 4);
     let samples = taken(&world, 3000, 1);
@@ -95,7 +95,7 @@ fn a_surface_tells_no_more_than_it_has_texels() {
 }
 
 #[test]
-fn what_lies_in_a_brush_tells_nothing() {
+fn positions_inside_brushes_give_no_samples() {
     let [low, high] = [
         Vec3::new(100.0, -200.0, -8.0),
         Vec3::new(200.0, -100.0, 60.0),

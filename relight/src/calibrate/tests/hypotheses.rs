@@ -1,4 +1,4 @@
-//! Ways that are tried: more measurements where directives are nearly as good as what is found, and what is given up.
+//! Selection of hypotheses: more samples where directives are nearly as good as the fit, and abandoned fits.
 
 use super::splash::from_lamp;
 use super::*;
@@ -24,7 +24,7 @@ fn noisy() -> RelitWorld {
 }
 
 #[test]
-fn where_directives_are_nearly_right_more_is_measured_and_the_better_is_kept() {
+fn nearly_exact_directives_trigger_more_samples_and_the_better_fit_is_kept() {
     for seed in [1, 2] {
         let options = CalibrationOptions {
             samples: 600,
@@ -37,7 +37,7 @@ fn where_directives_are_nearly_right_more_is_measured_and_the_better_is_kept() {
         let [before, after] = [&report.before, &report.after].map(|a| a.median_stops);
         assert!(after < UNEXPLAINED && after > before * HALF);
         let mut world = noisy();
-        let way = |splashes: bool| Compiler {
+        let setting = |splashes: bool| Compiler {
             gamma: report.gamma,
             has_cutoff: report.has_cutoff,
             dirt: None,
@@ -46,8 +46,8 @@ fn where_directives_are_nearly_right_more_is_measured_and_the_better_is_kept() {
         assert!(report.gamma == 1.0 && !report.has_cutoff && !report.dirty);
         let nothing = &mut |_| ();
         let mut hypotheses = Hypotheses::new(&mut world, &[], &options, nothing);
-        let once = hypotheses.with(way(true));
-        let (cell, same) = (Cell::new(true), way(once.report.splashes > 0));
+        let once = hypotheses.with(setting(true));
+        let (cell, same) = (Cell::new(true), setting(once.report.splashes > 0));
         let more = hypotheses
             .measured_more(same, None, &cell, &|| 1.0)
             .unwrap();
@@ -59,7 +59,7 @@ fn where_directives_are_nearly_right_more_is_measured_and_the_better_is_kept() {
 }
 
 #[test]
-fn what_falls_behind_a_rival_is_given_up() {
+fn a_fit_behind_the_incumbent_is_abandoned() {
     let mut world = room(false, Some(&from_hidden));
     let (options, nothing) = (small(), &mut |_| ());
     let mut hypotheses = Hypotheses::new(&mut world, &[], &options, nothing);

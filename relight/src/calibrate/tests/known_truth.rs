@@ -1,4 +1,5 @@
-//! A hall of which everything is known: baked by a reference integrator that shares nothing with calibration.
+//! A hall whose lights and reflectances are known, baked by a reference integrator that shares no code with
+//! calibration.
 
 use super::*;
 use std::f32::consts::TAU;
@@ -94,17 +95,17 @@ fn stored(at: Vec3, normal: Vec3, bounced: Vec3) -> Vec3 {
 }
 
 #[test]
-fn a_hall_with_everything_is_taken_apart() {
-    taken_apart(LightColor::Stored);
+fn all_sources_of_a_known_hall_are_found() {
+    assert_all_sources_found(LightColor::Stored);
 }
 
 #[test]
-fn the_same_hall_is_taken_apart_in_the_colours_that_the_engine_shows() {
-    taken_apart(LightColor::Displayed);
+fn all_sources_of_a_known_hall_are_found_in_engine_colours() {
+    assert_all_sources_found(LightColor::Displayed);
 }
 
-/// The map is one, but what its lights are is told by how colours are understood.
-fn taken_apart(light_color: LightColor) {
+/// Calibrates the hall and compares all light sources with the known ones.
+fn assert_all_sources_found(light_color: LightColor) {
     let mut map = MapBuilder::new();
     let wall = map.add_shader("t/wall", 0, 1);
     let mut faces = map.add_box_faces(wall, ROOM[0], ROOM[1], true).to_vec();

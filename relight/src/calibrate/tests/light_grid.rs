@@ -1,4 +1,4 @@
-//! A room whose light grid is known, baked as a compiler does.
+//! A room with a known light grid, baked as a compiler does.
 
 use super::*;
 use crate::occluders::Occluders;
@@ -72,7 +72,7 @@ fn found(world: &RelitWorld) -> Vec<(f32, f32)> {
 }
 
 #[test]
-fn the_grid_places_lights_that_few_texels_see() {
+fn the_light_grid_places_lights_that_few_texels_see() {
     // Two of twelve faces are lightmapped, and the grid is stored half as bright as it should be.
     let light = |gridded: bool| {
         let map = room_map("t/wall", false, 2, Some(&from_hidden));
@@ -100,7 +100,7 @@ fn the_grid_places_lights_that_few_texels_see() {
 }
 
 #[test]
-fn what_is_lit_by_vertex_is_measured_beside_texels() {
+fn vertex_light_joins_the_texels() {
     let mut map = room_map("t/wall", false, 2, Some(&from_hidden));
     let wall = map.add_shader("t/wall", 0, 1);
     // A pane in the open, lit at its corners as the lights have it.

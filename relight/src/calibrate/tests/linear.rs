@@ -23,7 +23,7 @@ fn from_linear(at: Vec3, normal: Vec3) -> Vec3 {
 }
 
 #[test]
-fn lights_that_end_are_told_from_those_that_do_not() {
+fn linear_and_inverse_square_lights_are_distinguished() {
     let mut world = room(false, Some(&from_linear));
     let report = calibrate(&mut world, &small());
     println!("{report:?}");
@@ -45,7 +45,7 @@ fn lights_that_end_are_told_from_those_that_do_not() {
 }
 
 #[test]
-fn lights_that_end_are_looked_for_where_others_leave_more_than_half() {
+fn linear_falloff_is_tried_where_more_than_half_of_the_error_is_left() {
     // beside light from everywhere they are too weak to leave much
     let weak = |at: Vec3, normal: Vec3| Vec3::splat(0.2) + 0.3 * from_linear(at, normal);
     let mut world = room(false, Some(&weak));

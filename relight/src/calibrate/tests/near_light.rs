@@ -1,4 +1,4 @@
-//! Texels beside lights that are put in.
+//! Texels beside placed lights.
 
 use super::*;
 use crate::calibrate::near_light::spots;
@@ -21,7 +21,7 @@ fn from_middle(at: Vec3, normal: Vec3) -> Vec3 {
 const BESIDE: Vec3 = Vec3::new(-310.0, 40.0, 100.0);
 
 #[test]
-fn spots_are_counted_where_a_point_makes_one() {
+fn a_point_light_near_a_wall_makes_a_counted_spot() {
     let mut world = room(false, Some(&from_middle));
     let mut lit_by = |origin: Vec3, intensity: f32| {
         world.point_lights = vec![PointLight {
@@ -44,7 +44,7 @@ fn spots_are_counted_where_a_point_makes_one() {
 }
 
 #[test]
-fn texels_that_a_light_makes_too_bright_join_and_turn_it_down() {
+fn texels_that_are_too_bright_join_the_samples_and_reduce_the_light() {
     let world = room(false, Some(&from_middle));
     let occluders = Occluders::of_world(&world);
     let sampling = sampling(200);

@@ -1,10 +1,10 @@
-//! What light passes although it is drawn.
+//! Surfaces that are drawn but pass light.
 
 use super::*;
 use crate::occluders::Occluders;
 
 #[test]
-fn shadow_rays_pass_what_the_compiler_let_light_pass() {
+fn shadow_rays_pass_surfaces_that_the_compiler_let_light_pass() {
     let corners = LAMP_CORNERS;
     let [above, below] = [260.0, 100.0].map(|z| Vec3::new(200.0, 0.0, z) - Vec3::Y * 3.0);
     for (material, stops) in [

@@ -1,4 +1,4 @@
-//! Candidates in front of samples that stay unexplained.
+//! Candidates in front of samples with a large residual.
 
 use super::*;
 use crate::calibrate::placement::Scene;
@@ -7,7 +7,7 @@ use crate::occluders::Occluders;
 use samples::Sample;
 
 #[test]
-fn what_places_see_is_kept_and_samples_that_join_are_looked_at() {
+fn candidate_rows_are_reused_and_extended_by_new_samples() {
     let world = room(false, Some(&from_hidden));
     let occluders = Occluders::of_world(&world);
     let (all, _) = samples::take(&world, &occluders, &sampling(800));

@@ -1,4 +1,4 @@
-//! A lamp whose compiler put a weak light in front of it.
+//! A lamp with the compiler's back splash.
 
 use super::*;
 
@@ -36,7 +36,7 @@ fn from_lamp_and_point(splash: f32, below: f32) -> impl Fn(Vec3, Vec3) -> Vec3 {
 }
 
 #[test]
-fn the_light_in_front_of_a_lamp_is_found_as_one() {
+fn a_back_splash_is_found_as_one_source() {
     let part = 0.08;
     let mut world = room(true, Some(&from_lamp(part)));
     let report = calibrate(&mut world, &small());
@@ -55,7 +55,7 @@ fn the_light_in_front_of_a_lamp_is_found_as_one() {
 }
 
 #[test]
-fn lamps_without_such_lights_get_none() {
+fn lamps_without_back_splashes_get_none() {
     let mut world = room(true, Some(&from_lamp(0.0)));
     let mut told = vec![0.0];
     let report = calibrate_with(&mut world, &small(), &mut |part| told.push(part));
@@ -67,7 +67,7 @@ fn lamps_without_such_lights_get_none() {
 }
 
 #[test]
-fn splashes_go_where_lights_put_in_explain_as_much() {
+fn back_splashes_are_dropped_if_placed_lights_explain_as_much() {
     // A splash explains much of this light, but not as well as the point that it is.
     let mut world = room(true, Some(&from_lamp_and_point(0.3, 50.0)));
     let report = calibrate(&mut world, &small());
@@ -80,7 +80,7 @@ fn splashes_go_where_lights_put_in_explain_as_much() {
 }
 
 #[test]
-fn splashes_are_no_entities_that_were_found() {
+fn back_splashes_do_not_count_as_recovered_entities() {
     let mut world = room(true, Some(&from_lamp(0.08)));
     let report = calibrate(&mut world, &small());
     let found = recovery(&[], &world);
@@ -89,7 +89,7 @@ fn splashes_are_no_entities_that_were_found() {
 }
 
 #[test]
-fn what_nothing_explains_is_measured_twice_and_progress_never_falls() {
+fn unexplained_light_takes_more_samples_and_progress_is_monotonic() {
     // No light is like that: each texel by chance.
     let noise = |at: Vec3, _: Vec3| {
         let hashed_uniform = support::random::hashed_uniform(3, &at.to_array().map(f32::to_bits));

@@ -1,4 +1,4 @@
-//! Rooms whose baked light lies in images that scripts name, and in styles.
+//! Rooms whose baked light lies in images that scripts name, and in light styles.
 
 use super::*;
 

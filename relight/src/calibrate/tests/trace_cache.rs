@@ -1,10 +1,10 @@
-//! What ways of looking for light have in common.
+//! Reuse of rays between fits.
 
 use super::*;
 use crate::occluders::Occluders;
 
 #[test]
-fn what_is_remembered_is_what_would_be_traced_again() {
+fn reused_rays_equal_fresh_ones() {
     let mut world = room(true, Some(&from_hidden));
     for material in &mut world.materials {
         material.albedo = Vec3::splat(0.5);
