@@ -1,19 +1,19 @@
-//! A folder of results that are kept, such as what calibration found.
+//! A folder of cached results, such as calibrations.
 //!
-//! A file's name is the hash of all that its result depends on, so that a file is right or not there.
+//! The file name is the hash of everything that a result depends on, so a file is either current or absent.
 
 use crate::world::RelitWorld;
 use std::io;
 use std::path::{Path, PathBuf};
 use support::hash::Hash;
 
-/// A folder of results.
+/// A folder of cached results.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CalibrationCache {
     folder: PathBuf,
 }
 
-/// Why a kept result could not be used, or not be kept.
+/// Reason why a cached result could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum CacheError {
     #[error("{}: cannot be read: {source}", path.display())]
@@ -31,7 +31,7 @@ pub(crate) enum CacheError {
 }
 
 impl CalibrationCache {
-    /// Results in a folder, which is made when the first is kept.
+    /// A cache in a folder, which is created when the first result is written.
     pub fn new(folder: impl Into<PathBuf>) -> CalibrationCache {
         CalibrationCache {
             folder: folder.into(),
@@ -43,12 +43,12 @@ impl CalibrationCache {
         &self.folder
     }
 
-    /// The file of a result of some kind.
+    /// Path of a result of a kind.
     pub(crate) fn path(&self, key: u128, kind: &str) -> PathBuf {
         self.folder.join(format!("{key:032x}.{kind}"))
     }
 
-    /// Writes a file of the folder. It appears whole or not at all.
+    /// Writes a file atomically: it appears whole or not at all.
     pub(crate) fn write_file(&self, path: PathBuf, bytes: &[u8]) -> Result<(), CacheError> {
         let unfinished = path.with_extension(format!("{}.part", std::process::id()));
         let write = || {
@@ -57,14 +57,14 @@ impl CalibrationCache {
             std::fs::rename(&unfinished, &path)
         };
         write().map_err(|source| {
-            // What is left of a failed attempt; that it may not be there is fine.
+            // Removes the temporary file of a failed attempt, if there is one.
             let _ = std::fs::remove_file(&unfinished);
             CacheError::Write { path, source }
         })
     }
 }
 
-/// The bytes of a file; `None` when there is none.
+/// Bytes of a file; `None` if it does not exist.
 pub(crate) fn read_file(path: &Path) -> Result<Option<Vec<u8>>, CacheError> {
     match std::fs::read(path) {
         Ok(bytes) => Ok(Some(bytes)),
@@ -76,9 +76,9 @@ pub(crate) fn read_file(path: &Path) -> Result<Option<Vec<u8>>, CacheError> {
     }
 }
 
-/// What light in a world depends on: its geometry, its materials, its lights.
+/// Hashes everything that light in a world depends on: geometry, materials, lights.
 pub(crate) fn add_world(hash: &mut Hash, world: &RelitWorld) {
-    // The file's own bytes: light, geometry, visibility. The entities hold the grid's size.
+    // The file's bytes: lightmaps, geometry, PVS. The entities hold the size of the light grid.
     hash.bytes(&world.bsp.write());
     for surface in &world.surfaces {
         for number in [

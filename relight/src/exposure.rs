@@ -1,74 +1,71 @@
-//! How bright a map is meant to look: the exposure at which a linear picture of it is, in the mean, as bright as the
-//! engine's own.
+//! Exposure of a map: the factor at which the linear picture has the mean brightness of the engine's picture.
 //!
-//! The engine multiplies textures t and stored light v as both are encoded for the display, at most 1; shown is D(t v),
-//! with D the display's curve. A tracer finds the light L itself, and shows T(e D(t) L), with T the tone curve. Were D a
-//! power, D(t v) would be D(t) D(v), and e would not depend on textures: mean D(v) over mean v. It is not: e is found such
-//! that the means of both agree, over what players see where the game sets them and over the pixels of the textures there
-//! ([`matching`]). L is the light of the lights that calibration found: what comes out too bright in the mean is exposed
-//! less. What mirrors besides shows its surroundings: in the mean what all these pixels show.
+//! The engine multiplies textures t and stored light v, both display-encoded and at most 1, and shows D(t v) with
+//! the display's curve D. The tracer computes the light L and shows T(e D(t) L) with the tone curve T. If D were a
+//! power, D(t v) would be D(t) D(v), and e would be mean D(v) over mean v, independent of textures. It is not, so e
+//! is solved for equal means over the views from the spawn points and over the pixels of the textures there
+//! ([`matching`]). L is the calibrated light: light that is too bright in the mean lowers the exposure. Mirrors
+//! show the mean of all these pixels.
 //!
-//! Automatic exposure brings a picture a little nearer to a usual one of its map: how bright that is
-//! ([`Exposure::middle`]) is taken from the same pixels.
+//! Automatic exposure moves a picture towards the usual brightness of its map ([`Exposure::middle`]), computed from
+//! the same pixels.
 //!
-//! Without such light ([`display_exposure`](crate::RelitWorld::display_exposure) of a world that nobody calibrated) there is the mean of D(v) over the mean of
-//! v; where the map's compiler stored light with a gamma g, that light is v^g, and the mean is over that.
+//! Without calibrated light ([`display_exposure`](crate::RelitWorld::display_exposure)) e is mean D(v) over mean v,
+//! with v^g in the denominator if the compiler stored light with a gamma g.
 
 use crate::emitters::Shade;
 use crate::overbright::{self, luminance};
 use glam::Vec3;
 use q3bsp::{Bsp, Lightmap};
 
-/// Every so many texels of a page one is taken.
+/// One texel of a page in this many is used.
 const STRIDE: usize = 7;
-/// Texels darker than this are what no light reached, or lie outside of any surface.
+/// Encoded brightness below which texels are ignored: unlit, or outside any surface.
 const DARK: f32 = 2.0 / 255.0;
-/// Exposure of a map that has no light stored.
+/// Exposure of a map without stored light.
 const DEFAULT: f32 = 0.25;
-/// Bounds, so that a strange map stays visible.
+/// Bounds of an exposure from stored light, so that an unusual map stays visible.
 const LIMITS: (f32, f32) = (0.02, 1.0);
-/// Mean luminance of a usual picture, logarithms averaged, linear.
+/// Usual luminance of a picture, logarithmic mean, linear.
 const MIDDLE: f32 = 0.02;
-/// Least luminance of a picture's pixel, stops: the histogram's end in `exposure.glsl`.
+/// Smallest luminance of a pixel, stops: the end of the histogram in `exposure.glsl`.
 const DARKEST: f32 = -12.0;
-/// Pixels left out of a picture's mean at the dark and at the bright end, of all, as in `exposure.comp`.
+/// Parts of the darkest and brightest pixels that automatic exposure leaves out, as in `exposure.comp`.
 const DARK_PART: f32 = 0.2;
 const BRIGHT_PART: f32 = 0.05;
-/// Bounds of an exposure that light and textures tell.
+/// Bounds of an exposure from calibrated light.
 const MATCHED: (f32, f32) = (0.005, 8.0);
-/// Steps in which it is found, at most.
+/// Largest number of iterations.
 const STEPS: u32 = 32;
-/// How near the means must come.
+/// Relative tolerance of the means.
 const NEAR: f32 = 1e-3;
-/// Below this the picture is linear: the knee of the tone curve, as in `tonemap.comp`.
+/// Knee of the tone curve, below which it is linear, as in `tonemap.comp`.
 const KNEE: f32 = 0.6;
 
-/// How many times the stored light the light found may count as, where the stored one is not cut off at white. Where it is
-/// more it is a light beside a wall that is not where it was, or not as it was: a spot that is wrong, and no reason to show
-/// all else darker.
+/// Largest ratio of computed to stored light in the mean, where the stored light is not clipped. More than this is
+/// an error of a light's position or shape, and must not darken the rest.
 const MOST_OVER: f32 = 2.0;
-/// From here on stored light may be cut off, encoded.
+/// Encoded stored light from which it may be clipped.
 const CUT_OFF: f32 = 0.99;
 
-/// Brightness of a texture, encoded, where nobody measured the map's own: about the mean of lit surfaces in OpenArena's maps
-/// (0.13 to 0.33).
+/// Assumed encoded brightness of unmeasured textures: about the mean of lit surfaces in OpenArena's maps (0.13 to
+/// 0.33).
 const TEXTURE: f32 = 0.2;
-/// Exponent of the display's curve on a map that has no light stored.
+/// Exponent of the display's curve for a map without stored light.
 pub(crate) const DEFAULT_EXPONENT: f32 = 1.4;
 
-/// How bright a map is shown.
+/// Exposure of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exposure {
-    /// A factor of radiance.
+    /// Factor of radiance.
     pub scale: f32,
-    /// How bright a usual picture of the map is as the engine shows it: the mean of the logarithm of luminance, stops,
-    /// without the pixels that automatic exposure leaves out.
+    /// Usual brightness of the map as the engine shows it: logarithmic mean of luminance, stops, without the pixels
+    /// that automatic exposure leaves out.
     pub middle: f32,
 }
 
 impl Exposure {
-    /// An exposure, of pictures as bright as those of OpenArena's maps in the mean: what is known where no light is
-    /// calibrated.
+    /// An exposure with the usual brightness of OpenArena's maps, for uncalibrated worlds.
     pub fn usual(scale: f32) -> Exposure {
         Exposure {
             scale,
@@ -76,14 +73,14 @@ impl Exposure {
         }
     }
 
-    /// Whether it can have been found by calibration.
+    /// Whether calibration can have found it.
     pub(crate) fn is_possible(&self) -> bool {
         (MATCHED.0..=MATCHED.1).contains(&self.scale) && (DARKEST..=0.0).contains(&self.middle)
     }
 }
 
-/// A place where light is stored, and what the world's lights give there.
-pub(crate) struct Place<'a> {
+/// Stored and computed light at a position.
+pub(crate) struct LitSample<'a> {
     /// Stored light as the engine shows it on a white surface, encoded, at most 1.
     pub stored: Vec3,
     /// Light that the world's lights give, linear.
@@ -92,7 +89,7 @@ pub(crate) struct Place<'a> {
     pub shades: &'a [Shade],
 }
 
-/// What the traced look shows of an exposed radiance, linear: see `tonemap.comp`.
+/// Tone curve of the traced look, linear output: see `tonemap.comp`.
 fn tone(x: f32) -> f32 {
     if x < KNEE {
         x
@@ -101,8 +98,8 @@ fn tone(x: f32) -> f32 {
     }
 }
 
-/// The exposure at which places are as bright in the mean, traced, as the engine shows them; `None` where all is dark.
-pub(crate) fn matching<'a>(places: impl Iterator<Item = Place<'a>>) -> Option<Exposure> {
+/// The exposure at which samples have the same mean brightness traced as in the engine; `None` if all are dark.
+pub(crate) fn matching<'a>(places: impl Iterator<Item = LitSample<'a>>) -> Option<Exposure> {
     let usual = [Shade {
         linear: Vec3::splat(overbright::to_linear(TEXTURE)),
         encoded: Vec3::splat(TEXTURE),
@@ -118,7 +115,7 @@ pub(crate) fn matching<'a>(places: impl Iterator<Item = Place<'a>>) -> Option<Ex
             place.shades
         };
         let part = 1.0 / shades.len() as f32;
-        let light = believed(&place);
+        let light = bounded_light(&place);
         for shade in shades {
             let shown = overbright::colour_to_linear((shade.encoded * place.stored).min(Vec3::ONE));
             engine += f64::from(luminance(shown) * part);
@@ -135,7 +132,7 @@ pub(crate) fn matching<'a>(places: impl Iterator<Item = Place<'a>>) -> Option<Ex
         };
         traced.iter().map(shown).sum()
     };
-    // The curve bends downwards only: each step comes nearer from the same side.
+    // The curve is concave: the iteration converges monotonically.
     let mut exposure = DEFAULT;
     for _ in 0..STEPS {
         let ratio = (engine / mean(exposure)) as f32;
@@ -151,12 +148,12 @@ pub(crate) fn matching<'a>(places: impl Iterator<Item = Place<'a>>) -> Option<Ex
             });
         }
     }
-    // No exposure does: most of what is lit has no light.
+    // No solution: most of what is lit has no computed light.
     None
 }
 
-/// The light of a place as it counts.
-fn believed(place: &Place<'_>) -> Vec3 {
+/// Computed light of a sample, bounded relative to the stored light.
+fn bounded_light(place: &LitSample<'_>) -> Vec3 {
     let most = MOST_OVER * luminance(place.stored).max(DARK);
     let found = luminance(place.light);
     if found <= most || place.stored.max_element() > CUT_OFF {
@@ -165,7 +162,7 @@ fn believed(place: &Place<'_>) -> Vec3 {
     place.light * (most / found)
 }
 
-/// The mean of the logarithm of luminances, each with its weight, as automatic exposure takes it: stops.
+/// Weighted logarithmic mean of luminances as automatic exposure computes it, stops.
 fn middle(mut pixels: Vec<(f32, f32)>) -> f32 {
     pixels.sort_by(|a, b| a.0.total_cmp(&b.0));
     let whole: f64 = pixels.iter().map(|(_, part)| f64::from(*part)).sum();
@@ -183,11 +180,11 @@ fn middle(mut pixels: Vec<(f32, f32)>) -> f32 {
     (sum / (to - from)) as f32
 }
 
-/// Most of what is around that mirrors count as giving back, so that mirrors among mirrors stay finite.
+/// Largest mean mirror reflectance, so that mutual reflections stay finite.
 const MOST_MIRRORED: f32 = 0.9;
 
-/// Mean radiance of what mirrors find, of pixels that show radiance of their own and mirror a part of it, each with its
-/// weight: what all of them show, in mirrors, too.
+/// Mean radiance that mirrors show, from (own radiance, mirrored part, weight) of pixels, including mutual
+/// reflections.
 fn surroundings(pixels: &[(Vec3, Vec3, f32)]) -> Vec3 {
     let whole: f32 = pixels.iter().map(|(.., part)| part).sum();
     let mean = |of: fn(&(Vec3, Vec3, f32)) -> Vec3| {
@@ -198,14 +195,14 @@ fn surroundings(pixels: &[(Vec3, Vec3, f32)]) -> Vec3 {
     own / (1.0 - mirrored.min(Vec3::splat(MOST_MIRRORED)))
 }
 
-/// The exposure of a map whose light nobody calibrated: from its lightmaps, or from the colours of its vertices. `pages`: of
-/// lightmaps beside it; `gamma`: what its compiler encoded light with.
+/// Exposure of an uncalibrated map from its lightmaps or vertex colours. `pages`: further lightmaps; `gamma`: the
+/// compiler's gamma.
 pub(crate) fn of_stored_light(bsp: &Bsp, pages: &[Lightmap], gamma: f32) -> Exposure {
     let found = of_stored(bsp, pages, |light| ratio(light, gamma));
     Exposure::usual(found.unwrap_or(DEFAULT))
 }
 
-/// A part of a map's surfaces whose texture is equally bright.
+/// Surfaces with textures of one brightness.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Texture {
     /// Luminance, encoded.
@@ -214,15 +211,14 @@ pub(crate) struct Texture {
     pub area: f32,
 }
 
-/// The exponent of the power law that the display's curve D comes to where a map shows its light: the mean of
-/// d ln D / d ln x over the light v of its lightmaps and of the `pages` beside it, else of its vertices, on each of its
-/// `textures` t, where x = t v. Each x has the weight x: what is brighter is seen better. No textures: one of usual
-/// brightness.
+/// Exponent of the power law that approximates the display's curve D where a map shows light: the mean of d ln D /
+/// d ln x over x = t v, for the light v of its lightmaps and `pages`, else of its vertices, on each of its
+/// `textures` t, weighted by x. Without textures a usual brightness is assumed.
 pub(crate) fn display_exponent(bsp: &Bsp, pages: &[Lightmap], textures: &[Texture]) -> f32 {
     of_stored(bsp, pages, |light| exponent(light, textures)).unwrap_or(DEFAULT_EXPONENT)
 }
 
-/// What is found of light on lightmaps, encoded; else on vertices.
+/// A result from encoded lightmap colours, else from vertex colours.
 fn of_stored(
     bsp: &Bsp,
     pages: &[Lightmap],
@@ -242,13 +238,13 @@ fn of_stored(
     find(&mut texels).or_else(|| find(&mut vertices))
 }
 
-/// Luminance of a colour, encoded like its bytes (Rec. 709); `None` of what is dark.
+/// Encoded luminance of an encoded colour (Rec. 709 weights); `None` if dark.
 fn level(rgb: [u8; 3]) -> Option<f32> {
     let value = luminance(Vec3::from_array(rgb.map(f32::from))) / 255.0;
     (value > DARK).then_some(value)
 }
 
-/// Mean decoded brightness over mean light, which is brightness to the power of `gamma`; `None` where all is dark.
+/// Mean decoded brightness over mean light, which is brightness to the power of `gamma`; `None` if all is dark.
 fn ratio(colors: impl Iterator<Item = [u8; 3]>, gamma: f32) -> Option<f32> {
     let (mut decoded, mut stored) = (0.0_f64, 0.0_f64);
     for value in colors.filter_map(level) {
@@ -258,7 +254,7 @@ fn ratio(colors: impl Iterator<Item = [u8; 3]>, gamma: f32) -> Option<f32> {
     (stored > 0.0).then(|| ((decoded / stored) as f32).clamp(LIMITS.0, LIMITS.1))
 }
 
-/// Mean of the curve's exponent; `None` where all is dark.
+/// Mean exponent of the curve; `None` if all is dark.
 fn exponent(colors: impl Iterator<Item = [u8; 3]>, textures: &[Texture]) -> Option<f32> {
     let usual = [Texture {
         brightness: TEXTURE,
@@ -308,7 +304,7 @@ mod tests {
                 places
                     .iter()
                     .zip(&shades)
-                    .map(|(&(stored, light, _), shades)| Place {
+                    .map(|(&(stored, light, _), shades)| LitSample {
                         stored: Vec3::splat(stored),
                         light: Vec3::splat(light),
                         shades,
@@ -357,7 +353,7 @@ mod tests {
         near(&[(1.0, 0.05), (0.25, 0.75), (0.001, 0.2)], -2.0);
         near(&[(0.125, 0.5), (0.5, 0.5)], (-3.0 * 0.3 - 0.45) / 0.75);
         near(&[(0.0, 1.0)], DARKEST);
-        let place = Place {
+        let place = LitSample {
             stored: Vec3::splat(0.5),
             light: Vec3::ONE,
             shades: &[],
@@ -377,7 +373,7 @@ mod tests {
                 encoded: Vec3::splat(0.5),
                 mirrored: Vec3::splat(mirrored),
             }];
-            let place = Place {
+            let place = LitSample {
                 stored: Vec3::splat(0.5),
                 light: Vec3::splat(0.5),
                 shades: &shades,

@@ -1,15 +1,15 @@
 //! Map conversion: a map, its materials and its images become a relit world.
 //!
-//! * [`mod@calibrate`]: lights fitted to the map's own lightmaps, and those found again that its compiler stripped.
-//! * [`compare`]: two pictures of one view compared.
-//! * [`emitters`]: what emits light, in physical units.
+//! * [`mod@calibrate`]: fits lights to the lightmaps and places those that the compiler stripped.
+//! * [`compare`]: image comparison.
+//! * [`emitters`]: light sources in physical units.
 //! * [`export`]: maps written for other programs.
-//! * [`exposure`]: how bright a map is meant to look.
+//! * [`exposure`]: exposure of a map.
 //! * [`files`]: game files behind one trait: packs, folders, an engine, memory.
 //! * [`mod@image`]: texture images as the engine reads them.
 //! * [`materials`]: scripts and implicit materials by name.
 //! * [`overbright`]: the one place that knows overbright bits, gamma and sRGB.
-//! * [`sample`]: a small made-up game, to show and test things without game data.
+//! * [`sample`]: a small synthetic game for demonstrations and tests without game data.
 //! * [`viewpoints`]: where players appear, and what they see there.
 //! * [`world`]: a map with flat geometry, resolved materials and its light sources.
 //! * [`light`]: light sources found in a map, and the lists of them per cluster.

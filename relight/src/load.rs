@@ -1,4 +1,4 @@
-//! From a map's bytes to a [`RelitWorld`].
+//! Loads a map's bytes into a [`RelitWorld`].
 
 #[cfg(test)]
 mod tests;
@@ -19,7 +19,7 @@ use glam::{Vec3, Vec4};
 use q3bsp::{Bsp, Entity, SurfaceKind};
 use std::collections::{BTreeSet, HashMap};
 
-/// Why a map could not be relit.
+/// Reason why a map could not be loaded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoadError {
@@ -42,7 +42,7 @@ pub enum LoadError {
     },
 }
 
-/// What loading is busy with.
+/// Stage of loading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// Reading and checking the map.
@@ -61,10 +61,10 @@ pub enum Stage {
     Done,
 }
 
-/// Told of every stage as it begins.
+/// Called as each stage begins.
 pub type Progress<'a> = &'a mut dyn FnMut(Stage);
 
-/// How a map is relit.
+/// Options of loading.
 pub struct Options<'a> {
     /// Largest distance of a curve from its mesh, id units (`r_subdivisions`).
     pub subdivisions: f32,
@@ -120,8 +120,7 @@ impl RelitWorld {
         Ok(world)
     }
 
-    /// Relights a map that was read elsewhere. Lightmaps beside the map are not looked for: see
-    /// [`external_lightmaps`].
+    /// Relights a parsed map. External lightmaps are not loaded: see [`external_lightmaps`].
     pub fn from_bsp(
         files: &dyn GameFiles,
         materials: &Materials,
@@ -248,9 +247,9 @@ impl RelitWorld {
             overbright_shift: options.overbright_shift,
             bsp,
         };
-        light::place(&mut world);
+        light::add_triangle_lights(&mut world);
         if world.light_count() == 0 {
-            light::rescue(&mut world, &mut finder);
+            light::add_fallback_light(&mut world, &mut finder);
         }
         for material in &mut world.materials {
             material.flicker = finder.flicker(material);
@@ -271,9 +270,9 @@ impl RelitWorld {
         world
     }
 
-    /// Finds what calibration needs to know of materials: how much light they throw back, what they show of their own, and
-    /// which colours the lights that the map describes have on them. Loading does this only when it is asked to calibrate.
-    /// To be done before [lights by hand](Self::light_by_hand), whose colours are final.
+    /// Measures what calibration needs of materials (albedo, emission of their stages) and the colours of described
+    /// lights. Loading does this only for calibration. Must precede [lights by hand](Self::light_by_hand), whose
+    /// colours are final.
     pub fn measure_materials(&mut self, files: &dyn GameFiles) {
         self.measure_materials_with(&mut light::Finder::new(files, self.color_exponent));
     }
@@ -281,7 +280,7 @@ impl RelitWorld {
     fn measure_materials_with(&mut self, finder: &mut light::Finder<'_>) {
         let corners = self.corner_colors();
         for (material, corners) in self.materials.iter_mut().zip(corners) {
-            material.throw_back(finder, corners);
+            material.measure_reflection(finder, corners);
             material.shown = if material.is_sky() {
                 finder.sky_radiance(material)
             } else {
@@ -294,7 +293,7 @@ impl RelitWorld {
         }
     }
 
-    /// How bright the textures of the surfaces of the world are, as light shows them.
+    /// Brightness of the textures of the world's surfaces under light.
     fn textures(&self) -> Vec<Texture> {
         let mut areas = vec![0.0; self.materials.len()];
         let lit = (self.surfaces.iter()).filter(|s| s.num_indices > 0 && s.model == 0);
@@ -303,7 +302,7 @@ impl RelitWorld {
                 *area += self.surface_area(surface);
             }
         }
-        // What glows throws back nothing where it glows: it counts for nothing there.
+        // Glowing parts reflect nothing and do not count.
         (self.materials.iter().zip(areas))
             .filter(|(_, area)| area.is_finite() && *area > 0.0)
             .flat_map(|(material, area)| {
@@ -317,7 +316,7 @@ impl RelitWorld {
             .collect()
     }
 
-    /// Mean colour of each material's corners over its area, encoded; white where it has none.
+    /// Mean vertex colour of each material over its area, encoded; white without surfaces.
     fn corner_colors(&self) -> Vec<[u8; 4]> {
         let mut sums = vec![(Vec4::ZERO, 0.0); self.materials.len()];
         for surface in &self.surfaces {
@@ -344,7 +343,7 @@ impl RelitWorld {
         sums.into_iter().map(mean).collect()
     }
 
-    /// Material of the sky surfaces with the largest area together.
+    /// Material of the sky with the largest total area.
     fn largest_sky(&self) -> Option<u32> {
         let mut area: HashMap<u32, f32> = HashMap::new();
         for surface in &self.surfaces {
@@ -368,7 +367,7 @@ impl RelitWorld {
             .sum()
     }
 
-    /// Index of the light that a triangle of the index buffer is.
+    /// The light of a triangle of the index buffer.
     pub fn light_of_triangle(&self, triangle: usize) -> Option<&TriangleLight> {
         self.lights
             .get(*self.triangle_lights.get(triangle)? as usize)
@@ -377,8 +376,7 @@ impl RelitWorld {
 
 /// The materials that the surfaces use, and for every surface the index of its own.
 ///
-/// One entry per (name, flags, lighting): compilers write one name several times with different flags, of which
-/// one may be invisible.
+/// One entry per (name, flags, lighting): compilers write one name with several flags, some of them invisible.
 fn resolve_materials(
     files: &dyn GameFiles,
     materials: &Materials,
@@ -413,7 +411,7 @@ fn resolve_materials(
     (list, of_surface)
 }
 
-/// The models, with the origins of the entities that they belong to.
+/// The models, with the origins of their entities.
 fn place_models(bsp: &Bsp, entities: &[Entity]) -> Vec<WorldModel> {
     let mut models: Vec<_> = bsp
         .models
@@ -436,7 +434,7 @@ fn place_models(bsp: &Bsp, entities: &[Entity]) -> Vec<WorldModel> {
     models
 }
 
-/// For every surface the model that it belongs to.
+/// Model of each surface.
 fn model_of_surfaces(bsp: &Bsp) -> Vec<u32> {
     let mut of_surface = vec![0; bsp.surfaces.len()];
     for (number, model) in bsp.models.iter().enumerate().skip(1) {
@@ -450,7 +448,7 @@ fn model_of_surfaces(bsp: &Bsp) -> Vec<u32> {
     of_surface
 }
 
-/// What is wrong with materials, each thing once.
+/// Faults of materials, each once.
 fn material_faults(map: &str, materials: &[WorldMaterial]) -> BTreeSet<String> {
     let fault = |m: &WorldMaterial| {
         let fault = m.resolved.fault.as_ref()?;
@@ -460,7 +458,7 @@ fn material_faults(map: &str, materials: &[WorldMaterial]) -> BTreeSet<String> {
 }
 
 impl RelitWorld {
-    /// What was wrong as the map was loaded, beside faults of materials: a game warns of those as it registers them.
+    /// Warnings of loading except faults of materials, which a game reports when it registers them.
     pub fn map_warnings(&self) -> impl Iterator<Item = &String> {
         let of_materials = material_faults(&self.name, &self.materials);
         let others = move |warning: &&String| !of_materials.contains(*warning);

@@ -60,7 +60,7 @@ impl Random {
     }
 }
 
-/// Evenly in 0..1, 1 excluded, of anything that has a name: with one seed the same at all times.
+/// Uniform number in [0, 1) from the hash of a seed and an identity.
 pub fn hashed_uniform(seed: u64, name: &[u32]) -> f32 {
     let drawn = |so_far: u64, word: &u32| {
         let mixed = (so_far ^ u64::from(*word)).wrapping_mul(0x9E37_79B9_7F4A_7C15);

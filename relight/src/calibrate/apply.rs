@@ -40,7 +40,7 @@ pub(super) fn apply(world: &mut RelitWorld, solution: &Solution) -> usize {
     let dark = world.lights.iter().any(|l| l.radiance.max_element() <= 0.0);
     if dark {
         // Dark triangle lights are removed from the lists.
-        light::take_out(world, |_| false);
+        light::remove_triangle_lights(world, |_| false);
     }
     if splashes.is_empty() && solution.placed.is_empty() && !dark {
         return 0;

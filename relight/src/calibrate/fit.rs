@@ -15,7 +15,7 @@ use super::texels::TexelId;
 use super::triangulation::Crossing;
 use super::{FitMode, hypotheses, spawn_views, suns};
 use crate::emitters::Agreement;
-use crate::exposure::{self, Exposure, Place};
+use crate::exposure::{self, Exposure, LitSample};
 use crate::occluders::Occluders;
 use crate::world::{RelitWorld, WorldMaterial};
 use glam::Vec3;
@@ -162,7 +162,7 @@ impl Fit<'_> {
             let stored = self.samples.get(sample)?.shown;
             let light = *computed.get(sample)?;
             let material = self.world.materials.get(material as usize);
-            Some(Place {
+            Some(LitSample {
                 stored,
                 light: light * material.map_or(1.0, WorldMaterial::stored_scale),
                 shades: material.map_or(&[], |m| &m.shades),

@@ -29,7 +29,7 @@ pub(super) fn open(world: &mut RelitWorld, skies: &[u32]) {
             material.emission = Some(Emission::of(material, EmissionSource::Sky, shown));
         }
     }
-    light::place_of(world, |material| skies.contains(&material));
+    light::add_triangle_lights_of(world, |material| skies.contains(&material));
     light::build_lists(world);
 }
 
@@ -43,6 +43,6 @@ pub(super) fn close(world: &mut RelitWorld, skies: &[u32]) {
             material.emission = None;
         }
     }
-    light::take_out(world, |material| skies.contains(&material));
+    light::remove_triangle_lights(world, |material| skies.contains(&material));
     light::build_lists(world);
 }

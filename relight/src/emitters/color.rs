@@ -1,26 +1,25 @@
-//! Which colour stored light has.
+//! Colour of stored light.
 //!
-//! The engine multiplies textures and stored light as they are encoded for the display. With D the display's curve, t
-//! a texture and v the light on it, shown is D(t v); were D a power x^γ, that would be D(t) D(v): the linear albedo
-//! D(t) lit by D(v), not by v. So what the map's author saw is light of stronger colours than v has, and of more
-//! contrast.
+//! The engine multiplies textures and stored light display-encoded. With the display's curve D, a texture t and the
+//! light v on it, it shows D(t v). If D were a power x^γ, that would be D(t) D(v): the linear albedo D(t) lit by
+//! D(v) instead of v. The map's author therefore saw light of more saturated colours and more contrast than v.
 //!
-//! Contrast cannot be followed: lights add up in v, in D(v) they do not, and a light of the square of the distance
-//! would fall off with a higher power. So *how bright* light is stays as it is stored, and
-//! [one exposure](crate::exposure) makes a map as bright as it was, in the mean. *Which colour* it has can be: under a
-//! power law the ratio of the channels of D(v) does not depend on brightness, so that a light has one colour wherever it
-//! falls. Hence
+//! The contrast cannot be reproduced: lights add up in v but not in D(v), and an inverse-square light would fall
+//! off with a higher power. So the *luminance* of light stays as stored, and [one exposure](crate::exposure) gives
+//! the map its mean brightness. The *colour* can be: under a power law the ratio of the channels of D(v) is
+//! independent of brightness, so a light has one colour everywhere. Hence
 //!
 //! > v' = v^γ Y(v) / Y(v^γ)
 //!
-//! channel by channel, with Y the luminance. sRGB's curve is no power law; γ is what its slope is at the brightnesses
-//! that a map shows: [`display_exponent`](crate::exposure::display_exponent). That depends on its textures, which only
-//! calibration measures: until then they count as usually bright, and then the lights are raised anew.
+//! channel by channel, with Y the luminance. sRGB's curve is not a power law; γ is its slope at the brightness that
+//! a map shows: [`display_exponent`](crate::exposure::display_exponent). That depends on the map's textures, which
+//! only calibration measures; until then a usual brightness is assumed, and afterwards the colours are raised
+//! again.
 
 use crate::overbright::luminance;
 use glam::Vec3;
 
-/// How the colours of stored light, and of directives, which are numbers of the same kind, become colours of light.
+/// How colours of stored light and of directives, which are on the same scale, become colours of light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LightColor {
     /// As the engine shows them.
@@ -30,8 +29,8 @@ pub enum LightColor {
     Stored,
 }
 
-/// Light whose channels have ratios raised to `exponent`, and the luminance that it had. Negative channels count as
-/// black; what is not finite is black.
+/// Light with the ratios of its channels raised to `exponent` and its luminance kept. Negative channels count as
+/// black; non-finite light is black.
 pub(crate) fn raise(light: Vec3, exponent: f32) -> Vec3 {
     let light = light.max(Vec3::ZERO);
     let largest = light.max_element();

@@ -1,8 +1,8 @@
-//! Light that a material emits.
+//! Emission of a material.
 
 use glam::Vec3;
 
-/// Why a surface emits.
+/// Evidence for an emission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum EmissionSource {
     /// `q3map_surfacelight`.
@@ -30,7 +30,7 @@ impl EmissionSource {
     }
 }
 
-/// Light that a material emits.
+/// Emission of a material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Emission {
     /// Why.

@@ -1,5 +1,4 @@
-//! Lights that change in time: what the stages of an emitting material show at a moment, over what they show in the
-//! mean.
+//! Change of lights over time: emission of a material's stages at a time, relative to its mean.
 
 use crate::image::Image;
 use crate::overbright;
@@ -9,20 +8,20 @@ use shaderscript::eval::{self, ColorContext};
 use shaderscript::light::{StageSample, compose};
 use shaderscript::{AlphaGen, RgbGen, Shader, Stage, StageImage};
 
-/// Places of the texture that tell how bright the material is: squares of this many a side.
+/// Cells along each side of the texture in which brightness is evaluated.
 const GRID: u32 = 4;
 
-/// Times that the mean is taken over, and their distance in seconds: no common period hides a blinking lamp.
+/// Number and spacing, seconds, of the times of the mean: no common period hides a blinking lamp.
 const TIMES: u32 = 128;
 const TIME_STEP: f64 = 0.137;
 
-/// Changes below this part of the mean are left out: nobody sees them.
+/// Relative change that is ignored as invisible.
 const STEADY: f32 = 0.02;
 
-/// The strongest that a light gets, over its mean: a lamp that hardly ever flashes would be endless.
+/// Largest brightness relative to the mean: a lamp that rarely flashes would be unbounded.
 const MOST: f32 = 64.0;
 
-/// How an emitting material changes in time.
+/// Change over time of an emitting material.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flicker {
     stages: Vec<Stage>,
@@ -32,7 +31,7 @@ pub struct Flicker {
     mean: f32,
 }
 
-/// Whether something about a stage depends on time.
+/// Whether a stage depends on time.
 pub(crate) fn changes(stage: &Stage) -> bool {
     stage.image.names().len() > 1
         || matches!(stage.rgb_gen, RgbGen::Wave(_))
@@ -40,7 +39,7 @@ pub(crate) fn changes(stage: &Stage) -> bool {
 }
 
 impl Flicker {
-    /// How a material's stages flicker; `None` if they do not. `image` gives a picture by its name.
+    /// Change over time of a material; `None` if it is constant. `image` returns a picture by name.
     pub(crate) fn of<'a>(
         shader: &Shader,
         mut image: impl FnMut(&str) -> Option<&'a Image>,
@@ -77,7 +76,7 @@ impl Flicker {
         Some(flicker)
     }
 
-    /// How bright the material is at a shader time in seconds, over its mean brightness. At least 0.
+    /// Brightness at a shader time in seconds, relative to the mean. At least 0.
     pub fn scale(&self, time: f64) -> f32 {
         let context = ColorContext {
             time,
@@ -120,7 +119,7 @@ impl Flicker {
     }
 }
 
-/// Mean of a square of a picture, linear; black without one.
+/// Mean of a cell of a picture, linear; black without one.
 fn mean_of_cell(picture: Option<&Image>, x: u32, y: u32) -> Vec4 {
     let Some(picture) = picture else {
         return Vec4::ZERO;

@@ -1,11 +1,11 @@
-//! Which lights can matter in which cluster, in compressed rows.
+//! Light lists: the lights that may reach each cluster, in compressed rows.
 
-/// Lights per cluster, in compressed rows.
+/// Lights of each cluster, in compressed rows.
 ///
-/// Row `c` holds the lights of cluster `c`; one more row at the end holds all lights, for points outside of
-/// every cluster. An entry below the number of triangle lights is an index of one of them; the others are
-/// point lights: see [`LightLists::light`]. Entries of a row ascend. Suns are in no list: they matter
-/// wherever the sky can be seen.
+/// Row `c` holds the lights of cluster `c`; one more row holds all lights, for points outside every cluster. An
+/// entry below the number of triangle lights is the index of one; the others are point lights: see
+/// [`LightLists::light`]. Entries of a row ascend. Suns are in no list: they reach every place from which the sky
+/// is visible.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LightLists {
     /// Start of every row in `lights`, and the end of the last: clusters + 2 values.
@@ -20,7 +20,7 @@ pub struct LightLists {
     pub shares: Vec<LightShare>,
 }
 
-/// What a light gives to a cluster.
+/// Light of a list entry in its cluster.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightShare {
     /// Light without shadows: mean irradiance / π, luminance. 0: not known.
@@ -37,7 +37,7 @@ impl LightShare {
     };
 }
 
-/// What an entry of [`LightLists`] stands for.
+/// The light of an entry of [`LightLists`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LightRef {
     /// Index into [`RelitWorld::lights`](crate::RelitWorld::lights).
@@ -47,7 +47,7 @@ pub enum LightRef {
 }
 
 impl LightLists {
-    /// What each entry of a [`row`](Self::row) gives to its cluster; empty where nothing is known.
+    /// Share of each entry of a [`row`](Self::row); empty before the sweep.
     pub fn shares(&self, cluster: i32) -> &[LightShare] {
         let range = self.range(cluster);
         self.shares.get(range).unwrap_or_default()
@@ -64,8 +64,7 @@ impl LightLists {
         self.lights.get(self.range(cluster)).unwrap_or_default()
     }
 
-    /// Appends the last row, of all lights, as `old` has it: nothing is known of what they give to a point in no
-    /// cluster.
+    /// Appends the row of all lights from `old`, with unknown shares.
     pub(crate) fn end_with_all(&mut self, old: &LightLists) {
         let all = old.row(-1);
         self.lights.extend(all);
@@ -74,7 +73,7 @@ impl LightLists {
         self.offsets.push(self.lights.len() as u32);
     }
 
-    /// Where a row is in `lights`.
+    /// Range of a row in `lights`.
     fn range(&self, cluster: i32) -> std::ops::Range<usize> {
         let row = usize::try_from(cluster)
             .ok()
@@ -86,14 +85,14 @@ impl LightLists {
         }
     }
 
-    /// Whether light from the sky, and so that of suns, can come to a cluster: whether it can see a cluster with a
-    /// surface of sky in it. True for clusters that nothing is known of.
+    /// Whether a cluster can see a cluster with a sky surface, so that skies and suns may light it. True where this
+    /// is unknown.
     pub fn sees_sky(&self, cluster: i32) -> bool {
         let known = usize::try_from(cluster).ok().and_then(|c| self.sky.get(c));
         known.copied().unwrap_or(true)
     }
 
-    /// What an entry stands for.
+    /// The light of an entry.
     pub fn light(&self, entry: u32) -> LightRef {
         match entry.checked_sub(self.triangle_lights) {
             None => LightRef::Triangle(entry),

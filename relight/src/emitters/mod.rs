@@ -76,14 +76,14 @@ pub const SKY_LIGHT_RADIANCE: f32 = 4.0 / 255.0 / 2.0;
 /// Radiance of the uniform surroundings of `ambient 1`.
 pub const AMBIENT_RADIANCE: f32 = 4.0 / 255.0;
 
-/// What light was multiplied by before it was stored in lightmaps, of what `q3map_lightmapBrightness` says: nothing is 1,
-/// and bytes cannot tell what lies beyond 1/64 and 64.
+/// Factor that the compiler applied to light before storing it, from `q3map_lightmapBrightness`; 1 by default.
+/// Bounded to 1/64..64, the range of bytes.
 pub fn stored_scale(says: Option<f32>) -> f32 {
     says.filter(|scale| *scale > 0.0 && scale.is_finite())
         .map_or(1.0, |scale| scale.clamp(1.0 / 64.0, 64.0))
 }
 
-/// A triangle that emits light: the same radiance at every point and into every direction of its side.
+/// A triangle with uniform radiance over its area and its side's hemisphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TriangleLight {
     /// Corners, counter-clockwise seen from the emitting side; world space, brush models where the
@@ -113,7 +113,8 @@ impl TriangleLight {
         (b - a).cross(c - a)
     }
 
-    /// Whether the compiler made a light of it alone, which has an end of its own; all quads of a sprite are one.
+    /// Whether the compiler made a light of this triangle alone, which then has a light cutoff of its own; all
+    /// quads of a sprite are one light.
     pub fn has_own_cutoff(&self) -> bool {
         self.triangle != u32::MAX
     }
@@ -180,7 +181,7 @@ impl Falloff {
         }
     }
 
-    /// The reach of linear light.
+    /// Reach of linear falloff, id units.
     pub fn reach(self) -> Option<f32> {
         match self {
             Falloff::InverseSquare => None,

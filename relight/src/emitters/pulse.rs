@@ -1,13 +1,13 @@
-//! Lights of styles, whose strength is a wave of time.
+//! Strength of light styles over time.
 
 use shaderscript::eval;
 use shaderscript::{RgbGen, Stage, Wave};
 
-/// Times that the mean of a wave is taken over, and their distance in seconds.
+/// Number and spacing, seconds, of the times of a wave's mean.
 const TIMES: u32 = 256;
 const TIME_STEP: f64 = 0.137;
 
-/// The factor on a style's light.
+/// Factor on the light of a style.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StyleStrength {
     /// The same at all times.
@@ -44,7 +44,7 @@ impl StyleStrength {
     }
 }
 
-/// How a light's strength changes in time, about its mean.
+/// Change of a light's strength over time, relative to its mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pulse {
     strength: StyleStrength,
@@ -52,7 +52,7 @@ pub struct Pulse {
 }
 
 impl Pulse {
-    /// The mean strength of a style over time, and how it changes about that; `None` where it does not change.
+    /// Mean strength of a style over time, and its change relative to it; `None` if it is constant.
     pub fn of(strength: StyleStrength) -> (f32, Option<Pulse>) {
         if let StyleStrength::Steady(_) = strength {
             return (strength.at(0.0), None);
@@ -64,7 +64,7 @@ impl Pulse {
         (mean, (mean > 0.0).then_some(Pulse { strength, mean }))
     }
 
-    /// The strength at a shader time in seconds over the mean. At least 0.
+    /// Strength at a shader time in seconds, relative to the mean. At least 0.
     pub fn scale(&self, time: f64) -> f32 {
         self.strength.at(time) / self.mean
     }

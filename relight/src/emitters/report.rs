@@ -1,9 +1,9 @@
-//! What was found in a map, by which evidence, and how well it agrees with stored light.
+//! Report of the light sources found, their evidence, and their agreement with stored light.
 
 use super::EmissionSource;
 use glam::Vec3;
 
-/// Light sources of a map, counted.
+/// Numbers of light sources of a map.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LightReport {
     /// Materials that emit, in the order of the world's materials.
@@ -20,8 +20,8 @@ pub struct LightReport {
     pub mean_list_length: f64,
     /// Longest list of a cluster.
     pub longest_list: usize,
-    /// Whether directives and glowing stages gave no light at all, and weaker evidence was taken: skies and
-    /// glows as they look, flares as lamps.
+    /// Whether directives and glowing stages gave no light at all, so that weaker evidence is used: sky and glow
+    /// images, flares.
     pub fallback: bool,
     /// Visibility clusters.
     pub clusters: usize,
@@ -57,7 +57,7 @@ impl LightReport {
     }
 }
 
-/// What measurements were taken from.
+/// The stored light that calibration uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Evidence {
     /// Lightmap texels.
@@ -66,7 +66,7 @@ pub enum Evidence {
     Vertices,
     /// Points of the light grid: neither lightmaps nor lit vertices.
     Grid,
-    /// Nothing that tells of light.
+    /// No stored light.
     #[default]
     Nothing,
 }
@@ -94,10 +94,9 @@ impl Evidence {
     }
 }
 
-/// Computed light against stored light, over measurements that fitting did not see.
+/// Error of computed light against stored light at held-out samples.
 ///
-/// Stops are those of what is stored: what a map's compiler is known to have done to light before it stored it (a gamma,
-/// darker corners) is done to computed light, too.
+/// Stops are on the scale of stored light: gamma and dirt of the compiler are applied to computed light as well.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Agreement {
     /// Median of |log2(computed / stored)|, stops: 0 is perfect, 1 is a factor of two.
@@ -108,42 +107,42 @@ pub struct Agreement {
     pub sum_ratio: f32,
 }
 
-/// What calibration did.
+/// Result of a calibration in numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationReport {
-    /// What told of light.
+    /// Stored light that was used.
     pub evidence: Evidence,
-    /// Measurements taken.
+    /// Samples taken.
     pub samples: usize,
-    /// Of those, kept out of fitting.
+    /// Held-out samples among them.
     pub held_out: usize,
-    /// Sources that the map's directives tell of; the triangle lights of one material count once.
+    /// Sources with a directive; all triangle lights of a material count once.
     pub known: usize,
-    /// Lights put in.
+    /// Placed point lights.
     pub placed: usize,
-    /// Back splashes put in: weak lights in front of lamps, as the compiler had them.
+    /// Back splashes: weak lights in front of lamps, as the compiler places them.
     pub splashes: usize,
-    /// Suns put in.
+    /// Suns found.
     pub suns: usize,
-    /// Gamma that the compiler encoded light with before it stored it: see
+    /// Gamma with which the compiler encoded light: see
     /// [`RelitWorld::stored_gamma`](crate::RelitWorld::stored_gamma).
     pub gamma: f32,
-    /// Whether the map's lights end where they give little: see [`RelitWorld::light_cutoff`](crate::RelitWorld::light_cutoff).
+    /// Whether the map's lights have a cutoff: see [`RelitWorld::light_cutoff`](crate::RelitWorld::light_cutoff).
     pub has_cutoff: bool,
-    /// Whether the compiler made corners darker (its *dirt*): what it stored is compared with light made as dark.
+    /// Whether the compiler applied ambient occlusion (*dirt*).
     pub dirty: bool,
-    /// Agreement of the light that directives tell of: direct, ambient and bounced.
+    /// Agreement of the directives' light: direct, ambient and reflected.
     pub before: Agreement,
-    /// Agreement of calibrated light: direct, ambient and bounced.
+    /// Agreement of the calibrated light: direct, ambient and reflected.
     pub after: Agreement,
-    /// Whether the result was kept from an earlier time.
+    /// Whether the result comes from a cache.
     pub cached: bool,
-    /// Time that it took.
+    /// Duration, seconds.
     pub seconds: f64,
 }
 
 impl Default for CalibrationReport {
-    /// Nothing done, of a map that stores light as it is.
+    /// No calibration, of a map that stores light unchanged.
     fn default() -> Self {
         CalibrationReport {
             evidence: Evidence::Nothing,

@@ -1,14 +1,14 @@
-//! What surfaces show of light.
+//! Reflectance of surfaces.
 
 use glam::Vec3;
 
-/// One of the brightnesses of a material's texture: what it shows of the light that falls on it.
+/// One class of brightness of a material's texture, and its response to light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shade {
-    /// Part of the light that is thrown back, linear: the albedo.
+    /// Albedo, linear.
     pub linear: Vec3,
-    /// What the engine multiplies stored light by, as encoded for the display.
+    /// Factor that the engine applies to display-encoded stored light.
     pub encoded: Vec3,
-    /// How much of its surroundings it mirrors besides, linear.
+    /// Additional mirror reflectance, linear.
     pub mirrored: Vec3,
 }

@@ -1,13 +1,13 @@
-//! Lights stronger than 32-bit arithmetic can carry, which files may well ask for, are brought into range.
+//! Bounds on light strengths: files may ask for more than 32-bit arithmetic can carry.
 
 use crate::world::RelitWorld;
 use glam::Vec3;
 
-/// Strongest radiance, intensity or irradiance of a light. Its square, and its product with the area of the largest
-/// surface that fits into a map, are still finite; lights of real maps stay below a millionth of it.
+/// Largest radiance, radiant intensity or irradiance of a light. Its square, and its product with the area of the
+/// largest surface that fits into a map, are still finite; lights of real maps stay below a millionth of it.
 pub const STRONGEST: f32 = 1.0e12;
 
-/// Brings a strength into range; what is left of an overflow, no number, becomes none. Whether it had to.
+/// Clamps a strength; NaN becomes 0. Returns whether it changed.
 fn bound(strength: &mut Vec3) -> bool {
     let good = strength.is_finite() && strength.abs().max_element() <= STRONGEST;
     if !good {
@@ -20,7 +20,7 @@ fn bound(strength: &mut Vec3) -> bool {
     !good
 }
 
-/// Brings all lights of a world into range; what had to be changed is a warning of the world's.
+/// Clamps all lights of a world; changes become warnings of the world.
 pub(super) fn bound_lights(world: &mut RelitWorld) {
     let mut changed = usize::from(bound(&mut world.ambient));
     let strengths = world
@@ -41,7 +41,7 @@ pub(super) fn bound_lights(world: &mut RelitWorld) {
     }
     if changed > 0 {
         world.warnings.push(format!(
-            "{}: {changed} lights are too strong to be computed with; they have strength {STRONGEST:e}",
+            "{}: {changed} lights exceed the largest strength and are clamped to {STRONGEST:e}",
             world.name
         ));
     }

@@ -27,7 +27,7 @@ use crate::files::GameFiles;
 use crate::world::RelitWorld;
 use glam::Vec3;
 
-/// What of a world's lights a line speaks of.
+/// The kind of lights that a line applies to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Points,
@@ -35,7 +35,7 @@ enum Kind {
     Surfaces,
 }
 
-/// A file of lights written by hand.
+/// A file of hand-written lights.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LightsByHand {
     without: Vec<Kind>,
@@ -58,7 +58,7 @@ pub struct LightsLineError {
 }
 
 impl LightsByHand {
-    /// Reads the text of such a file. Lines that are wrong are left out and told of.
+    /// Parses such a file. Invalid lines are skipped and returned as errors.
     pub fn parse(text: &str) -> (LightsByHand, Vec<LightsLineError>) {
         let mut file = LightsByHand::default();
         let mut wrong = Vec::new();
@@ -155,7 +155,8 @@ impl LightsByHand {
         Ok(())
     }
 
-    /// Changes a world's lights, and lists them anew. Names of materials that the world does not have are returned.
+    /// Changes a world's lights and rebuilds the lists. Returns the names of materials that the world does not
+    /// have.
     pub fn apply(&self, world: &mut RelitWorld) -> Vec<String> {
         let without = |kind: Kind| self.without.contains(&kind);
         let scale = |kind: Kind| {
@@ -193,7 +194,7 @@ impl LightsByHand {
                 unknown.push(name.clone());
             }
         }
-        super::take_out(world, |_| false);
+        super::remove_triangle_lights(world, |_| false);
         world
             .point_lights
             .retain(|l| l.intensity.max_element() > 0.0);
@@ -209,14 +210,13 @@ impl LightsByHand {
 }
 
 impl RelitWorld {
-    /// Game path of the file of lights that belongs to the map: its own with the ending `.lights`.
+    /// Game path of the map's light file: the map's own with the extension `.lights`.
     pub fn lights_file(&self) -> String {
         let stem = self.name.strip_suffix(".bsp").unwrap_or(&self.name);
         format!("{stem}.lights")
     }
 
-    /// Changes the lights as the [file](LightsByHand) beside the map says; nothing without one. What is wrong with it is
-    /// warnings of the world's.
+    /// Applies the [file](LightsByHand) beside the map, if there is one. Its errors become warnings of the world.
     pub fn light_by_hand(&mut self, files: &dyn GameFiles) {
         let path = self.lights_file();
         let bytes = match files.read(&path) {
@@ -238,14 +238,14 @@ impl RelitWorld {
     }
 }
 
-/// Makes the surfaces of a material shine, or not; `false` when there is none of that name.
+/// Sets the emission of a material's surfaces; `false` if no material has this name.
 fn set_material(world: &mut RelitWorld, name: &str, radiance: Vec3) -> bool {
     let chosen: Vec<u32> = (0u32..)
         .zip(&world.materials)
         .filter(|(_, m)| m.name.eq_ignore_ascii_case(name))
         .map(|(i, _)| i)
         .collect();
-    super::take_out(world, |material| chosen.contains(&material));
+    super::remove_triangle_lights(world, |material| chosen.contains(&material));
     for &index in &chosen {
         if let Some(material) = world.materials.get_mut(index as usize) {
             let source = if material.is_sky() {
@@ -256,7 +256,7 @@ fn set_material(world: &mut RelitWorld, name: &str, radiance: Vec3) -> bool {
             material.emission = Some(Emission::of(material, source, radiance));
         }
     }
-    super::place_of(world, |material| chosen.contains(&material));
+    super::add_triangle_lights_of(world, |material| chosen.contains(&material));
     !chosen.is_empty()
 }
 
@@ -269,7 +269,7 @@ fn kind(word: &str) -> Result<Kind, String> {
     }
 }
 
-/// Finite numbers, at least and at most so many.
+/// Finite numbers, between `least` and `most` of them.
 fn numbers(words: &[&str], least: usize, most: usize) -> Result<Vec<f32>, String> {
     if words.len() < least || words.len() > most {
         return Err(if least == most {
@@ -285,7 +285,7 @@ fn numbers(words: &[&str], least: usize, most: usize) -> Result<Vec<f32>, String
     words.iter().map(number).collect()
 }
 
-/// The three numbers from a place on; 0 for what is not there.
+/// Three numbers from index `first` on; missing ones are 0.
 fn vector(numbers: &[f32], first: usize) -> Vec3 {
     let number = |i: usize| numbers.get(first + i).copied().unwrap_or(0.0);
     Vec3::new(number(0), number(1), number(2))

@@ -1,11 +1,11 @@
-//! Colours of described lights, raised anew: see [`LightColor`](super::LightColor).
+//! Colours of described lights under another exponent: see [`LightColor`](super::LightColor).
 
 use super::emission::directed;
 use super::{EmissionSource, raise};
 use crate::world::RelitWorld;
 
-/// Gives the lights that directives and entities describe the colours that they have with another exponent: exact,
-/// because exponents of successive [`raise`]s multiply.
+/// Raises the colours of lights from directives and entities to another exponent. This is exact, because exponents
+/// of successive [`raise`]s multiply.
 pub(crate) fn recolor(world: &mut RelitWorld, exponent: f32) {
     let by = exponent / world.color_exponent;
     if by == 1.0 {

@@ -1,15 +1,15 @@
-//! Whether a material emits light, and how much: by its directives and its stages, never by its name.
+//! Whether and how strongly a material emits light: decided by its directives and stages, never by its name.
 //!
 //! In this order:
 //!
-//! 1. `q3map_surfacelight` and, on skies, `q3map_skylight`: what the map compiler was told. The colour is the
-//!    mean of the light image, scaled so that its largest channel is 1. Which image: `q3map_lightRGB` gives the
-//!    colour itself; else the first that exists of `q3map_lightimage`, for skies the box's upper side,
-//!    `qer_editorimage`, an image of the material's name, the images of its stages; white when there is none.
-//! 2. Stages that glow: of an opaque material, what its stack of stages shows where no light falls, averaged
-//!    over the texture and over time, is at least [`GLOW_THRESHOLD`].
+//! 1. `q3map_surfacelight` and, on skies, `q3map_skylight`: the value given to the map compiler. The colour is
+//!    `q3map_lightRGB`, else the mean of the light image, scaled to a largest channel of 1. The light image is the
+//!    first that exists of `q3map_lightimage`, for skies the upper side of the sky box, `qer_editorimage`, an image
+//!    of the material's name, the images of its stages; white without any.
+//! 2. Glowing stages: the luminance of an opaque material's stages without incident light, averaged over texture
+//!    and time, is at least [`GLOW_THRESHOLD`].
 //!
-//! Source: q3map2's choice of the light image; the stage algebra is [`shaderscript::light`]'s.
+//! Source: q3map2's choice of the light image; the algebra of stages is that of [`shaderscript::light`].
 
 use super::entities::normalise;
 use super::glow::{mean_emission, shades};
@@ -25,7 +25,7 @@ use shaderscript::{Cull, Deform, Shader};
 use std::collections::HashMap;
 
 impl Emission {
-    /// Emission of a material, from the sides that are drawn. Sky emits to its front whatever its script says:
+    /// Emission of a material from the sides that are drawn. A sky emits from its front regardless of its script:
     /// it is only seen from inside.
     pub(crate) fn of(material: &WorldMaterial, source: EmissionSource, strength: Vec3) -> Emission {
         let definition = material.resolved.definition();
@@ -41,14 +41,14 @@ impl Emission {
     }
 }
 
-/// Least mean emission (luminance, linear) that makes an opaque material without directives a light: that of
-/// a display grey of 37 %. Full-bright trim is dimmer than that; lamps, screens and lava are not.
+/// Smallest mean luminance (linear) at which an opaque material without directives is a light: a display grey of 37
+/// %. Full-bright trim is dimmer; lamps, screens and lava are brighter.
 pub const GLOW_THRESHOLD: f32 = 0.11;
 
-/// Longest side of the copies of textures that means are taken from.
+/// Longest side of the image copies that means are computed from, texels.
 const SAMPLE_SIDE: u32 = 64;
 
-/// What directives make a material emit: `q3map_surfacelight`, and of a sky `q3map_skylight`; `None` where they say nothing.
+/// Light directives of a material: `q3map_surfacelight` and, of a sky, `q3map_skylight`; `None` without them.
 pub(super) fn directed(material: &WorldMaterial) -> Option<(f32, f32)> {
     let light = &material.resolved.definition().light;
     let positive = |v: Option<f32>| v.filter(|v| v.is_finite() && *v > 0.0).unwrap_or(0.0);
@@ -60,7 +60,7 @@ pub(super) fn directed(material: &WorldMaterial) -> Option<(f32, f32)> {
     (surface_light > 0.0 || dome > 0.0).then_some((surface_light, dome))
 }
 
-/// Finds what materials emit, keeping small copies of the images that it looked at.
+/// Computes what materials emit; keeps small copies of the images.
 pub(crate) struct Finder<'a> {
     files: &'a dyn GameFiles,
     images: HashMap<String, Option<Image>>,
@@ -77,12 +77,12 @@ impl<'a> Finder<'a> {
         }
     }
 
-    /// The light that a material emits.
+    /// Emission of a material.
     pub fn emission(&mut self, material: &WorldMaterial) -> Option<Emission> {
         let definition = material.resolved.definition();
         let sky = material.is_sky();
         if let Some((surface_light, dome)) = directed(material) {
-            // A colour with the luminance that the compiler's has, which scales it to a largest channel of 1.
+            // The compiler scales its colour to a largest channel of 1; this one has the same luminance.
             let color = raise(self.light_color(definition), self.exponent);
             let (source, strength) = if sky {
                 (
@@ -114,7 +114,7 @@ impl<'a> Finder<'a> {
             .then(|| Emission::of(material, EmissionSource::Glow, shown))
     }
 
-    /// Mean radiance that a material's stages show where no light falls.
+    /// Mean radiance of a material's stages without incident light.
     pub fn shown(&mut self, material: &WorldMaterial) -> Vec3 {
         let shader = &material.resolved.shader;
         if material.resolved.fault.is_some() {
@@ -128,7 +128,7 @@ impl<'a> Finder<'a> {
         mean_emission(shader, |name| self.images.get(name)?.as_ref())
     }
 
-    /// What a material throws back of light all over its texture, where its corners have these colours. Nothing for skies.
+    /// Reflectances over a material's texture, for these corner colours. Empty for skies.
     pub fn shades(&mut self, material: &WorldMaterial, corners: [u8; 4]) -> Vec<Shade> {
         let shader = &material.resolved.shader;
         if material.is_sky() {
@@ -142,18 +142,18 @@ impl<'a> Finder<'a> {
         })
     }
 
-    /// Where a cut-out lets light through.
+    /// The transparent texels of a cut-out.
     pub fn holes(&self, material: &WorldMaterial) -> Option<Holes> {
         if material.class.class != SurfaceClass::CutOut {
             return None;
         }
         let shader = &material.resolved.shader;
-        // Not of the small copy: alpha that is tested against 0 would fill small holes there.
+        // From the full image: alpha tests against 0 would fill small holes in the copy.
         let load = |name: &str| image::load(self.files, name).ok().flatten();
         Holes::of(shader, material.class.two_sided, |name| Some(load(name)?.0))
     }
 
-    /// Mean radiance of what a sky shows: the sides of its box that exist, and its clouds.
+    /// Mean radiance of a sky: the existing sides of its box, and its clouds.
     pub fn sky_radiance(&mut self, material: &WorldMaterial) -> Vec3 {
         let clouds = self.shown(material);
         let outer = material
@@ -174,8 +174,8 @@ impl<'a> Finder<'a> {
         clouds + sum / sides.max(1.0)
     }
 
-    /// Colour of the light that directives ask for as the compiler takes it, its largest channel 1: of images the mean
-    /// of what they show, encoded.
+    /// Colour of the directives' light as the compiler computes it, largest channel 1: the mean of the
+    /// display-encoded image.
     fn light_color(&mut self, definition: &Shader) -> Vec3 {
         let light = &definition.light;
         if let Some(rgb) = light.light_rgb {
@@ -198,12 +198,12 @@ impl<'a> Finder<'a> {
         mean.map_or(Vec3::ONE, |mean| normalise(encode(mean)))
     }
 
-    /// The small copy of an image that was asked for before.
+    /// The small copy of an image that was loaded before.
     pub(super) fn kept(&self, name: &str) -> Option<&Image> {
         self.images.get(name)?.as_ref()
     }
 
-    /// A small copy of an image, if there is one.
+    /// The small copy of an image, if the image exists.
     pub(super) fn image(&mut self, name: &str) -> Option<&Image> {
         if !self.images.contains_key(name) {
             let loaded = image::load(self.files, name).unwrap_or_else(|problem| {
@@ -223,7 +223,7 @@ impl<'a> Finder<'a> {
 }
 
 impl Finder<'_> {
-    /// How the light of an emitting material changes in time; `None` for most.
+    /// Change over time of an emitting material; `None` if it is constant.
     pub fn flicker(&mut self, material: &WorldMaterial) -> Option<Flicker> {
         material.emission?;
         let shader = &material.resolved.shader;

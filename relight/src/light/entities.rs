@@ -1,8 +1,8 @@
-//! Light that entities describe: light entities left in the map, and the world's ambient term.
+//! Light of entities: light entities that the compiler left in the map, and the ambient term.
 //!
-//! Compilers strip light entities unless told otherwise, so most maps have none.
+//! Compilers strip light entities by default, so most maps have none.
 //!
-//! Source: meaning and defaults of the keys are q3map2's.
+//! Source: meanings and defaults of the keys are q3map2's.
 
 use super::{
     AMBIENT_RADIANCE, DEFAULT_POINT_LIGHT_RADIUS, DEFAULT_SUN_RADIUS, Falloff,
@@ -11,18 +11,18 @@ use super::{
 use glam::Vec3;
 use q3bsp::Entity;
 
-/// `light` of an entity that does not say.
+/// Default of `light`.
 const DEFAULT_LIGHT: f32 = 300.0;
-/// `radius` of a spot light that does not say: of its cone where its target stands.
+/// Default `radius` of a spot light: radius of the cone at its target, id units.
 const DEFAULT_CONE_RADIUS: f32 = 64.0;
-/// Added to a cone's radius by the compiler.
+/// Radius that the compiler adds to a cone, id units.
 const CONE_MARGIN: f32 = 16.0;
-/// `spawnflags` bit of a light that falls off linearly.
+/// `spawnflags` bit of linear falloff.
 const LINEAR_FALLOFF: i64 = 1;
-/// A linear light of value l gives 7500 l / 8000 up close.
+/// Scale of a linear light: value l gives 7500 l / 8000 at distance 0.
 const LINEAR_SCALE: f32 = 1.0 / 8000.0;
 
-/// Light entities, as point lights and suns.
+/// Light entities as point lights and suns.
 pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLight>) {
     let mut points = Vec::new();
     let mut suns = Vec::new();
@@ -81,13 +81,13 @@ pub(crate) fn light_entities(entities: &[Entity]) -> (Vec<PointLight>, Vec<SunLi
     (points, suns)
 }
 
-/// The value of a light entity. q3map2 subtracts the light of negative ones.
+/// Value of a light entity. q3map2 subtracts negative lights.
 fn value_of(entity: &Entity) -> f32 {
     let scale = number(entity, &["scale"]).filter(|s| *s != 0.0);
     number(entity, &["_light", "light"]).unwrap_or(DEFAULT_LIGHT) * scale.unwrap_or(1.0)
 }
 
-/// Number of light entities that take light away (dark spots): no light source can.
+/// Number of light entities with a negative value (dark spots), which a light source cannot represent.
 pub(crate) fn negative_lights(entities: &[Entity]) -> usize {
     let lights = entities.iter().filter(|e| is_light(e.classname()));
     lights.filter(|light| value_of(light) < 0.0).count()
@@ -104,7 +104,7 @@ pub(super) fn linear(value: f32, fade: f32) -> (f32, Falloff) {
     (intensity, Falloff::Linear { reach })
 }
 
-/// Radiance from everywhere: the compiler adds `ambient` to every texel, and lifts texels to `_minlight`.
+/// Ambient radiance: the compiler adds `ambient` to every texel and raises texels to `_minlight`.
 pub(crate) fn ambient(entities: &[Entity]) -> Vec3 {
     let Some(world) = entities.first() else {
         return Vec3::ZERO;
@@ -118,13 +118,13 @@ pub(crate) fn ambient(entities: &[Entity]) -> Vec3 {
     color(world) * (value * AMBIENT_RADIANCE)
 }
 
-/// Whether a class of entity lights the world. (`lightJunior` lights only what moves.)
+/// Whether an entity class lights the world. (`lightJunior` lights moving models only.)
 fn is_light(classname: &str) -> bool {
     let class = classname.to_ascii_lowercase();
     class.starts_with("light") && class != "lightjunior"
 }
 
-/// The first key that is there, as a finite number.
+/// The first existing key as a finite number.
 fn number(entity: &Entity, keys: &[&str]) -> Option<f32> {
     keys.iter()
         .find_map(|key| entity.number(key))

@@ -1,14 +1,14 @@
-//! Light for maps whose directives tell of none.
+//! Fallback light for maps whose directives describe none.
 //!
-//! Some maps were made for compilers that took all light from entities, and had those stripped. Then weaker
-//! evidence counts, all of it together:
+//! Some maps were made for compilers that take all light from entities, and had the entities stripped. Weaker
+//! evidence is then used together:
 //!
-//! * stages that glow, however faintly and on whatever surface, with what they show;
-//! * skies, with the mean of what they show;
-//! * flares: a mapper, or a lamp's script, puts one where a lamp is. Each becomes a small square lamp of the
-//!   flare's colour, [`LAMP_SIDE`] wide, as strong as a surface of `q3map_surfacelight` [`LAMP_VALUE`].
+//! * glowing stages of any strength on any surface, with their emission;
+//! * skies, with the mean radiance of their image;
+//! * flares, which mappers or materials place at lamps. Each becomes a square light of the flare's colour,
+//!   [`LAMP_SIDE`] wide, as strong as a surface of `q3map_surfacelight` [`LAMP_VALUE`].
 //!
-//! When even that gives nothing, the mean of the map's lightmaps becomes its ambient term, so that it is seen.
+//! Without any of these the mean of the lightmaps becomes the ambient term, so that the map is visible.
 
 use super::{
     AMBIENT_RADIANCE, Emission, EmissionSource, EmitterSummary, Finder, SURFACE_LIGHT_RADIANCE,
@@ -18,27 +18,27 @@ use crate::overbright::{self, MAP_OVERBRIGHT_BITS};
 use crate::world::{Flare, RelitWorld};
 use glam::Vec3;
 
-/// Side of the lamp that stands for a flare, id units.
+/// Side of a flare's lamp, id units.
 const LAMP_SIDE: f32 = 16.0;
 
-/// Strength of that lamp: the median of all `q3map_surfacelight` in OpenArena's scripts.
+/// Strength of that lamp: the median `q3map_surfacelight` in OpenArena's scripts.
 const LAMP_VALUE: f32 = 2000.0;
 
-/// How far in front of its flare a lamp lies, id units: flares lie in the surface that they mark.
+/// Distance of a lamp from its flare, id units: flares lie in the plane of their surface.
 const LAMP_OFFSET: f32 = 1.0;
 
-/// Ambient value (0..255) of maps that have no lightmap to tell.
+/// Ambient value (0..255) of maps without lightmaps.
 const BARE_AMBIENT: f32 = 64.0;
 
 /// Adds light to a world that has none.
-pub(crate) fn rescue(world: &mut RelitWorld, finder: &mut Finder<'_>) {
+pub(crate) fn add_fallback_light(world: &mut RelitWorld, finder: &mut Finder<'_>) {
     world.report.fallback = true;
     for material in &mut world.materials {
         if material.emission.is_none() {
             material.emission = finder.faint_emission(material);
         }
     }
-    surfaces::place(world);
+    surfaces::add_triangle_lights(world);
     for flare in world.flares.clone() {
         lamp(world, &flare);
     }
@@ -62,7 +62,7 @@ fn lamp(world: &mut RelitWorld, flare: &Flare) {
     let (u, v) = normal.any_orthonormal_pair();
     let (u, v) = (u * (LAMP_SIDE / 2.0), v * (LAMP_SIDE / 2.0));
     let center = flare.origin + flare.normal.normalize_or_zero() * LAMP_OFFSET;
-    // Counter-clockwise seen from where the normal points: u, v and it are right-handed.
+    // Counter-clockwise seen from the front: u, v and the normal are right-handed.
     let corners = [
         center - u - v,
         center + u - v,
@@ -113,13 +113,13 @@ fn lamp(world: &mut RelitWorld, flare: &Flare) {
     }
 }
 
-/// Mean of the lightmaps, 0..255 as stored; a grey for maps without any light in them.
+/// Mean of the lightmaps, 0..255 as stored; grey for maps without any light in them.
 fn mean_lightmap(world: &RelitWorld) -> Vec3 {
     let mut sum = [0u64; 3];
     let mut count = 0u64;
     let pages = (0..).map_while(|number| Some((number, world.page(number)?)));
     for (number, page) in pages {
-        // A step of a page that is shown as stored is a quarter of a step of the map's own.
+        // A step of a page that is shown as stored is a quarter of a step of the map's own pages.
         let weight = match world.is_shown_as_stored(number) {
             true => 1,
             false => 1 << MAP_OVERBRIGHT_BITS,
@@ -141,7 +141,7 @@ fn mean_lightmap(world: &RelitWorld) -> Vec3 {
 }
 
 impl Finder<'_> {
-    /// Light of a material for which neither directives nor a strong glow speak: whatever it shows of its own.
+    /// Emission of a material without directives and without a strong glow: everything that its stages emit.
     fn faint_emission(&mut self, material: &crate::world::WorldMaterial) -> Option<Emission> {
         let shown = if material.is_sky() {
             self.sky_radiance(material)

@@ -1,4 +1,5 @@
-//! What a stack of stages shows of its own, without any light falling on it, and what it shows of the light that does.
+//! What a material's stages show without incident light (emission), and what they show of incident light
+//! (reflectance).
 
 use super::Shade;
 use crate::image::Image;
@@ -11,23 +12,22 @@ use shaderscript::light::{
 };
 use shaderscript::{ImplicitKind, RgbGen, Shader, Stage, StageImage, TcGen};
 
-/// Samples per side of a texture.
+/// Samples along each side of a texture.
 const GRID: u32 = 16;
 
-/// Brightnesses that a texture is told apart into.
+/// Number of classes of brightness of a texture.
 const SHADES: usize = 16;
 
-/// Times at which a material that moves is looked at, seconds: spread unevenly, so that no common period hides a
-/// blinking lamp.
+/// Times at which an animated material is evaluated, seconds: uneven, so that no common period hides a blinking
+/// lamp.
 const TIMES: [f64; 12] = [
     0.0, 0.31, 0.73, 1.07, 1.39, 1.83, 2.21, 2.69, 3.17, 3.71, 4.33, 5.09,
 ];
 
 /// Mean emission of a material's stages over texture and time, linear; zero for stages that only reflect.
 ///
-/// Vertex colours of world surfaces are light, and light is what is left out here. Stages mapped by the reflected
-/// view show surroundings, no light of their own; they count as black. `image` gives a picture by its name; one
-/// that it does not know is black.
+/// Vertex colours of world surfaces are light and are left out. Environment-mapped stages show surroundings and
+/// count as black. `image` returns a picture by name; unknown ones are black.
 pub(super) fn mean_emission<'a>(
     shader: &Shader,
     image: impl FnMut(&str) -> Option<&'a Image>,
@@ -48,9 +48,8 @@ pub(super) fn mean_emission<'a>(
     if mean.is_finite() { mean } else { Vec3::ZERO }
 }
 
-/// What a material's stages show of the light that falls on them, as they are at the start: the brightnesses of its
-/// texture, from dark to bright, each standing for the same part of it. `lighting`: how its surfaces are lit; `corners`:
-/// the mean colour of their corners, encoded.
+/// Reflectance of a material at time 0: the brightness classes of its texture from dark to bright, equal parts of
+/// the texture each. `lighting`: how its surfaces are lit; `corners`: mean colour of their vertices, encoded.
 pub(super) fn shades<'a>(
     shader: &Shader,
     lighting: ImplicitKind,
@@ -58,7 +57,7 @@ pub(super) fn shades<'a>(
     image: impl FnMut(&str) -> Option<&'a Image>,
 ) -> Vec<Shade> {
     let start = TIMES.get(..1).unwrap_or_default();
-    // Stages are put together as they are displayed, as the shaders do it.
+    // Stages are composed display-encoded, as in the shaders.
     let sum = Sum {
         table: &std::array::from_fn(|byte| byte as f32 / 255.0),
         compose: compose_encoded,
@@ -97,10 +96,10 @@ pub(super) fn shades<'a>(
         .collect()
 }
 
-/// What a stage shows of its image, as `run_stages` of `trace/layer.glsl` has it.
+/// How a stage uses its image; the same cases as `run_stages` of `trace/layer.glsl`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Role {
-    /// Nothing: it counts as black.
+    /// Black.
     Nothing,
     /// The image.
     Texture,
@@ -111,7 +110,7 @@ enum Role {
     Gloss { masked: bool },
 }
 
-/// Of what is mapped by the reflected view nothing is light of its own.
+/// Role of a stage without incident light: environment-mapped stages emit nothing.
 fn emission_role(stage: &Stage) -> Role {
     match stage.tc_gen {
         TcGen::Environment => Role::Nothing,
@@ -119,7 +118,7 @@ fn emission_role(stage: &Stage) -> Role {
     }
 }
 
-/// What a stage is where light falls on surfaces that are lit in this way.
+/// Role of a stage on surfaces that are lit in this manner.
 fn light_role(shader: &Shader, index: usize, lighting: ImplicitKind) -> Role {
     let Some(stage) = shader.stages.get(index) else {
         return Role::Nothing;
@@ -136,10 +135,10 @@ fn light_role(shader: &Shader, index: usize, lighting: ImplicitKind) -> Role {
     }
 }
 
-/// Puts the stages of a stack together.
+/// Composes the stages of a material.
 type Compose = fn(&[Stage], &[StageSample], bool) -> LightLinear;
 
-/// How what a stack draws is found.
+/// Evaluation of a material's stages.
 struct Sum<'a> {
     /// The numbers that bytes stand for.
     table: &'a [f32; 256],
@@ -151,7 +150,7 @@ struct Sum<'a> {
 }
 
 impl Sum<'_> {
-    /// What is drawn all over the texture, at some times. `image` gives a picture by its name.
+    /// Results all over the texture at some times. `image` returns a picture by name.
     fn drawn<'i>(
         &self,
         shader: &Shader,
@@ -188,7 +187,7 @@ impl Sum<'_> {
         drawn
     }
 
-    /// The colour of a stage at a time.
+    /// Colour of a stage at a time.
     fn color(&self, stage: &Stage, time: f64) -> Vec4 {
         let context = ColorContext {
             time,
@@ -200,7 +199,7 @@ impl Sum<'_> {
         Vec4::new(number(r), number(g), number(b), f32::from(a) / 255.0)
     }
 
-    /// The mean of a picture of an environment; of others nobody asks.
+    /// Mean of an environment image; not needed for other images.
     fn mean_texel(&self, stage: &Stage, pictures: &[Option<&Image>], time: f64) -> Vec4 {
         if stage.tc_gen != TcGen::Environment {
             return Vec4::ZERO;
@@ -212,13 +211,13 @@ impl Sum<'_> {
     }
 }
 
-/// Places all over a texture.
+/// Positions all over a texture.
 fn grid() -> impl Iterator<Item = Vec2> {
     (0..GRID * GRID)
         .map(|cell| Vec2::new((cell % GRID) as f32 + 0.5, (cell / GRID) as f32 + 0.5) / GRID as f32)
 }
 
-/// What a stage shows at a place: `texture` there, `mean` all over its picture.
+/// Contribution of a stage at a position: `texture` there, `mean` over its image.
 fn sample(stage: &Stage, role: Role, (texture, mean): (Vec4, Vec4), color: Vec4) -> StageSample {
     let shown = StageSample {
         texture,
@@ -253,7 +252,7 @@ fn sample(stage: &Stage, role: Role, (texture, mean): (Vec4, Vec4), color: Vec4)
     }
 }
 
-/// What a stage's image shows at a place.
+/// Texel of a stage's image at a position.
 fn texel(
     stage: &Stage,
     pictures: &[Option<&Image>],
@@ -263,7 +262,7 @@ fn texel(
 ) -> Vec4 {
     match stage.image {
         StageImage::White | StageImage::Lightmap => return Vec4::ONE,
-        // A cinematic shows anything.
+        // The content of a cinematic is unknown.
         StageImage::Video(_) => return Vec4::splat(0.5),
         _ => {}
     }

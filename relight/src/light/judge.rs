@@ -1,63 +1,64 @@
-//! Light lists against shadow rays: what they have of what is visible.
+//! Recall and precision of light lists, measured by shadow rays.
 //!
-//! # What is true
+//! # Definitions
 //!
-//! A light is visible in a cluster when a ray from some point of the cluster, on a surface or in the open, to some point
-//! of the light meets no opaque triangle that is drawn and does not run through the solid of the map. (Where nothing is
-//! drawn on a wall, as behind panels and outside of the hull, rays that ask triangles alone come through it. Such pairs
-//! are counted apart.) A visible light matters when it gives the cluster more than [`DROPPED_PART`] of its light.
+//! A light is *visible* in a cluster when a ray from some point of the cluster, on a surface or in the open, to
+//! some point of the light meets no opaque drawn triangle and does not pass through solid. (Walls without drawn
+//! surfaces, as behind panels and outside the hull, do not stop rays that test triangles only. Such pairs are
+//! counted separately.) A visible light *matters* when it gives the cluster more than [`DROPPED_PART`] of its
+//! light.
 
-use super::looks::DROPPED_PART;
 use super::receivers::{Target, receivers};
 use super::solid::through_solid;
+use super::visibility_rays::DROPPED_PART;
 use super::{LightLists, lists_of};
 use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use support::parallel;
 use support::random::Random;
 
-/// Lists against rays: see [`judge`].
+/// Comparison of lists with rays: see [`judge`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ListJudgement {
-    /// Pairs of light and cluster that were looked at.
+    /// Tested pairs of light and cluster.
     pub pairs: usize,
-    /// Those where some ray arrives: see the head of this file's documentation for what is counted.
+    /// Visible pairs.
     pub visible: usize,
-    /// Pairs where rays arrive through the solid of the map alone; they are not visible.
+    /// Pairs whose rays arrive only through solid; not visible.
     pub through_solid: usize,
-    /// Of these, those that the lists have.
+    /// Visible pairs in the lists.
     pub found: usize,
-    /// Visible pairs that give more than [`DROPPED_PART`] of their cluster's light.
+    /// Pairs that matter.
     pub mattering: usize,
-    /// Of these, those that the lists have.
+    /// Pairs that matter and are in the lists.
     pub mattering_found: usize,
-    /// Pairs that the lists have.
+    /// Pairs in the lists.
     pub listed: usize,
-    /// Of all light that arrives, the part of lights that the lists have.
+    /// Part of the arriving light that comes from listed lights.
     pub light_found: f64,
-    /// The largest part of a cluster's light that comes from lights which its list does not have.
+    /// Largest part of a cluster's light that comes from unlisted lights.
     pub worst_loss: f64,
 }
 
 impl ListJudgement {
-    /// Part of the visible pairs that the lists have.
+    /// Part of the visible pairs in the lists.
     pub fn recall(&self) -> f64 {
         self.found as f64 / self.visible.max(1) as f64
     }
 
-    /// Part of the visible pairs that matter that the lists have.
+    /// Part of the pairs that matter in the lists.
     pub fn recall_of_mattering(&self) -> f64 {
         self.mattering_found as f64 / self.mattering.max(1) as f64
     }
 
-    /// Part of the lists' pairs that are visible.
+    /// Part of the listed pairs that are visible.
     pub fn precision(&self) -> f64 {
         self.found as f64 / self.listed.max(1) as f64
     }
 }
 
-/// Judges lists by rays of their own: in every `step`th cluster points other than those of [`sweep`](super::sweep()) look at every
-/// light of the map, `rays` times each. For each of several lists of one world what they are worth.
+/// Compares several lists of one world with shadow rays: in every `step`th cluster, points other than those of
+/// [`sweep`](super::sweep()) send `rays` rays to every light of the map.
 pub fn judge(
     world: &RelitWorld,
     lists: &[&LightLists],
@@ -156,12 +157,12 @@ pub fn judge(
     sums
 }
 
-/// A world's lists from the potentially visible sets alone, to compare with.
+/// A world's lists from the PVS alone, for comparison.
 pub fn lists_by_visibility(world: &RelitWorld) -> LightLists {
     lists_of(world, false)
 }
 
-/// A world's lists before any rays: by visibility, less what lies behind a light's plane.
+/// A world's lists before any rays: from the PVS, without lights that face away from the cluster.
 pub fn lists_by_geometry(world: &RelitWorld) -> LightLists {
     lists_of(world, true)
 }

@@ -1,8 +1,8 @@
-//! Which lights can matter in which cluster: exact lists from the potentially visible sets.
+//! Light lists from the PVS: the lights that may reach each cluster.
 //!
-//! A light is in a cluster's list when one of the clusters that it lies in can see that cluster,
-//! or be seen from it (compilers write matrices that are not symmetric, and light travels both ways), unless
-//! the whole cluster lies behind a one-sided light.
+//! A light is in a cluster's list when a cluster that the light lies in sees the cluster or is seen from it
+//! (compilers write asymmetric matrices, and light travels both ways), unless the whole cluster lies behind a
+//! one-sided light.
 
 use super::sight::{ClusterSet, Sight, furthest_in_front};
 use super::{LightLists, PointLight, TriangleLight};
@@ -11,7 +11,7 @@ use glam::Vec3;
 use q3bsp::Bsp;
 use std::collections::HashMap;
 
-/// Bounds of a cluster: those of its leafs.
+/// Bounds of a cluster: the union of its leafs' bounds.
 #[derive(Clone, Copy)]
 struct Bounds {
     mins: Vec3,
@@ -25,14 +25,14 @@ impl Bounds {
     };
 }
 
-/// How far in front of a light's plane a cluster must reach to be lit, id units: leaf bounds are whole
-/// numbers, and a light's own plane bounds the leafs that it lights.
+/// Distance that a cluster must reach in front of a light's plane, id units: leaf bounds are integers, and a
+/// light's own plane bounds the leafs that it lights.
 const PLANE_SLACK: f32 = 0.125;
 
-/// How far around something its clusters are looked for when leafs do not list it, id units.
+/// Margin around the bounds of a surface that no leaf lists, id units.
 const SEARCH_MARGIN: f32 = 2.0;
 
-/// Clusters of a map, prepared for asking what sees what.
+/// Clusters of a map, indexed for visibility queries.
 pub(crate) struct Clusters {
     sight: Sight,
     /// Bounds of the leafs of every cluster; `EMPTY` for clusters without a leaf in the tree.
@@ -76,8 +76,8 @@ impl Clusters {
         }
     }
 
-    /// Clusters that a triangle light lies in: those that its bounds touch, of a world surface only such as list
-    /// it. (The few world surfaces that no leaf lists, and those of brush models, are where their bounds are.)
+    /// Clusters that a triangle light lies in: those that its bounds touch; of a world surface only clusters that
+    /// list it. (World surfaces that no leaf lists, and brush models, use their bounds alone.)
     fn clusters_of(&self, light: &TriangleLight, listed: &ClusterSet) -> ClusterSet {
         let margin = Vec3::splat(SEARCH_MARGIN);
         let [a, b, c] = light.vertices;
@@ -93,7 +93,7 @@ impl Clusters {
         at
     }
 
-    /// Clusters whose leafs list a world surface; none for surfaces of brush models.
+    /// Clusters whose leafs list a world surface; empty for surfaces of brush models.
     fn listing(&self, index: usize, surfaces: &[WorldSurface]) -> ClusterSet {
         let mut at = ClusterSet::none(self.sight.count());
         if surfaces.get(index).is_some_and(|s| s.model == 0) {
@@ -104,7 +104,7 @@ impl Clusters {
         at
     }
 
-    /// Whether some of a cluster may lie on an emitting side of a light.
+    /// Whether a part of a cluster may lie on an emitting side of a light.
     fn faces(&self, light: &TriangleLight, cluster: usize) -> bool {
         let Some(bounds) = self.bounds.get(cluster).filter(|_| !light.two_sided) else {
             return true;
@@ -114,8 +114,8 @@ impl Clusters {
         furthest_in_front(bounds.mins, bounds.maxs, normal, dist) > PLANE_SLACK
     }
 
-    /// For each cluster whether it can see a surface that `is_sky`. Where no surface is, or one belongs to a brush
-    /// model, nothing can be said: the answer is empty.
+    /// For each cluster, whether it can see a surface that `is_sky`. Empty (unknown) if there is no such surface or
+    /// one belongs to a brush model.
     fn sky(&self, surfaces: &[WorldSurface], is_sky: impl Fn(&WorldSurface) -> bool) -> Vec<bool> {
         let mut at = ClusterSet::none(self.sight.count());
         for (index, surface) in surfaces.iter().enumerate() {
@@ -135,7 +135,7 @@ impl Clusters {
         (0..self.sight.count()).map(|c| lit.contains(c)).collect()
     }
 
-    /// The lists of a map's lights. `facing`: less what lies behind a light's plane; `is_sky` tells surfaces of sky.
+    /// Light lists. `facing`: without lights that face away from the cluster; `is_sky`: whether a surface is sky.
     pub fn lists(
         &self,
         lights: &[TriangleLight],

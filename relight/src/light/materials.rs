@@ -1,4 +1,4 @@
-//! What materials emit and throw back, measured on their images.
+//! Emission and reflectance of materials, measured on their images.
 
 use super::Finder;
 use crate::exposure::DEFAULT_EXPONENT;
@@ -11,8 +11,8 @@ use shaderscript::ImplicitKind;
 use std::sync::Arc;
 
 impl WorldMaterial {
-    /// A material by itself, understood as a map's would be: with the flags that its script gives, what it emits, what
-    /// it throws back.
+    /// A material without a map, resolved as a map's would be: with the flags of its script, its emission and its
+    /// reflectance.
     pub fn by_name(
         files: &dyn GameFiles,
         materials: &Materials,
@@ -27,13 +27,13 @@ impl WorldMaterial {
         let mut finder = Finder::new(files, DEFAULT_EXPONENT);
         material.emission = finder.emission(&material);
         material.flicker = finder.flicker(&material);
-        material.throw_back(&mut finder, [255; 4]);
+        material.measure_reflection(&mut finder, [255; 4]);
         material.shown = finder.shown(&material);
         material
     }
 
-    /// Finds what it throws back of light, and where it lets it through. `corners`: the mean colour of its corners.
-    pub(crate) fn throw_back(&mut self, finder: &mut Finder<'_>, corners: [u8; 4]) {
+    /// Measures its reflectance and its holes. `corners`: mean colour of its vertices.
+    pub(crate) fn measure_reflection(&mut self, finder: &mut Finder<'_>, corners: [u8; 4]) {
         self.shades = finder.shades(self, corners);
         self.holes = finder.holes(self).map(Arc::new);
         let count = self.shades.len().max(1) as f32;

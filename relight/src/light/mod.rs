@@ -1,5 +1,5 @@
-//! Light sources of a relit world: which surfaces, stages and entities emit, in which clusters they matter, and which of that
-//! reaches anything. What they are, and their units: [`emitters`](mod@crate::emitters).
+//! Light sources of a map: which surfaces, stages and entities emit, the light lists of each cluster, and their
+//! reduction by visibility rays. The source types and their units are in [`emitters`](mod@crate::emitters).
 
 mod bounds;
 mod by_hand;
@@ -9,9 +9,7 @@ mod entities;
 mod fallback;
 mod glow;
 mod judge;
-mod kept;
 mod lists;
-mod looks;
 mod materials;
 mod occlusion;
 mod receivers;
@@ -19,26 +17,31 @@ mod sight;
 mod solid;
 mod surfaces;
 mod sweep;
+mod sweep_cache;
+mod visibility_rays;
 
 pub use crate::emitters::*;
 pub use bounds::STRONGEST;
 pub use by_hand::{LightsByHand, LightsLineError};
 pub use emission::GLOW_THRESHOLD;
 pub use judge::{ListJudgement, judge, lists_by_geometry, lists_by_visibility};
-pub use looks::{DROPPED_LEAST, DROPPED_PART};
 pub use occlusion::Occlusion;
 pub use sight::{ClusterSet, Sight};
 pub use sweep::{SweepReport, sweep};
+pub use visibility_rays::{DROPPED_LEAST, DROPPED_PART};
 
 pub(crate) use crate::emitters::raise;
 pub(crate) use color::recolor;
 pub(crate) use emission::Finder;
 pub(crate) use entities::{ambient, light_entities, negative_lights};
-pub(crate) use fallback::rescue;
+pub(crate) use fallback::add_fallback_light;
 use lists::Clusters;
-pub(crate) use surfaces::{place, place_of, suns, take_out};
+pub(crate) use surfaces::{
+    add_triangle_lights, add_triangle_lights_of, remove_triangle_lights, suns,
+};
 
-/// The light lists of a world as it is now. `facing`: less what lies behind a light's plane.
+/// The light lists of a world's current lights. `facing`: without lights whose plane has the whole cluster behind
+/// it.
 fn lists_of(world: &crate::world::RelitWorld, facing: bool) -> LightLists {
     let clusters = Clusters::new(&world.bsp);
     let sky = |s: &crate::world::WorldSurface| {
@@ -49,7 +52,7 @@ fn lists_of(world: &crate::world::RelitWorld, facing: bool) -> LightLists {
     clusters.lists(lights, points, &world.surfaces, facing, sky)
 }
 
-/// Builds a world's light lists, of lights within bounds.
+/// Bounds a world's lights and rebuilds its light lists.
 pub(crate) fn build_lists(world: &mut crate::world::RelitWorld) {
     bounds::bound_lights(world);
     world.light_lists = lists_of(world, true);

@@ -1,4 +1,4 @@
-//! Where light is gathered in clusters, and lights as rays from there see them.
+//! Receivers: points of a cluster at which light is gathered; and lights as targets of their rays.
 
 use super::{LightRef, PointLight, TriangleLight};
 use crate::world::RelitWorld;
@@ -7,10 +7,10 @@ use std::f32::consts::PI;
 use support::parallel;
 use support::random::Random;
 
-/// How far off its surface a point lies, id units.
+/// Distance of a receiver from its surface, id units.
 const LIFT: f32 = 0.5;
 
-/// A place where light is gathered.
+/// A point at which light is gathered.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Receiver {
     pub position: Vec3,
@@ -18,7 +18,7 @@ pub(super) struct Receiver {
     pub normal: Vec3,
 }
 
-/// Points of each cluster: random ones on what is drawn there, and in the open.
+/// Receivers of each cluster: random points on its drawn surfaces, and in the open.
 pub(super) fn receivers(
     world: &RelitWorld,
     clusters: usize,
@@ -49,16 +49,18 @@ pub(super) fn receivers(
     parallel::map(&rooms, |cluster, (surfaces, boxes)| {
         let mut random = Random::new(seed ^ (cluster as u64) << 8);
         let inside = |p: Vec3| usize::try_from(bsp.cluster_at(p)).is_ok_and(|c| c == cluster);
-        let mut points = on_drawn(world, surfaces, boxes, on_surfaces, &mut random, inside);
-        // where nothing is drawn, more in the open
+        let mut points =
+            points_on_surfaces(world, surfaces, boxes, on_surfaces, &mut random, inside);
+        // a cluster without drawn surfaces gets more points in the open
         let open = in_the_open.max((on_surfaces + in_the_open - points.len()) / 2);
-        in_boxes(boxes, open, &mut random, inside, &mut points);
+        points_in_the_open(boxes, open, &mut random, inside, &mut points);
         points
     })
 }
 
-/// Points on the surfaces of a cluster, evenly over the area that lies in its leafs' boxes, as nearly as a few tries do.
-fn on_drawn(
+/// Points on the surfaces of a cluster, approximately uniform over the area inside its leafs' bounds (rejection
+/// with few tries).
+fn points_on_surfaces(
     world: &RelitWorld,
     surfaces: &[u32],
     boxes: &[(Vec3, Vec3)],
@@ -81,7 +83,7 @@ fn on_drawn(
                 continue;
             };
             let (mins, maxs) = (a.min(b).min(c), a.max(b).max(c));
-            // only what may lie here
+            // only surfaces that may lie in the cluster
             let touches = |(low, high): &(Vec3, Vec3)| {
                 mins.cmple(*high + 1.0).all() && maxs.cmpge(*low - 1.0).all()
             };
@@ -111,7 +113,7 @@ fn on_drawn(
         // fronts are clockwise
         let normal = (c - a).cross(b - a).normalize_or_zero();
         let on = a + (b - a) * u + (c - a) * v;
-        // as the shaders look for it
+        // the same offset as in the shaders
         if inside(on + normal) {
             points.push(Receiver {
                 position: on + normal * LIFT,
@@ -123,7 +125,7 @@ fn on_drawn(
 }
 
 /// Points in the open.
-fn in_boxes(
+fn points_in_the_open(
     boxes: &[(Vec3, Vec3)],
     count: usize,
     random: &mut Random,
@@ -149,12 +151,12 @@ fn in_boxes(
     }
 }
 
-/// Luminance of linear colours, of negative ones none.
+/// Luminance of a linear colour; 0 if negative.
 pub(super) fn luminance(color: Vec3) -> f32 {
     crate::overbright::luminance(color).max(0.0)
 }
 
-/// A light as rays see it.
+/// A light as the target of a ray.
 pub(super) enum Target<'a> {
     Triangle(&'a TriangleLight),
     Point(&'a PointLight),
@@ -168,12 +170,12 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// A random point of it, and what it would give to a receiver if all of it were there, without shadows: irradiance
-    /// / π, luminance.
+    /// A random point of the light, and the unshadowed light at a receiver if all of the light were there:
+    /// irradiance over π, luminance.
     pub fn sample(&self, receiver: &Receiver, random: &mut Random) -> (Vec3, f32) {
         let cosine = |to: Vec3| {
             if receiver.normal == Vec3::ZERO {
-                // a surface in the open may face any way
+                // a surface in the open may face any direction
                 0.25
             } else {
                 receiver.normal.dot(to).max(0.0)
@@ -223,7 +225,7 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// Light that comes to a place about there from a light that faces it.
+    /// Approximate unshadowed light at a position that faces the light.
     pub fn bare(&self, at: Vec3) -> f32 {
         let (middle, power) = match self {
             Target::Triangle(light) => {

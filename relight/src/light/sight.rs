@@ -1,4 +1,4 @@
-//! Which clusters can see which, kept apart from the map so that what moves can be asked about in every frame.
+//! Visibility between clusters, independent of the map, for queries about moving objects in every frame.
 
 use glam::{Vec3, Vec4};
 use q3bsp::Bsp;
@@ -8,7 +8,7 @@ use q3bsp::Bsp;
 pub struct ClusterSet(Vec<u64>);
 
 impl ClusterSet {
-    /// The empty set of a map of so many clusters.
+    /// The empty set for a map of `count` clusters.
     pub fn none(count: usize) -> Self {
         Self(vec![0; count.div_ceil(64)])
     }
@@ -20,7 +20,7 @@ impl ClusterSet {
         bits
     }
 
-    /// Adds a cluster; one beyond the map's is left out.
+    /// Adds a cluster; indices beyond the map's are ignored.
     pub fn insert(&mut self, bit: usize) {
         if let Some(word) = self.0.get_mut(bit / 64) {
             *word |= 1 << (bit % 64);
@@ -34,21 +34,21 @@ impl ClusterSet {
             .is_some_and(|word| word >> (bit % 64) & 1 == 1)
     }
 
-    /// Adds the clusters of another set.
+    /// Union with another set.
     pub fn merge(&mut self, other: &Self) {
         for (word, more) in self.0.iter_mut().zip(&other.0) {
             *word |= more;
         }
     }
 
-    /// Keeps only the clusters that are in another set, too.
+    /// Intersection with another set.
     pub fn keep(&mut self, other: &Self) {
         for (word, kept) in self.0.iter_mut().zip(&other.0) {
             *word &= kept;
         }
     }
 
-    /// Whether there is no cluster in it.
+    /// Whether it contains no cluster.
     pub fn is_empty(&self) -> bool {
         self.0.iter().all(|&word| word == 0)
     }
@@ -71,7 +71,7 @@ pub(super) fn furthest_in_front(mins: Vec3, maxs: Vec3, normal: Vec3, dist: f32)
     Vec3::select(normal.cmpge(Vec3::ZERO), maxs, mins).dot(normal) - dist
 }
 
-/// Clusters of a map, prepared for asking where something is and what sees it.
+/// Cluster lookup and visibility of a map.
 #[derive(Debug, Clone, Default)]
 pub struct Sight {
     /// Number of clusters; 0 for a map without a visibility matrix: there everything sees everything.
@@ -85,7 +85,7 @@ pub struct Sight {
 }
 
 impl Sight {
-    /// Of a map.
+    /// The clusters of a map.
     pub fn new(bsp: &Bsp) -> Self {
         let count = bsp.visibility.as_ref().map_or(0, |v| v.clusters);
         let mut sees = vec![ClusterSet::none(count); count];
@@ -110,7 +110,7 @@ impl Sight {
             nodes: bsp
                 .nodes
                 .iter()
-                // without its plane a node parts nothing: both sides are looked at
+                // a node without its plane separates nothing: both children are visited
                 .map(|n| (plane(n.plane).unwrap_or(Vec4::ZERO), n.children))
                 .collect(),
             leaf_clusters: bsp.leafs.iter().map(|leaf| leaf.cluster).collect(),
@@ -122,10 +122,10 @@ impl Sight {
         self.count
     }
 
-    /// Cluster of a point; `None` where there is none, as in solid.
+    /// Cluster of a point; `None` in solid.
     pub fn cluster_at(&self, point: Vec3) -> Option<usize> {
         let mut child = 0i32;
-        // a damaged tree may go in circles
+        // a damaged tree may contain cycles
         for _ in 0..=self.nodes.len() {
             let Ok(index) = usize::try_from(child) else {
                 let leaf = usize::try_from(-1 - i64::from(child)).ok()?;
@@ -142,13 +142,13 @@ impl Sight {
         None
     }
 
-    /// Clusters of the leafs that touch a box, world space.
+    /// Clusters of the leafs that intersect a box, world space.
     pub fn touching(&self, mins: Vec3, maxs: Vec3) -> ClusterSet {
         let mut at = ClusterSet::none(self.count);
         if self.nodes.is_empty() {
             return at;
         }
-        // A damaged tree may share nodes or go in circles: no path needs more steps than there are nodes.
+        // A damaged tree may share nodes or contain cycles: no path is longer than the number of nodes.
         let mut steps = self.nodes.len() * 2;
         let mut stack = vec![0i32];
         while let Some(child) = stack.pop() {

@@ -1,18 +1,17 @@
-//! Where a ray runs through the solid of a map.
+//! Tests whether a ray passes through the solid of a map.
 //!
-//! Compilers draw no surface where nobody is meant to look from: behind panels, under the skins of curves, outside of
-//! the hull. A ray from there meets no triangle on its way through a wall. Light does not come that way; the tree knows,
-//! for the wall's leafs belong to no cluster.
+//! Compilers draw no surface where nobody can look from: behind panels, under curves, outside the hull. A ray from
+//! there meets no triangle on its way through a wall. The BSP tree still marks the wall: its leafs belong to no
+//! cluster.
 
 use glam::Vec3;
 use q3bsp::Bsp;
 
-/// Units of solid that a ray may run through and count as free: surfaces lie on the boundaries of solid, where the
-/// halves of units that the receivers are lifted by, and rounding, decide which side is met. No wall is as thin.
+/// Length of solid that a ray may pass through and count as free, id units: surfaces lie on the boundary of solid,
+/// and the receivers' offset and rounding decide the side. No wall is as thin.
 const SLACK: f32 = 1.0;
 
-/// Whether the straight way between two points runs through the solid of a map. Never for a map without a visibility
-/// matrix, whose leafs need not tell.
+/// Whether a segment passes through solid. Never for a map without a PVS, whose leafs carry no cluster.
 pub(super) fn through_solid(bsp: &Bsp, from: Vec3, to: Vec3) -> bool {
     if bsp.visibility.is_none() || bsp.nodes.is_empty() {
         return false;
@@ -22,9 +21,9 @@ pub(super) fn through_solid(bsp: &Bsp, from: Vec3, to: Vec3) -> bool {
         return false;
     }
     let mut solid = 0.0f32;
-    // a damaged tree may share nodes or go in circles
+    // a damaged tree may share nodes or contain cycles
     let mut steps = bsp.nodes.len() * 2;
-    // pieces of the way, as parts of it, by the node or leaf that they lie in
+    // intervals of the segment, as parts of it, with the node or leaf that they lie in
     let mut pending = vec![(0i32, 0.0f32, 1.0f32)];
     while let Some((child, start, end)) = pending.pop() {
         let Ok(index) = usize::try_from(child) else {

@@ -1,4 +1,4 @@
-//! From emitting materials to triangle lights, and from sky materials to suns.
+//! Triangle lights from emitting materials, and suns from sky materials.
 
 use super::{
     DEFAULT_SUN_RADIUS, Emission, EmissionSource, EmitterSummary, SUN_IRRADIANCE, SunLight,
@@ -7,15 +7,15 @@ use super::{
 use crate::world::{NO_LIGHT, RelitWorld, WorldMaterial, WorldSurface};
 use glam::Vec3;
 
-/// Triangles of less area emit nothing: their light is less than rounding, and their normal is noise.
-/// Square id units.
+/// Smallest area of an emitting triangle, square id units: below it the light is less than rounding and the normal
+/// is noise.
 const LEAST_AREA: f32 = 1.0 / 64.0;
 
-/// Largest area of a triangle that emits, square id units: no map that an engine plays is a million units wide. What is
-/// larger counts as degenerate, as its power might not be a number.
+/// Largest area of an emitting triangle, square id units: no playable map is a million units wide. Larger triangles
+/// count as degenerate, because their power might overflow.
 const MOST_AREA: f32 = 1.0e12;
 
-/// Suns of the sky materials that drawn surfaces use. The same sun written twice counts once.
+/// Suns of the sky materials of drawn surfaces. Equal suns count once.
 pub(crate) fn suns(materials: &[WorldMaterial], surfaces: &[WorldSurface]) -> Vec<SunLight> {
     let mut used = vec![false; materials.len()];
     for surface in surfaces.iter().filter(|s| s.num_indices > 0) {
@@ -57,15 +57,15 @@ pub(crate) fn suns(materials: &[WorldMaterial], surfaces: &[WorldSurface]) -> Ve
     suns
 }
 
-/// Makes the triangle lights of a world whose materials know their emission, and the report of them.
-pub(crate) fn place(world: &mut RelitWorld) {
+/// Creates the triangle lights of a world whose materials have their emission, and the report of them.
+pub(crate) fn add_triangle_lights(world: &mut RelitWorld) {
     world.lights.clear();
     world.report.emitters.clear();
-    place_of(world, |_| true);
+    add_triangle_lights_of(world, |_| true);
 }
 
-/// Adds the triangle lights of some materials, chosen by their index, to those that are there.
-pub(crate) fn place_of(world: &mut RelitWorld, chosen: impl Fn(u32) -> bool) {
+/// Adds the triangle lights of the materials that `chosen` accepts by index.
+pub(crate) fn add_triangle_lights_of(world: &mut RelitWorld, chosen: impl Fn(u32) -> bool) {
     let mut summaries: Vec<Option<EmitterSummary>> = vec![None; world.materials.len()];
     let mut lights = std::mem::take(&mut world.lights);
     for index in 0..world.surfaces.len() {
@@ -80,7 +80,7 @@ pub(crate) fn place_of(world: &mut RelitWorld, chosen: impl Fn(u32) -> bool) {
             continue;
         };
         let first = lights.len();
-        let degenerate = cut(
+        let degenerate = add_surface_lights(
             world,
             index as u32,
             &surface,
@@ -134,8 +134,8 @@ pub(crate) fn place_of(world: &mut RelitWorld, chosen: impl Fn(u32) -> bool) {
     world.report.suns = world.suns.len();
 }
 
-/// Takes out triangle lights that do not shine, and those of some materials.
-pub(crate) fn take_out(world: &mut RelitWorld, dropped: impl Fn(u32) -> bool) {
+/// Removes triangle lights without radiance, and those of materials that `dropped` accepts.
+pub(crate) fn remove_triangle_lights(world: &mut RelitWorld, dropped: impl Fn(u32) -> bool) {
     let old = std::mem::take(&mut world.lights);
     world.triangle_lights.fill(NO_LIGHT);
     for surface in &mut world.surfaces {
@@ -160,8 +160,8 @@ pub(crate) fn take_out(world: &mut RelitWorld, dropped: impl Fn(u32) -> bool) {
     world.report.triangle_lights = world.lights.len();
 }
 
-/// Appends the lights of one surface; returns how many of its triangles are degenerate.
-fn cut(
+/// Appends the lights of one surface; returns the number of degenerate triangles.
+fn add_surface_lights(
     world: &RelitWorld,
     index: u32,
     surface: &WorldSurface,
@@ -175,7 +175,7 @@ fn cut(
         .map_or(Vec3::ZERO, |m| m.origin);
     let sprite = emission.turns_to_viewer;
     let radiance = match emission.source {
-        // All quads of the surface share one light of the compiler's.
+        // The compiler has one light for all quads of the surface.
         EmissionSource::Sprite => {
             let area = world.surface_area(surface);
             if area < LEAST_AREA {
@@ -195,7 +195,7 @@ fn cut(
         let Some([a, b, c]) = world.triangle(triangle as usize) else {
             continue;
         };
-        // Front faces of a map are clockwise; a light's are the other way round.
+        // Front faces of a map are clockwise; a light's are counter-clockwise.
         let corners = if emission.reversed {
             [a, b, c]
         } else {

@@ -1,40 +1,41 @@
-//! Shadow rays at load: how much of each light arrives in each cluster of its lists.
+//! Visibility rays at load: the part of each light that arrives in each cluster of its lists.
 //!
-//! Points of a cluster (of its surfaces, and some in the open for what moves) look at random points of each light of
-//! the cluster's list. What comes out is two numbers for each pair: the light that the cluster would get without
-//! shadows, and the part of it that arrives. They make good chances for picking lights, and tell which lights can be
-//! left out.
+//! Receivers of a cluster (points on its surfaces, and some in the open for moving models) send rays to random
+//! points of each light in the cluster's list. Each pair of light and cluster gets two numbers: the mean unshadowed
+//! light, and the visible part. They give the tracer its selection probabilities, and decide which lights can be
+//! dropped.
 //!
-//! # What is left out
+//! # Dropped lights
 //!
-//! A light is left out of a cluster's list only if none of its rays arrived, and only as long as all that is left out of
-//! the list together stays below [`DROPPED_PART`](super::DROPPED_PART) of the light that does arrive there. A light that
-//! arrives in a cluster beside is charged with more than others (`BESIDE_CHARGE`): where light comes in through a gap,
-//! few points see it.
+//! A light is dropped from a cluster's list only if none of its rays arrived, and only while everything dropped
+//! from the list stays below [`DROPPED_PART`](super::DROPPED_PART) of the light that arrives there. A light that
+//! arrives in a neighbouring cluster is charged with a multiple of its light (`NEIGHBOUR_CHARGE`): where light
+//! enters through a gap, few receivers see it.
 //!
-//! What is missed by leaving out all that n rays each did not find is told by what they found once (Good, The
-//! Population Frequencies of Species and the Estimation of Population Parameters, 1953): a light of which the part v
-//! arrives is not found with the chance (1 - v)^n, and found once with n v (1 - v)^(n - 1), so that with b for a light
-//! without shadows the sum of b / n over the lights found once has the mean of what is missed. Where none was found
-//! once, the number of rays that should have arrived is below 3 with a confidence of 95 %, and less than 3 times the
-//! largest b / n is missed. Both are added, and for b the most is taken that a point of the cluster could get. Strong
-//! lights that no ray found stay in the list with a small chance, and the estimators stay as unbiased as they are
-//! without sweeping, but for that part.
+//! The light missed by dropping every light without a hit among n rays is estimated from the lights with exactly
+//! one hit (Good, *The Population Frequencies of Species and the Estimation of Population Parameters*, 1953). A
+//! light with visible part v has no hit with probability (1 - v)^n and one hit with probability n v (1 - v)^(n -
+//! 1), so with b the unshadowed light, the sum of b / n over the lights with one hit has the expected missed light
+//! as its mean. Where no light has exactly one hit, the expected number of hits is below 3 with a confidence of 95
+//! %, and less than 3 times the largest b / n is missed. Both terms are added, and b is the peak over the
+//! receivers. Strong lights without a hit stay in the list with a small probability, so the estimators stay as
+//! unbiased as without the sweep, except for the dropped part.
 //!
-//! # How long it may take
+//! # Ray budget
 //!
-//! A map gets [`BUDGET`] rays at the most, each cluster as many of them as its list has of all lists' entries, so that
-//! the result depends on no clock. A first round, which may take half, finds what is easily seen; a second one looks
-//! longer for lights that were not, weak ones first. Rays that visible lights leave go to those that come after them.
-//! Where not even `FEWEST` rays are left for each pair, the lights that would give most without shadows come first;
-//! pairs that get no ray stay in the list as the potentially visible sets have them, with a chance by their unshadowed
-//! light.
+//! A map gets at most [`BUDGET`] rays; each cluster gets a part in proportion to its list's entries, so the result
+//! depends on no clock. The first round may use half and finds lights that are easily seen; the second sends more
+//! rays to lights without hits, weakest first. Rays that visible lights do not need go to the lights after them. If
+//! the budget leaves less than `MIN_RAYS` rays a pair, the lights with most unshadowed light come first; pairs
+//! without a ray stay in the list as the PVS has them, with a probability by their unshadowed light.
 //!
-//! What was found can be kept: see [`sweep`].
+//! Results can be cached: see [`sweep`].
 
-use super::looks::{Pair, Row, boxes, keep, look_again, look_at_all, mark_beside};
 use super::receivers::{luminance, receivers};
-use super::{LightLists, LightShare, kept};
+use super::visibility_rays::{
+    Pair, Row, boxes, first_round, mark_neighbours, retained, second_round,
+};
+use super::{LightLists, LightShare, sweep_cache};
 use crate::cache::CalibrationCache;
 use crate::occluders::Occluders;
 use crate::world::RelitWorld;
@@ -42,34 +43,33 @@ use std::time::Instant;
 use support::parallel;
 use support::random::Random;
 
-/// Points of a cluster on surfaces, and in the open.
+/// Receivers of a cluster: on surfaces, and in the open.
 const ON_SURFACES: usize = 96;
 const IN_THE_OPEN: usize = 32;
 
-/// Most rays for a map: see the [module](self). Less than two seconds of two processor cores on large maps.
+/// Most rays for a map: see the [module](self). Less than two seconds on two processor cores on large maps.
 const BUDGET: u64 = 6_000_000;
 
-/// What sweeping did.
+/// Figures of a sweep.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SweepReport {
     /// Entries of the clusters' lists before and after.
     pub entries: [usize; 2],
-    /// Clusters without a point to look from; their lists stay.
+    /// Clusters without a receiver; their lists stay.
     pub unseen: usize,
-    /// Entries before that no ray was left for; they stay.
+    /// Pairs without a ray for lack of budget; they stay.
     pub unswept: usize,
-    /// Rays.
+    /// Number of rays.
     pub rays: u64,
-    /// Whether it comes from a cache; rays and what they did not reach are not counted then.
+    /// Whether it comes from a cache; `rays` and `unswept` are 0 then.
     pub cached: bool,
-    /// Seconds.
+    /// Duration, seconds.
     pub seconds: f64,
 }
 
-/// Sends rays through a world's light lists: shortens the lists, and notes in them what each light gives where. What
-/// it does depends on the world alone: its geometry, and its lights as they are now. A world whose lists know already
-/// is left as it is. With a `cache` a result is taken from there, or kept there; what goes wrong with it is a warning
-/// of the world's.
+/// Sends visibility rays through a world's light lists: shortens the lists and stores the share of each entry. The
+/// result depends on the world alone: its geometry and its current lights. A world whose lists have shares stays
+/// unchanged. With a `cache` the result is read from it or written to it; failures become warnings of the world.
 pub fn sweep(world: &mut RelitWorld, cache: Option<&CalibrationCache>) -> SweepReport {
     let begin = Instant::now();
     let lists = &world.light_lists;
@@ -80,7 +80,8 @@ pub fn sweep(world: &mut RelitWorld, cache: Option<&CalibrationCache>) -> SweepR
             ..SweepReport::default()
         };
     }
-    let (lists, mut report) = kept::kept(world, cache, |world| fresh(world, entries, BUDGET));
+    let (lists, mut report) =
+        sweep_cache::load_or_sweep(world, cache, |world| fresh(world, entries, BUDGET));
     world.report.mean_list_length = lists.mean_length();
     world.report.longest_list = lists.longest();
     world.light_lists = lists;
@@ -88,7 +89,7 @@ pub fn sweep(world: &mut RelitWorld, cache: Option<&CalibrationCache>) -> SweepR
     report
 }
 
-/// A world's lists of so many entries, swept with so many rays at the most.
+/// A world's lists of `entries` entries, swept with at most `budget` rays.
 pub(super) fn fresh(world: &RelitWorld, entries: usize, budget: u64) -> (LightLists, SweepReport) {
     let old = &world.light_lists;
     let clusters = old.clusters();
@@ -106,17 +107,17 @@ pub(super) fn fresh(world: &RelitWorld, entries: usize, budget: u64) -> (LightLi
         let row = i32::try_from(cluster).map_or(&[][..], |c| old.row(c));
         let allowed = allowed(row.len()) / 2;
         let mut random = Random::new(0x11f7 + cluster as u64);
-        let row = look_at_all(world, row, receivers, &occluders, allowed, &mut random);
+        let row = first_round(world, row, receivers, &occluders, allowed, &mut random);
         Some(row)
     });
     let boxes = boxes(&receivers);
-    let rows = mark_beside(rows, &boxes);
+    let rows = mark_neighbours(rows, &boxes);
     let rows = parallel::map(&rows, |cluster, row| {
         let (mut row, receivers) = (row.clone()?, receivers.get(cluster)?);
         let length = i32::try_from(cluster).map_or(0, |c| old.row(c).len());
         let left = allowed(length).saturating_sub(row.rays);
         let mut random = Random::new(0xa6a1 + cluster as u64);
-        row.rays += look_again(
+        row.rays += second_round(
             world,
             &mut row.pairs,
             receivers,
@@ -126,7 +127,7 @@ pub(super) fn fresh(world: &RelitWorld, entries: usize, budget: u64) -> (LightLi
         );
         Some(row)
     });
-    let rows = mark_beside(rows, &boxes);
+    let rows = mark_neighbours(rows, &boxes);
     let found: Vec<&Row> = rows.iter().flatten().collect();
     let mut report = SweepReport {
         entries: [entries; 2],
@@ -141,7 +142,7 @@ pub(super) fn fresh(world: &RelitWorld, entries: usize, budget: u64) -> (LightLi
     };
     let rows: Vec<Option<Vec<Pair>>> = rows
         .into_iter()
-        .map(|row| Some(keep(row?.pairs, ambient)))
+        .map(|row| Some(retained(row?.pairs, ambient)))
         .collect();
     let mut lists = LightLists {
         offsets: vec![0],
@@ -154,7 +155,7 @@ pub(super) fn fresh(world: &RelitWorld, entries: usize, budget: u64) -> (LightLi
             Some(pairs) => {
                 lists.lights.extend(pairs.iter().map(|p| p.entry));
                 lists.shares.extend(pairs.iter().map(|p| {
-                    kept::rounded(LightShare {
+                    sweep_cache::rounded(LightShare {
                         bare: p.bare,
                         visible: p.visible(),
                     })

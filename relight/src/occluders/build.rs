@@ -1,6 +1,6 @@
-//! Sorts triangles into boxes: a tree of two children to a node.
+//! Builds a bounding volume hierarchy with two children a node.
 //!
-//! Source: Wald 2007 for splits by the surface area heuristic over bins along the longest axis.
+//! Source: Wald 2007 for binned splits by the surface area heuristic along the longest axis.
 
 use super::{Kind, WIDE};
 use glam::{Vec3, Vec3A};
@@ -8,13 +8,13 @@ use glam::{Vec3, Vec3A};
 /// Bins of the surface area heuristic.
 const BINS: usize = 12;
 
-/// Part of a node's triangles that is too few for a side: such trees would be deep.
+/// Reciprocal of the smallest part of a node's triangles on one side: smaller parts make deep trees.
 const LOPSIDED: usize = 64;
 
-/// By how much boxes are larger than what is in them: as a part of their coordinates, and at least, id units.
+/// Padding of boxes: relative to their coordinates, and at least this, id units.
 const PAD: f32 = 1e-6;
 
-/// A triangle with what is known of it.
+/// A triangle and its properties.
 pub(super) type Input = ([Vec3; 3], Kind);
 
 /// A node.
@@ -24,7 +24,7 @@ pub(super) struct Binary {
     pub halves: Result<Box<[Binary; 2]>, Vec<Input>>,
 }
 
-/// The tree over some triangles; `None` without any.
+/// The hierarchy of some triangles; `None` for none.
 pub(super) fn build(triangles: Vec<Input>) -> Option<Binary> {
     let placed = |input: Input| {
         let bounds = Bounds::of(&input);
@@ -34,10 +34,10 @@ pub(super) fn build(triangles: Vec<Input>) -> Option<Binary> {
     (!triangles.is_empty()).then(|| node(&mut triangles))
 }
 
-/// A triangle, its box, and twice its middle.
+/// A triangle, its bounds, and twice its centroid.
 type Placed = (Input, Bounds, Vec3A);
 
-/// A box around some triangles.
+/// Axis-aligned bounds.
 #[derive(Clone, Copy)]
 pub(super) struct Bounds {
     pub mins: Vec3A,
@@ -52,7 +52,7 @@ impl Bounds {
         count: 0,
     };
 
-    /// Of corners as rays meet them: one, and the ways to the others.
+    /// Bounds of a triangle as the intersection test computes its corners: one corner plus edges.
     fn of(([a, b, c], _): &Input) -> Bounds {
         let [a, b, c] = [*a, *a + (*b - *a), *a + (*c - *a)].map(Vec3A::from);
         Bounds {
@@ -68,19 +68,19 @@ impl Bounds {
         self.count += other.count;
     }
 
-    /// Its corners, a little apart: what a ray along a face meets there lies inside.
+    /// Padded corners: hits of rays along a face lie inside.
     pub fn padded(&self) -> (Vec3, Vec3) {
         let pad = (self.mins.abs().max(self.maxs.abs()) * PAD).max(Vec3A::splat(PAD));
         ((self.mins - pad).into(), (self.maxs + pad).into())
     }
 
-    /// Half the surface.
+    /// Half the surface area.
     pub fn area(&self) -> f32 {
         let size = (self.maxs - self.mins).max(Vec3A::ZERO);
         size.x * size.y + size.y * size.z + size.z * size.x
     }
 
-    /// What a walk may cost here.
+    /// Expected cost of traversal.
     fn cost(&self) -> f32 {
         match self.count {
             0 => 0.0,
@@ -108,7 +108,8 @@ fn node(triangles: &mut [Placed]) -> Binary {
     Binary { bounds, halves }
 }
 
-/// Puts the triangles of the cheaper left side first; returns how many these are: not none and not all.
+/// Partitions triangles so that those of the cheaper split's left side come first; returns their number, neither
+/// none nor all.
 fn divide(triangles: &mut [Placed], axis: usize, low: f32, high: f32) -> usize {
     let scale = BINS as f32 / (high - low).max(f32::MIN_POSITIVE);
     let bin = |centre: &Vec3A| (((centre[axis] - low) * scale) as usize).min(BINS - 1);
@@ -140,7 +141,7 @@ fn divide(triangles: &mut [Placed], axis: usize, low: f32, high: f32) -> usize {
             split += 1;
         }
     }
-    // All in one place, or so lopsided that the tree would be deep: then the median.
+    // All at one place, or so unbalanced that the tree would be deep: split at the median.
     let least = (triangles.len() / LOPSIDED).max(1);
     if split < least || triangles.len() - split < least {
         split = triangles.len() / 2;

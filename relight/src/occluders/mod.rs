@@ -1,7 +1,8 @@
-//! Shadow rays on the CPU: a bounding volume hierarchy over the triangles that stop light, four children to a node and four
-//! triangles to a leaf, so that a ray meets four at a time.
+//! Shadow rays on the CPU: a bounding volume hierarchy over the triangles that stop light, with four children a
+//! node and four triangles a leaf, tested four at a time.
 //!
-//! Source: Möller and Trumbore 1997 for the triangle, the slab test for boxes, Dammertz et al. 2008 for four at a time.
+//! Source: Möller and Trumbore 1997 for triangles, the slab test for boxes, Dammertz et al. 2008 for four-wide
+//! hierarchies.
 
 mod build;
 mod of_world;
@@ -14,16 +15,16 @@ use glam::{Vec2, Vec3, Vec4};
 use std::sync::Arc;
 use support::simd4::{Four, WIDE, at, cross, dot, four, lanes, splat, sub};
 
-/// Nodes of a walk that are kept without taking from the heap: more than maps need as a rule.
+/// Entries of the traversal stack without a heap allocation: enough for most maps.
 const STACK: usize = 48;
 
-/// Set in references to leaves; the rest of them is the leaf's index.
+/// Set in references to leaves; the other bits are the index.
 const LEAF: u32 = 1 << 31;
 
-/// What a ray found.
+/// Nearest hit of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Hit {
-    /// Distance along the ray, in lengths of its direction.
+    /// Distance in lengths of the ray's direction.
     pub t: f32,
     /// Whether it is sky.
     pub sky: bool,
@@ -35,7 +36,7 @@ pub(crate) struct Hit {
     pub normal: Vec3,
 }
 
-/// What is known of a triangle beside its shape.
+/// Properties of a triangle.
 #[derive(Clone, Copy)]
 struct Kind {
     sky: bool,
@@ -44,7 +45,7 @@ struct Kind {
     cut_out: u32,
 }
 
-/// A triangle with holes.
+/// A triangle of a material with holes.
 pub(crate) struct CutOut {
     /// Texture coordinates of its corners.
     pub st: [Vec2; 3],
@@ -52,7 +53,7 @@ pub(crate) struct CutOut {
     pub holes: Arc<Holes>,
 }
 
-/// The boxes of a node's children.
+/// Bounds of a node's children.
 struct Node {
     /// Their least and their largest coordinates, an axis at a time.
     planes: [[Vec4; 2]; 3],
@@ -62,7 +63,7 @@ struct Node {
     there: u32,
 }
 
-/// Triangles. Where there are fewer than four the rest have no area, so that nothing meets them.
+/// Up to four triangles; empty lanes have no area and are never hit.
 struct Leaf {
     a: Four,
     e1: Four,
@@ -70,39 +71,39 @@ struct Leaf {
     kinds: [Kind; WIDE],
 }
 
-/// Triangles that stop light, sorted into boxes.
+/// Triangles that stop light, in a bounding volume hierarchy.
 pub(crate) struct Occluders {
     nodes: Vec<Node>,
     leaves: Vec<Leaf>,
     cut_outs: Vec<CutOut>,
 }
 
-/// Largest part of a reciprocal: what is finite gives a number, not NaN, for a ray along an axis.
+/// Bound on reciprocals of ray directions: finite operands give a number, not NaN, for axis-parallel rays.
 const STEEPEST: Vec3 = Vec3::splat(1e30);
 
-/// A ray as four alike.
+/// A ray in four equal lanes.
 struct Ray {
     from: Four,
-    way: Four,
+    direction: Four,
     inverse: Four,
     /// For each axis, which of a box's planes it meets first.
     first: [usize; 3],
 }
 
 impl Ray {
-    fn new(from: Vec3, way: Vec3) -> Ray {
-        let inverse = way.recip().clamp(-STEEPEST, STEEPEST);
+    fn new(from: Vec3, direction: Vec3) -> Ray {
+        let inverse = direction.recip().clamp(-STEEPEST, STEEPEST);
         Ray {
             from: splat(from),
-            way: splat(way),
+            direction: splat(direction),
             inverse: splat(inverse),
             first: inverse.to_array().map(|i| usize::from(i < 0.0)),
         }
     }
 }
 
-/// Where a ray meets the planes of a leaf's triangles.
-struct Meeting {
+/// Intersections of a ray with a leaf's triangles.
+struct LeafHits {
     /// Those of the triangles that it meets, a bit for each.
     mask: u32,
     t: Vec4,
@@ -112,7 +113,7 @@ struct Meeting {
 }
 
 impl Occluders {
-    /// Builds the tree over (corners, is sky, tag).
+    /// Builds the hierarchy from (corners, is sky, tag).
     pub fn new(input: impl Iterator<Item = ([Vec3; 3], bool, u32)>) -> Occluders {
         let kept: Vec<([Vec3; 3], Kind)> = input
             .filter(|(corners, ..)| corners.iter().all(|c| c.is_finite()))
@@ -127,13 +128,13 @@ impl Occluders {
             cut_outs: Vec::new(),
         };
         if let Some(root) = build::build(kept) {
-            // The root is a node even if all that there is is a leaf.
+            // The root is a node even for a single leaf.
             occluders.add(vec![root]);
         }
         occluders
     }
 
-    /// Adds a node with these children, taking up theirs in place of them as long as there is room; its index.
+    /// Adds a node with these children and returns its index. Grandchildren replace children while there is room.
     fn add(&mut self, mut children: Vec<Binary>) -> u32 {
         while children.len() < WIDE {
             let inner = |(_, c): &(usize, &Binary)| c.halves.is_ok();
@@ -177,7 +178,7 @@ impl Occluders {
         index as u32
     }
 
-    /// Cuts holes: `cut_out` tells of a triangle's tag whether it has some.
+    /// Adds holes: `cut_out` returns those of a triangle's tag.
     pub fn cut(mut self, cut_out: impl Fn(u32) -> Option<CutOut>) -> Occluders {
         let kinds = self.leaves.iter_mut().flat_map(|leaf| &mut leaf.kinds);
         for kind in kinds.filter(|kind| !kind.sky) {
@@ -189,24 +190,24 @@ impl Occluders {
         self
     }
 
-    /// The triangle's holes, if it has some, and whether one of them is where a ray meets it.
-    fn holes(&self, kind: Kind, meeting: &Meeting, lane: usize) -> Option<(&CutOut, bool)> {
+    /// A triangle's holes, if it has any, and whether the hit is in one.
+    fn holes(&self, kind: Kind, hits: &LeafHits, lane: usize) -> Option<(&CutOut, bool)> {
         let cut_out = self.cut_outs.get(kind.cut_out as usize)?;
         let [a, b, c] = cut_out.st;
-        let st = a + (b - a) * meeting.u[lane] + (c - a) * meeting.v[lane];
+        let st = a + (b - a) * hits.u[lane] + (c - a) * hits.v[lane];
         Some((cut_out, !cut_out.holes.is_solid(st)))
     }
 
-    /// What a ray meets of a leaf's triangle, unless it is a hole there. Of what is drawn from both sides both are fronts.
-    fn hit(&self, leaf: &Leaf, meeting: &Meeting, lane: usize) -> Option<Hit> {
+    /// The hit of a leaf's triangle, unless it is in a hole. Two-sided materials have two fronts.
+    fn hit(&self, leaf: &Leaf, hits: &LeafHits, lane: usize) -> Option<Hit> {
         let kind = *leaf.kinds.get(lane)?;
         // The determinant is positive against the counter-clockwise side.
-        let mut front = meeting.determinant[lane] < 0.0;
-        // Clockwise corners: the front is the other way.
+        let mut front = hits.determinant[lane] < 0.0;
+        // Corners are clockwise: the front is the opposite side.
         let mut normal = at(&leaf.e2, lane)
             .cross(at(&leaf.e1, lane))
             .normalize_or_zero();
-        if let Some((cut_out, hole)) = self.holes(kind, meeting, lane) {
+        if let Some((cut_out, hole)) = self.holes(kind, hits, lane) {
             if hole {
                 return None;
             }
@@ -215,7 +216,7 @@ impl Occluders {
             }
         }
         Some(Hit {
-            t: meeting.t[lane],
+            t: hits.t[lane],
             sky: kind.sky,
             front,
             tag: kind.tag,
@@ -224,46 +225,46 @@ impl Occluders {
     }
 
     /// Whether a leaf stops a ray.
-    fn stops(&self, leaf: u32, ray: &Ray, through_sky: bool) -> bool {
+    fn blocks(&self, leaf: u32, ray: &Ray, through_sky: bool) -> bool {
         let Some(leaf) = self.leaves.get(leaf as usize) else {
             return false;
         };
-        let meeting = leaf.meet(ray, SHORT);
-        lanes(meeting.mask).any(|lane| {
-            let stops = |kind: &Kind| {
-                let hole = self.holes(*kind, &meeting, lane);
+        let hits = leaf.intersect(ray, SHORT);
+        lanes(hits.mask).any(|lane| {
+            let blocks = |kind: &Kind| {
+                let hole = self.holes(*kind, &hits, lane);
                 !(through_sky && kind.sky || hole.is_some_and(|(_, hole)| hole))
             };
-            leaf.kinds.get(lane).is_some_and(stops)
+            leaf.kinds.get(lane).is_some_and(blocks)
         })
     }
 
-    /// Whether some triangle is sky.
+    /// Whether any triangle is sky.
     pub fn any_sky(&self) -> bool {
         let mut kinds = self.leaves.iter().flat_map(|leaf| &leaf.kinds);
         kinds.any(|kind| kind.sky)
     }
 
-    /// Whether something lies on the way. `through_sky`: sky does not count.
+    /// Whether a segment is blocked. `through_sky`: sky does not block.
     pub fn blocked(&self, from: Vec3, to: Vec3, through_sky: bool) -> bool {
         let ray = Ray::new(from, to - from);
-        self.stopper(&ray, through_sky).is_some()
+        self.blocking_leaf(&ray, through_sky).is_some()
     }
 
-    /// As [`blocked`](Self::blocked) where sky counts; `last` is what stopped an earlier ray: it is asked first, for
-    /// rays from about one place to another are often stopped by the same triangle.
+    /// [`blocked`](Self::blocked) with sky blocking; `last`, the occluder of an earlier ray, is tested first: rays
+    /// between similar points are often stopped by the same triangle.
     pub fn blocked_hinted(&self, from: Vec3, to: Vec3, last: &mut Option<u32>) -> bool {
         let ray = Ray::new(from, to - from);
-        if last.is_some_and(|leaf| self.stops(leaf, &ray, false)) {
+        if last.is_some_and(|leaf| self.blocks(leaf, &ray, false)) {
             return true;
         }
-        let stopper = self.stopper(&ray, false);
-        *last = stopper.or(*last);
-        stopper.is_some()
+        let blocking_leaf = self.blocking_leaf(&ray, false);
+        *last = blocking_leaf.or(*last);
+        blocking_leaf.is_some()
     }
 
-    /// A leaf that stops a ray. Which of them is all the same, so that none has to be the nearest.
-    fn stopper(&self, ray: &Ray, through_sky: bool) -> Option<u32> {
+    /// Any leaf that stops a ray, not necessarily the nearest.
+    fn blocking_leaf(&self, ray: &Ray, through_sky: bool) -> Option<u32> {
         let mut stack = [0; STACK];
         let mut depth = 0;
         let mut more = Vec::new();
@@ -281,7 +282,7 @@ impl Occluders {
                         None => more.push(node.children[lane]),
                     }
                 }
-            } else if self.stops(at & !LEAF, ray, through_sky) {
+            } else if self.blocks(at & !LEAF, ray, through_sky) {
                 return Some(at & !LEAF);
             }
             next = more.pop().or_else(|| {
@@ -300,10 +301,10 @@ impl Occluders {
             let Some(leaf) = self.leaves.get(index as usize) else {
                 return false;
             };
-            let meeting = leaf.meet(&ray, *limit);
-            for lane in lanes(meeting.mask) {
-                if meeting.t[lane] < *limit
-                    && let Some(hit) = self.hit(leaf, &meeting, lane)
+            let hits = leaf.intersect(&ray, *limit);
+            for lane in lanes(hits.mask) {
+                if hits.t[lane] < *limit
+                    && let Some(hit) = self.hit(leaf, &hits, lane)
                 {
                     *limit = hit.t;
                     nearest = Some(hit);
@@ -314,8 +315,8 @@ impl Occluders {
         nearest
     }
 
-    /// Shows the leaves that a ray comes to before `limit`, near ones first, until `leaf` has seen enough (true) or all;
-    /// whether it has. It may lower the limit.
+    /// Visits leaves along a ray before `limit`, roughly front to back, until `leaf` returns true; returns whether
+    /// it did. `leaf` may lower the limit.
     fn walk(&self, ray: &Ray, mut limit: f32, mut leaf: impl FnMut(u32, &mut f32) -> bool) -> bool {
         let mut stack = Stack::new();
         let mut next = (!self.nodes.is_empty()).then_some(0);
@@ -340,10 +341,10 @@ impl Occluders {
     }
 }
 
-/// Part of the way to a place beyond which it is the place itself that is met.
+/// Part of a segment that is tested: at its end the target itself would be hit.
 const SHORT: f32 = 0.9999;
 
-/// What a walk has still to see.
+/// Traversal stack.
 struct Stack {
     /// References, and where on the ray their boxes begin.
     entries: [(u32, f32); STACK],
@@ -361,7 +362,7 @@ impl Stack {
         }
     }
 
-    /// Adds a child. Of those above `from`, which are its node's, the nearest stays on top.
+    /// Pushes a child. Of the entries above `from`, which are of its node, the nearest stays on top.
     fn push(&mut self, reference: u32, near: f32, from: usize) {
         let Some(slot) = self.entries.get_mut(self.depth) else {
             self.more.push((reference, near));
@@ -376,7 +377,7 @@ impl Stack {
         }
     }
 
-    /// The next that begins before the limit.
+    /// Pops the next entry that begins before the limit.
     fn pop(&mut self, limit: f32) -> Option<u32> {
         loop {
             let (reference, near) = match self.more.pop() {
@@ -394,7 +395,7 @@ impl Stack {
 }
 
 impl Node {
-    /// The children whose boxes a ray comes into before `limit`, a bit for each, and where.
+    /// Children whose boxes a ray enters before `limit`, one bit each, and the entry distances.
     fn enters(&self, ray: &Ray, limit: f32) -> (u32, Vec4) {
         let mut near = Vec4::ZERO;
         let mut far = Vec4::splat(limit);
@@ -425,15 +426,15 @@ impl Leaf {
         }
     }
 
-    /// Where a ray meets the triangles, from either side.
-    fn meet(&self, ray: &Ray, limit: f32) -> Meeting {
-        let p = cross(&ray.way, &self.e2);
+    /// Intersections with the triangles, from either side.
+    fn intersect(&self, ray: &Ray, limit: f32) -> LeafHits {
+        let p = cross(&ray.direction, &self.e2);
         let determinant = dot(&self.e1, &p);
         let inverse = 1.0 / determinant;
         let s = sub(&ray.from, &self.a);
         let u = dot(&s, &p) * inverse;
         let q = cross(&s, &self.e1);
-        let v = dot(&ray.way, &q) * inverse;
+        let v = dot(&ray.direction, &q) * inverse;
         let t = dot(&self.e2, &q) * inverse;
         let inside = u.cmpge(Vec4::ZERO)
             & u.cmple(Vec4::ONE)
@@ -442,7 +443,7 @@ impl Leaf {
             & t.cmpgt(Vec4::splat(1e-5))
             & t.cmplt(Vec4::splat(limit))
             & determinant.cmpne(Vec4::ZERO);
-        Meeting {
+        LeafHits {
             mask: inside.bitmask(),
             t,
             u,

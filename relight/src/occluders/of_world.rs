@@ -1,4 +1,4 @@
-//! What stops light in a world.
+//! The occluders of a world.
 
 use super::{CutOut, Occluders};
 use crate::world::{RelitWorld, WorldMaterial};
@@ -7,8 +7,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 impl Occluders {
-    /// Triangles that stop light: those of the world itself that are opaque, and cut-outs where these are there, if anybody
-    /// knows where that is. Tagged with their number.
+    /// Triangles of the world model that stop light: opaque ones, and cut-outs with their holes where these are
+    /// known. The tag is the triangle's index.
     pub(crate) fn of_world(world: &RelitWorld) -> Occluders {
         let drawn = world.surfaces.iter().filter(|s| {
             let material = world.materials.get(s.material as usize);

@@ -1,4 +1,4 @@
-//! Rays that are known to meet something, or not.
+//! Rays with known hits.
 
 use super::*;
 use support::random::Random;
@@ -58,18 +58,18 @@ fn agrees_with_trying_every_triangle() {
 #[test]
 fn rays_along_faces_are_stopped_and_deep_trees_are_seen_to_their_end() {
     // Ever farther off, so that the tree is as deep as can be; a ray passes by all but one.
-    let input = |stops: i32| {
+    let input = |blocker: i32| {
         (0..120).map(move |k| {
             let x = (k as f32 * 0.8).exp2();
-            let far = if k == stops { 9.0 } else { 1.0 };
+            let far = if k == blocker { 9.0 } else { 1.0 };
             let corners = [[-1.0, -1.0], [-1.0, far], [far, -1.0]];
             (corners.map(|[y, z]| Vec3::new(x, y, z)), false, k as u32)
         })
     };
-    for stops in 0..120 {
-        let tree = Occluders::new(input(stops));
+    for blocker in 0..120 {
+        let tree = Occluders::new(input(blocker));
         let hit = tree.nearest(Vec3::splat(0.5), Vec3::X, f32::INFINITY);
-        assert_eq!(hit.map(|h| h.tag), Some(stops as u32));
+        assert_eq!(hit.map(|h| h.tag), Some(blocker as u32));
     }
     // Along a side of the box around a triangle.
     for side in [Vec3::X, Vec3::NEG_X] {

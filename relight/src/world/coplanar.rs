@@ -1,5 +1,6 @@
-//! Surfaces that lie in one plane with others: posters on walls, decals, paint. The engine draws them in the order of its
-//! own (polygon offset first, then sort value, then material), rays and other programs' depth know none.
+//! Coplanar rank: the order of surfaces that share a plane with others (posters on walls, decals, paint). The
+//! engine draws them in its own order (polygon offset, then sort value, then material); ray tracing and depth
+//! buffers of other programs have none.
 
 use super::{RelitWorld, WorldSurface};
 use glam::{Vec2, Vec3};
@@ -8,19 +9,18 @@ use shaderscript::light::SurfaceClass;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// Surfaces that are no farther apart lie in one plane, units. Compilers compute the corners of both from the same plane
-/// in single precision; what mappers put before a wall themselves stands 1/16 or more before it.
+/// Largest distance of coplanar surfaces, id units. Compilers compute both surfaces' corners from the same plane in
+/// single precision; surfaces that mappers place before a wall are 1/16 or more away.
 pub const APART: f32 = 0.01;
-/// Triangles that overlap by no more than this lie side by side, units.
+/// Overlap up to which triangles count as side by side, id units.
 const TOUCHING: f32 = 0.01;
-/// Cells of normals and of distances from the origin in which planes are looked for, and how much two that are one may
-/// differ in them.
+/// Cell size and tolerance of the plane lookup: normals, and distances from the origin, id units.
 const NORMAL_CELL: (f32, f32) = (1.0 / 16.0, 1.0 / 256.0);
 const DISTANCE_CELL: (f32, f32) = (4.0, 0.25);
-/// Most pairs of triangles that are compared: damaged maps put all of theirs in one place.
+/// Largest number of triangle pairs that are compared: damaged maps place all triangles in one spot.
 const MOST_PAIRS: usize = 1 << 26;
 
-/// What the engine orders surfaces in one plane by; the greater is drawn over the smaller.
+/// The engine's drawing order in a plane; greater is drawn later, above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DrawOrder {
     /// The material has `polygonOffset`: it is moved towards the eye.
@@ -52,7 +52,7 @@ pub struct Sheet {
     pub triangles: Vec<[Vec3; 3]>,
 }
 
-/// Where a surface lies among those that share its plane.
+/// Position of a surface among those that share its plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stacked {
     /// Rank: surfaces below it, one on the other. 0: it lies on nothing.
@@ -64,14 +64,14 @@ pub struct Stacked {
 }
 
 impl Stacked {
-    /// How high it lies: 0 at the bottom, 1 on top. Of two surfaces that overlap the upper has the greater share.
+    /// Relative height: 0 at the bottom, 1 on top. Of two overlapping surfaces the upper one has the greater share.
     pub fn share(self) -> f32 {
         self.below as f32 / (self.below + self.above).max(1) as f32
     }
 
-    /// Unit vectors along which the vertices of the surface rise from what it lies on, by their numbers; `triangles`: the
-    /// surface's, by number and place of each corner. A vertex of a bent surface rises along the mean of its triangles,
-    /// so that no gap opens between them.
+    /// Unit vectors, by vertex index, along which the surface's vertices are raised; `triangles`: index and
+    /// position of each corner. A vertex of a curved surface is raised along the mean of its triangles' normals, so
+    /// that no gap opens.
     pub fn directions(
         self,
         triangles: impl Iterator<Item = ([u32; 3], [Vec3; 3])>,
@@ -91,8 +91,8 @@ impl Stacked {
 }
 
 impl RelitWorld {
-    /// Where each surface lies among those that share its plane; skies, fog, what is not drawn and what `deformVertexes`
-    /// moves lie on nothing.
+    /// Coplanar rank of each surface. Skies, fog, surfaces that are not drawn and those moved by `deformVertexes`
+    /// have rank 0.
     pub fn stacked(&self) -> Vec<Stacked> {
         let sheet = |surface: &WorldSurface| {
             let material = self.materials.get(surface.material as usize);
@@ -128,7 +128,7 @@ impl RelitWorld {
     }
 }
 
-/// A triangle in its plane.
+/// A triangle projected to its plane.
 struct Flat {
     sheet: usize,
     corners: [Vec3; 3],
@@ -140,11 +140,10 @@ struct Flat {
     maxs: Vec2,
 }
 
-/// A cell of planes, whichever way they face, of a model.
+/// Model and lookup cell of a plane, regardless of its orientation.
 type Cell = (u32, [i32; 4]);
 
-/// Where each of `sheets` lies among the others. Surfaces of one material have no order among themselves, and are not
-/// compared.
+/// Rank of each of `sheets`. Surfaces of one material have no order and are not compared.
 pub fn stack(sheets: &[Sheet]) -> Vec<Stacked> {
     let mut on: Vec<BTreeSet<(usize, bool)>> = vec![BTreeSet::new(); sheets.len()];
     for (lower, upper, alike) in overlaps(sheets) {
@@ -189,8 +188,8 @@ pub fn stack(sheets: &[Sheet]) -> Vec<Stacked> {
     stacked
 }
 
-/// Pairs of sheets that overlap in one plane and show the same side there: the lower, the upper, and whether their
-/// triangles face the same way.
+/// Pairs of sheets that overlap in one plane with the same visible side: the lower, the upper, and whether their
+/// triangles face the same side.
 fn overlaps(sheets: &[Sheet]) -> BTreeSet<(usize, usize, bool)> {
     let mut planes: HashMap<Cell, Vec<Flat>> = HashMap::new();
     for (number, sheet) in sheets.iter().enumerate() {
@@ -257,7 +256,7 @@ fn overlap(sheets: &[Sheet], a: &Flat, b: &Flat) -> Option<(usize, usize, bool)>
     })
 }
 
-/// Whether two triangles overlap: no line along a side of either has one on each of its sides.
+/// Whether two triangles overlap (separating axis test).
 fn overlap_flat(a: &[Vec2; 3], b: &[Vec2; 3]) -> bool {
     let range = |t: &[Vec2; 3], axis: Vec2| {
         let [p, q, r] = t.map(|v| v.dot(axis));
@@ -271,18 +270,17 @@ fn overlap_flat(a: &[Vec2; 3], b: &[Vec2; 3]) -> bool {
     !(sides(a).into_iter().chain(sides(b))).any(|side| apart(side.perp().normalize_or_zero()))
 }
 
-/// Unit normal on the front, which is where corners go round clockwise; `None` for a triangle without area, or without
-/// numbers.
+/// Unit normal of the front (clockwise corners); `None` for degenerate or non-finite triangles.
 fn front_of([a, b, c]: [Vec3; 3]) -> Option<Vec3> {
     (c - a).cross(b - a).try_normalize()
 }
 
-/// The cells that a triangle's plane lies in: more than one where it is close to their border.
+/// Lookup cells of a triangle's plane: several if it is near a cell border.
 fn cells(model: u32, corners: [Vec3; 3]) -> Vec<Cell> {
     let Some(front) = front_of(corners) else {
         return Vec::new();
     };
-    // one of the two ways that the plane faces; those that lean to none of them clearly are looked for by both
+    // One orientation of the plane; both, if neither is clear.
     let lean = front.x + 0.7 * front.y + 0.4 * front.z;
     let sides = [1.0, -1.0].map(|s| (s * lean > -NORMAL_CELL.1).then_some(front * s));
     let range = |x: f32, (size, slack): (f32, f32)| {
@@ -302,7 +300,7 @@ fn cells(model: u32, corners: [Vec3; 3]) -> Vec<Cell> {
     found
 }
 
-/// A triangle in a cell: all of one cell are looked at along the same axis.
+/// A triangle projected along the common axis of a cell.
 fn flat(sheet: usize, corners: [Vec3; 3], (_, [x, y, z, _]): Cell) -> Option<Flat> {
     let front = front_of(corners)?;
     let [a, b, c] = corners;

@@ -1,4 +1,4 @@
-//! Fog volumes with what fills them.
+//! Fog volumes with their colour and density.
 
 use crate::files::GameFiles;
 use crate::materials::Materials;
@@ -19,9 +19,9 @@ pub struct WorldFog {
 /// Depth of a fog that hides nothing, id units.
 const CLEAR: f32 = 1.0e9;
 
-/// The fogs of a map, and what is wrong with them. Colour and depth come from `fogParms` of the fog's material. A fog
-/// without them is black and of depth 1 in a brush, as the engine's zeroed parameters are; where it fills the world, which
-/// the engine does not load, it hides nothing.
+/// Fog volumes of a map, and warnings. Colour and depth come from `fogParms` of the fog's material. Without it, a
+/// fog brush is black with depth 1, as the engine's zero-initialized parameters; a fog of the whole world, which
+/// the engine rejects, hides nothing.
 pub(crate) fn fogs(
     bsp: &Bsp,
     files: &dyn GameFiles,

@@ -1,4 +1,4 @@
-//! Surfaces of a map to flat vertex and index arrays.
+//! Flat vertex and index arrays from the surfaces of a map.
 
 use crate::overbright;
 use glam::{Vec2, Vec3};
@@ -71,7 +71,7 @@ pub struct WorldModel {
     pub origin: Vec3,
 }
 
-/// A corona: a point that shows a glow when it can be seen.
+/// A corona at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flare {
     /// Position, id units.
@@ -89,14 +89,14 @@ pub struct Flare {
     pub fog: u32,
 }
 
-/// Vertices and triangles while they are gathered.
+/// Vertices and triangles under construction.
 #[derive(Default)]
 pub(crate) struct Geometry {
     pub vertices: Vec<WorldVertex>,
     pub indices: Vec<u32>,
 }
 
-/// Where one surface's geometry lies, and what follows from it.
+/// Range of a surface's geometry, and derived values.
 pub(crate) struct Placed {
     pub first_vertex: u32,
     pub num_vertices: u32,
@@ -177,9 +177,9 @@ impl Geometry {
             .extend(corners.iter().take(whole).map(|c| base + c));
     }
 
-    /// Gives a planar surface its plane. The stored normal is zero in many maps: then the triangles'
-    /// winding decides, then the vertices' own normals. Compilers also join faces that bend into one "planar"
-    /// surface: such a one has no plane, and keeps the normals of its vertices.
+    /// Sets the plane of a planar surface. Many maps store a zero normal: then the triangles' winding decides, then
+    /// the vertex normals. Compilers also merge bent faces into one "planar" surface, which keeps its vertex
+    /// normals and has no plane.
     fn flatten(&mut self, first_vertex: u32, first_index: u32, stored: Vec3) -> Option<Plane> {
         let geometric = self.front(first_index);
         let vertices = self.vertices.get(first_vertex as usize..)?;
@@ -201,14 +201,14 @@ impl Geometry {
         })
     }
 
-    /// Whether some triangle from `first_index` on, slivers apart, faces more than about eight degrees away
-    /// from `normal`.
+    /// Whether a triangle from `first_index` on, except slivers, deviates by more than about eight degrees from
+    /// `normal`.
     fn bends(&self, first_index: u32, normal: Vec3) -> bool {
         let corners = self.indices.get(first_index as usize..).unwrap_or_default();
         corners.as_chunks::<3>().0.iter().any(|triangle| {
             let front = self.triangle_front(triangle);
             let area = front.length();
-            // a sliver's direction is rounding
+            // the normal of a sliver is rounding noise
             area > 1.0 && front.dot(normal) < 0.99 * area
         })
     }
@@ -234,7 +234,7 @@ impl Geometry {
         (c - a).cross(b - a)
     }
 
-    /// Unit normals for vertices that have none: the mean of their triangles' fronts, else up.
+    /// Sets missing vertex normals to the mean normal of the adjacent triangles, else up.
     fn repair_normals(&mut self, first_vertex: u32, first_index: u32) {
         let first_vertex = first_vertex as usize;
         let broken = |v: &WorldVertex| v.normal.normalize_or_zero() == Vec3::ZERO;

@@ -1,11 +1,11 @@
-//! Where a material with an alpha test lets light through, for rays on the CPU.
+//! Transparent texels of materials with an alpha test, for rays on the CPU.
 
 use crate::image::Image;
 use glam::Vec2;
 use shaderscript::light::cut_out_stage;
 use shaderscript::{AlphaGen, Shader, StageImage, TcGen};
 
-/// Which texels of a material are there.
+/// Opacity of a material's texels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Holes {
     width: u32,
@@ -18,8 +18,8 @@ pub struct Holes {
 }
 
 impl Holes {
-    /// The holes of a cut-out; `None` for other materials, for pictures without holes, and where holes move: then nobody
-    /// knows. `image` gives a picture by its name.
+    /// Holes of a cut-out; `None` for other materials, for images without holes, and for animated holes, which are
+    /// unknown. `image` returns a picture by name.
     pub(crate) fn of(
         shader: &Shader,
         two_sided: bool,
@@ -51,7 +51,7 @@ impl Holes {
         })
     }
 
-    /// Whether there is something at texture coordinates.
+    /// Whether the texel at these coordinates is opaque.
     pub(crate) fn is_solid(&self, st: Vec2) -> bool {
         let at = |t: f32, side: u32| -> usize {
             let t = if self.clamp {
@@ -65,7 +65,7 @@ impl Holes {
         self.solid.get(index).copied().unwrap_or(true)
     }
 
-    /// What tells one from another, for a hash.
+    /// Identity for a hash.
     pub(crate) fn bytes(&self) -> Vec<u8> {
         let mut bytes: Vec<u8> = self.solid.iter().map(|s| u8::from(*s)).collect();
         bytes.extend(self.width.to_le_bytes());

@@ -1,5 +1,4 @@
-//! All light of a world, to be kept and put back: a world can be seen in the light that its directives tell of, and in
-//! the light that calibration found.
+//! A snapshot of a world's light, to switch between the directives' light and the calibrated light.
 
 use super::RelitWorld;
 use crate::emitters::{
@@ -8,8 +7,8 @@ use crate::emitters::{
 use crate::exposure::Exposure;
 use glam::Vec3;
 
-/// What light a world is in: everything that [`measure_materials`](RelitWorld::measure_materials),
-/// [`calibrate`](crate::calibrate()) and [`sweep`](crate::light::sweep()) change of it.
+/// Everything that [`measure_materials`](RelitWorld::measure_materials), [`calibrate`](crate::calibrate()) and
+/// [`sweep`](crate::light::sweep()) change in a world.
 #[derive(Debug, Clone)]
 pub struct Lighting {
     lights: Vec<TriangleLight>,
@@ -31,7 +30,7 @@ pub struct Lighting {
 }
 
 impl RelitWorld {
-    /// A copy of the light that the world is in.
+    /// Copies the world's light.
     pub fn lighting(&self) -> Lighting {
         Lighting {
             lights: self.lights.clone(),
@@ -53,7 +52,7 @@ impl RelitWorld {
         }
     }
 
-    /// Puts the world into a light that it was in before.
+    /// Restores a snapshot.
     pub fn set_lighting(&mut self, lighting: Lighting) {
         self.lights = lighting.lights;
         self.triangle_lights = lighting.triangle_lights;

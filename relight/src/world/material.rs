@@ -1,4 +1,4 @@
-//! Materials of a world: each combination of name, flags and lighting that its surfaces use.
+//! Materials of a world: one for each combination of name, flags and lighting that its surfaces use.
 
 use super::holes::Holes;
 use super::pages::{BakedPages, PageLoader};
@@ -77,25 +77,25 @@ impl WorldMaterial {
         }
     }
 
-    /// What the compiler multiplied light by before it stored it in lightmaps of this material: by so much less than the
-    /// light that falls on them lightmapped surfaces show.
+    /// Factor that the compiler applied to light before storing it in lightmaps of this material; the surface shows
+    /// its light by this factor.
     ///
-    /// Such surfaces are meant to look darker, or brighter, than light and texture make them: it is part of what they
-    /// throw back (their [`albedo`](Self::albedo) has it), not of the light.
+    /// The author wanted such surfaces darker or brighter than their light: the factor is part of the
+    /// [`albedo`](Self::albedo), not of the light.
     pub fn stored_scale(&self) -> f32 {
         let says = self.resolved.definition().light.lightmap_brightness;
         let lightmapped = self.lighting == ImplicitKind::Lightmapped;
         emitters::stored_scale(says.filter(|_| lightmapped))
     }
 
-    /// Whether it is sky, for the map or for its script.
+    /// Whether the map's flags or the script make it sky.
     pub fn is_sky(&self) -> bool {
         self.surface_flags & q3bsp::surface_flags::SKY != 0 || self.resolved.shader.sky.is_some()
     }
 }
 
-/// The lightmap index that the engine uses for a surface: triangle soups are lit by vertex, and so is what
-/// names a page that is not there or a code that does not exist.
+/// Lightmap index that the engine uses for a surface: triangle soups are lit by vertex, as are surfaces with a page
+/// or code that does not exist.
 pub(crate) fn lightmap_of(bsp: &Bsp, index: usize) -> i32 {
     let Some(surface) = bsp.surfaces.get(index) else {
         return lightmap_index::BY_VERTEX;
@@ -111,7 +111,7 @@ pub(crate) fn lightmap_of(bsp: &Bsp, index: usize) -> i32 {
     }
 }
 
-/// The implicit material that belongs to a lightmap index.
+/// Implicit material of a lightmap index.
 pub(crate) fn lighting_of(lightmap: i32) -> ImplicitKind {
     match lightmap {
         0.. => ImplicitKind::Lightmapped,

@@ -1,4 +1,4 @@
-//! A map, relit: geometry in flat arrays, materials resolved, light sources found.
+//! A relit map: flat geometry, resolved materials, light sources.
 
 pub mod coplanar;
 pub(crate) mod fog;
@@ -25,7 +25,7 @@ use crate::overbright;
 use glam::Vec3;
 use q3bsp::{Bsp, Lightmap};
 
-/// A map made ready for tracing and for drawing.
+/// A map prepared for tracing and rasterization.
 ///
 /// `surfaces` has one entry per surface of the map, under the same index.
 #[derive(Debug)]
@@ -55,36 +55,35 @@ pub struct RelitWorld {
     pub fogs: Vec<WorldFog>,
     /// Emitting triangles; those of one surface follow each other.
     pub lights: Vec<TriangleLight>,
-    /// Light entities left in the map, then those that calibration put in.
+    /// Light entities left in the map, then lights placed by calibration.
     pub point_lights: Vec<PointLight>,
     /// Suns.
     pub suns: Vec<SunLight>,
-    /// Which lights matter where.
+    /// Light lists of the clusters.
     pub light_lists: LightLists,
-    /// Radiance that comes from everywhere: the compiler's ambient term, or what calibration found for it.
+    /// Ambient radiance: the compiler's, or the fitted one.
     pub ambient: Vec3,
     /// Material of the sky that covers the largest area; `None` for a map without sky.
     pub sky: Option<u32>,
-    /// What was found, and by which evidence.
+    /// Light sources found, and their evidence.
     pub report: LightReport,
-    /// How well light agrees with the map's lightmaps; `None` when nobody asked.
+    /// Result of calibration; `None` if the world is not calibrated.
     pub calibration: Option<CalibrationReport>,
-    /// What was wrong and is made up for: missing materials, repaired values. Each thing once.
+    /// Problems that were repaired: missing materials, invalid values. Each appears once.
     pub warnings: Vec<String>,
-    /// Which colours stored light and directives mean.
+    /// How colours of stored light and directives are interpreted.
     pub light_color: LightColor,
     /// What ratios of the channels of stored light were raised to, to get the colours of light: see
     /// [`LightColor`].
     pub color_exponent: f32,
-    /// Gamma g that the map's compiler encoded light with before it stored it, L^(1 / g); 1 where it stored light as it is,
-    /// and where nobody [calibrated](crate::calibrate()) to find out. Light is counted in a unit in which what the engine
-    /// shows as white is 1 with any gamma.
+    /// Gamma g of the map's compiler, which stored L^(1 / g); 1 if it stored light unchanged or if the world is not
+    /// [calibrated](crate::calibrate()). The unit of light is display white for any gamma.
     pub stored_gamma: f32,
-    /// Light, irradiance / π without shadows, that a surface must get from one light to get any: compilers that save time
-    /// leave out what adds less than a step of light. 0: lights have no end. Suns and skies have none. Found by
+    /// Light cutoff: unshadowed irradiance over π that a light must exceed at a surface to light it. Fast compiler
+    /// modes leave out contributions below one step of light. 0: no cutoff. Suns and skies have none. Found by
     /// [calibration](crate::calibrate()).
     pub light_cutoff: f32,
-    /// Exposure at which the world's light, on the map's textures, is as bright in the mean as the engine shows the map:
+    /// Exposure at which the world's light on the map's textures has the mean brightness of the engine's picture:
     /// found by [calibration](crate::calibrate()). `None`: see [`display_exposure`](Self::display_exposure).
     pub exposure: Option<Exposure>,
     /// Shift that was applied to vertex colours; see [`overbright`].
@@ -138,7 +137,7 @@ impl RelitWorld {
         Some([vertex(a)?, vertex(b)?, vertex(c)?])
     }
 
-    /// How a light changes in time; `None` for most.
+    /// Change of a light over time; `None` if it is constant.
     pub fn flicker_of(&self, light: &TriangleLight) -> Option<&Flicker> {
         let surface = self.surfaces.get(light.surface as usize)?;
         self.materials
@@ -147,8 +146,7 @@ impl RelitWorld {
             .as_ref()
     }
 
-    /// The exposure that the map is shown with: what calibration found; else from its lightmaps, or from the colours of its
-    /// vertices.
+    /// Exposure for showing the map: from calibration, else from its lightmaps or vertex colours.
     pub fn display_exposure(&self) -> Exposure {
         let stored = || exposure::of_stored_light(&self.bsp, &self.pages, self.stored_gamma);
         self.exposure.unwrap_or_else(stored)

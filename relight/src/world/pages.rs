@@ -1,8 +1,8 @@
-//! Baked light that scripts name beside the surfaces' own pages: images for lightmaps, and light of further styles.
+//! Baked light that scripts name besides the surfaces' own pages: lightmap images, and light styles.
 //!
-//! [`shaderscript::light::baked_light`] finds the stages. Here they leave the materials: the main light becomes an ordinary
-//! `$lightmap` stage, whose page is an image, and the stages of styles are taken out, so that whoever reads a material finds
-//! one light and the albedo under it.
+//! [`shaderscript::light::baked_light`] finds the stages. They are removed from the materials: the main light
+//! becomes an ordinary `$lightmap` stage with an image as its page, and the stages of styles are taken out, so that
+//! a material has one light and the albedo below it.
 
 use crate::emitters::StyleStrength;
 use crate::files::GameFiles;
@@ -12,7 +12,7 @@ use shaderscript::light::{BakedLight, baked_light};
 use shaderscript::{Shader, Stage, StageImage, TcMod};
 use std::collections::HashMap;
 
-/// Baked light of a material beside the page that each of its surfaces names in the map.
+/// Baked light of a material besides the page that the map assigns to each surface.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BakedPages {
     /// Index into [`RelitWorld::pages`](crate::RelitWorld::pages) of the page that has the main light; `None`: the surface's own.
@@ -21,7 +21,7 @@ pub struct BakedPages {
     pub styles: Vec<StyleLight>,
 }
 
-/// Light of a style: where it is stored, and how bright it is at a time.
+/// Baked light of a style: its page and its strength over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StyleLight {
     /// Index into [`RelitWorld::pages`](crate::RelitWorld::pages); `None`: the surface's own page.
@@ -32,7 +32,7 @@ pub struct StyleLight {
     pub strength: StyleStrength,
 }
 
-/// The pages that scripts name, each once.
+/// Loader of pages that scripts name; each is loaded once.
 pub(crate) struct PageLoader<'a> {
     files: &'a dyn GameFiles,
     known: HashMap<String, Option<u32>>,
@@ -51,7 +51,7 @@ impl<'a> PageLoader<'a> {
         }
     }
 
-    /// Takes baked light out of a material's stages but for one `$lightmap` stage, and says where it lies.
+    /// Removes baked light from a material's stages except for one `$lightmap` stage, and returns it.
     pub fn take(&mut self, shader: &mut Shader) -> BakedPages {
         let mut baked = BakedPages::default();
         let mut kinds = baked_light(&shader.stages).into_iter();
@@ -77,7 +77,7 @@ impl<'a> PageLoader<'a> {
         baked
     }
 
-    /// The page of a stage's image; `None` for `$lightmap`, and where the image is unusable.
+    /// Page of a stage's image; `None` for `$lightmap` and unusable images.
     fn page(&mut self, stage: &Stage) -> Option<u32> {
         let name = stage.image.names().first()?;
         if let Some(&page) = self.known.get(&name.to_ascii_lowercase()) {
@@ -98,7 +98,7 @@ impl<'a> PageLoader<'a> {
     }
 }
 
-/// An image as a page as wide as high: texels of its shorter side are repeated.
+/// A square page from an image: texels of its shorter side are repeated.
 fn square(image: &Image) -> Lightmap {
     let side = image.width.max(image.height) as usize;
     let (width, height) = (image.width as usize, image.height as usize);

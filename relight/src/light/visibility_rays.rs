@@ -1,5 +1,5 @@
-//! What rays tell of pairs of a light and a cluster: two rounds of them, and what may be left out after these. Why so
-//! is in [`sweep`](mod@super::sweep).
+//! Visibility rays of the sweep: two rounds of rays for each pair of light and cluster, and the decision which
+//! lights are dropped. [`sweep`](mod@super::sweep) derives the bounds.
 
 use super::receivers::{Receiver, Target, luminance};
 use crate::occluders::Occluders;
@@ -8,68 +8,73 @@ use glam::Vec3;
 use support::parallel;
 use support::random::Random;
 
-/// Part of a cluster's light that may be left out of its list. The step of a display in sRGB from one code to the next
-/// is about 2.4 / (code + 14) of the light: 0.9 % at the bright end and more below. This is a quarter of it at the most.
+/// Part of a cluster's light that its list may lack. One code of an sRGB display is about 2.4 / (code + 14) of the
+/// light: 0.9 % at the bright end and more below. This is at most a quarter of it.
 pub const DROPPED_PART: f32 = 0.002;
 
-/// Light (irradiance / π, luminance) that may be left out of a dark cluster's list: a tenth of the first display code.
+/// Light (irradiance over π, luminance) that the list of a dark cluster may lack: a tenth of the first display
+/// code.
 pub const DROPPED_LEAST: f32 = 3.0e-5;
 
-/// Rays after which a light that was seen is known well enough.
-const ENOUGH: u32 = 6;
+/// Rays after which a light with a hit is known well enough.
+const ENOUGH_RAYS: u32 = 6;
 
 /// Most rays for a pair of light and cluster in the first round, and in the second.
-const MOST: u32 = 32;
-const MOST_AGAIN: u32 = 4096;
+const MAX_RAYS: u32 = 32;
+const MAX_RAYS_SECOND_ROUND: u32 = 4096;
 
-/// Rays that should have arrived where none did, at the most, with a confidence of 95 %: -ln 0.05.
-const UNSEEN: f32 = 3.0;
+/// 95 % confidence bound of the expected hits where none was observed: -ln 0.05.
+const MISSED_HITS: f32 = 3.0;
 
-/// Fewest, on maps of so many pairs that a bound on all rays would leave less.
-const FEWEST: u32 = 8;
+/// Fewest rays for a pair on maps where the ray budget would leave less.
+const MIN_RAYS: u32 = 8;
 
-/// A light that no ray found, but that arrives in a cluster beside, is charged with so many times its light: points at
-/// random seldom lie in the gap that it comes in through.
-const BESIDE_CHARGE: f32 = 256.0;
+/// Factor on the light of a pair without hits whose light arrives in a neighbouring cluster: random points seldom
+/// lie in the gap through which it enters.
+const NEIGHBOUR_CHARGE: f32 = 256.0;
 
-/// Clusters are beside each other when the boxes around their points meet, after these have been made wider by so many
-/// id units or by such a part of their size: points seldom lie at the very end of their cluster.
-const BESIDE: f32 = 2.0;
-const WIDER: f32 = 0.04;
+/// Clusters are neighbours when the boxes of their receivers intersect after widening by this margin, id units, or
+/// this part of their size: receivers seldom lie at the very end of their cluster.
+const NEIGHBOUR_MARGIN: f32 = 2.0;
+const NEIGHBOUR_WIDENING: f32 = 0.04;
 
-/// What is known of a light in a cluster.
+/// Result of the rays for a light in a cluster.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pair {
     pub entry: u32,
-    /// Mean light without shadows, irradiance / π, luminance.
+    /// Mean unshadowed light, irradiance over π, luminance.
     pub bare: f32,
-    /// The most that it would give to a point of the cluster without shadows, of those that looked.
+    /// Largest unshadowed light at a receiver.
     pub peak: f32,
     /// Mean light that arrives.
     arrived: f32,
     pub rays: u32,
     hits: u32,
-    /// Whether it arrives in a cluster beside.
-    beside: bool,
+    /// Whether it arrives in a neighbouring cluster.
+    in_neighbour: bool,
 }
 
-/// Least that is believed to arrive of a light, for one that arrives in a cluster beside and for others. Where such a
-/// light does come in after all, a smaller chance would make it rare and blinding: noise that no filter takes away.
+/// Smallest assumed visible part: of a light that arrives in a neighbouring cluster, and of others. If such a light
+/// does arrive, a smaller sampling probability would make it rare and bright: noise that no filter removes.
 const LEAST_VISIBLE: [f32; 2] = [0.1, 0.03];
 
 impl Pair {
-    /// What a light is charged with for being left out, for each ray that was sent.
-    fn ratio(&self) -> f32 {
+    /// Bound on the missed light for dropping this light, divided by its rays.
+    fn charge_per_ray(&self) -> f32 {
         self.charged() / self.rays.max(1) as f32
     }
 
-    /// Light as it counts for being left out: the most that a point could get, for the places that see a light may be
-    /// those that are next to it.
+    /// Light that dropping may lose: the peak, because the points that see a light may be those next to it.
     fn charged(&self) -> f32 {
-        self.peak * if self.beside { BESIDE_CHARGE } else { 1.0 }
+        self.peak
+            * if self.in_neighbour {
+                NEIGHBOUR_CHARGE
+            } else {
+                1.0
+            }
     }
 
-    /// Adds what more rays found.
+    /// Adds the result of more rays.
     fn add(&mut self, more: &Pair) {
         let [own, others] = [self.rays, more.rays].map(|n| n as f32);
         let all = (own + others).max(1.0);
@@ -80,20 +85,24 @@ impl Pair {
         self.hits += more.hits;
     }
 
-    /// About which part of the light arrives, above 0.
+    /// Estimated visible part of the light, above 0.
     pub fn visible(&self) -> f32 {
-        let [beside, alone] = LEAST_VISIBLE;
+        let [in_neighbour, other] = LEAST_VISIBLE;
         if self.rays == 0 {
-            // not known
+            // unknown
             return 1.0;
         }
-        let least = if self.beside { beside } else { alone };
+        let least = if self.in_neighbour {
+            in_neighbour
+        } else {
+            other
+        };
         ((self.hits as f32 + 0.5) / (self.rays as f32 + 1.0)).max(least)
     }
 }
 
-/// Looks at a light with `most` rays at the most; also the number that were sent.
-fn look(
+/// Sends at most `most` rays to a light; returns the result and the number of rays.
+fn trace_pair(
     entry: u32,
     target: &Target<'_>,
     receivers: &[Receiver],
@@ -105,7 +114,7 @@ fn look(
     let (mut bare, mut arrived, mut rays, mut hits, mut tries) = (0.0, 0.0, 0u32, 0u32, 0u32);
     let mut peak = 0.0f32;
     let start = (random.uniform() * receivers.len() as f32) as usize;
-    while rays < most && tries < 2 * most && (hits == 0 || rays < ENOUGH) {
+    while rays < most && tries < 2 * most && (hits == 0 || rays < ENOUGH_RAYS) {
         let Some(receiver) = receivers.get((start + tries as usize) % receivers.len()) else {
             break;
         };
@@ -126,7 +135,7 @@ fn look(
     let (bare, peak) = if rays > 0 {
         (bare / count, peak)
     } else {
-        // all that looked had it below their horizon or were behind it: others may just see its edge
+        // The light is below the horizon of, or behind, all receivers; other points may see its edge.
         let at = receivers.first().map_or(Vec3::ZERO, |r| r.position);
         (target.bare(at) / count, target.bare(at))
     };
@@ -137,13 +146,13 @@ fn look(
         arrived: arrived / count,
         rays: if rays > 0 { rays } else { tries },
         hits,
-        beside: false,
+        in_neighbour: false,
     };
     (pair, rays)
 }
 
-/// Looks from a cluster at the lights of its list, with as many rays as are `allowed` for all.
-pub(super) fn look_at_all(
+/// First round: rays from a cluster to the lights of its list, at most `allowed` in total.
+pub(super) fn first_round(
     world: &RelitWorld,
     row: &[u32],
     receivers: &[Receiver],
@@ -155,7 +164,7 @@ pub(super) fn look_at_all(
     let middle = sum / receivers.len().max(1) as f32;
     let targets = row.iter().filter_map(|&e| Some((e, Target::of(world, e)?)));
     let mut targets: Vec<_> = targets.map(|(e, t)| (t.bare(middle), e, t)).collect();
-    if allowed < targets.len() as u64 * u64::from(FEWEST) {
+    if allowed < targets.len() as u64 * u64::from(MIN_RAYS) {
         targets.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     }
     let mut left = allowed;
@@ -165,8 +174,8 @@ pub(super) fn look_at_all(
         .iter()
         .enumerate()
         .map(|(i, (bare, entry, target))| {
-            let share = u32::try_from(left / (count - i).max(1) as u64).unwrap_or(MOST);
-            let most = share.clamp(FEWEST, MOST);
+            let share = u32::try_from(left / (count - i).max(1) as u64).unwrap_or(MAX_RAYS);
+            let most = share.clamp(MIN_RAYS, MAX_RAYS);
             if u64::from(most) > left {
                 let nothing = Pair {
                     entry: *entry,
@@ -175,11 +184,11 @@ pub(super) fn look_at_all(
                     arrived: 0.0,
                     rays: 0,
                     hits: 0,
-                    beside: false,
+                    in_neighbour: false,
                 };
                 return (nothing, 0);
             }
-            let (pair, sent) = look(
+            let (pair, sent) = trace_pair(
                 *entry, target, receivers, occluders, most, random, &mut last,
             );
             left -= u64::from(sent).min(left);
@@ -190,15 +199,15 @@ pub(super) fn look_at_all(
     Row { pairs, rays: sent }
 }
 
-/// Light of a cluster that may be left out of its list, when so much arrives there.
+/// Light that the list of a cluster may lack when `arrives` arrives.
 fn droppable(arrives: f32) -> f32 {
     (arrives * DROPPED_PART).max(DROPPED_LEAST)
 }
 
-/// Looks with as many more rays as it takes to leave lights out for those that no ray found, or a single one, as far as
-/// `allowed` reaches; returns how many it took. What is left out is bounded through charge / n (see [`threshold`]): so n
-/// goes with bare, and the lights that give least come first, for they cost least.
-pub(super) fn look_again(
+/// Second round: the additional rays that dropping a light with at most one hit requires, at most `allowed` in
+/// total; returns their number. The bound on dropped light is charge / n (see [`threshold`]), so n is proportional
+/// to the charge; the weakest lights come first, because they need the fewest rays.
+pub(super) fn second_round(
     world: &RelitWorld,
     pairs: &mut [Pair],
     receivers: &[Receiver],
@@ -216,19 +225,19 @@ pub(super) fn look_again(
             .total_cmp(&b.charged())
             .then(a.entry.cmp(&b.entry))
     });
-    let unit = droppable(arrives) * 0.5 / UNSEEN;
+    let unit = droppable(arrives) * 0.5 / MISSED_HITS;
     let (mut sent, mut last) = (0, None);
     for pair in unknown {
         let wanted = (pair.charged() / unit).ceil();
-        // the most that there are left for
-        if wanted > MOST_AGAIN as f32 || sent + u64::from(wanted as u32) > allowed {
+        // no budget for this and all stronger lights
+        if wanted > MAX_RAYS_SECOND_ROUND as f32 || sent + u64::from(wanted as u32) > allowed {
             break;
         }
         let more = (wanted as u32).saturating_sub(pair.rays);
         let Some(target) = Target::of(world, pair.entry).filter(|_| more > 0) else {
             continue;
         };
-        let seen = look(
+        let seen = trace_pair(
             pair.entry, &target, receivers, occluders, more, random, &mut last,
         );
         sent += u64::from(seen.1);
@@ -237,15 +246,15 @@ pub(super) fn look_again(
     sent
 }
 
-/// What is known of a cluster's list.
+/// Results for a cluster's list.
 #[derive(Clone)]
 pub(super) struct Row {
     pub pairs: Vec<Pair>,
-    /// Rays that it took.
+    /// Number of rays.
     pub rays: u64,
 }
 
-/// Bounds of each cluster's receivers, a little larger than they are.
+/// Widened bounds of each cluster's receivers.
 pub(super) fn boxes(receivers: &[Vec<Receiver>]) -> Vec<(Vec3, Vec3)> {
     let of = |points: &Vec<Receiver>| {
         points
@@ -258,57 +267,60 @@ pub(super) fn boxes(receivers: &[Vec<Receiver>]) -> Vec<(Vec3, Vec3)> {
         .iter()
         .map(|points| {
             let (low, high) = of(points);
-            let margin = ((high - low) * WIDER).max(Vec3::splat(BESIDE));
+            let margin = ((high - low) * NEIGHBOUR_WIDENING).max(Vec3::splat(NEIGHBOUR_MARGIN));
             (low - margin, high + margin)
         })
         .collect()
 }
 
-/// Marks in each row the lights that arrive in clusters beside its own: those whose boxes meet.
-pub(super) fn mark_beside(mut rows: Vec<Option<Row>>, boxes: &[(Vec3, Vec3)]) -> Vec<Option<Row>> {
-    let beside = parallel::map(boxes, |_, &(low, high)| {
+/// Marks the lights of each row that arrive in a neighbouring cluster.
+pub(super) fn mark_neighbours(
+    mut rows: Vec<Option<Row>>,
+    boxes: &[(Vec3, Vec3)],
+) -> Vec<Option<Row>> {
+    let in_neighbours = parallel::map(boxes, |_, &(low, high)| {
         let near = rows
             .iter()
             .zip(boxes)
             .filter(|(_, other)| low.cmple(other.1).all() && high.cmpge(other.0).all());
-        let mut beside: Vec<u32> = near
+        let mut in_neighbours: Vec<u32> = near
             .flat_map(|(row, _)| row.iter().flat_map(|r| &r.pairs))
             .filter(|pair| pair.hits > 0)
             .map(|pair| pair.entry)
             .collect();
-        beside.sort_unstable();
-        beside.dedup();
-        beside
+        in_neighbours.sort_unstable();
+        in_neighbours.dedup();
+        in_neighbours
     });
-    for (row, beside) in rows.iter_mut().zip(beside) {
+    for (row, in_neighbours) in rows.iter_mut().zip(in_neighbours) {
         for pair in row.iter_mut().flat_map(|r| &mut r.pairs) {
-            pair.beside = beside.binary_search(&pair.entry).is_ok();
+            pair.in_neighbour = in_neighbours.binary_search(&pair.entry).is_ok();
         }
     }
     rows
 }
 
-/// The largest charge / n of pairs that may be left out when no ray found them: see the [module](self).
+/// Largest charge / n at which a pair without hits is dropped: see [`sweep`](mod@super::sweep).
 fn threshold(pairs: &[Pair], bound: f32) -> f32 {
     let known = pairs.iter().filter(|p| p.rays > 0);
-    let mut ratios: Vec<(f32, bool)> = known.map(|p| (p.ratio(), p.hits == 1)).collect();
+    let mut ratios: Vec<(f32, bool)> = known.map(|p| (p.charge_per_ray(), p.hits == 1)).collect();
     ratios.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (mut once, mut most) = (0.0, 0.0);
-    for (ratio, seen_once) in ratios {
-        once += if seen_once { ratio } else { 0.0 };
-        if once + UNSEEN * ratio > bound {
+    for (charge_per_ray, seen_once) in ratios {
+        once += if seen_once { charge_per_ray } else { 0.0 };
+        if once + MISSED_HITS * charge_per_ray > bound {
             break;
         }
-        most = ratio;
+        most = charge_per_ray;
     }
     most
 }
 
-/// The pairs of a cluster's list that stay, by rising entry.
-pub(super) fn keep(mut pairs: Vec<Pair>, ambient: f32) -> Vec<Pair> {
+/// The pairs that remain in a cluster's list, by ascending entry.
+pub(super) fn retained(mut pairs: Vec<Pair>, ambient: f32) -> Vec<Pair> {
     let light: f32 = ambient + pairs.iter().map(|p| p.arrived).sum::<f32>();
     let most = threshold(&pairs, droppable(light));
-    pairs.retain(|p| p.hits > 0 || p.rays == 0 || p.ratio() > most);
+    pairs.retain(|p| p.hits > 0 || p.rays == 0 || p.charge_per_ray() > most);
     pairs.sort_by_key(|p| p.entry);
     pairs
 }

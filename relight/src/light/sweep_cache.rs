@@ -1,13 +1,13 @@
-//! Swept light lists, kept in the folder of the calibrations.
+//! Cache of swept light lists, in the folder of the calibrations.
 //!
-//! A file's name is the hash of all that its lists depend on: the map's own bytes, its lights' geometry and powers, the
-//! lists before the sweep, and [`VERSION`]. So a file is right or not there; one that is damaged, cut off or another's
-//! counts as absent, with a warning.
+//! The file name is the hash of everything that the lists depend on: the map's bytes, its lights' geometry and
+//! powers, the lists before the sweep, and [`VERSION`]. So a file is either current or absent; a damaged or foreign
+//! file counts as absent and gives a warning.
 //!
-//! In the file, all numbers little-endian: a header of [`MAGIC`], version, key, number of clusters, of entries before
-//! and of entries kept, and of clusters that nothing was seen from; a bit for each entry before the sweep, set when it
-//! is kept, in the order of the rows; two numbers of 16 bits for each kept entry, its [`LightShare`] ([`pack()`]); a
-//! hash of all that. Kept entries can only be such as the lists had: no file can name a light that is not there.
+//! Format, all numbers little-endian: a header of [`MAGIC`], version, key, number of clusters, of entries before
+//! and after the sweep, and of clusters without a receiver; one bit for each entry before the sweep, set if it is
+//! kept, in the order of the rows; two 16-bit numbers for each kept entry, its [`LightShare`] ([`pack()`]); a hash
+//! of all that. Kept entries are a subset of the existing ones, so no file can name a light that does not exist.
 
 use super::sweep::SweepReport;
 use super::{LightLists, LightShare};
@@ -15,17 +15,17 @@ use crate::cache::{CacheError, CalibrationCache, add_world, read_file};
 use crate::world::RelitWorld;
 use support::hash::Hash;
 
-/// Number that changes whenever the same world would give other lists.
+/// Version; to be incremented when the same world gives other lists.
 const VERSION: u32 = 2;
 
 /// First bytes of a file.
 const MAGIC: &[u8; 16] = b"relight-lists\r\n\0";
 
-/// Bytes of the header and of the hash at the end.
+/// Bytes of the header, and of the hash at the end.
 const HEADER: usize = 16 + 4 + 16 + 4 * 4;
 const END: usize = 16;
 
-/// How the names of the files end.
+/// Extension of the files.
 const KIND: &str = "lists";
 
 /// Hash of everything that sweeping a world's lists depends on.
@@ -51,8 +51,8 @@ fn key(world: &RelitWorld) -> u128 {
     hash.finish()
 }
 
-/// A share in 32 bits: the upper half of its light's floating-point number, 0.8 % at the most below it, and what is
-/// visible in 65535ths, not below it.
+/// A share in 32 bits: the upper half of its `f32` light, at most 0.8 % below the value, and the visible part in
+/// 65535ths, rounded up.
 pub(super) fn pack(share: LightShare) -> [u16; 2] {
     let bare = share.bare.clamp(0.0, f32::MAX);
     let bare = if bare.is_finite() { bare } else { 0.0 };
@@ -60,7 +60,7 @@ pub(super) fn pack(share: LightShare) -> [u16; 2] {
     [(bare.to_bits() >> 16) as u16, visible as u16]
 }
 
-/// What [`pack()`] packed; `None` for what it never gives.
+/// Inverse of [`pack()`]; `None` for values that it never gives.
 fn unpack([bare, visible]: [u16; 2]) -> Option<LightShare> {
     let bare = f32::from_bits(u32::from(bare) << 16);
     let right = bare.is_finite() && bare.is_sign_positive() && visible > 0;
@@ -70,18 +70,18 @@ fn unpack([bare, visible]: [u16; 2]) -> Option<LightShare> {
     })
 }
 
-/// A share as it comes back from a file, so that kept lists equal fresh ones.
+/// A share after packing and unpacking, so that cached lists equal fresh ones.
 pub(super) fn rounded(share: LightShare) -> LightShare {
     unpack(pack(share)).unwrap_or(LightShare::UNKNOWN)
 }
 
-/// The clusters' entries of lists.
+/// Number of entries of all clusters.
 fn entries(lists: &LightLists) -> usize {
     let end = lists.offsets.get(lists.clusters()).copied().unwrap_or(0);
     (end as usize).min(lists.lights.len())
 }
 
-/// Bytes of a file: `new` is what sweeping made of `old`.
+/// Bytes of a file. `old`: the lists before the sweep; `new`: after it.
 fn print(key: u128, old: &LightLists, new: &LightLists, unseen: usize) -> Vec<u8> {
     let [before, after] = [entries(old), entries(new)];
     let mut bytes = Vec::with_capacity(HEADER + before / 8 + 1 + after * 4 + END);
@@ -114,8 +114,8 @@ fn print(key: u128, old: &LightLists, new: &LightLists, unseen: usize) -> Vec<u8
     bytes
 }
 
-/// Reads what [`print()`] wrote for the lists `old`: the swept ones, and the number of unseen clusters; else what is
-/// wrong.
+/// Parses the bytes of [`print()`] for the lists `old`: the swept lists, and the number of clusters without a
+/// receiver; else what is wrong.
 fn parse(bytes: &[u8], key: u128, old: &LightLists) -> Result<(LightLists, usize), &'static str> {
     let rest = bytes.strip_prefix(MAGIC).ok_or("not lists of lights")?;
     let (version, _) = rest.split_first_chunk::<4>().ok_or("cut off")?;
@@ -177,9 +177,9 @@ fn parse(bytes: &[u8], key: u128, old: &LightLists) -> Result<(LightLists, usize
     Ok((lists, unseen))
 }
 
-/// Swept lists of a world, from a folder, or of `fresh`, which are kept there then. What goes wrong with the folder is
-/// a warning of the world's.
-pub(super) fn kept(
+/// Swept lists of a world from the cache, else from `fresh`, which are then written to it. Cache failures become
+/// warnings of the world.
+pub(super) fn load_or_sweep(
     world: &mut RelitWorld,
     cache: Option<&CalibrationCache>,
     fresh: impl FnOnce(&RelitWorld) -> (LightLists, SweepReport),
