@@ -27,15 +27,15 @@ fn table() -> Vec<(String, BTreeSet<String>)> {
     };
     let rows = page
         .lines()
-        .skip_while(|line| !line.starts_with("| room | holds | may use |"))
+        .skip_while(|line| !line.starts_with("| crate | holds | may use |"))
         .skip(2)
         .take_while(|line| line.starts_with('|'));
     rows.map(|row| {
         let cells: Vec<&str> = row.trim_matches('|').split('|').collect();
-        let [room, _, uses] = cells[..] else {
+        let [name, _, uses] = cells[..] else {
             panic!("three cells: {row}")
         };
-        let name = quoted(room).into_iter().next().expect("a crate's name");
+        let name = quoted(name).into_iter().next().expect("a crate's name");
         (name, quoted(uses).into_iter().collect())
     })
     .collect()
