@@ -152,7 +152,7 @@ pub(super) fn find(
         done: Vec::new(),
         with_all_samples: Vec::new(),
     };
-    let found = trials.from_stored_light().unwrap_or(Compiler::PLAIN);
+    let found = trials.best_by_stored_light().unwrap_or(Compiler::PLAIN);
     for (material, holes) in world.materials.iter_mut().zip(holes) {
         material.holes = holes;
     }
@@ -225,7 +225,7 @@ impl Trials<'_> {
     }
 
     /// The setting that explains the stored light best, if it is clearly better.
-    fn from_stored_light(&mut self) -> Option<Compiler> {
+    fn best_by_stored_light(&mut self) -> Option<Compiler> {
         let clean = self.gamma_and_cutoff()?;
         let dirty = Compiler {
             dirt: Some(Dirt::DEFAULT),
