@@ -20,6 +20,32 @@ pub(super) fn shows_full_light(stage: &Stage) -> bool {
     stage.image == StageImage::Lightmap && !lit
 }
 
+/// The `STAGE_*` bits of a stage that depend on its material and its place in it. `baked`: the baked light that it shows.
+pub(super) fn stage_flags(
+    shader: &Shader,
+    class: LightmapClass,
+    number: usize,
+    baked: Option<BakedLight>,
+) -> u32 {
+    let Some(stage) = shader.stages.get(number) else {
+        return 0;
+    };
+    let mut flags = baked_light_flag(baked, stage);
+    if class != LightmapClass::Page && shows_full_light(stage) {
+        flags |= c::STAGE_NO_LIGHTMAP;
+    }
+    let vertex_light = class == LightmapClass::Vertex;
+    if light::is_reflection(shader, stage) {
+        flags |= c::STAGE_REFLECTION;
+        if light::is_gloss(shader, number, vertex_light) {
+            flags |= c::STAGE_GLOSS;
+        } else if light::is_haze(shader, number, vertex_light) {
+            flags |= c::STAGE_HAZE;
+        }
+    }
+    flags
+}
+
 /// The `STAGE_*` bit of a stage that shows baked light. The lightmap of a draw needs none.
 pub(super) fn baked_light_flag(found: Option<BakedLight>, stage: &Stage) -> u32 {
     match found {

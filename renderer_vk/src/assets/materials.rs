@@ -13,7 +13,7 @@ mod listing;
 use super::bind::{internal_shader, passes, sky_faces};
 use super::compile::{FOG_IMAGE, StageArrays, VideoClients, sampler};
 use super::dielectric;
-use super::flags::{self, shows_full_light};
+use super::flags;
 use super::material::{LightmapClass, Material, SkyBox, VideoStage};
 use super::material_buffers::Uploaded;
 use super::prepare::grey;
@@ -49,6 +49,17 @@ impl MaterialSettings {
             greyscale: settings.greyscale,
         }
     }
+}
+
+/// Stages of a material that were appended to the arrays.
+#[derive(Default)]
+struct PushedStages {
+    /// How many, from the first.
+    count: usize,
+    /// Those of them that show videos.
+    videos: Vec<VideoStage>,
+    /// Name of the image that the next stage lacks.
+    missing: Option<String>,
 }
 
 /// Materials by index; 0 is the default material.
@@ -285,14 +296,7 @@ impl Materials {
         }
         // the engine loads the images of all stages before it drops any
         let written = shader.stages.clone();
-        if !self.settings.detail_textures {
-            shader.stages.retain(|stage| !stage.detail);
-        }
-        for stage in &mut shader.stages {
-            if let RgbGen::Const(color) = &mut stage.rgb_gen {
-                *color = grey(*color, self.settings.greyscale);
-            }
-        }
+        self.apply_settings(&mut shader);
         if let Some(sun) = &shader.sun {
             self.last_sun = Some(sun.direction.normalize_or_zero());
         }
@@ -303,56 +307,15 @@ impl Materials {
         }
         let mut missing = None;
         if shader.stages.len() < written.len() {
-            let need = |stage: &shaderscript::Stage| {
-                self.arrays
-                    .need_stage(stage, &mut self.videos, source)
-                    .err()
-            };
-            missing = written.iter().find_map(need);
+            missing = self.missing_image(&written, source);
             if missing.is_some() {
                 shader.stages.clear();
             }
         }
         let stage_first = self.arrays.stages.len();
-        let vertex_light = class == LightmapClass::Vertex;
-        let mut baked = shaderscript::light::baked_light(&shader.stages).into_iter();
-        let mut videos = Vec::new();
-        let mut kept = 0;
-        for stage in &shader.stages {
-            let pushed = self
-                .arrays
-                .push_stage(stage, implicit, &mut self.videos, source);
-            match pushed {
-                Ok((index, video)) => {
-                    kept += 1;
-                    let mut flags = flags::baked_light_flag(baked.next().flatten(), stage);
-                    if class != LightmapClass::Page && shows_full_light(stage) {
-                        flags |= types::constants::STAGE_NO_LIGHTMAP;
-                    }
-                    if shaderscript::light::is_reflection(&shader, stage) {
-                        flags |= types::constants::STAGE_REFLECTION;
-                        if shaderscript::light::is_gloss(&shader, kept - 1, vertex_light) {
-                            flags |= types::constants::STAGE_GLOSS;
-                        } else if shaderscript::light::is_haze(&shader, kept - 1, vertex_light) {
-                            flags |= types::constants::STAGE_HAZE;
-                        }
-                    }
-                    if let Some(pushed) = self.arrays.stages.get_mut(index as usize) {
-                        pushed.flags |= flags;
-                    }
-                    let stage = index;
-                    videos.extend(video.map(|(name, client)| VideoStage {
-                        stage,
-                        name,
-                        client,
-                    }));
-                }
-                Err(image) => {
-                    missing = Some(image);
-                    break;
-                }
-            }
-        }
+        let pushed = self.push_stages(&shader, class, implicit, source);
+        let kept = pushed.count;
+        let missing = missing.or(pushed.missing);
         if let Some(image) = missing {
             // menus and mods ask for pictures that do not exist all the time: only scripts are worth a warning
             if explicit {
@@ -376,14 +339,6 @@ impl Materials {
         let stage_first = u32::try_from(stage_first).unwrap_or(u32::MAX);
         let stage_count = u32::try_from(kept).unwrap_or(0);
         let order = u32::try_from(self.list.len()).unwrap_or(u32::MAX);
-        let portal_range = shader
-            .stages
-            .iter()
-            .find_map(|stage| match stage.alpha_gen {
-                shaderscript::AlphaGen::Portal { range } => Some(range),
-                _ => None,
-            })
-            .unwrap_or(DEFAULT_PORTAL_RANGE);
         self.light_radiance.push(Vec3::ZERO);
         let dielectric =
             dielectric::dielectric(&shader, class, &self.arrays, stage_first as usize, source);
@@ -405,16 +360,74 @@ impl Materials {
             fog: shader.fog,
             surface_flags: shader.surface_flags,
             content_flags: shader.content_flags,
-            portal_range,
+            portal_range: portal_range(&shader),
             remapped: None,
             time_offset: 0.0,
-            videos,
+            videos: pushed.videos,
             shader,
         };
         self.list.push(material);
         self.insert_sorted(order, sort);
         self.touch();
         order
+    }
+
+    /// Leaves out stages, and colour, that the settings ask to be left out.
+    fn apply_settings(&self, shader: &mut Shader) {
+        if !self.settings.detail_textures {
+            shader.stages.retain(|stage| !stage.detail);
+        }
+        for stage in &mut shader.stages {
+            if let RgbGen::Const(color) = &mut stage.rgb_gen {
+                *color = grey(*color, self.settings.greyscale);
+            }
+        }
+    }
+
+    /// Loads the images of stages; the name of the first that is missing.
+    fn missing_image(
+        &mut self,
+        stages: &[shaderscript::Stage],
+        source: &mut dyn ImageSource,
+    ) -> Option<String> {
+        stages.iter().find_map(|stage| {
+            self.arrays
+                .need_stage(stage, &mut self.videos, source)
+                .err()
+        })
+    }
+
+    /// Appends the stages of a material to the arrays, up to the first whose image is missing.
+    fn push_stages(
+        &mut self,
+        shader: &Shader,
+        class: LightmapClass,
+        implicit: Option<ImageFlags>,
+        source: &mut dyn ImageSource,
+    ) -> PushedStages {
+        let mut pushed = PushedStages::default();
+        let mut baked = shaderscript::light::baked_light(&shader.stages).into_iter();
+        for (number, stage) in shader.stages.iter().enumerate() {
+            let (index, video) =
+                match (self.arrays).push_stage(stage, implicit, &mut self.videos, source) {
+                    Ok(appended) => appended,
+                    Err(image) => {
+                        pushed.missing = Some(image);
+                        break;
+                    }
+                };
+            pushed.count += 1;
+            let flags = flags::stage_flags(shader, class, number, baked.next().flatten());
+            if let Some(appended) = self.arrays.stages.get_mut(index as usize) {
+                appended.flags |= flags;
+            }
+            pushed.videos.extend(video.map(|(name, client)| VideoStage {
+                stage: index,
+                name,
+                client,
+            }));
+        }
+        pushed
     }
 
     /// Keeps the drawing order: by sort value, then by creation.
@@ -552,4 +565,13 @@ impl Materials {
             self.pages.insert((material, page));
         }
     }
+}
+
+/// Distance at which a portal is opaque, units.
+fn portal_range(shader: &Shader) -> f32 {
+    let range = |stage: &shaderscript::Stage| match stage.alpha_gen {
+        shaderscript::AlphaGen::Portal { range } => Some(range),
+        _ => None,
+    };
+    (shader.stages.iter().find_map(range)).unwrap_or(DEFAULT_PORTAL_RANGE)
 }

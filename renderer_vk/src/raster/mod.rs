@@ -38,7 +38,7 @@ pub use target::Target;
 
 use crate::api::DynamicLight;
 use crate::gpu::{
-    self, Device, Format, Image, ImageDesc, ImageUsage, Recorder, Rendering, Viewport,
+    self, Device, Format, Image, ImageDesc, ImageUsage, Pass, Recorder, Rendering, Viewport,
 };
 use crate::scene::{ShadowVolumes, View};
 use cover::Cover;
@@ -92,6 +92,15 @@ pub struct ViewParameters<'a> {
     pub clear_color: Option<[f32; 4]>,
     /// Shadow volumes with the view that they are seen in; without effect unless the depth image has a stencil.
     pub shadows: Option<(&'a ShadowVolumes, &'a View)>,
+}
+
+/// Device addresses of a view's `RasterView`s.
+#[derive(Clone, Copy)]
+struct ViewAddresses {
+    /// Of all depth ranges but [`DepthRange::Near`].
+    all: u64,
+    /// Of [`DepthRange::Near`].
+    near: u64,
 }
 
 /// Draws [`DrawList`]s.
@@ -195,48 +204,15 @@ impl Raster {
         list: &DrawList,
         p: &ViewParameters<'_>,
     ) -> Result<(), gpu::Error> {
-        let overdraw = self.overdraw.address();
         let kind = TargetKind {
-            counted: overdraw != 0,
+            counted: self.overdraw.address() != 0,
             ..target.kind()
         };
         for call in &list.calls {
             self.pipelines.prepare(kind, call.state)?;
         }
-        self.lights.clear();
-        self.lights.extend(p.lights.iter().map(|l| RasterLight {
-            origin: l.origin,
-            radius: l.radius,
-            color: l.color,
-        }));
-        let arena = recorder.arena();
-        let view = RasterView {
-            world_to_clip: p.world_to_clip.to_cols_array_2d(),
-            clip_plane: p.clip_plane,
-            eye: p.eye,
-            forward: p.forward,
-            identity_light: p.identity_light,
-            light_backs: p.light_backs.into(),
-            materials: p.materials,
-            static_vertices: p.static_vertices,
-            dynamic_vertices: match p.dynamic_vertices {
-                Some(address) => address,
-                None => arena.push(&list.vertices)?,
-            },
-            instances: arena.push(p.instances)?,
-            draws: arena.push(&list.draws)?,
-            fogs: p.fogs,
-            lights: arena.push(&self.lights)?,
-        };
-        let near_view = match p.near_world_to_clip {
-            Some(matrix) => Some(arena.push(&[RasterView {
-                world_to_clip: matrix.to_cols_array_2d(),
-                ..view
-            }])?),
-            None => None,
-        };
-        let view = arena.push(&[view])?;
-        let (index_buffer, index_offset) = arena.push_indices(&list.indices)?;
+        let views = self.upload_view(recorder, list, p)?;
+        let (index_buffer, index_offset) = recorder.arena().push_indices(&list.indices)?;
         let shadows = match p.shadows {
             Some((volumes, view)) if kind.depth.has_stencil() && !volumes.ranges.is_empty() => {
                 let uploaded = self
@@ -283,6 +259,69 @@ impl Raster {
             pass.clear_stencil_rect([x, y, width, height]);
         }
         pass.bind_index_buffer(&index_buffer, index_offset);
+        self.draw_calls(&mut pass, kind, list, p, views);
+        if let Some((uploaded, volumes, view)) = &shadows {
+            self.shadows.draw(&mut pass, kind, uploaded, volumes, view);
+        }
+        Ok(())
+    }
+
+    /// Uploads what the shaders read of a view and of its list.
+    fn upload_view(
+        &mut self,
+        recorder: &mut Recorder,
+        list: &DrawList,
+        p: &ViewParameters<'_>,
+    ) -> Result<ViewAddresses, gpu::Error> {
+        self.lights.clear();
+        self.lights.extend(p.lights.iter().map(|l| RasterLight {
+            origin: l.origin,
+            radius: l.radius,
+            color: l.color,
+        }));
+        let arena = recorder.arena();
+        let view = RasterView {
+            world_to_clip: p.world_to_clip.to_cols_array_2d(),
+            clip_plane: p.clip_plane,
+            eye: p.eye,
+            forward: p.forward,
+            identity_light: p.identity_light,
+            light_backs: p.light_backs.into(),
+            materials: p.materials,
+            static_vertices: p.static_vertices,
+            dynamic_vertices: match p.dynamic_vertices {
+                Some(address) => address,
+                None => arena.push(&list.vertices)?,
+            },
+            instances: arena.push(p.instances)?,
+            draws: arena.push(&list.draws)?,
+            fogs: p.fogs,
+            lights: arena.push(&self.lights)?,
+        };
+        let near = match p.near_world_to_clip {
+            Some(matrix) => Some(arena.push(&[RasterView {
+                world_to_clip: matrix.to_cols_array_2d(),
+                ..view
+            }])?),
+            None => None,
+        };
+        let all = arena.push(&[view])?;
+        Ok(ViewAddresses {
+            all,
+            near: near.unwrap_or(all),
+        })
+    }
+
+    /// Records the calls of a list, whose pipelines are made. State is set where it changes.
+    fn draw_calls(
+        &self,
+        pass: &mut Pass<'_>,
+        kind: TargetKind,
+        list: &DrawList,
+        p: &ViewParameters<'_>,
+        views: ViewAddresses,
+    ) {
+        let overdraw = self.overdraw.address();
         let mut state = None;
         let mut range = None;
         let mut pushed = 0;
@@ -300,40 +339,41 @@ impl Raster {
             }
             // every pipeline has the same layout, so what was pushed stays
             let wanted = match call.range {
-                DepthRange::Near => near_view.unwrap_or(view),
-                _ => view,
+                DepthRange::Near => views.near,
+                _ => views.all,
             };
             if pushed != wanted {
                 pass.push(&[wanted, overdraw]);
                 pushed = wanted;
             }
             if range != Some(call.range) {
-                let (min_depth, max_depth) = match call.range {
-                    DepthRange::Normal => (0.0, 1.0),
-                    DepthRange::Near | DepthRange::Crosshair => (0.0, 0.3),
-                    DepthRange::Sky => (1.0, 1.0),
-                    DepthRange::Front => (0.0, 0.0),
-                };
-                let [x, mut y, width, height] = p.viewport.map(|v| v as f32);
-                if p.clear_depth {
-                    y += EDGE_SHIFT;
-                }
-                pass.set_viewport(&Viewport {
-                    x,
-                    y,
-                    width,
-                    height,
-                    min_depth,
-                    max_depth,
-                });
+                pass.set_viewport(&viewport(call.range, p));
                 range = Some(call.range);
             }
             pass.draw_indexed(call.index_count, 1, call.first_index, 0, call.draw);
         }
-        if let Some((uploaded, volumes, view)) = &shadows {
-            self.shadows.draw(&mut pass, kind, uploaded, volumes, view);
-        }
-        Ok(())
+    }
+}
+
+/// The viewport of a part of the depth range.
+fn viewport(range: DepthRange, p: &ViewParameters<'_>) -> Viewport {
+    let (min_depth, max_depth) = match range {
+        DepthRange::Normal => (0.0, 1.0),
+        DepthRange::Near | DepthRange::Crosshair => (0.0, 0.3),
+        DepthRange::Sky => (1.0, 1.0),
+        DepthRange::Front => (0.0, 0.0),
+    };
+    let [x, mut y, width, height] = p.viewport.map(|v| v as f32);
+    if p.clear_depth {
+        y += EDGE_SHIFT;
+    }
+    Viewport {
+        x,
+        y,
+        width,
+        height,
+        min_depth,
+        max_depth,
     }
 }
 
