@@ -4,7 +4,7 @@
 use super::bounce::{Near, surfaces_of_triangles};
 use super::samples::Sample;
 use crate::occluders::Occluders;
-use crate::viewpoints::is_spawn_point;
+use crate::viewpoints::{self, Viewpoint};
 use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::Entity;
@@ -17,9 +17,6 @@ const VIEWS: usize = 128;
 /// Rays of all views together.
 const RAYS: usize = 16_384;
 
-/// Height of the camera above the spawn point, id units.
-const EYES: f32 = 35.0;
-
 /// Half the height of a 4 : 3 view with a horizontal field of view of 90 degrees, at distance 1.
 const HALF_HEIGHT: f32 = 0.75;
 
@@ -31,13 +28,8 @@ struct View {
 
 /// The views from the spawn points.
 fn views(entities: &[Entity]) -> Vec<View> {
-    let all: Vec<View> = entities
-        .iter()
-        .filter(|entity| is_spawn_point(entity))
-        .filter_map(|entity| {
-            let eye = entity.vec3("origin")? + Vec3::Z * EYES;
-            let turned = entity.vec3("angles").map(|angles| angles.y);
-            let yaw = turned.or(entity.number("angle")).unwrap_or(0.0);
+    let all: Vec<View> = viewpoints::spawn_views(entities)
+        .filter_map(|Viewpoint { eye, yaw, .. }| {
             let (sin, cos) = yaw.to_radians().sin_cos();
             let forward = Vec3::new(cos, sin, 0.0);
             (eye.is_finite() && forward.is_finite()).then_some(View { eye, forward })
