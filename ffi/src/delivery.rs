@@ -1,5 +1,5 @@
-//! The way of a captured picture to the engine: taken from the renderer, encoded, and handed over once the renderer's
-//! state is back in its cell.
+//! Delivers captures to the engine: reads them back from the renderer, encodes them, and hands them over after the
+//! renderer's state was returned to its cell.
 
 use crate::capture::{self, Format, Shot, VideoFrame};
 use crate::cvars::Cvar;
@@ -25,8 +25,8 @@ pub struct Outbox {
     pub back_end_ms: c_int,
 }
 
-/// Takes the pictures that were asked for between two frames: they show the frame before, which is what the player
-/// sees, whatever the next command does. Within a frame, or before the first one, they wait for its end.
+/// Takes captures requested between two frames. They show the previous frame, which the player sees, whatever the next
+/// command does. Within a frame, or before the first one, captures wait for its end.
 pub fn take_captures_of_last_frame(engine: Engine) -> Result<(), Failure> {
     let outbox = with_renderer(|renderer, front| {
         let mut outbox = Outbox::default();
@@ -39,7 +39,7 @@ pub fn take_captures_of_last_frame(engine: Engine) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Takes the pictures that were asked for, of what is drawn so far.
+/// Takes the requested captures from the picture as drawn so far.
 pub fn take_captures(
     renderer: &mut Renderer,
     front: &mut Front,
@@ -95,8 +95,8 @@ fn keep_video(frame: &VideoFrame, bytes: &[u8]) -> Option<(*mut u8, c_int)> {
     if frame.encode_buffer.is_null() || bytes.len() > room {
         return None;
     }
-    // SAFETY: by the contract of `take_video_frame` the buffer has `width * height * 4` bytes, of which `bytes` needs
-    // no more, and stays until the frame ends. Our bytes lie elsewhere.
+    // SAFETY: by the contract of `take_video_frame` the buffer has `width * height * 4` bytes, at least as many
+    // as `bytes`, and stays until the frame ends. The two do not overlap.
     unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), frame.encode_buffer, bytes.len()) };
     Some((frame.encode_buffer, length))
 }

@@ -132,7 +132,7 @@ impl Bsp {
             self.warnings.push(Warning {
                 lump: Lump::LightArray,
                 element: layers.grid_indices.iter().position(beyond),
-                field: "number of indices beyond the lightgrid, of which this is the first,".into(),
+                field: "number of indices beyond the lightgrid (this is the first)".into(),
                 value: count as i64,
                 action: "taken as points in walls".into(),
             });

@@ -457,8 +457,7 @@ impl Bsp {
                 self.warnings.push(Warning {
                     lump,
                     element: Some(first),
-                    field: "number of records with NaN or infinity, of which this is the first,"
-                        .into(),
+                    field: "number of records with NaN or infinity (this is the first)".into(),
                     value: count as i64,
                     action: "kept as they are".into(),
                 });

@@ -323,7 +323,7 @@ pub unsafe extern "C" fn render_scene(from: *const refdef_t) {
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `points` must be null, which draws nothing, or point at `count`
-/// vectors of three floats, of which the first 64 are looked at. A count below 0 counts as 0.
+/// vectors of three floats; only the first 64 are read. A count below 0 counts as 0.
 unsafe extern "C" fn debug_polygon(color: c_int, count: c_int, points: *mut c_float) {
     entry(|| {
         let count = usize::try_from(count).unwrap_or(0).min(MAX_MARK_POINTS);
@@ -491,7 +491,7 @@ pub unsafe extern "C" fn light_for_point(
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract).
-/// - `points` must be null or point at `num_points` vectors, of which the first 64 are looked at.
+/// - `points` must be null or point at `num_points` vectors; only the first 64 are read.
 /// - `projection` must be null, which counts as no direction, or point at three floats.
 /// - `point_buffer` must be null or have room for `max_points` vectors, `fragment_buffer` for `max_fragments`
 ///   fragments.

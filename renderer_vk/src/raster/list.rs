@@ -345,8 +345,9 @@ pub(super) fn faces(cull: Cull, mirrored: bool) -> CullFaces {
     }
 }
 
-/// Which channels fog scales on a blended stage, by the way it blends, if the material's first stage blends, too. Its sort
-/// makes no difference: blended stages that are drawn with the opaque ones, as the clouds of a sky, fade and are fogged.
+/// The channels of a blended stage that fog scales, by its blend function; none unless the material's first stage blends,
+/// too (`adjustColorsForFog`, `ComputeColors`). The material's sort makes no difference: clouds of a sky fade like this and
+/// get a fog pass besides.
 pub(super) fn fog_adjust(material: &Material, fog: u32, blend: Option<(u32, u32)>) -> u32 {
     let first_blends = material.passes.first().is_some_and(|p| p.blend.is_some());
     if fog == 0 || !first_blends {

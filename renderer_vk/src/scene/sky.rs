@@ -9,7 +9,7 @@ use glam::{Vec2, Vec3};
 pub const FACES: usize = 6;
 /// Cells of a face along each side.
 pub const CELLS: usize = 8;
-/// What covers less than about this share of a face covers nothing.
+/// Polygons below about this share of a face cover nothing.
 const SMALLEST_SHARE: f32 = 1e-6;
 /// What lies nearer to the plane of the eye than this covers nothing, units.
 const NEAREST: f32 = 0.001;

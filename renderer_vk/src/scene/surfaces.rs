@@ -186,7 +186,7 @@ impl SurfaceRun<'_> {
 }
 
 impl SurfaceRun<'_> {
-    /// Adds triangles to what is seen of a sky: of one material, the engine draws by itself what stores one fog.
+    /// Adds triangles to the coverage of a sky. The engine draws a sky once for each fog that its surfaces store.
     fn add_sky(
         &self,
         (material, fog): (u32, u32),
