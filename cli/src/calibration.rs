@@ -16,7 +16,7 @@ use crate::game::Maps;
 use crate::scripts::load_scripts;
 use crate::view::open;
 
-/// Tell how well traced light agrees with maps' lightmaps, before and after calibration
+/// Measure how well traced light agrees with maps' lightmaps, before and after calibration
 ///
 /// Compared is the irradiance that tracing gives (direct, bounced and ambient) with stored light, at measurements that
 /// fitting did not see: the median of |log2(traced / stored)| in stops, before (what directives say) and after. `sum` is
@@ -36,10 +36,10 @@ pub struct CalibrationArgs {
     /// Keep what calibration finds in this folder, and take it from there
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
-    /// Hide the light entities that maps kept, and tell how many of them are found again
+    /// Hide the light entities that maps kept, and count those that are found again
     #[arg(long)]
     hide_entities: bool,
-    /// Tell how many lightmap texels beside point lights these make too bright
+    /// Count lightmap texels near point lights that these lights make too bright
     #[arg(long)]
     spots: bool,
     /// Print JSON in place of a table: one object a map

@@ -8,7 +8,7 @@ use relight::compare::{Rgb8, compare, flip};
 
 use crate::pictures::{read, write};
 
-/// Tell how alike pictures of one view are
+/// Compare pictures of one view
 ///
 /// Prints a line for each picture: structural similarity (1: the same), mean FLIP (0: the same), mean absolute and root
 /// mean square difference (0 to 255), share of pixels that differ by more than 8, mean luminance of both; of folders a table.

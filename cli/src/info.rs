@@ -23,7 +23,7 @@ use crate::outcome::{BAD_INPUT, one_sentence};
 use crate::scripts::load_scripts;
 use describe::MapInfo;
 
-/// Tell what is in maps, and where their light comes from
+/// List what maps hold, and where their light comes from
 ///
 /// One map in full, several as a table: format, lumps, bounds, entities, materials and which are missing, lightmaps,
 /// fogs, clusters and how much they see, lights by their evidence, warnings. Exit code: 0, or 2 when some map cannot be

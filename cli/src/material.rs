@@ -15,7 +15,7 @@ use crate::game::Game;
 use crate::scripts::load_scripts;
 use crate::view::open;
 
-/// Tell how a material is understood
+/// Print how a material is understood
 ///
 /// Where it is defined, its stages as they are drawn, what it is to light, what it emits, and every warning with the
 /// script's line. Exit code: 0, or 1 when the default is drawn instead of some material.
