@@ -17,6 +17,7 @@ mod info;
 mod lab;
 mod lights;
 mod lights_picture;
+mod lit_maps;
 mod material;
 mod messages;
 mod numbers;

@@ -5,11 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use clap::Args;
 use relight::light::sweep;
-use relight::{CalibrationCache, CalibrationOptions, Options, RelitWorld};
 
-use crate::game::Maps;
-use crate::scripts::load_scripts;
-use crate::view::open;
+use crate::lit_maps::LitMaps;
 
 /// Draw a map's lights from above
 ///
@@ -20,16 +17,10 @@ use crate::view::open;
 #[derive(Args, Debug)]
 pub struct LightsArgs {
     #[command(flatten)]
-    chosen: Maps,
-    /// Do not fit lights to the map's lightmaps first (the game does)
-    #[arg(long)]
-    no_calibration: bool,
+    maps: LitMaps,
     /// Where the picture goes, .svg or .png; may be given for both
     #[arg(short, long, value_name = "PATH")]
     output: Vec<PathBuf>,
-    /// Keep what calibration and rays find in this folder, and take it from there
-    #[arg(long, value_name = "DIR")]
-    cache: Option<PathBuf>,
 }
 
 /// Where the pictures of a map go: where the command line says, else beside each other in the current folder.
@@ -46,29 +37,12 @@ fn pictures(args: &LightsArgs, map: &str) -> Vec<PathBuf> {
 
 /// Runs the command.
 pub fn run(args: &LightsArgs) -> Result<()> {
-    if args.chosen.maps.len() > 1 && !args.output.is_empty() {
+    if args.maps.chosen.maps.len() > 1 && !args.output.is_empty() {
         bail!("--output is for one map");
     }
-    for map in &args.chosen.maps {
-        let (files, map) = open(map, &args.chosen.game)?;
-        let (materials, _) = load_scripts(&*files);
-        let cache = args.cache.as_ref().map(CalibrationCache::new);
-        let calibrate = (!args.no_calibration).then(|| CalibrationOptions {
-            cache: cache.clone(),
-            ..CalibrationOptions::default()
-        });
-        let options = Options {
-            calibrate,
-            by_hand: false,
-            ..Options::default()
-        };
-        let mut world = RelitWorld::load(&*files, &materials, &map, options)?;
-        world.measure_materials(&*files);
-        world.light_by_hand(&*files);
-        for warning in &world.warnings {
-            log::warn!("{warning}");
-        }
-        sweep(&mut world, cache.as_ref());
+    for map in &args.maps.chosen.maps {
+        let (mut world, map) = args.maps.load(map)?;
+        sweep(&mut world, args.maps.cache().as_ref());
         let pictures = pictures(args, &map);
         crate::lights_picture::draw(&world, &pictures)?;
         for picture in pictures {

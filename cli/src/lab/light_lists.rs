@@ -1,6 +1,5 @@
 //! `relight-lab light-lists`: how good maps' light lists are, judged by rays.
 
-use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Result;
@@ -8,12 +7,9 @@ use clap::Args;
 use relight::light::{
     LightLists, ListJudgement, judge, lists_by_geometry, lists_by_visibility, sweep,
 };
-use relight::{CalibrationCache, CalibrationOptions, Options, RelitWorld};
 use serde_json::json;
 
-use crate::game::Maps;
-use crate::scripts::load_scripts;
-use crate::view::open;
+use crate::lit_maps::LitMaps;
 
 /// Judge maps' light lists by rays, and print JSON: one object a map and kind of list
 ///
@@ -30,19 +26,13 @@ use crate::view::open;
 #[derive(Args, Debug)]
 pub struct LightListsArgs {
     #[command(flatten)]
-    chosen: Maps,
+    maps: LitMaps,
     /// Rays for a pair of light and cluster
     #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..))]
     rays: u32,
     /// Clusters that are judged; they are spread evenly over the map's list
     #[arg(long, default_value_t = 64, value_parser = crate::numbers::count)]
     clusters: usize,
-    /// Do not fit lights to the map's lightmaps first (the game does)
-    #[arg(long)]
-    no_calibration: bool,
-    /// Keep what calibration and rays find in this folder, and take it from there
-    #[arg(long, value_name = "DIR")]
-    cache: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -50,31 +40,15 @@ pub struct LightListsArgs {
 /// # Errors
 /// A map cannot be found or read.
 pub fn run(args: &LightListsArgs) -> Result<()> {
-    for map in &args.chosen.maps {
-        let (files, map) = open(map, &args.chosen.game)?;
-        let (materials, _) = load_scripts(&*files);
-        let cache = args.cache.as_ref().map(CalibrationCache::new);
-        let calibrate = (!args.no_calibration).then(|| CalibrationOptions {
-            cache: cache.clone(),
-            ..CalibrationOptions::default()
-        });
-        let options = Options {
-            calibrate,
-            by_hand: false,
-            ..Options::default()
-        };
-        let mut world = RelitWorld::load(&*files, &materials, &map, options)?;
-        world.light_by_hand(&*files);
-        for warning in &world.warnings {
-            log::warn!("{warning}");
-        }
+    for map in &args.maps.chosen.maps {
+        let (mut world, map) = args.maps.load(map)?;
         let begin = Instant::now();
         let visible = lists_by_visibility(&world);
         let visible_seconds = begin.elapsed().as_secs_f64();
         let begin = Instant::now();
         let geometric = lists_by_geometry(&world);
         let geometric_seconds = begin.elapsed().as_secs_f64();
-        let swept = sweep(&mut world, cache.as_ref());
+        let swept = sweep(&mut world, args.maps.cache().as_ref());
         let lists: [(&str, &LightLists, f64); 3] = [
             ("pvs", &visible, visible_seconds),
             ("pvs+geometry", &geometric, geometric_seconds),
