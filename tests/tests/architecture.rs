@@ -207,6 +207,20 @@ fn no_modules_of_a_crate_use_each_other_in_a_circle() {
 }
 
 #[test]
+fn the_test_command_runs_every_program_of_this_crate() {
+    let root = tests::data::repository();
+    let command = read(&root.join("test"));
+    let programs = std::fs::read_dir(root.join("tests/tests")).expect("a folder");
+    for program in programs {
+        let path = program.expect("an entry").path();
+        let name = path.file_stem().expect("a name").to_string_lossy();
+        let runs = command.split_whitespace().collect::<Vec<_>>();
+        let named = runs.windows(2).any(|w| w[0] == "--test" && w[1] == name);
+        assert!(named, "./test does not run {name}");
+    }
+}
+
+#[test]
 fn names_are_found_alone_and_in_groups() {
     let code = "use crate::one::Two;\nuse crate::{three, four::{five, Six}, seven::Eight};\nlet x = crate::nine::ten();";
     let found = names_after(code, "crate::");
