@@ -215,7 +215,7 @@ fn read_shared(root: &Path, name: &str) -> Result<shared::Module, String> {
     Ok(module)
 }
 
-/// Rust constants for the ids of specialization constants: `trace/turn.glsl` becomes the module `trace::turn`. Two files
+/// Rust constants for the ids of specialization constants: `trace/reflect_refract.glsl` becomes the module `trace::turn`. Two files
 /// with the same folder and stem do not compile if both have such constants.
 fn constant_ids(root: &Path, files: &[String], errors: &mut String) -> String {
     let mut folders: BTreeMap<&str, String> = BTreeMap::new();

@@ -39,11 +39,11 @@ void main() {
     int spacing = int(push.spacing);
     vec3 normal = guide_components(guide);
     float depth = guide_depth(guide);
-    vec2 slope = imageLoad(images_rg16f[DENOISE.slope], pixel).xy * float(spacing);
+    vec2 depth_gradient = imageLoad(images_rg16f[DENOISE.depth_gradient], pixel).xy * float(spacing);
 
     // the plane in camera space: its point at tangent (x, y) has the inverse depth a x + b y + c
     vec2 tangent = tangent_of(vec2(pixel));
-    vec2 rate = -slope / (float(spacing) * VIEW.pixel_spread * depth);
+    vec2 rate = -depth_gradient / (float(spacing) * VIEW.pixel_spread * depth);
     vec3 plane = vec3(rate, 1.0 / depth - dot(rate, tangent));
     // the logarithm makes a power of e one of 2
     float plane_scale = LOG2_E * inversesqrt(dot(plane, plane)) / (0.1 + depth * (0.5 * float(spacing) * VIEW.pixel_spread + 5.0e-4));
@@ -63,7 +63,7 @@ void main() {
         const ivec2 offset = ivec2(at % 3, at / 3);
         taps[i] = LightTexels(push.source).at[uint(rows[offset.y] + columns[offset.x])];
         uint other = taps[i].w;
-        float expected = 1.0 + dot(slope, vec2(offset - 1));
+        float expected = 1.0 + dot(depth_gradient, vec2(offset - 1));
         float off_plane = abs(expected - guide_inverse(other) * unit);
         vec3 bend = guide_components(other) - normal;
         const float kernel = (offset.x == 1 ? 0.0 : -1.0) + (offset.y == 1 ? 0.0 : -1.0);

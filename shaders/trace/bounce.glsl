@@ -8,7 +8,7 @@
 #include "trace/layer.glsl"
 #include "trace/sky.glsl"
 #include "trace/fog.glsl"
-#include "trace/sparse.glsl"
+#include "trace/subsample.glsl"
 
 // The map has fog: without, nothing of it is compiled in.
 layout(constant_id = 1) const uint HAS_FOG = 0;
@@ -37,7 +37,7 @@ PathVertex first_vertex(LightTask task) {
 
 // Begins the random numbers of a pixel's bounced light; returns one for its rounding.
 float bounce_random(LightTask task) {
-    rng_begin(uvec2(task.pixel), sparse_index(task.seed), STREAM_BOUNCE);
+    rng_begin(uvec2(task.pixel), subsample_index(task.seed), STREAM_BOUNCE);
     return rng_independent();
 }
 
@@ -62,7 +62,7 @@ bool shows_face(SurfacePoint p, vec3 direction) {
 }
 
 // What a path finds at what its ray meets: adds what glows there to `sum`, and moves on. False: the path ends.
-bool bounce_meets(Hit hit, vec3 origin, vec3 direction, inout vec3 throughput, inout vec3 sum, out PathVertex v) {
+bool bounce_shade(Hit hit, vec3 origin, vec3 direction, inout vec3 throughput, inout vec3 sum, out PathVertex v) {
     SurfacePoint p = surface_point(hit);
     float t = dot(p.position - origin, direction);
     if (HAS_FOG != 0) {

@@ -6,7 +6,7 @@
 
 // The nearest hit of the mask that is not Kind::Passed (renderer_vk/src/trace/input.rs). Few rays meet such a surface; those
 // are traced again without what casts no shadow. Drivers inline functions: in a loop the traversal is compiled once.
-Hit trace_bounce(vec3 origin, vec3 direction, uint mask) {
+Hit trace_bounce_rays(vec3 origin, vec3 direction, uint mask) {
     Hit hit;
     for (uint i = 0; i < 2; i++) {
         hit = trace_ray(origin, 0.0, direction, FAR, mask, false);

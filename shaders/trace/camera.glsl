@@ -14,7 +14,7 @@ struct CameraRay {
 };
 
 // A thin lens (Kolb et al., A Realistic Camera Model for Computer Graphics, SIGGRAPH 1995, section 2, and Cook et al.,
-// Distributed Ray Tracing, SIGGRAPH 1984): rays from all of a disc meet in the plane of focus, uniformly chosen by area.
+// Distributed Ray Tracing, SIGGRAPH 1984): rays from all of a disc meet in the plane of focus, uniformly sampled by area.
 CameraRay camera_ray(ivec2 pixel) {
     CameraRay ray;
     // two numbers: one for each axis of the pixel's square

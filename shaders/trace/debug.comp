@@ -45,7 +45,7 @@ vec3 specular_color(ivec2 pixel, GBufferPixel g) {
     float field = mark_field(mark_read(pixel));
     if (field > 0.0) return field == 2.0 ? vec3(0.0, 1.0, 0.0) : vec3(0.0, 0.0, 1.0);
     if (g.path < 0.0) return vec3(0.0);
-    rng_begin(uvec2(pixel), VIEW.seed, STREAM_EYE);
+    rng_begin(uvec2(pixel), VIEW.seed, STREAM_PRIMARY);
     CameraRay ray = camera_ray(pixel);
     return distance(ray.origin + ray.direction * g.path, g.position) > 0.1 + 0.01 * g.path ? vec3(1.0) : vec3(0.0);
 }

@@ -24,14 +24,14 @@ const uint WAVE_COUNT = 5;
 // The normal of a liquid whose ripples are a sum of sine waves of root mean square slope `slope`; each next one is
 // shorter and turned by the golden angle, so that they never line up. Waves shorter than the ray's footprint (`width`,
 // units) are averaged away.
-vec3 ripple_normal(vec3 n, vec3 position, float slope, float width, float time) {
-    if (!(slope > 0.0)) return n;
+vec3 ripple_normal(vec3 n, vec3 position, float depth_gradient, float width, float time) {
+    if (!(depth_gradient > 0.0)) return n;
     vec3 t = normalize(abs(n.z) > 0.7 ? cross(vec3(0.0, 1.0, 0.0), n) : cross(vec3(0.0, 0.0, 1.0), n));
     vec3 b = cross(n, t);
     vec2 place = vec2(dot(position, t), dot(position, b));
     vec2 gradient = vec2(0.0);
     float wave_length = 110.0, angle = 0.4;
-    float amplitude = slope * sqrt(2.0 / float(WAVE_COUNT));
+    float amplitude = depth_gradient * sqrt(2.0 / float(WAVE_COUNT));
     for (uint i = 0; i < WAVE_COUNT; i++) {
         float k = 6.2831853 / wave_length;
         vec2 along = vec2(cos(angle), sin(angle));

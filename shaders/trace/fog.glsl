@@ -57,19 +57,19 @@ void fog_in_light(vec3 origin, vec3 direction, float to, inout vec3 transmittanc
     TraceFogs fogs = TraceFogs(VIEW.fogs);
     for (uint turn = 0; turn < count; turn++) {
         vec2 best = vec2(FAR);
-        uint chosen = count;
+        uint nearest = count;
         for (uint i = 0; i < count; i++) {
             vec2 range = fog_range(fogs.at[i], origin, direction, inverse);
             if (range.x >= range.y || range.x >= to) continue;
             bool later = range.x > entered || (range.x == entered && i > last);
-            if (later && range.x < best.x) { best = range; chosen = i; }
+            if (later && range.x < best.x) { best = range; nearest = i; }
         }
-        if (chosen == count) return;
-        float cover = fog_cover(fogs.at[chosen], min(to, best.y) - best.x, 1.0);
-        radiance += transmittance * decode_display(fogs.at[chosen].color) * cover;
+        if (nearest == count) return;
+        float cover = fog_cover(fogs.at[nearest], min(to, best.y) - best.x, 1.0);
+        radiance += transmittance * decode_display(fogs.at[nearest].color) * cover;
         transmittance *= 1.0 - cover;
         entered = best.x;
-        last = chosen;
+        last = nearest;
     }
 }
 

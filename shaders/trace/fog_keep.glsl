@@ -57,8 +57,8 @@ void fog_write(ivec2 pixel) {
     int cell = int(VIEW.fog.cell);
     ivec2 at = pixel / cell;
     // each pixel of a cell in turn; from the eye, so that half floats are as exact as one sees
-    ivec2 chosen = min(at * cell + ivec2(VIEW.seed, VIEW.seed >> 1) % cell, ivec2(VIEW.width, VIEW.height) - 1);
-    if (pixel == chosen) imageStore(images_rgba16f[VIEW.fog.point], at, vec4(clamp(fog_point - VIEW.eye, -60000.0, 60000.0), min(fog_distance, 60000.0)));
+    ivec2 sampled = min(at * cell + ivec2(VIEW.seed, VIEW.seed >> 1) % cell, ivec2(VIEW.width, VIEW.height) - 1);
+    if (pixel == sampled) imageStore(images_rgba16f[VIEW.fog.point], at, vec4(clamp(fog_point - VIEW.eye, -60000.0, 60000.0), min(fog_distance, 60000.0)));
 }
 
 #endif

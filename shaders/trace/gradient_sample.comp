@@ -3,15 +3,15 @@
 // in the last frame (Schied et al. 2018, section 4.2). What gradient.comp spreads, in one texel: change and size of direct
 // light, of indirect light, and the logarithms of the luminance that the last frame was left with, as 16-bit floats; the
 // guide.
-#include "trace/sparse.glsl"
+#include "trace/subsample.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-uint level_of(Carried c) {
+uint level_of(GradientPixel c) {
     return packHalf2x16(log2(unpackHalf2x16(LightTexels(DENOISE.history).at[place_of(c.last)].x) + 1.0e-5));
 }
 
-uvec2 gradient_at(ivec2 stratum, Carried c) {
+uvec2 gradient_at(ivec2 stratum, GradientPixel c) {
     ivec2 pixel = pixel_of(stratum, c.index);
     vec2 now = vec2(luminance(light_read(VIEW.image_direct, pixel)), luminance(light_read(VIEW.image_indirect, pixel)));
     // as the sample was rounded
@@ -27,7 +27,7 @@ void main() {
     if (!inside(stratum * STRATUM)) return;
     uvec4 texel = uvec4(0, 0, 0, imageLoad(uimages_r32ui[DENOISE.stratum_guide], stratum).x);
     if (texel.w != 0) {
-        Carried c = carried_at(stratum);
+        GradientPixel c = gradient_pixel_at(stratum);
         if (c.valid) texel.xyz = uvec3(gradient_at(stratum, c), level_of(c));
     }
     imageStore(uimages_rgba32ui[DENOISE.gradient_samples], stratum, texel);

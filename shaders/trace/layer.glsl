@@ -52,11 +52,11 @@ Footprint ellipse_footprint(SurfacePoint p, vec3 direction, float cosine, float 
     vec3 ab = axis * (b.position - a.position), ac = axis * (c.position - a.position);
     vec3 n = cross(ab, ac);
     float area_squared = dot(n, n);
-    vec3 slope = direction - p.face_normal * dot(p.face_normal, direction);
-    float slant = length(slope);
+    vec3 depth_gradient = direction - p.face_normal * dot(p.face_normal, direction);
+    float slant = length(depth_gradient);
     if (!(area_squared > 0.0) || slant < 0.1) return f; // seen from straight above it is round
-    vec3 along = slope * (width / (cosine * slant));
-    vec3 across = cross(p.face_normal, slope) * (width / slant);
+    vec3 along = depth_gradient * (width / (cosine * slant));
+    vec3 across = cross(p.face_normal, depth_gradient) * (width / slant);
     vec2 sb = b.st - a.st, sc = c.st - a.st;
     f.along = (dot(cross(along, ac), n) * sb + dot(cross(ab, along), n) * sc) / area_squared;
     f.across = (dot(cross(across, ac), n) * sb + dot(cross(ab, across), n) * sc) / area_squared;

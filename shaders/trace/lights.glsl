@@ -289,11 +289,11 @@ float light_target(uint light, vec3 position, vec3 normal) {
 struct LightChoice {
     uint light;
     float weight;
-    float total; // what all that it was chosen from would give without shadows, about; of resampled ones alone
+    float total; // what all that it was sampled from would give without shadows, about; of resampled ones alone
 };
 
 // One light, each with about the same probability. `u` of this and what follows: uniform, before and after (see rng_decide),
-// so that with another number it is a point on the chosen light.
+// so that with another number it is a point on the sampled light.
 LightChoice choose_uniform(LightSet set, inout float u) {
     uint count = set_count(set), length = uint(findMSB(count));
     if (length > 13) {
@@ -314,7 +314,7 @@ LightChoice choose_sun(uint count, inout float u) {
     return LightChoice((LIGHT_SUN << LIGHT_KIND_SHIFT) | index, float(count), 0.0);
 }
 
-// Resampled importance sampling (Talbot et al. 2005): some candidates, one of them chosen by its target, weighed by
+// Resampled importance sampling (Talbot et al. 2005): some candidates, one of them sampled by its target, weighed by
 // the inverse of the chance that it had. Candidates come from the row's list by alias tables (Walker 1977), with
 // chances by what each light gives in the cell to what faces about that way, shadows included; the whole list is taken if it is short enough.
 // Lights of this frame are candidates of their own. A hidden sun would outshine all that is left in its shadow: suns
@@ -323,9 +323,9 @@ LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal, inout flo
     uint candidates = max(VIEW.lights.candidates, 1);
     uint drawn = min(set.listed, candidates), drawn_dynamic = min(set.dynamic_count, candidates);
     LightSlots slots = LightSlots(VIEW.lights.slots);
-    float sum = 0.0, chosen_target = 0.0;
+    float sum = 0.0, selected_target = 0.0;
     float offset = set.listed > drawn ? rng_next() : 0.0, dynamic_offset = set.dynamic_count > drawn_dynamic ? rng_next() : 0.0;
-    uint chosen = 0;
+    uint selected = 0;
     for (uint i = 0; i < drawn + drawn_dynamic; i++) {
         // decisions use up digits: those of one number last for some
         if (i > 0 && i % 8 == 0) u = rng_next();
@@ -360,11 +360,11 @@ LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal, inout flo
         if (!(target > 0.0)) continue;
         sum += target * weight;
         if (rng_decide(u, target * weight / sum)) {
-            chosen = light;
-            chosen_target = target;
+            selected = light;
+            selected_target = target;
         }
     }
-    return LightChoice(chosen, chosen_target > 0.0 ? sum / chosen_target : 0.0, sum);
+    return LightChoice(selected, selected_target > 0.0 ? sum / selected_target : 0.0, sum);
 }
 
 // A light of the list or a sun, for points that get one ray: about by what each would give without shadows, neither of

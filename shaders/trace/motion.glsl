@@ -1,7 +1,7 @@
 // Motion: where the surface that a pixel shows was on the screen in the last frame, and how long the way to it was.
 //
 // What is seen in a plane mirror is seen at its mirror image, and what a portal shows is seen as if it stood behind the
-// portal; both are affine maps from a point to where the eye takes it to be. The map is carried along the path as it was
+// portal; both are affine maps from a point to where the eye takes it to be. The map is gradient_pixels along the path as it was
 // in the last frame, so that motion is right behind any chain of mirrors and portals, moved ones included (the virtual
 // space of Zimmer et al., Path-space Motion Estimation and Decomposition for Robust Animation Filtering, EGSR 2015,
 // section 5, for plane reflections). What is on a texture moves with its surface: scrolling is no motion.

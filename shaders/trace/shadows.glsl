@@ -1,4 +1,4 @@
-// Direct light on a point: the lights that were chosen, as far as something is in the way of their light.
+// Direct light on a point: the lights that were sampled, as far as something is in the way of their light.
 #ifndef RELIGHT_TRACE_SHADOWS_GLSL
 #define RELIGHT_TRACE_SHADOWS_GLSL
 

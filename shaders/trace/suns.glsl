@@ -4,7 +4,7 @@
 #define RELIGHT_TRACE_SUNS_GLSL
 
 #include "trace/lights.glsl"
-#include "trace/carry.glsl"
+#include "trace/gradient_reproject.glsl"
 
 // Where less than this part of a sun's light falls, fewer rays are sent, each for as much more: walls below a sun that
 // stands overhead see the edge of its disc, and so would send every other of their rays for next to nothing.

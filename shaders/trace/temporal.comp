@@ -4,8 +4,8 @@
 // light itself has changed (Schied et al., Gradient Estimation for Real-Time Adaptive Temporal Filtering, 2018,
 // section 4.4). Direct and indirect light each have their history. Works on light without albedo, so textures stay
 // sharp.
-#include "trace/sparse.glsl"
-#include "trace/slope.glsl"
+#include "trace/subsample.glsl"
+#include "trace/depth_gradient.glsl"
 
 // Whether there is bounced light at all.
 layout(constant_id = 0) const uint BOUNCES = 1;
@@ -52,14 +52,14 @@ void add_tap(inout History h, ivec2 tap, vec3 normal, vec2 range, float weight) 
     h.weight += weight;
 }
 
-History history_at(ivec2 pixel, uint guide, vec2 slope) {
+History history_at(ivec2 pixel, uint guide, vec2 depth_gradient) {
     const History NONE = History(LightTexel(vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), 0), vec2(0.0), 0.0);
     History h = NONE;
     if ((DENOISE.flags & DENOISE_HISTORY) == 0) return h;
     Before before = before_of(pixel);
     if (!(before.depth > 0.0)) return h;
     // depths of taps differ by about as much as those of this frame's pixels, and by rounding
-    float tolerance = before.depth * (0.01 + 2.0 * (abs(slope.x) + abs(slope.y))) + 0.1;
+    float tolerance = before.depth * (0.01 + 2.0 * (abs(depth_gradient.x) + abs(depth_gradient.y))) + 0.1;
     vec2 range = INVERSE_SCALE / vec2(before.depth + tolerance, max(before.depth - tolerance, NEAREST_DEPTH));
     vec3 normal = guide_components(guide);
     vec2 low = floor(before.pixel), part = before.pixel - low;
@@ -81,14 +81,14 @@ History history_at(ivec2 pixel, uint guide, vec2 slope) {
 
 // Variance of the level of this frame's light around the pixel, of what the group has of its surface: of every other row and
 // column, which show the same where pixels take turns. Where one pixel asks for it the others wait, so it reads no memory.
-vec2 variance_around(float depth, vec2 slope) {
+vec2 variance_around(float depth, vec2 depth_gradient) {
     ivec2 own = ivec2(gl_LocalInvocationID.xy);
     vec4 moments = vec4(0.0);
     float count = 0.0;
     for (int y = max(own.y - AROUND, own.y & 1); y <= min(own.y + AROUND, TILE - 1); y += 2) {
         for (int x = own.x & 1; x < TILE; x += 2) {
             float other = depths[(y + 1) * (TILE + 2) + x + 1];
-            if (other == 0.0 || abs(depth / other - 1.0 - dot(slope, vec2(ivec2(x, y) - own))) > 0.02) continue;
+            if (other == 0.0 || abs(depth / other - 1.0 - dot(depth_gradient, vec2(ivec2(x, y) - own))) > 0.02) continue;
             vec2 level = levels[y * TILE + x];
             moments += vec4(level, level * level);
             count += 1.0;
@@ -106,10 +106,10 @@ const uint AGAIN = 1u << 31, GATHERED = 1u << 30;
 
 uint choice_of(ivec2 stratum) {
     stratum = min(stratum, (ivec2(VIEW.width, VIEW.height) - 1) / STRATUM);
-    Carried c = Carried(false, false, 0, ivec2(0));
-    if ((DENOISE.flags & DENOISE_GRADIENTS) != 0) c = carried_at(stratum);
+    GradientPixel c = GradientPixel(false, false, 0, ivec2(0));
+    if ((DENOISE.flags & DENOISE_GRADIENTS) != 0) c = gradient_pixel_at(stratum);
     // one whose turn it is where bounced light is not gathered everywhere: in each direction there are one or two
-    bool sparse = (VIEW.flags & VIEW_SPARSE_BOUNCE) != 0;
+    bool sparse = (VIEW.flags & VIEW_SUBSAMPLED_BOUNCE) != 0;
     int random = int(4.0 * dither(stratum, DITHER_SAMPLE));
     ivec2 corner = stratum * STRATUM, first, choice;
     first.y = sparse ? (turn(0).y + corner.y) & 1 : int(dither(stratum, DITHER_SAMPLE_ROW) < 0.5);
@@ -159,7 +159,7 @@ void main() {
     uvec2 surface = imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).xy;
     vec3 normal = unpack_normal(surface.y);
     float field = mark_field(mark_read(pixel));
-    vec2 slope = slope_at(depth, field > 0.0);
+    vec2 depth_gradient = depth_gradient_at(depth, field > 0.0);
 
     LightTexel light;
     light.level = vec2(direct.x, indirect.x);
@@ -172,7 +172,7 @@ void main() {
         keep_sample(stratum, pixel, imageLoad(images_rgba32f[VIEW.image_position], pixel), surface, luminances);
     }
 
-    History h = history_at(pixel, light.guide, slope);
+    History h = history_at(pixel, light.guide, depth_gradient);
     vec2 frames = vec2(0.0), variance = vec2(0.0);
     if (h.weight > 0.0) {
         frames = h.frames;
@@ -200,14 +200,14 @@ void main() {
     }
     frames = min(frames + 1.0, 1.0 / MIN_WEIGHT);
     if (min(frames.x, frames.y) < TRUSTED_FRAMES) {
-        vec2 around = variance_around(depth, slope);
+        vec2 around = variance_around(depth, depth_gradient);
         variance = mix(variance, max(variance, around), lessThan(frames, vec2(TRUSTED_FRAMES)));
     }
     // of the mean over the frames: what has settled is left as it is
     light.variance = variance / min(frames, 2.0 / MIN_WEIGHT - 1.0);
 
     LightTexels(DENOISE.fresh).at[place_of(pixel)] = pack_texel(light, dither(pixel, DITHER_FRESH));
-    imageStore(images_rg16f[DENOISE.slope], pixel, vec4(slope, 0.0, 0.0));
+    imageStore(images_rg16f[DENOISE.depth_gradient], pixel, vec4(depth_gradient, 0.0, 0.0));
     float random = dither(pixel, DITHER_PAST);
     Pasts(DENOISE.past).at[place_of(pixel)] = pack_past(frames, variance, fract(random + vec4(0.0, 0.25, 0.5, 0.75)));
 }

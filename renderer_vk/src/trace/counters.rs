@@ -9,11 +9,11 @@ use crate::gpu::{
 
 /// The counted passes by the names that their times go by, in the order of `COUNT_*`.
 pub const COUNTED: [&str; 7] = [
-    "trace_eye",
+    "trace_primary_rays",
     "trace_primary",
     "trace_direct",
     "trace_indirect",
-    "trace_bounce",
+    "trace_bounce_rays",
     "trace_bounce_light",
     "trace_suns",
 ];

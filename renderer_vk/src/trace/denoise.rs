@@ -45,7 +45,7 @@ struct Images {
     size: [u32; 2],
     /// What the last frame left; once it has joined the fresh light, that after the first step, for the next frame.
     history: Buffer,
-    slope: Image,
+    depth_gradient: Image,
     adaptive: Option<AdaptiveImages>,
 }
 
@@ -57,7 +57,7 @@ struct AdaptiveImages {
     samples: Image,
     sample_surfaces: Image,
     /// The gradient samples of this frame.
-    carried: Image,
+    gradient_pixels: Image,
     stratum_guide: Image,
     /// Their gradients, spread over some and over many strata.
     gradient_samples: Image,
@@ -83,7 +83,7 @@ impl Images {
             tier,
             size,
             history: texels(device, "trace light history", size, bytes)?,
-            slope: make(device, "trace slope", size, Format::Rg16F)?,
+            depth_gradient: make(device, "trace depth gradient", size, Format::Rg16F)?,
             adaptive: match tier {
                 Tier::Adaptive => Some(AdaptiveImages::new(device, size)?),
                 Tier::Sparse => None,
@@ -103,7 +103,7 @@ impl AdaptiveImages {
             ],
             samples: strata("trace samples", Format::Rgba32Uint)?,
             sample_surfaces: strata("trace sample surfaces", Format::Rgba32Uint)?,
-            carried: strata("trace carried", Format::R32Uint)?,
+            gradient_pixels: strata("trace gradient pixels", Format::R32Uint)?,
             stratum_guide: strata("trace stratum guide", Format::R32Uint)?,
             gradient_samples: strata("trace gradient samples", Format::Rgba32Uint)?,
             gradient_sums: strata("trace gradient sums", Format::Rgba16F)?,
@@ -166,12 +166,12 @@ impl DenoisePasses {
             ])
         };
         let sparse = |last| {
-            let code = &shaders::TRACE_SCATTER_COMP;
-            let constants = [(ids::scatter::LAST, last)];
-            ComputePipeline::new(device, "trace_sparse", code, &constants)
+            let code = &shaders::TRACE_SPARSE_FILTER_COMP;
+            let constants = [(ids::sparse_filter::LAST, last)];
+            ComputePipeline::new(device, "trace_sparse_filter", code, &constants)
         };
         Ok(Self {
-            carry: compute("trace_carry", &shaders::TRACE_CARRY_COMP)?,
+            carry: compute("trace_gradient_reproject", &shaders::TRACE_GRADIENT_REPROJECT_COMP)?,
             gradient_sample: compute(
                 "trace_gradient_sample",
                 &shaders::TRACE_GRADIENT_SAMPLE_COMP,
@@ -182,7 +182,7 @@ impl DenoisePasses {
             wavelet: [wavelets(0)?, wavelets(1)?],
             sparse_temporal: compute(
                 "trace_sparse_temporal",
-                &shaders::TRACE_SCATTER_TEMPORAL_COMP,
+                &shaders::TRACE_SPARSE_TEMPORAL_COMP,
             )?,
             sparse: [sparse(0)?, sparse(0)?, sparse(1)?],
         })
@@ -262,12 +262,12 @@ impl Denoiser {
             last_seed,
             samples: nothing,
             sample_surfaces: nothing,
-            carried: nothing,
+            gradient_pixels: nothing,
             stratum_guide: nothing,
             gradient_samples: nothing,
             gradient_sums: nothing,
             gradient: nothing,
-            slope: nothing,
+            depth_gradient: nothing,
             ..DenoiseView::default()
         };
         let Some(images) = &self.images else {
@@ -280,7 +280,7 @@ impl Denoiser {
                 | flag(images.tier == Tier::Sparse, t::DENOISE_SPARSE),
             history: images.history.address(),
             fresh: fresh.address(),
-            slope: images.slope.storage_index(),
+            depth_gradient: images.depth_gradient.storage_index(),
             ..empty
         };
         let Some(adaptive) = &images.adaptive else {
@@ -289,7 +289,7 @@ impl Denoiser {
         DenoiseView {
             samples: adaptive.samples.storage_index(),
             sample_surfaces: adaptive.sample_surfaces.storage_index(),
-            carried: adaptive.carried.storage_index(),
+            gradient_pixels: adaptive.gradient_pixels.storage_index(),
             stratum_guide: adaptive.stratum_guide.storage_index(),
             gradient_samples: adaptive.gradient_samples.storage_index(),
             gradient_sums: adaptive.gradient_sums.storage_index(),
@@ -314,7 +314,7 @@ impl Denoiser {
         match self.carries() {
             Some(images) => {
                 let strata = images.size.map(|s| s.div_ceil(STRATUM));
-                dispatch(rec, "trace_carry", &passes.carry, view, strata, [TILE; 2])
+                dispatch(rec, "trace_gradient_reproject", &passes.carry, view, strata, [TILE; 2])
             }
             None => Ok(()),
         }
@@ -360,7 +360,7 @@ impl Denoiser {
                 dispatch(rec, name, &passes.sparse_temporal, view, size, [TILE; 2])?;
                 steps(
                     rec,
-                    "trace_sparse",
+                    "trace_sparse_filter",
                     &passes.sparse,
                     view,
                     images,

@@ -6,7 +6,7 @@ use crate::settings::Settings;
 
 /// Whether bounced light is gathered for a quarter of the pixels: in a picture that is denoised nobody can tell, and it is the
 /// dearest pass. Reference mode and undenoised pictures get every pixel.
-pub fn is_sparse(settings: &Settings) -> bool {
+pub fn is_subsampled(settings: &Settings) -> bool {
     !settings.rt_accumulate && settings.rt_denoiser > 0 && settings.rt_bounces > 0
 }
 
@@ -23,10 +23,10 @@ pub fn record(
     has_fog: bool,
 ) -> Result<(), Error> {
     let cells = size.map(|n| n.div_ceil(2));
-    let sparse = is_sparse(settings);
+    let sparse = is_subsampled(settings);
     let fog = usize::from(has_fog);
     if sparse && settings.rt_bounces == 1 {
-        let meets = passes.get(&passes.bounce_meets[fog])?;
+        let meets = passes.get(&passes.bounce_shade[fog])?;
         passes.get(&passes.bounce_rays)?.record(rec, view, cells)?;
         meets.record(rec, view, cells)?;
         passes

@@ -9,7 +9,7 @@ use super::denoise::DenoisePasses;
 use super::fog::FogPasses;
 use super::input::Tracer;
 use super::passes::{
-    BounceLights, BounceMeets, BounceRays, Choose, Composite, Direct, Exposure, EyeRays, Fill,
+    BounceLights, BounceHits, BounceRays, Choose, Composite, Direct, Exposure, EyeRays, Fill,
     FlareRays, Indirect, OtherSide, PlainPrimary, Primary, ToneMap,
 };
 use crate::at_once::{Late, Make, make_all};
@@ -46,7 +46,7 @@ pub struct PassSet {
     /// Of any number of lights.
     pub(super) direct: Pass<Direct>,
     pub(super) bounce_rays: Pass<BounceRays>,
-    pub(super) bounce_meets: [Pass<BounceMeets>; 2],
+    pub(super) bounce_shade: [Pass<BounceHits>; 2],
     pub(super) bounce_lights: Pass<BounceLights>,
     pub(super) fill: Pass<Fill>,
     pub(super) indirect: [Pass<Indirect>; 2],
@@ -82,9 +82,9 @@ impl PassSet {
             suns: Pass::new(Direct::of_suns),
             direct: Pass::new(Direct::new),
             bounce_rays: Pass::new(BounceRays::new),
-            bounce_meets: [
-                Pass::new(|device, _| BounceMeets::new(device)),
-                Pass::new(|device, _| BounceMeets::with_fog(device)),
+            bounce_shade: [
+                Pass::new(|device, _| BounceHits::new(device)),
+                Pass::new(|device, _| BounceHits::with_fog(device)),
             ],
             bounce_lights: Pass::new(BounceLights::new),
             fill: Pass::new(|device, _| Fill::new(device)),
@@ -144,7 +144,7 @@ impl PassSet {
         passes.extend([
             self.ahead(&self.primary[0]),
             self.ahead(&self.other_side),
-            self.ahead(&self.bounce_meets[usize::from(has_fog)]),
+            self.ahead(&self.bounce_shade[usize::from(has_fog)]),
             self.ahead(&self.denoise),
             self.ahead(&self.plain[0]),
             self.ahead(&self.chosen_direct),

@@ -2,8 +2,8 @@
 //! All of them read their inputs and outputs from one `TraceView`, whose address `record` is given.
 
 use shaders::Spirv;
-use shaders::constant_ids::trace::{bounce, direct, fog_keep, turn};
-use shaders::trace_types::constants::{CHOSEN_LIGHTS, CHOSEN_SUNS, RAY_TILE};
+use shaders::constant_ids::trace::{bounce, direct, fog_keep, reflect_refract};
+use shaders::trace_types::constants::{SAMPLING_LIGHT, SAMPLING_SUNS, RAY_TILE};
 
 use super::input::Tracer;
 use crate::gpu::{
@@ -162,8 +162,8 @@ macro_rules! pixel_pass {
 
 ray_pass!(
     /// Reads the acceleration structures; writes what the eye's own rays meet first (`texels`).
-    EyeRays, "trace_eye", TRACE_EYE_RGEN,
-    TRACE_EYE_RGEN_COMPUTE, TRACE_EYE_RGEN_QUERY
+    EyeRays, "trace_primary_rays", TRACE_PRIMARY_RAYS_RGEN,
+    TRACE_PRIMARY_RAYS_RGEN_COMPUTE, TRACE_PRIMARY_RAYS_RGEN_QUERY
 );
 ray_pass!(
     /// Reads what the eye's rays meet, the acceleration structures and materials; writes the G-buffer (`position`,
@@ -184,7 +184,7 @@ impl Primary {
 
 pixel_pass!(
     /// What [`Primary`] does, for those pixels that need no ray for it beyond the eye's own: they are finished then.
-    PlainPrimary, "trace_plain", TRACE_PRIMARY_RGEN_NO_RAYS
+    PlainPrimary, "trace_primary_simple", TRACE_PRIMARY_RGEN_NO_RAYS
 );
 impl PlainPrimary {
     /// The same pass, which in addition leaves the points where fog is to be lit.
@@ -202,7 +202,7 @@ ray_pass!(
     /// besides what the eye's paths read.
     OtherSide, "trace_other_side", TRACE_PRIMARY_RGEN,
     TRACE_PRIMARY_RGEN_COMPUTE, TRACE_PRIMARY_RGEN_QUERY,
-    &[(turn::OTHER_FIELD, 1)]
+    &[(reflect_refract::OTHER_FIELD, 1)]
 );
 
 ray_pass!(
@@ -221,7 +221,7 @@ impl Direct {
     /// # Errors
     /// The driver refuses the pipeline.
     pub fn of_chosen(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-        Self::with(device, tracer, &[(direct::CHOSEN, CHOSEN_LIGHTS)])
+        Self::with(device, tracer, &[(direct::SAMPLING, SAMPLING_LIGHT)])
     }
 
     /// The pass after that, which adds the light of suns.
@@ -229,7 +229,7 @@ impl Direct {
     /// # Errors
     /// The driver refuses the pipeline.
     pub fn of_suns(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-        Self::with(device, tracer, &[(direct::CHOSEN, CHOSEN_SUNS)])
+        Self::with(device, tracer, &[(direct::SAMPLING, SAMPLING_SUNS)])
     }
 
     /// Records the pass for rays in the order that [`Choose`] has left them in.
@@ -258,7 +258,7 @@ impl Direct {
 
 ray_pass!(
     /// Reads the G-buffer and the light lists; writes `indirect`, by paths of any number of bounces: with
-    /// `VIEW_SPARSE_BOUNCE` for one of 2 × 2 pixels, and `size` is half as large then.
+    /// `VIEW_SUBSAMPLED_BOUNCE` for one of 2 × 2 pixels, and `size` is half as large then.
     Indirect, "trace_indirect", TRACE_INDIRECT_RGEN,
     TRACE_INDIRECT_RGEN_COMPUTE, TRACE_INDIRECT_RGEN_QUERY
 );
@@ -275,15 +275,15 @@ impl Indirect {
 ray_pass!(
     /// Reads the G-buffer; writes what the rays of a single bounce meet (`texels`). `size`: half of the view's, of this and
     /// the next two.
-    BounceRays, "trace_bounce", TRACE_BOUNCE_RGEN,
-    TRACE_BOUNCE_RGEN_COMPUTE, TRACE_BOUNCE_RGEN_QUERY
+    BounceRays, "trace_bounce_rays", TRACE_BOUNCE_RAYS_RGEN,
+    TRACE_BOUNCE_RAYS_RGEN_COMPUTE, TRACE_BOUNCE_RAYS_RGEN_QUERY
 );
 pixel_pass!(
     /// Reads what those rays meet, and the light lists; writes the light that is found there and that which a ray is to be
     /// sent to (`texels`).
-    BounceMeets, "trace_bounce_meets", TRACE_BOUNCE_COMP
+    BounceHits, "trace_bounce_hits", TRACE_BOUNCE_HITS_COMP
 );
-impl BounceMeets {
+impl BounceHits {
     /// The same pass for maps with fog, which lies in the way of those rays.
     ///
     /// # Errors
@@ -307,11 +307,11 @@ ray_pass!(
 pixel_pass!(
     /// Reads the G-buffer and the light lists; writes for each pixel the light that it sends a ray to (`texels`), those of a
     /// tile in the order of where the rays go.
-    Choose, "trace_choose", TRACE_CHOOSE_COMP, RAY_TILE
+    Choose, "trace_sample_lights", TRACE_SAMPLE_LIGHTS_COMP, RAY_TILE
 );
 pixel_pass!(
     /// Reads the G-buffer and `indirect`; writes `indirect` where it was not gathered. `size`: half of the view's.
-    Fill, "trace_fill", TRACE_FILL_COMP
+    Fill, "trace_bounce_upsample", TRACE_BOUNCE_UPSAMPLE_COMP
 );
 pixel_pass!(
     /// Reads the G-buffer, `front`, `direct` and `indirect`; writes `composite`, or the mean in `accumulation`.

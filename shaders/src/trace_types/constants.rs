@@ -51,7 +51,7 @@ pub const VIEW_FULLBRIGHT: u32 = 64;
 pub const VIEW_HISTORY: u32 = 128;
 pub const VIEW_DENOISE: u32 = 256;
 /// Bounced light is gathered for one of each 2 × 2 pixels, which take turns.
-pub const VIEW_SPARSE_BOUNCE: u32 = 512;
+pub const VIEW_SUBSAMPLED_BOUNCE: u32 = 512;
 
 /// The views of `rt_debug`: `PostView::debug`.
 pub const DEBUG_ALBEDO: u32 = 1;
@@ -67,11 +67,11 @@ pub const DEBUG_RAYS: u32 = 10;
 pub const DEBUG_SPECULAR: u32 = 11;
 
 /// Counted passes.
-pub const COUNT_EYE: u32 = 0;
+pub const COUNT_PRIMARY_RAYS: u32 = 0;
 pub const COUNT_PRIMARY: u32 = 1;
 pub const COUNT_DIRECT: u32 = 2;
 pub const COUNT_INDIRECT: u32 = 3;
-pub const COUNT_BOUNCE: u32 = 4;
+pub const COUNT_BOUNCE_RAYS: u32 = 4;
 pub const COUNT_BOUNCE_LIGHT: u32 = 5;
 pub const COUNT_SUNS: u32 = 6;
 
@@ -91,7 +91,7 @@ pub const FOG_LIT: u32 = 1;
 pub const FOG_FILTERED: u32 = 2;
 pub const FOG_HISTORY: u32 = 4;
 
-/// How a light is chosen: `LightView::selection`.
+/// How a light is sampled: `LightView::selection`.
 pub const SELECT_UNIFORM: u32 = 0;
 pub const SELECT_RESAMPLED: u32 = 1;
 pub const SELECT_ALL: u32 = 2;
@@ -137,7 +137,7 @@ pub const LAST_MOVED: u32 = 1;
 pub const LAST_SAME: u32 = 2;
 
 /// Streams of a pixel's random numbers (`rng_begin` in `random.glsl`): the path from the eye.
-pub const STREAM_EYE: u32 = 0;
+pub const STREAM_PRIMARY: u32 = 0;
 /// The choice of a light for a visible surface.
 pub const STREAM_LIGHT: u32 = 1;
 /// Bounced light.
@@ -161,16 +161,16 @@ pub const DITHER_SAMPLE: u32 = 3;
 /// Turn of the taps with `rt_denoiser 2`: this plus the distance of the step's taps in pixels.
 pub const DITHER_TURN: u32 = 4;
 /// Rounding of bounced light between the pixels that have it.
-pub const DITHER_FILLED: u32 = 5;
+pub const DITHER_UPSAMPLED: u32 = 5;
 /// Column and row of the first candidate for that pixel.
 pub const DITHER_SAMPLE_COLUMN: u32 = 6;
 pub const DITHER_SAMPLE_ROW: u32 = 7;
 
-/// Whose light the pass of direct light adds (`CHOSEN` in `direct.rgen`): of lights that it chooses itself; of those that
-/// `choose.comp` has chosen; of suns.
-pub const CHOSEN_HERE: u32 = 0;
-pub const CHOSEN_LIGHTS: u32 = 1;
-pub const CHOSEN_SUNS: u32 = 2;
+/// Whose light the pass of direct light adds (`SAMPLING` in `direct.rgen`): of lights that it chooses itself; of those that
+/// `sample_lights.comp` has sampled; of suns.
+pub const SAMPLING_HERE: u32 = 0;
+pub const SAMPLING_LIGHT: u32 = 1;
+pub const SAMPLING_SUNS: u32 = 2;
 
 /// No instance of its own: the triangle names it.
 pub const NO_INSTANCE: u32 = 0xFFFF_FFFF;

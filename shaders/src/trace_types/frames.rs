@@ -60,7 +60,7 @@ pub struct DenoiseView {
     /// Its normals, light and length of path.
     pub sample_surfaces: u32,
     /// Which pixel of each stratum is lit as such a sample, and which sample.
-    pub carried: u32,
+    pub gradient_pixels: u32,
     /// Depth and normal of each stratum.
     pub stratum_guide: u32,
     /// Change and size of direct and indirect light around each stratum.
@@ -68,7 +68,7 @@ pub struct DenoiseView {
     /// The part of direct and indirect light that has changed, of each stratum.
     pub gradient: u32,
     /// Change of the inverse of depth from pixel to pixel.
-    pub slope: u32,
+    pub depth_gradient: u32,
     /// Change and size of the light of each stratum's own sample.
     pub gradient_samples: u32,
 }

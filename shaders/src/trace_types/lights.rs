@@ -1,4 +1,4 @@
-//! Lights, and the lists that they are chosen from.
+//! Lights, and the lists that they are sampled from.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;

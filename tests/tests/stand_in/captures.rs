@@ -225,7 +225,7 @@ fn costs_are_told_in_lines_and_as_json() {
     }
     let lines = text_of(&engine.take_messages());
     for part in [
-        "trace_eye",
+        "trace_primary_rays",
         "rays",
         "all passes",
         "screen images",
@@ -235,7 +235,7 @@ fn costs_are_told_in_lines_and_as_json() {
     }
     let json = engine.read_file("stats/frame.json").expect("the file");
     let json = String::from_utf8(json).unwrap();
-    let eye = json.lines().find(|l| l.contains("\"trace_eye\""));
+    let eye = json.lines().find(|l| l.contains("\"trace_primary_rays\""));
     let eye = eye.expect("the pass");
     let rays = eye
         .split("\"rays\": ")

@@ -233,7 +233,7 @@ fn tracers_agree_on_maps() {
                 .and_then(|rec| gpu.ring.end(rec))
                 .expect("frame");
             let passes = [
-                "trace_eye",
+                "trace_primary_rays",
                 "trace_primary",
                 "trace_direct",
                 "trace_indirect",

@@ -7,7 +7,7 @@ use shaders::trace_types::{
 };
 use shaders::types::{SunDisc, constants::NO_TEXTURE};
 
-use super::super::indirect::is_sparse;
+use super::super::indirect::is_subsampled;
 use super::{DARK_ADAPTATION, LIGHT_ADAPTATION, TracedView, ViewTracer, is_lit};
 use crate::gpu::{Error, Image, Recorder};
 use crate::raster::FlareTest;
@@ -158,7 +158,7 @@ impl ViewTracer {
         set(t::VIEW_FAST_SKY, settings.fast_sky);
         set(t::VIEW_FULLBRIGHT, !is_lit);
         set(t::VIEW_DENOISE, self.denoiser.is_on());
-        set(t::VIEW_SPARSE_BOUNCE, is_sparse(settings));
+        set(t::VIEW_SUBSAMPLED_BOUNCE, is_subsampled(settings));
         set(t::VIEW_HISTORY, self.history.is_some());
         flags
     }

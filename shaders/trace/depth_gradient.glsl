@@ -1,6 +1,6 @@
 // How the depth of the surface that a pixel shows goes on to its neighbours: what tells a plane from an edge.
-#ifndef RELIGHT_TRACE_SLOPE_GLSL
-#define RELIGHT_TRACE_SLOPE_GLSL
+#ifndef RELIGHT_TRACE_DEPTH_GRADIENT_GLSL
+#define RELIGHT_TRACE_DEPTH_GRADIENT_GLSL
 
 #include "trace/denoise.glsl"
 #include "trace/motion.glsl"
@@ -34,16 +34,16 @@ float lesser(float a, float b) { return abs(a) < abs(b) ? a : b; }
 // By how much the inverse of depth grows from pixel to pixel, in parts of it. That of a plane is linear on the screen,
 // also of one that a flat mirror shows. `takes_turns`: the pixels beside it show another surface, and those at its corners
 // the same one.
-vec2 slope_at(float depth, bool takes_turns) {
+vec2 depth_gradient_at(float depth, bool takes_turns) {
     const int ROW = TILE + 2;
     int place = own_place(), first = takes_turns ? ROW + 1 : 1, second = takes_turns ? ROW - 1 : ROW;
     vec4 around = vec4(depths[place - first], depths[place + first], depths[place - second], depths[place + second]);
     vec4 change = depth / max(around, 1.0e-3) - 1.0;
     change = mix(change, vec4(1.0e3), equal(around, vec4(0.0)));
-    vec2 slope = vec2(lesser(-change.x, change.y), lesser(-change.z, change.w));
-    slope = mix(slope, vec2(0.0), greaterThanEqual(abs(slope), vec2(1.0)));
+    vec2 depth_gradient = vec2(lesser(-change.x, change.y), lesser(-change.z, change.w));
+    depth_gradient = mix(depth_gradient, vec2(0.0), greaterThanEqual(abs(depth_gradient), vec2(1.0)));
     // from along the diagonals to along rows and columns
-    return takes_turns ? 0.5 * vec2(slope.x - slope.y, slope.x + slope.y) : slope;
+    return takes_turns ? 0.5 * vec2(depth_gradient.x - depth_gradient.y, depth_gradient.x + depth_gradient.y) : depth_gradient;
 }
 
 #endif

@@ -1,24 +1,24 @@
-// What the eye's own rays meet first: written by eye.rgen, read by the passes that go on from there.
-#ifndef RELIGHT_TRACE_EYE_HIT_GLSL
-#define RELIGHT_TRACE_EYE_HIT_GLSL
+// What the eye's own rays meet first: written by primary_rays.rgen, read by the passes that go on from there.
+#ifndef RELIGHT_TRACE_PRIMARY_HIT_GLSL
+#define RELIGHT_TRACE_PRIMARY_HIT_GLSL
 
 #include "trace/geometry.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer EyeHits { uvec4 at[]; };
 
 // What every path sees, and what the eye's own ray sees.
-const uint MASK_ALWAYS = MASK_SKY | MASK_NO_SHADOW, EYE_MASK = MASK_SOLID | MASK_ALWAYS;
+const uint MASK_ALWAYS = MASK_SKY | MASK_NO_SHADOW, PRIMARY_MASK = MASK_SOLID | MASK_ALWAYS;
 
 // Bits beside the number of the triangle: it is of what only the eye itself sees, and the pixel is finished.
 const uint EYE_HIT_FIRST_PERSON = 1u << 31, EYE_HIT_FINISHED = 1u << 30, EYE_HIT_BITS = EYE_HIT_FIRST_PERSON | EYE_HIT_FINISHED;
 
-void eye_hit_write(ivec2 pixel, Hit hit, bool first_person) {
+void primary_hit_write(ivec2 pixel, Hit hit, bool first_person) {
     uint bits = first_person ? EYE_HIT_FIRST_PERSON : 0u;
     EyeHits(VIEW.texels).at[place_of(pixel)] = uvec4(hit.geometry, hit.primitive & ~EYE_HIT_BITS | bits, floatBitsToUint(hit.barycentrics));
 }
 
 // How far away it is, the point on the triangle tells.
-Hit eye_hit_read(ivec2 pixel, out bool first_person) {
+Hit primary_hit_read(ivec2 pixel, out bool first_person) {
     uvec4 packed = EyeHits(VIEW.texels).at[place_of(pixel)];
     first_person = (packed.y & EYE_HIT_FIRST_PERSON) != 0;
     return Hit(packed.x, packed.y & ~EYE_HIT_BITS, uintBitsToFloat(packed.zw), 0.0);

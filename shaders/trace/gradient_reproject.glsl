@@ -2,17 +2,17 @@
 // Filtering, 2018, section 4.2): each frame keeps a pixel of each stratum of 3 x 3 as it was lit. The next frame finds
 // where that surface is by then, and lights it there once more with the same random numbers, in place of the pixel's own
 // surface with new ones. What differs is then the light itself, not its noise.
-#ifndef RELIGHT_TRACE_CARRY_GLSL
-#define RELIGHT_TRACE_CARRY_GLSL
+#ifndef RELIGHT_TRACE_GRADIENT_REPROJECT_GLSL
+#define RELIGHT_TRACE_GRADIENT_REPROJECT_GLSL
 
 #include "trace/denoise.glsl"
 
-// A record of the image `carried`: which pixel of the stratum is lit as a sample, where the sample was, and whether its
+// A record of the image `gradient_pixels`: which pixel of the stratum is lit as a sample, where the sample was, and whether its
 // surface has moved since. In 32 bits: 14 and 13 for the place, 5 for the rest. All ones: none.
-const uint NOT_CARRIED = 0xFFFFFFFFu;
-const ivec2 MOST_CARRIED = ivec2(1 << 14, 1 << 13);
+const uint NO_GRADIENT_PIXEL = 0xFFFFFFFFu;
+const ivec2 GRADIENT_PIXEL_LIMIT = ivec2(1 << 14, 1 << 13);
 
-struct Carried {
+struct GradientPixel {
     bool valid;
     bool moved;
     int index;   // in the stratum
@@ -22,21 +22,21 @@ struct Carried {
 uint pack_place(ivec2 pixel) { return uint(pixel.x) | uint(pixel.y) << 14; }
 ivec2 unpack_place(uint packed) { return ivec2(packed & 0x3FFFu, packed >> 14 & 0x1FFFu); }
 
-uint pack_carried(int index, bool moved, ivec2 last) { return pack_place(last) | uint(index + (moved ? 9 : 0)) << 27; }
+uint pack_gradient_pixel(int index, bool moved, ivec2 last) { return pack_place(last) | uint(index + (moved ? 9 : 0)) << 27; }
 
-Carried carried_at(ivec2 stratum) {
-    uint record = imageLoad(uimages_r32ui[DENOISE.carried], stratum).x;
+GradientPixel gradient_pixel_at(ivec2 stratum) {
+    uint record = imageLoad(uimages_r32ui[DENOISE.gradient_pixels], stratum).x;
     int index = int(record >> 27);
-    return Carried(index < 18, index >= 9, index % 9, unpack_place(record));
+    return GradientPixel(index < 18, index >= 9, index % 9, unpack_place(record));
 }
 
 ivec2 pixel_of(ivec2 stratum, int index) { return stratum * STRATUM + ivec2(index % STRATUM, index / STRATUM); }
 
 // Whether a pixel is lit as a sample of the last frame.
-bool is_carried(ivec2 pixel) {
+bool is_gradient_pixel(ivec2 pixel) {
     if ((DENOISE.flags & DENOISE_GRADIENTS) == 0) return false;
     ivec2 stratum = pixel / STRATUM;
-    Carried c = carried_at(stratum);
+    GradientPixel c = gradient_pixel_at(stratum);
     return c.valid && pixel_of(stratum, c.index) == pixel;
 }
 
@@ -51,7 +51,7 @@ struct LitSample {
     vec2 light; // luminance of direct and indirect light, rounded to 16-bit floats; negative: not known
 };
 
-void keep_nothing(ivec2 stratum) { imageStore(uimages_rgba32ui[DENOISE.samples], stratum, uvec4(NOT_CARRIED)); }
+void keep_nothing(ivec2 stratum) { imageStore(uimages_rgba32ui[DENOISE.samples], stratum, uvec4(NO_GRADIENT_PIXEL)); }
 
 void keep_sample(ivec2 stratum, ivec2 pixel, vec4 position, uvec2 normals, vec2 light) {
     imageStore(uimages_rgba32ui[DENOISE.samples], stratum, uvec4(floatBitsToUint(position.xyz), pack_place(pixel)));
@@ -60,7 +60,7 @@ void keep_sample(ivec2 stratum, ivec2 pixel, vec4 position, uvec2 normals, vec2 
 
 LitSample kept_sample(ivec2 stratum) {
     uvec4 a = imageLoad(uimages_rgba32ui[DENOISE.samples], stratum), b = imageLoad(uimages_rgba32ui[DENOISE.sample_surfaces], stratum);
-    return LitSample(a.w != NOT_CARRIED, unpack_place(a.w), uintBitsToFloat(a.xyz), uintBitsToFloat(b.w), unpack_normal(b.x),
+    return LitSample(a.w != NO_GRADIENT_PIXEL, unpack_place(a.w), uintBitsToFloat(a.xyz), uintBitsToFloat(b.w), unpack_normal(b.x),
         unpack_normal(b.y), unpackHalf2x16(b.z));
 }
 
@@ -73,8 +73,8 @@ struct LightTask {
 
 LightTask light_task(ivec2 pixel) {
     LightTask task = LightTask(gbuffer_read(pixel), pixel, VIEW.seed);
-    if (!is_carried(pixel)) return task;
-    Carried c = carried_at(pixel / STRATUM);
+    if (!is_gradient_pixel(pixel)) return task;
+    GradientPixel c = gradient_pixel_at(pixel / STRATUM);
     task.pixel = c.last;
     task.seed = DENOISE.last_seed;
     // what moves is lit where it is now

@@ -1,8 +1,8 @@
 #version 460
 // First pass of the cheap filter: the light of this frame joins the running mean of those before, where the surface was
 // in sight.
-#include "trace/scatter.glsl"
-#include "trace/slope.glsl"
+#include "trace/sparse_filter.glsl"
+#include "trace/depth_gradient.glsl"
 
 const float MIN_WEIGHT = 1.0 / float(SPARSE_FRAMES + 1);
 
@@ -18,7 +18,7 @@ void main() {
     vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).y);
     float field = mark_field(mark_read(pixel));
     uint reflection = field == 2.0 ? REFLECTION_BIT : 0u;
-    vec2 slope = slope_at(depth, field > 0.0);
+    vec2 depth_gradient = depth_gradient_at(depth, field > 0.0);
     SparseTexel texel;
     texel.light = light_read(VIEW.image_direct, pixel) + light_read(VIEW.image_indirect, pixel);
 
@@ -26,7 +26,7 @@ void main() {
     float frames = 0.0, sum = 0.0;
     Before before = before_of(pixel);
     if ((DENOISE.flags & DENOISE_HISTORY) != 0 && before.depth > 0.0) {
-        float tolerance = before.depth * (0.01 + 2.0 * (abs(slope.x) + abs(slope.y))) + 0.1;
+        float tolerance = before.depth * (0.01 + 2.0 * (abs(depth_gradient.x) + abs(depth_gradient.y))) + 0.1;
         vec2 low = floor(before.pixel), part = before.pixel - low;
         for (int i = 0; i < 4; i++) {
             ivec2 offset = ivec2(i & 1, i >> 1), tap = ivec2(low) + offset;
@@ -49,5 +49,5 @@ void main() {
     float random = dither(pixel, DITHER_FRESH);
     texel.guide = pack_sparse_guide(depth, normal, reflection != 0u, uint(frames + 1.0 + random));
     sparse_write(DENOISE.fresh, pixel, texel, dither(pixel, DITHER_PAST));
-    imageStore(images_rg16f[DENOISE.slope], pixel, vec4(slope, 0.0, 0.0));
+    imageStore(images_rg16f[DENOISE.depth_gradient], pixel, vec4(depth_gradient, 0.0, 0.0));
 }

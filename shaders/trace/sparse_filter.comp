@@ -5,7 +5,7 @@
 // taps in several passes in place of a dense kernel). No variance is kept: that the light is noise and not a shadow
 // is judged by how many frames it comes from.
 #define OWN_PUSH
-#include "trace/scatter.glsl"
+#include "trace/sparse_filter.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -22,7 +22,7 @@ void main() {
     }
     float depth = sparse_depth(middle.guide), value = luminance(middle.light);
     vec3 normal = sparse_normal(middle.guide);
-    vec2 slope = imageLoad(images_rg16f[DENOISE.slope], pixel).xy;
+    vec2 depth_gradient = imageLoad(images_rg16f[DENOISE.depth_gradient], pixel).xy;
     float frames = max(sparse_frames(middle.guide), 1.0);
     // the noise of one frame's light is about as large as the light
     float light_scale = 1.5 * sqrt(frames);
@@ -39,7 +39,7 @@ void main() {
         if (!inside(tap)) continue;
         SparseTexel other = sparse_read(push.source, tap);
         if (other.guide == 0 || ((other.guide ^ middle.guide) & REFLECTION_BIT) != 0) continue;
-        float off_plane = abs((1.0 + dot(slope, offset)) * sparse_depth(other.guide) / depth - 1.0);
+        float off_plane = abs((1.0 + dot(depth_gradient, offset)) * sparse_depth(other.guide) / depth - 1.0);
         float alike = max(dot(normal, sparse_normal(other.guide)), 0.0);
         alike *= alike; alike *= alike; alike *= alike;
         // of the two values the larger one sets the scale, so that bright noise is not left alone by all around it

@@ -1,9 +1,9 @@
 // Bounced light is gathered for one of each 2 x 2 pixels, and in four frames for all. Where another pixel of a cell is a
 // gradient sample, it takes the turn: it has to be traced to be compared.
-#ifndef RELIGHT_TRACE_SPARSE_GLSL
-#define RELIGHT_TRACE_SPARSE_GLSL
+#ifndef RELIGHT_TRACE_SUBSAMPLE_GLSL
+#define RELIGHT_TRACE_SUBSAMPLE_GLSL
 
-#include "trace/carry.glsl"
+#include "trace/gradient_reproject.glsl"
 
 // Pixels to the edge of a cell.
 const int CELL = 2;
@@ -18,22 +18,22 @@ ivec2 turn(int row) {
 
 // Which of the frames that gather light for a pixel this one is. Numbers that are evenly spread over all frames are not over
 // every fourth.
-uint sparse_index(uint frame) { return (VIEW.flags & VIEW_SPARSE_BOUNCE) != 0 ? frame >> 2 : frame; }
+uint subsample_index(uint frame) { return (VIEW.flags & VIEW_SUBSAMPLED_BOUNCE) != 0 ? frame >> 2 : frame; }
 
 // The pixel of a cell that is traced.
-ivec2 sparse_pixel(ivec2 cell) {
+ivec2 subsample_pixel(ivec2 cell) {
     ivec2 end = ivec2(VIEW.width, VIEW.height) - 1, first = turn(cell.y), pixel = min(cell * CELL + first, end);
     if ((DENOISE.flags & DENOISE_GRADIENTS) == 0) return pixel;
     for (int i = 0; i < 4; i++) {
         ivec2 other = min(cell * CELL + (first ^ ivec2(i & 1, i >> 1)), end);
-        if (is_carried(other)) return other;
+        if (is_gradient_pixel(other)) return other;
     }
     return pixel;
 }
 
 // Whether bounced light was gathered for the pixel itself.
 bool is_gathered(ivec2 pixel) {
-    return (VIEW.flags & VIEW_SPARSE_BOUNCE) == 0 || sparse_pixel(pixel / CELL) == pixel;
+    return (VIEW.flags & VIEW_SUBSAMPLED_BOUNCE) == 0 || subsample_pixel(pixel / CELL) == pixel;
 }
 
 #endif

@@ -3,15 +3,15 @@
 // because a ray is followed faster the less has to be kept over it.
 #define SORTS_RAYS
 #include "trace/lights.glsl"
-#include "trace/carry.glsl"
-#include "trace/chosen.glsl"
+#include "trace/gradient_reproject.glsl"
+#include "trace/sampled_light.glsl"
 #include "trace/suns.glsl"
 
 layout(local_size_x = RAY_TILE, local_size_y = RAY_TILE) in;
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    LightSample chosen = no_light();
+    LightSample sampled = no_light();
     float random = 0.5;
     bool sun = false;
     if (inside(pixel)) {
@@ -24,12 +24,12 @@ void main() {
             if (set_count(set) > set.suns) {
                 vec2 u = rng_next2();
                 LightChoice choice = choose_resampled(set, g.position, g.normal, u.x);
-                if (choice.weight > 0.0) chosen = sample_light(choice.light, g.position, g.normal, u);
-                chosen.light *= choice.weight;
+                if (choice.weight > 0.0) sampled = sample_light(choice.light, g.position, g.normal, u);
+                sampled.light *= choice.weight;
             }
             sun = set.suns > 0 && max_component(sun_sample(task).light) > 0.0;
         }
     }
-    uint slot = ray_slot(chosen.direction, max_component(chosen.light) > 0.0);
-    chosen_write(slot, gl_LocalInvocationID.xy, wanted_place(slot, sun), chosen, random);
+    uint slot = ray_slot(sampled.direction, max_component(sampled.light) > 0.0);
+    sampled_light_write(slot, gl_LocalInvocationID.xy, wanted_place(slot, sun), sampled, random);
 }

@@ -1,5 +1,5 @@
 #version 460
-// What the rays of bounce.rgen find at what they meet, and the light that is asked for there; bounce_light.rgen sends the
+// What the rays of bounce_rays.rgen find at what they meet, and the light that is asked for there; bounce_light.rgen sends the
 // ray to it.
 #include "trace/bounce_ray.glsl"
 
@@ -8,7 +8,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 void main() {
     ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(cell, bounce_cells()))) return;
-    LightTask task = light_task(sparse_pixel(cell));
+    LightTask task = light_task(subsample_pixel(cell));
     BounceLight b = BounceLight(vec3(0.0), no_light(), vec3(0.0));
     float random = 0.5;
     vec3 throughput;
@@ -19,7 +19,7 @@ void main() {
         vec3 direction;
         bounce_direction(v, direction);
         vec3 origin = offset_ray(v.position, v.face_normal);
-        if (hit.geometry != NO_HIT && bounce_meets(hit, origin, direction, throughput, b.found, v)) {
+        if (hit.geometry != NO_HIT && bounce_shade(hit, origin, direction, throughput, b.found, v)) {
             b.light = vertex_light(v);
             b.light.light *= throughput;
             b.origin = offset_ray(v.position, v.face_normal);

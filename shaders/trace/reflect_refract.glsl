@@ -1,6 +1,6 @@
 // What sends the eye's path elsewhere: portals, mirrors, what reflects as its stages say, glass and liquids.
-#ifndef RELIGHT_TRACE_TURN_GLSL
-#define RELIGHT_TRACE_TURN_GLSL
+#ifndef RELIGHT_TRACE_REFLECT_REFRACT_GLSL
+#define RELIGHT_TRACE_REFLECT_REFRACT_GLSL
 #include "trace/path.glsl"
 #include "trace/dielectric.glsl"
 
@@ -48,7 +48,7 @@ void pass_portal(inout Path path, SurfacePoint p, float t, uint index) {
 }
 
 // Goes on from a surface point that lies `t` ahead, on the side of `normal`.
-void turn_path(inout Path path, SurfacePoint p, float t, vec3 normal, vec3 direction) {
+void redirect_path(inout Path path, SurfacePoint p, float t, vec3 normal, vec3 direction) {
     path.origin = offset_ray(p.position, normal);
     path.direction = direction;
     path.travelled += t;
@@ -63,7 +63,7 @@ void reflect_path(inout Path path, SurfacePoint p, float t, vec3 face, vec3 norm
     if (dot(mirrored, face) <= 0.0) mirrored = reflect(path.direction, face);
     path.last = last_reflected(path.last, vec4(face, dot(face, p.position)));
     if (normal != face) path.bent = max(path.bent, bend);
-    turn_path(path, p, t, face, normalize(mirrored));
+    redirect_path(path, p, t, face, normalize(mirrored));
     path.solid_mask |= MASK_SOLID | MASK_THIRD_SOLID;
     path.layer_mask = MASK_TRANSLUCENT | MASK_THIRD_TRANSLUCENT;
 }
@@ -147,7 +147,7 @@ bool pass_dielectric(inout Path path, SurfacePoint p, Material material, SeenLay
     if (dot(refracted, face) >= 0.0) refracted = path.direction;
     path.absorption = enters ? dielectric.absorption : vec3(0.0);
     path.bent = max(path.bent, bend);
-    turn_path(path, p, t, -face, normalize(refracted));
+    redirect_path(path, p, t, -face, normalize(refracted));
     return true;
 }
 

@@ -1,7 +1,7 @@
 // The cheap filter's texel: 8 bytes with the light, which is not told apart here, depth, the bit of reflections where the
 // depth has its sign, a normal of 2 x 6 bits and the number of frames, up to 15.
-#ifndef RELIGHT_TRACE_SCATTER_GLSL
-#define RELIGHT_TRACE_SCATTER_GLSL
+#ifndef RELIGHT_TRACE_SPARSE_FILTER_GLSL
+#define RELIGHT_TRACE_SPARSE_FILTER_GLSL
 
 #include "trace/denoise.glsl"
 

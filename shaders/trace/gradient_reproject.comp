@@ -1,7 +1,7 @@
 #version 460
-// Finds the samples of the last frame again; see carry.glsl. One invocation is one stratum: it asks each of its pixels
+// Finds the samples of the last frame again; see gradient_reproject.glsl. One invocation is one stratum: it asks each of its pixels
 // where it was, and takes the sample that was next to there.
-#include "trace/carry.glsl"
+#include "trace/gradient_reproject.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -46,7 +46,7 @@ void main() {
         ivec2 last = ivec2(floor(before + 0.5));
         if (motion.z < 0.0 || !inside(last)) continue;
         uint packed = imageLoad(uimages_rgba32ui[DENOISE.samples], last / STRATUM).w;
-        if (packed == NOT_CARRIED) continue;
+        if (packed == NO_GRADIENT_PIXEL) continue;
         vec2 off = abs(before - vec2(unpack_place(packed)));
         float distance = max(off.x, off.y);
         if (distance >= nearest) continue;
@@ -56,9 +56,9 @@ void main() {
         rests = motion.xy == vec2(0.0);
         place = unpack_place(packed);
     }
-    uint record = NOT_CARRIED;
+    uint record = NO_GRADIENT_PIXEL;
     bool moved;
     if (found >= 0 && same_surface(kept_sample(place / STRATUM), pixel_of(stratum, found), found_path, moved) && !(moved && rests))
-        record = pack_carried(found, moved, place);
-    imageStore(uimages_r32ui[DENOISE.carried], stratum, uvec4(record));
+        record = pack_gradient_pixel(found, moved, place);
+    imageStore(uimages_r32ui[DENOISE.gradient_pixels], stratum, uvec4(record));
 }

@@ -3,7 +3,7 @@
 // surface, the nearer the more. Bounced light changes slowly over a surface, and the denoiser smooths it over far more
 // than a pixel.
 #include "trace/motion.glsl"
-#include "trace/sparse.glsl"
+#include "trace/subsample.glsl"
 
 const int TILE = 8, WIDE = TILE + 2;
 layout(local_size_x = TILE, local_size_y = TILE) in;
@@ -22,7 +22,7 @@ void main() {
         ivec2 cell = corner + ivec2(i % WIDE, i / WIDE);
         places[i] = vec4(-1.0);
         if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, cells))) continue;
-        ivec2 pixel = sparse_pixel(cell);
+        ivec2 pixel = subsample_pixel(cell);
         places[i] = imageLoad(images_rgba32f[VIEW.image_position], pixel);
         gathered[i] = uint(pixel.x) | uint(pixel.y) << 16;
         lights[i] = light_read(VIEW.image_indirect, pixel);
@@ -65,6 +65,6 @@ void main() {
             if (weight > 0.0) light /= weight;
             else if (any_weight > 0.0) light = any_light / any_weight;
         }
-        light_write(VIEW.image_indirect, pixel, light, dither(pixel, DITHER_FILLED));
+        light_write(VIEW.image_indirect, pixel, light, dither(pixel, DITHER_UPSAMPLED));
     }
 }
