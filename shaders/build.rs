@@ -109,9 +109,13 @@ fn main() {
 
     let mut generated = String::new();
     for job in &jobs {
-        if let Err(e) = build(&roots, &out, job) {
-            let _ = writeln!(errors, "{e}");
-        }
+        let group = match build(&roots, &out, job) {
+            Ok(words) => local_size(&words),
+            Err(e) => {
+                let _ = writeln!(errors, "{e}");
+                [1; 3]
+            }
+        };
         let stage = STAGES
             .iter()
             .find(|s| s.0 == job.stage)
@@ -126,10 +130,13 @@ fn main() {
         let _ = write!(
             generated,
             "/// `{file}`{defines}\npub static {symbol}: Spirv = Spirv {{\n    name: \"{file}{defines}\",\n    stage: Stage::{stage},\n    \
-             bytes: &Aligned(*include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{symbol}.spv\"))),\n}};\n",
+             local_size: {group:?},\n    bytes: &Aligned(*include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{symbol}.spv\"))),\n}};\n",
             file = job.file,
             symbol = job.symbol,
         );
+    }
+    for job in &jobs {
+        generated.push_str(&for_tracers(job, &symbols));
     }
     let _ = writeln!(
         generated,
@@ -148,6 +155,38 @@ fn main() {
     ] {
         write_if_changed(&out.join(file), &text).expect("OUT_DIR can be written");
     }
+}
+
+/// The static that joins the modules of a ray generation shader for all tracers; empty for other modules.
+fn for_tracers(job: &Job, symbols: &BTreeSet<String>) -> String {
+    let [compute, query] = ["COMPUTE", "QUERY"].map(|v| format!("{}_{v}", job.symbol));
+    match job.symbol.strip_suffix("_RGEN") {
+        Some(name) if symbols.contains(&compute) && symbols.contains(&query) => format!(
+            "/// `{file}` for each tracer.\npub static {name}: RayShader = RayShader {{\n    pipeline: &{pipeline},\n    \
+             compute: &{compute},\n    query: &{query},\n}};\n",
+            file = job.file,
+            pipeline = job.symbol,
+        ),
+        _ => String::new(),
+    }
+}
+
+/// The size of a compute shader's work groups: the operands of `OpExecutionMode LocalSize`. 1 for other stages.
+fn local_size(words: &[u32]) -> [u32; 3] {
+    const HEADER: usize = 5;
+    const OP_EXECUTION_MODE: u32 = 16;
+    const LOCAL_SIZE: u32 = 17;
+    let mut rest = words.get(HEADER..).unwrap_or_default();
+    while let Some(&first) = rest.first() {
+        let length = ((first >> 16) as usize).max(1);
+        if let [_, _, LOCAL_SIZE, x, y, z] = *rest.get(..length).unwrap_or_default()
+            && first & 0xFFFF == OP_EXECUTION_MODE
+        {
+            return [x, y, z];
+        }
+        rest = rest.get(length..).unwrap_or_default();
+    }
+    [1; 3]
 }
 
 /// Writes a file unless it has this text already, so that what depends on it is not built again.
@@ -447,21 +486,25 @@ impl IncludeHandler for Includes<'_> {
     }
 }
 
-/// Compiles one module unless its output is up to date.
-fn build(roots: &Roots, out: &Path, job: &Job) -> Result<(), String> {
+/// Compiles one module unless its output is up to date; returns its words.
+fn build(roots: &Roots, out: &Path, job: &Job) -> Result<Vec<u32>, String> {
     let mut text = format!("{SCRIPT_VERSION} {} {:?}\n", job.stage, job.defines);
     gather(roots, &job.file, &mut BTreeSet::new(), &mut text);
     let key = format!("{:016x}", hash(&text));
     let module = out.join(format!("{}.spv", job.symbol));
     let stamp = out.join(format!("{}.hash", job.symbol));
-    if module.is_file() && fs::read_to_string(&stamp).is_ok_and(|old| old == key) {
-        return Ok(());
+    if fs::read_to_string(&stamp).is_ok_and(|old| old == key)
+        && let Ok(bytes) = fs::read(&module)
+    {
+        let words = bytes.as_chunks().0.iter();
+        return Ok(words.map(|word| u32::from_le_bytes(*word)).collect());
     }
     let words = compile(roots, job)?;
     let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
     fs::write(&module, bytes)
         .and_then(|()| fs::write(&stamp, key))
-        .map_err(|e| format!("{}: {e}", module.display()))
+        .map_err(|e| format!("{}: {e}", module.display()))?;
+    Ok(words)
 }
 
 /// GLSL to SPIR-V words, or glslang's messages with the file's name in them.

@@ -40,6 +40,7 @@ pub enum Stage {
 pub struct Spirv {
     name: &'static str,
     stage: Stage,
+    local_size: [u32; 3],
     bytes: &'static Aligned<[u8]>,
 }
 
@@ -54,6 +55,11 @@ impl Spirv {
         self.stage
     }
 
+    /// Invocations of a work group of a compute shader, along each axis; 1 for other stages.
+    pub fn local_size(&self) -> [u32; 3] {
+        self.local_size
+    }
+
     /// The words of the module, SPIR-V 1.5.
     pub fn words(&self) -> &'static [u32] {
         // The wrapper aligns the bytes and SPIR-V comes in whole words, so this cast cannot fail.
@@ -65,6 +71,17 @@ impl std::fmt::Debug for Spirv {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Spirv({}, {:?})", self.name, self.stage)
     }
+}
+
+/// The modules of a ray generation shader: one for each tracer (`trace/tracer.glsl`).
+#[derive(Debug)]
+pub struct RayShader {
+    /// For a ray tracing pipeline.
+    pub pipeline: &'static Spirv,
+    /// A compute shader that traverses hierarchies of our own.
+    pub compute: &'static Spirv,
+    /// A compute shader with ray queries.
+    pub query: &'static Spirv,
 }
 
 include!(concat!(env!("OUT_DIR"), "/modules.rs"));

@@ -5,7 +5,6 @@
 #include "trace/view.glsl"
 #include "trace/color.glsl"
 
-const uint EXPOSURE_BINS = 128;
 // Luminance of the histogram's ends, stops.
 const float EXPOSURE_MIN_LOG = -12.0, EXPOSURE_MAX_LOG = 8.0;
 

@@ -31,7 +31,8 @@ pub struct Pass<'a> {
 pub(crate) struct Bound {
     /// The pipeline for draws, and the dynamic state that was told.
     pub graphics: Option<(vk::Pipeline, DynamicState)>,
-    compute: bool,
+    /// Size of the work groups of the pipeline for dispatches.
+    compute: Option<[u32; 3]>,
     /// The bind point that the descriptor set was bound for last.
     set: Option<vk::PipelineBindPoint>,
 }
@@ -106,7 +107,7 @@ impl<'a> Pass<'a> {
     /// Binds a pipeline for the dispatches that follow.
     pub fn bind_compute(&mut self, pipeline: &ComputePipeline) {
         self.bind(vk::PipelineBindPoint::COMPUTE, pipeline.raw());
-        self.bound.compute = true;
+        self.bound.compute = Some(pipeline.local_size());
     }
 
     /// Binds a pipeline for the ray launches that follow.
@@ -156,7 +157,7 @@ impl<'a> Pass<'a> {
     /// Launches workgroups.
     pub fn dispatch(&mut self, x: u32, y: u32, z: u32) {
         self.end_rendering();
-        if !self.bound.compute {
+        if self.bound.compute.is_none() {
             self.refuse("a dispatch without pipeline");
         } else if x > 0 && y > 0 && z > 0 {
             // SAFETY: a compute pipeline is bound, outside of a render pass.
@@ -164,10 +165,16 @@ impl<'a> Pass<'a> {
         }
     }
 
+    /// Launches the workgroups that at least so many invocations need.
+    pub fn dispatch_invocations(&mut self, x: u32, y: u32) {
+        let [width, height, _] = self.bound.compute.unwrap_or([1; 3]);
+        self.dispatch(x.div_ceil(width), y.div_ceil(height), 1);
+    }
+
     /// Launches as many workgroups as three 32-bit numbers in a buffer say.
     pub fn dispatch_indirect(&mut self, buffer: &Buffer, offset: u64) {
         self.end_rendering();
-        if !self.bound.compute || buffer.check(offset, 12).is_err() {
+        if self.bound.compute.is_none() || buffer.check(offset, 12).is_err() {
             self.refuse("an indirect dispatch without pipeline or parameters");
             return;
         }

@@ -316,7 +316,10 @@ impl GraphicsPipeline {
 }
 
 /// A pipeline for dispatches.
-pub struct ComputePipeline(Pipeline);
+pub struct ComputePipeline {
+    pipeline: Pipeline,
+    local_size: [u32; 3],
+}
 
 impl ComputePipeline {
     /// Compiles a pipeline; `constants` are specialization constants, id and 32-bit value.
@@ -346,11 +349,19 @@ impl ComputePipeline {
                 .vk()
                 .create_compute_pipelines(device.0.pipeline_cache, &infos, None)
         };
-        Ok(Self(one(device, made, "vkCreateComputePipelines", name)?))
+        Ok(Self {
+            pipeline: one(device, made, "vkCreateComputePipelines", name)?,
+            local_size: code.local_size().map(|n| n.max(1)),
+        })
+    }
+
+    /// Invocations of a work group along each axis.
+    pub fn local_size(&self) -> [u32; 3] {
+        self.local_size
     }
 
     pub(crate) fn raw(&self) -> vk::Pipeline {
-        self.0.raw
+        self.pipeline.raw
     }
 }
 

@@ -7,17 +7,13 @@
 use glam::Vec2;
 use shaders::trace_types::AntialiasView;
 
+use super::frame_passes::FramePasses;
+use super::passes::Pass;
+use super::targets::Targets;
 use crate::gpu::{
-    Access, ComputePipeline, Device, Error, Filter, Format, Image, ImageDesc, ImageUsage,
-    MipFilter, Recorder, SamplerDesc, Wrap,
+    Device, Error, Filter, Format, Image, ImageDesc, ImageUsage, MipFilter, SamplerDesc, Wrap,
 };
 use crate::settings::Settings;
-
-use super::targets::Targets;
-
-/// Pixels along each edge of a group of the two passes, see their `local_size`.
-const RESOLVE_GROUP: u32 = 16;
-const UPSCALE_GROUP: u32 = 8;
 
 /// The smallest part of the picture's size that is traced, along each axis.
 const LEAST_SCALE: f32 = 0.25;
@@ -60,26 +56,6 @@ pub fn traced_size(settings: &Settings, output: [u32; 2]) -> [u32; 2] {
         clippy::cast_sign_loss
     )] // a number of pixels
     output.map(|side| ((side as f32 * scale).round() as u32).clamp(1, side.max(1)))
-}
-
-/// The two passes.
-pub struct AntialiasPasses {
-    resolve: ComputePipeline,
-    upscale: ComputePipeline,
-}
-
-impl AntialiasPasses {
-    /// Compiles the pipelines.
-    ///
-    /// # Errors
-    /// The driver refuses a pipeline.
-    pub fn new(device: &Device) -> Result<Self, Error> {
-        let pipeline = |name, spirv| ComputePipeline::new(device, name, spirv, &[]);
-        Ok(Self {
-            resolve: pipeline("trace_antialias", &shaders::TRACE_ANTIALIAS_COMP)?,
-            upscale: pipeline("trace_upscale", &shaders::TRACE_UPSCALE_COMP)?,
-        })
-    }
 }
 
 /// Resolves traced pictures to those of the window.
@@ -185,29 +161,16 @@ impl Antialias {
         })
     }
 
-    /// Records the pass, if there is anything to do. `view`: device address of the `TraceView`.
+    /// Records the pass, if there is anything to do.
     ///
     /// # Errors
-    /// Out of memory.
-    pub fn record(
-        &self,
-        passes: &AntialiasPasses,
-        rec: &mut Recorder,
-        view: u64,
-    ) -> Result<(), Error> {
-        let (pipeline, name, group) = match self.method {
-            Method::Plain => return Ok(()),
-            Method::Temporal => (&passes.resolve, "trace_antialias", RESOLVE_GROUP),
-            Method::Upscale => (&passes.upscale, "trace_upscale", UPSCALE_GROUP),
-        };
-        let Some([now, _]) = &self.resolved else {
-            return Ok(());
-        };
-        let mut pass = rec.pass(name, Access::COMPUTE, Access::COMPUTE)?;
-        pass.bind_compute(pipeline);
-        pass.push(&view);
-        pass.dispatch(now.width().div_ceil(group), now.height().div_ceil(group), 1);
-        Ok(())
+    /// Out of memory, or the driver refuses the pipeline.
+    pub fn record(&self, passes: &mut FramePasses<'_>) -> Result<(), Error> {
+        match self.method {
+            Method::Plain => Ok(()),
+            Method::Temporal => passes.run(Pass::Antialias),
+            Method::Upscale => passes.run(Pass::Upscale),
+        }
     }
 
     /// The picture of this frame becomes that of the last one.

@@ -1,37 +1,12 @@
 //! Bloom: a part of the light spread around where it comes from; `shaders/trace/bloom.glsl` says how.
 
-use super::pass_set::PassSet;
-use super::passes::{TILE, dispatch};
-use crate::gpu::{
-    Buffer, BufferDesc, BufferUsage, ComputePipeline, Device, Error, Memory, Recorder,
-};
+use super::frame_passes::FramePasses;
+use super::passes::Pass;
+use crate::gpu::{Buffer, BufferDesc, BufferUsage, Device, Error, Memory};
 
 /// As in `bloom.glsl`: levels, and pixels to a texel of the first one.
 const LEVELS: u32 = 5;
 const FIRST: u32 = 4;
-
-/// Pixels to the edge of what a group of the first pass averages.
-const GROUP: u32 = 64;
-
-/// The two passes.
-pub struct BloomPasses {
-    down: ComputePipeline,
-    up: ComputePipeline,
-}
-
-impl BloomPasses {
-    /// Compiles the pipelines.
-    ///
-    /// # Errors
-    /// The driver refuses a pipeline.
-    pub fn new(device: &Device) -> Result<Self, Error> {
-        let make = |shader| ComputePipeline::new(device, "trace_bloom", shader, &[]);
-        Ok(Self {
-            down: make(&shaders::TRACE_BLOOM_DOWN_COMP)?,
-            up: make(&shaders::TRACE_BLOOM_UP_COMP)?,
-        })
-    }
-}
 
 /// Reads `hdr`; writes the spread light, a texel for each 4 x 4 pixels. Nothing is made before it is first asked for.
 #[derive(Default)]
@@ -70,17 +45,16 @@ impl Bloom {
         Ok(texels.address())
     }
 
-    /// Records the passes, once [`prepare`](Self::prepare) gave an address. `view`: device address of the `TraceView`.
+    /// Records the passes, once [`prepare`](Self::prepare) gave an address.
     ///
     /// # Errors
     /// Out of memory, or the driver refuses a pipeline.
-    pub fn record(&self, passes: &PassSet, rec: &mut Recorder, view: u64) -> Result<(), Error> {
-        let Some((size, _)) = &self.texels else {
-            return Ok(());
-        };
-        let BloomPasses { down, up } = passes.get(&passes.bloom)?;
-        dispatch(rec, "trace_bloom", down, view, *size, [GROUP; 2])?;
-        dispatch(rec, "trace_bloom", up, view, *size, [TILE * FIRST; 2])
+    pub fn record(&self, passes: &mut FramePasses<'_>) -> Result<(), Error> {
+        if self.texels.is_some() {
+            passes.run(Pass::BloomDown)?;
+            passes.run(Pass::BloomUp)?;
+        }
+        Ok(())
     }
 }
 

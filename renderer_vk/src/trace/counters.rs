@@ -2,24 +2,14 @@
 
 use shaders::trace_types::constants as t;
 
+use super::passes::COUNTERS;
 use crate::gpu::{
     Access, Buffer, BufferDesc, BufferUsage, Device, Error, Format, Image, ImageDesc, ImageUsage,
     Memory, Recorder,
 };
 
-/// The counted passes by the names that their times go by, in the order of `COUNT_*`.
-pub const COUNTED: [&str; 7] = [
-    "trace_primary_rays",
-    "trace_primary",
-    "trace_direct",
-    "trace_indirect",
-    "trace_bounce_rays",
-    "trace_bounce_light",
-    "trace_suns",
-];
-
 /// Bytes of the counters.
-const SIZE: u64 = COUNTED.len() as u64 * t::COUNTER_ROWS as u64 * 4;
+const SIZE: u64 = COUNTERS as u64 * t::COUNTER_ROWS as u64 * 4;
 
 /// The counters, and the answers of the newest frame that is over.
 #[derive(Default)]
@@ -27,7 +17,7 @@ pub struct RayCounters {
     counters: Option<Buffer>,
     /// Copies that the CPU reads, each with the frame that wrote it; a frame uses the oldest.
     copies: Vec<(u64, Buffer)>,
-    newest: Option<(u64, [u64; COUNTED.len()])>,
+    newest: Option<(u64, [u64; COUNTERS])>,
     /// Rays of each pixel, while they are shown.
     pixels: Option<Image>,
 }
@@ -43,7 +33,7 @@ pub struct Counting {
 
 impl RayCounters {
     /// Rays of each counted pass in the newest frame that is over; `None` while there is none.
-    pub fn rays(&self) -> Option<[u64; COUNTED.len()]> {
+    pub fn rays(&self) -> Option<[u64; COUNTERS]> {
         self.newest.map(|(_, rays)| rays)
     }
 
@@ -107,7 +97,7 @@ impl RayCounters {
         }
         let mut bytes = vec![0; SIZE as usize];
         buffer.read(0, &mut bytes)?;
-        let mut rays = [0; COUNTED.len()];
+        let mut rays = [0; COUNTERS];
         let rows = bytes.chunks_exact(t::COUNTER_ROWS as usize * 4);
         for (sum, row) in rays.iter_mut().zip(rows) {
             let counters = row.chunks_exact(4).filter_map(|c| c.try_into().ok());

@@ -3,7 +3,7 @@
 //! `rt_denoiser 1` is A-SVGF (Schied, Peters, Dachsbacher, Gradient Estimation for Real-Time Adaptive Temporal
 //! Filtering, 2018) over direct and indirect light:
 //!
-//! 1. [`Denoiser::choose_gradient_samples`], before anything is lit: in each stratum of 3 × 3 pixels one is to light a
+//! 1. [`Denoiser::reproject_gradients`], before anything is lit: in each stratum of 3 × 3 pixels one is to light a
 //!    surface of the last frame again, with the random numbers of then.
 //! 2. [`Denoiser::filter`], after: the change of light that those samples show is spread over their neighbourhood; the
 //!    light joins that of earlier frames, which keep less weight where it has changed; three wavelet steps, guided by
@@ -12,20 +12,16 @@
 //!
 //! `rt_denoiser 2` costs about a third: a running mean over frames, and three passes of few scattered taps.
 
-use shaders::constant_ids::trace as ids;
 use shaders::trace_types::DenoiseView;
 use shaders::trace_types::constants as t;
 
-use super::passes::{TILE, dispatch};
+use super::frame_passes::FramePasses;
+use super::passes::Pass;
 use super::targets::texels;
-use crate::gpu::{
-    Access, Buffer, ComputePipeline, Device, Error, Format, Image, ImageDesc, ImageUsage, Recorder,
-};
+use crate::gpu::{Buffer, Device, Error, Format, Image, ImageDesc, ImageUsage};
 
 /// Pixels to the edge of a stratum, see `denoise.glsl`.
 const STRATUM: u32 = 3;
-/// Strata of a group of the gradient's pass, across and down, see `gradient.comp`.
-const GRADIENT_TILE: [u32; 2] = [16, 8];
 /// Distances between the taps of the wavelet steps, pixels: a fourth step between them changes no measure of quality.
 const WAVELET: [u32; 3] = [1, 3, 8];
 /// Radii of the passes of the cheap filter, pixels.
@@ -112,83 +108,6 @@ impl AdaptiveImages {
     }
 }
 
-/// Push constants of a step.
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Step {
-    view: u64,
-    source: u64,
-    target: u64,
-    spacing: u32,
-    padding: u32,
-}
-
-/// The passes of both filters.
-pub struct DenoisePasses {
-    carry: ComputePipeline,
-    gradient_sample: ComputePipeline,
-    gradient: ComputePipeline,
-    gradient_wide: ComputePipeline,
-    /// Without and with bounced light.
-    temporal: [ComputePipeline; 2],
-    /// Likewise; each of the three steps.
-    wavelet: [[ComputePipeline; 3]; 2],
-    sparse_temporal: ComputePipeline,
-    sparse: [ComputePipeline; 3],
-}
-
-impl DenoisePasses {
-    /// Compiles the pipelines.
-    ///
-    /// # Errors
-    /// The driver refuses a pipeline.
-    pub fn new(device: &Device) -> Result<Self, Error> {
-        let compute = |name, code| ComputePipeline::new(device, name, code, &[]);
-        let temporal = |bounces| {
-            let code = &shaders::TRACE_TEMPORAL_COMP;
-            let constants = [(ids::temporal::BOUNCES, bounces)];
-            ComputePipeline::new(device, "trace_temporal", code, &constants)
-        };
-        let wavelet = |bounces, noisy, last| {
-            let constants = [
-                (ids::atrous::BOUNCES, bounces),
-                (ids::atrous::NOISY_VARIANCE, noisy),
-                (ids::atrous::LAST, last),
-            ];
-            let code = &shaders::TRACE_ATROUS_COMP;
-            ComputePipeline::new(device, "trace_wavelet", code, &constants)
-        };
-        let wavelets = |bounces| -> Result<_, Error> {
-            Ok([
-                wavelet(bounces, 1, 0)?,
-                wavelet(bounces, 0, 0)?,
-                wavelet(bounces, 0, 1)?,
-            ])
-        };
-        let sparse = |last| {
-            let code = &shaders::TRACE_SPARSE_FILTER_COMP;
-            let constants = [(ids::sparse_filter::LAST, last)];
-            ComputePipeline::new(device, "trace_sparse_filter", code, &constants)
-        };
-        Ok(Self {
-            carry: compute("trace_gradient_reproject", &shaders::TRACE_GRADIENT_REPROJECT_COMP)?,
-            gradient_sample: compute(
-                "trace_gradient_sample",
-                &shaders::TRACE_GRADIENT_SAMPLE_COMP,
-            )?,
-            gradient: compute("trace_gradient", &shaders::TRACE_GRADIENT_COMP)?,
-            gradient_wide: compute("trace_gradient_wide", &shaders::TRACE_GRADIENT_WIDE_COMP)?,
-            temporal: [temporal(0)?, temporal(1)?],
-            wavelet: [wavelets(0)?, wavelets(1)?],
-            sparse_temporal: compute(
-                "trace_sparse_temporal",
-                &shaders::TRACE_SPARSE_TEMPORAL_COMP,
-            )?,
-            sparse: [sparse(0)?, sparse(0)?, sparse(1)?],
-        })
-    }
-}
-
 /// The denoiser's images.
 pub struct Denoiser {
     device: Device,
@@ -246,7 +165,7 @@ impl Denoiser {
     }
 
     /// The images for gradients, if this frame has gradient samples.
-    fn carries(&self) -> Option<&Images> {
+    fn gradient_images(&self) -> Option<&Images> {
         let wanted = self.history && self.gradients;
         self.images
             .as_ref()
@@ -276,7 +195,7 @@ impl Denoiser {
         let flag = |on: bool, bit: u32| if on { bit } else { 0 };
         let view = DenoiseView {
             flags: flag(self.history, t::DENOISE_HISTORY)
-                | flag(self.carries().is_some(), t::DENOISE_GRADIENTS)
+                | flag(self.gradient_images().is_some(), t::DENOISE_GRADIENTS)
                 | flag(images.tier == Tier::Sparse, t::DENOISE_SPARSE),
             history: images.history.address(),
             fresh: fresh.address(),
@@ -300,75 +219,49 @@ impl Denoiser {
         }
     }
 
-    /// Reads the G-buffer and the samples of the last frame; writes which pixels are gradient samples. `view`: device
-    /// address of the `TraceView`.
+    /// Finds the gradient samples of a frame, before anything is lit.
     ///
     /// # Errors
-    /// Out of memory.
-    pub fn choose_gradient_samples(
-        &self,
-        passes: &DenoisePasses,
-        rec: &mut Recorder,
-        view: u64,
-    ) -> Result<(), Error> {
-        match self.carries() {
-            Some(images) => {
-                let strata = images.size.map(|s| s.div_ceil(STRATUM));
-                dispatch(rec, "trace_gradient_reproject", &passes.carry, view, strata, [TILE; 2])
-            }
+    /// Out of memory, or the driver refuses a pipeline.
+    pub fn reproject_gradients(&self, passes: &mut FramePasses<'_>) -> Result<(), Error> {
+        match self.gradient_images() {
+            Some(_) => passes.run(Pass::GradientReproject),
             None => Ok(()),
         }
     }
 
-    /// Reads the G-buffer, the light of the rays and what the last frame left; writes the filtered light, direct and
-    /// indirect together, to where direct light was. `view`: device address of the `TraceView`; `fresh`: as for
-    /// [`view`](Self::view); `bounces`: there is bounced light.
+    /// Filters the light of the rays with what the last frame left; direct and indirect light go together to where direct
+    /// light was. `fresh`: as for [`view`](Self::view).
     ///
     /// # Errors
-    /// Out of memory.
-    pub fn filter(
-        &self,
-        passes: &DenoisePasses,
-        rec: &mut Recorder,
-        view: u64,
-        fresh: &Buffer,
-        bounces: bool,
-    ) -> Result<(), Error> {
+    /// Out of memory, or the driver refuses a pipeline.
+    pub fn filter(&self, passes: &mut FramePasses<'_>, fresh: &Buffer) -> Result<(), Error> {
         let Some(images) = &self.images else {
             return Ok(());
         };
-        let size = images.size;
-        if self.carries().is_some() {
-            let strata = size.map(|s| s.div_ceil(STRATUM));
-            let name = "trace_gradient_sample";
-            dispatch(rec, name, &passes.gradient_sample, view, strata, [TILE; 2])?;
-            let name = "trace_gradient";
-            dispatch(rec, name, &passes.gradient, view, strata, GRADIENT_TILE)?;
-            let name = "trace_gradient_wide";
-            dispatch(rec, name, &passes.gradient_wide, view, strata, [TILE; 2])?;
+        if self.gradient_images().is_some() {
+            passes.run(Pass::GradientSample)?;
+            passes.run(Pass::Gradient)?;
+            passes.run(Pass::GradientWide)?;
         }
-        match images.tier {
+        let (steps, spacings) = match images.tier {
             Tier::Adaptive => {
-                let tile = [TILE; 2];
-                let temporal = &passes.temporal[usize::from(bounces)];
-                dispatch(rec, "trace_temporal", temporal, view, size, tile)?;
-                let wavelet = &passes.wavelet[usize::from(bounces)];
-                steps(rec, "trace_wavelet", wavelet, view, images, fresh, WAVELET)
+                passes.run(Pass::Temporal)?;
+                let steps = [Pass::WaveletFirst, Pass::WaveletSecond, Pass::WaveletLast];
+                (steps, WAVELET)
             }
             Tier::Sparse => {
-                let name = "trace_sparse_temporal";
-                dispatch(rec, name, &passes.sparse_temporal, view, size, [TILE; 2])?;
-                steps(
-                    rec,
-                    "trace_sparse_filter",
-                    &passes.sparse,
-                    view,
-                    images,
-                    fresh,
-                    SPARSE,
-                )
+                passes.run(Pass::SparseTemporal)?;
+                let steps = [Pass::SparseFirst, Pass::SparseSecond, Pass::SparseLast];
+                (steps, SPARSE)
             }
-        }
+        };
+        let [history, fresh] = [&images.history, fresh].map(Buffer::address);
+        // The result of the first step replaces the history, which the fresh light holds by now; the last step writes to an
+        // image.
+        passes.run_step(steps[0], fresh, history, spacings[0])?;
+        passes.run_step(steps[1], history, fresh, spacings[1])?;
+        passes.run_step(steps[2], fresh, fresh, spacings[2])
     }
 
     /// The frame is recorded: what it wrote becomes what the last one wrote.
@@ -379,37 +272,4 @@ impl Denoiser {
             adaptive.past.swap(0, 1);
         }
     }
-}
-
-/// The steps of a filter from the fresh texels to the light of the picture; `spacings` is what differs.
-fn steps(
-    rec: &mut Recorder,
-    name: &str,
-    pipelines: &[ComputePipeline; 3],
-    view: u64,
-    images: &Images,
-    fresh: &Buffer,
-    spacings: [u32; 3],
-) -> Result<(), Error> {
-    let mut pass = rec.pass(name, Access::COMPUTE, Access::COMPUTE)?;
-    let [x, y] = images.size.map(|s| s.div_ceil(TILE));
-    let [history, fresh] = [&images.history, fresh].map(Buffer::address);
-    // The first step is kept in place of the last frame's light, which the fresh light holds by now; the last step writes
-    // the picture's light.
-    let places = [(fresh, history), (history, fresh), (fresh, fresh)];
-    for (step, (source, target)) in places.into_iter().enumerate() {
-        if step > 0 {
-            pass.barrier();
-        }
-        pass.bind_compute(&pipelines[step]);
-        pass.push(&Step {
-            view,
-            source,
-            target,
-            spacing: spacings[step],
-            padding: 0,
-        });
-        pass.dispatch(x, y, 1);
-    }
-    Ok(())
 }

@@ -8,30 +8,16 @@
 use shaders::trace_types::FogView;
 use shaders::trace_types::constants as t;
 
-use super::input::Tracer;
-use super::pass_set::PassSet;
-use super::passes::{FogLight, TILE};
-use crate::gpu::{
-    Access, ComputePipeline, Device, Error, Format, Image, ImageDesc, ImageUsage, Recorder,
-};
+use super::frame_passes::FramePasses;
+use super::passes::Pass;
+use crate::gpu::{Device, Error, Format, Image, ImageDesc, ImageUsage};
 
 /// Pixels to the edge of a cell of filtered light.
 const CELL: u32 = 2;
-/// Distances between the taps of the filter's steps, cells; an odd number of steps.
+/// Distances between the taps of the filter's steps, cells.
 const SPACINGS: [u32; 3] = [1, 2, 4];
 /// Frames that the images are kept for after fog was last in sight: turning to and fro costs no memory to be taken anew.
 const KEPT_FRAMES: u32 = 300;
-
-/// Push constants of a step of the filter.
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Step {
-    view: u64,
-    source: u64,
-    target: u64,
-    spacing: u32,
-    padding: u32,
-}
 
 struct Images {
     /// Of the view, pixels.
@@ -64,26 +50,6 @@ impl Images {
                 make("trace last fog light", cells, Format::Rgba16F)?,
             ],
             filtered: filtered.transpose()?,
-        })
-    }
-}
-
-/// The two passes.
-pub struct FogPasses {
-    light: FogLight,
-    filter: ComputePipeline,
-}
-
-impl FogPasses {
-    /// Compiles the pipelines.
-    ///
-    /// # Errors
-    /// The driver refuses a pipeline.
-    pub fn new(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-        let (name, code) = ("trace_fog_filter", &shaders::TRACE_FOG_FILTER_COMP);
-        Ok(Self {
-            light: FogLight::new(device, tracer)?,
-            filter: ComputePipeline::new(device, name, code, &[])?,
         })
     }
 }
@@ -183,43 +149,30 @@ impl LitFog {
         }
     }
 
-    /// Reads what the primary rays left and the light lists; writes the light that fog shows. `view`: device address of
-    /// the `TraceView`.
+    /// Cells of the light in this frame's fog; 0 where there is none.
+    pub fn cells(&self) -> [u32; 2] {
+        self.seen().map_or([0; 2], |images| images.cells)
+    }
+
+    /// Lights the fog in sight, and filters that light where the picture is denoised.
     ///
     /// # Errors
     /// Out of memory, or the driver refuses a pipeline.
-    pub fn record(&self, passes: &PassSet, rec: &mut Recorder, view: u64) -> Result<(), Error> {
+    pub fn record(&self, passes: &mut FramePasses<'_>) -> Result<(), Error> {
         let Some(images) = self.seen() else {
             return Ok(());
         };
-        let passes = passes.get(&passes.fog)?;
-        passes.light.record(rec, view, images.cells)?;
+        passes.run(Pass::FogLight)?;
         let Some(filtered) = &images.filtered else {
             return Ok(());
         };
-        let [fresh, last] = [0, 1].map(|i| images.light[i].storage_index());
-        let mut pass = rec.pass("trace_fog_filter", Access::COMPUTE, Access::COMPUTE)?;
-        pass.bind_compute(&passes.filter);
-        let [x, y] = images.cells.map(|s| s.div_ceil(TILE));
-        let filtered = filtered.storage_index();
-        // the fresh light is what the next frame goes on from; the last frame's is free
-        let mut source = fresh;
-        for (step, spacing) in SPACINGS.into_iter().enumerate() {
-            let target = if step % 2 == 0 { filtered } else { last };
-            if step > 0 {
-                pass.barrier();
-            }
-            pass.push(&Step {
-                view,
-                source: source.into(),
-                target: target.into(),
-                spacing,
-                padding: 0,
-            });
-            pass.dispatch(x, y, 1);
-            source = target;
-        }
-        Ok(())
+        let [fresh, last, filtered] = [&images.light[0], &images.light[1], filtered]
+            .map(|image| u64::from(image.storage_index()));
+        // the next frame goes on from the fresh light; the last frame's is free
+        let [first, second, third] = SPACINGS;
+        passes.run_step(Pass::FogFilter, fresh, filtered, first)?;
+        passes.run_step(Pass::FogFilter, filtered, last, second)?;
+        passes.run_step(Pass::FogFilter, last, filtered, third)
     }
 
     /// The frame is recorded: what it wrote becomes what the last one wrote.

@@ -9,13 +9,13 @@ use shaders::types::constants::NO_TEXTURE;
 use shaders::types::{Fog, MaterialBuffers};
 
 use super::accel::AccelMemory;
-use super::counters::COUNTED;
 use super::cutout::{Coverage, coverage};
 use super::fog_light;
 use super::geometry::StaticGeometry;
 use super::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
 use super::lights::{MapLightSource, MapLights};
 use super::pass_set::PassSet;
+use super::passes::counter_of;
 use super::surroundings::Surroundings;
 use super::view_tracer::{TracedMap, TracedView, ViewTracer};
 use relight::light::Occlusion;
@@ -289,8 +289,7 @@ impl TraceLook {
     /// Rays that a pass asked for in the newest finished frame; `None` for a pass that asks for none, or while rays
     /// are not counted.
     pub fn rays(&self, pass: &str) -> Option<u64> {
-        let index = COUNTED.iter().position(|name| *name == pass)?;
-        self.tracer.rays()?.get(index).copied()
+        self.tracer.rays()?.get(counter_of(pass)?).copied()
     }
 
     /// Bytes of the acceleration structures, by what they hold.

@@ -23,6 +23,7 @@ mod doubled;
 pub mod fog;
 mod fog_light;
 mod frame_lights;
+pub mod frame_passes;
 pub mod geometry;
 mod indirect;
 pub mod input;

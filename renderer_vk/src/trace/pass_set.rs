@@ -1,67 +1,59 @@
-//! Every pass of the traced look, compiled once for a device and tracer, whatever maps and views come and go.
+//! The pipelines of the traced look's passes, compiled once for a device and tracer, whatever maps and views come and go.
 
 use std::sync::OnceLock;
 
-use super::antialias::AntialiasPasses;
-use super::bloom::BloomPasses;
-use super::debug::DebugView;
-use super::denoise::DenoisePasses;
-use super::fog::FogPasses;
 use super::input::Tracer;
-use super::passes::{
-    BounceLights, BounceHits, BounceRays, Choose, Composite, Direct, Exposure, EyeRays, Fill,
-    FlareRays, Indirect, OtherSide, PlainPrimary, Primary, ToneMap,
-};
+use super::passes::{Pass, Shader, Switch, TABLE};
 use crate::at_once::{Late, Make, make_all};
-use crate::gpu::{Device, Error};
+use crate::gpu::{ComputePipeline, Device, Error, HitGroup, RayTracingDesc, RayTracingPipeline};
 
-/// A pass that is compiled when it is first asked for.
-pub struct Pass<T> {
-    made: OnceLock<T>,
-    compile: fn(&Device, Tracer) -> Result<T, Error>,
+/// A compiled variant of a pass.
+pub enum Pipeline {
+    /// Launched as rays.
+    Rays(RayTracingPipeline),
+    /// Work groups, which may follow rays themselves.
+    Compute(ComputePipeline),
 }
 
-impl<T> Pass<T> {
-    fn new(compile: fn(&Device, Tracer) -> Result<T, Error>) -> Self {
-        Self {
-            made: OnceLock::new(),
-            compile,
-        }
-    }
-}
-
-/// The passes. Where there are two of a kind, the second is for maps with fog.
+/// The pipelines: those of each pass with its switch off and on.
 pub struct PassSet {
     device: Device,
     tracer: Tracer,
-    pub(super) eye_rays: Pass<EyeRays>,
-    pub(super) plain: [Pass<PlainPrimary>; 2],
-    pub(super) primary: [Pass<Primary>; 2],
-    pub(super) other_side: Pass<OtherSide>,
-    pub(super) fog: Pass<FogPasses>,
-    pub(super) choose: Pass<Choose>,
-    /// Of one chosen light a pixel.
-    pub(super) chosen_direct: Pass<Direct>,
-    pub(super) suns: Pass<Direct>,
-    /// Of any number of lights.
-    pub(super) direct: Pass<Direct>,
-    pub(super) bounce_rays: Pass<BounceRays>,
-    pub(super) bounce_shade: [Pass<BounceHits>; 2],
-    pub(super) bounce_lights: Pass<BounceLights>,
-    pub(super) fill: Pass<Fill>,
-    pub(super) indirect: [Pass<Indirect>; 2],
-    pub(super) flare_rays: Pass<FlareRays>,
-    pub(super) denoise: Pass<DenoisePasses>,
-    pub(super) composite: Pass<Composite>,
-    pub(super) antialias: Pass<AntialiasPasses>,
-    pub(super) exposure: Pass<Exposure>,
-    pub(super) bloom: Pass<BloomPasses>,
-    pub(super) tone_map: Pass<ToneMap>,
-    pub(super) debug: Pass<DebugView>,
+    pipelines: Vec<[OnceLock<Pipeline>; 2]>,
 }
 
-/// Compiles a pass unless it is there.
-type Ahead<'a> = Box<dyn Fn() -> Result<(), Error> + Sync + 'a>;
+/// Passes of denoised pictures with one bounce, those that compile longest first.
+const AHEAD: [Pass; 27] = [
+    Pass::Primary,
+    Pass::OtherSide,
+    Pass::BounceShade,
+    Pass::Temporal,
+    Pass::PrimarySimple,
+    Pass::SampledDirect,
+    Pass::Suns,
+    Pass::BounceLight,
+    Pass::BounceRays,
+    Pass::PrimaryRays,
+    Pass::SampleLights,
+    Pass::WaveletFirst,
+    Pass::WaveletSecond,
+    Pass::WaveletLast,
+    Pass::Antialias,
+    Pass::Composite,
+    Pass::Gradient,
+    Pass::GradientReproject,
+    Pass::GradientSample,
+    Pass::GradientWide,
+    Pass::Histogram,
+    Pass::Exposure,
+    Pass::BounceUpsample,
+    Pass::ToneMap,
+    Pass::SparseTemporal,
+    Pass::SparseFirst,
+    Pass::SparseLast,
+];
+/// Passes that only maps with fog need.
+const FOG_AHEAD: [Pass; 2] = [Pass::FogLight, Pass::FogFilter];
 
 impl PassSet {
     /// Nothing is compiled yet.
@@ -69,34 +61,7 @@ impl PassSet {
         Self {
             device: device.clone(),
             tracer,
-            eye_rays: Pass::new(EyeRays::new),
-            plain: [
-                Pass::new(|device, _| PlainPrimary::new(device)),
-                Pass::new(|device, _| PlainPrimary::with_lit_fog(device)),
-            ],
-            primary: [Pass::new(Primary::new), Pass::new(Primary::with_lit_fog)],
-            other_side: Pass::new(OtherSide::new),
-            fog: Pass::new(FogPasses::new),
-            choose: Pass::new(|device, _| Choose::new(device)),
-            chosen_direct: Pass::new(Direct::of_chosen),
-            suns: Pass::new(Direct::of_suns),
-            direct: Pass::new(Direct::new),
-            bounce_rays: Pass::new(BounceRays::new),
-            bounce_shade: [
-                Pass::new(|device, _| BounceHits::new(device)),
-                Pass::new(|device, _| BounceHits::with_fog(device)),
-            ],
-            bounce_lights: Pass::new(BounceLights::new),
-            fill: Pass::new(|device, _| Fill::new(device)),
-            indirect: [Pass::new(Indirect::new), Pass::new(Indirect::with_fog)],
-            flare_rays: Pass::new(FlareRays::new),
-            denoise: Pass::new(|device, _| DenoisePasses::new(device)),
-            composite: Pass::new(|device, _| Composite::new(device)),
-            antialias: Pass::new(|device, _| AntialiasPasses::new(device)),
-            exposure: Pass::new(|device, _| Exposure::new(device)),
-            bloom: Pass::new(|device, _| BloomPasses::new(device)),
-            tone_map: Pass::new(|device, _| ToneMap::new(device)),
-            debug: Pass::new(|device, _| DebugView::new(device)),
+            pipelines: TABLE.iter().map(|_| Default::default()).collect(),
         }
     }
 
@@ -110,20 +75,51 @@ impl PassSet {
         self.tracer
     }
 
-    /// A pass, compiled now if it was not.
+    /// The pipeline of a pass with its switch `on` or off, compiled now if it was not.
     ///
     /// # Errors
-    /// The driver refuses a pipeline.
-    pub(super) fn get<'a, T>(&'a self, pass: &'a Pass<T>) -> Result<&'a T, Error> {
-        if let Some(made) = pass.made.get() {
-            return Ok(made);
+    /// The driver refuses the pipeline.
+    pub fn get(&self, pass: Pass, on: bool) -> Result<&Pipeline, Error> {
+        let place = &self.pipelines[pass as usize][usize::from(on)];
+        match place.get() {
+            Some(made) => Ok(made),
+            None => {
+                let made = self.compile(pass, on)?;
+                Ok(place.get_or_init(|| made))
+            }
         }
-        let made = (pass.compile)(&self.device, self.tracer)?;
-        Ok(pass.made.get_or_init(|| made))
     }
 
-    fn ahead<'a, T: Send + Sync>(&'a self, pass: &'a Pass<T>) -> Ahead<'a> {
-        Box::new(|| self.get(pass).map(|_| ()))
+    fn compile(&self, pass: Pass, on: bool) -> Result<Pipeline, Error> {
+        let row = pass.row();
+        let mut constants = row.constants.to_vec();
+        constants.extend(row.switch.map(|(id, _)| (id, u32::from(on))));
+        let compute = |spirv| {
+            let made = ComputePipeline::new(&self.device, row.name, spirv, &constants);
+            made.map(Pipeline::Compute)
+        };
+        match (row.shader, self.tracer) {
+            (Shader::Compute(spirv), _) => compute(spirv),
+            (Shader::Rays(rays), Tracer::Compute) => compute(rays.compute),
+            (Shader::Rays(rays), Tracer::Query) => compute(rays.query),
+            (Shader::Rays(rays), Tracer::Pipeline) => {
+                let any_hit = |any_hit| HitGroup {
+                    closest_hit: Some(&shaders::TRACE_HIT_RCHIT),
+                    any_hit: Some(any_hit),
+                };
+                let desc = RayTracingDesc {
+                    name: row.name,
+                    raygen: rays.pipeline,
+                    miss: &[&shaders::TRACE_MISS_RMISS, &shaders::TRACE_LAYERS_RMISS],
+                    hit: &[
+                        any_hit(&shaders::TRACE_TESTED_RAHIT),
+                        any_hit(&shaders::TRACE_TRANSLUCENT_RAHIT),
+                    ],
+                    constants: &constants,
+                };
+                RayTracingPipeline::new(&self.device, &desc).map(Pipeline::Rays)
+            }
+        }
     }
 
     /// Compiles, on all cores at once, what denoised pictures with one bounce need and is not there yet. `has_fog`: the
@@ -132,35 +128,20 @@ impl PassSet {
     /// # Errors
     /// The driver refuses a pipeline.
     pub fn compile_ahead(&self, has_fog: bool) -> Result<(), Error> {
-        let mut passes: Vec<Ahead<'_>> = Vec::new();
-        // drivers compile for a long time where they have not done it before: those that take longest first
-        if has_fog {
-            passes.extend([
-                self.ahead(&self.primary[1]),
-                self.ahead(&self.plain[1]),
-                self.ahead(&self.fog),
-            ]);
-        }
-        passes.extend([
-            self.ahead(&self.primary[0]),
-            self.ahead(&self.other_side),
-            self.ahead(&self.bounce_shade[usize::from(has_fog)]),
-            self.ahead(&self.denoise),
-            self.ahead(&self.plain[0]),
-            self.ahead(&self.chosen_direct),
-            self.ahead(&self.suns),
-            self.ahead(&self.bounce_lights),
-            self.ahead(&self.bounce_rays),
-            self.ahead(&self.eye_rays),
-            self.ahead(&self.choose),
-            self.ahead(&self.antialias),
-            self.ahead(&self.composite),
-            self.ahead(&self.exposure),
-            self.ahead(&self.fill),
-            self.ahead(&self.tone_map),
-        ]);
-        let passes: Vec<_> = passes.into_iter().map(Late::new).collect();
-        make_all(&passes.iter().map(|p| p as &dyn Make).collect::<Vec<_>>());
-        passes.into_iter().try_for_each(Late::take)
+        let fog: &[Pass] = if has_fog { &FOG_AHEAD } else { &[] };
+        let variants = AHEAD.iter().chain(fog).flat_map(|&pass| {
+            let states: &[bool] = match pass.row().switch {
+                None => &[false],
+                Some((_, Switch::MapFog)) if has_fog => &[true],
+                Some((_, Switch::LitFog | Switch::MapFog)) if !has_fog => &[false],
+                Some(_) => &[true, false],
+            };
+            states.iter().map(move |&on| (pass, on))
+        });
+        let jobs: Vec<_> = variants
+            .map(|(pass, on)| Late::new(move || self.get(pass, on).map(|_| ())))
+            .collect();
+        make_all(&jobs.iter().map(|job| job as &dyn Make).collect::<Vec<_>>());
+        jobs.into_iter().try_for_each(Late::take)
     }
 }

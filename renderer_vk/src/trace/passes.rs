@@ -1,374 +1,438 @@
-//! The passes of a traced frame after the acceleration structures: each type owns its pipelines and records one step.
-//! All of them read their inputs and outputs from one `TraceView`, whose address `record` is given.
+//! The passes of the traced look, one row each: shader, specialization constants, size, and what a pass reads and writes.
+//!
+//! [`PassSet`](super::pass_set::PassSet) compiles the rows, [`FramePasses`](super::frame_passes::FramePasses) records them
+//! and checks in debug builds that a frame has written what a pass reads. Timers, statistics and the table in
+//! ARCHITECTURE.md take their names from here. The order of a frame is that of `ViewTracer::record_passes`.
 
-use shaders::Spirv;
-use shaders::constant_ids::trace::{bounce, direct, fog_keep, reflect_refract};
-use shaders::trace_types::constants::{SAMPLING_LIGHT, SAMPLING_SUNS, RAY_TILE};
+use shaders::constant_ids::trace as ids;
+use shaders::trace_types::constants as t;
+use shaders::{RayShader, Spirv};
 
-use super::input::Tracer;
-use crate::gpu::{
-    Access, ComputePipeline, Device, Error, HitGroup, RayTracingDesc, RayTracingPipeline, Recorder,
-};
+/// A shader of a pass.
+#[derive(Clone, Copy, Debug)]
+pub enum Shader {
+    /// Traces rays, by whichever tracer.
+    Rays(&'static RayShader),
+    /// Traces none.
+    Compute(&'static Spirv),
+}
 
-/// A ray tracing pipeline with the hit shaders that all passes share.
-fn ray_pipeline(
-    device: &Device,
-    name: &str,
-    raygen: &Spirv,
-    constants: &[(u32, u32)],
-) -> Result<RayTracingPipeline, Error> {
-    RayTracingPipeline::new(
-        device,
-        &RayTracingDesc {
+/// How many invocations a pass has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Size {
+    /// One for each traced pixel.
+    Traced,
+    /// One for each slot of the tiles of rays (`ray_order.glsl`).
+    RayTiles,
+    /// One for each cell of 2 × 2 traced pixels.
+    Cells,
+    /// One for each pixel, or cell of 2 × 2 pixels, that gathers bounced light.
+    Gathered,
+    /// One for each stratum of 3 × 3 traced pixels.
+    Strata,
+    /// One for each cell of the light in fog.
+    FogCells,
+    /// One for each flare.
+    Flares,
+    /// One for each pixel of the finished picture.
+    Output,
+    /// One for each 2 × 2 pixels of the finished picture.
+    OutputHalf,
+    /// One for each 4 × 4 pixels of the finished picture.
+    OutputQuarter,
+    /// A single work group.
+    Group,
+}
+
+/// A fact about a frame that decides which variant of a pass runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Switch {
+    /// The view has fog that rays light.
+    LitFog,
+    /// The map has fog.
+    MapFog,
+    /// There is bounced light.
+    Bounces,
+}
+
+/// What passes hand on to each other within a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resource {
+    /// Acceleration structures, geometry, materials and where things were in the last frame; ready before the passes.
+    Scene,
+    /// Light lists, lights and suns; ready before the passes.
+    Lights,
+    /// What the camera's rays meet first.
+    PrimaryHits,
+    /// Position, normals, motion and view distance of the surface that a pixel shows.
+    GBuffer,
+    /// Albedo of that surface, and the radiance in front of it.
+    Shown,
+    /// The same for the other side of a reflecting surface.
+    Other,
+    /// Points in fog that are to be lit, and the weight of their light.
+    FogPoints,
+    /// Visibility of flares.
+    FlareStates,
+    /// Pixels that shade a surface of the last frame again.
+    GradientPixels,
+    /// The light that each pixel sends a shadow ray to.
+    SampledLights,
+    /// Direct light without albedo; the denoiser leaves the sum of all filtered light here.
+    DirectLight,
+    /// What the first rays of bounces hit.
+    BounceHits,
+    /// The light that each of those hits sends a shadow ray to.
+    BounceLights,
+    /// Bounced light without albedo.
+    IndirectLight,
+    /// Light at the points in fog.
+    FogLight,
+    /// The same, filtered.
+    FilteredFogLight,
+    /// Change of light at the gradient pixels.
+    GradientSamples,
+    /// The same, filtered over neighbouring strata.
+    GradientSums,
+    /// The changed part of light in each stratum.
+    Gradients,
+    /// Change of depth from pixel to pixel.
+    DepthGradient,
+    /// Light of this and earlier frames, being filtered.
+    FreshLight,
+    /// Filtered light for the next frame.
+    LightHistory,
+    /// Radiance of the traced size.
+    Picture,
+    /// Radiance of the output's size, resolved over frames or upscaled.
+    ResolvedPicture,
+    /// Histogram of luminance.
+    Histogram,
+    /// Exposure.
+    Exposure,
+    /// Levels of bloom.
+    BloomLevels,
+    /// Their sum.
+    Bloom,
+    /// The view's rectangle of the frame's image.
+    Target,
+}
+
+impl Resource {
+    /// The first of the resources that share memory with this one: writing one of them destroys the others.
+    pub fn memory(self) -> Self {
+        match self {
+            Self::SampledLights | Self::BounceHits | Self::BounceLights | Self::FreshLight => {
+                Self::PrimaryHits
+            }
+            Self::FogPoints => Self::Picture,
+            other => other,
+        }
+    }
+}
+
+/// Declaration of a pass.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// What it does.
+    pub about: &'static str,
+    /// Name in timers, statistics and captures. Steps of one filter share a name.
+    pub name: &'static str,
+    /// Its code.
+    pub shader: Shader,
+    /// Invocations.
+    pub size: Size,
+    /// Specialization constants, id and value.
+    pub constants: &'static [(u32, u32)],
+    /// Id of the constant that a switch sets to 0 or 1.
+    pub switch: Option<(u32, Switch)>,
+    /// What this frame has written before.
+    pub reads: &'static [Resource],
+    /// What it reads if this frame has written it.
+    pub may_read: &'static [Resource],
+    /// What it writes.
+    pub writes: &'static [Resource],
+    /// Number of its ray counter (`COUNT_*`).
+    pub counter: Option<u32>,
+}
+
+impl Row {
+    const fn of(about: &'static str, name: &'static str, shader: Shader, size: Size) -> Self {
+        Self {
+            about,
             name,
-            raygen,
-            miss: &[&shaders::TRACE_MISS_RMISS, &shaders::TRACE_LAYERS_RMISS],
-            hit: &[
-                HitGroup {
-                    closest_hit: Some(&shaders::TRACE_HIT_RCHIT),
-                    any_hit: Some(&shaders::TRACE_TESTED_RAHIT),
-                },
-                HitGroup {
-                    closest_hit: Some(&shaders::TRACE_HIT_RCHIT),
-                    any_hit: Some(&shaders::TRACE_TRANSLUCENT_RAHIT),
-                },
-            ],
-            constants,
-        },
-    )
-}
-
-/// A pass that traces: launched as rays, or as a compute shader that follows rays itself.
-enum RayPass {
-    Pipeline(RayTracingPipeline),
-    Compute(ComputePipeline),
-}
-
-/// Groups of the compute shaders that trace.
-const COMPUTE_TILE: [u32; 2] = [8, 4];
-
-fn trace(
-    rec: &mut Recorder,
-    name: &str,
-    pipeline: &RayPass,
-    view: u64,
-    size: [u32; 2],
-) -> Result<(), Error> {
-    let pipeline = match pipeline {
-        RayPass::Pipeline(pipeline) => pipeline,
-        RayPass::Compute(pipeline) => {
-            let mut pass = rec.pass(name, Access::COMPUTE, Access::COMPUTE)?;
-            pass.bind_compute(pipeline);
-            pass.push(&view);
-            let [x, y] = COMPUTE_TILE;
-            pass.dispatch(size[0].div_ceil(x), size[1].div_ceil(y), 1);
-            return Ok(());
+            shader,
+            size,
+            constants: &[],
+            switch: None,
+            reads: &[],
+            may_read: &[],
+            writes: &[],
+            counter: None,
         }
-    };
-    let mut pass = rec.pass(name, Access::RAY_TRACING, Access::RAY_TRACING)?;
-    pass.bind_rays(pipeline);
-    pass.push(&view);
-    pass.trace_rays(size[0], size[1], 1);
-    Ok(())
+    }
 }
 
-/// Edge of the groups of the compute passes over pixels, see their `local_size`.
-pub(super) const TILE: u32 = 8;
-
-pub(super) fn dispatch(
-    rec: &mut Recorder,
-    name: &str,
-    pipeline: &ComputePipeline,
-    view: u64,
-    size: [u32; 2],
-    tile: [u32; 2],
-) -> Result<(), Error> {
-    let mut pass = rec.pass(name, Access::COMPUTE, Access::COMPUTE)?;
-    pass.bind_compute(pipeline);
-    pass.push(&view);
-    pass.dispatch(size[0].div_ceil(tile[0]), size[1].div_ceil(tile[1]), 1);
-    Ok(())
-}
-
-macro_rules! ray_pass {
-    ($(#[$doc:meta])* $type:ident, $name:literal, $raygen:ident, $compute:ident, $query:ident) => {
-        ray_pass!($(#[$doc])* $type, $name, $raygen, $compute, $query, &[]);
-    };
-    ($(#[$doc:meta])* $type:ident, $name:literal, $raygen:ident, $compute:ident, $query:ident, $constants:expr) => {
-        $(#[$doc])*
-        pub struct $type(RayPass);
-
-        impl $type {
-            /// Compiles the pipeline.
-            ///
-            /// # Errors
-            /// The driver refuses the pipeline.
-            pub fn new(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-                Self::with(device, tracer, $constants)
-            }
-
-            /// Compiles the pipeline with specialization constants, id and value.
-            fn with(device: &Device, tracer: Tracer, constants: &[(u32, u32)]) -> Result<Self, Error> {
-                Ok(Self(match tracer {
-                    Tracer::Pipeline => RayPass::Pipeline(ray_pipeline(device, $name, &shaders::$raygen, constants)?),
-                    Tracer::Compute => RayPass::Compute(ComputePipeline::new(device, $name, &shaders::$compute, constants)?),
-                    Tracer::Query => RayPass::Compute(ComputePipeline::new(device, $name, &shaders::$query, constants)?),
-                }))
-            }
-
-            /// Records the pass. `view`: device address of the `TraceView`; `size`: its pixels.
-            ///
-            /// # Errors
-            /// Out of memory.
-            pub fn record(&self, rec: &mut Recorder, view: u64, size: [u32; 2]) -> Result<(), Error> {
-                trace(rec, $name, &self.0, view, size)
-            }
+macro_rules! passes {
+    ($($(#[doc = $about:literal])+ $pass:ident = $name:literal, $shader:expr, $size:ident { $($field:ident: $value:expr),* $(,)? })+) => {
+        /// A pass of the traced look.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Pass {
+            $($(#[doc = $about])+ $pass),+
         }
-    };
-}
 
-macro_rules! pixel_pass {
-    ($(#[$doc:meta])* $type:ident, $name:literal, $shader:ident) => {
-        pixel_pass!($(#[$doc])* $type, $name, $shader, TILE);
-    };
-    ($(#[$doc:meta])* $type:ident, $name:literal, $shader:ident, $tile:expr) => {
-        $(#[$doc])*
-        pub struct $type(ComputePipeline);
-
-        impl $type {
-            /// Compiles the pipeline.
-            ///
-            /// # Errors
-            /// The driver refuses the pipeline.
-            pub fn new(device: &Device) -> Result<Self, Error> {
-                Self::with(device, &[])
-            }
-
-            /// Compiles the pipeline with specialization constants, id and value.
-            fn with(device: &Device, constants: &[(u32, u32)]) -> Result<Self, Error> {
-                Ok(Self(ComputePipeline::new(device, $name, &shaders::$shader, constants)?))
-            }
-
-            /// Records the pass. `view`: device address of the `TraceView`; `size`: its pixels.
-            ///
-            /// # Errors
-            /// Out of memory.
-            pub fn record(&self, rec: &mut Recorder, view: u64, size: [u32; 2]) -> Result<(), Error> {
-                dispatch(rec, $name, &self.0, view, size, [$tile; 2])
-            }
-        }
-    };
-}
-
-ray_pass!(
-    /// Reads the acceleration structures; writes what the eye's own rays meet first (`texels`).
-    EyeRays, "trace_primary_rays", TRACE_PRIMARY_RAYS_RGEN,
-    TRACE_PRIMARY_RAYS_RGEN_COMPUTE, TRACE_PRIMARY_RAYS_RGEN_QUERY
-);
-ray_pass!(
-    /// Reads what the eye's rays meet, the acceleration structures and materials; writes the G-buffer (`position`,
-    /// `surface`) and `front`: the picture of all that lies in front of the surface whose light is asked for. Pixels that
-    /// [`PlainPrimary`] has finished stay.
-    Primary, "trace_primary", TRACE_PRIMARY_RGEN,
-    TRACE_PRIMARY_RGEN_COMPUTE, TRACE_PRIMARY_RGEN_QUERY
-);
-impl Primary {
-    /// The same pass, which in addition leaves the points where fog is to be lit.
-    ///
-    /// # Errors
-    /// The driver refuses the pipeline.
-    pub fn with_lit_fog(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-        Self::with(device, tracer, &[(fog_keep::LIT_FOG, 1)])
-    }
-}
-
-pixel_pass!(
-    /// What [`Primary`] does, for those pixels that need no ray for it beyond the eye's own: they are finished then.
-    PlainPrimary, "trace_primary_simple", TRACE_PRIMARY_RGEN_NO_RAYS
-);
-impl PlainPrimary {
-    /// The same pass, which in addition leaves the points where fog is to be lit.
-    ///
-    /// # Errors
-    /// The driver refuses the pipeline.
-    pub fn with_lit_fog(device: &Device) -> Result<Self, Error> {
-        Self::with(device, &[(fog_keep::LIT_FOG, 1)])
-    }
-}
-
-ray_pass!(
-    /// Follows those paths of the eye that were split between a reflection and what lies behind it once more, to the side
-    /// that the pixel does not show: writes its albedo and what is in front of it (`other`). Reads the marks of `motion`
-    /// besides what the eye's paths read.
-    OtherSide, "trace_other_side", TRACE_PRIMARY_RGEN,
-    TRACE_PRIMARY_RGEN_COMPUTE, TRACE_PRIMARY_RGEN_QUERY,
-    &[(reflect_refract::OTHER_FIELD, 1)]
-);
-
-ray_pass!(
-    /// Reads the points in fog and the light lists; writes the light there. `size`: cells of the fog.
-    FogLight, "trace_fog", TRACE_FOG_LIGHT_RGEN,
-    TRACE_FOG_LIGHT_RGEN_COMPUTE, TRACE_FOG_LIGHT_RGEN_QUERY
-);
-ray_pass!(
-    /// Reads the G-buffer and the light lists; writes `direct`.
-    Direct, "trace_direct", TRACE_DIRECT_RGEN,
-    TRACE_DIRECT_RGEN_COMPUTE, TRACE_DIRECT_RGEN_QUERY
-);
-impl Direct {
-    /// The same pass, whose lights [`Choose`] has chosen.
-    ///
-    /// # Errors
-    /// The driver refuses the pipeline.
-    pub fn of_chosen(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-        Self::with(device, tracer, &[(direct::SAMPLING, SAMPLING_LIGHT)])
-    }
-
-    /// The pass after that, which adds the light of suns.
-    ///
-    /// # Errors
-    /// The driver refuses the pipeline.
-    pub fn of_suns(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-        Self::with(device, tracer, &[(direct::SAMPLING, SAMPLING_SUNS)])
-    }
-
-    /// Records the pass for rays in the order that [`Choose`] has left them in.
-    ///
-    /// # Errors
-    /// Out of memory.
-    pub fn record_chosen(
-        &self,
-        rec: &mut Recorder,
-        name: &str,
-        view: u64,
-        size: [u32; 2],
-    ) -> Result<(), Error> {
-        let [across, down] = size.map(|n| n.div_ceil(RAY_TILE));
-        let launch = match self.0 {
-            RayPass::Pipeline(_) => [across * down * RAY_TILE * RAY_TILE, 1],
-            // the groups of a tile side by side
-            RayPass::Compute(_) => {
-                let groups = RAY_TILE * RAY_TILE / (COMPUTE_TILE[0] * COMPUTE_TILE[1]);
-                [across * groups * COMPUTE_TILE[0], down * COMPUTE_TILE[1]]
-            }
+        /// Declarations, in the order of [`Pass`].
+        pub static TABLE: &[Row] = {
+            #[allow(clippy::enum_glob_use)] // rows name many of them
+            use {Resource::*, Shader::{Compute, Rays}, Switch::{Bounces, LitFog, MapFog}};
+            &[$(Row { $($field: $value,)* ..Row::of(concat!($($about),+), $name, $shader, Size::$size) }),+]
         };
-        trace(rec, name, &self.0, view, launch)
+    };
+}
+
+passes! {
+    /// First hits of the camera's rays.
+    PrimaryRays = "trace_primary_rays", Rays(&shaders::TRACE_PRIMARY_RAYS), Traced {
+        reads: &[Scene],
+        writes: &[PrimaryHits],
+        counter: Some(t::COUNT_PRIMARY_RAYS),
+    }
+    /// `Primary` compiled without rays: finishes the many pixels that show the surface of their first hit.
+    PrimarySimple = "trace_primary_simple", Compute(&shaders::TRACE_PRIMARY_RGEN_NO_RAYS), Traced {
+        switch: Some((ids::fog_keep::LIT_FOG, LitFog)),
+        reads: &[Scene, PrimaryHits],
+        writes: &[GBuffer, Shown, FogPoints],
+    }
+    /// The surface that each other pixel shows behind mirrors, portals, glass and liquids, with the layers in front of it.
+    Primary = "trace_primary", Rays(&shaders::TRACE_PRIMARY), Traced {
+        switch: Some((ids::fog_keep::LIT_FOG, LitFog)),
+        reads: &[Scene, PrimaryHits],
+        writes: &[GBuffer, Shown, FogPoints],
+        counter: Some(t::COUNT_PRIMARY),
+    }
+    /// The side of glass or of a glossy surface that a pixel does not show.
+    OtherSide = "trace_other_side", Rays(&shaders::TRACE_PRIMARY), Traced {
+        constants: &[(ids::reflect_refract::OTHER_FIELD, 1)],
+        reads: &[Scene, PrimaryHits, GBuffer],
+        writes: &[Other],
+    }
+    /// Visibility of flares.
+    FlareRays = "trace_flares", Rays(&shaders::TRACE_FLARES), Flares {
+        reads: &[Scene],
+        writes: &[FlareStates],
+    }
+    /// Finds in each stratum a surface of the last frame, which is then shaded again with its old random numbers.
+    GradientReproject = "trace_gradient_reproject", Compute(&shaders::TRACE_GRADIENT_REPROJECT_COMP), Strata {
+        reads: &[GBuffer],
+        writes: &[GradientPixels],
+    }
+    /// Samples one light for each pixel, and sorts the rays of a tile by direction.
+    SampleLights = "trace_sample_lights", Compute(&shaders::TRACE_SAMPLE_LIGHTS_COMP), Traced {
+        reads: &[Lights, GBuffer],
+        may_read: &[GradientPixels],
+        writes: &[SampledLights],
+    }
+    /// Shadow rays to the sampled lights.
+    SampledDirect = "trace_direct", Rays(&shaders::TRACE_DIRECT), RayTiles {
+        constants: &[(ids::direct::SAMPLING, t::SAMPLING_LIGHT)],
+        reads: &[Scene, Lights, GBuffer, SampledLights],
+        may_read: &[GradientPixels],
+        writes: &[DirectLight],
+        counter: Some(t::COUNT_DIRECT),
+    }
+    /// Shadow rays to suns, whose light is added.
+    Suns = "trace_suns", Rays(&shaders::TRACE_DIRECT), RayTiles {
+        constants: &[(ids::direct::SAMPLING, t::SAMPLING_SUNS)],
+        reads: &[Scene, Lights, GBuffer, SampledLights, DirectLight],
+        may_read: &[GradientPixels],
+        writes: &[DirectLight],
+        counter: Some(t::COUNT_SUNS),
+    }
+    /// Direct light where a pixel samples several lights or all.
+    Direct = "trace_direct", Rays(&shaders::TRACE_DIRECT), Traced {
+        reads: &[Scene, Lights, GBuffer],
+        may_read: &[GradientPixels],
+        writes: &[DirectLight],
+        counter: Some(t::COUNT_DIRECT),
+    }
+    /// Rays of a single bounce.
+    BounceRays = "trace_bounce_rays", Rays(&shaders::TRACE_BOUNCE_RAYS), Cells {
+        reads: &[Scene, GBuffer],
+        may_read: &[GradientPixels],
+        writes: &[BounceHits],
+        counter: Some(t::COUNT_BOUNCE_RAYS),
+    }
+    /// Shades what they hit, and samples a light for it.
+    BounceShade = "trace_bounce_hits", Compute(&shaders::TRACE_BOUNCE_HITS_COMP), Cells {
+        switch: Some((ids::bounce::HAS_FOG, MapFog)),
+        reads: &[Scene, Lights, GBuffer, BounceHits],
+        may_read: &[GradientPixels],
+        writes: &[BounceLights],
+    }
+    /// Shadow rays to those lights.
+    BounceLight = "trace_bounce_light", Rays(&shaders::TRACE_BOUNCE_LIGHT), Cells {
+        reads: &[Scene, Lights, GBuffer, BounceLights],
+        may_read: &[GradientPixels],
+        writes: &[IndirectLight],
+        counter: Some(t::COUNT_BOUNCE_LIGHT),
+    }
+    /// Paths of any number of bounces.
+    Indirect = "trace_indirect", Rays(&shaders::TRACE_INDIRECT), Gathered {
+        switch: Some((ids::bounce::HAS_FOG, MapFog)),
+        reads: &[Scene, Lights, GBuffer],
+        may_read: &[GradientPixels],
+        writes: &[IndirectLight],
+        counter: Some(t::COUNT_INDIRECT),
+    }
+    /// Interpolates bounced light to the pixels that did not gather it.
+    BounceUpsample = "trace_bounce_upsample", Compute(&shaders::TRACE_BOUNCE_UPSAMPLE_COMP), Cells {
+        reads: &[GBuffer, IndirectLight],
+        may_read: &[GradientPixels],
+        writes: &[IndirectLight],
+    }
+    /// Light at the points in fog.
+    FogLight = "trace_fog", Rays(&shaders::TRACE_FOG_LIGHT), FogCells {
+        reads: &[Scene, Lights, FogPoints],
+        writes: &[FogLight],
+    }
+    /// A step of the filter of that light.
+    FogFilter = "trace_fog_filter", Compute(&shaders::TRACE_FOG_FILTER_COMP), FogCells {
+        reads: &[FogPoints, FogLight],
+        writes: &[FilteredFogLight],
+    }
+    /// Change of the light of each gradient pixel.
+    GradientSample = "trace_gradient_sample", Compute(&shaders::TRACE_GRADIENT_SAMPLE_COMP), Strata {
+        reads: &[GradientPixels, DirectLight, IndirectLight],
+        writes: &[GradientSamples],
+    }
+    /// Filters it over strata up to 6 away.
+    Gradient = "trace_gradient", Compute(&shaders::TRACE_GRADIENT_COMP), Strata {
+        reads: &[GradientSamples],
+        writes: &[GradientSums],
+    }
+    /// Filters it over strata up to 12 away.
+    GradientWide = "trace_gradient_wide", Compute(&shaders::TRACE_GRADIENT_WIDE_COMP), Strata {
+        reads: &[GradientPixels, GradientSums],
+        writes: &[Gradients],
+    }
+    /// A-SVGF: joins the light with that of earlier frames.
+    Temporal = "trace_temporal", Compute(&shaders::TRACE_TEMPORAL_COMP), Traced {
+        switch: Some((ids::temporal::BOUNCES, Bounces)),
+        reads: &[GBuffer, DirectLight, IndirectLight],
+        may_read: &[GradientPixels, Gradients],
+        writes: &[FreshLight, DepthGradient],
+    }
+    /// A-SVGF: first wavelet step; its result is the history of the next frame.
+    WaveletFirst = "trace_wavelet", Compute(&shaders::TRACE_ATROUS_COMP), Traced {
+        constants: &[(ids::atrous::NOISY_VARIANCE, 1), (ids::atrous::LAST, 0)],
+        switch: Some((ids::atrous::BOUNCES, Bounces)),
+        reads: &[FreshLight, DepthGradient],
+        writes: &[LightHistory],
+    }
+    /// A-SVGF: second wavelet step.
+    WaveletSecond = "trace_wavelet", Compute(&shaders::TRACE_ATROUS_COMP), Traced {
+        constants: &[(ids::atrous::NOISY_VARIANCE, 0), (ids::atrous::LAST, 0)],
+        switch: Some((ids::atrous::BOUNCES, Bounces)),
+        reads: &[LightHistory, DepthGradient],
+        writes: &[FreshLight],
+    }
+    /// A-SVGF: last wavelet step.
+    WaveletLast = "trace_wavelet", Compute(&shaders::TRACE_ATROUS_COMP), Traced {
+        constants: &[(ids::atrous::NOISY_VARIANCE, 0), (ids::atrous::LAST, 1)],
+        switch: Some((ids::atrous::BOUNCES, Bounces)),
+        reads: &[FreshLight, DepthGradient],
+        writes: &[DirectLight],
+    }
+    /// Sparse filter: running mean over frames.
+    SparseTemporal = "trace_sparse_temporal", Compute(&shaders::TRACE_SPARSE_TEMPORAL_COMP), Traced {
+        reads: &[GBuffer, DirectLight, IndirectLight],
+        writes: &[FreshLight, DepthGradient],
+    }
+    /// Sparse filter: first pass of scattered taps; its result is the history of the next frame.
+    SparseFirst = "trace_sparse_filter", Compute(&shaders::TRACE_SPARSE_FILTER_COMP), Traced {
+        reads: &[FreshLight, DepthGradient],
+        writes: &[LightHistory],
+    }
+    /// Sparse filter: second pass.
+    SparseSecond = "trace_sparse_filter", Compute(&shaders::TRACE_SPARSE_FILTER_COMP), Traced {
+        reads: &[LightHistory, DepthGradient],
+        writes: &[FreshLight],
+    }
+    /// Sparse filter: last pass.
+    SparseLast = "trace_sparse_filter", Compute(&shaders::TRACE_SPARSE_FILTER_COMP), Traced {
+        constants: &[(ids::sparse_filter::LAST, 1)],
+        reads: &[FreshLight, DepthGradient],
+        writes: &[DirectLight],
+    }
+    /// The linear picture; in reference mode the mean over frames.
+    Composite = "trace_composite", Compute(&shaders::TRACE_COMPOSITE_COMP), Traced {
+        reads: &[GBuffer, Shown, DirectLight, IndirectLight],
+        may_read: &[Other, FogPoints, FogLight, FilteredFogLight, Gradients],
+        writes: &[Picture],
+    }
+    /// Temporal antialiasing, and upscaling with it.
+    Antialias = "trace_antialias", Compute(&shaders::TRACE_ANTIALIAS_COMP), Output {
+        reads: &[GBuffer, DirectLight, IndirectLight, Picture],
+        may_read: &[Gradients],
+        writes: &[ResolvedPicture],
+    }
+    /// Upscaling of a single frame.
+    Upscale = "trace_upscale", Compute(&shaders::TRACE_UPSCALE_COMP), Output {
+        reads: &[Picture],
+        writes: &[ResolvedPicture],
+    }
+    /// Histogram of luminance.
+    Histogram = "trace_exposure", Compute(&shaders::TRACE_HISTOGRAM_COMP), OutputHalf {
+        reads: &[GBuffer, Picture],
+        may_read: &[ResolvedPicture],
+        writes: &[Histogram],
+    }
+    /// Adaptation of exposure.
+    Exposure = "trace_exposure", Compute(&shaders::TRACE_EXPOSURE_COMP), Group {
+        reads: &[Histogram],
+        writes: &[Exposure],
+    }
+    /// Mean light of ever larger squares.
+    BloomDown = "trace_bloom", Compute(&shaders::TRACE_BLOOM_DOWN_COMP), OutputQuarter {
+        reads: &[Picture, Exposure],
+        may_read: &[ResolvedPicture],
+        writes: &[BloomLevels],
+    }
+    /// Their weighted sum.
+    BloomUp = "trace_bloom", Compute(&shaders::TRACE_BLOOM_UP_COMP), OutputQuarter {
+        reads: &[BloomLevels],
+        writes: &[Bloom],
+    }
+    /// Exposure, tone curve and display encoding.
+    ToneMap = "trace_tonemap", Compute(&shaders::TRACE_TONEMAP_COMP), Output {
+        reads: &[Picture, Exposure],
+        may_read: &[ResolvedPicture, Bloom],
+        writes: &[Target],
+    }
+    /// An intermediate result in place of the picture (`rt_debug`).
+    Debug = "trace_debug", Compute(&shaders::TRACE_DEBUG_COMP), Output {
+        reads: &[GBuffer, Picture],
+        may_read: &[Shown, Other, Gradients, DirectLight, IndirectLight],
+        writes: &[Target],
     }
 }
 
-ray_pass!(
-    /// Reads the G-buffer and the light lists; writes `indirect`, by paths of any number of bounces: with
-    /// `VIEW_SUBSAMPLED_BOUNCE` for one of 2 × 2 pixels, and `size` is half as large then.
-    Indirect, "trace_indirect", TRACE_INDIRECT_RGEN,
-    TRACE_INDIRECT_RGEN_COMPUTE, TRACE_INDIRECT_RGEN_QUERY
-);
-impl Indirect {
-    /// The same pass for maps with fog, which lies in the way of its rays.
-    ///
-    /// # Errors
-    /// The driver refuses the pipeline.
-    pub fn with_fog(device: &Device, tracer: Tracer) -> Result<Self, Error> {
-        Self::with(device, tracer, &[(bounce::HAS_FOG, 1)])
+impl Pass {
+    /// Its declaration.
+    pub fn row(self) -> &'static Row {
+        &TABLE[self as usize]
     }
 }
 
-ray_pass!(
-    /// Reads the G-buffer; writes what the rays of a single bounce meet (`texels`). `size`: half of the view's, of this and
-    /// the next two.
-    BounceRays, "trace_bounce_rays", TRACE_BOUNCE_RAYS_RGEN,
-    TRACE_BOUNCE_RAYS_RGEN_COMPUTE, TRACE_BOUNCE_RAYS_RGEN_QUERY
-);
-pixel_pass!(
-    /// Reads what those rays meet, and the light lists; writes the light that is found there and that which a ray is to be
-    /// sent to (`texels`).
-    BounceHits, "trace_bounce_hits", TRACE_BOUNCE_HITS_COMP
-);
-impl BounceHits {
-    /// The same pass for maps with fog, which lies in the way of those rays.
-    ///
-    /// # Errors
-    /// The driver refuses the pipeline.
-    pub fn with_fog(device: &Device) -> Result<Self, Error> {
-        Self::with(device, &[(bounce::HAS_FOG, 1)])
-    }
-}
-ray_pass!(
-    /// Reads that light; writes `indirect` for one of 2 × 2 pixels.
-    BounceLights, "trace_bounce_light", TRACE_BOUNCE_LIGHT_RGEN,
-    TRACE_BOUNCE_LIGHT_RGEN_COMPUTE, TRACE_BOUNCE_LIGHT_RGEN_QUERY
-);
+/// Number of ray counters.
+pub const COUNTERS: usize = t::COUNT_SUNS as usize + 1;
 
-ray_pass!(
-    /// Reads the acceleration structures and the flares of the view; writes which of them are seen. `size`: their number
-    /// and 1.
-    FlareRays, "trace_flares", TRACE_FLARES_RGEN,
-    TRACE_FLARES_RGEN_COMPUTE, TRACE_FLARES_RGEN_QUERY
-);
-pixel_pass!(
-    /// Reads the G-buffer and the light lists; writes for each pixel the light that it sends a ray to (`texels`), those of a
-    /// tile in the order of where the rays go.
-    Choose, "trace_sample_lights", TRACE_SAMPLE_LIGHTS_COMP, RAY_TILE
-);
-pixel_pass!(
-    /// Reads the G-buffer and `indirect`; writes `indirect` where it was not gathered. `size`: half of the view's.
-    Fill, "trace_bounce_upsample", TRACE_BOUNCE_UPSAMPLE_COMP
-);
-pixel_pass!(
-    /// Reads the G-buffer, `front`, `direct` and `indirect`; writes `composite`, or the mean in `accumulation`.
-    Composite, "trace_composite", TRACE_COMPOSITE_COMP
-);
-pixel_pass!(
-    /// Reads the picture and the exposure; writes the view's rectangle of the target.
-    ToneMap, "trace_tonemap", TRACE_TONEMAP_COMP
-);
-
-/// Reads the picture; writes the exposure.
-pub struct Exposure {
-    histogram: ComputePipeline,
-    adapt: ComputePipeline,
+/// Number of the ray counter of the pass with a name.
+pub fn counter_of(name: &str) -> Option<usize> {
+    let mut rows = TABLE.iter().filter(|row| row.name == name);
+    rows.find_map(|row| row.counter).map(|count| count as usize)
 }
 
-impl Exposure {
-    /// Bytes of the state that outlives a frame: the exposure and the histogram.
-    pub const STATE_SIZE: u64 = 4 + 4 * 128;
-
-    /// Compiles the pipelines.
-    ///
-    /// # Errors
-    /// The driver refuses a pipeline.
-    pub fn new(device: &Device) -> Result<Self, Error> {
-        Ok(Self {
-            histogram: ComputePipeline::new(
-                device,
-                "trace_histogram",
-                &shaders::TRACE_HISTOGRAM_COMP,
-                &[],
-            )?,
-            adapt: ComputePipeline::new(
-                device,
-                "trace_exposure",
-                &shaders::TRACE_EXPOSURE_COMP,
-                &[],
-            )?,
-        })
-    }
-
-    /// Records the pass. `view`: device address of the `TraceView`; `size`: its pixels.
-    ///
-    /// # Errors
-    /// Out of memory.
-    pub fn record(&self, rec: &mut Recorder, view: u64, size: [u32; 2]) -> Result<(), Error> {
-        const HISTOGRAM_TILE: u32 = 16;
-        let mut pass = rec.pass("trace_exposure", Access::COMPUTE, Access::COMPUTE)?;
-        pass.bind_compute(&self.histogram);
-        pass.push(&view);
-        // one of each 2 × 2 pixels
-        let [x, y] = size.map(|s| s.div_ceil(2).div_ceil(HISTOGRAM_TILE));
-        pass.dispatch(x, y, 1);
-        pass.barrier();
-        pass.bind_compute(&self.adapt);
-        pass.push(&view);
-        pass.dispatch(1, 1, 1);
-        Ok(())
-    }
-}
+#[cfg(test)]
+#[path = "passes_tests.rs"]
+mod tests;

@@ -12,16 +12,17 @@ use shaders::trace_types::{PortalRecord, PostView, TraceView};
 use super::accel::Accel;
 use super::antialias::{Antialias, traced_size};
 use super::bloom::Bloom;
-use super::counters::{COUNTED, RayCounters};
+use super::counters::RayCounters;
 use super::denoise::Denoiser;
 use super::fog::LitFog;
+use super::frame_passes::{FrameFacts, FramePasses};
 use super::geometry::StaticGeometry;
 use super::indirect;
 use super::input::MaterialTable;
 use super::lights::MapLights;
 use super::motion::Motion;
 use super::pass_set::PassSet;
-use super::passes::Exposure;
+use super::passes::{COUNTERS, Pass, Resource};
 use super::targets::Targets;
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
@@ -56,6 +57,9 @@ pub struct TracedView<'a> {
     /// The image that the view's rectangle is in: RGBA8, usable as storage image.
     pub target: &'a Image,
 }
+
+/// Values of 32 bits that automatic exposure keeps from frame to frame: the exposure and the histogram.
+const EXPOSURE_STATE: usize = 1 + t::EXPOSURE_BINS as usize;
 
 /// Draws views by tracing rays.
 pub struct ViewTracer {
@@ -116,7 +120,7 @@ impl ViewTracer {
                 device,
                 "trace exposure",
                 BufferUsage::STORAGE,
-                &[0u8; Exposure::STATE_SIZE as usize],
+                &[0u32; EXPOSURE_STATE],
             )?,
             exposure_started: false,
             map_exposure: relight::exposure::Exposure::usual(1.0),
@@ -140,9 +144,9 @@ impl ViewTracer {
         Some(self.antialias.picture().unwrap_or(targets.picture()))
     }
 
-    /// Rays of each of [`COUNTED`]'s passes in the newest finished frame; `None` while they
+    /// Rays of each counter (`COUNT_*`) in the newest finished frame; `None` while they
     /// are not counted.
-    pub fn rays(&self) -> Option<[u64; COUNTED.len()]> {
+    pub fn rays(&self) -> Option<[u64; COUNTERS]> {
         self.counters.rays()
     }
 
@@ -283,57 +287,64 @@ impl ViewTracer {
         params: &TraceView,
     ) -> Result<(), Error> {
         let address = rec.arena().push(std::slice::from_ref(params))?;
-        let size = [targets.width, targets.height];
-        let set = &*self.passes;
-        set.get(&set.eye_rays)?.record(rec, address, size)?;
-        let fog = usize::from(self.fog.is_on());
-        set.get(&set.plain[fog])?.record(rec, address, size)?;
-        set.get(&set.primary[fog])?.record(rec, address, size)?;
+        let facts = self.facts(targets, settings, output, params);
+        let passes = &mut FramePasses::new(&self.passes, rec, address, facts);
+        passes.run(Pass::PrimaryRays)?;
+        passes.run(Pass::PrimarySimple)?;
+        passes.run(Pass::Primary)?;
         if !settings.rt_accumulate {
-            set.get(&set.other_side)?.record(rec, address, size)?;
+            passes.run(Pass::OtherSide)?;
         }
-        if params.flare_count > 0 {
-            let flare_rays = set.get(&set.flare_rays)?;
-            flare_rays.record(rec, address, [params.flare_count, 1])?;
+        if facts.flares > 0 {
+            passes.run(Pass::FlareRays)?;
         }
-        let denoise = set.get(&set.denoise)?;
-        self.denoiser
-            .choose_gradient_samples(denoise, rec, address)?;
-        if is_lit(settings)
-            && params.lights.selection == t::SELECT_RESAMPLED
-            && params.lights.samples == 1
-        {
-            set.get(&set.choose)?.record(rec, address, size)?;
-            let chosen = set.get(&set.chosen_direct)?;
-            chosen.record_chosen(rec, "trace_direct", address, size)?;
+        self.denoiser.reproject_gradients(passes)?;
+        if is_lit(settings) && samples_one_light(params) {
+            passes.run(Pass::SampleLights)?;
+            passes.run(Pass::SampledDirect)?;
             if params.lights.sun_count > 0 {
-                let suns = set.get(&set.suns)?;
-                suns.record_chosen(rec, "trace_suns", address, size)?;
+                passes.run(Pass::Suns)?;
             }
         } else {
-            set.get(&set.direct)?.record(rec, address, size)?;
+            passes.run(Pass::Direct)?;
         }
-        if settings.rt_bounces == 0 {
-            darken_indirect(targets, rec)?;
+        if facts.bounces {
+            indirect::record(passes, settings)?;
         } else {
-            let has_fog = params.fog_count > 0;
-            indirect::record(set, rec, address, size, settings, has_fog)?;
+            clear_indirect(targets, passes)?;
         }
-        self.fog.record(set, rec, address)?;
-        self.counters.end(rec)?;
-        let (texels, bounces) = (&targets.texels, settings.rt_bounces > 0);
-        self.denoiser
-            .filter(denoise, rec, address, texels, bounces)?;
-        set.get(&set.composite)?.record(rec, address, size)?;
-        let antialias = set.get(&set.antialias)?;
-        self.antialias.record(antialias, rec, address)?;
-        set.get(&set.exposure)?.record(rec, address, output)?;
-        self.bloom.record(set, rec, address)?;
-        set.get(&set.tone_map)?.record(rec, address, output)?;
+        self.fog.record(passes)?;
+        self.counters.end(passes.rec)?;
+        self.denoiser.filter(passes, &targets.texels)?;
+        passes.run(Pass::Composite)?;
+        self.antialias.record(passes)?;
+        passes.run(Pass::Histogram)?;
+        passes.run(Pass::Exposure)?;
+        self.bloom.record(passes)?;
+        passes.run(Pass::ToneMap)?;
         if settings.rt_debug > 0 {
-            set.get(&set.debug)?.record(rec, address, output)?;
+            passes.run(Pass::Debug)?;
         }
         Ok(())
+    }
+
+    /// What decides sizes and variants of the passes.
+    fn facts(
+        &self,
+        targets: &Targets,
+        settings: &Settings,
+        output: [u32; 2],
+        params: &TraceView,
+    ) -> FrameFacts {
+        FrameFacts {
+            traced: [targets.width, targets.height],
+            output,
+            fog_cells: self.fog.cells(),
+            flares: params.flare_count,
+            subsampled: indirect::is_subsampled(settings),
+            map_fog: params.fog_count > 0,
+            bounces: settings.rt_bounces > 0,
+        }
     }
 
     /// How far automatic exposure moves to its aim in this frame, when the eye adapts within `seconds`.
@@ -373,13 +384,20 @@ impl ViewTracer {
     }
 }
 
-/// Bounced light becomes black, where it is not.
-fn darken_indirect(targets: &mut Targets, rec: &mut Recorder) -> Result<(), Error> {
+/// Whether each pixel samples a single light, in a pass of its own.
+fn samples_one_light(params: &TraceView) -> bool {
+    params.lights.selection == t::SELECT_RESAMPLED && params.lights.samples == 1
+}
+
+/// Makes bounced light black, where it is not.
+fn clear_indirect(targets: &mut Targets, passes: &mut FramePasses<'_>) -> Result<(), Error> {
     if !targets.indirect_is_black {
-        let mut pass = rec.pass("trace_no_indirect", Access::TRANSFER, Access::TRANSFER)?;
+        let (rec, access) = (&mut *passes.rec, Access::TRANSFER);
+        let mut pass = rec.pass("trace_no_indirect", access, access)?;
         pass.clear_image(&targets.indirect, [0.0; 4]);
         targets.indirect_is_black = true;
     }
+    passes.wrote(Resource::IndirectLight);
     Ok(())
 }
 

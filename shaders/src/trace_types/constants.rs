@@ -66,6 +66,9 @@ pub const DEBUG_GRADIENTS: u32 = 9;
 pub const DEBUG_RAYS: u32 = 10;
 pub const DEBUG_SPECULAR: u32 = 11;
 
+/// Bins of the histogram of luminance.
+pub const EXPOSURE_BINS: u32 = 128;
+
 /// Counted passes.
 pub const COUNT_PRIMARY_RAYS: u32 = 0;
 pub const COUNT_PRIMARY: u32 = 1;

@@ -15,9 +15,9 @@ use crate::gpu::{
 use crate::raster::FlareTest;
 use crate::scene::{View, ViewScene};
 use crate::settings::Settings;
-use crate::trace::counters::COUNTED;
 use crate::trace::input::Tracer;
 use crate::trace::pass_set::PassSet;
+use crate::trace::passes::COUNTERS;
 use crate::trace::view_tracer::{TracedMap, TracedView, ViewTracer};
 
 /// The tests of a file, in its module `on_gpu`: a `#[test]` for each named function of the file, which takes a
@@ -136,7 +136,7 @@ impl Gpu {
     }
 
     /// Rays of each counted pass in the newest finished frame.
-    pub fn rays(&self) -> Option<[u64; COUNTED.len()]> {
+    pub fn rays(&self) -> Option<[u64; COUNTERS]> {
         self.look.rays()
     }
 

@@ -1,0 +1,211 @@
+//! Recording of the traced look's passes for one view.
+
+use shaders::trace_types::constants::RAY_TILE;
+
+use super::pass_set::{PassSet, Pipeline};
+use super::passes::{Pass, Resource, Size, Switch, TABLE};
+use crate::gpu::{Access, Error, Recorder};
+
+/// What decides sizes and variants of a view's passes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FrameFacts {
+    /// Size that is traced, pixels.
+    pub traced: [u32; 2],
+    /// Size of the finished picture, pixels.
+    pub output: [u32; 2],
+    /// Cells of the light in fog; 0 where the view has none.
+    pub fog_cells: [u32; 2],
+    /// Number of flares.
+    pub flares: u32,
+    /// One of 2 × 2 pixels gathers bounced light.
+    pub subsampled: bool,
+    /// The map has fog.
+    pub map_fog: bool,
+    /// There is bounced light.
+    pub bounces: bool,
+}
+
+impl FrameFacts {
+    fn is_on(&self, switch: Switch) -> bool {
+        match switch {
+            Switch::LitFog => self.fog_cells != [0; 2],
+            Switch::MapFog => self.map_fog,
+            Switch::Bounces => self.bounces,
+        }
+    }
+
+    /// Invocations along both axes; those of [`Size::RayTiles`] as `pipeline` numbers them.
+    fn invocations(&self, size: Size, pipeline: &Pipeline) -> [u32; 2] {
+        let (traced, output) = (self.traced, self.output);
+        match size {
+            Size::Traced => traced,
+            Size::RayTiles => ray_tiles(traced, pipeline),
+            Size::Gathered if !self.subsampled => traced,
+            Size::Cells | Size::Gathered => traced.map(|n| n.div_ceil(2)),
+            Size::Strata => traced.map(|n| n.div_ceil(3)),
+            Size::FogCells => self.fog_cells,
+            Size::Flares => [self.flares, 1],
+            Size::Output => output,
+            Size::OutputHalf => output.map(|n| n.div_ceil(2)),
+            Size::OutputQuarter => output.map(|n| n.div_ceil(4)),
+            Size::Group => [1, 1],
+        }
+    }
+}
+
+/// One invocation for each slot of all tiles: in a row, or with the work groups of a tile side by side.
+fn ray_tiles(traced: [u32; 2], pipeline: &Pipeline) -> [u32; 2] {
+    let [across, down] = traced.map(|n| n.div_ceil(RAY_TILE));
+    match pipeline {
+        Pipeline::Rays(_) => [across * down * RAY_TILE * RAY_TILE, 1],
+        Pipeline::Compute(pipeline) => {
+            let [x, y, _] = pipeline.local_size();
+            let groups = RAY_TILE * RAY_TILE / (x * y);
+            [across * groups * x, down * y]
+        }
+    }
+}
+
+/// What a step of a filter reads and writes: addresses of texels or bindless indices of images.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Step {
+    view: u64,
+    source: u64,
+    target: u64,
+    spacing: u32,
+    padding: u32,
+}
+
+/// Records the passes of a view.
+pub struct FramePasses<'a> {
+    set: &'a PassSet,
+    /// What they are recorded to.
+    pub rec: &'a mut Recorder,
+    view: u64,
+    /// Sizes and variants.
+    pub facts: FrameFacts,
+    written: Written,
+}
+
+impl<'a> FramePasses<'a> {
+    /// Records to `rec`; `view` is the device address of the `TraceView`.
+    pub fn new(set: &'a PassSet, rec: &'a mut Recorder, view: u64, facts: FrameFacts) -> Self {
+        let mut written = Written::default();
+        written.add(&[Resource::Scene, Resource::Lights]);
+        Self {
+            set,
+            rec,
+            view,
+            facts,
+            written,
+        }
+    }
+
+    /// Records a pass.
+    ///
+    /// # Errors
+    /// Out of memory, or the driver refuses the pipeline.
+    pub fn run(&mut self, pass: Pass) -> Result<(), Error> {
+        let view = self.view;
+        self.record(pass, &view)
+    }
+
+    /// Records a step of a filter from `source` to `target`, addresses of texels or indices of images; `spacing`: pixels
+    /// between its taps.
+    ///
+    /// # Errors
+    /// Out of memory, or the driver refuses the pipeline.
+    pub fn run_step(
+        &mut self,
+        pass: Pass,
+        source: u64,
+        target: u64,
+        spacing: u32,
+    ) -> Result<(), Error> {
+        let step = Step {
+            view: self.view,
+            source,
+            target,
+            spacing,
+            padding: 0,
+        };
+        self.record(pass, &step)
+    }
+
+    /// Notes that something else than a pass of the table has written a resource.
+    pub fn wrote(&mut self, resource: Resource) {
+        self.written.add(&[resource]);
+    }
+
+    fn record<T: bytemuck::Pod>(&mut self, pass: Pass, push: &T) -> Result<(), Error> {
+        let row = pass.row();
+        if cfg!(debug_assertions) {
+            let missing = self.written.first_missing(row.reads);
+            debug_assert_eq!(missing, None, "not written before {pass:?} reads it");
+            self.written.add(row.writes);
+        }
+        let on = row
+            .switch
+            .is_some_and(|(_, switch)| self.facts.is_on(switch));
+        let pipeline = self.set.get(pass, on)?;
+        let [x, y] = self.facts.invocations(row.size, pipeline);
+        match pipeline {
+            Pipeline::Rays(pipeline) => {
+                let access = Access::RAY_TRACING;
+                let mut recorded = self.rec.pass(row.name, access, access)?;
+                recorded.bind_rays(pipeline);
+                recorded.push(push);
+                recorded.trace_rays(x, y, 1);
+            }
+            Pipeline::Compute(pipeline) => {
+                let mut recorded = self.rec.pass(row.name, Access::COMPUTE, Access::COMPUTE)?;
+                recorded.bind_compute(pipeline);
+                recorded.push(push);
+                recorded.dispatch_invocations(x, y);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Which resources hold what this frame has written.
+#[derive(Clone, Copy, Debug, Default)]
+struct Written(u64);
+
+impl Written {
+    fn add(&mut self, resources: &[Resource]) {
+        for &resource in resources {
+            self.0 &= !sharing(resource);
+            self.0 |= 1 << resource as u32;
+        }
+    }
+
+    fn first_missing(self, resources: &[Resource]) -> Option<Resource> {
+        let missing = |r: &&Resource| self.0 >> **r as u32 & 1 == 0;
+        resources.iter().find(missing).copied()
+    }
+}
+
+/// Bits of the resources that share memory with one.
+fn sharing(resource: Resource) -> u64 {
+    let all = TABLE.iter().flat_map(|row| row.writes);
+    all.filter(|other| other.memory() == resource.memory())
+        .fold(0, |bits, other| bits | 1 << *other as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn writing_shared_memory_destroys_what_was_there() {
+        let mut written = Written::default();
+        let (hits, sampled) = (Resource::PrimaryHits, Resource::SampledLights);
+        written.add(&[hits, Resource::GBuffer]);
+        assert_eq!(written.first_missing(&[hits, Resource::GBuffer]), None);
+        written.add(&[sampled]);
+        assert_eq!(written.first_missing(&[sampled, Resource::GBuffer]), None);
+        assert_eq!(written.first_missing(&[sampled, hits]), Some(hits));
+    }
+}
