@@ -133,7 +133,7 @@ vec3 in_light_of_now(vec3 color, ivec2 pixel, float path) {
     vec3 ratio = clamp(now / then, 1.0 / MOST_RATIO, MOST_RATIO);
     // half of what such pixels show is the other field's
     if (mark_field(mark_read(pixel)) > 0.0) ratio = mix(vec3(1.0), ratio, 0.5);
-    vec3 front = min(g.front * exp2(-VIEW.exposure_base), color);
+    vec3 front = min(g.front * exp2(-VIEW.exposure.base), color);
     return (color - front) * ratio + front;
 }
 
@@ -141,13 +141,13 @@ void main() {
     ivec2 output_size = ivec2(VIEW.antialias.output_width, VIEW.antialias.output_height);
     ivec2 traced_size = ivec2(VIEW.width, VIEW.height);
     vec2 ratio = vec2(traced_size) / vec2(output_size);
-    float exposure = COMPRESSION * max(ExposureState(VIEW.exposure).exposure, 1.0e-3) * exp2(VIEW.exposure_base + VIEW.exposure_bias);
+    float exposure = COMPRESSION * max(ExposureState(VIEW.exposure.state).exposure, 1.0e-3) * exp2(VIEW.exposure.base + VIEW.exposure.bias);
 
     ivec2 first = ivec2(floor((vec2(gl_WorkGroupID.xy) * float(GROUP) + 0.5) * ratio)) - 1;
     for (int i = int(gl_LocalInvocationIndex); i < TILE * TILE; i += GROUP * GROUP) {
         ivec2 at = ivec2(i % TILE, i / TILE);
         ivec2 pixel = clamp(first + at, ivec2(0), traced_size - 1);
-        vec4 color = imageLoad(images_rgba16f[VIEW.image_composite], pixel);
+        vec4 color = imageLoad(images_rgba16f[VIEW.images.composite], pixel);
         tile[at.y][at.x] = vec4(to_ycocg(compress(color.rgb, exposure)), path_read(pixel));
         fresh_parts[at.y][at.x] = color.a == 0.0 ? LEAST_FRESH : color.a;
     }

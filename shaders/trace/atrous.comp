@@ -43,10 +43,10 @@ void main() {
 
     // the plane in camera space: its point at tangent (x, y) has the inverse depth a x + b y + c
     vec2 tangent = tangent_of(vec2(pixel));
-    vec2 rate = -depth_gradient / (float(spacing) * VIEW.pixel_spread * depth);
+    vec2 rate = -depth_gradient / (float(spacing) * VIEW.camera.pixel_spread * depth);
     vec3 plane = vec3(rate, 1.0 / depth - dot(rate, tangent));
     // the logarithm makes a power of e one of 2
-    float plane_scale = LOG2_E * inversesqrt(dot(plane, plane)) / (0.1 + depth * (0.5 * float(spacing) * VIEW.pixel_spread + 5.0e-4));
+    float plane_scale = LOG2_E * inversesqrt(dot(plane, plane)) / (0.1 + depth * (0.5 * float(spacing) * VIEW.camera.pixel_spread + 5.0e-4));
     float unit = depth / INVERSE_SCALE;
 
     // Places of the taps. Beyond the edge of the picture they are on it, and weigh little unless they are alike.
@@ -97,7 +97,7 @@ void main() {
     mean.red = (red - CODE_GREY * level_sum) * (CODE_SCALE * scale);
     if (LAST != 0) {
         vec3 light = light_of_texel(mean.level.x + mean.level.y, mean.green.x + mean.green.y, mean.red.x + mean.red.y);
-        light_write(VIEW.image_direct, pixel, light, dither(pixel, DITHER_FILTERED));
+        light_write(VIEW.images.direct, pixel, light, dither(pixel, DITHER_FILTERED));
         return;
     }
     // those around, which weigh because they are alike, vary as much

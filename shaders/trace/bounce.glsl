@@ -69,7 +69,7 @@ bool bounce_shade(Hit hit, vec3 origin, vec3 direction, inout vec3 throughput, i
         // as the eye sees it: with its own colour, which shows as the engine shows it
         vec3 fog = vec3(0.0);
         fog_in_light(origin, direction, t, throughput, fog);
-        sum += fog * exp2(-VIEW.exposure_base);
+        sum += fog * exp2(-VIEW.exposure.base);
     }
     if (!shows_face(p, direction)) return false;
     // what is in the light lists is counted by sampling the lights, never twice

@@ -18,14 +18,14 @@ uint bounce_place(ivec2 cell, uint part) {
 
 // What the ray meets, and what colour its way takes from its light.
 void bounce_hit_write(ivec2 cell, Hit hit, vec3 color) {
-    BounceTexels texels = BounceTexels(VIEW.texels);
+    BounceTexels texels = BounceTexels(VIEW.scratch);
     texels.at[bounce_place(cell, 0)] = uvec4(hit.geometry, hit.primitive, floatBitsToUint(hit.barycentrics));
     if (VIEW.transport.filter_count != 0) texels.at[bounce_place(cell, 1)] = uvec4(floatBitsToUint(color), 0);
 }
 
 // How far away it is, the point on the triangle tells.
 Hit bounce_hit_read(ivec2 cell, out vec3 color) {
-    BounceTexels texels = BounceTexels(VIEW.texels);
+    BounceTexels texels = BounceTexels(VIEW.scratch);
     uvec4 hit = texels.at[bounce_place(cell, 0)];
     color = vec3(1.0);
     if (VIEW.transport.filter_count != 0) color = uintBitsToFloat(texels.at[bounce_place(cell, 1)].xyz);
@@ -41,13 +41,13 @@ struct BounceLight {
 
 // `dither`: see pack_light.
 void bounce_light_write(ivec2 cell, BounceLight b, float dither) {
-    BounceTexels texels = BounceTexels(VIEW.texels);
+    BounceTexels texels = BounceTexels(VIEW.scratch);
     texels.at[bounce_place(cell, 2)] = uvec4(floatBitsToUint(b.origin), pack_light(sound_light(b.found), dither));
     texels.at[bounce_place(cell, 3)] = pack_light_ray(b.light, uvec2(0), b.light.sky, dither);
 }
 
 BounceLight bounce_light_read(ivec2 cell) {
-    BounceTexels texels = BounceTexels(VIEW.texels);
+    BounceTexels texels = BounceTexels(VIEW.scratch);
     uvec4 found = texels.at[bounce_place(cell, 2)];
     uvec2 spare;
     bool sky;

@@ -10,7 +10,7 @@ Hit trace_bounce_rays(vec3 origin, vec3 direction, uint mask) {
     Hit hit;
     for (uint i = 0; i < 2; i++) {
         hit = trace_ray(origin, 0.0, direction, FAR, mask, false);
-        if (hit.geometry == NO_HIT || Geometries(VIEW.geometries).at[hit.geometry].kind != KIND_PASSED) break;
+        if (hit.geometry == NO_HIT || Geometries(VIEW.scene.geometries).at[hit.geometry].kind != KIND_PASSED) break;
         mask &= ~MASK_NO_SHADOW;
     }
     return hit;

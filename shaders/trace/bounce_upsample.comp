@@ -23,10 +23,10 @@ void main() {
         places[i] = vec4(-1.0);
         if (any(lessThan(cell, ivec2(0))) || any(greaterThanEqual(cell, cells))) continue;
         ivec2 pixel = subsample_pixel(cell);
-        places[i] = imageLoad(images_rgba32f[VIEW.image_position], pixel);
+        places[i] = imageLoad(images_rgba32f[VIEW.images.position], pixel);
         gathered[i] = uint(pixel.x) | uint(pixel.y) << 16;
-        lights[i] = light_read(VIEW.image_indirect, pixel);
-        normals[i] = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).x);
+        lights[i] = light_read(VIEW.images.indirect, pixel);
+        normals[i] = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).x);
     }
     barrier();
     ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
@@ -36,11 +36,11 @@ void main() {
         ivec2 in_cell = ivec2(i & 1, i >> 1), pixel = cell * CELL + in_cell;
         bool is_own = gathered[own] == (uint(pixel.x) | uint(pixel.y) << 16);
         if (is_own || any(greaterThanEqual(pixel, size))) continue;
-        vec4 position = imageLoad(images_rgba32f[VIEW.image_position], pixel);
+        vec4 position = imageLoad(images_rgba32f[VIEW.images.position], pixel);
         vec3 light = vec3(0.0);
         if (position.w >= 0.0) {
-            vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).x);
-            float tolerance = 0.1 + 6.0 * position.w * VIEW.pixel_spread;
+            vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).x);
+            float tolerance = 0.1 + 6.0 * position.w * VIEW.camera.pixel_spread;
             // those of the other field show another surface, so a field's own lie farther apart
             bool takes_turns = mark_field(mark_read(pixel)) > 0.0;
             float reach = takes_turns ? 7.5 : 3.0;
@@ -65,6 +65,6 @@ void main() {
             if (weight > 0.0) light /= weight;
             else if (any_weight > 0.0) light = any_light / any_weight;
         }
-        light_write(VIEW.image_indirect, pixel, light, dither(pixel, DITHER_UPSAMPLED));
+        light_write(VIEW.images.indirect, pixel, light, dither(pixel, DITHER_UPSAMPLED));
     }
 }

@@ -95,7 +95,7 @@ bool bvh_report(inout BvhWalk walk, Hit hit) {
         if (last < LAYER_NONE) walk.tmax = min(walk.tmax, last + 2.0 * layer_slack(last + layer_slack(last)));
         return false;
     }
-    uint kind = Geometries(VIEW.geometries).at[hit.geometry].kind;
+    uint kind = Geometries(VIEW.scene.geometries).at[hit.geometry].kind;
     if ((kind == KIND_TESTED || kind == KIND_PASSED) && !is_stopped_by(hit, walk.direction)) return false;
     walk.hit = hit;
     walk.tmax = hit.t;
@@ -117,11 +117,11 @@ void bvh_sort(inout float near_a, inout uint a, inout float near_b, inout uint b
 const uint BVH_TOP = 0xFFFFFFFFu;
 
 void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
-    if (VIEW.bvh_nodes == 0) return;
+    if (VIEW.scene.nodes == 0) return;
     BvhRay outside = bvh_ray(origin, walk.direction);
     BvhRay ray = outside;
-    BvhNodes nodes = BvhNodes(VIEW.bvh_nodes);
-    BvhInstances instances = BvhInstances(VIEW.bvh_instances);
+    BvhNodes nodes = BvhNodes(VIEW.scene.nodes);
+    BvhInstances instances = BvhInstances(VIEW.scene.placed);
     BvhTriangles triangles = BvhTriangles(uint64_t(0));
     uint geometry = 0;
     // what is left for later with the distance at which it begins, and how much of it there was when the instance was entered
@@ -186,7 +186,7 @@ void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
         if (size == base) {
             base = BVH_TOP;
             ray = outside;
-            nodes = BvhNodes(VIEW.bvh_nodes);
+            nodes = BvhNodes(VIEW.scene.nodes);
         }
         if (size == 0) return;
         uvec2 later = stack[--size];

@@ -21,16 +21,16 @@ CameraRay camera_ray(ivec2 pixel) {
     vec2 place = (VIEW.flags & VIEW_JITTER) != 0 ? rng_next2() : vec2(0.5) + VIEW.antialias.jitter;
     ray.seen = vec2(pixel) + place;
     vec2 ndc = ray.seen / vec2(VIEW.width, VIEW.height) * 2.0 - 1.0;
-    ndc.x += VIEW.eye_shift;
+    ndc.x += VIEW.camera.stereo_shift;
     // one unit deep
-    vec3 direction = VIEW.forward - VIEW.left * ndc.x - VIEW.up * ndc.y;
+    vec3 direction = VIEW.camera.forward - VIEW.camera.left * ndc.x - VIEW.camera.up * ndc.y;
     ray.through_middle = normalize(direction);
-    ray.origin = VIEW.eye;
+    ray.origin = VIEW.camera.origin;
     ray.direction = ray.through_middle;
     if (VIEW.antialias.lens_radius > 0.0) {
         vec2 random = rng_next2();
         float radius = VIEW.antialias.lens_radius * sqrt(random.x), angle = 2.0 * PI * random.y;
-        vec3 offset = (normalize(VIEW.left) * cos(angle) + normalize(VIEW.up) * sin(angle)) * radius;
+        vec3 offset = (normalize(VIEW.camera.left) * cos(angle) + normalize(VIEW.camera.up) * sin(angle)) * radius;
         ray.origin += offset;
         ray.direction = normalize(direction * VIEW.antialias.focal_distance - offset);
     }

@@ -39,7 +39,7 @@ void layers_clear(out LayerList list) {
 // Adds a hit to the list, if it is a translucent layer that shows its face, lies behind `last`, and is among the nearest so far.
 void layers_add(inout LayerList list, Hit hit, vec3 direction, LayerOrder last) {
     // the order first: of many layers on a ray, each is looked at for every other list
-    GeometryRecord record = Geometries(VIEW.geometries).at[hit.geometry];
+    GeometryRecord record = Geometries(VIEW.scene.geometries).at[hit.geometry];
     float key = layer_key(Triangles(record.triangles).at[hit.primitive].flags, hit.t);
     if (!layer_before(last.key, last.geometry, last.primitive, key, hit.geometry, hit.primitive)) return;
     const int end = int(LAYERS_A_RAY) - 1;
@@ -74,7 +74,7 @@ float layer_start(LayerOrder last) { return max(last.key - 0.01, 0.0); }
 bool is_stopped_by(Hit hit, vec3 direction) {
     SurfacePoint p = surface_point(hit);
     if ((p.triangle.flags & TRIANGLE_ONE_SIDED) != 0) return !is_culled(p, direction);
-    return is_solid_at(p, hit.t * VIEW.pixel_spread);
+    return is_solid_at(p, hit.t * VIEW.camera.pixel_spread);
 }
 
 #endif

@@ -42,7 +42,7 @@ Shown shown(ivec2 pixel) {
     GBufferPixel g = gbuffer_read(pixel);
     Shown s;
     // what glows by itself, sky and fog show as the engine shows them when the map is exposed to look as bright as there
-    s.front = g.front * exp2(-VIEW.exposure_base);
+    s.front = g.front * exp2(-VIEW.exposure.base);
     s.is_lit = g.path >= 0.0;
     s.albedo = g.albedo;
     s.light = s.is_lit ? light_of(pixel) : vec3(0.0);
@@ -61,8 +61,8 @@ vec3 lit_fog(ivec2 pixel) {
 bool other_side(ivec2 pixel, float field, out vec3 other, out vec3 whole) {
     const ivec2 beside[4] = ivec2[](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1));
     GBufferPixel own;
-    shown_read(VIEW.image_other, pixel, own);
-    own.front *= exp2(-VIEW.exposure_base);
+    shown_read(VIEW.images.other, pixel, own);
+    own.front *= exp2(-VIEW.exposure.base);
     bool is_lit = max_component(own.albedo) > 0.0;
     // to the sides, above and below: of those that show a surface where one is to be shown, and of all
     vec3 sums[2] = vec3[](vec3(0.0), vec3(0.0)), all_sum = vec3(0.0);
@@ -138,12 +138,12 @@ void main() {
             fresh = max(fresh, min(max(change.x, change.y), 0.99));
         }
         fresh += LEAST_FRESH;
-        imageStore(images_rgba16f[VIEW.image_composite], pixel, vec4(min(radiance, vec3(60000.0)), lesser ? -fresh : fresh));
+        imageStore(images_rgba16f[VIEW.images.composite], pixel, vec4(min(radiance, vec3(60000.0)), lesser ? -fresh : fresh));
         return;
     }
     if (VIEW.accumulated > 0) {
-        vec3 mean = imageLoad(images_rgba32f[VIEW.image_accumulation], pixel).rgb;
+        vec3 mean = imageLoad(images_rgba32f[VIEW.images.accumulation], pixel).rgb;
         radiance = mean + (radiance - mean) / float(VIEW.accumulated + 1);
     }
-    imageStore(images_rgba32f[VIEW.image_accumulation], pixel, vec4(radiance, 1.0));
+    imageStore(images_rgba32f[VIEW.images.accumulation], pixel, vec4(radiance, 1.0));
 }

@@ -17,9 +17,9 @@ void count_rays(ivec2 pixel, uint pass, bool first) {
         uint row = uint(pixel.y) % COUNTER_ROWS;
         atomicAdd(RayCounters(VIEW.post.counters).at[pass * COUNTER_ROWS + row], rays_asked);
     }
-    if (VIEW.image_rays != NO_IMAGE) {
-        uint before = first ? 0 : imageLoad(uimages_r32ui[VIEW.image_rays], pixel).x;
-        imageStore(uimages_r32ui[VIEW.image_rays], pixel, uvec4(before + rays_asked));
+    if (VIEW.post.image_rays != NO_IMAGE) {
+        uint before = first ? 0 : imageLoad(uimages_r32ui[VIEW.post.image_rays], pixel).x;
+        imageStore(uimages_r32ui[VIEW.post.image_rays], pixel, uvec4(before + rays_asked));
     }
 }
 

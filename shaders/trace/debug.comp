@@ -85,8 +85,8 @@ vec3 debug_color(ivec2 pixel) {
         return heat(max(change.x, change.y));
     }
     case DEBUG_RAYS:
-        if (VIEW.image_rays == NO_IMAGE) return NOTHING;
-        return heat_count(float(imageLoad(uimages_r32ui[VIEW.image_rays], pixel).x), 8.0);
+        if (VIEW.post.image_rays == NO_IMAGE) return NOTHING;
+        return heat_count(float(imageLoad(uimages_r32ui[VIEW.post.image_rays], pixel).x), 8.0);
     case DEBUG_SPECULAR: return specular_color(pixel, g);
     }
     return NOTHING;
@@ -95,8 +95,8 @@ vec3 debug_color(ivec2 pixel) {
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, picture_size()))) return;
-    ivec2 target = pixel + ivec2(VIEW.target_x, VIEW.target_y);
-    if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target_width) || target.y >= int(VIEW.target_height)) return;
+    ivec2 target = pixel + ivec2(VIEW.target.x, VIEW.target.y);
+    if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target.width) || target.y >= int(VIEW.target.height)) return;
     // each traced pixel as a block, where fewer are traced than shown
     ivec2 traced = min(ivec2((vec2(pixel) + 0.5) * vec2(VIEW.width, VIEW.height) / vec2(picture_size())), ivec2(VIEW.width, VIEW.height) - 1);
     target_store(target, debug_color(traced));

@@ -136,8 +136,8 @@ uvec4 pack_texel(LightTexel t, float dither) {
 // Coordinates of a pixel's middle on the plane at distance 1, to the left and up.
 vec2 tangent_of(vec2 pixel) {
     vec2 ndc = 1.0 - (pixel + 0.5) / vec2(VIEW.width, VIEW.height) * 2.0;
-    ndc.x -= VIEW.eye_shift;
-    return ndc * vec2(length(VIEW.left), length(VIEW.up));
+    ndc.x -= VIEW.camera.stereo_shift;
+    return ndc * vec2(length(VIEW.camera.left), length(VIEW.camera.up));
 }
 
 // Depth of what lies `path` away on the ray through a pixel. For what mirrors show it is that of the mirror image.
@@ -153,7 +153,7 @@ struct Before {
 };
 
 Before before_of(ivec2 pixel) {
-    vec4 motion = imageLoad(images_rgba16f[VIEW.image_motion], pixel);
+    vec4 motion = imageLoad(images_rgba16f[VIEW.images.motion], pixel);
     Before before = Before(vec2(pixel) + motion.xy, -1.0);
     if (motion.z >= 0.0) {
         vec2 t = tangent_of(before.pixel);
@@ -164,8 +164,8 @@ Before before_of(ivec2 pixel) {
 
 // The light that a picture is made with: both kinds, which the denoiser sums up where direct light was.
 vec3 light_of(ivec2 pixel) {
-    vec3 light = light_read(VIEW.image_direct, pixel);
-    return (VIEW.flags & VIEW_DENOISE) != 0 ? light : light + light_read(VIEW.image_indirect, pixel);
+    vec3 light = light_read(VIEW.images.direct, pixel);
+    return (VIEW.flags & VIEW_DENOISE) != 0 ? light : light + light_read(VIEW.images.indirect, pixel);
 }
 
 #endif

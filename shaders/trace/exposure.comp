@@ -22,7 +22,7 @@ const float MIN_STOPS = -0.75, MAX_STOPS = 0.75;
 const float DARK_PART = 0.2, BRIGHT_PART = 0.05;
 
 void main() {
-    ExposureState state = ExposureState(VIEW.exposure);
+    ExposureState state = ExposureState(VIEW.exposure.state);
     uint own = gl_LocalInvocationIndex;
     bins[own] = state.bins[own];
     state.bins[own] = 0;
@@ -42,8 +42,8 @@ void main() {
     }
     float stops = 0.0;
     if ((VIEW.flags & VIEW_AUTO_EXPOSURE) != 0 && weight > 0.0)
-        stops = clamp((VIEW.exposure_middle - VIEW.exposure_base - sum / weight) * ADAPTATION, MIN_STOPS, MAX_STOPS) * (total / whole);
+        stops = clamp((VIEW.exposure.usual - VIEW.exposure.base - sum / weight) * ADAPTATION, MIN_STOPS, MAX_STOPS) * (total / whole);
     float old = log2(clamp(state.exposure, exp2(MIN_STOPS), exp2(MAX_STOPS)));
     if ((VIEW.flags & VIEW_EXPOSURE_RESET) != 0 || isnan(old)) old = stops;
-    state.exposure = exp2(mix(old, stops, stops < old ? VIEW.exposure_blend : VIEW.exposure_blend_dark));
+    state.exposure = exp2(mix(old, stops, stops < old ? VIEW.exposure.blend : VIEW.exposure.blend_dark));
 }

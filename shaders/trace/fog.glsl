@@ -52,9 +52,9 @@ float fog_part(Fog fog, SurfacePoint p, vec3 eye) {
 // part by itself, in light. Volumes do not overlap, so each is taken whole, nearest first.
 void fog_in_light(vec3 origin, vec3 direction, float to, inout vec3 transmittance, inout vec3 radiance) {
     vec3 inverse = inverse_direction(direction);
-    uint count = VIEW.fog_count, last = 0;
+    uint count = VIEW.scene.fog_count, last = 0;
     float entered = -1.0;
-    TraceFogs fogs = TraceFogs(VIEW.fogs);
+    TraceFogs fogs = TraceFogs(VIEW.scene.fogs);
     for (uint turn = 0; turn < count; turn++) {
         vec2 best = vec2(FAR);
         uint nearest = count;

@@ -15,7 +15,7 @@ layout(constant_id = 0) const uint LIT_FOG = 0;
 const float MOST_LIT = 0.5;
 
 // The map's own light in a volume in the mean, as it is displayed; `rt_lightScale` does not count, which is to be seen.
-vec3 fog_own_light(Fog fog) { return fog.own_light * exp2(VIEW.exposure_base); }
+vec3 fog_own_light(Fog fog) { return fog.own_light * exp2(VIEW.exposure.base); }
 
 // The part of the fog's colour that is the map's own straight light, in the mean of the volume.
 vec3 fog_lit_part(Fog fog) { return min(fog_own_light(fog), MOST_LIT); }
@@ -58,7 +58,7 @@ void fog_write(ivec2 pixel) {
     ivec2 at = pixel / cell;
     // each pixel of a cell in turn; from the eye, so that half floats are as exact as one sees
     ivec2 sampled = min(at * cell + ivec2(VIEW.seed, VIEW.seed >> 1) % cell, ivec2(VIEW.width, VIEW.height) - 1);
-    if (pixel == sampled) imageStore(images_rgba16f[VIEW.fog.point], at, vec4(clamp(fog_point - VIEW.eye, -60000.0, 60000.0), min(fog_distance, 60000.0)));
+    if (pixel == sampled) imageStore(images_rgba16f[VIEW.fog.point], at, vec4(clamp(fog_point - VIEW.camera.origin, -60000.0, 60000.0), min(fog_distance, 60000.0)));
 }
 
 #endif

@@ -35,21 +35,21 @@ void shown_read(uint image, ivec2 pixel, inout GBufferPixel g) {
 
 // `dither`: see pack_light.
 void gbuffer_write(ivec2 pixel, GBufferPixel g, vec2 dither) {
-    imageStore(images_rgba32f[VIEW.image_position], pixel, vec4(g.position, pack_path(g)));
-    imageStore(uimages_rg32ui[VIEW.image_surface], pixel, uvec4(pack_normal(g.face_normal), pack_normal(g.normal), 0, 0));
-    shown_write(VIEW.image_shown, pixel, g, dither);
+    imageStore(images_rgba32f[VIEW.images.position], pixel, vec4(g.position, pack_path(g)));
+    imageStore(uimages_rg32ui[VIEW.images.surface], pixel, uvec4(pack_normal(g.face_normal), pack_normal(g.normal), 0, 0));
+    shown_write(VIEW.images.shown, pixel, g, dither);
 }
 
 GBufferPixel gbuffer_read(ivec2 pixel) {
     GBufferPixel g;
-    vec4 position = imageLoad(images_rgba32f[VIEW.image_position], pixel);
-    uvec2 surface = imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).xy;
+    vec4 position = imageLoad(images_rgba32f[VIEW.images.position], pixel);
+    uvec2 surface = imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).xy;
     g.position = position.xyz;
     g.path = position.w;
     g.first_person = first_person_of(position.w);
     g.face_normal = unpack_normal(surface.x);
     g.normal = unpack_normal(surface.y);
-    shown_read(VIEW.image_shown, pixel, g);
+    shown_read(VIEW.images.shown, pixel, g);
     return g;
 }
 

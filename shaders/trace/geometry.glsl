@@ -28,7 +28,7 @@ struct SurfacePoint {
     StagePoint stage;
 };
 
-Instance instance_of(uint index) { return TraceInstances(VIEW.instances).at[index]; }
+Instance instance_of(uint index) { return TraceInstances(VIEW.scene.instances).at[index]; }
 Material material_of(uint index) { return Materials(VIEW.materials.materials).at[index]; }
 
 vec3 safe_normalize(vec3 v, vec3 otherwise) {
@@ -37,7 +37,7 @@ vec3 safe_normalize(vec3 v, vec3 otherwise) {
 }
 
 SurfacePoint surface_point(Hit hit) {
-    GeometryRecord record = Geometries(VIEW.geometries).at[hit.geometry];
+    GeometryRecord record = Geometries(VIEW.scene.geometries).at[hit.geometry];
     SurfacePoint p;
     p.triangle = Triangles(record.triangles).at[hit.primitive];
     p.instance = record.instance != NO_INSTANCE ? record.instance : p.triangle.instance;
@@ -72,7 +72,7 @@ SurfacePoint surface_point(Hit hit) {
     vec2 sb = b.st - a.st, sc = c.st - a.st;
     float double_st = abs(sb.x * sc.y - sb.y * sc.x);
     p.texel_scale = double_area > 0.0 ? sqrt(double_st / double_area) : 0.0;
-    p.stage.view_distance = distance(p.position, VIEW.eye);
+    p.stage.view_distance = distance(p.position, VIEW.camera.origin);
     return p;
 }
 

@@ -10,12 +10,12 @@ const float REACH = 1.0;
 
 // Whether the sample is of the surface that the pixel shows; `moved`: which is somewhere else by now.
 bool same_surface(LitSample s, ivec2 pixel, float last_path, out bool moved) {
-    vec4 position = imageLoad(images_rgba32f[VIEW.image_position], pixel);
+    vec4 position = imageLoad(images_rgba32f[VIEW.images.position], pixel);
     moved = false;
     if (position.w < 0.0) return false;
-    vec3 face_normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).x);
+    vec3 face_normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).x);
     vec3 away = s.position - position.xyz;
-    float footprint = position.w * VIEW.pixel_spread;
+    float footprint = position.w * VIEW.camera.pixel_spread;
     if (dot(s.face_normal, face_normal) > 0.9 && abs(dot(away, face_normal)) < 0.05 + 0.5 * footprint
         && dot(away, away) < 1.0 + 100.0 * footprint * footprint) return true;
     moved = true;
@@ -28,9 +28,9 @@ void main() {
     if (!inside(first)) return;
 
     ivec2 middle = min(first + 1, ivec2(VIEW.width, VIEW.height) - 1);
-    float path = imageLoad(images_rgba32f[VIEW.image_position], middle).w;
+    float path = imageLoad(images_rgba32f[VIEW.images.position], middle).w;
     uint guide = 0;
-    if (path >= 0.0) guide = pack_guide(depth_of(middle, path), unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], middle).x), false);
+    if (path >= 0.0) guide = pack_guide(depth_of(middle, path), unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], middle).x), false);
     imageStore(uimages_r32ui[DENOISE.stratum_guide], stratum, uvec4(guide));
 
     float nearest = REACH;
@@ -41,7 +41,7 @@ void main() {
     for (int i = 0; i < 9; i++) {
         ivec2 pixel = pixel_of(stratum, i);
         if (!inside(pixel)) continue;
-        vec4 motion = imageLoad(images_rgba16f[VIEW.image_motion], pixel);
+        vec4 motion = imageLoad(images_rgba16f[VIEW.images.motion], pixel);
         vec2 before = vec2(pixel) + motion.xy;
         ivec2 last = ivec2(floor(before + 0.5));
         if (motion.z < 0.0 || !inside(last)) continue;

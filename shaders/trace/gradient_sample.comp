@@ -13,7 +13,7 @@ uint level_of(GradientPixel c) {
 
 uvec2 gradient_at(ivec2 stratum, GradientPixel c) {
     ivec2 pixel = pixel_of(stratum, c.index);
-    vec2 now = vec2(luminance(light_read(VIEW.image_direct, pixel)), luminance(light_read(VIEW.image_indirect, pixel)));
+    vec2 now = vec2(luminance(light_read(VIEW.images.direct, pixel)), luminance(light_read(VIEW.images.indirect, pixel)));
     // as the sample was rounded
     now = unpackHalf2x16(packHalf2x16(now));
     vec2 then = unpackHalf2x16(imageLoad(uimages_rgba32ui[DENOISE.sample_surfaces], c.last / STRATUM).z);

@@ -9,7 +9,7 @@ layout(local_size_x = 16, local_size_y = 16) in;
 
 bool shows_surface(ivec2 pixel) {
     vec2 traced = (vec2(pixel) + 0.5) * vec2(VIEW.width, VIEW.height) / vec2(picture_size());
-    return imageLoad(images_rgba32f[VIEW.image_position], ivec2(traced)).w >= 0.0;
+    return imageLoad(images_rgba32f[VIEW.images.position], ivec2(traced)).w >= 0.0;
 }
 
 shared uint counts[EXPOSURE_BINS];
@@ -30,5 +30,5 @@ void main() {
     }
     barrier();
     if (local_index < EXPOSURE_BINS && counts[local_index] > 0)
-        atomicAdd(ExposureState(VIEW.exposure).bins[local_index], counts[local_index]);
+        atomicAdd(ExposureState(VIEW.exposure.state).bins[local_index], counts[local_index]);
 }

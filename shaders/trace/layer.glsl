@@ -134,7 +134,7 @@ vec3 displayed_light(SurfacePoint p) {
     if ((p.triangle.flags & TRIANGLE_WORLD) != 0) {
         uint page = p.triangle.lightmap;
         if (page == NO_TEXTURE) return p.stage.color.rgb;
-        return textureLod(sampler2D(textures[nonuniformEXT(page)], samplers[VIEW.sky_sampler]), p.stage.lightmap, 0.0).rgb;
+        return textureLod(sampler2D(textures[nonuniformEXT(page)], samplers[VIEW.scene.sky_sampler]), p.stage.lightmap, 0.0).rgb;
     }
     Instance instance = instance_of(p.instance);
     if ((instance.flags & INSTANCE_UNLIT) != 0) return vec3(1.0);

@@ -25,7 +25,7 @@ struct Motion {
 };
 
 Motion motion_read(ivec2 pixel) {
-    vec4 v = imageLoad(images_rgba16f[VIEW.image_motion], pixel);
+    vec4 v = imageLoad(images_rgba16f[VIEW.images.motion], pixel);
     return Motion(v.xy, v.z, v.w);
 }
 
@@ -38,7 +38,7 @@ const float LEAST_FRESH = 1.0 / 1024.0;
 // The pixel's mark, which the motion image has room for: the field of a pixel that shows either a reflection (2) or what
 // lies behind it (1), otherwise 0, and 3 more if it is seen bent, so that its motion is a guess; its fraction tells how much
 // light of what is in front moves otherwise than the surface.
-float mark_read(ivec2 pixel) { return imageLoad(images_rgba16f[VIEW.image_motion], pixel).w; }
+float mark_read(ivec2 pixel) { return imageLoad(images_rgba16f[VIEW.images.motion], pixel).w; }
 float mark_of(uint field, bool bent, float new_part) { return float(field + (bent ? 3u : 0u)) + new_part; }
 bool mark_bent(float mark) { return mark >= 3.0; }
 float mark_field(float mark) { return floor(mark) - (mark_bent(mark) ? 3.0 : 0.0); }
@@ -116,13 +116,13 @@ vec4 motion_of(CameraRay ray, LastPlace place) {
     if (place.rests && VIEW.motion.still != 0) return vec4(0.0, 0.0, path, path);
     // out of focus, a pixel shows what lies beside it; the blur of what rests moves as a thing at its distance would
     if (VIEW.antialias.lens_radius > 0.0 && place.rests && place.at.w > 0.0)
-        place.at.xyz = VIEW.eye + ray.through_middle * path;
-    vec3 v = place.at.xyz - VIEW.last_eye * place.at.w;
-    float depth = dot(v, VIEW.last_forward);
+        place.at.xyz = VIEW.camera.origin + ray.through_middle * path;
+    vec3 v = place.at.xyz - VIEW.last_camera.origin * place.at.w;
+    float depth = dot(v, VIEW.last_camera.forward);
     if (depth <= 0.0) return vec4(0.0, 0.0, -1.0, path);
-    vec2 ndc = -vec2(dot(v, VIEW.last_left) / dot(VIEW.last_left, VIEW.last_left),
-        dot(v, VIEW.last_up) / dot(VIEW.last_up, VIEW.last_up)) / depth;
-    ndc.x -= VIEW.eye_shift;
+    vec2 ndc = -vec2(dot(v, VIEW.last_camera.left) / dot(VIEW.last_camera.left, VIEW.last_camera.left),
+        dot(v, VIEW.last_camera.up) / dot(VIEW.last_camera.up, VIEW.last_camera.up)) / depth;
+    ndc.x -= VIEW.camera.stereo_shift;
     vec2 offset = (ndc * 0.5 + 0.5) * vec2(VIEW.width, VIEW.height) - ray.seen;
     float last_path = place.at.w > 0.0 ? min(length(v), SKY_PATH) : SKY_PATH;
     // none at all is the mark of what rests
@@ -132,7 +132,7 @@ vec4 motion_of(CameraRay ray, LastPlace place) {
 
 // `motion`: as `motion_of` makes it.
 void motion_write(ivec2 pixel, vec4 motion, float mark) {
-    imageStore(images_rgba16f[VIEW.image_motion], pixel, vec4(motion.xyz, mark));
+    imageStore(images_rgba16f[VIEW.images.motion], pixel, vec4(motion.xyz, mark));
     bool rests = motion.xy == vec2(0.0) && motion.z >= 0.0;
     imageStore(images_r16f[VIEW.motion.path], pixel, vec4(rests ? motion.w : -motion.w));
 }

@@ -73,7 +73,7 @@ const float MIN_GLOW = 1.0 / 256.0;
 // Where a point of the path was seen in the last frame. What is seen bent is taken to stand where the eye sees it now.
 LastSpace last_space(Path path, vec3 position, float t) {
     if (path.bent == BENT_NOT) return path.last;
-    return LastSpace(path.last.turn, VIEW.eye + path.eye_direction * (path.travelled + t) - path.last.turn * position);
+    return LastSpace(path.last.turn, VIEW.camera.origin + path.eye_direction * (path.travelled + t) - path.last.turn * position);
 }
 
 void keep_lit(SurfacePoint p, vec3 lit, Path path, float t) {
@@ -210,7 +210,7 @@ bool is_over(Path path) {
 // What the pixel's cone meets of the surface.
 Footprint footprint(Path path, SurfacePoint p, float t) {
     float cosine = max(abs(dot(p.face_normal, path.direction)), 0.05);
-    float width = (path.travelled + t) * VIEW.pixel_spread * VIEW.antialias.texture_scale;
+    float width = (path.travelled + t) * VIEW.camera.pixel_spread * VIEW.antialias.texture_scale;
     if (VIEW.antialias.anisotropy > 1.0) return ellipse_footprint(p, path.direction, cosine, width);
     return round_footprint(width * inversesqrt(cosine));
 }

@@ -17,11 +17,11 @@ vec3 picture_load(ivec2 pixel) {
 
 // Writes a display-encoded colour to the picture that is shown; where each eye has channels of its own, to those alone.
 void target_store(ivec2 target, vec3 color) {
-    if (VIEW.channels != 7u) {
-        bvec3 written = notEqual(uvec3(VIEW.channels) & uvec3(1, 2, 4), uvec3(0));
-        color = mix(imageLoad(images_rgba8[VIEW.image_target], target).rgb, color, written);
+    if (VIEW.target.channels != 7u) {
+        bvec3 written = notEqual(uvec3(VIEW.target.channels) & uvec3(1, 2, 4), uvec3(0));
+        color = mix(imageLoad(images_rgba8[VIEW.target.image], target).rgb, color, written);
     }
-    imageStore(images_rgba8[VIEW.image_target], target, vec4(color, 1.0));
+    imageStore(images_rgba8[VIEW.target.image], target, vec4(color, 1.0));
 }
 
 #endif

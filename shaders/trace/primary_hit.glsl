@@ -14,19 +14,19 @@ const uint EYE_HIT_FIRST_PERSON = 1u << 31, EYE_HIT_FINISHED = 1u << 30, EYE_HIT
 
 void primary_hit_write(ivec2 pixel, Hit hit, bool first_person) {
     uint bits = first_person ? EYE_HIT_FIRST_PERSON : 0u;
-    EyeHits(VIEW.texels).at[place_of(pixel)] = uvec4(hit.geometry, hit.primitive & ~EYE_HIT_BITS | bits, floatBitsToUint(hit.barycentrics));
+    EyeHits(VIEW.scratch).at[place_of(pixel)] = uvec4(hit.geometry, hit.primitive & ~EYE_HIT_BITS | bits, floatBitsToUint(hit.barycentrics));
 }
 
 // How far away it is, the point on the triangle tells.
 Hit primary_hit_read(ivec2 pixel, out bool first_person) {
-    uvec4 packed = EyeHits(VIEW.texels).at[place_of(pixel)];
+    uvec4 packed = EyeHits(VIEW.scratch).at[place_of(pixel)];
     first_person = (packed.y & EYE_HIT_FIRST_PERSON) != 0;
     return Hit(packed.x, packed.y & ~EYE_HIT_BITS, uintBitsToFloat(packed.zw), 0.0);
 }
 
 // Whether primary.rgen has told without a ray what the pixel shows.
-bool eye_hit_finished(ivec2 pixel) { return (EyeHits(VIEW.texels).at[place_of(pixel)].y & EYE_HIT_FINISHED) != 0; }
+bool eye_hit_finished(ivec2 pixel) { return (EyeHits(VIEW.scratch).at[place_of(pixel)].y & EYE_HIT_FINISHED) != 0; }
 
-void eye_hit_finish(ivec2 pixel) { EyeHits(VIEW.texels).at[place_of(pixel)].y |= EYE_HIT_FINISHED; }
+void eye_hit_finish(ivec2 pixel) { EyeHits(VIEW.scratch).at[place_of(pixel)].y |= EYE_HIT_FINISHED; }
 
 #endif

@@ -15,7 +15,7 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
     rays_asked++;
     rayQueryEXT query;
     uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT : gl_RayFlagsNoneEXT;
-    rayQueryInitializeEXT(query, scenes[VIEW.scene], flags, mask, origin, tmin, direction, tmax);
+    rayQueryInitializeEXT(query, scenes[VIEW.scene.top_level], flags, mask, origin, tmin, direction, tmax);
     while (rayQueryProceedEXT(query)) {
         if (is_stopped_by(QUERY_HIT(query, false), direction)) rayQueryConfirmIntersectionEXT(query);
     }
@@ -30,7 +30,7 @@ void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder
     rays_asked++;
     layers_clear(found);
     rayQueryEXT query;
-    rayQueryInitializeEXT(query, scenes[VIEW.scene], gl_RayFlagsNoneEXT, mask, origin, layer_start(order), direction, tmax);
+    rayQueryInitializeEXT(query, scenes[VIEW.scene.top_level], gl_RayFlagsNoneEXT, mask, origin, layer_start(order), direction, tmax);
     // none is ever confirmed: the nearest so far are noted
     while (rayQueryProceedEXT(query)) layers_add(found, QUERY_HIT(query, false), direction, order);
 }

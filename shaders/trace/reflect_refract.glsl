@@ -6,7 +6,7 @@
 
 // The paths that have passed a portal after `paths` (scene/turned.rs counts alike).
 uint paths_through(uint paths, uint portal) {
-    uint count = VIEW.portal_count;
+    uint count = VIEW.scene.portal_count;
     bool pairs = PATHS_PORTAL + count + count * count <= PATHS_MOST;
     if (!pairs || paths < PATHS_PORTAL) return PATHS_PORTAL + portal <= 255u ? PATHS_PORTAL + portal : PATHS_DIRECT;
     uint last = paths - PATHS_PORTAL;
@@ -16,16 +16,16 @@ uint paths_through(uint paths, uint portal) {
 
 // The portal that the surface belongs to, or portal_count.
 uint portal_at(SurfacePoint p) {
-    for (uint i = 0; i < VIEW.portal_count; i++) {
-        vec4 plane = Portals(VIEW.portals).at[i].plane;
+    for (uint i = 0; i < VIEW.scene.portal_count; i++) {
+        vec4 plane = Portals(VIEW.scene.portals).at[i].plane;
         if (abs(dot(plane.xyz, p.position) - plane.w) < 1.0 && abs(dot(plane.xyz, p.face_normal)) > 0.99) return i;
     }
-    return VIEW.portal_count;
+    return VIEW.scene.portal_count;
 }
 
 // Goes on as seen through the portal: reflected, or from the far camera.
 void pass_portal(inout Path path, SurfacePoint p, float t, uint index) {
-    PortalRecord portal = Portals(VIEW.portals).at[index];
+    PortalRecord portal = Portals(VIEW.scene.portals).at[index];
     if (portal.mirror != 0) {
         vec3 n = portal.plane.xyz;
         path.direction = normalize(path.direction - n * (2.0 * dot(n, path.direction)));

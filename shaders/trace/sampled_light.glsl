@@ -16,21 +16,21 @@ struct SampledLight {
 // those that send a ray to a sun, too, or NO_PLACE; `dither`: see pack_light.
 void sampled_light_write(uint slot, uvec2 place, uvec2 sun_place, LightSample s, float dither) {
     bool sun = sun_place != NO_PLACE;
-    SampledLightTexels(VIEW.texels).at[slot] = pack_light_ray(s, place | (sun ? sun_place << 4 : uvec2(0)), sun, dither);
+    SampledLightTexels(VIEW.scratch).at[slot] = pack_light_ray(s, place | (sun ? sun_place << 4 : uvec2(0)), sun, dither);
 }
 
 SampledLight sampled_light_read(uint slot) {
     SampledLight sampled;
     uvec2 spare;
     bool sun;
-    sampled.light = unpack_light_ray(SampledLightTexels(VIEW.texels).at[slot], spare, sun);
+    sampled.light = unpack_light_ray(SampledLightTexels(VIEW.scratch).at[slot], spare, sun);
     sampled.pixel = pixel_of_slot(slot, spare & 15u);
     return sampled;
 }
 
 // Whether there is a pixel with this number that sends a ray to a sun, and which.
 bool samples_sun(uint slot, out ivec2 pixel) {
-    uvec4 packed = SampledLightTexels(VIEW.texels).at[slot];
+    uvec4 packed = SampledLightTexels(VIEW.scratch).at[slot];
     pixel = pixel_of_slot(slot, spare_of_direction(packed.xy) >> 4);
     return flag_of_light_ray(packed);
 }

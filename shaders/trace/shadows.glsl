@@ -18,7 +18,7 @@ uint shadow_mask(bool first_person) { return first_person ? MASK_SOLID : MASK_SH
 bool light_arrives(LightSample s, vec3 origin, uint mask) {
     if (!s.sky && s.distance <= 0.0) return true;
     Hit hit = trace_ray(origin, 0.0, s.direction, s.distance, mask | MASK_SKY, !s.sky);
-    return hit.geometry == NO_HIT || (s.sky && Geometries(VIEW.geometries).at[hit.geometry].kind == KIND_SKY);
+    return hit.geometry == NO_HIT || (s.sky && Geometries(VIEW.scene.geometries).at[hit.geometry].kind == KIND_SKY);
 }
 
 // What arrives of a sample's light. `mask`: see shadow_mask.

@@ -114,7 +114,7 @@ bool clouds_at(inout SurfacePoint p, vec3 d, uint face, float height) {
 
 // Whether the picture of the sun covers the direction; `p` becomes its point in it.
 bool sun_at(inout SurfacePoint p, vec3 d) {
-    SunDisc sun = VIEW.sun;
+    SunDisc sun = VIEW.scene.sun;
     float ahead = dot(d, sun.direction);
     if (sun.material == NO_TEXTURE || ahead <= 0.0) return false;
     vec3 up = cross(sun.direction, sun.left);
@@ -134,7 +134,7 @@ bool sun_at(inout SurfacePoint p, vec3 d) {
 // the fog over the clouds, and its share.
 vec3 sky_radiance(SurfacePoint p, vec3 d, float spread, bool with_sun, vec4 fog) {
     if ((VIEW.flags & VIEW_FAST_SKY) != 0) return vec3(0.0);
-    SkyRecord sky = Skies(VIEW.skies).at[p.triangle.lightmap];
+    SkyRecord sky = Skies(VIEW.scene.skies).at[p.triangle.lightmap];
     uint face;
     vec2 uv;
     sky_face(d, face, uv);
@@ -143,7 +143,7 @@ vec3 sky_radiance(SurfacePoint p, vec3 d, float spread, bool with_sun, vec4 fog)
     if (image != NO_TEXTURE) {
         vec2 size = vec2(textureSize(textures[nonuniformEXT(image)], 0));
         float lod = max(log2(max(spread * 0.5 * max(size.x, size.y), 1.0e-6)), 0.0);
-        color = textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[VIEW.sky_sampler]), uv, lod).rgb;
+        color = textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[VIEW.scene.sky_sampler]), uv, lod).rgb;
     }
     // drivers inline functions: in a loop the stages are compiled once
     for (uint picture = 0; picture < (with_sun ? 2 : 1); picture++) {

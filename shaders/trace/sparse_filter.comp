@@ -26,7 +26,7 @@ void main() {
     float frames = max(sparse_frames(middle.guide), 1.0);
     // the noise of one frame's light is about as large as the light
     float light_scale = 1.5 * sqrt(frames);
-    float plane_scale = 1.0 / (0.01 + 2.0 * VIEW.pixel_spread * float(push.spacing));
+    float plane_scale = 1.0 / (0.01 + 2.0 * VIEW.camera.pixel_spread * float(push.spacing));
 
     float turn = 2.0 * PI * dither(pixel, DITHER_TURN + push.spacing);
     vec3 sum = middle.light;
@@ -49,6 +49,6 @@ void main() {
         total += weight;
     }
     middle.light = sum / total;
-    if (LAST != 0) light_write(VIEW.image_direct, pixel, middle.light, dither(pixel, DITHER_FILTERED));
+    if (LAST != 0) light_write(VIEW.images.direct, pixel, middle.light, dither(pixel, DITHER_FILTERED));
     else sparse_write(push.target, pixel, middle, dither(pixel, DITHER_FILTERED));
 }

@@ -15,12 +15,12 @@ void main() {
         SparseTexels(DENOISE.fresh).at[place_of(pixel)] = uvec2(0);
         return;
     }
-    vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).y);
+    vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).y);
     float field = mark_field(mark_read(pixel));
     uint reflection = field == 2.0 ? REFLECTION_BIT : 0u;
     vec2 depth_gradient = depth_gradient_at(depth, field > 0.0);
     SparseTexel texel;
-    texel.light = light_read(VIEW.image_direct, pixel) + light_read(VIEW.image_indirect, pixel);
+    texel.light = light_read(VIEW.images.direct, pixel) + light_read(VIEW.images.indirect, pixel);
 
     vec3 old = vec3(0.0);
     float frames = 0.0, sum = 0.0;

@@ -135,8 +135,8 @@ void main() {
     if (index < STRATA * STRATA) choices[index] = choice_of(first_stratum + ivec2(index % STRATA, index / STRATA));
     vec3 direct = vec3(0.0), indirect = vec3(0.0);
     if (inside(pixel)) {
-        direct = light_read(VIEW.image_direct, pixel);
-        if (BOUNCES != 0) indirect = light_read(VIEW.image_indirect, pixel);
+        direct = light_read(VIEW.images.direct, pixel);
+        if (BOUNCES != 0) indirect = light_read(VIEW.images.indirect, pixel);
     }
     vec2 luminances = vec2(luminance(direct), luminance(indirect));
     direct = texel_of(direct);
@@ -156,7 +156,7 @@ void main() {
         LightTexels(DENOISE.fresh).at[place_of(pixel)] = uvec4(0);
         return;
     }
-    uvec2 surface = imageLoad(uimages_rg32ui[VIEW.image_surface], pixel).xy;
+    uvec2 surface = imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).xy;
     vec3 normal = unpack_normal(surface.y);
     float field = mark_field(mark_read(pixel));
     vec2 depth_gradient = depth_gradient_at(depth, field > 0.0);
@@ -169,7 +169,7 @@ void main() {
 
     if (kept) {
         if ((choice & GATHERED) == 0) luminances.y = -1.0;
-        keep_sample(stratum, pixel, imageLoad(images_rgba32f[VIEW.image_position], pixel), surface, luminances);
+        keep_sample(stratum, pixel, imageLoad(images_rgba32f[VIEW.images.position], pixel), surface, luminances);
     }
 
     History h = history_at(pixel, light.guide, depth_gradient);

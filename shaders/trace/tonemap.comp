@@ -33,9 +33,9 @@ vec3 spread_light(ivec2 pixel) {
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, picture_size()))) return;
-    ivec2 target = pixel + ivec2(VIEW.target_x, VIEW.target_y);
-    if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target_width) || target.y >= int(VIEW.target_height)) return;
-    float exposure = ExposureState(VIEW.exposure).exposure * exp2(VIEW.exposure_base + VIEW.exposure_bias);
+    ivec2 target = pixel + ivec2(VIEW.target.x, VIEW.target.y);
+    if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target.width) || target.y >= int(VIEW.target.height)) return;
+    float exposure = ExposureState(VIEW.exposure.state).exposure * exp2(VIEW.exposure.base + VIEW.exposure.bias);
     vec3 radiance = picture_load(pixel);
     if (VIEW.post.bloom != 0) radiance = mix(radiance, spread_light(pixel), VIEW.post.bloom_strength);
     radiance = max(radiance * exposure, 0.0);

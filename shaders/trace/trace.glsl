@@ -46,7 +46,7 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
     // where nothing reports, the ray was blocked
     payload.geometry = any_hit ? 0 : NO_HIT;
     uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT;
-    traceRayEXT(scenes[VIEW.scene], flags, mask, 0, 0, 0, origin, tmin, direction, tmax, 0);
+    traceRayEXT(scenes[VIEW.scene.top_level], flags, mask, 0, 0, 0, origin, tmin, direction, tmax, 0);
     return payload_hit();
 }
 
@@ -57,7 +57,7 @@ void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder
     layers_clear(layer_payload.found);
     layer_payload.last = order;
     const uint missed = 1;
-    traceRayEXT(scenes[VIEW.scene], gl_RayFlagsSkipClosestHitShaderEXT, mask, 0, 0, missed, origin, layer_start(order), direction, tmax, 1);
+    traceRayEXT(scenes[VIEW.scene.top_level], gl_RayFlagsSkipClosestHitShaderEXT, mask, 0, 0, missed, origin, layer_start(order), direction, tmax, 1);
     found = layer_payload.found;
 }
 

@@ -17,7 +17,7 @@ void main() {
     ivec2 output_size = ivec2(VIEW.antialias.output_width, VIEW.antialias.output_height);
     if (any(greaterThanEqual(pixel, output_size))) return;
     ivec2 traced_size = ivec2(VIEW.width, VIEW.height);
-    float exposure = COMPRESSION * max(ExposureState(VIEW.exposure).exposure, 1.0e-3) * exp2(VIEW.exposure_base + VIEW.exposure_bias);
+    float exposure = COMPRESSION * max(ExposureState(VIEW.exposure.state).exposure, 1.0e-3) * exp2(VIEW.exposure.base + VIEW.exposure.bias);
     vec2 place = (vec2(pixel) + 0.5) * vec2(traced_size) / vec2(output_size) - 0.5 - VIEW.antialias.jitter;
     ivec2 low = ivec2(floor(place));
     vec4 across = weights(place.x - float(low.x)), down = weights(place.y - float(low.y));
@@ -25,7 +25,7 @@ void main() {
     for (int y = 0; y < 4; y++) {
         for (int x = 0; x < 4; x++) {
             ivec2 at = clamp(low + ivec2(x, y) - 1, ivec2(0), traced_size - 1);
-            vec3 c = imageLoad(images_rgba16f[VIEW.image_composite], at).rgb;
+            vec3 c = imageLoad(images_rgba16f[VIEW.images.composite], at).rgb;
             c /= 1.0 + max_component(c) * exposure;
             sum += c * (across[x] * down[y]);
             if ((x == 1 || x == 2) && (y == 1 || y == 2)) {

@@ -205,6 +205,7 @@ impl MapLights {
         lights.samples = settings.rt_num_random_dl.max(1);
         lights.candidates = settings.rt_candidates.max(1);
         lights.scale = scale;
+        lights.ambient = self.ambient * scale;
         Ok(lights)
     }
 }

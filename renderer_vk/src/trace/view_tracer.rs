@@ -5,9 +5,8 @@ mod parameters;
 
 use std::sync::Arc;
 
-use glam::Vec3;
 use shaders::trace_types::constants as t;
-use shaders::trace_types::{PortalRecord, PostView, TraceView};
+use shaders::trace_types::{CameraView, PortalRecord, PostView, TraceView};
 
 use super::accel::Accel;
 use super::antialias::{Antialias, traced_size};
@@ -85,7 +84,7 @@ pub struct ViewTracer {
     frame: u32,
     last_time: f32,
     /// Camera of the last frame whose light the denoiser can go on from.
-    history: Option<[Vec3; 4]>,
+    history: Option<CameraView>,
     /// Hash of everything that the accumulated frames show, and how many there are.
     accumulated: (u64, u32),
 }
@@ -263,6 +262,8 @@ impl ViewTracer {
                 .prepare(&self.device, output, settings.rt_bloom)?,
             bloom_strength: settings.rt_bloom.clamp(0.0, 1.0),
             debug: settings.rt_debug,
+            image_rays: counting.image,
+            padding: 0,
         };
         let prepared = Prepared {
             targets,
@@ -272,7 +273,6 @@ impl ViewTracer {
             motion,
             antialias,
             post,
-            image_rays: counting.image,
         };
         self.params(rec, view, &prepared)
     }
@@ -340,9 +340,9 @@ impl ViewTracer {
             traced: [targets.width, targets.height],
             output,
             fog_cells: self.fog.cells(),
-            flares: params.flare_count,
+            flares: params.flares.count,
             subsampled: indirect::is_subsampled(settings),
-            map_fog: params.fog_count > 0,
+            map_fog: params.scene.fog_count > 0,
             bounces: settings.rt_bounces > 0,
         }
     }

@@ -180,4 +180,8 @@ pub struct LightView {
     pub grid_scale: f32,
     /// Boxes along each axis; zero: no grid.
     pub grid_size: [u32; 3],
+    /// Ambient light, as radiance of a white diffuse surface.
+    pub ambient: Vec3,
+    /// To a multiple of eight bytes.
+    pub padding: u32,
 }

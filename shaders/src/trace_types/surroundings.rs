@@ -51,6 +51,10 @@ pub struct TransportView {
     pub beyond_count: u32,
     /// Number of bits in `beyond_surfaces`.
     pub beyond_surface_count: u32,
+    /// Mirrors and portals on a path.
+    pub max_depth: u32,
+    /// Diffuse bounces.
+    pub bounces: u32,
 }
 
 /// The flares of a view.
@@ -61,6 +65,10 @@ pub struct FlareView {
     pub flares: u64,
     /// [`FlareState`](crate::types::FlareState)s, by slot.
     pub states: u64,
+    /// Number of flares.
+    pub count: u32,
+    /// To a multiple of eight bytes.
+    pub padding: u32,
 }
 
 /// Light in fog: bindless image indices.

@@ -3,7 +3,8 @@
 use glam::Vec3;
 use shaders::trace_types::constants as t;
 use shaders::trace_types::{
-    AntialiasView, FlareView, MotionView, PortalRecord, PostView, TraceView, TransportView,
+    AntialiasView, CameraView, ExposureView, FlareView, ImageView, MotionView, PortalRecord,
+    PostView, SceneView, TargetView, TraceView, TransportView,
 };
 use shaders::types::{SunDisc, constants::NO_TEXTURE};
 
@@ -34,8 +35,6 @@ pub(super) struct Prepared<'a> {
     pub antialias: AntialiasView,
     /// What comes after tracing, and the ray counters.
     pub post: PostView,
-    /// Storage image of the rays of each pixel, or `NO_IMAGE`.
-    pub image_rays: u32,
 }
 
 impl ViewTracer {
@@ -46,100 +45,76 @@ impl ViewTracer {
         traced: &TracedView<'_>,
         prepared: &Prepared<'_>,
     ) -> Result<TraceView, Error> {
-        let TracedView {
-            scene: view,
-            map,
-            materials,
-            settings,
-            target,
-        } = *traced;
-        let &Prepared { targets, accel, .. } = prepared;
-        let camera = &view.view;
-        let lights = map.map_or(&self.no_lights, |m| m.lights);
-        let flares = map.map_or_else(FlareTest::default, |m| m.flares);
-        let [last_eye, last_forward, last_left, last_up] = self.history.unwrap_or([Vec3::ZERO; 4]);
-        let [eye, forward, left, up] = camera_frame(view);
+        let &TracedView {
+            scene, settings, ..
+        } = traced;
+        let &Prepared {
+            targets,
+            accel,
+            accumulated,
+            ..
+        } = prepared;
+        let lights = traced.map.map_or(&self.no_lights, |m| m.lights);
+        let flares = traced.map.map_or_else(FlareTest::default, |m| m.flares);
         Ok(TraceView {
-            geometries: accel.geometries,
-            instances: accel.instances,
-            fogs: map.map_or(0, |m| m.geometry.fogs.address()),
-            portals: rec.arena().push(prepared.portals)?,
-            skies: map.map_or(0, |m| m.geometry.skies.address()),
-            exposure: self.exposure_state.address(),
-            texels: targets.texels.address(),
-            bvh_nodes: accel.nodes,
-            bvh_instances: accel.placed,
+            scratch: targets.texels.address(),
+            materials: traced.materials.buffers(),
+            scene: scene_view(rec, traced, prepared)?,
+            lights: lights.of_view(rec, scene, settings)?,
+            transport: transport(rec, traced)?,
+            motion: prepared.motion,
+            denoise: (self.denoiser).view(self.frame.wrapping_sub(1), &targets.texels),
             flares: FlareView {
                 flares: flares.flares,
                 states: flares.states,
+                count: flares.count,
+                ..FlareView::default()
             },
-            materials: materials.buffers(),
+            exposure: self.exposure_view(traced),
             post: prepared.post,
-            image_rays: prepared.image_rays,
-            motion: prepared.motion,
             antialias: prepared.antialias,
-            lights: lights.of_view(rec, view, settings)?,
-            eye,
-            forward,
-            left,
-            up,
+            fog: self.fog.view(&targets.direct[0], &targets.composite),
+            images: image_view(targets),
+            target: self.target_view(traced),
+            camera: camera_view(traced, targets.height),
+            last_camera: self.history.unwrap_or_default(),
             width: targets.width,
             height: targets.height,
-            target_x: camera.viewport[0],
-            target_y: camera.viewport[1],
-            scene: accel.scene,
             flags: self.flags(settings, accel.first_person),
             seed: if settings.rt_accumulate {
-                prepared.accumulated
+                accumulated
             } else {
                 self.frame
             },
-            accumulated: prepared.accumulated,
-            time: view.time,
-            pixel_spread: pixel_spread(camera.tan_y, targets.height),
-            ambient: lights.ambient * settings.rt_light_scale.max(0.0),
-            transport: transport(rec, traced, eye)?,
-            eye_absorption: map.map_or(Vec3::ZERO, |m| {
-                m.geometry.surroundings.absorption(camera.origin)
-            }),
-            eye_shift: camera.stereo.slope / camera.tan_x,
-            channels: self.channels,
-            fog_count: map.map_or(0, |m| m.geometry.fog_count),
-            portal_count: u32::try_from(prepared.portals.len()).unwrap_or(u32::MAX),
-            flare_count: flares.count,
-            sun: sun_disc(view),
-            fog: self.fog.view(&targets.direct[0], &targets.composite),
-            max_depth: settings.rt_max_depth,
-            bounces: settings.rt_bounces.min(2),
-            image_position: targets.position.storage_index(),
-            image_surface: targets.surface.storage_index(),
-            image_shown: targets.shown.storage_index(),
-            image_other: targets.other.storage_index(),
-            image_direct: targets.direct[0].storage_index(),
-            image_indirect: targets.indirect.storage_index(),
-            image_composite: targets.composite.storage_index(),
-            image_accumulation: targets
-                .accumulation
-                .as_ref()
-                .map_or(0, Image::storage_index),
-            image_motion: targets.motion.storage_index(),
-            image_target: target.storage_index(),
-            exposure_bias: settings.rt_exposure,
-            exposure_base: self.map_exposure.scale.log2(),
-            exposure_middle: self.map_exposure.middle,
-            exposure_blend: self.exposure_blend(view, settings, LIGHT_ADAPTATION),
-            exposure_blend_dark: self.exposure_blend(view, settings, DARK_ADAPTATION),
-            target_width: target.width(),
-            target_height: target.height(),
-            sky_sampler: materials.sky_sampler(),
-            sky_distance: camera.sky_distance(),
-            last_eye,
-            last_forward,
-            last_left,
-            last_up,
-            padding: 0,
-            denoise: (self.denoiser).view(self.frame.wrapping_sub(1), &targets.texels),
+            accumulated,
         })
+    }
+
+    fn exposure_view(&self, traced: &TracedView<'_>) -> ExposureView {
+        let TracedView {
+            scene, settings, ..
+        } = *traced;
+        ExposureView {
+            state: self.exposure_state.address(),
+            bias: settings.rt_exposure,
+            base: self.map_exposure.scale.log2(),
+            usual: self.map_exposure.middle,
+            blend: self.exposure_blend(scene, settings, LIGHT_ADAPTATION),
+            blend_dark: self.exposure_blend(scene, settings, DARK_ADAPTATION),
+            padding: 0,
+        }
+    }
+
+    fn target_view(&self, traced: &TracedView<'_>) -> TargetView {
+        let [x, y, ..] = traced.scene.view.viewport;
+        TargetView {
+            image: traced.target.storage_index(),
+            x,
+            y,
+            width: traced.target.width(),
+            height: traced.target.height(),
+            channels: self.channels,
+        }
     }
 
     /// The bits `VIEW_*` of a view. `first_person`: there is something that only the eye sees.
@@ -164,12 +139,62 @@ impl ViewTracer {
     }
 }
 
-/// The boxes that rays are held against: translucent layers, what lies behind skies, and surfaces that colour light.
-fn transport(
+/// What rays meet.
+fn scene_view(
     rec: &mut Recorder,
     traced: &TracedView<'_>,
-    eye: Vec3,
-) -> Result<TransportView, Error> {
+    prepared: &Prepared<'_>,
+) -> Result<SceneView, Error> {
+    let &Prepared { accel, portals, .. } = prepared;
+    let geometry = traced.map.map(|m| m.geometry);
+    Ok(SceneView {
+        geometries: accel.geometries,
+        instances: accel.instances,
+        fogs: geometry.map_or(0, |g| g.fogs.address()),
+        portals: rec.arena().push(portals)?,
+        skies: geometry.map_or(0, |g| g.skies.address()),
+        nodes: accel.nodes,
+        placed: accel.placed,
+        top_level: accel.scene,
+        fog_count: geometry.map_or(0, |g| g.fog_count),
+        portal_count: u32::try_from(portals.len()).unwrap_or(u32::MAX),
+        time: traced.scene.time,
+        sky_sampler: traced.materials.sky_sampler(),
+        sky_distance: traced.scene.view.sky_distance(),
+        sun: sun_disc(traced.scene),
+    })
+}
+
+/// Bindless indices of the images.
+fn image_view(targets: &Targets) -> ImageView {
+    ImageView {
+        position: targets.position.storage_index(),
+        surface: targets.surface.storage_index(),
+        shown: targets.shown.storage_index(),
+        other: targets.other.storage_index(),
+        direct: targets.direct[0].storage_index(),
+        indirect: targets.indirect.storage_index(),
+        composite: targets.composite.storage_index(),
+        accumulation: (targets.accumulation.as_ref()).map_or(0, Image::storage_index),
+        motion: targets.motion.storage_index(),
+    }
+}
+
+/// The camera of a view that is traced with `height` rows of pixels.
+fn camera_view(traced: &TracedView<'_>, height: u32) -> CameraView {
+    let camera = &traced.scene.view;
+    CameraView {
+        absorption: traced.map.map_or(Vec3::ZERO, |m| {
+            m.geometry.surroundings.absorption(camera.origin)
+        }),
+        pixel_spread: pixel_spread(camera.tan_y, height),
+        stereo_shift: camera.stereo.slope / camera.tan_x,
+        ..camera_frame(traced.scene)
+    }
+}
+
+/// The boxes that rays are tested against: translucent layers, what lies behind skies, and surfaces that colour light.
+fn transport(rec: &mut Recorder, traced: &TracedView<'_>) -> Result<TransportView, Error> {
     let TracedView {
         scene: view,
         map,
@@ -191,6 +216,7 @@ fn transport(
     } else {
         0.0
     };
+    let eye = camera_frame(view).origin;
     let beyond = Beyond::of(view, eye, lens, geometry, materials);
     Ok(TransportView {
         filters: geometry.map_or(0, |g| g.surroundings.filters()),
@@ -201,19 +227,22 @@ fn transport(
         beyond_surfaces: rec.arena().push(&beyond.surfaces)?,
         beyond_count: u32::try_from(beyond.boxes.len()).unwrap_or(u32::MAX),
         beyond_surface_count: u32::try_from(32 * beyond.surfaces.len()).unwrap_or(u32::MAX),
+        max_depth: settings.rt_max_depth,
+        bounces: settings.rt_bounces.min(2),
     })
 }
 
-/// Eye, forward, and left and up scaled by the tangents of the half angles.
-pub(super) fn camera_frame(view: &ViewScene) -> [Vec3; 4] {
+/// Where a view is seen from: what two frames must have in common to show the same directions.
+pub(super) fn camera_frame(view: &ViewScene) -> CameraView {
     let camera = &view.view;
     let [forward, left, up] = camera.axis;
-    [
-        camera.origin + left * camera.stereo.offset(),
+    CameraView {
+        origin: camera.origin + left * camera.stereo.offset(),
         forward,
-        left * camera.tan_x,
-        up * camera.tan_y,
-    ]
+        left: left * camera.tan_x,
+        up: up * camera.tan_y,
+        ..CameraView::default()
+    }
 }
 
 /// The sun's picture where it is to be seen.
