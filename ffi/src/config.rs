@@ -1,6 +1,6 @@
 //! The device in the words that the engine, its menus and the game show.
 
-use renderer_vk::gpu::DeviceInfo;
+use renderer_vk::DeviceInfo;
 
 /// The device in the words that menus show.
 pub struct DeviceStrings {

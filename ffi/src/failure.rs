@@ -1,7 +1,7 @@
 //! Why a call of the engine fails, as the engine has to hear it.
 
 use crate::engine::error_level;
-use renderer_vk::{Error, gpu};
+use renderer_vk::{Error, GpuError};
 use std::ffi::c_int;
 
 /// Why a call cannot do what the engine asked, in a way that the engine has to hear about.
@@ -41,7 +41,7 @@ impl From<Error> for Failure {
         let discard = match &error {
             Error::Gpu(error) => !matches!(
                 error,
-                gpu::Error::Full { .. } | gpu::Error::Unsupported { .. } | gpu::Error::Usage { .. }
+                GpuError::Full { .. } | GpuError::Unsupported { .. } | GpuError::Usage { .. }
             ),
             _ => false,
         };

@@ -4,27 +4,31 @@
 #![deny(unsafe_code)]
 
 pub mod api;
-pub mod assets;
+mod assets;
 mod at_once;
 mod error;
 mod frame;
-pub mod gpu;
+mod gpu;
 mod half;
 pub mod path;
 mod raster;
 mod renderer;
-pub mod scene;
-pub mod settings;
+mod scene;
+mod settings;
 mod statistics;
 mod stereo;
 mod targets;
 #[cfg(test)]
 mod test_support;
-pub mod trace;
-pub mod world;
+mod trace;
+mod world;
 
-pub use assets::is_texture_mode;
+pub use assets::{LoadedFont, is_texture_mode};
 pub use error::Error;
+pub use gpu::{
+    CreateSurface, DeviceInfo, DeviceKind, Error as GpuError, RayTracingLimits, Window,
+    WindowSource,
+};
 pub use renderer::{CpuTimes, FrameStats, Renderer, RendererOptions, probe};
 pub use settings::{LightSelection, MapLightChoice, Settings, TracerChoice};
 pub use statistics::{Costs, MemoryPurpose, PassCost};

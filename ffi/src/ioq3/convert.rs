@@ -5,8 +5,8 @@ use super::abi::{
     refdef_t,
 };
 use glam::{Vec2, Vec3};
+use renderer_vk::LoadedFont;
 use renderer_vk::api::{EntityKind, MarkFragment, Orientation, PolyVert, RefDef, RefEntity};
-use renderer_vk::assets::LoadedFont;
 use std::ffi::c_char;
 
 /// The kind of an entity; `None` for a number that is none.

@@ -2,7 +2,7 @@
 
 use super::abi::{QBool, glconfig_t};
 use crate::config::DeviceStrings;
-use renderer_vk::gpu::DeviceInfo;
+use renderer_vk::DeviceInfo;
 use std::ffi::c_char;
 
 /// Facts besides the device.

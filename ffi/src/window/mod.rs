@@ -9,7 +9,6 @@ pub mod sdl;
 use crate::cvars::{Cvar, Cvars};
 use crate::engine::Engine;
 use modes::{Custom, Mode};
-use renderer_vk::gpu;
 use sdl::{Sdl, SdlError, WindowPtr};
 use std::cell::Cell;
 use std::ffi::c_int;
@@ -292,7 +291,7 @@ impl Window {
     ///
     /// # Errors
     /// When SDL has no Vulkan for this window.
-    pub fn source(&self) -> Result<gpu::Window, SdlError> {
+    pub fn source(&self) -> Result<renderer_vk::Window, SdlError> {
         let (sdl, raw) = (self.sdl, self.raw);
         // SAFETY: the window is open: whoever has a `Window` got it from `current` or `open` in this call.
         let extensions = unsafe { sdl.instance_extensions(raw) }?;
@@ -306,7 +305,7 @@ impl Window {
         });
         // SAFETY: SDL's loader stays in memory, because SDL is never closed; the surface is made with the instance
         // given; `Shutdown` drops the renderer before it closes the window, and a stale window's renderer is leaked.
-        unsafe { gpu::Window::new(entry, extensions, create) }.ok_or(SdlError::Call {
+        unsafe { renderer_vk::Window::new(entry, extensions, create) }.ok_or(SdlError::Call {
             call: "SDL_Vulkan_GetVkGetInstanceProcAddr",
             message: "there is no Vulkan loader".into(),
         })

@@ -19,8 +19,6 @@ pub mod sampler {
     pub const REPEAT: u32 = 2;
     /// Clamped, linear, largest level only.
     pub const CLAMP: u32 = 3;
-    /// Clamped, nearest, largest level only.
-    pub const NEAREST: u32 = 4;
 }
 
 /// The arrays that all materials share.

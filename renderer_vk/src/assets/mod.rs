@@ -21,13 +21,15 @@ use std::sync::Arc;
 use relight::GameFiles;
 
 pub use fonts::LoadedFont;
-pub use material::{Combine, LightmapClass, Material, RasterPass, SkyBox, VideoStage};
-pub use materials::{DEFAULT_PORTAL_RANGE, Internal, MaterialSettings, Materials};
-pub use models::{IqmModel, MAX_LODS, Md3Lod, MdrModel, Model, Models};
+pub use material::{Combine, LightmapClass, Material, RasterPass};
+pub use materials::{MaterialSettings, Materials};
+pub use models::{IqmModel, Md3Lod, MdrModel, Model, Models};
 pub use prepare::TextureSettings;
 pub(crate) use prepare::{desaturate, grey};
-pub use skins::{LoadedSkin, Skins};
-pub use source::{ImageFlags, ImageSource};
+pub use skins::Skins;
+#[cfg(test)]
+pub use source::ImageFlags;
+pub use source::ImageSource;
 pub use textures::{Samplers, Textures, is_texture_mode};
 
 use crate::gpu::{self, Device};
@@ -171,3 +173,6 @@ const MAX_TEXTURE_SIZE: u32 = 4096;
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod gpu_tests;

@@ -66,16 +66,6 @@ impl FrameRing {
         Ok(ring)
     }
 
-    /// Frames in flight.
-    pub fn len(&self) -> usize {
-        self.slots.len()
-    }
-
-    /// A ring has at least one frame.
-    pub fn is_empty(&self) -> bool {
-        self.slots.is_empty()
-    }
-
     /// Begins the next frame: waits until its place in the ring is free (and for no other frame), publishes the times
     /// of the frame that held it and frees what no frame uses any more.
     ///

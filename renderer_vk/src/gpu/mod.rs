@@ -49,8 +49,6 @@ mod window;
 
 pub use accel::{Blas, BlasBuild, BlasFlags, BlasGeometry};
 pub use access::Access;
-pub use arena::{ArenaSlice, UploadArena};
-pub use ash::vk;
 pub use bindless::{Filter, MipFilter, SamplerDesc, Wrap};
 pub use buffer::{Buffer, BufferDesc, BufferUsage, Memory};
 pub use compaction::CompactedSizes;
@@ -62,7 +60,7 @@ pub use frame::FrameRing;
 pub use heap::give_back_freed_memory;
 pub use image::{Format, Image, ImageDesc, ImageUsage, NO_INDEX};
 pub use instance::{SurfaceSource, WindowSource};
-pub use memory::{MemoryKind, MemoryReport, MemoryUse};
+pub use memory::{MemoryKind, MemoryUse};
 pub use pass::Pass;
 pub use pipeline::{ComputePipeline, GraphicsDesc, GraphicsPipeline};
 pub(crate) use pipeline_cache::hash;
@@ -70,8 +68,9 @@ pub use pipeline_cache::is_pipeline_cache;
 pub use ray_tracing::{HitGroup, RayTracingDesc, RayTracingPipeline};
 pub use recorder::Recorder;
 pub use select::{DeviceInfo, DeviceKind, RayTracingLimits};
-pub use shaders::Spirv;
 pub use swapchain::{Swapchain, SwapchainDesc};
 pub use tlas::{Instance, Tlas};
-pub use upload::ImageRegion;
 pub use window::{CreateSurface, Window};
+
+#[cfg(test)]
+mod tests;

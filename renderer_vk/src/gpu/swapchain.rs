@@ -86,6 +86,7 @@ impl Swapchain {
     }
 
     /// Size of the images; zero while the window is minimised.
+    #[cfg(test)]
     pub fn extent(&self) -> (u32, u32) {
         self.images
             .first()

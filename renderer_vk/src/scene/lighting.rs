@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 
-use crate::api::{DynamicLight, PointLighting};
+use crate::api::DynamicLight;
 use crate::settings::Settings;
 use crate::world::{GridLight, WorldData};
 
@@ -51,20 +51,6 @@ pub(super) fn entity_light(
     light.ambient = light.ambient.min(Vec3::splat((255.0 * identity).trunc()));
     light.direction = direction.normalize_or_zero();
     light
-}
-
-/// Light at a point of the map, before the engine's constant part and dynamic lights; `None` without a light grid.
-pub fn light_for_point(
-    world: &WorldData,
-    point: Vec3,
-    settings: &Settings,
-) -> Option<PointLighting> {
-    let light = world.grid_light(point, settings)?;
-    Some(PointLighting {
-        ambient: light.ambient,
-        directed: light.directed,
-        direction: light.direction,
-    })
 }
 
 #[cfg(test)]

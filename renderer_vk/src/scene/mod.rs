@@ -39,12 +39,11 @@ use crate::stereo::Eye;
 use crate::world::{VisibleSet, World, WorldData};
 pub use debug_polygons::DebugPolygons;
 pub use flares::ViewFlare;
-pub use lighting::light_for_point;
 pub use rigid::{MeshId, RigidMesh, Shape};
 pub use shadow_volumes::ShadowVolumes;
 pub(crate) use shapes::perpendicular;
 pub use sky::{CELLS as SKY_CELLS, Cells, FACES as SKY_FACES, SkyCoverage, VisibleSky, cube_point};
-pub use statistics::{CullCounts, Lying, Statistics};
+pub use statistics::Statistics;
 pub use view::View;
 
 /// Where a surface's triangles are.
@@ -395,25 +394,12 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// An empty scene.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Forgets what was added (`ClearScene`).
     pub fn clear(&mut self) {
         self.entities.clear();
         self.polys.clear();
         self.poly_vertices.clear();
         self.lights.clear();
-    }
-
-    /// Forgets everything that belongs to a map or a registration.
-    pub fn reset(&mut self) {
-        self.clear();
-        self.scratch.rigid.clear();
-        self.visible.reset();
-        self.portal_visible.reset();
     }
 
     /// Whose views follow.

@@ -143,7 +143,7 @@ fn at(model: i32, frame: i32, old_frame: i32, backlerp: f32) -> RefEntity {
 }
 
 fn gather(game: &Registration, entity: &RefEntity, look: Look) -> ViewScene {
-    let mut scene = Scene::new();
+    let mut scene = Scene::default();
     scene.add_entity(entity);
     let mut views = scene.gather_from(&game.input(None), &def(), look).unwrap();
     views.pop().unwrap()

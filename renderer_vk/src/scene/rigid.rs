@@ -80,11 +80,6 @@ impl RigidMeshes {
         }
     }
 
-    /// Forgets everything: handles may mean other models from now on.
-    pub fn clear(&mut self) {
-        self.entries.clear();
-    }
-
     /// The mesh of a surface in a key frame. `only`: the model has no other frame; otherwise the frame has to rest for
     /// two views to be one that is kept, so that nothing is kept of an animation whose frames pass by.
     pub fn get(

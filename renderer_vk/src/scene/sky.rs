@@ -49,6 +49,7 @@ pub struct Cells {
 
 impl Cells {
     /// A whole face.
+    #[cfg(test)]
     pub const ALL: Self = Self {
         from: [0; 2],
         to: [CELLS; 2],
@@ -80,6 +81,7 @@ impl SkyCoverage {
     };
 
     /// Every cell of every face covered.
+    #[cfg(test)]
     pub const FULL: Self = Self {
         extent: [(Vec2::NEG_ONE, Vec2::ONE); FACES],
     };

@@ -47,6 +47,7 @@ pub struct AccelOutput {
 
 /// Bytes of the structures that rays are traced against, by what they hold. What is made for one frame alone is counted
 /// as it was in the last one.
+#[cfg(test)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AccelMemory {
     /// The map, with its triangle records.
@@ -127,6 +128,7 @@ impl Accel {
     }
 
     /// Bytes of everything but the map.
+    #[cfg(test)]
     pub fn memory(&self) -> AccelMemory {
         let shapes = self.shapes.memory();
         let [changing, top] = self.driver.as_ref().map_or(self.own_bytes, |driver| {
@@ -144,6 +146,7 @@ impl Accel {
     }
 
     /// How many structures are kept: of models that keep their shape, and such as are fitted each frame.
+    #[cfg(test)]
     pub fn counts(&self) -> [usize; 2] {
         self.shapes.counts()
     }

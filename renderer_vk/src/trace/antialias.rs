@@ -92,6 +92,7 @@ impl Antialias {
 
     /// The next picture has nothing to do with the last one. Its samples begin anew, too, so that the same frames make the
     /// same picture.
+    #[cfg(test)]
     pub fn reset(&mut self) {
         self.history = false;
         self.frame = 0;

@@ -184,6 +184,7 @@ impl LitFog {
     }
 
     /// Forgets the last frame.
+    #[cfg(test)]
     pub fn reset(&mut self) {
         self.history = false;
     }

@@ -79,7 +79,8 @@ pub struct StaticGeometry {
     pub map_skies: MapSkies,
     /// What lies in the way of light; nothing unless it is put here.
     pub surroundings: Surroundings,
-    // kept alive for the structures' triangles
+    /// Records of the structures' triangles, which shaders read by address.
+    #[cfg_attr(not(test), expect(dead_code, reason = "only kept alive"))]
     triangle_records: Buffer,
 }
 
@@ -253,6 +254,7 @@ fn layers(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Vec<StaticL
 
 impl StaticGeometry {
     /// Bytes of the structures and of the triangle records.
+    #[cfg(test)]
     pub fn bytes(&self) -> u64 {
         let structure = |part: &StaticBlas| match &part.structure {
             Structure::Driver(blas) => blas.size(),

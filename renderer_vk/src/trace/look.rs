@@ -8,6 +8,7 @@ use shaders::trace_types::SkyRecord;
 use shaders::types::constants::NO_TEXTURE;
 use shaders::types::{Fog, MaterialBuffers};
 
+#[cfg(test)]
 use super::accel::AccelMemory;
 use super::cutout::{Coverage, coverage};
 use super::fog_light;
@@ -293,16 +294,12 @@ impl TraceLook {
     }
 
     /// Bytes of the acceleration structures, by what they hold.
+    #[cfg(test)]
     pub fn accel_memory(&self) -> AccelMemory {
         AccelMemory {
             map: self.geometry.bytes(),
             ..self.tracer.accel.memory()
         }
-    }
-
-    /// How many frames the last picture is the mean of; 1 outside of reference mode.
-    pub fn accumulated_frames(&self) -> u32 {
-        self.tracer.accumulated_frames()
     }
 
     /// The linear picture of the last view, before exposure: RGBA, 32-bit floats.

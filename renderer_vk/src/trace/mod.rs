@@ -17,7 +17,6 @@ pub mod bvh;
 mod cell_grid;
 pub mod counters;
 pub mod cutout;
-pub mod debug;
 pub mod denoise;
 mod doubled;
 pub mod fog;

@@ -134,7 +134,8 @@ impl Resource {
 /// Declaration of a pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
-    /// What it does.
+    /// What it does, for the table in ARCHITECTURE.md.
+    #[cfg_attr(not(test), expect(dead_code, reason = "documentation"))]
     pub about: &'static str,
     /// Name in timers, statistics and captures. Steps of one filter share a name.
     pub name: &'static str,
@@ -148,7 +149,8 @@ pub struct Row {
     pub switch: Option<(u32, Switch)>,
     /// What this frame has written before.
     pub reads: &'static [Resource],
-    /// What it reads if this frame has written it.
+    /// What it reads if this frame has written it, for the same table.
+    #[cfg_attr(not(test), expect(dead_code, reason = "documentation"))]
     pub may_read: &'static [Resource],
     /// What it writes.
     pub writes: &'static [Resource],

@@ -64,6 +64,7 @@ pub struct Prepared {
 }
 
 /// Bytes of the structures by what they are for.
+#[cfg(test)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ShapeMemory {
     /// Of shapes that stay: structures, vertices and indices.
@@ -124,12 +125,14 @@ impl Shapes {
     }
 
     /// How many shapes are kept: those that stay, and structures that are fitted.
+    #[cfg(test)]
     pub fn counts(&self) -> [usize; 2] {
         let poses = self.animated.values().map(AnimatedShape::pose_count).sum();
         [self.rigid.len(), poses]
     }
 
     /// Bytes on the device.
+    #[cfg(test)]
     pub fn memory(&self) -> ShapeMemory {
         ShapeMemory {
             rigid: self.rigid.values().map(RigidShape::size).sum(),

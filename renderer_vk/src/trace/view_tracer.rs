@@ -150,6 +150,7 @@ impl ViewTracer {
     }
 
     /// Forgets what was accumulated and lets exposure start anew: the map has changed.
+    #[cfg(test)]
     pub fn reset(&mut self) {
         self.accumulated = (0, 0);
         self.history = None;

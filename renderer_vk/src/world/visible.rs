@@ -261,11 +261,6 @@ pub struct VisibleSet {
 }
 
 impl VisibleSet {
-    /// Forgets everything: the world changed.
-    pub fn reset(&mut self) {
-        *self = Self::default();
-    }
-
     /// Cluster that the last call was for; `None` before the first.
     pub fn cluster(&self) -> Option<i32> {
         self.marked_for.map(|(cluster, ..)| cluster)

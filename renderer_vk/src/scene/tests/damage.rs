@@ -11,7 +11,7 @@ use testkit::Random;
 fn bad_entities_do_no_harm() {
     let mut game = game();
     let world = room(&mut game);
-    let mut scene = Scene::new();
+    let mut scene = Scene::default();
     scene.add_entity(&RefEntity {
         origin: Vec3::new(f32::NAN, 0.0, 0.0),
         ..entity(EntityKind::Model)
@@ -93,7 +93,7 @@ fn random_scenes_stay_within_their_arrays() {
     game.model("m/thing.md3");
     game.settings.shadows = 3;
     let mut numbers = Numbers(Random::new(1));
-    let mut scene = Scene::new();
+    let mut scene = Scene::default();
     for round in 0..200 {
         for _ in 0..20 {
             let kinds = [

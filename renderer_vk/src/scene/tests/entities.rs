@@ -14,7 +14,7 @@ fn models_are_lerped_and_placed() {
     assert!(thing > 0);
     assert_eq!(game.model("m/thing.md3"), thing);
     assert_eq!(game.model("m/none.md3"), 0);
-    let mut scene = Scene::new();
+    let mut scene = Scene::default();
     let none = RefDef {
         flags: rdflags::NO_WORLD_MODEL,
         ..def()
@@ -91,7 +91,7 @@ fn persons_show_where_they_should() {
         old_origin: Vec3::new(250.0, 0.0, 0.0),
         ..entity(EntityKind::PortalSurface)
     };
-    let mut scene = Scene::new();
+    let mut scene = Scene::default();
     for e in [
         at(renderfx::FIRST_PERSON),
         at(renderfx::THIRD_PERSON),
@@ -167,7 +167,7 @@ fn what_turns_to_the_eye_turns_to_mirrors_too() {
         view_axis: [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| turn * axis),
         ..def()
     };
-    let mut scene = Scene::new();
+    let mut scene = Scene::default();
     let mut shown = |look, renderfx, mirrored: bool| {
         scene.add_entity(&sprite(renderfx));
         if mirrored {
@@ -218,7 +218,7 @@ fn models_cast_planar_shadows_when_asked() {
         shadow_plane: 10.0,
         ..entity(EntityKind::Model)
     };
-    let mut scene = Scene::new();
+    let mut scene = Scene::default();
     scene.add_entity(&standing);
     let views = gather(&mut scene, &game, None, &none, Look::Classic);
     assert!(views[0].meshes.is_empty());
@@ -249,7 +249,7 @@ fn opaque_models_cast_shadow_volumes_when_asked() {
         ..entity(EntityKind::Model)
     };
     let volumes = |game: &Registration, entity: RefEntity, look| {
-        let mut scene = Scene::new();
+        let mut scene = Scene::default();
         scene.add_entity(&entity);
         let views = gather(&mut scene, game, Some(&world), &def(), look);
         views.last().unwrap().shadows.ranges.clone()
@@ -287,7 +287,7 @@ fn brush_models_move_with_their_entity() {
     assert!(door > 0);
     let (mins, maxs) = game.models.bounds(door);
     assert!(mins.max_element() <= -16.0 && maxs.min_element() >= 16.0);
-    let mut scene = Scene::new();
+    let mut scene = Scene::default();
     let placed = RefEntity {
         model: door,
         origin: Vec3::new(0.0, 50.0, 0.0),
@@ -389,7 +389,7 @@ fn polygons_of_one_material_are_one_mesh() {
         corner(8.0, 0.0),
     ];
     let eight: Vec<_> = quad.iter().chain(&quad).copied().collect();
-    let mut scene = Scene::new();
+    let mut scene = Scene::default();
     scene.add_poly(glass, &eight, 4);
     scene.add_poly(glass, &quad, 4);
     scene.add_poly(0, &quad, 4);

@@ -11,7 +11,7 @@ use glam::Vec3;
 fn the_world_in_sight_is_sorted_and_culled() {
     let mut game = game();
     let world = room(&mut game);
-    let mut scene = Scene::new();
+    let mut scene = Scene::default();
     let views = gather(&mut scene, &game, Some(&world), &def(), Look::Classic);
     let [view] = views.as_slice() else { panic!() };
     let sorts: Vec<f32> = view
@@ -58,7 +58,7 @@ fn without_the_world_only_entities_show() {
     let mut game = game();
     let world = room(&mut game);
     let thing = game.model("m/thing.md3");
-    let mut scene = Scene::new();
+    let mut scene = Scene::default();
     let none = RefDef {
         flags: rdflags::NO_WORLD_MODEL,
         ..def()
@@ -92,7 +92,7 @@ fn real_maps_gather_from_every_spawn() {
     let mut game = Registration::new(files);
     for map in &maps {
         let world = game.load(&format!("maps/{map}"));
-        let mut scene = Scene::new();
+        let mut scene = Scene::default();
         let entities = world.relit.bsp.entities();
         let spawns: Vec<Vec3> = entities
             .iter()

@@ -6,6 +6,7 @@
 //! once when the box of all triangles has [`GROWN`] times the surface it had, or as much less.
 
 use glam::Vec3;
+#[cfg(test)]
 use shaders::trace_types::BvhTriangle;
 use shaders::types::Vertex;
 
@@ -129,11 +130,13 @@ impl AnimatedShape {
     }
 
     /// Structures that are kept.
+    #[cfg(test)]
     pub fn pose_count(&self) -> usize {
         self.poses.len()
     }
 
     /// Bytes on the device.
+    #[cfg(test)]
     pub fn size(&self) -> u64 {
         let indices = self.index_buffer.as_ref().map_or(0, Buffer::size);
         indices + self.poses.iter().map(Pose::size).sum::<u64>()
@@ -287,6 +290,7 @@ impl Pose {
     }
 
     /// Bytes on the device.
+    #[cfg(test)]
     fn size(&self) -> u64 {
         match &self.bottom {
             PoseBottom::Driver { blas, .. } => blas.size(),

@@ -103,6 +103,7 @@ impl RigidShape {
     }
 
     /// Bytes on the device.
+    #[cfg(test)]
     pub fn size(&self) -> u64 {
         self.data.size() + self.blas().map_or(0, Blas::size)
     }

@@ -90,7 +90,7 @@ fn maps_are_lit() {
             .materials
             .upload(device, &assets.samplers)
             .expect("materials");
-        let mut scene = Scene::new();
+        let mut scene = Scene::default();
         let def = camera(&world);
         let view = scene
             .gather(Some(&world), &assets, &settings, &def, Look::Traced)
@@ -197,7 +197,7 @@ fn tracers_agree_on_maps() {
                 height: size[1] as i32,
                 ..camera(&world)
             };
-            let view = Scene::new()
+            let view = Scene::default()
                 .gather(Some(&world), &assets, &settings, &def, Look::Traced)
                 .expect("view")
                 .pop()

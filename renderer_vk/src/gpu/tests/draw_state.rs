@@ -2,8 +2,8 @@
 //! such that are not.
 
 use super::support::{device, finish, poor_device};
+use crate::gpu::*;
 use bytemuck::{Pod, Zeroable};
-use renderer_vk::gpu::*;
 
 const SIZE: u32 = 32;
 

@@ -1,7 +1,7 @@
 //! What these tests share: a device with the validation layer, and what must hold at the end.
 
+use crate::gpu::*;
 use bytemuck::Pod;
-use renderer_vk::gpu::*;
 
 /// A headless device, or `None` with a report of a skipped test.
 pub(super) fn device(allow_ray_tracing: bool) -> Option<Device> {

@@ -1,9 +1,9 @@
 //! Directions in few bits: nothing is lost but what rounding takes, along the axes either.
 
 use super::support::{collect, device, finish};
+use crate::gpu::*;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-use renderer_vk::gpu::*;
 use testkit::Random;
 
 #[repr(C)]

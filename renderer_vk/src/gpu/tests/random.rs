@@ -1,8 +1,8 @@
 //! The random numbers of the shaders: spread over the frames, independent of each other in all else.
 
 use super::support::{collect, device, finish};
+use crate::gpu::*;
 use bytemuck::{Pod, Zeroable};
-use renderer_vk::gpu::*;
 
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]

@@ -1,7 +1,7 @@
 //! The life of objects and of the device: the graveyard, the pipeline cache, refused requests, an end amid everything.
 
 use super::support::{device, finish};
-use renderer_vk::gpu::*;
+use crate::gpu::*;
 
 #[test]
 fn dropped_objects_wait_for_their_frame_and_no_longer() {

@@ -1,8 +1,8 @@
 //! Graphics pipelines: depth, blending, culling, stencils, channel masks, several samples a pixel.
 
 use super::support::{collect, device, finish};
+use crate::gpu::*;
 use bytemuck::{Pod, Zeroable};
-use renderer_vk::gpu::*;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]

@@ -4,13 +4,13 @@
 
 use std::sync::Arc;
 
+use crate::Settings;
+use crate::api::RefDef;
+use crate::assets::{Assets, ImageFlags, ImageSource, Samplers};
+use crate::gpu::{Device, DeviceOptions, SurfaceSource};
+use crate::scene::{Geometry, Look, Scene};
+use crate::world::{World, WorldError};
 use relight::{GameFiles, MemoryFiles};
-use renderer_vk::Settings;
-use renderer_vk::api::RefDef;
-use renderer_vk::assets::{Assets, ImageFlags, ImageSource, Samplers};
-use renderer_vk::gpu::{Device, DeviceOptions, SurfaceSource};
-use renderer_vk::scene::{Geometry, Look, Scene};
-use renderer_vk::world::{World, WorldError};
 
 /// A headless device, or `None` with a report of a skipped test.
 fn device() -> Option<Device> {
@@ -140,7 +140,7 @@ fn the_sample_map_loads_and_gathers() {
         .collect();
     assert_eq!(back, world.indices);
 
-    let mut scene = Scene::new();
+    let mut scene = Scene::default();
     let def = RefDef {
         time_ms: 1000,
         ..RefDef::default()

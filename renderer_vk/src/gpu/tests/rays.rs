@@ -1,8 +1,8 @@
 //! Acceleration structures, traced by pipeline and by query, and devices that have none.
 
 use super::support::{collect, device, finish};
+use crate::gpu::*;
 use bytemuck::{Pod, Zeroable};
-use renderer_vk::gpu::*;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]

@@ -1,8 +1,9 @@
 //! Buffers, images and textures: uploads, compute shaders that read and write them, levels, sampling by index.
 
 use super::support::{collect, device, finish};
+use crate::gpu::upload::ImageRegion;
+use crate::gpu::*;
 use bytemuck::{Pod, Zeroable};
-use renderer_vk::gpu::*;
 
 #[test]
 fn buffers_keep_what_was_uploaded() {
