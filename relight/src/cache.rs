@@ -20,11 +20,10 @@ pub(crate) enum CacheError {
     Read { path: PathBuf, source: io::Error },
     #[error("{}: cannot be written: {source}", path.display())]
     Write { path: PathBuf, source: io::Error },
-    #[error("{}: line {line}: {what}; the map is calibrated again", path.display())]
+    #[error("{}: {source}; the map is calibrated again", path.display())]
     Damaged {
         path: PathBuf,
-        line: usize,
-        what: &'static str,
+        source: serde_json::Error,
     },
     #[error("{}: {what}; the lists of lights are swept again", path.display())]
     Lists { path: PathBuf, what: &'static str },

@@ -55,7 +55,7 @@ const TEXTURE: f32 = 0.2;
 pub(crate) const DEFAULT_EXPONENT: f32 = 1.4;
 
 /// Exposure of a map.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Exposure {
     /// Factor of radiance.
     pub scale: f32,

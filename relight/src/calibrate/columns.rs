@@ -44,7 +44,7 @@ pub(super) enum Source {
 }
 
 /// Position and falloff of a point light.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Lamp {
     pub origin: Vec3,
     pub falloff: Falloff,

@@ -82,13 +82,14 @@ use fit::Fit;
 use glam::Vec3;
 use residual_candidates::ResidualCandidates;
 use samples::SamplingOptions;
+use serde::{Deserialize, Serialize};
 use std::cell::Cell;
 use std::collections::{HashMap, HashSet};
 use std::time::Instant;
 use trace_cache::{CandidateKey, TraceCache};
 
-/// Version of the results; to be incremented when the same world gives another result.
-const VERSION: u32 = 27;
+/// Version of the results; to be incremented when the same world gives another result, or [`Solution`] changes.
+const VERSION: u32 = 28;
 
 /// Light-grid candidates: at most one for this many grid nodes.
 const CROSSINGS: usize = 5;
@@ -122,7 +123,7 @@ impl Default for CalibrationOptions {
 }
 
 /// Result of a calibration: everything that it changes in a world.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 struct Solution {
     /// Strength of each known source, in the order of [`columns::known`].
     known: Vec<Vec3>,
@@ -137,18 +138,14 @@ struct Solution {
     exposure: Option<Exposure>,
     report: CalibrationReport,
     /// Error at all texels, fitted ones included: less noise for a comparison of fits with equal freedom.
+    #[serde(skip)]
     overall: Agreement,
     /// Whether it was fitted to more samples than the options ask for.
+    #[serde(skip)]
     measured_more: bool,
     /// Error at held-out samples after each round of placement, stops.
+    #[serde(skip)]
     rounds: Vec<f32>,
-}
-
-impl Solution {
-    /// Number of sources of all kinds.
-    fn lights(&self) -> usize {
-        self.known.len() + self.placed.len() + self.splashes.len() + self.suns.len()
-    }
 }
 
 /// Fits a world's lights to the light that its compiler stored, and places the lights that the compiler stripped.

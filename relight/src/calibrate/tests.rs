@@ -531,26 +531,21 @@ fn results_are_the_same_every_time_and_can_be_kept() {
     let paths: Vec<_> = files().map(|f| f.unwrap().path()).collect();
     let whole: Vec<_> = paths.iter().map(|p| std::fs::read(p).unwrap()).collect();
     type Damage<'a> = &'a dyn Fn(&[u8]) -> Vec<u8>;
-    let damages: [Damage<'_>; 7] = [
+    let replaced = |b: &[u8], from, to| {
+        let text = String::from_utf8_lossy(b);
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1).into_bytes()
+    };
+    let damages: [Damage<'_>; 9] = [
         &|_| Vec::new(),
         &|b| b[..b.len() / 2].to_vec(),
         &|b| b.iter().map(|c| c ^ 0x80).collect(),
-        &|b| [b, b"placed 1 2 3 4 5 6\n"].concat(),
-        &|b| {
-            String::from_utf8_lossy(b)
-                .replace("known ", "known -")
-                .into()
-        },
-        &|b| {
-            String::from_utf8_lossy(b)
-                .replace("ambient ", "ambient NaN ")
-                .into()
-        },
-        &|b| {
-            String::from_utf8_lossy(b)
-                .replacen("known", "placed 1 2 3", 1)
-                .into()
-        },
+        &|b| [b, b"{}"].concat(),
+        &|b| replaced(b, "\"known\":[[", "\"known\":[[-"),
+        &|b| replaced(b, "\"known\":[[", "\"known\":[[1,2,3],["),
+        &|b| replaced(b, "\"ambient\":[", "\"ambient\":[9e99,"),
+        &|b| replaced(b, "\"ambient\":[", "\"ambient\":[1e39],\"x\":["),
+        &|b| replaced(b, "\"ambient\"", "\"ambience\""),
     ];
     for (number, damage) in damages.iter().enumerate() {
         for (path, whole) in paths.iter().zip(&whole) {
@@ -561,11 +556,18 @@ fn results_are_the_same_every_time_and_can_be_kept() {
             !report.cached && warnings.len() == 1,
             "{number}: {warnings:?}"
         );
-        assert!(warnings[0].contains(".light: line "), "{}", warnings[0]);
+        assert!(warnings[0].contains(".light: "), "{}", warnings[0]);
         assert_eq!(again, first.0, "{number}");
         // It was written anew.
         assert!(run(&caching).1.cached, "{number}");
     }
+    // A file of another version is absent.
+    for (path, whole) in paths.iter().zip(&whole) {
+        std::fs::write(path, replaced(whole, "\"version\":", "\"version\":1")).unwrap();
+    }
+    let (again, report, warnings) = run(&caching);
+    assert!(!report.cached && warnings.is_empty(), "{warnings:?}");
+    assert_eq!(again, first.0);
 }
 
 #[test]

@@ -154,7 +154,7 @@ pub struct PointLight {
 }
 
 /// How the light of a point falls off with distance.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Falloff {
     /// With the square of the distance, as light does.
     #[default]

@@ -2,6 +2,7 @@
 
 use super::EmissionSource;
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// Numbers of light sources of a map.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -58,7 +59,7 @@ impl LightReport {
 }
 
 /// The stored light that calibration uses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Evidence {
     /// Lightmap texels.
     Lightmaps,
@@ -72,7 +73,7 @@ pub enum Evidence {
 }
 
 impl Evidence {
-    /// A short name for tables and files.
+    /// A short name for tables.
     pub fn label(self) -> &'static str {
         match self {
             Evidence::Lightmaps => "lightmaps",
@@ -81,23 +82,12 @@ impl Evidence {
             Evidence::Nothing => "nothing",
         }
     }
-
-    /// The evidence of a [`label`](Self::label).
-    pub(crate) fn from_label(label: &str) -> Option<Evidence> {
-        let all = [
-            Evidence::Lightmaps,
-            Evidence::Vertices,
-            Evidence::Grid,
-            Evidence::Nothing,
-        ];
-        all.into_iter().find(|e| e.label() == label)
-    }
 }
 
 /// Error of computed light against stored light at held-out samples.
 ///
 /// Stops are on the scale of stored light: gamma and dirt of the compiler are applied to computed light as well.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Agreement {
     /// Median of |log2(computed / stored)|, stops: 0 is perfect, 1 is a factor of two.
     pub median_stops: f32,
@@ -108,7 +98,7 @@ pub struct Agreement {
 }
 
 /// Result of a calibration in numbers.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CalibrationReport {
     /// Stored light that was used.
     pub evidence: Evidence,
@@ -136,8 +126,10 @@ pub struct CalibrationReport {
     /// Agreement of the calibrated light: direct, ambient and reflected.
     pub after: Agreement,
     /// Whether the result comes from a cache.
+    #[serde(skip)]
     pub cached: bool,
     /// Duration, seconds.
+    #[serde(skip)]
     pub seconds: f64,
 }
 
