@@ -96,23 +96,6 @@ impl Put for Vec<u8> {
     }
 }
 
-/// A 64-byte name field as a list of bytes: `serde` has no arrays of more than 32 elements.
-#[cfg(feature = "serde")]
-pub(crate) mod name_as_list {
-    use serde::de::Error;
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    pub(crate) fn serialize<S: Serializer>(name: &[u8; 64], to: S) -> Result<S::Ok, S::Error> {
-        name.as_slice().serialize(to)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<[u8; 64], D::Error> {
-        let bytes = Vec::<u8>::deserialize(from)?;
-        let length = bytes.len();
-        <[u8; 64]>::try_from(bytes).map_err(|_| D::Error::invalid_length(length, &"64 bytes"))
-    }
-}
-
 /// The text of a 64-byte name field: up to the first NUL, or all of it.
 pub(crate) fn name_text(raw: &[u8; 64]) -> String {
     let end = raw.iter().position(|&b| b == 0).unwrap_or(raw.len());

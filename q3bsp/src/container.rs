@@ -34,6 +34,7 @@ pub struct Gap {
     /// Bytes from the start of the file.
     pub offset: usize,
     /// What is there.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub bytes: Vec<u8>,
 }
 
@@ -69,6 +70,7 @@ pub struct Container {
     pub file_length: usize,
     /// Bytes at the end of a lump that are no whole record, by [`Lump::index`]. For the visibility
     /// lump also everything that the matrix does not cover.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub trailing: [Vec<u8>; SLOTS],
     /// Replaced values.
     pub repairs: Vec<Repair>,

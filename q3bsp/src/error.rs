@@ -6,6 +6,7 @@ use std::fmt;
 /// The lumps: the seventeen of `IBSP` in directory order, then those that other formats add.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 #[non_exhaustive]
 #[allow(missing_docs)] // the names are the format's own
 pub enum Lump {

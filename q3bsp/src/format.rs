@@ -6,6 +6,7 @@ use crate::error::Lump;
 /// A map format. All are read into the same [`crate::Bsp`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(into = "&'static str", try_from = "String"))]
 #[non_exhaustive]
 pub enum Format {
     /// `IBSP` version 46: Quake III Arena and the games and mods made with its engine.
@@ -33,6 +34,22 @@ pub enum Format {
     TwoPsb,
     /// Version 30: GoldSrc (Half-Life).
     GoldSrc,
+}
+
+#[cfg(feature = "serde")]
+impl From<Format> for &'static str {
+    fn from(format: Format) -> &'static str {
+        format.name()
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<String> for Format {
+    type Error = String;
+    fn try_from(name: String) -> Result<Format, String> {
+        let found = Format::ALL.into_iter().find(|f| f.name() == name);
+        found.ok_or_else(|| format!("unknown format {name:?}"))
+    }
 }
 
 impl Format {

@@ -102,6 +102,7 @@ impl Default for SurfaceLayers {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct VertexLayers {
     /// Coordinates in the lightmap pages, 0 to 1.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub lightmap: [Vec2; 3],
     /// Colours.
     pub color: [[u8; 4]; 3],
@@ -110,6 +111,10 @@ pub struct VertexLayers {
 /// A point of the light grid with its four layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(from = "GridLayersForm", into = "GridLayersForm")
+)]
 pub struct GridLayers {
     /// Light from everywhere, per layer.
     pub ambient: [[u8; 3]; 4],
@@ -342,12 +347,50 @@ pub struct Advertisement {
     /// Number of the cell in the advertiser's system.
     pub cell: i32,
     /// Normal of the rectangle.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub normal: Vec3,
     /// Its corners, id units.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub corners: [Vec3; 4],
     /// The model field as stored: a NUL-terminated name such as `*12`.
-    #[cfg_attr(feature = "serde", serde(with = "crate::bytes::name_as_list"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub model: [u8; 64],
+}
+
+/// A serialized [`GridLayers`].
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+struct GridLayersForm {
+    ambient: [[u8; 3]; 4],
+    directed: [[u8; 3]; 4],
+    styles: [u8; 4],
+    angles: [u8; 2],
+}
+
+#[cfg(feature = "serde")]
+impl From<GridLayers> for GridLayersForm {
+    fn from(point: GridLayers) -> GridLayersForm {
+        GridLayersForm {
+            ambient: point.ambient,
+            directed: point.directed,
+            styles: point.styles,
+            angles: [point.longitude, point.latitude],
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<GridLayersForm> for GridLayers {
+    fn from(form: GridLayersForm) -> GridLayers {
+        let [longitude, latitude] = form.angles;
+        GridLayers {
+            ambient: form.ambient,
+            directed: form.directed,
+            styles: form.styles,
+            longitude,
+            latitude,
+        }
+    }
 }
 
 impl Record for Advertisement {

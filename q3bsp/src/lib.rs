@@ -15,8 +15,8 @@
 //! normals, and they must survive writing); [`DrawVert::finite`] gives the cleaned vertex, and
 //! everything derived here (patches, fog volumes, grid samples) is finite.
 //!
-//! With the feature `serde` the data types are `Serialize` and `Deserialize`; a deserialized map has to pass
-//! [`Bsp::validate`] before its indices may be used.
+//! With the feature `serde` the data types are `Serialize` and `Deserialize`, without [`Bsp::warnings`]; a deserialized
+//! map has to pass [`Bsp::validate`] before its indices may be used.
 //!
 //! ```no_run
 //! let bytes = std::fs::read("maps/example.bsp")?;
@@ -56,6 +56,8 @@ mod parse;
 mod patch;
 #[cfg(feature = "quake")]
 pub mod quake;
+#[cfg(feature = "serde")]
+mod serial;
 mod surface;
 mod tree;
 mod validate;
@@ -89,6 +91,7 @@ pub struct Bsp {
     /// The format that the map was read from and is written in.
     pub format: Format,
     /// Lump 0 as stored: entity text, meaningful up to the first NUL. See [`Bsp::entities`].
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub entities: Vec<u8>,
     /// Lump 1: shader references of surfaces, brushes and brush sides. The same name may occur
     /// several times with different flags.
@@ -140,6 +143,7 @@ pub struct Bsp {
     /// What the file looked like around the data.
     pub container: Container,
     /// Tolerated oddities found by [`Bsp::parse`], in the order found.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub warnings: Vec<Warning>,
 }
 

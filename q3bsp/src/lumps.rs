@@ -21,7 +21,7 @@ pub struct ShaderRef {
     /// Name without extension, as written, to the first NUL; bytes that are not UTF-8 are replaced.
     pub name: String,
     /// The field as stored; compilers left garbage behind the NUL.
-    #[cfg_attr(feature = "serde", serde(with = "crate::bytes::name_as_list"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub raw_name: [u8; 64],
     /// See [`crate::surface_flags`].
     pub surface_flags: u32,
@@ -89,8 +89,10 @@ impl Record for ShaderRef {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Plane {
     /// Unit normal.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub normal: Vec3,
     /// Distance from the origin along the normal, id units.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub dist: f32,
 }
 
@@ -213,8 +215,10 @@ impl Record for i32 {
 pub struct Model {
     /// Smallest corner. For model 0 these are the compiler's bounds, which the light grid is laid out
     /// by; geometry may lie outside.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub mins: Vec3,
     /// Largest corner.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub maxs: Vec3,
     /// First surface.
     pub first_surface: i32,
@@ -305,12 +309,16 @@ impl Record for BrushSide {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DrawVert {
     /// Position, id units.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub position: Vec3,
     /// Texture coordinates; t = 0 is the first image row.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub st: Vec2,
     /// Coordinates in the lightmap page, 0 to 1.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub lightmap: Vec2,
     /// Unit normal; zero in some files.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub normal: Vec3,
     /// Red, green, blue before the over-bright shift, and alpha.
     pub color: [u8; 4],
@@ -381,7 +389,7 @@ pub struct Fog {
     /// Shader whose `fogParms` give colour and depth.
     pub shader: String,
     /// The name field as stored.
-    #[cfg_attr(feature = "serde", serde(with = "crate::bytes::name_as_list"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub raw_shader: [u8; 64],
     /// The brush, which has at least six sides; -1 for fog that fills the world.
     pub brush: i32,
@@ -419,6 +427,7 @@ pub const LIGHTMAP_BYTES: usize = LIGHTMAP_SIZE * LIGHTMAP_SIZE * 3;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Lightmap(
     /// The bytes.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub Box<[u8]>,
 );
 
@@ -449,6 +458,10 @@ impl Lightmap {
 /// Lump 15: light that arrives at one point of the grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(from = "GridPointForm", into = "GridPointForm")
+)]
 pub struct GridPoint {
     /// Light from everywhere; all zero when the point is inside a wall.
     pub ambient: [u8; 3],
@@ -458,6 +471,30 @@ pub struct GridPoint {
     pub longitude: u8,
     /// Angle around the z axis in 1/256 turns (byte 7).
     pub latitude: u8,
+}
+
+/// A serialized [`GridPoint`], without keys because there are many: ambient, directed, angles.
+#[cfg(feature = "serde")]
+type GridPointForm = ([u8; 3], [u8; 3], [u8; 2]);
+
+#[cfg(feature = "serde")]
+impl From<GridPoint> for GridPointForm {
+    fn from(point: GridPoint) -> GridPointForm {
+        let angles = [point.longitude, point.latitude];
+        (point.ambient, point.directed, angles)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<GridPointForm> for GridPoint {
+    fn from((ambient, directed, [longitude, latitude]): GridPointForm) -> GridPoint {
+        GridPoint {
+            ambient,
+            directed,
+            longitude,
+            latitude,
+        }
+    }
 }
 
 impl GridPoint {

@@ -7,12 +7,14 @@ use glam::Vec3;
 /// What a [`Surface`] is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 pub enum SurfaceKind {
     /// A flat polygon with its triangles; stored 1.
     Planar,
     /// A grid of control points of bi-quadratic Bézier patches; stored 2.
     Patch,
     /// Any triangles, vertex lit; stored 3.
+    #[cfg_attr(feature = "serde", serde(rename = "mesh"))]
     TriangleSoup,
     /// A point that shows a corona, without geometry; stored 4.
     Flare,
@@ -20,6 +22,7 @@ pub enum SurfaceKind {
     /// the `patch_width` that follow are its places. See [`crate::Bsp::foliage_mesh`].
     Foliage,
     /// A number that the engine does not know. Never in a validated map.
+    #[cfg_attr(feature = "serde", serde(untagged))]
     Other(i32),
 }
 
@@ -90,9 +93,11 @@ pub struct Surface {
     /// Height of the chart.
     pub lightmap_height: i32,
     /// World position of the chart's first texel; of a flare: its position.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub lightmap_origin: Vec3,
     /// World steps per texel and the plane normal (often zero); of a patch: mins and maxs of its LOD
     /// group; of a flare: colour, unused, normal.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub lightmap_vecs: [Vec3; 3],
     /// Control points per row: odd and at least 3 for a patch. Of foliage: places.
     pub patch_width: i32,

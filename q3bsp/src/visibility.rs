@@ -7,6 +7,7 @@ use std::borrow::Cow;
 /// Lump 16: a bit matrix. Not symmetric in most shipped maps.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(into = "Rows", try_from = "Rows"))]
 pub struct Visibility {
     /// Number of clusters, which is the number of rows; at least 1.
     pub clusters: usize,
@@ -14,6 +15,44 @@ pub struct Visibility {
     pub bytes_per_cluster: usize,
     /// `clusters × bytes_per_cluster` bytes; bit `c & 7` of byte `c >> 3` in row `r` says that `r` sees `c`.
     pub rows: Vec<u8>,
+}
+
+/// A serialized [`Visibility`]: one row of bits for each cluster.
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Rows {
+    bytes_per_cluster: usize,
+    rows: Vec<crate::serial::Bytes<Vec<u8>>>,
+}
+
+#[cfg(feature = "serde")]
+impl From<Visibility> for Rows {
+    fn from(visibility: Visibility) -> Rows {
+        let row = |cluster| crate::serial::Bytes(visibility.row(cluster).to_vec());
+        Rows {
+            bytes_per_cluster: visibility.bytes_per_cluster,
+            rows: (0..visibility.clusters).map(row).collect(),
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Rows> for Visibility {
+    type Error = String;
+    fn try_from(form: Rows) -> Result<Visibility, String> {
+        let (clusters, bytes_per_cluster) = (form.rows.len(), form.bytes_per_cluster);
+        let mut lengths = form.rows.iter().map(|row| row.0.len());
+        if bytes_per_cluster < clusters.div_ceil(8) || lengths.any(|l| l != bytes_per_cluster) {
+            return Err(format!(
+                "expected rows of {bytes_per_cluster} bytes, one bit a cluster"
+            ));
+        }
+        Ok(Visibility {
+            clusters,
+            bytes_per_cluster,
+            rows: form.rows.into_iter().flat_map(|row| row.0).collect(),
+        })
+    }
 }
 
 impl Visibility {

@@ -45,8 +45,10 @@ pub struct EmbeddedTexture {
     /// Height, texels.
     pub height: u32,
     /// `width × height` palette indices, first row first; `None` when the map only names the texture.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub indices: Option<Vec<u8>>,
     /// The texture's own palette, 256 × RGB; `None` in Quake, where the game has one.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub palette: Option<Vec<u8>>,
 }
 
@@ -112,6 +114,7 @@ pub struct TextureUse {
     /// Game paths of the pictures without extension: one, or those of an animation.
     pub frames: Vec<String>,
     /// Pictures of an animation per second.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub rate: f32,
     /// Sky in two layers that drift: the pictures are the back and the front one.
     pub layered_sky: bool,
@@ -122,10 +125,13 @@ pub struct TextureUse {
     /// Has holes where alpha is 0.
     pub holes: bool,
     /// Part that it covers of what is behind: 1 for an opaque one.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub opacity: f32,
     /// Repetitions of the texture per second that it flows by.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub flow: f32,
     /// Light that the map's compiler took it to emit, in the compiler's units; 0 for none.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial"))]
     pub light: f32,
     /// Picture of what glows, added after light.
     pub glow: Option<String>,

@@ -3,7 +3,8 @@
 use glam::Vec3;
 
 /// Evidence for an emission.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum EmissionSource {
     /// `q3map_surfacelight`.
     SurfaceLight,

@@ -84,7 +84,7 @@ pub fn stored_scale(says: Option<f32>) -> f32 {
 }
 
 /// A triangle with uniform radiance over its area and its side's hemisphere.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct TriangleLight {
     /// Corners, counter-clockwise seen from the emitting side; world space, brush models where the
     /// map's entities put them at start.
@@ -97,6 +97,7 @@ pub struct TriangleLight {
     pub surface: u32,
     /// Triangle of the world's index buffer that it is, counted from its start (first index / 3);
     /// `u32::MAX` for the quads of sprites and the lamps of flares, which have no triangle that stays in place.
+    #[serde(serialize_with = "triangle_or_null")]
     pub triangle: u32,
     /// Brush model that it belongs to: 0 is the world, which never moves.
     pub model: u32,
@@ -104,6 +105,10 @@ pub struct TriangleLight {
     pub is_sky: bool,
     /// Where its radiance comes from.
     pub source: EmissionSource,
+}
+
+fn triangle_or_null<S: serde::Serializer>(&triangle: &u32, to: S) -> Result<S::Ok, S::Error> {
+    serde::Serialize::serialize(&(triangle != u32::MAX).then_some(triangle), to)
 }
 
 impl TriangleLight {
@@ -204,7 +209,7 @@ pub struct Spot {
 }
 
 /// Light from infinitely far, through surfaces of sky.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct SunLight {
     /// Unit vector towards the sun.
     pub direction: Vec3,

@@ -3,18 +3,16 @@
 //! The document holds the typed map without loss ([`read_map`] gives it back), and what relighting found: materials,
 //! lights, and which lights matter where.
 
-mod model;
-mod values;
-
-pub use values::JsonError;
-
 use super::extras;
 use super::{Export, ExportError, ExportReport, Output};
+use crate::emitters::{PointLight, SunLight, TriangleLight};
 use crate::world::RelitWorld;
 use glam::Vec3;
 use q3bsp::Bsp;
-use serde_json::Value;
-use values::{Json, WriteText, field, put_display, put_list};
+use serde::{Deserialize, Serialize};
+use serde_json::ser::Formatter;
+use serde_json::{Serializer, Value};
+use std::io;
 
 /// Name of this kind of document, the value of its key `schema`.
 pub const SCHEMA: &str = "relight-map";
@@ -22,12 +20,36 @@ pub const SCHEMA: &str = "relight-map";
 /// Version of the document's layout. It grows when a reader of the last would misunderstand it.
 pub const VERSION: u32 = 1;
 
+/// What is wrong with a document.
+#[derive(Debug, thiserror::Error)]
+pub enum JsonError {
+    /// Not JSON, or not a map.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// Another kind of document.
+    #[error("a document of the schema {0:?}, not {SCHEMA:?}")]
+    Schema(String),
+    /// Another layout.
+    #[error("a document of version {0}, not {VERSION}")]
+    Version(u32),
+    /// Lightmaps of another size than the format's.
+    #[error("a lightmap that has not the {0} bytes of its format")]
+    Lightmap(usize),
+    /// References that lead out of their lists.
+    #[error("not a valid map: {0}")]
+    Map(#[from] q3bsp::Error),
+}
+
 /// Writes a map.
 ///
 /// # Errors
 /// [`ExportError::Write`].
 pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportReport, ExportError> {
-    output.write_main(document(source.world).as_bytes())?;
+    let document = document(source.world).map_err(|problem| ExportError::Write {
+        path: output.main().to_owned(),
+        source: problem.into(),
+    })?;
+    output.write_main(&document)?;
     Ok(ExportReport {
         triangles: source.world.indices.len() / 3,
         vertices: source.world.bsp.vertices.len(),
@@ -36,167 +58,197 @@ pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportRe
     })
 }
 
-/// The document of a map.
-pub fn document(world: &RelitWorld) -> String {
-    let mut out = String::from("{\n\"schema\":");
-    SCHEMA.write(&mut out);
-    out.push_str(",\n\"version\":");
-    VERSION.put(&mut out);
-    out.push_str(",\n\"name\":");
-    world.name.put(&mut out);
-    out.push_str(",\n\"map\":");
-    model::put_map(&world.bsp, &mut out);
-    out.push_str(",\n\"entities\":");
-    put_list(&mut out, world.bsp.entities(), |entity, out| {
-        put_list(out, &entity.pairs, |(key, value), out| {
-            put_list(out, [key, value], |text, out| text.put(out));
-        });
-    });
-    out.push_str(",\n\"materials\":");
-    put_list(&mut out, &world.materials, |material, out| {
-        put_display(out, extras::material(material));
-    });
-    out.push_str(",\n\"surface_materials\":");
-    put_list(&mut out, &world.surfaces, |s, out| s.material.put(out));
-    out.push_str(",\n\"lights\":");
-    put_lights(world, &mut out);
-    out.push_str(",\n\"clusters\":");
-    put_clusters(world, &mut out);
-    out.push_str(",\n\"warnings\":");
-    put_list(&mut out, &world.warnings, |warning, out| warning.put(out));
-    out.push_str("\n}\n");
-    out
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'static str,
+    version: u32,
+    name: &'a str,
+    map: &'a Bsp,
+    entities: Vec<Vec<(String, String)>>,
+    materials: Vec<Value>,
+    surface_materials: Vec<u32>,
+    lights: Lights<'a>,
+    clusters: Vec<Cluster>,
+    warnings: &'a [String],
 }
 
-/// A key, and what writes its value.
-type Part<'a> = (&'a str, &'a dyn Fn(&mut String));
+#[derive(Serialize)]
+struct Lights<'a> {
+    triangles: &'a [TriangleLight],
+    points: Vec<Point>,
+    suns: &'a [SunLight],
+    ambient: Vec3,
+}
 
-/// Appends an object.
-fn put_object(out: &mut String, parts: &[Part<'_>]) {
-    out.push('{');
-    for (at, (key, put)) in parts.iter().enumerate() {
-        if at > 0 {
-            out.push(',');
+#[derive(Serialize)]
+struct Point {
+    origin: Vec3,
+    intensity: Vec3,
+    radius: f32,
+    spot_direction: Option<Vec3>,
+    spot_tan_half_angle: Option<f32>,
+    linear_reach: Option<f32>,
+}
+
+impl Point {
+    fn of(light: &PointLight) -> Point {
+        let spot = light.spot.as_ref();
+        Point {
+            origin: light.origin,
+            intensity: light.intensity,
+            radius: light.radius,
+            spot_direction: spot.map(|spot| spot.direction),
+            spot_tan_half_angle: spot.map(|spot| spot.tan_half_angle),
+            linear_reach: light.falloff.reach(),
         }
-        key.write(out);
-        out.push(':');
-        put(out);
     }
-    out.push('}');
 }
 
-fn put_lights(world: &RelitWorld, out: &mut String) {
-    out.push_str("{\n\"triangles\":");
-    put_list(out, &world.lights, |light, out| {
-        let triangle = (light.triangle != u32::MAX).then_some(light.triangle);
-        put_object(
-            out,
-            &[
-                ("vertices", &|out| light.vertices.put(out)),
-                ("radiance", &|out| light.radiance.put(out)),
-                ("two_sided", &|out| light.two_sided.put(out)),
-                ("surface", &|out| light.surface.put(out)),
-                ("triangle", &|out| triangle.put(out)),
-                ("model", &|out| light.model.put(out)),
-                ("is_sky", &|out| light.is_sky.put(out)),
-                ("source", &|out| light.source.label().write(out)),
-            ],
-        );
-    });
-    out.push_str(",\n\"points\":");
-    put_list(out, &world.point_lights, |light, out| {
-        let direction = light.spot.as_ref().map(|spot| spot.direction);
-        let tangent = light.spot.as_ref().map(|spot| spot.tan_half_angle);
-        let reach = light.falloff.reach();
-        put_object(
-            out,
-            &[
-                ("origin", &|out| light.origin.put(out)),
-                ("intensity", &|out| light.intensity.put(out)),
-                ("radius", &|out| light.radius.put(out)),
-                ("spot_direction", &|out| direction.put(out)),
-                ("spot_tan_half_angle", &|out| tangent.put(out)),
-                ("linear_reach", &|out| reach.put(out)),
-            ],
-        );
-    });
-    out.push_str(",\n\"suns\":");
-    put_list(out, &world.suns, |sun, out| {
-        put_object(
-            out,
-            &[
-                ("direction", &|out| sun.direction.put(out)),
-                ("irradiance", &|out| sun.irradiance.put(out)),
-                ("angular_radius", &|out| sun.angular_radius.put(out)),
-                ("material", &|out| sun.material.put(out)),
-            ],
-        );
-    });
-    out.push_str(",\n\"ambient\":");
-    <Vec3 as Json>::put(&world.ambient, out);
-    out.push_str("\n}");
+/// What a cluster sees, and the lights that matter in it.
+#[derive(Serialize)]
+struct Cluster {
+    sees: Option<Vec<usize>>,
+    triangle_lights: Vec<u32>,
+    point_lights: Vec<u32>,
+    sky: bool,
 }
 
-/// What each cluster sees, and the lights that matter in it; the last row is for places outside of all clusters.
-fn put_clusters(world: &RelitWorld, out: &mut String) {
-    let lists = &world.light_lists;
-    let count = lists.clusters();
-    put_list(out, 0..=count, |cluster, out| {
+impl Cluster {
+    /// A cluster by its number; the number of clusters stands for places outside of all.
+    fn of(world: &RelitWorld, cluster: usize) -> Cluster {
+        let lists = &world.light_lists;
         let bounds = |at: usize| lists.offsets.get(at).map(|&offset| offset as usize);
         let row = bounds(cluster).zip(bounds(cluster + 1));
         let row = row.and_then(|(start, end)| lists.lights.get(start..end));
         // Point lights follow the triangles.
-        let (triangles, points): (Vec<u32>, Vec<u32>) = row
+        let (triangle_lights, points): (Vec<u32>, Vec<u32>) = row
             .unwrap_or_default()
             .iter()
             .partition(|&&light| light < lists.triangle_lights);
-        let points: Vec<u32> = points.iter().map(|p| p - lists.triangle_lights).collect();
-        let sees: Option<Vec<usize>> = match &world.bsp.visibility {
-            Some(visibility) if cluster < count => Some(visibility.visible_from(cluster).collect()),
-            _ => None,
-        };
-        let sky = lists.sky.get(cluster).copied().unwrap_or(true);
-        put_object(
-            out,
-            &[
-                ("sees", &|out| sees.put(out)),
-                ("triangle_lights", &|out| triangles.put(out)),
-                ("point_lights", &|out| points.put(out)),
-                ("sky", &|out| sky.put(out)),
-            ],
-        );
-    });
+        let visibility = world.bsp.visibility.as_ref();
+        let visibility = visibility.filter(|_| cluster < lists.clusters());
+        Cluster {
+            sees: visibility.map(|visibility| visibility.visible_from(cluster).collect()),
+            triangle_lights,
+            point_lights: points.iter().map(|p| p - lists.triangle_lights).collect(),
+            sky: lists.sky.get(cluster).copied().unwrap_or(true),
+        }
+    }
+}
+
+/// JSON without white space, but for a line for each key of the document, of `map` and of `lights`.
+#[derive(Default)]
+struct Layout {
+    /// Arrays and objects around what is written.
+    arrays: usize,
+    objects: usize,
+}
+
+impl Layout {
+    fn has_lines(&self) -> bool {
+        self.arrays == 0 && self.objects <= 2
+    }
+}
+
+impl Formatter for Layout {
+    fn begin_array<W: io::Write + ?Sized>(&mut self, to: &mut W) -> io::Result<()> {
+        self.arrays += 1;
+        to.write_all(b"[")
+    }
+
+    fn end_array<W: io::Write + ?Sized>(&mut self, to: &mut W) -> io::Result<()> {
+        self.arrays -= 1;
+        to.write_all(b"]")
+    }
+
+    fn begin_object<W: io::Write + ?Sized>(&mut self, to: &mut W) -> io::Result<()> {
+        self.objects += 1;
+        to.write_all(b"{")
+    }
+
+    fn end_object<W: io::Write + ?Sized>(&mut self, to: &mut W) -> io::Result<()> {
+        let end: &[u8] = if self.has_lines() { b"\n}" } else { b"}" };
+        self.objects -= 1;
+        to.write_all(end)
+    }
+
+    fn begin_object_key<W: io::Write + ?Sized>(
+        &mut self,
+        to: &mut W,
+        first: bool,
+    ) -> io::Result<()> {
+        to.write_all(if first { b"" } else { b"," })?;
+        to.write_all(if self.has_lines() { b"\n" } else { b"" })
+    }
+
+    /// The fewest digits that give the same number, without an exponent.
+    fn write_f32<W: io::Write + ?Sized>(&mut self, to: &mut W, value: f32) -> io::Result<()> {
+        write!(to, "{value}")
+    }
+}
+
+/// The document of a map.
+///
+/// # Errors
+/// None but bugs: the document is written to memory.
+pub fn document(world: &RelitWorld) -> Result<Vec<u8>, serde_json::Error> {
+    let entities = world.bsp.entities().into_iter();
+    let mut document = Vec::new();
+    Document {
+        schema: SCHEMA,
+        version: VERSION,
+        name: &world.name,
+        map: &world.bsp,
+        entities: entities.map(|entity| entity.pairs).collect(),
+        materials: world.materials.iter().map(extras::material).collect(),
+        surface_materials: world.surfaces.iter().map(|s| s.material).collect(),
+        lights: Lights {
+            triangles: &world.lights,
+            points: world.point_lights.iter().map(Point::of).collect(),
+            suns: &world.suns,
+            ambient: world.ambient,
+        },
+        clusters: (0..=world.light_lists.clusters())
+            .map(|cluster| Cluster::of(world, cluster))
+            .collect(),
+        warnings: &world.warnings,
+    }
+    .serialize(&mut Serializer::with_formatter(
+        &mut document,
+        Layout::default(),
+    ))?;
+    document.push(b'\n');
+    Ok(document)
 }
 
 /// Reads the typed map out of a document. Its references are checked as those of a file are.
 ///
 /// # Errors
 /// [`JsonError`] for what is not JSON, not such a document, or a map whose references lead out of their lists.
-pub fn read_map(text: &str) -> Result<Bsp, JsonError> {
-    let document: Value = serde_json::from_str(text)
-        .map_err(|problem| JsonError::new(format!("JSON ({problem})")))?;
-    if document.get("schema").and_then(Value::as_str) != Some(SCHEMA) {
-        return Err(JsonError::new(format!(
-            "a document of the schema {SCHEMA:?}"
-        )));
+pub fn read_map(document: &[u8]) -> Result<Bsp, JsonError> {
+    #[derive(Deserialize)]
+    struct Head {
+        schema: String,
+        version: u32,
     }
-    if field::<u32>(&document, "version")? != VERSION {
-        return Err(JsonError::new(format!("version {VERSION}")));
+    #[derive(Deserialize)]
+    struct Body {
+        map: Bsp,
     }
-    let missing = || JsonError::new("the key \"map\"");
-    let map = document.get("map").ok_or_else(missing)?;
-    let mut bsp = model::get_map(map).map_err(|problem| problem.inside("map"))?;
+    let head: Head = serde_json::from_slice(document)?;
+    if head.schema != SCHEMA {
+        return Err(JsonError::Schema(head.schema));
+    }
+    if head.version != VERSION {
+        return Err(JsonError::Version(head.version));
+    }
+    let Body { map: mut bsp } = serde_json::from_slice(document)?;
     let page = bsp.format.lightmap_size() * bsp.format.lightmap_size() * 3;
-    if bsp
-        .lightmaps
-        .iter()
-        .any(|lightmap| lightmap.0.len() != page)
-    {
-        return Err(JsonError::new(format!("lightmaps of {page} bytes")));
+    if bsp.lightmaps.iter().any(|pixels| pixels.0.len() != page) {
+        return Err(JsonError::Lightmap(page));
     }
     let repairs = bsp.container.repairs.len();
-    bsp.validate()
-        .map_err(|problem| JsonError::new(format!("a valid map ({problem})")))?;
+    bsp.validate()?;
     // What was repaired when the file was read is repaired already.
     bsp.container.repairs.truncate(repairs);
     Ok(bsp)
