@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::gpu::{MemoryKind, MemoryUse};
+use serde::{Serialize, Serializer};
 
 /// A pass of the newest finished frame; those of the same name are one.
 #[derive(Clone, Debug, PartialEq)]
@@ -192,52 +193,56 @@ impl Costs {
 
     /// The same as JSON, one value a line.
     pub fn json(&self) -> String {
-        let mut text = String::from("{\n");
-        let _ = writeln!(text, "  \"device\": {},", quoted(&self.device));
-        let tracer = self.tracer.as_deref().map_or("null".into(), quoted);
-        let _ = writeln!(text, "  \"tracer\": {tracer},");
-        let _ = writeln!(text, "  \"width\": {},", self.size.0);
-        let _ = writeln!(text, "  \"height\": {},", self.size.1);
-        text.push_str("  \"passes\": [\n");
-        let passes: Vec<String> = self.passes.iter().map(pass_json).collect();
-        text.push_str(&passes.join(",\n"));
-        let _ = writeln!(text, "\n  ],\n  \"total\":\n{},", pass_json(&self.total()));
-        text.push_str("  \"memory\": {\n");
-        for (purpose, bytes) in &self.memory {
-            let _ = writeln!(text, "    {}: {bytes},", quoted(purpose.name()));
-        }
-        let _ = writeln!(text, "    \"reserved\": {}\n  }}\n}}", self.reserved);
-        text
+        let report = Report {
+            device: &self.device,
+            tracer: self.tracer.as_deref(),
+            width: self.size.0,
+            height: self.size.1,
+            passes: self.passes.iter().map(PassReport::of).collect(),
+            total: PassReport::of(&self.total()),
+            memory: self,
+        };
+        // Nothing in a report fails to serialize.
+        serde_json::to_string_pretty(&report).unwrap_or_default() + "\n"
     }
 }
 
-fn pass_json(pass: &PassCost) -> String {
-    let number = |value: Option<String>| value.unwrap_or_else(|| "null".into());
-    // a time that is no number is none in JSON either
-    let ms = Some(pass.ms).filter(|ms| ms.is_finite());
-    format!(
-        "    {{ \"name\": {}, \"ms\": {}, \"rays\": {}, \"mrays_per_second\": {} }}",
-        quoted(&pass.name),
-        number(ms.map(|ms| format!("{ms:.4}"))),
-        number(pass.rays.map(|rays| rays.to_string())),
-        number(pass.mrays_per_second().map(|rate| format!("{rate:.2}")))
-    )
+/// [`Costs`] as JSON.
+#[derive(Serialize)]
+struct Report<'a> {
+    device: &'a str,
+    tracer: Option<&'a str>,
+    width: u32,
+    height: u32,
+    passes: Vec<PassReport>,
+    total: PassReport,
+    #[serde(serialize_with = "memory_by_name")]
+    memory: &'a Costs,
 }
 
-/// A JSON string.
-fn quoted(text: &str) -> String {
-    let mut quoted = String::from("\"");
-    for c in text.chars() {
-        match c {
-            '"' => quoted.push_str("\\\""),
-            '\\' => quoted.push_str("\\\\"),
-            c if c.is_control() => {
-                let _ = write!(quoted, "\\u{:04x}", u32::from(c));
-            }
-            c => quoted.push(c),
+/// [`PassCost`] as JSON; a number that is not finite becomes `null`.
+#[derive(Serialize)]
+struct PassReport {
+    name: String,
+    ms: f64,
+    rays: Option<u64>,
+    mrays_per_second: Option<f64>,
+}
+
+impl PassReport {
+    fn of(pass: &PassCost) -> PassReport {
+        PassReport {
+            name: pass.name.clone(),
+            ms: (f64::from(pass.ms) * 1e4).round() / 1e4,
+            rays: pass.rays,
+            mrays_per_second: pass.mrays_per_second().map(|r| (r * 100.0).round() / 100.0),
         }
     }
-    quoted + "\""
+}
+
+fn memory_by_name<S: Serializer>(costs: &&Costs, to: S) -> Result<S::Ok, S::Error> {
+    let held = costs.memory.iter().map(|(of, bytes)| (of.name(), *bytes));
+    to.collect_map(held.chain([("reserved", costs.reserved)]))
 }
 
 fn megabytes(bytes: u64) -> f64 {
@@ -321,10 +326,22 @@ mod tests {
             (&json["total"]["ms"], &json["total"]["rays"]),
             (&3.5.into(), &6000.into())
         );
-        assert_eq!(
-            json["memory"].as_object().map(|m| m.len()),
-            Some(costs.memory.len() + 1)
-        );
+        let memory = json["memory"].as_object().unwrap();
+        assert_eq!(memory.len(), costs.memory.len() + 1);
+        assert_eq!(memory["reserved"], 1 << 20);
+        // Four digits of a millisecond, two of a rate.
+        let odd = PassCost {
+            name: "odd".into(),
+            ms: 0.123_456,
+            rays: Some(1),
+        };
+        let json = Costs {
+            passes: vec![odd],
+            ..Costs::default()
+        };
+        let json: serde_json::Value = serde_json::from_str(&json.json()).unwrap();
+        assert_eq!(json["passes"][0]["ms"], 0.1235);
+        assert_eq!(json["passes"][0]["mrays_per_second"], 0.01);
         // neither a pass nor a tracer
         let empty = Costs::default().json();
         let empty: serde_json::Value = serde_json::from_str(&empty).unwrap();
