@@ -198,7 +198,7 @@ fn measure_gltf(path: &Path, scale: f32) -> (BTreeMap<String, Measure>, usize) {
 
 /// Materials that are not drawn whatever the map's flags say.
 fn hidden(world: &RelitWorld) -> HashSet<String> {
-    use shaderscript::light::SurfaceClass::{Fog, Invisible};
+    use relight::materials::light::SurfaceClass::{Fog, Invisible};
     let unseen = world
         .materials
         .iter()

@@ -6,8 +6,8 @@
 
 use glam::Vec3;
 use relight::light::{LightColor, LightRef};
+use relight::materials::light::SurfaceClass;
 use relight::{Materials, RelitWorld, SearchPath, WorldSurface};
-use shaderscript::light::SurfaceClass;
 use std::f32::consts::PI;
 use testkit::Random;
 

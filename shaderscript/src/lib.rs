@@ -1,11 +1,9 @@
-//! Quake III `.shader` scripts: text to typed materials, their evaluation, and what they are to light.
+//! Quake III `.shader` scripts: text to typed materials, and their evaluation.
 //!
 //! * [`parse_script`] reads one file and never fails as a whole: every fault is a [`Diagnostic`] with file, line
 //!   and column, and reading goes on at the next definition.
 //! * [`Library`] joins the files of a game by the engine's rules of precedence and finds a [`Shader`] by name.
 //! * [`eval`] is the run-time half: waves, noise, colour and texture coordinate generators, vertex deformations.
-//! * [`light`] tells what a material is to a light simulation (opaque, cut-out, glass, sky, emitter ...) from its
-//!   directives alone, and separates a stack of stages into what reflects light and what glows.
 //!
 //! No files are opened here: whether an image exists is for the caller to find out.
 //!
@@ -15,7 +13,6 @@
 #![cfg_attr(not(test), deny(clippy::indexing_slicing))]
 
 pub mod eval;
-pub mod light;
 pub mod surface_params;
 pub mod token;
 

@@ -10,10 +10,10 @@ use super::texels::{self, Stored, lit_by_texel};
 use super::vertices;
 use crate::emitters::Evidence;
 use crate::light;
+use crate::materials::light::SurfaceClass;
 use crate::occluders::Occluders;
 use crate::world::{RelitWorld, WorldSurface};
 use glam::Vec3;
-use shaderscript::light::SurfaceClass;
 use support::random::{self, Random};
 
 /// Radiance of white for a stored value of 1 with gamma 1.

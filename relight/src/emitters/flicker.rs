@@ -1,11 +1,11 @@
 //! Change of lights over time: emission of a material's stages at a time, relative to its mean.
 
 use crate::image::Image;
+use crate::materials::light::{StageSample, compose};
 use crate::overbright;
 use crate::overbright::luminance;
 use glam::{Vec3, Vec4};
 use shaderscript::eval::{self, ColorContext};
-use shaderscript::light::{StageSample, compose};
 use shaderscript::{AlphaGen, RgbGen, Shader, Stage, StageImage};
 
 /// Cells along each side of the texture in which brightness is evaluated.

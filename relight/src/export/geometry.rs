@@ -1,10 +1,10 @@
 //! What of a map is drawn, joined by model and material.
 
+use crate::materials::light::SurfaceClass;
 use crate::world::coplanar::Stacked;
 use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
 use glam::{Vec2, Vec3};
 use q3bsp::surface_flags;
-use shaderscript::light::SurfaceClass;
 use std::collections::{BTreeMap, HashMap};
 
 /// Texture coordinates beyond this many repetitions are moved back by whole ones: far out, floats have no fraction left.

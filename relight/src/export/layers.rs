@@ -9,8 +9,8 @@
 use super::Export;
 use super::geometry::Part;
 use super::look::{Alpha, Look, Picture, VertexAlpha};
+use crate::materials::light::classify;
 use crate::world::{WorldMaterial, WorldVertex};
-use shaderscript::light::classify;
 use shaderscript::{AlphaFunc, AlphaGen, BlendFactor, Shader, Stage, StageImage, TcGen};
 use std::borrow::Cow;
 

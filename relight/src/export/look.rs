@@ -1,6 +1,6 @@
 //! A material as far as other programs can say it: one image for colour, one for glow, transparency, refraction.
 //!
-//! The stages are told apart by what they do, as everywhere ([`shaderscript::light`]). Those whose images lie on the
+//! The stages are told apart by what they do, as everywhere ([`crate::materials::light`]). Those whose images lie on the
 //! surface in the same way become one picture; of what moves against that, the brightest addition is kept as glow and
 //! the rest is told in [`Look::lost`].
 
@@ -8,11 +8,11 @@ use super::film::Film;
 use super::layers::draws_nothing;
 use super::losses::told_losses;
 use super::stack::{self, Moment, Part, tiling};
-use crate::world::WorldMaterial;
-use glam::{Vec2, Vec3, Vec4};
-use shaderscript::light::{
+use crate::materials::light::{
     LightLinear, SurfaceClass, base_stage, cut_out_stage, glow_stages, refraction_index,
 };
+use crate::world::WorldMaterial;
+use glam::{Vec2, Vec3, Vec4};
 use shaderscript::surface_params::{CONTENTS_FOG, CONTENTS_SLIME};
 use shaderscript::{
     AlphaFunc, AlphaGen, BlendFactor, Cull, ImplicitKind, RgbGen, Shader, Stage, StageImage, TcGen,
@@ -483,7 +483,7 @@ fn dielectric(shader: &Shader, drawn: &LightLinear, look: &mut Look) {
     if transmission < LEAST_TRANSMISSION && shader.content_flags & CONTENTS_SLIME != 0 {
         return;
     }
-    let liquid = shaderscript::light::classify(shader).liquid;
+    let liquid = crate::materials::light::classify(shader).liquid;
     let color = drawn.lit + drawn.emission + drawn.through;
     look.dielectric = Some(Dielectric {
         index,

@@ -8,11 +8,11 @@ use super::look::Picture;
 use super::stack::texel;
 use crate::files::GameFiles;
 use crate::image::Image;
+use crate::materials::light::{StageSample, compose};
 use crate::overbright::{self, ByteEncoder};
 use crate::world::WorldMaterial;
 use glam::{Vec2, Vec3, Vec4};
 use shaderscript::eval;
-use shaderscript::light::{StageSample, compose};
 use shaderscript::{Shader, StageImage};
 
 /// Suffixes of the images of the sides, in the order of [`point`].

@@ -3,10 +3,10 @@
 use super::images::load;
 use crate::files::GameFiles;
 use crate::image::Image;
+use crate::materials::light::{LightLinear, StageSample, compose};
 use crate::overbright::{self, ByteEncoder};
 use glam::{Vec2, Vec3, Vec4};
 use shaderscript::eval::{self, ColorContext};
-use shaderscript::light::{LightLinear, StageSample, compose};
 use shaderscript::{AlphaGen, RgbGen, Shader, Stage, StageImage, TcGen, TcMod};
 use std::num::NonZeroUsize;
 

@@ -9,7 +9,7 @@
 //! 2. Glowing stages: the luminance of an opaque material's stages without incident light, averaged over texture
 //!    and time, is at least [`GLOW_THRESHOLD`].
 //!
-//! Source: q3map2's choice of the light image; the algebra of stages is that of [`shaderscript::light`].
+//! Source: q3map2's choice of the light image; the algebra of stages is that of [`crate::materials::light`].
 
 use super::entities::normalise;
 use super::glow::{mean_emission, shades};
@@ -17,10 +17,10 @@ use super::{Emission, EmissionSource, Flicker, Shade, changes, raise};
 use super::{POINT_LIGHT_INTENSITY, SKY_LIGHT_RADIANCE, SURFACE_LIGHT_RADIANCE};
 use crate::files::GameFiles;
 use crate::image::{self, Image};
+use crate::materials::light::SurfaceClass;
 use crate::overbright;
 use crate::world::{Holes, WorldMaterial};
 use glam::Vec3;
-use shaderscript::light::SurfaceClass;
 use shaderscript::{Cull, Deform, Shader};
 use std::collections::HashMap;
 
@@ -120,7 +120,7 @@ impl<'a> Finder<'a> {
         if material.resolved.fault.is_some() {
             return Vec3::ZERO;
         }
-        if shaderscript::light::is_glowing(shader) {
+        if crate::materials::light::is_glowing(shader) {
             for name in shader.image_names() {
                 self.image(name);
             }

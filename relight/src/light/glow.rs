@@ -3,13 +3,13 @@
 
 use super::Shade;
 use crate::image::Image;
+use crate::materials::light::{
+    LightLinear, StageSample, compose, compose_encoded, glow_stages, is_gloss, is_reflection,
+};
 use crate::overbright;
 use crate::overbright::luminance;
 use glam::{Vec2, Vec3, Vec4};
 use shaderscript::eval::{self, ColorContext};
-use shaderscript::light::{
-    LightLinear, StageSample, compose, compose_encoded, glow_stages, is_gloss, is_reflection,
-};
 use shaderscript::{ImplicitKind, RgbGen, Shader, Stage, StageImage, TcGen};
 
 /// Samples along each side of a texture.

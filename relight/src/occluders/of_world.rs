@@ -1,8 +1,8 @@
 //! The occluders of a world.
 
 use super::{CutOut, Occluders};
+use crate::materials::light::SurfaceClass;
 use crate::world::{RelitWorld, WorldMaterial};
-use shaderscript::light::SurfaceClass;
 use std::collections::HashMap;
 use std::sync::Arc;
 

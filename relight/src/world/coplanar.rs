@@ -3,9 +3,9 @@
 //! buffers of other programs have none.
 
 use super::{RelitWorld, WorldSurface};
+use crate::materials::light::SurfaceClass;
 use glam::{Vec2, Vec3};
 use shaderscript::Cull;
-use shaderscript::light::SurfaceClass;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 

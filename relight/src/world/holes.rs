@@ -1,8 +1,8 @@
 //! Transparent texels of materials with an alpha test, for rays on the CPU.
 
 use crate::image::Image;
+use crate::materials::light::cut_out_stage;
 use glam::Vec2;
-use shaderscript::light::cut_out_stage;
 use shaderscript::{AlphaGen, Shader, StageImage, TcGen};
 
 /// Opacity of a material's texels.

@@ -4,10 +4,10 @@ use super::holes::Holes;
 use super::pages::{BakedPages, PageLoader};
 use crate::emitters::{self, Emission, Flicker, Shade};
 use crate::materials::Resolved;
+use crate::materials::light::{LightClass, classify};
 use glam::Vec3;
 use q3bsp::{Bsp, SurfaceKind, lightmap_index};
 use shaderscript::ImplicitKind;
-use shaderscript::light::{LightClass, classify};
 use std::sync::Arc;
 
 /// A material of a world.

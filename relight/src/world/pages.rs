@@ -1,14 +1,14 @@
 //! Baked light that scripts name besides the surfaces' own pages: lightmap images, and light styles.
 //!
-//! [`shaderscript::light::baked_light`] finds the stages. They are removed from the materials: the main light
+//! [`crate::materials::light::baked_light`] finds the stages. They are removed from the materials: the main light
 //! becomes an ordinary `$lightmap` stage with an image as its page, and the stages of styles are taken out, so that
 //! a material has one light and the albedo below it.
 
 use crate::emitters::StyleStrength;
 use crate::files::GameFiles;
 use crate::image::{self, Image};
+use crate::materials::light::{BakedLight, baked_light};
 use q3bsp::Lightmap;
-use shaderscript::light::{BakedLight, baked_light};
 use shaderscript::{Shader, Stage, StageImage, TcMod};
 use std::collections::HashMap;
 

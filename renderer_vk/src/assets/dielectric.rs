@@ -1,9 +1,9 @@
 //! What a material that is seen through does to rays, decided from its directives and the means of its images.
 
 use glam::{Vec3, Vec4};
+use relight::materials::light::{self, LightLinear};
 use shaders::types::{self, constants as c};
 use shaderscript::Shader;
-use shaderscript::light::{self, LightLinear};
 use shaderscript::surface_params::CONTENTS_SLIME;
 
 use super::compile::StageArrays;

@@ -1,7 +1,7 @@
 //! What a material is to light, as `MATERIAL_*` bits.
 
+use relight::materials::light::{self, BakedLight, SurfaceClass};
 use shaders::types::constants as c;
-use shaderscript::light::{self, BakedLight, SurfaceClass};
 use shaderscript::{Deform, RgbGen, Shader, Stage, StageImage};
 
 use super::material::LightmapClass;

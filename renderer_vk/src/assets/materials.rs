@@ -406,7 +406,7 @@ impl Materials {
         source: &mut dyn ImageSource,
     ) -> PushedStages {
         let mut pushed = PushedStages::default();
-        let mut baked = shaderscript::light::baked_light(&shader.stages).into_iter();
+        let mut baked = relight::materials::light::baked_light(&shader.stages).into_iter();
         for (number, stage) in shader.stages.iter().enumerate() {
             let (index, video) =
                 match (self.arrays).push_stage(stage, implicit, &mut self.videos, source) {

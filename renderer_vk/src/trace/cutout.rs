@@ -2,8 +2,8 @@
 //! plant or a banner are solid or empty all over, and a ray's cost is the triangles that it has to ask about.
 
 use glam::Vec2;
+use relight::materials::light;
 use shaders::types::constants as c;
-use shaderscript::light;
 
 use crate::assets::Assets;
 

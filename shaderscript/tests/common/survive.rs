@@ -1,7 +1,7 @@
 //! What every text must lead to: materials that can be evaluated, and faults with a place.
 
 use glam::{Vec2, Vec3};
-use shaderscript::{Library, Shader, eval, light, parse_script};
+use shaderscript::{Library, Shader, eval, parse_script};
 
 /// Reads a script and evaluates all of it at a time in seconds. False when there is no definition.
 pub fn survive(text: &[u8], time: f64) -> bool {
@@ -33,9 +33,6 @@ fn use_everything(shader: &Shader, time: f64) {
     let _ = shader.sort_value();
     let _ = shaderscript::collapse(shader);
     let _ = shaderscript::collapse_vertex_light(shader, false);
-    let _ = light::classify(shader);
-    let _ = light::base_stage(shader);
-    let _ = light::compose(&shader.stages, &[], true);
     let context = eval::ColorContext {
         time: shader.shader_time(time, 0.0, 0.0),
         ..eval::ColorContext::default()

@@ -87,7 +87,7 @@ impl Materials {
         );
         if let (Some(material), Some(light)) = slots {
             material.flags |= types::constants::MATERIAL_EMITTER;
-            *light = if shaderscript::light::is_glowing(&material.shader) {
+            *light = if relight::materials::light::is_glowing(&material.shader) {
                 Vec3::ZERO
             } else {
                 radiance

@@ -1,5 +1,5 @@
 use super::*;
-use crate::{ImplicitKind, Shader, parse_script};
+use shaderscript::{ImplicitKind, Shader, parse_script};
 
 const RED: Vec3 = Vec3::new(0.8, 0.2, 0.1);
 const BLUE: Vec3 = Vec3::new(0.1, 0.3, 0.6);
@@ -23,7 +23,10 @@ fn run(stages: &str, samples: &[StageSample]) -> LightLinear {
 
 /// As the engine mixes them.
 fn mixed(below: Vec3, above: Vec3, alpha: f32) -> Vec3 {
-    below.map(encode).lerp(above.map(encode), alpha).map(decode)
+    below
+        .map(from_linear)
+        .lerp(above.map(from_linear), alpha)
+        .map(to_linear)
 }
 
 #[track_caller]
@@ -120,11 +123,11 @@ fn encoded_samples_add_up_as_the_engine_adds_them() {
     near(found, 0.75 * RED, 0.25 * BLUE, Vec3::ZERO);
     // In linear light the same stack shows the same where it is lit in full.
     let linear = samples(0.25).map(|s| StageSample {
-        texture: s.texture.truncate().map(decode).extend(s.texture.w),
+        texture: s.texture.truncate().map(to_linear).extend(s.texture.w),
         ..s
     });
     let shown = compose(&stages, &linear, false).evaluate(Vec3::ONE, Vec3::ONE);
-    let meant = found.evaluate(Vec3::ONE, Vec3::ONE).map(decode);
+    let meant = found.evaluate(Vec3::ONE, Vec3::ONE).map(to_linear);
     assert!(shown.abs_diff_eq(meant, 1e-5), "{shown} {meant}");
 }
 

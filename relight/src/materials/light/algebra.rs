@@ -16,8 +16,9 @@
 //! * twice the product (`GL_DST_COLOR GL_SRC_COLOR`): half grey, encoded, leaves what is below as it is;
 //! * a paint over an opaque body (`blend`): it has the colour that the mixed display values have where all is lit in full.
 
-use crate::stage::{BlendFactor, RgbGen, Stage, StageImage};
+use crate::overbright::{from_linear, to_linear};
 use glam::{Vec3, Vec4};
+use shaderscript::{BlendFactor, RgbGen, Stage, StageImage};
 
 /// What a stage shows at a point: texture and generated colour, before blending. Both linear, alpha in 0..1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,31 +156,16 @@ enum Numbers {
 /// Linear value of half the display's range (IEC 61966-2-1).
 const HALF: f32 = 0.214_041_14;
 
-/// Linear value of an encoded one.
-fn decode(encoded: f32) -> f32 {
-    if encoded <= 0.040_45 {
-        encoded / 12.92
-    } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
-    }
-}
-
-/// Encoded value of a linear one.
-fn encode(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 {
-        linear * 12.92
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
-}
-
 /// A paint over an opaque body: both mixed in linear light, with the colour of the mixed display values.
 fn paint(body: LightLinear, paint: LightLinear, alpha: f32) -> LightLinear {
     let mut mixed = paint.scale(alpha).plus(body.scale(1.0 - alpha));
     let full = |l: LightLinear| (l.lit + l.emission).max(Vec3::ZERO);
     let (below, above) = (full(body), full(paint));
     let sum = below.lerp(above, alpha);
-    let chosen = below.map(encode).lerp(above.map(encode), alpha).map(decode);
+    let chosen = below
+        .map(from_linear)
+        .lerp(above.map(from_linear), alpha)
+        .map(to_linear);
     let tint = |sum: f32, chosen: f32| if sum > 1e-6 { chosen / sum } else { 1.0 };
     let tint = Vec3::new(
         tint(sum.x, chosen.x),

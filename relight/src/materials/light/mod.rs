@@ -17,14 +17,11 @@ pub use dielectric::{
 };
 pub use glow::{glow_stages, is_glowing, stage_samples_white};
 
-use crate::{
-    shader::{Cull, Shader, sort},
-    stage::{AlphaGen, BlendFactor, Stage, TcGen},
-    surface_params::{
-        CONTENTS_FOG, CONTENTS_LAVA, CONTENTS_SLIME, CONTENTS_TRANSLUCENT, CONTENTS_WATER,
-        SURF_ALPHASHADOW, SURF_LIGHTFILTER, SURF_SKY,
-    },
+use shaderscript::surface_params::{
+    CONTENTS_FOG, CONTENTS_LAVA, CONTENTS_SLIME, CONTENTS_TRANSLUCENT, CONTENTS_WATER,
+    SURF_ALPHASHADOW, SURF_LIGHTFILTER, SURF_SKY,
 };
+use shaderscript::{AlphaGen, BlendFactor, Cull, Shader, Stage, TcGen, sort};
 
 /// The kinds of surface that a light simulation tells apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -199,7 +196,9 @@ pub fn base_stage(shader: &Shader) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parse_script;
+    use crate::{Materials, SearchPath};
+    use glam::Vec3;
+    use shaderscript::parse_script;
 
     fn shader(body: &str) -> Shader {
         parse_script("test", format!("t\n{{\n{body}\n}}\n").as_bytes())
@@ -316,5 +315,81 @@ mod tests {
         assert_eq!(base("{\nmap glow\nblendFunc add\n}"), Some(0));
         assert_eq!(base("{\nmap e\ntcGen environment\n}"), Some(0));
         assert_eq!(base("{\nmap $lightmap\n}"), None);
+    }
+
+    /// What holds for any material.
+    fn check(shader: &Shader) {
+        let name = &shader.name;
+        let samples = stage_samples_white(&shader.stages);
+        let composed = compose(&shader.stages, &samples, true);
+        if classify(shader).class == SurfaceClass::Opaque {
+            assert_eq!(composed.through, Vec3::ZERO, "{name}");
+        }
+        let has_image = shader.image_names().next().is_some();
+        assert_eq!(base_stage(shader).is_some(), has_image, "{name}");
+        assert_eq!(baked_light(&shader.stages).len(), shader.stages.len());
+        let glows = glow_stages(shader, true);
+        assert!(glows.iter().all(|&stage| stage < shader.stages.len()));
+        assert!(refraction_index(shader).is_none_or(|index| index > 1.0));
+    }
+
+    #[test]
+    fn materials_of_the_game_keep_the_rules() {
+        let Some(folder) = testkit::folder() else {
+            return;
+        };
+        let files = SearchPath::open(&[folder]).unwrap();
+        let (materials, _) = Materials::load(&files);
+        let shaders = materials.library().definitions();
+        assert!(shaders.len() > 1000, "{}", shaders.len());
+        for shader in shaders {
+            check(shader);
+            let samples = stage_samples_white(&shader.stages);
+            let composed = compose(&shader.stages, &samples, true);
+            let sum = composed.lit + composed.emission;
+            assert!(sum.is_finite(), "{}", shader.name);
+        }
+    }
+
+    #[test]
+    fn random_materials_keep_the_rules() {
+        const GENERAL: [&str; 6] = [
+            "surfaceparm trans",
+            "surfaceparm water",
+            "surfaceparm slime",
+            "sort portal",
+            "cull none",
+            "deformVertexes wave 1 sin 0 1 0 1",
+        ];
+        const STAGE: [&str; 18] = [
+            "map a",
+            "map $lightmap",
+            "clampMap b",
+            "animMap 1 a b",
+            "blendFunc add",
+            "blendFunc blend",
+            "blendFunc filter",
+            "blendFunc GL_DST_COLOR GL_SRC_COLOR",
+            "blendFunc GL_ONE_MINUS_DST_COLOR GL_ONE_MINUS_SRC_ALPHA",
+            "alphaFunc GE128",
+            "depthWrite",
+            "tcGen environment",
+            "tcGen lightmap",
+            "rgbGen wave sin 1e30 1 0 1",
+            "rgbGen vertex",
+            "alphaGen const 2",
+            "tcMod scroll 1 0",
+            "tcMod transform 1 0 0 1 .5 .5",
+        ];
+        let mut random = testkit::Random::new(1);
+        let mut lines = |of: &[&str], most| {
+            let count = random.below(most);
+            let line = |_| of[random.below(of.len())];
+            (0..count).map(line).collect::<Vec<_>>().join("\n")
+        };
+        for _ in 0..3000 {
+            let stages = [(); 3].map(|()| format!("{{\n{}\n}}", lines(&STAGE, 6)));
+            check(&shader(&(lines(&GENERAL, 3) + "\n" + &stages.join("\n"))));
+        }
     }
 }

@@ -5,7 +5,7 @@
 //! styles follows as stages that are added: `$lightmap` moved to another part of a page by `tcMod transform`, or another
 //! page, each with the wave of its style (q3map2 `q3map_styleMarker`).
 
-use crate::stage::{BlendFactor, RgbGen, Stage, StageImage, TcGen, TcMod};
+use shaderscript::{BlendFactor, RgbGen, Stage, StageImage, TcGen, TcMod};
 
 /// The baked light that a stage shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -85,7 +85,7 @@ fn adds(stage: &Stage) -> bool {
 mod tests {
     use super::BakedLight::{Main, Style};
     use super::*;
-    use crate::parse_script;
+    use shaderscript::parse_script;
 
     fn found(stages: &str) -> Vec<Option<BakedLight>> {
         let script = parse_script("test", format!("t\n{{\n{stages}\n}}\n").as_bytes());

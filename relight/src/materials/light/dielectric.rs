@@ -3,11 +3,8 @@
 use std::f32::consts::TAU;
 
 use super::{SurfaceClass, classify, glow_stages};
-use crate::{
-    shader::{Deform, Shader},
-    stage::{AlphaGen, BlendFactor, RgbGen, Stage, TcGen, TcMod},
-    surface_params::{CONTENTS_LAVA, CONTENTS_SLIME, SURF_LIGHTFILTER},
-};
+use shaderscript::surface_params::{CONTENTS_LAVA, CONTENTS_SLIME, SURF_LIGHTFILTER};
+use shaderscript::{AlphaGen, BlendFactor, Deform, RgbGen, Shader, Stage, TcGen, TcMod};
 
 /// Refraction index of window glass.
 pub const INDEX_GLASS: f32 = 1.5;
@@ -140,7 +137,7 @@ fn is_lit_reflection(shader: &Shader, index: usize, vertex_light: bool) -> bool 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parse_script;
+    use shaderscript::parse_script;
 
     fn shader(body: &str) -> Shader {
         parse_script("test", format!("t\n{{\n{body}\n}}\n").as_bytes())

@@ -1,9 +1,8 @@
 //! Which stages of a material glow: found by evaluating its stack, not by what blend functions are called.
 
 use super::algebra::{StageSample, compose};
-use crate::shader::Shader;
-use crate::stage::{AlphaGen, RgbGen, Stage, Wave};
 use glam::{Vec3, Vec4};
+use shaderscript::{AlphaGen, RgbGen, Shader, Stage, Wave};
 
 /// White samples for every stage of a material, with its constant colours put in and every wave at its brightest.
 pub fn stage_samples_white(stages: &[Stage]) -> Vec<StageSample> {
@@ -70,7 +69,7 @@ pub fn glow_stages(shader: &Shader, vertex_light: bool) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parse_script;
+    use shaderscript::parse_script;
 
     #[test]
     fn glow_is_what_reaches_the_emission() {
