@@ -235,7 +235,8 @@ impl Reader<'_> {
             let mut name = self.name(f.u32(), || format!("mesh {number}"))?;
             let mut material = self.name(f.u32(), || what("material"))?;
             for name in [&mut name, &mut material] {
-                name.truncate(name.floor_char_boundary(MAX_NAME));
+                let end = (0..=MAX_NAME).rfind(|&at| name.is_char_boundary(at));
+                name.truncate(end.unwrap_or(0));
             }
             name.make_ascii_lowercase();
             let (first_vertex, num_vertices) = (f.u32(), f.u32());
