@@ -5,8 +5,7 @@
 use q3bsp::builder::MapBuilder;
 use q3bsp::glam::{Vec2, Vec3};
 use q3bsp::{Bsp, DrawVert, content_flags};
-use std::hint::black_box;
-use std::time::{Duration, Instant};
+use testkit::bench::{input, measure};
 
 /// 200 rooms with boxes, arches and entities, and eight lightmap pages.
 fn made_up() -> Vec<u8> {
@@ -43,27 +42,8 @@ fn made_up() -> Vec<u8> {
     map.build().write()
 }
 
-/// Runs `work` for a second and prints the best time.
-fn measure<T>(name: &str, bytes: usize, mut work: impl FnMut() -> T) {
-    let started = Instant::now();
-    let mut best = Duration::MAX;
-    while started.elapsed() < Duration::from_secs(1) {
-        let run = Instant::now();
-        black_box(work());
-        best = best.min(run.elapsed());
-    }
-    let seconds = best.as_secs_f64();
-    let rate = bytes as f64 / 1e6 / seconds;
-    println!("{name:<12} {rate:>8.1} MB/s, {:.3} ms", seconds * 1e3);
-}
-
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // cargo adds `--bench`
-    let path = std::env::args().skip(1).find(|a| !a.starts_with("--"));
-    let bytes = match path {
-        Some(path) => std::fs::read(path)?,
-        None => made_up(),
-    };
+    let bytes = input(made_up)?;
     let bsp = Bsp::parse(&bytes)?;
     println!("{}, {:.2} MB", bsp.format, bytes.len() as f64 / 1e6);
     measure("parse", bytes.len(), || Bsp::parse(&bytes));

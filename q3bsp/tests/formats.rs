@@ -5,10 +5,10 @@ use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 use q3bsp::builder::MapBuilder;
 use q3bsp::{
-    Advertisement, Bsp, Error, Format, GridLayers, GridPoint, Lightmap, Lump, SurfaceKind,
-    SurfaceLayers, VertexLayers, content_flags, surface_flags,
+    Bsp, Error, Format, GridLayers, GridPoint, Lightmap, Lump, SurfaceKind, SurfaceLayers,
+    VertexLayers, content_flags, surface_flags,
 };
-use sample::{sample, vert};
+use sample::{advertisement, sample, vert};
 use survive::survive;
 
 #[path = "common/exercise.rs"]
@@ -82,12 +82,7 @@ fn sample_of(format: Format) -> Bsp {
             .collect();
     }
     if format == Format::QuakeLive {
-        bsp.advertisements = vec![Advertisement {
-            cell: 5,
-            normal: Vec3::Z,
-            corners: [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE],
-            model: [b'*'; 64],
-        }];
+        bsp.advertisements = vec![advertisement()];
     }
     bsp
 }

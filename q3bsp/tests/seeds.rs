@@ -2,8 +2,7 @@
 
 #![cfg(feature = "quake")]
 
-use glam::Vec3;
-use q3bsp::{Advertisement, Format, lightmap_index};
+use q3bsp::{Format, lightmap_index};
 use survive::survive;
 
 #[path = "common/exercise.rs"]
@@ -48,12 +47,7 @@ fn write_seeds() {
             surface.lightmap = lightmap_index::BY_VERTEX;
         }
         if format == Format::QuakeLive {
-            bsp.advertisements = vec![Advertisement {
-                cell: 5,
-                normal: Vec3::Z,
-                corners: [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE],
-                model: [b'*'; 64],
-            }];
+            bsp.advertisements = vec![sample::advertisement()];
         }
         write(name, bsp.write());
     }

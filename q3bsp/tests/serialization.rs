@@ -1,7 +1,7 @@
 //! The feature `serde`: what was serialized is deserialized again.
 
 use q3bsp::quake::QuakeMap;
-use q3bsp::{Advertisement, Bsp, Format, glam::Vec3};
+use q3bsp::{Bsp, Format};
 
 #[path = "quake/room.rs"]
 #[allow(dead_code, reason = "the tests of these formats take all of it")]
@@ -23,12 +23,7 @@ fn maps_keep_their_bytes() {
         bsp.vertices[0].st.x = f32::from_bits(0xffc1_2345);
         bsp.planes[0].dist = f32::NEG_INFINITY;
         if format == Format::QuakeLive {
-            bsp.advertisements = vec![Advertisement {
-                cell: 5,
-                normal: Vec3::Z,
-                corners: [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE],
-                model: [b'*'; 64],
-            }];
+            bsp.advertisements = vec![sample::advertisement()];
         }
         let bytes = bsp.write();
         let bsp = Bsp::parse(&bytes).unwrap();

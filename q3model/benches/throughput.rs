@@ -4,8 +4,7 @@
 
 use q3model::glam::{Vec2, Vec3};
 use q3model::{Frame, Iqm, Md3, Mdr, PackedVertex, Surface};
-use std::hint::black_box;
-use std::time::{Duration, Instant};
+use testkit::bench::{input, measure};
 
 /// 100 frames of 1000 vertices.
 fn made_up() -> Vec<u8> {
@@ -39,27 +38,8 @@ fn made_up() -> Vec<u8> {
     model.write()
 }
 
-/// Runs `work` for a second and prints the best time.
-fn measure<T>(name: &str, bytes: usize, mut work: impl FnMut() -> T) {
-    let started = Instant::now();
-    let mut best = Duration::MAX;
-    while started.elapsed() < Duration::from_secs(1) {
-        let run = Instant::now();
-        black_box(work());
-        best = best.min(run.elapsed());
-    }
-    let seconds = best.as_secs_f64();
-    let rate = bytes as f64 / 1e6 / seconds;
-    println!("{name:<12} {rate:>8.1} MB/s, {:.3} ms", seconds * 1e3);
-}
-
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // cargo adds `--bench`
-    let path = std::env::args().skip(1).find(|a| !a.starts_with("--"));
-    let bytes = match path {
-        Some(path) => std::fs::read(path)?,
-        None => made_up(),
-    };
+    let bytes = input(made_up)?;
     println!("{:.2} MB", bytes.len() as f64 / 1e6);
     if bytes.starts_with(b"INTERQUAKEMODEL\0") {
         let model = Iqm::parse(&bytes)?;

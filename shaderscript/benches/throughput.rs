@@ -4,8 +4,7 @@
 
 use shaderscript::glam::Vec3;
 use shaderscript::{Library, Stage, eval, parse_script};
-use std::hint::black_box;
-use std::time::{Duration, Instant};
+use testkit::bench::{input, measure};
 
 /// 4000 definitions of three stages.
 fn made_up() -> Vec<u8> {
@@ -19,27 +18,8 @@ fn made_up() -> Vec<u8> {
     (0..4000).map(definition).collect::<String>().into_bytes()
 }
 
-/// Runs `work` for a second and prints the best time.
-fn measure<T>(name: &str, bytes: usize, mut work: impl FnMut() -> T) {
-    let started = Instant::now();
-    let mut best = Duration::MAX;
-    while started.elapsed() < Duration::from_secs(1) {
-        let run = Instant::now();
-        black_box(work());
-        best = best.min(run.elapsed());
-    }
-    let seconds = best.as_secs_f64();
-    let rate = bytes as f64 / 1e6 / seconds;
-    println!("{name:<12} {rate:>8.1} MB/s, {:.3} ms", seconds * 1e3);
-}
-
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // cargo adds `--bench`
-    let path = std::env::args().skip(1).find(|a| !a.starts_with("--"));
-    let text = match path {
-        Some(path) => std::fs::read(path)?,
-        None => made_up(),
-    };
+    let text = input(made_up)?;
     let script = parse_script("bench", &text);
     let stages = script.shaders.iter().map(|shader| shader.stages.len());
     println!(

@@ -1,5 +1,6 @@
 //! What the tests of several crates share: game data or a skipped test ([`game`], [`folder`]), a Vulkan device or a
-//! skipped test ([`device()`]), the report of a skipped test ([`skip`]), and a seeded random generator ([`Random`]).
+//! skipped test ([`device()`]), the report of a skipped test ([`skip`]), a seeded random generator ([`Random`]), damage to files ([`poke_words`]), and the timing of
+//! benchmarks ([`bench`]).
 //!
 //! # Game data
 //!
@@ -13,6 +14,8 @@
 
 #![forbid(unsafe_code)]
 
+pub mod bench;
+mod hostile;
 mod skips;
 
 use std::ffi::OsStr;
@@ -25,6 +28,7 @@ use std::sync::OnceLock;
 use zip::ZipArchive;
 use zip::result::ZipError;
 
+pub use hostile::poke_words;
 pub use skips::{Need, absent, assert_optional, device, is_set, skip};
 pub use support::random::Random;
 

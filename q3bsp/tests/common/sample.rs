@@ -1,8 +1,9 @@
 //! A map with something in every lump.
+#![allow(dead_code, reason = "each test takes some of it")]
 
 use glam::{Vec2, Vec3};
 use q3bsp::builder::MapBuilder;
-use q3bsp::{Bsp, DrawVert, GridPoint, content_flags};
+use q3bsp::{Advertisement, Bsp, DrawVert, GridPoint, content_flags};
 
 pub fn vert(x: f32, y: f32, z: f32) -> DrawVert {
     DrawVert {
@@ -11,6 +12,15 @@ pub fn vert(x: f32, y: f32, z: f32) -> DrawVert {
         lightmap: Vec2::ZERO,
         normal: Vec3::Z,
         color: [255; 4],
+    }
+}
+
+pub fn advertisement() -> Advertisement {
+    Advertisement {
+        cell: 5,
+        normal: Vec3::Z,
+        corners: [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE],
+        model: [b'*'; 64],
     }
 }
 
