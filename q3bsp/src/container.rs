@@ -1,6 +1,7 @@
 //! The file around the lumps: kept so that an unchanged map is written back byte for byte.
 
-use crate::error::Lump;
+use crate::bytes::Fields;
+use crate::error::{Error, Lump};
 
 /// Most directory entries that a format read here has.
 pub(crate) const SLOTS: usize = 18;
@@ -13,6 +14,27 @@ pub struct LumpRange {
     pub offset: i32,
     /// Length in bytes.
     pub length: i32,
+}
+
+impl LumpRange {
+    /// Reads an entry of the directory of a file with this length.
+    pub(crate) fn read(
+        fields: &mut Fields<'_>,
+        lump: Lump,
+        file_length: usize,
+    ) -> Result<LumpRange, Error> {
+        let (offset, length) = (fields.i32(), fields.i32());
+        let end = i64::from(offset) + i64::from(length);
+        if length == 0 || (offset >= 0 && length > 0 && end <= file_length as i64) {
+            return Ok(LumpRange { offset, length });
+        }
+        Err(Error::LumpOutsideFile {
+            lump,
+            offset,
+            length,
+            file_length,
+        })
+    }
 }
 
 /// A lump as the directory of a file has it.

@@ -1,7 +1,8 @@
 //! The formats that are read, and how one is told from another.
 
+use crate::bytes::Fields;
 use crate::container::LumpRange;
-use crate::error::Lump;
+use crate::error::{Error, Lump};
 
 /// A map format. All are read into the same [`crate::Bsp`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -94,10 +95,7 @@ impl Format {
 
     /// The format that a file announces; `None` when it is none of those that are read.
     pub fn of(bytes: &[u8]) -> Option<Format> {
-        match announced(bytes) {
-            Announced::Known(format) => Some(format),
-            _ => None,
-        }
+        announced(bytes).ok()
     }
 
     /// Name for people: identification, version and games.
@@ -172,32 +170,23 @@ const fn with_eighteenth(lump: Lump) -> [Lump; 18] {
 const RAVEN_LUMPS: [Lump; 18] = with_eighteenth(Lump::LightArray);
 const QUAKE_LIVE_LUMPS: [Lump; 18] = with_eighteenth(Lump::Advertisements);
 
-/// What the first eight bytes announce.
-pub(crate) enum Announced {
-    /// A format that is read.
-    Known(Format),
-    /// Another one: what was found, with its name where it is known.
-    Foreign(String),
-    /// Fewer than eight bytes.
-    Nothing,
-}
-
-/// Reads identification and version.
-pub(crate) fn announced(bytes: &[u8]) -> Announced {
-    let Some((ident, rest)) = bytes.split_first_chunk::<4>() else {
-        return Announced::Nothing;
+/// The format that identification and version announce.
+pub(crate) fn announced(bytes: &[u8]) -> Result<Format, Error> {
+    let (Some(ident), Some(version)) = (bytes.first_chunk::<4>(), bytes.get(4..8)) else {
+        return Err(Error::TooShort {
+            found: bytes.len(),
+            needed: Format::Ibsp46.header_bytes(),
+        });
     };
-    let Some(version) = rest.first_chunk::<4>().map(|v| i32::from_le_bytes(*v)) else {
-        return Announced::Nothing;
-    };
+    let version = Fields::new(version).i32();
     let known = match (ident, version) {
-        (b"IBSP", 46) => return Announced::Known(Format::Ibsp46),
-        (b"IBSP", 47) if has_advertisements(bytes) => return Announced::Known(Format::QuakeLive),
-        (b"IBSP", 47) => return Announced::Known(Format::Ibsp47),
-        (b"RBSP", 1) => return Announced::Known(Format::Rbsp),
-        (b"FBSP", 1) => return Announced::Known(Format::Fbsp),
-        (b"IBSP", 38) => return Announced::Known(Format::Quake2),
-        (b"QBSP", 38) => return Announced::Known(Format::Qbism),
+        (b"IBSP", 46) => return Ok(Format::Ibsp46),
+        (b"IBSP", 47) if has_advertisements(bytes) => return Ok(Format::QuakeLive),
+        (b"IBSP", 47) => return Ok(Format::Ibsp47),
+        (b"RBSP", 1) => return Ok(Format::Rbsp),
+        (b"FBSP", 1) => return Ok(Format::Fbsp),
+        (b"IBSP", 38) => return Ok(Format::Quake2),
+        (b"QBSP", 38) => return Ok(Format::Qbism),
         (b"IBSP", 43..=45) => "a Quake III test version",
         (b"IBSP", 48) => "Iron Grip: Warlord",
         (b"IBSP", 666) => "Dark Salvation",
@@ -205,17 +194,16 @@ pub(crate) fn announced(bytes: &[u8]) -> Announced {
         (b"PSBI", _) => "big-endian",
         (b"FAKK" | b"2015" | b"EF2!", _) => "Ritual's format",
         (b"VBSP", _) => "Source",
-        (b"BSP2", _) => return Announced::Known(Format::Bsp2),
-        (b"2PSB", _) => return Announced::Known(Format::TwoPsb),
-        ([29, 0, 0, 0], _) => return Announced::Known(Format::Quake),
-        ([30, 0, 0, 0], _) => return Announced::Known(Format::GoldSrc),
+        (b"BSP2", _) => return Ok(Format::Bsp2),
+        (b"2PSB", _) => return Ok(Format::TwoPsb),
+        ([29, 0, 0, 0], _) => return Ok(Format::Quake),
+        ([30, 0, 0, 0], _) => return Ok(Format::GoldSrc),
         (b"PK\x03\x04", _) => "a zip archive",
         _ => "unknown",
     };
-    Announced::Foreign(format!(
-        "\"{}\" version {version} ({known})",
-        ident.escape_ascii()
-    ))
+    Err(Error::WrongFormat {
+        found: format!("\"{}\" version {version} ({known})", ident.escape_ascii()),
+    })
 }
 
 /// Whether an `IBSP` 47 file has the eighteenth lump of Quake Live: RTCW and Enemy Territory have the same version

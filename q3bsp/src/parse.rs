@@ -3,7 +3,7 @@
 use crate::bytes::Fields;
 use crate::container::{Container, Gap, LumpEntry, LumpRange, SLOTS};
 use crate::error::{Error, Lump, Warning};
-use crate::format::{Announced, Format, announced};
+use crate::format::{Format, announced};
 use crate::layers::{GridLayers, LayeredSide, LayeredSurface, LayeredVertex};
 use crate::lumps::{GridPoint, Lightmap, Record, ShaderRef};
 #[cfg(feature = "quake")]
@@ -18,22 +18,13 @@ impl Bsp {
     /// that leads out of its lump, which the engine would follow. Oddities that the engine tolerates
     /// are in [`Bsp::warnings`].
     pub fn parse(bytes: &[u8]) -> Result<Bsp, Error> {
-        let format = match announced(bytes) {
+        let format = announced(bytes)?;
+        if format.is_quake() {
             #[cfg(feature = "quake")]
-            Announced::Known(format) if format.is_quake() => {
-                return QuakeMap::parse(bytes)?.to_bsp();
-            }
+            return QuakeMap::parse(bytes)?.to_bsp();
             #[cfg(not(feature = "quake"))]
-            Announced::Known(format) if format.is_quake() => return Err(left_out(format)),
-            Announced::Known(format) => format,
-            Announced::Foreign(found) => return Err(Error::WrongFormat { found }),
-            Announced::Nothing => {
-                return Err(Error::TooShort {
-                    found: bytes.len(),
-                    needed: Format::Ibsp46.header_bytes(),
-                });
-            }
-        };
+            return Err(left_out(format));
+        }
         let lumps = directory(bytes, format)?;
         let mut bsp = Bsp {
             format,
@@ -217,22 +208,11 @@ impl Bsp {
 /// # Errors
 /// Another format, or a lump outside the file.
 pub fn lump_entries(bytes: &[u8]) -> Result<Vec<LumpEntry>, Error> {
-    let format = match announced(bytes) {
-        Announced::Known(format) => format,
-        Announced::Foreign(found) => return Err(Error::WrongFormat { found }),
-        Announced::Nothing => {
-            return Err(Error::TooShort {
-                found: bytes.len(),
-                needed: Format::Ibsp46.header_bytes(),
-            });
-        }
-    };
-    #[cfg(feature = "quake")]
+    let format = announced(bytes)?;
     if format.is_quake() {
+        #[cfg(feature = "quake")]
         return Ok(QuakeMap::parse(bytes)?.lump_entries());
-    }
-    #[cfg(not(feature = "quake"))]
-    if format.is_quake() {
+        #[cfg(not(feature = "quake"))]
         return Err(left_out(format));
     }
     let ranges = directory(bytes, format)?;
@@ -263,20 +243,7 @@ fn directory(bytes: &[u8], format: Format) -> Result<[LumpRange; SLOTS], Error> 
     let _ident_and_version: [u8; 8] = fields.bytes();
     let mut lumps = [LumpRange::default(); SLOTS];
     for (&lump, range) in format.lumps().iter().zip(&mut lumps) {
-        let (offset, length) = (fields.i32(), fields.i32());
-        let fits = length == 0
-            || (offset >= 0
-                && length > 0
-                && i64::from(offset) + i64::from(length) <= bytes.len() as i64);
-        if !fits {
-            return Err(Error::LumpOutsideFile {
-                lump,
-                offset,
-                length,
-                file_length: bytes.len(),
-            });
-        }
-        *range = LumpRange { offset, length };
+        *range = LumpRange::read(&mut fields, lump, bytes.len())?;
     }
     Ok(lumps)
 }

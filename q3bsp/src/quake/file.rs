@@ -7,7 +7,7 @@ use super::records::{
 use crate::bytes::Fields;
 use crate::container::{LumpEntry, LumpRange};
 use crate::error::{Error, Lump};
-use crate::format::Format;
+use crate::format::{Format, announced};
 use glam::Vec3;
 
 /// Lumps of Quake and GoldSrc in directory order.
@@ -112,20 +112,11 @@ impl QuakeMap {
     /// # Errors
     /// Another format, a lump outside the file, or one that is no whole number of records.
     pub fn parse(bytes: &[u8]) -> Result<QuakeMap, Error> {
-        let format = match crate::format::announced(bytes) {
-            crate::format::Announced::Known(format) if format.is_quake() => format,
-            crate::format::Announced::Known(format) => {
-                let found = format.name().to_owned();
-                return Err(Error::WrongFormat { found });
-            }
-            crate::format::Announced::Foreign(found) => return Err(Error::WrongFormat { found }),
-            crate::format::Announced::Nothing => {
-                return Err(Error::TooShort {
-                    found: bytes.len(),
-                    needed: 4 + 8 * QUAKE_LUMPS.len(),
-                });
-            }
-        };
+        let format = announced(bytes)?;
+        if !format.is_quake() {
+            let found = format.name().to_owned();
+            return Err(Error::WrongFormat { found });
+        }
         let lumps = lumps_of(format);
         let mut reader = Reader {
             bytes,
@@ -141,20 +132,8 @@ impl QuakeMap {
         };
         let mut fields = Fields::new(entries);
         for &lump in lumps {
-            let (offset, length) = (fields.i32(), fields.i32());
-            let fits = length == 0
-                || (offset >= 0
-                    && length > 0
-                    && i64::from(offset) + i64::from(length) <= bytes.len() as i64);
-            if !fits {
-                return Err(Error::LumpOutsideFile {
-                    lump,
-                    offset,
-                    length,
-                    file_length: bytes.len(),
-                });
-            }
-            reader.directory.push(LumpRange { offset, length });
+            let range = LumpRange::read(&mut fields, lump, bytes.len())?;
+            reader.directory.push(range);
         }
         reader.read()
     }
