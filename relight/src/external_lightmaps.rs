@@ -74,6 +74,7 @@ pub fn external_lightmaps(
 mod tests {
     use super::*;
     use crate::files::MemoryFiles;
+    use crate::image::tests::rgb_tga;
     use glam::Vec3;
     use q3bsp::builder::MapBuilder;
 
@@ -89,20 +90,12 @@ mod tests {
         Bsp::parse(&bsp.write()).unwrap()
     }
 
-    fn tga(side: u8, bytes: &[u8]) -> Vec<u8> {
-        let mut out = vec![
-            0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, side, 0, side, 0, 24, 0x20,
-        ];
-        out.extend_from_slice(bytes);
-        out
-    }
-
     #[test]
     fn surfaces_get_their_pages_back() {
         let mut files = MemoryFiles::new();
         for (number, value) in [(0, 10), (1, 20)] {
             let path = format!("maps/room/lm_{number:04}.tga");
-            files.insert(&path, tga(4, &[value; 48])).unwrap();
+            files.insert(&path, rgb_tga(4, 4, &[value; 48])).unwrap();
         }
         let mut bsp = map();
         assert_eq!(bsp.surfaces[1].lightmap, -3);
@@ -118,10 +111,10 @@ mod tests {
     fn pages_of_other_sizes_are_refused_and_nothing_changes() {
         let mut files = MemoryFiles::new();
         files
-            .insert("maps/room/lm_0000.tga", tga(4, &[1; 48]))
+            .insert("maps/room/lm_0000.tga", rgb_tga(4, 4, &[1; 48]))
             .unwrap();
         files
-            .insert("maps/room/lm_0001.tga", tga(2, &[1; 12]))
+            .insert("maps/room/lm_0001.tga", rgb_tga(2, 2, &[1; 12]))
             .unwrap();
         let mut bsp = map();
         assert!(external_lightmaps(&mut bsp, &files, "maps/room.bsp").is_err());

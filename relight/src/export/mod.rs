@@ -307,3 +307,15 @@ pub fn export(
         .extend(source.world.warnings.iter().cloned());
     Ok(report)
 }
+
+/// A map without game files, for tests.
+#[cfg(test)]
+fn uncalibrated(bsp: q3bsp::Bsp) -> RelitWorld {
+    let files = crate::MemoryFiles::new();
+    let (materials, _) = Materials::load(&files);
+    let options = crate::Options {
+        calibrate: None,
+        ..crate::Options::default()
+    };
+    RelitWorld::from_bsp(&files, &materials, "maps/t.bsp", bsp, options)
+}

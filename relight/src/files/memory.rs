@@ -1,6 +1,6 @@
 //! Game files in memory, for tests and for made-up games.
 
-use super::{FileError, GameFiles, below, has_extension, normalise, normalise_dir};
+use super::{FileError, GameFiles, listed, normalise};
 use std::collections::HashMap;
 
 /// Files held in memory; listed in the order in which they were first inserted.
@@ -48,15 +48,7 @@ impl GameFiles for MemoryFiles {
     }
 
     fn list(&self, dir: &str, extension: &str) -> Vec<String> {
-        let Some(dir) = normalise_dir(dir) else {
-            return Vec::new();
-        };
-        let names = self.files.iter().filter_map(|(path, _)| {
-            let canonical = path.to_ascii_lowercase();
-            let name = below(path, &canonical, &dir)?;
-            has_extension(name, extension).then(|| name.to_owned())
-        });
-        names.collect()
+        listed(self.files.iter().map(|(path, _)| path), dir, extension)
     }
 
     fn exists(&self, path: &str) -> bool {

@@ -184,6 +184,18 @@ fn below<'a>(path: &'a str, canonical: &str, dir: &str) -> Option<&'a str> {
     (rest.matches('/').count() <= PACK_LIST_DEPTH).then_some(rest)
 }
 
+/// [`GameFiles::list`] of a pack with these paths.
+fn listed<'a>(paths: impl Iterator<Item = &'a String>, dir: &str, extension: &str) -> Vec<String> {
+    let Some(dir) = normalise_dir(dir) else {
+        return Vec::new();
+    };
+    let names = paths.filter_map(|path| {
+        let name = below(path, &path.to_ascii_lowercase(), &dir)?;
+        has_extension(name, extension).then(|| name.to_owned())
+    });
+    names.collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,7 +1,7 @@
 //! PAK, the archives of Quake, GoldSrc and Quake II: files one after the other, nothing compressed, a directory of
 //! entries of 64 bytes.
 
-use super::{FileError, GameFiles, MAX_FILE_BYTES, below, has_extension, normalise, normalise_dir};
+use super::{FileError, GameFiles, MAX_FILE_BYTES, listed, normalise};
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -126,14 +126,7 @@ impl GameFiles for Pak {
     }
 
     fn list(&self, dir: &str, extension: &str) -> Vec<String> {
-        let Some(dir) = normalise_dir(dir) else {
-            return Vec::new();
-        };
-        let names = self.entries.iter().filter_map(|(path, ..)| {
-            let name = below(path, &path.to_ascii_lowercase(), &dir)?;
-            has_extension(name, extension).then(|| name.to_owned())
-        });
-        names.collect()
+        listed(self.entries.iter().map(|(path, ..)| path), dir, extension)
     }
 
     fn exists(&self, path: &str) -> bool {

@@ -1,6 +1,6 @@
 //! One `.pk3`: a zip archive of game files.
 
-use super::{FileError, GameFiles, MAX_FILE_BYTES, below, has_extension, normalise, normalise_dir};
+use super::{FileError, GameFiles, MAX_FILE_BYTES, listed, normalise};
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -118,15 +118,7 @@ impl GameFiles for Pk3 {
     }
 
     fn list(&self, dir: &str, extension: &str) -> Vec<String> {
-        let Some(dir) = normalise_dir(dir) else {
-            return Vec::new();
-        };
-        let names = self.entries.iter().filter_map(|(path, _)| {
-            let canonical = path.to_ascii_lowercase();
-            let name = below(path, &canonical, &dir)?;
-            has_extension(name, extension).then(|| name.to_owned())
-        });
-        names.collect()
+        listed(self.entries.iter().map(|(path, _)| path), dir, extension)
     }
 
     fn exists(&self, path: &str) -> bool {

@@ -108,13 +108,18 @@ impl Image {
         if pixels == 0 || pixels > MAX_PIXELS || rgba.len() as u64 != pixels * 4 {
             return None;
         }
+        Some(Image::of(width, height, rgba))
+    }
+
+    /// A picture from as many pixels as its size has.
+    fn of(width: u32, height: u32, rgba: Vec<u8>) -> Image {
         let has_alpha = rgba.chunks_exact(4).any(|p| p.get(3) != Some(&255));
-        Some(Image {
+        Image {
             width,
             height,
             rgba,
             has_alpha,
-        })
+        }
     }
 
     /// A picture of one colour, 1 × 1.
@@ -427,4 +432,4 @@ fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

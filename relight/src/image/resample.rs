@@ -33,29 +33,14 @@ impl Image {
             (0..new).map(|i| [tap(i, 1), tap(i, 3)]).collect()
         };
         let (columns, rows) = (taps(self.width, width), taps(self.height, height));
-        let texels = self.rgba.as_chunks::<4>().0;
-        let stride = self.width as usize;
         let mut rgba = Vec::with_capacity(columns.len() * rows.len() * 4);
         for [upper, lower] in rows {
             for &[left, right] in &columns {
                 let taps = [(upper, left), (upper, right), (lower, left), (lower, right)];
-                let mut sum = [0u16; 4];
-                for (y, x) in taps {
-                    let texel = texels.get(y * stride + x).copied().unwrap_or_default();
-                    for (sum, byte) in sum.iter_mut().zip(texel) {
-                        *sum += u16::from(byte);
-                    }
-                }
-                rgba.extend(sum.map(|s| (s >> 2) as u8));
+                rgba.extend(self.mean(taps));
             }
         }
-        let has_alpha = rgba.chunks_exact(4).any(|p| p.get(3) != Some(&255));
-        Image {
-            width,
-            height,
-            rgba,
-            has_alpha,
-        }
+        Image::of(width, height, rgba)
     }
 
     /// The next smaller level of the mip chain: a 2 × 2 box filter on encoded values, rounding down,
@@ -64,29 +49,28 @@ impl Image {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
         let dx = usize::from(self.width > 1);
         let dy = usize::from(self.height > 1);
-        let texels = self.rgba.as_chunks::<4>().0;
-        let stride = self.width as usize;
         let mut rgba = Vec::with_capacity(width as usize * height as usize * 4);
         for y in 0..height as usize {
             for x in 0..width as usize {
                 let (x0, y0) = (x * (1 + dx), y * (1 + dy));
-                let mut sum = [0u16; 4];
-                for (ty, tx) in [(y0, x0), (y0, x0 + dx), (y0 + dy, x0), (y0 + dy, x0 + dx)] {
-                    let texel = texels.get(ty * stride + tx).copied().unwrap_or_default();
-                    for (sum, byte) in sum.iter_mut().zip(texel) {
-                        *sum += u16::from(byte);
-                    }
-                }
-                rgba.extend(sum.map(|s| (s >> 2) as u8));
+                let (x1, y1) = (x0 + dx, y0 + dy);
+                rgba.extend(self.mean([(y0, x0), (y0, x1), (y1, x0), (y1, x1)]));
             }
         }
-        let has_alpha = rgba.chunks_exact(4).any(|p| p.get(3) != Some(&255));
-        Image {
-            width,
-            height,
-            rgba,
-            has_alpha,
+        Image::of(width, height, rgba)
+    }
+
+    /// Mean of four texels (row, column), rounded down.
+    fn mean(&self, taps: [(usize, usize); 4]) -> [u8; 4] {
+        let texels = self.rgba.as_chunks::<4>().0;
+        let mut sum = [0u16; 4];
+        for (y, x) in taps {
+            let texel = texels.get(y * self.width as usize + x);
+            for (sum, byte) in sum.iter_mut().zip(texel.copied().unwrap_or_default()) {
+                *sum += u16::from(byte);
+            }
         }
+        sum.map(|s| (s >> 2) as u8)
     }
 
     /// The picture and all its smaller levels, down to 1 × 1.

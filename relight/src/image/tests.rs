@@ -21,6 +21,11 @@ fn encode(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
     bytes.into_inner()
 }
 
+/// A TGA of 24 bits, first row first.
+pub(crate) fn rgb_tga(width: u16, height: u16, body: &[u8]) -> Vec<u8> {
+    tga(2, width, height, 24, 0x20, body)
+}
+
 fn tga(kind: u8, width: u16, height: u16, bits: u8, descriptor: u8, body: &[u8]) -> Vec<u8> {
     let mut bytes = vec![0, 0, kind, 0, 0, 0, 0, 0, 0, 0, 0, 0];
     bytes.extend(width.to_le_bytes());

@@ -115,23 +115,16 @@ fn square(image: &Image) -> Lightmap {
 mod tests {
     use super::*;
     use crate::files::MemoryFiles;
+    use crate::image::tests::rgb_tga;
     use glam::Vec2;
     use shaderscript::eval;
     use shaderscript::parse_script;
-
-    fn tga(width: u8, height: u8, bytes: &[u8]) -> Vec<u8> {
-        let mut out = vec![
-            0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, width, 0, height, 0, 24, 0x20,
-        ];
-        out.extend_from_slice(bytes);
-        out
-    }
 
     #[test]
     fn light_leaves_the_stages_and_keeps_its_place() {
         let mut files = MemoryFiles::new();
         files
-            .insert("maps/m/lm_0000.tga", tga(2, 1, &[1, 2, 3, 4, 5, 6]))
+            .insert("maps/m/lm_0000.tga", rgb_tga(2, 1, &[1, 2, 3, 4, 5, 6]))
             .unwrap();
         let script = "t\n{\n{\nmap maps/m/LM_0000.tga\ntcGen lightmap\n}\n\
             {\nmap $lightmap\nblendFunc add\nrgbGen wave square 0.5 0.5 0 1\ntcMod transform 1 0 0 1 0.5 0\n}\n\

@@ -1,21 +1,12 @@
 //! Maps to JSON and back.
 
 use super::*;
-use crate::files::{GameFiles, MemoryFiles};
-use crate::{Materials, Options, SearchPath, sample};
+use crate::export::uncalibrated as world;
+use crate::files::GameFiles;
+use crate::{SearchPath, sample};
 use proptest::prelude::*;
 use q3bsp::builder::MapBuilder;
 use q3bsp::{DrawVert, Format, GridLayers, GridPoint, SurfaceLayers, VertexLayers};
-
-fn world(bsp: Bsp) -> RelitWorld {
-    let files = MemoryFiles::new();
-    let (materials, _) = Materials::load(&files);
-    let options = Options {
-        calibrate: None,
-        ..Options::default()
-    };
-    RelitWorld::from_bsp(&files, &materials, "maps/t.bsp", bsp, options)
-}
 
 /// A small map with something in every list.
 fn map() -> Bsp {

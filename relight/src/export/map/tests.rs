@@ -1,7 +1,7 @@
 //! Maps as map files, read back by a parser that nobody here wrote.
 
 use super::*;
-use crate::export::{ExportOptions, ImageStore};
+use crate::export::{ExportOptions, ImageStore, uncalibrated as world};
 use crate::files::MemoryFiles;
 use crate::{Materials, Options, RelitWorld, SearchPath};
 use glam::Vec2;
@@ -21,16 +21,6 @@ fn written(world: &RelitWorld, files: &dyn crate::GameFiles) -> (String, Tally) 
             ..ExportOptions::default()
         },
     })
-}
-
-fn world(bsp: Bsp) -> RelitWorld {
-    let files = MemoryFiles::new();
-    let (materials, _) = Materials::load(&files);
-    let options = Options {
-        calibrate: None,
-        ..Options::default()
-    };
-    RelitWorld::from_bsp(&files, &materials, "maps/t.bsp", bsp, options)
 }
 
 /// A box brush with one drawn side, a patch, and a door with an origin.

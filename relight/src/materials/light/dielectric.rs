@@ -137,15 +137,7 @@ fn is_lit_reflection(shader: &Shader, index: usize, vertex_light: bool) -> bool 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shaderscript::parse_script;
-
-    fn shader(body: &str) -> Shader {
-        parse_script("test", format!("t\n{{\n{body}\n}}\n").as_bytes())
-            .shaders
-            .into_iter()
-            .next()
-            .unwrap()
-    }
+    use crate::materials::light::tests::shader;
 
     #[test]
     fn indices_are_those_of_the_kind() {

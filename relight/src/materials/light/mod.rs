@@ -200,7 +200,7 @@ mod tests {
     use glam::Vec3;
     use shaderscript::parse_script;
 
-    fn shader(body: &str) -> Shader {
+    pub(super) fn shader(body: &str) -> Shader {
         parse_script("test", format!("t\n{{\n{body}\n}}\n").as_bytes())
             .shaders
             .into_iter()
