@@ -5,15 +5,13 @@ use crate::files::{GameFiles, MemoryFiles};
 use crate::image;
 use q3bsp::Bsp;
 use q3bsp::quake::EmbeddedTexture;
+use shaderscript::Sky;
 
 /// Game path of Quake's palette.
 const PALETTE: &str = "gfx/palette.lmp";
 
 /// Game path of the script made for a map.
 const SCRIPT: &str = "scripts/of_the_map.shader";
-
-/// Suffixes of the sides of a sky box: in Quake's formats the picture's name ends in them directly, here after `_`.
-const SKY_SIDES: [&str; 6] = ["rt", "bk", "lf", "ft", "up", "dn"];
 
 /// Quake's sky: half of the picture drifts behind the other half.
 const SKY_HOLE: u8 = 0;
@@ -42,7 +40,7 @@ pub fn map_files(bsp: &Bsp, game: &dyn GameFiles) -> Option<(MemoryFiles, Vec<St
         }
     }
     for sky in bsp.texture_uses.iter().filter_map(|t| t.sky_box.as_ref()) {
-        for side in SKY_SIDES {
+        for side in Sky::SIDES {
             let wanted = format!("{sky}_{side}");
             if image::find(game, &wanted).is_some() {
                 continue;

@@ -241,6 +241,24 @@ pub struct Sky {
     pub inner: Option<String>,
 }
 
+impl Sky {
+    /// Sides of a box by the suffixes of their images, without the `_`.
+    pub const SIDES: [&str; 6] = ["rt", "bk", "lf", "ft", "up", "dn"];
+
+    /// The point of a side of the cube [-1, 1]³ at `s` (right) and `t` (up) of its image, both in [-1, 1] and seen from
+    /// inside. Sides are in the order of [`Self::SIDES`].
+    pub fn side_point(side: usize, s: f32, t: f32) -> Vec3 {
+        match side {
+            0 => Vec3::new(1.0, -s, t),
+            1 => Vec3::new(s, 1.0, t),
+            2 => Vec3::new(-1.0, s, t),
+            3 => Vec3::new(-s, -1.0, t),
+            4 => Vec3::new(-t, -s, 1.0),
+            _ => Vec3::new(t, -s, -1.0),
+        }
+    }
+}
+
 /// `fogParms`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

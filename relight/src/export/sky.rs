@@ -13,26 +13,12 @@ use crate::overbright::{self, ByteEncoder};
 use crate::world::WorldMaterial;
 use glam::{Vec2, Vec3, Vec4};
 use shaderscript::eval;
-use shaderscript::{Shader, StageImage};
+use shaderscript::{Shader, Sky, StageImage};
 
-/// Suffixes of the images of the sides, in the order of [`point`].
-const SIDES: [&str; 6] = ["rt", "bk", "lf", "ft", "up", "dn"];
 /// Side of the pictures of skies with clouds.
 const SIZE: u32 = 512;
 /// Radius of the planet under the clouds, id units.
 const PLANET: f32 = 4096.0;
-
-/// The point of side `side` of the cube [-1, 1]³ at `s` (right) and `t` (up) in [-1, 1], seen from inside.
-pub fn point(side: usize, s: f32, t: f32) -> Vec3 {
-    match side {
-        0 => Vec3::new(1.0, -s, t),
-        1 => Vec3::new(s, 1.0, t),
-        2 => Vec3::new(-1.0, s, t),
-        3 => Vec3::new(-s, -1.0, t),
-        4 => Vec3::new(-t, -s, 1.0),
-        _ => Vec3::new(t, -s, -1.0),
-    }
-}
 
 /// What is seen on a side of the box; `None` where nothing is.
 pub fn picture(files: &dyn GameFiles, material: &WorldMaterial, side: usize) -> Option<Picture> {
@@ -59,7 +45,7 @@ pub fn definition(material: &WorldMaterial) -> &Shader {
 
 fn outer(shader: &Shader, side: usize) -> Option<String> {
     let outer = shader.sky.as_ref()?.outer.as_ref()?;
-    Some(format!("{outer}_{}", SIDES.get(side)?))
+    Some(format!("{outer}_{}", Sky::SIDES.get(side)?))
 }
 
 /// Coordinates on the cloud layer in a direction, clouds `height` above the ground: where the direction meets a
@@ -94,7 +80,7 @@ pub fn bake(files: &dyn GameFiles, shader: &Shader, side: usize) -> Option<Image
             let behind = outer
                 .as_ref()
                 .map_or(Vec4::ZERO, |image| texel(image, Vec2::new(u, v), &table));
-            let direction = point(side, u * 2.0 - 1.0, 1.0 - v * 2.0);
+            let direction = Sky::side_point(side, u * 2.0 - 1.0, 1.0 - v * 2.0);
             let mut color = behind.truncate();
             // The clouds' dome has no floor.
             if side != 5 {
@@ -141,12 +127,12 @@ fn side_of(direction: Vec3) -> (usize, Vec2) {
     let mut found = (0, Vec2::splat(0.5));
     let mut nearest = 0.0;
     for side in 0..6 {
-        let middle = point(side, 0.0, 0.0);
+        let middle = Sky::side_point(side, 0.0, 0.0);
         let depth = direction.dot(middle);
         if depth > nearest {
             nearest = depth;
-            let right = point(side, 1.0, 0.0) - middle;
-            let up = point(side, 0.0, 1.0) - middle;
+            let right = Sky::side_point(side, 1.0, 0.0) - middle;
+            let up = Sky::side_point(side, 0.0, 1.0) - middle;
             let (s, t) = (direction.dot(right) / depth, direction.dot(up) / depth);
             found = (side, Vec2::new((s + 1.0) * 0.5, (1.0 - t) * 0.5));
         }
@@ -193,14 +179,21 @@ mod tests {
     fn sides_meet_and_look_inward() {
         // the right edge of a side is the left edge of the next, going round to the right
         for (side, next) in [(0, 3), (3, 2), (2, 1), (1, 0)] {
-            assert_eq!(point(side, 1.0, 0.5), point(next, -1.0, 0.5), "{side}");
+            assert_eq!(
+                Sky::side_point(side, 1.0, 0.5),
+                Sky::side_point(next, -1.0, 0.5),
+                "{side}"
+            );
         }
-        assert_eq!(point(0, 0.0, 1.0), point(4, 0.0, -1.0));
+        assert_eq!(Sky::side_point(0, 0.0, 1.0), Sky::side_point(4, 0.0, -1.0));
         for side in 0..6 {
-            let right = point(side, 1.0, 0.0) - point(side, -1.0, 0.0);
-            let up = point(side, 0.0, 1.0) - point(side, 0.0, -1.0);
+            let right = Sky::side_point(side, 1.0, 0.0) - Sky::side_point(side, -1.0, 0.0);
+            let up = Sky::side_point(side, 0.0, 1.0) - Sky::side_point(side, 0.0, -1.0);
             // right × up points to the viewer in the middle
-            assert!(right.cross(up).dot(point(side, 0.0, 0.0)) < 0.0, "{side}");
+            assert!(
+                right.cross(up).dot(Sky::side_point(side, 0.0, 0.0)) < 0.0,
+                "{side}"
+            );
         }
     }
 
@@ -214,7 +207,7 @@ mod tests {
     fn places_of_the_picture_all_round_are_on_the_side_that_shows_them() {
         for side in 0..6 {
             for (s, t) in [(0.0, 0.0), (0.5, -0.25), (-0.7, 0.9)] {
-                let (found, place) = side_of(point(side, s, t).normalize());
+                let (found, place) = side_of(Sky::side_point(side, s, t).normalize());
                 assert_eq!(found, side);
                 let want = Vec2::new((s + 1.0) * 0.5, (1.0 - t) * 0.5);
                 assert!((place - want).length() < 1.0e-5, "{side} {place} {want}");

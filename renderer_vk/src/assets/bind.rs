@@ -1,13 +1,10 @@
 //! Parts of a material: its own stages, sky sides and drawing passes.
 
-use shaderscript::Shader;
+use shaderscript::{Shader, Sky};
 
 use super::compile;
 use super::material::{Combine, RasterPass};
 use super::source::{ImageFlags, ImageSource};
-
-/// Suffixes of a sky box's sides, in the order of [`SkyBox::faces`](super::SkyBox::faces).
-const SKY_SIDES: [&str; 6] = ["rt", "bk", "lf", "ft", "up", "dn"];
 
 /// A material of one white stage, changed by `edit`.
 pub(super) fn internal_shader(name: &str, edit: impl FnOnce(&mut shaderscript::Stage)) -> Shader {
@@ -26,7 +23,7 @@ pub(super) fn sky_faces(outer: &str, source: &mut dyn ImageSource) -> Option<[u3
         picmip: true,
         clamp: true,
     };
-    let faces = SKY_SIDES.map(|side| {
+    let faces = Sky::SIDES.map(|side| {
         source
             .image(&format!("{outer}_{side}.tga"), flags)
             .map(|(index, _)| index)

@@ -5,8 +5,9 @@
 
 use glam::{Vec2, Vec3};
 use shaders::types::Vertex;
+use shaderscript::Sky;
 
-use crate::scene::{Cells, SKY_CELLS, SUN_SIZE, View, cube_point, perpendicular};
+use crate::scene::{Cells, SKY_CELLS, SUN_SIZE, View, perpendicular};
 
 /// Radius of the planet under the clouds, units.
 const PLANET_RADIUS: f32 = 4096.0;
@@ -54,7 +55,7 @@ impl Mesh<'_> {
             for column in cells.from[0]..=cells.to[0] {
                 let s = column as f32 / SKY_CELLS as f32 * 2.0 - 1.0;
                 let t = row as f32 / SKY_CELLS as f32 * 2.0 - 1.0;
-                let point = cube_point(face, s, t);
+                let point = Sky::side_point(face, s, t);
                 let st = match coordinates {
                     Coordinates::Box => Vec2::new((s + 1.0) * 0.5, 1.0 - (t + 1.0) * 0.5),
                     Coordinates::Clouds(height) => cloud_coordinates(point, height),

@@ -42,7 +42,7 @@ pub use flares::ViewFlare;
 pub use rigid::{MeshId, RigidMesh, Shape};
 pub use shadow_volumes::ShadowVolumes;
 pub(crate) use shapes::perpendicular;
-pub use sky::{CELLS as SKY_CELLS, Cells, FACES as SKY_FACES, SkyCoverage, VisibleSky, cube_point};
+pub use sky::{CELLS as SKY_CELLS, Cells, FACES as SKY_FACES, SkyCoverage, VisibleSky};
 pub use statistics::Statistics;
 pub use view::View;
 

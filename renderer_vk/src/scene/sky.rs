@@ -14,19 +14,7 @@ const SMALLEST_SHARE: f32 = 1e-6;
 /// What lies nearer to the plane of the eye than this covers nothing, units.
 const NEAREST: f32 = 0.001;
 
-/// The point of face `face` of the cube [-1, 1]³ at texture parameters `s`, `t` in [-1, 1].
-pub fn cube_point(face: usize, s: f32, t: f32) -> Vec3 {
-    match face {
-        0 => Vec3::new(1.0, -s, t),
-        1 => Vec3::new(s, 1.0, t),
-        2 => Vec3::new(-1.0, s, t),
-        3 => Vec3::new(-s, -1.0, t),
-        4 => Vec3::new(-t, -s, 1.0),
-        _ => Vec3::new(t, -s, -1.0),
-    }
-}
-
-/// The inverse: a direction as `(s, t)` of a face, both times the depth towards it, and that depth.
+/// The inverse of [`shaderscript::Sky::side_point`]: a direction as `(s, t)` of a face, both times the depth towards it, and that depth.
 fn face_point(face: usize, p: Vec3) -> Vec3 {
     match face {
         0 => Vec3::new(-p.y, p.z, p.x),
@@ -178,11 +166,12 @@ impl Polygon {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use shaderscript::Sky;
 
     #[test]
     fn faces_lie_on_the_cube_and_go_back() {
         for face in 0..FACES {
-            let p = cube_point(face, 0.25, -0.5);
+            let p = Sky::side_point(face, 0.25, -0.5);
             assert_eq!(p.abs().max_element(), 1.0, "face {face}: {p}");
             assert_eq!(face_point(face, p), Vec3::new(0.25, -0.5, 1.0));
         }
@@ -222,7 +211,7 @@ mod tests {
         // two walls of a cube around the eye touch the ceiling with an edge each, whose box is all of the ceiling
         let mut coverage = SkyCoverage::EMPTY;
         for face in [0, 1] {
-            let at = |s: f32, t: f32| cube_point(face, s, t) * 256.0;
+            let at = |s: f32, t: f32| Sky::side_point(face, s, t) * 256.0;
             coverage.add([at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0)]);
             coverage.add([at(-1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)]);
         }

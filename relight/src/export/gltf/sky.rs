@@ -95,9 +95,10 @@ impl Document<'_> {
                 continue;
             }
             let corners = [(-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (1.0, 1.0)];
-            let positions =
-                corners.map(|(s, t)| turn(middle + sky::point(side, s, t) * radius) * scale);
-            let normal = turn(-sky::point(side, 0.0, 0.0));
+            let positions = corners.map(|(s, t)| {
+                turn(middle + shaderscript::Sky::side_point(side, s, t) * radius) * scale
+            });
+            let normal = turn(-shaderscript::Sky::side_point(side, 0.0, 0.0));
             primitives.push(quad(&mut self.buffers, positions, normal, number));
         }
         self.meshes
