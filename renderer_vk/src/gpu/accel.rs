@@ -276,16 +276,8 @@ fn plan(builds: &mut [BlasBuild<'_>]) -> Result<Vec<Planned>, Error> {
             .flags(flags)
             .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
             .geometries(&geometries);
-        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
         // SAFETY: one count for each geometry.
-        unsafe {
-            functions.get_acceleration_structure_build_sizes(
-                vk::AccelerationStructureBuildTypeKHR::DEVICE,
-                &info,
-                &counts,
-                &mut sizes,
-            );
-        }
+        let sizes = unsafe { build_sizes(functions, &info, &counts) };
         let refit = build.refit && build.blas.flags.refit && build.blas.built == counts;
         if !refit && build.blas.size() < sizes.acceleration_structure_size {
             // A structure that is built anew each frame with varying triangles should not be made anew each time.
@@ -328,6 +320,24 @@ fn plan(builds: &mut [BlasBuild<'_>]) -> Result<Vec<Planned>, Error> {
         });
     }
     Ok(planned)
+}
+
+/// Sizes of a structure and of the scratch memory of its build.
+///
+/// # Safety
+/// `counts` has one for each geometry of `info`.
+pub(super) unsafe fn build_sizes(
+    functions: &ash::khr::acceleration_structure::Device,
+    info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
+    counts: &[u32],
+) -> vk::AccelerationStructureBuildSizesInfoKHR<'static> {
+    let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+    let on_device = vk::AccelerationStructureBuildTypeKHR::DEVICE;
+    // SAFETY: as the caller promises.
+    unsafe {
+        functions.get_acceleration_structure_build_sizes(on_device, info, counts, &mut sizes);
+    }
+    sizes
 }
 
 pub(super) fn scratch_alignment(device: &Device) -> u64 {

@@ -3,7 +3,7 @@
 use ash::vk;
 
 use super::buffer::Buffer;
-use super::image::{Image, whole};
+use super::image::{Image, layout_change, rectangle, whole};
 use super::pass::Pass;
 
 /// Level 0 of an image's first layer.
@@ -71,28 +71,7 @@ impl Pass<'_> {
         if from == to {
             return;
         }
-        let barrier = vk::ImageMemoryBarrier::default()
-            .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
-            .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)
-            .old_layout(from)
-            .new_layout(to)
-            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .image(image.0.raw)
-            .subresource_range(whole(image.0.aspect));
-        let all = vk::PipelineStageFlags::ALL_COMMANDS;
-        // SAFETY: recording, outside of a render pass; `from` is the layout that the image has.
-        unsafe {
-            self.vk().cmd_pipeline_barrier(
-                self.cmd(),
-                all,
-                all,
-                vk::DependencyFlags::empty(),
-                &[],
-                &[],
-                &[barrier],
-            );
-        }
+        self.record_barrier(&[], &[layout_change(image.0.raw, image.0.aspect, from, to)]);
     }
 
     /// Runs a copy with an image in a layout that allows it.
@@ -285,19 +264,12 @@ impl Pass<'_> {
             self.refuse("a read-back outside of the image or the buffer");
             return;
         }
+        let (image_offset, image_extent) = rectangle([x, y, width, height]);
         let region = vk::BufferImageCopy {
             buffer_offset: offset,
             image_subresource: first_level(source),
-            image_offset: vk::Offset3D {
-                x: x.cast_signed(),
-                y: y.cast_signed(),
-                z: 0,
-            },
-            image_extent: vk::Extent3D {
-                width,
-                height,
-                depth: 1,
-            },
+            image_offset,
+            image_extent,
             ..Default::default()
         };
         self.with_layout(

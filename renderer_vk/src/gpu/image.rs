@@ -219,6 +219,35 @@ pub(crate) fn whole(aspect: vk::ImageAspectFlags) -> vk::ImageSubresourceRange {
     }
 }
 
+/// Corner and size of a rectangle (x, y, width, height), for copies.
+pub(crate) fn rectangle([x, y, width, height]: [u32; 4]) -> (vk::Offset3D, vk::Extent3D) {
+    let (x, y) = (x.cast_signed(), y.cast_signed());
+    let size = vk::Extent3D {
+        width,
+        height,
+        depth: 1,
+    };
+    (vk::Offset3D { x, y, z: 0 }, size)
+}
+
+/// A change of layout of a whole image, between all writes before and all accesses after.
+pub(crate) fn layout_change(
+    image: vk::Image,
+    aspect: vk::ImageAspectFlags,
+    from: vk::ImageLayout,
+    to: vk::ImageLayout,
+) -> vk::ImageMemoryBarrier<'static> {
+    vk::ImageMemoryBarrier::default()
+        .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
+        .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)
+        .old_layout(from)
+        .new_layout(to)
+        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .image(image)
+        .subresource_range(whole(aspect))
+}
+
 impl Image {
     /// Makes an image; its contents are undefined until written.
     ///

@@ -140,20 +140,24 @@ impl<'a> Pass<'a> {
         let memory = [vk::MemoryBarrier::default()
             .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
             .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)];
+        self.record_barrier(&memory, &[]);
+    }
+
+    /// Waits outside of a render pass; images have the layouts that their barriers begin with.
+    pub(crate) fn record_barrier(
+        &self,
+        memory: &[vk::MemoryBarrier<'_>],
+        images: &[vk::ImageMemoryBarrier<'_>],
+    ) {
         let all = vk::PipelineStageFlags::ALL_COMMANDS;
-        // SAFETY: recording, outside of a render pass.
+        let none = vk::DependencyFlags::empty();
+        // SAFETY: recording, outside of a render pass; the callers see to layouts.
         unsafe {
-            self.vk().cmd_pipeline_barrier(
-                self.cmd(),
-                all,
-                all,
-                vk::DependencyFlags::empty(),
-                &memory,
-                &[],
-                &[],
-            );
+            self.vk()
+                .cmd_pipeline_barrier(self.cmd(), all, all, none, memory, &[], images);
         }
     }
+
     /// Launches workgroups.
     pub fn dispatch(&mut self, x: u32, y: u32, z: u32) {
         self.end_rendering();

@@ -5,7 +5,7 @@ use ash::vk;
 use super::device::{Device, lock};
 use super::error::{Context, Error};
 use super::graveyard::Garbage;
-use super::image::{Format, Image, whole};
+use super::image::{Format, Image, layout_change};
 use super::recorder::{Acquired, Recorder};
 
 /// Nanoseconds that an image is waited for. Window systems hold images back while a window is not on the screen; the
@@ -225,15 +225,7 @@ impl Swapchain {
         from: vk::ImageLayout,
         to: vk::ImageLayout,
     ) {
-        let barrier = vk::ImageMemoryBarrier::default()
-            .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
-            .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)
-            .old_layout(from)
-            .new_layout(to)
-            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .image(image.0.raw)
-            .subresource_range(whole(vk::ImageAspectFlags::COLOR));
+        let barrier = layout_change(image.0.raw, vk::ImageAspectFlags::COLOR, from, to);
         // The stages that the wait for the acquisition has too, so that this comes after it.
         let stages =
             vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT | vk::PipelineStageFlags::TRANSFER;

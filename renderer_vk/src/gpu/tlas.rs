@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use super::accel::{Storage, functions, scratch_alignment};
+use super::accel::{Storage, build_sizes, functions, scratch_alignment};
 use super::device::Device;
 use super::error::Error;
 use super::graveyard::Garbage;
@@ -187,16 +187,8 @@ impl Pass<'_> {
             .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)
             .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
             .geometries(&geometries);
-        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
         // SAFETY: one count for the one geometry.
-        unsafe {
-            functions.get_acceleration_structure_build_sizes(
-                vk::AccelerationStructureBuildTypeKHR::DEVICE,
-                &info,
-                &[count],
-                &mut sizes,
-            );
-        }
+        let sizes = unsafe { build_sizes(functions, &info, &[count]) };
         tlas.reserve(&device, sizes.acceleration_structure_size)?;
         let align = scratch_alignment(&device);
         let scratch = self.recorder().scratch(sizes.build_scratch_size + align)?;

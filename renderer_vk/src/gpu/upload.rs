@@ -13,7 +13,7 @@ use super::buffer::{Buffer, BufferDesc, BufferUsage, Memory};
 use super::device::{Device, DeviceInner, lock};
 use super::error::Error;
 use super::graveyard::Garbage;
-use super::image::{Image, whole};
+use super::image::{Image, layout_change, rectangle};
 
 /// Size of a staging buffer; larger data get one of their own size.
 const CHUNK: u64 = 4 << 20;
@@ -44,15 +44,7 @@ impl Target {
         from: vk::ImageLayout,
         to: vk::ImageLayout,
     ) -> vk::ImageMemoryBarrier<'static> {
-        vk::ImageMemoryBarrier::default()
-            .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
-            .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)
-            .old_layout(from)
-            .new_layout(to)
-            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .image(self.image)
-            .subresource_range(whole(self.aspect))
+        layout_change(self.image, self.aspect, from, to)
     }
 }
 
@@ -427,6 +419,7 @@ impl Device {
         let mut pending = lock(&self.0.pending);
         let (source, start) = pending.stage(self, bytes)?;
         pending.targets.insert(target.0.raw, Target::of(target));
+        let (image_offset, image_extent) = rectangle([x, y, width, height]);
         pending.copies.push(Copy::Image {
             source,
             target: target.0.raw,
@@ -440,16 +433,8 @@ impl Device {
                     base_array_layer: layer,
                     layer_count: 1,
                 },
-                image_offset: vk::Offset3D {
-                    x: x.cast_signed(),
-                    y: y.cast_signed(),
-                    z: 0,
-                },
-                image_extent: vk::Extent3D {
-                    width,
-                    height,
-                    depth: 1,
-                },
+                image_offset,
+                image_extent,
             },
         });
         self.flush_when_full(pending)

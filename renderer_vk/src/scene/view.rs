@@ -133,17 +133,19 @@ mod tests {
         c.truncate() / c.w
     }
 
+    /// A view of 90 degrees across and down.
+    fn square() -> View {
+        let def = RefDef {
+            fov_x: 90.0,
+            fov_y: 90.0,
+            ..RefDef::default()
+        };
+        View::new(&def, 4.0, 1000.0)
+    }
+
     #[test]
     fn forward_is_the_middle_and_up_is_up() {
-        let view = View::new(
-            &RefDef {
-                fov_x: 90.0,
-                fov_y: 90.0,
-                ..RefDef::default()
-            },
-            4.0,
-            1000.0,
-        );
+        let view = square();
         let middle = clip(&view, Vec3::new(4.0, 0.0, 0.0));
         assert!(middle.abs_diff_eq(Vec3::ZERO, 1e-5), "{middle}");
         let far = clip(&view, Vec3::new(1000.0, 0.0, 0.0));
@@ -155,15 +157,7 @@ mod tests {
 
     #[test]
     fn the_eyes_pictures_meet_at_their_distance() {
-        let mut view = View::new(
-            &RefDef {
-                fov_x: 90.0,
-                fov_y: 90.0,
-                ..RefDef::default()
-            },
-            4.0,
-            1000.0,
-        );
+        let mut view = square();
         let middle = clip(&view, Vec3::new(64.0, 20.0, 0.0));
         view.stereo = Stereo {
             slope: 1.0 / 64.0,
