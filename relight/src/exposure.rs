@@ -28,18 +28,19 @@ const DEFAULT: f32 = 0.25;
 const LIMITS: (f32, f32) = (0.02, 1.0);
 /// Usual luminance of a picture, logarithmic mean, linear.
 const MIDDLE: f32 = 0.02;
-/// Smallest luminance of a pixel, stops: the end of the histogram in `exposure.glsl`.
-const DARKEST: f32 = -12.0;
-/// Parts of the darkest and brightest pixels that automatic exposure leaves out, as in `exposure.comp`.
-const DARK_PART: f32 = 0.2;
-const BRIGHT_PART: f32 = 0.05;
+/// Smallest luminance of a pixel, stops: the end of the renderer's histogram.
+pub const DARKEST: f32 = -12.0;
+/// Part of the darkest pixels that automatic exposure leaves out.
+pub const DARK_PART: f32 = 0.2;
+/// Part of the brightest pixels that automatic exposure leaves out.
+pub const BRIGHT_PART: f32 = 0.05;
 /// Bounds of an exposure from calibrated light.
 const MATCHED: (f32, f32) = (0.005, 8.0);
 /// Largest number of iterations.
 const STEPS: u32 = 32;
 /// Relative tolerance of the means.
 const NEAR: f32 = 1e-3;
-/// Knee of the tone curve, below which it is linear, as in `tonemap.comp`.
+/// Knee of the tone curve, below which it is linear.
 const KNEE: f32 = 0.6;
 
 /// Largest ratio of computed to stored light in the mean, where the stored light is not clipped. More than this is
@@ -89,8 +90,8 @@ pub(crate) struct LitSample<'a> {
     pub shades: &'a [Shade],
 }
 
-/// Tone curve of the traced look, linear output: see `tonemap.comp`.
-fn tone(x: f32) -> f32 {
+/// Tone curve of the traced look, linear output. `shaders/trace/tone_curve.glsl` has its source.
+pub fn tone_curve(x: f32) -> f32 {
     if x < KNEE {
         x
     } else {
@@ -127,7 +128,7 @@ pub(crate) fn matching<'a>(places: impl Iterator<Item = LitSample<'a>>) -> Optio
     let mean = |exposure: f32| -> f64 {
         let shown = |(own, mirrored, part): &(Vec3, Vec3, f32)| {
             let radiance = *own + *mirrored * surroundings;
-            let shown = (radiance * exposure).to_array().map(tone);
+            let shown = (radiance * exposure).to_array().map(tone_curve);
             f64::from(luminance(Vec3::from_array(shown)) * part)
         };
         traced.iter().map(shown).sum()
@@ -335,7 +336,7 @@ mod tests {
         assert!((spot / even - 2.0 / 3.0).abs() < 1e-3);
         // The tone curve takes from what is bright, which is made up for.
         let white = found(&[(0.95, 0.95, &[1.0])]).unwrap();
-        assert!((tone(white * 0.95) / shown(1.0, 0.95) - 1.0).abs() < 1e-3);
+        assert!((tone_curve(white * 0.95) / shown(1.0, 0.95) - 1.0).abs() < 1e-3);
         assert_eq!(found(&[]), None);
         assert_eq!(found(&[(0.0, 1.0, &[0.5])]), None);
         assert_eq!(found(&[(0.5, 0.0, &[0.5])]), None);

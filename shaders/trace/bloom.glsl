@@ -9,17 +9,13 @@
 
 #include "trace/picture.glsl"
 
-const uint BLOOM_LEVELS = 5;
-// Pixels to a texel of the first level.
-const int BLOOM_FIRST = 4;
-
 // Texels of all levels, then the sum of them as large as the first level; four halves each.
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer BloomTexels { uvec2 at[]; };
 
 // Texels of a level; the last row and column may lie half outside of the picture.
 ivec2 bloom_size(uint level) {
     ivec2 picture = picture_size();
-    int pixels = BLOOM_FIRST << level;
+    int pixels = int(BLOOM_FIRST << level);
     return (picture + pixels - 1) / pixels;
 }
 

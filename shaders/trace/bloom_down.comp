@@ -13,9 +13,9 @@ void main() {
     uint local = gl_LocalInvocationIndex;
     vec3 sum = vec3(0.0);
     float count = 0.0;
-    for (int y = 0; y < BLOOM_FIRST; y++) {
-        for (int x = 0; x < BLOOM_FIRST; x++) {
-            ivec2 pixel = place * BLOOM_FIRST + ivec2(x, y);
+    for (int y = 0; y < int(BLOOM_FIRST); y++) {
+        for (int x = 0; x < int(BLOOM_FIRST); x++) {
+            ivec2 pixel = place * int(BLOOM_FIRST) + ivec2(x, y);
             if (pixel.x >= picture.x || pixel.y >= picture.y) continue;
             sum += min(picture_load(pixel), vec3(60000.0));
             count += 1.0;

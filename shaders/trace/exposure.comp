@@ -18,8 +18,6 @@ shared uint bins[EXPOSURE_BINS];
 // that the classic look has, and that look adapts to nothing.
 const float ADAPTATION = 0.15;
 const float MIN_STOPS = -0.75, MAX_STOPS = 0.75;
-// Pixels left out at the dark and at the bright end, of those that are counted.
-const float DARK_PART = 0.2, BRIGHT_PART = 0.05;
 
 void main() {
     ExposureState state = ExposureState(VIEW.exposure.state);
@@ -30,7 +28,7 @@ void main() {
     if (own != 0) return;
     float whole = float(histogram_size().x) * float(histogram_size().y), total = 0.0;
     for (uint i = 0; i < EXPOSURE_BINS; i++) total += float(bins[i]);
-    float from = total * DARK_PART, to = total * (1.0 - BRIGHT_PART);
+    float from = total * EXPOSURE_DARK_PART, to = total * (1.0 - EXPOSURE_BRIGHT_PART);
     float below = 0.0, sum = 0.0, weight = 0.0;
     for (uint i = 0; i < EXPOSURE_BINS; i++) {
         float count = float(bins[i]);

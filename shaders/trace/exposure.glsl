@@ -7,6 +7,8 @@
 
 // Luminance of the histogram's ends, stops.
 const float EXPOSURE_MIN_LOG = -12.0, EXPOSURE_MAX_LOG = 8.0;
+// Pixels left out at the dark and at the bright end, of those that are counted.
+const float EXPOSURE_DARK_PART = 0.2, EXPOSURE_BRIGHT_PART = 0.05;
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer ExposureState {
     float exposure; // scale of radiance

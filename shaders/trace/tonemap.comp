@@ -1,22 +1,11 @@
 #version 460
 // From linear radiance to the picture: bloom, exposure, tone curve, display encoding.
-//
-// The curve is Uchimura's (HDR theory and practice, CEDEC 2017) with maximum brightness P = 1, contrast a = 1, linear
-// section from m = 0 on, of length l = KNEE, and no toe: the identity up to KNEE, so that textures look as their authors
-// saw them, and above it a film's shoulder, P - (P - KNEE) exp(-a (x - KNEE) / (P - KNEE)), with a continuous slope.
-// Radiance 1, the white of the classic look, shows as 0.85 of white, and what is brighter still gains.
 #include "trace/bloom.glsl"
 #include "trace/exposure.glsl"
 #include "trace/picture.glsl"
+#include "trace/tone_curve.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-
-const float KNEE = 0.6;
-
-vec3 tone_curve(vec3 x) {
-    vec3 shoulder = 1.0 - (1.0 - KNEE) * exp(-(x - KNEE) / (1.0 - KNEE));
-    return mix(shoulder, x, lessThan(x, vec3(KNEE)));
-}
 
 // The bloom at a pixel, between its texels.
 vec3 spread_light(ivec2 pixel) {

@@ -3,10 +3,7 @@
 use super::frame_passes::FramePasses;
 use super::passes::Pass;
 use crate::gpu::{Buffer, BufferDesc, BufferUsage, Device, Error, Memory};
-
-/// As in `bloom.glsl`: levels, and pixels to a texel of the first one.
-const LEVELS: u32 = 5;
-const FIRST: u32 = 4;
+use shaders::trace_types::constants::{BLOOM_FIRST, BLOOM_LEVELS};
 
 /// Reads `hdr`; writes the spread light, a texel for each 4 x 4 pixels. Nothing is made before it is first asked for.
 #[derive(Default)]
@@ -61,8 +58,8 @@ impl Bloom {
 /// Texels of all levels and of their sum.
 fn texel_count(size: [u32; 2]) -> u64 {
     let level = |level: u32| {
-        let [w, h] = size.map(|s| u64::from(s.div_ceil(FIRST << level)));
+        let [w, h] = size.map(|s| u64::from(s.div_ceil(BLOOM_FIRST << level)));
         w * h
     };
-    (0..LEVELS).map(level).sum::<u64>() + level(0)
+    (0..BLOOM_LEVELS).map(level).sum::<u64>() + level(0)
 }

@@ -56,7 +56,7 @@ impl Seen {
 }
 
 impl Listed<'_> {
-    /// As the shaders' target function has it; `nearest`: the least distance that is believed.
+    /// As `light_target` of `shaders/trace/lights.glsl`; `nearest`: the least distance that is believed.
     fn seen_from(&self, point: Vec3, nearest: f32) -> Option<Seen> {
         let bounds = &self.bounds;
         let to = bounds.centre - point;
@@ -296,6 +296,8 @@ pub fn shares(
 }
 
 #[cfg(test)]
+mod target_test;
+#[cfg(test)]
 mod tests {
     use super::super::lights::{triangle_bounds, triangle_light};
     use super::*;
@@ -304,7 +306,7 @@ mod tests {
     use relight::{Materials, MemoryFiles, Options, RelitWorld};
     use testkit::Random;
 
-    fn lamp(at: Vec3, towards: Vec3, radiance: f32) -> TriangleLight {
+    pub(super) fn lamp(at: Vec3, towards: Vec3, radiance: f32) -> TriangleLight {
         let (x, y) = towards.normalize().any_orthonormal_pair();
         let mut vertices = [at + x * 4.0, at + y * 4.0, at - (x + y) * 4.0];
         let [a, b, c] = vertices;
@@ -323,7 +325,7 @@ mod tests {
         }
     }
 
-    fn listed(light: &TriangleLight) -> Listed<'_> {
+    pub(super) fn listed(light: &TriangleLight) -> Listed<'_> {
         Listed {
             number: 0,
             bounds: triangle_bounds(&triangle_light(light, 0.0, Vec3::ZERO)),

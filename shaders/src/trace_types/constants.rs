@@ -9,6 +9,12 @@ pub const KIND_TRANSLUCENT: u32 = 2;
 pub const KIND_SKY: u32 = 3;
 pub const KIND_PASSED: u32 = 4;
 
+/// Levels of bloom, each of half the size of the one before.
+pub const BLOOM_LEVELS: u32 = 5;
+
+/// Pixels to a texel of the first level of bloom.
+pub const BLOOM_FIRST: u32 = 4;
+
 /// Edge of the tiles of pixels whose rays are sorted.
 pub const RAY_TILE: u32 = 16;
 

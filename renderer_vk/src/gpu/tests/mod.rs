@@ -5,6 +5,7 @@
 mod direction;
 mod draw_state;
 mod drawing;
+mod exposure;
 mod life;
 mod memory;
 mod random;

@@ -1,0 +1,64 @@
+//! What `relight::exposure` and `relight::overbright` repeat of the shaders.
+
+use super::support::{collect, device, finish};
+use bytemuck::{Pod, Zeroable};
+use relight::exposure::{BRIGHT_PART, DARK_PART, DARKEST, tone_curve};
+use relight::overbright::{from_linear, to_linear};
+use crate::gpu::*;
+
+/// As `OWN_PUSH` of `shaders/trace/view.glsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    view: u64,
+    source: u64,
+    target: u64,
+    spacing: u32,
+    padding: u32,
+}
+
+#[test]
+fn constants_and_curves_are_those_of_the_shaders() {
+    let Some(device) = device(false) else { return };
+    let mut ring = FrameRing::new(&device, 2).unwrap();
+    let shader = &shaders::TEST_EXPOSURE_COMP;
+    let pipeline = ComputePipeline::new(&device, "exposure", shader, &[]).unwrap();
+    const STEPS: u32 = 256;
+    let mut expected = vec![DARKEST, DARK_PART, BRIGHT_PART];
+    for step in 0..STEPS {
+        let x = step as f32 / 64.0;
+        expected.extend([tone_curve(x), to_linear(x), from_linear(x)]);
+    }
+    let mut bytes = vec![0; size_of_val(&expected[..])];
+    let desc = BufferDesc {
+        name: "results",
+        size: bytes.len() as u64,
+        usage: BufferUsage::STORAGE,
+        memory: Memory::Readback,
+    };
+    let buffer = Buffer::new(&device, &desc).unwrap();
+    let mut rec = ring.begin().unwrap();
+    let mut pass = rec
+        .pass("exposure", Access::COMPUTE, Access::COMPUTE)
+        .unwrap();
+    pass.bind_compute(&pipeline);
+    pass.push(&Push {
+        view: 0,
+        source: 0,
+        target: buffer.address(),
+        spacing: STEPS,
+        padding: 0,
+    });
+    pass.dispatch(STEPS.div_ceil(64), 1, 1);
+    drop(pass);
+    ring.end(rec).unwrap();
+    device.wait_idle().unwrap();
+    buffer.read(0, &mut bytes).unwrap();
+    let found: Vec<f32> = collect(&bytes);
+    for (found, expected) in found.iter().zip(&expected) {
+        let near = (found - expected).abs() <= 1e-5 * expected.abs().max(1.0);
+        assert!(near, "{found}, not {expected}");
+    }
+    drop((ring, pipeline, buffer));
+    finish(device);
+}

@@ -1,0 +1,16 @@
+// The tone curve: Uchimura's (HDR theory and practice, CEDEC 2017) with maximum brightness P = 1, contrast a = 1, linear
+// section from m = 0 on, of length l = KNEE, and no toe: the identity up to KNEE, so that textures look as their authors
+// saw them, and above it a film's shoulder, P - (P - KNEE) exp(-a (x - KNEE) / (P - KNEE)), with a continuous slope.
+// Radiance 1, the white of the classic look, shows as 0.85 of white, and what is brighter still gains.
+// `relight::exposure::tone_curve` is the same on the CPU.
+#ifndef RELIGHT_TRACE_TONE_CURVE_GLSL
+#define RELIGHT_TRACE_TONE_CURVE_GLSL
+
+const float KNEE = 0.6;
+
+vec3 tone_curve(vec3 x) {
+    vec3 shoulder = 1.0 - (1.0 - KNEE) * exp(-(x - KNEE) / (1.0 - KNEE));
+    return mix(shoulder, x, lessThan(x, vec3(KNEE)));
+}
+
+#endif
