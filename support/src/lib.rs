@@ -1,5 +1,7 @@
 //! General tools that know nothing of maps or of rendering.
 //!
+//! * [`aabb`]: axis-aligned boxes.
+//! * [`bvh`]: bounding volume hierarchies over boxes.
 //! * [`parallel`]: a function of every item, on all cores.
 //! * [`random`]: a small generator that gives the same numbers everywhere.
 //! * [`hash`]: 128-bit names for results that are kept.
@@ -11,7 +13,11 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic)
 )]
 
+pub mod aabb;
+pub mod bvh;
 pub mod hash;
 pub mod parallel;
 pub mod random;
 pub mod simd4;
+
+pub use aabb::Aabb;
