@@ -1,5 +1,5 @@
-// The compute tracer: two levels of bounding volume hierarchies, built on the CPU (renderer_vk/src/trace/bvh.rs and
-// wide_bvh.rs).
+// The compute tracer: two levels of bounding volume hierarchies, built on the CPU (support/src/bvh.rs,
+// renderer_vk/src/trace/bvh.rs).
 #ifndef RELIGHT_TRACE_BVH_GLSL
 #define RELIGHT_TRACE_BVH_GLSL
 

@@ -7,6 +7,7 @@ use super::samples::Sample;
 use crate::world::RelitWorld;
 use glam::{IVec3, Vec3};
 use std::collections::HashMap;
+use support::Aabb;
 
 /// Smallest grid spacing, id units.
 const SPACING: f32 = 64.0;
@@ -28,19 +29,18 @@ const NODES_PER_CANDIDATE: f32 = 60.0;
 pub(super) struct MeasuredSpace {
     /// Blocks, sorted.
     blocks: Vec<IVec3>,
-    mins: Vec3,
-    maxs: Vec3,
+    /// Bounds of the samples.
+    bounds: Aabb,
 }
 
 impl MeasuredSpace {
     /// The space near these samples.
     pub fn new(samples: &[Sample]) -> MeasuredSpace {
         let mut counts: HashMap<IVec3, f32> = HashMap::new();
-        let (mut mins, mut maxs) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let mut bounds = Aabb::EMPTY;
         let near = |s: &&Sample| s.position.abs().max_element() < FARTHEST;
         for sample in samples.iter().filter(near) {
-            mins = mins.min(sample.position);
-            maxs = maxs.max(sample.position);
+            bounds = bounds.with(sample.position);
             for k in 0..27 {
                 let around = IVec3::new(k % 3, k / 3 % 3, k / 9) - 1;
                 *counts
@@ -55,7 +55,7 @@ impl MeasuredSpace {
             .map(|(block, _)| block)
             .collect();
         blocks.sort_by_key(IVec3::to_array);
-        MeasuredSpace { blocks, mins, maxs }
+        MeasuredSpace { blocks, bounds }
     }
 
     /// Whether a position has samples nearby.
@@ -91,9 +91,9 @@ impl MeasuredSpace {
     }
 
     fn nodes(&self, spacing: f32) -> Vec<Vec3> {
-        let extent = self.maxs - self.mins;
+        let extent = self.bounds.size();
         let counts = (extent / spacing).floor().max(Vec3::ZERO);
-        let origin = self.mins + (extent - counts * spacing) * 0.5;
+        let origin = self.bounds.mins + (extent - counts * spacing) * 0.5;
         let mut places = Vec::new();
         for block in &self.blocks {
             let from = block.as_vec3() * BLOCK - origin;

@@ -16,6 +16,7 @@ use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
 use std::collections::BTreeMap;
+use support::Aabb;
 use support::parallel;
 
 /// Default back splash: per cent of the piece's light, and distance from it, id units.
@@ -66,9 +67,7 @@ impl LampSurface {
 
 /// Longest side of the bounding box of points, id units.
 fn side<'a>(points: impl Iterator<Item = &'a Vec3>) -> f32 {
-    let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    let (low, high) = points.fold(none, |(low, high), p| (low.min(*p), high.max(*p)));
-    (high - low).max_element()
+    Aabb::of(points.copied()).size().max_element()
 }
 
 /// Back splashes of a world, by material.

@@ -10,20 +10,7 @@ use crate::world::WorldSurface;
 use glam::Vec3;
 use q3bsp::Bsp;
 use std::collections::HashMap;
-
-/// Bounds of a cluster: the union of its leafs' bounds.
-#[derive(Clone, Copy)]
-struct Bounds {
-    mins: Vec3,
-    maxs: Vec3,
-}
-
-impl Bounds {
-    const EMPTY: Bounds = Bounds {
-        mins: Vec3::INFINITY,
-        maxs: Vec3::NEG_INFINITY,
-    };
-}
+use support::Aabb;
 
 /// Distance that a cluster must reach in front of a light's plane, id units: leaf bounds are integers, and a
 /// light's own plane bounds the leafs that it lights.
@@ -36,7 +23,7 @@ const SEARCH_MARGIN: f32 = 2.0;
 pub(crate) struct Clusters {
     sight: Sight,
     /// Bounds of the leafs of every cluster; `EMPTY` for clusters without a leaf in the tree.
-    bounds: Vec<Bounds>,
+    bounds: Vec<Aabb>,
     /// Clusters whose leafs list a surface.
     of_surface: Vec<Vec<u32>>,
 }
@@ -47,7 +34,7 @@ impl Clusters {
         let leafs = || leafs.iter().filter_map(|&i| bsp.leafs.get(i));
         let sight = Sight::new(bsp);
         let count = sight.count();
-        let mut bounds = vec![Bounds::EMPTY; count];
+        let mut bounds = vec![Aabb::EMPTY; count];
         let mut of_surface = vec![Vec::new(); bsp.surfaces.len()];
         for leaf in leafs() {
             let Ok(cluster) = usize::try_from(leaf.cluster) else {
@@ -55,8 +42,7 @@ impl Clusters {
             };
             if let Some(bounds) = bounds.get_mut(cluster) {
                 let corner = |c: [i32; 3]| Vec3::from_array(c.map(|v| v as f32));
-                bounds.mins = bounds.mins.min(corner(leaf.mins));
-                bounds.maxs = bounds.maxs.max(corner(leaf.maxs));
+                *bounds = bounds.union(Aabb::new(corner(leaf.mins), corner(leaf.maxs)));
             }
             for &surface in bsp.leaf_surface_indices(leaf) {
                 let clusters: Option<&mut Vec<u32>> = usize::try_from(surface)
@@ -80,10 +66,7 @@ impl Clusters {
     /// list it. (World surfaces that no leaf lists, and brush models, use their bounds alone.)
     fn clusters_of(&self, light: &TriangleLight, listed: &ClusterSet) -> ClusterSet {
         let margin = Vec3::splat(SEARCH_MARGIN);
-        let [a, b, c] = light.vertices;
-        let mut at = self
-            .sight
-            .touching(a.min(b).min(c) - margin, a.max(b).max(c) + margin);
+        let mut at = self.sight.touching(Aabb::of(light.vertices).grown(margin));
         if !listed.is_empty() {
             at.keep(listed);
             if at.is_empty() {
@@ -111,7 +94,7 @@ impl Clusters {
         };
         let normal = light.normal();
         let dist = normal.dot(light.vertices[0]);
-        furthest_in_front(bounds.mins, bounds.maxs, normal, dist) > PLANE_SLACK
+        furthest_in_front(*bounds, normal, dist) > PLANE_SLACK
     }
 
     /// For each cluster, whether it can see a surface that `is_sky`. Empty (unknown) if there is no such surface or
@@ -168,9 +151,7 @@ impl Clusters {
         }
         for (entry, point) in (lights.len() as u32..).zip(points) {
             let margin = Vec3::splat(SEARCH_MARGIN.max(point.radius));
-            let at = self
-                .sight
-                .touching(point.origin - margin, point.origin + margin);
+            let at = self.sight.touching(Aabb::of([point.origin]).grown(margin));
             for cluster in self.sight.lit_from(&at).iter() {
                 if let Some(row) = rows.get_mut(cluster) {
                     row.push(entry);

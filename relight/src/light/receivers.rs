@@ -4,6 +4,7 @@ use super::{LightRef, PointLight, TriangleLight};
 use crate::world::RelitWorld;
 use glam::Vec3;
 use std::f32::consts::PI;
+use support::Aabb;
 use support::parallel;
 use support::random::Random;
 
@@ -28,7 +29,7 @@ pub(super) fn receivers(
 ) -> Vec<Vec<Receiver>> {
     let bsp = &world.bsp;
     let mut surfaces: Vec<Vec<u32>> = vec![Vec::new(); clusters];
-    let mut boxes: Vec<Vec<(Vec3, Vec3)>> = vec![Vec::new(); clusters];
+    let mut boxes: Vec<Vec<Aabb>> = vec![Vec::new(); clusters];
     for leaf in bsp.tree_leafs() {
         let Some(leaf) = bsp.leafs.get(leaf) else {
             continue;
@@ -41,7 +42,7 @@ pub(super) fn receivers(
             continue;
         };
         let corner = |c: [i32; 3]| Vec3::from_array(c.map(|v| v as f32));
-        boxes.push((corner(leaf.mins), corner(leaf.maxs)));
+        boxes.push(Aabb::new(corner(leaf.mins), corner(leaf.maxs)));
         let listed = bsp.leaf_surface_indices(leaf).iter();
         surfaces.extend(listed.filter_map(|&s| u32::try_from(s).ok()));
     }
@@ -63,7 +64,7 @@ pub(super) fn receivers(
 fn points_on_surfaces(
     world: &RelitWorld,
     surfaces: &[u32],
-    boxes: &[(Vec3, Vec3)],
+    boxes: &[Aabb],
     count: usize,
     random: &mut Random,
     inside: impl Fn(Vec3) -> bool,
@@ -82,11 +83,9 @@ fn points_on_surfaces(
             let Some([a, b, c]) = world.triangle(triangle) else {
                 continue;
             };
-            let (mins, maxs) = (a.min(b).min(c), a.max(b).max(c));
+            let bounds = Aabb::of([a, b, c]);
             // only surfaces that may lie in the cluster
-            let touches = |(low, high): &(Vec3, Vec3)| {
-                mins.cmple(*high + 1.0).all() && maxs.cmpge(*low - 1.0).all()
-            };
+            let touches = |leaf: &Aabb| bounds.touches(leaf.grown(Vec3::ONE));
             let area = (b - a).cross(c - a).length() * 0.5;
             if area > 0.0 && area.is_finite() && boxes.iter().any(touches) {
                 total += area;
@@ -126,7 +125,7 @@ fn points_on_surfaces(
 
 /// Points in the open.
 fn points_in_the_open(
-    boxes: &[(Vec3, Vec3)],
+    boxes: &[Aabb],
     count: usize,
     random: &mut Random,
     inside: impl Fn(Vec3) -> bool,
@@ -137,11 +136,11 @@ fn points_in_the_open(
         if points.len() >= wanted || boxes.is_empty() {
             break;
         }
-        let Some(&(low, high)) = boxes.get(attempt % boxes.len()) else {
+        let Some(bounds) = boxes.get(attempt % boxes.len()) else {
             break;
         };
         let at = Vec3::new(random.uniform(), random.uniform(), random.uniform());
-        let position = low + (high - low) * at;
+        let position = bounds.mins + bounds.size() * at;
         if inside(position) {
             points.push(Receiver {
                 position,

@@ -2,6 +2,7 @@
 
 use glam::{Vec3, Vec4};
 use q3bsp::Bsp;
+use support::Aabb;
 
 /// A set of clusters.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
@@ -67,8 +68,8 @@ impl ClusterSet {
 }
 
 /// The largest distance of a point of a box from a plane, positive in front.
-pub(super) fn furthest_in_front(mins: Vec3, maxs: Vec3, normal: Vec3, dist: f32) -> f32 {
-    Vec3::select(normal.cmpge(Vec3::ZERO), maxs, mins).dot(normal) - dist
+pub(super) fn furthest_in_front(bounds: Aabb, normal: Vec3, dist: f32) -> f32 {
+    bounds.farthest(normal).dot(normal) - dist
 }
 
 /// Cluster lookup and visibility of a map.
@@ -143,7 +144,7 @@ impl Sight {
     }
 
     /// Clusters of the leafs that intersect a box, world space.
-    pub fn touching(&self, mins: Vec3, maxs: Vec3) -> ClusterSet {
+    pub fn touching(&self, bounds: Aabb) -> ClusterSet {
         let mut at = ClusterSet::none(self.count);
         if self.nodes.is_empty() {
             return at;
@@ -168,10 +169,10 @@ impl Sight {
             }
             steps -= 1;
             let (normal, dist) = (plane.truncate(), plane.w);
-            if furthest_in_front(mins, maxs, normal, dist) >= 0.0 {
+            if furthest_in_front(bounds, normal, dist) >= 0.0 {
                 stack.push(children[0]);
             }
-            if furthest_in_front(mins, maxs, -normal, -dist) >= 0.0 {
+            if furthest_in_front(bounds, -normal, -dist) >= 0.0 {
                 stack.push(children[1]);
             }
         }

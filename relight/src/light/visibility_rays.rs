@@ -5,6 +5,7 @@ use super::receivers::{Receiver, Target, luminance};
 use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use glam::Vec3;
+use support::Aabb;
 use support::parallel;
 use support::random::Random;
 
@@ -255,34 +256,21 @@ pub(super) struct Row {
 }
 
 /// Widened bounds of each cluster's receivers.
-pub(super) fn boxes(receivers: &[Vec<Receiver>]) -> Vec<(Vec3, Vec3)> {
-    let of = |points: &Vec<Receiver>| {
-        points
-            .iter()
-            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), r| {
-                (low.min(r.position), high.max(r.position))
-            })
-    };
+pub(super) fn boxes(receivers: &[Vec<Receiver>]) -> Vec<Aabb> {
     receivers
         .iter()
         .map(|points| {
-            let (low, high) = of(points);
-            let margin = ((high - low) * NEIGHBOUR_WIDENING).max(Vec3::splat(NEIGHBOUR_MARGIN));
-            (low - margin, high + margin)
+            let bounds = Aabb::of(points.iter().map(|r| r.position));
+            let margin = (bounds.size() * NEIGHBOUR_WIDENING).max(Vec3::splat(NEIGHBOUR_MARGIN));
+            bounds.grown(margin)
         })
         .collect()
 }
 
 /// Marks the lights of each row that arrive in a neighbouring cluster.
-pub(super) fn mark_neighbours(
-    mut rows: Vec<Option<Row>>,
-    boxes: &[(Vec3, Vec3)],
-) -> Vec<Option<Row>> {
-    let in_neighbours = parallel::map(boxes, |_, &(low, high)| {
-        let near = rows
-            .iter()
-            .zip(boxes)
-            .filter(|(_, other)| low.cmple(other.1).all() && high.cmpge(other.0).all());
+pub(super) fn mark_neighbours(mut rows: Vec<Option<Row>>, boxes: &[Aabb]) -> Vec<Option<Row>> {
+    let in_neighbours = parallel::map(boxes, |_, bounds| {
+        let near = (rows.iter().zip(boxes)).filter(|(_, other)| bounds.touches(**other));
         let mut in_neighbours: Vec<u32> = near
             .flat_map(|(row, _)| row.iter().flat_map(|r| &r.pairs))
             .filter(|pair| pair.hits > 0)

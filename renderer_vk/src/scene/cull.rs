@@ -5,9 +5,9 @@
 
 use glam::{Vec3, Vec4};
 use q3model::Frame;
+use support::Aabb;
 
 use crate::api::RefEntity;
-use crate::world::Bounds;
 
 /// How something lies to the view's pyramid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +50,7 @@ pub(super) fn corners(corners: &[Vec3; 8], planes: &[Vec4]) -> Lies {
 }
 
 /// The corners of a box in an entity's space.
-pub(super) fn placed(entity: &RefEntity, bounds: &Bounds) -> [Vec3; 8] {
+pub(super) fn placed(entity: &RefEntity, bounds: &Aabb) -> [Vec3; 8] {
     bounds.corners().map(|corner| to_world(entity, corner))
 }
 
@@ -81,13 +81,10 @@ pub(super) fn model(entity: &RefEntity, new: &Frame, old: &Frame, planes: &[Vec4
     let agreed = || Some(by_frame(new)).filter(|lies| by_frame(old) == *lies);
     let by_sphere = (!entity.non_normalized_axes).then(agreed).flatten();
     let decided = matches!(by_sphere, Some(Lies::Inside | Lies::Outside));
-    let both = Bounds {
-        mins: new.mins.min(old.mins),
-        maxs: new.maxs.max(old.maxs),
-    };
+    let [new, old] = [new, old].map(|frame| Aabb::new(frame.mins, frame.maxs));
     ModelLies {
         by_sphere,
-        by_box: (!decided).then(|| corners(&placed(entity, &both), planes)),
+        by_box: (!decided).then(|| corners(&placed(entity, &new.union(old)), planes)),
     }
 }
 
@@ -125,10 +122,7 @@ mod tests {
             (-5.0, Lies::Outside),
         ] {
             assert_eq!(sphere(Vec3::new(x, 9.0, 9.0), 2.0, &PLANE), expected);
-            let bounds = Bounds {
-                mins: Vec3::splat(-2.0),
-                maxs: Vec3::splat(2.0),
-            };
+            let bounds = Aabb::new(Vec3::splat(-2.0), Vec3::splat(2.0));
             assert_eq!(corners(&placed(&entity(x), &bounds), &PLANE), expected);
         }
         assert_eq!(sphere(Vec3::ZERO, 1.0, &[]), Lies::Inside);

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use shaders::types::constants as c;
+use support::Aabb;
 
 use super::cull;
 use super::entity;
@@ -14,7 +15,7 @@ use super::turned::Way;
 use super::{Look, Submodel, ViewScene};
 use crate::api::{EntityKind, RefEntity, renderfx};
 use crate::assets::Model;
-use crate::world::{Bounds, GridLight};
+use crate::world::GridLight;
 
 impl Gatherer<'_> {
     pub(super) fn add_entity(&mut self, number: u32, entity: &RefEntity, out: &mut ViewScene) {
@@ -153,7 +154,7 @@ impl Gatherer<'_> {
         instance
     }
 
-    pub(super) fn culls_box(&self, entity: &RefEntity, bounds: &Bounds) -> bool {
+    pub(super) fn culls_box(&self, entity: &RefEntity, bounds: &Aabb) -> bool {
         cull::corners(&cull::placed(entity, bounds), self.planes()) == cull::Lies::Outside
     }
 

@@ -4,6 +4,7 @@ use glam::{Vec3, Vec4};
 use q3model::BoneMatrix;
 use shaders::types::Vertex;
 use shaders::types::constants::NO_TEXTURE;
+use support::Aabb;
 
 use super::entity;
 use super::flares::FlareView;
@@ -20,7 +21,7 @@ use super::{
     ViewScene,
 };
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags, renderfx};
-use crate::world::{Bounds, VisibleQuery, VisibleSet, WorldData};
+use crate::world::{VisibleQuery, VisibleSet, WorldData};
 
 /// Stands for the map in the numbers of meshes: models have positive handles.
 const WORLD_MODEL: i32 = -1;
@@ -272,7 +273,7 @@ impl<'a> Gatherer<'a> {
             },
         );
         let bounds = self.visible.bounds;
-        if bounds.mins.cmple(bounds.maxs).all() {
+        if !bounds.is_empty() {
             let eye = self.view.origin;
             let far = bounds
                 .corners()
@@ -514,9 +515,7 @@ impl<'a> Gatherer<'a> {
             if self.look == Look::Traced && darkens() && is_painted_shadow(corners, self.entities) {
                 continue;
             }
-            let bounds = corners
-                .iter()
-                .fold(Bounds::EMPTY, |b, v| b.with(v.position));
+            let bounds = Aabb::of(corners.iter().map(|v| v.position));
             let fog = self.world.map_or(0, |world| world.fog_of_box(&bounds));
             let same = open.is_some_and(|(raw, asked)| asked == poly.material && raw.fog == fog);
             if !same {

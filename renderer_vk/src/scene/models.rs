@@ -7,6 +7,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use q3model::{BoneMatrix, Frame, Iqm, IqmSurface, MdrSurface};
 use shaders::types::Vertex;
+use support::Aabb;
 
 use super::cull;
 use super::gather::{Gatherer, count};
@@ -16,10 +17,9 @@ use super::turned::Way;
 use super::{DynamicMesh, Look, MeshId, Shape, ViewScene};
 use crate::api::{RefEntity, renderfx};
 use crate::assets::{IqmModel, Md3Lod, MdrModel, Model};
-use crate::world::Bounds;
 
-/// Half the side of the box that a skeleton without bounds of its own is taken for where fog is looked up, units.
-const UNKNOWN_SIZE: f32 = 8.0;
+/// Box of a skeleton without bounds of its own where fog is looked up, units.
+const UNKNOWN: Aabb = Aabb::new(Vec3::splat(-8.0), Vec3::splat(8.0));
 
 /// A model placed in a view, ready for its surfaces.
 pub(super) struct Placed<'a> {
@@ -171,23 +171,16 @@ impl Gatherer<'_> {
         let frames = Frames::of(placed.entity, iqm.num_frames.max(iqm.bounds.len()));
         let bounds = |frame: usize| {
             let &(mins, maxs) = iqm.bounds.get(frame)?;
-            Some(Bounds { mins, maxs })
+            Some(Aabb::new(mins, maxs))
         };
         let new = bounds(frames.new);
-        if let (Some(new), Some(old)) = (new, bounds(frames.old)) {
-            let both = Bounds {
-                mins: new.mins.min(old.mins),
-                maxs: new.maxs.max(old.maxs),
-            };
-            if self.culls_box(placed.entity, &both) {
-                return;
-            }
+        if let (Some(new), Some(old)) = (new, bounds(frames.old))
+            && self.culls_box(placed.entity, &new.union(old))
+        {
+            return;
         }
-        let around = new.unwrap_or(Bounds {
-            mins: Vec3::splat(-UNKNOWN_SIZE),
-            maxs: Vec3::splat(UNKNOWN_SIZE),
-        });
-        let half = (around.maxs - around.mins) * 0.5;
+        let around = new.unwrap_or(UNKNOWN);
+        let half = around.size() * 0.5;
         let placed = self.place(placed, around.mins + half, half.length(), out);
         let mut pose = std::mem::take(&mut self.scratch.bones);
         let Frames { new, old, backlerp } = frames;

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use q3bsp::SurfaceKind;
 use q3model::Frame;
+use support::Aabb;
 
 use super::cull::{self, Lies, ModelLies};
 use super::gather::Gatherer;
@@ -10,7 +11,7 @@ use super::key_frames::Frames;
 use super::{DrawSurface, ViewScene};
 use crate::api::{RefEntity, renderfx};
 use crate::assets::Model;
-use crate::world::{Bounds, WorldData};
+use crate::world::WorldData;
 
 /// How what was tested against the view's pyramid lies to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -216,8 +217,8 @@ impl Gatherer<'_> {
     }
 
     /// A curve of the map: by the sphere around its box, then by the box.
-    fn curve_lies(&self, bounds: &Bounds) -> ModelLies {
-        let half = (bounds.maxs - bounds.mins) * 0.5;
+    fn curve_lies(&self, bounds: &Aabb) -> ModelLies {
+        let half = bounds.size() * 0.5;
         let by_sphere = cull::sphere(bounds.mins + half, half.length(), &self.frustum);
         ModelLies {
             by_sphere: Some(by_sphere),
@@ -254,14 +255,10 @@ impl Gatherer<'_> {
 
     fn skeleton_lies(&self, entity: &RefEntity, iqm: &q3model::Iqm) -> ModelLies {
         let frames = Frames::of(entity, iqm.num_frames.max(iqm.bounds.len()));
-        let of = |frame: usize| iqm.bounds.get(frame).copied();
+        let of = |frame: usize| iqm.bounds.get(frame).map(|&(a, b)| Aabb::new(a, b));
         let by_box = match (of(frames.new), of(frames.old)) {
-            (Some((mins, maxs)), Some((old_mins, old_maxs))) => {
-                let both = Bounds {
-                    mins: mins.min(old_mins),
-                    maxs: maxs.max(old_maxs),
-                };
-                cull::corners(&cull::placed(entity, &both), &self.frustum)
+            (Some(new), Some(old)) => {
+                cull::corners(&cull::placed(entity, &new.union(old)), &self.frustum)
             }
             // one that tells no bounds may be anywhere
             _ => Lies::Across,

@@ -3,11 +3,12 @@
 use glam::{Vec3, Vec4};
 use q3bsp::SurfaceKind;
 use shaderscript::Cull;
+use support::Aabb;
 
 use super::{DrawSurface, DynamicMesh, Geometry, SkyCoverage, ViewScene, VisibleSky, entity};
 use crate::api::DynamicLight;
 use crate::assets::Materials;
-use crate::world::{Bounds, WorldData, WorldSurface, outside};
+use crate::world::{WorldData, WorldSurface, outside};
 
 /// Entity number of the world: after every entity.
 pub(super) const WORLD_ENTITY: u32 = 0xF_FFFF;
@@ -50,7 +51,7 @@ pub(super) struct LocalView<'a> {
 }
 
 /// Bits of the lights that reach a box.
-fn bits_at(lights: impl Iterator<Item = (Vec3, f32)>, bounds: &Bounds) -> u32 {
+fn bits_at(lights: impl Iterator<Item = (Vec3, f32)>, bounds: &Aabb) -> u32 {
     lights
         .take(MAX_LIGHT_BITS)
         .enumerate()
@@ -63,7 +64,7 @@ fn bits_at(lights: impl Iterator<Item = (Vec3, f32)>, bounds: &Bounds) -> u32 {
 }
 
 /// Bits of the lights that reach a box in the model's space.
-pub(super) fn lights_at(lights: &[LocalLight], bounds: &Bounds) -> u32 {
+pub(super) fn lights_at(lights: &[LocalLight], bounds: &Aabb) -> u32 {
     bits_at(
         lights.iter().map(|light| (light.local, light.radius)),
         bounds,
@@ -72,7 +73,7 @@ pub(super) fn lights_at(lights: &[LocalLight], bounds: &Bounds) -> u32 {
 
 impl LocalView<'_> {
     /// Bits of the lights that reach a box.
-    pub fn lights_at(&self, bounds: &Bounds) -> u32 {
+    pub fn lights_at(&self, bounds: &Aabb) -> u32 {
         lights_at(self.lights, bounds)
     }
 
@@ -305,10 +306,7 @@ mod tests {
             forward: Vec3::X,
             by_facing: true,
         };
-        let at = |x: f32| Bounds {
-            mins: Vec3::new(x, -1.0, -1.0),
-            maxs: Vec3::new(x + 1.0, 1.0, 1.0),
-        };
+        let at = |x: f32| Aabb::new(Vec3::new(x, -1.0, -1.0), Vec3::new(x + 1.0, 1.0, 1.0));
         assert_eq!(local.lights_at(&at(9.0)), 1);
         assert_eq!(local.lights_at(&at(50.0)), 0);
         assert_eq!(local.lights_at(&at(95.0)), 2);

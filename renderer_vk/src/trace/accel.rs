@@ -9,13 +9,14 @@ use std::iter;
 use glam::{Mat3, Vec3};
 use shaders::trace_types::constants::NO_INSTANCE;
 use shaders::trace_types::{BvhInstance, GeometryRecord};
+use support::Aabb;
+use support::bvh::Hierarchy;
 
-use super::bvh::{Aabb, build, build_triangles};
+use super::bvh::{INSTANCES, build_triangles, widen};
 use super::geometry::{StaticGeometry, StaticPart, Structure};
 use super::input::{Kind, MaterialTable, Tracer};
 use super::parts::{Parts, Seen, Slot, axes, is_solid};
 use super::shapes::{Bottom, OwnBottom, Shapes};
-use super::wide_bvh::widen;
 use crate::gpu::{
     self, Access, Blas, BlasBuild, BlasFlags, BlasGeometry, Device, Error, Recorder, Tlas,
 };
@@ -393,12 +394,9 @@ impl Accel {
                 continue;
             };
             let inverse = p.axis.inverse();
-            boxes.push(
-                own.bounds
-                    .corners()
-                    .iter()
-                    .fold(Aabb::EMPTY, |b, &c| b.with(p.axis * c + p.origin)),
-            );
+            boxes.push(Aabb::of(
+                own.bounds.corners().map(|c| p.axis * c + p.origin),
+            ));
             instances.push(BvhInstance {
                 nodes: own.nodes,
                 triangles: own.triangles,
@@ -407,11 +405,8 @@ impl Accel {
                 mask: u32::from(p.mask),
             });
         }
-        // an instance costs as much as a node, and more
-        let top = build(&boxes, 1);
-        let ordered: Vec<BvhInstance> = top
-            .order
-            .iter()
+        let top = Hierarchy::new(&boxes, INSTANCES);
+        let ordered: Vec<BvhInstance> = (top.order().iter())
             .filter_map(|&i| instances.get(i as usize).copied())
             .collect();
         let nodes = widen(&top);

@@ -8,14 +8,14 @@ use std::collections::BTreeMap;
 
 use glam::{Vec3, Vec4};
 use shaders::types::Instance;
+use support::Aabb;
 
 use super::geometry::StaticGeometry;
 use super::input::{Kind, MaterialTable, StaticScene};
 use super::layer_boxes::{bounds_of, may_be_seen, placed};
 use super::parts::axes;
-use super::surroundings::{Corners, merged};
+use super::surroundings::merged;
 use crate::scene::{ViewScene, turned};
-use crate::world::Bounds;
 
 /// Boxes that a ray is held against; with more of them each is around several.
 const MAX_BOXES: usize = 48;
@@ -29,7 +29,7 @@ struct Sky {
     point: Vec3,
     normal: Vec3,
     /// Numbers and bounds.
-    surfaces: Vec<(u32, Bounds)>,
+    surfaces: Vec<(u32, Aabb)>,
 }
 
 /// The skies of a map, and what may show through them.
@@ -39,9 +39,9 @@ pub struct MapSkies {
     /// One more than the greatest number of a surface in `skies`.
     sky_numbers: usize,
     /// Of the world's other surfaces, by number.
-    surfaces: Vec<Option<Bounds>>,
+    surfaces: Vec<Option<Aabb>>,
     /// Of the other models.
-    models: BTreeMap<u32, Bounds>,
+    models: BTreeMap<u32, Aabb>,
 }
 
 impl MapSkies {
@@ -72,13 +72,10 @@ impl MapSkies {
                         normal,
                         surfaces: Vec::new(),
                     });
-                    let bounds = Bounds {
-                        mins: a.min(b).min(c),
-                        maxs: a.max(b).max(c),
-                    };
+                    let bounds = Aabb::of([a, b, c]);
                     match sky.surfaces.last_mut() {
                         Some((number, all)) if *number == surface.number => {
-                            *all = all.with(bounds.mins).with(bounds.maxs);
+                            *all = all.union(bounds);
                         }
                         _ => sky.surfaces.push((surface.number, bounds)),
                     }
@@ -94,7 +91,7 @@ impl MapSkies {
                 made.surfaces[number] = Some(bounds);
             } else {
                 let all = made.models.entry(surface.model).or_insert(bounds);
-                *all = all.with(bounds.mins).with(bounds.maxs);
+                *all = all.union(bounds);
             }
         }
         made.skies = planes.into_values().collect();
@@ -106,7 +103,7 @@ impl MapSkies {
 struct Seen {
     /// Towards the eye: `xyz . p > w` on its side.
     plane: Vec4,
-    bounds: Bounds,
+    bounds: Aabb,
 }
 
 impl Seen {
@@ -119,43 +116,35 @@ impl Seen {
         lens: f32,
     ) -> Option<Self> {
         let surfaces = sky.surfaces.iter().filter(|(number, _)| is_seen(*number));
-        let bounds = surfaces
-            .map(|(_, bounds)| *bounds)
-            .reduce(|a, b| a.with(b.mins).with(b.maxs))?;
+        let bounds = surfaces.map(|(_, bounds)| *bounds).reduce(Aabb::union)?;
         let bounds = placed(&bounds, instance)?;
         let axis = axes(instance);
         let normal = (axis * sky.normal).try_normalize()?;
         let plane = normal.extend(normal.dot(axis * sky.point + instance.origin));
         // rays end at its back, too
         let in_front = normal.dot(eye) >= plane.w;
-        let margin = Vec3::splat(lens);
         Some(Self {
             plane: if in_front { plane } else { -plane },
-            bounds: Bounds {
-                mins: bounds.mins - margin,
-                maxs: bounds.maxs + margin,
-            },
+            bounds: bounds.grown(Vec3::splat(lens)),
         })
     }
 
     /// Whether a ray from the eye may meet a box behind it.
-    fn hides(&self, bounds: &Bounds, eye: Vec3) -> bool {
+    fn hides(&self, bounds: &Aabb, eye: Vec3) -> bool {
         let normal = self.plane.truncate();
-        let deepest = Vec3::select(normal.cmpge(Vec3::ZERO), bounds.mins, bounds.maxs);
-        if normal.dot(deepest) > self.plane.w - IN_PLANE {
+        if normal.dot(bounds.nearest(normal)) > self.plane.w - IN_PLANE {
             return false;
         }
         // all ways from the eye to the box lie between these corners
-        let [mins, maxs] = [bounds.mins.min(eye), bounds.maxs.max(eye)];
-        mins.cmple(self.bounds.maxs).all() && maxs.cmpge(self.bounds.mins).all()
+        bounds.with(eye).touches(self.bounds)
     }
 }
 
 /// What may show through the skies of a view.
 #[derive(Debug, Default)]
 pub struct Beyond {
-    /// Boxes around it, smallest and largest corners.
-    pub boxes: Vec<Corners>,
+    /// Boxes around it.
+    pub boxes: Vec<Aabb>,
     /// One bit for each surface of the world.
     pub surfaces: Vec<u32>,
 }
@@ -179,7 +168,7 @@ impl Beyond {
         let mut beyond = Self::default();
         let skies = skies_in_sight(map, view, world, eye, lens);
         let frustum = view.view.frustum();
-        let is_hidden = |bounds: &Bounds| {
+        let is_hidden = |bounds: &Aabb| {
             may_be_seen(bounds, eye, &frustum) && skies.iter().any(|sky| sky.hides(bounds, eye))
         };
         if skies.is_empty() {
@@ -195,15 +184,13 @@ impl Beyond {
                     beyond.surfaces.resize(word + 1, 0);
                 }
                 beyond.surfaces[word] |= 1 << (number % 32);
-                beyond.boxes.push([bounds.mins, bounds.maxs]);
+                beyond.boxes.push(*bounds);
             }
         }
-        let mut add = |bounds: Option<&Bounds>, instance: u32| {
+        let mut add = |bounds: Option<&Aabb>, instance: u32| {
             let instance = view.instances.get(instance as usize);
             let bounds = bounds.zip(instance).and_then(|(b, i)| placed(b, i));
-            if let Some(bounds) = bounds.filter(&is_hidden) {
-                beyond.boxes.push([bounds.mins, bounds.maxs]);
-            }
+            beyond.boxes.extend(bounds.filter(&is_hidden));
         };
         for submodel in &view.submodels {
             add(map.models.get(&submodel.model), submodel.instance);

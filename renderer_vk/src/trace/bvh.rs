@@ -1,370 +1,114 @@
-//! Bounding volume hierarchies for the compute tracer: binary, split by the surface area heuristic over bins (Wald, On
-//! fast Construction of SAH-based Bounding Volume Hierarchies, 2007). Rays walk them in a wider form (`wide_bvh`).
+//! Our hierarchies on the GPU: up to four children to a node, their boxes rounded outwards to a grid of the node's own,
+//! so that a node is 64 bytes and a walk takes half as many steps as in a binary hierarchy (after Ylitie, Karras and
+//! Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, HPG 2017; there with eight children,
+//! here with fewer, because a walk without hardware for it tests them all).
 
 use glam::Vec3;
+use shaders::trace_types::constants::{BVH_COUNT_SHIFT, BVH_FIRST, BVH_LEAF, BVH_NONE, BVH_STACK};
 use shaders::trace_types::{BvhNode, BvhTriangle};
+use support::Aabb;
+use support::bvh::{Child, Hierarchy, LeafRule, MAX_DEPTH};
+use support::simd4::WIDE;
 
-use super::wide_bvh::widen;
+/// Leafs of triangles; testing the boxes of a split costs as much as 0.7 triangles.
+pub const TRIANGLES: LeafRule = LeafRule {
+    most: 4,
+    split_cost: 0.7,
+};
+/// Leafs of instances: testing one costs more than a node.
+pub const INSTANCES: LeafRule = LeafRule {
+    most: 1,
+    split_cost: 0.7,
+};
 
-/// Triangles of a leaf that are no longer split.
-pub const LEAF: usize = 4;
-/// Bins on an axis.
-const BINS: usize = 16;
-/// What testing the boxes of a split costs, in tests of triangles.
-const SPLIT_COST: f32 = 0.7;
-/// Depth at which splitting by cost gives way to splitting in halves, which ends after at most 32 more levels: no
-/// hierarchy is deeper than the shader's stack (`BVH_STACK`).
-const COST_DEPTH: u32 = 15;
+/// A walk of a binary hierarchy keeps one child a level.
+const _: () = assert!(MAX_DEPTH <= BVH_STACK);
 
-/// Where the box of a child lies that is not there.
-const ABSENT: Vec3 = Vec3::splat(3.0e38);
+/// Steps of a node's grid that its children span; the others are margins.
+const STEPS: f32 = 252.0;
+/// Part of a coordinate that a step is at least: a few times what a 32-bit float can tell apart.
+const FINEST: f32 = 1.0e-6;
+/// Part of a step that boxes are widened by before they are rounded outwards, for the shader's own rounding.
+const MARGIN: f32 = 0.01;
 
-/// An axis-aligned box.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Aabb {
-    /// Smallest corner.
-    pub low: Vec3,
-    /// Largest corner.
-    pub high: Vec3,
-}
-
-impl Aabb {
-    /// Holds nothing.
-    pub const EMPTY: Self = Self {
-        low: Vec3::INFINITY,
-        high: Vec3::NEG_INFINITY,
-    };
-
-    /// With a point added.
-    #[must_use]
-    pub fn with(self, p: Vec3) -> Self {
-        Self {
-            low: self.low.min(p),
-            high: self.high.max(p),
-        }
-    }
-
-    /// Of both.
-    #[must_use]
-    pub fn union(self, other: Self) -> Self {
-        Self {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-        }
-    }
-
-    /// The eight corners.
-    pub fn corners(self) -> [Vec3; 8] {
-        std::array::from_fn(|i| {
-            let pick = |bit: usize, low: f32, high: f32| if i & bit == 0 { low } else { high };
-            Vec3::new(
-                pick(1, self.low.x, self.high.x),
-                pick(2, self.low.y, self.high.y),
-                pick(4, self.low.z, self.high.z),
-            )
-        })
-    }
-
-    /// Half of its surface.
-    pub fn half_area(self) -> f32 {
-        let size = (self.high - self.low).max(Vec3::ZERO);
-        size.x * size.y + size.y * size.z + size.z * size.x
-    }
-
-    fn middle(self) -> Vec3 {
-        (self.low + self.high) * 0.5
-    }
-}
-
-/// The boxes of two children.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BinaryNode {
-    /// Smallest corners; a child that is not there is a point beyond everything.
-    pub low: [Vec3; 2],
-    /// Largest corners.
-    pub high: [Vec3; 2],
-    /// Of a leaf the first of its entries, otherwise the child's node.
-    pub first: [u32; 2],
-    /// Entries of a leaf; 0: a node.
-    pub count: [u32; 2],
-}
-
-impl BinaryNode {
-    /// The box of a child that is there.
-    pub fn child(&self, side: usize) -> Option<Aabb> {
-        let (&low, &high) = (self.low.get(side)?, self.high.get(side)?);
-        (low != ABSENT).then_some(Aabb { low, high })
-    }
-}
-
-/// A hierarchy over numbered entries.
-#[derive(Clone, Debug, Default)]
-pub struct Hierarchy {
-    /// Nodes; the first is the root, children come behind their parents. Empty for no entries.
-    pub nodes: Vec<BinaryNode>,
-    /// The entries in the order of the leafs.
-    pub order: Vec<u32>,
-}
-
-/// A range of entries that becomes the child of a node.
+/// A node to be made.
 struct Task {
-    first: usize,
-    count: usize,
-    bounds: Aabb,
-    depth: u32,
-    /// Node and side that wait for it; the root's parent is none.
-    parent: Option<(usize, usize)>,
+    /// Binary node whose children it begins with.
+    node: usize,
+    /// Index of the wide node.
+    index: usize,
+    /// Entries that a walk from here on may keep for later.
+    room: u32,
 }
 
-fn index(n: usize) -> u32 {
-    u32::try_from(n).unwrap_or(u32::MAX)
-}
-
-impl Hierarchy {
-    /// Fits the boxes to entries that have moved; which entry is in which leaf stays. `boxes`: of the entries that the
-    /// hierarchy was built from, all finite. Returns the box of everything.
-    pub fn refit(&mut self, boxes: &[Aabb]) -> Aabb {
-        let of = |i: u32| boxes.get(i as usize).copied().unwrap_or(Aabb::EMPTY);
-        // children come behind their parents
-        for index in (0..self.nodes.len()).rev() {
-            let Some(mut node) = self.nodes.get(index).copied() else {
-                break;
-            };
-            for side in 0..2 {
-                if node.low[side] == ABSENT {
-                    continue;
-                }
-                let first = node.first[side] as usize;
-                let fitted = if node.count[side] == 0 {
-                    self.nodes.get(first).map_or(Aabb::EMPTY, bounds_of)
-                } else {
-                    let entries = self.order.get(first..first + node.count[side] as usize);
-                    let entries = entries.unwrap_or_default().iter();
-                    entries.fold(Aabb::EMPTY, |b, &i| b.union(of(i)))
-                };
-                node.low[side] = fitted.low;
-                node.high[side] = fitted.high;
-            }
-            if let Some(slot) = self.nodes.get_mut(index) {
-                *slot = node;
-            }
-        }
-        self.bounds()
+/// The wide form of a hierarchy: entries keep their places, nodes do not. Empty for an empty one.
+pub fn widen(hierarchy: &Hierarchy) -> Vec<BvhNode> {
+    if hierarchy.is_empty() {
+        return Vec::new();
     }
-
-    /// The box of everything.
-    pub fn bounds(&self) -> Aabb {
-        self.nodes.first().map_or(Aabb::EMPTY, bounds_of)
-    }
-
-    /// What a ray that meets the whole costs, in boxes and entries tested: the areas of the parts over that of the whole
-    /// (the surface area heuristic).
-    pub fn cost(&self) -> f32 {
-        let whole = self.bounds().half_area();
-        let mut sum = 0.0;
-        for node in &self.nodes {
-            for side in 0..2 {
-                if let Some(part) = node.child(side) {
-                    #[allow(clippy::cast_precision_loss)] // a few entries
-                    let tests = node.count[side].max(1) as f32;
-                    sum += part.half_area() * tests;
-                }
-            }
-        }
-        if whole > 0.0 { sum / whole } else { 0.0 }
-    }
-}
-
-/// The box around both children of a node.
-fn bounds_of(node: &BinaryNode) -> Aabb {
-    (0..2)
-        .filter_map(|side| node.child(side))
-        .fold(Aabb::EMPTY, Aabb::union)
-}
-
-/// Builds a hierarchy over boxes. Boxes that are not finite are left out: nothing can hit them. `leaf`: entries that a
-/// leaf holds at most.
-pub fn build(boxes: &[Aabb], leaf: usize) -> Hierarchy {
-    let leaf = leaf.max(1);
-    let usable = |b: &Aabb| b.low.is_finite() && b.high.is_finite() && b.low.cmple(b.high).all();
-    let mut order: Vec<u32> = (0u32..)
-        .zip(boxes)
-        .filter(|(_, b)| usable(b))
-        .map(|(i, _)| i)
-        .collect();
-    if order.is_empty() {
-        return Hierarchy::default();
-    }
-    let of = |i: u32| boxes.get(i as usize).copied().unwrap_or(Aabb::EMPTY);
-    let bounds = order.iter().fold(Aabb::EMPTY, |b, &i| b.union(of(i)));
-    let mut nodes: Vec<BinaryNode> = Vec::with_capacity(order.len());
+    let heights = hierarchy.heights();
+    let height = |node: usize| heights.get(node).copied().unwrap_or(0);
+    let mut wide: Vec<BvhNode> = vec![BvhNode::default()];
     let mut tasks = vec![Task {
-        first: 0,
-        count: order.len(),
-        bounds,
-        depth: 0,
-        parent: None,
+        node: 0,
+        index: 0,
+        room: BVH_STACK,
     }];
     while let Some(task) = tasks.pop() {
-        let entries = order
-            .get_mut(task.first..task.first + task.count)
-            .unwrap_or_default();
-        let parts = split(entries, &of, &task, leaf);
-        // the root is always a node, be it of one leaf alone
-        if parts.is_none() && task.parent.is_some() {
-            attach(&mut nodes, &task, index(task.first), index(task.count));
-            continue;
-        }
-        let node = nodes.len();
-        nodes.push(BinaryNode {
-            // a child that is not there is a point that no ray comes to
-            low: [ABSENT; 2],
-            high: [ABSENT; 2],
-            first: [0; 2],
-            count: [1; 2],
-        });
-        attach(&mut nodes, &task, index(node), 0);
-        let left = parts.unwrap_or(task.count);
-        let mut first = task.first;
-        for (side, count) in [left, task.count - left].into_iter().enumerate() {
-            if count > 0 {
-                let members = order.get(first..first + count).unwrap_or_default();
-                tasks.push(Task {
-                    first,
-                    count,
-                    bounds: members.iter().fold(Aabb::EMPTY, |b, &i| b.union(of(i))),
-                    depth: task.depth + 1,
-                    parent: Some((node, side)),
-                });
-            }
-            first += count;
-        }
-    }
-    Hierarchy { nodes, order }
-}
-
-fn attach(nodes: &mut [BinaryNode], task: &Task, first: u32, count: u32) {
-    if let Some((parent, side)) = task.parent
-        && let Some(node) = nodes.get_mut(parent)
-    {
-        node.low[side] = task.bounds.low;
-        node.high[side] = task.bounds.high;
-        node.first[side] = first;
-        node.count[side] = count;
-    }
-}
-
-/// Reorders entries into two parts and returns the length of the first; both parts have entries. `None`: they are to be
-/// one leaf.
-fn split(
-    entries: &mut [u32],
-    of: &impl Fn(u32) -> Aabb,
-    task: &Task,
-    leaf: usize,
-) -> Option<usize> {
-    let half = entries.len() / 2;
-    if half == 0 {
-        return None;
-    }
-    let fits = entries.len() <= leaf;
-    let middles = entries
-        .iter()
-        .fold(Aabb::EMPTY, |b, &i| b.with(of(i).middle()));
-    let size = middles.high - middles.low;
-    let widest = size.max_position();
-    if task.depth < COST_DEPTH
-        && let Some((cost, axis, cut)) = cheapest(entries, of, middles)
-    {
-        #[allow(clippy::cast_precision_loss)] // a few entries
-        let as_leaf = task.bounds.half_area() * entries.len() as f32;
-        if fits && cost + task.bounds.half_area() * SPLIT_COST >= as_leaf {
-            return None;
-        }
-        let mut left = 0;
-        for i in 0..entries.len() {
-            if of(entries[i]).middle()[axis] < cut {
-                entries.swap(i, left);
-                left += 1;
-            }
-        }
-        if left > 0 && left < entries.len() {
-            return Some(left);
-        }
-    }
-    if fits {
-        return None;
-    }
-    // by the middle entry of the widest axis
-    entries.select_nth_unstable_by(half, |&a, &b| {
-        of(a).middle()[widest]
-            .total_cmp(&of(b).middle()[widest])
-            .then(a.cmp(&b))
-    });
-    Some(half)
-}
-
-/// Cost (areas times entries), axis and place of the cheapest split between bins.
-fn cheapest(
-    entries: &[u32],
-    of: &impl Fn(u32) -> Aabb,
-    middles: Aabb,
-) -> Option<(f32, usize, f32)> {
-    let mut best: Option<(f32, usize, f32)> = None;
-    // few entries need few of them
-    let used = BINS.min(2 * entries.len());
-    for axis in 0..3 {
-        let (low, size) = (middles.low[axis], middles.high[axis] - middles.low[axis]);
-        if size <= 0.0 {
-            continue;
-        }
-        let mut bins = [(Aabb::EMPTY, 0usize); BINS];
-        #[allow(
-            clippy::cast_precision_loss,
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss
-        )]
-        let bin_of = |x: f32| (((x - low) / size * used as f32) as usize).min(used - 1);
-        for &i in entries {
-            let bounds = of(i);
-            let bin = &mut bins[bin_of(bounds.middle()[axis])];
-            *bin = (bin.0.union(bounds), bin.1 + 1);
-        }
-        // cost of everything to the right of each cut
-        let mut right = [0.0; BINS];
-        let (mut bounds, mut count) = (Aabb::EMPTY, 0);
-        for i in (1..used).rev() {
-            bounds = bounds.union(bins[i].0);
-            count += bins[i].1;
-            #[allow(clippy::cast_precision_loss)]
-            let entries = count as f32;
-            right[i] = if count > 0 {
-                bounds.half_area() * entries
+        // a walk keeps all children but one, and must have room for one more on each level below
+        let spare = task.room.saturating_sub(height(task.node)) as usize;
+        let children = hierarchy.wide_children(task.node, spare + 2);
+        let mut node = quantize(&children);
+        let kept = u32::try_from(children.len().saturating_sub(1)).unwrap_or(0);
+        for (child, slot) in children.iter().zip(&mut node.children) {
+            *slot = if !child.is_node() {
+                BVH_LEAF | (child.count - 1) << BVH_COUNT_SHIFT | child.first & BVH_FIRST
             } else {
-                0.0
+                let index = wide.len();
+                wide.push(BvhNode::default());
+                tasks.push(Task {
+                    node: child.first as usize,
+                    index,
+                    room: task.room.saturating_sub(kept),
+                });
+                u32::try_from(index).unwrap_or(BVH_NONE)
             };
         }
-        let (mut bounds, mut count) = (Aabb::EMPTY, 0);
-        for i in 1..used {
-            bounds = bounds.union(bins[i - 1].0);
-            count += bins[i - 1].1;
-            if count == 0 || count == entries.len() {
-                continue;
-            }
-            #[allow(clippy::cast_precision_loss)]
-            let cost = bounds.half_area() * count as f32 + right[i];
-            #[allow(clippy::cast_precision_loss)]
-            let cut = low + size * i as f32 / used as f32;
-            if best.is_none_or(|b| cost < b.0) {
-                best = Some((cost, axis, cut));
-            }
+        if let Some(slot) = wide.get_mut(task.index) {
+            *slot = node;
         }
     }
-    best
+    wide
 }
 
-/// The box of a triangle.
-pub fn box_of(corners: &[Vec3; 3]) -> Aabb {
-    corners.iter().fold(Aabb::EMPTY, |b, &p| b.with(p))
+/// The grid of a node and its children's boxes on it.
+fn quantize(children: &[Child]) -> BvhNode {
+    let bounds = (children.iter()).fold(Aabb::EMPTY, |b, c| b.union(c.bounds));
+    let mut node = BvhNode {
+        children: [BVH_NONE; WIDE],
+        ..BvhNode::default()
+    };
+    for axis in 0..3 {
+        let (low, high) = (bounds.mins[axis], bounds.maxs[axis]);
+        let finest = low.abs().max(high.abs()).max(1.0) * FINEST;
+        let step = ((high - low) / STEPS).max(finest);
+        let origin = low - step;
+        node.origin[axis] = origin;
+        node.step[axis] = step;
+        let steps = 1.0 / step;
+        for (i, child) in children.iter().take(WIDE).enumerate() {
+            let place = |x: f32| (x - origin) * steps;
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            // 0 to 255, and none where it is no number
+            let floor = |x: f32| u32::from(x as u8);
+            let low = floor(place(child.bounds.mins[axis]) - MARGIN);
+            // what lies on a step gets one more than it needs
+            let high = (floor(place(child.bounds.maxs[axis]) + MARGIN) + 1).min(255);
+            node.low[axis] |= low << (8 * i);
+            node.high[axis] |= high << (8 * i);
+        }
+    }
+    node
 }
 
 /// The triangles of a hierarchy in the order of its leafs.
@@ -380,7 +124,7 @@ pub fn ordered(hierarchy: &Hierarchy, corners: &[[Vec3; 3]]) -> Vec<BvhTriangle>
             padding: 0,
         })
     };
-    hierarchy.order.iter().filter_map(triangle).collect()
+    hierarchy.order().iter().filter_map(triangle).collect()
 }
 
 /// A hierarchy over triangles, with the triangles in the order of its leafs.
@@ -390,93 +134,213 @@ pub struct TriangleHierarchy {
     pub nodes: Vec<BvhNode>,
     /// Triangles.
     pub triangles: Vec<BvhTriangle>,
-    /// Of all triangles.
+    /// Box of all triangles.
     pub bounds: Aabb,
 }
 
 /// Builds a hierarchy over triangles given by their corners; `None` if there is none that a ray can hit.
 pub fn build_triangles(corners: &[[Vec3; 3]]) -> Option<TriangleHierarchy> {
-    let boxes: Vec<Aabb> = corners.iter().map(box_of).collect();
-    let hierarchy = build(&boxes, LEAF);
+    let boxes: Vec<Aabb> = corners.iter().map(|&c| Aabb::of(c)).collect();
+    let hierarchy = Hierarchy::new(&boxes, TRIANGLES);
     let triangles = ordered(&hierarchy, corners);
-    let bounds = hierarchy.bounds();
-    (!triangles.is_empty()).then_some(TriangleHierarchy {
+    (!triangles.is_empty()).then(|| TriangleHierarchy {
         nodes: widen(&hierarchy),
         triangles,
-        bounds,
+        bounds: hierarchy.bounds(),
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use testkit::Random;
+
     use super::*;
 
-    /// Depth of the deepest node, and how often each entry occurs in a leaf whose box holds it.
-    fn check(boxes: &[Aabb], hierarchy: &Hierarchy) -> u32 {
-        let mut seen = vec![0; boxes.len()];
+    fn boxes(seed: u64, count: usize, spread: f32, size: f32) -> Vec<Aabb> {
+        let mut random = Random::new(seed);
+        let mut point = |scale: f32| random.signed_point() * scale;
+        (0..count)
+            .map(|_| {
+                let low = point(spread) + Vec3::new(300.0, -8000.0, 0.0);
+                let high = low + point(size).abs();
+                Aabb::new(low, high)
+            })
+            .collect()
+    }
+
+    fn child_box(node: &BvhNode, child: usize) -> Aabb {
+        let side = |bytes: [u32; 3]| {
+            let q = bytes.map(|b| ((b >> (8 * child)) & 255) as f32);
+            node.origin + Vec3::from(q) * node.step
+        };
+        Aabb::new(side(node.low), side(node.high))
+    }
+
+    /// Walks everything below a node; what a walk that keeps all children but one has kept at most.
+    fn check(
+        wide: &[BvhNode],
+        order: &[u32],
+        boxes: &[Aabb],
+        node: usize,
+        seen: &mut [u32],
+    ) -> u32 {
+        let node = &wide[node];
+        let used: Vec<usize> = (0..WIDE)
+            .filter(|&c| node.children[c] != BVH_NONE)
+            .collect();
         let mut deepest = 0;
-        let mut stack = vec![(0usize, 1u32)];
-        while let Some((node, depth)) = stack.pop() {
-            deepest = deepest.max(depth);
-            let node = hierarchy.nodes[node];
-            for side in 0..2 {
-                if node.low[side] == ABSENT {
-                    continue;
+        for &child in &used {
+            let around = child_box(node, child);
+            let word = node.children[child];
+            if word & BVH_LEAF == 0 {
+                let below = &wide[word as usize];
+                for c in 0..WIDE {
+                    if below.children[c] != BVH_NONE {
+                        // each is rounded on its own grid
+                        let part = child_box(below, c);
+                        let slack = below.step * 2.0 + 0.01;
+                        assert!((part.mins + slack).cmpge(around.mins).all());
+                        assert!((part.maxs - slack).cmple(around.maxs).all());
+                    }
                 }
-                if node.count[side] == 0 {
-                    stack.push((node.first[side] as usize, depth + 1));
-                }
-                for i in 0..node.count[side] {
-                    let entry = hierarchy.order[(node.first[side] + i) as usize] as usize;
-                    seen[entry] += 1;
-                    assert!(node.low[side].cmple(boxes[entry].low).all());
-                    assert!(node.high[side].cmpge(boxes[entry].high).all());
+                deepest = deepest.max(check(wide, order, boxes, word as usize, seen));
+            } else {
+                let first = (word & BVH_FIRST) as usize;
+                let count = (word >> BVH_COUNT_SHIFT & 7) as usize + 1;
+                for &entry in &order[first..first + count] {
+                    seen[entry as usize] += 1;
+                    assert!(around.mins.cmple(boxes[entry as usize].mins).all());
+                    assert!(around.maxs.cmpge(boxes[entry as usize].maxs).all());
                 }
             }
         }
-        assert!(seen.iter().all(|&n| n == 1));
-        deepest
+        deepest + used.len() as u32 - 1
     }
 
     #[test]
-    fn every_entry_is_in_one_leaf() {
-        for n in [1usize, 2, 4, 5, 33, 1000] {
-            let boxes: Vec<Aabb> = (0..n)
-                .map(|i| {
-                    let p = Vec3::new(
-                        (i * 37 % 101) as f32,
-                        (i * 53 % 89) as f32,
-                        (i * 71 % 97) as f32,
-                    );
-                    Aabb {
-                        low: p,
-                        high: p + 3.0,
-                    }
-                })
-                .collect();
-            check(&boxes, &build(&boxes, LEAF));
+    fn every_entry_lies_in_the_box_of_its_leaf() {
+        for (seed, count, spread, size) in [
+            (1, 1, 100.0, 10.0),
+            (2, 2, 100.0, 0.0),
+            (3, 5, 1000.0, 1.0),
+            (4, 1000, 4000.0, 30.0),
+            (5, 3000, 0.001, 0.001),
+            (6, 300, 60000.0, 60000.0),
+        ] {
+            let boxes = boxes(seed, count, spread, size);
+            for leaf in [INSTANCES, TRIANGLES] {
+                let hierarchy = Hierarchy::new(&boxes, leaf);
+                let wide = widen(&hierarchy);
+                let mut seen = vec![0; boxes.len()];
+                let kept = check(&wide, hierarchy.order(), &boxes, 0, &mut seen);
+                assert!(kept <= BVH_STACK, "{kept}");
+                assert!(seen.iter().all(|&n| n == 1));
+            }
         }
-        assert!(build(&[], LEAF).nodes.is_empty());
+        assert!(widen(&Hierarchy::default()).is_empty());
     }
 
     #[test]
-    fn no_arrangement_is_deeper_than_the_stack() {
-        // each box twice as far as the last, and all in one place: what splitting by cost likes least
+    fn a_chain_of_nodes_needs_no_more_than_the_stack() {
+        // each box twice as far as the last: what makes the deepest hierarchies
         let spread: Vec<Aabb> = (0..4000)
             .map(|i| {
                 let p = Vec3::X * 1.02f32.powi(i);
-                Aabb { low: p, high: p }
+                Aabb::new(p, p)
             })
             .collect();
-        assert!(check(&spread, &build(&spread, LEAF)) <= 48);
-        let same = vec![
-            Aabb {
-                low: Vec3::ONE,
-                high: Vec3::ONE
+        let hierarchy = Hierarchy::new(&spread, INSTANCES);
+        let mut seen = vec![0; spread.len()];
+        let kept = check(&widen(&hierarchy), hierarchy.order(), &spread, 0, &mut seen);
+        assert!(kept <= BVH_STACK, "{kept}");
+    }
+
+    /// Distance to a triangle (Moller and Trumbore, 1997).
+    fn hit(origin: Vec3, direction: Vec3, t: &[Vec3; 3]) -> Option<f32> {
+        let (ab, ac) = (t[1] - t[0], t[2] - t[0]);
+        let p = direction.cross(ac);
+        let inverse = ab.dot(p).recip();
+        let s = origin - t[0];
+        let u = s.dot(p) * inverse;
+        let q = s.cross(ab);
+        let v = direction.dot(q) * inverse;
+        let distance = ac.dot(q) * inverse;
+        (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some(distance)
+    }
+
+    fn walk(
+        hierarchy: &Hierarchy,
+        corners: &[[Vec3; 3]],
+        origin: Vec3,
+        direction: Vec3,
+    ) -> Option<f32> {
+        let wide = widen(hierarchy);
+        let mut stack: Vec<u32> = if wide.is_empty() { vec![] } else { vec![0] };
+        let mut nearest: Option<f32> = None;
+        while let Some(word) = stack.pop() {
+            if word & BVH_LEAF != 0 {
+                let first = (word & BVH_FIRST) as usize;
+                let count = (word >> BVH_COUNT_SHIFT & 7) as usize + 1;
+                for &entry in &hierarchy.order()[first..first + count] {
+                    let found = hit(origin, direction, &corners[entry as usize]);
+                    nearest = [nearest, found].into_iter().flatten().reduce(f32::min);
+                }
+                continue;
+            }
+            let node = &wide[word as usize];
+            for child in 0..WIDE {
+                if node.children[child] == BVH_NONE {
+                    continue;
+                }
+                let around = child_box(node, child);
+                let a = (around.mins - origin) / direction;
+                let b = (around.maxs - origin) / direction;
+                let enter = a.min(b).max_element().max(0.0);
+                if enter <= a.max(b).min_element() {
+                    stack.push(node.children[child]);
+                }
+            }
+        }
+        nearest
+    }
+
+    #[test]
+    fn a_fitted_hierarchy_is_hit_where_a_fresh_one_is() {
+        let mut random = Random::new(11);
+        for round in 0..20 {
+            let count = 1 + round * 13;
+            let mut point = |scale: f32| random.signed_point() * scale;
+            let mut corners: Vec<[Vec3; 3]> = (0..count)
+                .map(|_| {
+                    let middle = point(50.0);
+                    [0; 3].map(|_| middle + point(12.0))
+                })
+                .collect();
+            let boxes = |corners: &[[Vec3; 3]]| -> Vec<Aabb> {
+                corners.iter().map(|&c| Aabb::of(c)).collect()
             };
-            5000
-        ];
-        assert!(check(&same, &build(&same, LEAF)) <= 48);
+            let mut fitted = Hierarchy::new(&boxes(&corners), TRIANGLES);
+            for triangle in &mut corners {
+                let moved = point(30.0);
+                *triangle = triangle.map(|p| p * 1.3 + moved);
+            }
+            let bounds = fitted.refit(&boxes(&corners));
+            let fresh = Hierarchy::new(&boxes(&corners), TRIANGLES);
+            assert_eq!(bounds, fresh.bounds());
+            assert!(fitted.cost() >= fresh.cost() * 0.8);
+            let mut hits = 0;
+            for _ in 0..200 {
+                let (origin, to) = (point(120.0), point(30.0));
+                let direction = (to - origin).normalize();
+                let all = (corners.iter()).filter_map(|t| hit(origin, direction, t));
+                let nearest = all.reduce(f32::min);
+                assert_eq!(walk(&fitted, &corners, origin, direction), nearest);
+                assert_eq!(walk(&fresh, &corners, origin, direction), nearest);
+                hits += usize::from(nearest.is_some());
+            }
+            assert!(count < 20 || hits > 5, "{hits}");
+        }
+        assert!(build_triangles(&[]).is_none());
     }
 
     #[test]
@@ -490,7 +354,7 @@ mod tests {
                 let found = build_triangles(&[far, good]).unwrap();
                 let primitives: Vec<u32> = found.triangles.iter().map(|t| t.primitive).collect();
                 assert_eq!(primitives, [1], "{far:?}");
-                assert_eq!(found.bounds, box_of(&good), "{far:?}");
+                assert_eq!(found.bounds, Aabb::of(good), "{far:?}");
             }
         }
     }
@@ -504,7 +368,7 @@ mod tests {
             let found = build_triangles(&[bad, good]).unwrap();
             let hits = found.triangles.iter().filter(|t| t.primitive == 1);
             assert_eq!(hits.count(), 1, "{bad:?}");
-            assert_eq!(found.bounds, box_of(&good), "{bad:?}");
+            assert_eq!(found.bounds, Aabb::of(good), "{bad:?}");
         }
     }
 }

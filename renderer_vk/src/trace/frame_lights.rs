@@ -8,6 +8,7 @@ use relight::light::{ClusterSet, STRONGEST, Sight};
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
 use shaders::types::Instance;
+use support::Aabb;
 
 use super::lights::{
     ChangingLight, MapLights, count, number, sphere, sphere_bounds, triangle_bounds,
@@ -32,7 +33,7 @@ const SEARCH_MARGIN: f32 = 2.0;
 impl FrameLights {
     fn add_sphere(&mut self, light: t::SphereLight, sight: &Sight) {
         let margin = Vec3::splat(light.radius.max(SEARCH_MARGIN));
-        let at = sight.touching(light.origin - margin, light.origin + margin);
+        let at = sight.touching(Aabb::of([light.origin]).grown(margin));
         let light_number = number(c::LIGHT_CHANGING_SPHERE, self.spheres.len());
         self.spheres.push(light);
         self.reach.push((light_number, sight.lit_from(&at)));
@@ -51,16 +52,13 @@ impl FrameLights {
             x * p.x + y * p.y + z * p.z + instance.origin
         };
         let first = self.triangles.len();
-        let (mut mins, mut maxs) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let mut bounds = Aabb::EMPTY;
         for light in lights {
             let corners = light.light.corners.map(place);
             if !corners.iter().all(|p| p.is_finite()) {
                 continue;
             }
-            for corner in corners {
-                mins = mins.min(corner);
-                maxs = maxs.max(corner);
-            }
+            bounds = bounds.union(Aabb::of(corners));
             self.triangles.push(t::TriangleLight {
                 corners,
                 radiance: light.light.radiance * scale_of(light),
@@ -72,7 +70,7 @@ impl FrameLights {
             return;
         }
         let margin = Vec3::splat(SEARCH_MARGIN);
-        let reached = sight.lit_from(&sight.touching(mins - margin, maxs + margin));
+        let reached = sight.lit_from(&sight.touching(bounds.grown(margin)));
         for index in first..self.triangles.len() {
             let light_number = number(c::LIGHT_CHANGING_TRIANGLE, index);
             self.reach.push((light_number, reached.clone()));

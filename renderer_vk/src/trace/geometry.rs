@@ -8,9 +8,10 @@ use glam::{Vec2, Vec3};
 use shaders::trace_types::SkyRecord;
 use shaders::types::Triangle;
 use shaders::types::constants::{NO_TEXTURE, TRIANGLE_ONE_SIDED, TRIANGLE_STATIC, TRIANGLE_WORLD};
+use support::Aabb;
 
 use super::beyond_sky::MapSkies;
-use super::bvh::{Aabb, build_triangles};
+use super::bvh::build_triangles;
 use super::cutout::Coverage;
 use super::doubled::doubled;
 use super::input::{Kind, MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
@@ -18,7 +19,6 @@ use super::layer_boxes::{StaticLayer, bounds_of};
 use super::lifted::lifted;
 use super::surroundings::Surroundings;
 use crate::gpu::{Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error};
-use crate::world::Bounds;
 
 /// Triangles of one kind.
 pub struct StaticPart {
@@ -72,7 +72,7 @@ pub struct StaticGeometry {
     /// Number of fog volumes.
     pub fog_count: u32,
     /// Their boxes.
-    pub fog_boxes: Vec<Bounds>,
+    pub fog_boxes: Vec<Aabb>,
     /// What of it is translucent.
     pub layers: Vec<StaticLayer>,
     /// Its skies, and what may show through them.
@@ -297,10 +297,7 @@ impl StaticGeometry {
             fogs: Buffer::with_data(device, "trace fogs", storage, scene.fogs)?,
             fog_count: u32::try_from(scene.fogs.len()).unwrap_or(u32::MAX),
             fog_boxes: (scene.fogs.iter())
-                .map(|fog| Bounds {
-                    mins: fog.mins,
-                    maxs: fog.maxs,
-                })
+                .map(|fog| Aabb::new(fog.mins, fog.maxs))
                 .collect(),
             layers: layers(scene, materials),
             map_skies: MapSkies::new(scene, materials),

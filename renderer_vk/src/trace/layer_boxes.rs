@@ -5,13 +5,14 @@
 
 use glam::{Vec3, Vec4};
 use shaders::types::{Instance, Vertex};
+use support::Aabb;
 
 use super::geometry::StaticGeometry;
 use super::input::{Kind, MaterialTable};
 use super::parts::axes;
-use super::surroundings::{Corners, merged};
+use super::surroundings::merged;
 use crate::scene::{ViewScene, turned};
-use crate::world::{Bounds, outside};
+use crate::world::outside;
 
 /// Boxes that a ray is held against; with more of them in sight each is around several.
 const MAX_BOXES: usize = 48;
@@ -22,74 +23,59 @@ pub struct StaticLayer {
     /// Index of the map's model; 0 is the world.
     pub model: u32,
     /// Around all of it.
-    pub bounds: Bounds,
+    pub bounds: Aabb,
 }
 
 /// Around some vertices; infinite if one is not finite, as rays may meet what hangs on it.
-pub fn bounds_of<'a>(vertices: impl Iterator<Item = &'a Vertex>) -> Bounds {
-    let mut bounds = Bounds {
-        mins: Vec3::INFINITY,
-        maxs: Vec3::NEG_INFINITY,
-    };
+pub fn bounds_of<'a>(vertices: impl Iterator<Item = &'a Vertex>) -> Aabb {
+    let mut bounds = Aabb::EMPTY;
     for vertex in vertices {
         if !vertex.position.is_finite() {
             return EVERYWHERE;
         }
-        bounds.mins = bounds.mins.min(vertex.position);
-        bounds.maxs = bounds.maxs.max(vertex.position);
+        bounds = bounds.with(vertex.position);
     }
     bounds
 }
 
 /// Around all that a map can hold.
-const EVERYWHERE: Bounds = Bounds {
-    mins: Vec3::splat(-1.0e6),
-    maxs: Vec3::splat(1.0e6),
-};
+const EVERYWHERE: Aabb = Aabb::new(Vec3::splat(-1.0e6), Vec3::splat(1.0e6));
 
 /// A box where an instance places it, with room for rounding; `None`: nothing is in it.
-pub(super) fn placed(bounds: &Bounds, instance: &Instance) -> Option<Bounds> {
-    if !bounds.mins.cmple(bounds.maxs).all() {
+pub(super) fn placed(bounds: &Aabb, instance: &Instance) -> Option<Aabb> {
+    if bounds.is_empty() {
         return None;
     }
     let axis = axes(instance);
-    let middle = axis * ((bounds.mins + bounds.maxs) * 0.5) + instance.origin;
-    let half = (bounds.maxs - bounds.mins) * 0.5;
+    let middle = axis * bounds.centre() + instance.origin;
+    let half = bounds.size() * 0.5;
     let reach =
         axis.x_axis.abs() * half.x + axis.y_axis.abs() * half.y + axis.z_axis.abs() * half.z;
     if !(middle.is_finite() && reach.is_finite()) {
         return Some(EVERYWHERE);
     }
     let reach = reach + 0.1 + 1.0e-5 * (middle.abs() + reach);
-    Some(Bounds {
-        mins: middle - reach,
-        maxs: middle + reach,
-    })
+    Some(Aabb::new(middle - reach, middle + reach))
 }
 
 /// Whether rays of a view's pixels may meet a box.
-pub(super) fn may_be_seen(bounds: &Bounds, eye: Vec3, frustum: &[Vec4]) -> bool {
+pub(super) fn may_be_seen(bounds: &Aabb, eye: Vec3, frustum: &[Vec4]) -> bool {
     // rays go through all of a pixel, also of those on the picture's edge
     let farthest = (bounds.mins - eye).abs().max((bounds.maxs - eye).abs());
     let margin = Vec3::splat(0.01 * farthest.max_element());
-    let wide = Bounds {
-        mins: bounds.mins - margin,
-        maxs: bounds.maxs + margin,
-    };
-    !outside(&wide, frustum)
+    !outside(&bounds.grown(margin), frustum)
 }
 
-/// The boxes of what is translucent in a view: at most [`MAX_BOXES`], smallest and largest corners. `geometry`: the
-/// map's, if the view shows it.
+/// The boxes of what is translucent in a view: at most [`MAX_BOXES`]. `geometry`: the map's, if the view shows it.
 pub fn in_sight(
     view: &ViewScene,
     geometry: Option<&StaticGeometry>,
     materials: &dyn MaterialTable,
-) -> Vec<Corners> {
+) -> Vec<Aabb> {
     let frustum = view.view.frustum();
     let eye = view.view.origin;
     let mut boxes = Vec::new();
-    let mut add = |bounds: &Bounds, instance: u32| {
+    let mut add = |bounds: &Aabb, instance: u32| {
         let Some(instance) = view.instances.get(instance as usize) else {
             return;
         };
@@ -97,7 +83,7 @@ pub fn in_sight(
             return;
         };
         if may_be_seen(&bounds, eye, &frustum) {
-            boxes.push([bounds.mins, bounds.maxs]);
+            boxes.push(bounds);
         }
     };
     if let Some(geometry) = geometry {

@@ -10,6 +10,7 @@ use glam::Vec3;
 use q3bsp::Bsp;
 use relight::light::TriangleLight;
 use shaders::trace_types::BspNode;
+use support::Aabb;
 
 use super::light_facings::{Facings, facings};
 
@@ -29,23 +30,20 @@ pub struct Cell {
     /// The cluster.
     pub cluster: usize,
     /// Bounds.
-    pub mins: Vec3,
-    /// Bounds.
-    pub maxs: Vec3,
+    pub bounds: Aabb,
 }
 
 impl Cell {
     /// Middle and half diagonal.
     pub fn ball(&self) -> (Vec3, f32) {
-        let size = self.maxs - self.mins;
-        (self.mins + size * 0.5, size.length() * 0.5)
+        let size = self.bounds.size();
+        (self.bounds.mins + size * 0.5, size.length() * 0.5)
     }
 
     /// Whether all of it lies behind a light that shines to its front alone.
     pub fn behind(&self, light: &TriangleLight) -> bool {
         let normal = light.normal();
-        let furthest = Vec3::select(normal.cmpge(Vec3::ZERO), self.maxs, self.mins);
-        let in_front = (furthest - light.vertices[0]).dot(normal);
+        let in_front = (self.bounds.farthest(normal) - light.vertices[0]).dot(normal);
         !light.two_sided && in_front < -BEHIND
     }
 }
@@ -67,26 +65,24 @@ pub struct Cells {
 #[derive(Clone, Copy)]
 struct Piece {
     cluster: usize,
-    mins: Vec3,
-    maxs: Vec3,
+    bounds: Aabb,
     /// Cells of the grid that it lies in: from, to (excluded).
     from: [i32; 3],
     to: [i32; 3],
 }
 
 impl Piece {
-    fn new(cluster: usize, mins: Vec3, maxs: Vec3, side: f32) -> Self {
+    fn new(cluster: usize, bounds: Aabb, side: f32) -> Self {
         #[allow(clippy::cast_possible_truncation)] // saturates, for damaged maps
         let index = |v: f32| v as i32;
-        let from = (mins / side).floor().to_array().map(index);
-        let mut to = (maxs / side).ceil().to_array().map(index);
+        let from = (bounds.mins / side).floor().to_array().map(index);
+        let mut to = (bounds.maxs / side).ceil().to_array().map(index);
         for (to, from) in to.iter_mut().zip(from) {
             *to = (*to).max(from.saturating_add(1));
         }
         Self {
             cluster,
-            mins,
-            maxs,
+            bounds,
             from,
             to,
         }
@@ -117,14 +113,12 @@ impl Cutter {
             .or_insert_with(|| {
                 cells.push(Cell {
                     cluster: piece.cluster,
-                    mins: piece.mins,
-                    maxs: piece.maxs,
+                    bounds: piece.bounds,
                 });
                 cells.len() - 1
             });
         if let Some(cell) = cells.get_mut(index) {
-            cell.mins = cell.mins.min(piece.mins);
-            cell.maxs = cell.maxs.max(piece.maxs);
+            cell.bounds = cell.bounds.union(piece.bounds);
         }
         i32::try_from(index).unwrap_or(-1)
     }
@@ -147,7 +141,10 @@ impl Cutter {
         let index = self.made.nodes.len();
         self.made.nodes.push(BspNode::default());
         let (mut front, mut back) = (piece, piece);
-        for (part, bound) in [(&mut front.mins, dist), (&mut back.maxs, dist)] {
+        for (part, bound) in [
+            (&mut front.bounds.mins, dist),
+            (&mut back.bounds.maxs, dist),
+        ] {
             if let Some(v) = part.as_mut().get_mut(axis) {
                 *v = bound;
             }
@@ -172,7 +169,7 @@ impl Cutter {
 impl Cells {
     /// Of a map of so many clusters; `length`: entries of a cluster's list.
     pub fn new(bsp: &Bsp, clusters: usize, length: impl Fn(usize) -> usize) -> Self {
-        let leafs: Vec<(usize, usize, Vec3, Vec3)> = bsp
+        let leafs: Vec<(usize, usize, Aabb)> = bsp
             .tree_leafs()
             .into_iter()
             .filter_map(|index| {
@@ -180,13 +177,13 @@ impl Cells {
                 let cluster = usize::try_from(leaf.cluster).ok()?;
                 #[allow(clippy::cast_precision_loss)] // map coordinates
                 let [a, b] = [leaf.mins, leaf.maxs].map(|v| Vec3::from(v.map(|x| x as f32)));
-                (cluster < clusters).then_some((index, cluster, a.min(b), a.max(b)))
+                (cluster < clusters).then_some((index, cluster, Aabb::of([a, b])))
             })
             .collect();
         #[allow(clippy::cast_precision_loss)] // lengths of lists
         let entries = |side: f32| -> f64 {
-            let of = |&(_, cluster, mins, maxs): &(usize, usize, Vec3, Vec3)| {
-                let sizes = Piece::new(cluster, mins, maxs, side).sizes();
+            let of = |&(_, cluster, bounds): &(usize, usize, Aabb)| {
+                let sizes = Piece::new(cluster, bounds, side).sizes();
                 sizes.iter().product::<f64>() * length(cluster) as f64
             };
             leafs.iter().map(of).sum()
@@ -220,7 +217,7 @@ impl Cells {
     /// Cuts leafs, which have an index, a cluster and bounds, along a grid; without one they stay whole.
     fn cut(
         bsp: &Bsp,
-        leafs: &[(usize, usize, Vec3, Vec3)],
+        leafs: &[(usize, usize, Aabb)],
         side: Option<f32>,
         length: impl Fn(usize) -> usize,
     ) -> Self {
@@ -243,14 +240,13 @@ impl Cells {
         };
         // what takes the place of each leaf as a child
         let mut instead: Vec<Option<i32>> = vec![None; bsp.leafs.len()];
-        for &(index, cluster, mins, maxs) in leafs {
+        for &(index, cluster, bounds) in leafs {
             // Where there is no light, there is nothing to tell apart: such a leaf may be as large as the map.
             let piece = match side.filter(|_| length(cluster) > 0) {
-                Some(side) => Piece::new(cluster, mins, maxs, side),
+                Some(side) => Piece::new(cluster, bounds, side),
                 None => Piece {
                     cluster,
-                    mins,
-                    maxs,
+                    bounds,
                     from: [0; 3],
                     to: [1; 3],
                 },
@@ -320,8 +316,8 @@ mod tests {
             };
             let cell = &cells.cells[index];
             assert_eq!(cell.cluster as i32, cluster, "{p}");
-            assert!((cell.mins - 1.0).cmple(p).all() && (cell.maxs + 1.0).cmpge(p).all());
-            assert!((cell.maxs - cell.mins).max_element() <= SIDES[0]);
+            assert!(cell.bounds.grown(Vec3::ONE).touches(Aabb::of([p])));
+            assert!(cell.bounds.size().max_element() <= SIDES[0]);
         }
     }
 
@@ -358,8 +354,7 @@ mod tests {
     fn a_cell_is_behind_a_light_only_with_all_of_it() {
         let cell = Cell {
             cluster: 0,
-            mins: Vec3::ZERO,
-            maxs: Vec3::splat(10.0),
+            bounds: Aabb::new(Vec3::ZERO, Vec3::splat(10.0)),
         };
         let light = |z: f32, up: f32, two_sided| TriangleLight {
             vertices: [Vec3::Z * z, Vec3::new(1.0, 0.0, z), Vec3::new(0.0, up, z)],

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use q3bsp::{Bsp, Surface, SurfaceKind, surface_flags};
 use shaders::trace_types::constants as c;
+use support::Aabb;
 
 use super::light_cells::Cell;
 
@@ -57,9 +58,14 @@ impl Piece {
     }
 
     /// What of it lies in a box, as corners of a polygon (Sutherland and Hodgman, Reentrant Polygon Clipping, 1974).
-    fn within(&self, low: Vec3, high: Vec3) -> Vec<Vec3> {
+    fn within(&self, bounds: Aabb) -> Vec<Vec3> {
         let mut polygon = self.corners.to_vec();
-        let planes = Vec3::AXES.map(|axis| [(axis, axis.dot(low)), (-axis, -axis.dot(high))]);
+        let planes = Vec3::AXES.map(|axis| {
+            [
+                (axis, axis.dot(bounds.mins)),
+                (-axis, -axis.dot(bounds.maxs)),
+            ]
+        });
         for (normal, dist) in planes.into_iter().flatten() {
             let height = |p: Vec3| p.dot(normal) - dist;
             let next = polygon.iter().cycle().skip(1);
@@ -151,7 +157,7 @@ impl Parts {
 /// For each cell points on the surfaces of the world in it, but for skies.
 pub fn facings(bsp: &Bsp, cells: &[Cell]) -> Vec<Facings> {
     let world = bsp.models.first().map(|model| bsp.model_surfaces(model));
-    let drawn: Vec<(Vec3, Vec3, Vec<Piece>)> = (bsp.surfaces.iter().enumerate())
+    let drawn: Vec<(Aabb, Vec<Piece>)> = (bsp.surfaces.iter().enumerate())
         .map(|(index, surface)| {
             let shader = usize::try_from(surface.shader).ok();
             let shader = shader.and_then(|s| bsp.shaders.get(s));
@@ -162,24 +168,21 @@ pub fn facings(bsp: &Bsp, cells: &[Cell]) -> Vec<Facings> {
                 pieces(bsp, surface)
             };
             let corners = pieces.iter().flat_map(|piece| piece.corners);
-            let low = corners.clone().fold(Vec3::INFINITY, Vec3::min);
-            (low, corners.fold(Vec3::NEG_INFINITY, Vec3::max), pieces)
+            (Aabb::of(corners), pieces)
         })
         .collect();
     let listed = bsp.cluster_surfaces();
     let of_cell = |cell: &Cell| {
-        let (low, high) = (cell.mins - BESIDE, cell.maxs + BESIDE);
-        let touches = |mins: Vec3, maxs: Vec3| mins.cmple(high).all() && maxs.cmpge(low).all();
+        let around = cell.bounds.grown(Vec3::splat(BESIDE));
         let mut parts: [Parts; FACINGS] = Default::default();
         let surfaces = listed.get(cell.cluster).into_iter().flatten();
         let surfaces = surfaces.filter_map(|&s| drawn.get(s as usize));
-        for (.., pieces) in surfaces.filter(|(mins, maxs, _)| touches(*mins, *maxs)) {
+        for (_, pieces) in surfaces.filter(|(bounds, _)| bounds.touches(around)) {
             for piece in pieces {
-                let [a, b, c] = piece.corners;
-                if !touches(a.min(b).min(c), a.max(b).max(c)) {
+                if !Aabb::of(piece.corners).touches(around) {
                     continue;
                 }
-                let polygon = piece.within(low, high);
+                let polygon = piece.within(around);
                 for (facing, parts) in parts.iter_mut().enumerate() {
                     if faces(piece.normal, facing) {
                         parts.add(&polygon, piece.normal);
@@ -212,7 +215,7 @@ mod tests {
         let corners = [Vec3::ZERO, Vec3::Y * 100.0, Vec3::X * 100.0];
         let piece = Piece::new(corners.map(up)).unwrap();
         let mut parts = Parts::default();
-        let polygon = piece.within(Vec3::splat(-1.0), Vec3::new(60.0, 60.0, 1.0));
+        let polygon = piece.within(Aabb::new(Vec3::splat(-1.0), Vec3::new(60.0, 60.0, 1.0)));
         parts.add(&polygon, Vec3::Z);
         // the square but for the corner beyond the long side
         assert!(
@@ -230,7 +233,11 @@ mod tests {
             );
             assert!(p.x + p.y <= 100.01, "{p}");
         }
-        assert!(piece.within(Vec3::splat(2.0), Vec3::splat(60.0)).is_empty());
+        assert!(
+            piece
+                .within(Aabb::new(Vec3::splat(2.0), Vec3::splat(60.0)))
+                .is_empty()
+        );
         assert!(Piece::new([up(Vec3::ZERO); 3]).is_none());
     }
 
@@ -243,8 +250,7 @@ mod tests {
         map.add_quad(stone, corners.map(|p| p * 100.0));
         let cell = |low: f32, high: f32| Cell {
             cluster: 0,
-            mins: Vec3::new(0.0, 0.0, low),
-            maxs: Vec3::new(100.0, 100.0, high),
+            bounds: Aabb::new(Vec3::new(0.0, 0.0, low), Vec3::new(100.0, 100.0, high)),
         };
         let found = facings(&map.build(), &[cell(0.0, 50.0), cell(50.0, 100.0)]);
         let faced = |i: usize| found[i].iter().map(|points| !points.is_empty());

@@ -5,6 +5,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use relight::light::{Occlusion, TriangleLight};
 use shaders::trace_types as t;
+use support::Aabb;
 
 use super::light_cells::Cell;
 use super::light_facings::{BESIDE, FACINGS, POINTS, direction};
@@ -130,7 +131,7 @@ impl Listed<'_> {
 
     /// Whether it gives nothing to any point of a cell whose normal has its largest part along the axis of `facing`.
     pub fn is_below(&self, cell: &Cell, facing: usize) -> bool {
-        let (mins, maxs) = (cell.mins - BESIDE, cell.maxs + BESIDE);
+        let Aabb { mins, maxs } = cell.bounds.grown(Vec3::splat(BESIDE));
         let axis = direction(facing);
         // The height of a place over a point's horizon, were the largest part of the normal 1 and the others, which may
         // be anything up to that, the worst; such a normal is no longer than the root of 3.
@@ -183,7 +184,7 @@ impl Place {
     /// Throughout a cell, for what faces any way.
     pub fn throughout(cell: &Cell) -> Vec<Self> {
         let place = |i: usize| Self {
-            point: cell.mins + (cell.maxs - cell.mins) * spread_point(i),
+            point: cell.bounds.mins + cell.bounds.size() * spread_point(i),
             normals: (0..FACINGS).map(|f| (direction(f), 1.0 / 6.0)).collect(),
         };
         (0..POINTS).map(place).collect()
@@ -360,8 +361,7 @@ mod tests {
         // facing any way, both lamps are alike
         let cell = Cell {
             cluster: 0,
-            mins: Vec3::splat(-1.0),
-            maxs: Vec3::splat(1.0),
+            bounds: Aabb::new(Vec3::splat(-1.0), Vec3::splat(1.0)),
         };
         let found = chances(&lights, &Place::throughout(&cell));
         assert!((found[0] / found[1] - 1.0).abs() < 0.1, "{found:?}");
@@ -413,8 +413,7 @@ mod tests {
         let mut vector = || random.signed_point();
         let cell = Cell {
             cluster: 0,
-            mins: Vec3::splat(-20.0),
-            maxs: Vec3::splat(20.0),
+            bounds: Aabb::new(Vec3::splat(-20.0), Vec3::splat(20.0)),
         };
         let mut left_out = 0;
         for _ in 0..2000 {

@@ -10,13 +10,13 @@ use relight::light::{
 };
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
+use support::Aabb;
 
 use super::cell_grid::CellGrid;
 use super::light_cells::Cells;
 use super::light_rows;
 use super::light_tables::luminance;
 use crate::gpu::{Buffer, BufferUsage, Device, Error};
-use crate::world::Bounds;
 
 /// Lights of a map, its lists, and the tree that finds the list of a point.
 pub struct MapLights {
@@ -371,11 +371,8 @@ impl MapLights {
     }
 
     /// Finds from where each of the map's fog volumes may be seen.
-    pub fn find_fogs(&mut self, boxes: &[Bounds]) {
-        let reach = |fog: &Bounds| {
-            self.sight
-                .lit_from(&self.sight.touching(fog.mins, fog.maxs))
-        };
+    pub fn find_fogs(&mut self, boxes: &[Aabb]) {
+        let reach = |fog: &Aabb| self.sight.lit_from(&self.sight.touching(*fog));
         self.fog_reach = boxes.iter().map(reach).collect();
     }
 

@@ -45,7 +45,6 @@ pub mod still;
 pub mod surroundings;
 pub mod targets;
 pub mod view_tracer;
-mod wide_bvh;
 
 pub use look::{MapView, TraceLook};
 

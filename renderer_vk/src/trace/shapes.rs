@@ -11,8 +11,8 @@ use std::collections::HashMap;
 
 use shaders::types::constants as c;
 use shaders::types::{Triangle, Vertex};
+use support::Aabb;
 
-use super::bvh::Aabb;
 use super::input::Tracer;
 use super::part_mesh::{MeshPart, members};
 use super::parts::{Part, Parts, ShapeMesh, SkinMesh};

@@ -2,6 +2,7 @@
 
 use glam::{Vec3, Vec4};
 use q3bsp::Bsp;
+use support::Aabb;
 
 use crate::assets::Assets;
 use crate::gpu::{Buffer, BufferUsage, Device, Error};
@@ -11,9 +12,6 @@ use crate::world::World;
 const MAX_BOXES: usize = 16;
 /// How far a deformed surface leaves its place, units, at most as a rule.
 const DEFORMATION: f32 = 16.0;
-
-/// A box by its smallest and largest corner.
-pub type Corners = [Vec3; 2];
 
 /// A brush of liquid.
 struct Liquid {
@@ -41,14 +39,13 @@ impl Surroundings {
             let drawn = assets.materials.resolve(material);
             assets.materials.get(drawn).dielectric
         };
-        let boxes: Vec<Corners> = data
+        let boxes: Vec<Aabb> = data
             .surfaces
             .iter()
             .filter(|s| s.model == 0 && s.index_count > 0 && dielectric(s.material).filters != 0)
             .map(|s| {
                 let margin = if s.deformed { DEFORMATION } else { 0.0 };
-                let margin = Vec3::splat(margin + 1.0);
-                [s.bounds.mins - margin, s.bounds.maxs + margin]
+                s.bounds.grown(Vec3::splat(margin + 1.0))
             })
             .collect();
         let liquids = (data.surfaces.iter())
@@ -71,7 +68,7 @@ impl Surroundings {
     ///
     /// # Errors
     /// Out of memory, or a lost device.
-    pub fn of_boxes(device: &Device, boxes: Vec<Corners>) -> Result<Self, Error> {
+    pub fn of_boxes(device: &Device, boxes: Vec<Aabb>) -> Result<Self, Error> {
         let boxes = merged(boxes, MAX_BOXES);
         let count = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
         let boxes = (count > 0)
@@ -133,21 +130,17 @@ fn brushes(bsp: &Bsp, name: &str, absorption: Vec3) -> Vec<Liquid> {
 }
 
 /// At most `limit` boxes that hold all of these: neighbours along the longest axis are put together.
-pub fn merged(mut boxes: Vec<Corners>, limit: usize) -> Vec<Corners> {
-    boxes.retain(|b| b[0].is_finite() && b[1].is_finite());
+pub fn merged(mut boxes: Vec<Aabb>, limit: usize) -> Vec<Aabb> {
+    boxes.retain(|b| b.is_finite());
     if boxes.len() <= limit {
         return boxes;
     }
-    let join = |a: Corners, b: &Corners| [a[0].min(b[0]), a[1].max(b[1])];
-    let nothing = [Vec3::INFINITY, Vec3::NEG_INFINITY];
-    let all = boxes.iter().fold(nothing, join);
-    let axis = (all[1] - all[0]).max_position();
-    let middle = |b: &Corners| b[0][axis] + b[1][axis];
+    let union = |boxes: &[Aabb]| boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
+    let axis = union(&boxes).size().max_position();
+    let middle = |b: &Aabb| b.mins[axis] + b.maxs[axis];
     boxes.sort_by(|a, b| middle(a).total_cmp(&middle(b)));
     let share = boxes.len().div_ceil(limit);
-    (boxes.chunks(share))
-        .map(|part| part.iter().fold(nothing, join))
-        .collect()
+    boxes.chunks(share).map(union).collect()
 }
 
 #[cfg(test)]
@@ -156,20 +149,19 @@ mod tests {
 
     #[test]
     fn merged_boxes_hold_every_one() {
-        let boxes: Vec<Corners> = (0..100)
+        let boxes: Vec<Aabb> = (0..100)
             .map(|i| {
                 let at = Vec3::new((i * 37 % 100) as f32 * 10.0, (i % 7) as f32, 0.0);
-                [at, at + 5.0]
+                Aabb::new(at, at + 5.0)
             })
             .collect();
         let few = merged(boxes.clone(), 16);
         assert!(few.len() <= 16 && !few.is_empty());
         for b in &boxes {
-            let holds = |f: &&Corners| f[0].cmple(b[0]).all() && f[1].cmpge(b[1]).all();
-            assert!(few.iter().find(holds).is_some(), "{b:?}");
+            assert!(few.iter().any(|f| f.union(*b) == *f), "{b:?}");
         }
         // and are not around everything
-        assert!(few.iter().all(|f| f[1].x - f[0].x < 300.0));
+        assert!(few.iter().all(|f| f.size().x < 300.0));
         assert_eq!(merged(boxes[..3].to_vec(), 16), boxes[..3]);
     }
 }

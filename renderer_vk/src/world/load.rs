@@ -8,10 +8,11 @@ use shaders::types::{
     self, Vertex,
     constants::{self as c, NO_TEXTURE},
 };
+use support::Aabb;
 
 use super::patch_lod::PatchLod;
 use super::visible::Tree;
-use super::{Bounds, BrushModel, ClassicCopy, WorldData, WorldSurface};
+use super::{BrushModel, ClassicCopy, WorldData, WorldSurface};
 use crate::assets::{ImageSource, LightmapClass, Materials, Textures, prepare};
 use crate::gpu;
 use crate::settings::Settings;
@@ -143,10 +144,7 @@ impl WorldData {
                 material: found,
                 fog: stored.fog,
                 lightmap,
-                bounds: Bounds {
-                    mins: stored.mins,
-                    maxs: stored.maxs,
-                },
+                bounds: Aabb::new(stored.mins, stored.maxs),
                 plane: stored.plane,
                 flat: is_flat(&relit, stored),
                 kind: stored.kind,
@@ -374,10 +372,7 @@ fn brush_models(relit: &RelitWorld) -> Vec<BrushModel> {
         .map(|(model, stored)| BrushModel {
             first_surface: model.first_surface,
             num_surfaces: model.num_surfaces,
-            bounds: Bounds {
-                mins: stored.mins,
-                maxs: stored.maxs,
-            },
+            bounds: Aabb::new(stored.mins, stored.maxs),
         })
         .collect()
 }

@@ -5,9 +5,10 @@
 use glam::Vec3;
 use q3bsp::{Plane, SurfaceKind};
 use shaders::types::Vertex;
+use support::Aabb;
 
 use super::visible::Side;
-use super::{Bounds, WorldData, WorldSurface};
+use super::{WorldData, WorldSurface};
 use crate::api::MarkFragment;
 use crate::assets::Materials;
 
@@ -111,7 +112,7 @@ impl Marker {
         let finite = projection.is_finite() && points.iter().all(|p| p.is_finite());
         if let Some(&first) = points.first().filter(|_| finite && max_fragments > 0) {
             let direction = projection.normalize_or_zero();
-            let bounds = points.iter().fold(Bounds::EMPTY, |bounds, &point| {
+            let bounds = points.iter().fold(Aabb::EMPTY, |bounds, &point| {
                 bounds
                     .with(point)
                     .with(point + projection)
@@ -162,7 +163,7 @@ fn clip_planes(
 }
 
 /// Surfaces of the leafs that the box touches and that can take the mark, each once.
-fn candidates(marked: &Marked<'_>, bounds: &Bounds, direction: Vec3, found: &mut Vec<u32>) {
+fn candidates(marked: &Marked<'_>, bounds: &Aabb, direction: Vec3, found: &mut Vec<u32>) {
     let (world, materials) = (marked.world, marked.materials);
     let bsp = &world.relit.bsp;
     found.clear();

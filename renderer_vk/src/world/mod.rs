@@ -11,6 +11,7 @@ use glam::Vec3;
 use q3bsp::{LightGridLayout, Plane, SurfaceKind};
 use relight::RelitWorld;
 use shaders::types::{self, Vertex};
+use support::Aabb;
 
 use crate::assets::Assets;
 use crate::gpu::{self, Buffer, BufferUsage, Device};
@@ -36,51 +37,6 @@ pub enum WorldError {
     Gpu(#[from] gpu::Error),
 }
 
-/// An axis-aligned box.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Bounds {
-    /// Smallest corner.
-    pub mins: Vec3,
-    /// Largest corner.
-    pub maxs: Vec3,
-}
-
-impl Bounds {
-    /// Contains nothing; adding a point makes it that point.
-    pub const EMPTY: Self = Self {
-        mins: Vec3::INFINITY,
-        maxs: Vec3::NEG_INFINITY,
-    };
-
-    /// With a point added.
-    pub fn with(self, point: Vec3) -> Self {
-        Self {
-            mins: self.mins.min(point),
-            maxs: self.maxs.max(point),
-        }
-    }
-
-    /// Square of the distance from a point to the nearest point inside, units²; infinite when empty.
-    pub fn distance_squared(&self, point: Vec3) -> f32 {
-        (self.mins - point)
-            .max(point - self.maxs)
-            .max(Vec3::ZERO)
-            .length_squared()
-    }
-
-    /// The eight corners.
-    pub fn corners(&self) -> [Vec3; 8] {
-        std::array::from_fn(|i| {
-            let pick = |bit: usize, lo: f32, hi: f32| if i & bit == 0 { lo } else { hi };
-            Vec3::new(
-                pick(1, self.mins.x, self.maxs.x),
-                pick(2, self.mins.y, self.maxs.y),
-                pick(4, self.mins.z, self.maxs.z),
-            )
-        })
-    }
-}
-
 /// A surface of the map as it is drawn. Index = index of the map's surface.
 #[derive(Clone, Debug)]
 pub struct WorldSurface {
@@ -100,7 +56,7 @@ pub struct WorldSurface {
     /// Bindless texture index of the lightmap page, or `NO_TEXTURE`.
     pub lightmap: u32,
     /// Bounds in the model's space.
-    pub bounds: Bounds,
+    pub bounds: Aabb,
     /// Plane of planar surfaces, normal to the front.
     pub plane: Option<Plane>,
     /// Every triangle lies in `plane` and faces as it does. Compilers also write "planar" surfaces that bend, or whose
@@ -139,7 +95,7 @@ pub struct BrushModel {
     /// Number of surfaces.
     pub num_surfaces: u32,
     /// Bounds in its own space.
-    pub bounds: Bounds,
+    pub bounds: Aabb,
 }
 
 /// The world without its GPU buffers.
@@ -190,7 +146,7 @@ impl WorldData {
     }
 
     /// Number of the first fog volume that a box overlaps, plus one; 0 for none.
-    pub fn fog_of_box(&self, bounds: &Bounds) -> u32 {
+    pub fn fog_of_box(&self, bounds: &Aabb) -> u32 {
         let overlaps = |fog: &types::Fog| {
             bounds.maxs.cmpge(fog.mins).all() && bounds.mins.cmple(fog.maxs).all()
         };

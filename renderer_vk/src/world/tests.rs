@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 use q3bsp::builder::MapBuilder;
 use q3bsp::{DrawVert, GridPoint};
+use support::Aabb;
 
 use super::{Marked, Marker};
 use super::{VisibleQuery, VisibleSet, WorldData};
@@ -262,11 +263,7 @@ fn fog_volumes_take_in_spheres_and_boxes() {
     assert_eq!(world.fog_of_sphere(Vec3::splat(50.0), 1.0), 1);
     assert_eq!(world.fog_of_sphere(Vec3::new(110.0, 50.0, 50.0), 9.0), 0);
     assert_eq!(world.fog_of_sphere(Vec3::new(110.0, 50.0, 50.0), 11.0), 1);
-    let bounds = |x: f32| {
-        super::Bounds::EMPTY
-            .with(Vec3::splat(x))
-            .with(Vec3::splat(x + 1.0))
-    };
+    let bounds = |x: f32| Aabb::new(Vec3::splat(x), Vec3::splat(x + 1.0));
     assert_eq!(world.fog_of_box(&bounds(50.0)), 1);
     assert_eq!(world.fog_of_box(&bounds(150.0)), 0);
 }

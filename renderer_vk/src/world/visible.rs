@@ -5,8 +5,9 @@
 
 use glam::{Vec3, Vec4};
 use q3bsp::Bsp;
+use support::Aabb;
 
-use super::{Bounds, WorldData};
+use super::WorldData;
 
 /// A child of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +58,7 @@ impl Pending {
 #[derive(Clone, Debug)]
 struct TreeNode {
     children: [Child; 2],
-    bounds: Bounds,
+    bounds: Aabb,
     parent: u32,
     plane: u32,
 }
@@ -66,7 +67,7 @@ struct TreeNode {
 struct TreeLeaf {
     cluster: i32,
     area: i32,
-    bounds: Bounds,
+    bounds: Aabb,
     /// `NO_PARENT` for leafs that the tree does not reach.
     parent: u32,
 }
@@ -80,12 +81,9 @@ pub struct Tree {
     leafs: Vec<TreeLeaf>,
 }
 
-fn bounds_of(mins: [i32; 3], maxs: [i32; 3]) -> Bounds {
+fn bounds_of(mins: [i32; 3], maxs: [i32; 3]) -> Aabb {
     let to = |v: [i32; 3]| Vec3::from_array(v.map(|c| c as f32));
-    Bounds {
-        mins: to(mins),
-        maxs: to(maxs),
-    }
+    Aabb::new(to(mins), to(maxs))
 }
 
 impl Tree {
@@ -153,7 +151,7 @@ impl Tree {
     }
 
     /// Calls `visit` for every leaf that the box touches, front children first.
-    pub fn leafs_in_box(&self, bsp: &Bsp, bounds: &Bounds, mut visit: impl FnMut(u32)) {
+    pub fn leafs_in_box(&self, bsp: &Bsp, bounds: &Aabb, mut visit: impl FnMut(u32)) {
         let mut pending = Pending::default();
         pending.push(self.root());
         while let Some(child) = pending.pop() {
@@ -204,23 +202,19 @@ impl Side {
     };
 
     /// A box that only touches the plane counts as in front.
-    pub fn of(bounds: &Bounds, normal: Vec3, dist: f32) -> Self {
-        let positive = normal.cmpge(Vec3::ZERO);
-        let farthest = Vec3::select(positive, bounds.maxs, bounds.mins);
-        let nearest = Vec3::select(positive, bounds.mins, bounds.maxs);
+    pub fn of(bounds: &Aabb, normal: Vec3, dist: f32) -> Self {
         Self {
-            front: normal.dot(farthest) >= dist,
-            back: normal.dot(nearest) < dist,
+            front: normal.dot(bounds.farthest(normal)) >= dist,
+            back: normal.dot(bounds.nearest(normal)) < dist,
         }
     }
 }
 
 /// Whether a box lies wholly outside one of the planes (`xyz.p >= w` is inside).
-pub(crate) fn outside(bounds: &Bounds, planes: &[Vec4]) -> bool {
+pub(crate) fn outside(bounds: &Aabb, planes: &[Vec4]) -> bool {
     planes.iter().any(|plane| {
         let normal = plane.truncate();
-        let farthest = Vec3::select(normal.cmpge(Vec3::ZERO), bounds.maxs, bounds.mins);
-        normal.dot(farthest) < plane.w
+        normal.dot(bounds.farthest(normal)) < plane.w
     })
 }
 
@@ -248,8 +242,8 @@ pub struct VisibleQuery<'a> {
 pub struct VisibleSet {
     /// Visible surfaces of the world (model 0), in the engine's order, each once.
     pub surfaces: Vec<u32>,
-    /// Bounds of the visible leafs in the frustum; `Bounds::EMPTY` when there are none.
-    pub bounds: Bounds,
+    /// Bounds of the visible leafs in the frustum; `Aabb::EMPTY` when there are none.
+    pub bounds: Aabb,
     /// Leafs in sight of the last call.
     pub leafs: u32,
     marked_for: Option<(i32, [u8; 32], bool, i32)>,
@@ -271,7 +265,7 @@ impl VisibleSet {
         let tree = &world.tree;
         self.mark(world, query);
         self.surfaces.clear();
-        self.bounds = Bounds::EMPTY;
+        self.bounds = Aabb::EMPTY;
         self.leafs = 0;
         self.surface_stamps.resize(world.surfaces.len(), 0);
         self.stamp = self.stamp.wrapping_add(1);
@@ -279,7 +273,7 @@ impl VisibleSet {
             self.surface_stamps.fill(0);
             self.stamp = 1;
         }
-        let culled = |bounds: &Bounds| query.culls && outside(bounds, query.frustum);
+        let culled = |bounds: &Aabb| query.culls && outside(bounds, query.frustum);
         self.pending.clear();
         self.pending.push(tree.root());
         while let Some(child) = self.pending.pop() {

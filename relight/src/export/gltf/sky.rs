@@ -12,6 +12,7 @@ use crate::overbright::luminance;
 use glam::{Vec3, Vec4};
 use serde_json::{Value, json};
 use std::sync::Arc;
+use support::Aabb;
 
 impl Document<'_> {
     /// Adds the sky around everything; `None` for a map without.
@@ -163,12 +164,8 @@ impl Document<'_> {
 /// A side of the sky: corners from above left, counter-clockwise.
 fn quad(buffers: &mut Buffers, positions: [Vec3; 4], normal: Vec3, material: usize) -> Value {
     let position = buffers.add_floats(Kind::Vec3, positions.iter().map(|p| p.to_array()));
-    let (least, most) = positions
-        .iter()
-        .fold((positions[0], positions[0]), |(a, b), p| {
-            (a.min(*p), b.max(*p))
-        });
-    buffers.bound(position, &least.to_array(), &most.to_array());
+    let bounds = Aabb::of(positions);
+    buffers.bound(position, &bounds.mins.to_array(), &bounds.maxs.to_array());
     let normals = buffers.add_floats(Kind::Vec3, positions.iter().map(|_| normal.to_array()));
     let corners = [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]];
     let st = buffers.add_floats(Kind::Vec2, corners.into_iter());
@@ -216,15 +213,10 @@ fn ball(buffers: &mut Buffers, place: impl Fn(Vec3) -> Vec3, material: usize) ->
             }
         }
     }
-    let (least, most) = positions
-        .iter()
-        .map(|p| Vec3::from_array(*p))
-        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), p| {
-            (a.min(p), b.max(p))
-        });
+    let bounds = Aabb::of(positions.iter().map(|p| Vec3::from_array(*p)));
     let count = indices.len() / 2;
     let position = buffers.add_floats(Kind::Vec3, positions.into_iter());
-    buffers.bound(position, &least.to_array(), &most.to_array());
+    buffers.bound(position, &bounds.mins.to_array(), &bounds.maxs.to_array());
     let normal = buffers.add_floats(Kind::Vec3, normals.into_iter());
     let st = buffers.add_floats(Kind::Vec2, st.into_iter());
     let indices = buffers.add(Kind::Short, &indices, count);

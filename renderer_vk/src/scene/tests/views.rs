@@ -6,6 +6,7 @@ use crate::scene::{Geometry, Look, Scene, ViewScene};
 use crate::test_support::{Registration, openarena};
 use crate::world::WorldData;
 use glam::Vec3;
+use support::Aabb;
 
 #[test]
 fn the_world_in_sight_is_sorted_and_culled() {
@@ -136,10 +137,7 @@ fn check_against_leafs(world: &WorldData, game: &Registration, view: &ViewScene)
     let frustum = view.view.frustum();
     let cluster = bsp.cluster_at(view.def.view_origin);
     let corner = |v: [i32; 3]| Vec3::from_array(v.map(|c| c as f32));
-    let bounds = |mins, maxs| crate::world::Bounds {
-        mins: corner(mins),
-        maxs: corner(maxs),
-    };
+    let bounds = |mins, maxs| Aabb::new(corner(mins), corner(maxs));
     let mut leafs = Vec::new();
     let mut expected = std::collections::BTreeSet::new();
     let mut pending = vec![0i32];

@@ -6,14 +6,14 @@
 //! once when the box of all triangles has [`GROWN`] times the surface it had, or as much less.
 
 use glam::Vec3;
-#[cfg(test)]
-use shaders::trace_types::BvhTriangle;
+use shaders::trace_types::{BvhNode, BvhTriangle};
 use shaders::types::Vertex;
+use support::Aabb;
+use support::bvh::Hierarchy;
 
-use super::super::bvh::{self, Aabb, Hierarchy, build};
+use super::super::bvh::{TRIANGLES, ordered, widen};
 use super::super::input::{Kind, Tracer};
 use super::super::part_mesh::{MeshPart, geometry, is_same, part_indices};
-use super::super::wide_bvh::widen;
 use super::{Bottom, OwnBottom};
 use crate::gpu::{
     Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error, Recorder,
@@ -221,10 +221,7 @@ impl AnimatedShape {
                 refits,
                 pending,
             } => {
-                let bounds = vertices
-                    .iter()
-                    .fold(Aabb::EMPTY, |b, v| b.with(v.position))
-                    .half_area();
+                let bounds = Aabb::of(vertices.iter().map(|v| v.position)).half_area();
                 let fits = *refits < REFITS && bounds <= *area * GROWN && bounds * GROWN >= *area;
                 let refit = fits && blas.address() != 0 && *area > 0.0;
                 if refit {
@@ -248,10 +245,10 @@ impl AnimatedShape {
                 corners.clear();
                 corners.extend(self.indices.iter().map(|t| t.map(position)));
                 boxes.clear();
-                boxes.extend(corners.iter().map(bvh::box_of));
+                boxes.extend(corners.iter().map(|&c| Aabb::of(c)));
                 *bottom = fit(hierarchy, cost, boxes)
                     .map(|bounds| {
-                        let triangles = bvh::ordered(hierarchy, corners);
+                        let triangles = ordered(hierarchy, corners);
                         Ok::<_, Error>(OwnBottom {
                             nodes: rec.arena().push(&widen(hierarchy))?,
                             triangles: rec.arena().push(&triangles)?,
@@ -295,8 +292,8 @@ impl Pose {
         match &self.bottom {
             PoseBottom::Driver { blas, .. } => blas.size(),
             PoseBottom::Own { hierarchy, .. } => {
-                (size_of_val(hierarchy.nodes.as_slice())
-                    + hierarchy.order.len() * size_of::<BvhTriangle>()) as u64
+                (hierarchy.node_count() * size_of::<BvhNode>()
+                    + hierarchy.order().len() * size_of::<BvhTriangle>()) as u64
             }
         }
     }
@@ -312,13 +309,13 @@ impl Pose {
 
 /// Fits a hierarchy to its entries, or builds it anew; the box of everything, if there is anything.
 fn fit(hierarchy: &mut Hierarchy, cost: &mut f32, boxes: &[Aabb]) -> Option<Aabb> {
-    if hierarchy.order.len() == boxes.len() && !boxes.is_empty() {
+    if hierarchy.order().len() == boxes.len() && !boxes.is_empty() {
         let bounds = hierarchy.refit(boxes);
         if hierarchy.cost() <= *cost * WORSE {
             return Some(bounds);
         }
     }
-    *hierarchy = build(boxes, bvh::LEAF);
+    *hierarchy = Hierarchy::new(boxes, TRIANGLES);
     *cost = hierarchy.cost();
-    (!hierarchy.nodes.is_empty()).then(|| hierarchy.bounds())
+    (!hierarchy.is_empty()).then(|| hierarchy.bounds())
 }

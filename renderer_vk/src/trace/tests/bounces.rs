@@ -5,6 +5,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use relight::light::{PointLight, SunLight};
 use shaders::types::{Dielectric, constants as c};
+use support::Aabb;
 
 use super::dielectrics::square;
 use super::harness::{
@@ -366,11 +367,8 @@ fn bounced_light_passes_tinted_glass(gpu: &mut Gpu) {
     scene.quad(rectangle(corner, x, y), floor);
     scene.quad(rectangle(corner + Vec3::Z * 100.0, y, x), glass);
     scene.quad(rectangle(corner + Vec3::Z * 200.0, y, x), ceiling);
-    let around = Vec3::Z;
-    scene.filters.push([
-        corner + Vec3::Z * 100.0 - around,
-        corner + x + y + Vec3::Z * 100.0 + around,
-    ]);
+    let pane = [corner, corner + x + y].map(|p| p + Vec3::Z * 100.0);
+    scene.filters.push(Aabb::of(pane).grown(Vec3::Z));
     let exact = through_byte(encode(glow)) * tint;
     for mean in by_each_way(gpu, &scene, &bounced(1), 16) {
         println!("{mean} {exact}");

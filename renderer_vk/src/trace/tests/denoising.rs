@@ -3,6 +3,7 @@
 use glam::Vec3;
 use relight::light::PointLight;
 use shaders::types::{Dielectric, constants as c};
+use support::Aabb;
 
 use super::harness::{Gpu, Scene, gpu_tests, identity, rectangle, reference, stage};
 use crate::api::DynamicLight;
@@ -430,10 +431,10 @@ fn both_sides_of_water_keep_their_light(gpu: &mut Gpu) {
         Vec3::Y * 200.0,
     );
     scene.quad(surface, water);
-    scene.filters.push([
+    scene.filters.push(Aabb::new(
         Vec3::new(-100.0, -100.0, -1.0),
         Vec3::new(100.0, 100.0, 1.0),
-    ]);
+    ));
     let lamp = Vec3::new(0.0, -30.0, 95.0);
     scene.light(
         [lamp, lamp + Vec3::Y * 60.0, lamp + Vec3::X * 60.0],

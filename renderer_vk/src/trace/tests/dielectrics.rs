@@ -3,6 +3,7 @@
 use glam::Vec3;
 use shaders::types::constants as c;
 use shaders::types::{Dielectric, Stage};
+use support::Aabb;
 use testkit::Random;
 
 use super::harness::{Gpu, Scene, encode, gpu_tests, rectangle, reference, stage, through_byte};
@@ -359,7 +360,8 @@ fn light_takes_on_the_colour_of_what_it_passes(gpu: &mut Gpu) {
         let material = scene.material(&[clear()], c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED);
         scene.materials[material as usize].0.dielectric = dielectric;
         scene.quad(rectangle(corner, u, v), material);
-        scene.filters.push([corner - 1.0, corner + u + v + 1.0]);
+        let glass = Aabb::new(corner - 1.0, corner + u + v + 1.0);
+        scene.filters.push(glass);
     };
     let filter = |filter_color: Vec3| Dielectric {
         filters: 1,

@@ -7,6 +7,7 @@ use relight::light::{EmissionSource, LightLists, PointLight, SunLight, TriangleL
 use shaders::trace_types::SkyRecord;
 use shaders::types::constants as c;
 use shaders::types::{Fog, Instance, Material, MaterialBuffers, Stage, TcMod, Vertex};
+use support::Aabb;
 
 use super::{encode, identity, rectangle, stage};
 use crate::api::{DynamicLight, EntityKind, RefDef};
@@ -34,7 +35,7 @@ pub struct Scene {
     pub light_cutoff: f32,
     pub fogs: Vec<Fog>,
     /// Boxes around what colours light.
-    pub filters: Vec<[Vec3; 2]>,
+    pub filters: Vec<Aabb>,
     pub instances: Vec<Instance>,
     pub dynamic_vertices: Vec<Vertex>,
     pub dynamic_indices: Vec<u32>,
