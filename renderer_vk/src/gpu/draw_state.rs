@@ -168,3 +168,14 @@ pub enum Topology {
     /// One for a point.
     Points,
 }
+
+impl Topology {
+    pub(crate) fn vk(self) -> vk::PrimitiveTopology {
+        match self {
+            Self::Triangles => vk::PrimitiveTopology::TRIANGLE_LIST,
+            Self::TriangleStrip => vk::PrimitiveTopology::TRIANGLE_STRIP,
+            Self::Lines => vk::PrimitiveTopology::LINE_LIST,
+            Self::Points => vk::PrimitiveTopology::POINT_LIST,
+        }
+    }
+}

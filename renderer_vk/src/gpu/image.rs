@@ -135,6 +135,38 @@ impl ImageUsage {
     pub(crate) fn has(self, other: Self) -> bool {
         self.0 & other.0 != 0
     }
+
+    /// Vulkan's usage, and the features that it takes of a format.
+    fn vk(self) -> (vk::ImageUsageFlags, vk::FormatFeatureFlags) {
+        use vk::FormatFeatureFlags as F;
+        use vk::ImageUsageFlags as U;
+        let mut usage = U::TRANSFER_SRC | U::TRANSFER_DST;
+        let mut needed = F::empty();
+        for (wanted, use_flag, feature) in [
+            (Self::SAMPLED, U::SAMPLED, F::SAMPLED_IMAGE),
+            (Self::STORAGE, U::STORAGE, F::STORAGE_IMAGE),
+            (Self::COLOR, U::COLOR_ATTACHMENT, F::COLOR_ATTACHMENT),
+            (
+                Self::DEPTH,
+                U::DEPTH_STENCIL_ATTACHMENT,
+                F::DEPTH_STENCIL_ATTACHMENT,
+            ),
+        ] {
+            if self.has(wanted) {
+                usage |= use_flag;
+                needed |= feature;
+            }
+        }
+        (usage, needed)
+    }
+
+    fn memory(self) -> MemoryKind {
+        if self.has(Self::STORAGE | Self::COLOR | Self::DEPTH) {
+            MemoryKind::Target
+        } else {
+            MemoryKind::Texture
+        }
+    }
 }
 
 impl BitOr for ImageUsage {
@@ -178,6 +210,35 @@ impl<'a> ImageDesc<'a> {
             usage,
             samples: 1,
         }
+    }
+
+    /// Whether the device can make it.
+    fn check(&self, device: &Device) -> Result<(), Error> {
+        let limit = device.0.info.max_image_size;
+        if self.width == 0 || self.height == 0 || self.width > limit || self.height > limit {
+            return Err(Error::Usage {
+                name: self.name.to_owned(),
+                what: format!(
+                    "an image of {}x{} texels (1 to {limit} are possible)",
+                    self.width, self.height
+                ),
+            });
+        }
+        let unsupported = |what| {
+            Err(Error::Unsupported {
+                name: self.name.to_owned(),
+                what,
+                device: device.0.info.name.clone(),
+            })
+        };
+        if self.samples > 1 && !device.supports_samples(self.format, self.samples) {
+            return unsupported(format!("{:?} with {} samples", self.format, self.samples));
+        }
+        let (_, needed) = self.usage.vk();
+        if !device.0.features(self.format).contains(needed) {
+            return unsupported(format!("{:?} as {needed:?}", self.format));
+        }
+        Ok(())
     }
 }
 
@@ -255,51 +316,9 @@ impl Image {
     /// Out of memory, a full descriptor table, a size of zero or beyond the device's limit, a format that the device
     /// cannot use so.
     pub fn new(device: &Device, desc: &ImageDesc<'_>) -> Result<Self, Error> {
-        use vk::ImageUsageFlags as U;
-        let limit = device.0.info.max_image_size;
-        if desc.width == 0 || desc.height == 0 || desc.width > limit || desc.height > limit {
-            return Err(Error::Usage {
-                name: desc.name.to_owned(),
-                what: format!(
-                    "an image of {}x{} texels (1 to {limit} are possible)",
-                    desc.width, desc.height
-                ),
-            });
-        }
+        desc.check(device)?;
         let most_mips = 32 - desc.width.max(desc.height).leading_zeros();
         let (mips, layers) = (desc.mips.clamp(1, most_mips), desc.layers.max(1));
-        if desc.samples > 1 && !device.supports_samples(desc.format, desc.samples) {
-            return Err(Error::Unsupported {
-                name: desc.name.to_owned(),
-                what: format!("{:?} with {} samples", desc.format, desc.samples),
-                device: device.0.info.name.clone(),
-            });
-        }
-        let mut usage = U::TRANSFER_SRC | U::TRANSFER_DST;
-        let mut needed = vk::FormatFeatureFlags::empty();
-        if desc.usage.has(ImageUsage::SAMPLED) {
-            usage |= U::SAMPLED;
-            needed |= vk::FormatFeatureFlags::SAMPLED_IMAGE;
-        }
-        if desc.usage.has(ImageUsage::STORAGE) {
-            usage |= U::STORAGE;
-            needed |= vk::FormatFeatureFlags::STORAGE_IMAGE;
-        }
-        if desc.usage.has(ImageUsage::COLOR) {
-            usage |= U::COLOR_ATTACHMENT;
-            needed |= vk::FormatFeatureFlags::COLOR_ATTACHMENT;
-        }
-        if desc.usage.has(ImageUsage::DEPTH) {
-            usage |= U::DEPTH_STENCIL_ATTACHMENT;
-            needed |= vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
-        }
-        if !device.0.features(desc.format).contains(needed) {
-            return Err(Error::Unsupported {
-                name: desc.name.to_owned(),
-                what: format!("{:?} as {needed:?}", desc.format),
-                device: device.0.info.name.clone(),
-            });
-        }
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
             .format(desc.format.vk())
@@ -312,26 +331,16 @@ impl Image {
             .array_layers(layers)
             .samples(vk::SampleCountFlags::from_raw(desc.samples.max(1)))
             .tiling(vk::ImageTiling::OPTIMAL)
-            .usage(usage)
+            .usage(desc.usage.vk().0)
             .initial_layout(vk::ImageLayout::UNDEFINED);
         let vk = device.vk();
         // SAFETY: size and format were checked against the device.
         let raw = unsafe { vk.create_image(&info, None) }.context("vkCreateImage")?;
         // SAFETY: `raw` was just made.
         let requirements = unsafe { vk.get_image_memory_requirements(raw) };
-        let drawn = ImageUsage::STORAGE | ImageUsage::COLOR | ImageUsage::DEPTH;
-        let kind = if desc.usage.has(drawn) {
-            MemoryKind::Target
-        } else {
-            MemoryKind::Texture
-        };
-        let memory = match device.0.allocate(
-            desc.name,
-            kind,
-            requirements,
-            MemoryLocation::GpuOnly,
-            false,
-        ) {
+        let kind = desc.usage.memory();
+        let gpu_only = MemoryLocation::GpuOnly;
+        let memory = match (device.0).allocate(desc.name, kind, requirements, gpu_only, false) {
             Ok(memory) => memory,
             Err(e) => {
                 // SAFETY: nothing uses the new image.

@@ -7,6 +7,9 @@ use ash::{ext, khr, vk};
 
 use super::error::{Context, Error};
 
+/// Makes the surface of a window for an instance, or says why it cannot.
+pub type CreateSurface<'a> = &'a mut dyn FnMut(vk::Instance) -> Result<vk::SurfaceKHR, String>;
+
 /// Where the picture goes.
 pub enum SurfaceSource<'a> {
     /// Nowhere: no window, the loader is the system's `libvulkan`.
@@ -19,8 +22,7 @@ pub enum SurfaceSource<'a> {
 pub struct WindowSource<'a> {
     get_instance_proc_addr: vk::PFN_vkGetInstanceProcAddr,
     extensions: Vec<CString>,
-    #[allow(clippy::type_complexity)]
-    create: &'a mut dyn FnMut(vk::Instance) -> Result<vk::SurfaceKHR, String>,
+    create: CreateSurface<'a>,
 }
 
 impl<'a> SurfaceSource<'a> {
@@ -31,11 +33,10 @@ impl<'a> SurfaceSource<'a> {
     /// # Safety
     /// `get_instance_proc_addr` must be the entry point of a Vulkan loader that stays in memory for as long as the
     /// device lives, and `create` must return a surface made with the instance that it is given.
-    #[allow(clippy::type_complexity)]
     pub unsafe fn window(
         get_instance_proc_addr: vk::PFN_vkGetInstanceProcAddr,
         extensions: Vec<CString>,
-        create: &'a mut dyn FnMut(vk::Instance) -> Result<vk::SurfaceKHR, String>,
+        create: CreateSurface<'a>,
     ) -> Self {
         Self::Window(WindowSource {
             get_instance_proc_addr,
@@ -64,45 +65,11 @@ const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 impl Instance {
     /// Makes the instance and, with a window, its surface.
     pub fn new(app_name: &str, validation: bool, source: SurfaceSource<'_>) -> Result<Self, Error> {
-        let (entry, mut extensions, window) = match source {
-            SurfaceSource::Headless => {
-                // SAFETY: opening the loader runs its initializers; the library is a Vulkan loader by its name.
-                let entry = unsafe { ash::Entry::load() }.map_err(|e| {
-                    Error::Loader(format!(
-                        "{e}; is a Vulkan driver with its loader installed?"
-                    ))
-                })?;
-                (entry, Vec::new(), None)
-            }
-            SurfaceSource::Window(window) => {
-                let functions = ash::StaticFn {
-                    get_instance_proc_addr: window.get_instance_proc_addr,
-                };
-                // SAFETY: the maker of the source promised a loader's entry point that stays in memory.
-                let entry = unsafe { ash::Entry::from_static_fn(functions) };
-                (entry, window.extensions, Some(window.create))
-            }
-        };
-
-        // SAFETY: no instance is needed for this call.
-        let version = unsafe { entry.try_enumerate_instance_version() }
-            .context("vkEnumerateInstanceVersion")?
-            .unwrap_or(vk::API_VERSION_1_0);
-        if version < vk::API_VERSION_1_2 {
-            return Err(Error::Loader(format!(
-                "it offers Vulkan {}.{}, 1.2 is needed",
-                vk::api_version_major(version),
-                vk::api_version_minor(version)
-            )));
-        }
-
+        let (entry, mut extensions, window) = load(source)?;
+        check_version(&entry)?;
         // SAFETY: no instance is needed for this call.
         let available = unsafe { entry.enumerate_instance_extension_properties(None) }
             .context("vkEnumerateInstanceExtensionProperties")?;
-        let has = |list: &[vk::ExtensionProperties], name: &CStr| {
-            list.iter()
-                .any(|e| e.extension_name_as_c_str().is_ok_and(|n| n == name))
-        };
         for wanted in &extensions {
             if !has(&available, wanted) {
                 return Err(Error::Surface(format!(
@@ -112,60 +79,35 @@ impl Instance {
             }
         }
         let debug_utils = has(&available, ext::debug_utils::NAME);
-        if debug_utils
-            && !extensions
-                .iter()
-                .any(|e| e.as_c_str() == ext::debug_utils::NAME)
-        {
+        if debug_utils && extensions.iter().all(|e| **e != *ext::debug_utils::NAME) {
             extensions.push(ext::debug_utils::NAME.to_owned());
         }
-
-        let mut layers = Vec::new();
-        let mut validation_features = false;
-        if validation {
-            // SAFETY: no instance is needed for this call.
-            let found = unsafe { entry.enumerate_instance_layer_properties() }
-                .context("vkEnumerateInstanceLayerProperties")?
-                .iter()
-                .any(|l| l.layer_name_as_c_str().is_ok_and(|n| n == VALIDATION_LAYER));
-            if found {
-                layers.push(VALIDATION_LAYER.as_ptr());
-                // SAFETY: no instance is needed; the layer was just found.
-                let of_layer = unsafe {
-                    entry.enumerate_instance_extension_properties(Some(VALIDATION_LAYER))
-                }
-                .unwrap_or_default();
-                validation_features = has(&of_layer, ext::validation_features::NAME);
-                if validation_features {
-                    extensions.push(ext::validation_features::NAME.to_owned());
-                }
-            } else {
-                log::warn!(
-                    "Vulkan validation was asked for, but {} is not installed",
-                    VALIDATION_LAYER.to_string_lossy()
-                );
-            }
+        let validates = validation && has_validation_layer(&entry)?;
+        let synchronization = validates && validates_synchronization(&entry);
+        if synchronization {
+            extensions.push(ext::validation_features::NAME.to_owned());
         }
-
-        let app_name = CString::new(app_name.replace('\0', "")).unwrap_or_default();
-        let app = vk::ApplicationInfo::default()
-            .application_name(&app_name)
-            .engine_name(c"Relight")
-            .api_version(vk::API_VERSION_1_2);
-        let pointers: Vec<_> = extensions.iter().map(|e| e.as_ptr()).collect();
         let messages = Arc::new(Messages::default());
         let mut debug_info = messenger_info(&messages);
         let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
         let mut features =
             vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+        let app_name = CString::new(app_name.replace('\0', "")).unwrap_or_default();
+        let app = vk::ApplicationInfo::default()
+            .application_name(&app_name)
+            .engine_name(c"Relight")
+            .api_version(vk::API_VERSION_1_2);
+        let layers = [VALIDATION_LAYER.as_ptr()];
+        let pointers: Vec<_> = extensions.iter().map(|e| e.as_ptr()).collect();
         let mut info = vk::InstanceCreateInfo::default()
             .application_info(&app)
             .enabled_extension_names(&pointers)
-            .enabled_layer_names(&layers);
-        if validation_features {
+            .enabled_layer_names(if validates { &layers } else { &[] });
+        if synchronization {
             info = info.push_next(&mut features);
         }
-        if debug_utils && !layers.is_empty() {
+        let listens = debug_utils && validates;
+        if listens {
             // Catches what the layer says while the instance itself is made and destroyed.
             info = info.push_next(&mut debug_info);
         }
@@ -179,7 +121,6 @@ impl Instance {
                 result,
             },
         })?;
-
         let mut instance = Self {
             raw,
             debug_utils,
@@ -188,7 +129,7 @@ impl Instance {
             messenger: None,
             _entry: entry.clone(),
         };
-        if debug_utils && !layers.is_empty() {
+        if listens {
             let functions = ext::debug_utils::Instance::new(&entry, &instance.raw);
             let info = messenger_info(&instance.messages);
             // SAFETY: the instance is alive; the user data is the `Arc` held beside the messenger.
@@ -203,6 +144,77 @@ impl Instance {
         }
         Ok(instance)
     }
+}
+
+/// The loader, the extensions that the window needs, and what makes its surface.
+fn load(
+    source: SurfaceSource<'_>,
+) -> Result<(ash::Entry, Vec<CString>, Option<CreateSurface<'_>>), Error> {
+    match source {
+        SurfaceSource::Headless => {
+            // SAFETY: opening the loader runs its initializers; the library is a Vulkan loader by its name.
+            let entry = unsafe { ash::Entry::load() }.map_err(|e| {
+                Error::Loader(format!(
+                    "{e}; is a Vulkan driver with its loader installed?"
+                ))
+            })?;
+            Ok((entry, Vec::new(), None))
+        }
+        SurfaceSource::Window(window) => {
+            let functions = ash::StaticFn {
+                get_instance_proc_addr: window.get_instance_proc_addr,
+            };
+            // SAFETY: the maker of the source promised a loader's entry point that stays in memory.
+            let entry = unsafe { ash::Entry::from_static_fn(functions) };
+            Ok((entry, window.extensions, Some(window.create)))
+        }
+    }
+}
+
+fn check_version(entry: &ash::Entry) -> Result<(), Error> {
+    // SAFETY: no instance is needed for this call.
+    let version = unsafe { entry.try_enumerate_instance_version() }
+        .context("vkEnumerateInstanceVersion")?
+        .unwrap_or(vk::API_VERSION_1_0);
+    if version < vk::API_VERSION_1_2 {
+        return Err(Error::Loader(format!(
+            "it offers Vulkan {}.{}, 1.2 is needed",
+            vk::api_version_major(version),
+            vk::api_version_minor(version)
+        )));
+    }
+    Ok(())
+}
+
+fn has(list: &[vk::ExtensionProperties], name: &CStr) -> bool {
+    list.iter()
+        .any(|e| e.extension_name_as_c_str().is_ok_and(|n| n == name))
+}
+
+/// Whether the validation layer is installed; warns if not.
+fn has_validation_layer(entry: &ash::Entry) -> Result<bool, Error> {
+    // SAFETY: no instance is needed for this call.
+    let found = unsafe { entry.enumerate_instance_layer_properties() }
+        .context("vkEnumerateInstanceLayerProperties")?
+        .iter()
+        .any(|l| l.layer_name_as_c_str().is_ok_and(|n| n == VALIDATION_LAYER));
+    if !found {
+        log::warn!(
+            "Vulkan validation was asked for, but {} is not installed",
+            VALIDATION_LAYER.to_string_lossy()
+        );
+    }
+    Ok(found)
+}
+
+/// Whether the validation layer, which is installed, can check synchronization.
+fn validates_synchronization(entry: &ash::Entry) -> bool {
+    // SAFETY: no instance is needed; the layer was found.
+    let of_layer = unsafe { entry.enumerate_instance_extension_properties(Some(VALIDATION_LAYER)) };
+    has(
+        &of_layer.unwrap_or_default(),
+        ext::validation_features::NAME,
+    )
 }
 
 impl Drop for Instance {

@@ -73,6 +73,54 @@ impl<'a> GraphicsDesc<'a> {
             constants: &[],
         }
     }
+
+    fn rasterization(&self) -> vk::PipelineRasterizationStateCreateInfo<'static> {
+        let (slope, units) = self.polygon_offset.unwrap_or_default();
+        vk::PipelineRasterizationStateCreateInfo::default()
+            .polygon_mode(if self.wireframe {
+                vk::PolygonMode::LINE
+            } else {
+                vk::PolygonMode::FILL
+            })
+            .cull_mode(self.cull.vk())
+            .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
+            .depth_bias_enable(self.polygon_offset.is_some())
+            .depth_bias_slope_factor(slope)
+            .depth_bias_constant_factor(units)
+            .line_width(1.0)
+    }
+
+    fn depth_stencil(&self) -> vk::PipelineDepthStencilStateCreateInfo<'static> {
+        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+            .depth_test_enable(self.depth.is_some())
+            .depth_write_enable(self.depth.is_some() && self.depth_write)
+            .depth_compare_op(self.depth_test.vk());
+        let has_stencil = self.depth.is_some_and(Format::has_stencil);
+        match self.stencil.filter(|_| has_stencil) {
+            Some(stencil) => depth
+                .stencil_test_enable(true)
+                .front(stencil.vk())
+                .back(stencil.vk()),
+            None => depth,
+        }
+    }
+
+    fn blending(&self) -> vk::PipelineColorBlendAttachmentState {
+        let attachment = vk::PipelineColorBlendAttachmentState::default()
+            .color_write_mask(self.color_write.vk());
+        let Some((source, target)) = self.blend else {
+            return attachment;
+        };
+        // SRC_ALPHA_SATURATE means 1 for the alpha channel, so one pair serves both.
+        attachment
+            .blend_enable(true)
+            .src_color_blend_factor(source.vk())
+            .dst_color_blend_factor(target.vk())
+            .color_blend_op(vk::BlendOp::ADD)
+            .src_alpha_blend_factor(source.vk())
+            .dst_alpha_blend_factor(target.vk())
+            .alpha_blend_op(vk::BlendOp::ADD)
+    }
 }
 
 /// A raw pipeline with its end.
@@ -218,57 +266,15 @@ impl GraphicsPipeline {
         }
         let input = vk::PipelineVertexInputStateCreateInfo::default();
         let assembly =
-            vk::PipelineInputAssemblyStateCreateInfo::default().topology(match desc.topology {
-                Topology::Triangles => vk::PrimitiveTopology::TRIANGLE_LIST,
-                Topology::TriangleStrip => vk::PrimitiveTopology::TRIANGLE_STRIP,
-                Topology::Lines => vk::PrimitiveTopology::LINE_LIST,
-                Topology::Points => vk::PrimitiveTopology::POINT_LIST,
-            });
+            vk::PipelineInputAssemblyStateCreateInfo::default().topology(desc.topology.vk());
         let viewport = vk::PipelineViewportStateCreateInfo::default()
             .viewport_count(1)
             .scissor_count(1);
-        let (slope, units) = desc.polygon_offset.unwrap_or_default();
-        let raster = vk::PipelineRasterizationStateCreateInfo::default()
-            .polygon_mode(if desc.wireframe {
-                vk::PolygonMode::LINE
-            } else {
-                vk::PolygonMode::FILL
-            })
-            .cull_mode(desc.cull.vk())
-            .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
-            .depth_bias_enable(desc.polygon_offset.is_some())
-            .depth_bias_slope_factor(slope)
-            .depth_bias_constant_factor(units)
-            .line_width(1.0);
+        let raster = desc.rasterization();
         let samples = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::from_raw(desc.samples.max(1)));
-        let stencil = desc
-            .stencil
-            .filter(|_| desc.depth.is_some_and(Format::has_stencil));
-        let mut depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(desc.depth.is_some())
-            .depth_write_enable(desc.depth.is_some() && desc.depth_write)
-            .depth_compare_op(desc.depth_test.vk());
-        if let Some(stencil) = stencil {
-            depth = depth
-                .stencil_test_enable(true)
-                .front(stencil.vk())
-                .back(stencil.vk());
-        }
-        let mut attachment = vk::PipelineColorBlendAttachmentState::default()
-            .color_write_mask(desc.color_write.vk());
-        if let Some((source, target)) = desc.blend {
-            // SRC_ALPHA_SATURATE means 1 for the alpha channel, so one pair serves both.
-            attachment = attachment
-                .blend_enable(true)
-                .src_color_blend_factor(source.vk())
-                .dst_color_blend_factor(target.vk())
-                .color_blend_op(vk::BlendOp::ADD)
-                .src_alpha_blend_factor(source.vk())
-                .dst_alpha_blend_factor(target.vk())
-                .alpha_blend_op(vk::BlendOp::ADD);
-        }
-        let attachments = [attachment];
+        let depth = desc.depth_stencil();
+        let attachments = [desc.blending()];
         let mut blend = vk::PipelineColorBlendStateCreateInfo::default();
         if desc.color.is_some() {
             blend = blend.attachments(&attachments);

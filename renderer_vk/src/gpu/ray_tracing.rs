@@ -6,7 +6,7 @@ use shaders::Spirv;
 use super::buffer::{Buffer, BufferDesc, BufferUsage, Memory};
 use super::device::Device;
 use super::error::{Context, Error};
-use super::pipeline::{Constants, Module, Pipeline};
+use super::pipeline::{Constants, Module, Pipeline, one};
 
 /// A triangle hit group; a hit group of `None`s is legal and reports nothing.
 #[derive(Clone, Copy, Debug, Default)]
@@ -62,70 +62,13 @@ impl RayTracingPipeline {
                 device: device.0.info.name.clone(),
             });
         };
-        let constants = Constants::new(desc.constants);
-        let constants = constants.info();
-        let mut modules = Vec::new();
-        let mut stages = Vec::new();
-        let mut add = |code: &Spirv, flags: vk::ShaderStageFlags| -> Result<u32, Error> {
-            let module = Module::new(device, code)?;
-            stages.push(
-                vk::PipelineShaderStageCreateInfo::default()
-                    .stage(flags)
-                    .module(module.raw)
-                    .name(c"main")
-                    .specialization_info(&constants),
-            );
-            modules.push(module);
-            Ok(u32::try_from(modules.len() - 1).unwrap_or(vk::SHADER_UNUSED_KHR))
-        };
-        let empty = vk::RayTracingShaderGroupCreateInfoKHR::default()
-            .general_shader(vk::SHADER_UNUSED_KHR)
-            .closest_hit_shader(vk::SHADER_UNUSED_KHR)
-            .any_hit_shader(vk::SHADER_UNUSED_KHR)
-            .intersection_shader(vk::SHADER_UNUSED_KHR);
-        let general = empty.ty(vk::RayTracingShaderGroupTypeKHR::GENERAL);
-        let mut groups =
-            vec![general.general_shader(add(desc.raygen, vk::ShaderStageFlags::RAYGEN_KHR)?)];
-        for miss in desc.miss {
-            groups.push(general.general_shader(add(miss, vk::ShaderStageFlags::MISS_KHR)?));
-        }
-        for hit in desc.hit {
-            let mut group = empty.ty(vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP);
-            if let Some(code) = hit.closest_hit {
-                group = group.closest_hit_shader(add(code, vk::ShaderStageFlags::CLOSEST_HIT_KHR)?);
-            }
-            if let Some(code) = hit.any_hit {
-                group = group.any_hit_shader(add(code, vk::ShaderStageFlags::ANY_HIT_KHR)?);
-            }
-            groups.push(group);
-        }
-        let infos = [vk::RayTracingPipelineCreateInfoKHR::default()
-            .stages(&stages)
-            .groups(&groups)
-            .max_pipeline_ray_recursion_depth(1)
-            .layout(device.0.bindless.pipeline_layout)];
-        // SAFETY: everything that the description points to lives here; the modules declare the common layout.
-        let made = unsafe {
-            functions.create_ray_tracing_pipelines(
-                vk::DeferredOperationKHR::null(),
-                device.0.pipeline_cache,
-                &infos,
-                None,
-            )
-        };
-        let pipeline =
-            super::pipeline::one(device, made, "vkCreateRayTracingPipelinesKHR", desc.name)?;
-
+        let pipeline = compile(device, functions, desc)?;
         let size = limits.handle_size as usize;
-        let count = u32::try_from(groups.len()).unwrap_or(u32::MAX);
+        let groups = 1 + desc.miss.len() + desc.hit.len();
+        let count = u32::try_from(groups).unwrap_or(u32::MAX);
         // SAFETY: all groups of the pipeline, with room for their handles.
         let handles = unsafe {
-            functions.get_ray_tracing_shader_group_handles(
-                pipeline.raw(),
-                0,
-                count,
-                size * groups.len(),
-            )
+            functions.get_ray_tracing_shader_group_handles(pipeline.raw(), 0, count, size * groups)
         }
         .context("vkGetRayTracingShaderGroupHandlesKHR")?;
 
@@ -177,6 +120,66 @@ impl RayTracingPipeline {
     pub(crate) fn regions(&self) -> SbtRegions {
         self.regions
     }
+}
+
+/// Compiles a pipeline; its groups are ray generation, misses, hit groups.
+fn compile(
+    device: &Device,
+    functions: &ash::khr::ray_tracing_pipeline::Device,
+    desc: &RayTracingDesc<'_>,
+) -> Result<Pipeline, Error> {
+    let constants = Constants::new(desc.constants);
+    let constants = constants.info();
+    let mut modules = Vec::new();
+    let mut stages = Vec::new();
+    let mut add = |code: &Spirv, flags: vk::ShaderStageFlags| -> Result<u32, Error> {
+        let module = Module::new(device, code)?;
+        stages.push(
+            vk::PipelineShaderStageCreateInfo::default()
+                .stage(flags)
+                .module(module.raw)
+                .name(c"main")
+                .specialization_info(&constants),
+        );
+        modules.push(module);
+        Ok(u32::try_from(modules.len() - 1).unwrap_or(vk::SHADER_UNUSED_KHR))
+    };
+    let empty = vk::RayTracingShaderGroupCreateInfoKHR::default()
+        .general_shader(vk::SHADER_UNUSED_KHR)
+        .closest_hit_shader(vk::SHADER_UNUSED_KHR)
+        .any_hit_shader(vk::SHADER_UNUSED_KHR)
+        .intersection_shader(vk::SHADER_UNUSED_KHR);
+    let general = empty.ty(vk::RayTracingShaderGroupTypeKHR::GENERAL);
+    let mut groups =
+        vec![general.general_shader(add(desc.raygen, vk::ShaderStageFlags::RAYGEN_KHR)?)];
+    for miss in desc.miss {
+        groups.push(general.general_shader(add(miss, vk::ShaderStageFlags::MISS_KHR)?));
+    }
+    for hit in desc.hit {
+        let mut group = empty.ty(vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP);
+        if let Some(code) = hit.closest_hit {
+            group = group.closest_hit_shader(add(code, vk::ShaderStageFlags::CLOSEST_HIT_KHR)?);
+        }
+        if let Some(code) = hit.any_hit {
+            group = group.any_hit_shader(add(code, vk::ShaderStageFlags::ANY_HIT_KHR)?);
+        }
+        groups.push(group);
+    }
+    let infos = [vk::RayTracingPipelineCreateInfoKHR::default()
+        .stages(&stages)
+        .groups(&groups)
+        .max_pipeline_ray_recursion_depth(1)
+        .layout(device.0.bindless.pipeline_layout)];
+    // SAFETY: everything that the description points to lives here; the modules declare the common layout.
+    let made = unsafe {
+        functions.create_ray_tracing_pipelines(
+            vk::DeferredOperationKHR::null(),
+            device.0.pipeline_cache,
+            &infos,
+            None,
+        )
+    };
+    one(device, made, "vkCreateRayTracingPipelinesKHR", desc.name)
 }
 
 /// Offsets of the records in a shader binding table: ray generation, miss, hit.

@@ -23,6 +23,52 @@ pub struct SwapchainDesc {
     pub vsync: bool,
 }
 
+impl SwapchainDesc {
+    fn present_mode(&self, offered: &[vk::PresentModeKHR]) -> vk::PresentModeKHR {
+        let unsynchronized = [vk::PresentModeKHR::IMMEDIATE, vk::PresentModeKHR::MAILBOX];
+        let found = unsynchronized.into_iter().find(|m| offered.contains(m));
+        found
+            .filter(|_| !self.vsync)
+            .unwrap_or(vk::PresentModeKHR::FIFO)
+    }
+
+    /// Size of the images.
+    fn extent(&self, caps: &vk::SurfaceCapabilitiesKHR) -> vk::Extent2D {
+        let (least, most) = (caps.min_image_extent, caps.max_image_extent);
+        // This value says that the swapchain decides the size.
+        if caps.current_extent.width != u32::MAX {
+            return caps.current_extent;
+        }
+        vk::Extent2D {
+            width: self.width.max(least.width).min(most.width),
+            height: self.height.max(least.height).min(most.height),
+        }
+    }
+}
+
+/// Three images, or one more than the window system needs.
+fn image_count(caps: &vk::SurfaceCapabilitiesKHR) -> u32 {
+    let count = caps.min_image_count.saturating_add(1).max(3);
+    match caps.max_image_count {
+        // no limit
+        0 => count,
+        most => count.min(most),
+    }
+}
+
+/// Opaque if the window system offers it.
+fn composite_alpha(caps: &vk::SurfaceCapabilitiesKHR) -> vk::CompositeAlphaFlagsKHR {
+    [
+        vk::CompositeAlphaFlagsKHR::OPAQUE,
+        vk::CompositeAlphaFlagsKHR::INHERIT,
+        vk::CompositeAlphaFlagsKHR::PRE_MULTIPLIED,
+        vk::CompositeAlphaFlagsKHR::POST_MULTIPLIED,
+    ]
+    .into_iter()
+    .find(|a| caps.supported_composite_alpha.contains(*a))
+    .unwrap_or(vk::CompositeAlphaFlagsKHR::OPAQUE)
+}
+
 /// The images that the window shows, made anew when the window changes.
 pub struct Swapchain {
     device: Device,
@@ -304,55 +350,13 @@ impl Swapchain {
             functions.get_physical_device_surface_present_modes(device.0.physical, surface)
         }
         .context("vkGetPhysicalDeviceSurfacePresentModesKHR")?;
-        let mode = if self.desc.vsync {
-            vk::PresentModeKHR::FIFO
-        } else {
-            [vk::PresentModeKHR::IMMEDIATE, vk::PresentModeKHR::MAILBOX]
-                .into_iter()
-                .find(|m| modes.contains(m))
-                .unwrap_or(vk::PresentModeKHR::FIFO)
-        };
-        // This value says that the swapchain decides the size.
-        let free = caps.current_extent.width == u32::MAX;
-        let axis = |current: u32, wanted: u32, min: u32, max: u32| {
-            if free {
-                wanted.max(min).min(max)
-            } else {
-                current
-            }
-        };
-        let extent = vk::Extent2D {
-            width: axis(
-                caps.current_extent.width,
-                self.desc.width,
-                caps.min_image_extent.width,
-                caps.max_image_extent.width,
-            ),
-            height: axis(
-                caps.current_extent.height,
-                self.desc.height,
-                caps.min_image_extent.height,
-                caps.max_image_extent.height,
-            ),
-        };
+        let extent = self.desc.extent(&caps);
         if extent.width == 0 || extent.height == 0 {
             // Minimised. Stay stale, so that the next acquisition tries again.
             self.stale = true;
             return Ok(());
         }
-        let mut count = caps.min_image_count.saturating_add(1).max(3);
-        if caps.max_image_count > 0 {
-            count = count.min(caps.max_image_count);
-        }
-        let alpha = [
-            vk::CompositeAlphaFlagsKHR::OPAQUE,
-            vk::CompositeAlphaFlagsKHR::INHERIT,
-            vk::CompositeAlphaFlagsKHR::PRE_MULTIPLIED,
-            vk::CompositeAlphaFlagsKHR::POST_MULTIPLIED,
-        ]
-        .into_iter()
-        .find(|a| caps.supported_composite_alpha.contains(*a))
-        .unwrap_or(vk::CompositeAlphaFlagsKHR::OPAQUE);
+        let count = image_count(&caps);
         let usage = (vk::ImageUsageFlags::COLOR_ATTACHMENT
             | vk::ImageUsageFlags::TRANSFER_DST
             | vk::ImageUsageFlags::TRANSFER_SRC)
@@ -369,8 +373,8 @@ impl Swapchain {
             .image_usage(usage)
             .image_sharing_mode(vk::SharingMode::EXCLUSIVE)
             .pre_transform(caps.current_transform)
-            .composite_alpha(alpha)
-            .present_mode(mode)
+            .composite_alpha(composite_alpha(&caps))
+            .present_mode(self.desc.present_mode(&modes))
             .clipped(true)
             .old_swapchain(old);
         // SAFETY: values are within the surface's capabilities; the old swapchain is retired by this.
@@ -383,18 +387,25 @@ impl Swapchain {
         // one image waits while the next frame takes another
         self.late = device.info().software && count > caps.min_image_count;
         device.0.name(self.raw, "swapchain");
-        // SAFETY: just made.
+        self.add_images(swapchains, extent)?;
+        self.stale = false;
+        Ok(())
+    }
+
+    /// Wraps the images of a new swapchain.
+    fn add_images(
+        &mut self,
+        swapchains: &ash::khr::swapchain::Device,
+        extent: vk::Extent2D,
+    ) -> Result<(), Error> {
+        let device = &self.device;
+        // SAFETY: the swapchain was just made.
         let raw_images = unsafe { swapchains.get_swapchain_images(self.raw) }
             .context("vkGetSwapchainImagesKHR")?;
         for raw in raw_images {
-            let image = Image::of_swapchain(
-                &device,
-                raw,
-                "swapchain image",
-                extent.width,
-                extent.height,
-                format,
-            )?;
+            let (width, height) = (extent.width, extent.height);
+            let image =
+                Image::of_swapchain(device, raw, "swapchain image", width, height, self.format)?;
             // SAFETY: plain creation.
             let finished = unsafe {
                 device
@@ -404,7 +415,6 @@ impl Swapchain {
             .context("vkCreateSemaphore")?;
             self.images.push((image, finished));
         }
-        self.stale = false;
         Ok(())
     }
 

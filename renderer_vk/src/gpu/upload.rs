@@ -168,74 +168,51 @@ impl Pending {
     }
 }
 
-/// Records everything that waits, between two full barriers.
-pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &mut Pending) {
-    let vk = device.vk();
-    let Pending {
-        inits,
-        targets,
-        copies,
-        seen,
-        ..
-    } = pending;
-    let part = |images: &[vk::ImageMemoryBarrier<'_>], to_all: bool| {
-        let all = vk::PipelineStageFlags::ALL_COMMANDS;
-        let transfer = vk::PipelineStageFlags::TRANSFER;
-        let memory = [vk::MemoryBarrier::default()
-            .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
-            .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)];
+/// A memory barrier between transfers and all commands, with changes of layouts.
+fn full_barrier(
+    device: &Device,
+    cmd: vk::CommandBuffer,
+    after_transfer: bool,
+    mut images: impl Iterator<Item = vk::ImageMemoryBarrier<'static>>,
+) {
+    let all = vk::PipelineStageFlags::ALL_COMMANDS;
+    let transfer = vk::PipelineStageFlags::TRANSFER;
+    let (before, after) = if after_transfer {
+        (transfer, all)
+    } else {
+        (all, transfer)
+    };
+    let memory = [vk::MemoryBarrier::default()
+        .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
+        .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)];
+    // A piece at a time, which needs no memory; without images the memory barrier alone.
+    let mut piece = [vk::ImageMemoryBarrier::default(); 16];
+    loop {
+        let mut count = 0;
+        for (place, image) in piece.iter_mut().zip(&mut images) {
+            *place = image;
+            count += 1;
+        }
+        let part = piece.get(..count).unwrap_or_default();
+        let flags = vk::DependencyFlags::empty();
         // SAFETY: `cmd` is being recorded outside of a render pass; the images are alive (graveyard).
         unsafe {
-            vk.cmd_pipeline_barrier(
-                cmd,
-                if to_all { transfer } else { all },
-                if to_all { all } else { transfer },
-                vk::DependencyFlags::empty(),
-                &memory,
-                &[],
-                images,
-            );
+            let vk = device.vk();
+            vk.cmd_pipeline_barrier(cmd, before, after, flags, &memory, &[], part);
         }
-    };
-    // A piece at a time, which needs no memory; without images the memory barrier alone.
-    let barrier = |images: &mut dyn Iterator<Item = vk::ImageMemoryBarrier<'static>>, to_all| {
-        let mut piece = [vk::ImageMemoryBarrier::default(); 16];
-        loop {
-            let mut count = 0;
-            for (place, image) in piece.iter_mut().zip(&mut *images) {
-                *place = image;
-                count += 1;
-            }
-            part(piece.get(..count).unwrap_or_default(), to_all);
-            if count < piece.len() {
-                break;
-            }
+        if count < piece.len() {
+            break;
         }
-    };
-    let dst = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-    // A new image that is written now goes straight to the layout for that.
-    let fresh = &mut seen.fresh;
-    fresh.clear();
-    fresh.extend(inits.iter().map(|target| target.image));
-    let new = inits.iter().map(|target| {
-        let written = targets.contains_key(&target.image);
-        let to = if written { dst } else { target.layout };
-        target.barrier(vk::ImageLayout::UNDEFINED, to)
-    });
-    let old = (targets.values())
-        .filter(|target| !fresh.contains(&target.image))
-        .map(|target| target.barrier(target.layout, dst));
-    barrier(&mut new.chain(old), false);
+    }
+}
 
-    // Two copies to the same place must keep their order.
-    let (buffers, levels) = (&mut seen.buffers, &mut seen.levels);
-    buffers.clear();
-    levels.clear();
-    for copy in &*copies {
-        let again = match copy {
+impl Seen {
+    /// Whether a copy writes where an earlier one did, as far as it is known; two such copies must keep their order.
+    fn overlaps(&mut self, copy: &Copy) -> bool {
+        match copy {
             Copy::Buffer { target, region, .. } => {
                 let (start, end) = (region.dst_offset, region.dst_offset + region.size);
-                let range = buffers.entry(*target).or_insert((start, start));
+                let range = self.buffers.entry(*target).or_insert((start, start));
                 let overlaps = start < range.1 && end > range.0;
                 *range = if overlaps {
                     (start, end)
@@ -246,25 +223,49 @@ pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &mut Pend
             }
             Copy::Image { target, region, .. } => {
                 let part = region.image_subresource;
-                !levels.insert((*target, part.mip_level, part.base_array_layer))
+                let level = (*target, part.mip_level, part.base_array_layer);
+                !self.levels.insert(level)
             }
-        };
-        if again {
+        }
+    }
+}
+
+/// Records everything that waits, between two full barriers.
+pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &mut Pending) {
+    let vk = device.vk();
+    let Pending {
+        inits,
+        targets,
+        copies,
+        seen,
+        ..
+    } = pending;
+    let dst = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+    // A new image that is written now goes straight to the layout for that.
+    seen.fresh.clear();
+    seen.fresh.extend(inits.iter().map(|target| target.image));
+    let new = inits.iter().map(|target| {
+        let written = targets.contains_key(&target.image);
+        let to = if written { dst } else { target.layout };
+        target.barrier(vk::ImageLayout::UNDEFINED, to)
+    });
+    let old = (targets.values())
+        .filter(|target| !seen.fresh.contains(&target.image))
+        .map(|target| target.barrier(target.layout, dst));
+    full_barrier(device, cmd, false, new.chain(old));
+
+    seen.buffers.clear();
+    seen.levels.clear();
+    for copy in &*copies {
+        if seen.overlaps(copy) {
             let memory = [vk::MemoryBarrier::default()
                 .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
                 .dst_access_mask(vk::AccessFlags::TRANSFER_WRITE)];
             let transfer = vk::PipelineStageFlags::TRANSFER;
-            // SAFETY: as above.
+            let flags = vk::DependencyFlags::empty();
+            // SAFETY: `cmd` is being recorded outside of a render pass.
             unsafe {
-                vk.cmd_pipeline_barrier(
-                    cmd,
-                    transfer,
-                    transfer,
-                    vk::DependencyFlags::empty(),
-                    &memory,
-                    &[],
-                    &[],
-                );
+                vk.cmd_pipeline_barrier(cmd, transfer, transfer, flags, &memory, &[], &[]);
             }
         }
         match copy {
@@ -281,13 +282,13 @@ pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &mut Pend
                 target,
                 region,
             } => {
-                // SAFETY: as above; the image is in this layout since the first barrier.
+                // SAFETY: as for buffers; the image is in this layout since the first barrier.
                 unsafe { vk.cmd_copy_buffer_to_image(cmd, *source, *target, dst, &[*region]) };
             }
         }
     }
-    let mut back = targets.values().map(|t| t.barrier(dst, t.layout));
-    barrier(&mut back, true);
+    let back = targets.values().map(|t| t.barrier(dst, t.layout));
+    full_barrier(device, cmd, true, back);
 }
 
 impl DeviceInner {
