@@ -75,9 +75,6 @@ enum Part<'a> {
     Kept(usize, super::shapes::Prepared),
 }
 
-/// A record for each geometry of a structure.
-type Records<'a> = &'a mut dyn Iterator<Item = GeometryRecord>;
-
 /// A structure in its place.
 struct Placement<'a> {
     part: Part<'a>,
@@ -86,6 +83,72 @@ struct Placement<'a> {
     record: u32,
     mask: u8,
     kind: Kind,
+}
+
+/// The structures of a view.
+#[derive(Default)]
+struct Placements<'a> {
+    placed: Vec<Placement<'a>>,
+    /// One for each geometry of a structure; a hit finds its record by the number of the structure's first.
+    records: Vec<GeometryRecord>,
+}
+
+impl<'a> Placements<'a> {
+    fn add(
+        &mut self,
+        part: Part<'a>,
+        (axis, origin): (Mat3, Vec3),
+        mask: u8,
+        kind: Kind,
+        records: impl IntoIterator<Item = GeometryRecord>,
+    ) {
+        self.placed.push(Placement {
+            part,
+            axis,
+            origin,
+            record: u32::try_from(self.records.len()).unwrap_or(u32::MAX),
+            mask,
+            kind,
+        });
+        self.records.extend(records);
+    }
+
+    /// Adds the world and the brush models of a view.
+    fn add_map(&mut self, view: &ViewScene, geometry: &'a StaticGeometry) {
+        let submodels = view.submodels.iter().map(|s| (s.model, s.instance));
+        for (model, index) in iter::once((0, 0)).chain(submodels) {
+            let Some(instance) = view.instances.get(index as usize) else {
+                continue;
+            };
+            let axis = axes(instance);
+            // flattened to nothing it is not to be seen
+            if !is_solid(axis) {
+                continue;
+            }
+            for blas in geometry.structures.iter().filter(|s| s.model == model) {
+                let Some(first) = blas.parts.first() else {
+                    continue;
+                };
+                let record = |part: &StaticPart| GeometryRecord {
+                    triangles: part.triangles,
+                    vertices: geometry.vertices,
+                    instance: index,
+                    kind: part.kind.index(),
+                };
+                let mask = |mask, part: &StaticPart| mask | Seen::Always.mask(part.kind);
+                let mask = blas.parts.iter().fold(0, mask);
+                let structure = Part::Static(&blas.structure);
+                let records = blas.parts.iter().map(record);
+                self.add(
+                    structure,
+                    (axis, instance.origin),
+                    mask,
+                    first.kind,
+                    records,
+                );
+            }
+        }
+    }
 }
 
 /// The driver's structures that are built in each frame.
@@ -172,48 +235,9 @@ impl Accel {
             first_person: self.shows_first_person(),
             ..AccelOutput::default()
         };
-        let mut records: Vec<GeometryRecord> = Vec::new();
-        let mut placed: Vec<Placement<'_>> = Vec::new();
-        // a hit finds its record by the number of the first
-        let mut place = |part, axis, origin, mask, kind: Kind, of: Records<'_>| {
-            placed.push(Placement {
-                part,
-                axis,
-                origin,
-                record: u32::try_from(records.len()).unwrap_or(u32::MAX),
-                mask,
-                kind,
-            });
-            records.extend(of);
-        };
+        let mut placements = Placements::default();
         if let Some(geometry) = geometry {
-            let submodels = view.submodels.iter().map(|s| (s.model, s.instance));
-            for (model, index) in iter::once((0, 0)).chain(submodels) {
-                let Some(instance) = view.instances.get(index as usize) else {
-                    continue;
-                };
-                let axis = axes(instance);
-                // flattened to nothing it is not to be seen
-                if !is_solid(axis) {
-                    continue;
-                }
-                for blas in geometry.structures.iter().filter(|s| s.model == model) {
-                    let Some(first) = blas.parts.first() else {
-                        continue;
-                    };
-                    let record = |part: &StaticPart| GeometryRecord {
-                        triangles: part.triangles,
-                        vertices: geometry.vertices,
-                        instance: index,
-                        kind: part.kind.index(),
-                    };
-                    let mask = |mask, part: &StaticPart| mask | Seen::Always.mask(part.kind);
-                    let mask = blas.parts.iter().fold(0, mask);
-                    let structure = Part::Static(&blas.structure);
-                    let of = &mut blas.parts.iter().map(record);
-                    place(structure, axis, instance.origin, mask, first.kind, of);
-                }
-            }
+            placements.add_map(view, geometry);
         }
         for (index, part) in self.parts.parts.iter().enumerate() {
             let Some(instance) = view.instances.get(part.instance as usize) else {
@@ -230,14 +254,8 @@ impl Accel {
             };
             let mask = part.seen.mask(part.kind);
             let kept = Part::Kept(index, prepared);
-            place(
-                kept,
-                axes(instance),
-                instance.origin,
-                mask,
-                part.kind,
-                &mut iter::once(record),
-            );
+            let place = (axes(instance), instance.origin);
+            placements.add(kept, place, mask, part.kind, [record]);
         }
         for (index, slot) in self.parts.slots.iter().enumerate() {
             if slot.triangles.is_empty() {
@@ -250,10 +268,10 @@ impl Accel {
                 kind: slot.kind.index(),
             };
             let mask = slot.seen.mask(slot.kind);
-            let part = Part::Slot(index);
-            let of = &mut iter::once(record);
-            place(part, Mat3::IDENTITY, Vec3::ZERO, mask, slot.kind, of);
+            let place = (Mat3::IDENTITY, Vec3::ZERO);
+            placements.add(Part::Slot(index), place, mask, slot.kind, [record]);
         }
+        let Placements { placed, records } = placements;
         output.geometries = rec.arena().push(&records)?;
         if self.driver.is_some() {
             output.scene = self.build_driver(rec, geometry.map_or(0, |g| g.serial), &placed)?;

@@ -20,16 +20,8 @@ use crate::gpu::{Buffer, BufferUsage, Device, Error};
 
 /// Lights of a map, its lists, and the tree that finds the list of a point.
 pub struct MapLights {
-    triangles: Buffer,
-    triangle_bounds: Buffer,
-    spheres: Buffer,
-    sphere_bounds: Buffer,
-    suns: Buffer,
-    nodes: Buffer,
-    leaf_cells: Buffer,
-    grid: Buffer,
-    rows: Buffer,
-    slots: Buffer,
+    /// What `fixed` has the addresses of.
+    _buffers: Vec<Buffer>,
     /// What does not change from view to view: counts and addresses.
     fixed: t::LightView,
     /// Which cluster sees which.
@@ -227,56 +219,96 @@ pub(super) fn point_light(light: &PointLight, end: f32) -> t::SphereLight {
     s
 }
 
+/// Triangle lights by where and how they shine.
+#[derive(Default)]
+struct SortedTriangles {
+    /// Of the world, as they are.
+    triangles: Vec<t::TriangleLight>,
+    /// Of the world, changing in time.
+    changing: Vec<ChangingLight>,
+    /// Of brush models.
+    moving: Vec<(u32, Vec<ChangingLight>)>,
+    flickers: Vec<Flicker>,
+    /// For each light of the source its number in the lists; lights of brush models are in no list.
+    numbers: Vec<Option<u32>>,
+}
+
+impl SortedTriangles {
+    fn of(source: &MapLightSource<'_>) -> Self {
+        let mut sorted = Self::default();
+        for (index, (light, end)) in source.triangles.iter().zip(ends(source)).enumerate() {
+            let known = source.flickers.get(index).copied().flatten();
+            let flicker = known.map(|flicker| sorted.flicker(flicker));
+            let number = sorted.add(source, light, end, flicker);
+            sorted.numbers.push(number);
+        }
+        sorted
+    }
+
+    /// Index of a way to change in time.
+    fn flicker(&mut self, flicker: &Flicker) -> usize {
+        let at = self.flickers.iter().position(|f| f == flicker);
+        at.unwrap_or_else(|| {
+            self.flickers.push(flicker.clone());
+            self.flickers.len() - 1
+        })
+    }
+
+    /// Adds a light; returns its number in the lists.
+    fn add(
+        &mut self,
+        source: &MapLightSource<'_>,
+        light: &TriangleLight,
+        end: f32,
+        flicker: Option<usize>,
+    ) -> Option<u32> {
+        let origin = match light.model {
+            0 => Vec3::ZERO,
+            model => (source.model_origins.get(model as usize).copied()).unwrap_or_default(),
+        };
+        let placed = ChangingLight {
+            light: triangle_light(light, end, origin),
+            flicker,
+        };
+        if light.model != 0 {
+            match self.moving.iter_mut().find(|(m, _)| *m == light.model) {
+                Some((_, lights)) => lights.push(placed),
+                None => self.moving.push((light.model, vec![placed])),
+            }
+            None
+        } else if flicker.is_some() {
+            self.changing.push(placed);
+            Some(number(c::LIGHT_CHANGING_TRIANGLE, self.changing.len() - 1))
+        } else {
+            self.triangles.push(placed.light);
+            Some(number(c::LIGHT_TRIANGLE, self.triangles.len() - 1))
+        }
+    }
+}
+
+/// Buffers that shaders read by address.
+struct Buffers<'a> {
+    device: &'a Device,
+    made: Vec<Buffer>,
+}
+
+impl Buffers<'_> {
+    /// Uploads data; returns their address.
+    fn add<T: bytemuck::Pod>(&mut self, name: &str, data: &[T]) -> Result<u64, Error> {
+        let buffer = Buffer::with_data(self.device, name, BufferUsage::STORAGE, data)?;
+        let address = buffer.address();
+        self.made.push(buffer);
+        Ok(address)
+    }
+}
+
 impl MapLights {
     /// Uploads a map's lights.
     ///
     /// # Errors
     /// Out of memory.
     pub fn new(device: &Device, source: &MapLightSource<'_>) -> Result<Self, Error> {
-        let storage = BufferUsage::STORAGE;
-        let mut triangles: Vec<t::TriangleLight> = Vec::new();
-        let mut changing: Vec<ChangingLight> = Vec::new();
-        let mut moving: Vec<(u32, Vec<ChangingLight>)> = Vec::new();
-        let mut flickers: Vec<Flicker> = Vec::new();
-        // what a list's entry is called here; lights of brush models are in no list
-        let mut numbers = Vec::with_capacity(source.triangles.len());
-        let ends = ends(source);
-        for (index, light) in source.triangles.iter().enumerate() {
-            let end = ends.get(index).copied().unwrap_or(0.0);
-            let known = source.flickers.get(index).copied().flatten();
-            let flicker = known.map(|flicker| {
-                let at = flickers.iter().position(|f| f == flicker);
-                at.unwrap_or_else(|| {
-                    flickers.push(flicker.clone());
-                    flickers.len() - 1
-                })
-            });
-            if light.model == 0 {
-                let placed = triangle_light(light, end, Vec3::ZERO);
-                if flicker.is_some() {
-                    let light = number(c::LIGHT_CHANGING_TRIANGLE, changing.len());
-                    numbers.push(Some(light));
-                    changing.push(ChangingLight {
-                        light: placed,
-                        flicker,
-                    });
-                } else {
-                    numbers.push(Some(number(c::LIGHT_TRIANGLE, triangles.len())));
-                    triangles.push(placed);
-                }
-                continue;
-            }
-            numbers.push(None);
-            let origin = source.model_origins.get(light.model as usize);
-            let light_of_model = ChangingLight {
-                light: triangle_light(light, end, origin.copied().unwrap_or(Vec3::ZERO)),
-                flicker,
-            };
-            match moving.iter_mut().find(|(model, _)| *model == light.model) {
-                Some((_, lights)) => lights.push(light_of_model),
-                None => moving.push((light.model, vec![light_of_model])),
-            }
-        }
+        let sorted = SortedTriangles::of(source);
         let spheres: Vec<t::SphereLight> = (source.points.iter())
             .map(|light| point_light(light, source.light_cutoff))
             .collect();
@@ -295,71 +327,55 @@ impl MapLights {
             .bsp
             .map(|bsp| Cells::new(bsp, lists.clusters(), length));
         let cells = cells.unwrap_or_default();
-        let (rows, slots) = light_rows::rows(source, &numbers, &cells);
-        let (nodes, leaf_cells) = (&cells.nodes, &cells.leaf_cells);
+        let (rows, slots) = light_rows::rows(source, &sorted.numbers, &cells);
         let bounds = source.bsp.and_then(|bsp| bsp.models.first());
         let (low, high) = bounds
             .map(|world| (world.mins, world.maxs))
             .unwrap_or_default();
-        let grid = CellGrid::new(nodes, low, high);
-        let triangle_bounds: Vec<_> = triangles.iter().map(triangle_bounds).collect();
+        let grid = CellGrid::new(&cells.nodes, low, high);
+        let triangle_bounds: Vec<_> = sorted.triangles.iter().map(triangle_bounds).collect();
         let sphere_bounds: Vec<_> = spheres.iter().map(sphere_bounds).collect();
-        let mut lights = Self {
-            triangles: Buffer::with_data(device, "trace triangle lights", storage, &triangles)?,
-            triangle_bounds: Buffer::with_data(
-                device,
-                "trace triangle light bounds",
-                storage,
-                &triangle_bounds,
-            )?,
-            spheres: Buffer::with_data(device, "trace point lights", storage, &spheres)?,
-            sphere_bounds: Buffer::with_data(
-                device,
-                "trace point light bounds",
-                storage,
-                &sphere_bounds,
-            )?,
-            suns: Buffer::with_data(device, "trace suns", storage, &suns)?,
-            nodes: Buffer::with_data(device, "trace nodes", storage, nodes)?,
-            leaf_cells: Buffer::with_data(device, "trace leafs", storage, leaf_cells)?,
-            grid: Buffer::with_data(device, "trace cell grid", storage, &grid.starts)?,
-            rows: Buffer::with_data(device, "trace light rows", storage, &rows)?,
-            slots: Buffer::with_data(device, "trace light lists", storage, &slots)?,
-            fixed: t::LightView {
-                node_count: count(nodes.len()),
-                grid_origin: grid.origin,
-                grid_scale: grid.scale,
-                grid_size: grid.size.to_array(),
-                row_count: count(rows.len()),
-                sun_count: count(suns.len()),
-                ..t::LightView::default()
-            },
+        let mut buffers = Buffers {
+            device,
+            made: Vec::new(),
+        };
+        let fixed = t::LightView {
+            triangles: [buffers.add("trace triangle lights", &sorted.triangles)?, 0],
+            spheres: [buffers.add("trace point lights", &spheres)?, 0],
+            bounds: [
+                buffers.add("trace triangle light bounds", &triangle_bounds)?,
+                0,
+                buffers.add("trace point light bounds", &sphere_bounds)?,
+                0,
+            ],
+            suns: buffers.add("trace suns", &suns)?,
+            nodes: buffers.add("trace nodes", &cells.nodes)?,
+            leaf_cells: buffers.add("trace leafs", &cells.leaf_cells)?,
+            grid: buffers.add("trace cell grid", &grid.starts)?,
+            rows: buffers.add("trace light rows", &rows)?,
+            slots: buffers.add("trace light lists", &slots)?,
+            node_count: count(cells.nodes.len()),
+            grid_origin: grid.origin,
+            grid_scale: grid.scale,
+            grid_size: grid.size.to_array(),
+            row_count: count(rows.len()),
+            sun_count: count(suns.len()),
+            ..t::LightView::default()
+        };
+        Ok(Self {
+            _buffers: buffers.made,
+            fixed,
             sight: source.bsp.map(Sight::new).unwrap_or_default(),
             fog_reach: Vec::new(),
-            changing,
+            changing: sorted.changing,
             pulsing: (source.points.iter().zip(&spheres))
                 .filter_map(|(light, sphere)| Some((*sphere, light.pulse?)))
                 .collect(),
-            moving,
-            flickers,
+            moving: sorted.moving,
+            flickers: sorted.flickers,
             ambient: source.ambient,
             white: 1.0,
-        };
-        lights.fixed.triangles = [lights.triangles.address(), 0];
-        lights.fixed.spheres = [lights.spheres.address(), 0];
-        lights.fixed.bounds = [
-            lights.triangle_bounds.address(),
-            0,
-            lights.sphere_bounds.address(),
-            0,
-        ];
-        lights.fixed.suns = lights.suns.address();
-        lights.fixed.nodes = lights.nodes.address();
-        lights.fixed.leaf_cells = lights.leaf_cells.address();
-        lights.fixed.grid = lights.grid.address();
-        lights.fixed.rows = lights.rows.address();
-        lights.fixed.slots = lights.slots.address();
-        Ok(lights)
+        })
     }
 
     /// No lights, for views without a map.

@@ -249,6 +249,39 @@ pub fn axes(instance: &Instance) -> Mat3 {
     Mat3::from_cols(x, y, z)
 }
 
+/// `Triangle.flags` of a mesh.
+fn triangle_flags(mesh: &DynamicMesh, instance: &Instance, kind: Kind, info: &MaterialInfo) -> u32 {
+    // what is baked into the world's own vertices is not part of the material
+    let world = if mesh.world_surface.is_some() {
+        c::TRIANGLE_WORLD
+    } else {
+        0
+    };
+    let faces_eye = if instance.flags & c::INSTANCE_SUSPENDED != 0 {
+        c::TRIANGLE_FACES_EYE
+    } else {
+        0
+    };
+    let paths = u32::from(mesh.paths) << TRIANGLE_PATHS_SHIFT;
+    world | faces_eye | sides(kind) | rank_bits(info) | paths
+}
+
+/// Source, vertices and indices of a mesh that has a structure of its own.
+fn kept_source(view: &ViewScene, mesh: &DynamicMesh) -> Option<(Source, u32, u32)> {
+    match mesh.shape {
+        Shape::Rigid(rigid) => {
+            let rigid = view.rigid.get(rigid as usize)?;
+            let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+            let (vertices, indices) = (count(rigid.vertices.len()), count(rigid.indices.len()));
+            Some((Source::Rigid(rigid.id), vertices, indices))
+        }
+        Shape::Animated(id) if !is_scrap(mesh) && is_whole(view, mesh) => {
+            Some((Source::Animated(id), mesh.vertex_count, mesh.index_count))
+        }
+        Shape::Animated(_) | Shape::Changing => None,
+    }
+}
+
 impl Parts {
     /// Sorts a view's meshes.
     pub fn collect(&mut self, view: &ViewScene, materials: &dyn MaterialTable) {
@@ -295,20 +328,7 @@ impl Parts {
         ) else {
             return;
         };
-        // what is baked into the world's own vertices is not part of the material
-        let world = if mesh.world_surface.is_some() {
-            c::TRIANGLE_WORLD
-        } else {
-            0
-        };
-        let faces_eye = if instance.flags & c::INSTANCE_SUSPENDED != 0 {
-            c::TRIANGLE_FACES_EYE
-        } else {
-            0
-        };
-        let paths = u32::from(mesh.paths) << TRIANGLE_PATHS_SHIFT;
-        let sides = sides(kind);
-        let flags = world | faces_eye | sides | rank_bits(info) | paths;
+        let flags = triangle_flags(mesh, instance, kind, info);
         // Seen from anywhere, the faces of something pressed flat lie in one plane, and which of them a ray meets first
         // is left to the last bits of its distance: it would flicker.
         if !is_solid(axes(instance)) {
@@ -328,46 +348,16 @@ impl Parts {
             );
             return;
         }
-        let (source, vertices, indices) = match mesh.shape {
-            Shape::Rigid(rigid) => {
-                let Some(rigid) = view.rigid.get(rigid as usize) else {
-                    return;
-                };
-                let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-                (
-                    Source::Rigid(rigid.id),
-                    count(rigid.vertices.len()),
-                    count(rigid.indices.len()),
-                )
-            }
-            Shape::Animated(id) if !is_scrap(mesh) && is_whole(view, mesh) => {
-                (Source::Animated(id), mesh.vertex_count, mesh.index_count)
-            }
-            Shape::Animated(_) | Shape::Changing => {
-                let slot = (Seen::of(instance.flags), kind);
-                self.add_changing(view, mesh, instance, slot, material, flags);
-                return;
-            }
+        let Some((source, vertices, indices)) = kept_source(view, mesh) else {
+            let slot = (Seen::of(instance.flags), kind);
+            self.add_changing(view, mesh, instance, slot, material, flags);
+            return;
         };
-        let mut shares = [Some((kind, Share::Whole)), None];
-        if kind == Kind::Tested && mesh.world_surface.is_none() {
-            let key = (source, material, indices);
-            let known = self.coverages.entry(key).or_insert_with(|| {
-                let found = triangle_coverages(view, mesh, material, materials);
-                found
-                    .iter()
-                    .any(|c| *c != Coverage::Mixed)
-                    .then(|| found.into())
-            });
-            if let Some(known) = known {
-                let some =
-                    |coverage, kind, share| known.contains(&coverage).then_some((kind, share));
-                shares = [
-                    some(Coverage::Solid, Kind::Opaque, Share::Solid(material)),
-                    some(Coverage::Mixed, Kind::Tested, Share::Mixed(material)),
-                ];
-            }
-        }
+        let shares = if kind == Kind::Tested && mesh.world_surface.is_none() {
+            self.cut_out_shares(view, mesh, (source, material, indices), materials)
+        } else {
+            [Some((kind, Share::Whole)), None]
+        };
         for (kind, share) in shares.into_iter().flatten() {
             self.members.push(Member {
                 key: PartKey {
@@ -398,6 +388,32 @@ impl Parts {
                 },
             });
         }
+    }
+
+    /// Kinds and shares of a cut-out's triangles: those without holes need no test.
+    fn cut_out_shares(
+        &mut self,
+        view: &ViewScene,
+        mesh: &DynamicMesh,
+        skin: SkinnedShape,
+        materials: &dyn MaterialTable,
+    ) -> [Option<(Kind, Share)>; 2] {
+        let (_, material, _) = skin;
+        let known = self.coverages.entry(skin).or_insert_with(|| {
+            let found = triangle_coverages(view, mesh, material, materials);
+            found
+                .iter()
+                .any(|c| *c != Coverage::Mixed)
+                .then(|| found.into())
+        });
+        let Some(known) = known else {
+            return [Some((Kind::Tested, Share::Whole)), None];
+        };
+        let some = |coverage, kind, share| known.contains(&coverage).then_some((kind, share));
+        [
+            some(Coverage::Solid, Kind::Opaque, Share::Solid(material)),
+            some(Coverage::Mixed, Kind::Tested, Share::Mixed(material)),
+        ]
     }
 
     /// The coverages of a skin's triangles, where it takes a share of them.

@@ -110,51 +110,9 @@ impl WorldData {
             .iter()
             .map(|fog| materials.find(source, &fog.volume.shader, LightmapClass::None, true))
             .collect();
-        let patches = relit.bsp.patch_meshes(options.subdivisions);
         let mut indices = relit.indices.clone();
-        let mut surfaces = Vec::with_capacity(relit.surfaces.len());
-        for (index, stored) in relit.surfaces.iter().enumerate() {
-            let material = relit.materials.get(stored.material as usize);
-            let name = material.map_or("", |m| m.name.as_str());
-            let class = class_of(stored.lightmap, options);
-            let found = materials.find_or_default(source, name, class);
-            let found = if options.single_shader && !materials.get(found).is_sky() {
-                0
-            } else {
-                found
-            };
-            materials.note_lightmap_page(found, stored.lightmap);
-            mark_emitter(&relit, stored, found, materials);
-            let lod = patches
-                .get(index)
-                .and_then(Option::as_ref)
-                .filter(|_| stored.num_indices > 0)
-                .map(|mesh| PatchLod::new(mesh, stored, &mut indices));
-            let registered = materials.get(found);
-            let lightmap = usize::try_from(stored.lightmap)
-                .ok()
-                .filter(|_| class == LightmapClass::Page)
-                .and_then(|page| lightmaps.get(page).copied())
-                .unwrap_or(NO_TEXTURE);
-            surfaces.push(WorldSurface {
-                first_index: stored.first_index,
-                index_count: stored.num_indices,
-                first_vertex: stored.first_vertex,
-                vertex_count: stored.num_vertices,
-                material: found,
-                fog: stored.fog,
-                lightmap,
-                bounds: Aabb::new(stored.mins, stored.maxs),
-                plane: stored.plane,
-                flat: is_flat(&relit, stored),
-                kind: stored.kind,
-                model: stored.model,
-                deformed: registered.deforms(),
-                sky: registered.is_sky(),
-                lod,
-                classic: None,
-            });
-        }
+        let mut surfaces =
+            find_surfaces(&relit, &lightmaps, &mut indices, materials, source, options);
         let mut vertices: Vec<Vertex> = relit.vertices.iter().map(|v| vertex(v, options)).collect();
         for (index, surface) in surfaces.iter_mut().enumerate() {
             if materials.get(surface.material).uses_normals() {
@@ -166,7 +124,11 @@ impl WorldData {
             materials.leave_to_fog(&fog.volume.shader);
         }
         remap_by_map(&relit, materials, source, options);
-        let mut data = Self {
+        let drawn = (0u32..).zip(&surfaces).filter(|(_, s)| s.index_count > 0);
+        let is_deformed = |s: &WorldSurface| s.deformed && s.model == 0;
+        let is_portal =
+            |s: &WorldSurface| materials.get(s.material).sort <= shaderscript::sort::PORTAL;
+        Self {
             vertices,
             indices,
             models: brush_models(&relit),
@@ -178,22 +140,74 @@ impl WorldData {
             sun_direction: materials
                 .last_sun()
                 .unwrap_or_else(|| DEFAULT_SUN.normalize()),
-            deformed_surfaces: Vec::new(),
-            portal_surfaces: Vec::new(),
+            deformed_surfaces: (drawn.clone())
+                .filter(|(_, s)| is_deformed(s))
+                .map(|(index, _)| index)
+                .collect(),
+            portal_surfaces: drawn
+                .filter(|(_, s)| is_portal(s))
+                .map(|(index, _)| index)
+                .collect(),
             surfaces,
             relit,
-        };
-        for (index, surface) in (0u32..).zip(&data.surfaces) {
-            let drawn = surface.index_count > 0;
-            if drawn && surface.deformed && surface.model == 0 {
-                data.deformed_surfaces.push(index);
-            }
-            if drawn && materials.get(surface.material).sort <= shaderscript::sort::PORTAL {
-                data.portal_surfaces.push(index);
-            }
         }
-        data
     }
+}
+
+/// The surfaces with their materials, lightmaps and levels of detail. The indices of coarser levels are appended.
+fn find_surfaces<S: LightmapSink>(
+    relit: &RelitWorld,
+    lightmaps: &[u32],
+    indices: &mut Vec<u32>,
+    materials: &mut Materials,
+    source: &mut S,
+    options: &WorldOptions,
+) -> Vec<WorldSurface> {
+    let patches = relit.bsp.patch_meshes(options.subdivisions);
+    let mut surfaces = Vec::with_capacity(relit.surfaces.len());
+    for (index, stored) in relit.surfaces.iter().enumerate() {
+        let material = relit.materials.get(stored.material as usize);
+        let name = material.map_or("", |m| m.name.as_str());
+        let class = class_of(stored.lightmap, options);
+        let found = materials.find_or_default(source, name, class);
+        let found = if options.single_shader && !materials.get(found).is_sky() {
+            0
+        } else {
+            found
+        };
+        materials.note_lightmap_page(found, stored.lightmap);
+        mark_emitter(relit, stored, found, materials);
+        let lod = patches
+            .get(index)
+            .and_then(Option::as_ref)
+            .filter(|_| stored.num_indices > 0)
+            .map(|mesh| PatchLod::new(mesh, stored, indices));
+        let registered = materials.get(found);
+        let lightmap = usize::try_from(stored.lightmap)
+            .ok()
+            .filter(|_| class == LightmapClass::Page)
+            .and_then(|page| lightmaps.get(page).copied())
+            .unwrap_or(NO_TEXTURE);
+        surfaces.push(WorldSurface {
+            first_index: stored.first_index,
+            index_count: stored.num_indices,
+            first_vertex: stored.first_vertex,
+            vertex_count: stored.num_vertices,
+            material: found,
+            fog: stored.fog,
+            lightmap,
+            bounds: Aabb::new(stored.mins, stored.maxs),
+            plane: stored.plane,
+            flat: is_flat(relit, stored),
+            kind: stored.kind,
+            model: stored.model,
+            deformed: registered.deforms(),
+            sky: registered.is_sky(),
+            lod,
+            classic: None,
+        });
+    }
+    surfaces
 }
 
 /// Tells a surface's material which light it is.
