@@ -25,6 +25,7 @@ mod outcome;
 mod pictures;
 mod render;
 mod scripts;
+mod settings;
 mod table;
 mod timings;
 mod view;
@@ -50,10 +51,9 @@ mod tests {
     use super::{command, lab};
 
     /// Options whose description depends on the command, such as a file in one and a folder in another.
-    const DESCRIBED_APART: [&str; 8] = [
+    const DESCRIBED_APART: [&str; 7] = [
         "cache",
         "calibrate",
-        "exposure",
         "frames",
         "json",
         "output",

@@ -7,11 +7,6 @@ fn number(text: &str, what: &str, fits: impl Fn(f32) -> bool) -> Result<f32, Str
     fitting.ok_or_else(|| format!("it must be {what}"))
 }
 
-/// Any number but infinity and what is none.
-pub fn finite(text: &str) -> Result<f32, String> {
-    number(text, "a number", |_| true)
-}
-
 /// More than nothing.
 pub fn positive(text: &str) -> Result<f32, String> {
     number(text, "a number above 0", |n| n > 0.0)
@@ -41,13 +36,6 @@ pub fn fov(text: &str) -> Result<f32, String> {
     )
 }
 
-/// Part of a picture's width and height that is traced.
-pub fn traced_part(text: &str) -> Result<f32, String> {
-    number(text, "a number from 0.25 to 1", |n| {
-        (0.25..=1.0).contains(&n)
-    })
-}
-
 /// A whole number from 1 on.
 pub fn count(text: &str) -> Result<usize, String> {
     let parsed: Option<usize> = text.parse().ok();
@@ -66,14 +54,11 @@ mod tests {
             assert!(fov(text).is_err(), "{text}");
         }
         assert!(fov("180").unwrap_err().contains("1 to 170"));
-        assert_eq!(finite("-2.5"), Ok(-2.5));
-        assert!(finite("NaN").is_err() && finite("-inf").is_err());
+        assert!(positive("NaN").is_err() && positive("inf").is_err());
         assert!(positive("0").is_err() && positive("-1").is_err());
         assert_eq!(positive("1e-3"), Ok(1e-3));
         assert_eq!(not_negative("0"), Ok(0.0));
         assert!(not_negative("-1").is_err());
-        assert!(traced_part("0.2").is_err() && traced_part("1.5").is_err());
-        assert_eq!(traced_part("0.5"), Ok(0.5));
         assert!(count("0").is_err() && count("1.5").is_err() && count("-1").is_err());
         assert_eq!(count("3"), Ok(3));
         assert_eq!(list("1,-2 3.5"), Some(vec![1.0, -2.0, 3.5]));

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::game::Game;
 use crate::numbers;
 use crate::pictures::write_png;
+use crate::settings::{Assignment, SettingArgs, default, help, value_of};
 use crate::timings::Timings;
 use crate::view::{Camera, load, open};
 use anyhow::{Context, bail};
@@ -15,7 +16,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use relight::GameFiles;
 use renderer_vk::api::RefDef;
 use renderer_vk::path::{self, PathPoint};
-use renderer_vk::{Renderer, RendererOptions, Settings, TracerChoice};
+use renderer_vk::{LightSelection, Renderer, RendererOptions, Settings};
 
 /// How the picture is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -35,19 +36,6 @@ pub enum Sampling {
     Resampled,
     /// Every light of the list.
     All,
-}
-
-/// What follows the rays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Tracer {
-    /// The best for the device.
-    Auto,
-    /// Ray tracing pipelines.
-    Pipeline,
-    /// Ray queries in compute shaders.
-    Query,
-    /// A hierarchy of our own in compute shaders.
-    Compute,
 }
 
 /// Make a picture of a map, or a series of pictures, without an engine or a display
@@ -100,19 +88,14 @@ pub struct RenderArgs {
     /// How traced light chooses lights
     #[arg(long, value_enum, default_value = "resampled")]
     sampling: Sampling,
-    /// Lights looked at for each one that is chosen
-    #[arg(long, default_value_t = Settings::default().rt_candidates,
-        value_parser = clap::value_parser!(u32).range(1..))]
-    candidates: u32,
-    /// What follows the rays
-    #[arg(long, value_enum, default_value = "auto")]
-    tracer: Tracer,
-    /// Diffuse bounces of the traced look, 2 at most
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(..=2))]
-    bounces: u32,
-    /// Exposure in stops, on top of automatic exposure
-    #[arg(long, default_value_t = 0.0, value_parser = numbers::finite, allow_negative_numbers = true)]
-    exposure: f32,
+    #[arg(long, help = help("rt_candidates"), value_parser = value_of("rt_candidates"), default_value = default("rt_candidates"))]
+    candidates: Assignment,
+    #[arg(long, help = help("rt_tracer"), value_parser = value_of("rt_tracer"), default_value = default("rt_tracer"))]
+    tracer: Assignment,
+    #[arg(long, help = help("rt_bounces"), value_parser = value_of("rt_bounces"), default_value = default("rt_bounces"))]
+    bounces: Assignment,
+    #[arg(long, help = help("rt_exposure"), value_parser = value_of("rt_exposure"), default_value = default("rt_exposure"), allow_negative_numbers = true)]
+    exposure: Assignment,
     /// Game time, seconds
     #[arg(long, default_value_t = 0.0, value_parser = numbers::not_negative)]
     time: f32,
@@ -142,21 +125,20 @@ pub struct RenderArgs {
     /// Move the camera by this much from frame to frame, so that the last frame is where it was asked for
     #[arg(long, value_parser = parse_step, allow_hyphen_values = true, value_name = "X,Y,Z,YAW")]
     step: Option<[f32; 4]>,
-    /// Look into a step of the traced look: the numbers of the console variable rt_debug
-    #[arg(long, default_value_t = 0)]
-    debug: u32,
-    /// Filter of frames that do not accumulate: 0 none, 1 A-SVGF, 2 sparse
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(..=2))]
-    denoiser: u32,
+    #[arg(long, help = help("rt_debug"), value_parser = value_of("rt_debug"), default_value = default("rt_debug"))]
+    debug: Assignment,
+    #[arg(long, help = help("rt_denoiser"), value_parser = value_of("rt_denoiser"), default_value = default("rt_denoiser"))]
+    denoiser: Assignment,
     /// No temporal antialiasing of frames that do not accumulate
     #[arg(long)]
     no_taa: bool,
-    /// Width and height that are traced over those of the picture, 0.25 to 1, for frames that do not accumulate
-    #[arg(long, default_value_t = 1.0, value_parser = numbers::traced_part)]
-    render_scale: f32,
+    #[arg(long, help = help("rt_scale"), value_parser = value_of("rt_scale"), default_value = default("rt_scale"))]
+    render_scale: Assignment,
     /// Depth of field: diameter of the lens and distance that is sharp, units
     #[arg(long, value_parser = parse_lens, value_name = "DIAMETER,DISTANCE")]
     lens: Option<[f32; 2]>,
+    #[command(flatten)]
+    set: SettingArgs,
 }
 
 /// `WIDTHxHEIGHT`.
@@ -225,35 +207,32 @@ impl RenderArgs {
         let mut settings = Settings {
             rt: self.look() == Look::Traced,
             rt_accumulate: !self.no_accumulation,
-            rt_bounces: self.bounces,
-            rt_candidates: self.candidates.max(1),
-            rt_tracer: match self.tracer {
-                Tracer::Auto => TracerChoice::Auto,
-                Tracer::Pipeline => TracerChoice::Pipeline,
-                Tracer::Query => TracerChoice::Query,
-                Tracer::Compute => TracerChoice::Compute,
-            },
-            rt_debug: self.debug,
-            rt_exposure: self.exposure,
-            rt_denoiser: self.denoiser,
             rt_taa: !self.no_taa,
-            rt_scale: self.render_scale,
             rt_dof: self.lens.is_some(),
             rt_num_random_dl: match self.sampling {
                 Sampling::Uniform | Sampling::Resampled => 1,
                 Sampling::All => 0,
             },
             rt_light_selection: match self.sampling {
-                Sampling::Uniform => renderer_vk::LightSelection::Uniform,
-                Sampling::Resampled | Sampling::All => renderer_vk::LightSelection::Resampled,
+                Sampling::Uniform => LightSelection::Uniform,
+                Sampling::Resampled | Sampling::All => LightSelection::Resampled,
             },
-            ..Settings::default()
+            ..Settings::full_size()
         };
         if let Some([diameter, distance]) = self.lens {
             settings.rt_aperture = diameter;
             settings.rt_focal_length = distance;
         }
-        settings
+        let options = [
+            &self.candidates,
+            &self.tracer,
+            &self.bounces,
+            &self.exposure,
+            &self.debug,
+            &self.denoiser,
+            &self.render_scale,
+        ];
+        self.set.change(options, settings)
     }
 
     fn camera(&self, world: &relight::RelitWorld) -> anyhow::Result<Camera> {

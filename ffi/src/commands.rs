@@ -224,10 +224,10 @@ unsafe extern "C" fn gfx_info() {
         let refresh = window::current().map_or(0, |window| window.refresh_rate());
         let mode = front.cvars.as_ref().map_or(0, |c| c.integer(Cvar::Mode));
         let fullscreen = window::current().is_some_and(|window| window.is_fullscreen());
-        let aids = if settings.anisotropy > 1.0 {
+        let aids = if settings.anisotropy() > 1.0 {
             format!(
                 "{:.0}x",
-                settings.anisotropy.min(info.anisotropy.unwrap_or(1.0))
+                settings.anisotropy().min(info.anisotropy.unwrap_or(1.0))
             )
         } else {
             "disabled".into()
@@ -259,7 +259,7 @@ unsafe extern "C" fn gfx_info() {
                 },
                 settings.effective_overbright_bits()
             ),
-            format!("texturemode: {}", settings.texture_mode),
+            format!("texturemode: {}", settings.texture_mode.name()),
             format!("picmip: {}", settings.picmip),
             format!("anisotropic filtering: {aids}"),
             format!("look: {}", if settings.rt { "traced" } else { "classic" }),

@@ -36,7 +36,6 @@ pub mod error_level {
 #[allow(missing_docs)]
 pub mod cvar_flags {
     use std::ffi::c_int;
-    pub const NONE: c_int = 0;
     pub const ARCHIVE: c_int = 0x1;
     pub const LATCH: c_int = 0x20;
     pub const ROM: c_int = 0x40;

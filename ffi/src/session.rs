@@ -8,7 +8,7 @@
 use crate::capture::Captures;
 use crate::cinematics::Cinematics;
 use crate::costs::Questions;
-use crate::cvars::{Cvars, WindowFacts};
+use crate::cvars::Cvars;
 use crate::failure::Failure;
 use crate::window;
 use renderer_vk::{Renderer, Settings};
@@ -46,8 +46,6 @@ pub struct Front {
     pub cinematics: Cinematics,
     /// Pixels of the window as the game was told.
     pub size: (u32, u32),
-    /// As of when the window was opened.
-    pub window: WindowFacts,
     /// When the frame's first `BeginFrame` came; `None` between frames.
     pub frame_start: Option<Instant>,
     /// The renderer has finished a frame.

@@ -195,7 +195,7 @@ impl<'a> FrameContext<'a> {
             Aids {
                 edges: settings.show_tris && self.raster.draws_edges(),
                 normals: settings.show_normals && self.raster.draws_edges(),
-                lightmaps: settings.lightmap,
+                lightmaps: settings.lightmap != 0,
                 sky_in_front: settings.show_sky,
                 last_sort: settings.debug_sort,
                 overdraw: settings.measure_overdraw,
@@ -282,7 +282,7 @@ pub fn clear_color(scene: &ViewScene, settings: &Settings) -> Option<[f32; 4]> {
     if scene.def.flags & crate::api::rdflags::HYPERSPACE != 0 {
         let grey = (scene.def.time_ms & 255) as f32 / 255.0;
         Some([grey, grey, grey, 1.0])
-    } else if settings.fast_sky && scene.has_world {
+    } else if settings.hides_sky() && scene.has_world {
         Some([0.0, 0.0, 0.0, 1.0])
     } else {
         None

@@ -14,7 +14,7 @@ pub mod path;
 mod raster;
 mod renderer;
 mod scene;
-mod settings;
+pub mod settings;
 mod statistics;
 mod stereo;
 mod targets;
@@ -23,13 +23,16 @@ mod test_support;
 mod trace;
 mod world;
 
-pub use assets::{LoadedFont, is_texture_mode};
+pub use assets::LoadedFont;
 pub use error::Error;
 pub use gpu::{
     CreateSurface, DeviceInfo, DeviceKind, Error as GpuError, RayTracingLimits, Window,
     WindowSource,
 };
 pub use renderer::{CpuTimes, FrameStats, Renderer, RendererOptions, probe};
-pub use settings::{LightSelection, MapLightChoice, Settings, TracerChoice};
+pub use settings::{
+    Anaglyph, DebugOutput, DenoiserChoice, LightSelection, MapLightChoice, ModelShadows, Settings,
+    TextureMode, TracerChoice,
+};
 pub use statistics::{Costs, MemoryPurpose, PassCost};
 pub use stereo::Eye;

@@ -23,7 +23,7 @@ use crate::gpu::{
 };
 use crate::raster::{DrawList, Flares, Overlay, Present, Raster};
 use crate::scene::{Look, Scene};
-use crate::settings::Settings;
+use crate::settings::{Anaglyph, Settings};
 use crate::stereo::Eye;
 use crate::targets::FrameTargets;
 use crate::trace::TraceLook;
@@ -100,7 +100,7 @@ pub struct Renderer {
     queue: Vec<(Item, ColorMask)>,
     eye: Eye,
     /// `r_anaglyphMode` of the newest frame.
-    shown_anaglyph: u32,
+    shown_anaglyph: Anaglyph,
     /// Milliseconds spent on gathering views since the last frame.
     gather_ms: f32,
     overlay: Overlay,
@@ -192,7 +192,7 @@ impl Renderer {
             queue: Vec::new(),
             counts_rays: false,
             eye: Eye::Both,
-            shown_anaglyph: 0,
+            shown_anaglyph: Anaglyph::None,
             gather_ms: 0.0,
             overlay: Overlay::default(),
             spare_overlays: Vec::new(),

@@ -1,182 +1,221 @@
-//! The renderer's settings: the values of the cvars, as plain data. The front end owns the cvars (names, ranges,
-//! flags) and hands over a fresh copy each frame; what is latched there changes only at `begin_registration`.
+//! The renderer's settings. A setting is a row of the table below: from it come the field of [`Settings`] and its
+//! default, the console variable that a front end registers, the key of accumulation, `docs/settings.md`, and the values
+//! that the command line takes.
 
-/// How a traced light sample picks its light from a cluster's list.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum LightSelection {
-    /// Each light with the same probability.
-    Uniform,
-    /// Resampled importance sampling over a few candidates.
-    #[default]
-    Resampled,
+mod choices;
+mod row;
+mod value;
+
+use std::hash::Hasher;
+
+pub use choices::{
+    Anaglyph, DebugOutput, DenoiserChoice, LightSelection, MapLightChoice, ModelShadows,
+    TextureMode, TracerChoice,
+};
+use row::written_back;
+pub use row::{Accumulation, Kind, Range, Reading, Row, SettingError, Spec, flags, kept};
+pub use value::Given;
+use value::Value;
+
+use Accumulation::{GoesOn, Restarts};
+use Reading::{Frame, Start, With};
+use flags::{ARCHIVE, CHEAT, LATCH, NONE, TEMP};
+
+macro_rules! settings {
+    (
+        variables { $( $field:ident: $type:ty = $name:literal, $default:literal, $flags:expr, $range:expr, $reading:expr,
+            $accumulation:expr, $help:literal; )* }
+        others { $( $(#[$doc:meta])* $other:ident: $other_type:ty = $value:expr; )* }
+    ) => {
+        /// All settings.
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct Settings {
+            $( #[doc = concat!("`", $name, "`: ", $help)] pub $field: $type, )*
+            $( $(#[$doc])* pub $other: $other_type, )*
+        }
+
+        /// The table of settings.
+        pub static ROWS: &[Row] = &[$( Row {
+            spec: Spec {
+                name: $name,
+                kind: <$type as Value>::KIND,
+                default: $default,
+                flags: $flags,
+                range: $range,
+                help: $help,
+            },
+            reading: $reading,
+            accumulation: $accumulation,
+            put: |settings, given| settings.$field.put(given),
+        } ),*];
+
+        /// What a player has who changed nothing.
+        impl Default for Settings {
+            fn default() -> Self {
+                Self {
+                    $( $field: Value::default_of($default), )*
+                    $( $other: $value, )*
+                }
+            }
+        }
+
+        impl Settings {
+            /// Hashes the settings whose change restarts accumulation.
+            pub fn accumulation_key(&self, hasher: &mut impl Hasher) {
+                $( if $accumulation == Restarts {
+                    hasher.write_u32(self.$field.bits());
+                } )*
+            }
+        }
+    };
 }
 
-/// What is to follow the rays of the traced look. A device that cannot do it gets the one that `Auto` picks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum TracerChoice {
-    /// The fastest one on the device.
-    #[default]
-    Auto,
-    /// The device's ray tracing pipeline.
-    Pipeline,
-    /// Ray queries in compute shaders.
-    Query,
-    /// Hierarchies of our own, walked by compute shaders.
-    Compute,
-}
+// Columns: field, type, console variable, default, flags, limits, when it is read, what a change does to accumulation,
+// help with the unit.
+#[rustfmt::skip] // one row, one line
+settings! { variables {
+    // of the engine's own renderer, with its names, defaults and flags
+    swap_interval: i32 = "r_swapInterval", "0", ARCHIVE | LATCH, None, Frame, GoesOn, "1 waits for the display's vertical retrace.";
+    multisample: u32 = "r_ext_multisample", "0", ARCHIVE | LATCH, kept(0.0, 4.0), Frame, GoesOn, "Samples of a pixel, for smooth edges; the next number that the device has. The traced look has none.";
+    anaglyph: Anaglyph = "r_anaglyphMode", "0", ARCHIVE, None, Frame, GoesOn, "Stereo through coloured glasses: 1 red-cyan, 2 red-blue, 3 red-green, 4 green-magenta; 5 to 8 the same, eyes swapped.";
+    stereo_separation: f32 = "r_stereoSeparation", "64", ARCHIVE, None, Frame, GoesOn, "Convergence distance over the distance of an eye from the middle; negative swaps the eyes.";
+    convergence: f32 = "r_zproj", "64", ARCHIVE, None, Frame, GoesOn, "Distance at which both eyes' pictures meet.";
+    znear: f32 = "r_znear", "4", CHEAT, kept(0.001, 200.0), Frame, GoesOn, "Distance of the near plane in units.";
+    anisotropic_filter: bool = "r_ext_texture_filter_anisotropic", "0", ARCHIVE | LATCH, None, Frame, GoesOn, "1 samples textures anisotropically.";
+    max_anisotropy: f32 = "r_ext_max_anisotropy", "2", ARCHIVE | LATCH, None, Frame, GoesOn, "Highest degree of anisotropic sampling.";
+    texture_mode: TextureMode = "r_textureMode", "GL_LINEAR_MIPMAP_LINEAR", ARCHIVE, None, With("r_textureMode"), Restarts, "Texture filter under its OpenGL name, GL_NEAREST to GL_LINEAR_MIPMAP_LINEAR.";
+    picmip: u32 = "r_picmip", "1", ARCHIVE | LATCH, kept(0.0, 16.0), Frame, GoesOn, "How often textures are halved when they are loaded.";
+    round_images_down: bool = "r_roundImagesDown", "1", ARCHIVE | LATCH, None, Frame, GoesOn, "1 shrinks textures of odd sizes to a power of two, 0 enlarges them.";
+    color_mip_levels: bool = "r_colorMipLevels", "0", LATCH, None, Frame, GoesOn, "1 tints smaller mip levels red, green and blue in turn.";
+    simple_mip_maps: bool = "r_simpleMipMaps", "1", ARCHIVE | LATCH, None, Frame, GoesOn, "1 averages 2x2 pixels for mip levels, 0 filters wider.";
+    detail_textures: bool = "r_detailtextures", "1", ARCHIVE | LATCH, None, Frame, GoesOn, "0 leaves detail stages of materials out.";
+    intensity: f32 = "r_intensity", "1", LATCH, written_back(1.0, f32::MAX), With("r_gamma"), GoesOn, "Multiplies textures; 1 or more.";
+    gamma: f32 = "r_gamma", "1", ARCHIVE, written_back(0.5, 3.0), With("r_gamma"), GoesOn, "Brightness of the display, 0.5 to 3.";
+    overbright_bits: u32 = "r_overBrightBits", "1", ARCHIVE | LATCH, None, With("r_gamma"), GoesOn, "Doublings of light beyond white in the classic look, in full screen.";
+    map_overbright_bits: u32 = "r_mapOverBrightBits", "2", LATCH, None, Frame, GoesOn, "Doublings that the map's lightmaps are meant to get in the classic look.";
+    greyscale: f32 = "r_greyscale", "0", ARCHIVE | LATCH, kept(0.0, 1.0), Frame, GoesOn, "0 coloured to 1 grey: takes colour out of textures and light.";
+    vertex_light: bool = "r_vertexLight", "0", ARCHIVE | LATCH, None, Frame, GoesOn, "1 lights the classic look by vertex colours instead of lightmaps.";
+    fullbright: bool = "r_fullbright", "0", LATCH | CHEAT, None, Frame, Restarts, "1 draws the classic look without lightmaps.";
+    lightmap: i32 = "r_lightmap", "0", NONE, None, Frame, GoesOn, "1 shows lightmaps alone in the classic look; 2, when a map is loaded, as colours by brightness.";
+    single_shader: bool = "r_singleShader", "0", LATCH | CHEAT, None, Frame, GoesOn, "1 shows the default material on every surface of the map but the sky.";
+    subdivisions: f32 = "r_subdivisions", "4", ARCHIVE | LATCH, None, Frame, GoesOn, "Largest deviation of curved surfaces in units; smaller is smoother.";
+    lod_curve_error: f32 = "r_lodCurveError", "250", ARCHIVE | CHEAT, None, Frame, GoesOn, "Distance scale of the detail of curved surfaces in the classic look.";
+    lod_bias: i32 = "r_lodbias", "0", ARCHIVE, None, Frame, GoesOn, "Added to the level of detail of models; higher is coarser.";
+    lod_scale: f32 = "r_lodscale", "5", CHEAT, None, Frame, GoesOn, "Scales the level of detail of models by their size on screen.";
+    flares: bool = "r_flares", "0", ARCHIVE, None, Frame, GoesOn, "1 draws light flares.";
+    flare_size: f32 = "r_flareSize", "40", CHEAT, None, Frame, GoesOn, "Size of far flares, of a window 640 pixels wide.";
+    flare_fade: f32 = "r_flareFade", "7", CHEAT, None, Frame, GoesOn, "How often in a second a flare could appear or go.";
+    flare_coefficient: f32 = "r_flareCoeff", "150", CHEAT, None, Frame, GoesOn, "How bright flares stay with distance.";
+    fast_sky: i32 = "r_fastsky", "0", ARCHIVE, None, Frame, Restarts, "1 draws no sky and no portals, 2 keeps the portals.";
+    draw_sun: bool = "r_drawSun", "0", ARCHIVE, None, Frame, GoesOn, "1 draws the sun's disc in the sky.";
+    dynamic_light: bool = "r_dynamiclight", "1", ARCHIVE, None, Frame, Restarts, "0 ignores lights of explosions, missiles and items.";
+    dlight_backs: bool = "r_dlightBacks", "1", ARCHIVE, None, Frame, GoesOn, "0 keeps dynamic light off faces turned away from it.";
+    face_plane_cull: bool = "r_facePlaneCull", "1", ARCHIVE, None, Frame, GoesOn, "0 draws flat surfaces that are turned away from the eye too; they are not seen.";
+    rail_width: f32 = "r_railWidth", "16", ARCHIVE, None, Frame, GoesOn, "Diameter of the rings of a rail trail.";
+    rail_core_width: f32 = "r_railCoreWidth", "6", ARCHIVE, None, Frame, GoesOn, "Half width of the core of a rail trail.";
+    rail_segment_length: f32 = "r_railSegmentLength", "32", ARCHIVE, None, Frame, GoesOn, "Distance between the rings of a rail trail.";
+    ambient_scale: f32 = "r_ambientScale", "0.6", CHEAT, None, Frame, GoesOn, "Multiplies the ambient light of models in the classic look.";
+    directed_scale: f32 = "r_directedScale", "1", CHEAT, None, Frame, GoesOn, "Multiplies the directed light of models in the classic look.";
+    marks_on_triangle_meshes: bool = "r_marksOnTriangleMeshes", "0", ARCHIVE, None, Frame, GoesOn, "1 lets bullet marks stick to detail meshes of the map.";
+    shadows: ModelShadows = "cg_shadows", "1", NONE, None, Frame, GoesOn, "Shadows of models in the classic look: 0 none, 1 spot, 2 volumes, 3 planar.";
+    ui_fullscreen: bool = "r_uifullscreen", "0", NONE, None, Frame, GoesOn, "Set by the engine while a menu covers the game.";
+    offset_factor: f32 = "r_offsetfactor", "-1", CHEAT, None, Frame, GoesOn, "Depth offset of decals by their slope in the classic look.";
+    offset_units: f32 = "r_offsetunits", "-2", CHEAT, None, Frame, GoesOn, "Constant depth offset of decals in the classic look.";
+    print_shaders: bool = "r_printShaders", "0", NONE, None, Frame, GoesOn, "1 prints the name of each script that is used when it is registered.";
+    no_curves: bool = "r_nocurves", "0", CHEAT, None, Frame, GoesOn, "1 draws no curved surfaces.";
+    draw_world: bool = "r_drawworld", "1", CHEAT, None, Frame, GoesOn, "0 draws no map.";
+    draw_entities: bool = "r_drawentities", "1", CHEAT, None, Frame, GoesOn, "0 draws no entities.";
+    portal_only: bool = "r_portalOnly", "0", CHEAT, None, Frame, GoesOn, "1 draws what a portal or mirror in sight shows, and nothing before it.";
+    no_portals: bool = "r_noportals", "0", CHEAT, None, Frame, Restarts, "1 draws no portals and mirrors.";
+    skip_back_end: bool = "r_skipBackEnd", "0", CHEAT, None, Frame, GoesOn, "1 draws nothing and takes no pictures.";
+    no_refresh: bool = "r_norefresh", "0", CHEAT, None, Frame, GoesOn, "1 leaves out 3D views.";
+    measure_overdraw: bool = "r_measureOverdraw", "0", CHEAT, None, Frame, GoesOn, "1 counts how often a pixel is drawn in the classic look: the last number of r_speeds 1.";
+    no_bind: bool = "r_nobind", "0", CHEAT, None, Frame, GoesOn, "1 draws everything with one texture, the spot of dynamic lights.";
+    show_tris: bool = "r_showtris", "0", CHEAT, None, Frame, GoesOn, "1 shows triangle edges in the classic look.";
+    show_normals: bool = "r_shownormals", "0", CHEAT, None, Frame, GoesOn, "1 shows the normals of vertices in the classic look.";
+    show_sky: bool = "r_showsky", "0", CHEAT, None, Frame, GoesOn, "1 draws the sky before everything.";
+    clear: bool = "r_clear", "0", CHEAT, None, Frame, GoesOn, "1 clears the picture to pink each frame.";
+    show_images: i32 = "r_showImages", "0", TEMP, None, Frame, GoesOn, "1 shows all images on a grid, 2 in proportion to their sizes.";
+    debug_light: bool = "r_debuglight", "0", TEMP, None, Frame, GoesOn, "1 prints the light on the first-person weapon.";
+    debug_sort: i32 = "r_debugSort", "0", CHEAT, None, Frame, GoesOn, "Leaves out materials of a greater sort value; 0 draws all.";
+    speeds: i32 = "r_speeds", "0", CHEAT, None, Frame, GoesOn, "1 to 6 print counts of each frame: surfaces, culling, cluster, dynamic lights, far plane, flares.";
+    lock_pvs: bool = "r_lockpvs", "0", CHEAT, None, Frame, GoesOn, "1 keeps the visible part of the map as it is.";
+    no_vis: bool = "r_novis", "0", CHEAT, None, Frame, GoesOn, "1 ignores the map's visibility.";
+    no_cull: bool = "r_nocull", "0", CHEAT, None, Frame, GoesOn, "1 draws what is out of view as well.";
+    show_cluster: i32 = "r_showcluster", "0", CHEAT, None, Frame, GoesOn, "1 prints the cluster and area of the eye when they change.";
+    // ours
+    rt: bool = "r_rt", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 traces light with rays, 0 draws the classic look. Switches at once.";
+    rt_tracer: TracerChoice = "rt_tracer", "auto", ARCHIVE | LATCH, None, Start, GoesOn, "What follows the rays: auto, pipeline, query or compute. A device without it gets what auto picks.";
+    rt_lights: MapLightChoice = "rt_lights", "calibrated", ARCHIVE, None, With("rt_lights"), Restarts, "Lights of the map: calibrated, fitted to the light that its compiler stored, or prior, as its directives say. Switches at once.";
+    rt_print_perf_stats: bool = "rt_printPerfStats", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 prints times, rays and memory of the traced look each second.";
+    rt_illumination: bool = "rt_illumination", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "0 shows surfaces in their own colour, without light.";
+    rt_cull_lights: bool = "rt_cullLights", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "0 asks every light of the map at every point instead of those that may reach it. Same picture, slower.";
+    rt_num_random_dl: u32 = "rt_numRandomDL", "1", ARCHIVE, kept(0.0, 64.0), Frame, Restarts, "Lights picked at random for each pixel and frame, each with a shadow ray; 0 asks all that may reach the point.";
+    rt_light_selection: LightSelection = "rt_lightSelection", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "How a random light is picked: 0 uniformly, 1 resampled by importance. Same picture in the mean.";
+    rt_candidates: u32 = "rt_candidates", "8", ARCHIVE, kept(1.0, 64.0), Frame, Restarts, "Lights looked at for each pick with rt_lightSelection 1.";
+    rt_pause: bool = "rt_pause", "0", NONE, kept(0.0, 1.0), Frame, GoesOn, "1 keeps what the traced look shows still: view, entities and time. The game goes on.";
+    rt_accumulate: bool = "rt_accumulate", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 averages frames, unfiltered, for as long as nothing moves, towards the exact picture. With rt_pause 1 also in a running game.";
+    rt_antialiasing: bool = "rt_antialiasing", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 moves the traced points within their pixels from frame to frame, for smooth edges.";
+    rt_soft_shadows: bool = "rt_softshadows", "1", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "0 takes each light at its middle: sharp shadows.";
+    rt_dof: bool = "rt_dof", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 gives the camera a lens: what is out of focus is blurred.";
+    rt_aperture: f32 = "rt_aperture", "4", ARCHIVE, kept(0.0, 256.0), Frame, Restarts, "Diameter of the lens of rt_dof in units.";
+    rt_focal_length: f32 = "rt_focallength", "256", ARCHIVE, kept(1.0, 65536.0), Frame, Restarts, "Distance in units that is sharp with rt_dof.";
+    rt_denoiser: DenoiserChoice = "rt_denoiser", "1", ARCHIVE, kept(0.0, 2.0), Frame, GoesOn, "Filter for traced light: 0 none, 1 A-SVGF, 2 a cheaper sparse filter.";
+    rt_taa: bool = "rt_taa", "1", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 smooths edges over time.";
+    rt_scale: f32 = "rt_scale", "1", ARCHIVE, kept(0.25, 1.0), Frame, GoesOn, "Width and height of the traced picture over those of the window.";
+    rt_max_depth: u32 = "rt_maxDepth", "4", ARCHIVE, kept(0.0, 16.0), Frame, Restarts, "Mirrors and panes of glass that a view ray may pass.";
+    rt_bounces: u32 = "rt_bounces", "1", ARCHIVE, kept(0.0, 2.0), Frame, Restarts, "Bounces of light from surface to surface.";
+    rt_exposure: f32 = "rt_exposure", "0", ARCHIVE, kept(-16.0, 16.0), Frame, GoesOn, "Exposure in stops, added to the automatic one.";
+    rt_auto_exposure: bool = "rt_autoExposure", "1", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 adapts the exposure to the picture.";
+    rt_bloom: f32 = "rt_bloom", "0.05", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "Part of the light that spreads around bright things; 0 none.";
+    rt_flashlight: bool = "rt_flashlight", "0", ARCHIVE, kept(0.0, 1.0), Frame, Restarts, "1 carries a lamp at the eye.";
+    rt_light_scale: f32 = "rt_lightScale", "1", ARCHIVE, kept(0.0, 100.0), Frame, Restarts, "Multiplies every light of the map when it is traced.";
+    rt_dlight_scale: f32 = "rt_dlightScale", "1", ARCHIVE, kept(0.0, 100.0), Frame, Restarts, "Multiplies lights of explosions, missiles and items when they are traced.";
+    rt_debug: DebugOutput = "rt_debug", "0", NONE, kept(0.0, 11.0), Frame, GoesOn, "Shows a step of the traced look in place of the picture: 1 albedo, 2 normals, 3 depth, 4 motion, 5 clusters, 6 lights per pixel, 7 samples, 8 variance, 9 gradients, 10 rays per pixel, 11 reflections.";
 
-/// Which lights of a map are traced.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum MapLightChoice {
-    /// Those that the map's directives tell of, fitted to the light that its compiler stored, and those found there.
-    #[default]
-    Calibrated,
-    /// Those that the map's directives tell of, as strong as these say.
-    Prior,
-}
+} others {
+    /// Temporal gradients of A-SVGF. Off is the baseline that measurements compare with.
+    rt_gradients: bool = true;
+    /// Whether the window filled the screen when it was opened (`r_fullscreen`).
+    fullscreen: bool = false;
+    /// `r_ignorehwgamma` when the window was opened: gamma is applied to textures instead of to the finished picture.
+    ignore_hw_gamma: bool = false;
+} }
 
-/// All settings. Names follow the cvars.
-#[derive(Clone, Debug, PartialEq)]
-#[allow(missing_docs)] // each is documented with its cvar in `ffi`
-pub struct Settings {
-    // the traced look
-    pub rt: bool,
-    /// Latched: what follows the rays.
-    pub rt_tracer: TracerChoice,
-    pub rt_lights: MapLightChoice,
-    /// Prints a line of statistics each second.
-    pub rt_print_perf_stats: bool,
-    /// Off: surfaces show their own colour, without light.
-    pub rt_illumination: bool,
-    /// Off: every light of the map is a candidate at every point.
-    pub rt_cull_lights: bool,
-    /// Light samples (shadow rays) a pixel and frame; 0: one for every light that may reach the point.
-    pub rt_num_random_dl: u32,
-    pub rt_light_selection: LightSelection,
-    /// Candidates of resampled selection.
-    pub rt_candidates: u32,
-    /// Freezes what the traced look shows: view, scene and time.
-    pub rt_pause: bool,
-    /// Accumulate frames while nothing moves (reference mode): neither denoiser nor TAA, towards the exact picture.
-    pub rt_accumulate: bool,
-    /// Camera rays go through all of a pixel's area instead of its middle.
-    pub rt_antialiasing: bool,
-    /// Off: each light is sampled at its middle, so that shadows are sharp.
-    pub rt_soft_shadows: bool,
-    /// Depth of field by a thin lens.
-    pub rt_dof: bool,
-    /// Diameter of the lens, units.
-    pub rt_aperture: f32,
-    /// Distance from the eye of the plane in focus, units.
-    pub rt_focal_length: f32,
-    /// 0 none, 1 A-SVGF, 2 sparse filter.
-    pub rt_denoiser: u32,
-    /// A-SVGF's temporal gradients. No cvar: off is the baseline that measurements compare with.
-    pub rt_gradients: bool,
-    /// Temporal anti-aliasing.
-    pub rt_taa: bool,
-    /// Pixels traced over pixels shown, along each axis, 0.25 to 1.
-    pub rt_scale: f32,
-    /// Mirrors and glass on a path.
-    pub rt_max_depth: u32,
-    /// Diffuse bounces, 0 to 2.
-    pub rt_bounces: u32,
-    /// Strength of bloom: the part of light that is spread; 0 none.
-    pub rt_bloom: f32,
-    /// A lamp at the eye.
-    pub rt_flashlight: bool,
-    /// Number of the debug view in place of the picture; 0 none.
-    pub rt_debug: u32,
-    /// Exposure in stops; added to automatic exposure.
-    pub rt_exposure: f32,
-    pub rt_auto_exposure: bool,
-    /// Multiplies every light that the map has.
-    pub rt_light_scale: f32,
-    /// Multiplies the game's dynamic lights.
-    pub rt_dlight_scale: f32,
-    // textures (latched)
-    pub picmip: u32,
-    pub round_images_down: bool,
-    pub simple_mip_maps: bool,
-    pub detail_textures: bool,
-    pub intensity: f32,
-    pub greyscale: f32,
-    pub color_mip_levels: bool,
-    pub single_shader: bool,
-    pub print_shaders: bool,
-    /// Lightmaps as colours by brightness (`r_lightmap 2`).
-    pub lightmap_heat: bool,
-    pub anisotropy: f32,
-    pub texture_mode: String,
-    pub map_overbright_bits: u32,
-    pub overbright_bits: u32,
-    pub vertex_light: bool,
-    /// A menu covers the game: what is registered meanwhile keeps its stages with `vertex_light`.
-    pub ui_fullscreen: bool,
-    pub fullbright: bool,
-    pub subdivisions: f32,
-    // polled
-    pub gamma: f32,
-    pub ignore_hw_gamma: bool,
-    pub fullscreen: bool,
-    pub swap_interval: i32,
-    pub lod_bias: i32,
-    pub lod_scale: f32,
-    pub lod_curve_error: f32,
-    pub znear: f32,
-    pub fast_sky: bool,
-    pub draw_sun: bool,
-    pub dynamic_light: bool,
-    pub flares: bool,
-    pub flare_size: f32,
-    pub flare_fade: f32,
-    pub flare_coefficient: f32,
-    pub shadows: i32,
-    /// Samples of a pixel of the classic look that are wished for.
-    pub multisample: u32,
-    /// `r_anaglyphMode`.
-    pub anaglyph: u32,
-    /// Distance at which the eyes' pictures meet over that of an eye from the middle.
-    pub stereo_separation: f32,
-    /// Distance at which the eyes' pictures meet, units.
-    pub convergence: f32,
-    pub draw_world: bool,
-    pub draw_entities: bool,
-    pub no_vis: bool,
-    pub lock_pvs: bool,
-    pub no_cull: bool,
-    pub no_curves: bool,
-    pub no_portals: bool,
-    pub portal_only: bool,
-    pub no_refresh: bool,
-    pub skip_back_end: bool,
-    pub face_plane_cull: bool,
-    /// Materials of a greater sort value are left out; 0: none are.
-    pub debug_sort: i32,
-    pub show_cluster: i32,
-    pub no_bind: bool,
-    pub measure_overdraw: bool,
-    pub show_normals: bool,
-    pub show_sky: bool,
-    /// 1: all images on a grid; 2: in proportion to their sizes.
-    pub show_images: i32,
-    pub dlight_backs: bool,
-    pub debug_light: bool,
-    pub clear: bool,
-    pub show_tris: bool,
-    pub lightmap: bool,
-    pub speeds: i32,
-    pub ambient_scale: f32,
-    pub directed_scale: f32,
-    pub rail_width: f32,
-    pub rail_core_width: f32,
-    pub rail_segment_length: f32,
-    pub marks_on_triangle_meshes: bool,
-    pub offset_factor: f32,
-    pub offset_units: f32,
+/// The row of a console variable, whatever the case of the name.
+pub fn row(name: &str) -> Option<&'static Row> {
+    ROWS.iter()
+        .find(|row| row.spec.name.eq_ignore_ascii_case(name))
 }
 
 impl Settings {
+    /// Defaults with textures of full size, for pictures without a player: the engine's default of `r_picmip` halves
+    /// them.
+    pub fn full_size() -> Self {
+        Self {
+            picmip: 0,
+            ..Self::default()
+        }
+    }
+
+    /// Degree of anisotropic sampling of textures; 0: none.
+    pub fn anisotropy(&self) -> f32 {
+        match self.anisotropic_filter {
+            true => self.max_anisotropy.max(1.0),
+            false => 0.0,
+        }
+    }
+
+    /// Whether the sky is left out.
+    pub fn hides_sky(&self) -> bool {
+        self.fast_sky != 0
+    }
+
+    /// Whether portals and mirrors are left out.
+    pub fn hides_portals(&self) -> bool {
+        self.no_portals || self.fast_sky == 1
+    }
+
     /// Overbright bits in force: only a full-screen window with a gamma ramp shows colours doubled.
     pub fn effective_overbright_bits(&self) -> u32 {
         if self.ignore_hw_gamma || !self.fullscreen {
@@ -191,14 +230,14 @@ impl Settings {
         if self.ignore_hw_gamma {
             1.0
         } else {
-            self.gamma.clamp(0.5, 3.0)
+            self.gamma
         }
     }
 
     /// The gamma that images get when they are loaded.
     pub fn software_gamma(&self) -> f32 {
         if self.ignore_hw_gamma {
-            self.gamma.clamp(0.5, 3.0)
+            self.gamma
         } else {
             1.0
         }
@@ -210,108 +249,123 @@ impl Settings {
     }
 }
 
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            rt: false,
-            rt_tracer: TracerChoice::Auto,
-            rt_lights: MapLightChoice::Calibrated,
-            rt_print_perf_stats: false,
-            rt_illumination: true,
-            rt_cull_lights: true,
-            rt_num_random_dl: 1,
-            rt_light_selection: LightSelection::Resampled,
-            rt_candidates: 8,
-            rt_pause: false,
-            rt_accumulate: false,
-            rt_antialiasing: true,
-            rt_soft_shadows: true,
-            rt_dof: false,
-            rt_aperture: 4.0,
-            rt_focal_length: 256.0,
-            rt_denoiser: 1,
-            rt_gradients: true,
-            rt_taa: true,
-            rt_scale: 1.0,
-            rt_max_depth: 4,
-            rt_bounces: 1,
-            rt_bloom: 0.05,
-            rt_flashlight: false,
-            rt_debug: 0,
-            rt_exposure: 0.0,
-            rt_auto_exposure: true,
-            rt_light_scale: 1.0,
-            rt_dlight_scale: 1.0,
-            picmip: 0,
-            round_images_down: true,
-            simple_mip_maps: true,
-            detail_textures: true,
-            intensity: 1.0,
-            greyscale: 0.0,
-            color_mip_levels: false,
-            single_shader: false,
-            print_shaders: false,
-            lightmap_heat: false,
-            anisotropy: 0.0,
-            texture_mode: "GL_LINEAR_MIPMAP_LINEAR".into(),
-            map_overbright_bits: 2,
-            overbright_bits: 0,
-            vertex_light: false,
-            ui_fullscreen: false,
-            fullbright: false,
-            subdivisions: 4.0,
-            gamma: 1.0,
-            ignore_hw_gamma: false,
-            fullscreen: false,
-            swap_interval: 0,
-            lod_bias: 0,
-            lod_scale: 5.0,
-            lod_curve_error: 250.0,
-            znear: 4.0,
-            fast_sky: false,
-            draw_sun: false,
-            dynamic_light: true,
-            flares: false,
-            flare_size: 40.0,
-            flare_fade: 7.0,
-            flare_coefficient: 150.0,
-            shadows: 1,
-            multisample: 0,
-            anaglyph: 0,
-            stereo_separation: 64.0,
-            convergence: 64.0,
-            draw_world: true,
-            draw_entities: true,
-            no_vis: false,
-            lock_pvs: false,
-            no_cull: false,
-            no_curves: false,
-            no_portals: false,
-            portal_only: false,
-            no_refresh: false,
-            skip_back_end: false,
-            face_plane_cull: true,
-            debug_sort: 0,
-            show_cluster: 0,
-            no_bind: false,
-            measure_overdraw: false,
-            show_normals: false,
-            show_sky: false,
-            show_images: 0,
-            dlight_backs: true,
-            debug_light: false,
-            clear: false,
-            show_tris: false,
-            lightmap: false,
-            speeds: 0,
-            ambient_scale: 0.6,
-            directed_scale: 1.0,
-            rail_width: 16.0,
-            rail_core_width: 6.0,
-            rail_segment_length: 32.0,
-            marks_on_triangle_meshes: false,
-            offset_factor: -1.0,
-            offset_units: -2.0,
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::hash::DefaultHasher;
+
+    fn key(settings: &Settings) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        settings.accumulation_key(&mut hasher);
+        hasher.finish()
+    }
+
+    #[test]
+    fn the_key_changes_with_the_settings_that_restart_accumulation() {
+        let default = Settings::default();
+        for row in ROWS {
+            let name = row.spec.name;
+            let values: &[&str] = match row.spec.kind {
+                Kind::Name(names) => names,
+                _ => &["0", "1", "2"],
+            };
+            let changed = values.iter().find_map(|value| {
+                let mut settings = default.clone();
+                assert_eq!(row.put(&mut settings, &Given::parse(value)), Ok(()));
+                (settings != default).then_some(settings)
+            });
+            let changed = changed.unwrap_or_else(|| panic!("{name} sets nothing"));
+            let restarts = row.accumulation == Restarts;
+            assert_eq!(key(&changed) != key(&default), restarts, "{name}");
         }
+    }
+
+    #[test]
+    fn defaults_are_values_within_the_limits() {
+        for row in ROWS {
+            assert_eq!(row.check(row.spec.default), Ok(()));
+            let mut settings = Settings::default();
+            assert_eq!(
+                row.put(&mut settings, &Given::parse(row.spec.default)),
+                Ok(())
+            );
+            assert_eq!(settings, Settings::default(), "{}", row.spec.name);
+        }
+    }
+
+    #[test]
+    fn rows_that_are_read_together_name_a_row() {
+        for row in ROWS {
+            if let With(name) = row.reading {
+                assert!(super::row(name).is_some(), "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_are_brought_within_the_limits() {
+        let mut settings = Settings::default();
+        let mut put = |name, value| {
+            let put = row(name).unwrap().put(&mut settings, &Given::parse(value));
+            assert_eq!(put, Ok(()));
+            settings.clone()
+        };
+        assert_eq!(put("rt_bloom", "7").rt_bloom, 1.0);
+        assert_eq!(put("RT_BOUNCES", "-1").rt_bounces, 0);
+        assert_eq!(put("rt_exposure", "inf").rt_exposure, 0.0);
+        assert_eq!(put("r_gamma", "0").gamma, 0.5);
+        assert_eq!(put("r_overBrightBits", "-3").overbright_bits, 0);
+        assert_eq!(put("rt_denoiser", "9").rt_denoiser, DenoiserChoice::Sparse);
+    }
+
+    #[test]
+    fn choices_have_their_documented_numbers_and_names() {
+        let mut settings = Settings::default();
+        let mut put = |name, value| {
+            let put = row(name).unwrap().put(&mut settings, &Given::parse(value));
+            (put.is_ok(), settings.clone())
+        };
+        let (_, uniform) = put("rt_lightSelection", "0");
+        assert_eq!(uniform.rt_light_selection, LightSelection::Uniform);
+        let (_, resampled) = put("rt_lightSelection", "1");
+        assert_eq!(resampled.rt_light_selection, LightSelection::Resampled);
+        assert_eq!(put("cg_shadows", "2").1.shadows, ModelShadows::Volumes);
+        assert_eq!(put("cg_shadows", "-2").1.shadows, ModelShadows::None);
+        assert_eq!(put("r_anaglyphMode", "5").1.anaglyph, Anaglyph::CyanRed);
+        assert_eq!(put("r_anaglyphMode", "9").1.anaglyph, Anaglyph::None);
+        assert_eq!(put("rt_debug", "11").1.rt_debug, DebugOutput::Specular);
+        assert_eq!(put("rt_tracer", "Query").1.rt_tracer, TracerChoice::Query);
+        let (known, kept) = put("rt_tracer", "gpu");
+        assert!(!known && kept.rt_tracer == TracerChoice::Query);
+        assert_eq!(put("rt_lights", "PRIOR").1.rt_lights, MapLightChoice::Prior);
+        assert_eq!(put("rt_lights", "").1.rt_lights, MapLightChoice::Calibrated);
+        let (known, nearest) = put("r_textureMode", "gl_nearest");
+        assert!(known && nearest.texture_mode == TextureMode::Nearest);
+        assert!(!put("r_textureMode", "nearest").0);
+    }
+
+    #[test]
+    fn texts_that_are_no_value_are_refused_with_what_a_value_is() {
+        let refused = |name, text| row(name).unwrap().check(text).unwrap_err().to_string();
+        assert_eq!(
+            refused("rt_bounces", "9"),
+            "rt_bounces 9: not a whole number from 0 to 2"
+        );
+        assert!(refused("rt_bounces", "1.5").contains("a whole number"));
+        assert_eq!(
+            refused("rt_scale", "inf"),
+            "rt_scale inf: not a number from 0.25 to 1"
+        );
+        assert_eq!(
+            refused("r_intensity", "0.5"),
+            "r_intensity 0.5: not a number from 1 on"
+        );
+        assert_eq!(refused("r_zproj", "NaN"), "r_zproj NaN: not a number");
+        assert_eq!(
+            refused("rt_lights", "all"),
+            "rt_lights all: not one of calibrated, prior"
+        );
+        assert_eq!(row("rt_tracer").unwrap().check("AUTO"), Ok(()));
+        assert!(row("rt_none").is_none());
     }
 }

@@ -3,7 +3,7 @@
 //! Source: engine behaviour of `renderer_opengl1` (anaglyph modes, stereo projection).
 
 use crate::gpu::ColorMask;
-use crate::settings::Settings;
+use crate::settings::{Anaglyph, Settings};
 
 /// Whose picture is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -18,25 +18,28 @@ pub enum Eye {
 }
 
 impl Eye {
-    /// The channels that it draws by `r_anaglyphMode`: 1 red and cyan, 2 red and blue, 3 red and green, 4 green and
-    /// magenta; 5 to 8 the same with the eyes swapped.
-    pub fn mask(self, anaglyph: u32) -> ColorMask {
-        let (mode, swapped) = match anaglyph {
-            1..=4 => (anaglyph, false),
-            5..=8 => (anaglyph - 4, true),
-            _ => return ColorMask::ALL,
+    /// The channels that it draws.
+    pub fn mask(self, anaglyph: Anaglyph) -> ColorMask {
+        const RED: [bool; 3] = [true, false, false];
+        const GREEN: [bool; 3] = [false, true, false];
+        const BLUE: [bool; 3] = [false, false, true];
+        const CYAN: [bool; 3] = [false, true, true];
+        const MAGENTA: [bool; 3] = [true, false, true];
+        let (left, right) = match anaglyph {
+            Anaglyph::None => return ColorMask::ALL,
+            Anaglyph::RedCyan => (RED, CYAN),
+            Anaglyph::RedBlue => (RED, BLUE),
+            Anaglyph::RedGreen => (RED, GREEN),
+            Anaglyph::GreenMagenta => (GREEN, MAGENTA),
+            Anaglyph::CyanRed => (CYAN, RED),
+            Anaglyph::BlueRed => (BLUE, RED),
+            Anaglyph::GreenRed => (GREEN, RED),
+            Anaglyph::MagentaGreen => (MAGENTA, GREEN),
         };
-        let left = match self {
+        let [red, green, blue] = match self {
             Self::Both => return ColorMask::ALL,
-            Self::Left => !swapped,
-            Self::Right => swapped,
-        };
-        let [red, green, blue] = match (mode, left) {
-            (1..=3, true) => [true, false, false],
-            (4, true) | (3, false) => [false, true, false],
-            (1, false) => [false, true, true],
-            (2, false) => [false, false, true],
-            _ => [true, false, true],
+            Self::Left => left,
+            Self::Right => right,
         };
         ColorMask {
             red,
@@ -86,7 +89,18 @@ mod tests {
 
     #[test]
     fn eyes_share_the_channels() {
-        for mode in 1..=8 {
+        use Anaglyph::*;
+        let modes = [
+            RedCyan,
+            RedBlue,
+            RedGreen,
+            GreenMagenta,
+            CyanRed,
+            BlueRed,
+            GreenRed,
+            MagentaGreen,
+        ];
+        for mode in modes {
             let [left, right] = [Eye::Left, Eye::Right].map(|eye| eye.mask(mode));
             let shared = [
                 left.red && right.red,
@@ -94,13 +108,14 @@ mod tests {
                 left.blue && right.blue,
             ];
             assert_eq!(shared, [false; 3]);
-            assert_eq!(left.red, mode < 4 || mode == 8);
+            let number = mode as u32;
+            assert_eq!(left.red, number < 4 || number == 8);
             assert_eq!(Eye::Both.mask(mode), ColorMask::ALL);
         }
-        assert_eq!(Eye::Left.mask(0), ColorMask::ALL);
-        assert!(Eye::Right.mask(1).green && Eye::Right.mask(1).blue);
-        assert!(!Eye::Right.mask(2).green && Eye::Right.mask(3).green);
-        assert!(Eye::Left.mask(5).green && Eye::Right.mask(5).red);
+        assert_eq!(Eye::Left.mask(None), ColorMask::ALL);
+        assert!(Eye::Right.mask(RedCyan).green && Eye::Right.mask(RedCyan).blue);
+        assert!(!Eye::Right.mask(RedBlue).green && Eye::Right.mask(RedGreen).green);
+        assert!(Eye::Left.mask(CyanRed).green && Eye::Right.mask(CyanRed).red);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::gpu::{self, Access, Device, Format, Image, ImageDesc, ImageUsage, Recorder};
 use crate::raster;
-use crate::settings::Settings;
+use crate::settings::{ModelShadows, Settings};
 
 /// Colour and depth of a frame.
 pub struct FrameTargets {
@@ -47,7 +47,7 @@ impl FrameTargets {
             self.several = None;
         }
         let wanted = if settings.rt { 0 } else { settings.multisample };
-        let stencil = settings.shadows == 2;
+        let stencil = settings.shadows == ModelShadows::Volumes;
         let samples = samples(device, wanted, stencil);
         let drawn = self.drawn().samples();
         if samples != drawn {

@@ -9,7 +9,7 @@ use q3bsp::builder::MapBuilder;
 use q3model::{Frame, Md3, PackedVertex, Surface};
 use relight::MemoryFiles;
 use renderer_vk::api::{EntityKind, Picture, RefDef, RefEntity, StretchedPicture};
-use renderer_vk::{Error, Eye, Renderer, RendererOptions, Settings};
+use renderer_vk::{Anaglyph, Error, Eye, ModelShadows, Renderer, RendererOptions, Settings};
 
 /// Side of the picture, pixels.
 const SIDE: u32 = 64;
@@ -175,12 +175,12 @@ fn red(picture: &Picture, x: usize, y: usize) -> u8 {
 
 #[test]
 fn stencil_shadows_darken_what_lies_behind_a_model() {
-    let Some(mut stage) = Stage::new(Settings::default()) else {
+    let Some(mut stage) = Stage::new(Settings::full_size()) else {
         return;
     };
     let cube = entity(stage.box_model, Vec3::new(100.0, 0.0, -100.0));
     let plain = stage.frame(&def(), &[cube]);
-    stage.settings.shadows = 2;
+    stage.settings.shadows = ModelShadows::Volumes;
     let shadowed = stage.frame(&def(), &[cube]);
     let empty = stage.frame(&def(), &[]);
     let mut dark = 0;
@@ -191,7 +191,7 @@ fn stencil_shadows_darken_what_lies_behind_a_model() {
     }
     assert!(dark > 60, "{dark}");
     // without a stencil again, and nothing is left of the shadow
-    stage.settings.shadows = 1;
+    stage.settings.shadows = ModelShadows::Spot;
     assert!(stage.frame(&def(), &[cube]).rgb == plain.rgb);
     assert!(stage.frame(&def(), &[]).rgb == empty.rgb);
 }
@@ -201,7 +201,7 @@ fn flares_fade_in_where_they_can_be_seen_and_out_where_not() {
     let settings = Settings {
         flares: true,
         flare_coefficient: 1e6,
-        ..Settings::default()
+        ..Settings::full_size()
     };
     let Some(mut stage) = Stage::new(settings) else {
         return;
@@ -258,8 +258,8 @@ fn flares_fade_in_where_they_can_be_seen_and_out_where_not() {
 fn several_samples_smooth_edges_along_with_shadows_and_flares() {
     let settings = Settings {
         flares: true,
-        shadows: 2,
-        ..Settings::default()
+        shadows: ModelShadows::Volumes,
+        ..Settings::full_size()
     };
     let Some(mut stage) = Stage::new(settings) else {
         return;
@@ -287,12 +287,12 @@ fn several_samples_smooth_edges_along_with_shadows_and_flares() {
 
 #[test]
 fn each_eye_draws_its_channels_from_its_place() {
-    let Some(mut stage) = Stage::new(Settings::default()) else {
+    let Some(mut stage) = Stage::new(Settings::full_size()) else {
         return;
     };
     let cube = entity(stage.box_model, Vec3::new(0.0, 0.0, 0.0));
     let both = stage.frame(&def(), &[cube]);
-    stage.settings.anaglyph = 1;
+    stage.settings.anaglyph = Anaglyph::RedCyan;
     // far apart, and meeting far behind the cube
     stage.settings.stereo_separation = 64.0;
     stage.settings.convergence = 320.0;
@@ -323,16 +323,17 @@ fn each_eye_draws_its_channels_from_its_place() {
     assert!(green.0 < left && green.1 < right, "{green:?}");
     assert_eq!(green, blue);
     // alone again
-    stage.settings.anaglyph = 0;
+    stage.settings.anaglyph = Anaglyph::None;
     assert!(stage.frame(&def(), &[cube]).rgb == both.rgb);
 }
 
 #[test]
 fn a_device_with_nothing_optional_draws_all_but_what_needs_it() {
     let settings = Settings {
-        shadows: 2,
-        anisotropy: 16.0,
-        ..Settings::default()
+        shadows: ModelShadows::Volumes,
+        anisotropic_filter: true,
+        max_anisotropy: 16.0,
+        ..Settings::full_size()
     };
     let Some(mut rich) = Stage::new(settings.clone()) else {
         return;
@@ -366,8 +367,8 @@ fn a_device_with_nothing_optional_draws_all_but_what_needs_it() {
 fn no_descriptor_is_written_while_drawing() {
     let settings = Settings {
         flares: true,
-        shadows: 2,
-        ..Settings::default()
+        shadows: ModelShadows::Volumes,
+        ..Settings::full_size()
     };
     let Some(mut stage) = Stage::new(settings) else {
         return;

@@ -188,7 +188,7 @@ fn assert_flat(held: &[Held], warm: usize, growth: u64) {
 
 #[test]
 fn classic_maps_hold_no_more_after_sixty_than_after_a_few() {
-    let Some(held) = changes(&Settings::default(), 60) else {
+    let Some(held) = changes(&Settings::full_size(), 60) else {
         return;
     };
     // a driver's pipeline for draws takes 3 MB of Mesa's software driver: kept ones make it 300 MB
@@ -201,7 +201,7 @@ fn traced_maps_share_the_passes() {
         rt: true,
         rt_tracer: TracerChoice::Compute,
         rt_lights: MapLightChoice::Prior,
-        ..Settings::default()
+        ..Settings::full_size()
     };
     let Some(held) = changes(&settings, 15) else {
         return;

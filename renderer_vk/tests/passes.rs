@@ -144,7 +144,7 @@ fn renderer() -> Option<Renderer> {
     files.insert("maps/t.bsp", map.build().write()).unwrap();
     let files = Arc::new(files);
     renderer
-        .begin_registration(files, &Settings::default())
+        .begin_registration(files, &Settings::full_size())
         .unwrap();
     renderer.load_world("maps/t.bsp").unwrap();
     renderer.end_registration();
@@ -175,10 +175,10 @@ fn passes_drawn_together_look_as_one_after_the_other() {
     let Some(mut renderer) = renderer() else {
         return;
     };
-    let together = Settings::default();
+    let together = Settings::full_size();
     let alone = Settings {
         measure_overdraw: true,
-        ..Settings::default()
+        ..Settings::full_size()
     };
     let (expected, many) = frame(&mut renderer, &alone);
     let (picture, few) = frame(&mut renderer, &together);
@@ -213,12 +213,12 @@ fn what_is_registered_is_compiled_before_it_is_seen() {
     };
     let ahead = renderer.compiled_pipelines();
     assert!(ahead > 20, "{ahead}");
-    frame(&mut renderer, &Settings::default());
+    frame(&mut renderer, &Settings::full_size());
     assert_eq!(renderer.compiled_pipelines(), ahead);
     // and the count does tell what was not foreseen
     let unforeseen = Settings {
         measure_overdraw: true,
-        ..Settings::default()
+        ..Settings::full_size()
     };
     frame(&mut renderer, &unforeseen);
     assert!(renderer.compiled_pipelines() > ahead);

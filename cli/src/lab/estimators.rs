@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use crate::game::Maps;
 use crate::render::{parse_size, parse_view};
+use crate::settings::{Assignment, SettingArgs, default, help, value_of};
 use crate::view::{Camera, load, open};
 
 /// Compare the ways to choose lights: all of them have the same mean
@@ -38,13 +39,10 @@ pub struct EstimatorsArgs {
     /// Size in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "512x384", value_parser = parse_size)]
     size: (u32, u32),
-    /// Diffuse bounces of the traced look, 2 at most
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=2))]
-    bounces: u32,
-    /// Lights looked at for each one that is chosen
-    #[arg(long, default_value_t = Settings::default().rt_candidates,
-        value_parser = clap::value_parser!(u32).range(1..))]
-    candidates: u32,
+    #[arg(long, help = help("rt_bounces"), value_parser = value_of("rt_bounces"), default_value = "0")]
+    bounces: Assignment,
+    #[arg(long, help = help("rt_candidates"), value_parser = value_of("rt_candidates"), default_value = default("rt_candidates"))]
+    candidates: Assignment,
     /// Leave out the pictures lit by every light of the map
     #[arg(long)]
     no_unculled: bool,
@@ -61,6 +59,8 @@ pub struct EstimatorsArgs {
     /// Print JSON in place of a table: one object a map and estimator
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    set: SettingArgs,
 }
 
 /// Side of the squares that are compared.
@@ -285,14 +285,13 @@ pub fn run(args: &EstimatorsArgs) -> Result<()> {
         let base = Settings {
             rt: true,
             rt_accumulate: true,
-            rt_bounces: args.bounces,
             rt_auto_exposure: false,
             // what differs is to be the light alone
             rt_antialiasing: false,
             rt_num_random_dl: 1,
-            rt_candidates: args.candidates,
-            ..Settings::default()
+            ..Settings::full_size()
         };
+        let base = (args.set).change([&args.bounces, &args.candidates], base);
         let (width, height) = args.size;
         let mut renderer = Renderer::new(RendererOptions {
             device: args.device.clone(),

@@ -15,6 +15,7 @@ use super::statistics::luminance;
 use crate::cameras::places;
 use crate::game::Maps;
 use crate::render::parse_size;
+use crate::settings::SettingArgs;
 use crate::view::{Camera, load, map_name, open};
 
 /// Draw views in the classic look and traced, side by side, and compare how bright and how coloured they are
@@ -55,6 +56,8 @@ pub struct LooksArgs {
     /// Print JSON in place of a table: one object a map, null for looks without a view
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    set: SettingArgs,
 }
 
 /// The looks, from left to right.
@@ -182,12 +185,13 @@ fn one(args: &LooksArgs, map: &str) -> Result<Sums> {
     })
     .context("no picture without a Vulkan device")?;
     renderer.keep_calibrations(args.cache.clone());
+    let chosen = args.set.change([], Settings::full_size());
     let settings = |look: Option<MapLightChoice>| Settings {
         rt: look.is_some(),
         rt_lights: look.unwrap_or_default(),
         rt_accumulate: !args.no_accumulation,
         rt_auto_exposure: !args.fixed_exposure,
-        ..Settings::default()
+        ..chosen.clone()
     };
     let (bsp, entities) = load(&mut renderer, files, &path, &settings(None))?;
     let places = places(&bsp.entities(), args.views);

@@ -31,6 +31,7 @@ use crate::cameras::{Place, places};
 use crate::game::Maps;
 use crate::numbers;
 use crate::render::{parse_size, parse_view};
+use crate::settings::{Assignment, SettingArgs, default, help, value_of};
 use crate::view::{Camera, load, map_name, open};
 
 /// Measure the traced look in real time against its reference
@@ -75,12 +76,10 @@ pub struct MeasureArgs {
     /// Frames that lead to a picture, and frames over which noise is taken
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(2..))]
     frames: u32,
-    /// Diffuse bounces of the traced look, 2 at most
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(..=2))]
-    bounces: u32,
-    /// Exposure in stops, on top of the one that the map starts with: for dark places
-    #[arg(long, default_value_t = 0.0, value_parser = numbers::finite, allow_hyphen_values = true)]
-    exposure: f32,
+    #[arg(long, help = help("rt_bounces"), value_parser = value_of("rt_bounces"), default_value = default("rt_bounces"))]
+    bounces: Assignment,
+    #[arg(long, help = help("rt_exposure"), value_parser = value_of("rt_exposure"), default_value = default("rt_exposure"), allow_negative_numbers = true)]
+    exposure: Assignment,
     /// Vulkan device: part of its name
     #[arg(long, value_name = "NAME")]
     device: Option<String>,
@@ -90,6 +89,8 @@ pub struct MeasureArgs {
     /// Print JSON in place of a table
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    set: SettingArgs,
 }
 
 /// Distance of the light that is switched, before the eye, and its reach: about an explosion.
@@ -353,11 +354,10 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
         .context("nothing to measure without a Vulkan device")?;
         let base = Settings {
             rt: true,
-            rt_bounces: args.bounces,
             rt_auto_exposure: false,
-            rt_exposure: args.exposure,
-            ..Settings::default()
+            ..Settings::full_size()
         };
+        let base = (args.set).change([&args.bounces, &args.exposure], base);
         let (bsp, entities) = load(&mut renderer, files, &path, &base)?;
         let held = args.hold.as_ref().map(|m| renderer.register_model(m));
         let mut stage = Stage {

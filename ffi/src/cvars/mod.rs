@@ -1,50 +1,109 @@
 //! Console variables: registration, reading, and their way into the renderer's settings.
 
+#[cfg(test)]
+mod document;
 mod settings;
-pub mod table;
+mod table;
 
-pub use settings::{WindowFacts, apply, apply_at_registration, write_back_clamps};
-pub use table::{Cvar, TABLE};
+pub use settings::{apply, apply_at_registration, write_back_limits};
+pub use table::Cvar;
 
-use crate::engine::{Engine, Variable};
+use std::ffi::{CString, c_int};
 
-/// What may be asked of a cvar's number.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
-    /// Smallest value.
-    pub min: f32,
-    /// Largest value.
-    pub max: f32,
-    /// Whole numbers alone.
-    pub integral: bool,
+use crate::engine::{Engine, Services, Variable, cvar_flags};
+use renderer_vk::settings::{Kind, ROWS, Reading, Row, Spec, flags};
+use table::{TABLE, UNUSED};
+
+/// The variable of a setting.
+#[derive(Debug)]
+struct Registered {
+    row: &'static Row,
+    variable: Option<Variable>,
+    /// The variable with whose change it is read, if it is not read each frame.
+    with: Option<Variable>,
 }
 
-/// The engine's variables behind [`TABLE`], by position.
+/// The engine's variables.
 #[derive(Debug)]
 pub struct Cvars {
     engine: Engine,
-    handles: Vec<Option<Variable>>,
+    /// Of [`TABLE`], by position.
+    own: Vec<Option<Variable>>,
+    settings: Vec<Registered>,
+}
+
+/// A text for the engine. Texts of tables have no NUL; one from elsewhere with a NUL is empty.
+pub fn c_text(text: &str) -> CString {
+    CString::new(text).unwrap_or_default()
+}
+
+/// The value as a number; 0 if it is not finite.
+fn number(engine: Engine, variable: Variable) -> f32 {
+    let value = engine.cvar_as_number(variable);
+    if value.is_finite() { value } else { 0.0 }
+}
+
+/// The engine's bits of a variable's flags.
+fn engine_flags(spec: &Spec) -> c_int {
+    let pairs = [
+        (flags::ARCHIVE, cvar_flags::ARCHIVE),
+        (flags::LATCH, cvar_flags::LATCH),
+        (flags::ROM, cvar_flags::ROM),
+        (flags::TEMP, cvar_flags::TEMP),
+        (flags::CHEAT, cvar_flags::CHEAT),
+    ];
+    let set = pairs.iter().filter(|(ours, _)| spec.flags & ours != 0);
+    set.map(|(_, engines)| engines).sum()
+}
+
+/// Finds or makes a variable.
+pub fn get(engine: &dyn Services, spec: &Spec) -> Option<Variable> {
+    let (name, default) = (c_text(spec.name), c_text(spec.default));
+    engine.cvar_get(&name, &default, engine_flags(spec))
+}
+
+fn register(engine: Engine, spec: &Spec) -> Option<Variable> {
+    let variable = get(engine, spec)?;
+    if let Some(range) = spec.range.filter(|range| range.by_engine) {
+        engine.cvar_check_range(variable, range.min, range.max, spec.kind == Kind::Whole);
+    }
+    engine.cvar_describe(variable, &c_text(spec.help));
+    Some(variable)
 }
 
 impl Cvars {
-    /// Registers every cvar of the table. Doing it again applies the latched values.
+    /// Registers every variable. Doing it again applies the latched values.
     pub fn register(engine: Engine) -> Cvars {
-        let handles = TABLE
+        let own = TABLE.iter().map(|spec| register(engine, spec)).collect();
+        for spec in UNUSED {
+            register(engine, spec);
+        }
+        let variables: Vec<_> = ROWS.iter().map(|row| register(engine, &row.spec)).collect();
+        let named = |name| {
+            let at = ROWS.iter().position(|row| row.spec.name == name)?;
+            variables.get(at).copied().flatten()
+        };
+        let settings = ROWS
             .iter()
-            .map(|spec| {
-                let cvar = engine.cvar_get(spec.name, spec.default, spec.flags)?;
-                if let Some(range) = spec.range {
-                    engine.cvar_check_range(cvar, range.min, range.max, range.integral);
-                }
-                engine.cvar_describe(cvar, spec.description);
-                Some(cvar)
-            })
-            .collect();
-        Cvars { engine, handles }
+            .zip(&variables)
+            .map(|(row, variable)| Registered {
+                row,
+                variable: *variable,
+                with: match row.reading {
+                    Reading::With(name) => named(name),
+                    Reading::Frame | Reading::Start => None,
+                },
+            });
+        let settings = settings.collect();
+        Cvars {
+            engine,
+            own,
+            settings,
+        }
     }
 
     fn handle(&self, cvar: Cvar) -> Option<Variable> {
-        self.handles.get(cvar as usize).copied().flatten()
+        self.own.get(cvar as usize).copied().flatten()
     }
 
     /// The value as an integer, as the engine parsed it; 0 if the engine has no such cvar.
@@ -53,12 +112,10 @@ impl Cvars {
             .map_or(0, |handle| self.engine.cvar_as_integer(handle))
     }
 
-    /// The value as a number, with anything that is not finite taken for 0.
+    /// The value as a finite number; 0 if the engine has no such cvar.
     pub fn value(&self, cvar: Cvar) -> f32 {
-        let value = self
-            .handle(cvar)
-            .map_or(0.0, |handle| self.engine.cvar_as_number(handle));
-        if value.is_finite() { value } else { 0.0 }
+        self.handle(cvar)
+            .map_or(0.0, |handle| number(self.engine, handle))
     }
 
     /// Whether the integer value is not 0.
@@ -85,11 +142,9 @@ impl Cvars {
         }
     }
 
-    /// Sets a variable of the table.
-    pub fn set(&self, engine: Engine, cvar: Cvar, value: &str) {
-        if let Some(spec) = TABLE.get(cvar as usize) {
-            engine.cvar_set(spec.name, value);
-        }
+    /// Sets a variable.
+    fn set(&self, spec: &Spec, value: &str) {
+        self.engine.cvar_set(&c_text(spec.name), value);
     }
 }
 
@@ -99,9 +154,9 @@ mod tests {
     use std::collections::HashSet;
 
     /// Names, defaults and flags as Debian's opengl1 registers them (its log), one per line. `-` is the empty string.
-    const KNOWN: &str = include_str!("known_cvars.txt");
+    pub const KNOWN: &str = include_str!("known_cvars.txt");
 
-    fn flag_bits(letters: &str) -> i32 {
+    fn flag_bits(letters: &str) -> c_int {
         letters
             .chars()
             .map(|letter| match letter {
@@ -116,6 +171,12 @@ mod tests {
             .sum()
     }
 
+    /// All variables.
+    pub fn specs() -> impl Iterator<Item = &'static Spec> {
+        let settings = ROWS.iter().map(|row| &row.spec);
+        TABLE.iter().chain(UNUSED).chain(settings)
+    }
+
     #[test]
     fn every_known_cvar_is_there_with_its_default_and_flags() {
         let mut rows = 0;
@@ -124,12 +185,11 @@ mod tests {
                 panic!("bad row {line:?}")
             };
             let default = if default == "-" { "" } else { default };
-            let spec = TABLE
-                .iter()
-                .find(|spec| spec.name.to_str() == Ok(name))
+            let spec = specs()
+                .find(|spec| spec.name == name)
                 .unwrap_or_else(|| panic!("{name} is missing"));
-            assert_eq!(spec.default.to_str(), Ok(default), "default of {name}");
-            assert_eq!(spec.flags, flag_bits(flags), "flags of {name}");
+            assert_eq!(spec.default, default, "default of {name}");
+            assert_eq!(engine_flags(spec), flag_bits(flags), "flags of {name}");
             rows += 1;
         }
         assert_eq!(rows, 107);
@@ -137,41 +197,17 @@ mod tests {
 
     #[test]
     fn names_are_unique_whatever_their_case() {
-        let names: HashSet<_> = TABLE
-            .iter()
-            .map(|spec| spec.name.to_bytes().to_ascii_lowercase())
-            .collect();
-        assert_eq!(names.len(), TABLE.len());
+        let names: HashSet<_> = specs().map(|s| s.name.to_ascii_lowercase()).collect();
+        assert_eq!(names.len(), specs().count());
     }
 
     #[test]
-    fn defaults_are_within_their_ranges() {
-        for spec in TABLE {
-            let Some(range) = spec.range else { continue };
-            let value: f32 = spec.default.to_str().unwrap().parse().unwrap_or(0.0);
-            assert!(range.min <= value && value <= range.max, "{:?}", spec.name);
-            assert!(!range.integral || value.fract() == 0.0, "{:?}", spec.name);
-        }
-    }
-
-    #[test]
-    fn each_has_a_description() {
-        for spec in TABLE {
-            assert!(spec.description.to_bytes().len() > 10, "{:?}", spec.name);
-        }
-    }
-
-    #[test]
-    fn the_documentation_lists_each_with_its_default() {
-        let text = include_str!("../../../docs/settings.md");
-        for spec in TABLE {
-            let (name, default) = (spec.name.to_str().unwrap(), spec.default.to_str().unwrap());
-            let start = match default {
-                "" => format!("| `{name}` |  | "),
-                default => format!("| `{name}` | `{default}` | "),
-            };
-            let rows = text.lines().filter(|line| line.starts_with(&start));
-            assert_eq!(rows.count(), 1, "{name} in docs/settings.md");
+    fn texts_have_no_nul_and_a_description() {
+        for spec in specs() {
+            for text in [spec.name, spec.default, spec.help] {
+                assert!(!text.contains('\0'), "{}", spec.name);
+            }
+            assert!(spec.help.len() > 10, "{}", spec.name);
         }
     }
 }

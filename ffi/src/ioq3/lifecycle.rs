@@ -5,7 +5,7 @@ use super::glconfig;
 use crate::boundary::entry;
 use crate::capture::{self, VideoFrame};
 use crate::commands;
-use crate::cvars::{self, Cvar, Cvars, WindowFacts};
+use crate::cvars::{self, Cvar, Cvars};
 use crate::delivery::{Outbox, deliver, take_captures, take_captures_of_last_frame};
 use crate::engine::{self, Engine, valid_game_path};
 use crate::failure::Failure;
@@ -59,7 +59,8 @@ pub unsafe extern "C" fn begin_registration(out: *mut glconfig_t) {
         };
         let cvars = Cvars::register(engine);
         window::apply_safe_settings(engine);
-        cvars::write_back_clamps(engine, &cvars);
+        cvars::write_back_limits(&cvars);
+        session::with(|session| cvars::apply(&cvars, &mut session.front.settings));
         commands::add(engine);
 
         let cache_folder = cache_folder(engine);
@@ -83,12 +84,7 @@ pub unsafe extern "C" fn begin_registration(out: *mut glconfig_t) {
             let Some(renderer) = &mut session.renderer else {
                 return Ok(());
             };
-            cvars::apply(&cvars, front.window, &mut front.settings);
             cvars::apply_at_registration(&cvars, &mut front.settings);
-            let mode = cvars.string(Cvar::TextureMode);
-            if renderer_vk::is_texture_mode(&mode) {
-                front.settings.texture_mode = mode;
-            }
             front.cvars = Some(cvars);
             front.registered = true;
             let files = Arc::new(EngineFiles::new(engine));
@@ -140,10 +136,11 @@ fn start_renderer(
             session::with(|session| {
                 session.renderer = Some(renderer);
                 session.front.has_picture = false;
-                session.front.window = WindowFacts {
-                    fullscreen: window::current().is_some_and(|window| window.is_fullscreen()),
-                    gamma: !cvars.flag(Cvar::IgnoreHwGamma),
-                };
+                // whatever the variables become: the engine's own renderer reads them here only
+                let settings = &mut session.front.settings;
+                settings.fullscreen =
+                    window::current().is_some_and(|window| window.is_fullscreen());
+                settings.ignore_hw_gamma = cvars.flag(Cvar::IgnoreHwGamma);
             });
             Ok(())
         }
@@ -172,7 +169,8 @@ fn make_renderer(
         window,
         validation: cvars.flag(Cvar::VkValidation),
         device: wanted_device(cvars),
-        vsync: cvars.flag(Cvar::SwapInterval),
+        vsync: session::with(|session| session.front.settings.swap_interval != 0)
+            .unwrap_or_default(),
         pipeline_cache: cache_folder.map(|folder| folder.join("pipelines.cache")),
     };
     Renderer::new(options).map_err(|e| e.to_string())
@@ -186,8 +184,8 @@ fn describe(renderer: &Renderer, front: &mut Front) -> glconfig_t {
         size,
         aspect: window.map_or(size.0 as f32 / size.1 as f32, |window| window.aspect),
         refresh_rate: window.map_or(0, |window| window.refresh_rate()),
-        fullscreen: front.window.fullscreen,
-        gamma: front.window.gamma,
+        fullscreen: front.settings.fullscreen,
+        gamma: !front.settings.ignore_hw_gamma,
     };
     front.size = screen.size;
     glconfig::glconfig(renderer.device_info(), screen)
@@ -274,8 +272,8 @@ pub unsafe extern "C" fn begin_frame(stereo: c_int) {
                 return Ok(());
             }
             if let Some(cvars) = &front.cvars {
-                cvars::write_back_clamps(engine, cvars);
-                cvars::apply(cvars, front.window, &mut front.settings);
+                cvars::write_back_limits(cvars);
+                cvars::apply(cvars, &mut front.settings);
             }
             front.frame_start = Some(Instant::now());
             renderer.set_settings(&front.settings);

@@ -12,7 +12,7 @@
 
 use super::abi::refimport_t;
 use super::services::Ioq3;
-use crate::cvars::{Cvar, TABLE};
+use crate::cvars;
 use crate::engine::Services;
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -104,9 +104,9 @@ unsafe fn difference(engine: &Ioq3, imports: *const refimport_t) -> Option<(Stri
             return Some((found, "opengl1"));
         }
     }
-    let spec = TABLE.get(Cvar::RayTrace as usize)?;
-    let variable = engine.cvar_get(spec.name, spec.default, spec.flags)?;
-    if engine.cvar_keeps_description(variable, spec.description) {
+    let spec = &renderer_vk::settings::row("r_rt")?.spec;
+    let variable = cvars::get(engine, spec)?;
+    if engine.cvar_keeps_description(variable, &cvars::c_text(spec.help)) {
         return None;
     }
     let version = engine.cvar_text(c"version");

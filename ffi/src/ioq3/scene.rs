@@ -113,7 +113,7 @@ pub unsafe extern "C" fn load_world(name: *const c_char) {
             }
             // The game may have changed a latched setting since the frame began, such as one that its server forbids.
             if let Some(cvars) = &front.cvars {
-                cvars::apply(cvars, front.window, &mut front.settings);
+                cvars::apply(cvars, &mut front.settings);
                 renderer.set_settings(&front.settings);
             }
             renderer.load_world(&name).map_err(Failure::from)
@@ -295,11 +295,7 @@ pub unsafe extern "C" fn render_scene(from: *const refdef_t) {
         // of its members are numbers: any bytes are a value.
         let view = convert::view(&unsafe { from.read_unaligned() });
         draw(|renderer, front| {
-            if front
-                .cvars
-                .as_ref()
-                .is_some_and(|cvars| cvars.flag(Cvar::NoRefresh))
-            {
+            if front.settings.no_refresh {
                 return Ok(());
             }
             if let Some((_, lines)) = &mut front.path

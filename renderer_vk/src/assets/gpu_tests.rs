@@ -4,12 +4,12 @@
 
 use std::sync::Arc;
 
-use crate::Settings;
 use crate::api::RefDef;
 use crate::assets::{Assets, ImageFlags, ImageSource, Samplers};
 use crate::gpu::{Device, DeviceOptions, SurfaceSource};
 use crate::scene::{Geometry, Look, Scene};
 use crate::world::{World, WorldError};
+use crate::{Settings, TextureMode};
 use relight::{GameFiles, MemoryFiles};
 
 /// A headless device, or `None` with a report of a skipped test.
@@ -49,7 +49,7 @@ fn textures_are_found_once_and_videos_grow() {
     files
         .insert("scripts/t.shader", "t/film\n{\n{\nvideoMap x.roq\n}\n}\n")
         .unwrap();
-    let settings = Settings::default();
+    let settings = Settings::full_size();
     let mut assets = assets(&device, files, &settings);
 
     let found = assets.textures.find("t/a", ImageFlags::WORLD).unwrap();
@@ -103,7 +103,7 @@ fn textures_are_found_once_and_videos_grow() {
     assets.prepare_frame(&settings).unwrap();
     assert_eq!(assets.materials.addresses(), addresses, "nothing changed");
     let nearest = Settings {
-        texture_mode: "GL_NEAREST".into(),
+        texture_mode: TextureMode::Nearest,
         ..settings
     };
     let before = assets.samplers;
@@ -117,7 +117,7 @@ fn textures_are_found_once_and_videos_grow() {
 #[test]
 fn samplers_are_numbered_from_zero() {
     let Some(device) = device() else { return };
-    let samplers = Samplers::new(&device, "GL_LINEAR_MIPMAP_LINEAR", 0.0).unwrap();
+    let samplers = Samplers::new(&device, TextureMode::LinearMipLinear, 0.0).unwrap();
     assert_eq!(samplers, Samplers([0, 1, 2, 3, 4]));
     finish(&device);
 }
@@ -125,7 +125,7 @@ fn samplers_are_numbered_from_zero() {
 #[test]
 fn the_sample_map_loads_and_gathers() {
     let Some(device) = device() else { return };
-    let settings = Settings::default();
+    let settings = Settings::full_size();
     let mut assets = assets(&device, relight::sample::files().unwrap(), &settings);
     let missing = World::load(&device, &mut assets, "maps/none.bsp", &settings);
     assert!(matches!(missing, Err(WorldError::Map(_))));

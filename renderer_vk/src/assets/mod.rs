@@ -30,10 +30,10 @@ pub use skins::Skins;
 #[cfg(test)]
 pub use source::ImageFlags;
 pub use source::ImageSource;
-pub use textures::{Samplers, Textures, is_texture_mode};
+pub use textures::{Samplers, Textures};
 
 use crate::gpu::{self, Device};
-use crate::settings::Settings;
+use crate::settings::{Settings, TextureMode};
 
 /// Everything registered since the last `BeginRegistration`.
 pub struct Assets {
@@ -52,7 +52,7 @@ pub struct Assets {
     /// The game's scripts.
     pub scripts: Arc<relight::Materials>,
     fonts: Vec<LoadedFont>,
-    texture_mode: String,
+    texture_mode: TextureMode,
     anisotropy: f32,
 }
 
@@ -67,7 +67,7 @@ impl Assets {
         scripts: Arc<relight::Materials>,
         settings: &Settings,
     ) -> Result<Self, gpu::Error> {
-        let samplers = Samplers::new(device, &settings.texture_mode, settings.anisotropy)?;
+        let samplers = Samplers::new(device, settings.texture_mode, settings.anisotropy())?;
         let texture_settings = TextureSettings::new(settings, MAX_TEXTURE_SIZE);
         let mut textures = Textures::new(device, files, texture_settings)?;
         let materials = Materials::new(
@@ -84,8 +84,8 @@ impl Assets {
             samplers,
             scripts,
             fonts: Vec::new(),
-            texture_mode: settings.texture_mode.clone(),
-            anisotropy: settings.anisotropy,
+            texture_mode: settings.texture_mode,
+            anisotropy: settings.anisotropy(),
         })
     }
 
@@ -160,8 +160,8 @@ impl Assets {
     /// The device has no memory for the copies, or no room for more samplers.
     pub fn prepare_frame(&mut self, settings: &Settings) -> Result<(), gpu::Error> {
         if settings.texture_mode != self.texture_mode {
-            self.texture_mode.clone_from(&settings.texture_mode);
-            self.samplers = Samplers::new(&self.device, &self.texture_mode, self.anisotropy)?;
+            self.texture_mode = settings.texture_mode;
+            self.samplers = Samplers::new(&self.device, self.texture_mode, self.anisotropy)?;
             self.materials.invalidate();
         }
         self.materials.upload(&self.device, &self.samplers)

@@ -34,7 +34,7 @@ impl TextureSettings {
     /// The part of the settings that matters here.
     pub fn new(settings: &Settings, max_size: u32) -> Self {
         Self {
-            picmip: settings.picmip.min(16),
+            picmip: settings.picmip,
             round_down: settings.round_images_down,
             simple_mip_maps: settings.simple_mip_maps,
             intensity: if settings.intensity.is_finite() {
@@ -293,7 +293,7 @@ mod tests {
     use super::*;
 
     fn settings() -> TextureSettings {
-        TextureSettings::new(&Settings::default(), 4096)
+        TextureSettings::new(&Settings::full_size(), 4096)
     }
 
     fn grey(width: u32, height: u32, value: u8) -> Image {

@@ -13,6 +13,7 @@ use super::source::{ImageFlags, ImageSource};
 use crate::gpu::{
     self, Device, Filter, Format, ImageDesc, ImageUsage, MipFilter, SamplerDesc, Wrap,
 };
+use crate::settings::TextureMode;
 
 /// The samplers of textures: bindless indices in the order of [`compile::sampler`](super::compile::sampler).
 ///
@@ -26,7 +27,11 @@ impl Samplers {
     ///
     /// # Errors
     /// The device has no room for more samplers.
-    pub fn new(device: &Device, texture_mode: &str, anisotropy: f32) -> Result<Self, gpu::Error> {
+    pub fn new(
+        device: &Device,
+        texture_mode: TextureMode,
+        anisotropy: f32,
+    ) -> Result<Self, gpu::Error> {
         let (filter, mip) = texture_filter(texture_mode);
         let anisotropy = if anisotropy.is_finite() {
             anisotropy
@@ -57,43 +62,16 @@ impl Samplers {
     }
 }
 
-/// The names that `r_textureMode` takes, in any case, with their filters.
-const TEXTURE_MODES: [(&str, Filter, MipFilter); 6] = [
-    ("GL_NEAREST", Filter::Nearest, MipFilter::None),
-    ("GL_LINEAR", Filter::Linear, MipFilter::None),
-    (
-        "GL_NEAREST_MIPMAP_NEAREST",
-        Filter::Nearest,
-        MipFilter::Nearest,
-    ),
-    (
-        "GL_LINEAR_MIPMAP_NEAREST",
-        Filter::Linear,
-        MipFilter::Nearest,
-    ),
-    (
-        "GL_NEAREST_MIPMAP_LINEAR",
-        Filter::Nearest,
-        MipFilter::Linear,
-    ),
-    ("GL_LINEAR_MIPMAP_LINEAR", Filter::Linear, MipFilter::Linear),
-];
-
-fn find_mode(mode: &str) -> Option<(Filter, MipFilter)> {
-    TEXTURE_MODES
-        .iter()
-        .find(|(name, ..)| name.eq_ignore_ascii_case(mode))
-        .map(|&(_, filter, mip)| (filter, mip))
-}
-
-/// Whether `r_textureMode` may have this value.
-pub fn is_texture_mode(mode: &str) -> bool {
-    find_mode(mode).is_some()
-}
-
-/// Filters of an `r_textureMode`; an unknown name is trilinear.
-fn texture_filter(mode: &str) -> (Filter, MipFilter) {
-    find_mode(mode).unwrap_or((Filter::Linear, MipFilter::Linear))
+/// Filters of an `r_textureMode`.
+fn texture_filter(mode: TextureMode) -> (Filter, MipFilter) {
+    match mode {
+        TextureMode::Nearest => (Filter::Nearest, MipFilter::None),
+        TextureMode::Linear => (Filter::Linear, MipFilter::None),
+        TextureMode::NearestMipNearest => (Filter::Nearest, MipFilter::Nearest),
+        TextureMode::LinearMipNearest => (Filter::Linear, MipFilter::Nearest),
+        TextureMode::NearestMipLinear => (Filter::Nearest, MipFilter::Linear),
+        TextureMode::LinearMipLinear => (Filter::Linear, MipFilter::Linear),
+    }
 }
 
 /// A texture that a name stands for.

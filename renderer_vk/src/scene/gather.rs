@@ -368,7 +368,7 @@ impl<'a> Gatherer<'a> {
             entity,
             curve_error: self.input.settings.lod_curve_error,
             no_curves: self.input.settings.no_curves,
-            no_sky: self.input.settings.fast_sky,
+            no_sky: self.input.settings.hides_sky(),
         }
     }
 

@@ -17,6 +17,7 @@ use super::turned::Way;
 use super::{DynamicMesh, Look, MeshId, Shape, ViewScene};
 use crate::api::{RefEntity, renderfx};
 use crate::assets::{IqmModel, Md3Lod, MdrModel, Model};
+use crate::settings::ModelShadows;
 
 /// Box of a skeleton without bounds of its own where fog is looked up, units.
 const UNKNOWN: Aabb = Aabb::new(Vec3::splat(-8.0), Vec3::splat(8.0));
@@ -344,7 +345,7 @@ impl Gatherer<'_> {
     /// real ones.
     fn shadow_material(&self, entity: &RefEntity) -> Option<u32> {
         let casts = self.look == Look::Classic
-            && self.input.settings.shadows == 3
+            && self.input.settings.shadows == ModelShadows::Planar
             && entity.renderfx & renderfx::SHADOW_PLANE != 0
             && entity.shadow_plane.is_finite();
         self.input.materials.internal().shadow.filter(|_| casts)
@@ -353,7 +354,7 @@ impl Gatherer<'_> {
     /// Whether an entity casts shadow volumes (`cg_shadows 2`).
     fn casts_volumes(&self, entity: &RefEntity) -> bool {
         self.look == Look::Classic
-            && self.input.settings.shadows == 2
+            && self.input.settings.shadows == ModelShadows::Volumes
             && entity.renderfx & (renderfx::NO_SHADOW | renderfx::DEPTH_HACK) == 0
     }
 

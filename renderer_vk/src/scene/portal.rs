@@ -24,7 +24,7 @@ pub(super) fn find_first(
 ) -> Option<Portal> {
     let settings = input.settings;
     let world = input.world?;
-    if settings.no_portals || scene.view.is_portal {
+    if settings.hides_portals() || scene.view.is_portal {
         return None;
     }
     // surfaces are in drawing order, portals first
@@ -54,7 +54,9 @@ pub(super) fn find_all(
     let Some(world) = input.world.filter(|_| shows_world) else {
         return found;
     };
-    if input.settings.no_portals || !entities.iter().any(|e| e.kind == EntityKind::PortalSurface) {
+    if input.settings.hides_portals()
+        || !entities.iter().any(|e| e.kind == EntityKind::PortalSurface)
+    {
         return found;
     }
     for &index in &world.portal_surfaces {

@@ -157,7 +157,7 @@ impl Antialias {
             lens_radius: if dof { 0.5 * settings.rt_aperture } else { 0.0 },
             focal_distance: settings.rt_focal_length.max(1.0),
             texture_scale: texture_scale(settings, output, jittered),
-            anisotropy: settings.anisotropy,
+            anisotropy: settings.anisotropy(),
             padding: 0,
         })
     }

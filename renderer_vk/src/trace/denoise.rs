@@ -19,6 +19,7 @@ use super::frame_passes::FramePasses;
 use super::passes::Pass;
 use super::targets::texels;
 use crate::gpu::{Buffer, Device, Error, Format, Image, ImageDesc, ImageUsage};
+use crate::settings::DenoiserChoice;
 
 /// Pixels to the edge of a stratum, see `denoise.glsl`.
 const STRATUM: u32 = 3;
@@ -135,16 +136,21 @@ impl Denoiser {
         })
     }
 
-    /// To be called before a frame's parameters are gathered. `mode`: `rt_denoiser`; `size`: of the view, pixels;
+    /// To be called before a frame's parameters are gathered. `size`: of the view, pixels;
     /// `goes_on`: the frame follows the last one that was drawn, whose motion and camera are known.
     ///
     /// # Errors
     /// Out of memory.
-    pub fn prepare(&mut self, mode: u32, size: [u32; 2], goes_on: bool) -> Result<(), Error> {
+    pub fn prepare(
+        &mut self,
+        mode: DenoiserChoice,
+        size: [u32; 2],
+        goes_on: bool,
+    ) -> Result<(), Error> {
         let tier = match mode {
-            0 => None,
-            1 => Some(Tier::Adaptive),
-            _ => Some(Tier::Sparse),
+            DenoiserChoice::None => None,
+            DenoiserChoice::ASvgf => Some(Tier::Adaptive),
+            DenoiserChoice::Sparse => Some(Tier::Sparse),
         };
         let had = self.images.as_ref().map(|i| (i.tier, i.size));
         if had != tier.map(|tier| (tier, size)) {

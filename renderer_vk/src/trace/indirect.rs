@@ -3,12 +3,14 @@
 use super::frame_passes::FramePasses;
 use super::passes::Pass;
 use crate::gpu::Error;
-use crate::settings::Settings;
+use crate::settings::{DenoiserChoice, Settings};
 
 /// Whether one of 2 × 2 pixels gathers bounced light: in a denoised picture the difference is invisible, and gathering is the
 /// most expensive pass. Reference mode and undenoised pictures gather for every pixel.
 pub fn is_subsampled(settings: &Settings) -> bool {
-    !settings.rt_accumulate && settings.rt_denoiser > 0 && settings.rt_bounces > 0
+    !settings.rt_accumulate
+        && settings.rt_denoiser != DenoiserChoice::None
+        && settings.rt_bounces > 0
 }
 
 /// Records the passes that gather bounced light.

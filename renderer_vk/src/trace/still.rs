@@ -3,7 +3,7 @@
 use super::view_tracer::ViewTracer;
 use crate::gpu::{Device, Error, Format, Image, ImageDesc, ImageUsage, Recorder};
 use crate::scene::{View, ViewScene};
-use crate::settings::Settings;
+use crate::settings::{DebugOutput, Settings};
 
 use super::TraceLook;
 use crate::assets::Assets;
@@ -67,7 +67,7 @@ impl Still {
         let settings = Settings {
             rt_accumulate: true,
             rt_scale: 1.0,
-            rt_debug: 0,
+            rt_debug: DebugOutput::None,
             ..settings.clone()
         };
         for _ in 0..count {

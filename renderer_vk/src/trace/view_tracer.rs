@@ -26,7 +26,7 @@ use super::targets::Targets;
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
 use crate::scene::ViewScene;
-use crate::settings::Settings;
+use crate::settings::{DebugOutput, DenoiserChoice, Settings};
 use crate::world::outside;
 use content::content_hash;
 use parameters::{Prepared, camera_frame, portal_record};
@@ -232,19 +232,23 @@ impl ViewTracer {
         let size = [targets.width, targets.height];
         let goes_on = self.history.is_some();
         let denoiser = if settings.rt_accumulate {
-            0
+            DenoiserChoice::None
         } else {
             settings.rt_denoiser
         };
         self.denoiser.prepare(denoiser, size, goes_on)?;
         let has_fog = map.is_some_and(|m| fog_in_sight(&m, scene));
-        self.fog
-            .prepare(has_fog && is_lit(settings), denoiser > 0, size, goes_on)?;
+        self.fog.prepare(
+            has_fog && is_lit(settings),
+            denoiser != DenoiserChoice::None,
+            size,
+            goes_on,
+        )?;
         let accumulated = self.accumulated_before(scene, materials, settings);
         let accel = self
             .accel
             .record(rec, scene, map.map(|m| m.geometry), materials)?;
-        let portals: Vec<PortalRecord> = if settings.no_portals {
+        let portals: Vec<PortalRecord> = if settings.hides_portals() {
             Vec::new()
         } else {
             scene.portals.iter().map(portal_record).collect()
@@ -252,7 +256,7 @@ impl ViewTracer {
         let camera_rests = self.history == Some(camera_frame(scene));
         let vertices = accel.vertices;
         let motion = (self.motion).record(rec, scene, &portals, vertices, targets, camera_rests)?;
-        let show_rays = settings.rt_debug == t::DEBUG_RAYS;
+        let show_rays = settings.rt_debug == DebugOutput::Rays;
         let counting = (self.counters).begin(rec, size, self.count_rays, show_rays)?;
         let antialias =
             (self.antialias).prepare(&self.device, settings, output, targets, goes_on)?;
@@ -261,8 +265,8 @@ impl ViewTracer {
             bloom: self
                 .bloom
                 .prepare(&self.device, output, settings.rt_bloom)?,
-            bloom_strength: settings.rt_bloom.clamp(0.0, 1.0),
-            debug: settings.rt_debug,
+            bloom_strength: settings.rt_bloom,
+            debug: settings.rt_debug as u32,
             image_rays: counting.image,
             padding: 0,
         };
@@ -323,7 +327,7 @@ impl ViewTracer {
         passes.run(Pass::Exposure)?;
         self.bloom.record(passes)?;
         passes.run(Pass::ToneMap)?;
-        if settings.rt_debug > 0 {
+        if settings.rt_debug != DebugOutput::None {
             passes.run(Pass::Debug)?;
         }
         Ok(())

@@ -50,7 +50,7 @@ impl WorldOptions {
             fullbright: settings.fullbright,
             vertex_light: settings.vertex_light,
             single_shader: settings.single_shader,
-            lightmap_heat: settings.lightmap_heat,
+            lightmap_heat: settings.lightmap == 2,
         }
     }
 

@@ -5,7 +5,7 @@ use glam::{Mat3, Vec3};
 use indicatif::ProgressBar;
 use relight::compare::Rgb8;
 use renderer_vk::api::{DynamicLight, RefDef, RefEntity, renderfx};
-use renderer_vk::{LightSelection, Renderer, Settings};
+use renderer_vk::{DebugOutput, DenoiserChoice, LightSelection, Renderer, Settings};
 
 use crate::view::Camera;
 
@@ -13,9 +13,6 @@ use crate::view::Camera;
 /// around while walking.
 const TURN: f32 = 0.5;
 const WALK: f32 = 0.75;
-
-/// The view of `rt_debug` that tells what is seen by way of mirrors, glass and shiny surfaces.
-const DEBUG_SPECULAR: u32 = 11;
 
 /// Milliseconds of a frame on that way, and game time at its end: what ripples and drifts does so on the way.
 const FRAME_TIME: u32 = 16;
@@ -37,12 +34,20 @@ pub fn variants(base: &Settings) -> Vec<Variant> {
         Variant { name, settings }
     };
     vec![
-        with("raw", &|s| (s.rt_denoiser, s.rt_taa) = (0, false)),
-        with("denoised", &|s| (s.rt_denoiser, s.rt_taa) = (1, false)),
-        with("denoised-taa", &|s| (s.rt_denoiser, s.rt_taa) = (1, true)),
-        with("sparse-taa", &|s| (s.rt_denoiser, s.rt_taa) = (2, true)),
+        with("raw", &|s| {
+            (s.rt_denoiser, s.rt_taa) = (DenoiserChoice::None, false)
+        }),
+        with("denoised", &|s| {
+            (s.rt_denoiser, s.rt_taa) = (DenoiserChoice::ASvgf, false)
+        }),
+        with("denoised-taa", &|s| {
+            (s.rt_denoiser, s.rt_taa) = (DenoiserChoice::ASvgf, true)
+        }),
+        with("sparse-taa", &|s| {
+            (s.rt_denoiser, s.rt_taa) = (DenoiserChoice::Sparse, true)
+        }),
         with("baseline", &|s| {
-            (s.rt_denoiser, s.rt_taa) = (1, true);
+            (s.rt_denoiser, s.rt_taa) = (DenoiserChoice::ASvgf, true);
             s.rt_light_selection = LightSelection::Uniform;
             s.rt_gradients = false;
         }),
@@ -121,7 +126,7 @@ impl Stage {
     /// The device is lost or out of memory.
     pub fn specular(&mut self, base: &Settings, camera: &Camera) -> Result<Vec<bool>> {
         let settings = Settings {
-            rt_debug: DEBUG_SPECULAR,
+            rt_debug: DebugOutput::Specular,
             rt_taa: false,
             ..base.clone()
         };

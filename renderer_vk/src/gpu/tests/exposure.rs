@@ -1,10 +1,10 @@
 //! What `relight::exposure` and `relight::overbright` repeat of the shaders.
 
 use super::support::{collect, device, finish};
+use crate::gpu::*;
 use bytemuck::{Pod, Zeroable};
 use relight::exposure::{BRIGHT_PART, DARK_PART, DARKEST, tone_curve};
 use relight::overbright::{from_linear, to_linear};
-use crate::gpu::*;
 
 /// As `OWN_PUSH` of `shaders/trace/view.glsl`.
 #[repr(C)]

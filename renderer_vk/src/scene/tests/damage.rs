@@ -91,7 +91,7 @@ fn random_scenes_stay_within_their_arrays() {
     let mut game = game();
     let world = room(&mut game);
     game.model("m/thing.md3");
-    game.settings.shadows = 3;
+    game.settings.shadows = crate::settings::ModelShadows::Planar;
     let mut numbers = Numbers(Random::new(1));
     let mut scene = Scene::default();
     for round in 0..200 {

@@ -222,7 +222,7 @@ fn models_cast_planar_shadows_when_asked() {
     scene.add_entity(&standing);
     let views = gather(&mut scene, &game, None, &none, Look::Classic);
     assert!(views[0].meshes.is_empty());
-    game.settings.shadows = 3;
+    game.settings.shadows = crate::settings::ModelShadows::Planar;
     scene.add_entity(&standing);
     let views = gather(&mut scene, &game, None, &none, Look::Classic);
     let [mesh] = views[0].meshes.as_slice() else {
@@ -255,7 +255,7 @@ fn opaque_models_cast_shadow_volumes_when_asked() {
         views.last().unwrap().shadows.ranges.clone()
     };
     assert!(volumes(&game, standing, Look::Classic).is_empty());
-    game.settings.shadows = 2;
+    game.settings.shadows = crate::settings::ModelShadows::Volumes;
     // one triangle that the sun meets from behind: three sides, two triangles each
     assert_eq!(volumes(&game, standing, Look::Classic), [(0, 18)]);
     assert!(volumes(&game, standing, Look::Traced).is_empty());

@@ -6,7 +6,8 @@
 //! once when the box of all triangles has [`GROWN`] times the surface it had, or as much less.
 
 use glam::Vec3;
-use shaders::trace_types::{BvhNode, BvhTriangle};
+#[cfg(test)]
+use shaders::trace_types::BvhTriangle;
 use shaders::types::Vertex;
 use support::Aabb;
 use support::bvh::Hierarchy;

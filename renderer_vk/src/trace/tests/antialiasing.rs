@@ -9,7 +9,7 @@ use super::dielectrics::{LIQUID, square};
 use super::harness::{Gpu, Scene, identity, mirror_at, rectangle, reference, stage};
 use crate::api::RefDef;
 use crate::scene::ViewScene;
-use crate::settings::Settings;
+use crate::settings::{DenoiserChoice, Settings};
 use crate::trace::input::Tracer;
 
 const SIZE: i32 = 64;
@@ -19,7 +19,7 @@ const TRUTH: u32 = 256;
 fn live() -> Settings {
     Settings {
         rt_accumulate: false,
-        rt_denoiser: 0,
+        rt_denoiser: DenoiserChoice::None,
         ..reference()
     }
 }

@@ -11,7 +11,7 @@ use super::dielectrics::square;
 use super::harness::{
     Gpu, Scene, encode, floor_point, gpu_tests, lambert, rectangle, stage, through_byte,
 };
-use crate::settings::{LightSelection, Settings};
+use crate::settings::{DenoiserChoice, LightSelection, Settings};
 use crate::trace::frame_lights::decode;
 
 gpu_tests! {
@@ -40,7 +40,7 @@ fn bounced(bounces: u32) -> Settings {
 fn by_each_way(gpu: &mut Gpu, scene: &Scene, settings: &Settings, frames: u32) -> [Vec3; 2] {
     let live = Settings {
         rt_accumulate: false,
-        rt_denoiser: 1,
+        rt_denoiser: DenoiserChoice::ASvgf,
         rt_taa: false,
         ..settings.clone()
     };

@@ -8,7 +8,7 @@ use support::Aabb;
 use super::harness::{Gpu, Scene, gpu_tests, identity, rectangle, reference, stage};
 use crate::api::DynamicLight;
 use crate::scene::ViewScene;
-use crate::settings::Settings;
+use crate::settings::{DenoiserChoice, Settings};
 
 gpu_tests! {
     any: [
@@ -67,7 +67,7 @@ fn live() -> Settings {
     Settings {
         rt_accumulate: false,
         rt_taa: false,
-        rt_denoiser: 1,
+        rt_denoiser: DenoiserChoice::ASvgf,
         rt_bounces: 1,
         ..reference()
     }
@@ -323,7 +323,7 @@ fn a_broken_number_does_not_spread(gpu: &mut Gpu) {
                 ..live()
             },
             Settings {
-                rt_denoiser: 2,
+                rt_denoiser: DenoiserChoice::Sparse,
                 ..live()
             },
         ] {
@@ -381,11 +381,11 @@ fn a_picture_at_rest_is_quiet(gpu: &mut Gpu) {
 fn the_cheap_filter_comes_near_the_truth(gpu: &mut Gpu) {
     let scene = room();
     let sparse = Settings {
-        rt_denoiser: 2,
+        rt_denoiser: DenoiserChoice::Sparse,
         ..live()
     };
     let none = Settings {
-        rt_denoiser: 0,
+        rt_denoiser: DenoiserChoice::None,
         ..live()
     };
     let (truth, _) = gpu.render(&scene, &truth_settings(), 256);
@@ -441,7 +441,11 @@ fn both_sides_of_water_keep_their_light(gpu: &mut Gpu) {
         Vec3::splat(12.0),
     );
     // direct and bounced light each go their own way through the denoiser
-    for (bounces, denoiser) in [(0, 1), (1, 1), (0, 2)] {
+    for (bounces, denoiser) in [
+        (0, DenoiserChoice::ASvgf),
+        (1, DenoiserChoice::ASvgf),
+        (0, DenoiserChoice::Sparse),
+    ] {
         let with = |settings: Settings| Settings {
             rt_bounces: bounces,
             ..settings
@@ -454,9 +458,9 @@ fn both_sides_of_water_keep_their_light(gpu: &mut Gpu) {
         let (settled, _) = gpu.render(&scene, &with(filtered), 32);
         let water = 24 * 64..60 * 64;
         let (mean, error) = compare(&settled[water.clone()], &truth[water]);
-        println!("water, {bounces} bounces, filter {denoiser}: mean {mean}, error {error}");
-        assert!((mean - 1.0).abs() < 0.04, "{bounces}, {denoiser}: {mean}");
-        assert!(error < 0.15, "{bounces}, {denoiser}: {error}");
+        println!("water, {bounces} bounces, filter {denoiser:?}: mean {mean}, error {error}");
+        assert!((mean - 1.0).abs() < 0.04, "{bounces}, {denoiser:?}: {mean}");
+        assert!(error < 0.15, "{bounces}, {denoiser:?}: {error}");
     }
 }
 

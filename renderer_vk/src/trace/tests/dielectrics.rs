@@ -8,7 +8,7 @@ use testkit::Random;
 
 use super::harness::{Gpu, Scene, encode, gpu_tests, rectangle, reference, stage, through_byte};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
-use crate::settings::Settings;
+use crate::settings::{DenoiserChoice, Settings};
 
 gpu_tests! {
     any: [
@@ -296,7 +296,7 @@ fn is_seen_in_every_pixel(gpu: &mut Gpu, scene: &Scene) {
     let (truth, _) = gpu.render(scene, &middles(), 2);
     let live = Settings {
         rt_accumulate: false,
-        rt_denoiser: 0,
+        rt_denoiser: DenoiserChoice::None,
         rt_taa: false,
         ..middles()
     };

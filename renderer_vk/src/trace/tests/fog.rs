@@ -6,7 +6,7 @@ use shaders::types::{Fog, constants as c};
 
 use super::harness::{Gpu, Scene, gpu_tests, rectangle, reference, stage};
 use super::layers::{TRANSLUCENT, close, displayed, screen};
-use crate::settings::Settings;
+use crate::settings::{DenoiserChoice, Settings};
 use crate::trace::frame_lights::decode;
 
 gpu_tests! {
@@ -65,7 +65,7 @@ fn fog_is_lit_by_what_lights_each_place_of_it(gpu: &mut Gpu) {
     assert!(exact.y > 0.3 * ambient.y, "a test of nothing: {exact}");
     let filtered = Settings {
         rt_accumulate: false,
-        rt_denoiser: 1,
+        rt_denoiser: DenoiserChoice::ASvgf,
         rt_taa: false,
         ..reference()
     };

@@ -2,12 +2,11 @@
 
 use glam::Vec3;
 use relight::light::{Falloff, PointLight};
-use shaders::trace_types::constants::{DEBUG_GRADIENTS, DEBUG_SAMPLES};
 
 use super::harness::{Gpu, Scene, gpu_tests, rectangle, reference};
 use crate::api::DynamicLight;
 use crate::scene::ViewScene;
-use crate::settings::Settings;
+use crate::settings::{DebugOutput, DenoiserChoice, Settings};
 
 gpu_tests! {
     compute: [
@@ -54,10 +53,10 @@ fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther(gpu: &
     let settings = Settings {
         rt_accumulate: false,
         rt_taa: false,
-        rt_denoiser: 1,
+        rt_denoiser: DenoiserChoice::ASvgf,
         // all of them, so that one that is gone changes nothing where it did not shine
         rt_num_random_dl: 0,
-        rt_debug: DEBUG_SAMPLES,
+        rt_debug: DebugOutput::Samples,
         ..reference()
     };
     let last = 15;
@@ -115,14 +114,15 @@ fn what_rests_has_not_changed_whatever_place_in_the_pixel_is_seen(gpu: &mut Gpu)
     let seen = |rt_debug| Settings {
         rt_accumulate: false,
         rt_taa: true,
-        rt_denoiser: 1,
+        rt_denoiser: DenoiserChoice::ASvgf,
         rt_debug,
         ..reference()
     };
-    let (_, picture) = gpu.render_views(&scene, &seen(0), 8, |_, _| {});
+    let (_, picture) = gpu.render_views(&scene, &seen(DebugOutput::None), 8, |_, _| {});
     assert!(picture.iter().any(|p| p[0] > 20), "nothing is lit");
     for frames in 3..8 {
-        let (_, change) = gpu.render_views(&scene, &seen(DEBUG_GRADIENTS), frames, |_, _| {});
+        let (_, change) =
+            gpu.render_views(&scene, &seen(DebugOutput::Gradients), frames, |_, _| {});
         let changed = change.iter().filter(|p| p[..3] != [0; 3]).count();
         assert_eq!(changed, 0, "pixels that changed in frame {frames}");
     }
@@ -140,7 +140,7 @@ fn antialiasing_keeps_nothing_of_light_that_fades(gpu: &mut Gpu) {
         let settings = Settings {
             rt_accumulate: false,
             rt_taa,
-            rt_denoiser: 1,
+            rt_denoiser: DenoiserChoice::ASvgf,
             // all of them, so that no noise is in the way
             rt_num_random_dl: 0,
             ..reference()

@@ -76,7 +76,7 @@ fn maps_are_lit() {
     let settings = Settings {
         rt: true,
         rt_accumulate: std::env::var_os("RELIGHT_TRACE_LIVE").is_none(),
-        ..Settings::default()
+        ..Settings::full_size()
     };
     let passes = Arc::new(PassSet::new(device, gpu.tracer));
     for map in maps {
@@ -178,7 +178,7 @@ fn tracers_agree_on_maps() {
                 rt_bounces: 1,
                 rt_auto_exposure: false,
                 rt_tracer,
-                ..Settings::default()
+                ..Settings::full_size()
             };
             let tracer = Tracer::of(device.info(), rt_tracer);
             let passes = Arc::new(PassSet::new(device, tracer));

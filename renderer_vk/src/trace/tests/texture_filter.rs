@@ -77,10 +77,11 @@ fn anisotropy_comes_nearer_to_the_mean_of_many_samples() {
     let gpu = &mut gpu;
     let (whole, levels) = (image(gpu, false), image(gpu, true));
     let (truth, _) = gpu.render(&floor(&whole), &reference(), 128);
-    let mut error = |anisotropy: f32| {
+    let mut error = |max_anisotropy: f32| {
         let scene = floor(&levels);
         let settings = Settings {
-            anisotropy,
+            anisotropic_filter: true,
+            max_anisotropy,
             rt_antialiasing: false,
             ..reference()
         };

@@ -319,7 +319,7 @@ fn the_sky_is_where_its_stages_say_and_lets_the_sun_in(gpu: &mut Gpu) {
     assert_eq!(pixels[30 * 32 + 16], Vec3::ZERO);
     // quick sky
     let fast = Settings {
-        fast_sky: true,
+        fast_sky: 2,
         ..reference()
     };
     let (pixels, _) = gpu.render(&scene, &fast, 1);

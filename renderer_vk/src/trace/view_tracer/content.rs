@@ -28,7 +28,6 @@ pub(super) fn content_hash(
     }
     floats(&[camera.tan_x, camera.tan_y, view.time]);
     floats(&[camera.stereo.slope, camera.stereo.distance]);
-    floats(&[settings.rt_light_scale, settings.rt_dlight_scale]);
     for light in &view.dlights {
         floats(&vector(light.origin));
         floats(&vector(light.color));
@@ -58,26 +57,6 @@ pub(super) fn content_hash(
     view.has_world.hash(&mut hasher);
     view.potential.hash(&mut hasher);
     materials.generation().hash(&mut hasher);
-    (
-        settings.rt_max_depth,
-        settings.rt_bounces,
-        settings.fast_sky,
-        settings.fullbright || !settings.rt_illumination,
-    )
-        .hash(&mut hasher);
-    (settings.dynamic_light, settings.no_portals).hash(&mut hasher);
-    (settings.rt_antialiasing, settings.rt_dof).hash(&mut hasher);
-    let lens = [settings.rt_aperture, settings.rt_focal_length];
-    lens.map(f32::to_bits).hash(&mut hasher);
-    // estimators with the same mean could go on together, but a comparison wants them apart
-    (
-        settings.rt_cull_lights,
-        settings.rt_soft_shadows,
-        settings.rt_flashlight,
-        settings.rt_light_selection as u32,
-        settings.rt_num_random_dl,
-        settings.rt_candidates,
-    )
-        .hash(&mut hasher);
+    settings.accumulation_key(&mut hasher);
     hasher.finish()
 }

@@ -130,7 +130,7 @@ impl ViewTracer {
         let is_lit = is_lit(settings);
         set(t::VIEW_AUTO_EXPOSURE, settings.rt_auto_exposure && is_lit);
         set(t::VIEW_EXPOSURE_RESET, !self.exposure_started);
-        set(t::VIEW_FAST_SKY, settings.fast_sky);
+        set(t::VIEW_FAST_SKY, settings.hides_sky());
         set(t::VIEW_FULLBRIGHT, !is_lit);
         set(t::VIEW_DENOISE, self.denoiser.is_on());
         set(t::VIEW_SUBSAMPLED_BOUNCE, is_subsampled(settings));

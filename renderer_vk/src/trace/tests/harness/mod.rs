@@ -24,7 +24,7 @@ pub fn reference() -> Settings {
         rt_bounces: 0,
         rt_auto_exposure: false,
         rt_bloom: 0.0,
-        ..Settings::default()
+        ..Settings::full_size()
     }
 }
 

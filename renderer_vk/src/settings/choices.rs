@@ -1,0 +1,141 @@
+//! Settings with a few values, each with its number or name.
+
+use shaders::trace_types::constants as t;
+
+use super::row::Kind;
+use super::value::{Given, Value, named, numbered};
+
+numbered! {
+    /// How a traced light sample selects its light from a cluster's list.
+    LightSelection {
+        /// Resampled importance sampling among a few candidates.
+        Resampled = 1,
+        /// Each light with the same probability.
+        Uniform = 0,
+    }
+}
+
+numbered! {
+    /// Filter of traced light.
+    DenoiserChoice {
+        /// No filter.
+        None = 0,
+        /// Adaptive spatiotemporal variance-guided filter.
+        ASvgf = 1,
+        /// The cheaper sparse filter.
+        Sparse = 2,
+    }
+}
+
+numbered! {
+    /// What the traced look shows.
+    DebugOutput {
+        /// The picture.
+        None = 0,
+        /// Albedo of the surface and of all before it.
+        Albedo = t::DEBUG_ALBEDO,
+        /// Normals.
+        Normals = t::DEBUG_NORMALS,
+        /// View distance.
+        Depth = t::DEBUG_DEPTH,
+        /// Motion since the last frame.
+        Motion = t::DEBUG_MOTION,
+        /// Clusters of the map's visibility.
+        Clusters = t::DEBUG_CLUSTERS,
+        /// Lights that may reach the point.
+        Lights = t::DEBUG_LIGHTS,
+        /// Light samples in the mean.
+        Samples = t::DEBUG_SAMPLES,
+        /// Deviation of a frame's light over its mean.
+        Variance = t::DEBUG_VARIANCE,
+        /// Changed part of the light.
+        Gradients = t::DEBUG_GRADIENTS,
+        /// Rays of all passes.
+        Rays = t::DEBUG_RAYS,
+        /// What is seen in mirrors, portals, glass, liquids and glossy surfaces.
+        Specular = t::DEBUG_SPECULAR,
+    }
+}
+
+numbered! {
+    /// Channels of the left and of the right eye in anaglyph stereo.
+    Anaglyph {
+        /// No stereo.
+        None = 0,
+        /// Red, cyan.
+        RedCyan = 1,
+        /// Red, blue.
+        RedBlue = 2,
+        /// Red, green.
+        RedGreen = 3,
+        /// Green, magenta.
+        GreenMagenta = 4,
+        /// Cyan, red.
+        CyanRed = 5,
+        /// Blue, red.
+        BlueRed = 6,
+        /// Green, red.
+        GreenRed = 7,
+        /// Magenta, green.
+        MagentaGreen = 8,
+    }
+}
+
+numbered! {
+    /// Shadows of models in the classic look.
+    ModelShadows {
+        /// No shadows.
+        None = 0,
+        /// A dark spot, which the game draws.
+        Spot = 1,
+        /// Stencil shadow volumes.
+        Volumes = 2,
+        /// Flattened onto the plane below the model.
+        Planar = 3,
+    }
+}
+
+named! {
+    /// Which way of tracing rays is wanted. A device that cannot do it gets the one that `Auto` selects.
+    TracerChoice, other: None, {
+        /// The fastest one on the device.
+        #[default]
+        Auto = "auto",
+        /// The device's ray tracing pipeline.
+        Pipeline = "pipeline",
+        /// Ray queries in compute shaders.
+        Query = "query",
+        /// Own hierarchies in compute shaders.
+        Compute = "compute",
+    }
+}
+
+named! {
+    /// Which lights of a map are traced.
+    MapLightChoice, other: Some(Self::Calibrated), {
+        /// Those of the map's directives, fitted to the light that its compiler stored, and those found there.
+        #[default]
+        Calibrated = "calibrated",
+        /// Those of the map's directives, with the strength that these state.
+        Prior = "prior",
+    }
+}
+
+named! {
+    /// Filter of textures.
+    TextureMode, other: None, {
+        /// Nearest texel, no mip levels.
+        Nearest = "GL_NEAREST",
+        /// Bilinear, no mip levels.
+        Linear = "GL_LINEAR",
+        /// Nearest texel of the nearest mip level.
+        NearestMipNearest = "GL_NEAREST_MIPMAP_NEAREST",
+        /// Bilinear in the nearest mip level.
+        LinearMipNearest = "GL_LINEAR_MIPMAP_NEAREST",
+        /// Nearest texels of two mip levels.
+        NearestMipLinear = "GL_NEAREST_MIPMAP_LINEAR",
+        /// Trilinear.
+        #[default]
+        LinearMipLinear = "GL_LINEAR_MIPMAP_LINEAR",
+    }
+}
