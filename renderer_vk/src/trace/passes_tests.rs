@@ -56,12 +56,12 @@ fn the_table_of_passes_in_architecture_is_this_one() {
     let (before, rest) = text.split_once(begin).expect("the mark before the table");
     let (table, after) = rest.split_once(end).expect("the mark behind the table");
     let wanted = markdown();
-    if std::env::var_os("RELIGHT_UPDATE_DOCS").is_some() {
+    if std::env::var_os("RELIGHT_UPDATE").is_some() {
         std::fs::write(file, format!("{before}{begin}{wanted}{end}{after}")).expect("written");
     } else {
         assert_eq!(
             table, wanted,
-            "run `RELIGHT_UPDATE_DOCS=1 cargo test -p renderer_vk --lib table_of_passes`"
+            "run `RELIGHT_UPDATE=1 cargo test -p renderer_vk --lib table_of_passes`"
         );
     }
 }
