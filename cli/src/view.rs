@@ -224,11 +224,7 @@ impl Camera {
         const STEP: f32 = 16.0;
         const STEPS: u16 = 8192;
         let [forward, ..] = self.axis();
-        let inside = |p: &Vec3| {
-            bsp.leafs
-                .get(bsp.leaf_at(*p))
-                .is_some_and(|l| l.cluster >= 0)
-        };
+        let inside = |p: &Vec3| bsp.cluster_at(*p) >= 0;
         let origin = (0..STEPS)
             .map(|step| self.origin + forward * (f32::from(step) * STEP))
             .find(inside)

@@ -17,6 +17,7 @@
 mod tree;
 
 use crate::entities::{self, Entity};
+use crate::ids::{Child, PlaneId, ShaderId};
 use crate::lumps::{
     Brush, BrushSide, DrawVert, Fog, GridPoint, LIGHTMAP_BYTES, Lightmap, Node, Plane, ShaderRef,
 };
@@ -59,11 +60,11 @@ impl MapBuilder {
     }
 
     /// Adds a shader reference.
-    pub fn add_shader(&mut self, name: &str, surface_flags: u32, content_flags: u32) -> i32 {
+    pub fn add_shader(&mut self, name: &str, surface_flags: u32, content_flags: u32) -> ShaderId {
         self.bsp
             .shaders
             .push(ShaderRef::new(name, surface_flags, content_flags));
-        last(&self.bsp.shaders)
+        ShaderId(last(&self.bsp.shaders))
     }
 
     /// Adds an entity; the first, a `worldspawn`, is there already.
@@ -85,7 +86,7 @@ impl MapBuilder {
 
     /// Adds a flat convex polygon, its corners clockwise seen from the front. Texture coordinates repeat
     /// every 128 units; lightmap coordinates cover the page.
-    pub fn add_polygon(&mut self, shader: i32, corners: &[Vec3]) -> usize {
+    pub fn add_polygon(&mut self, shader: ShaderId, corners: &[Vec3]) -> usize {
         let normal = match corners {
             [a, b, c, ..] => (*c - *a).cross(*b - *a).normalize_or_zero(),
             _ => Vec3::ZERO,
@@ -117,14 +118,14 @@ impl MapBuilder {
     }
 
     /// [`Self::add_polygon`] with four corners.
-    pub fn add_quad(&mut self, shader: i32, corners: [Vec3; 4]) -> usize {
+    pub fn add_quad(&mut self, shader: ShaderId, corners: [Vec3; 4]) -> usize {
         self.add_polygon(shader, &corners)
     }
 
     /// Adds the six faces of a box; they look inwards, as the walls of a room do, or outwards.
     pub fn add_box_faces(
         &mut self,
-        shader: i32,
+        shader: ShaderId,
         mins: Vec3,
         maxs: Vec3,
         inwards: bool,
@@ -142,7 +143,7 @@ impl MapBuilder {
     /// become its LOD group.
     pub fn add_patch(
         &mut self,
-        shader: i32,
+        shader: ShaderId,
         width: usize,
         height: usize,
         points: &[DrawVert],
@@ -161,12 +162,18 @@ impl MapBuilder {
     }
 
     /// Adds triangles of any shape: three corners each, clockwise seen from the front.
-    pub fn add_soup(&mut self, shader: i32, vertices: &[DrawVert], indices: &[i32]) -> usize {
+    pub fn add_soup(&mut self, shader: ShaderId, vertices: &[DrawVert], indices: &[i32]) -> usize {
         self.add_surface(shader, SurfaceKind::TriangleSoup, vertices, indices)
     }
 
     /// Adds a flare.
-    pub fn add_flare(&mut self, shader: i32, position: Vec3, normal: Vec3, color: Vec3) -> usize {
+    pub fn add_flare(
+        &mut self,
+        shader: ShaderId,
+        position: Vec3,
+        normal: Vec3,
+        color: Vec3,
+    ) -> usize {
         let surface = self.add_surface(shader, SurfaceKind::Flare, &[], &[]);
         if let Some(surface) = self.bsp.surfaces.get_mut(surface) {
             surface.lightmap_origin = position;
@@ -177,7 +184,7 @@ impl MapBuilder {
 
     fn add_surface(
         &mut self,
-        shader: i32,
+        shader: ShaderId,
         kind: SurfaceKind,
         vertices: &[DrawVert],
         indices: &[i32],
@@ -264,7 +271,7 @@ impl MapBuilder {
     }
 
     /// [`Self::add_cell`] with six walls that look inwards. Returns the cluster.
-    pub fn add_room(&mut self, shader: i32, mins: Vec3, maxs: Vec3) -> i32 {
+    pub fn add_room(&mut self, shader: ShaderId, mins: Vec3, maxs: Vec3) -> i32 {
         self.add_box_faces(shader, mins, maxs, true);
         self.add_cell(mins, maxs)
     }
@@ -294,7 +301,7 @@ impl MapBuilder {
     }
 
     /// Adds a box-shaped brush of six sides.
-    pub fn add_box_brush(&mut self, shader: i32, mins: Vec3, maxs: Vec3) -> i32 {
+    pub fn add_box_brush(&mut self, shader: ShaderId, mins: Vec3, maxs: Vec3) -> i32 {
         let first_side = int(self.bsp.brush_sides.len());
         for axis in 0..3 {
             for (direction, dist) in [(-1.0, -mins[axis]), (1.0, maxs[axis])] {
@@ -313,11 +320,16 @@ impl MapBuilder {
     }
 
     /// Adds a fog volume with its brush. `visible_side` is 0 to 5 for -x +x -y +y -z +z, or -1.
-    pub fn add_fog_brush(&mut self, shader: i32, mins: Vec3, maxs: Vec3, visible_side: i32) -> i32 {
+    pub fn add_fog_brush(
+        &mut self,
+        shader: ShaderId,
+        mins: Vec3,
+        maxs: Vec3,
+        visible_side: i32,
+    ) -> i32 {
         let brush = self.add_box_brush(shader, mins, maxs);
-        let reference = usize::try_from(shader)
-            .ok()
-            .and_then(|s| self.bsp.shaders.get(s));
+        // An index that the builder did not give out is left to [`Bsp::validate`].
+        let reference = self.bsp.shaders.get(shader.index());
         let (shader, raw_shader) = reference.map_or((String::new(), [0; 64]), |shader| {
             (shader.name.clone(), shader.raw_name)
         });
@@ -338,10 +350,10 @@ impl MapBuilder {
         self.model_starts.len() - 1
     }
 
-    fn plane(&mut self, normal: Vec3, dist: f32) -> i32 {
+    fn plane(&mut self, normal: Vec3, dist: f32) -> PlaneId {
         let wanted = Plane { normal, dist };
         if let Some(at) = self.bsp.planes.iter().position(|&plane| plane == wanted) {
-            return int(at);
+            return PlaneId(int(at));
         }
         // Planes come in pairs, the positive first.
         let negative = normal.min_element() < 0.0 && normal.max_element() <= 0.0;
@@ -355,7 +367,7 @@ impl MapBuilder {
             [wanted, opposite]
         };
         self.bsp.planes.extend(pair);
-        last(&self.bsp.planes) - i32::from(!negative)
+        PlaneId(last(&self.bsp.planes) - i32::from(!negative))
     }
 
     /// Builds the tree, the leafs with their surfaces and brushes, the models and the entity text.
@@ -390,7 +402,7 @@ impl MapBuilder {
             cluster: -1,
         };
         let root = self.build_node(&cells, everything);
-        if root < 0 {
+        if let Child::Leaf(_) = root {
             // A single cell may fill the world; the format still wants a node.
             let plane = self.plane(Vec3::X, 0.0);
             self.bsp.nodes.push(Node {

@@ -2,8 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
-/// Reads fields of one record in order. A record is cut out by its stride beforehand, so that running
-/// out of bytes cannot happen; it would read zeros.
+/// Reads fields of one record in order, and zeros beyond its end. Records in a file are cut out by their stride, so that
+/// they do not end early.
 pub(crate) struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {

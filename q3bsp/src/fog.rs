@@ -35,26 +35,24 @@ impl Bsp {
         self.fogs
             .iter()
             .map(|fog| {
-                let brush = usize::try_from(fog.brush)
-                    .ok()
-                    .and_then(|b| self.brushes.get(b));
-                if brush.is_none() {
+                let Some(brush) = fog.brush_id() else {
                     return FogVolume {
                         mins: Vec3::splat(-WORLD_EXTENT),
                         maxs: Vec3::splat(WORLD_EXTENT),
                         surface: None,
                         shader: fog.shader.clone(),
                     };
-                }
-                let sides = brush.map_or(&[][..], |brush| self.sides_of(brush));
+                };
+                let sides = self.sides_of(self.brush(brush));
                 let plane = |side: usize| -> Option<Plane> {
-                    let plane = self.plane_of(sides.get(side)?)?;
+                    let plane = self.plane(sides.get(side)?.plane);
                     let clean = |v: f32| if v.is_finite() { v } else { 0.0 };
                     Some(Plane {
                         normal: plane.normal.map(clean),
                         dist: clean(plane.dist),
                     })
                 };
+                // The brush of a fog has at least six sides.
                 let dist = |side: usize| plane(side).map_or(0.0, |plane| plane.dist);
                 FogVolume {
                     mins: Vec3::new(-dist(0), -dist(2), -dist(4)),

@@ -21,8 +21,9 @@ impl Bsp {
         let mesh = usize::try_from(surface.patch_height).ok()?;
         let places = usize::try_from(surface.patch_width).ok()?;
         let (mesh, rest) = stored.split_at_checked(mesh)?;
-        let corners = self.surface_indices(surface);
-        let most = MAX_VERTICES / mesh.len().max(corners.len()).max(1);
+        let triangles = self.surface_triangles(surface);
+        let corners = self.surface_indices(surface).len();
+        let most = MAX_VERTICES / mesh.len().max(corners).max(1);
         let mut vertices = Vec::new();
         let mut indices = Vec::new();
         for place in rest.iter().take(places.min(most)) {
@@ -33,11 +34,7 @@ impl Bsp {
                 color: place.color,
                 ..*v
             }));
-            indices.extend(
-                corners
-                    .iter()
-                    .filter_map(|&c| Some(base + u32::try_from(c).ok()?)),
-            );
+            indices.extend(triangles.clone().flatten().map(|corner| base + corner));
         }
         let clean = |v: f32| if v.is_finite() { v } else { 0.0 };
         for vertex in &mut vertices {

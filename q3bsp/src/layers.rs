@@ -6,6 +6,7 @@
 //! constant, 255 says that a layer is not used.
 
 use crate::bytes::{Fields, Put};
+use crate::ids::{PlaneId, ShaderId};
 use crate::lumps::{BrushSide, DrawVert, GridPoint, Record};
 use crate::surface::{Surface, SurfaceKind, lightmap_index};
 use glam::{Vec2, Vec3};
@@ -259,7 +260,7 @@ impl Record for LayeredSurface {
         ] = head;
         LayeredSurface(
             Surface {
-                shader,
+                shader: ShaderId(shader),
                 fog,
                 kind: SurfaceKind::from_raw(kind),
                 first_vert,
@@ -288,7 +289,7 @@ impl Record for LayeredSurface {
     fn encode(&self, out: &mut Vec<u8>) {
         let LayeredSurface(s, layers) = self;
         for v in [
-            s.shader,
+            s.shader.0,
             s.fog,
             s.kind.raw(),
             s.first_vert,
@@ -327,15 +328,15 @@ impl Record for LayeredSide {
     fn decode(mut f: Fields<'_>) -> Self {
         LayeredSide(
             BrushSide {
-                plane: f.i32(),
-                shader: f.i32(),
+                plane: PlaneId(f.i32()),
+                shader: ShaderId(f.i32()),
             },
             f.i32(),
         )
     }
     fn encode(&self, out: &mut Vec<u8>) {
-        out.put_i32(self.0.plane);
-        out.put_i32(self.0.shader);
+        out.put_i32(self.0.plane.0);
+        out.put_i32(self.0.shader.0);
         out.put_i32(self.1);
     }
 }

@@ -7,7 +7,8 @@
 //! [`Bsp::parse`] checks everything that a reader would otherwise have to check again: the directory,
 //! the record sizes and every index of every lump. What the engine refuses is a typed [`Error`] that
 //! names lump, element and value; what the engine tolerates is repaired and remembered as a [`Warning`].
-//! After `Ok`, an index found in a public field may be used without another check.
+//! Indices are types of their own ([`ShaderId`], [`Child`] and so on): after `Ok` the map has the record that each names, and
+//! accessors such as [`Bsp::shader`] return it.
 //! [`Bsp::write`] gives an unchanged file back byte for byte, repairs undone.
 //!
 //! Numbers are as in the file: id units, x forward, y left, z up, triangles clockwise seen from their
@@ -50,6 +51,7 @@ mod fog;
 mod foliage;
 mod format;
 mod grid;
+mod ids;
 mod layers;
 mod lumps;
 mod parse;
@@ -73,6 +75,7 @@ pub use flags::{content_flags, surface_flags};
 pub use fog::FogVolume;
 pub use format::Format;
 pub use grid::{GridSample, LightGridLayout};
+pub use ids::{BrushId, Child, LeafId, NodeId, PlaneId, ShaderId, SurfaceId};
 pub use layers::{Advertisement, GridLayers, Layers, NO_STYLE, SurfaceLayers, VertexLayers};
 pub use lumps::{
     Brush, BrushSide, DrawVert, Fog, GridPoint, LIGHTMAP_BYTES, LIGHTMAP_SIZE, Leaf, Lightmap,
@@ -103,9 +106,9 @@ pub struct Bsp {
     /// Lump 4: leafs. Not every leaf is in the tree (see [`Bsp::tree_leafs`]).
     pub leafs: Vec<Leaf>,
     /// Lump 5: surface indices that leafs refer to.
-    pub leaf_surfaces: Vec<i32>,
+    pub leaf_surfaces: Vec<SurfaceId>,
     /// Lump 6: brush indices that leafs refer to.
-    pub leaf_brushes: Vec<i32>,
+    pub leaf_brushes: Vec<BrushId>,
     /// Lump 7: models; 0 is the world, `n` is what an entity calls `*n`.
     pub models: Vec<Model>,
     /// Lump 8: convex brushes.

@@ -2,6 +2,7 @@
 
 use crate::bytes::{Fields, Put, name_field, name_text};
 use crate::flags;
+use crate::ids::{BrushId, Child, PlaneId, ShaderId};
 use glam::{Vec2, Vec3};
 
 /// A record of fixed size in a lump.
@@ -121,10 +122,10 @@ impl Record for Plane {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Node {
-    /// Index of the splitting plane.
-    pub plane: i32,
-    /// Front and back child: a node index, or `-1 - leaf` when negative.
-    pub children: [i32; 2],
+    /// The splitting plane.
+    pub plane: PlaneId,
+    /// Front and back child.
+    pub children: [Child; 2],
     /// Smallest corner of the bounds, id units.
     pub mins: [i32; 3],
     /// Largest corner of the bounds, id units.
@@ -135,16 +136,16 @@ impl Record for Node {
     const STRIDE: usize = 36;
     fn decode(mut f: Fields<'_>) -> Self {
         Node {
-            plane: f.i32(),
-            children: [f.i32(), f.i32()],
+            plane: PlaneId(f.i32()),
+            children: [Child::from_raw(f.i32()), Child::from_raw(f.i32())],
             mins: f.ivec3(),
             maxs: f.ivec3(),
         }
     }
     fn encode(&self, out: &mut Vec<u8>) {
-        out.put_i32(self.plane);
-        out.put_i32(self.children[0]);
-        out.put_i32(self.children[1]);
+        out.put_i32(self.plane.0);
+        out.put_i32(self.children[0].raw());
+        out.put_i32(self.children[1].raw());
         out.put_ivec3(self.mins);
         out.put_ivec3(self.maxs);
     }
@@ -170,6 +171,13 @@ pub struct Leaf {
     pub first_leaf_brush: i32,
     /// Number of them.
     pub num_leaf_brushes: i32,
+}
+
+impl Leaf {
+    /// The cluster as an index; `None` in solid space and outside.
+    pub fn cluster_index(&self) -> Option<usize> {
+        usize::try_from(self.cluster).ok()
+    }
 }
 
 impl Record for Leaf {
@@ -198,7 +206,7 @@ impl Record for Leaf {
     }
 }
 
-/// Lumps 5, 6 and 11 are plain integers.
+/// Lump 11 is plain integers.
 impl Record for i32 {
     const STRIDE: usize = 4;
     fn decode(mut f: Fields<'_>) -> Self {
@@ -261,7 +269,7 @@ pub struct Brush {
     /// Number of sides.
     pub num_sides: i32,
     /// Shader whose content flags say what the brush is.
-    pub shader: i32,
+    pub shader: ShaderId,
 }
 
 impl Record for Brush {
@@ -270,13 +278,13 @@ impl Record for Brush {
         Brush {
             first_side: f.i32(),
             num_sides: f.i32(),
-            shader: f.i32(),
+            shader: ShaderId(f.i32()),
         }
     }
     fn encode(&self, out: &mut Vec<u8>) {
         out.put_i32(self.first_side);
         out.put_i32(self.num_sides);
-        out.put_i32(self.shader);
+        out.put_i32(self.shader.0);
     }
 }
 
@@ -285,22 +293,22 @@ impl Record for Brush {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BrushSide {
     /// Plane, normal outwards.
-    pub plane: i32,
+    pub plane: PlaneId,
     /// Shader.
-    pub shader: i32,
+    pub shader: ShaderId,
 }
 
 impl Record for BrushSide {
     const STRIDE: usize = 8;
     fn decode(mut f: Fields<'_>) -> Self {
         BrushSide {
-            plane: f.i32(),
-            shader: f.i32(),
+            plane: PlaneId(f.i32()),
+            shader: ShaderId(f.i32()),
         }
     }
     fn encode(&self, out: &mut Vec<u8>) {
-        out.put_i32(self.plane);
-        out.put_i32(self.shader);
+        out.put_i32(self.plane.0);
+        out.put_i32(self.shader.0);
     }
 }
 
@@ -395,6 +403,13 @@ pub struct Fog {
     pub brush: i32,
     /// Side of the brush (relative to its first) through which one looks into the fog; -1 for none.
     pub visible_side: i32,
+}
+
+impl Fog {
+    /// The brush; `None` for fog that fills the world.
+    pub fn brush_id(&self) -> Option<BrushId> {
+        (self.brush >= 0).then_some(BrushId(self.brush))
+    }
 }
 
 impl Record for Fog {

@@ -1,6 +1,7 @@
 //! Lump 13: the records of what is drawn.
 
 use crate::bytes::{Fields, Put};
+use crate::ids::ShaderId;
 use crate::lumps::Record;
 use glam::Vec3;
 
@@ -68,8 +69,8 @@ pub mod lightmap_index {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Surface {
-    /// Shader index.
-    pub shader: i32,
+    /// Shader.
+    pub shader: ShaderId,
     /// Fog index, or -1.
     pub fog: i32,
     /// What the surface is made of.
@@ -109,7 +110,7 @@ impl Record for Surface {
     const STRIDE: usize = 104;
     fn decode(mut f: Fields<'_>) -> Self {
         Surface {
-            shader: f.i32(),
+            shader: ShaderId(f.i32()),
             fog: f.i32(),
             kind: SurfaceKind::from_raw(f.i32()),
             first_vert: f.i32(),
@@ -129,7 +130,7 @@ impl Record for Surface {
     }
     fn encode(&self, out: &mut Vec<u8>) {
         for v in [
-            self.shader,
+            self.shader.0,
             self.fog,
             self.kind.raw(),
             self.first_vert,

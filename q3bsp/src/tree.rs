@@ -1,9 +1,10 @@
-//! Walking the tree, and slices that a validated map can hand out without a check.
+//! Walks through the tree, and the parts of lumps that records of a validated map name.
 
+use crate::Bsp;
 use crate::flags::{content_flags, surface_flags};
-use crate::lumps::{Brush, BrushSide, DrawVert, Leaf, Model, ShaderRef};
+use crate::ids::{BrushId, Child, LeafId, NodeId, SurfaceId};
+use crate::lumps::{Brush, BrushSide, DrawVert, Leaf, Model};
 use crate::surface::Surface;
-use crate::{Bsp, Plane};
 use glam::Vec3;
 use std::ops::Range;
 
@@ -13,93 +14,74 @@ pub(crate) fn span(first: i32, count: i32) -> Range<usize> {
     first..first.saturating_add(usize::try_from(count).unwrap_or(0))
 }
 
+/// The part of a lump that a checked (first, count) pair names; empty in release builds if it leads out of the lump.
+fn part<T>(lump: &[T], first: i32, count: i32) -> &[T] {
+    let part = lump.get(span(first, count));
+    debug_assert!(part.is_some(), "{first} + {count} of {}", lump.len());
+    part.unwrap_or_default()
+}
+
 impl Bsp {
-    /// Index of the leaf that contains a point. Points on a plane belong to its back, as in the engine.
-    /// Ends after as many steps as there are nodes, whatever they say; 0 for a map without nodes.
-    pub fn leaf_at(&self, p: Vec3) -> usize {
-        let mut at = 0i32;
-        for _ in 0..=self.nodes.len() {
-            let Some(node) = usize::try_from(at).ok().and_then(|at| self.nodes.get(at)) else {
-                return 0;
-            };
-            let plane = usize::try_from(node.plane)
-                .ok()
-                .and_then(|plane| self.planes.get(plane));
-            let in_front = plane.is_some_and(|plane: &Plane| plane.distance(p) > 0.0);
+    /// The leaf that contains a point. Points on a plane belong to its back, as in the engine.
+    /// Ends after as many steps as there are nodes, whatever they say; leaf 0 for a map without nodes.
+    pub fn leaf_at(&self, p: Vec3) -> LeafId {
+        let mut at = NodeId::ROOT;
+        for _ in 0..self.nodes.len() {
+            let node = self.node(at);
             let [front, back] = node.children;
-            at = if in_front { front } else { back };
-            if at < 0 {
-                return usize::try_from(-1 - at).unwrap_or(0);
+            let in_front = self.plane(node.plane).distance(p) > 0.0;
+            match if in_front { front } else { back } {
+                Child::Node(next) => at = next,
+                Child::Leaf(leaf) => return leaf,
             }
         }
-        0
+        LeafId(0)
     }
 
     /// Cluster of the leaf that contains a point; -1 outside and in solid space.
     pub fn cluster_at(&self, p: Vec3) -> i32 {
-        self.leafs
-            .get(self.leaf_at(p))
-            .map_or(-1, |leaf| leaf.cluster)
+        // A map that was never parsed or built has no leafs.
+        let leaf = self.leafs.get(self.leaf_at(p).index());
+        leaf.map_or(-1, |leaf| leaf.cluster)
     }
 
     /// Whether a point lies inside of something solid that is seen from outside: in a solid brush of the world of which
     /// some side is drawn. Detail brushes do not make solid leafs, so [`Bsp::cluster_at`] does not tell. `margin`: how far
     /// inside, id units.
     pub fn is_in_drawn_brush(&self, p: Vec3, margin: f32) -> bool {
-        let has = |shader: i32, is: fn(&ShaderRef) -> bool| {
-            let shader = usize::try_from(shader).ok();
-            shader.and_then(|s| self.shaders.get(s)).is_some_and(is)
-        };
-        let solid = |s: &ShaderRef| s.content_flags & content_flags::SOLID != 0;
-        let drawn = |s: &ShaderRef| s.surface_flags & surface_flags::NODRAW == 0;
-        let leaf = self.leafs.get(self.leaf_at(p));
-        let brushes = leaf.map_or(&[][..], |leaf| self.leaf_brush_indices(leaf));
-        let brushes = brushes.iter().filter_map(|&index| {
-            let index = usize::try_from(index).ok()?;
-            self.brushes.get(index)
-        });
-        brushes.filter(|b| has(b.shader, solid)).any(|brush| {
+        let solid = |b: &Brush| self.shader(b.shader).content_flags & content_flags::SOLID != 0;
+        let drawn =
+            |s: &BrushSide| self.shader(s.shader).surface_flags & surface_flags::NODRAW == 0;
+        let behind = |s: &BrushSide| self.plane(s.plane).distance(p) < -margin;
+        let leaf = self.leafs.get(self.leaf_at(p).index());
+        let brushes = leaf.map_or(&[][..], |leaf| self.leaf_brush_ids(leaf));
+        brushes.iter().map(|&id| self.brush(id)).any(|brush| {
             let sides = self.sides_of(brush);
-            let behind = |side: &BrushSide| {
-                let plane = self.plane_of(side);
-                plane.is_some_and(|plane| plane.distance(p) < -margin)
-            };
-            !sides.is_empty()
-                && sides.iter().all(behind)
-                && sides.iter().any(|side| has(side.shader, drawn))
+            solid(brush) && !sides.is_empty() && sides.iter().all(behind) && sides.iter().any(drawn)
         })
     }
 
-    /// Indices of the leafs that can be reached from the root, each once, front before back. Compilers
+    /// The leafs that can be reached from the root, each once, front before back. Compilers
     /// also write leafs that cannot: a dummy leaf 0, and one per brush model whose surfaces would
     /// wrongly land in cluster 0.
-    pub fn tree_leafs(&self) -> Vec<usize> {
+    pub fn tree_leafs(&self) -> Vec<LeafId> {
         let mut found = Vec::new();
         let mut seen = vec![false; self.nodes.len()];
         let mut listed = vec![false; self.leafs.len()];
-        let mut pending = if self.nodes.is_empty() {
-            vec![]
-        } else {
-            vec![0i32]
+        let is_first = |list: &mut Vec<bool>, at: usize| {
+            list.get_mut(at)
+                .is_some_and(|seen| !std::mem::replace(seen, true))
         };
+        let mut pending = vec![Child::Node(NodeId::ROOT)];
         while let Some(at) = pending.pop() {
-            match usize::try_from(at) {
-                Err(_) => {
-                    let leaf = usize::try_from(-1 - at).unwrap_or(0);
-                    if let Some(listed) = listed.get_mut(leaf)
-                        && !std::mem::replace(listed, true)
-                    {
-                        found.push(leaf);
-                    }
+            match at {
+                Child::Leaf(leaf) if is_first(&mut listed, leaf.index()) => found.push(leaf),
+                Child::Node(node) if is_first(&mut seen, node.index()) => {
+                    let [front, back] = self.node(node).children;
+                    pending.extend([back, front]);
                 }
-                Ok(at) => {
-                    if let (Some(node), Some(seen)) = (self.nodes.get(at), seen.get_mut(at))
-                        && !std::mem::replace(seen, true)
-                    {
-                        pending.push(node.children[1]);
-                        pending.push(node.children[0]);
-                    }
-                }
+                // A leaf may be the child of several nodes.
+                Child::Leaf(_) | Child::Node(_) => {}
             }
         }
         found
@@ -107,19 +89,12 @@ impl Bsp {
 
     /// For each cluster the surfaces that its leafs in the tree list, ascending, each once. A few maps
     /// have world surfaces that no leaf lists (they are never drawn by the engine).
-    pub fn cluster_surfaces(&self) -> Vec<Vec<u32>> {
+    pub fn cluster_surfaces(&self) -> Vec<Vec<SurfaceId>> {
         let mut lists = vec![Vec::new(); self.num_clusters()];
-        for leaf in self
-            .tree_leafs()
-            .into_iter()
-            .filter_map(|at| self.leafs.get(at))
-        {
-            let list = usize::try_from(leaf.cluster)
-                .ok()
-                .and_then(|c| lists.get_mut(c));
-            if let Some(list) = list {
-                let surfaces = self.leaf_surface_indices(leaf);
-                list.extend(surfaces.iter().filter_map(|&s| u32::try_from(s).ok()));
+        for leaf in self.tree_leafs().into_iter().map(|id| self.leaf(id)) {
+            // A leaf in solid space has no cluster.
+            if let Some(list) = leaf.cluster_index().and_then(|c| lists.get_mut(c)) {
+                list.extend_from_slice(self.leaf_surface_ids(leaf));
             }
         }
         for list in &mut lists {
@@ -129,33 +104,42 @@ impl Bsp {
         lists
     }
 
-    /// The surface indices that a leaf lists.
-    pub fn leaf_surface_indices(&self, leaf: &Leaf) -> &[i32] {
-        self.leaf_surfaces
-            .get(span(leaf.first_leaf_surface, leaf.num_leaf_surfaces))
-            .unwrap_or(&[])
+    /// The surfaces that a leaf lists.
+    pub fn leaf_surface_ids(&self, leaf: &Leaf) -> &[SurfaceId] {
+        part(
+            &self.leaf_surfaces,
+            leaf.first_leaf_surface,
+            leaf.num_leaf_surfaces,
+        )
     }
 
-    /// The brush indices that a leaf lists.
-    pub fn leaf_brush_indices(&self, leaf: &Leaf) -> &[i32] {
-        self.leaf_brushes
-            .get(span(leaf.first_leaf_brush, leaf.num_leaf_brushes))
-            .unwrap_or(&[])
+    /// The brushes that a leaf lists.
+    pub fn leaf_brush_ids(&self, leaf: &Leaf) -> &[BrushId] {
+        part(
+            &self.leaf_brushes,
+            leaf.first_leaf_brush,
+            leaf.num_leaf_brushes,
+        )
     }
 
     /// The vertices, or control points, of a surface.
     pub fn surface_vertices(&self, surface: &Surface) -> &[DrawVert] {
-        self.vertices
-            .get(span(surface.first_vert, surface.num_verts))
-            .unwrap_or(&[])
+        part(&self.vertices, surface.first_vert, surface.num_verts)
     }
 
     /// The triangle corners of a surface, relative to [`Bsp::surface_vertices`], clockwise seen from the
     /// front.
     pub fn surface_indices(&self, surface: &Surface) -> &[i32] {
-        self.indices
-            .get(span(surface.first_index, surface.num_indices))
-            .unwrap_or(&[])
+        part(&self.indices, surface.first_index, surface.num_indices)
+    }
+
+    /// The triangles of a surface other than a patch or a flare: [`Bsp::surface_indices`] three by three, each an index of
+    /// [`Bsp::surface_vertices`].
+    pub fn surface_triangles(&self, surface: &Surface) -> impl Iterator<Item = [u32; 3]> + Clone {
+        let (triangles, _) = self.surface_indices(surface).as_chunks::<3>();
+        triangles
+            .iter()
+            .map(|corners| corners.map(i32::cast_unsigned))
     }
 
     /// The surfaces of a model, as a range of [`Bsp::surfaces`].
@@ -165,14 +149,17 @@ impl Bsp {
 
     /// The sides of a brush.
     pub fn sides_of(&self, brush: &Brush) -> &[BrushSide] {
-        self.brush_sides
-            .get(span(brush.first_side, brush.num_sides))
-            .unwrap_or(&[])
+        part(&self.brush_sides, brush.first_side, brush.num_sides)
     }
 
-    /// The plane of a brush side.
-    pub fn plane_of(&self, side: &BrushSide) -> Option<&Plane> {
-        self.planes.get(usize::try_from(side.plane).ok()?)
+    /// The surfaces of a model.
+    pub fn surfaces_of(&self, model: &Model) -> &[Surface] {
+        part(&self.surfaces, model.first_surface, model.num_surfaces)
+    }
+
+    /// The brushes of a model.
+    pub fn brushes_of(&self, model: &Model) -> &[Brush] {
+        part(&self.brushes, model.first_brush, model.num_brushes)
     }
 }
 

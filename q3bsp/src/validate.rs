@@ -8,6 +8,7 @@ mod surfaces;
 use crate::Bsp;
 use crate::container::Repair;
 use crate::error::{Error, Lump, Warning};
+use crate::ids::{Child, NodeId};
 
 /// Most elements of one lump that the records of another may refer to in all. Sharing is normal, but
 /// shipped maps stay far below a million; the limit keeps a file that shares one range a million times
@@ -164,25 +165,16 @@ impl Bsp {
                 lump,
                 element,
                 "planeNum",
-                node.plane,
+                node.plane.0,
                 Lump::Planes,
                 self.planes.len(),
             )?;
             for child in node.children {
-                if child >= 0 {
-                    index(lump, element, "child", child, Lump::Nodes, self.nodes.len())?;
-                } else {
-                    // -1 - child cannot overflow for a negative number.
-                    let leaf = -1 - child;
-                    index(
-                        lump,
-                        element,
-                        "leaf child",
-                        leaf,
-                        Lump::Leafs,
-                        self.leafs.len(),
-                    )?;
-                }
+                let (field, at, target, limit) = match child {
+                    Child::Node(node) => ("child", node.0, Lump::Nodes, self.nodes.len()),
+                    Child::Leaf(leaf) => ("leaf child", leaf.0, Lump::Leafs, self.leafs.len()),
+                };
+                index(lump, element, field, at, target, limit)?;
             }
         }
         Ok(())
@@ -192,25 +184,22 @@ impl Bsp {
     /// exponential.
     fn check_tree(&self) -> Result<(), Error> {
         let mut seen = vec![false; self.nodes.len()];
-        let mut pending = vec![0usize];
+        let mut pending = vec![NodeId::ROOT];
         while let Some(at) = pending.pop() {
-            let (Some(node), Some(seen)) = (self.nodes.get(at), seen.get_mut(at)) else {
-                continue;
-            };
-            if std::mem::replace(seen, true) {
+            let visited = seen.get_mut(at.index());
+            if visited.is_some_and(|seen| std::mem::replace(seen, true)) {
                 return Err(Error::Value {
                     lump: Lump::Nodes,
-                    element: at,
+                    element: at.index(),
                     field: "number of parents",
                     value: 2,
                     expected: "but the nodes below the root must form a tree".to_owned(),
                 });
             }
-            pending.extend(
-                node.children
-                    .iter()
-                    .filter_map(|&c| usize::try_from(c).ok()),
-            );
+            pending.extend(self.node(at).children.iter().filter_map(|&c| match c {
+                Child::Node(node) => Some(node),
+                Child::Leaf(_) => None,
+            }));
         }
         Ok(())
     }
@@ -265,7 +254,7 @@ impl Bsp {
                 Lump::LeafSurfaces,
                 element,
                 "surface",
-                surface,
+                surface.0,
                 Lump::Surfaces,
                 surfaces,
             )?;
@@ -275,7 +264,7 @@ impl Bsp {
                 Lump::LeafBrushes,
                 element,
                 "brush",
-                brush,
+                brush.0,
                 Lump::Brushes,
                 brushes,
             )?;
@@ -331,7 +320,7 @@ impl Bsp {
                 Lump::Brushes,
                 element,
                 "shaderNum",
-                brush.shader,
+                brush.shader.0,
                 Lump::Shaders,
                 shaders,
             )?;
@@ -348,12 +337,19 @@ impl Bsp {
         }
         for (element, side) in self.brush_sides.iter().enumerate() {
             let lump = Lump::BrushSides;
-            index(lump, element, "planeNum", side.plane, Lump::Planes, planes)?;
+            index(
+                lump,
+                element,
+                "planeNum",
+                side.plane.0,
+                Lump::Planes,
+                planes,
+            )?;
             index(
                 lump,
                 element,
                 "shaderNum",
-                side.shader,
+                side.shader.0,
                 Lump::Shaders,
                 shaders,
             )?;

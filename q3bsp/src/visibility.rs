@@ -2,6 +2,7 @@
 
 use crate::Bsp;
 use crate::error::{Lump, Warning};
+use crate::lumps::Leaf;
 use std::borrow::Cow;
 
 /// Lump 16: a bit matrix. Not symmetric in most shipped maps.
@@ -186,7 +187,7 @@ impl Bsp {
             None => self
                 .leafs
                 .iter()
-                .filter_map(|leaf| usize::try_from(leaf.cluster).ok())
+                .filter_map(Leaf::cluster_index)
                 .max()
                 .map_or(0, |largest| largest + 1),
         }

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 use q3bsp::builder::MapBuilder;
 use q3bsp::{
-    Bsp, Error, Format, GridLayers, GridPoint, Lightmap, Lump, SurfaceKind, SurfaceLayers,
+    Bsp, Error, Format, GridLayers, GridPoint, Lightmap, Lump, ShaderId, SurfaceKind, SurfaceLayers,
     VertexLayers, content_flags, surface_flags,
 };
 use sample::{advertisement, sample, vert};
@@ -168,7 +168,7 @@ fn layered_records_have_the_layouts_of_the_format() {
         assert_eq!(
             [0, 8, 12, 16, 20, 24].map(|at| i32_at(surface, at)),
             [
-                s.shader,
+                s.shader.raw(),
                 1,
                 s.first_vert,
                 s.num_verts,
@@ -354,7 +354,7 @@ fn repairs_of_layered_surfaces_are_undone_in_the_right_place() {
 fn errors_name_the_byte() {
     for (format, stride) in [(Format::Ibsp47, 104), (Format::Rbsp, 148)] {
         let mut bsp = sample_of(format);
-        bsp.surfaces[2].shader = 77;
+        bsp.surfaces[2].shader = ShaderId::from_raw(77);
         let bytes = bsp.write();
         let start = i32_at(&bytes, 8 + 13 * 8) as u64;
         match Bsp::parse(&bytes).unwrap_err() {

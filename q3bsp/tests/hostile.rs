@@ -1,7 +1,7 @@
 //! Broken maps: the reader answers with a map or an error, and every accessor of a map works.
 
 use proptest::prelude::*;
-use q3bsp::{Bsp, DrawVert, Error, Lump, tessellate_patch};
+use q3bsp::{Bsp, Child, DrawVert, Error, Lump, PlaneId, ShaderId, tessellate_patch};
 use sample::{sample, vert};
 use std::sync::LazyLock;
 use survive::survive;
@@ -163,19 +163,19 @@ fn broken(change: impl FnOnce(&mut Bsp)) -> Error {
 fn errors_name_lump_element_and_value() {
     for (error, text) in [
         (
-            broken(|b| b.nodes[1].plane = 999),
+            broken(|b| b.nodes[1].plane = PlaneId::from_raw(999)),
             "lump nodes, element 1: planeNum is 999, outside the ",
         ),
         (
-            broken(|b| b.nodes[2].children[0] = -1000),
+            broken(|b| b.nodes[2].children[0] = Child::from_raw(-1000)),
             "lump nodes, element 2: leaf child is 999, outside the ",
         ),
         (
-            broken(|b| b.nodes[1].children[0] = 0),
+            broken(|b| b.nodes[1].children[0] = Child::from_raw(0)),
             "lump nodes, element 0: number of parents is 2",
         ),
         (
-            broken(|b| b.surfaces[3].shader = -1),
+            broken(|b| b.surfaces[3].shader = ShaderId::from_raw(-1)),
             "lump surfaces, element 3: shaderNum is -1, outside the 2 of lump shaders",
         ),
         (

@@ -35,6 +35,19 @@ fn maps_keep_their_bytes() {
 }
 
 #[test]
+fn indices_are_plain_numbers() {
+    let bsp = sample::sample();
+    let json = serde_json::to_value(&bsp).unwrap();
+    for (node, json) in bsp.nodes.iter().zip(json["nodes"].as_array().unwrap()) {
+        assert_eq!(json["plane"], node.plane.raw());
+        assert_eq!(json["children"][0], node.children[0].raw());
+        assert_eq!(json["children"][1], node.children[1].raw());
+    }
+    assert_eq!(json["leaf_surfaces"][1], bsp.leaf_surfaces[1].raw());
+    assert_eq!(json["surfaces"][0]["shader"], bsp.surfaces[0].shader.raw());
+}
+
+#[test]
 fn converted_maps_keep_what_their_formats_add() {
     for format in room::FORMATS {
         let map = room::room(format);

@@ -383,26 +383,17 @@ fn resolve_materials(
     bsp: &Bsp,
     pages: &mut PageLoader<'_>,
 ) -> (Vec<WorldMaterial>, Vec<u32>) {
-    let mut known: HashMap<(String, u32, u32, _), u32> = HashMap::new();
+    let mut known: HashMap<_, u32> = HashMap::new();
     let mut list = Vec::new();
     let mut of_surface = Vec::with_capacity(bsp.surfaces.len());
     for (index, surface) in bsp.surfaces.iter().enumerate() {
-        let shader = usize::try_from(surface.shader)
-            .ok()
-            .and_then(|s| bsp.shaders.get(s));
-        let (name, surface_flags, content_flags) = shader.map_or(("", 0, 0), |s| {
-            (s.name.as_str(), s.surface_flags, s.content_flags)
-        });
+        let shader = bsp.shader(surface.shader);
+        let name = shader.name.as_str();
+        let flags = (shader.surface_flags, shader.content_flags);
         let lighting = lighting_of(lightmap_of(bsp, index));
-        let key = (
-            name.to_ascii_lowercase(),
-            surface_flags,
-            content_flags,
-            lighting,
-        );
+        let key = (name.to_ascii_lowercase(), flags, lighting);
         let material = *known.entry(key).or_insert_with(|| {
             let resolved = materials.resolve(files, name, lighting);
-            let flags = (surface_flags, content_flags);
             list.push(WorldMaterial::new(name, flags, lighting, resolved, pages));
             (list.len() - 1) as u32
         });

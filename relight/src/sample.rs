@@ -5,7 +5,7 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3};
 use q3bsp::builder::MapBuilder;
-use q3bsp::{DrawVert, GridPoint, content_flags, surface_flags};
+use q3bsp::{DrawVert, GridPoint, ShaderId, content_flags, surface_flags};
 
 use crate::files::{FileError, MemoryFiles};
 
@@ -237,17 +237,17 @@ fn baked(position: Vec3, normal: Vec3) -> [u8; 3] {
 }
 
 struct Shaders {
-    brick: i32,
-    tile: i32,
-    plaster: i32,
-    metal: i32,
-    grate: i32,
-    mirror: i32,
-    sky: i32,
-    mist: i32,
-    warm: i32,
-    red: i32,
-    blue: i32,
+    brick: ShaderId,
+    tile: ShaderId,
+    plaster: ShaderId,
+    metal: ShaderId,
+    grate: ShaderId,
+    mirror: ShaderId,
+    sky: ShaderId,
+    mist: ShaderId,
+    warm: ShaderId,
+    red: ShaderId,
+    blue: ShaderId,
 }
 
 fn shaders(map: &mut MapBuilder) -> Shaders {
@@ -300,7 +300,7 @@ fn light(map: &mut MapBuilder, surfaces: &[usize]) {
     }
 }
 
-fn patch(map: &mut MapBuilder, shader: i32) -> usize {
+fn patch(map: &mut MapBuilder, shader: ShaderId) -> usize {
     // a half pipe along y in front of the far wall: 5 x 3 control points, facing the room
     let profile = [
         Vec2::new(300.0, 0.0),

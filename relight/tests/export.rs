@@ -98,7 +98,7 @@ fn measure_lumps(bsp: &Bsp, hidden: &dyn Fn(&str) -> bool) -> (BTreeMap<String, 
     let mut away = 0;
     let patches = bsp.patch_meshes(4.0);
     for (index, surface) in bsp.surfaces.iter().enumerate() {
-        let shader = &bsp.shaders[surface.shader as usize];
+        let shader = bsp.shader(surface.shader);
         let flags =
             surface_flags::NODRAW | surface_flags::HINT | surface_flags::SKIP | surface_flags::SKY;
         if shader.surface_flags & flags != 0 || hidden(&shader.name) {

@@ -35,7 +35,7 @@ impl Random {
 
 /// A wall between two rooms, seen from both sides, with a doorway in it or without. `along`: from the wall's start to
 /// its end.
-fn wall(map: &mut MapBuilder, shader: i32, start: Vec3, along: Vec3, door: bool) {
+fn wall(map: &mut MapBuilder, shader: q3bsp::ShaderId, start: Vec3, along: Vec3, door: bool) {
     let mut panel = |from: f32, to: f32, low: f32, high: f32| {
         let corner = |t: f32, z: f32| start + along * t + Vec3::Z * z;
         let quad = [

@@ -313,7 +313,7 @@ mod tests {
         }
         let read = |name: &str| &all.iter().find(|(n, _)| n == name).unwrap().1;
         let map = q3bsp::Bsp::parse(read(ROOMS)).unwrap();
-        let leafs = [HERE, ELSEWHERE].map(|p| map.leafs[map.leaf_at(p)].cluster);
+        let leafs = [HERE, ELSEWHERE].map(|p| map.cluster_at(p));
         assert!(leafs[0] >= 0 && leafs[1] >= 0 && leafs[0] != leafs[1]);
         assert!(!map.cluster_sees(leafs[0], leafs[1]) && map.cluster_sees(leafs[0], leafs[0]));
         assert!(map.light_grid().is_some());

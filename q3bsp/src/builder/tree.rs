@@ -1,6 +1,7 @@
 //! The models, the tree and the leafs of a map under construction.
 
 use super::{Cell, MapBuilder, int, last, whole};
+use crate::ids::{BrushId, Child, LeafId, NodeId, SurfaceId};
 use crate::lumps::{Leaf, Model, Node};
 use crate::surface::SurfaceKind;
 use glam::Vec3;
@@ -48,9 +49,8 @@ impl MapBuilder {
         }
     }
 
-    /// Splits `region` by the faces of cells until each part is one cell or solid. Returns a child
-    /// reference.
-    pub(super) fn build_node(&mut self, cells: &[Cell], region: Cell) -> i32 {
+    /// Splits `region` by the faces of cells until each part is one cell or solid.
+    pub(super) fn build_node(&mut self, cells: &[Cell], region: Cell) -> Child {
         for cell in cells {
             for axis in 0..3 {
                 for at in [cell.mins[axis], cell.maxs[axis]] {
@@ -60,20 +60,20 @@ impl MapBuilder {
                 }
             }
         }
-        -1 - self.push_leaf(cells.first().map(|cell| Cell {
+        Child::Leaf(self.push_leaf(cells.first().map(|cell| Cell {
             cluster: cell.cluster,
             ..region
-        }))
+        })))
     }
 
-    fn split(&mut self, cells: &[Cell], region: Cell, axis: usize, at: f32) -> i32 {
+    fn split(&mut self, cells: &[Cell], region: Cell, axis: usize, at: f32) -> Child {
         let mut normal = Vec3::ZERO;
         normal[axis] = 1.0;
         let plane = self.plane(normal, at);
         let node = self.bsp.nodes.len();
         self.bsp.nodes.push(Node {
             plane,
-            children: [0, 0],
+            children: [Child::Node(NodeId::ROOT); 2],
             mins: whole(region.mins),
             maxs: whole(region.maxs),
         });
@@ -97,12 +97,12 @@ impl MapBuilder {
         if let Some(node) = self.bsp.nodes.get_mut(node) {
             node.children = children;
         }
-        int(node)
+        Child::Node(NodeId(int(node)))
     }
 
     /// Adds a leaf with the world's surfaces and brushes that touch it; `None` makes an empty one.
     /// Leafs outside all cells are solid and list nothing.
-    pub(super) fn push_leaf(&mut self, cell: Option<Cell>) -> i32 {
+    pub(super) fn push_leaf(&mut self, cell: Option<Cell>) -> LeafId {
         let dummy = self.bsp.leafs.is_empty();
         let first_leaf_surface = int(self.bsp.leaf_surfaces.len());
         let first_leaf_brush = int(self.bsp.leaf_brushes.len());
@@ -110,16 +110,13 @@ impl MapBuilder {
             let overlaps = |mins: Vec3, maxs: Vec3| {
                 mins.cmple(cell.maxs + 1.0).all() && maxs.cmpge(cell.mins - 1.0).all()
             };
+            // The world's surfaces and brushes are the first.
             let world = self.bsp.models.first().copied();
-            let (surfaces, brushes) = world.map_or((0..0, 0..0), |w| {
-                let brushes = crate::tree::span(w.first_brush, w.num_brushes);
-                (self.bsp.model_surfaces(&w), brushes)
-            });
+            let (surfaces, brushes) =
+                world.map_or((0, 0), |world| (world.num_surfaces, world.num_brushes));
             let mut listed = Vec::new();
-            for at in surfaces {
-                let Some(surface) = self.bsp.surfaces.get(at) else {
-                    continue;
-                };
+            for id in (0..surfaces).map(SurfaceId) {
+                let surface = self.bsp.surface(id);
                 let points = self
                     .bsp
                     .surface_vertices(surface)
@@ -133,24 +130,20 @@ impl MapBuilder {
                     })
                 };
                 if overlaps(mins, maxs) {
-                    listed.push(int(at));
+                    listed.push(id);
                 }
             }
             self.bsp.leaf_surfaces.extend(listed);
             let mut listed = Vec::new();
-            for at in brushes {
-                let Some(brush) = self.bsp.brushes.get(at) else {
-                    continue;
-                };
-                let outside = self.bsp.sides_of(brush).iter().any(|side| {
-                    self.bsp.plane_of(side).is_some_and(|plane| {
-                        let lowest =
-                            Vec3::select(plane.normal.cmpgt(Vec3::ZERO), cell.mins, cell.maxs);
-                        plane.distance(lowest) > 1.0
-                    })
+            for id in (0..brushes).map(BrushId) {
+                let sides = self.bsp.sides_of(self.bsp.brush(id));
+                let outside = sides.iter().any(|side| {
+                    let plane = self.bsp.plane(side.plane);
+                    let lowest = Vec3::select(plane.normal.cmpgt(Vec3::ZERO), cell.mins, cell.maxs);
+                    plane.distance(lowest) > 1.0
                 });
                 if !outside {
-                    listed.push(int(at));
+                    listed.push(id);
                 }
             }
             self.bsp.leaf_brushes.extend(listed);
@@ -167,6 +160,6 @@ impl MapBuilder {
             first_leaf_brush,
             num_leaf_brushes: int(self.bsp.leaf_brushes.len()) - first_leaf_brush,
         });
-        last(&self.bsp.leafs)
+        LeafId(last(&self.bsp.leafs))
     }
 }

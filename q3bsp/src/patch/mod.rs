@@ -114,10 +114,7 @@ impl Bsp {
     /// The mesh of one surface before stitching. `None` when it is no patch or when its shader
     /// reference says [`surface_flags::NODRAW`]: such patches are collision copies.
     pub fn patch_mesh(&self, surface: &Surface, subdivisions: f32) -> Option<PatchMesh> {
-        let shader = usize::try_from(surface.shader)
-            .ok()
-            .and_then(|s| self.shaders.get(s));
-        let hidden = shader.is_some_and(|s| s.surface_flags & surface_flags::NODRAW != 0);
+        let hidden = self.shader(surface.shader).surface_flags & surface_flags::NODRAW != 0;
         if surface.kind != SurfaceKind::Patch || hidden {
             return None;
         }

@@ -4,6 +4,7 @@ use super::atlas::Atlas;
 use super::{EmbeddedTexture, Face, QuakeMap, QuakeNode};
 use crate::Bsp;
 use crate::error::{Error, Lump, Warning};
+use crate::ids::{BrushId, Child, NodeId, PlaneId, ShaderId, SurfaceId};
 use crate::lumps::{Brush, BrushSide, Leaf, Model, Node, Plane, ShaderRef};
 use glam::{Vec2, Vec3};
 use std::collections::{HashMap, HashSet};
@@ -15,15 +16,15 @@ const MAX_CORNERS: u64 = 1 << 24;
 /// The shaders of the map made, each combination of name and flags once.
 #[derive(Default)]
 struct Shaders {
-    known: HashMap<(String, u32, u32), i32>,
+    known: HashMap<(String, u32, u32), ShaderId>,
 }
 
 impl Shaders {
-    fn index(&mut self, bsp: &mut Bsp, name: &str, surface: u32, content: u32) -> i32 {
+    fn index(&mut self, bsp: &mut Bsp, name: &str, surface: u32, content: u32) -> ShaderId {
         let key = (name.to_owned(), surface, content);
         *self.known.entry(key).or_insert_with(|| {
             bsp.shaders.push(ShaderRef::new(name, surface, content));
-            int(bsp.shaders.len()) - 1
+            ShaderId(int(bsp.shaders.len()) - 1)
         })
     }
 }
@@ -87,8 +88,8 @@ impl QuakeMap {
 
     fn convert_tree(&self, bsp: &mut Bsp) {
         let node = |node: &QuakeNode| Node {
-            plane: node.plane,
-            children: node.children,
+            plane: PlaneId(node.plane),
+            children: node.children.map(Child::from_raw),
             mins: whole(node.mins),
             maxs: whole(node.maxs),
         };
@@ -97,9 +98,10 @@ impl QuakeMap {
         self.move_root(bsp, root);
         let two = self.format.is_quake2();
         let clusters = self.clusters();
-        let brushes: Vec<i32> = self.leaf_brushes.iter().map(|&b| signed(b)).collect();
-        bsp.leaf_brushes = brushes;
-        bsp.leaf_surfaces = self.leaf_faces.iter().map(|&face| signed(face)).collect();
+        let brushes = self.leaf_brushes.iter();
+        bsp.leaf_brushes = brushes.map(|&brush| BrushId(signed(brush))).collect();
+        let faces = self.leaf_faces.iter();
+        bsp.leaf_surfaces = faces.map(|&face| SurfaceId(signed(face))).collect();
         bsp.leafs = self
             .leafs
             .iter()
@@ -143,27 +145,30 @@ impl QuakeMap {
 
     /// Makes the root of the world node 0.
     fn move_root(&self, bsp: &mut Bsp, root: i32) {
-        match usize::try_from(root) {
-            Ok(0) => {}
-            Ok(at) if at < bsp.nodes.len() => {
-                bsp.nodes.swap(0, at);
+        let (first, root) = (Child::Node(NodeId::ROOT), Child::from_raw(root));
+        match root {
+            Child::Node(NodeId::ROOT) => {}
+            Child::Node(node) if node.index() < bsp.nodes.len() => {
+                bsp.nodes.swap(0, node.index());
                 for node in &mut bsp.nodes {
                     for child in &mut node.children {
-                        if *child == 0 {
+                        if *child == first {
                             *child = root;
                         } else if *child == root {
-                            *child = 0;
+                            *child = first;
                         }
                     }
                 }
             }
-            Ok(_) => {}
+            // The world names no node: node 0 stays the root.
+            Child::Node(_) => {}
             // All the world is one leaf.
-            Err(_) => {
+            Child::Leaf(_) => {
+                // A map without models is refused later.
                 let bounds = self.models.first().map(|w| (w.mins, w.maxs));
                 let (mins, maxs) = bounds.unwrap_or_default();
                 bsp.nodes = vec![Node {
-                    plane: 0,
+                    plane: PlaneId(0),
                     children: [root; 2],
                     mins: whole(mins),
                     maxs: whole(maxs),
@@ -204,7 +209,7 @@ impl QuakeMap {
         let names = textures.iter().flatten().map(|t| t.name.as_str()).collect();
         let mut described_materials = HashSet::new();
         // The material of each texinfo: shader, whether it takes a lightmap, size of the texture.
-        let mut materials: Vec<Option<(i32, bool, Vec2)>> = vec![None; self.texinfos.len()];
+        let mut materials: Vec<Option<(ShaderId, bool, Vec2)>> = vec![None; self.texinfos.len()];
         let mut atlas = Atlas::new(self.lighting.len());
         let mut too_large = 0;
         for (element, face) in self.faces.iter().enumerate() {
@@ -315,7 +320,7 @@ impl QuakeMap {
                 None => shaders.index(bsp, "noshader", crate::surface_flags::NODRAW, 0),
             };
             bsp.brush_sides.push(BrushSide {
-                plane: signed(side.plane),
+                plane: PlaneId(signed(side.plane)),
                 shader,
             });
         }
@@ -356,8 +361,7 @@ impl Bsp {
             .map(|s| sizes.get(s.name.as_str()).copied().unwrap_or(Vec2::ONE))
             .collect();
         for surface in &self.surfaces {
-            let shader = usize::try_from(surface.shader).ok();
-            let size = shader.and_then(|at| shader_sizes.get(at));
+            let size = shader_sizes.get(surface.shader.index());
             let range = crate::tree::span(surface.first_vert, surface.num_verts);
             if let (Some(size), Some(vertices)) = (size, self.vertices.get_mut(range)) {
                 for vertex in vertices {

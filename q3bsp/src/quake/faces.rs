@@ -4,6 +4,7 @@ use super::atlas::{Atlas, PAGE};
 use super::{Face, QuakeMap, Texinfo};
 use crate::error::{Error, Lump};
 use crate::format::Format;
+use crate::ids::ShaderId;
 use crate::layers::{NO_STYLE, SurfaceLayers, VertexLayers};
 use crate::lumps::DrawVert;
 use crate::surface::{Surface, SurfaceKind, lightmap_index};
@@ -161,7 +162,7 @@ impl QuakeMap {
         &self,
         element: usize,
         face: &Face,
-        shader: i32,
+        shader: ShaderId,
         lit: bool,
         size: Vec2,
         atlas: &mut Atlas,

@@ -29,7 +29,7 @@ impl Bsp {
                 Lump::Surfaces,
                 element,
                 "shaderNum",
-                s.shader,
+                s.shader.0,
                 Lump::Shaders,
                 shaders,
             )?;

@@ -8,15 +8,15 @@ pub fn exercise(bsp: &Bsp) {
     let clusters = bsp.num_clusters();
     for (at, leaf) in bsp.leafs.iter().enumerate() {
         assert!(i64::from(leaf.cluster) < clusters as i64, "leaf {at}");
-        for &surface in bsp.leaf_surface_indices(leaf) {
-            let _ = bsp.surfaces[surface as usize];
+        for surface in bsp.leaf_surface_ids(leaf) {
+            let _ = bsp.surfaces[surface.index()];
         }
-        for &brush in bsp.leaf_brush_indices(leaf) {
-            let _ = bsp.brushes[brush as usize];
+        for brush in bsp.leaf_brush_ids(leaf) {
+            let _ = bsp.brushes[brush.index()];
         }
     }
     for surface in &bsp.surfaces {
-        let _ = &bsp.shaders[surface.shader as usize];
+        let _ = &bsp.shaders[surface.shader.index()];
         if surface.fog >= 0 {
             let _ = &bsp.fogs[surface.fog as usize];
         }
@@ -32,6 +32,7 @@ pub fn exercise(bsp: &Bsp) {
         let corners = &bsp.indices[surface.first_index as usize..][..surface.num_indices as usize];
         if !matches!(surface.kind, SurfaceKind::Patch | SurfaceKind::Flare) {
             assert_eq!(corners.len() % 3, 0);
+            assert_eq!(bsp.surface_triangles(surface).count() * 3, corners.len());
             for &corner in corners {
                 assert!((corner as usize) < vertices.len());
             }
@@ -53,7 +54,7 @@ pub fn exercise(bsp: &Bsp) {
     }
     for brush in &bsp.brushes {
         for side in bsp.sides_of(brush) {
-            assert!(bsp.plane_of(side).is_some());
+            let _ = (bsp.plane(side.plane), bsp.shader(side.shader));
         }
     }
     for volume in bsp.fog_volumes() {
@@ -72,7 +73,7 @@ pub fn exercise(bsp: &Bsp) {
         }
     }
     for p in [Vec3::ZERO, Vec3::splat(1e9), Vec3::NAN] {
-        assert!(bsp.leaf_at(p) < bsp.leafs.len());
+        assert!(bsp.leaf_at(p).index() < bsp.leafs.len());
         bsp.cluster_sees(bsp.cluster_at(p), 0);
     }
     assert_eq!(bsp.cluster_surfaces().len(), clusters);

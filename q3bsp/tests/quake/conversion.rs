@@ -67,10 +67,9 @@ fn rooms_become_maps_of_the_one_model() {
         };
         assert_eq!(second, expected, "{format}");
         assert_eq!(bsp.surfaces[5].lightmap, lightmap_index::WHITE);
-        let flags =
-            |surface: usize| bsp.shaders[bsp.surfaces[surface].shader as usize].surface_flags;
+        let flags = |surface: usize| bsp.shader(bsp.surfaces[surface].shader).surface_flags;
         assert!(flags(5) & surface_flags::SKY != 0 && flags(0) & surface_flags::SKY == 0);
-        let contents = bsp.shaders[bsp.surfaces[4].shader as usize].content_flags;
+        let contents = bsp.shader(bsp.surfaces[4].shader).content_flags;
         assert_eq!(
             contents,
             if two(format) {

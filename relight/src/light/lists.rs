@@ -30,24 +30,21 @@ pub(crate) struct Clusters {
 
 impl Clusters {
     pub fn new(bsp: &Bsp) -> Self {
-        let leafs = bsp.tree_leafs();
-        let leafs = || leafs.iter().filter_map(|&i| bsp.leafs.get(i));
         let sight = Sight::new(bsp);
         let count = sight.count();
         let mut bounds = vec![Aabb::EMPTY; count];
         let mut of_surface = vec![Vec::new(); bsp.surfaces.len()];
-        for leaf in leafs() {
-            let Ok(cluster) = usize::try_from(leaf.cluster) else {
+        for leaf in bsp.tree_leafs().into_iter().map(|id| bsp.leaf(id)) {
+            let Some(cluster) = leaf.cluster_index() else {
+                // Solid space has no cluster.
                 continue;
             };
             if let Some(bounds) = bounds.get_mut(cluster) {
                 let corner = |c: [i32; 3]| Vec3::from_array(c.map(|v| v as f32));
                 *bounds = bounds.union(Aabb::new(corner(leaf.mins), corner(leaf.maxs)));
             }
-            for &surface in bsp.leaf_surface_indices(leaf) {
-                let clusters: Option<&mut Vec<u32>> = usize::try_from(surface)
-                    .ok()
-                    .and_then(|s| of_surface.get_mut(s));
+            for &surface in bsp.leaf_surface_ids(leaf) {
+                let clusters: Option<&mut Vec<u32>> = of_surface.get_mut(surface.index());
                 if let Some(clusters) = clusters
                     && clusters.last() != Some(&(cluster as u32))
                 {

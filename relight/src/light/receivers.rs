@@ -3,6 +3,7 @@
 use super::{LightRef, PointLight, TriangleLight};
 use crate::world::RelitWorld;
 use glam::Vec3;
+use q3bsp::SurfaceId;
 use std::f32::consts::PI;
 use support::Aabb;
 use support::parallel;
@@ -28,28 +29,26 @@ pub(super) fn receivers(
     seed: u64,
 ) -> Vec<Vec<Receiver>> {
     let bsp = &world.bsp;
-    let mut surfaces: Vec<Vec<u32>> = vec![Vec::new(); clusters];
+    let mut surfaces: Vec<Vec<SurfaceId>> = vec![Vec::new(); clusters];
     let mut boxes: Vec<Vec<Aabb>> = vec![Vec::new(); clusters];
-    for leaf in bsp.tree_leafs() {
-        let Some(leaf) = bsp.leafs.get(leaf) else {
-            continue;
-        };
-        let Ok(cluster) = usize::try_from(leaf.cluster) else {
+    for leaf in bsp.tree_leafs().into_iter().map(|id| bsp.leaf(id)) {
+        let Some(cluster) = leaf.cluster_index() else {
+            // Solid space has no cluster.
             continue;
         };
         let (Some(surfaces), Some(boxes)) = (surfaces.get_mut(cluster), boxes.get_mut(cluster))
         else {
+            // The lights of a map without a PVS are in one list.
             continue;
         };
         let corner = |c: [i32; 3]| Vec3::from_array(c.map(|v| v as f32));
         boxes.push(Aabb::new(corner(leaf.mins), corner(leaf.maxs)));
-        let listed = bsp.leaf_surface_indices(leaf).iter();
-        surfaces.extend(listed.filter_map(|&s| u32::try_from(s).ok()));
+        surfaces.extend_from_slice(bsp.leaf_surface_ids(leaf));
     }
     let rooms: Vec<_> = surfaces.into_iter().zip(boxes).collect();
     parallel::map(&rooms, |cluster, (surfaces, boxes)| {
         let mut random = Random::new(seed ^ (cluster as u64) << 8);
-        let inside = |p: Vec3| usize::try_from(bsp.cluster_at(p)).is_ok_and(|c| c == cluster);
+        let inside = |p: Vec3| bsp.leaf(bsp.leaf_at(p)).cluster_index() == Some(cluster);
         let mut points =
             points_on_surfaces(world, surfaces, boxes, on_surfaces, &mut random, inside);
         // a cluster without drawn surfaces gets more points in the open
@@ -63,7 +62,7 @@ pub(super) fn receivers(
 /// with few tries).
 fn points_on_surfaces(
     world: &RelitWorld,
-    surfaces: &[u32],
+    surfaces: &[SurfaceId],
     boxes: &[Aabb],
     count: usize,
     random: &mut Random,
@@ -74,10 +73,10 @@ fn points_on_surfaces(
     listed.dedup();
     let mut triangles = Vec::new();
     let mut total = 0.0f32;
-    for index in listed {
-        let Some(surface) = world.surfaces.get(index as usize) else {
-            continue;
-        };
+    for surface in listed
+        .into_iter()
+        .filter_map(|id| world.surfaces.get(id.index()))
+    {
         let first = surface.first_index as usize / 3;
         for triangle in first..first + surface.num_indices as usize / 3 {
             let Some([a, b, c]) = world.triangle(triangle) else {

@@ -1,7 +1,7 @@
 //! Visibility between clusters, independent of the map, for queries about moving objects in every frame.
 
 use glam::{Vec3, Vec4};
-use q3bsp::Bsp;
+use q3bsp::{Bsp, Child, Leaf, Node, NodeId};
 use support::Aabb;
 
 /// A set of clusters.
@@ -80,9 +80,10 @@ pub struct Sight {
     /// For every cluster those that it sees or is seen from: compilers write matrices that are not symmetric, and
     /// light travels both ways.
     sees: Vec<ClusterSet>,
-    /// Plane and children of each node; children below 0 are `-1 - leaf`.
-    nodes: Vec<(Vec4, [i32; 2])>,
-    leaf_clusters: Vec<i32>,
+    /// Plane and children of each node.
+    nodes: Vec<(Vec4, [Child; 2])>,
+    /// Cluster of each leaf; `None` in solid space.
+    leaf_clusters: Vec<Option<usize>>,
 }
 
 impl Sight {
@@ -101,20 +102,15 @@ impl Sight {
                 }
             }
         }
-        let plane = |index: i32| {
-            let plane = usize::try_from(index).ok().and_then(|p| bsp.planes.get(p));
-            plane.map(|p| p.normal.extend(p.dist))
+        let node = |node: &Node| {
+            let plane = bsp.plane(node.plane);
+            (plane.normal.extend(plane.dist), node.children)
         };
         Self {
             count,
             sees,
-            nodes: bsp
-                .nodes
-                .iter()
-                // a node without its plane separates nothing: both children are visited
-                .map(|n| (plane(n.plane).unwrap_or(Vec4::ZERO), n.children))
-                .collect(),
-            leaf_clusters: bsp.leafs.iter().map(|leaf| leaf.cluster).collect(),
+            nodes: bsp.nodes.iter().map(node).collect(),
+            leaf_clusters: bsp.leafs.iter().map(Leaf::cluster_index).collect(),
         }
     }
 
@@ -125,20 +121,19 @@ impl Sight {
 
     /// Cluster of a point; `None` in solid.
     pub fn cluster_at(&self, point: Vec3) -> Option<usize> {
-        let mut child = 0i32;
-        // a damaged tree may contain cycles
-        for _ in 0..=self.nodes.len() {
-            let Ok(index) = usize::try_from(child) else {
-                let leaf = usize::try_from(-1 - i64::from(child)).ok()?;
-                let cluster = usize::try_from(*self.leaf_clusters.get(leaf)?).ok()?;
-                return Some(cluster).filter(|c| *c < self.count);
-            };
-            let &(plane, [front, back]) = self.nodes.get(index)?;
-            child = if plane.truncate().dot(point) >= plane.w {
-                front
-            } else {
-                back
-            };
+        // A map without nodes has no clusters.
+        let mut at = self.nodes.first()?;
+        // No way down is longer than the number of nodes.
+        for _ in 0..self.nodes.len() {
+            let &(plane, [front, back]) = at;
+            let in_front = plane.truncate().dot(point) >= plane.w;
+            match if in_front { front } else { back } {
+                Child::Node(node) => at = self.nodes.get(node.index())?,
+                Child::Leaf(leaf) => {
+                    let cluster = *self.leaf_clusters.get(leaf.index())?;
+                    return cluster.filter(|c| *c < self.count);
+                }
+            }
         }
         None
     }
@@ -149,25 +144,22 @@ impl Sight {
         if self.nodes.is_empty() {
             return at;
         }
-        // A damaged tree may share nodes or contain cycles: no path is longer than the number of nodes.
-        let mut steps = self.nodes.len() * 2;
-        let mut stack = vec![0i32];
+        let mut stack = vec![Child::Node(NodeId::ROOT)];
         while let Some(child) = stack.pop() {
-            let Ok(index) = usize::try_from(child) else {
-                let leaf = usize::try_from(-1 - i64::from(child)).ok();
-                let cluster = leaf.and_then(|l| self.leaf_clusters.get(l));
-                if let Some(cluster) = cluster.and_then(|&c| usize::try_from(c).ok()) {
-                    at.insert(cluster);
+            let node = match child {
+                Child::Node(node) => self.nodes.get(node.index()),
+                Child::Leaf(leaf) => {
+                    // A leaf in solid space has no cluster.
+                    if let Some(&Some(cluster)) = self.leaf_clusters.get(leaf.index()) {
+                        at.insert(cluster);
+                    }
+                    continue;
                 }
+            };
+            let Some(&(plane, children)) = node else {
+                debug_assert!(false, "{child:?} of {}", self.nodes.len());
                 continue;
             };
-            let Some(&(plane, children)) = self.nodes.get(index) else {
-                continue;
-            };
-            if steps == 0 {
-                return ClusterSet::none(self.count);
-            }
-            steps -= 1;
             let (normal, dist) = (plane.truncate(), plane.w);
             if furthest_in_front(bounds, normal, dist) >= 0.0 {
                 stack.push(children[0]);
@@ -205,15 +197,15 @@ mod tests {
             count: 2,
             sees: vec![ClusterSet::all(2); 2],
             nodes: vec![
-                (Vec4::new(0.0, 0.0, 1.0, 8.0), [-2, 1]),
-                (Vec4::new(1.0, 0.0, 0.0, 0.0), [-1, -3]),
+                (Vec4::new(0.0, 0.0, 1.0, 8.0), [-2, 1].map(Child::from_raw)),
+                (Vec4::new(1.0, 0.0, 0.0, 0.0), [-1, -3].map(Child::from_raw)),
             ],
-            leaf_clusters: vec![-1, 0, 5],
+            leaf_clusters: vec![None, Some(0), Some(5)],
         };
         assert_eq!(sight.cluster_at(Vec3::Z * 9.0), Some(0));
         assert_eq!(sight.cluster_at(Vec3::X), None);
         assert_eq!(sight.cluster_at(-Vec3::X), None);
-        sight.nodes[1].1 = [1, 1];
+        sight.nodes[1].1 = [Child::from_raw(1); 2];
         assert_eq!(sight.cluster_at(Vec3::X), None, "a tree in circles ends");
         assert_eq!(Sight::default().cluster_at(Vec3::ZERO), None);
     }

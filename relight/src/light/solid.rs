@@ -5,7 +5,7 @@
 //! cluster.
 
 use glam::Vec3;
-use q3bsp::Bsp;
+use q3bsp::{Bsp, Child, NodeId};
 
 /// Length of solid that a ray may pass through and count as free, id units: surfaces lie on the boundary of solid,
 /// and the receivers' offset and rounding decide the side. No wall is as thin.
@@ -21,30 +21,22 @@ pub(super) fn through_solid(bsp: &Bsp, from: Vec3, to: Vec3) -> bool {
         return false;
     }
     let mut solid = 0.0f32;
-    // a damaged tree may share nodes or contain cycles
-    let mut steps = bsp.nodes.len() * 2;
     // intervals of the segment, as parts of it, with the node or leaf that they lie in
-    let mut pending = vec![(0i32, 0.0f32, 1.0f32)];
+    let mut pending = vec![(Child::Node(NodeId::ROOT), 0.0f32, 1.0f32)];
     while let Some((child, start, end)) = pending.pop() {
-        let Ok(index) = usize::try_from(child) else {
-            let leaf = usize::try_from(-1 - i64::from(child)).ok();
-            let leaf = leaf.and_then(|l| bsp.leafs.get(l));
-            if leaf.is_some_and(|l| l.cluster < 0) {
-                solid += (end - start) * length;
-                if solid > SLACK {
-                    return true;
+        let node = match child {
+            Child::Node(node) => bsp.node(node),
+            Child::Leaf(leaf) => {
+                if bsp.leaf(leaf).cluster < 0 {
+                    solid += (end - start) * length;
+                    if solid > SLACK {
+                        return true;
+                    }
                 }
+                continue;
             }
-            continue;
         };
-        let Some(node) = bsp.nodes.get(index).filter(|_| steps > 0) else {
-            continue;
-        };
-        steps -= 1;
-        let plane = usize::try_from(node.plane).ok();
-        let Some(plane) = plane.and_then(|p| bsp.planes.get(p)) else {
-            continue;
-        };
+        let plane = bsp.plane(node.plane);
         let distance = |part: f32| plane.normal.dot(from.lerp(to, part)) - plane.dist;
         let (a, b) = (distance(start), distance(end));
         let [front, back] = node.children;

@@ -163,9 +163,8 @@ fn same_model(bsp: &Bsp, model: usize, found: &Entity, out: &mut Agreement) {
     }
     assert!(written.is_empty(), "brushes that the map does not have");
     let mut patches = found.patches.iter();
-    for index in bsp.model_surfaces(stored) {
-        let surface = &bsp.surfaces[index];
-        let shader = &bsp.shaders[surface.shader as usize];
+    for surface in bsp.surfaces_of(stored) {
+        let shader = bsp.shader(surface.shader);
         let name = shader.name.to_ascii_lowercase();
         let name = name.strip_prefix("textures/").unwrap_or(&name).to_owned();
         let vertices = bsp.surface_vertices(surface);
@@ -177,7 +176,7 @@ fn same_model(bsp: &Bsp, model: usize, found: &Entity, out: &mut Agreement) {
             }
             SurfaceKind::Planar if shader.surface_flags & surface_flags::NODRAW == 0 => {
                 let list = made.get(&name).map_or(&[][..], Vec::as_slice);
-                for corners in bsp.surface_indices(surface).as_chunks::<3>().0 {
+                for corners in bsp.surface_triangles(surface) {
                     let corners = corners.map(|i| vertices[i as usize]);
                     triangle(corners, list, origin, out);
                 }
@@ -191,7 +190,7 @@ fn same_model(bsp: &Bsp, model: usize, found: &Entity, out: &mut Agreement) {
 /// How far the bounds of polygons are from those that the compiler wrote for a brush, its first six planes; 0 where it
 /// wrote none.
 fn bounds_off(bsp: &Bsp, brush: &Brush, polygons: &[Vec<DVec3>], origin: DVec3) -> f64 {
-    let planes = bsp.sides_of(brush).iter().filter_map(|s| bsp.plane_of(s));
+    let planes = bsp.sides_of(brush).iter().map(|s| bsp.plane(s.plane));
     let planes: Vec<_> = planes.take(6).collect();
     let along = |direction: Vec3| {
         let found = planes.iter().find(|p| p.normal.dot(direction) > 0.999_999);

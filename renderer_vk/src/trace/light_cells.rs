@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use glam::Vec3;
-use q3bsp::Bsp;
+use q3bsp::{Bsp, Child, LeafId};
 use relight::light::TriangleLight;
 use shaders::trace_types::BspNode;
 use support::Aabb;
@@ -169,20 +169,20 @@ impl Cutter {
 impl Cells {
     /// Of a map of so many clusters; `length`: entries of a cluster's list.
     pub fn new(bsp: &Bsp, clusters: usize, length: impl Fn(usize) -> usize) -> Self {
-        let leafs: Vec<(usize, usize, Aabb)> = bsp
+        let leafs: Vec<(LeafId, usize, Aabb)> = bsp
             .tree_leafs()
             .into_iter()
-            .filter_map(|index| {
-                let leaf = bsp.leafs.get(index)?;
-                let cluster = usize::try_from(leaf.cluster).ok()?;
+            .filter_map(|id| {
+                let leaf = bsp.leaf(id);
+                let cluster = leaf.cluster_index()?;
                 #[allow(clippy::cast_precision_loss)] // map coordinates
                 let [a, b] = [leaf.mins, leaf.maxs].map(|v| Vec3::from(v.map(|x| x as f32)));
-                (cluster < clusters).then_some((index, cluster, Aabb::of([a, b])))
+                (cluster < clusters).then_some((id, cluster, Aabb::of([a, b])))
             })
             .collect();
         #[allow(clippy::cast_precision_loss)] // lengths of lists
         let entries = |side: f32| -> f64 {
-            let of = |&(_, cluster, bounds): &(usize, usize, Aabb)| {
+            let of = |&(_, cluster, bounds): &(LeafId, usize, Aabb)| {
                 let sizes = Piece::new(cluster, bounds, side).sizes();
                 sizes.iter().product::<f64>() * length(cluster) as f64
             };
@@ -214,20 +214,19 @@ impl Cells {
         lists.sum()
     }
 
-    /// Cuts leafs, which have an index, a cluster and bounds, along a grid; without one they stay whole.
+    /// Cuts leafs, which have an id, a cluster and bounds, along a grid; without one they stay whole.
     fn cut(
         bsp: &Bsp,
-        leafs: &[(usize, usize, Aabb)],
+        leafs: &[(LeafId, usize, Aabb)],
         side: Option<f32>,
         length: impl Fn(usize) -> usize,
     ) -> Self {
-        let plane = |index: i32| {
-            let plane = usize::try_from(index).ok().and_then(|i| bsp.planes.get(i));
-            plane.map_or([0.0; 4], |p| p.normal.extend(p.dist).to_array())
-        };
-        let nodes = bsp.nodes.iter().map(|node| BspNode {
-            plane: plane(node.plane),
-            children: node.children,
+        let nodes = bsp.nodes.iter().map(|node| {
+            let plane = bsp.plane(node.plane);
+            BspNode {
+                plane: plane.normal.extend(plane.dist).to_array(),
+                children: node.children.map(Child::raw),
+            }
         });
         let mut cutter = Cutter {
             side: side.unwrap_or(1.0),
@@ -240,7 +239,7 @@ impl Cells {
         };
         // what takes the place of each leaf as a child
         let mut instead: Vec<Option<i32>> = vec![None; bsp.leafs.len()];
-        for &(index, cluster, bounds) in leafs {
+        for &(id, cluster, bounds) in leafs {
             // Where there is no light, there is nothing to tell apart: such a leaf may be as large as the map.
             let piece = match side.filter(|_| length(cluster) > 0) {
                 Some(side) => Piece::new(cluster, bounds, side),
@@ -253,18 +252,19 @@ impl Cells {
             };
             if piece.sizes() == [1.0; 3] {
                 let cell = cutter.cell(&piece);
-                if let Some(slot) = cutter.made.leaf_cells.get_mut(index) {
+                if let Some(slot) = cutter.made.leaf_cells.get_mut(id.index()) {
                     *slot = cell;
                 }
-            } else if let Some(slot) = instead.get_mut(index) {
+            } else if let Some(slot) = instead.get_mut(id.index()) {
                 *slot = Some(cutter.cut(piece));
             }
         }
         let mut made = cutter.made;
         for node in made.nodes.iter_mut().take(bsp.nodes.len()) {
             for child in &mut node.children {
-                let leaf = usize::try_from(-1 - i64::from(*child)).ok();
-                if let Some(Some(other)) = leaf.and_then(|l| instead.get(l)) {
+                if let Child::Leaf(leaf) = Child::from_raw(*child)
+                    && let Some(Some(other)) = instead.get(leaf.index())
+                {
                     *child = *other;
                 }
             }

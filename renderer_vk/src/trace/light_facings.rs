@@ -92,12 +92,8 @@ fn pieces(bsp: &Bsp, surface: &Surface) -> Vec<Piece> {
     let piece = |[a, b, c]: [usize; 3]| Piece::new([corner(a)?, corner(b)?, corner(c)?]);
     match surface.kind {
         SurfaceKind::Planar | SurfaceKind::TriangleSoup => {
-            let triangles = bsp.surface_indices(surface).chunks_exact(3);
-            let index = |i: &i32| usize::try_from(*i).ok();
-            let corners = triangles.filter_map(|t| match t {
-                [a, b, c] => Some([index(a)?, index(b)?, index(c)?]),
-                _ => None,
-            });
+            let corners = bsp.surface_triangles(surface);
+            let corners = corners.map(|t| t.map(|corner| corner as usize));
             corners.filter_map(piece).collect()
         }
         SurfaceKind::Patch => {
@@ -159,9 +155,7 @@ pub fn facings(bsp: &Bsp, cells: &[Cell]) -> Vec<Facings> {
     let world = bsp.models.first().map(|model| bsp.model_surfaces(model));
     let drawn: Vec<(Aabb, Vec<Piece>)> = (bsp.surfaces.iter().enumerate())
         .map(|(index, surface)| {
-            let shader = usize::try_from(surface.shader).ok();
-            let shader = shader.and_then(|s| bsp.shaders.get(s));
-            let sky = shader.is_some_and(|s| s.surface_flags & surface_flags::SKY != 0);
+            let sky = bsp.shader(surface.shader).surface_flags & surface_flags::SKY != 0;
             let pieces = if sky || !world.as_ref().is_some_and(|w| w.contains(&index)) {
                 Vec::new()
             } else {
@@ -176,7 +170,7 @@ pub fn facings(bsp: &Bsp, cells: &[Cell]) -> Vec<Facings> {
         let around = cell.bounds.grown(Vec3::splat(BESIDE));
         let mut parts: [Parts; FACINGS] = Default::default();
         let surfaces = listed.get(cell.cluster).into_iter().flatten();
-        let surfaces = surfaces.filter_map(|&s| drawn.get(s as usize));
+        let surfaces = surfaces.filter_map(|&s| drawn.get(s.index()));
         for (_, pieces) in surfaces.filter(|(bounds, _)| bounds.touches(around)) {
             for piece in pieces {
                 if !Aabb::of(piece.corners).touches(around) {

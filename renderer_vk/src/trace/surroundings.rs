@@ -1,7 +1,7 @@
 //! What lies in the way of light in a map: surfaces that colour it, and the liquids that a camera can be in.
 
 use glam::{Vec3, Vec4};
-use q3bsp::Bsp;
+use q3bsp::{Brush, Bsp};
 use support::Aabb;
 
 use crate::assets::Assets;
@@ -101,27 +101,16 @@ impl Surroundings {
 
 /// The brushes of the world that a material fills.
 fn brushes(bsp: &Bsp, name: &str, absorption: Vec3) -> Vec<Liquid> {
-    let index = |i: i32| usize::try_from(i).ok();
-    let of_world = bsp.models.first().and_then(|world| {
-        let first = index(world.first_brush)?;
-        bsp.brushes
-            .get(first..first.checked_add(index(world.num_brushes)?)?)
-    });
-    of_world
-        .unwrap_or_default()
+    let world = bsp.models.first();
+    let brushes = world.map_or(&[][..], |world| bsp.brushes_of(world));
+    let named = |b: &&Brush| bsp.shader(b.shader).name.eq_ignore_ascii_case(name);
+    brushes
         .iter()
-        .filter(|brush| {
-            let shader = index(brush.shader).and_then(|i| bsp.shaders.get(i));
-            shader.is_some_and(|s| s.name.eq_ignore_ascii_case(name))
-        })
+        .filter(named)
         .filter_map(|brush| {
-            let first = index(brush.first_side)?;
-            let sides = bsp
-                .brush_sides
-                .get(first..first.checked_add(index(brush.num_sides)?)?)?;
+            let sides = bsp.sides_of(brush).iter();
             let planes: Vec<Vec4> = sides
-                .iter()
-                .filter_map(|side| bsp.planes.get(index(side.plane)?))
+                .map(|side| bsp.plane(side.plane))
                 .map(|plane| plane.normal.extend(plane.dist))
                 .collect();
             (planes.len() >= 4).then_some(Liquid { planes, absorption })

@@ -3,7 +3,7 @@
 //! Source: engine behaviour of `MarkFragments`, its tolerances included.
 
 use glam::Vec3;
-use q3bsp::{Plane, SurfaceKind};
+use q3bsp::{Bsp, Plane, SurfaceId, SurfaceKind};
 use shaders::types::Vertex;
 use support::Aabb;
 
@@ -37,7 +37,7 @@ struct ClipPlane {
 pub struct Marker {
     out: Output,
     planes: Vec<ClipPlane>,
-    found: Vec<u32>,
+    found: Vec<SurfaceId>,
 }
 
 /// The answer while it grows.
@@ -120,10 +120,8 @@ impl Marker {
             });
             clip_planes(points, projection, direction, first, &mut self.planes);
             candidates(&marked, &bounds, direction, &mut self.found);
-            for &index in &self.found {
-                let Some(surface) = marked.world.surfaces.get(index as usize) else {
-                    continue;
-                };
+            let surfaces = &marked.world.surfaces;
+            for surface in self.found.iter().filter_map(|id| surfaces.get(id.index())) {
                 mark_surface(marked, surface, direction, &self.planes, out);
                 if out.full() {
                     break;
@@ -163,25 +161,20 @@ fn clip_planes(
 }
 
 /// Surfaces of the leafs that the box touches and that can take the mark, each once.
-fn candidates(marked: &Marked<'_>, bounds: &Aabb, direction: Vec3, found: &mut Vec<u32>) {
+fn candidates(marked: &Marked<'_>, bounds: &Aabb, direction: Vec3, found: &mut Vec<SurfaceId>) {
     let (world, materials) = (marked.world, marked.materials);
     let bsp = &world.relit.bsp;
     found.clear();
     world.tree.leafs_in_box(bsp, bounds, |leaf| {
-        let Some(leaf) = bsp.leafs.get(leaf as usize) else {
-            return;
-        };
-        for &index in bsp.leaf_surface_indices(leaf) {
+        for &id in bsp.leaf_surface_ids(bsp.leaf(leaf)) {
             if found.len() >= MAX_SURFACES {
                 return;
             }
-            let Some((index, surface)) = u32::try_from(index)
-                .ok()
-                .and_then(|i| Some((i, world.surfaces.get(i as usize)?)))
-            else {
+            let Some(surface) = world.surfaces.get(id.index()) else {
+                debug_assert!(false, "{id:?} of {}", world.surfaces.len());
                 continue;
             };
-            if found.contains(&index) || surface.model != 0 {
+            if found.contains(&id) || surface.model != 0 {
                 continue;
             }
             let material = materials.get(surface.material);
@@ -191,7 +184,7 @@ fn candidates(marked: &Marked<'_>, bounds: &Aabb, direction: Vec3, found: &mut V
                 continue;
             }
             let taken = match surface.kind {
-                SurfaceKind::Planar => stored_plane(world, index).is_some_and(|plane| {
+                SurfaceKind::Planar => stored_plane(&world.relit.bsp, id).is_some_and(|plane| {
                     let side = Side::of(bounds, plane.normal, plane.dist);
                     side.front && side.back && plane.normal.dot(direction) <= -0.5
                 }),
@@ -199,7 +192,7 @@ fn candidates(marked: &Marked<'_>, bounds: &Aabb, direction: Vec3, found: &mut V
                 _ => false,
             };
             if taken {
-                found.push(index);
+                found.push(id);
             }
         }
     });
@@ -207,10 +200,10 @@ fn candidates(marked: &Marked<'_>, bounds: &Aabb, direction: Vec3, found: &mut V
 
 /// The plane as the map stores it. Compilers leave it zero on surfaces that they merge, and the engine then marks
 /// nothing.
-fn stored_plane(world: &WorldData, index: u32) -> Option<Plane> {
-    let stored = world.relit.bsp.surfaces.get(index as usize)?;
+fn stored_plane(bsp: &Bsp, id: SurfaceId) -> Option<Plane> {
+    let stored = bsp.surface(id);
     let normal = stored.lightmap_vecs[2];
-    let first = world.relit.bsp.surface_vertices(stored).first()?.position;
+    let first = bsp.surface_vertices(stored).first()?.position;
     let dist = normal.dot(first);
     (normal != Vec3::ZERO && normal.is_finite() && dist.is_finite())
         .then_some(Plane { normal, dist })

@@ -4,19 +4,10 @@
 //! hidden, their ancestors, the frustum against the nodes' boxes, and each surface of what is left once.
 
 use glam::{Vec3, Vec4};
-use q3bsp::Bsp;
+use q3bsp::{Bsp, Child, LeafId, NodeId};
 use support::Aabb;
 
 use super::WorldData;
-
-/// A child of a node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Child {
-    Node(u32),
-    Leaf(u32),
-    /// Leads nowhere: out of range, or to a node that has another parent already.
-    Nothing,
-}
 
 /// Children still to be visited, newest first. Memory is taken only for deep trees.
 struct Pending {
@@ -28,7 +19,7 @@ struct Pending {
 impl Default for Pending {
     fn default() -> Self {
         Self {
-            near: [Child::Nothing; 64],
+            near: [Child::Node(NodeId::ROOT); 64],
             count: 0,
             rest: Vec::new(),
         }
@@ -59,8 +50,7 @@ impl Pending {
 struct TreeNode {
     children: [Child; 2],
     bounds: Aabb,
-    parent: u32,
-    plane: u32,
+    parent: Option<NodeId>,
 }
 
 #[derive(Clone, Debug)]
@@ -68,13 +58,11 @@ struct TreeLeaf {
     cluster: i32,
     area: i32,
     bounds: Aabb,
-    /// `NO_PARENT` for leafs that the tree does not reach.
-    parent: u32,
+    /// `None` for leafs that the tree does not reach.
+    parent: Option<NodeId>,
 }
 
-const NO_PARENT: u32 = u32::MAX;
-
-/// The BSP tree with parents, every node at most once.
+/// The BSP tree with parents.
 #[derive(Clone, Debug, Default)]
 pub struct Tree {
     nodes: Vec<TreeNode>,
@@ -87,17 +75,16 @@ fn bounds_of(mins: [i32; 3], maxs: [i32; 3]) -> Aabb {
 }
 
 impl Tree {
-    /// The tree of a map; what could be reached twice is reached once.
+    /// The tree of a map. Of several nodes with the same leaf one is its parent.
     pub fn new(bsp: &Bsp) -> Self {
         let mut tree = Self {
             nodes: bsp
                 .nodes
                 .iter()
                 .map(|node| TreeNode {
-                    children: [Child::Nothing; 2],
+                    children: node.children,
                     bounds: bounds_of(node.mins, node.maxs),
-                    parent: NO_PARENT,
-                    plane: u32::try_from(node.plane).unwrap_or(0),
+                    parent: None,
                 })
                 .collect(),
             leafs: bsp
@@ -107,84 +94,55 @@ impl Tree {
                     cluster: leaf.cluster,
                     area: leaf.area,
                     bounds: bounds_of(leaf.mins, leaf.maxs),
-                    parent: NO_PARENT,
+                    parent: None,
                 })
                 .collect(),
         };
-        let mut seen = vec![false; tree.nodes.len()];
-        if let Some(root) = seen.first_mut() {
-            *root = true;
-        }
-        let mut pending = vec![0u32];
-        while let Some(at) = pending.pop() {
-            let Some(stored) = bsp.nodes.get(at as usize) else {
-                continue;
-            };
-            let children = stored.children.map(|child| match u32::try_from(child) {
-                Ok(node) => match seen.get_mut(node as usize) {
-                    Some(seen) if !*seen => {
-                        *seen = true;
-                        pending.push(node);
-                        if let Some(node) = tree.nodes.get_mut(node as usize) {
-                            node.parent = at;
-                        }
-                        Child::Node(node)
-                    }
-                    _ => Child::Nothing,
-                },
-                Err(_) => {
-                    let leaf = u32::try_from(-1 - i64::from(child)).unwrap_or(u32::MAX);
-                    match tree.leafs.get_mut(leaf as usize) {
-                        Some(found) => {
-                            found.parent = at;
-                            Child::Leaf(leaf)
-                        }
-                        None => Child::Nothing,
-                    }
+        let mut pending = Vec::from_iter(tree.root());
+        while let Some(child) = pending.pop() {
+            let Child::Node(at) = child else { continue };
+            for child in bsp.node(at).children {
+                let parent = match child {
+                    Child::Node(node) => tree.nodes.get_mut(node.index()).map(|n| &mut n.parent),
+                    Child::Leaf(leaf) => tree.leafs.get_mut(leaf.index()).map(|l| &mut l.parent),
+                };
+                if let Some(parent) = parent {
+                    *parent = Some(at);
                 }
-            });
-            if let Some(node) = tree.nodes.get_mut(at as usize) {
-                node.children = children;
+                pending.push(child);
             }
         }
         tree
     }
 
     /// Calls `visit` for every leaf that the box touches, front children first.
-    pub fn leafs_in_box(&self, bsp: &Bsp, bounds: &Aabb, mut visit: impl FnMut(u32)) {
+    pub fn leafs_in_box(&self, bsp: &Bsp, bounds: &Aabb, mut visit: impl FnMut(LeafId)) {
         let mut pending = Pending::default();
-        pending.push(self.root());
+        if let Some(root) = self.root() {
+            pending.push(root);
+        }
         while let Some(child) = pending.pop() {
             match child {
-                Child::Nothing => {}
                 Child::Leaf(leaf) => visit(leaf),
-                Child::Node(index) => {
-                    let Some(node) = self.nodes.get(index as usize) else {
-                        continue;
-                    };
-                    let side = bsp
-                        .planes
-                        .get(node.plane as usize)
-                        .map_or(Side::BOTH, |p| Side::of(bounds, p.normal, p.dist));
+                Child::Node(node) => {
+                    let node = bsp.node(node);
+                    let plane = bsp.plane(node.plane);
+                    let side = Side::of(bounds, plane.normal, plane.dist);
+                    let [front, back] = node.children;
                     if side.back {
-                        pending.push(node.children[1]);
+                        pending.push(back);
                     }
                     if side.front {
-                        pending.push(node.children[0]);
+                        pending.push(front);
                     }
                 }
             }
         }
     }
 
-    fn root(&self) -> Child {
-        if !self.nodes.is_empty() {
-            Child::Node(0)
-        } else if !self.leafs.is_empty() {
-            Child::Leaf(0)
-        } else {
-            Child::Nothing
-        }
+    /// The root; `None` without a map.
+    fn root(&self) -> Option<Child> {
+        (!self.nodes.is_empty()).then_some(Child::Node(NodeId::ROOT))
     }
 }
 
@@ -196,11 +154,6 @@ pub(super) struct Side {
 }
 
 impl Side {
-    const BOTH: Self = Self {
-        front: true,
-        back: true,
-    };
-
     /// A box that only touches the plane counts as in front.
     pub fn of(bounds: &Aabb, normal: Vec3, dist: f32) -> Self {
         Self {
@@ -275,13 +228,13 @@ impl VisibleSet {
         }
         let culled = |bounds: &Aabb| query.culls && outside(bounds, query.frustum);
         self.pending.clear();
-        self.pending.push(tree.root());
+        self.pending.extend(tree.root());
         while let Some(child) = self.pending.pop() {
             match child {
-                Child::Nothing => {}
-                Child::Node(index) => {
-                    let marked = self.node_marks.get(index as usize) == Some(&true);
-                    let Some(node) = tree.nodes.get(index as usize).filter(|_| marked) else {
+                Child::Node(id) => {
+                    let marked = self.node_marks.get(id.index()) == Some(&true);
+                    let Some(node) = tree.nodes.get(id.index()).filter(|_| marked) else {
+                        // Out of sight.
                         continue;
                     };
                     if culled(&node.bounds) {
@@ -290,9 +243,10 @@ impl VisibleSet {
                     self.pending.push(node.children[1]);
                     self.pending.push(node.children[0]);
                 }
-                Child::Leaf(index) => {
-                    let marked = self.leaf_marks.get(index as usize) == Some(&true);
-                    let Some(leaf) = tree.leafs.get(index as usize).filter(|_| marked) else {
+                Child::Leaf(id) => {
+                    let marked = self.leaf_marks.get(id.index()) == Some(&true);
+                    let Some(leaf) = tree.leafs.get(id.index()).filter(|_| marked) else {
+                        // Out of sight.
                         continue;
                     };
                     if !outside(&leaf.bounds, query.frustum) {
@@ -300,28 +254,21 @@ impl VisibleSet {
                     }
                     if !culled(&leaf.bounds) {
                         self.leafs += 1;
-                        self.add_leaf(world, index);
+                        self.add_leaf(world, id);
                     }
                 }
             }
         }
     }
 
-    fn add_leaf(&mut self, world: &WorldData, leaf: u32) {
+    fn add_leaf(&mut self, world: &WorldData, leaf: LeafId) {
         let bsp = &world.relit.bsp;
-        let Some(leaf) = bsp.leafs.get(leaf as usize) else {
-            return;
-        };
-        for &surface in bsp.leaf_surface_indices(leaf) {
-            let Ok(surface) = u32::try_from(surface) else {
-                continue;
-            };
-            let Some(stamp) = self.surface_stamps.get_mut(surface as usize) else {
-                continue;
-            };
-            if *stamp != self.stamp {
+        for &surface in bsp.leaf_surface_ids(bsp.leaf(leaf)) {
+            if let Some(stamp) = self.surface_stamps.get_mut(surface.index())
+                && *stamp != self.stamp
+            {
                 *stamp = self.stamp;
-                self.surfaces.push(surface);
+                self.surfaces.push(surface.index() as u32);
             }
         }
     }
@@ -346,8 +293,7 @@ impl VisibleSet {
             return;
         }
         if query.show_cluster != 0 {
-            let leaf = bsp.leafs.get(bsp.leaf_at(query.pvs_origin));
-            let area = leaf.map_or(-1, |leaf| leaf.area);
+            let area = bsp.leaf(bsp.leaf_at(query.pvs_origin)).area;
             log::info!("cluster:{cluster}  area:{area}");
         }
         self.marked_for = Some(wanted);
@@ -374,11 +320,11 @@ impl VisibleSet {
             }
             *mark = true;
             let mut at = leaf.parent;
-            while let Some(mark) = self.node_marks.get_mut(at as usize) {
-                if std::mem::replace(mark, true) {
-                    break;
-                }
-                at = tree.nodes.get(at as usize).map_or(NO_PARENT, |n| n.parent);
+            while let Some(node) = at
+                && let Some(mark) = self.node_marks.get_mut(node.index())
+                && !std::mem::replace(mark, true)
+            {
+                at = tree.nodes.get(node.index()).and_then(|n| n.parent);
             }
         }
     }

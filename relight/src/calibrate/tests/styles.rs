@@ -21,7 +21,7 @@ fn room_with_images(
         usize::MAX,
         Some(stored.unwrap_or(&quarter)),
     );
-    let shaders: Vec<i32> = (0..images.lightmaps.len())
+    let shaders: Vec<_> = (0..images.lightmaps.len())
         .map(|face| builder.add_shader(&format!("t/{face}"), 0, 1))
         .collect();
     let mut map = builder.build();

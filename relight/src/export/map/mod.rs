@@ -18,7 +18,7 @@ use super::{Export, ExportError, ExportReport, Output};
 use crate::world::RelitWorld;
 use form::{Form, numbers};
 use glam::{DVec3, Vec3};
-use q3bsp::{Brush, Bsp, Entity, Model, Surface, SurfaceKind, content_flags};
+use q3bsp::{Brush, Bsp, Entity, Model, ShaderId, Surface, SurfaceKind, content_flags};
 use std::fmt::Write;
 use texture::{Drawn, Sizes, default_projection};
 use winding::{Side, plane_points, sides};
@@ -158,11 +158,8 @@ impl Writer<'_> {
     fn model(&mut self, number: usize, model: &Model, origin: Vec3) {
         let bsp = &self.world.bsp;
         let of_model = u32::try_from(number).unwrap_or(u32::MAX);
-        let first = usize::try_from(model.first_brush).unwrap_or(0);
-        let count = usize::try_from(model.num_brushes).unwrap_or(0);
-        let brushes = bsp.brushes.get(first..first + count).unwrap_or_default();
         let mut written = 0;
-        for brush in brushes {
+        for brush in bsp.brushes_of(model) {
             match sides(bsp, brush) {
                 Some(sides) => {
                     let contents = match number == 0 && is_detail(bsp, brush, &sides) {
@@ -185,8 +182,7 @@ impl Writer<'_> {
                 None => self.tally.open += 1,
             }
         }
-        let surfaces = bsp.surfaces.get(bsp.model_surfaces(model));
-        for surface in surfaces.unwrap_or_default() {
+        for surface in bsp.surfaces_of(model) {
             match surface.kind {
                 SurfaceKind::Patch => self.patch(surface, origin),
                 SurfaceKind::TriangleSoup | SurfaceKind::Foliage => self.tally.meshes += 1,
@@ -196,7 +192,7 @@ impl Writer<'_> {
     }
 
     /// A shader's name as the form has it: without the folder, which compilers put before it.
-    fn name(&mut self, shader: i32) -> String {
+    fn name(&mut self, shader: ShaderId) -> String {
         let name = shader_name(&self.world.bsp, shader);
         let stem = match name.get(..FOLDER.len()) {
             Some(folder) if folder.eq_ignore_ascii_case(FOLDER) => name.get(FOLDER.len()..),
@@ -222,7 +218,7 @@ impl Writer<'_> {
         // What a brush is comes from all its sides: one of a fog on a wall, which shows nothing there, would let the
         // world leak.
         let shown = found.is_some_and(|(_, in_front)| in_front);
-        let solid = |shader| flags(bsp, shader) & content_flags::SOLID != 0;
+        let solid = |shader| bsp.shader(shader).content_flags & content_flags::SOLID != 0;
         let foreign = !shown && solid(brush.shader) && !solid(side.shader);
         let named = if foreign { brush.shader } else { side.shader };
         let found = found.map(|(texture, _)| texture).filter(|_| !foreign);
@@ -273,11 +269,8 @@ impl Writer<'_> {
     }
 }
 
-fn shader_name(bsp: &Bsp, shader: i32) -> &str {
-    let shader = usize::try_from(shader)
-        .ok()
-        .and_then(|at| bsp.shaders.get(at));
-    let name = shader.map_or("", |s| s.name.as_str());
+fn shader_name(bsp: &Bsp, shader: ShaderId) -> &str {
+    let name = bsp.shader(shader).name.as_str();
     // Of a converted map the picture, not the way that it is drawn.
     let texture = bsp.texture_uses.iter().find(|t| t.material == name);
     let picture = texture.and_then(|t| t.frames.first());
@@ -291,16 +284,9 @@ fn number(value: f64) -> String {
     format!("{}", rounded + 0.0)
 }
 
-/// The content flags of a shader; none for one that is not there.
-fn flags(bsp: &Bsp, shader: i32) -> u32 {
-    let shader = usize::try_from(shader).ok();
-    let shader = shader.and_then(|at| bsp.shaders.get(at));
-    shader.map_or(0, |s| s.content_flags)
-}
-
 /// Whether the compiler did not divide the world by a solid brush: leaves in those that it did are closed.
 fn is_detail(bsp: &Bsp, brush: &Brush, sides: &[Side]) -> bool {
-    let contents = flags(bsp, brush.shader);
+    let contents = bsp.shader(brush.shader).content_flags;
     let (solid, keeps) = (content_flags::SOLID, content_flags::AREAPORTAL);
     if contents & solid == 0 || contents & keeps != 0 || bsp.leafs.is_empty() {
         return false;

@@ -155,7 +155,7 @@ fn bevels_are_left_out_and_open_brushes_told() {
     });
     bsp.planes = planes;
     let bevel = q3bsp::BrushSide {
-        plane: bsp.planes.len() as i32 - 1,
+        plane: q3bsp::PlaneId::from_raw(bsp.planes.len() as i32 - 1),
         ..side
     };
     let first = bsp.brush_sides.len() as i32;

@@ -4,7 +4,7 @@ use crate::files::GameFiles;
 use crate::image;
 use crate::world::RelitWorld;
 use glam::{DVec2, DVec3};
-use q3bsp::SurfaceKind;
+use q3bsp::{DrawVert, SurfaceKind};
 use std::collections::HashMap;
 
 /// Cosine of the largest angle between a side and a triangle drawn for it.
@@ -59,20 +59,16 @@ impl Drawn {
             if !matches!(stored.kind, SurfaceKind::Planar | SurfaceKind::TriangleSoup) {
                 continue;
             }
-            let shader = usize::try_from(stored.shader).ok();
-            let Some(shader) = shader.and_then(|at| bsp.shaders.get(at)) else {
-                continue;
-            };
             let vertices = bsp.surface_vertices(stored);
-            let key = (surface.model, shader.name.to_ascii_lowercase());
+            let shader = &bsp.shader(stored.shader).name;
+            let key = (surface.model, shader.to_ascii_lowercase());
             let list = triangles.entry(key).or_default();
-            for corners in bsp.surface_indices(stored).as_chunks::<3>().0 {
-                let vertex = |at: usize| {
-                    let index = usize::try_from(*corners.get(at)?).ok()?;
-                    let vertex = vertices.get(index)?;
-                    vertex.is_finite().then_some(vertex)
-                };
-                let (Some(a), Some(b), Some(c)) = (vertex(0), vertex(1), vertex(2)) else {
+            for corners in bsp.surface_triangles(stored) {
+                let finite = |v: &&DrawVert| v.is_finite();
+                let [Some(a), Some(b), Some(c)] =
+                    corners.map(|at| vertices.get(at as usize).filter(finite))
+                else {
+                    // Shipped maps have vertices that are not numbers.
                     continue;
                 };
                 let corners = [a, b, c].map(|v| v.position.as_dvec3());

@@ -1,7 +1,7 @@
 //! The polygons of a brush's sides: what is left of each plane between all the others.
 
 use glam::DVec3;
-use q3bsp::{Brush, Bsp};
+use q3bsp::{Brush, Bsp, ShaderId};
 
 /// Half the size of the polygon that a plane begins with, id units: larger than any world.
 const EXTENT: f64 = 262_144.0;
@@ -22,8 +22,8 @@ const AXIAL: f64 = 3e-5;
 pub(super) struct Side {
     /// Unit normal, outwards.
     pub normal: DVec3,
-    /// Shader index.
-    pub shader: i32,
+    /// Shader.
+    pub shader: ShaderId,
     /// Corners, clockwise seen from outside.
     pub winding: Vec<DVec3>,
 }
@@ -31,16 +31,16 @@ pub(super) struct Side {
 /// The sides of a brush that bound it; sides that only helped the compiler's collision (bevels) touch it in an edge or
 /// not at all, and are left out. `None` for a brush that is not closed, or whose planes are not numbers.
 pub(super) fn sides(bsp: &Bsp, brush: &Brush) -> Option<Vec<Side>> {
-    let mut planes: Vec<(DVec3, f64, i32)> = Vec::new();
+    let mut planes: Vec<(DVec3, f64, ShaderId)> = Vec::new();
     for side in bsp.sides_of(brush) {
-        let plane = bsp.plane_of(side)?;
+        let plane = bsp.plane(side.plane);
         let normal = plane.normal.as_dvec3();
         let length = normal.length();
         if !(length > 0.5 && length.is_finite() && plane.dist.is_finite()) {
             return None;
         }
         let (normal, dist) = (normal / length, f64::from(plane.dist) / length);
-        let same = |other: &&(DVec3, f64, i32)| {
+        let same = |other: &&(DVec3, f64, ShaderId)| {
             other.0.dot(normal) > 0.999_999 && (other.1 - dist).abs() < ON_PLANE
         };
         if !planes.iter().any(|other| same(&other)) {
@@ -252,7 +252,7 @@ mod tests {
         }
         let side = Side {
             normal,
-            shader: 0,
+            shader: ShaderId::from_raw(0),
             winding,
         };
         let origin = DVec3::new(10.0, 20.0, 30.0);

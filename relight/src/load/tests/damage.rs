@@ -52,7 +52,7 @@ fn rich_map() -> Vec<u8> {
     let names = [
         "t/wall", "t/lamp", "t/both", "t/sprite", "t/sky", "t/glow", "t/gone", "t/haze",
     ];
-    let shaders: Vec<i32> = names.iter().map(|n| map.add_shader(n, 0, 1)).collect();
+    let shaders: Vec<_> = names.iter().map(|n| map.add_shader(n, 0, 1)).collect();
     map.add_room(shaders[0], Vec3::splat(-128.0), Vec3::splat(128.0));
     let other = map.add_room(
         shaders[4],

@@ -130,7 +130,7 @@ fn check_lists(map: &str, world: &RelitWorld) -> usize {
                 // Surfaces that no leaf of the cluster in front lists are never drawn from there.
                 let listed = of_cluster
                     .get(from as usize)
-                    .is_some_and(|l| l.contains(&light.surface));
+                    .is_some_and(|l| l.iter().any(|id| id.index() == light.surface as usize));
                 assert!(
                     !listed || row.binary_search(&index).is_ok(),
                     "{map}: light {index} at {center} is missing at {place}"

@@ -6,6 +6,7 @@ use crate::scene::{Geometry, Look, Scene, ViewScene};
 use crate::test_support::{Registration, openarena};
 use crate::world::WorldData;
 use glam::Vec3;
+use q3bsp::{Child, NodeId};
 use support::Aabb;
 
 #[test]
@@ -140,16 +141,16 @@ fn check_against_leafs(world: &WorldData, game: &Registration, view: &ViewScene)
     let bounds = |mins, maxs| Aabb::new(corner(mins), corner(maxs));
     let mut leafs = Vec::new();
     let mut expected = std::collections::BTreeSet::new();
-    let mut pending = vec![0i32];
+    let mut pending = vec![Child::Node(NodeId::ROOT)];
     while let Some(at) = pending.pop() {
-        let Ok(node) = usize::try_from(at) else {
-            let leaf = &bsp.leafs[usize::try_from(-1 - at).unwrap()];
-            leafs.push(leaf);
-            continue;
-        };
-        let node = &bsp.nodes[node];
-        if !crate::world::outside(&bounds(node.mins, node.maxs), &frustum) {
-            pending.extend(node.children);
+        match at {
+            Child::Leaf(leaf) => leafs.push(bsp.leaf(leaf)),
+            Child::Node(node) => {
+                let node = bsp.node(node);
+                if !crate::world::outside(&bounds(node.mins, node.maxs), &frustum) {
+                    pending.extend(node.children);
+                }
+            }
         }
     }
     for leaf in leafs {
@@ -157,8 +158,8 @@ fn check_against_leafs(world: &WorldData, game: &Registration, view: &ViewScene)
         if !seen || crate::world::outside(&bounds(leaf.mins, leaf.maxs), &frustum) {
             continue;
         }
-        for &index in bsp.leaf_surface_indices(leaf) {
-            let surface = &world.surfaces[usize::try_from(index).unwrap()];
+        for id in bsp.leaf_surface_ids(leaf) {
+            let surface = &world.surfaces[id.index()];
             let material = game.materials.get(surface.material);
             let turned_away = surface.plane.is_some_and(|p| {
                 let distance = p.distance(view.view.origin);

@@ -204,7 +204,7 @@ fn plain_files() -> Vec<File> {
 }
 
 /// A quad that faces back towards the camera, `size` units to each side.
-fn add_screen(map: &mut MapBuilder, shader: i32, center: Vec3, size: f32) {
+fn add_screen(map: &mut MapBuilder, shader: q3bsp::ShaderId, center: Vec3, size: f32) {
     let corner = |y: f32, z: f32| center + Vec3::new(0.0, y * size, z * size);
     let corners = [
         corner(1.0, 1.0),
