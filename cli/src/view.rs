@@ -186,11 +186,7 @@ impl Camera {
             .surfaces
             .iter()
             .filter(|s| s.model == 0 && s.num_indices > 0 && !sky(s.material));
-        let vertices = drawn.flat_map(|s| {
-            let first = s.first_vertex as usize;
-            let range = first..first + s.num_vertices as usize;
-            world.vertices.get(range).unwrap_or_default()
-        });
+        let vertices = drawn.flat_map(|s| world.vertices_of(s));
         let places = || {
             vertices
                 .clone()

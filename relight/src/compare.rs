@@ -5,6 +5,7 @@
 
 mod flip;
 
+use support::slice::part;
 use thiserror::Error;
 
 /// Side of the window over which structural similarity is computed, in pixels.
@@ -151,11 +152,7 @@ impl Rgb8 {
         let (width, height) = (self.width.min(other.width), self.height.min(other.height));
         let row = |picture: &Self, y: usize| {
             let start = y * picture.width * 3;
-            picture
-                .pixels
-                .get(start..start + width * 3)
-                .unwrap_or_default()
-                .to_vec()
+            part(&picture.pixels, start..start + width * 3).to_vec()
         };
         let pixels = (0..height)
             .flat_map(|y| row(self, y).into_iter().zip(row(other, y)))

@@ -18,6 +18,7 @@ use crate::world::{Flare, NO_LIGHT, RelitWorld, WorldMaterial, WorldModel, World
 use glam::{Vec3, Vec4};
 use q3bsp::{Bsp, Entity, SurfaceKind};
 use std::collections::{BTreeSet, HashMap};
+use support::slice;
 
 /// Reason why a map could not be loaded.
 #[derive(Debug, thiserror::Error)]
@@ -162,7 +163,7 @@ impl RelitWorld {
         let mut flares = Vec::new();
         for (index, stored) in bsp.surfaces.iter().enumerate() {
             let patch = patches.get(index).and_then(Option::as_ref);
-            let placed = geometry.add(&bsp, index, patch, options.overbright_shift);
+            let placed = geometry.add(&bsp, stored, patch, options.overbright_shift);
             let fog = match usize::try_from(stored.fog) {
                 Ok(fog) if fog < fogs.len() => fog as u32 + 1,
                 _ => 0,
@@ -179,7 +180,7 @@ impl RelitWorld {
                     fog,
                 });
             }
-            let lightmap = lightmap_of(&bsp, index);
+            let lightmap = lightmap_of(&bsp, stored);
             let external = world_materials
                 .get(material as usize)
                 .and_then(|m| m.baked.main);
@@ -320,11 +321,10 @@ impl RelitWorld {
     fn corner_colors(&self) -> Vec<[u8; 4]> {
         let mut sums = vec![(Vec4::ZERO, 0.0); self.materials.len()];
         for surface in &self.surfaces {
-            let Some((sum, whole)) = sums.get_mut(surface.material as usize) else {
+            let Some((sum, whole)) = slice::get_mut(&mut sums, surface.material as usize) else {
                 continue;
             };
-            let first = surface.first_index as usize / 3;
-            for triangle in first..first + surface.num_indices as usize / 3 {
+            for triangle in surface.triangles() {
                 let Some([a, b, c]) = self.triangle(triangle) else {
                     continue;
                 };
@@ -347,7 +347,7 @@ impl RelitWorld {
     fn largest_sky(&self) -> Option<u32> {
         let mut area: HashMap<u32, f32> = HashMap::new();
         for surface in &self.surfaces {
-            let material = self.materials.get(surface.material as usize);
+            let material = self.material_of(surface);
             if surface.num_indices > 0 && material.is_some_and(WorldMaterial::is_sky) {
                 *area.entry(surface.material).or_default() += self.surface_area(surface);
             }
@@ -360,8 +360,8 @@ impl RelitWorld {
 
     /// Area of a surface's triangles, square id units.
     pub fn surface_area(&self, surface: &WorldSurface) -> f32 {
-        let first = surface.first_index as usize / 3;
-        (first..first + surface.num_indices as usize / 3)
+        let triangles = surface.triangles();
+        triangles
             .filter_map(|t| self.triangle(t))
             .map(|[a, b, c]| (b - a).cross(c - a).length() * 0.5)
             .sum()
@@ -386,11 +386,11 @@ fn resolve_materials(
     let mut known: HashMap<_, u32> = HashMap::new();
     let mut list = Vec::new();
     let mut of_surface = Vec::with_capacity(bsp.surfaces.len());
-    for (index, surface) in bsp.surfaces.iter().enumerate() {
+    for surface in &bsp.surfaces {
         let shader = bsp.shader(surface.shader);
         let name = shader.name.as_str();
         let flags = (shader.surface_flags, shader.content_flags);
-        let lighting = lighting_of(lightmap_of(bsp, index));
+        let lighting = lighting_of(lightmap_of(bsp, surface));
         let key = (name.to_ascii_lowercase(), flags, lighting);
         let material = *known.entry(key).or_insert_with(|| {
             let resolved = materials.resolve(files, name, lighting);
@@ -429,12 +429,7 @@ fn place_models(bsp: &Bsp, entities: &[Entity]) -> Vec<WorldModel> {
 fn model_of_surfaces(bsp: &Bsp) -> Vec<u32> {
     let mut of_surface = vec![0; bsp.surfaces.len()];
     for (number, model) in bsp.models.iter().enumerate().skip(1) {
-        for slot in of_surface
-            .get_mut(bsp.model_surfaces(model))
-            .unwrap_or_default()
-        {
-            *slot = number as u32;
-        }
+        slice::part_mut(&mut of_surface, bsp.model_surfaces(model)).fill(number as u32);
     }
     of_surface
 }

@@ -15,6 +15,7 @@ use std::collections::HashMap;
 use std::f32::consts::TAU;
 use support::parallel;
 use support::random::Random;
+use support::slice::{self, part_mut};
 
 /// Strata along each side of the unit square; a sample sends the square of this number of rays.
 const SIDE: u32 = 6;
@@ -188,9 +189,7 @@ fn trace_from(
 pub(super) fn surfaces_of_triangles(world: &RelitWorld) -> Vec<u32> {
     let mut of_triangle = vec![u32::MAX; world.indices.len() / 3];
     for (index, surface) in (0u32..).zip(&world.surfaces) {
-        let first = surface.first_index as usize / 3;
-        let own = first..first + surface.num_indices as usize / 3;
-        of_triangle.get_mut(own).unwrap_or_default().fill(index);
+        part_mut(&mut of_triangle, surface.triangles()).fill(index);
     }
     of_triangle
 }
@@ -203,7 +202,7 @@ fn material_of<'a>(
 ) -> Option<(u32, &'a WorldMaterial)> {
     let surface = *of_triangle.get(hit.tag as usize)?;
     let index = world.surfaces.get(surface as usize)?.material;
-    Some((index, world.materials.get(index as usize)?))
+    Some((index, slice::get(&world.materials, index as usize)?))
 }
 
 /// A cell and its neighbours by distance, so that near samples prune far cells.
@@ -255,7 +254,7 @@ impl Near {
                 continue;
             }
             for &i in self.0.get(&cell).map_or(&[][..], Vec::as_slice) {
-                let Some(sample) = samples.get(i as usize) else {
+                let Some(sample) = slice::get(samples, i as usize) else {
                     continue;
                 };
                 let offset = sample.position - at;

@@ -15,6 +15,7 @@ use std::collections::HashMap;
 use std::f32::consts::{PI, TAU};
 use support::parallel;
 use support::random::Random;
+use support::slice::{self, part};
 
 /// Contribution, as a part of a sample's light, below which a shadow ray is sent at random and weighted by its
 /// probability (Russian roulette).
@@ -139,7 +140,7 @@ pub(super) fn point_rows_hinted(
             continue;
         }
         let light = unshadowed(sample, lamp, spot);
-        let Some(last) = stopped.get_mut(i as usize % places) else {
+        let Some(last) = slice::get_mut(stopped, i as usize % places) else {
             continue;
         };
         if light > 0.0 && !occluders.blocked_hinted(origin, sample.position, last) {
@@ -203,7 +204,7 @@ pub(super) fn known(
         .collect();
     for (i, given) in (0u32..).zip(found) {
         for bucket in given {
-            let Some(column) = columns.get_mut(bucket.group as usize) else {
+            let Some(column) = slice::get_mut(&mut columns, bucket.group as usize) else {
                 continue;
             };
             match column.rows.last_mut() {
@@ -401,6 +402,7 @@ fn triangles_at(
             world.lights.get(index as usize),
             of_light.get(index as usize),
         ) else {
+            // While a light style is fitted, the world has no lights, but still its lists.
             continue;
         };
         let geometric = lambert(sample, light) / PI;
@@ -510,7 +512,7 @@ fn lambert(sample: &Sample, light: &TriangleLight) -> f32 {
             keep(from + (to - from) * (h0 / (h0 - h1)));
         }
     }
-    let corners = polygon.get(..count).unwrap_or_default();
+    let corners = part(&polygon, ..count);
     let mut sum = 0.0;
     for (i, from) in corners.iter().enumerate() {
         let to = corners

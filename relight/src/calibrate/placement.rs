@@ -20,6 +20,7 @@ use crate::world::RelitWorld;
 use glam::Vec3;
 use std::f32::consts::PI;
 use support::parallel;
+use support::slice::part_mut;
 
 /// Smallest distance of a light from surfaces, id units: its sphere must not reach into them.
 pub(super) const CLEARANCE: f32 = 8.0;
@@ -375,9 +376,7 @@ fn move_lights(
     state: &Residual,
     step: f32,
 ) {
-    let Some(placed) = columns.get_mut(known..) else {
-        return;
-    };
+    let placed = part_mut(columns, known..);
     let moved = parallel::map(placed, |_, column| best_move(scene, column, state, step));
     for (column, moved) in placed.iter_mut().zip(moved) {
         if let Some(moved) = moved {

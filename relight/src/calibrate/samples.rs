@@ -126,7 +126,7 @@ pub(super) fn shown(stored: Vec3) -> Vec3 {
 /// Whether the stored light of a surface is evidence of the lights around it: opaque or cut-out, not emitting, not
 /// sky, of the world model.
 pub(super) fn is_measurable(world: &RelitWorld, surface: &WorldSurface) -> bool {
-    let material = world.materials.get(surface.material as usize);
+    let material = world.material_of(surface);
     surface.model == 0
         && surface.num_indices > 0
         && material.is_some_and(|m| {
@@ -142,10 +142,7 @@ fn area(world: &RelitWorld, is: fn(&WorldSurface) -> bool) -> f64 {
         .surfaces
         .iter()
         .filter(|s| is(s) && is_measurable(world, s));
-    let triangles = told.flat_map(|surface| {
-        let first = surface.first_index as usize / 3;
-        first..first + surface.num_indices as usize / 3
-    });
+    let triangles = told.flat_map(|surface| surface.triangles());
     let areas = triangles.filter_map(|triangle| {
         let [a, b, c] = world.triangle(triangle)?;
         Some(f64::from((b - a).cross(c - a).length() * 0.5)).filter(|area| area.is_finite())

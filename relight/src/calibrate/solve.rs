@@ -14,6 +14,7 @@ use super::columns::Column;
 use super::samples::{Sample, mean};
 use glam::{Vec3, Vec4};
 use support::parallel;
+use support::slice;
 
 /// |log ratio| up to which a sample has its full weight.
 const HUBER: f32 = 0.3;
@@ -205,7 +206,9 @@ fn sweep_over(
         }
         for (&index, sum) in now.iter().zip(sums(rows, rest)) {
             done += 1;
-            let (Some(column), Some(active)) = (columns.get_mut(index), active.get(index)) else {
+            let (Some(column), Some(active)) =
+                (slice::get_mut(columns, index), slice::get(active, index))
+            else {
                 continue;
             };
             let change = improve(column, active.norm, sum.truncate(), sparsity);

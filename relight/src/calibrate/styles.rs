@@ -69,6 +69,7 @@ fn lights_of(
     world.bsp.light_grid = grid;
     world.set_lighting(lighting);
     let placed = solution.filter(|s| s.report.evidence == Evidence::Lightmaps);
+    // No lamp where the fit fails or finds no lightmaps.
     let placed = placed.map(|s| s.placed).unwrap_or_default();
     placed
         .into_iter()
@@ -155,7 +156,7 @@ impl Layer {
             };
             let page = pages.entry(surface.light_page);
             let page = page.or_insert_with(|| vec![0; size * size * 3]);
-            let material = world.materials.get(surface.material as usize);
+            let material = world.material_of(surface);
             let styles = material.map_or(&[][..], |m| &m.baked.styles);
             let mine: Vec<&StyleLight> = styles.iter().filter(|s| s.strength == strength).collect();
             if !mine.is_empty() {
@@ -193,11 +194,7 @@ fn fill(
     page: &mut [u8],
     size: usize,
 ) {
-    let first = surface.first_vertex as usize;
-    let places = world.vertices.iter().skip(first);
-    let places = places
-        .take(surface.num_vertices as usize)
-        .map(|v| v.lightmap);
+    let places = world.vertices_of(surface).iter().map(|v| v.lightmap);
     let (low, high) = places.fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(low, high), at| {
         (low.min(at), high.max(at))
     });

@@ -11,6 +11,7 @@ use crate::occluders::Occluders;
 use glam::Vec3;
 use std::f32::consts::TAU;
 use support::parallel;
+use support::slice;
 
 /// Directions tried first, evenly over the upper hemisphere.
 const DIRECTIONS: u32 = 320;
@@ -111,9 +112,11 @@ fn explained_error(
     let mut norm = 0.0;
     for &i in subset {
         let at = i as usize;
-        let (Some(sample), Some(rest), Some(&weight)) =
-            (samples.get(at), state.rest.get(at), state.weights.get(at))
-        else {
+        let (Some(sample), Some(rest), Some(&weight)) = (
+            slice::get(samples, at),
+            slice::get(&state.rest, at),
+            slice::get(&state.weights, at),
+        ) else {
             continue;
         };
         if weight <= 0.0 {

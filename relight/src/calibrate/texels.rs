@@ -214,8 +214,7 @@ impl<'a> SampleDensity<'a> {
             let page = usize::try_from(surface.light_page).ok();
             let page = page.and_then(|page| world.page(page));
             let side = page.map_or(0.0, |page| page.size() as f32);
-            let first = surface.first_index as usize / 3;
-            for triangle in first..first + surface.num_indices as usize / 3 {
+            for triangle in surface.triangles() {
                 let Some(corners) = world.corners(triangle) else {
                     continue;
                 };
@@ -315,8 +314,7 @@ fn texel_at(
         return None;
     }
     let middle = cell + Vec2::splat(0.5);
-    let first = surface.first_index as usize / 3;
-    let others = first..first + surface.num_indices as usize / 3;
+    let others = surface.triangles();
     let place = std::iter::once(triangle)
         .chain(others)
         .find_map(|t| place_of(world.corners(t)?, middle, size))?;
@@ -399,7 +397,7 @@ fn step_of(world: &RelitWorld, page: usize) -> f32 {
 
 /// Factor that the compiler applied to a surface's light before storing.
 fn stored_scale(world: &RelitWorld, surface: &WorldSurface) -> f32 {
-    let material = world.materials.get(surface.material as usize);
+    let material = world.material_of(surface);
     material.map_or(1.0, WorldMaterial::stored_scale)
 }
 

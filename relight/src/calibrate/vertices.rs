@@ -6,6 +6,7 @@ use crate::world::WorldSurface;
 use q3bsp::SurfaceKind;
 use support::parallel;
 use support::random::Random;
+use support::slice::part;
 
 /// Whether a surface is lit by vertex and its vertices are the map's own.
 pub(super) fn lit(surface: &WorldSurface) -> bool {
@@ -26,8 +27,7 @@ pub(super) fn take(context: &SampleContext<'_>, count: usize, random: &mut Rando
         }
         let stored = world.bsp.surfaces.get(index);
         let stored = stored.map_or(&[][..], |s| world.bsp.surface_vertices(s));
-        let first = surface.first_vertex as usize;
-        let made = world.vertices.get(first..).unwrap_or_default();
+        let made = part(&world.vertices, surface.first_vertex as usize..);
         all.extend(stored.iter().zip(made).map(|(raw, vertex)| {
             let [r, g, b, _] = raw.color;
             let place = (vertex.position, vertex.normal);

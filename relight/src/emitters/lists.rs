@@ -1,5 +1,7 @@
 //! Light lists: the lights that may reach each cluster, in compressed rows.
 
+use support::slice::part;
+
 /// Lights of each cluster, in compressed rows.
 ///
 /// Row `c` holds the lights of cluster `c`; one more row holds all lights, for points outside every cluster. An
@@ -61,7 +63,7 @@ impl LightLists {
     /// The entries for a cluster, as [`q3bsp::Bsp::cluster_at`] gives it; all lights for -1 and for clusters
     /// that do not exist.
     pub fn row(&self, cluster: i32) -> &[u32] {
-        self.lights.get(self.range(cluster)).unwrap_or_default()
+        part(&self.lights, self.range(cluster))
     }
 
     /// Appends the row of all lights from `old`, with unknown shares.

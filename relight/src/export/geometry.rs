@@ -6,6 +6,7 @@ use crate::world::{RelitWorld, WorldMaterial, WorldSurface, WorldVertex};
 use glam::{Vec2, Vec3};
 use q3bsp::surface_flags;
 use std::collections::{BTreeMap, HashMap};
+use support::slice::item;
 
 /// Texture coordinates beyond this many repetitions are moved back by whole ones: far out, floats have no fraction left.
 const FAR: f32 = 256.0;
@@ -188,7 +189,7 @@ pub fn gather(world: &RelitWorld, place: &dyn Fn(&WorldSurface, Vec2) -> Vec2) -
     let mut degenerate = 0;
     let stacked = world.stacked();
     for (number, surface) in world.surfaces.iter().enumerate() {
-        let Some(material) = world.materials.get(surface.material as usize) else {
+        let Some(material) = world.material_of(surface) else {
             continue;
         };
         if surface.num_indices == 0 {
@@ -207,16 +208,8 @@ pub fn gather(world: &RelitWorld, place: &dyn Fn(&WorldSurface, Vec2) -> Vec2) -
             ),
         };
         let shift = far_shift(world, surface, material);
-        let first = surface.first_index as usize;
-        let indices = world
-            .indices
-            .get(first..first + surface.num_indices as usize)
-            .unwrap_or_default();
-        let rises = rises(
-            world,
-            indices,
-            stacked.get(number).copied().unwrap_or_default(),
-        );
+        let indices = world.indices_of(surface);
+        let rises = rises(world, indices, item(&stacked, number));
         for corners in indices.as_chunks::<3>().0 {
             let [Some(a), Some(b), Some(c)] = corners.map(|i| world.vertices.get(i as usize))
             else {
@@ -228,6 +221,7 @@ pub fn gather(world: &RelitWorld, place: &dyn Fn(&WorldSurface, Vec2) -> Vec2) -
             }
             let corner = [0, 1, 2].map(|i| {
                 let v = [a, b, c][i];
+                // Only corners that lie on another surface rise.
                 let rise = rises.get(&corners[i]).copied().unwrap_or_default();
                 joiner.index(WorldVertex {
                     position: v.position + origin + rise,
@@ -293,11 +287,7 @@ pub fn join(triangles: impl Iterator<Item = [WorldVertex; 3]>) -> (Part, usize) 
 
 /// Whole repetitions that a surface's texture coordinates are moved back by: none unless they are far out.
 fn far_shift(world: &RelitWorld, surface: &WorldSurface, material: &WorldMaterial) -> Vec2 {
-    let first = surface.first_vertex as usize;
-    let vertices = world
-        .vertices
-        .get(first..first + surface.num_vertices as usize)
-        .unwrap_or_default();
+    let vertices = world.vertices_of(surface);
     let Some(least) = vertices.iter().map(|v| v.st).reduce(Vec2::min) else {
         return Vec2::ZERO;
     };

@@ -13,6 +13,7 @@ use crate::materials::light::classify;
 use crate::world::{WorldMaterial, WorldVertex};
 use shaderscript::{AlphaFunc, AlphaGen, BlendFactor, Shader, Stage, StageImage, TcGen};
 use std::borrow::Cow;
+use support::slice;
 
 /// Distance between layers along the normals of vertices, id units.
 pub const LIFT: f32 = 0.125;
@@ -179,7 +180,7 @@ impl<'a> Layer<'a> {
             return;
         };
         let stages = &self.material.resolved.shader.stages;
-        let Some(stage) = stages.get(number) else {
+        let Some(stage) = slice::get(stages, number) else {
             return;
         };
         look.vertex_alpha = VertexAlpha::weighing(stage);

@@ -14,6 +14,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::Arc;
+use support::slice;
 
 /// Warning for a material that fades by vertex alpha.
 const FADES: &str = "fades by vertex alpha, which OBJ lacks; it does not fade";
@@ -44,7 +45,7 @@ pub(super) fn write(source: &Export<'_>, output: &mut Output) -> Result<ExportRe
     let mut looks = BTreeMap::new();
     let radiances = emission::radiances(world);
     for &index in &used {
-        let Some(material) = world.materials.get(index as usize) else {
+        let Some(material) = slice::get(&world.materials, index as usize) else {
             continue;
         };
         let mut made = Vec::new();

@@ -13,6 +13,7 @@ use crate::world::{RelitWorld, WorldMaterial};
 use glam::{Vec2, Vec3};
 use shaderscript::ImplicitKind;
 use std::collections::HashMap;
+use support::slice;
 
 /// Texels between places where the lightmap is read.
 const SPACING: f32 = 1.5;
@@ -246,7 +247,7 @@ pub fn means<'a>(
     let table = overbright::byte_table();
     let mut sums = vec![(Vec3::ZERO, 0.0); world.materials.len()];
     for (part, light) in parts {
-        let Some(sum) = sums.get_mut(part.material as usize) else {
+        let Some(sum) = slice::get_mut(&mut sums, part.material as usize) else {
             continue;
         };
         let light_of = |i: u32| -> Vec3 {

@@ -7,6 +7,7 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
+use support::slice::item;
 
 /// Bytes of an entry: a name of 56 bytes, offset, length.
 const ENTRY: u64 = 64;
@@ -43,10 +44,8 @@ impl Pak {
         let mut header = [0; 12];
         file.read_exact(&mut header)
             .map_err(|_| bad("the header is cut short"))?;
-        let [ident, offset, length] = [0, 4, 8].map(|at| {
-            let word = header.get(at..).and_then(|rest| rest.first_chunk::<4>());
-            word.copied().unwrap_or_default()
-        });
+        let words = header.as_chunks::<4>().0;
+        let [ident, offset, length] = [0, 1, 2].map(|at| item(words, at));
         let (offset, length) = (u32::from_le_bytes(offset), u32::from_le_bytes(length));
         if &ident != b"PACK" {
             return Err(bad("it does not begin with PACK"));
@@ -68,11 +67,9 @@ impl Pak {
             let (raw, place) = entry.split_at(56);
             let end = raw.iter().position(|&b| b == 0).unwrap_or(raw.len());
             let stored = String::from_utf8_lossy(raw.get(..end).unwrap_or(raw)).replace('\\', "/");
-            let word = |at: usize| {
-                let word = place.get(at..).and_then(|rest| rest.first_chunk::<4>());
-                u64::from(u32::from_le_bytes(word.copied().unwrap_or_default()))
-            };
-            let (start, length) = (word(0), word(4));
+            let words = place.as_chunks::<4>().0;
+            let word = |at: usize| u64::from(u32::from_le_bytes(item(words, at)));
+            let (start, length) = (word(0), word(1));
             if start + length > size {
                 return Err(FileError::Entry {
                     pack: name,
@@ -98,6 +95,7 @@ impl GameFiles for Pak {
     fn read(&self, path: &str) -> Result<Option<Vec<u8>>, FileError> {
         let entry = self.index.get(&normalise(path)?);
         let Some((stored, start, length)) = entry.and_then(|&at| self.entries.get(at)) else {
+            // The pack has no such file.
             return Ok(None);
         };
         if *length > MAX_FILE_BYTES {

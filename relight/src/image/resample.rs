@@ -1,5 +1,7 @@
 //! Sizes of textures: powers of two, and mip chains.
 
+use support::slice::item;
+
 use super::Image;
 
 impl Image {

@@ -11,6 +11,7 @@ use crate::overbright::luminance;
 use glam::{Vec2, Vec3, Vec4};
 use shaderscript::eval::{self, ColorContext};
 use shaderscript::{ImplicitKind, RgbGen, Shader, Stage, StageImage, TcGen};
+use support::slice;
 
 /// Samples along each side of a texture.
 const GRID: u32 = 16;
@@ -56,7 +57,7 @@ pub(super) fn shades<'a>(
     corners: [u8; 4],
     image: impl FnMut(&str) -> Option<&'a Image>,
 ) -> Vec<Shade> {
-    let start = TIMES.get(..1).unwrap_or_default();
+    let start = slice::part(&TIMES, ..1);
     // Stages are composed display-encoded, as in the shaders.
     let sum = Sum {
         table: &std::array::from_fn(|byte| byte as f32 / 255.0),
@@ -120,7 +121,7 @@ fn emission_role(stage: &Stage) -> Role {
 
 /// Role of a stage on surfaces that are lit in this manner.
 fn light_role(shader: &Shader, index: usize, lighting: ImplicitKind) -> Role {
-    let Some(stage) = shader.stages.get(index) else {
+    let Some(stage) = slice::get(&shader.stages, index) else {
         return Role::Nothing;
     };
     if !is_reflection(shader, stage) {
@@ -267,6 +268,7 @@ fn texel(
         _ => {}
     }
     let Some(picture) = pictures.get(stage.image.frame(time)).copied().flatten() else {
+        // The image is missing.
         return Vec4::ZERO;
     };
     let st = eval::apply_tc_mods(&stage.tc_mods, st, Vec3::ZERO, time, Vec2::ZERO);

@@ -16,6 +16,7 @@ use crate::occluders::Occluders;
 use crate::world::RelitWorld;
 use support::parallel;
 use support::random::Random;
+use support::slice;
 
 /// Comparison of lists with rays: see [`judge`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -91,7 +92,7 @@ pub fn judge(
             let mut arrived = 0.0f64;
             let mut leaks = false;
             for i in 0..rays {
-                let Some(receiver) = receivers.get(i as usize % receivers.len()) else {
+                let Some(receiver) = slice::get(receivers, i as usize % receivers.len()) else {
                     break;
                 };
                 let (point, bare) = target.sample(receiver, &mut random);

@@ -45,7 +45,7 @@ pub(crate) use surfaces::{
 fn lists_of(world: &crate::world::RelitWorld, facing: bool) -> LightLists {
     let clusters = Clusters::new(&world.bsp);
     let sky = |s: &crate::world::WorldSurface| {
-        let material = world.materials.get(s.material as usize);
+        let material = world.material_of(s);
         material.is_some_and(crate::world::WorldMaterial::is_sky)
     };
     let (lights, points) = (&world.lights, &world.point_lights);

@@ -8,6 +8,7 @@ use std::f32::consts::PI;
 use support::Aabb;
 use support::parallel;
 use support::random::Random;
+use support::slice;
 
 /// Distance of a receiver from its surface, id units.
 const LIFT: f32 = 0.5;
@@ -75,10 +76,9 @@ fn points_on_surfaces(
     let mut total = 0.0f32;
     for surface in listed
         .into_iter()
-        .filter_map(|id| world.surfaces.get(id.index()))
+        .filter_map(|id| slice::get(&world.surfaces, id.index()))
     {
-        let first = surface.first_index as usize / 3;
-        for triangle in first..first + surface.num_indices as usize / 3 {
+        for triangle in surface.triangles() {
             let Some([a, b, c]) = world.triangle(triangle) else {
                 continue;
             };
@@ -104,7 +104,7 @@ fn points_on_surfaces(
         let found = triangles
             .partition_point(|(end, _)| *end <= at)
             .min(triangles.len() - 1);
-        let Some(&(_, [a, b, c])) = triangles.get(found) else {
+        let Some(&(_, [a, b, c])) = slice::get(&triangles, found) else {
             break;
         };
         let (u, v) = random.in_triangle();

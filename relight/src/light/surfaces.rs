@@ -6,6 +6,7 @@ use super::{
 };
 use crate::world::{NO_LIGHT, RelitWorld, WorldMaterial, WorldSurface};
 use glam::Vec3;
+use support::slice::{self, part};
 
 /// Smallest area of an emitting triangle, square id units: below it the light is less than rounding and the normal
 /// is noise.
@@ -69,13 +70,13 @@ pub(crate) fn add_triangle_lights_of(world: &mut RelitWorld, chosen: impl Fn(u32
     let mut summaries: Vec<Option<EmitterSummary>> = vec![None; world.materials.len()];
     let mut lights = std::mem::take(&mut world.lights);
     for index in 0..world.surfaces.len() {
-        let Some(surface) = world.surfaces.get(index).copied() else {
+        let Some(surface) = slice::get(&world.surfaces, index).copied() else {
             continue;
         };
         if !chosen(surface.material) {
             continue;
         }
-        let material = world.materials.get(surface.material as usize);
+        let material = slice::get(&world.materials, surface.material as usize);
         let Some((material, emission)) = material.and_then(|m| Some((m, m.emission?))) else {
             continue;
         };
@@ -88,7 +89,7 @@ pub(crate) fn add_triangle_lights_of(world: &mut RelitWorld, chosen: impl Fn(u32
             emission,
             &mut lights,
         );
-        let made = lights.get(first..).unwrap_or_default();
+        let made = part(&lights, first..);
         world.report.degenerate_triangles += degenerate;
         for (light, at) in made.iter().zip(first as u32..) {
             if let Some(slot) = world.triangle_lights.get_mut(light.triangle as usize) {
@@ -100,6 +101,7 @@ pub(crate) fn add_triangle_lights_of(world: &mut RelitWorld, chosen: impl Fn(u32
             surface.num_lights = made.len() as u32;
         }
         let Some(brightest) = made.first() else {
+            // No triangle of the surface has an area.
             continue;
         };
         if let Some(slot) = summaries.get_mut(surface.material as usize) {

@@ -8,6 +8,7 @@ use glam::Vec3;
 use support::Aabb;
 use support::parallel;
 use support::random::Random;
+use support::slice;
 
 /// Part of a cluster's light that its list may lack. One code of an sRGB display is about 2.4 / (code + 14) of the
 /// light: 0.9 % at the bright end and more below. This is at most a quarter of it.
@@ -116,7 +117,8 @@ fn trace_pair(
     let mut peak = 0.0f32;
     let start = (random.uniform() * receivers.len() as f32) as usize;
     while rays < most && tries < 2 * most && (hits == 0 || rays < ENOUGH_RAYS) {
-        let Some(receiver) = receivers.get((start + tries as usize) % receivers.len()) else {
+        let Some(receiver) = slice::get(receivers, (start + tries as usize) % receivers.len())
+        else {
             break;
         };
         tries += 1;

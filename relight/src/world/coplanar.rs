@@ -8,6 +8,7 @@ use glam::{Vec2, Vec3};
 use shaderscript::Cull;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use support::slice::{self, item};
 
 /// Largest distance of coplanar surfaces, id units. Compilers compute both surfaces' corners from the same plane in
 /// single precision; surfaces that mappers place before a wall are 1/16 or more away.
@@ -95,7 +96,7 @@ impl RelitWorld {
     /// have rank 0.
     pub fn stacked(&self) -> Vec<Stacked> {
         let sheet = |surface: &WorldSurface| {
-            let material = self.materials.get(surface.material as usize);
+            let material = self.material_of(surface);
             let shader = material.map(|m| &m.resolved.shader);
             let first = surface.first_index as usize / 3;
             let drawn = material.is_some_and(|m| {
@@ -159,11 +160,11 @@ pub fn stack(sheets: &[Sheet]) -> Vec<Stacked> {
     let shows_both = |sheet: usize| sheets.get(sheet).is_some_and(|s| s.cull == Cull::None);
     let mut stacked = vec![Stacked::default(); sheets.len()];
     for &upper in &rising {
-        let Some(cull) = sheets.get(upper).map(|s| s.cull) else {
+        let Some(cull) = slice::get(sheets, upper).map(|s| s.cull) else {
             continue;
         };
         let below = || on.get(upper).into_iter().flatten();
-        let of = |sheet: usize| stacked.get(sheet).copied().unwrap_or_default();
+        let of = |sheet: usize| item(&stacked, sheet);
         let rank = below().map(|&(lower, _)| of(lower).below + 1).max();
         let on_back = match cull {
             Cull::Front => false,

@@ -2,7 +2,9 @@
 
 use crate::overbright;
 use glam::{Vec2, Vec3};
-use q3bsp::{Bsp, DrawVert, PatchMesh, Plane, SurfaceKind};
+use q3bsp::{Bsp, DrawVert, PatchMesh, Plane, Surface, SurfaceKind};
+use std::ops::Range;
+use support::slice::{part, part_mut, span};
 
 /// [`RelitWorld::triangle_lights`](crate::RelitWorld::triangle_lights) of a triangle that emits nothing.
 pub const NO_LIGHT: u32 = u32::MAX;
@@ -60,6 +62,13 @@ pub struct WorldSurface {
     pub plane: Option<Plane>,
 }
 
+impl WorldSurface {
+    /// Its triangles, as places in [`RelitWorld::indices`](crate::RelitWorld::indices) divided by three.
+    pub fn triangles(&self) -> Range<usize> {
+        span(self.first_index / 3, self.num_indices / 3)
+    }
+}
+
 /// A brush model: a range of surfaces, and where the map's entities put it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorldModel {
@@ -112,32 +121,27 @@ impl Geometry {
     pub fn add(
         &mut self,
         bsp: &Bsp,
-        index: usize,
+        surface: &Surface,
         patch: Option<&PatchMesh>,
         shift: u32,
     ) -> Placed {
         let first_vertex = self.vertices.len() as u32;
         let first_index = self.indices.len() as u32;
         let mut plane = None;
-        let kind = bsp
-            .surfaces
-            .get(index)
-            .map_or(SurfaceKind::Flare, |s| s.kind);
-        match (kind, patch) {
+        match (surface.kind, patch) {
             (SurfaceKind::Patch, Some(patch)) => {
                 let vertices: Vec<_> = patch.vertices.iter().map(DrawVert::finite).collect();
                 self.append(&vertices, &patch.indices(), shift);
             }
             (SurfaceKind::Planar | SurfaceKind::TriangleSoup, _) => {
-                let (vertices, corners) = polygon(bsp, index);
+                let (vertices, corners) = polygon(bsp, surface);
                 self.append(&vertices, &corners, shift);
-                if kind == SurfaceKind::Planar {
-                    plane = self.flatten(first_vertex, first_index, stored_normal(bsp, index));
+                if surface.kind == SurfaceKind::Planar {
+                    plane = self.flatten(first_vertex, first_index, stored_normal(surface));
                 }
             }
             (SurfaceKind::Foliage, _) => {
-                let surface = bsp.surfaces.get(index);
-                if let Some((vertices, corners)) = surface.and_then(|s| bsp.foliage_mesh(s)) {
+                if let Some((vertices, corners)) = bsp.foliage_mesh(surface) {
                     let vertices: Vec<_> = vertices.iter().map(DrawVert::finite).collect();
                     self.append(&vertices, &corners, shift);
                 }
@@ -145,10 +149,7 @@ impl Geometry {
             _ => {}
         }
         self.repair_normals(first_vertex, first_index);
-        let added = self
-            .vertices
-            .get(first_vertex as usize..)
-            .unwrap_or_default();
+        let added = part(&self.vertices, first_vertex as usize..);
         let mut bounds = added.iter().map(|v| v.position);
         let first = bounds.next().unwrap_or(Vec3::ZERO);
         let (mins, maxs) = bounds.fold((first, first), |(lo, hi), p| (lo.min(p), hi.max(p)));
@@ -204,7 +205,7 @@ impl Geometry {
     /// Whether a triangle from `first_index` on, except slivers, deviates by more than about eight degrees from
     /// `normal`.
     fn bends(&self, first_index: u32, normal: Vec3) -> bool {
-        let corners = self.indices.get(first_index as usize..).unwrap_or_default();
+        let corners = part(&self.indices, first_index as usize..);
         corners.as_chunks::<3>().0.iter().any(|triangle| {
             let front = self.triangle_front(triangle);
             let area = front.length();
@@ -215,7 +216,7 @@ impl Geometry {
 
     /// Area-weighted front normal of the triangles from `first_index` on.
     fn front(&self, first_index: u32) -> Vec3 {
-        let corners = self.indices.get(first_index as usize..).unwrap_or_default();
+        let corners = part(&self.indices, first_index as usize..);
         corners
             .as_chunks::<3>()
             .0
@@ -238,16 +239,11 @@ impl Geometry {
     fn repair_normals(&mut self, first_vertex: u32, first_index: u32) {
         let first_vertex = first_vertex as usize;
         let broken = |v: &WorldVertex| v.normal.normalize_or_zero() == Vec3::ZERO;
-        let added = self.vertices.get(first_vertex..).unwrap_or_default();
+        let added = part(&self.vertices, first_vertex..);
         if added.iter().any(broken) {
             let mut fronts = vec![Vec3::ZERO; added.len()];
-            for corners in self
-                .indices
-                .get(first_index as usize..)
-                .unwrap_or_default()
-                .as_chunks::<3>()
-                .0
-            {
+            let corners = part(&self.indices, first_index as usize..);
+            for corners in corners.as_chunks::<3>().0 {
                 let front = self.triangle_front(corners);
                 for &corner in corners {
                     if let Some(sum) = fronts.get_mut((corner as usize).wrapping_sub(first_vertex))
@@ -256,25 +252,22 @@ impl Geometry {
                     }
                 }
             }
-            let added = self.vertices.get_mut(first_vertex..).unwrap_or_default();
+            let added = part_mut(&mut self.vertices, first_vertex..);
             for (vertex, front) in added.iter_mut().zip(fronts) {
                 if broken(vertex) {
                     vertex.normal = front.normalize_or(Vec3::Z);
                 }
             }
         }
-        for vertex in self.vertices.get_mut(first_vertex..).unwrap_or_default() {
+        for vertex in part_mut(&mut self.vertices, first_vertex..) {
             vertex.normal = vertex.normal.normalize_or(Vec3::Z);
         }
     }
 }
 
 /// A planar surface's stored normal, finite.
-fn stored_normal(bsp: &Bsp, index: usize) -> Vec3 {
-    let stored = bsp
-        .surfaces
-        .get(index)
-        .map_or(Vec3::ZERO, |s| s.lightmap_vecs[2]);
+fn stored_normal(surface: &Surface) -> Vec3 {
+    let stored = surface.lightmap_vecs[2];
     if stored.is_finite() {
         stored
     } else {
@@ -283,21 +276,12 @@ fn stored_normal(bsp: &Bsp, index: usize) -> Vec3 {
 }
 
 /// Vertices and triangle corners of a planar surface or a triangle soup.
-fn polygon(bsp: &Bsp, index: usize) -> (Vec<DrawVert>, Vec<u32>) {
-    let Some(surface) = bsp.surfaces.get(index) else {
-        return Default::default();
-    };
+fn polygon(bsp: &Bsp, surface: &Surface) -> (Vec<DrawVert>, Vec<u32>) {
     let vertices: Vec<_> = bsp
         .surface_vertices(surface)
         .iter()
         .map(DrawVert::finite)
         .collect();
-    let count = vertices.len() as u32;
-    let triangles = bsp.surface_indices(surface).as_chunks::<3>().0.iter();
-    let corners = triangles
-        .map(|c| c.map(|i| u32::try_from(i).unwrap_or(u32::MAX)))
-        .filter(|c| c.iter().all(|&i| i < count))
-        .flatten()
-        .collect();
+    let corners = bsp.surface_triangles(surface).flatten().collect();
     (vertices, corners)
 }

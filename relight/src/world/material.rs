@@ -6,7 +6,7 @@ use crate::emitters::{self, Emission, Flicker, Shade};
 use crate::materials::Resolved;
 use crate::materials::light::{LightClass, classify};
 use glam::Vec3;
-use q3bsp::{Bsp, SurfaceKind, lightmap_index};
+use q3bsp::{Bsp, Surface, SurfaceKind, lightmap_index};
 use shaderscript::ImplicitKind;
 use std::sync::Arc;
 
@@ -96,10 +96,7 @@ impl WorldMaterial {
 
 /// Lightmap index that the engine uses for a surface: triangle soups are lit by vertex, as are surfaces with a page
 /// or code that does not exist.
-pub(crate) fn lightmap_of(bsp: &Bsp, index: usize) -> i32 {
-    let Some(surface) = bsp.surfaces.get(index) else {
-        return lightmap_index::BY_VERTEX;
-    };
+pub(crate) fn lightmap_of(bsp: &Bsp, surface: &Surface) -> i32 {
     let page = usize::try_from(surface.lightmap).ok();
     match surface.kind {
         SurfaceKind::TriangleSoup | SurfaceKind::Flare | SurfaceKind::Foliage => {

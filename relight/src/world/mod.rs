@@ -24,6 +24,7 @@ use crate::exposure::{self, Exposure};
 use crate::overbright;
 use glam::Vec3;
 use q3bsp::{Bsp, Lightmap};
+use support::slice::{self, part, span};
 
 /// A map prepared for tracing and rasterization.
 ///
@@ -116,6 +117,27 @@ impl RelitWorld {
             texels
                 .flat_map(|&texel| overbright::shift(texel, shift))
                 .collect(),
+        )
+    }
+
+    /// The material of a surface.
+    pub fn material_of(&self, surface: &WorldSurface) -> Option<&WorldMaterial> {
+        slice::get(&self.materials, surface.material as usize)
+    }
+
+    /// The vertices of a surface.
+    pub fn vertices_of(&self, surface: &WorldSurface) -> &[WorldVertex] {
+        part(
+            &self.vertices,
+            span(surface.first_vertex, surface.num_vertices),
+        )
+    }
+
+    /// The indices of a surface, three a triangle.
+    pub fn indices_of(&self, surface: &WorldSurface) -> &[u32] {
+        part(
+            &self.indices,
+            span(surface.first_index, surface.num_indices),
         )
     }
 

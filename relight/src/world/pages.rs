@@ -11,6 +11,7 @@ use crate::materials::light::{BakedLight, baked_light};
 use q3bsp::Lightmap;
 use shaderscript::{Shader, Stage, StageImage, TcMod};
 use std::collections::HashMap;
+use support::slice::item;
 
 /// Baked light of a material besides the page that the map assigns to each surface.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -103,9 +104,9 @@ fn square(image: &Image) -> Lightmap {
     let side = image.width.max(image.height) as usize;
     let (width, height) = (image.width as usize, image.height as usize);
     let texels = image.rgba.as_chunks::<4>().0;
-    let at = |x: usize, y: usize| texels.get(y * height / side * width + x * width / side);
+    let at = |x: usize, y: usize| item(texels, y * height / side * width + x * width / side);
     let bytes = (0..side * side).flat_map(|i| {
-        let [r, g, b, _] = at(i % side, i / side).copied().unwrap_or_default();
+        let [r, g, b, _] = at(i % side, i / side);
         [r, g, b]
     });
     Lightmap(bytes.collect())

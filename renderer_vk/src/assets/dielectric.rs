@@ -5,6 +5,7 @@ use relight::materials::light::{self, LightLinear};
 use shaders::types::{self, constants as c};
 use shaderscript::Shader;
 use shaderscript::surface_params::CONTENTS_SLIME;
+use support::slice::{part, span};
 
 use super::compile::StageArrays;
 use super::flags::has_vertex_light;
@@ -29,11 +30,7 @@ fn mean_layer(
             sample.texture = Vec4::W;
             continue;
         }
-        let first = stage.image_first as usize;
-        let images = arrays
-            .images
-            .get(first..first + stage.image_count as usize)
-            .unwrap_or_default();
+        let images = part(&arrays.images, span(stage.image_first, stage.image_count));
         if !images.is_empty() {
             let sum: Vec4 = images.iter().map(|&image| source.mean(image)).sum();
             sample.texture = sum / images.len() as f32;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use shaders::types;
 use shaderscript::{ImplicitKind, RgbGen, Shader, StageImage, strip_extension};
+use support::slice::{part, span};
 
 mod changes;
 mod listing;
@@ -524,11 +525,8 @@ impl Materials {
 
     /// The stages, on the CPU; samplers are kinds, not bindless indices.
     pub fn stages(&self, material: &Material) -> &[types::Stage] {
-        let first = material.stage_first as usize;
-        self.arrays
-            .stages
-            .get(first..first + material.stage_count as usize)
-            .unwrap_or_default()
+        let range = span(material.stage_first, material.stage_count);
+        part(&self.arrays.stages, range)
     }
 
     /// Bindless texture of a stage of one still image, and whether it ends at its edges instead of repeating.

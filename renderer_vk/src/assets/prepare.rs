@@ -5,6 +5,7 @@
 use glam::{Vec3, Vec4};
 use relight::image::Image;
 use relight::overbright;
+use support::slice::item;
 
 use super::source::ImageFlags;
 use crate::settings::Settings;
@@ -132,7 +133,7 @@ fn weighted(image: &Image) -> Image {
     let texels = image.rgba.as_chunks::<4>().0;
     let at = |x: u32, y: u32| {
         let index = (y % image.height) as usize * image.width as usize + (x % image.width) as usize;
-        texels.get(index).copied().unwrap_or_default()
+        item(texels, index)
     };
     const WEIGHTS: [u32; 4] = [1, 2, 2, 1];
     let mut rgba = Vec::with_capacity(width as usize * height as usize * 4);

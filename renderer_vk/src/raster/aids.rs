@@ -3,6 +3,7 @@
 use glam::Vec2;
 use shaders::types::constants as c;
 use shaders::types::{Draw, Vertex};
+use support::slice::{self, part};
 
 use super::list::{DepthRange, DrawList};
 use super::overlay::{Overlay, Picture2d};
@@ -62,9 +63,7 @@ impl DrawList {
     /// Draws the normals of the vertices that the indices of a span use. `statics` are the world's
     /// vertices; the view's own are in the list.
     pub(super) fn push_normals(&mut self, span: (u32, u32), statics: &[Vertex], draw: Draw) {
-        let range = span.0 as usize..(span.0 + span.1) as usize;
-        let used = self.indices.get(range).unwrap_or_default();
-        let mut used = used.to_vec();
+        let mut used = part(&self.indices, slice::span(span.0, span.1)).to_vec();
         used.sort_unstable();
         used.dedup();
         let start = self.indices.len() as u32;
@@ -74,7 +73,7 @@ impl DrawList {
             } else {
                 statics
             };
-            let Some(&vertex) = source.get(index as usize) else {
+            let Some(&vertex) = slice::get(source, index as usize) else {
                 continue;
             };
             let tip = vertex.position + vertex.normal * NORMAL_LENGTH;
@@ -120,9 +119,7 @@ impl DrawList {
         for &size in &polygons.sizes {
             let corners = first..first + size as usize;
             first = corners.end;
-            let Some(corners) = polygons.vertices.get(corners) else {
-                return;
-            };
+            let corners = part(&polygons.vertices, corners);
             let base = self.vertices.len() as u32;
             let start = self.indices.len() as u32;
             self.vertices.extend_from_slice(corners);

@@ -9,6 +9,7 @@
 use shaders::types::Draw;
 use shaders::types::constants as c;
 use shaderscript::sort;
+use support::slice::{part, span};
 
 use super::list::{Call, DepthRange, DrawList};
 use super::pipelines::{CullFaces, Depth, State};
@@ -111,10 +112,8 @@ impl DrawList {
             let Some(&first) = run.first() else { continue };
             let first_index = self.indices.len() as u32;
             for occluder in run {
-                let from = occluder.first_index as usize;
-                let span = from..from.saturating_add(occluder.index_count as usize);
-                self.indices
-                    .extend_from_slice(indices.get(span).unwrap_or_default());
+                let own = part(indices, span(occluder.first_index, occluder.index_count));
+                self.indices.extend_from_slice(own);
             }
             let draw = self.draws.len() as u32;
             self.draws.push(Draw {

@@ -11,6 +11,7 @@
 
 use shaders::types::constants as c;
 use shaders::types::{Draw, Instance};
+use support::slice::{self, part};
 
 use super::aids::Aids;
 use super::depth_first;
@@ -90,7 +91,7 @@ pub(super) struct GroupContext<'a> {
 
 impl GroupContext<'_> {
     fn instance(&self, group: &Group) -> Option<&Instance> {
-        self.scene.instances.get(group.common.instance as usize)
+        slice::get(&self.scene.instances, group.common.instance as usize)
     }
 
     fn plain_state(&self, material: &Material) -> State {
@@ -177,7 +178,7 @@ impl DrawList {
             let order_free = depth_first::order_free(material);
             groups.clear();
             loop {
-                let begin = surfaces.get(next..).unwrap_or_default();
+                let begin = part(surfaces, next..);
                 if begin.first().is_some_and(|s| wanted(&Common::of(s))) {
                     let group = self.gather_group(next, context);
                     next += group.surfaces.1;
@@ -219,7 +220,7 @@ impl DrawList {
 
     /// The group that begins with a surface, with its indices copied.
     fn gather_group(&mut self, first: usize, context: &GroupContext<'_>) -> Group {
-        let surfaces = context.surfaces.get(first..).unwrap_or_default();
+        let surfaces = part(context.surfaces, first..);
         let common = surfaces.first().map(Common::of);
         let count = Common::run(surfaces);
         let first_index = self.indices.len() as u32;
@@ -234,7 +235,7 @@ impl DrawList {
             lightmap: c::NO_TEXTURE,
             dynamic: false,
         });
-        let instance = context.scene.instances.get(common.instance as usize);
+        let instance = slice::get(&context.scene.instances, common.instance as usize);
         let has = |bit: u32| instance.is_some_and(|i| i.flags & bit != 0);
         let range = match (has(c::INSTANCE_DEPTH_HACK), has(c::INSTANCE_CROSSHAIR)) {
             (true, false) => DepthRange::Near,
@@ -255,8 +256,8 @@ impl DrawList {
         for group in groups {
             if !group.common.dynamic && group.range == DepthRange::Normal {
                 let (first, count) = group.surfaces;
-                let surfaces = context.surfaces.get(first..first + count);
-                self.note_depth(material, plain, surfaces.unwrap_or_default());
+                let surfaces = part(context.surfaces, first..first + count);
+                self.note_depth(material, plain, surfaces);
             }
         }
         let aids = context.aids;
@@ -313,8 +314,7 @@ impl DrawList {
             return;
         }
         let (first, count) = group.surfaces;
-        let surfaces = context.surfaces.get(first..first + count);
-        let surfaces = surfaces.unwrap_or_default();
+        let surfaces = part(context.surfaces, first..first + count);
         let lights = surfaces.iter().fold(0, |all, s| all | s.dlights);
         for (i, light) in (0..).zip(context.scene.dlights.iter().take(MAX_LIGHTS)) {
             if lights & (1 << i) == 0 {

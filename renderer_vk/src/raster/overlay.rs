@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 use shaders::types::constants as c;
 use shaders::types::{Draw, Instance, Vertex};
 use shaderscript::eval::{self, DeformContext, DeformVertex};
+use support::slice::part;
 
 use super::aids::Aids;
 use super::list::{Call, DepthRange, DrawList, faces, stage_depth};
@@ -131,8 +132,7 @@ impl Overlay {
     fn geometry(&self, run: &Run, stages: &StageContext<'_>, time: f32, list: &mut DrawList) {
         let base = list.vertices.len() as u32;
         let first = run.first as usize * 4;
-        let vertices = self.vertices.get(first..first + run.count as usize * 4);
-        let vertices = vertices.unwrap_or_default();
+        let vertices = part(&self.vertices, first..first + run.count as usize * 4);
         let quads = (0..run.count * 4).step_by(4);
         let indices = quads.flat_map(|v| [v, v + 1, v + 2, v, v + 2, v + 3]);
         let material = match run.content {

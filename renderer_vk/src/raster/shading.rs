@@ -6,6 +6,7 @@ use shaders::constant_ids::raster::draw as id;
 use shaders::types::constants as c;
 use shaders::types::{DRAW_STAGES, Draw, Instance};
 use shaderscript::{AlphaGen, RgbGen, TcMod, WaveFunction, eval};
+use support::slice;
 
 use crate::assets::compile::sampler;
 use crate::assets::{Combine, Material, Materials, RasterPass, Samplers};
@@ -209,7 +210,7 @@ impl StageContext<'_> {
             let index = pass.stages[part];
             draw.stages[place] = index;
             let script = script_stage(material, index);
-            let Some(stage) = self.materials.arrays().stages.get(index as usize) else {
+            let Some(stage) = slice::get(&self.materials.arrays().stages, index as usize) else {
                 continue;
             };
             if let Some(texture) = self.stage_texture(stage, lightmap, time) {

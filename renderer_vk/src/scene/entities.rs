@@ -169,6 +169,7 @@ impl Gatherer<'_> {
             return;
         };
         let Some(brush) = world.models.get(model as usize).copied() else {
+            // The game names a model that the map does not have.
             return;
         };
         if self.culls_box(entity, &brush.bounds) {
@@ -193,7 +194,7 @@ impl Gatherer<'_> {
                 let reached = surfaces::lights_at(&lights, &brush.bounds) != 0;
                 lights.truncate(usize::from(reached));
                 // its box was tested; its surfaces are tested by facing alone
-                let placed = out.instances.get(instance as usize);
+                let placed = slice::get(&out.instances, instance as usize);
                 let local = LocalView {
                     eye: placed.map_or(Vec3::ZERO, |i| i.viewer),
                     frustum: &[],

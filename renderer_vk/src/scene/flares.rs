@@ -7,6 +7,7 @@ use glam::{Vec2, Vec3};
 use q3bsp::SurfaceKind;
 use relight::world::Flare;
 use shaders::types;
+use support::slice;
 
 use super::View;
 use super::entity::to_world;
@@ -40,7 +41,7 @@ pub(super) struct FlareView<'a> {
 impl FlareView<'_> {
     /// The flare of a surface placed by an instance, if it is in sight. `instance` is the number of `placed`.
     pub fn find(&self, surface: u32, instance: u32, placed: &types::Instance) -> Option<ViewFlare> {
-        let stored = self.world.surfaces.get(surface as usize)?;
+        let stored = slice::get(&self.world.surfaces, surface as usize)?;
         if stored.kind != SurfaceKind::Flare {
             return None;
         }

@@ -65,6 +65,7 @@ pub(super) fn views(
     def: &RefDef,
     look: Look,
 ) -> Vec<ViewScene> {
+    // New lists if none can be used again.
     let mut out = scene.lists.pop().unwrap_or_default();
     let mut view = View::new(def, input.settings.znear, FAR_WITHOUT_WORLD);
     view.stereo = scene.eye.stereo(input.settings);
@@ -338,7 +339,7 @@ impl<'a> Gatherer<'a> {
         out: &mut ViewScene,
     ) {
         let shown = self.input.settings.flares;
-        let Some(placed) = out.instances.get(instance as usize).filter(|_| shown) else {
+        let Some(placed) = slice::get(&out.instances, instance as usize).filter(|_| shown) else {
             return;
         };
         let view = FlareView {
@@ -373,7 +374,7 @@ impl<'a> Gatherer<'a> {
     }
 
     pub(super) fn traced_deform(&self, world: &WorldData, surface: u32) -> Option<PendingDeform> {
-        let found = world.surfaces.get(surface as usize)?;
+        let found = slice::get(&world.surfaces, surface as usize)?;
         (found.index_count > 0).then(|| PendingDeform {
             surface,
             material: self.input.materials.resolve(found.material),
@@ -392,7 +393,7 @@ impl<'a> Gatherer<'a> {
         out: &mut ViewScene,
     ) {
         for deform in pending.drain(..) {
-            let Some(surface) = world.surfaces.get(deform.surface as usize) else {
+            let Some(surface) = slice::get(&world.surfaces, deform.surface as usize) else {
                 continue;
             };
             let turns = self.input.materials.get(deform.material).turns_to_eye();
@@ -418,10 +419,7 @@ impl<'a> Gatherer<'a> {
                     .filter(|_| self.look == Look::Classic);
                 out.vertices.extend_from_slice(classic.unwrap_or(own));
                 out.indices.extend(
-                    world
-                        .indices
-                        .get(range)
-                        .unwrap_or_default()
+                    part(&world.indices, range)
                         .iter()
                         .map(|i| i.wrapping_sub(surface.first_vertex).wrapping_add(base)),
                 );
@@ -510,7 +508,7 @@ impl<'a> Gatherer<'a> {
         let polys = self.polys;
         for poly in polys {
             let range = poly.first_vertex..poly.first_vertex + poly.vertex_count;
-            let corners = self.poly_vertices.get(range).unwrap_or_default();
+            let corners = part(self.poly_vertices, range);
             let darkens = || only_darkens(&self.input.materials.get(poly.material).shader);
             if self.look == Look::Traced && darkens() && is_painted_shadow(corners, self.entities) {
                 continue;

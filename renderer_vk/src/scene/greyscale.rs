@@ -4,6 +4,7 @@
 //! stages compute from is linear in these colours, so it is taken out of them.
 
 use glam::Vec3;
+use support::slice::{part_mut, span};
 
 use super::ViewScene;
 use crate::assets::{desaturate, grey};
@@ -23,9 +24,8 @@ impl ViewScene {
             light.color = grey(light.color, amount);
         }
         for mesh in self.meshes.iter().filter(|m| m.world_surface.is_none()) {
-            let first = mesh.first_vertex as usize;
-            let range = first..first + mesh.vertex_count as usize;
-            for vertex in self.vertices.get_mut(range).unwrap_or_default() {
+            let range = span(mesh.first_vertex, mesh.vertex_count);
+            for vertex in part_mut(&mut self.vertices, range) {
                 let mut color = vertex.color.to_le_bytes();
                 desaturate(&mut color, amount);
                 vertex.color = u32::from_le_bytes(color);

@@ -4,6 +4,7 @@ use glam::Vec3;
 use shaders::types::Vertex;
 use shaderscript::Deform;
 use shaderscript::eval::{self, DeformContext, DeformVertex, ShadowProjection};
+use support::slice::{self, part};
 
 use super::entity::into_axes;
 use super::{DynamicMesh, Shape, View, ViewScene, turned};
@@ -59,7 +60,7 @@ impl ViewScene {
     /// Adds the shadow volumes of a mesh, before it is deformed.
     pub(super) fn add_shadow_volumes(&mut self, raw: &RawMesh) {
         let (Some(instance), Some(vertices), Some(indices), Ok(base)) = (
-            self.instances.get(raw.instance as usize),
+            slice::get(&self.instances, raw.instance as usize),
             self.vertices.get(raw.first_vertex..),
             self.indices.get(raw.first_index..),
             u32::try_from(raw.first_vertex),
@@ -124,7 +125,7 @@ fn deform(
     scratch: &mut DeformScratch,
     out: &mut ViewScene,
 ) {
-    let Some(instance) = out.instances.get(raw.instance as usize).copied() else {
+    let Some(instance) = slice::get(&out.instances, raw.instance as usize).copied() else {
         return;
     };
     let base = u32::try_from(raw.first_vertex).unwrap_or(u32::MAX);
@@ -135,7 +136,7 @@ fn deform(
     } = scratch;
     vertices.clear();
     lightmaps.clear();
-    for v in out.vertices.get(raw.first_vertex..).unwrap_or_default() {
+    for v in part(&out.vertices, raw.first_vertex..) {
         lightmaps.push(v.lightmap);
         vertices.push(DeformVertex {
             position: v.position,
@@ -145,7 +146,7 @@ fn deform(
         });
     }
     indices.clear();
-    let raw_indices = out.indices.get(raw.first_index..).unwrap_or_default();
+    let raw_indices = part(&out.indices, raw.first_index..);
     indices.extend(raw_indices.iter().map(|i| i.wrapping_sub(base)));
     let texts: [&[u8]; 8] = std::array::from_fn(|i| def.text[i].as_slice());
     let scaled = entity.filter(|e| e.non_normalized_axes);

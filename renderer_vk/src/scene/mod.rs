@@ -30,6 +30,7 @@ use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
 use shaders::types::{Instance, Vertex};
+use support::slice::{part, span};
 
 use crate::Error;
 use crate::api::{DynamicLight, EntityKind, PolyVert, RefDef, RefEntity};
@@ -271,16 +272,11 @@ impl ViewScene {
                 index_count,
             } => (self.indices.as_slice(), first_index, index_count),
         };
-        let range = first as usize..first as usize + count as usize;
-        source.get(range).unwrap_or_default()
+        part(source, span(first, count))
     }
 
     /// The vertices of a mesh, and its indices, which count from [`MeshGeometry::base`].
     pub fn mesh_geometry(&self, mesh: &DynamicMesh) -> MeshGeometry<'_> {
-        let range = |first: u32, count: u32| {
-            let first = first as usize;
-            first..first.saturating_add(count as usize)
-        };
         if let Shape::Rigid(rigid) = mesh.shape {
             let rigid = self.rigid.get(rigid as usize);
             return MeshGeometry {
@@ -289,13 +285,9 @@ impl ViewScene {
                 base: 0,
             };
         }
-        let vertices = self
-            .vertices
-            .get(range(mesh.first_vertex, mesh.vertex_count));
-        let indices = self.indices.get(range(mesh.first_index, mesh.index_count));
         MeshGeometry {
-            vertices: vertices.unwrap_or_default(),
-            indices: indices.unwrap_or_default(),
+            vertices: part(&self.vertices, span(mesh.first_vertex, mesh.vertex_count)),
+            indices: part(&self.indices, span(mesh.first_index, mesh.index_count)),
             base: mesh.first_vertex,
         }
     }

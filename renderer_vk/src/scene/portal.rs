@@ -5,6 +5,7 @@
 use glam::{Quat, Vec3, Vec4};
 use q3bsp::Plane;
 use shaders::types::Instance;
+use support::slice::{self, part, span};
 
 use super::shapes::perpendicular;
 use super::{DrawSurface, GatherInput, Geometry, Portal, View, ViewScene, entity};
@@ -60,7 +61,7 @@ pub(super) fn find_all(
         return found;
     }
     for &index in &world.portal_surfaces {
-        let Some(surface) = world.surfaces.get(index as usize) else {
+        let Some(surface) = slice::get(&world.surfaces, index as usize) else {
             continue;
         };
         let Some(instance) = placed_model(surface.model, entities, input) else {
@@ -117,11 +118,11 @@ fn placed_model(model: u32, entities: &[RefEntity], input: &GatherInput<'_>) -> 
 /// The plane that the map stores for a surface of the view. Which way is up in a portal depends on the least of its
 /// normal's components, so that of triangles does not do: they may be deformed, and their zeros are not exact.
 fn stored_plane(world: &WorldData, scene: &ViewScene, surface: &DrawSurface) -> Option<Plane> {
-    let instance = scene.instances.get(surface.instance as usize)?;
+    let instance = slice::get(&scene.instances, surface.instance as usize)?;
     let mut portals = world
         .portal_surfaces
         .iter()
-        .filter_map(|&index| world.surfaces.get(index as usize));
+        .filter_map(|&index| slice::get(&world.surfaces, index as usize));
     let found = match surface.geometry {
         Geometry::Static { first_index, .. } => portals.find(|s| {
             s.first_index == first_index || s.classic.is_some_and(|c| c.first_index == first_index)
@@ -129,7 +130,7 @@ fn stored_plane(world: &WorldData, scene: &ViewScene, surface: &DrawSurface) -> 
         Geometry::Dynamic { first_index, .. } => {
             let mut meshes = scene.meshes.iter();
             let mesh = meshes.find(|mesh| mesh.first_index == first_index)?;
-            world.surfaces.get(mesh.world_surface? as usize)?
+            slice::get(&world.surfaces, mesh.world_surface? as usize)?
         }
     };
     found.plane.map(|plane| placed_plane(plane, instance))
@@ -147,7 +148,8 @@ fn placed_plane(plane: Plane, instance: &Instance) -> Plane {
 
 /// World-space triangles of a surface of the view.
 fn triangles(world: &WorldData, scene: &ViewScene, surface: &DrawSurface) -> Vec<[Vec3; 3]> {
-    let Some(instance): Option<&Instance> = scene.instances.get(surface.instance as usize) else {
+    let Some(instance): Option<&Instance> = slice::get(&scene.instances, surface.instance as usize)
+    else {
         return Vec::new();
     };
     let place = |t: [Vec3; 3]| t.map(|p| entity::to_world(instance, p));
@@ -163,14 +165,13 @@ fn triangles(world: &WorldData, scene: &ViewScene, surface: &DrawSurface) -> Vec
             first_index,
             index_count,
         } => {
-            let range = first_index as usize..first_index as usize + index_count as usize;
             let position = |&i: &u32| {
                 scene
                     .vertices
                     .get(i as usize)
                     .map_or(Vec3::ZERO, |v| v.position)
             };
-            let indices = scene.indices.get(range).unwrap_or_default();
+            let indices = part(&scene.indices, span(first_index, index_count));
             let corners = indices.as_chunks::<3>().0.iter();
             corners
                 .map(|t| place([position(&t[0]), position(&t[1]), position(&t[2])]))

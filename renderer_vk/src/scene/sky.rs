@@ -4,6 +4,7 @@
 //! shows the rectangle of its 8 x 8 cells that they span.
 
 use glam::{Vec2, Vec3};
+use support::slice::part;
 
 /// Number of faces, in the order of the box's images: right, back, left, front, up, down.
 pub const FACES: usize = 6;
@@ -122,7 +123,7 @@ impl Polygon {
     }
 
     fn corners(&self) -> &[Vec3] {
-        self.points.get(..self.count).unwrap_or_default()
+        part(&self.points, ..self.count)
     }
 
     /// It has no area as seen from the eye: a triangle that touches a face of the cube with a corner or an edge alone.
@@ -141,7 +142,7 @@ impl Polygon {
     /// Keeps the part where `side` is not negative.
     fn clip(&mut self, side: impl Fn(Vec3) -> f32) {
         let old = self.points;
-        let corners = old.get(..self.count).unwrap_or_default();
+        let corners = part(&old, ..self.count);
         let next = corners.iter().cycle().skip(1);
         let mut count = 0;
         let mut push = |point: Vec3| {

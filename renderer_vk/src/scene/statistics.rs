@@ -198,7 +198,7 @@ impl Gatherer<'_> {
         let axes = [Vec3::X, Vec3::Y, Vec3::Z];
         super::surfaces::local_lights(self.lights, Vec3::ZERO, &axes, &mut lights);
         for &index in &self.visible.surfaces {
-            let Some(surface) = world.surfaces.get(index as usize) else {
+            let Some(surface) = slice::get(&world.surfaces, index as usize) else {
                 continue;
             };
             if surface.kind == SurfaceKind::Patch {

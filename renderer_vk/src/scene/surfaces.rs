@@ -130,7 +130,7 @@ pub(super) struct SurfaceRun<'a> {
 impl SurfaceRun<'_> {
     /// Adds a surface if it is in sight. Returns it when its vertices have to be deformed first.
     pub fn add(&self, index: u32, out: &mut ViewScene) -> Option<PendingDeform> {
-        let surface = self.world.surfaces.get(index as usize)?;
+        let surface = slice::get(&self.world.surfaces, index as usize)?;
         if surface.index_count == 0 || (self.no_curves && surface.kind == SurfaceKind::Patch) {
             return None;
         }
@@ -195,7 +195,7 @@ impl SurfaceRun<'_> {
         index_count: u32,
         out: &mut ViewScene,
     ) {
-        let Some(instance) = out.instances.get(self.instance as usize) else {
+        let Some(instance) = slice::get(&out.instances, self.instance as usize) else {
             return;
         };
         let eye = out.view.origin;

@@ -240,7 +240,7 @@ impl Accel {
             placements.add_map(view, geometry);
         }
         for (index, part) in self.parts.parts.iter().enumerate() {
-            let Some(instance) = view.instances.get(part.instance as usize) else {
+            let Some(instance) = slice::get(&view.instances, part.instance as usize) else {
                 continue;
             };
             let prepared = self

@@ -3,6 +3,7 @@
 
 use glam::{UVec3, Vec3};
 use shaders::trace_types::BspNode;
+use support::slice::part_mut;
 
 /// Boxes, about, at most: 1 MB.
 const MOST_BOXES: f32 = 262_144.0;
@@ -74,7 +75,7 @@ impl Fill<'_> {
                 for y in low.y as usize..high.y as usize {
                     let row = (z * height + y) * width;
                     let row = row + low.x as usize..row + high.x as usize;
-                    self.starts.get_mut(row).unwrap_or_default().fill(start);
+                    part_mut(&mut self.starts, row).fill(start);
                 }
             }
             return;

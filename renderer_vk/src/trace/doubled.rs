@@ -42,14 +42,12 @@ pub fn doubled(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> HashSe
             continue;
         }
         let back = info.flags & c::MATERIAL_CULL_BACK != 0;
-        let first = surface.first_index as usize;
-        let range = first..first.saturating_add(surface.index_count as usize);
-        let corners = scene.indices.get(range).unwrap_or_default();
-        for (i, corner) in corners.as_chunks::<3>().0.iter().enumerate() {
+        for (i, corner) in scene.triangles(surface).iter().enumerate() {
             let place = |i: u32| scene.vertices.get(i as usize).map(|v| v.position);
             let [Some(p), Some(q), Some(r)] = corner.map(place) else {
                 continue;
             };
+            let first = surface.first_index as usize;
             if let Some((plane, flat)) = flat(first + 3 * i, [p, q, r], back) {
                 let (normal, distance) = plane;
                 let key = (surface.model, normal, distance);

@@ -9,6 +9,7 @@ use shaders::trace_types::SkyRecord;
 use shaders::types::Triangle;
 use shaders::types::constants::{NO_TEXTURE, TRIANGLE_ONE_SIDED, TRIANGLE_STATIC, TRIANGLE_WORLD};
 use support::Aabb;
+use support::slice;
 
 use super::beyond_sky::MapSkies;
 use super::bvh::build_triangles;
@@ -199,11 +200,7 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
             } else {
                 surface.lightmap
             };
-            let range = surface.first_index as usize
-                ..(surface.first_index as usize).saturating_add(surface.index_count as usize);
-            let corners = scene.indices.get(range).unwrap_or_default();
-            for (i, corner) in corners.chunks_exact(3).enumerate() {
-                let indices = [corner[0], corner[1], corner[2]];
+            for (i, &indices) in scene.triangles(surface).iter().enumerate() {
                 if indices.iter().any(|&i| i as usize >= scene.vertices.len()) {
                     continue;
                 }
@@ -382,8 +379,7 @@ fn own_structures(
         let mut places: Vec<[u32; 2]> = Vec::new();
         let mut corners: Vec<[Vec3; 3]> = Vec::new();
         for (part, (_, group)) in (0..).zip(&groups) {
-            let range = group.first..group.first + group.count;
-            let members = grouped.triangles.get(range).unwrap_or_default();
+            let members = slice::part(&grouped.triangles, group.first..group.first + group.count);
             places.extend((0..).zip(members).map(|(primitive, _)| [part, primitive]));
             corners.extend(members.iter().map(|t| t.indices.map(position)));
         }

@@ -5,6 +5,7 @@ use glam::Vec2;
 use shaders::trace_types::SkyRecord;
 use shaders::types::constants as c;
 use shaders::types::{Fog, MaterialBuffers, Vertex};
+use support::slice::{part, span};
 
 use super::cutout::Coverage;
 use crate::gpu::DeviceInfo;
@@ -206,12 +207,18 @@ pub struct StaticScene<'a> {
 }
 
 impl StaticScene<'_> {
+    /// The triangles of a surface, as indices of vertices.
+    pub fn triangles(&self, surface: &StaticSurface) -> &[[u32; 3]] {
+        let indices = part(self.indices, span(surface.first_index, surface.index_count));
+        indices.as_chunks::<3>().0
+    }
+
     /// The corners of a surface's triangles, three each.
     pub fn corners(&self, surface: &StaticSurface) -> impl Iterator<Item = &Vertex> {
-        let first = surface.first_index as usize;
-        let range = first..first.saturating_add(surface.index_count as usize);
-        let indices = self.indices.get(range).unwrap_or_default();
-        (indices.iter()).filter_map(|&i| self.vertices.get(i as usize))
+        let indices = self.triangles(surface).as_flattened();
+        indices
+            .iter()
+            .filter_map(|&i| self.vertices.get(i as usize))
     }
 }
 

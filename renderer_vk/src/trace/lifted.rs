@@ -42,10 +42,7 @@ fn triangles<'a>(
     scene: &'a StaticScene<'_>,
     surface: &StaticSurface,
 ) -> impl Iterator<Item = ([u32; 3], [Vec3; 3])> + 'a {
-    let first = surface.first_index as usize;
-    let range = first..first.saturating_add(surface.index_count as usize);
-    let corners = scene.indices.get(range).unwrap_or_default();
-    corners.as_chunks::<3>().0.iter().filter_map(|&numbers| {
+    scene.triangles(surface).iter().filter_map(|&numbers| {
         let place = |i: u32| scene.vertices.get(i as usize).map(|v| v.position);
         let [Some(a), Some(b), Some(c)] = numbers.map(place) else {
             return None;

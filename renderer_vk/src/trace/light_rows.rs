@@ -9,6 +9,7 @@ use glam::Vec3;
 use relight::light::{LightRef, LightShare};
 use shaders::trace_types as t;
 use shaders::trace_types::constants as c;
+use support::slice::part;
 
 use super::light_cells::{Cell, Cells};
 use super::light_facings::{FACINGS, Facings};
@@ -173,10 +174,7 @@ pub fn rows(
     let mut placed = |row: &Row, cluster: Option<i32>| {
         let first = count(slots.len());
         append_slots(&mut slots, &row.entries);
-        append_slots(
-            &mut slots,
-            row.entries.get(row.strong..).unwrap_or_default(),
-        );
+        append_slots(&mut slots, part(&row.entries, row.strong..));
         t::LightRow {
             first,
             count: count(row.entries.len()),

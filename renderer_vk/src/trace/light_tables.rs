@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use shaders::trace_types::LightSlot;
+use support::slice::part_mut;
 
 /// Part of a row's chance that is shared out evenly, so that no light is left out by a bad guess.
 const EVEN_PART: f64 = 0.1;
@@ -57,9 +58,7 @@ pub fn append_slots(slots: &mut Vec<LightSlot>, entries: &[Entry]) {
         alias_visibility: visibility(e),
         padding: 0,
     }));
-    let Some(row) = slots.get_mut(first..) else {
-        return;
-    };
+    let row = part_mut(slots, first..);
     // what each slot has of its own light, in parts of a slot
     let mut parts: Vec<f64> = entries.iter().map(|e| chance(e) / even).collect();
     let (mut poor, mut rich): (Vec<usize>, Vec<usize>) =

@@ -16,6 +16,7 @@ use glam::Vec3;
 use shaders::trace_types::constants::{LAST_MOVED, LAST_SAME};
 use shaders::trace_types::{LastInstance, MotionView, PortalRecord};
 use shaders::types::{Instance, Vertex};
+use support::slice::item;
 
 use super::targets::Targets;
 use crate::api::{EntityKind, renderfx};
@@ -124,6 +125,7 @@ impl Motion {
 
     /// Finds everything of a view in the one before, and keeps it for the next.
     pub(super) fn follow(&mut self, view: &ViewScene, portals: &[PortalRecord]) -> Followed {
+        // The first view has none before it.
         let past = self.past.take().unwrap_or_default();
         let mut found = Followed {
             instances: vec![LastInstance::default(); view.instances.len()],
@@ -194,7 +196,7 @@ impl Past {
             let candidates = alike.get_mut(&Sort::of(entity))?;
             let cost = |&index: &usize| {
                 let last = self.entities.get(index)?;
-                let velocity = self.velocities.get(index).copied().unwrap_or_default();
+                let velocity = item(&self.velocities, index);
                 if entity.origin.distance(last.origin) > reach {
                     return None;
                 }

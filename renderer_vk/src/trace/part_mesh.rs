@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use shaders::types::Vertex;
+use support::slice;
 
 use super::cutout::Coverage;
 use super::input::Kind;
@@ -36,8 +37,8 @@ impl MeshPart<'_> {
 /// The meshes of a part.
 pub fn members<'a>(view: &'a ViewScene, parts: &'a Parts, part: &Part) -> Vec<MeshPart<'a>> {
     let members = part.members.clone();
-    let meshes = parts.meshes.get(members.clone()).unwrap_or_default();
-    let skins = parts.skins.get(members).unwrap_or_default();
+    let meshes = slice::part(&parts.meshes, members.clone());
+    let skins = slice::part(&parts.skins, members);
     // one that is not there is an empty one, so that members and skins stay side by side
     const NOTHING: MeshGeometry<'_> = MeshGeometry {
         vertices: &[],

@@ -10,6 +10,7 @@ use shaders::trace_types::constants::{
 };
 use shaders::types::constants as c;
 use shaders::types::{Instance, Triangle};
+use support::slice::{self, part, span};
 
 use super::cutout::Coverage;
 use super::geometry::{rank_bits, sides};
@@ -323,7 +324,7 @@ impl Parts {
         materials: &dyn MaterialTable,
     ) {
         let (Some(instance), Some(kind)) = (
-            view.instances.get(mesh.instance as usize),
+            slice::get(&view.instances, mesh.instance as usize),
             Kind::in_light(info.flags, mesh.world_surface.is_some()),
         ) else {
             return;
@@ -437,7 +438,7 @@ impl Parts {
             let Some(&Member { key, order, .. }) = members.first() else {
                 continue;
             };
-            let Some(instance) = view.instances.get(key.instance as usize) else {
+            let Some(instance) = slice::get(&view.instances, key.instance as usize) else {
                 continue;
             };
             let first = self.meshes.len();
@@ -485,24 +486,13 @@ impl Parts {
         let Some(slot) = slots.iter_mut().find(|s| s.seen == seen && s.kind == kind) else {
             return;
         };
-        let first = mesh.first_vertex as usize;
-        let vertices = view
-            .vertices
-            .get(first..first.saturating_add(mesh.vertex_count as usize))
-            .unwrap_or_default();
+        let vertices = part(&view.vertices, span(mesh.first_vertex, mesh.vertex_count));
         let axis = axes(instance);
         let base = self.positions.len();
         let placed = vertices.iter().map(|v| axis * v.position + instance.origin);
         self.positions.extend(placed);
-        let first = mesh.first_index as usize;
-        let range = first..first.saturating_add(mesh.index_count as usize);
-        for indices in view
-            .indices
-            .get(range)
-            .unwrap_or_default()
-            .as_chunks::<3>()
-            .0
-        {
+        let indices = part(&view.indices, span(mesh.first_index, mesh.index_count));
+        for indices in indices.as_chunks::<3>().0 {
             let corners = indices.map(|i| {
                 let local = i.checked_sub(mesh.first_vertex)? as usize;
                 let position = self.positions.get(base.checked_add(local)?)?;

@@ -154,7 +154,7 @@ impl Shapes {
         vertices: u64,
     ) -> Result<Prepared, Error> {
         let meshes = members(view, parts, part);
-        let key = parts.shapes.get(part.members.clone()).unwrap_or_default();
+        let key = slice::part(&parts.shapes, part.members.clone());
         let (address, pose, version) = if part.animated {
             let vertices = vertices + (part.vertices.start * size_of::<Vertex>()) as u64;
             let (pose, version) = self.prepare_animated(rec, view, part, key, &meshes, vertices)?;
@@ -162,7 +162,7 @@ impl Shapes {
         } else {
             (self.prepare_rigid(part, key, &meshes)?, 0, 0)
         };
-        let skin = parts.skins.get(part.members.clone()).unwrap_or_default();
+        let skin = slice::part(&parts.skins, part.members.clone());
         Ok(Prepared {
             vertices: address,
             triangles: self.prepare_skin(skin, &meshes, version)?,
@@ -287,7 +287,7 @@ impl Shapes {
             return Ok((0, 0)); // just inserted
         };
         shape.seen = self.frame;
-        let used = view.vertices.get(part.vertices.clone()).unwrap_or_default();
+        let used = slice::part(&view.vertices, part.vertices.clone());
         let pose = shape.take_pose(
             rec,
             &self.device,

@@ -236,8 +236,8 @@ fn is_flat(relit: &RelitWorld, surface: &relight::world::WorldSurface) -> bool {
     let Some(plane) = surface.plane else {
         return false;
     };
-    let first = surface.first_index as usize / 3;
-    (first..first + surface.num_indices as usize / 3)
+    surface
+        .triangles()
         .filter_map(|triangle| relit.triangle(triangle))
         .all(|[a, b, c]| {
             let front = (c - a).cross(b - a);
@@ -356,6 +356,7 @@ fn fogs(relit: &RelitWorld, surfaces: &[WorldSurface], materials: &Materials) ->
     for surface in surfaces {
         let volume = (surface.fog as usize).checked_sub(1);
         let Some(fog) = volume.and_then(|volume| fogs.get_mut(volume)) else {
+            // The surface lies in no fog.
             continue;
         };
         if fog.has_surface != 0 && materials.get(surface.material).flags & veil == veil {
@@ -400,6 +401,7 @@ fn remap_by_map<S: LightmapSink>(
 ) {
     let entities = relit.bsp.entities();
     let Some(world) = entities.first() else {
+        // The map has no entities.
         return;
     };
     let starts = |key: &str, prefix: &str| {

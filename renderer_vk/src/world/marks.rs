@@ -106,9 +106,7 @@ impl Marker {
         out.points.clear();
         out.fragments.clear();
         (out.max_points, out.max_fragments) = (max_points, max_fragments);
-        let points = points
-            .get(..points.len().min(MAX_POINTS))
-            .unwrap_or_default();
+        let points = part(points, ..points.len().min(MAX_POINTS));
         let finite = projection.is_finite() && points.iter().all(|p| p.is_finite());
         if let Some(&first) = points.first().filter(|_| finite && max_fragments > 0) {
             let direction = projection.normalize_or_zero();
@@ -121,7 +119,11 @@ impl Marker {
             clip_planes(points, projection, direction, first, &mut self.planes);
             candidates(&marked, &bounds, direction, &mut self.found);
             let surfaces = &marked.world.surfaces;
-            for surface in self.found.iter().filter_map(|id| surfaces.get(id.index())) {
+            for surface in self
+                .found
+                .iter()
+                .filter_map(|id| slice::get(surfaces, id.index()))
+            {
                 mark_surface(marked, surface, direction, &self.planes, out);
                 if out.full() {
                     break;
@@ -170,8 +172,7 @@ fn candidates(marked: &Marked<'_>, bounds: &Aabb, direction: Vec3, found: &mut V
             if found.len() >= MAX_SURFACES {
                 return;
             }
-            let Some(surface) = world.surfaces.get(id.index()) else {
-                debug_assert!(false, "{id:?} of {}", world.surfaces.len());
+            let Some(surface) = slice::get(&world.surfaces, id.index()) else {
                 continue;
             };
             if found.contains(&id) || surface.model != 0 {

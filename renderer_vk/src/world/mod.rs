@@ -12,6 +12,7 @@ use q3bsp::{LightGridLayout, Plane, SurfaceKind};
 use relight::RelitWorld;
 use shaders::types::{self, Vertex};
 use support::Aabb;
+use support::slice::{part, span};
 
 use crate::assets::Assets;
 use crate::gpu::{self, Buffer, BufferUsage, Device};
@@ -162,15 +163,12 @@ impl WorldData {
 
     /// The triangles of a static index range, as vertex positions in model space.
     pub fn triangles(&self, first: u32, count: u32) -> impl Iterator<Item = [Vec3; 3]> + '_ {
-        let range = first as usize..first as usize + count as usize;
         let position = |i: u32| {
             self.vertices
                 .get(i as usize)
                 .map_or(Vec3::ZERO, |v| v.position)
         };
-        self.indices
-            .get(range)
-            .unwrap_or_default()
+        part(&self.indices, span(first, count))
             .as_chunks::<3>()
             .0
             .iter()
@@ -186,10 +184,10 @@ impl WorldData {
 
     /// The vertices of a surface.
     pub fn surface_vertices(&self, surface: &WorldSurface) -> &[Vertex] {
-        let first = surface.first_vertex as usize;
-        self.vertices
-            .get(first..first + surface.vertex_count as usize)
-            .unwrap_or_default()
+        part(
+            &self.vertices,
+            span(surface.first_vertex, surface.vertex_count),
+        )
     }
 }
 

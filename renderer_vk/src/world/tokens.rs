@@ -1,5 +1,7 @@
 //! The entity lump, token by token, for games that read it through the renderer.
 
+use support::slice::part;
+
 /// Where reading stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EntityTokens {
@@ -14,7 +16,7 @@ impl EntityTokens {
     /// could begin.
     pub fn next(&mut self, text: &[u8]) -> Option<String> {
         let end = text.iter().position(|&b| b == 0).unwrap_or(text.len());
-        let text = text.get(..end).unwrap_or_default();
+        let text = part(text, ..end);
         let mut at = skip_blank(text, self.at);
         let token = match text.get(at) {
             None => {
@@ -23,16 +25,16 @@ impl EntityTokens {
             }
             Some(b'"') => {
                 let start = at + 1;
-                let rest = text.get(start..).unwrap_or_default();
+                let rest = part(text, start..);
                 let length = rest.iter().position(|&b| b == b'"').unwrap_or(rest.len());
                 at = start + length + 1;
-                rest.get(..length).unwrap_or_default()
+                part(rest, ..length)
             }
             Some(_) => {
-                let rest = text.get(at..).unwrap_or_default();
+                let rest = part(text, at..);
                 let length = rest.iter().position(|&b| b <= b' ').unwrap_or(rest.len());
                 at += length;
-                rest.get(..length).unwrap_or_default()
+                part(rest, ..length)
             }
         };
         self.at = at;
@@ -43,12 +45,13 @@ impl EntityTokens {
 /// Position of the next byte that is neither white space nor comment.
 fn skip_blank(text: &[u8], mut at: usize) -> usize {
     loop {
+        // A string or comment without an end puts the place beyond the text.
         let rest = text.get(at..).unwrap_or_default();
         match rest {
             [b, ..] if *b <= b' ' => at += 1,
             [b'/', b'/', ..] => at += rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len()),
             [b'/', b'*', ..] => {
-                let body = rest.get(2..).unwrap_or_default();
+                let body = part(rest, 2..);
                 at += body
                     .windows(2)
                     .position(|w| w == b"*/")

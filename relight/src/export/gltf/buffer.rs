@@ -1,6 +1,7 @@
 //! The binary half of a glTF: vertex attributes and indices, and the accessors that name them.
 
 use serde_json::{Value, json};
+use support::slice;
 
 /// What is kept in one view of the buffer: all data of one kind, so that views stay few.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,7 +81,7 @@ pub struct Buffers {
 impl Buffers {
     /// Appends elements and returns the number of their accessor.
     pub fn add(&mut self, kind: Kind, bytes: &[u8], count: usize) -> usize {
-        let Some(data) = self.data.get_mut(kind as usize) else {
+        let Some(data) = slice::get_mut(&mut self.data, kind as usize) else {
             return 0;
         };
         data.resize(data.len().next_multiple_of(4), 0);

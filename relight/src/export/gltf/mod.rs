@@ -35,6 +35,7 @@ use serde_json::{Map, Value, json};
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use support::slice;
 
 /// Which of the two kinds of file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -175,7 +176,7 @@ impl Document<'_> {
             let mut primitives = Vec::with_capacity(mesh.parts.len());
             for part in &mesh.parts {
                 let light = lights.next().and_then(Option::as_deref);
-                let Some(material) = world.materials.get(part.material as usize) else {
+                let Some(material) = slice::get(&world.materials, part.material as usize) else {
                     continue;
                 };
                 let made = match numbers.entry(part.material) {

@@ -194,15 +194,14 @@ impl Writer<'_> {
     /// A shader's name as the form has it: without the folder, which compilers put before it.
     fn name(&mut self, shader: ShaderId) -> String {
         let name = shader_name(&self.world.bsp, shader);
-        let stem = match name.get(..FOLDER.len()) {
-            Some(folder) if folder.eq_ignore_ascii_case(FOLDER) => name.get(FOLDER.len()..),
+        let stem = match name.split_at_checked(FOLDER.len()) {
+            Some((folder, stem)) if folder.eq_ignore_ascii_case(FOLDER) => stem,
             _ => {
                 self.tally.foreign_names += usize::from(!name.is_empty());
-                Some(name)
+                name
             }
         };
         // A name ends at white space, and brackets begin other things.
-        let stem = stem.unwrap_or_default();
         match stem.is_empty() || stem.contains(|c: char| c <= ' ' || "\"()[]{}".contains(c)) {
             true => NO_NAME.to_owned(),
             false => stem.to_owned(),

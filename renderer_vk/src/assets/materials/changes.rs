@@ -3,6 +3,7 @@
 use glam::Vec3;
 use shaders::types;
 use shaderscript::strip_extension;
+use support::slice::{part_mut, span};
 
 use super::super::bind::passes;
 use super::super::material::LightmapClass;
@@ -17,9 +18,8 @@ impl Materials {
         };
         let index = self.find(source, name, LightmapClass::Page, true);
         let material = self.get(index);
-        let first = material.stage_first as usize;
-        let stages = first..first + material.stage_count as usize;
-        for stage in self.arrays.stages.get_mut(stages).unwrap_or_default() {
+        let stages = span(material.stage_first, material.stage_count);
+        for stage in part_mut(&mut self.arrays.stages, stages) {
             if stage.image_count == 0 {
                 stage.image_first = u32::try_from(self.arrays.images.len()).unwrap_or(u32::MAX);
                 stage.image_count = 1;
