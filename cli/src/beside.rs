@@ -12,6 +12,7 @@ use relight::MemoryFiles;
 /// One of them is there and cannot be read.
 pub fn beside(file: &Path) -> Result<MemoryFiles> {
     let mut found = MemoryFiles::new();
+    // A path that ends in `..` has no name, and nothing lies beside it.
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     let mut take = |path: &Path, game_path: String| -> Result<()> {
         let bytes =

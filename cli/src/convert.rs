@@ -234,6 +234,7 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
                     let (Some(input), Some(output), Some(slot)) =
                         (inputs.get(index), outputs.get(index), results.get(index))
                     else {
+                        // All maps are taken.
                         break;
                     };
                     bar.set_message(input.to_string());

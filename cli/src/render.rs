@@ -336,6 +336,7 @@ impl RenderArgs {
 
     /// Name of a picture of a series: the output's with its number.
     fn numbered(&self, number: usize) -> PathBuf {
+        // A path that ends in `..` has no name; writing to it fails.
         let stem = self.output.file_stem().unwrap_or_default();
         let name = format!("{}_{number:04}.png", stem.to_string_lossy());
         self.output.with_file_name(name)

@@ -122,6 +122,7 @@ unsafe extern "C" fn timings() {
 
 unsafe extern "C" fn stats() {
     print_lines(|renderer, front, arguments| {
+        // The first argument is the name of the command.
         let Some(report) = Report::of(arguments.get(1..).unwrap_or_default()) else {
             return vec!["usage: rt_stats [json [FILE]]".into()];
         };
@@ -296,6 +297,7 @@ unsafe extern "C" fn still() {
             return Ok(());
         };
         let arguments = engine.arguments();
+        // The first argument is the name of the command.
         let line = match still_arguments(arguments.get(1..).unwrap_or_default()) {
             None => Some("usage: rt_screenshot SAMPLES [WIDTHxHEIGHT]".into()),
             Some((samples, size)) => begin_still(engine, samples, size)?,

@@ -420,6 +420,7 @@ impl MapBuilder {
         self.set_world_key("gridsize", &format!("{} {} {}", size.x, size.y, size.z));
         let mut bsp = self.build();
         let Some(world) = bsp.models.first() else {
+            // `build` makes at least the world.
             return bsp;
         };
         let origin = size * (world.mins / size).ceil();

@@ -114,6 +114,7 @@ impl LightGridLayout {
                 .index(at[0], at[1], at[2])
                 .and_then(|at| points.get(at))
             else {
+                // The corner lies beyond the grid.
                 continue;
             };
             if point.ambient == [0; 3] {

@@ -46,6 +46,7 @@ impl Bsp {
     fn read_lumps(&mut self, bytes: &[u8]) -> Result<(), Error> {
         let lumps = self.container.lumps;
         let data = |lump: Lump| {
+            // Every lump read below has a place in the directory.
             let range = lumps.get(lump.index()).copied().unwrap_or_default();
             lump_bytes(bytes, range)
         };

@@ -80,6 +80,7 @@ impl Bsp {
         file.extend_from_slice(self.container.banner());
         let mut lumps = [LumpRange::default(); SLOTS];
         for at in order {
+            // `order` is a permutation of the slots.
             let (Some(bytes), Some(range)) = (data.get(at), lumps.get_mut(at)) else {
                 continue;
             };

@@ -33,6 +33,7 @@ impl Skin {
             if surface.contains("tag_") {
                 continue;
             }
+            // The last line may name no shader.
             let shader = tokens.next().unwrap_or_default();
             surfaces.push(SkinSurface { surface, shader });
         }

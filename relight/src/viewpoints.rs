@@ -47,6 +47,7 @@ pub fn target(entity: &Entity, entities: &[Entity]) -> Option<Vec3> {
 /// The camera of the intermission, which looks at its target; `None` for a map without one.
 pub fn intermission(entities: &[Entity]) -> Option<Viewpoint> {
     let entity = entities.iter().find(|e| is_intermission(e))?;
+    // An entity without an origin is at 0, as in the engine.
     let eye = entity.vec3("origin").unwrap_or_default();
     let to = target(entity, entities).map(|target| target - eye);
     if let Some(to) = to.filter(|to| to.length() > 1.0) {
@@ -65,6 +66,7 @@ pub fn intermission(entities: &[Entity]) -> Option<Viewpoint> {
 pub fn spawn_views(entities: &[Entity]) -> impl Iterator<Item = Viewpoint> {
     let spawns = entities.iter().filter(|entity| is_spawn_point(entity));
     spawns.map(|entity| Viewpoint {
+        // As above.
         eye: entity.vec3("origin").unwrap_or_default() + Vec3::Z * (SPAWN_LIFT + EYE_HEIGHT),
         yaw: yaw(entity),
         pitch: 0.0,

@@ -96,6 +96,7 @@ impl PathPoint {
 pub fn parse(text: &str) -> Result<Vec<PathPoint>, PathError> {
     let mut points = Vec::new();
     for (index, full) in text.lines().enumerate() {
+        // `split` yields at least one part.
         let line = full.split('#').next().unwrap_or_default().trim();
         if line.is_empty() {
             continue;

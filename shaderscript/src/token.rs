@@ -340,6 +340,7 @@ pub fn parse_number(word: &str) -> Option<f32> {
     let bytes = word.as_bytes();
     let digits = |from: usize| {
         bytes
+            // A word may end before its fraction or exponent.
             .get(from..)
             .unwrap_or_default()
             .iter()

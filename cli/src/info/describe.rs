@@ -258,6 +258,7 @@ fn bounds(world: &RelitWorld) -> Option<[[f32; 3]; 2]> {
     let drawn = world.surfaces.iter().filter(|s| s.num_indices > 0);
     let boxes = drawn.map(|s| {
         let origin = world.models.get(s.model as usize).map(|m| m.origin);
+        // Every surface belongs to a model of the map.
         let origin = origin.unwrap_or_default();
         (s.mins + origin, s.maxs + origin)
     });

@@ -261,6 +261,7 @@ fn save(file: &std::path::Path, pictures: &[Rgb8], (width, height): (u32, u32)) 
         for picture in pictures {
             let bytes = width as usize * 3;
             let row = picture.pixels().get(row * bytes..(row + 1) * bytes);
+            // All pictures of a map have one size.
             rows.extend_from_slice(row.unwrap_or_default());
         }
     }

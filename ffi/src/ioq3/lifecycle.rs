@@ -400,6 +400,7 @@ fn run_videos(engine: Engine) -> Result<(), Failure> {
         let handle = match state {
             Some(handle) => handle,
             None => {
+                // Another call may have dropped the video; the empty name is refused.
                 let name = name.unwrap_or_default();
                 let handle = valid_game_path(&name).and_then(|name| engine.play_cinematic(&name));
                 with_renderer(|renderer, front| {

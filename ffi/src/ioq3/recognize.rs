@@ -66,6 +66,7 @@ const TOO_MANY: usize = 52;
 /// `imports` must point at the import table of an engine that speaks our version number, which must be the one that
 /// `engine` calls.
 pub unsafe fn refusal(engine: &Ioq3, imports: *const refimport_t) -> Option<String> {
+    // A variable that is not set is as one that is empty.
     let wanted = std::env::var(VARIABLE).unwrap_or_default();
     let (found, opengl) = match is_ours(&wanted) {
         Some(true) => return None,

@@ -274,6 +274,7 @@ impl QuakeMap {
             let first = usize::try_from(brush.first_side).unwrap_or(usize::MAX);
             let count = usize::try_from(brush.num_sides).unwrap_or(0);
             let sides = self.brush_sides.get(first..first.saturating_add(count));
+            // A range outside the lump is refused in `convert_brushes`.
             for side in sides.unwrap_or_default() {
                 let slot = usize::try_from(side.texinfo).ok();
                 if let Some(slot) = slot.and_then(|at| contents.get_mut(at)) {

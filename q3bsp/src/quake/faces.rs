@@ -197,6 +197,7 @@ impl QuakeMap {
                 };
                 mean.get_or_insert_with(|| mean_of(&texels));
                 let [width, height] = extent.size;
+                // `light_texels` returns width × height texels.
                 let texel = |at: usize| texels.get(at).copied().unwrap_or_default();
                 match atlas.add(width, height, texel) {
                     Some(chart) => charts.push((style, chart)),

@@ -198,6 +198,7 @@ impl QuakeMap {
             Lump::BrushSides => all(&self.brush_sides, format),
             other => {
                 let stored = self.others.iter().find(|(lump, _)| *lump == other);
+                // Empty lumps are not kept.
                 stored.map(|(_, data)| data.clone()).unwrap_or_default()
             }
         }
@@ -274,6 +275,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn range(&self, lump: Lump) -> LumpRange {
+        // A lump that the format does not have is empty.
         let at = lumps_of(self.format).iter().position(|&l| l == lump);
         at.and_then(|at| self.directory.get(at))
             .copied()
@@ -285,6 +287,7 @@ impl Reader<'_> {
         let start = usize::try_from(range.offset).unwrap_or(0);
         let length = usize::try_from(range.length).unwrap_or(0);
         let data = self.bytes.get(start..start.saturating_add(length));
+        // The directory was checked against the length of the file.
         data.unwrap_or_default().to_vec()
     }
 

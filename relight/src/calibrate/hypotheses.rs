@@ -169,6 +169,7 @@ impl<'a> Hypotheses<'a> {
             splashes: &splashes,
         };
         let first = self.find(compiler, self.options, acceptance, end);
+        // The second fit is taken whatever its error.
         first
             .or_else(|| self.measured_more(compiler, None, &splashes, end))
             .unwrap_or_default()

@@ -93,6 +93,7 @@ fn triangulate(
             for y in side.clone() {
                 for x in side.clone() {
                     let Some(near) = cells.get(&(middle + IVec3::new(x, y, z))) else {
+                        // No point lies in this cell.
                         continue;
                     };
                     let later = near.iter().filter(|&&j| j as usize > i);

@@ -254,6 +254,7 @@ pub fn look(
         clamp: matches!(stage.image, StageImage::ClampMap(_)),
         tc_mods: stage.tc_mods.clone(),
     };
+    // A stage may have no image file.
     let name = stage.image.names().first().cloned().unwrap_or_default();
     let images = |group: &[usize]| {
         let has = |i: &&usize| {

@@ -114,6 +114,7 @@ fn md3(model: &Md3) -> Vec<ModelSurface> {
     let one = |surface: &q3model::Surface| {
         let vertices = surface.frame_vertices(0).iter().zip(&surface.st);
         let vertices = vertices.map(|(v, st)| vertex(v.position(), v.normal(), *st));
+        // A surface may name no shader.
         let shader = surface.shaders.first().cloned().unwrap_or_default();
         joined(
             &surface.name,

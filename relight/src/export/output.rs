@@ -74,6 +74,7 @@ impl Output {
                 source,
             })?;
         }
+        // A path that ends in `..` has no name; writing to it fails below.
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let temporary =

@@ -32,6 +32,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Image, Fault> {
         Some((&PALETTE_MARK, palette)) => palette,
         _ => return Err("PCX without a palette".into()),
     };
+    // A file shorter than its header is refused as cut short.
     let mut body = body.get(HEADER..).unwrap_or_default().iter();
     if body.len().saturating_mul(63) < pixels {
         return Err("PCX cut short".into());

@@ -314,6 +314,7 @@ fn colored(numbers: &[f32]) -> Result<Vec3, String> {
 
 /// `X Y Z LIGHT R G B`.
 fn point(numbers: &[f32]) -> Result<PointLight, String> {
+    // A line with fewer numbers was refused before.
     let strength = colored(numbers.get(3..).unwrap_or_default())?;
     if strength == Vec3::ZERO {
         return Err("the light must be above 0".to_owned());

@@ -107,6 +107,7 @@ pub(super) fn linear(value: f32, fade: f32) -> (f32, Falloff) {
 /// Ambient radiance: the compiler adds `ambient` to every texel and raises texels to `_minlight`.
 pub(crate) fn ambient(entities: &[Entity]) -> Vec3 {
     let Some(world) = entities.first() else {
+        // The map has no entities.
         return Vec3::ZERO;
     };
     let positive = |keys: &[&str]| {

@@ -345,6 +345,7 @@ impl DeviceInner {
         // SAFETY: the timelineSemaphore feature is on.
         self.timeline =
             unsafe { raw.create_semaphore(&info, None) }.context("vkCreateSemaphore")?;
+        // A cache that is missing or damaged starts empty.
         let old = options
             .pipeline_cache
             .as_deref()

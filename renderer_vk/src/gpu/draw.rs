@@ -192,6 +192,7 @@ impl Pass<'_> {
 
     /// Sets the rectangle outside of which nothing is drawn; it is cut to the attachments.
     pub fn set_scissor(&mut self, x: i32, y: i32, width: u32, height: u32) {
+        // Nothing is drawn outside of a rendering.
         let rect = cut([x, y], [width, height], self.rendering.unwrap_or_default());
         // SAFETY: recording; offsets are not negative and offset + extent does not overflow.
         unsafe { self.vk().cmd_set_scissor(self.cmd(), 0, &[rect]) };

@@ -70,6 +70,7 @@ impl Renderer {
 
     pub(super) fn queue_overlay(&mut self) {
         if !self.overlay.is_empty() {
+            // A new one if none can be used again.
             let empty = self.spare_overlays.pop().unwrap_or_default();
             let overlay = std::mem::replace(&mut self.overlay, empty);
             let mask = self.eye.mask(self.settings.anaglyph);

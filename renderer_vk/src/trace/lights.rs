@@ -326,6 +326,7 @@ impl MapLights {
         let cells = source
             .bsp
             .map(|bsp| Cells::new(bsp, lists.clusters(), length));
+        // A scene without a map has no cells.
         let cells = cells.unwrap_or_default();
         let (rows, slots) = light_rows::rows(source, &sorted.numbers, &cells);
         let bounds = source.bsp.and_then(|bsp| bsp.models.first());

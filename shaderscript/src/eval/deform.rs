@@ -129,6 +129,7 @@ pub fn deform(
                 }
             }
             Deform::Text(number) => {
+                // A text that the game did not set is empty.
                 let text = context.texts.get(usize::from(*number)).copied();
                 text_quads(text.unwrap_or_default(), vertices, indices, context);
             }
@@ -233,6 +234,7 @@ fn autosprite2(vertices: &mut [DeformVertex], indices: &[u32], forward: Vec3) {
 /// tells the sides apart for the strip (3 0 2, 2 0 1) that map compilers make of a quad; a fan comes out twisted, in
 /// the engine too.
 fn follows(indices: &[u32], quad: usize, a: usize, b: usize) -> bool {
+    // The last quad may be incomplete.
     let triangles = indices.get(quad * 6..quad * 6 + 6).unwrap_or_default();
     let vertex = |local: usize| (quad * 4 + local) as u32;
     triangles

@@ -445,6 +445,7 @@ impl<'text, 'reporter, 'file> DefinitionParser<'text, 'reporter, 'file> {
         let mut read = |i: usize| {
             let value = number_at(&arguments, i);
             if value.is_none() {
+                // An argument that is missing is shown as empty.
                 not_a_number = Some(arguments.get(i).cloned().unwrap_or_default());
             }
             value

@@ -182,6 +182,7 @@ impl Motion {
             |values: &mut dyn Iterator<Item = Vec2>| values.flat_map(|v| v.to_array()).collect();
         let offsets = pairs(&mut values.iter().map(|v| v.0));
         let mut parts = vec![part("offset", Kind::Pair, offsets)];
+        // Nothing changes in an empty list.
         let first = values.first().copied().unwrap_or_default();
         if values.iter().any(|v| (v.1 - first.1).abs() > 1.0e-4) {
             parts.push(part(

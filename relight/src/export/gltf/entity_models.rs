@@ -133,6 +133,7 @@ impl Document<'_> {
         let mut stages = material.resolved.shader.stages.iter();
         let lit = stages.any(|stage| stage.rgb_gen == RgbGen::LightingDiffuse);
         let mean = shown.then(|| {
+            // White where no light is known.
             let light = light.filter(|_| lit).unwrap_or_default();
             let mean = light.iter().sum::<Vec3>() / light.len() as f32;
             if mean.is_finite() { mean } else { Vec3::ONE }

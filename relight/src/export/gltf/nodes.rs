@@ -113,6 +113,7 @@ impl Nodes {
     ) {
         for (key, path) in model_file::named(entity) {
             let Some(mesh) = files.get(&ModelName::of(entity, path)) else {
+                // The file of the model is missing or broken.
                 continue;
             };
             let scale = stretch(entity);

@@ -68,6 +68,7 @@ impl Pulse {
 
     /// Whether the colour changes.
     pub fn factor_varies(&self) -> bool {
+        // Nothing changes in an empty list.
         let first = self.factors.first().copied().unwrap_or_default();
         let off = |v: &Vec4| (*v - first).abs().max_element() > LEAST;
         self.factors.iter().any(off) && self.factors.iter().all(|v| v.is_finite())
@@ -75,6 +76,7 @@ impl Pulse {
 
     /// Whether the glow changes.
     fn glow_varies(&self) -> bool {
+        // Nothing changes in an empty list.
         let first = self.glows.first().copied().unwrap_or_default();
         let off = |v: &Vec3| (*v - first).abs().max_element() > LEAST;
         self.glows.iter().any(off) && self.glows.iter().all(|v| v.is_finite())

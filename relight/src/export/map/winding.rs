@@ -103,6 +103,7 @@ fn whole_plane(normal: DVec3, dist: f64) -> Vec<DVec3> {
 /// Twice the area times the normal of the side that a polygon is clockwise from.
 fn clockwise_normal(winding: &[DVec3]) -> DVec3 {
     let Some(&origin) = winding.first() else {
+        // Nothing of the side was left by clipping.
         return DVec3::ZERO;
     };
     let pairs = winding.iter().zip(winding.iter().skip(1));
