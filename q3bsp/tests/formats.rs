@@ -5,8 +5,8 @@ use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 use q3bsp::builder::MapBuilder;
 use q3bsp::{
-    Bsp, Error, Format, GridLayers, GridPoint, Lightmap, Lump, ShaderId, SurfaceKind, SurfaceLayers,
-    VertexLayers, content_flags, surface_flags,
+    Bsp, Error, Format, GridLayers, GridPoint, Lightmap, Lump, ShaderId, SurfaceKind,
+    SurfaceLayers, VertexLayers, content_flags, surface_flags,
 };
 use sample::{advertisement, sample, vert};
 use survive::survive;

@@ -1,7 +1,5 @@
 //! Sizes of textures: powers of two, and mip chains.
 
-use support::slice::item;
-
 use super::Image;
 
 impl Image {

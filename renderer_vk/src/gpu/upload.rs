@@ -8,7 +8,6 @@ use std::collections::{HashMap, HashSet};
 
 use ash::vk;
 use gpu_allocator::vulkan::Allocation;
-use support::slice;
 
 use super::buffer::{Buffer, BufferDesc, BufferUsage, Memory};
 use super::device::{Device, DeviceInner, lock};

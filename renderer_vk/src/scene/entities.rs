@@ -3,6 +3,7 @@
 use glam::Vec3;
 use shaders::types::constants as c;
 use support::Aabb;
+use support::slice;
 
 use super::cull;
 use super::entity;

@@ -5,6 +5,7 @@ use q3model::BoneMatrix;
 use shaders::types::Vertex;
 use shaders::types::constants::NO_TEXTURE;
 use support::Aabb;
+use support::slice;
 
 use super::entity;
 use super::flares::FlareView;
@@ -419,7 +420,7 @@ impl<'a> Gatherer<'a> {
                     .filter(|_| self.look == Look::Classic);
                 out.vertices.extend_from_slice(classic.unwrap_or(own));
                 out.indices.extend(
-                    part(&world.indices, range)
+                    slice::part(&world.indices, range)
                         .iter()
                         .map(|i| i.wrapping_sub(surface.first_vertex).wrapping_add(base)),
                 );
@@ -508,7 +509,7 @@ impl<'a> Gatherer<'a> {
         let polys = self.polys;
         for poly in polys {
             let range = poly.first_vertex..poly.first_vertex + poly.vertex_count;
-            let corners = part(self.poly_vertices, range);
+            let corners = slice::part(self.poly_vertices, range);
             let darkens = || only_darkens(&self.input.materials.get(poly.material).shader);
             if self.look == Look::Traced && darkens() && is_painted_shadow(corners, self.entities) {
                 continue;

@@ -4,6 +4,7 @@ use glam::Vec3;
 use q3bsp::SurfaceKind;
 use q3model::Frame;
 use support::Aabb;
+use support::slice;
 
 use super::cull::{self, Lies, ModelLies};
 use super::gather::Gatherer;

@@ -4,6 +4,7 @@ use glam::{Vec3, Vec4};
 use q3bsp::SurfaceKind;
 use shaderscript::Cull;
 use support::Aabb;
+use support::slice;
 
 use super::{DrawSurface, DynamicMesh, Geometry, SkyCoverage, ViewScene, VisibleSky, entity};
 use crate::api::DynamicLight;

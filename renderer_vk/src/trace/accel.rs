@@ -11,6 +11,7 @@ use shaders::trace_types::constants::NO_INSTANCE;
 use shaders::trace_types::{BvhInstance, GeometryRecord};
 use support::Aabb;
 use support::bvh::Hierarchy;
+use support::slice;
 
 use super::bvh::{INSTANCES, build_triangles, widen};
 use super::geometry::{StaticGeometry, StaticPart, Structure};

@@ -12,6 +12,7 @@ use std::collections::HashMap;
 use shaders::types::constants as c;
 use shaders::types::{Triangle, Vertex};
 use support::Aabb;
+use support::slice;
 
 use super::input::Tracer;
 use super::part_mesh::{MeshPart, members};

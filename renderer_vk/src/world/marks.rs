@@ -6,6 +6,7 @@ use glam::Vec3;
 use q3bsp::{Bsp, Plane, SurfaceId, SurfaceKind};
 use shaders::types::Vertex;
 use support::Aabb;
+use support::slice;
 
 use super::visible::Side;
 use super::{WorldData, WorldSurface};
@@ -106,7 +107,7 @@ impl Marker {
         out.points.clear();
         out.fragments.clear();
         (out.max_points, out.max_fragments) = (max_points, max_fragments);
-        let points = part(points, ..points.len().min(MAX_POINTS));
+        let points = slice::part(points, ..points.len().min(MAX_POINTS));
         let finite = projection.is_finite() && points.iter().all(|p| p.is_finite());
         if let Some(&first) = points.first().filter(|_| finite && max_fragments > 0) {
             let direction = projection.normalize_or_zero();

@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 #[cfg(test)]
-use shaders::trace_types::BvhTriangle;
+use shaders::trace_types::{BvhNode, BvhTriangle};
 use shaders::types::Vertex;
 use support::Aabb;
 use support::bvh::Hierarchy;
