@@ -26,7 +26,7 @@ enum Command {
     Info(info::InfoArgs),
     Lights(lights::LightsArgs),
     Material(material::MaterialArgs),
-    Render(render::RenderArgs),
+    Render(Box<render::RenderArgs>),
 }
 
 /// What earlier versions had: subcommand, the option or nothing for the subcommand itself, and what replaces it.
