@@ -63,6 +63,16 @@ impl<'a> Fields<'a> {
     }
 }
 
+/// A record of fixed size in a lump.
+pub(crate) trait Record: Sized {
+    /// Bytes per record.
+    const STRIDE: usize;
+    /// Decodes one record of exactly [`Self::STRIDE`] bytes.
+    fn decode(fields: Fields<'_>) -> Self;
+    /// Appends exactly [`Self::STRIDE`] bytes.
+    fn encode(&self, out: &mut Vec<u8>);
+}
+
 /// Appends fields of a record.
 pub(crate) trait Put {
     fn put_i32(&mut self, value: i32);

@@ -1,25 +1,19 @@
-//! Indices of records as types, and the records that they name.
+//! Indices of records as types.
 //!
-//! A file may hold any number where an index is expected. [`Bsp::validate`], and so [`Bsp::parse`], refuses a map with an
-//! index outside its lump; the accessors here therefore return a record and not an option. For a map that was changed by
-//! hand and not validated, an index outside its lump fails an assertion in debug builds; in release builds it names a
-//! record whose fields are all zero.
+//! A file may hold any number where an index is expected. [`Bsp::validate`](crate::Bsp::validate), and so
+//! [`Bsp::parse`](crate::Bsp::parse), refuses a map with an index outside its lump.
 
-use crate::Bsp;
-use crate::bytes::{Fields, Put};
-use crate::lumps::{Brush, Leaf, Node, Plane, Record, ShaderRef};
-use crate::surface::Surface;
-use std::sync::LazyLock;
+use crate::bytes::{Fields, Put, Record};
 
 macro_rules! ids {
-    ($($id:ident: $accessor:ident in $list:ident, $record:ident;)+) => { $(
-        #[doc = concat!("Index of one of [`Bsp::", stringify!($list), "`]; see [`Bsp::", stringify!($accessor), "`].")]
+    ($($id:ident: $accessor:ident in $list:ident;)+) => { $(
+        #[doc = concat!("Index of one of [`Bsp::", stringify!($list), "`](crate::Bsp::", stringify!($list), "); see [`Bsp::", stringify!($accessor), "`](crate::Bsp::", stringify!($accessor), ").")]
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         pub struct $id(pub(crate) i32);
 
         impl $id {
-            /// From the stored number, which [`Bsp::validate`] checks.
+            /// From the stored number, which [`Bsp::validate`](crate::Bsp::validate) checks.
             pub const fn from_raw(raw: i32) -> $id {
                 $id(raw)
             }
@@ -45,28 +39,16 @@ macro_rules! ids {
                 out.put_i32(self.0);
             }
         }
-
-        impl Bsp {
-            #[doc = concat!("The record of [`Bsp::", stringify!($list), "`] under an index of this map.")]
-            pub fn $accessor(&self, id: $id) -> &$record {
-                static ZEROS: LazyLock<$record> =
-                    LazyLock::new(|| $record::decode(Fields::new(&[])));
-                self.$list.get(id.index()).unwrap_or_else(|| {
-                    debug_assert!(false, "{id:?} of {}", self.$list.len());
-                    &ZEROS
-                })
-            }
-        }
     )+ };
 }
 
 ids! {
-    ShaderId: shader in shaders, ShaderRef;
-    PlaneId: plane in planes, Plane;
-    NodeId: node in nodes, Node;
-    LeafId: leaf in leafs, Leaf;
-    SurfaceId: surface in surfaces, Surface;
-    BrushId: brush in brushes, Brush;
+    ShaderId: shader in shaders;
+    PlaneId: plane in planes;
+    NodeId: node in nodes;
+    LeafId: leaf in leafs;
+    SurfaceId: surface in surfaces;
+    BrushId: brush in brushes;
 }
 
 impl NodeId {
@@ -124,7 +106,6 @@ impl From<Child> for i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::MapBuilder;
 
     #[test]
     fn children_keep_the_stored_number() {
@@ -133,13 +114,5 @@ mod tests {
         }
         assert_eq!(Child::from_raw(5), Child::Node(NodeId(5)));
         assert_eq!(Child::from_raw(-3), Child::Leaf(LeafId(2)));
-    }
-
-    #[test]
-    #[cfg_attr(debug_assertions, should_panic(expected = "ShaderId(-1) of 1"))]
-    fn an_index_that_was_not_validated_names_a_record_of_zeros() {
-        let bsp = MapBuilder::new().build();
-        assert_eq!(bsp.shader(ShaderId(0)).name, "noshader");
-        assert_eq!(bsp.shader(ShaderId(-1)).name, "");
     }
 }

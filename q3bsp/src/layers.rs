@@ -5,9 +5,9 @@
 //! styles sees the map as it is lit by its first style. A style is a number that the game gives a brightness to: 0 is
 //! constant, 255 says that a layer is not used.
 
-use crate::bytes::{Fields, Put};
+use crate::bytes::{Fields, Put, Record};
 use crate::ids::{PlaneId, ShaderId};
-use crate::lumps::{BrushSide, DrawVert, GridPoint, Record};
+use crate::lumps::{BrushSide, DrawVert, GridPoint};
 use crate::surface::{Surface, SurfaceKind, lightmap_index};
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;

@@ -1,19 +1,9 @@
 //! The records of the lumps: one struct per kind, with its decoder and encoder.
 
-use crate::bytes::{Fields, Put, name_field, name_text};
+use crate::bytes::{Fields, Put, Record, name_field, name_text};
 use crate::flags;
 use crate::ids::{BrushId, Child, PlaneId, ShaderId};
 use glam::{Vec2, Vec3};
-
-/// A record of fixed size in a lump.
-pub(crate) trait Record: Sized {
-    /// Bytes per record.
-    const STRIDE: usize;
-    /// Decodes one record of exactly [`Self::STRIDE`] bytes.
-    fn decode(fields: Fields<'_>) -> Self;
-    /// Appends exactly [`Self::STRIDE`] bytes.
-    fn encode(&self, out: &mut Vec<u8>);
-}
 
 /// Lump 1: a shader name with the flags that the map compiler saw.
 #[derive(Clone, Debug, PartialEq, Eq)]

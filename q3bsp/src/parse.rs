@@ -1,11 +1,11 @@
 //! Bytes to [`Bsp`]: the directory and the records. What they refer to is checked in `validate`.
 
-use crate::bytes::Fields;
+use crate::bytes::{Fields, Record};
 use crate::container::{Container, Gap, LumpEntry, LumpRange, SLOTS};
 use crate::error::{Error, Lump, Warning};
 use crate::format::{Format, announced};
 use crate::layers::{GridLayers, LayeredSide, LayeredSurface, LayeredVertex};
-use crate::lumps::{GridPoint, Lightmap, Record, ShaderRef};
+use crate::lumps::{GridPoint, Lightmap, ShaderRef};
 #[cfg(feature = "quake")]
 use crate::quake::QuakeMap;
 use crate::{Bsp, Visibility};

@@ -1,8 +1,7 @@
 //! Lump 13: the records of what is drawn.
 
-use crate::bytes::{Fields, Put};
+use crate::bytes::{Fields, Put, Record};
 use crate::ids::ShaderId;
-use crate::lumps::Record;
 use glam::Vec3;
 
 /// What a [`Surface`] is made of.

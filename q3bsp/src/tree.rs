@@ -1,12 +1,14 @@
-//! Walks through the tree, and the parts of lumps that records of a validated map name.
+//! Records of a validated map by their indices, the parts of lumps that they name, and walks through the tree.
 
 use crate::Bsp;
+use crate::bytes::{Fields, Record};
 use crate::flags::{content_flags, surface_flags};
-use crate::ids::{BrushId, Child, LeafId, NodeId, SurfaceId};
-use crate::lumps::{Brush, BrushSide, DrawVert, Leaf, Model};
+use crate::ids::{BrushId, Child, LeafId, NodeId, PlaneId, ShaderId, SurfaceId};
+use crate::lumps::{Brush, BrushSide, DrawVert, Leaf, Model, Node, Plane, ShaderRef};
 use crate::surface::Surface;
 use glam::Vec3;
 use std::ops::Range;
+use std::sync::LazyLock;
 
 /// A checked (first, count) pair as a range.
 pub(crate) fn span(first: i32, count: i32) -> Range<usize> {
@@ -19,6 +21,33 @@ fn part<T>(lump: &[T], first: i32, count: i32) -> &[T] {
     let part = lump.get(span(first, count));
     debug_assert!(part.is_some(), "{first} + {count} of {}", lump.len());
     part.unwrap_or_default()
+}
+
+macro_rules! records {
+    ($($accessor:ident, $id:ident: $record:ident in $list:ident;)+) => {
+        /// Records by their index. For a map that was changed by hand and not validated, an index outside its lump fails an
+        /// assertion in debug builds; in release builds it names a record whose fields are all zero.
+        impl Bsp { $(
+            #[doc = concat!("The record of [`Bsp::", stringify!($list), "`] under an index of this map.")]
+            pub fn $accessor(&self, id: $id) -> &$record {
+                static ZEROS: LazyLock<$record> =
+                    LazyLock::new(|| $record::decode(Fields::new(&[])));
+                self.$list.get(id.index()).unwrap_or_else(|| {
+                    debug_assert!(false, "{id:?} of {}", self.$list.len());
+                    &ZEROS
+                })
+            }
+        )+ }
+    };
+}
+
+records! {
+    shader, ShaderId: ShaderRef in shaders;
+    plane, PlaneId: Plane in planes;
+    node, NodeId: Node in nodes;
+    leaf, LeafId: Leaf in leafs;
+    surface, SurfaceId: Surface in surfaces;
+    brush, BrushId: Brush in brushes;
 }
 
 impl Bsp {
@@ -165,6 +194,7 @@ impl Bsp {
 
 #[cfg(test)]
 mod tests {
+    use super::ShaderId;
     use crate::builder::MapBuilder;
     use crate::{content_flags, surface_flags};
     use glam::Vec3;
@@ -187,5 +217,13 @@ mod tests {
         assert!(!inside(200.0, 0.0) && !inside(300.0, 0.0) && !inside(160.0, 0.0));
         assert!(inside(119.0, 0.5) && !inside(119.0, 1.5));
         assert!(!inside(121.0, 0.0) && !inside(121.0, -0.5) && inside(121.0, -1.5));
+    }
+
+    #[test]
+    #[cfg_attr(debug_assertions, should_panic(expected = "ShaderId(-1) of 1"))]
+    fn an_index_that_was_not_validated_names_a_record_of_zeros() {
+        let bsp = MapBuilder::new().build();
+        assert_eq!(bsp.shader(ShaderId::from_raw(0)).name, "noshader");
+        assert_eq!(bsp.shader(ShaderId::from_raw(-1)).name, "");
     }
 }

@@ -1,6 +1,7 @@
 //! [`Bsp`] to bytes.
 
 use crate::Bsp;
+use crate::bytes::Record;
 use crate::container::{Container, LumpRange, SLOTS};
 use crate::error::Lump;
 use crate::format::Format;
@@ -8,7 +9,7 @@ use crate::layers::{
     Advertisement, GridLayers, LayeredSide, LayeredSurface, LayeredVertex, Layers,
 };
 use crate::lumps::{
-    Brush, BrushSide, DrawVert, Fog, GridPoint, Leaf, Model, Node, Plane, Record, ShaderRef,
+    Brush, BrushSide, DrawVert, Fog, GridPoint, Leaf, Model, Node, Plane, ShaderRef,
 };
 use crate::surface::Surface;
 

@@ -6,7 +6,7 @@
 //! * [`random`]: a small generator that gives the same numbers everywhere.
 //! * [`hash`]: 128-bit names for results that are kept.
 //! * [`simd4`]: four vectors at once.
-//! * [`slice`]: parts of lists that exist by construction.
+//! * [`mod@slice`]: parts of lists that exist by construction.
 
 #![forbid(unsafe_code)]
 #![cfg_attr(
