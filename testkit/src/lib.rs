@@ -1,6 +1,6 @@
 //! What the tests of several crates share: game data or a skipped test ([`game`], [`folder`]), a Vulkan device or a
 //! skipped test ([`device()`]), the report of a skipped test ([`skip`]), a seeded random generator ([`Random`]), damage to files ([`poke_words`]), and the timing of
-//! benchmarks ([`bench`]).
+//! benchmarks ([`mod@bench`]).
 //!
 //! # Game data
 //!
