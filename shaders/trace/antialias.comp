@@ -39,7 +39,7 @@ const float REST_RANGE = 1.25, MOVING_RANGE = 1.0;
 // Part of the way to a pixel's surface at which a neighbour's is in front of it.
 const float IN_FRONT = 0.9;
 // Part of its length that the way to a surface may be off and still be the way to that surface.
-const float SAME_PATH = 0.04;
+const float SAME_DISTANCE = 0.04;
 // Part of the light that has to change within a frame.
 const float LEAST_CHANGE = 1.0e-3;
 // Pixels between the places that tell what has changed around a pixel.
@@ -91,45 +91,45 @@ float quadratic(float x) {
 // of an edge's pixels meet one side in one frame and the other in the next. Where pixels show a reflection and what lies behind it in turns,
 // those at the corners and those beside the pixel show different things, and the way may be that of either.
 // At rest what is too thin to be met in each frame was there all the same, if nothing around has gone away since.
-bool was_seen(vec2 place, float path, bool rests, bool takes_turns) {
+bool was_seen(vec2 place, float view_distance, bool rests, bool takes_turns) {
     const vec2 around[8] = vec2[](vec2(1, 1), vec2(-1, 1), vec2(1, -1), vec2(-1, -1), vec2(1, 0), vec2(-1, 0), vec2(0, 1), vec2(0, -1));
     ivec2 last = ivec2(VIEW.width, VIEW.height) - 1;
-    float slack = SAME_PATH * path + 1.0;
-    if (abs(abs(last_path_read(clamp(ivec2(floor(place)), ivec2(0), last))) - path) < slack) return true;
+    float slack = SAME_DISTANCE * view_distance + 1.0;
+    if (abs(abs(last_view_distance_read(clamp(ivec2(floor(place)), ivec2(0), last))) - view_distance) < slack) return true;
     float least = 1.0e30, most = 0.0;
     bool rested = rests;
     for (int i = 0; i < (rests || takes_turns ? 8 : 4); i++) {
-        float then = last_path_read(clamp(ivec2(floor(place + 0.99 * around[i])), ivec2(0), last));
+        float then = last_view_distance_read(clamp(ivec2(floor(place + 0.99 * around[i])), ivec2(0), last));
         rested = rested && then >= 0.0;
         least = min(least, abs(then));
         most = max(most, abs(then));
     }
-    return rested || path > least - slack && path < most + slack;
+    return rested || view_distance > least - slack && view_distance < most + slack;
 }
 
 // The history of a resting pixel as it would be in the light of now: times what the light has changed by since the last
 // frame. As each frame does so, all samples of the history come to have the light of now. The light's noise changes, too,
 // which the mean of the frames is to take out: so the change is that of the surface around.
-vec3 in_light_of_now(vec3 color, ivec2 pixel, float path) {
+vec3 in_light_of_now(vec3 color, ivec2 pixel, float view_distance) {
     const uint KNOWN = DENOISE_HISTORY | DENOISE_GRADIENTS;
     if ((VIEW.flags & VIEW_DENOISE) == 0 || (DENOISE.flags & KNOWN) != KNOWN) return color;
     // 0 where nothing has changed, to the last digit
     vec2 change = imageLoad(images_rg16f[DENOISE.gradient], pixel / STRATUM).xy;
     if (max(change.x, change.y) < LEAST_CHANGE) return color;
     vec3 now = vec3(1.0e-6), then = vec3(1.0e-6);
-    float slack = SAME_PATH * path + 1.0;
+    float slack = SAME_DISTANCE * view_distance + 1.0;
     for (int y = -1; y <= 1; y++) {
         for (int x = -1; x <= 1; x++) {
             ivec2 at = clamp(pixel + CHANGE_SPACING * ivec2(x, y), ivec2(0), ivec2(VIEW.width, VIEW.height) - 1);
             // of the same surface in both frames, which rests
-            vec2 paths = vec2(imageLoad(images_r16f[VIEW.motion.path], at).x, last_path_read(at));
-            if (any(greaterThan(abs(paths - path), vec2(slack)))) continue;
+            vec2 distances = vec2(imageLoad(images_r16f[VIEW.motion.view_distance], at).x, last_view_distance_read(at));
+            if (any(greaterThan(abs(distances - view_distance), vec2(slack)))) continue;
             now += light_of(at);
             then += light_read(VIEW.antialias.last_light, at);
         }
     }
     GBufferPixel g = gbuffer_read(pixel);
-    if (g.path < 0.0) return color;
+    if (g.view_distance < 0.0) return color;
     vec3 ratio = clamp(now / then, 1.0 / MOST_RATIO, MOST_RATIO);
     // half of what such pixels show is the other field's
     if (mark_field(mark_read(pixel)) > 0.0) ratio = mix(vec3(1.0), ratio, 0.5);
@@ -148,7 +148,7 @@ void main() {
         ivec2 at = ivec2(i % TILE, i / TILE);
         ivec2 pixel = clamp(first + at, ivec2(0), traced_size - 1);
         vec4 color = imageLoad(images_rgba16f[VIEW.images.composite], pixel);
-        tile[at.y][at.x] = vec4(to_ycocg(compress(color.rgb, exposure)), path_read(pixel));
+        tile[at.y][at.x] = vec4(to_ycocg(compress(color.rgb, exposure)), view_distance_read(pixel));
         fresh_parts[at.y][at.x] = color.a == 0.0 ? LEAST_FRESH : color.a;
     }
     barrier();
@@ -197,12 +197,12 @@ void main() {
     vec2 last_place = vec2(pixel) + 0.5 + motion.offset / ratio;
     vec3 old = mean;
     float frames = 0.0;
-    bool known = VIEW.antialias.history != 0 && motion.last_path >= 0.0
+    bool known = VIEW.antialias.history != 0 && motion.last_view_distance >= 0.0
         && all(greaterThanEqual(last_place, vec2(0.0))) && all(lessThan(last_place, vec2(output_size)));
     bool rests = motion.offset == vec2(0.0), is_fine = traced_size == output_size;
-    if (known && was_seen(last_place * ratio, motion.last_path, rests, mark_field(motion.mark) > 0.0)) {
+    if (known && was_seen(last_place * ratio, motion.last_view_distance, rests, mark_field(motion.mark) > 0.0)) {
         vec4 history = last_bicubic(last_place, vec2(output_size));
-        if (rests) history.rgb = in_light_of_now(history.rgb, middle, path_read(middle));
+        if (rests) history.rgb = in_light_of_now(history.rgb, middle, view_distance_read(middle));
         old = to_ycocg(compress(history.rgb, exposure));
         float range = rests ? REST_RANGE : MOVING_RANGE;
         vec3 off = old - mean;

@@ -29,7 +29,7 @@ struct PathVertex {
 };
 
 // Whether a pixel gathers bounced light at all.
-bool gathers(LightTask task) { return task.surface.path >= 0.0 && (VIEW.flags & VIEW_FULLBRIGHT) == 0; }
+bool gathers(LightTask task) { return task.surface.view_distance >= 0.0 && (VIEW.flags & VIEW_FULLBRIGHT) == 0; }
 
 PathVertex first_vertex(LightTask task) {
     return PathVertex(task.surface.position, task.surface.face_normal, task.surface.normal);

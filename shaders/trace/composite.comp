@@ -43,7 +43,7 @@ Shown shown(ivec2 pixel) {
     Shown s;
     // what glows by itself, sky and fog show as the engine shows them when the map is exposed to look as bright as there
     s.front = g.front * exp2(-VIEW.exposure.base);
-    s.is_lit = g.path >= 0.0;
+    s.is_lit = g.view_distance >= 0.0;
     s.albedo = g.albedo;
     s.light = s.is_lit ? light_of(pixel) : vec3(0.0);
     return s;

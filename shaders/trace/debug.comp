@@ -44,22 +44,22 @@ vec3 cluster_color(uint cluster, vec3 normal) {
 vec3 specular_color(ivec2 pixel, GBufferPixel g) {
     float field = mark_field(mark_read(pixel));
     if (field > 0.0) return field == 2.0 ? vec3(0.0, 1.0, 0.0) : vec3(0.0, 0.0, 1.0);
-    if (g.path < 0.0) return vec3(0.0);
+    if (g.view_distance < 0.0) return vec3(0.0);
     rng_begin(uvec2(pixel), VIEW.seed, STREAM_PRIMARY);
     CameraRay ray = camera_ray(pixel);
-    return distance(ray.origin + ray.direction * g.path, g.position) > 0.1 + 0.01 * g.path ? vec3(1.0) : vec3(0.0);
+    return distance(ray.origin + ray.direction * g.view_distance, g.position) > 0.1 + 0.01 * g.view_distance ? vec3(1.0) : vec3(0.0);
 }
 
 vec3 debug_color(ivec2 pixel) {
     GBufferPixel g = gbuffer_read(pixel);
-    bool is_lit = g.path >= 0.0;
+    bool is_lit = g.view_distance >= 0.0;
     switch (VIEW.post.debug) {
     case DEBUG_ALBEDO: return is_lit ? encode_display(clamp(g.albedo, 0.0, 1.0)) : vec3(0.0);
     case DEBUG_NORMALS: return is_lit ? g.normal * 0.5 + 0.5 : vec3(0.0);
-    case DEBUG_DEPTH: return is_lit ? vec3(1.0 - (log2(max(g.path, 8.0)) - 3.0) / 10.0) : vec3(0.0);
+    case DEBUG_DEPTH: return is_lit ? vec3(1.0 - (log2(max(g.view_distance, 8.0)) - 3.0) / 10.0) : vec3(0.0);
     case DEBUG_MOTION: {
         Motion m = motion_read(pixel);
-        if (m.last_path < 0.0) return vec3(0.5, 0.0, 0.5);
+        if (m.last_view_distance < 0.0) return vec3(0.5, 0.0, 0.5);
         float size = length(m.offset);
         // to the right is red; 64 pixels a frame and more are of full strength
         return size > 0.01 ? hue(atan(-m.offset.y, m.offset.x)) * clamp(log2(1.0 + size) / 6.0, 0.05, 1.0) : vec3(0.0);

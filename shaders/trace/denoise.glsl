@@ -140,10 +140,10 @@ vec2 tangent_of(vec2 pixel) {
     return ndc * vec2(length(VIEW.camera.left), length(VIEW.camera.up));
 }
 
-// Depth of what lies `path` away on the ray through a pixel. For what mirrors show it is that of the mirror image.
-float depth_of(ivec2 pixel, float path) {
+// Depth of what lies `view_distance` away on the ray through a pixel. For what mirrors show it is that of the mirror image.
+float depth_of(ivec2 pixel, float view_distance) {
     vec2 t = tangent_of(vec2(pixel));
-    return path * inversesqrt(1.0 + dot(t, t));
+    return view_distance * inversesqrt(1.0 + dot(t, t));
 }
 
 // Where what a pixel shows was in the last frame.

@@ -13,8 +13,8 @@ shared float depths[(TILE + 2) * (TILE + 2)];
 
 float depth_at(ivec2 pixel) {
     if (!inside(pixel)) return 0.0;
-    float path = imageLoad(images_rgba32f[VIEW.images.position], pixel).w;
-    return path < 0.0 ? 0.0 : max(depth_of(pixel, path), 1.0e-3);
+    float view_distance = imageLoad(images_rgba32f[VIEW.images.position], pixel).w;
+    return view_distance < 0.0 ? 0.0 : max(depth_of(pixel, view_distance), 1.0e-3);
 }
 
 // To be called by the whole group.

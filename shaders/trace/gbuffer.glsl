@@ -10,7 +10,7 @@
 
 struct GBufferPixel {
     vec3 position;
-    float path; // length of the way from the eye; negative: nothing to light
+    float view_distance; // length of the way from the eye; negative: nothing to light
     vec3 face_normal;
     vec3 normal;
     vec3 albedo;
@@ -19,8 +19,8 @@ struct GBufferPixel {
 };
 
 // The path's lowest bit, a part in ten million of its length, holds `first_person`.
-float pack_path(GBufferPixel g) { return uintBitsToFloat(floatBitsToUint(g.path) & ~1u | (g.first_person ? 1u : 0u)); }
-bool first_person_of(float packed_path) { return (floatBitsToUint(packed_path) & 1u) != 0; }
+float pack_view_distance(GBufferPixel g) { return uintBitsToFloat(floatBitsToUint(g.view_distance) & ~1u | (g.first_person ? 1u : 0u)); }
+bool first_person_of(float packed) { return (floatBitsToUint(packed) & 1u) != 0; }
 
 // Albedo and what is in front; `dither`: see pack_light.
 void shown_write(uint image, ivec2 pixel, GBufferPixel g, vec2 dither) {
@@ -35,7 +35,7 @@ void shown_read(uint image, ivec2 pixel, inout GBufferPixel g) {
 
 // `dither`: see pack_light.
 void gbuffer_write(ivec2 pixel, GBufferPixel g, vec2 dither) {
-    imageStore(images_rgba32f[VIEW.images.position], pixel, vec4(g.position, pack_path(g)));
+    imageStore(images_rgba32f[VIEW.images.position], pixel, vec4(g.position, pack_view_distance(g)));
     imageStore(uimages_rg32ui[VIEW.images.surface], pixel, uvec4(pack_normal(g.face_normal), pack_normal(g.normal), 0, 0));
     shown_write(VIEW.images.shown, pixel, g, dither);
 }
@@ -45,7 +45,7 @@ GBufferPixel gbuffer_read(ivec2 pixel) {
     vec4 position = imageLoad(images_rgba32f[VIEW.images.position], pixel);
     uvec2 surface = imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).xy;
     g.position = position.xyz;
-    g.path = position.w;
+    g.view_distance = position.w;
     g.first_person = first_person_of(position.w);
     g.face_normal = unpack_normal(surface.x);
     g.normal = unpack_normal(surface.y);

@@ -9,7 +9,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 const float REACH = 1.0;
 
 // Whether the sample is of the surface that the pixel shows; `moved`: which is somewhere else by now.
-bool same_surface(LitSample s, ivec2 pixel, float last_path, out bool moved) {
+bool same_surface(LitSample s, ivec2 pixel, float last_view_distance, out bool moved) {
     vec4 position = imageLoad(images_rgba32f[VIEW.images.position], pixel);
     moved = false;
     if (position.w < 0.0) return false;
@@ -19,7 +19,7 @@ bool same_surface(LitSample s, ivec2 pixel, float last_path, out bool moved) {
     if (dot(s.face_normal, face_normal) > 0.9 && abs(dot(away, face_normal)) < 0.05 + 0.5 * footprint
         && dot(away, away) < 1.0 + 100.0 * footprint * footprint) return true;
     moved = true;
-    return abs(s.path - last_path) < 0.02 * last_path + 0.1;
+    return abs(s.view_distance - last_view_distance) < 0.02 * last_view_distance + 0.1;
 }
 
 void main() {
@@ -28,14 +28,14 @@ void main() {
     if (!inside(first)) return;
 
     ivec2 middle = min(first + 1, ivec2(VIEW.width, VIEW.height) - 1);
-    float path = imageLoad(images_rgba32f[VIEW.images.position], middle).w;
+    float view_distance = imageLoad(images_rgba32f[VIEW.images.position], middle).w;
     uint guide = 0;
-    if (path >= 0.0) guide = pack_guide(depth_of(middle, path), unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], middle).x), false);
+    if (view_distance >= 0.0) guide = pack_guide(depth_of(middle, view_distance), unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], middle).x), false);
     imageStore(uimages_r32ui[DENOISE.stratum_guide], stratum, uvec4(guide));
 
     float nearest = REACH;
     int found = -1;
-    float found_path = 0.0;
+    float found_distance = 0.0;
     bool rests = false;
     ivec2 place = ivec2(0);
     for (int i = 0; i < 9; i++) {
@@ -52,13 +52,13 @@ void main() {
         if (distance >= nearest) continue;
         nearest = distance;
         found = i;
-        found_path = motion.z;
+        found_distance = motion.z;
         rests = motion.xy == vec2(0.0);
         place = unpack_place(packed);
     }
     uint record = NO_GRADIENT_PIXEL;
     bool moved;
-    if (found >= 0 && same_surface(kept_sample(place / STRATUM), pixel_of(stratum, found), found_path, moved) && !(moved && rests))
+    if (found >= 0 && same_surface(kept_sample(place / STRATUM), pixel_of(stratum, found), found_distance, moved) && !(moved && rests))
         record = pack_gradient_pixel(found, moved, place);
     imageStore(uimages_r32ui[DENOISE.gradient_pixels], stratum, uvec4(record));
 }

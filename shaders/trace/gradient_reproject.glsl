@@ -45,7 +45,7 @@ struct LitSample {
     bool valid;
     ivec2 pixel;
     vec3 position;
-    float path;
+    float view_distance;
     vec3 face_normal;
     vec3 normal;
     vec2 light; // luminance of direct and indirect light, rounded to 16-bit floats; negative: not known
@@ -83,7 +83,7 @@ LightTask light_task(ivec2 pixel) {
     task.surface.position = s.position;
     task.surface.face_normal = s.face_normal;
     task.surface.normal = s.normal;
-    task.surface.first_person = first_person_of(s.path);
+    task.surface.first_person = first_person_of(s.view_distance);
     return task;
 }
 

@@ -22,7 +22,7 @@ struct LightSet {
 uint set_count(LightSet set) { return set.listed + set.suns + set.dynamic_count; }
 
 // Number of cells, which have a row for each way that a surface may face; after these comes the row of all lights.
-uint cell_count() { return (VIEW.lights.row_count - 1) / FACINGS; }
+uint cell_count() { return (VIEW.lights.row_count - 1) / NORMAL_BINS; }
 
 // Cell of a point, a piece of a cluster, by a walk through the map's tree; the number of cells for a point in none.
 uint cell_at(vec3 position) {
@@ -49,7 +49,7 @@ uint cell_at(vec3 position) {
 }
 
 // The axis that a normal is nearest to, one of twice three.
-uint facing_of(vec3 normal) {
+uint normal_bin_of(vec3 normal) {
     vec3 size = abs(normal);
     uint axis = size.x >= max(size.y, size.z) ? 0 : size.y >= size.z ? 1 : 2;
     return axis * 2 + (normal[axis] < 0.0 ? 1 : 0);
@@ -57,7 +57,7 @@ uint facing_of(vec3 normal) {
 
 LightSet lights_at(vec3 position, vec3 face_normal, vec3 normal) {
     // a point of a surface lies on the boundary of leaves: step into the room that it faces
-    uint place = cell_at(position + face_normal) * FACINGS + facing_of(normal);
+    uint place = cell_at(position + face_normal) * NORMAL_BINS + normal_bin_of(normal);
     LightRow row = LightRows(VIEW.lights.rows).at[min(place, VIEW.lights.row_count - 1)];
     LightSet set = LightSet(row.first, row.count, row.strong, row.suns != 0 ? VIEW.lights.sun_count : 0, 0, 0);
     uint dynamic_rows = VIEW.lights.dynamic_row_count;
@@ -264,7 +264,7 @@ float light_target(uint light, vec3 position, vec3 normal) {
     if (aloft + bounds.radius <= 0.0) return 0.0;
     float inverse = inversesqrt(max(squared, 1.0e-6));
     float scale = kind == LIGHT_TRIANGLE || kind == LIGHT_SPHERE ? VIEW.lights.scale : 1.0;
-    float towards = bounds.even;
+    float towards = bounds.omni_intensity;
     if (towards <= 0.0) {
         float facing = -dot(bounds.axis, to);
         if (towards < 0.0) facing = abs(facing);
@@ -294,7 +294,7 @@ struct LightChoice {
 
 // One light, each with about the same probability. `u` of this and what follows: uniform, before and after (see rng_decide),
 // so that with another number it is a point on the sampled light.
-LightChoice choose_uniform(LightSet set, inout float u) {
+LightChoice sample_uniform(LightSet set, inout float u) {
     uint count = set_count(set), length = uint(findMSB(count));
     if (length > 13) {
         uint member = rng_pick(u, count);
@@ -309,7 +309,7 @@ LightChoice choose_uniform(LightSet set, inout float u) {
 }
 
 // One of the suns; a map has one as a rule.
-LightChoice choose_sun(uint count, inout float u) {
+LightChoice sample_sun(uint count, inout float u) {
     uint index = count > 1 ? rng_pick(u, count) : 0;
     return LightChoice((LIGHT_SUN << LIGHT_KIND_SHIFT) | index, float(count), 0.0);
 }
@@ -319,7 +319,7 @@ LightChoice choose_sun(uint count, inout float u) {
 // chances by what each light gives in the cell to what faces about that way, shadows included; the whole list is taken if it is short enough.
 // Lights of this frame are candidates of their own. A hidden sun would outshine all that is left in its shadow: suns
 // get a ray of their own.
-LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal, inout float u) {
+LightChoice sample_resampled(LightSet set, vec3 position, vec3 normal, inout float u) {
     uint candidates = max(VIEW.lights.candidates, 1);
     uint drawn = min(set.listed, candidates), drawn_dynamic = min(set.dynamic_count, candidates);
     LightSlots slots = LightSlots(VIEW.lights.slots);
@@ -369,10 +369,10 @@ LightChoice choose_resampled(LightSet set, vec3 position, vec3 normal, inout flo
 
 // A light of the list or a sun, for points that get one ray: about by what each would give without shadows, neither of
 // them rarely, as nobody knows here what is in the way.
-LightChoice choose_one(LightSet set, vec3 position, vec3 normal, inout float u) {
-    LightChoice listed = choose_resampled(set, position, normal, u);
+LightChoice sample_one(LightSet set, vec3 position, vec3 normal, inout float u) {
+    LightChoice listed = sample_resampled(set, position, normal, u);
     if (set.suns == 0) return listed;
-    LightChoice sun = choose_sun(set.suns, u);
+    LightChoice sun = sample_sun(set.suns, u);
     SunLight light = SunLights(VIEW.lights.suns).at[light_index(sun.light)];
     // the disc's edge may be up where its middle is not
     float aloft = dot(normal, light.direction) + sqrt(max(1.0 - light.cos_angle * light.cos_angle, 0.0));
@@ -390,8 +390,8 @@ LightSample one_light(vec3 position, vec3 face_normal, vec3 normal) {
     if (set_count(set) == 0) return no_light();
     vec2 u = rng_next2();
     LightChoice choice;
-    if (VIEW.lights.selection == SELECT_UNIFORM) choice = choose_uniform(set, u.x);
-    else choice = choose_one(set, position, normal, u.x);
+    if (VIEW.lights.selection == SELECT_UNIFORM) choice = sample_uniform(set, u.x);
+    else choice = sample_one(set, position, normal, u.x);
     if (!(choice.weight > 0.0)) return no_light();
     LightSample s = sample_light(choice.light, position, normal, u);
     s.light *= choice.weight;

@@ -73,7 +73,7 @@ const float MIN_GLOW = 1.0 / 256.0;
 // Where a point of the path was seen in the last frame. What is seen bent is taken to stand where the eye sees it now.
 LastSpace last_space(Path path, vec3 position, float t) {
     if (path.bent == BENT_NOT) return path.last;
-    return LastSpace(path.last.turn, VIEW.camera.origin + path.eye_direction * (path.travelled + t) - path.last.turn * position);
+    return LastSpace(path.last.linear, VIEW.camera.origin + path.eye_direction * (path.travelled + t) - path.last.linear * position);
 }
 
 void keep_lit(SurfacePoint p, vec3 lit, Path path, float t) {
@@ -90,7 +90,7 @@ void keep_lit(SurfacePoint p, vec3 lit, Path path, float t) {
     lit_kept = true;
     kept_weight = weight;
     kept.position = p.position;
-    kept.path = path.travelled + t;
+    kept.view_distance = path.travelled + t;
     bool turned = dot(p.face_normal, path.direction) > 0.0;
     kept.face_normal = turned ? -p.face_normal : p.face_normal;
     // light is gathered on the side that is seen

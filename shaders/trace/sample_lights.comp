@@ -17,13 +17,13 @@ void main() {
     if (inside(pixel)) {
         LightTask task = light_task(pixel);
         GBufferPixel g = task.surface;
-        if (g.path >= 0.0) {
+        if (g.view_distance >= 0.0) {
             rng_begin(uvec2(task.pixel), task.seed, STREAM_LIGHT);
             random = rng_independent();
             LightSet set = lights_at(g.position, g.face_normal, g.normal);
             if (set_count(set) > set.suns) {
                 vec2 u = rng_next2();
-                LightChoice choice = choose_resampled(set, g.position, g.normal, u.x);
+                LightChoice choice = sample_resampled(set, g.position, g.normal, u.x);
                 if (choice.weight > 0.0) sampled = sample_light(choice.light, g.position, g.normal, u);
                 sampled.light *= choice.weight;
             }

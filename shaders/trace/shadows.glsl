@@ -49,14 +49,14 @@ vec3 direct_light(vec3 position, vec3 face_normal, vec3 normal, uint mask, uint 
         uint ray = i % rays;
         LightChoice choice;
         vec2 u = rng_next2();
-        if (selection == SELECT_UNIFORM) choice = choose_uniform(set, u.x);
+        if (selection == SELECT_UNIFORM) choice = sample_uniform(set, u.x);
         else if (ray >= picks && selection == SELECT_ALL) {
             uint member = ray - picks;
             if (member >= set.strong) member += from.listed;
             choice = LightChoice(light_of_member(set, member), 1.0, 0.0);
-        } else if (ray >= picks) choice = choose_sun(set.suns, u.x);
+        } else if (ray >= picks) choice = sample_sun(set.suns, u.x);
         else {
-            choice = choose_resampled(from, position, normal, u.x);
+            choice = sample_resampled(from, position, normal, u.x);
             choice.weight /= float(picks);
         }
         if (!(choice.weight > 0.0)) continue;

@@ -9,7 +9,7 @@
 const int CELL = 2;
 
 // Where in a cell of a row of cells the pixel is whose turn it is.
-ivec2 turn(int row) {
+ivec2 gathered_offset(int row) {
     uint frame = VIEW.seed & 3u;
     // across, then the other two, so that two frames make a chessboard; shifted in every other row, so that each frame has
     // pixels of both fields where a reflection and what lies behind it take turns
@@ -22,7 +22,7 @@ uint subsample_index(uint frame) { return (VIEW.flags & VIEW_SUBSAMPLED_BOUNCE) 
 
 // The pixel of a cell that is traced.
 ivec2 subsample_pixel(ivec2 cell) {
-    ivec2 end = ivec2(VIEW.width, VIEW.height) - 1, first = turn(cell.y), pixel = min(cell * CELL + first, end);
+    ivec2 end = ivec2(VIEW.width, VIEW.height) - 1, first = gathered_offset(cell.y), pixel = min(cell * CELL + first, end);
     if ((DENOISE.flags & DENOISE_GRADIENTS) == 0) return pixel;
     for (int i = 0; i < 4; i++) {
         ivec2 other = min(cell * CELL + (first ^ ivec2(i & 1, i >> 1)), end);

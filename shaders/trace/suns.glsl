@@ -14,7 +14,7 @@ const float WEAK_SUN = 1.0 / 64.0;
 LightSample sun_sample(LightTask task) {
     rng_begin(uvec2(task.pixel), task.seed, STREAM_SUN);
     vec2 u = rng_next2();
-    LightChoice sun = choose_sun(VIEW.lights.sun_count, u.x);
+    LightChoice sun = sample_sun(VIEW.lights.sun_count, u.x);
     LightSample s = sample_light(sun.light, task.surface.position, task.surface.normal, u);
     float part = dot(task.surface.normal, s.direction);
     if (part < WEAK_SUN) {

@@ -112,9 +112,9 @@ uint choice_of(ivec2 stratum) {
     bool sparse = (VIEW.flags & VIEW_SUBSAMPLED_BOUNCE) != 0;
     int random = int(4.0 * dither(stratum, DITHER_SAMPLE));
     ivec2 corner = stratum * STRATUM, first, choice;
-    first.y = sparse ? (turn(0).y + corner.y) & 1 : int(dither(stratum, DITHER_SAMPLE_ROW) < 0.5);
+    first.y = sparse ? (gathered_offset(0).y + corner.y) & 1 : int(dither(stratum, DITHER_SAMPLE_ROW) < 0.5);
     choice.y = first.y + (first.y == 0 && (random & 2) != 0 ? 2 : 0);
-    first.x = sparse ? (turn((corner.y + choice.y) / CELL).x + corner.x) & 1 : int(dither(stratum, DITHER_SAMPLE_COLUMN) < 0.5);
+    first.x = sparse ? (gathered_offset((corner.y + choice.y) / CELL).x + corner.x) & 1 : int(dither(stratum, DITHER_SAMPLE_COLUMN) < 0.5);
     choice.x = first.x + (first.x == 0 && (random & 1) != 0 ? 2 : 0);
     int index = choice.y * STRATUM + choice.x;
     if (c.valid && c.index == index) {

@@ -12,7 +12,7 @@ use relight::light::TriangleLight;
 use shaders::trace_types::BspNode;
 use support::Aabb;
 
-use super::light_facings::{Facings, facings};
+use super::light_normal_bins::{NormalBins, normal_bins};
 
 /// Sides of the grid that are tried, units, from the finest; after these clusters stay whole.
 const SIDES: [f32; 7] = [128.0, 192.0, 256.0, 384.0, 512.0, 1024.0, 2048.0];
@@ -58,7 +58,7 @@ pub struct Cells {
     /// The cells.
     pub cells: Vec<Cell>,
     /// Of each cell where surfaces face which way.
-    pub facings: Vec<Facings>,
+    pub normal_bins: Vec<NormalBins>,
 }
 
 /// A leaf of the map that is to be cut.
@@ -196,7 +196,7 @@ impl Cells {
         fine.unwrap_or_else(|| {
             let mut whole = Self::cut(bsp, &leafs, None, &length);
             if whole.entries(&length) > MOST_ENTRIES {
-                whole.facings.fill_with(Facings::default);
+                whole.normal_bins.fill_with(NormalBins::default);
             }
             whole
         })
@@ -204,9 +204,12 @@ impl Cells {
 
     /// Entries of the lists: of each cell one for all normals, and one for each way that surfaces face.
     fn entries(&self, length: impl Fn(usize) -> usize) -> f64 {
-        let cells = self.cells.iter().zip(&self.facings);
-        let lists = cells.map(|(cell, facings)| {
-            let lists = 1 + facings.iter().filter(|points| !points.is_empty()).count();
+        let cells = self.cells.iter().zip(&self.normal_bins);
+        let lists = cells.map(|(cell, normal_bins)| {
+            let lists = 1 + normal_bins
+                .iter()
+                .filter(|points| !points.is_empty())
+                .count();
             #[allow(clippy::cast_precision_loss)] // lengths of lists
             let entries = (lists * length(cell.cluster)) as f64;
             entries
@@ -269,7 +272,7 @@ impl Cells {
                 }
             }
         }
-        made.facings = facings(bsp, &made.cells);
+        made.normal_bins = normal_bins(bsp, &made.cells);
         made
     }
 }

@@ -12,7 +12,7 @@ use shaders::trace_types::constants as c;
 use support::slice::part;
 
 use super::light_cells::{Cell, Cells};
-use super::light_facings::{FACINGS, Facings};
+use super::light_normal_bins::{NORMAL_BINS, NormalBins};
 use super::light_tables::{Entry, append_slots};
 use super::light_weights::{Arriving, Listed, Place, shares};
 use super::lights::{
@@ -77,7 +77,7 @@ impl Row {
 struct RowsOfCell {
     of_all: Row,
     /// For each direction, where something faces that way.
-    facing: [Option<Row>; FACINGS],
+    bins: [Option<Row>; NORMAL_BINS],
 }
 
 impl RowsOfCell {
@@ -85,7 +85,7 @@ impl RowsOfCell {
     fn new(
         source: &MapLightSource<'_>,
         cell: &Cell,
-        facings: &Facings,
+        normal_bins: &NormalBins,
         listed: &[Listed<'_>],
     ) -> Self {
         let near: Vec<&Listed<'_>> = (listed.iter())
@@ -108,8 +108,8 @@ impl RowsOfCell {
         );
         let of_all = near.iter().zip(&anywhere);
         let of_all = of_all.map(|(light, share)| entry(light, light.visibility, *share));
-        let facing = std::array::from_fn(|facing| {
-            let points = facings.get(facing).filter(|points| !points.is_empty())?;
+        let bins = std::array::from_fn(|bin| {
+            let points = normal_bins.get(bin).filter(|points| !points.is_empty())?;
             let places: Vec<Place> = (points.iter())
                 .map(|&(point, normal)| Place::on_surface(point, normal))
                 .collect();
@@ -121,7 +121,7 @@ impl RowsOfCell {
             let lights = near.iter().zip(&arriving.together);
             let entries = lights
                 .zip(anywhere.iter().zip(&own))
-                .filter(|((light, _), _)| !light.is_below(cell, facing))
+                .filter(|((light, _), _)| !light.is_below(cell, bin))
                 .map(|((light, &arriving), (any, own))| {
                     let any = any * arriving / light.visibility.max(f32::MIN_POSITIVE);
                     let share = ANYWHERE_PART * any + (1.0 - ANYWHERE_PART) * own;
@@ -131,7 +131,7 @@ impl RowsOfCell {
         });
         Self {
             of_all: Row::new(of_all.collect(), swept),
-            facing,
+            bins,
         }
     }
 }
@@ -150,14 +150,14 @@ pub fn rows(
     let clusters = 0..i32::try_from(lists.clusters()).unwrap_or(i32::MAX);
     let listed_in: Vec<Vec<Listed<'_>>> = clusters.map(|c| listed(source, numbers, c)).collect();
     let listed_in = &listed_in;
-    let facings = cells.facings.chunks(CELLS_AT_ONCE);
-    let made: Vec<_> = (cells.cells.chunks(CELLS_AT_ONCE).zip(facings))
-        .map(|(cells, facings)| {
+    let normal_bins = cells.normal_bins.chunks(CELLS_AT_ONCE);
+    let made: Vec<_> = (cells.cells.chunks(CELLS_AT_ONCE).zip(normal_bins))
+        .map(|(cells, normal_bins)| {
             Late::new(move || {
-                let cells = cells.iter().zip(facings);
-                let rows = cells.map(|(cell, facings)| {
+                let cells = cells.iter().zip(normal_bins);
+                let rows = cells.map(|(cell, normal_bins)| {
                     let listed = listed_in.get(cell.cluster).map_or(&[][..], Vec::as_slice);
-                    (cell, RowsOfCell::new(source, cell, facings, listed))
+                    (cell, RowsOfCell::new(source, cell, normal_bins, listed))
                 });
                 rows.collect::<Vec<_>>()
             })
@@ -169,7 +169,7 @@ pub fn rows(
             .map(|late| late as &dyn Make)
             .collect::<Vec<_>>(),
     );
-    let mut rows = Vec::with_capacity(cells.cells.len() * FACINGS + 1);
+    let mut rows = Vec::with_capacity(cells.cells.len() * NORMAL_BINS + 1);
     let mut slots = Vec::new();
     let mut placed = |row: &Row, cluster: Option<i32>| {
         let first = count(slots.len());
@@ -186,8 +186,8 @@ pub fn rows(
     for (cell, made) in made.into_iter().flat_map(Late::take) {
         let cluster = i32::try_from(cell.cluster).ok();
         let of_all = placed(&made.of_all, cluster);
-        for facing in &made.facing {
-            let own = facing.as_ref().map(|row| placed(row, cluster));
+        for bin in &made.bins {
+            let own = bin.as_ref().map(|row| placed(row, cluster));
             rows.push(own.unwrap_or(of_all));
         }
     }

@@ -8,7 +8,7 @@ use shaders::trace_types as t;
 use support::Aabb;
 
 use super::light_cells::Cell;
-use super::light_facings::{BESIDE, FACINGS, POINTS, direction};
+use super::light_normal_bins::{BESIDE, NORMAL_BINS, POINTS, direction};
 
 /// Cosine and sine of the angle by which normals are tilted besides the one that faces straight on.
 const TILT: (f32, f32) = (0.8, 0.6);
@@ -63,10 +63,10 @@ impl Listed<'_> {
         let to = bounds.centre - point;
         let squared = to.length_squared().max(nearest * nearest).max(1.0);
         let inverse = squared.sqrt().recip();
-        let mut light = bounds.even;
-        if bounds.even <= 0.0 {
+        let mut light = bounds.omni_intensity;
+        if bounds.omni_intensity <= 0.0 {
             let facing = -bounds.axis.dot(to);
-            let facing = if bounds.even < 0.0 {
+            let facing = if bounds.omni_intensity < 0.0 {
                 facing.abs()
             } else {
                 facing
@@ -101,8 +101,8 @@ impl Listed<'_> {
 
     /// What it gives to all sides, about.
     pub fn power(&self) -> f32 {
-        if self.bounds.even > 0.0 {
-            self.bounds.even
+        if self.bounds.omni_intensity > 0.0 {
+            self.bounds.omni_intensity
         } else {
             self.bounds.axis.length() * (0.25 / PI)
         }
@@ -130,9 +130,9 @@ impl Listed<'_> {
     }
 
     /// Whether it gives nothing to any point of a cell whose normal has its largest part along the axis of `facing`.
-    pub fn is_below(&self, cell: &Cell, facing: usize) -> bool {
+    pub fn is_below(&self, cell: &Cell, bin: usize) -> bool {
         let Aabb { mins, maxs } = cell.bounds.grown(Vec3::splat(BESIDE));
-        let axis = direction(facing);
+        let axis = direction(bin);
         // The height of a place over a point's horizon, were the largest part of the normal 1 and the others, which may
         // be anything up to that, the worst; such a normal is no longer than the root of 3.
         let highest = |place: Vec3, radius: f32| {
@@ -185,7 +185,9 @@ impl Place {
     pub fn throughout(cell: &Cell) -> Vec<Self> {
         let place = |i: usize| Self {
             point: cell.bounds.mins + cell.bounds.size() * spread_point(i),
-            normals: (0..FACINGS).map(|f| (direction(f), 1.0 / 6.0)).collect(),
+            normals: (0..NORMAL_BINS)
+                .map(|f| (direction(f), 1.0 / 6.0))
+                .collect(),
         };
         (0..POINTS).map(place).collect()
     }
@@ -419,14 +421,14 @@ mod tests {
         for _ in 0..2000 {
             let light = lamp(vector() * 300.0, vector(), 1.0);
             let listed = listed(&light);
-            for facing in 0..FACINGS {
-                if !listed.is_below(&cell, facing) {
+            for bin in 0..NORMAL_BINS {
+                if !listed.is_below(&cell, bin) {
                     continue;
                 }
                 left_out += 1;
                 for _ in 0..20 {
-                    let mut normal = vector() * (1.0 - direction(facing).abs());
-                    normal += direction(facing) * normal.abs().max_element();
+                    let mut normal = vector() * (1.0 - direction(bin).abs());
+                    normal += direction(bin) * normal.abs().max_element();
                     let point = vector() * 20.0;
                     let heights = light.vertices.map(|p| (p - point).dot(normal));
                     assert!(heights.iter().all(|h| *h <= 0.0), "{normal} {point}");
@@ -434,7 +436,7 @@ mod tests {
             }
             // what lies before the cell is kept
             let axis = light.vertices[0].abs().max_element();
-            let before = (0..FACINGS).find(|&f| light.vertices[0].dot(direction(f)) == axis);
+            let before = (0..NORMAL_BINS).find(|&f| light.vertices[0].dot(direction(f)) == axis);
             assert!(before.is_some_and(|f| !listed.is_below(&cell, f)));
         }
         assert!(left_out > 300, "{left_out}");

@@ -151,7 +151,8 @@ pub(super) fn sphere_bounds(light: &t::SphereLight) -> t::LightBounds {
             Vec3::ZERO
         },
         // as L: irradiance over pi. What gives nothing needs no candidates, but 0 would say that it is a triangle.
-        even: (luminance(light.radiance) * light.radius * light.radius).max(f32::MIN_POSITIVE),
+        omni_intensity: (luminance(light.radiance) * light.radius * light.radius)
+            .max(f32::MIN_POSITIVE),
     }
 }
 
@@ -164,7 +165,7 @@ pub(super) fn triangle_bounds(light: &t::TriangleLight) -> t::LightBounds {
         centre,
         radius: radius.into_iter().fold(0.0, f32::max),
         axis: (b - a).cross(c - a) * (0.5 * luminance(light.radiance)),
-        even: if light.flags & c::LIGHT_TWO_SIDED != 0 {
+        omni_intensity: if light.flags & c::LIGHT_TWO_SIDED != 0 {
             -1.0
         } else {
             0.0

@@ -29,7 +29,7 @@ pub mod input;
 pub mod layer_boxes;
 mod lifted;
 pub mod light_cells;
-pub mod light_facings;
+pub mod light_normal_bins;
 pub mod light_rows;
 pub mod light_tables;
 pub mod light_weights;

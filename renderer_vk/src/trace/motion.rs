@@ -118,8 +118,8 @@ impl Motion {
             last_portals: rec.arena().push(&found.portals)?,
             still: u32::from(camera_rests && found.portals == portals),
             time_stands: u32::from(found.time_stands),
-            path: targets.path[0].storage_index(),
-            last_path: targets.path[1].storage_index(),
+            view_distance: targets.view_distance[0].storage_index(),
+            last_view_distance: targets.view_distance[1].storage_index(),
         })
     }
 

@@ -34,9 +34,8 @@ pub struct Targets {
     pub width: u32,
     /// Pixels.
     pub height: u32,
-    /// 16 bytes a pixel that passes hand on: what the eye's rays meet, until the G-buffer is written; the light that is
-    /// chosen, until a ray is sent to it; then the light that the denoiser is filtering.
-    pub texels: Buffer,
+    /// 16 bytes a pixel that passes use in turns: primary hits, then sampled lights, then light that the denoiser filters.
+    pub scratch: Buffer,
     /// `Rgba32F`: world position of the surface that is shown, and length of the way to it from the eye (negative: nothing
     /// to light; its lowest bit is set of what the eye alone sees). Written by `plain` and `primary`, read by all that light
     /// or filter.
@@ -53,8 +52,8 @@ pub struct Targets {
     /// `Rgba16F`: how far from the pixel its surface was in the last frame (pixels, right and down), the length of the way
     /// to it then (negative: unknown), and the mark of the pixel (`motion.glsl`). Read by the denoiser and by TAA.
     pub motion: Image,
-    /// `R16F`: length of the way to it, of this frame and the last; negative where it does not rest in the picture.
-    pub path: [Image; 2],
+    /// `R16F`: view distance in this frame and in the last; negative where the surface moves in the picture.
+    pub view_distance: [Image; 2],
     /// `R32Uint`, light: what comes straight from lamps and suns, without albedo. Written by `direct` and `suns`, where the
     /// denoiser leaves the filtered light for `composite`; of this frame and the last.
     pub direct: [Image; 2],
@@ -82,9 +81,9 @@ impl Targets {
         Ok(Self {
             width,
             height,
-            texels: texels(
+            scratch: texels(
                 device,
-                "trace texels",
+                "trace scratch",
                 [width, height].map(|n| n.next_multiple_of(RAY_TILE)),
                 16,
             )?,
@@ -93,7 +92,7 @@ impl Targets {
             shown: make("trace shown", Format::Rg32Uint)?,
             other: make("trace other", Format::Rg32Uint)?,
             motion: make("trace motion", Format::Rgba16F)?,
-            path: [
+            view_distance: [
                 make("trace path", Format::R16F)?,
                 make("trace last path", Format::R16F)?,
             ],
@@ -130,7 +129,7 @@ impl Targets {
 
     /// What this frame has written becomes what the last one wrote.
     pub fn advance(&mut self) {
-        self.path.swap(0, 1);
+        self.view_distance.swap(0, 1);
         self.direct.swap(0, 1);
     }
 }

@@ -320,7 +320,7 @@ impl ViewTracer {
         }
         self.fog.record(passes)?;
         self.counters.end(passes.rec)?;
-        self.denoiser.filter(passes, &targets.texels)?;
+        self.denoiser.filter(passes, &targets.scratch)?;
         passes.run(Pass::Composite)?;
         self.antialias.record(passes)?;
         passes.run(Pass::Histogram)?;

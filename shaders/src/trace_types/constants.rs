@@ -112,7 +112,7 @@ pub const WEAK_RAYS: u32 = 3;
 pub const LIGHTS_SOFT: u32 = 1;
 
 /// Light lists of each cell: one for each side of a cube that normals point to.
-pub const FACINGS: u32 = 6;
+pub const NORMAL_BINS: u32 = 6;
 
 /// The upper bits of a light's number, from this one on, are its kind; the others are its index among its kind.
 pub const LIGHT_KIND_SHIFT: u32 = 29;

@@ -30,9 +30,9 @@ pub struct MotionView {
     /// For each portal of the view the [`PortalRecord`](super::PortalRecord) of the last frame.
     pub last_portals: u64,
     /// R16F: length of the way now, which the next frame reads, too.
-    pub path: u32,
+    pub view_distance: u32,
     /// The same image of the last frame.
-    pub last_path: u32,
+    pub last_view_distance: u32,
     /// 1: camera, mirrors and portals are where they were.
     pub still: u32,
     /// 1: no time has passed since the last frame.

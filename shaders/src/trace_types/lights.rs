@@ -68,7 +68,7 @@ pub struct LightBounds {
     /// a spot times the cosine from which on it is dark, shifted by 2 so that it is never zero; zero without a spot.
     pub axis: Vec3,
     /// Of a sphere the luminance of its radiant intensity, above 0; of a triangle 0, or -1 if both sides shine.
-    pub even: f32,
+    pub omni_intensity: f32,
 }
 
 /// A slot of a row's alias table: two lights, of which a number in [0, 1) picks the first below `threshold`.
@@ -141,7 +141,7 @@ pub struct LightView {
     pub spheres: [u64; 2],
     /// [`SunLight`]s.
     pub suns: u64,
-    /// `FACINGS` [`LightRow`]s of each cell (a piece of a cluster), one for each side of a cube that normals point to; the
+    /// `NORMAL_BINS` [`LightRow`]s of each cell (a piece of a cluster), one for each side of a cube that normals point to; the
     /// last is for points in no cell, and holds all lights.
     pub rows: u64,
     /// [`LightSlot`]s.

@@ -56,7 +56,7 @@ fn check(gpu: &Gpu, first: &RefDef, expected: impl Fn(Vec3) -> Option<Vec3>) -> 
             (i as i32 % SIZE) as f32 + 0.5,
             (i as i32 / SIZE) as f32 + 0.5,
         );
-        let [u, v, last_path, now] = motion;
+        let [u, v, last_view_distance, now] = motion;
         let wanted = seen(first, last);
         let found = pixel + Vec2::new(u, v);
         assert!(
@@ -65,8 +65,8 @@ fn check(gpu: &Gpu, first: &RefDef, expected: impl Fn(Vec3) -> Option<Vec3>) -> 
         );
         let length = last.distance(first.view_origin);
         assert!(
-            (last_path - length).abs() < 1.0e-3 * length,
-            "{last_path} {length}"
+            (last_view_distance - length).abs() < 1.0e-3 * length,
+            "{last_view_distance} {length}"
         );
         assert!((now - path).abs() < 1.0e-3 * path, "{now} {path}");
         known += 1;

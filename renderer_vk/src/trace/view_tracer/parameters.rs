@@ -57,13 +57,13 @@ impl ViewTracer {
         let lights = traced.map.map_or(&self.no_lights, |m| m.lights);
         let flares = traced.map.map_or_else(FlareTest::default, |m| m.flares);
         Ok(TraceView {
-            scratch: targets.texels.address(),
+            scratch: targets.scratch.address(),
             materials: traced.materials.buffers(),
             scene: scene_view(rec, traced, prepared)?,
             lights: lights.of_view(rec, scene, settings)?,
             transport: transport(rec, traced)?,
             motion: prepared.motion,
-            denoise: (self.denoiser).view(self.frame.wrapping_sub(1), &targets.texels),
+            denoise: (self.denoiser).view(self.frame.wrapping_sub(1), &targets.scratch),
             flares: FlareView {
                 flares: flares.flares,
                 states: flares.states,

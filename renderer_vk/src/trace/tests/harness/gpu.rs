@@ -265,7 +265,7 @@ impl Gpu {
         let read = |image| self.device.read_image(image).expect("read");
         let places: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.position));
         let halves: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&read(&targets.motion));
-        let paths: Vec<u16> = bytemuck::pod_collect_to_vec(&read(&targets.path[1]));
+        let paths: Vec<u16> = bytemuck::pod_collect_to_vec(&read(&targets.view_distance[1]));
         let motions = halves.iter().zip(paths).map(|(motion, path)| {
             let [x, y, last, _mark] = motion.map(half);
             // its sign tells whether it rests

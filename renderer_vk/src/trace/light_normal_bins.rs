@@ -1,4 +1,4 @@
-//! Which ways surfaces face in each cell, and where in it those lie.
+//! Normal bins of each cell, with sample points on the surfaces of each bin.
 
 use glam::Vec3;
 use q3bsp::{Bsp, Surface, SurfaceKind, surface_flags};
@@ -7,26 +7,22 @@ use support::Aabb;
 
 use super::light_cells::Cell;
 
-/// Directions that surfaces may face: one for each side of a cube.
-pub const FACINGS: usize = c::FACINGS as usize;
+/// Normal bins: one for each signed axis.
+pub const NORMAL_BINS: usize = c::NORMAL_BINS as usize;
 
 /// How far beside its cell a point may lie, units: that of a point is the cell one unit before it.
 pub const BESIDE: f32 = 1.5;
 
-/// Points on surfaces of a cell, with unit normals, for each direction that these face; none where none does.
-pub type Facings = [Vec<(Vec3, Vec3)>; FACINGS];
+/// Points on surfaces of a cell, with unit normals, for each normal bin; none for a bin without surfaces.
+pub type NormalBins = [Vec<(Vec3, Vec3)>; NORMAL_BINS];
 
-/// Points for each direction of a cell, at the most.
+/// Most points for each normal bin of a cell.
 pub const POINTS: usize = 8;
 
-/// The axis of a direction.
-pub fn direction(facing: usize) -> Vec3 {
-    let axis = Vec3::AXES.get(facing / 2).copied().unwrap_or(Vec3::X);
-    if facing.is_multiple_of(2) {
-        axis
-    } else {
-        -axis
-    }
+/// The axis of a normal bin.
+pub fn direction(bin: usize) -> Vec3 {
+    let axis = Vec3::AXES.get(bin / 2).copied().unwrap_or(Vec3::X);
+    if bin.is_multiple_of(2) { axis } else { -axis }
 }
 
 /// How much shorter a part of a normal may be than its longest and still be taken for that: what shaders know of normals is
@@ -34,8 +30,8 @@ pub fn direction(facing: usize) -> Vec3 {
 const TIE: f32 = 0.99;
 
 /// Whether shaders may take a normal to face a direction.
-fn faces(normal: Vec3, facing: usize) -> bool {
-    normal.dot(direction(facing)) >= TIE * normal.abs().max_element()
+fn faces(normal: Vec3, bin: usize) -> bool {
+    normal.dot(direction(bin)) >= TIE * normal.abs().max_element()
 }
 
 /// A triangle of a surface.
@@ -151,7 +147,7 @@ impl Parts {
 }
 
 /// For each cell points on the surfaces of the world in it, but for skies.
-pub fn facings(bsp: &Bsp, cells: &[Cell]) -> Vec<Facings> {
+pub fn normal_bins(bsp: &Bsp, cells: &[Cell]) -> Vec<NormalBins> {
     let world = bsp.models.first().map(|model| bsp.model_surfaces(model));
     let drawn: Vec<(Aabb, Vec<Piece>)> = (bsp.surfaces.iter().enumerate())
         .map(|(index, surface)| {
@@ -168,7 +164,7 @@ pub fn facings(bsp: &Bsp, cells: &[Cell]) -> Vec<Facings> {
     let listed = bsp.cluster_surfaces();
     let of_cell = |cell: &Cell| {
         let around = cell.bounds.grown(Vec3::splat(BESIDE));
-        let mut parts: [Parts; FACINGS] = Default::default();
+        let mut parts: [Parts; NORMAL_BINS] = Default::default();
         let surfaces = listed.get(cell.cluster).into_iter().flatten();
         let surfaces = surfaces.filter_map(|&s| drawn.get(s.index()));
         for (_, pieces) in surfaces.filter(|(bounds, _)| bounds.touches(around)) {
@@ -177,8 +173,8 @@ pub fn facings(bsp: &Bsp, cells: &[Cell]) -> Vec<Facings> {
                     continue;
                 }
                 let polygon = piece.within(around);
-                for (facing, parts) in parts.iter_mut().enumerate() {
-                    if faces(piece.normal, facing) {
+                for (bin, parts) in parts.iter_mut().enumerate() {
+                    if faces(piece.normal, bin) {
                         parts.add(&polygon, piece.normal);
                     }
                 }
@@ -196,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_slope_of_45_degrees_faces_two_ways() {
-        let count = |normal: Vec3| (0..FACINGS).filter(|&f| faces(normal, f)).count();
+        let count = |normal: Vec3| (0..NORMAL_BINS).filter(|&f| faces(normal, f)).count();
         assert!(faces(Vec3::NEG_Y, 3) && count(Vec3::NEG_Y) == 1);
         let slope = Vec3::new(-0.707_2, 0.0, -0.707_0);
         assert!(faces(slope, 1) && faces(slope, 5) && count(slope) == 2);
@@ -246,9 +242,9 @@ mod tests {
             cluster: 0,
             bounds: Aabb::new(Vec3::new(0.0, 0.0, low), Vec3::new(100.0, 100.0, high)),
         };
-        let found = facings(&map.build(), &[cell(0.0, 50.0), cell(50.0, 100.0)]);
+        let found = normal_bins(&map.build(), &[cell(0.0, 50.0), cell(50.0, 100.0)]);
         let faced = |i: usize| found[i].iter().map(|points| !points.is_empty());
-        assert!(faced(0).eq((0..FACINGS).map(|f| f == 4)), "{found:?}");
+        assert!(faced(0).eq((0..NORMAL_BINS).map(|f| f == 4)), "{found:?}");
         assert!(faced(1).all(|faced| !faced), "{found:?}");
     }
 }
