@@ -1,20 +1,19 @@
-//! Compiles every GLSL stage file beside this script to SPIR-V and writes the Rust statics that hold them.
+//! Compiles every GLSL file of a shader stage beside this script to SPIR-V and writes the Rust statics that hold them.
 //!
 //! Target: Vulkan 1.2, SPIR-V 1.5. Names (`OpName`, `OpMemberName`) are kept, because the layout test reads them.
-//! A file may ask for more than its plain compilation, one comment line for each:
+//! A file declares further variants, one comment line for each:
 //!
 //! ```glsl
 //! // variants: QUERY=-DTRACER_QUERY -DWIDTH=4
 //! // variants: PIPELINE=-DTRACER_PIPELINE -S rgen
 //! ```
 //!
-//! An output is compiled again only when the text that it was made from (the file, what it includes, its
-//! definitions, this script's version) has another hash than the one kept in `OUT_DIR`.
+//! A module is compiled again only when the hash of its source (the file, its includes, its definitions, this script's
+//! version) differs from the one stored in `OUT_DIR`.
 //!
-//! What Rust and GLSL share is written in Rust, in `src/types` and `src/trace_types`. This script writes the same
-//! structures and constants as GLSL to `OUT_DIR/glsl/generated`; shaders include `generated/types.glsl` or
-//! `generated/trace_types.glsl`. The other way round, it reads the ids of specialization constants out of the GLSL and
-//! writes them as Rust constants.
+//! Shared structures and constants are written in Rust, in `src/types` and `src/trace_types`. This script writes them
+//! as GLSL to `OUT_DIR/glsl/generated`; shaders include `generated/types.glsl` or `generated/trace_types.glsl`. Ids of
+//! specialization constants are written in GLSL; this script writes them as Rust constants.
 
 #[path = "build/shared.rs"]
 mod shared;
@@ -31,16 +30,16 @@ use glslang::{
     SourceLanguage, SpirvVersion, Target, VulkanVersion,
 };
 
-/// Rust modules whose structures and constants GLSL has too, with the generated file that each one includes.
+/// Rust modules whose structures and constants GLSL shares, and the generated file that each one includes.
 const SHARED: [(&str, Option<&str>); 2] = [
     ("types", None),
     ("trace_types", Some("generated/types.glsl")),
 ];
 
-/// Part of every content hash: raise it when the way of compiling changes.
+/// Part of every source hash: raise it when the compilation changes.
 const SCRIPT_VERSION: &str = "3 vulkan1.2 spirv1.5 glslang 0.9.1";
 
-/// The file name extensions that are stages, with the `Stage` variant of the library and glslang's value.
+/// File name extensions of stages, with the library's `Stage` variant and glslang's value.
 const STAGES: [(&str, &str, ShaderStage); 7] = [
     ("vert", "Vertex", ShaderStage::Vertex),
     ("frag", "Fragment", ShaderStage::Fragment),
@@ -51,13 +50,13 @@ const STAGES: [(&str, &str, ShaderStage); 7] = [
     ("rmiss", "Miss", ShaderStage::Miss),
 ];
 
-/// One SPIR-V module to be made.
+/// One SPIR-V module to compile.
 struct Job {
     /// Name of the Rust static.
     symbol: String,
     /// Path below the shader root, with `/`.
     file: String,
-    /// Extension that decides the stage; differs from the file's own for `-S` variants.
+    /// Extension that selects the stage; differs from the file's own for `-S` variants.
     stage: String,
     /// Preprocessor definitions.
     defines: Vec<(String, Option<String>)>,
@@ -189,7 +188,7 @@ fn local_size(words: &[u32]) -> [u32; 3] {
     [1; 3]
 }
 
-/// Writes a file unless it has this text already, so that what depends on it is not built again.
+/// Writes a file unless it has this text already, so that its dependents are not built again.
 fn write_if_changed(file: &Path, text: &str) -> std::io::Result<()> {
     if fs::read_to_string(file).is_ok_and(|old| old == text) {
         return Ok(());
@@ -197,8 +196,8 @@ fn write_if_changed(file: &Path, text: &str) -> std::io::Result<()> {
     fs::write(file, text)
 }
 
-/// Writes the GLSL of what Rust shares. Returns a table of the shared structures with the sizes and offsets that the
-/// Rust compiler gives them, for the test that compares them with SPIR-V.
+/// Writes the GLSL of the shared structures and constants. Returns a table of the structures with their sizes and
+/// offsets in Rust, for the test that compares them with SPIR-V.
 fn share(root: &Path, out: &Path) -> Result<String, String> {
     let folder = out.join("glsl/generated");
     fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
@@ -234,7 +233,7 @@ fn share(root: &Path, out: &Path) -> Result<String, String> {
     Ok(table)
 }
 
-/// What a module of this crate and the modules in its folder share.
+/// The shared items of a module of this crate and of the modules in its folder.
 fn read_shared(root: &Path, name: &str) -> Result<shared::Module, String> {
     let folder = root.join("src").join(name);
     let mut files: Vec<PathBuf> = fs::read_dir(&folder)
@@ -254,8 +253,8 @@ fn read_shared(root: &Path, name: &str) -> Result<shared::Module, String> {
     Ok(module)
 }
 
-/// Rust constants for the ids of specialization constants: `trace/reflect_refract.glsl` becomes the module `trace::turn`. Two files
-/// with the same folder and stem do not compile if both have such constants.
+/// Rust constants for the ids of specialization constants: those of `trace/direct.rgen` are in the module
+/// `trace::direct`. Two files with the same folder and stem do not compile if both declare such constants.
 fn constant_ids(root: &Path, files: &[String], errors: &mut String) -> String {
     let mut folders: BTreeMap<&str, String> = BTreeMap::new();
     let mut all = String::new();
@@ -325,7 +324,7 @@ fn collect_files(root: &Path, folder: &Path, files: &mut Vec<String>) {
     }
 }
 
-/// The plain compilation of a stage file and the variants that its comments ask for.
+/// The default compilation of a stage file, and the variants that its comments declare.
 fn jobs_of_file(file: &str, extension: &str, text: &str, jobs: &mut Vec<Job>, errors: &mut String) {
     let base = symbol_of(file);
     jobs.push(Job {
@@ -403,7 +402,7 @@ fn slashes(path: &Path) -> String {
     parts.join("/")
 }
 
-/// Folders that hold GLSL: the shader root, and what this script has written.
+/// Folders that hold GLSL: the shader root, and the folder of generated files.
 struct Roots<'a>([&'a Path; 2]);
 
 impl Roots<'_> {
@@ -430,7 +429,7 @@ impl Roots<'_> {
     }
 }
 
-/// Adds the text of `file` and of everything that it may include to `text`.
+/// Appends the text of `file` and of all files that it may include to `text`.
 fn gather(roots: &Roots, file: &str, seen: &mut BTreeSet<String>, text: &mut String) {
     if !seen.insert(file.to_owned()) {
         return;
@@ -453,14 +452,14 @@ fn gather(roots: &Roots, file: &str, seen: &mut BTreeSet<String>, text: &mut Str
     }
 }
 
-/// FNV-1a, 64 bits: enough to notice an edit, and the same on every machine.
+/// FNV-1a, 64 bits: detects edits, and is equal on every machine.
 fn hash(text: &str) -> u64 {
     text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {
         (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3)
     })
 }
 
-/// Answers glslang's `#include` lines.
+/// Resolves glslang's `#include` lines.
 struct Includes<'a> {
     roots: &'a Roots<'a>,
     file: &'a str,
@@ -560,7 +559,7 @@ fn compile(roots: &Roots, job: &Job) -> Result<Vec<u32>, String> {
     Ok(words)
 }
 
-/// Switches `#include` on, behind the `#version` line: nothing may stand before that. Line numbers stay what they were.
+/// Enables `#include` behind the `#version` line, which must be the first. Line numbers do not change.
 fn with_includes(text: &str) -> String {
     const EXTENSION: &str = "#extension GL_GOOGLE_include_directive : require\n";
     match text.split_once('\n') {
@@ -571,7 +570,7 @@ fn with_includes(text: &str) -> String {
     }
 }
 
-/// glslang calls the stage file `0` in its messages; give it its name: `file:line:column`.
+/// Replaces `0`, glslang's name of the stage file in messages, by the file's name: `file:line:column`.
 fn explain(file: &str, error: &GlslangError) -> String {
     let text = error.to_string();
     let mut lines = String::new();

@@ -1,7 +1,7 @@
-//! Reads the structures and constants that Rust and GLSL share out of the Rust sources and writes them as GLSL.
+//! Reads the structures and constants that Rust and GLSL share from the Rust sources and writes them as GLSL.
 //!
-//! The sources are read line by line, in the form that rustfmt gives them: one field or constant a line. A public
-//! structure or constant in another form, or of a type that GLSL has no counterpart for, is an error of the build.
+//! The sources are read line by line, in rustfmt's form: one field or constant a line. A public structure or constant
+//! in another form, or of a type without a GLSL counterpart, is a build error.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -32,7 +32,7 @@ pub struct Field {
     pub kind: String,
 }
 
-/// What one Rust module shares with GLSL.
+/// The structures and constants that one Rust module shares with GLSL.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Module {
     pub constants: Vec<Constant>,
@@ -40,7 +40,7 @@ pub struct Module {
 }
 
 impl Module {
-    /// Adds the public structures and constants of a source text, in the order in which they stand there.
+    /// Adds the public structures and constants of a source text, in their order.
     ///
     /// # Errors
     /// Line and reason.
@@ -104,7 +104,7 @@ impl Module {
                         name: name.to_owned(),
                         value: value.to_owned(),
                     }),
-                    // A length of an array in Rust; GLSL has the `u32` that it comes from.
+                    // The `usize` copy of a constant for array lengths in Rust; GLSL has the `u32` constant.
                     Some((_, "usize", _)) => {}
                     _ => return fail("expected `pub const NAME: u32 = NUMBER;` on one line"),
                 }
@@ -119,10 +119,10 @@ impl Module {
     }
 
     /// The GLSL of this module: an included file named `name` that includes `base` first. `known`: the structures of
-    /// that file; those of this one are added.
+    /// that file; this module's are added.
     ///
     /// # Errors
-    /// A number that is no literal, or a type without a counterpart.
+    /// A value that is not an integer literal, or a type without a counterpart.
     pub fn glsl(
         &self,
         name: &str,
@@ -153,7 +153,7 @@ impl Module {
             lengths.insert(constant.name.as_str());
         }
         let own: BTreeSet<&str> = self.structures.iter().map(|s| s.name.as_str()).collect();
-        // GLSL declares before it uses: a structure is written once all that it is made of are known.
+        // GLSL requires declaration before use: a structure is written once the structures of its members are known.
         let mut left: Vec<&Structure> = self.structures.iter().collect();
         while !left.is_empty() {
             let before = left.len();
@@ -206,8 +206,8 @@ const BASIC: [(&str, &str); 6] = [
     ("Vec3", "vec3"),
 ];
 
-/// The GLSL type of a Rust type and the array dimensions that stand behind the member's name. `lengths`: constants
-/// that a length may name.
+/// The GLSL type of a Rust type, and the array dimensions that follow the member's name. `lengths`: constants that may
+/// be array lengths.
 fn glsl_type<'a>(kind: &'a str, lengths: &BTreeSet<&str>) -> Result<(&'a str, String), String> {
     if kind == "[f32; 4]" {
         return Ok(("vec4", String::new()));
@@ -231,7 +231,7 @@ fn glsl_type<'a>(kind: &'a str, lengths: &BTreeSet<&str>) -> Result<(&'a str, St
     }
 }
 
-/// A Rust integer literal as GLSL has it.
+/// Converts a Rust integer literal to GLSL.
 fn number(literal: &str) -> Option<String> {
     let digits = literal.replace('_', "");
     let value = match digits.strip_prefix("0x") {
@@ -248,7 +248,7 @@ fn write_docs(text: &mut String, indent: &str, docs: &[String]) {
     }
 }
 
-/// The specialization constants that a GLSL file declares: name and id.
+/// Name and id of the specialization constants that a GLSL file declares.
 ///
 /// # Errors
 /// A declaration in another form than `layout(constant_id = ID) const TYPE NAME = VALUE;`.

@@ -1,9 +1,9 @@
-// The one descriptor set, number 0, that every pipeline uses. Indices come from the renderer's gpu layer;
-// an index that differs between invocations of a draw or dispatch needs nonuniformEXT.
-// Everything else reaches a shader as a buffer device address in its push constants.
+// Descriptor set 0, the only one, shared by all pipelines. The renderer's `gpu` module assigns the indices; an index
+// that differs between invocations of a draw or dispatch needs `nonuniformEXT`. Shaders receive all other data as
+// buffer device addresses in push constants.
 //
-// Before including this, a stage that walks acceleration structures defines BINDLESS_SCENES and enables
-// GL_EXT_ray_tracing or GL_EXT_ray_query.
+// A shader that uses acceleration structures defines `BINDLESS_SCENES` and enables `GL_EXT_ray_tracing` or
+// `GL_EXT_ray_query` before it includes this file.
 #ifndef RELIGHT_BINDLESS_GLSL
 #define RELIGHT_BINDLESS_GLSL
 
@@ -17,7 +17,7 @@ layout(set = 0, binding = 0) uniform sampler samplers[];
 layout(set = 0, binding = 1) uniform texture2D textures[];
 layout(set = 0, binding = 1) uniform utexture2D utextures[];
 
-// Storage images: one binding, seen as the format that the image was made with.
+// Storage images: one binding, declared once per image format.
 layout(set = 0, binding = 2, rgba8) uniform image2D images_rgba8[];
 layout(set = 0, binding = 2, rgba16) uniform image2D images_rgba16[];
 layout(set = 0, binding = 2, rgb10_a2) uniform image2D images_rgb10_a2[];

@@ -1,5 +1,5 @@
-// Evaluation of a material's stages, as shaderscript::eval does it on the CPU: waves, texture coordinates, colours.
-// Shared by the classic look (per vertex) and the tracer (per hit). Colours are as displayed (encoded), 0..1.
+// Evaluates the stages of a material: waves, texture coordinates, colours. `shaderscript::eval` does the same on the
+// CPU. The classic look evaluates stages per vertex, the traced look per hit. Colours are display-encoded, 0..1.
 #ifndef RELIGHT_MATERIAL_GLSL
 #define RELIGHT_MATERIAL_GLSL
 
@@ -12,7 +12,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TcM
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer ImageList { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer NoiseLattice { float values[256]; uint permutation[256]; };
 
-// Where a stage is evaluated: a vertex or a hit, in the space of its instance.
+// The point at which a stage is evaluated: a vertex or a hit, in the space of its instance.
 struct StagePoint {
     vec3 position;
     vec3 normal;
@@ -21,10 +21,10 @@ struct StagePoint {
     vec4 color;          // of the vertex
     float time;          // shader time, seconds
     float identity_light;
-    float view_distance; // from the eye, for alphaGen portal
+    float view_distance; // from the camera, for `alphaGen portal`
 };
 
-// The engine's tables have 1024 entries; turns to table value.
+// Value of a wave. `turns`: periods. The engine's tables have 1024 entries.
 float wave_table(uint function, float turns) {
     int index = int(turns * 1024.0) & 1023;
     switch (function) {
@@ -40,19 +40,19 @@ float wave_table(uint function, float turns) {
     }
 }
 
-// The time axis of the 4D lattice noise at the origin of space.
+// The engine's 4D lattice noise at the spatial origin, as a function of time.
 float noise_at_time(NoiseLattice lattice, float t) {
     float cell = floor(t);
     float fraction = t - cell;
     int i = int(cell);
     uint p0 = lattice.permutation[uint(i) & 255u];
     uint p1 = lattice.permutation[uint(i + 1) & 255u];
-    // x = y = z = 0: permute through the three zero coordinates, as the CPU does
+    // the spatial coordinates are 0: three permutations, as on the CPU
     for (int axis = 0; axis < 3; axis++) { p0 = lattice.permutation[p0 & 255u]; p1 = lattice.permutation[p1 & 255u]; }
     return mix(lattice.values[p0 & 255u], lattice.values[p1 & 255u], fraction);
 }
 
-// phase + time * frequency with whole periods taken out first, so that hours of uptime keep their precision
+// Returns phase + time * frequency. Removes whole periods first, so that hours of uptime keep their precision.
 float wave_turns(float phase, float frequency, float time) {
     float turns = time * frequency;
     return phase + (turns - trunc(turns));
@@ -62,7 +62,7 @@ float wave_value(Wave wave, float time) {
     return wave.base + wave_table(wave.function, wave_turns(wave.phase, wave.frequency, time)) * wave.amplitude;
 }
 
-// Texture coordinates as they are generated: the first of what a stage does to them.
+// Texture coordinates of `tcGen`, before any `tcMod`.
 vec2 generated_texcoord(uint tc_gen, vec3 vector_s, vec3 vector_t, vec3 viewer, StagePoint p) {
     switch (tc_gen) {
     case TCGEN_LIGHTMAP: return p.lightmap;
@@ -76,7 +76,7 @@ vec2 generated_texcoord(uint tc_gen, vec3 vector_s, vec3 vector_t, vec3 viewer, 
     }
 }
 
-// Then `count` modifiers, in order. `jacobian`: of the coordinates, is multiplied by theirs.
+// Applies `count` `tcMod`s in order. Multiplies `jacobian` by the derivative of each.
 vec2 modified_texcoord(MaterialBuffers buffers, uint first, uint count, vec2 entity_texcoord, StagePoint p, vec2 st, inout mat2 jacobian) {
     TcMods mods = TcMods(buffers.tc_mods);
     for (uint i = first; i < first + count; i++) {
@@ -103,7 +103,7 @@ vec2 modified_texcoord(MaterialBuffers buffers, uint first, uint count, vec2 ent
             offset = vec2(mods.at[i].values[4], mods.at[i].values[5]);
             break;
         case TCMOD_ROTATE: {
-            // the engine looks the angle up in its 1024-entry sine table
+            // the engine reads the angle from its sine table of 1024 entries
             float turns = -mods.at[i].values[0] * p.time / 360.0;
             int index = int(fract(turns) * 1024.0);
             float s = sin(float(index & 1023) * (6.283185307 / 1023.0));
@@ -120,14 +120,14 @@ vec2 modified_texcoord(MaterialBuffers buffers, uint first, uint count, vec2 ent
     return st;
 }
 
-// The stage's texture coordinates. `jacobian`: what becomes of small changes of those of the vertices, turbulence aside.
+// Texture coordinates of the stage. `jacobian`: their derivative by the vertex's coordinates, without turbulence.
 vec2 stage_texcoord(MaterialBuffers buffers, Stage stage, Instance instance, StagePoint p, out mat2 jacobian) {
     jacobian = mat2(1.0);
     vec2 st = generated_texcoord(stage.tc_gen, stage.vector_s, stage.vector_t, instance.viewer, p);
     return modified_texcoord(buffers, stage.tc_mod_first, stage.tc_mod_count, instance.texcoord, p, st, jacobian);
 }
 
-// What a stage's colour and alpha are where they are the same for every point; 1 where they are not.
+// Components of the stage's colour and alpha that are equal at all points; 1 for the other components.
 vec4 flat_color(MaterialBuffers buffers, Stage stage, Instance instance, float time, float identity_light) {
     vec4 c = vec4(1.0);
     switch (stage.rgb_gen) {
@@ -153,14 +153,14 @@ vec4 flat_color(MaterialBuffers buffers, Stage stage, Instance instance, float t
     return c;
 }
 
-// The same with what differs between points, as the engine keeps it: in bytes.
+// Multiplies in the components that differ between points, rounded to bytes as in the engine.
 vec4 point_color(vec4 c, uint rgb_gen, uint alpha_gen, float portal_range, Instance instance, StagePoint p) {
     switch (rgb_gen) {
     case RGBGEN_VERTEX: c.rgb = p.color.rgb * p.identity_light; break;
     case RGBGEN_EXACT_VERTEX: c.rgb = p.color.rgb; break;
     case RGBGEN_ONE_MINUS_VERTEX: c.rgb = (1.0 - p.color.rgb) * p.identity_light; break;
     case RGBGEN_LIGHTING_DIFFUSE: {
-        // there is none for some
+        // an instance without the light grid has no such light
         bool lit = (instance.flags & INSTANCE_UNLIT) == 0;
         float incoming = max(dot(p.normal, instance.light_direction), 0.0);
         c.rgb = lit ? instance.ambient + incoming * instance.directed : vec3(0.0);
@@ -169,7 +169,7 @@ vec4 point_color(vec4 c, uint rgb_gen, uint alpha_gen, float portal_range, Insta
     }
     }
     switch (alpha_gen) {
-    // vertex colours that nothing scales keep their alpha
+    // unscaled vertex colours keep their alpha
     case ALPHAGEN_IDENTITY: if (rgb_gen == RGBGEN_VERTEX && p.identity_light == 1.0) c.a = p.color.a; break;
     case ALPHAGEN_VERTEX: c.a = p.color.a; break;
     case ALPHAGEN_ONE_MINUS_VERTEX: c.a = 1.0 - p.color.a; break;
@@ -185,13 +185,13 @@ vec4 point_color(vec4 c, uint rgb_gen, uint alpha_gen, float portal_range, Insta
     return floor(clamp(c, 0.0, 1.0) * 255.0 + 0.001) / 255.0;
 }
 
-// Colour and alpha that the stage's image is multiplied by.
+// Colour and alpha by which the stage's image is multiplied.
 vec4 stage_color(MaterialBuffers buffers, Stage stage, Instance instance, StagePoint p) {
     vec4 c = flat_color(buffers, stage, instance, p.time, p.identity_light);
     return point_color(c, stage.rgb_gen, stage.alpha_gen, stage.portal_range, instance, p);
 }
 
-// Bindless texture of the stage at this time; `lightmap` is the draw's page.
+// Bindless texture of the stage at this time. `lightmap`: lightmap page of the draw.
 uint stage_image(MaterialBuffers buffers, Stage stage, uint lightmap, float time) {
     if (stage.image_count == 0) return lightmap;
     uint frame = 0;

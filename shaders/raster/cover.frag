@@ -1,5 +1,5 @@
 #version 460
-// One colour.
+// Fills with one colour.
 #extension GL_EXT_scalar_block_layout : require
 
 layout(push_constant, scalar) uniform Push { vec4 color; float depth; } push;

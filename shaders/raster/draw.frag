@@ -1,9 +1,9 @@
 #version 460
-// One draw of the classic look: one or more passes of a material (each texture times colour, with an alpha test), a
-// light's blob, or fog.
+// A draw of the classic look: one or more passes of a material (each a product of texture and colour, with an alpha
+// test), the blob of a dynamic light, or fog.
 // variants: MANY=-DMANY_STAGES
 // variants: COUNT=-DMANY_STAGES -DCOUNT_FRAGMENTS
-// The constants of draw.glsl leave only what the draw needs; without `discard`, depth is tested first.
+// Specialization constants (`draw.glsl`) remove unused code. Without `discard` the GPU tests depth before shading.
 #include "raster/draw.glsl"
 
 layout(location = 0) in vec4 in_uv[STAGE_PAIRS]; // two stages each
@@ -18,7 +18,7 @@ layout(location = 0) out vec4 out_color;
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counter { uint fragments; };
 #endif
 
-// The indices are the same for the whole draw, so they need no nonuniformEXT.
+// The indices are dynamically uniform within a draw and need no `nonuniformEXT`.
 vec4 sample_stage(uint stage) {
     if ((TEXTURES >> stage & 1) == 0) return vec4(1.0);
     uint handle = in_textures[stage];
@@ -39,10 +39,10 @@ bool passes_alpha_test(uint stage, vec4 color) {
 }
 
 #ifdef MANY_STAGES
-// As the picture keeps it.
+// Rounds to the 8 bits of the target image.
 vec3 stored(vec3 color) { return round(color * 255.0) / 255.0; }
 
-// What blending makes of one side. The picture's alpha reads as 1, as in raster/pipelines.rs.
+// Multiplies one operand of blending by its factor. Destination alpha reads as 1, as in `raster/pipelines.rs`.
 vec3 weighted(vec3 side, uint factor, vec4 source, vec3 target) {
     switch (factor) {
     case BLEND_ZERO: case BLEND_ONE_MINUS_DST_ALPHA: case BLEND_SRC_ALPHA_SATURATE: return vec3(0.0);
@@ -56,8 +56,8 @@ vec3 weighted(vec3 side, uint factor, vec4 source, vec3 target) {
     }
 }
 
-// A pass blended over what those before it left, in steps of 255 as drivers in software do it, those of OpenGL among
-// them; GPUs have a finer source and sum.
+// Blends a pass over the result of the previous passes, rounded to multiples of 1/255 as software drivers do, OpenGL's
+// included; GPUs blend with a finer source and sum.
 vec4 blend(vec4 before, vec4 pass, uint stage) {
     vec4 source = clamp(pass, 0.0, 1.0);
     source = vec4(stored(source.rgb), round(source.a * 255.0) / 255.0);
@@ -66,12 +66,12 @@ vec4 blend(vec4 before, vec4 pass, uint stage) {
         + weighted(target, of_stage(BLEND_TARGET, stage), source, target), 1.0);
 }
 
-// A stage onto those before it.
+// Combines a stage with the result of the previous stages.
 vec4 onto(vec4 before, uint stage) {
     uint combine = of_stage(COMBINE, stage);
     if (combine == COMBINE_NONE) return before;
     vec4 color = stage_value(stage);
-    // what fails leaves what was there
+    // a fragment that fails the alpha test keeps the previous result
     if (combine == COMBINE_BLEND) return passes_alpha_test(stage, color) ? blend(before, color, stage) : before;
     if (combine == COMBINE_MODULATE) color *= before;
     if (combine == COMBINE_ADD) color = vec4(before.rgb + color.rgb, before.a * color.a);
@@ -90,14 +90,14 @@ void main() {
         out_color = stage_value(0);
         if (!passes_alpha_test(0, out_color)) discard;
 #ifdef MANY_STAGES
-        // written out, so that every compiler sees the constants
+        // unrolled by hand, so that every compiler sees constant arguments
         out_color = onto(out_color, 1);
         out_color = onto(out_color, 2);
         out_color = onto(out_color, 3);
 #endif
     }
 #ifdef COUNT_FRAGMENTS
-    // nothing asks for early tests, so that what is hidden is counted, too
+    // no early depth test is declared, so that hidden fragments count too
     atomicAdd(Counter(push.overdraw).fragments, 1);
 #endif
 }

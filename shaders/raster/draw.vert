@@ -1,25 +1,25 @@
 #version 460
-// One draw of the classic look: fetches the vertex, evaluates the stages' colours and texture coordinates per vertex
-// as the engine does. gl_InstanceIndex is the index of the Draw.
+// A draw of the classic look: fetches the vertex and evaluates the stages' colours and texture coordinates per vertex,
+// as the engine does. `gl_InstanceIndex` is the index of the `Draw`.
 // variants: MANY=-DMANY_STAGES
 // variants: MODIFIED=-DMANY_STAGES -DMODIFIED_TEXCOORDS
 // variants: DEPTH=-DDEPTH_ALONE
 #include "raster/draw.glsl"
 
-// Stages of a surface are drawn where the depth is the same, by whichever pipelines.
+// Pipelines that draw stages of one surface must compute equal depths.
 invariant gl_Position;
 
 layout(location = 2) out float out_clip;
 
 #ifndef DEPTH_ALONE
-// Of the arrays only what the draw's constants ask for is written, and read.
+// Only the elements that the draw's specialization constants use are written and read.
 layout(location = 0) out vec4 out_uv[STAGE_PAIRS]; // two stages each
 layout(location = 3) out flat uvec4 out_textures; // see `Draw`
 layout(location = 4) out vec4 out_color[STAGES];
 layout(location = 8) out flat vec4 out_flat_color[STAGES];
 
-// Fog texture coordinates of a point: s from the view depth, t from the depth below the fog's surface
-// (engine's RB_CalcFogTexCoords; facts in the reference of the engine's behaviour).
+// Fog texture coordinates of a point: s from the view depth, t from the depth below the fog's surface (engine's
+// `RB_CalcFogTexCoords`).
 vec2 fog_coordinates(uint number, vec3 world) {
     Fogs fogs = Fogs(VIEW.fogs);
     uint index = number - 1;
@@ -34,7 +34,7 @@ vec2 fog_coordinates(uint number, vec3 world) {
     return vec2(s, t);
 }
 
-// Texture coordinates of stage `i`; what is the same for all vertices is in the draw.
+// Texture coordinates of stage `i`; the draw holds what all vertices share.
 vec2 texcoord(Draws draws, Instance instance, StagePoint point, uint i) {
     Stages stages = Stages(VIEW.materials.stages);
     uint index = draws.at[gl_InstanceIndex].stages[i];
@@ -83,7 +83,7 @@ void main() {
 
     if (MODE == DRAW_LIGHT) {
         RasterLight light = RasterLights(VIEW.lights).at[draws.at[gl_InstanceIndex].light];
-        // in the axes of the drawn entity, as the engine has it
+        // in the axes of the instance, as in the engine
         vec3 delta = (light.origin - world) * axis;
         out_uv[0].xy = 0.5 + delta.xy / light.radius;
         float height = abs(delta.z);
@@ -99,7 +99,7 @@ void main() {
         StagePoint point = StagePoint(position, vertices.at[gl_VertexIndex].normal, vertices.at[gl_VertexIndex].st,
             vertices.at[gl_VertexIndex].lightmap, unpackUnorm4x8(vertices.at[gl_VertexIndex].color),
             draws.at[gl_InstanceIndex].time, VIEW.identity_light, distance(VIEW.eye, world));
-        // written out, so that every compiler sees the constants
+        // unrolled by hand, so that every compiler sees constant arguments
         write_stage(draws, instance, point, 0);
 #ifdef MANY_STAGES
         write_stage(draws, instance, point, 1);

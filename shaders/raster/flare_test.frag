@@ -1,5 +1,5 @@
 #version 460
-// Reached only where nothing lies in front.
+// Runs only if the depth test passes; marks the flare as visible.
 #include "raster/flares.glsl"
 
 layout(early_fragment_tests) in;

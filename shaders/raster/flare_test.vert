@@ -1,5 +1,5 @@
 #version 460
-// One point for each flare, at the pixel and depth where it is tested.
+// One point for each flare, at the pixel and depth of its test.
 #include "raster/flares.glsl"
 
 layout(push_constant, scalar) uniform Push { uint64_t flares; uint64_t states; vec2 size; } push;

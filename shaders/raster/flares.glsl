@@ -1,4 +1,4 @@
-// What the shaders of flares share.
+// Shared by the shaders of flares.
 #extension GL_EXT_buffer_reference2 : require
 #include "generated/types.glsl"
 

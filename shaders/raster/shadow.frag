@@ -1,5 +1,5 @@
 #version 460
-// Shadow volumes only count in the stencil.
+// Shadow volumes write the stencil only.
 layout(location = 0) in float in_clip;
 
 void main() {

@@ -1,4 +1,4 @@
-// What the shaders of shadow volumes share.
+// Shared by the shaders of shadow volumes.
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_buffer_reference2 : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require

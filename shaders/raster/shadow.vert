@@ -1,5 +1,5 @@
 #version 460
-// The sides of shadow volumes, in world space.
+// Sides of shadow volumes, in world space.
 #include "raster/shadow.glsl"
 
 layout(location = 0) out float out_clip;

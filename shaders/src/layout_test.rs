@@ -1,6 +1,5 @@
-//! The structures that GLSL and Rust share must have the same layout on both sides: member names and offsets are read
-//! out of the compiled SPIR-V and compared with those of the Rust compiler. The same for specialization constants: names
-//! and ids.
+//! Compares the layout of the structures that GLSL and Rust share: member names and offsets from the compiled SPIR-V
+//! with those of the Rust compiler. Likewise names and ids of specialization constants.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +11,7 @@ type Layout = (&'static str, usize, &'static [(&'static str, usize)]);
 
 include!(concat!(env!("OUT_DIR"), "/layouts.rs"));
 
-/// A structure of a module: members with offsets, and the array strides that occur for it.
+/// A structure of a module: members with offsets, and their array strides.
 #[derive(Default, Debug)]
 struct Found {
     members: BTreeMap<u32, (String, Option<u32>)>,

@@ -1,23 +1,22 @@
 //! The renderer's GLSL as SPIR-V, and the structures that it shares with Rust.
 //!
-//! The sources lie beside this crate's manifest, one folder for each group of passes; the build script compiles
-//! them for Vulkan 1.2 and gives each module a static here, named after folder and file: `raster/draw.vert` is
-//! [`RASTER_DRAW_VERT`](crate). See `build.rs` for variants.
+//! The sources lie beside this crate's manifest, one folder for each group of passes. The build script compiles them
+//! for Vulkan 1.2 and writes a static for each module, named after folder and file: `raster/draw.vert` is
+//! [`RASTER_DRAW_VERT`](crate). `build.rs` describes variants.
 //!
-//! What both languages share is written once. Structures and constants stand in [`types`] and [`trace_types`], and the
-//! build script writes their GLSL. Specialization constants stand in GLSL, and the build script writes their ids as
-//! [`constant_ids`].
+//! Shared items are written once. Structures and constants are in [`types`] and [`trace_types`], and the build script
+//! writes their GLSL. Specialization constants are in GLSL, and the build script writes their ids as [`constant_ids`].
 
 #![forbid(unsafe_code)]
 
 pub mod trace_types;
 pub mod types;
 
-/// Bytes that start at an address that is a multiple of four, as words of SPIR-V must.
+/// Bytes aligned to 4, as SPIR-V words require.
 #[repr(C, align(4))]
 struct Aligned<T: ?Sized>(T);
 
-/// The stage of the pipeline that a module is for.
+/// The pipeline stage of a module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
     /// Vertex shader (`.vert`).
@@ -50,19 +49,19 @@ impl Spirv {
         self.name
     }
 
-    /// The stage that the module was compiled for.
+    /// The pipeline stage of the module.
     pub fn stage(&self) -> Stage {
         self.stage
     }
 
-    /// Invocations of a work group of a compute shader, along each axis; 1 for other stages.
+    /// Work group size of a compute shader along each axis; 1 for other stages.
     pub fn local_size(&self) -> [u32; 3] {
         self.local_size
     }
 
     /// The words of the module, SPIR-V 1.5.
     pub fn words(&self) -> &'static [u32] {
-        // The wrapper aligns the bytes and SPIR-V comes in whole words, so this cast cannot fail.
+        // The wrapper aligns the bytes, and SPIR-V consists of whole words, so this cast cannot fail.
         bytemuck::try_cast_slice(&self.bytes.0).unwrap_or_default()
     }
 }
@@ -78,7 +77,7 @@ impl std::fmt::Debug for Spirv {
 pub struct RayShader {
     /// For a ray tracing pipeline.
     pub pipeline: &'static Spirv,
-    /// A compute shader that traverses hierarchies of our own.
+    /// A compute shader that traverses own hierarchies.
     pub compute: &'static Spirv,
     /// A compute shader with ray queries.
     pub query: &'static Spirv,
@@ -86,7 +85,7 @@ pub struct RayShader {
 
 include!(concat!(env!("OUT_DIR"), "/modules.rs"));
 
-/// Ids of specialization constants, by the folder and the name of the file that declares them.
+/// Ids of specialization constants, by folder and file name of their declaration.
 pub mod constant_ids {
     include!(concat!(env!("OUT_DIR"), "/constant_ids.rs"));
 }

@@ -1,4 +1,4 @@
-//! The writer of shared GLSL: what it writes, and that it refuses what it cannot write.
+//! Tests of the writer of shared GLSL: its output, and its errors.
 
 use std::collections::BTreeSet;
 

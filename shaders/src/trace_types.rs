@@ -1,6 +1,7 @@
 //! The structures of the traced look that Rust and GLSL share. The build script writes them as
-//! `generated/trace_types.glsl`, `layout(scalar)`. Radiance is linear, in units where a white diffuse surface of outgoing radiance 1
-//! shows as display white; space is the world's unless said otherwise. Addresses are buffer device addresses.
+//! `generated/trace_types.glsl`, `layout(scalar)`. Radiance is linear; outgoing radiance 1 of a white diffuse surface
+//! is display white. Positions and directions are in world space unless stated otherwise. Addresses are buffer device
+//! addresses.
 
 pub mod constants;
 mod frames;
@@ -22,21 +23,20 @@ pub use structures::{BvhInstance, BvhNode, BvhTriangle, GeometryRecord};
 pub use surroundings::{FlareView, FogView, PortalRecord, SkyRecord, TransportView};
 pub use view::{CameraView, ExposureView, ImageView, PostView, SceneView, TargetView};
 
-/// All that the passes of one traced view read: the size that is traced, and a block for each concern. Blocks that hold
-/// addresses come first, so that little needs padding.
+/// Parameters of one traced view: the traced size, and a block for each concern. Blocks with addresses come first,
+/// which minimizes padding.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct TraceView {
-    /// 16 bytes a pixel that passes use in turns: what the primary rays hit, then sampled lights, then light that is being
-    /// filtered.
+    /// 16 bytes a pixel that passes use in turns: primary hits, then sampled lights, then light being filtered.
     pub scratch: u64,
-    /// Materials of everything that rays meet.
+    /// Materials of all geometry that rays hit.
     pub materials: MaterialBuffers,
-    /// What rays meet.
+    /// Geometry, portals, skies, fog volumes.
     pub scene: SceneView,
     /// Lights and light lists.
     pub lights: LightView,
-    /// What lies in the way of rays.
+    /// Filters, boxes around layers, limits of paths.
     pub transport: TransportView,
     /// Motion of surfaces.
     pub motion: MotionView,
@@ -54,7 +54,7 @@ pub struct TraceView {
     pub fog: FogView,
     /// Images of the traced size.
     pub images: ImageView,
-    /// Where the picture goes.
+    /// Target of the finished picture.
     pub target: TargetView,
     /// Camera of this frame.
     pub camera: CameraView,
@@ -66,7 +66,7 @@ pub struct TraceView {
     pub height: u32,
     /// `VIEW_*` bits.
     pub flags: u32,
-    /// Seed of the random numbers: differs from frame to frame.
+    /// Seed of the random numbers: different for each frame.
     pub seed: u32,
     /// Frames in the accumulation image before this one.
     pub accumulated: u32,

@@ -1,7 +1,7 @@
-//! The structures that Rust and GLSL share. The build script writes them as `generated/types.glsl`; a test reads the
-//! member offsets out of the compiled SPIR-V and compares them with these.
+//! The structures that Rust and GLSL share. The build script writes them as `generated/types.glsl`; a test compares
+//! their member offsets with those in the compiled SPIR-V.
 //!
-//! Everything is `layout(scalar)`: a `Vec3` takes 12 bytes and aligns to 4; a `vec4` is `[f32; 4]` here, because
+//! All layouts are `layout(scalar)`: a `Vec3` takes 12 bytes and aligns to 4; a `vec4` is `[f32; 4]` here, because
 //! glam's `Vec4` aligns to 16. Addresses are buffer device addresses.
 
 #![allow(clippy::struct_excessive_bools)]
@@ -11,7 +11,7 @@ pub mod constants;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
-/// A vertex, of the world (world space) or of what moves (space of its [`Instance`]).
+/// A vertex: of the world in world space, of moving geometry in the space of its [`Instance`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Vertex {
@@ -19,7 +19,7 @@ pub struct Vertex {
     pub position: Vec3,
     /// Unit normal.
     pub normal: Vec3,
-    /// Texture coordinates, (0, 0) is the image's first texel.
+    /// Texture coordinates; (0, 0) is the image's first texel.
     pub st: Vec2,
     /// Lightmap coordinates within the page of the draw.
     pub lightmap: Vec2,
@@ -37,7 +37,7 @@ pub struct Wave {
     pub base: f32,
     /// Scale of the table's value.
     pub amplitude: f32,
-    /// In periods.
+    /// Phase, in periods.
     pub phase: f32,
     /// Periods per second.
     pub frequency: f32,
@@ -61,7 +61,7 @@ pub struct TcMod {
 pub struct Stage {
     /// First of the stage's images in the image list (an array of bindless texture indices).
     pub image_first: u32,
-    /// How many images the animation has; 1 for a plain map; 0: the lightmap of the draw.
+    /// Number of images of the animation; 1: a plain map; 0: the lightmap of the draw.
     pub image_count: u32,
     /// Images per second of an animation.
     pub image_frequency: f32,
@@ -91,7 +91,7 @@ pub struct Stage {
     pub portal_range: f32,
     /// One of the `ALPHAFUNC_*` constants.
     pub alpha_func: u32,
-    /// Source blend factor, `BLEND_*`; `BLEND_ONE` with a destination of `BLEND_ZERO` is no blending.
+    /// Source blend factor, `BLEND_*`; `BLEND_ONE` with a destination of `BLEND_ZERO`: no blending.
     pub blend_src: u32,
     /// Destination blend factor, `BLEND_*`.
     pub blend_dst: u32,
@@ -99,25 +99,25 @@ pub struct Stage {
     pub flags: u32,
 }
 
-/// What a material that is seen through does to rays; all zero for what is neither glass nor liquid.
+/// Optical properties of glass and liquids; all zero for other materials.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Dielectric {
-    /// Refraction index of what lies behind the surface; 0: rays pass unbent and nothing is reflected.
+    /// Refractive index behind the surface; 0: no refraction and no reflection.
     pub index: f32,
     /// Root mean square slope of the ripples.
     pub ripple: f32,
-    /// What the stages multiply the background by is multiplied by this: a surface passes no more light than it gets.
+    /// Factor of the background's blend factor, so that a surface transmits no more light than it receives.
     pub scale: f32,
-    /// 1: light that passes takes on a colour.
+    /// 1: tints the light that passes it.
     pub filters: u32,
-    /// What light that passes the surface is multiplied by, in the mean over it.
+    /// Transmittance, the mean over the surface.
     pub filter_color: Vec3,
     /// Absorption behind the surface, per unit of length (Beer's law).
     pub absorption: Vec3,
 }
 
-/// A material: a run of stages and what the tracer needs to know at once.
+/// A material: a run of stages, and properties for the tracer.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Material {
@@ -131,16 +131,16 @@ pub struct Material {
     pub time_offset: f32,
     /// `clampTime`, or a very large number.
     pub clamp_time: f32,
-    /// Bindless texture of a material that is one still image under light, so that rays need not run its stages;
-    /// `NO_TEXTURE` for all others. Where `MATERIAL_VERTEX_LIGHT` is set this holds for the map's own surfaces alone.
+    /// Bindless texture of a material that is one still image under light, so that rays skip its stages; `NO_TEXTURE`
+    /// for all others. With `MATERIAL_VERTEX_LIGHT` this holds for the map's own surfaces only.
     pub plain_image: u32,
     /// Bindless sampler of `plain_image`.
     pub plain_sampler: u32,
-    /// Extra radiance of the surface as a light, display-white units, shown as its glow (0 if none).
+    /// Extra radiance of the surface as a light, display-white units, shown as its emission; 0: none.
     pub light_radiance: Vec3,
-    /// Factor on what it throws back of the light that falls on it, beside its stages (`q3map_lightmapBrightness`).
+    /// Factor of the reflected light beside its stages (`q3map_lightmapBrightness`).
     pub lit_scale: f32,
-    /// How rays pass it.
+    /// Optical properties.
     pub dielectric: Dielectric,
 }
 
@@ -150,15 +150,15 @@ pub struct Material {
 pub struct Instance {
     /// The entity's axes as columns: `world = axis * local + origin`.
     pub axis: [Vec3; 3],
-    /// Where the entity is, world space.
+    /// Origin of the entity, world space.
     pub origin: Vec3,
-    /// Viewer in the entity's space (for environment mapping and specular alpha).
+    /// Camera position in the entity's space (for environment mapping and specular alpha).
     pub viewer: Vec3,
     /// `shaderRGBA`, 0..1.
     pub color: [f32; 4],
     /// `shaderTexCoord`, for `tcMod entityTranslate`.
     pub texcoord: Vec2,
-    /// Shader time in seconds: view time less the entity's.
+    /// Shader time in seconds: view time minus the entity's.
     pub time: f32,
     /// Ambient light from the grid, 0..1 (of 255), engine's scales applied.
     pub ambient: Vec3,
@@ -166,13 +166,13 @@ pub struct Instance {
     pub directed: Vec3,
     /// Unit direction towards that light, in the entity's space.
     pub light_direction: Vec3,
-    /// The part of `ambient` that is no light of the place: the engine adds it to the light of every model.
+    /// Part of `ambient` that is not light of the place: the engine adds it to the light of every model.
     pub added: f32,
     /// `INSTANCE_*` bits.
     pub flags: u32,
 }
 
-/// What a primitive of an acceleration structure is.
+/// Material and instance of a primitive of an acceleration structure.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Triangle {
@@ -180,9 +180,9 @@ pub struct Triangle {
     pub indices: [u32; 3],
     /// Index of the material.
     pub material: u32,
-    /// Index of the instance (entity) it belongs to; with `TRIANGLE_STATIC` the number of its surface in the map.
+    /// Index of the instance (entity); with `TRIANGLE_STATIC` the index of its surface in the map.
     pub instance: u32,
-    /// Fog volume plus one; 0 none.
+    /// Index of the fog volume plus one; 0: none.
     pub fog: u32,
     /// Bindless texture index of the lightmap page, or `NO_TEXTURE`.
     pub lightmap: u32,
@@ -198,7 +198,7 @@ pub struct Fog {
     pub mins: Vec3,
     /// Upper corner of the box.
     pub maxs: Vec3,
-    /// Fog surface: `normal.p - distance` is the depth below it; only if `has_surface`.
+    /// Fog surface: `normal.p - distance` is the depth below it; valid if `has_surface`.
     pub plane: [f32; 4],
     /// `FOG_SURFACE_*`; 0: the volume has none.
     pub has_surface: u32,
@@ -206,7 +206,7 @@ pub struct Fog {
     pub color: Vec3,
     /// Depth at which the fog is opaque, units.
     pub depth: f32,
-    /// Mean radiance at places in it that the map's lights give; the traced look alone asks for it.
+    /// Mean radiance of the map's lights at points in the volume; read by the traced look only.
     pub own_light: Vec3,
 }
 
@@ -226,27 +226,27 @@ pub struct MaterialBuffers {
     pub noise: u64,
 }
 
-/// What every draw of a raster view shares.
+/// Parameters shared by all draws of a classic view.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct RasterView {
     /// World to clip space, columns.
     pub world_to_clip: [[f32; 4]; 4],
-    /// Only the positive side of `xyz.p = w` shows; zero: everything.
+    /// Only the positive side of `xyz.p = w` is drawn; zero: everything.
     pub clip_plane: [f32; 4],
-    /// Eye, world space.
+    /// Camera position, world space.
     pub eye: Vec3,
     /// View direction, world space.
     pub forward: Vec3,
     /// `identityLight`: 1 over 2 to the power of the overbright bits.
     pub identity_light: f32,
-    /// 0: dynamic lights leave out what is turned away from them (`r_dlightBacks`).
+    /// 0: dynamic lights skip surfaces that face away (`r_dlightBacks`).
     pub light_backs: u32,
     /// Materials.
     pub materials: MaterialBuffers,
     /// The world's [`Vertex`] array.
     pub static_vertices: u64,
-    /// [`Vertex`] array of what moves.
+    /// [`Vertex`] array of moving geometry.
     pub dynamic_vertices: u64,
     /// [`Instance`]s.
     pub instances: u64,
@@ -258,31 +258,31 @@ pub struct RasterView {
     pub lights: u64,
 }
 
-/// As many stages go into one draw of the classic look; `usize`, which GLSL has no use for.
+/// Most stages of one draw of the classic look, as an array length; not in GLSL.
 pub const DRAW_STAGES: usize = constants::DRAW_STAGES as usize;
 
-/// One draw call of the classic look. What the shaders are specialised for is not in it.
+/// One draw call of the classic look, apart from its specialization constants.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Draw {
-    /// Of each stage the bindless index of its texture in the lower 24 bits, of its sampler in the upper 8.
+    /// For each stage, the bindless index of its texture in the lower 24 bits and of its sampler in the upper 8.
     pub textures: [u32; DRAW_STAGES],
-    /// The stages, for what is evaluated per vertex.
+    /// Indices of the stages, for values evaluated per vertex.
     pub stages: [u32; DRAW_STAGES],
-    /// What each stage's `tcMod`s come to where they are the same for all vertices:
+    /// Combined `tcMod`s of each stage that are equal for all vertices:
     /// `s' = s m[0] + t m[2] + m[4]`, `t' = s m[1] + t m[3] + m[5]`.
     pub texcoords: [[f32; 6]; DRAW_STAGES],
-    /// Of the colour of each stage what is the same for all vertices; 1 where it is not.
+    /// Components of each stage's colour that are equal for all vertices; 1 for the others.
     pub colors: [[f32; 4]; DRAW_STAGES],
     /// The material's time, seconds.
     pub time: f32,
     /// Index of the instance.
     pub instance: u32,
-    /// Fog volume plus one; 0 none.
+    /// Index of the fog volume plus one; 0: none.
     pub fog: u32,
     /// Index of the dynamic light (`DRAW_LIGHT`).
     pub light: u32,
-    /// 1: dynamic vertices.
+    /// 1: the vertices are in `dynamic_vertices`.
     pub dynamic_vertices: u32,
 }
 
@@ -290,60 +290,60 @@ pub struct Draw {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct RasterLight {
-    /// World space.
+    /// Position, world space.
     pub origin: Vec3,
-    /// Units.
+    /// Radius, units.
     pub radius: f32,
-    /// Nominally 0..1.
+    /// Colour, nominally 0..1.
     pub color: Vec3,
 }
 
-/// A flare: where it is tested, and what is drawn where it shows.
+/// A flare: point of its visibility test, and its square.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Flare {
-    /// Colour at full brightness, of 255.
+    /// Colour at full brightness, 0..255.
     pub color: Vec3,
     /// Half the side of its square, pixels.
     pub size: f32,
-    /// Middle of its square, pixels of the window.
+    /// Centre of the square, pixels of the window.
     pub center: Vec2,
-    /// Pixel of the window where depth is tested.
+    /// Pixel of the window at which depth is tested.
     pub pixel: [u32; 2],
-    /// The test passes where the depth is this or more.
+    /// Depth of the test: passes if the depth image holds this or more.
     pub depth: f32,
     /// Index of its [`FlareState`].
     pub slot: u32,
-    /// 1: the state is another flare's, or none.
+    /// 1: the slot holds the state of another flare, or none.
     pub fresh: u32,
-    /// World space.
+    /// Position, world space.
     pub at: Vec3,
-    /// Units from the eye towards it that have to be free.
+    /// Length of the segment from the camera to the flare that must be free, units.
     pub reach: f32,
 }
 
-/// The sun's disc: a square picture in the sky (`r_drawSun`).
+/// The image of the sun: a square in the sky (`r_drawSun`).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SunDisc {
     /// Unit vector towards it.
     pub direction: Vec3,
-    /// Index of its material; `NO_TEXTURE`: there is none.
+    /// Index of its material; `NO_TEXTURE`: no sun is drawn.
     pub material: u32,
-    /// Unit vector to the left of the picture.
+    /// Unit vector to the left of the image.
     pub left: Vec3,
-    /// Half the side of the square, as a part of its distance.
+    /// Half the side of the square, relative to its distance.
     pub size: f32,
 }
 
-/// What is known of a flare from frame to frame.
+/// State of a flare between frames.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct FlareState {
     /// 1: the test has passed in this frame.
     pub seen: u32,
-    /// 1: it passed when it was last evaluated.
+    /// 1: the test had passed at the last evaluation.
     pub visible: u32,
-    /// Since when, milliseconds of the view's time.
+    /// Time of the last change, milliseconds of the view's time.
     pub since: i32,
 }

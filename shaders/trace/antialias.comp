@@ -1,53 +1,56 @@
 #version 460
-// Temporal antialiasing and upscaling: the samples of many frames, each frame's a little beside those of the last, join
-// to the picture of the window's size. Karis, High-Quality Temporal Supersampling (SIGGRAPH 2014 course) for the whole;
-// Salvi, An Excursion in Temporal Supersampling (GDC 2016) for the clipping by variance; Yang, Liu, Salvi, A Survey of
-// Temporal Antialiasing Techniques (Eurographics 2020), sections 4 and 5, for weighing samples of a coarser grid by their
-// distance from the pixel; Dodgson, Quadratic Interpolation for Image Resampling (1997), for the newest frame in motion.
+// Temporal antialiasing and upscaling: joins the jittered samples of many frames into a picture of the window's size.
+// Method: Karis, High-Quality Temporal Supersampling (SIGGRAPH 2014 course). Variance clipping: Salvi, An Excursion in
+// Temporal Supersampling (GDC 2016). Weights of the samples of a coarser grid by distance from the pixel: Yang, Liu,
+// Salvi, A Survey of Temporal Antialiasing Techniques (Eurographics 2020), sections 4 and 5. Interpolation of the
+// newest frame in motion: Dodgson, Quadratic Interpolation for Image Resampling (1997).
 //
-// What glows in front of a surface and moves otherwise than it does has no history there: of it the newest frame alone is
-// shown, as far as it is a part of the colour (as a mask of reactive pixels does it in AMD's FidelityFX Super Resolution 2).
+// Glow in front of a surface that moves differently from the surface has no history. Its share of the colour is taken
+// from the newest frame alone (like the reactive mask of AMD's FidelityFX Super Resolution 2).
 //
-// Colours are blended compressed, so that a bright sample does not outweigh all others at an edge, and clipped in YCoCg.
+// Colours are blended in a compressed range, so that a bright sample does not outweigh all others at an edge, and
+// clipped in YCoCg.
 #include "trace/denoise.glsl"
 #include "trace/exposure.glsl"
 #include "trace/motion.glsl"
 
 const int GROUP = 16;
-// Traced pixels that a group of pixels can need: as many as its own, and one more on each side.
+// Traced pixels that a work group may read along one axis: one for each of its pixels, and one more on each side.
 const int TILE = GROUP + 2;
 
 layout(local_size_x = GROUP, local_size_y = GROUP) in;
 
-// Compressed colour (YCoCg), and length of the way to what is seen there.
+// Compressed colour (YCoCg) and view distance of each traced pixel.
 shared vec4 tile[TILE][TILE];
-// How much of each colour is of what has moved in front of the surface, whose history knows nothing of it. Negative where
-// a reflection and what lies behind it are seen in turns and the pixel's own surface is the lesser part of the colour.
+// Fraction of each colour that comes from layers which moved relative to the surface, and so has no history. Negative
+// where the pixel is part of the checkerboard of reflection and refraction and its own surface contributes less than
+// half.
 shared float fresh_parts[TILE][TILE];
 
-// Standard deviation of a pixel's filter, output pixels: nearly that of its square.
+// Standard deviation of the filter of a pixel with history, output pixels: about that of the pixel's square.
 const float NARROW = 0.3;
-// The same in traced pixels for a pixel without history.
+// Standard deviation of the filter of a pixel without history, traced pixels.
 const float WIDE = 0.5;
-// Frames' worth of samples that a pixel keeps at rest, and where it is resampled from frame to frame, which blurs it: there
-// the newest frame counts as a whole one, and where it is not as fine as the picture as far as its samples are near.
+// Most history that a pixel keeps, in frames: at rest; in motion; in motion with fewer traced than output pixels.
+// Motion resamples the history, which blurs it. In motion the newest frame counts as one frame if every output pixel is
+// traced, otherwise by the distance of its samples from the pixel.
 const float REST_FRAMES = 16.0, MOVING_FRAMES = 2.0, COARSE_MOVING_FRAMES = 5.0;
-// The same in motion for what ripples bend: it has no motion of its own, and more of its history would smear it.
+// The same in motion for surfaces seen through ripples: their motion is unknown, and more history would smear.
 const float BENT_FRAMES = 0.5;
-// Standard deviations that history may differ by, at rest and in motion.
+// Clipping range of the history, standard deviations, at rest and in motion.
 const float REST_RANGE = 1.25, MOVING_RANGE = 1.0;
-// Part of the way to a pixel's surface at which a neighbour's is in front of it.
+// A neighbour is in front if its view distance is below this fraction of the pixel's.
 const float IN_FRONT = 0.9;
-// Part of its length that the way to a surface may be off and still be the way to that surface.
+// Relative tolerance of view distances of the same surface.
 const float SAME_DISTANCE = 0.04;
-// Part of the light that has to change within a frame.
+// Least relative change of the light within a frame that corrects the history.
 const float LEAST_CHANGE = 1.0e-3;
-// Pixels between the places that tell what has changed around a pixel.
+// Spacing of the pixels from which the change of the light around a pixel is taken, pixels.
 const int CHANGE_SPACING = 2;
-// By how much more or less light history is changed at most.
+// Largest factor by which a change of the light scales the history, up or down.
 const float MOST_RATIO = 8.0;
 
-// Nearly linear up to white, so that edges get the mean of both sides, and at most as much as four times white.
+// Nearly linear up to white, so that edges converge to the mean of both sides; bounded by four times white.
 vec3 compress(vec3 c, float exposure) { return c / (1.0 + max_component(c) * exposure); }
 vec3 expand(vec3 c, float exposure) { return c / max(1.0 - max_component(c) * exposure, 1.0e-3); }
 const float COMPRESSION = 0.25;
@@ -59,8 +62,8 @@ vec4 last_resolved(vec2 uv) {
     return textureLod(sampler2D(textures[VIEW.antialias.last_resolved], samplers[VIEW.antialias.sampler_index]), uv, 0.0);
 }
 
-// Catmull-Rom by bilinear taps (Sigg and Hadwiger, GPU Gems 2, chapter 20), without the four corners, whose weights are
-// small (Jimenez, Filmic SMAA, SIGGRAPH 2016). `place`: pixels. Alpha is that of the middle.
+// Catmull-Rom filter from bilinear taps (Sigg and Hadwiger, GPU Gems 2, chapter 20), without the four corners, whose
+// weights are small (Jimenez, Filmic SMAA, SIGGRAPH 2016). `place`: pixels. Alpha is that of the middle tap.
 vec4 last_bicubic(vec2 place, vec2 size) {
     vec2 middle = floor(place - 0.5) + 0.5;
     vec2 f = place - middle;
@@ -80,17 +83,17 @@ vec4 last_bicubic(vec2 place, vec2 size) {
     return vec4(max(sum / weight, 0.0), center.a);
 }
 
-// The kernel of quadratic interpolation: 3 x 3 samples a pixel apart make the value between them, as sharp as a cubic.
+// Kernel of quadratic interpolation: interpolates 3 x 3 samples one pixel apart, as sharp as a cubic.
 float quadratic(float x) {
     x = abs(x);
     return x < 0.5 ? 1.0 - 2.0 * x * x : x < 1.5 ? (x - 2.5) * x + 1.5 : 0.0;
 }
 
-// Whether the traced pixel of a place showed something at that distance in the last frame, as nearly all do, or those around it:
-// within their range, because a floor seen aslant has many distances. They are taken from a pixel around, because the samples
-// of an edge's pixels meet one side in one frame and the other in the next. Where pixels show a reflection and what lies behind it in turns,
-// those at the corners and those beside the pixel show different things, and the way may be that of either.
-// At rest what is too thin to be met in each frame was there all the same, if nothing around has gone away since.
+// Whether the traced pixel at `place`, or the range of the pixels around it, had this view distance in the last frame.
+// A range, because a floor at a grazing angle has many distances. The pixels around count, because the samples of an
+// edge pixel hit one side in one frame and the other side in the next. In the checkerboard of reflection and refraction
+// (`takes_turns`) diagonal and direct neighbours show different surfaces, and either may match. At rest, a surface too
+// thin to be hit in every frame counts as seen unless something around it has moved away since.
 bool was_seen(vec2 place, float view_distance, bool rests, bool takes_turns) {
     const vec2 around[8] = vec2[](vec2(1, 1), vec2(-1, 1), vec2(1, -1), vec2(-1, -1), vec2(1, 0), vec2(-1, 0), vec2(0, 1), vec2(0, -1));
     ivec2 last = ivec2(VIEW.width, VIEW.height) - 1;
@@ -107,13 +110,13 @@ bool was_seen(vec2 place, float view_distance, bool rests, bool takes_turns) {
     return rested || view_distance > least - slack && view_distance < most + slack;
 }
 
-// The history of a resting pixel as it would be in the light of now: times what the light has changed by since the last
-// frame. As each frame does so, all samples of the history come to have the light of now. The light's noise changes, too,
-// which the mean of the frames is to take out: so the change is that of the surface around.
-vec3 in_light_of_now(vec3 color, ivec2 pixel, float view_distance) {
+// Scales the history of a resting pixel by the change of the light since the last frame. Repeated each frame, this
+// brings all samples of the history to the current light. The mean over a neighbourhood of the surface gives the
+// change, because the light of one pixel also changes by noise, which the mean over frames has to remove.
+vec3 history_in_current_light(vec3 color, ivec2 pixel, float view_distance) {
     const uint KNOWN = DENOISE_HISTORY | DENOISE_GRADIENTS;
     if ((VIEW.flags & VIEW_DENOISE) == 0 || (DENOISE.flags & KNOWN) != KNOWN) return color;
-    // 0 where nothing has changed, to the last digit
+    // exactly 0 where nothing has changed
     vec2 change = imageLoad(images_rg16f[DENOISE.gradient], pixel / STRATUM).xy;
     if (max(change.x, change.y) < LEAST_CHANGE) return color;
     vec3 now = vec3(1.0e-6), then = vec3(1.0e-6);
@@ -121,7 +124,7 @@ vec3 in_light_of_now(vec3 color, ivec2 pixel, float view_distance) {
     for (int y = -1; y <= 1; y++) {
         for (int x = -1; x <= 1; x++) {
             ivec2 at = clamp(pixel + CHANGE_SPACING * ivec2(x, y), ivec2(0), ivec2(VIEW.width, VIEW.height) - 1);
-            // of the same surface in both frames, which rests
+            // only pixels that rest on the same surface in both frames
             vec2 distances = vec2(imageLoad(images_r16f[VIEW.motion.view_distance], at).x, last_view_distance_read(at));
             if (any(greaterThan(abs(distances - view_distance), vec2(slack)))) continue;
             now += light_of(at);
@@ -131,7 +134,7 @@ vec3 in_light_of_now(vec3 color, ivec2 pixel, float view_distance) {
     GBufferPixel g = gbuffer_read(pixel);
     if (g.view_distance < 0.0) return color;
     vec3 ratio = clamp(now / then, 1.0 / MOST_RATIO, MOST_RATIO);
-    // half of what such pixels show is the other field's
+    // half of the light of a checkerboard pixel is from the other field
     if (mark_field(mark_read(pixel)) > 0.0) ratio = mix(vec3(1.0), ratio, 0.5);
     vec3 front = min(g.front * exp2(-VIEW.exposure.base), color);
     return (color - front) * ratio + front;
@@ -155,14 +158,14 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, output_size))) return;
 
-    // the samples around the pixel
+    // traced samples around the pixel
     vec2 place = (vec2(pixel) + 0.5) * ratio;
     ivec2 middle = ivec2(floor(place));
     vec3 sum = vec3(0.0), squares = vec3(0.0);
     vec4 narrow = vec4(0.0), wide = vec4(0.0);
     vec3 between = vec3(0.0), least = vec3(1.0e30), most = vec3(-1.0e30);
-    // an edge moves with what is in front; on one surface the pixel's own motion is the right one
-    // not that of what is the lesser part of what is seen
+    // an edge moves with the nearest surface; within one surface the pixel's own motion is exact. A surface that
+    // contributes less than half does not set the motion
     bool lesser = fresh_parts[middle.y - first.y][middle.x - first.x] < 0.0;
     float nearest = lesser ? 1.0e30 : tile[middle.y - first.y][middle.x - first.x].w * IN_FRONT;
     ivec2 nearest_at = ivec2(0);
@@ -180,7 +183,7 @@ void main() {
             most = max(most, s.rgb);
             sum += s.rgb;
             squares += s.rgb * s.rgb;
-            // next to it, too: the samples of an edge's pixels meet it in one frame and miss it in the next
+            // neighbours count too: samples of an edge pixel hit the layer in one frame and miss it in the next
             float fresh_part = fresh_parts[at.y][at.x];
             fresh = max(fresh, abs(fresh_part) - LEAST_FRESH);
             if (s.w < nearest && fresh_part >= 0.0) {
@@ -192,7 +195,7 @@ void main() {
     vec3 mean = sum / 9.0;
     vec3 deviation = sqrt(max(squares / 9.0 - mean * mean, 0.0));
 
-    // the same place in the last frame
+    // the same point in the last frame
     Motion motion = motion_read(clamp(middle + nearest_at, ivec2(0), traced_size - 1));
     vec2 last_place = vec2(pixel) + 0.5 + motion.offset / ratio;
     vec3 old = mean;
@@ -202,13 +205,13 @@ void main() {
     bool rests = motion.offset == vec2(0.0), is_fine = traced_size == output_size;
     if (known && was_seen(last_place * ratio, motion.last_view_distance, rests, mark_field(motion.mark) > 0.0)) {
         vec4 history = last_bicubic(last_place, vec2(output_size));
-        if (rests) history.rgb = in_light_of_now(history.rgb, middle, view_distance_read(middle));
+        if (rests) history.rgb = history_in_current_light(history.rgb, middle, view_distance_read(middle));
         old = to_ycocg(compress(history.rgb, exposure));
         float range = rests ? REST_RANGE : MOVING_RANGE;
         vec3 off = old - mean;
         vec3 parts = abs(off) / (deviation * range + 1.0e-4);
         old = mean + off / max(max_component(parts), 1.0);
-        // in the sum with what is new, history is to have the part that is not
+        // the history contributes only the fraction that is not new
         float kept = rests ? REST_FRAMES : mark_bent(motion.mark) ? BENT_FRAMES : is_fine ? MOVING_FRAMES : COARSE_MOVING_FRAMES;
         frames = min(min(history.a, kept), (1.0 - fresh) / max(fresh, 1.0e-3));
     }

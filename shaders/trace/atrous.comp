@@ -1,29 +1,29 @@
 #version 460
-// An edge-avoiding a-trous wavelet step (Dammertz et al., HPG 2010), guided by normals, the surface's plane and the
-// variance of the light (Schied et al. 2017, section 4.3 and 4.4). The kernel is 3 x 3. Direct and indirect light share
-// what the surface says and differ in what the light says.
+// A step of the edge-avoiding a-trous wavelet filter (Dammertz et al., HPG 2010), guided by normals, the surface's
+// plane and the variance of the light (Schied et al. 2017, sections 4.3 and 4.4). The kernel is 3 x 3. Direct and
+// indirect light share the weights of the surface and have their own weights of luminance.
 #define OWN_PUSH
 #extension GL_EXT_control_flow_attributes : require
 #include "trace/denoise.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// Whether there is bounced light at all.
+// 1: there is bounced light.
 layout(constant_id = 0) const uint BOUNCES = 1;
-// Whether the variance of a pixel is taken from around it, too: that of fresh light is itself noisy.
+// 1: the variance is averaged over the taps, because the variance of fresh light is itself noisy.
 layout(constant_id = 1) const uint NOISY_VARIANCE = 1;
-// Whether this is the last step, which leaves the sum of both kinds of light where direct light was.
+// 1: last step; writes the sum of direct and indirect light to the image of direct light.
 layout(constant_id = 2) const uint LAST = 0;
 
-// Differences of luminance that count as noise, in standard deviations: of direct and indirect light.
+// Luminance tolerance in standard deviations, of direct and indirect light.
 const vec2 LUMINANCE_SIGMA = vec2(4.0, 6.0);
 const float LOG2_E = 1.44269504;
 
-// The exponent to which normals of guides go with the square of their difference: of normals of unit length about the
-// 64th power of their cosine. By the bit of reflections one differs from all that is none.
+// Scale of the squared difference of the guides' normals in the exponent: for unit normals about the 64th power of
+// their cosine. The reflection bit separates reflections from all other pixels.
 const float NORMAL_SCALE = 0.205; // 32 log2(e) / 15^2
 
-// Of both kinds of light, or direct light alone.
+// Both kinds of light, or direct light alone.
 vec2 of_kinds(vec2 v) { return BOUNCES != 0 ? v : vec2(v.x, 0.0); }
 
 void main() {
@@ -41,19 +41,19 @@ void main() {
     float depth = guide_depth(guide);
     vec2 depth_gradient = imageLoad(images_rg16f[DENOISE.depth_gradient], pixel).xy * float(spacing);
 
-    // the plane in camera space: its point at tangent (x, y) has the inverse depth a x + b y + c
+    // The plane in camera space: its point at tangent (x, y) has the inverse depth a x + b y + c.
     vec2 tangent = tangent_of(vec2(pixel));
     vec2 rate = -depth_gradient / (float(spacing) * VIEW.camera.pixel_spread * depth);
     vec3 plane = vec3(rate, 1.0 / depth - dot(rate, tangent));
-    // the logarithm makes a power of e one of 2
+    // the factor converts an exponent of e to one of 2
     float plane_scale = LOG2_E * inversesqrt(dot(plane, plane)) / (0.1 + depth * (0.5 * float(spacing) * VIEW.camera.pixel_spread + 5.0e-4));
     float unit = depth / INVERSE_SCALE;
 
-    // Places of the taps. Beyond the edge of the picture they are on it, and weigh little unless they are alike.
+    // Positions of the taps, clamped to the picture; a clamped tap gets little weight unless its surface is similar.
     ivec2 low = max(pixel - spacing, ivec2(0)), high = min(pixel + spacing, ivec2(VIEW.width, VIEW.height) - 1);
     ivec3 columns = ivec3(low.x, pixel.x, high.x), rows = ivec3(low.y, pixel.y, high.y) * int(VIEW.width);
 
-    // How much of the same surface a tap is, as a power of 2. A tap that has nothing to light is far from every normal.
+    // Exponents (base 2) of the taps' surface weights. The guide 0 of a tap without a surface is far from every normal.
     uvec4 taps[8];
     float alike[8];
     vec2 level = of_kinds(unpackHalf2x16(own.x)), variance_sum = of_kinds(unpackHalf2x16(own.z));
@@ -77,7 +77,7 @@ void main() {
     vec2 variance = variance_sum / count, deviation = sqrt(variance);
     vec2 light_scale = LOG2_E / (LUMINANCE_SIGMA * deviation + 1.0e-3 * level + 1.0e-6);
 
-    // colours are summed up as codes, times the level
+    // sums of colour codes, weighted by the level
     vec2 level_sum = level, green = level * green_code(own.y), red = level * red_code(own.y);
     vec2 squares = vec2(1.0), total = vec2(1.0);
     [[unroll]] for (int i = 0; i < 8; i++) {
@@ -100,7 +100,7 @@ void main() {
         light_write(VIEW.images.direct, pixel, light, dither(pixel, DITHER_FILTERED));
         return;
     }
-    // those around, which weigh because they are alike, vary as much
+    // the taps have similar surfaces and are taken to have the same variance
     mean.variance = variance * squares * (scale * scale);
     mean.guide = guide;
     LightTexels(push.target).at[place] = pack_texel(mean, dither(pixel, DITHER_FILTERED));

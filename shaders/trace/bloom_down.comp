@@ -1,10 +1,10 @@
 #version 460
-// All levels of the bloom in one go: a group averages 64 x 64 pixels down to one texel of the last level.
+// All levels of the bloom in one dispatch: a work group averages 64 x 64 pixels down to one texel of the last level.
 #include "trace/bloom.glsl"
 
 layout(local_size_x = 16, local_size_y = 16) in;
 
-// Mean light of a texel, and how many pixels of the picture it covers.
+// Mean light of a texel; w: number of pixels that it covers.
 shared vec4 texels[16 * 16];
 
 void main() {
@@ -24,7 +24,7 @@ void main() {
     vec4 own = vec4(sum / max(count, 1.0), count);
     for (uint level = 0; level < BLOOM_LEVELS; level++) {
         if (level > 0) {
-            // four texels of the level before become one; those with less in the picture weigh less
+            // four texels of the previous level become one, weighted by the pixels that they cover
             barrier();
             uint step = 1u << (level - 1);
             bool takes = (gl_LocalInvocationID.x | gl_LocalInvocationID.y) % (2 * step) == 0;

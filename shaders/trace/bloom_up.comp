@@ -4,7 +4,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// Weights of the four texels around a place that lies `t` behind the second one (uniform cubic B-spline).
+// Uniform cubic B-spline weights of four texels; `t`: position between the second and the third.
 vec4 spline(float t) {
     float u = 1.0 - t;
     return vec4(u * u * u, 4.0 + t * t * (3.0 * t - 6.0), 4.0 + u * u * (3.0 * u - 6.0), t * t * t) / 6.0;

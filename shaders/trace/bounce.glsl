@@ -1,6 +1,6 @@
-// Bounced light: a path of cosine-weighted bounces with a light sample at every vertex but the first, whose own light is
-// `direct`. With that density the estimator of L is the radiance found: cosine and pi cancel, and so a vertex multiplies
-// the throughput by its albedo alone.
+// Bounced light: paths of cosine-weighted bounces with a light sample at every vertex but the first, whose direct light
+// `direct.rgen` computes. With this density cosine and pi cancel in the estimator of L, so that a vertex multiplies the
+// throughput by its albedo alone.
 #ifndef RELIGHT_TRACE_BOUNCE_GLSL
 #define RELIGHT_TRACE_BOUNCE_GLSL
 
@@ -10,38 +10,38 @@
 #include "trace/fog.glsl"
 #include "trace/subsample.glsl"
 
-// The map has fog: without, nothing of it is compiled in.
+// 1: the map has fog. 0 removes the code of fog.
 layout(constant_id = 1) const uint HAS_FOG = 0;
 
-// What bounced rays meet.
+// Mask of bounce rays.
 const uint MASK_BOUNCE = MASK_SOLID | MASK_THIRD_SOLID | MASK_SKY | MASK_NO_SHADOW;
 
-// What the first of a path's rays meets: see shadow_mask.
+// Mask of the first ray of a path; see `shadow_mask`.
 uint first_bounce_mask(bool first_person) { return first_person ? MASK_BOUNCE & ~MASK_THIRD_SOLID : MASK_BOUNCE; }
-// Cones of bounced light are wide: about the spread of a hemisphere cut into as many pieces as one needs to look smooth.
+// Spread of the cones of bounce rays.
 const float BOUNCE_SPREAD = 0.1;
 
-// Where a path is.
+// The vertex of a path from which the next ray starts.
 struct PathVertex {
     vec3 position;
     vec3 face_normal; // on the side that the path comes from
     vec3 normal;
 };
 
-// Whether a pixel gathers bounced light at all.
+// Whether a pixel gathers bounced light.
 bool gathers(LightTask task) { return task.surface.view_distance >= 0.0 && (VIEW.flags & VIEW_FULLBRIGHT) == 0; }
 
 PathVertex first_vertex(LightTask task) {
     return PathVertex(task.surface.position, task.surface.face_normal, task.surface.normal);
 }
 
-// Begins the random numbers of a pixel's bounced light; returns one for its rounding.
+// Starts the random numbers of a pixel's bounced light; returns one for rounding.
 float bounce_random(LightTask task) {
     rng_begin(uvec2(task.pixel), subsample_index(task.seed), STREAM_BOUNCE);
     return rng_independent();
 }
 
-// A cosine-weighted direction about n; the estimator of L is then the radiance that it finds.
+// A cosine-weighted direction about n. With this density the estimator of L is the radiance along the ray.
 vec3 sample_cosine(vec3 n, vec2 u) {
     vec3 t, b;
     basis(n, t, b);
@@ -49,30 +49,31 @@ vec3 sample_cosine(vec3 n, vec2 u) {
     return normalize(t * (r * cos(phi)) + b * (r * sin(phi)) + n * sqrt(max(1.0 - u.x, 0.0)));
 }
 
-// Where a path goes on; false: into its own surface, as a bent normal can point, where nothing comes from.
+// Samples the direction of the next ray. False: it points into the surface, which an interpolated normal permits; no
+// light comes from there.
 bool bounce_direction(PathVertex v, out vec3 direction) {
     direction = sample_cosine(v.normal, rng_next2());
     return dot(direction, v.face_normal) > 0.0;
 }
 
-// Whether light can come from there: the side of a surface that is never drawn closes the world, and what lies behind it
-// (the outside of the map, the inside of a model) gives no light.
+// Whether light can come from the hit side. A culled side closes the world: what lies behind it (the outside of the
+// map, the inside of a model) emits no light.
 bool shows_face(SurfacePoint p, vec3 direction) {
     return p.kind == KIND_SKY || !is_culled(p, direction);
 }
 
-// What a path finds at what its ray meets: adds what glows there to `sum`, and moves on. False: the path ends.
+// Shades the hit of a bounce ray: adds emission to `sum` and moves the vertex to the hit. False: the path ends.
 bool bounce_shade(Hit hit, vec3 origin, vec3 direction, inout vec3 throughput, inout vec3 sum, out PathVertex v) {
     SurfacePoint p = surface_point(hit);
     float t = dot(p.position - origin, direction);
     if (HAS_FOG != 0) {
-        // as the eye sees it: with its own colour, which shows as the engine shows it
+        // displayed colour, exposed as the engine shows it, as for primary rays
         vec3 fog = vec3(0.0);
         fog_in_light(origin, direction, t, throughput, fog);
         sum += fog * exp2(-VIEW.exposure.base);
     }
     if (!shows_face(p, direction)) return false;
-    // what is in the light lists is counted by sampling the lights, never twice
+    // Emitters in the light lists are sampled by `one_light`; their emission must not count twice.
     bool in_lists = (material_of(p.triangle.material).flags & MATERIAL_EMITTER) != 0;
     if (p.kind == KIND_SKY) {
         if (!in_lists) sum += throughput * sky_radiance(p, direction, BOUNCE_SPREAD, false, vec4(0.0));
@@ -87,7 +88,7 @@ bool bounce_shade(Hit hit, vec3 origin, vec3 direction, inout vec3 throughput, i
     return max_component(throughput) > 0.0;
 }
 
-// The light that a vertex sends its ray to. One is enough: the bounce itself is noisier than the choice.
+// Samples the light of a vertex. One sample suffices: the bounce adds more noise than the selection.
 LightSample vertex_light(PathVertex v) { return one_light(v.position, v.face_normal, v.normal); }
 
 #endif

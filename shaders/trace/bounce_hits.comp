@@ -1,6 +1,5 @@
 #version 460
-// What the rays of bounce_rays.rgen find at what they meet, and the light that is asked for there; bounce_light.rgen sends the
-// ray to it.
+// Shades the hits of `bounce_rays.rgen` and samples a light for each; `bounce_light.rgen` traces the shadow rays.
 #include "trace/bounce_ray.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;

@@ -1,5 +1,5 @@
-// What the passes of a single bounce hand on from ray to ray, for each cell of 2 x 2 pixels, of which one gathers: 64 bytes
-// in the texels of four pixels.
+// Data that the passes of a single bounce exchange. Each cell of 2 x 2 pixels, of which one gathers, has 64 bytes: the
+// scratch texels of its four pixels.
 #ifndef RELIGHT_TRACE_BOUNCE_RAY_GLSL
 #define RELIGHT_TRACE_BOUNCE_RAY_GLSL
 
@@ -10,20 +10,20 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) buffer BounceTexel
 
 ivec2 bounce_cells() { return (ivec2(VIEW.width, VIEW.height) + CELL - 1) / CELL; }
 
-// Where the `part`th quarter of a cell's record is: those of all cells lie together.
+// Index of quarter `part` of a cell's record. The same quarters of all cells are contiguous.
 uint bounce_place(ivec2 cell, uint part) {
     ivec2 cells = bounce_cells();
     return uint(cells.x * cells.y) * part + uint(cell.y * cells.x + cell.x);
 }
 
-// What the ray meets, and what colour its way takes from its light.
+// Writes the hit of a bounce ray, and the colour by which filters on its way tint the light.
 void bounce_hit_write(ivec2 cell, Hit hit, vec3 color) {
     BounceTexels texels = BounceTexels(VIEW.scratch);
     texels.at[bounce_place(cell, 0)] = uvec4(hit.geometry, hit.primitive, floatBitsToUint(hit.barycentrics));
     if (VIEW.transport.filter_count != 0) texels.at[bounce_place(cell, 1)] = uvec4(floatBitsToUint(color), 0);
 }
 
-// How far away it is, the point on the triangle tells.
+// The distance is not stored; it follows from the point on the triangle.
 Hit bounce_hit_read(ivec2 cell, out vec3 color) {
     BounceTexels texels = BounceTexels(VIEW.scratch);
     uvec4 hit = texels.at[bounce_place(cell, 0)];
@@ -32,17 +32,17 @@ Hit bounce_hit_read(ivec2 cell, out vec3 color) {
     return Hit(hit.x, hit.y, uintBitsToFloat(hit.zw), 0.0);
 }
 
-// A ray to a light, and the light that was found before it.
+// A shadow ray to a light, and the radiance found before it.
 struct BounceLight {
     vec3 origin;
     LightSample light;
     vec3 found;
 };
 
-// `dither`: see pack_light.
+// `dither`: see `pack_light`.
 void bounce_light_write(ivec2 cell, BounceLight b, float dither) {
     BounceTexels texels = BounceTexels(VIEW.scratch);
-    texels.at[bounce_place(cell, 2)] = uvec4(floatBitsToUint(b.origin), pack_light(sound_light(b.found), dither));
+    texels.at[bounce_place(cell, 2)] = uvec4(floatBitsToUint(b.origin), pack_light(finite_light(b.found), dither));
     texels.at[bounce_place(cell, 3)] = pack_light_ray(b.light, uvec2(0), b.light.sky, dither);
 }
 

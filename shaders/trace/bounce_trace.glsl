@@ -1,11 +1,12 @@
-// The ray of a bounce.
+// Traces the ray of a bounce.
 #ifndef RELIGHT_TRACE_BOUNCE_TRACE_GLSL
 #define RELIGHT_TRACE_BOUNCE_TRACE_GLSL
 
 #include "trace/trace.glsl"
 
-// The nearest hit of the mask that is not Kind::Passed (renderer_vk/src/trace/input.rs). Few rays meet such a surface; those
-// are traced again without what casts no shadow. Drivers inline functions: in a loop the traversal is compiled once.
+// The nearest hit that is not `Kind::Passed` (`renderer_vk/src/trace/input.rs`). The few rays that hit such a surface
+// are traced again without surfaces that cast no shadow. A loop, because drivers inline functions: in a loop the
+// traversal is compiled once.
 Hit trace_bounce_rays(vec3 origin, vec3 direction, uint mask) {
     Hit hit;
     for (uint i = 0; i < 2; i++) {

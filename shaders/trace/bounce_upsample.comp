@@ -1,15 +1,15 @@
 #version 460
-// Bounced light of the pixels that it was not gathered for: the mean of the gathered ones around that lie on the same
-// surface, the nearer the more. Bounced light changes slowly over a surface, and the denoiser smooths it over far more
-// than a pixel.
+// Interpolates bounced light to the pixels that did not gather it: the mean of gathered neighbours on the same surface,
+// weighted by distance. Bounced light changes slowly over a surface, and the denoiser smooths it over more than a
+// pixel.
 #include "trace/motion.glsl"
 #include "trace/subsample.glsl"
 
 const int TILE = 8, WIDE = TILE + 2;
 layout(local_size_x = TILE, local_size_y = TILE) in;
 
-// Of the cells of the group and those around: the pixel that was gathered for (x, y in 16 bits each), its light and
-// normal; its position and path, negative where there is nothing.
+// For the cells of the work group and those around it: the gathered pixel (x, y in 16 bits each), its light and normal,
+// its position and view distance (negative: no surface).
 shared uint gathered[WIDE * WIDE];
 shared vec3 lights[WIDE * WIDE];
 shared vec3 normals[WIDE * WIDE];
@@ -41,10 +41,10 @@ void main() {
         if (position.w >= 0.0) {
             vec3 normal = unpack_normal(imageLoad(uimages_rg32ui[VIEW.images.surface], pixel).x);
             float tolerance = 0.1 + 6.0 * position.w * VIEW.camera.pixel_spread;
-            // those of the other field show another surface, so a field's own lie farther apart
+            // Pixels of the other field show another surface, so neighbours of the same field lie farther apart.
             bool takes_turns = mark_field(mark_read(pixel)) > 0.0;
             float reach = takes_turns ? 7.5 : 3.0;
-            // where no neighbour fits, as on a wire, what is around is better than black
+            // fallback where no neighbour matches, as on a wire
             vec3 any_light = vec3(0.0);
             float weight = 0.0, any_weight = 0.0;
             for (int j = 0; j < 9; j++) {

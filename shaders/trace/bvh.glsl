@@ -1,5 +1,5 @@
-// The compute tracer: two levels of bounding volume hierarchies, built on the CPU (support/src/bvh.rs,
-// renderer_vk/src/trace/bvh.rs).
+// The compute tracer: two levels of bounding volume hierarchies, built on the CPU (`support/src/bvh.rs`,
+// `renderer_vk/src/trace/bvh.rs`).
 #ifndef RELIGHT_TRACE_BVH_GLSL
 #define RELIGHT_TRACE_BVH_GLSL
 
@@ -9,14 +9,14 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Bv
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BvhTriangles { BvhTriangle at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BvhInstances { BvhInstance at[]; };
 
-// What a walk looks for.
+// Kinds of traversal: nearest hit, any hit, translucent layers.
 const uint BVH_CLOSEST = 0, BVH_ANY = 1, BVH_LAYER = 2;
 
-// A ray in the space of an instance, prepared for boxes and triangles.
+// A ray in the space of an instance, prepared for box and triangle tests.
 struct BvhRay {
     vec3 origin;
     vec3 inverse;  // of the direction
-    uint axis;     // largest component of the direction
+    uint axis;     // index of the direction's largest component
     vec3 shear;
 };
 
@@ -25,7 +25,7 @@ vec3 bvh_permute(vec3 v, uint axis) { return axis == 0 ? v.yzx : (axis == 1 ? v.
 BvhRay bvh_ray(vec3 origin, vec3 direction) {
     BvhRay ray;
     ray.origin = origin;
-    // no zero: zero times infinity is not a number
+    // replaces zeros: zero times infinity is not a number
     vec3 d = mix(direction, vec3(1.0e-20), lessThan(abs(direction), vec3(1.0e-20)));
     ray.inverse = 1.0 / d;
     vec3 m = abs(direction);
@@ -35,12 +35,12 @@ BvhRay bvh_ray(vec3 origin, vec3 direction) {
     return ray;
 }
 
-// The four bytes of a word.
+// The four bytes of a word, lowest first.
 vec4 bvh_bytes(uint v) { return vec4(v & 255u, (v >> 8) & 255u, (v >> 16) & 255u, v >> 24); }
 
-// Distances at which the ray enters the boxes of a node's children; FAR_AWAY for those that it misses. The far sides are
-// widened by what rounding can cost (Ize, Robust BVH Ray Traversal, JCGT 2013); what rounding costs on the node's grid is
-// in the boxes.
+// Distances at which the ray enters the boxes of a node's children; `FAR_AWAY` for a miss. The far sides are widened by
+// the rounding error of the test (Ize, Robust BVH Ray Traversal, JCGT 2013); the boxes include the rounding error of
+// the node's grid.
 const float FAR_AWAY = 3.0e38;
 vec4 bvh_boxes(BvhRay ray, BvhNode node, float tmin, float tmax) {
     vec3 scale = node.step * ray.inverse, shift = (node.origin - ray.origin) * ray.inverse;
@@ -74,23 +74,23 @@ vec3 bvh_triangle(BvhRay ray, BvhTriangle triangle) {
     return vec3(t, v, w) / determinant;
 }
 
-// State of a walk over all instances.
+// State of a traversal over all instances.
 struct BvhWalk {
     uint mode;
     float tmin;
     float tmax;
     vec3 direction; // world space
     Hit hit;
-    // of a walk for layers
+    // found so far, in a traversal for layers
     LayerList layers;
     LayerOrder last;
 };
 
-// Takes note of a hit; true ends the walk.
+// Records a hit; true ends the traversal.
 bool bvh_report(inout BvhWalk walk, Hit hit) {
     if (walk.mode == BVH_LAYER) {
         layers_add(walk.layers, hit, walk.direction, walk.last);
-        // nothing farther than this can have a smaller key than the last of the list
+        // no hit beyond this distance can have a smaller key than the last of the list
         float last = walk.layers.keys[LAYERS_A_RAY - 1];
         if (last < LAYER_NONE) walk.tmax = min(walk.tmax, last + 2.0 * layer_slack(last + layer_slack(last)));
         return false;
@@ -113,7 +113,7 @@ void bvh_sort(inout float near_a, inout uint a, inout float near_b, inout uint b
     b = swap ? child : b;
 }
 
-// No instance is being walked.
+// Value of `instance` while the top level is traversed.
 const uint BVH_TOP = 0xFFFFFFFFu;
 
 void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
@@ -124,13 +124,13 @@ void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
     BvhInstances instances = BvhInstances(VIEW.scene.placed);
     BvhTriangles triangles = BvhTriangles(uint64_t(0));
     uint geometry = 0;
-    // what is left for later with the distance at which it begins, and how much of it there was when the instance was entered
+    // postponed children with their entry distances; the number of them when the instance was entered
     uvec2 stack[2 * BVH_STACK];
     uint size = 0;
     uint base = BVH_TOP;
     uint current = 0;
     while (true) {
-        // down to a leaf, or until nothing is left of this level
+        // descends to a leaf, or until this level is finished
         while (current < BVH_LEAF) {
             BvhNode node = nodes.at[current];
             vec4 near = bvh_boxes(ray, node, walk.tmin, walk.tmax);
@@ -162,7 +162,7 @@ void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
                 if ((instance.mask & mask) != 0) {
                     vec4 from = vec4(origin, 1.0);
                     vec3 d = walk.direction;
-                    // not normalized: distances stay those of the world
+                    // not normalized, so that distances are those of the world
                     ray = bvh_ray(
                         vec3(dot(instance.to_object[0], from), dot(instance.to_object[1], from), dot(instance.to_object[2], from)),
                         vec3(dot(instance.to_object[0].xyz, d), dot(instance.to_object[1].xyz, d), dot(instance.to_object[2].xyz, d)));
@@ -190,15 +190,15 @@ void bvh_walk(inout BvhWalk walk, vec3 origin, uint mask) {
         }
         if (size == 0) return;
         uvec2 later = stack[--size];
-        // farther than what was found since
+        // skips children beyond the nearest hit found since
         current = uintBitsToFloat(later.y) <= walk.tmax ? later.x : BVH_NONE;
     }
 }
 
-// The nearest thing of the mask between tmin and tmax, translucent ones left out; with `any_hit` only whether there is
-// one: `geometry` is NO_HIT if not, and nothing else of the answer counts.
+// The nearest hit of the mask between tmin and tmax, without translucent surfaces. With `any_hit` only `geometry` is
+// valid: NO_HIT if the ray hits nothing.
 Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
-    rays_asked++;
+    ray_count++;
     BvhWalk walk;
     walk.mode = any_hit ? BVH_ANY : BVH_CLOSEST;
     walk.tmin = tmin;
@@ -209,10 +209,10 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
     return walk.hit;
 }
 
-// The next translucent layers behind `order` and before tmax. Layers in one plane come in the order of the engine, what
-// it draws last first.
+// The next translucent layers behind `order` and before tmax. Layers in one plane are ordered as the engine draws them,
+// the last drawn first.
 void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
-    rays_asked++;
+    ray_count++;
     BvhWalk walk;
     walk.mode = BVH_LAYER;
     walk.tmin = layer_start(order);

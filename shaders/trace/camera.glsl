@@ -1,5 +1,4 @@
-// The camera: where in its pixel a ray goes through, and through which point of the lens. Needs the random numbers of
-// random.glsl to have begun.
+// Camera rays: the sample point in the pixel and on the lens. `rng_begin` must have been called (`random.glsl`).
 #ifndef RELIGHT_TRACE_CAMERA_GLSL
 #define RELIGHT_TRACE_CAMERA_GLSL
 
@@ -9,20 +8,21 @@
 struct CameraRay {
     vec3 origin;
     vec3 direction;      // unit
-    vec3 through_middle; // unit: through the middle of the lens
+    vec3 through_middle; // unit: through the centre of the lens
     vec2 seen;           // place in the picture, traced pixels from the left and top
 };
 
 // A thin lens (Kolb et al., A Realistic Camera Model for Computer Graphics, SIGGRAPH 1995, section 2, and Cook et al.,
-// Distributed Ray Tracing, SIGGRAPH 1984): rays from all of a disc meet in the plane of focus, uniformly sampled by area.
+// Distributed Ray Tracing, SIGGRAPH 1984): rays from all of a disc meet in the plane of focus; the disc is sampled
+// uniformly by area.
 CameraRay camera_ray(ivec2 pixel) {
     CameraRay ray;
-    // two numbers: one for each axis of the pixel's square
+    // one random number for each axis of the pixel's square
     vec2 place = (VIEW.flags & VIEW_JITTER) != 0 ? rng_next2() : vec2(0.5) + VIEW.antialias.jitter;
     ray.seen = vec2(pixel) + place;
     vec2 ndc = ray.seen / vec2(VIEW.width, VIEW.height) * 2.0 - 1.0;
     ndc.x += VIEW.camera.stereo_shift;
-    // one unit deep
+    // scaled to depth 1
     vec3 direction = VIEW.camera.forward - VIEW.camera.left * ndc.x - VIEW.camera.up * ndc.y;
     ray.through_middle = normalize(direction);
     ray.origin = VIEW.camera.origin;

@@ -1,33 +1,33 @@
-// What each tracer decides about a triangle that a ray meets and that may be passed: the same here for all of them.
+// Decisions about triangles that a ray may pass (cut-outs, translucent layers), shared by all tracers.
 #ifndef RELIGHT_TRACE_CANDIDATE_GLSL
 #define RELIGHT_TRACE_CANDIDATE_GLSL
 
 #include "trace/layer.glsl"
 #include "trace/layer_order.glsl"
 
-// The place of a translucent layer in the order along a ray, nearest first.
+// Position of a translucent layer in the order along a ray, nearest first.
 struct LayerOrder {
     float key;
     uint geometry;
     uint primitive;
 };
 
-// The key of no layer at all.
+// Key of an empty entry.
 const float LAYER_NONE = 1.0e30;
 
 LayerOrder layer_begin() { return LayerOrder(-LAYER_NONE, NO_HIT, NO_HIT); }
 
-// Layers that one ray finds. With one a ray, each pixel behind layers needs a ray for each of them and one more to know
-// that there is none left; more are more to keep in registers while a layer is shaded.
+// Layers that one ray finds. With 1, a pixel behind n layers needs n + 1 rays; more layers occupy more registers while
+// a layer is shaded.
 const uint LAYERS_A_RAY = 2;
 
-// The nearest layers of a ray behind a place in the order, in order; where there are fewer the others have no geometry.
+// The nearest layers of a ray behind a given layer, in order; unused entries have no geometry.
 struct LayerList {
     float keys[LAYERS_A_RAY];
     Hit hits[LAYERS_A_RAY];
 };
 
-// A list of none; its keys tell, and what else is in it counts for nothing.
+// Empties the list. Only the keys are valid then.
 void layers_clear(out LayerList list) {
     for (uint i = 0; i < LAYERS_A_RAY; i++) {
         list.keys[i] = LAYER_NONE;
@@ -36,9 +36,9 @@ void layers_clear(out LayerList list) {
     }
 }
 
-// Adds a hit to the list, if it is a translucent layer that shows its face, lies behind `last`, and is among the nearest so far.
+// Adds a hit if it is a translucent layer that is not culled, lies behind `last`, and is among the nearest so far.
 void layers_add(inout LayerList list, Hit hit, vec3 direction, LayerOrder last) {
-    // the order first: of many layers on a ray, each is looked at for every other list
+    // order before facing: of many layers on a ray, each is a candidate again for every later list
     GeometryRecord record = Geometries(VIEW.scene.geometries).at[hit.geometry];
     float key = layer_key(Triangles(record.triangles).at[hit.primitive].flags, hit.t);
     if (!layer_before(last.key, last.geometry, last.primitive, key, hit.geometry, hit.primitive)) return;
@@ -56,7 +56,7 @@ void layers_add(inout LayerList list, Hit hit, vec3 direction, LayerOrder last) 
     }
 }
 
-// Takes the nearest layer out of the list; `order` becomes its place. No geometry: the list is empty.
+// Removes the nearest layer from the list; `order` becomes its position. NO_HIT: the list is empty.
 Hit layers_take(inout LayerList list, inout LayerOrder order) {
     Hit hit = list.hits[0];
     if (hit.geometry != NO_HIT) order = LayerOrder(list.keys[0], hit.geometry, hit.primitive);
@@ -67,10 +67,10 @@ Hit layers_take(inout LayerList list, inout LayerOrder order) {
     return hit;
 }
 
-// From where on layers behind `last` are found: a layer lies at its key or a bias behind it.
+// Least distance of layers behind `last`: a layer lies at its key or up to a bias behind it.
 float layer_start(LayerOrder last) { return max(last.key - 0.01, 0.0); }
 
-// Whether a triangle with holes, or with an opposite in its plane, stops the ray where it meets it.
+// Whether a triangle with holes, or one with an opposite in its plane, stops the ray at the hit.
 bool is_stopped_by(Hit hit, vec3 direction) {
     SurfacePoint p = surface_point(hit);
     if ((p.triangle.flags & TRIANGLE_ONE_SIDED) != 0) return !is_culled(p, direction);

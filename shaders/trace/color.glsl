@@ -1,8 +1,8 @@
-// The one place of the tracer that knows how displayed colours are encoded.
+// Display encoding of colours; the tracer's only implementation.
 //
-// Textures, vertex colours, entity colours and the colours of waves and constants are what the classic look would put
-// on the screen: sRGB (IEC 61966-2-1). Stages are put together as they are displayed (layer.glsl) and decoded then; what
-// is multiplied by white comes out of the tone curve exactly as it went in. Alpha is linear already.
+// Textures, vertex colours, entity colours and the colours of waves and constants are the values that the classic look
+// would display: sRGB (IEC 61966-2-1). Stages are combined as displayed (`layer.glsl`) and decoded then; a decoded
+// colour times white leaves the tone curve unchanged. Alpha is linear.
 #ifndef RELIGHT_TRACE_COLOR_GLSL
 #define RELIGHT_TRACE_COLOR_GLSL
 
@@ -18,8 +18,8 @@ vec3 encode_display(vec3 c) {
     return mix(high, low, lessThanEqual(c, vec3(0.0031308)));
 }
 
-// Linear value of what is displayed over the displayed value; from display white on 1, so that sums beyond it do not
-// blaze. Parts that add up to a displayed sum share its linear value as they share the sum.
+// Ratio of the linear to the displayed value; 1 from display white on, so that sums beyond white do not grow
+// excessively. Terms of a displayed sum share its linear value in proportion to their displayed values.
 vec3 display_slope(vec3 c) {
     vec3 bounded = clamp(c, 1.0e-4, 1.0);
     return decode_display(bounded) / bounded;

@@ -1,14 +1,14 @@
 #version 460
-// Puts light and surface together: what is in front + albedo * light. In reference mode it joins the running mean of the
-// frames since anything changed. Where a reflection and what lies behind it are seen in one place, pixels show either in
-// turns, like the fields of a chessboard: there a pixel is the mean of what it shows and of what it would show of the
-// other field: that surface and what is in front of it it knows, its light is that of its neighbours.
+// Combines light and surface: front + albedo * light. In reference mode adds the frame to the running mean since the
+// last change. Where a surface both reflects and refracts, pixels form a checkerboard of two fields. There a pixel is
+// the mean of both: of the other field it has the albedo and the front itself (`other`), and takes the light from its
+// neighbours.
 #include "trace/denoise.glsl"
 #include "trace/motion.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// The light of the fog that a pixel shows, between its cells.
+// The light of fog at a pixel, interpolated between fog cells.
 vec3 light_in_fog(ivec2 pixel) {
     if (VIEW.fog.cell == 1) return imageLoad(images_rgba16f[VIEW.fog.filtered], pixel).rgb;
     vec2 at = (vec2(pixel) + 0.5) / float(VIEW.fog.cell) - 0.5;
@@ -28,7 +28,7 @@ vec3 light_in_fog(ivec2 pixel) {
     return total > 0.0 ? sum / total : vec3(0.0);
 }
 
-// What a pixel shows by itself: albedo * light + front, or `front` alone where nothing is lit.
+// Radiance of the pixel's own field: albedo * light + front, or `front` alone if nothing is lit.
 struct Shown {
     bool is_lit;
     vec3 albedo;
@@ -41,7 +41,7 @@ vec3 radiance_of(Shown s) { return s.is_lit ? s.albedo * s.light + s.front : s.f
 Shown shown(ivec2 pixel) {
     GBufferPixel g = gbuffer_read(pixel);
     Shown s;
-    // what glows by itself, sky and fog show as the engine shows them when the map is exposed to look as bright as there
+    // at the map's base exposure, self-luminous surfaces, sky and fog show as in the engine
     s.front = g.front * exp2(-VIEW.exposure.base);
     s.is_lit = g.view_distance >= 0.0;
     s.albedo = g.albedo;
@@ -55,16 +55,15 @@ vec3 lit_fog(ivec2 pixel) {
     return max_component(weight) > 0.0 ? weight * light_in_fog(pixel) : vec3(0.0);
 }
 
-// What the pixels of the other field around a pixel show, as it would be seen at the pixel. Their light is the mean of
-// them; what it falls on, and what glows, is known for the pixel itself, so that textures are as sharp as anywhere.
-// False: there are none.
+// Radiance of the other field at this pixel. The light is the mean of the neighbours'; albedo and front are the pixel's
+// own, so that textures stay sharp. False: no neighbour belongs to the other field.
 bool other_side(ivec2 pixel, float field, out vec3 other, out vec3 whole) {
     const ivec2 beside[4] = ivec2[](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1));
     GBufferPixel own;
     shown_read(VIEW.images.other, pixel, own);
     own.front *= exp2(-VIEW.exposure.base);
     bool is_lit = max_component(own.albedo) > 0.0;
-    // to the sides, above and below: of those that show a surface where one is to be shown, and of all
+    // horizontal and vertical pairs: sums over neighbours with a matching surface, and over all
     vec3 sums[2] = vec3[](vec3(0.0), vec3(0.0)), all_sum = vec3(0.0);
     float counts[2] = float[](0.0, 0.0), contrast[2] = float[](0.0, 0.0), any_count = 0.0, whole_count = 0.0;
     whole = vec3(0.0);
@@ -97,7 +96,7 @@ bool other_side(ivec2 pixel, float field, out vec3 other, out vec3 whole) {
         other = is_lit ? all_sum / any_count : own.front;
         return true;
     }
-    // along an edge rather than across it, so that a line is not seen in every other pixel alone
+    // along an edge rather than across it, so that a line does not appear in every second pixel only
     vec2 weight = vec2(1.0);
     if (counts[0] == 2.0 && counts[1] == 2.0) weight = abs(vec2(contrast[1], contrast[0])) + 1.0e-4;
     other = (sums[0] * weight.x + sums[1] * weight.y) / (counts[0] * weight.x + counts[1] * weight.y);
@@ -119,20 +118,20 @@ void main() {
             lesser = luminance(radiance) < luminance(other);
             radiance = 0.5 * (radiance + other);
         } else {
-            // alone, at an edge or where a reflection begins to be worth following: what is behind the surface counts
-            // once, and is taken from beside it where it is not this pixel's own
+            // no neighbour: at an edge, or where a reflection becomes strong enough to be followed. The refracted side
+            // counts once, and comes from the neighbours if it is not the pixel's own
             radiance *= 0.5;
             if (field == 2.0 && whole.r >= 0.0) radiance += whole;
         }
     }
-    // one broken number must not spread through exposure and accumulation
+    // a single NaN or infinity would spread through exposure and accumulation
     if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
     if ((VIEW.flags & VIEW_ACCUMULATE) == 0) {
-        // alpha: how much of the colour is of what has come here since the last frame; negative where most of it moves
-        // not as this pixel's own surface does, but as those of the other field
+        // alpha: fraction of the colour that is new since the last frame; negative if most of it moves with the surface
+        // of the other field
         float fresh = min(mark_new_part(mark) * max_component(own.front) / max(max_component(radiance), 1.0e-6), 0.99);
         if (!(fresh > 0.0)) fresh = 0.0;
-        // so is light that has changed: history of the whole colour is off by as much
+        // changed light counts as new too: the history of the whole colour is wrong by that fraction
         if (own.is_lit && (VIEW.flags & VIEW_DENOISE) != 0 && (DENOISE.flags & DENOISE_GRADIENTS) != 0) {
             vec2 change = imageLoad(images_rg16f[DENOISE.gradient], pixel / STRATUM).xy;
             fresh = max(fresh, min(max(change.x, change.y), 0.99));

@@ -1,4 +1,4 @@
-// How many rays a pass asks for. The counters are there only while somebody wants to know.
+// Counts the rays of a pass. The counters exist only while something reads them.
 #ifndef RELIGHT_TRACE_COUNT_GLSL
 #define RELIGHT_TRACE_COUNT_GLSL
 
@@ -6,20 +6,20 @@
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer RayCounters { uint at[]; };
 
-// Rays that this invocation has asked for; every function of the tracer that starts one adds to it.
-uint rays_asked = 0;
+// Rays of this invocation; every tracer function that starts a ray increments it.
+uint ray_count = 0;
 
-// Adds what this invocation asked for to the counters of its pass (COUNT_*), and to its pixel's number, which begins with
-// the first pass.
+// Adds the rays of this invocation to the counters of its pass (`COUNT_*`) and to the count of its pixel, which the
+// first pass resets.
 void count_rays(ivec2 pixel, uint pass, bool first) {
-    if (VIEW.post.counters != 0 && rays_asked > 0) {
-        // several counters for a pass: fewer invocations meet at each, and none overflows
+    if (VIEW.post.counters != 0 && ray_count > 0) {
+        // several counters per pass reduce contention and prevent overflow
         uint row = uint(pixel.y) % COUNTER_ROWS;
-        atomicAdd(RayCounters(VIEW.post.counters).at[pass * COUNTER_ROWS + row], rays_asked);
+        atomicAdd(RayCounters(VIEW.post.counters).at[pass * COUNTER_ROWS + row], ray_count);
     }
     if (VIEW.post.image_rays != NO_IMAGE) {
         uint before = first ? 0 : imageLoad(uimages_r32ui[VIEW.post.image_rays], pixel).x;
-        imageStore(uimages_r32ui[VIEW.post.image_rays], pixel, uvec4(before + rays_asked));
+        imageStore(uimages_r32ui[VIEW.post.image_rays], pixel, uvec4(before + ray_count));
     }
 }
 

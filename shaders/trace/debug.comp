@@ -1,5 +1,5 @@
 #version 460
-// `rt_debug`: a step of the traced look in place of the picture. docs/settings.md says what the colours mean.
+// `rt_debug`: an intermediate result in place of the picture. `docs/settings.md` explains the colours.
 #include "trace/lights.glsl"
 #include "trace/denoise.glsl"
 #include "trace/camera.glsl"
@@ -10,7 +10,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 const vec3 NOTHING = vec3(0.1, 0.1, 0.1);
 
-// 0 black, then blue, cyan, green, yellow, red, 1 white: each sixth of the way is a colour that can be named.
+// Colour scale: 0 black, then blue, cyan, green, yellow, red, 1 white, in steps of 1/6.
 vec3 heat(float t) {
     const vec3 COLORS[7] = vec3[](vec3(0, 0, 0), vec3(0.1, 0.15, 0.9), vec3(0, 0.75, 0.9), vec3(0.1, 0.75, 0.15),
         vec3(0.95, 0.9, 0.1), vec3(0.9, 0.1, 0.05), vec3(1, 1, 1));
@@ -19,10 +19,10 @@ vec3 heat(float t) {
     return mix(COLORS[index], COLORS[index + 1], place - float(index));
 }
 
-// A count on the scale of `heat`: each doubling of 1 + count is a step, 2^steps is white.
+// A count as `heat`: one step for each doubling of 1 + count; 2^steps is white.
 vec3 heat_count(float count, float steps) { return heat(log2(1.0 + count) / steps); }
 
-// A colour for an angle, full circle.
+// Colour of an angle, full circle.
 vec3 hue(float angle) {
     vec3 shift = vec3(0.0, 2.0 / 3.0, 1.0 / 3.0);
     return clamp(abs(fract(angle / (2.0 * PI) + shift) * 6.0 - 3.0) - 1.0, 0.0, 1.0);
@@ -34,13 +34,12 @@ vec3 cluster_color(uint cluster, vec3 normal) {
     x ^= x >> 15;
     x *= 0x2C1B3C6Du;
     x ^= x >> 13;
-    // shades by direction keep the room's shape visible
+    // shading by direction keeps the geometry recognizable
     float shade = 0.75 + 0.15 * normal.z + 0.1 * normal.x;
     return mix(vec3(1.0), hue(float(x & 0xFFFFu) / 65536.0 * 2.0 * PI), 0.45 + 0.5 * float(x >> 16) / 65536.0) * shade;
 }
 
-// What a pixel shows by way of others: green what a surface reflects, blue what lies behind it, white all that a mirror or
-// a portal shows, or what is seen bent.
+// Green: reflected; blue: behind the reflecting surface; white: seen in a mirror or portal, or refracted.
 vec3 specular_color(ivec2 pixel, GBufferPixel g) {
     float field = mark_field(mark_read(pixel));
     if (field > 0.0) return field == 2.0 ? vec3(0.0, 1.0, 0.0) : vec3(0.0, 0.0, 1.0);
@@ -61,7 +60,7 @@ vec3 debug_color(ivec2 pixel) {
         Motion m = motion_read(pixel);
         if (m.last_view_distance < 0.0) return vec3(0.5, 0.0, 0.5);
         float size = length(m.offset);
-        // to the right is red; 64 pixels a frame and more are of full strength
+        // motion to the right is red; full strength from 64 pixels a frame
         return size > 0.01 ? hue(atan(-m.offset.y, m.offset.x)) * clamp(log2(1.0 + size) / 6.0, 0.05, 1.0) : vec3(0.0);
     }
     case DEBUG_CLUSTERS: return is_lit ? cluster_color(cell_at(g.position + g.face_normal), g.normal) : NOTHING;
@@ -97,7 +96,7 @@ void main() {
     if (any(greaterThanEqual(pixel, picture_size()))) return;
     ivec2 target = pixel + ivec2(VIEW.target.x, VIEW.target.y);
     if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target.width) || target.y >= int(VIEW.target.height)) return;
-    // each traced pixel as a block, where fewer are traced than shown
+    // shows a traced pixel as a block if fewer pixels are traced than displayed
     ivec2 traced = min(ivec2((vec2(pixel) + 0.5) * vec2(VIEW.width, VIEW.height) / vec2(picture_size())), ivec2(VIEW.width, VIEW.height) - 1);
     target_store(target, debug_color(traced));
 }

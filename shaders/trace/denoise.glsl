@@ -1,8 +1,8 @@
-// What the passes of the denoiser share: its packed images, and where a pixel was in the last frame.
+// Shared by the denoiser's passes: packed texels, and the position of a pixel in the last frame.
 //
-// The light of a pixel, with all that decides whether it is alike its neighbour's, is one texel of 16 bytes, so that a
-// tap of a filter is one read. Texels lie in buffers, row by row: texture units read images of such wide texels a
-// quarter as fast as narrow ones, while a buffer is read as fast as its bytes come.
+// A pixel's light and its guide (depth and normal, which decide whether two pixels are similar) are one texel of 16
+// bytes, so that a filter tap is one read. Texels are in buffers, row by row: texture units read images of 16-byte
+// texels at a quarter of the rate of narrow ones; buffers are limited by bandwidth only.
 #ifndef RELIGHT_TRACE_DENOISE_GLSL
 #define RELIGHT_TRACE_DENOISE_GLSL
 
@@ -16,14 +16,14 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) buffer LightTexels
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer SparseTexels { uvec2 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Pasts { uint at[]; };
 
-// Pixels to the edge of a stratum: each has one gradient sample (Schied et al. 2018, section 4.2).
+// Edge of a stratum in pixels: each stratum has one gradient sample (Schied et al. 2018, section 4.2).
 const int STRATUM = 3;
 
 bool inside(ivec2 pixel) {
     return pixel.x >= 0 && pixel.y >= 0 && pixel.x < int(VIEW.width) && pixel.y < int(VIEW.height);
 }
 
-// A number in [0, 1) that differs from pixel to pixel, frame to frame and `stream` (DITHER_*) to stream.
+// A number in [0, 1), different for each pixel, frame and `stream` (`DITHER_*`).
 float dither(ivec2 pixel, uint stream) {
     uint x = uint(pixel.x) * 0x9E3779B1u ^ uint(pixel.y) * 0x85EBCA77u ^ (VIEW.seed * 64u + stream) * 0xC2B2AE3Du;
     x ^= x >> 15;
@@ -33,12 +33,12 @@ float dither(ivec2 pixel, uint stream) {
     return float(x >> 8) * (1.0 / 16777216.0);
 }
 
-// The guide of a pixel in 32 bits: above the inverse of its depth as half float, which is linear on a plane and exact to
-// 0.05 %; below a normal of 3 x 5 bits, which are compared as they are, under a bit that is set where the pixel shows a
-// reflection that takes turns with what lies behind it: the two may be walls side by side, and lit otherwise. It is the
-// highest bit of the normal's z, so that to compare normals is to compare it, too. 0: nothing to light.
+// The guide of a pixel, 32 bits. High half: inverse depth as half float, which is linear on a plane and exact to 0.05
+// %. Low half: normal of 3 x 5 bits, compared without unpacking, and above it the reflection bit, set where the pixel
+// shows a reflection that alternates with refraction: both may show parallel walls in different light. It is the
+// highest bit of the normal's z, so that comparing normals compares it too. 0: no surface.
 const float NEAREST_DEPTH = 1.0e-3, FARTHEST_DEPTH = 60000.0;
-// Keeps inverses of all depths within the normal range of 16-bit floats.
+// Keeps the inverse of every depth within the normal range of 16-bit floats.
 const float INVERSE_SCALE = 32.0;
 
 uint pack_depth(float depth) { return packHalf2x16(vec2(INVERSE_SCALE / clamp(depth, NEAREST_DEPTH, FARTHEST_DEPTH), 0.0)); }
@@ -50,12 +50,12 @@ uint pack_guide(float depth, vec3 normal, bool reflection) {
     return pack_depth(depth) << 16 | (reflection ? REFLECTION_BIT : 0u) | n.z << 10 | n.y << 5 | n.x;
 }
 
-// A small whole number as float: its bits in the mantissa of 2^23, several times faster than a conversion.
+// Converts a small integer to float: places its bits in the mantissa of 2^23, several times faster than a conversion.
 float small_float(uint number) { return uintBitsToFloat(0x4B000000u | number) - 8388608.0; }
 
 float unpack_depth(uint code) { return INVERSE_SCALE / unpackHalf2x16(code).x; }
 
-// Inverse of the depth, times INVERSE_SCALE.
+// Inverse depth, times `INVERSE_SCALE`.
 float guide_inverse(uint guide) { return unpackHalf2x16(guide).y; }
 
 float guide_depth(uint guide) { return INVERSE_SCALE / guide_inverse(guide); }
@@ -63,23 +63,23 @@ float guide_depth(uint guide) { return INVERSE_SCALE / guide_inverse(guide); }
 // Difference of the logarithms (base 2) of two depths.
 float depth_change(uint guide, uint other) { return log2(guide_inverse(guide) / guide_inverse(other)); }
 
-// About as long as 1.
+// Normal of the guide; its length is about 1.
 vec3 guide_normal(uint guide) {
     return vec3(small_float(guide & 31u), small_float(guide >> 5 & 31u), small_float(guide >> 10 & 31u)) * (1.0 / 15.0) - 16.0 / 15.0;
 }
 
-// The normal with its bit of reflections, to be compared: three whole numbers, each as the mantissa of a float whose digits
-// count ones where the number stands in the guide. Of normals of unit length 15 times what they differ by.
+// Normal and reflection bit for comparison: three integers, each in the mantissa of a float whose unit in the last
+// place matches the position of the field in the guide. For unit normals the scale is 15.
 const uvec3 COMPONENTS = uvec3(31u, 31u << 5, 63u << 10), COMPONENT_BASE = uvec3(0x4B000000u, 0x48800000u, 0x46000000u);
-// What stands for nothing in each.
+// Value of a zero in each component.
 const vec3 COMPONENT_ZERO = vec3(8388608.0, 262144.0, 8192.0);
 vec3 guide_components(uint guide) { return uintBitsToFloat(guide & COMPONENTS | COMPONENT_BASE); }
 
-// What a pixel's history is: how many frames direct and indirect light were gathered over, and the variance of the
-// luminance of one frame's, as logarithm in steps of a fourth. In 32 bits.
+// History of a pixel, 32 bits: number of frames of direct and indirect light, and the variance of one frame's luminance
+// as logarithm in steps of 1/4.
 const float VARIANCE_STEP = 0.25, VARIANCE_FIRST = -32.0;
 
-// `random`: a number for each rounding, so that slow changes are not lost.
+// `random`: one number for each rounding, so that slow changes are not lost.
 uint pack_past(vec2 frames, vec2 variance, vec4 random) {
     vec2 codes = (log2(max(variance, 1.0e-12)) - VARIANCE_FIRST) / VARIANCE_STEP;
     uvec4 bytes = uvec4(clamp(vec4(frames, codes) + random, 0.0, 255.0));
@@ -90,13 +90,13 @@ vec2 past_frames(uint past) { return vec2(past & 0xFFu, past >> 8 & 0xFFu); }
 
 vec2 past_variance(uint past) { return exp2(vec2(past >> 16 & 0xFFu, past >> 24) * VARIANCE_STEP + VARIANCE_FIRST); }
 
-// A texel that is filtered: both kinds of light as level (r/4 + g/2 + b/4), as what is left of green in it and as what red
-// has over blue, each of which is at most as large as the level. Direct light is x, indirect light is y of each.
+// A texel of the filter. Each kind of light has a level (r/4 + g/2 + b/4), green minus level, and red minus blue, both
+// at most as large as the level. Direct light is x, indirect light y.
 struct LightTexel {
     vec2 level;
     vec2 green;
     vec2 red;
-    vec2 variance; // of the levels, of the mean that they are
+    vec2 variance; // of the mean levels
     uint guide;
 };
 
@@ -112,7 +112,7 @@ vec3 light_of_texel(float level, float green, float red) {
 
 const float MOST_LEVEL = 16000.0;
 
-// Colours over the level, as bytes of which 128 is grey: the low ones of both halves, and the high ones.
+// Colours divided by the level, as bytes with 128 for grey: even bytes and odd bytes.
 const uint CODES = 0x00FF00FFu, CODE_BASE = 0x64006400u; // 16-bit floats step by 1 from 1024 on
 
 const float CODE_GREY = 1024.0 + 128.0, CODE_SCALE = 1.0 / 127.0;
@@ -120,49 +120,49 @@ const float CODE_GREY = 1024.0 + 128.0, CODE_SCALE = 1.0 / 127.0;
 vec2 green_code(uint codes) { return unpackHalf2x16(codes & CODES | CODE_BASE); }
 vec2 red_code(uint codes) { return unpackHalf2x16(codes >> 8 & CODES | CODE_BASE); }
 
-// `dither`: uniform in [0, 1), makes the mean over many frames exact.
+// `dither`: uniform in [0, 1); makes the mean over many frames exact.
 uvec4 pack_texel(LightTexel t, float dither) {
     dither -= 0.5;
     vec2 level = clamp(t.level, 0.0, MOST_LEVEL);
-    // the place of the last digit that a half keeps
+    // unit in the last place of a half
     vec2 digit = uintBitsToFloat(floatBitsToUint(level) & 0x7F800000u) * (1.0 / 1024.0);
     vec2 scale = 127.0 / max(level, 1.0e-6);
-    // as in pack_light, rounded by adding 2^23
+    // rounds by adding 2^23, as in `pack_light`
     uvec4 codes = floatBitsToUint(clamp(vec4(t.green, t.red) * scale.xyxy + (128.0 + dither), 0.0, 255.0) + 8388608.0) & 0xFFu;
     return uvec4(packHalf2x16(level + digit * dither), codes.x | codes.z << 8 | codes.y << 16 | codes.w << 24,
         packHalf2x16(min(t.variance, vec2(60000.0))), t.guide);
 }
 
-// Coordinates of a pixel's middle on the plane at distance 1, to the left and up.
+// Coordinates of a pixel's centre on the plane at distance 1, to the left and up.
 vec2 tangent_of(vec2 pixel) {
     vec2 ndc = 1.0 - (pixel + 0.5) / vec2(VIEW.width, VIEW.height) * 2.0;
     ndc.x -= VIEW.camera.stereo_shift;
     return ndc * vec2(length(VIEW.camera.left), length(VIEW.camera.up));
 }
 
-// Depth of what lies `view_distance` away on the ray through a pixel. For what mirrors show it is that of the mirror image.
+// Depth of the point at `view_distance` on the ray through a pixel. In mirrors: depth of the mirror image.
 float depth_of(ivec2 pixel, float view_distance) {
     vec2 t = tangent_of(vec2(pixel));
     return view_distance * inversesqrt(1.0 + dot(t, t));
 }
 
-// Where what a pixel shows was in the last frame.
-struct Before {
-    vec2 pixel;  // middle of the first pixel: 0, 0
-    float depth; // negative: nobody knows, or it was not in the picture
+// Position of the pixel's surface in the last frame.
+struct LastPixel {
+    vec2 pixel;  // centre of the first pixel: 0, 0
+    float depth; // negative: unknown, or outside of the picture
 };
 
-Before before_of(ivec2 pixel) {
+LastPixel last_pixel_of(ivec2 pixel) {
     vec4 motion = imageLoad(images_rgba16f[VIEW.images.motion], pixel);
-    Before before = Before(vec2(pixel) + motion.xy, -1.0);
+    LastPixel last = LastPixel(vec2(pixel) + motion.xy, -1.0);
     if (motion.z >= 0.0) {
-        vec2 t = tangent_of(before.pixel);
-        before.depth = motion.z * inversesqrt(1.0 + dot(t, t));
+        vec2 t = tangent_of(last.pixel);
+        last.depth = motion.z * inversesqrt(1.0 + dot(t, t));
     }
-    return before;
+    return last;
 }
 
-// The light that a picture is made with: both kinds, which the denoiser sums up where direct light was.
+// Light of the picture: both kinds; the denoiser writes their sum to the image of direct light.
 vec3 light_of(ivec2 pixel) {
     vec3 light = light_read(VIEW.images.direct, pixel);
     return (VIEW.flags & VIEW_DENOISE) != 0 ? light : light + light_read(VIEW.images.indirect, pixel);

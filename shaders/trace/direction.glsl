@@ -1,4 +1,4 @@
-// Unit vectors in few bits: octahedral (Cigolle et al., A Survey of Efficient Representations for Independent Unit Vectors,
+// Packed unit vectors: octahedral (Cigolle et al., A Survey of Efficient Representations for Independent Unit Vectors,
 // 2014).
 #ifndef RELIGHT_TRACE_DIRECTION_GLSL
 #define RELIGHT_TRACE_DIRECTION_GLSL
@@ -20,11 +20,11 @@ uint pack_normal(vec3 n) { return packSnorm2x16(octahedral(n)); }
 
 vec3 unpack_normal(uint packed) { return from_octahedral(unpackSnorm2x16(packed)); }
 
-// Steps from 0 to 1 of 24 bits with a sign.
+// Largest value of a signed 24-bit integer.
 const float DIRECTION_STEPS = 8388607.0;
 
-// In 2 x 24 bits, nearly as fine as the numbers that directions are computed with: for rays. Rounded to 2 x 16 bits they end at what
-// they ought to pass, and some pictures are darker or brighter by a thousandth. `spare`: two numbers below 256.
+// In 2 x 24 bits, for rays: nearly the precision of the computed directions. Rays rounded to 2 x 16 bits hit surfaces
+// that they should pass, and change the brightness of some pictures by a thousandth. `spare`: two numbers below 256.
 uvec2 pack_direction(vec3 n, uvec2 spare) {
     ivec2 steps = ivec2(round(clamp(octahedral(n), -1.0, 1.0) * DIRECTION_STEPS));
     return uvec2(steps) << 8 | spare;

@@ -1,12 +1,12 @@
 #version 460
-// From the histogram to the exposure. The map's own base (stops at which it looks as bright as the engine shows it) is
-// what counts; automatic exposure corrects a part of how far this view is from a usual picture: the mean logarithm of
-// luminance (Reinhard et al., Photographic Tone Reproduction for Digital Images, SIGGRAPH 2002, equation 1), taken
-// between two percentiles, is brought towards that of a usual picture of the map (their equation 2: the key over that mean).
-// Dark rooms stay darker than bright ones, for the map's author chose its light: the key falls with the picture's
-// luminance (as in Krawczyk et al. 2005, section 3.1; here by a constant part of the difference in stops). The exposure
-// follows exponentially, faster into the light than into the dark (their section 3.2). Surfaces alone are looked at, and as
-// much of the correction is made as they cover of the picture.
+// Computes the exposure from the histogram. The map's base exposure (stops at which it looks as bright as in the
+// engine) dominates; automatic exposure corrects a part of this view's difference from a usual picture of the map. It
+// measures the mean logarithm of luminance between two percentiles (Reinhard et al., Photographic Tone Reproduction for
+// Digital Images, SIGGRAPH 2002, equation 1) and moves it towards that of the usual picture (equation 2: the key over
+// that mean). Dark rooms stay darker than bright ones, because the map's author chose their light: the key falls with
+// the picture's luminance (as in Krawczyk et al. 2005, section 3.1; here by a constant part of the difference in
+// stops). The exposure follows exponentially, faster from dark to bright than from bright to dark (their section 3.2).
+// Only surfaces are measured, and the correction is scaled by the part of the picture that they cover.
 #include "trace/exposure.glsl"
 #include "trace/picture.glsl"
 
@@ -14,8 +14,8 @@ layout(local_size_x = EXPOSURE_BINS) in;
 
 shared uint bins[EXPOSURE_BINS];
 
-// How much of the difference is corrected, and bounds. Little: a picture is to stay within a quarter of the brightness
-// that the classic look has, and that look adapts to nothing.
+// Corrected part of the difference, and its bounds. Small, so that a picture stays within a quarter of the brightness
+// of the classic look, which has no automatic exposure.
 const float ADAPTATION = 0.15;
 const float MIN_STOPS = -0.75, MAX_STOPS = 0.75;
 

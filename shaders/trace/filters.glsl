@@ -1,8 +1,8 @@
-// Surfaces that light passes and takes its colour from: tinted glass and filters. Liquids leave it as it is, as for maps'
-// compilers: the light that was measured in them has lost nothing on its way, and would be taken from twice.
+// Surfaces that tint the light that passes them: tinted glass and filters. Liquids do not: map compilers apply no
+// absorption in them, so the light measured in liquids would be reduced twice.
 //
-// The colour is the mean over the surface, so that a shadow ray runs no stages. Light goes straight through: what
-// refraction would focus (caustics) is spread evenly, which keeps its mean.
+// The tint is the mean over the surface, so that a shadow ray evaluates no stages. Light passes straight through: the
+// light that refraction would focus (caustics) is spread evenly, with the same mean.
 #ifndef RELIGHT_TRACE_FILTERS_GLSL
 #define RELIGHT_TRACE_FILTERS_GLSL
 
@@ -10,17 +10,17 @@
 #include "trace/trace.glsl"
 #include "trace/dielectric.glsl"
 
-// Filters on one ray that are counted; behind more of them there is hardly light left.
+// Most filters on one ray; hardly any light passes more of them.
 const uint MAX_FILTERS = 8;
-// A filter this near to where the ray starts is a layer of the surface itself, units.
+// A filter nearer than this to the start of the ray is a layer of the same surface, units.
 const float FILTER_CLEARANCE = 0.25;
 
-// Whether the ray comes near such a surface at all.
+// Whether the ray passes near a filter.
 bool meets_filter(vec3 origin, vec3 direction, float distance) {
     return meets_box(Boxes(VIEW.transport.filters), VIEW.transport.filter_count, origin, direction, distance);
 }
 
-// What light that comes along the ray is multiplied by.
+// Transmittance of the filters along the ray.
 vec3 filtered(vec3 origin, vec3 direction, float distance) {
     vec3 color = vec3(1.0);
     if (VIEW.transport.filter_count == 0 || !meets_filter(origin, direction, distance)) return color;
@@ -35,7 +35,7 @@ vec3 filtered(vec3 origin, vec3 direction, float distance) {
         if (dielectric.filters == 0 || (p.triangle.flags & TRIANGLE_WORLD) == 0) continue;
         if (hit.t < FILTER_CLEARANCE) continue;
         color *= dielectric.filter_color;
-        // light comes the other way and is never totally reflected from outside
+        // the light travels against the ray, so it enters from outside, without total reflection
         if (dielectric.index > 0.0) color *= 1.0 - fresnel(abs(dot(p.face_normal, direction)), dielectric.index);
         if (max_component(color) <= 0.0) break;
     }

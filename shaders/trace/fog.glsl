@@ -1,6 +1,6 @@
-// Fog volumes. What the eye sees of them follows the engine: fog covers the surfaces that are stored with it, by their
-// distance from the eye along the view, and never a sky. Rays of bounced light, which no player sees, meet the volumes
-// themselves: inside a volume's box and below its surface by sqrt(length / depth).
+// Fog volumes. For primary rays fog follows the engine: it covers the surfaces that the map assigns to it, by their
+// view depth, and never a sky. Rays of bounced light intersect the volumes themselves: inside a volume's box and below
+// its surface the fog's share is sqrt(length / depth).
 #ifndef RELIGHT_TRACE_FOG_GLSL
 #define RELIGHT_TRACE_FOG_GLSL
 
@@ -9,7 +9,7 @@
 #include "trace/color.glsl"
 #include "trace/geometry.glsl"
 
-// Where the ray is inside the volume: x < y, or an empty range. `inverse`: of the direction.
+// Range of the ray inside the volume: x < y, or empty. `inverse`: of the direction.
 vec2 fog_range(Fog fog, vec3 origin, vec3 direction, vec3 inverse) {
     vec2 range = box_range(fog.mins, fog.maxs, origin, inverse, FAR);
     float enter = range.x, leave = range.y;
@@ -27,14 +27,14 @@ vec2 fog_range(Fog fog, vec3 origin, vec3 direction, vec3 inverse) {
     return vec2(enter, leave);
 }
 
-// The engine's fog factor (R_FogFactor), 0 to 1: the fog's share of the displayed colour. `depth`: view depth of the point,
-// units; `part`: fraction of the segment from the eye to it that lies below the fog's surface.
+// The engine's fog factor (`R_FogFactor`), 0 to 1: the fog's share of the displayed colour. `depth`: view depth of the
+// point, units; `part`: fraction of the segment from the camera to it that lies below the fog's surface.
 float fog_cover(Fog fog, float depth, float part) {
     return sqrt(clamp(depth * part / max(fog.depth, 1.0), 0.0, 1.0));
 }
 
-// `part` of fog_cover for a point on a triangle: found at the corners, as the engine does, and interpolated. `eye`: the
-// eye's position unfolded through the mirrors and portals of the path.
+// `part` of `fog_cover` for a point on a triangle: computed at the corners, as in the engine, and interpolated. `eye`:
+// camera position unfolded through the mirrors and portals of the path.
 float fog_part(Fog fog, SurfacePoint p, vec3 eye) {
     if (fog.has_surface == 0) return 1.0;
     float eye_below = dot(fog.plane.xyz, eye) - fog.plane.w;
@@ -48,8 +48,8 @@ float fog_part(Fog fog, SurfacePoint p, vec3 eye) {
     return part;
 }
 
-// Composes the fog before a distance on a ray of bounced light behind what is in front (`transmittance`, `radiance`): each
-// part by itself, in light. Volumes do not overlap, so each is taken whole, nearest first.
+// Composites the fog along a ray of bounced light, up to the distance `to`, behind what is in front (`transmittance`,
+// `radiance`): each volume by itself, in linear light. Volumes do not overlap, so each is taken whole, nearest first.
 void fog_in_light(vec3 origin, vec3 direction, float to, inout vec3 transmittance, inout vec3 radiance) {
     vec3 inverse = inverse_direction(direction);
     uint count = VIEW.scene.fog_count, last = 0;

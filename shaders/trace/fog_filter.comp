@@ -1,6 +1,6 @@
 #version 460
-// Evens out the light in fog over cells that show as much of it: light in the air changes slowly, what cuts off the
-// stretch that is seen does not.
+// Filters the light in fog over cells with a similar amount of fog: light in the air changes slowly, the length of the
+// visible segment does not.
 #define OWN_PUSH
 #include "trace/color.glsl"
 #include "trace/light_image.glsl"
@@ -8,7 +8,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// How much fog a cell shows, as logarithm.
+// Logarithm of the amount of fog that a cell shows.
 float amount(ivec2 cell) {
     ivec2 pixel = min(cell * int(VIEW.fog.cell), ivec2(VIEW.width, VIEW.height) - 1);
     return log2(max(max_component(light_read(VIEW.fog.weight, pixel)), 1.0e-4));
@@ -40,7 +40,7 @@ void main() {
             if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
             vec4 light = imageLoad(images_rgba16f[uint(push.source)], at);
             if (!(light.a > 0.0)) continue;
-            // a binomial's weights, and less for a different amount; what has more frames counts more
+            // binomial weights, reduced for a different amount of fog, increased for a mean over more frames
             const float binomial[3] = float[](6.0, 4.0, 1.0);
             float weight = binomial[abs(x)] * binomial[abs(y)] * exp2(-2.0 * abs(amount(at) - here)) * light.a;
             sum += light * weight;

@@ -1,4 +1,4 @@
-// From what a ray reports to the point on the surface.
+// Computes the surface point of a hit.
 #ifndef RELIGHT_TRACE_GEOMETRY_GLSL
 #define RELIGHT_TRACE_GEOMETRY_GLSL
 
@@ -6,7 +6,7 @@
 
 const uint NO_HIT = 0xFFFFFFFFu;
 
-// What a ray reports. `geometry` indexes the geometry records; NO_HIT: nothing.
+// A hit as the tracers report it. `geometry`: index of the geometry record; NO_HIT: the ray hit nothing.
 struct Hit {
     uint geometry;
     uint primitive;
@@ -14,17 +14,17 @@ struct Hit {
     float t;
 };
 
-// A point on a triangle. Positions and normals of `stage` are in the space of the instance, the others in world space.
+// A point on a triangle. Positions and normals of `stage` are in the space of the instance, all others in world space.
 struct SurfacePoint {
     Triangle triangle;
     uint instance;
     uint kind;
     vec3 position;
-    vec3 face_normal;   // unit, on the side that faces front (clockwise)
+    vec3 face_normal;   // unit, on the front side (clockwise corners)
     vec3 normal;        // unit, interpolated
-    float texel_scale;  // texture coordinate per unit of length
-    uint64_t vertices;  // of its geometry
-    vec3 weights;       // of the triangle's corners
+    float texel_scale;  // texture coordinates per unit of length
+    uint64_t vertices;  // address of the geometry's vertices
+    vec3 weights;       // barycentric, of the triangle's corners
     StagePoint stage;
 };
 
@@ -53,7 +53,7 @@ SurfacePoint surface_point(Hit hit) {
     mat3 axis = mat3(instance.axis[0], instance.axis[1], instance.axis[2]);
 
     p.stage.position = a.position * w.x + b.position * w.y + c.position * w.z;
-    // the front is where the corners go round clockwise
+    // corners are clockwise seen from the front
     vec3 local_face = cross(c.position - a.position, b.position - a.position);
     p.stage.normal = safe_normalize(a.normal * w.x + b.normal * w.y + c.normal * w.z, safe_normalize(local_face, vec3(0, 0, 1)));
     p.stage.st = a.st * w.x + b.st * w.y + c.st * w.z;
@@ -76,7 +76,7 @@ SurfacePoint surface_point(Hit hit) {
     return p;
 }
 
-// The side that the material does not show.
+// Whether the material culls the side that the ray hits.
 bool is_culled(SurfacePoint p, vec3 direction) {
     uint material_flags = material_of(p.triangle.material).flags;
     if ((material_flags & MATERIAL_TWO_SIDED) != 0 || (p.triangle.flags & TRIANGLE_FACES_EYE) != 0) return false;
@@ -84,8 +84,8 @@ bool is_culled(SurfacePoint p, vec3 direction) {
     return from_front == ((material_flags & MATERIAL_CULL_BACK) != 0);
 }
 
-// Where a ray that leaves the surface on the side of `normal` starts: far enough not to meet the surface again in
-// spite of rounding (Wachter and Binder, A Fast and Robust Method for Avoiding Self-Intersection, scaled to coordinates).
+// Start of a ray that leaves the surface on the side of `normal`: offset so that rounding cannot make it hit the
+// surface again (Wachter and Binder, A Fast and Robust Method for Avoiding Self-Intersection, scaled to coordinates).
 vec3 offset_ray(vec3 position, vec3 normal) {
     vec3 m = abs(position);
     return position + normal * (0.02 + 1.0e-5 * max(m.x, max(m.y, m.z)));

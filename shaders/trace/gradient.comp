@@ -1,29 +1,29 @@
 #version 460
-// The gradients of the strata's samples (gradient_sample.comp), spread over the neighbourhood by three edge-avoiding
-// a-trous steps in shared memory (Schied et al. 2018, section 4.3: the change and the size of the light are filtered
-// apart, and divided at the end, which gradient_wide.comp does).
+// Spreads the gradients of the strata's samples (`gradient_sample.comp`) by three edge-avoiding a-trous steps in shared
+// memory (Schied et al. 2018, section 4.3). Change and size of the light are filtered separately; `gradient_wide.comp`
+// divides them.
 #include "trace/denoise.glsl"
 
-// Steps of 1, 2 and 3 strata reach 6 far. Every device lets a group share 16 KiB.
+// Steps of 1, 2 and 3 strata reach 6 strata. 16 KiB is the shared memory that every device has.
 const int ACROSS = 16, DOWN = 8, BORDER = 6, WIDE = ACROSS + 2 * BORDER, HIGH = DOWN + 2 * BORDER;
 layout(local_size_x = ACROSS, local_size_y = DOWN) in;
 
-// change and size of direct light, of indirect light, as 16-bit floats; each step reads one and writes the other
+// change and size of direct light, of indirect light, as 16-bit floats; each step reads one array and writes the other
 shared uvec2 tiles[2][WIDE * HIGH];
 shared uint guides[WIDE * HIGH];
-// logarithms of the luminance that the last frame was left with, of both, as 16-bit floats: bright light that has not
-// changed must not hide that dim light beside it has
+// logarithms of the last frame's filtered luminance, direct and indirect, as 16-bit floats. They keep unchanged bright
+// light from hiding a change of dim light beside it
 shared uint levels[WIDE * HIGH];
-// logarithms of the inverse depths
+// logarithms of inverse depths
 shared float depths[WIDE * HIGH];
 
 uvec2 filtered(uint source, ivec2 at, int spacing) {
     int place = at.y * WIDE + at.x;
     vec3 normal = guide_normal(guides[place]);
-    // of the dot product with a normal as the guide has it, 15 times as long and 16 from nothing
+    // constant part of the dot product with a guide's normal, whose components are scaled by 15 and biased by 16
     float turned = -16.0 / 15.0 * (normal.x + normal.y + normal.z);
     float depth = depths[place], depth_scale = -8.0 / float(spacing);
-    // a stratum without a sample takes from all around
+    // a stratum without a sample accepts all neighbours
     uint packed = levels[place];
     vec2 own = unpackHalf2x16(packed);
     vec4 sum = vec4(0.0);
@@ -31,7 +31,7 @@ uvec2 filtered(uint source, ivec2 at, int spacing) {
         ivec2 offset = ivec2(i % 3, i / 3) - 1;
         int tap = place + (offset.y * WIDE + offset.x) * spacing;
         float kernel = (offset.x == 0 ? 1.0 : 0.0) + (offset.y == 0 ? 1.0 : 0.0);
-        // wide for slanted surfaces: a gradient that leaks costs noise, not light
+        // tolerant of slanted surfaces: a gradient that leaks costs noise, not light
         vec2 alike = vec2(kernel + depth_scale * abs(depth - depths[tap]));
         uint level = levels[tap];
         if (packed != 0 && level != 0) alike -= abs(own - unpackHalf2x16(level));
@@ -40,7 +40,7 @@ uvec2 filtered(uint source, ivec2 at, int spacing) {
         uvec2 gradient = tiles[source][tap];
         sum += weight.xxyy * vec4(unpackHalf2x16(gradient.x), unpackHalf2x16(gradient.y));
     }
-    // the scale is the same for change and size and falls out at the end; this one keeps it near that of the input
+    // the scale cancels in the ratio of change and size; this one preserves the range of the input
     sum *= 1.0 / 16.0;
     return uvec2(packHalf2x16(sum.xy), packHalf2x16(sum.zw));
 }
@@ -56,7 +56,7 @@ void main() {
         tiles[0][i] = own.xy;
         levels[i] = own.z;
         guides[i] = own.w;
-        depths[i] = log2(max(guide_inverse(own.w), 1.0e-6)); // 0 where there is nothing to light
+        depths[i] = log2(max(guide_inverse(own.w), 1.0e-6)); // 0: no surface
     }
     barrier();
     int border = 0;

@@ -1,14 +1,14 @@
 #version 460
-// Finds the samples of the last frame again; see gradient_reproject.glsl. One invocation is one stratum: it asks each of its pixels
-// where it was, and takes the sample that was next to there.
+// Reprojects gradient samples (see `gradient_reproject.glsl`). One invocation handles one stratum: it projects each of
+// its pixels to the last frame and selects the pixel nearest to a sample.
 #include "trace/gradient_reproject.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// Farther from the sample than this, in pixels, a pixel shows something else.
+// Largest distance between a sample and the reprojected pixel, pixels.
 const float REACH = 1.0;
 
-// Whether the sample is of the surface that the pixel shows; `moved`: which is somewhere else by now.
+// Whether the sample lies on the surface that the pixel shows. `moved`: the surface has moved since.
 bool same_surface(LitSample s, ivec2 pixel, float last_view_distance, out bool moved) {
     vec4 position = imageLoad(images_rgba32f[VIEW.images.position], pixel);
     moved = false;

@@ -1,21 +1,21 @@
 // Gradient samples of A-SVGF (Schied, Peters, Dachsbacher, Gradient Estimation for Real-Time Adaptive Temporal
-// Filtering, 2018, section 4.2): each frame keeps a pixel of each stratum of 3 x 3 as it was lit. The next frame finds
-// where that surface is by then, and lights it there once more with the same random numbers, in place of the pixel's own
-// surface with new ones. What differs is then the light itself, not its noise.
+// Filtering, 2018, section 4.2). Each frame stores one shaded pixel of each stratum of 3 x 3. The next frame finds the
+// current position of that surface and shades it there again with the same random numbers, in place of the pixel's own
+// surface with new numbers. The difference is then a change of the light, not noise.
 #ifndef RELIGHT_TRACE_GRADIENT_REPROJECT_GLSL
 #define RELIGHT_TRACE_GRADIENT_REPROJECT_GLSL
 
 #include "trace/denoise.glsl"
 
-// A record of the image `gradient_pixels`: which pixel of the stratum is lit as a sample, where the sample was, and whether its
-// surface has moved since. In 32 bits: 14 and 13 for the place, 5 for the rest. All ones: none.
+// A texel of the image `gradient_pixels`: the pixel of the stratum that shades a sample, the sample's position in the
+// last frame, and whether its surface has moved. 32 bits: 14 and 13 for the position, 5 for the rest. All ones: none.
 const uint NO_GRADIENT_PIXEL = 0xFFFFFFFFu;
 const ivec2 GRADIENT_PIXEL_LIMIT = ivec2(1 << 14, 1 << 13);
 
 struct GradientPixel {
     bool valid;
     bool moved;
-    int index;   // in the stratum
+    int index;   // of the pixel in the stratum
     ivec2 last;  // pixel of the last frame
 };
 
@@ -32,7 +32,7 @@ GradientPixel gradient_pixel_at(ivec2 stratum) {
 
 ivec2 pixel_of(ivec2 stratum, int index) { return stratum * STRATUM + ivec2(index % STRATUM, index / STRATUM); }
 
-// Whether a pixel is lit as a sample of the last frame.
+// Whether the pixel shades a sample of the last frame.
 bool is_gradient_pixel(ivec2 pixel) {
     if ((DENOISE.flags & DENOISE_GRADIENTS) == 0) return false;
     ivec2 stratum = pixel / STRATUM;
@@ -40,7 +40,7 @@ bool is_gradient_pixel(ivec2 pixel) {
     return c.valid && pixel_of(stratum, c.index) == pixel;
 }
 
-// What a frame keeps of a pixel.
+// The stored sample of a stratum.
 struct LitSample {
     bool valid;
     ivec2 pixel;
@@ -48,7 +48,7 @@ struct LitSample {
     float view_distance;
     vec3 face_normal;
     vec3 normal;
-    vec2 light; // luminance of direct and indirect light, rounded to 16-bit floats; negative: not known
+    vec2 light; // luminance of direct and indirect light, rounded to 16-bit floats; negative: unknown
 };
 
 void keep_nothing(ivec2 stratum) { imageStore(uimages_rgba32ui[DENOISE.samples], stratum, uvec4(NO_GRADIENT_PIXEL)); }
@@ -64,7 +64,7 @@ LitSample kept_sample(ivec2 stratum) {
         unpack_normal(b.y), unpackHalf2x16(b.z));
 }
 
-// What a pixel is to light, and the random numbers to light it with.
+// The surface that a pixel shades, and its random numbers.
 struct LightTask {
     GBufferPixel surface;
     ivec2 pixel;
@@ -77,7 +77,7 @@ LightTask light_task(ivec2 pixel) {
     GradientPixel c = gradient_pixel_at(pixel / STRATUM);
     task.pixel = c.last;
     task.seed = DENOISE.last_seed;
-    // what moves is lit where it is now
+    // a surface that has moved is shaded at its current position
     if (c.moved) return task;
     LitSample s = kept_sample(c.last / STRATUM);
     task.surface.position = s.position;

@@ -1,7 +1,7 @@
 #version 460
-// The temporal gradient of each stratum's own sample: how much its light differs from the light that the same sample had
-// in the last frame (Schied et al. 2018, section 4.2). What gradient.comp spreads, in one texel: change and size of direct
-// light, of indirect light, and the logarithms of the luminance that the last frame was left with, as 16-bit floats; the
+// The temporal gradient of each stratum's own sample: the difference between its light and the light of the same sample
+// in the last frame (Schied et al. 2018, section 4.2). Writes the input of `gradient.comp`, one texel: change and size
+// of direct light, of indirect light, and the logarithms of the last frame's filtered luminance, as 16-bit floats; the
 // guide.
 #include "trace/subsample.glsl"
 
@@ -14,7 +14,7 @@ uint level_of(GradientPixel c) {
 uvec2 gradient_at(ivec2 stratum, GradientPixel c) {
     ivec2 pixel = pixel_of(stratum, c.index);
     vec2 now = vec2(luminance(light_read(VIEW.images.direct, pixel)), luminance(light_read(VIEW.images.indirect, pixel)));
-    // as the sample was rounded
+    // rounded like the stored sample
     now = unpackHalf2x16(packHalf2x16(now));
     vec2 then = unpackHalf2x16(imageLoad(uimages_rgba32ui[DENOISE.sample_surfaces], c.last / STRATUM).z);
     vec2 change = now - then, size = max(now, then);

@@ -1,6 +1,6 @@
 #version 460
-// The last step of the gradient's filter: 5 x 5 taps, six strata apart. Light that comes by rare paths changes in few
-// samples, and a neighbourhood that holds none of them would not know. One that does see a change keeps its own.
+// Last step of the gradient's filter: 5 x 5 taps, six strata apart. Light from rare paths changes in few samples, and a
+// neighbourhood without any of them shows no change. A stratum whose own neighbourhood changes more keeps its value.
 #include "trace/denoise.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -32,7 +32,7 @@ void main() {
                 vec4 sums = imageLoad(images_rgba16f[DENOISE.gradient_sums], tap);
                 float weight = kernel[abs(x)] * kernel[abs(y)] * max(dot(normal, guide_normal(other)), 0.0)
                     * exp2(-abs(depth_change(guide, other)));
-                // as in the steps before: what is much brighter is another thing
+                // as in the previous steps: much brighter light is unrelated
                 vec2 alike = exp2(-abs(log2((sums.yw + 1.0e-5) / (own.yw + 1.0e-5))));
                 sum += sums * (weight * alike).xxyy;
             }

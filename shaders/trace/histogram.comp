@@ -1,7 +1,7 @@
 #version 460
-// Counts one of each 2 x 2 of the picture's pixels by the logarithm of its luminance, if it shows a surface that light
-// falls on: a usual picture of the map, which exposure is compared with, is one of such surfaces. How bright a sky is, or
-// that space is black, says nothing of them.
+// Histogram of log luminance over one of each 2 x 2 pixels that show a lit surface. The usual picture of the map, the
+// reference of the exposure, consists of such surfaces; the brightness of a sky or of black space is unrelated to
+// theirs.
 #include "trace/exposure.glsl"
 #include "trace/picture.glsl"
 
@@ -20,7 +20,7 @@ void main() {
     barrier();
     ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
     if (all(lessThan(cell, histogram_size()))) {
-        // each of the four in turn, so that no row or column of a pattern is left out
+        // alternates over the four pixels, so that no row or column of a pattern is skipped
         ivec2 pixel = min(cell * 2 + (cell.yx & 1), picture_size() - 1);
         if (shows_surface(pixel)) {
             float value = log2(max(luminance(picture_load(pixel)), 1.0e-6));

@@ -1,5 +1,5 @@
 #version 460
-// Reports what was hit; nothing is shaded here.
+// Reports the hit; shades nothing.
 #extension GL_EXT_ray_tracing : require
 #include "trace/payload.glsl"
 

@@ -1,12 +1,11 @@
-// A stack of stages as light sees it: what reaches the eye is lit * L + emission + through * background + reflected * R,
-// where L is the light that a white diffuse surface would show here, and R what the mirrored ray sees.
+// Stages of a material as a linear function of light: outgoing radiance = lit * L + emission + through * background +
+// reflected * R. L: radiance of a white diffuse surface at this point; R: radiance along the mirrored ray.
 //
-// Stages are put together as they are displayed, because that is where their authors saw the sums and mixtures that they
-// chose; products are the same in linear light, but a sum of two linear values is darker than that of the two displayed
-// ones. So the algebra runs on displayed values. `evaluate_stages` tells what each part comes to by itself in linear light;
-// primary.rgen weighs the parts of what a pixel shows by their shares of what is displayed.
-// shaderscript::light has the same algebra (without reflections) on the CPU and its tests, in linear light but for what
-// the display mixes on an opaque body.
+// Stages are combined in displayed (encoded) values, because their authors chose sums and mixtures by what the display
+// shows. Products are nearly the same in linear light, but the sum of two linear values displays darker than the sum of
+// the two displayed values. `evaluate_stages` converts each part by itself to linear light; `primary.rgen` weights the
+// parts of a pixel by their shares of the displayed value. `shaderscript::light` has the same algebra (without
+// reflections) on the CPU, with tests, in linear light except for mixtures on an opaque body.
 #ifndef RELIGHT_TRACE_LAYER_GLSL
 #define RELIGHT_TRACE_LAYER_GLSL
 
@@ -18,31 +17,31 @@ struct Layer {
     vec3 emission;
     vec3 through;
     vec3 reflected;
-    vec3 haze; // of the emission: what waits for the light that the engine shows here
+    vec3 haze; // part of the emission that uses the light shown by the engine at this point
 };
 
 Layer layer_nothing() { return Layer(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)); }
 
-// What a ray sees of a texture.
+// The area of a texture that a ray covers.
 struct Footprint {
     float width; // of the ray's cone at the hit, units; on slanted surfaces the geometric mean of the ellipse's axes
-    // The axes of the ellipse that the cone cuts from the surface, texture coordinates; 0: not known.
+    // Axes of the ellipse in which the cone meets the surface, texture coordinates; 0: unknown.
     vec2 along;
     vec2 across;
 };
 
 Footprint round_footprint(float width) { return Footprint(width, vec2(0.0), vec2(0.0)); }
 
-// Level of detail for a texture whose coordinates change by `scale` per unit where the ray's cone is `width` wide.
+// Level of detail of a texture whose coordinates change by `scale` per unit, for a cone of `width` units.
 float texture_lod(uint image, float scale, float width) {
     vec2 size = vec2(textureSize(textures[nonuniformEXT(image)], 0));
     float texels = width * scale * sqrt(size.x * size.y);
     return max(log2(max(texels, 1.0e-6)), 0.0);
 }
 
-// The ellipse of a cone that is `width` units wide where it meets the surface, in texture coordinates: the cone's
-// section with the plane (Akenine-Möller et al., Improved Shader and Texture Level of Detail Using Ray Cones, JCGT 2021,
-// section 5), by the triangle's gradients.
+// Ellipse, in texture coordinates, of a cone that is `width` units wide at the surface: the cone's section with the
+// plane (Akenine-Möller et al., Improved Shader and Texture Level of Detail Using Ray Cones, JCGT 2021, section 5), by
+// the triangle's gradients.
 Footprint ellipse_footprint(SurfacePoint p, vec3 direction, float cosine, float width) {
     Footprint f = round_footprint(width * inversesqrt(cosine));
     TraceVertices vertices = TraceVertices(p.vertices);
@@ -54,7 +53,7 @@ Footprint ellipse_footprint(SurfacePoint p, vec3 direction, float cosine, float 
     float area_squared = dot(n, n);
     vec3 depth_gradient = direction - p.face_normal * dot(p.face_normal, direction);
     float slant = length(depth_gradient);
-    if (!(area_squared > 0.0) || slant < 0.1) return f; // seen from straight above it is round
+    if (!(area_squared > 0.0) || slant < 0.1) return f; // nearly perpendicular: a circle
     vec3 along = depth_gradient * (width / (cosine * slant));
     vec3 across = cross(p.face_normal, depth_gradient) * (width / slant);
     vec2 sb = b.st - a.st, sc = c.st - a.st;
@@ -63,9 +62,9 @@ Footprint ellipse_footprint(SurfacePoint p, vec3 direction, float cosine, float 
     return f;
 }
 
-// The mean of the image over an ellipse: look-ups of the width of the shorter axis side by side along the longer one,
-// as samplers take them, but the same with every driver. Where as many as are allowed do not cover it a part is taken,
-// so that it is never less sharp than the round footprint.
+// Mean of the image over an ellipse: lookups of the shorter axis's width, side by side along the longer axis, as
+// anisotropic samplers do, but equal with every driver. If the allowed number does not cover the ellipse, they cover a
+// part of it, so that the result is never less sharp than the round footprint.
 vec4 texel_in_ellipse(uint image, uint sampler_index, vec2 uv, vec2 along, vec2 across) {
     vec2 size = vec2(textureSize(textures[nonuniformEXT(image)], 0));
     float longer = length(along * size), shorter = length(across * size);
@@ -79,7 +78,7 @@ vec4 texel_in_ellipse(uint image, uint sampler_index, vec2 uv, vec2 along, vec2 
     float most = min(VIEW.antialias.anisotropy, 16.0);
     float covered = min(longer, most * sqrt(longer * shorter));
     axis *= covered / max(longer, 1.0e-12);
-    // where the image is magnified one look-up is enough
+    // a magnified image needs one lookup
     float count = clamp(ceil(covered / max(shorter, 1.0)), 1.0, floor(most));
     float lod = max(log2(max(covered / count, 1.0e-6)), 0.0);
     vec4 sum = vec4(0.0);
@@ -90,7 +89,7 @@ vec4 texel_in_ellipse(uint image, uint sampler_index, vec2 uv, vec2 along, vec2 
 
 bool has_ellipse(Footprint f) { return VIEW.antialias.anisotropy > 1.0 && f.along != vec2(0.0); }
 
-// The stage's image at the point; white where there is none.
+// The stage's image at the point; white for a stage without an image.
 vec4 stage_texel(Stage stage, SurfacePoint p, Instance instance, Footprint footprint) {
     uint image = stage_image(VIEW.materials, stage, p.triangle.lightmap, p.stage.time);
     if ((stage.flags & STAGE_WHITE) != 0 || image == NO_TEXTURE) return vec4(1.0);
@@ -106,7 +105,7 @@ vec4 stage_texel(Stage stage, SurfacePoint p, Instance instance, Footprint footp
     return textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), uv, lod);
 }
 
-// Whether the surface is there at all: where a stage that writes depth passes its alpha test.
+// Whether the point is solid: whether a stage that writes depth passes its alpha test.
 bool is_solid_at(SurfacePoint p, float width) {
     Material material = material_of(p.triangle.material);
     Instance instance = instance_of(p.instance);
@@ -122,14 +121,14 @@ bool is_solid_at(SurfacePoint p, float width) {
     return !tested;
 }
 
-// What the light grid gives a model at the point, as displayed.
+// Light of a model from the light grid, as displayed.
 vec3 grid_light(SurfacePoint p, Instance instance) {
     float incoming = max(dot(p.stage.normal, instance.light_direction), 0.0);
     return min(instance.ambient - instance.added + incoming * instance.directed, vec3(1.0));
 }
 
-// The light of the place that the engine shows at a surface, as displayed: its lightmap, the colours of its corners, or what
-// the light grid gives a model. Nothing is lit by it: it tells how much of the displayed sum of layers each of them is.
+// The light that the engine shows at a surface, as displayed: lightmap, vertex colours, or light grid for models. It
+// lights nothing; it gives the shares of layers in a displayed sum.
 vec3 displayed_light(SurfacePoint p) {
     if ((p.triangle.flags & TRIANGLE_WORLD) != 0) {
         uint page = p.triangle.lightmap;
@@ -141,14 +140,14 @@ vec3 displayed_light(SurfacePoint p) {
     return grid_light(p, instance);
 }
 
-// a * b for polynomials in L and the background. Light seen twice counts once: L * L becomes L. The background brings its
-// own light; what it is multiplied by, the light that the engine shows here (`light`) included, scales it.
+// a * b for polynomials in L and the background. Light counts once: L * L becomes L. The background brings its own
+// light; its factors, including the light that the engine shows here (`light`), scale it.
 Layer layer_product(Layer a, Layer b, vec3 light) {
     Layer r;
     r.lit = a.lit * b.lit + a.lit * b.emission + a.emission * b.lit;
     r.emission = a.emission * b.emission;
     r.through = a.through * (b.lit * light + b.emission) + b.through * (a.lit * light + a.emission);
-    // so does it scale what is reflected, which brings its own light, too
+    // the reflected part brings its own light too, and is scaled likewise
     r.reflected = a.reflected * (b.lit + b.emission) + b.reflected * (a.lit + a.emission);
     r.haze = a.haze * (b.lit * light + b.emission) + b.haze * (a.lit * light + a.emission);
     return r;
@@ -162,7 +161,7 @@ Layer layer_subtract(Layer a, Layer b) {
     return Layer(a.lit - b.lit, a.emission - b.emission, a.through - b.through, a.reflected - b.reflected, a.haze - b.haze);
 }
 
-// `value` times a blend factor. The frame buffer has no alpha of its own: destination alpha reads as one.
+// `value` times a blend factor. The frame buffer has no alpha: destination alpha reads as one.
 Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, float source_alpha, vec3 light) {
     switch (factor) {
     case BLEND_ONE: return value;
@@ -177,31 +176,30 @@ Layer layer_blend(uint factor, Layer value, Layer source, Layer destination, flo
     }
 }
 
-// One part of displayed values in linear light. Most parts of most layers are nothing.
+// A displayed part in linear light. Most parts of most layers are zero.
 vec3 linear_part(vec3 displayed) { return displayed == vec3(0.0) ? vec3(0.0) : decode_display(max(displayed, 0.0)); }
 
-// A picture of an environment in the mean: its smallest level.
+// Mean of an environment image: its smallest mip level.
 vec4 environment_mean(Stage stage, SurfacePoint p) {
     uint image = stage_image(VIEW.materials, stage, NO_TEXTURE, p.stage.time);
     return textureLod(sampler2D(textures[nonuniformEXT(image)], samplers[nonuniformEXT(stage.sampler_index)]), vec2(0.5), 32.0);
 }
 
-// What becomes of reflections: a ray follows them, or pictures of an environment stand for them where rays end. Diffuse
-// bounces do not find them.
+// Treatment of reflections: a ray follows them; where paths end, environment images replace them; diffuse bounces
+// ignore them.
 const uint SEEN_FOLLOWED = 0, SEEN_LAST = 1, SEEN_BOUNCED = 2;
 
-// Runs the stages of a material over the background, in displayed values.
+// Evaluates the stages of a material over the background, in displayed values.
 //
-// A picture of an environment is two things where its author lit it (STAGE_GLOSS): what is polished mirrors the
-// surroundings, as strongly as the picture is bright in the mean; what is rough gathers the light from all around, and
-// shows it by the picture as a texture does. Were it a mirror alone it would be far too dark: the picture is of
-// surroundings in full light, and so counts their albedo already, which a mirrored ray finds once more.
-// On panes the lit picture is a haze over what lies behind (STAGE_HAZE), by the light that the engine shows there:
-// as one more surface that light falls on it would take turns with the others of the pixel.
+// An environment image that its author lit (`STAGE_GLOSS`) has two parts. The specular part mirrors the surroundings,
+// scaled by the image's mean. The rough part gathers light from all around and shows it through the image, like a
+// texture. A mirror alone would be much too dark: the image shows surroundings in full light and includes their albedo,
+// which the mirrored ray applies once more. On panes the lit image is a haze over the background (`STAGE_HAZE`) with
+// the light that the engine shows there: as a lit surface it would compete with the other lit layers of the pixel.
 Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint seen) {
     bool world = (p.triangle.flags & TRIANGLE_WORLD) != 0;
     if (material.plain_image != NO_TEXTURE && (world || (material.flags & MATERIAL_VERTEX_LIGHT) == 0)) {
-        // what the stages below come to, for the many materials that are an image under light
+        // shortcut for the many materials that are one image under light; same result as the loop below
         if (has_ellipse(footprint)) {
             vec4 texel = texel_in_ellipse(material.plain_image, material.plain_sampler, p.stage.st, footprint.along, footprint.across);
             return Layer(texel.rgb, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
@@ -216,15 +214,15 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
     Layer layer = Layer(vec3(0.0), vec3(0.0), vec3(1.0), vec3(0.0), vec3(0.0));
     for (uint i = 0; i < material.stage_count; i++) {
         Stage stage = stages.at[material.stage_first + i];
-        // the light of a style comes from light sources of its own
+        // light styles are light sources in the traced look
         if ((stage.flags & STAGE_LIGHT_STYLE) != 0) continue;
         vec4 color = stage_color(VIEW.materials, stage, instance, p.stage);
         Layer source = layer_nothing();
         float alpha;
         bool lightmap = stage.image_count == 0 && (stage.flags & STAGE_WHITE) == 0;
         if (lightmap || (stage.flags & STAGE_BAKED_LIGHT) != 0) {
-            // baked light: the light itself, as bright as the stage lets it through. Where there is none the eye sees the
-            // engine's white picture; that light falls on nothing else, as it did not when the map was lit
+            // baked light stands for light itself, scaled by the stage. Without a lightmap, primary rays show the
+            // engine's white image; this light falls on nothing else, as when the map was compiled
             if ((stage.flags & STAGE_NO_LIGHTMAP) != 0 && seen != SEEN_BOUNCED) source.emission = color.rgb;
             else source.lit = color.rgb;
             alpha = color.a;
@@ -233,15 +231,15 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
                 && (stage.rgb_gen == RGBGEN_VERTEX || stage.rgb_gen == RGBGEN_EXACT_VERTEX);
             bool mirrors = (stage.flags & STAGE_REFLECTION) != 0, gloss = (stage.flags & STAGE_GLOSS) != 0;
             bool haze = (stage.flags & STAGE_HAZE) != 0 && seen != SEEN_BOUNCED;
-            // the light of the corners that a shine under a lightmap is multiplied by is no light that falls on it once more:
-            // it says where its author had it shine
+            // vertex light on a reflection under a lightmap is not light that falls on it once more: it is the author's
+            // mask of the reflection
             bool is_lit = stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE || (baked && !(mirrors && p.triangle.lightmap != NO_TEXTURE));
-            // the picture is placed as the eye sees it, which is not what a bounce finds
+            // environment coordinates depend on the camera, so bounces use the mean
             vec4 mean = mirrors ? environment_mean(stage, p) : vec4(0.0);
             vec4 texel = mirrors && !haze && (!gloss || seen == SEEN_BOUNCED) ? mean : stage_texel(stage, p, instance, footprint);
             vec3 image = texel.rgb;
             alpha = texel.a * (stage.rgb_gen == RGBGEN_LIGHTING_DIFFUSE && stage.alpha_gen == ALPHAGEN_IDENTITY ? 1.0 : color.a);
-            // what is mirrored brings its own light
+            // the reflection brings its own light
             if (mirrors && seen == SEEN_FOLLOWED) source.reflected = mean.rgb * (is_lit ? vec3(1.0) : color.rgb);
             if (haze) {
                 source.haze = image * (is_lit ? displayed_light(p) : color.rgb);
@@ -253,9 +251,9 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
                 vec3 shown = image * color.rgb;
                 bool matter = !world && (stage.flags & STAGE_MATTER) != 0;
                 if (matter && (material.flags & MATERIAL_POLYGON_OFFSET) != 0) {
-                    source.lit = shown; // a mark on a surface is lit with it
+                    source.lit = shown; // a mark shares the light of its surface
                 } else {
-                    // what hangs in the air shows the light around it: as layers it can only glow
+                    // a sprite takes the light grid's light as emission
                     if (matter && (instance.flags & INSTANCE_SUSPENDED) != 0) shown *= instance.ambient;
                     source.emission = shown;
                 }
@@ -269,12 +267,12 @@ Layer run_stages(Material material, SurfacePoint p, Footprint footprint, uint se
     return layer;
 }
 
-// How much of what light shows of a material is thrown back: never more than all of it, unless the stages themselves do.
+// Albedo of a material: at most 1, unless the stages themselves exceed it.
 vec3 bounded_albedo(Material material, vec3 lit) {
     return material.lit_scale != 1.0 ? min(lit * material.lit_scale, max(lit, 1.0)) : lit;
 }
 
-// Each part of the point's stages as a diffuse bounce finds it by itself, in linear light.
+// Parts of the point's stages for a diffuse bounce, each by itself in linear light.
 Layer evaluate_stages(SurfacePoint p, Footprint footprint) {
     Material material = material_of(p.triangle.material);
     Layer shown = run_stages(material, p, footprint, SEEN_BOUNCED);
@@ -282,14 +280,14 @@ Layer evaluate_stages(SurfacePoint p, Footprint footprint) {
         linear_part(shown.reflected), vec3(0.0));
 }
 
-// What a lamp shows of the light that it gives: its texture at up to full brightness.
+// Emission that an emitter displays: its texture at up to full brightness.
 vec3 shown_glow(Material material) {
     vec3 radiance = material.light_radiance;
     return radiance / (1.0 + max_component(radiance));
 }
 
-// What the engine adds to the light of the place on models, so that players see their weapons and each other in the dark,
-// linear. It adds it to what is displayed, so it is worth the more the more light there is. Nothing else is lit by it.
+// Light that the engine adds to models, so that players see weapons and each other in the dark; linear. It is added in
+// displayed values, so its linear value grows with the light. It lights nothing else.
 vec3 added_light(SurfacePoint p) {
     if ((p.triangle.flags & TRIANGLE_WORLD) != 0 || (VIEW.flags & VIEW_FULLBRIGHT) != 0) return vec3(0.0);
     Instance instance = instance_of(p.instance);

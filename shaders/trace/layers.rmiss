@@ -1,5 +1,5 @@
 #version 460
-// The end of a ray for translucent layers: what it found is in the payload, and stays.
+// Miss of a ray for translucent layers: keeps the layers in the payload.
 #extension GL_EXT_ray_tracing : require
 
 void main() {}

@@ -1,4 +1,4 @@
-// A ray to a light in 16 bytes, as one pass hands it to the next.
+// A shadow ray to a light in 16 bytes, passed from one pass to the next.
 #ifndef RELIGHT_TRACE_LIGHT_RAY_GLSL
 #define RELIGHT_TRACE_LIGHT_RAY_GLSL
 
@@ -8,11 +8,11 @@
 
 const uint SIGN_BIT = 0x80000000u;
 
-// `spare`: two numbers below 256; `flag`: kept beside it in place of `sky`; `dither`: see pack_light.
+// `spare`: two numbers below 256; `flag`: stored in place of `sky`; `dither`: see `pack_light`.
 uvec4 pack_light_ray(LightSample s, uvec2 spare, bool flag, float dither) {
-    // light from nearer than 0 arrives as that from 0 does, so the sign is free
+    // the sign is free: a negative distance has the effect of 0
     uint distance = floatBitsToUint(max(s.distance, 0.0)) & ~SIGN_BIT | (flag ? SIGN_BIT : 0u);
-    return uvec4(pack_direction(s.direction, spare), distance, pack_light(sound_light(s.light), dither));
+    return uvec4(pack_direction(s.direction, spare), distance, pack_light(finite_light(s.light), dither));
 }
 
 bool flag_of_light_ray(uvec4 packed) { return (packed.z & SIGN_BIT) != 0; }

@@ -1,7 +1,8 @@
-// The lights of a point: which can matter, the estimators that choose among them, and points on lights.
+// Lights at a point: the lists of lights that may reach it, the estimators that select among them, and sampling of
+// points on lights.
 //
-// Light is measured as L, the radiance that a white diffuse surface would show: irradiance divided by pi. Every
-// estimator divides by the probability with which it made its choices, so all of them have the same mean.
+// Light is measured as L, the radiance of a white diffuse surface: irradiance divided by pi. Every estimator divides by
+// its probability, so all estimators have the same mean.
 #ifndef RELIGHT_TRACE_LIGHTS_GLSL
 #define RELIGHT_TRACE_LIGHTS_GLSL
 
@@ -13,7 +14,7 @@
 struct LightSet {
     uint first;
     uint listed;
-    uint strong; // of the listed ones, which come first
+    uint strong; // number of strong lights, which come first
     uint suns;
     uint dynamic_first;
     uint dynamic_count;
@@ -21,10 +22,10 @@ struct LightSet {
 
 uint set_count(LightSet set) { return set.listed + set.suns + set.dynamic_count; }
 
-// Number of cells, which have a row for each way that a surface may face; after these comes the row of all lights.
+// Number of cells, each with a row per normal bin; the row of all lights follows them.
 uint cell_count() { return (VIEW.lights.row_count - 1) / NORMAL_BINS; }
 
-// Cell of a point, a piece of a cluster, by a walk through the map's tree; the number of cells for a point in none.
+// Cell of a point (a piece of a cluster), by a walk through the BSP tree; the number of cells for a point in none.
 uint cell_at(vec3 position) {
     uint no_cell = cell_count();
     uint node_count = VIEW.lights.node_count;
@@ -32,13 +33,13 @@ uint cell_at(vec3 position) {
     BspNodes nodes = BspNodes(VIEW.lights.nodes);
     int index = 0;
     uvec3 size = uvec3(VIEW.lights.grid_size[0], VIEW.lights.grid_size[1], VIEW.lights.grid_size[2]);
-    // negative numbers become 0 or are undefined, so they are looked at as floats
+    // tested as floats, because converting negative numbers to unsigned is undefined
     vec3 at = (position - VIEW.lights.grid_origin) * VIEW.lights.grid_scale;
     if (all(greaterThanEqual(at, vec3(0.0))) && all(lessThan(at, vec3(size)))) {
         uvec3 box = uvec3(at);
         index = Integers(VIEW.lights.grid).at[(box.z * size.y + box.y) * size.x + box.x];
     }
-    // a tree is never deeper than it has nodes; this also ends on a cyclic one
+    // a tree is at most as deep as its number of nodes; the bound also ends a cyclic one
     for (uint i = 0; i <= node_count && index >= 0; i++) {
         BspNode node = nodes.at[index];
         index = node.children[dot(node.plane.xyz, position) >= node.plane.w ? 0 : 1];
@@ -48,7 +49,7 @@ uint cell_at(vec3 position) {
     return cell >= 0 && uint(cell) < no_cell ? uint(cell) : no_cell;
 }
 
-// The axis that a normal is nearest to, one of twice three.
+// Normal bin: the nearest of the six signed axes.
 uint normal_bin_of(vec3 normal) {
     vec3 size = abs(normal);
     uint axis = size.x >= max(size.y, size.z) ? 0 : size.y >= size.z ? 1 : 2;
@@ -56,7 +57,7 @@ uint normal_bin_of(vec3 normal) {
 }
 
 LightSet lights_at(vec3 position, vec3 face_normal, vec3 normal) {
-    // a point of a surface lies on the boundary of leaves: step into the room that it faces
+    // a surface point lies on the boundary of leaves: step to the side that the surface faces
     uint place = cell_at(position + face_normal) * NORMAL_BINS + normal_bin_of(normal);
     LightRow row = LightRows(VIEW.lights.rows).at[min(place, VIEW.lights.row_count - 1)];
     LightSet set = LightSet(row.first, row.count, row.strong, row.suns != 0 ? VIEW.lights.sun_count : 0, 0, 0);
@@ -74,7 +75,7 @@ uint light_index(uint light) { return light & ((1u << LIGHT_KIND_SHIFT) - 1); }
 
 uint dynamic_light(LightSet set, uint member) { return Indices(VIEW.lights.dynamic_lights).at[set.dynamic_first + member]; }
 
-// The light that is a set's member: listed ones first, then suns, then those of this frame.
+// A light of the set by index: listed lights first, then suns, then lights of this frame.
 uint light_of_member(LightSet set, uint member) {
     if (member < set.listed) return LightSlots(VIEW.lights.slots).at[set.first + member].light;
     member -= set.listed;
@@ -96,11 +97,11 @@ float solid_angle(vec3 a, vec3 b, vec3 c) {
     return 2.0 * atan(numerator, denominator);
 }
 
-// A direction to a spherical triangle of unit vectors, uniform in its solid angle `omega`, which must not be 0 (Arvo,
-// Stratified Sampling of Spherical Triangles, 1995): a corner is moved from a towards c until the part-triangle has the
-// fraction u.x of the area, then a point is taken on the arc from b to there. That the tangent of half a solid angle is
-// a quotient of products of its corners (Van Oosterom and Strackee) gives the tangent of half the arc from a without
-// the triangle's angles.
+// Samples a direction in a spherical triangle of unit vectors uniformly by its solid angle `omega`, which must not be 0
+// (Arvo, Stratified Sampling of Spherical Triangles, 1995): moves a corner from a towards c until the partial triangle
+// has the fraction u.x of the area, then takes a point on the arc from b to it. The tangent of half a solid angle is a
+// quotient of products of its corners (Van Oosterom and Strackee); this gives the tangent of half the arc from a
+// without the triangle's angles.
 vec3 sample_spherical_triangle(vec3 a, vec3 b, vec3 c, float omega, vec2 u) {
     vec3 along = c - a * dot(a, c);
     float side = length(along);
@@ -108,7 +109,7 @@ vec3 sample_spherical_triangle(vec3 a, vec3 b, vec3 c, float omega, vec2 u) {
     float sin_part = sin(part);
     float p = side * (1.0 + dot(a, b)) * sin_part;
     float q = abs(dot(a, cross(b, c))) * cos(part) - dot(b, along) * sin_part;
-    // the arc's cosine and sine from the tangent p / q of its half
+    // cosine and sine of the arc from the tangent p / q of its half
     float scale = p * p + q * q;
     if (!(scale > 0.0 && side > 0.0)) return a;
     vec3 c_part = a * ((q * q - p * p) / scale) + along * (2.0 * p * q / (scale * side));
@@ -119,10 +120,10 @@ vec3 sample_spherical_triangle(vec3 a, vec3 b, vec3 c, float omega, vec2 u) {
     return z * b + sqrt(max(1.0 - z * z, 0.0)) * across;
 }
 
-// Below this solid angle a triangle is sampled by area: the spherical formulas lose their digits there.
+// Below this solid angle a triangle is sampled by area: the spherical formulas lose precision there.
 const float MIN_SOLID_ANGLE = 2.0e-3;
 
-// Two unit vectors at right angles to n (Duff et al., Building an Orthonormal Basis, Revisited, 2017).
+// Two unit vectors perpendicular to n (Duff et al., Building an Orthonormal Basis, Revisited, 2017).
 void basis(vec3 n, out vec3 t, out vec3 b) {
     float s = n.z >= 0.0 ? 1.0 : -1.0;
     float a = -1.0 / (s + n.z);
@@ -131,7 +132,7 @@ void basis(vec3 n, out vec3 t, out vec3 b) {
     b = vec3(c, s + n.y * n.y * a, -n.y);
 }
 
-// A direction in the cone around `axis` whose half angle has the given cosine, uniform in solid angle.
+// A direction in the cone around `axis` with the given cosine of its half angle, uniform in solid angle.
 vec3 sample_cone(vec3 axis, float cos_angle, vec2 u) {
     vec3 t, b;
     basis(axis, t, b);
@@ -141,24 +142,24 @@ vec3 sample_cone(vec3 axis, float cos_angle, vec2 u) {
     return t * (r * cos(phi)) + b * (r * sin(phi)) + axis * z;
 }
 
-// Part of a sphere light's radiance that goes towards a point in `direction` from it.
+// Part of a sphere light's radiance towards a point in `direction` from it.
 float spot_factor(SphereLight light, vec3 direction) {
     if (light.cos_outer <= -2.0) return 1.0;
     float c = dot(light.axis, direction);
     return clamp((c - light.cos_outer) / max(light.cos_inner - light.cos_outer, 1.0e-4), 0.0, 1.0);
 }
 
-// A point on a light as seen from a surface: `light` is the unshadowed L that the sample stands for, pdf divided out.
+// A point on a light as seen from a surface. `light`: unshadowed L of the sample, divided by the probability density.
 struct LightSample {
     vec3 direction;
     float distance; // to the end of the shadow ray
     vec3 light;
-    bool sky; // comes from behind the sky: arrives where the ray meets sky first
+    bool sky; // a sun: its light arrives if the ray hits sky first
 };
 
 LightSample no_light() { return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), false); }
 
-// Whether shadows come from the whole of a light, or from its middle alone.
+// Whether shadows are computed from the light's whole surface or from its centre.
 bool soft_shadows() { return (VIEW.lights.flags & LIGHTS_SOFT) != 0; }
 
 LightSample sample_triangle(TriangleLight light, vec3 position, vec3 normal, vec2 u) {
@@ -168,7 +169,7 @@ LightSample sample_triangle(TriangleLight light, vec3 position, vec3 normal, vec
     float double_area = length(face);
     if (double_area <= 0.0) return s;
     face /= double_area;
-    float height = dot(a, face); // negative where the emitting side is seen
+    float height = dot(a, face); // negative: the emitting side is visible
     if (height >= 0.0 && (light.flags & LIGHT_TWO_SIDED) == 0) return s;
     vec3 ua = safe_normalize(a, vec3(0)), ub = safe_normalize(b, vec3(0)), uc = safe_normalize(c, vec3(0));
     float omega = solid_angle(ua, ub, uc);
@@ -195,7 +196,7 @@ LightSample sample_triangle(TriangleLight light, vec3 position, vec3 normal, vec
     }
     s.light *= max(dot(normal, s.direction), 0.0);
     if (max_component(s.light) < light.end) s.light = vec3(0.0);
-    // stop short of the light's own surface
+    // ends before the light's own surface
     s.distance -= 0.02 + 2.0e-4 * s.distance;
     return s;
 }
@@ -205,12 +206,12 @@ LightSample sample_sphere(SphereLight light, vec3 position, vec3 normal, vec2 u)
     vec3 to = light.origin - position;
     float squared = dot(to, to);
     float d = sqrt(squared);
-    // from inside the sphere it is a light of the same intensity one radius away
+    // inside the sphere: a light of the same intensity one radius away
     float sine = min(light.radius / max(d, light.radius), 0.9999);
     float cos_angle = sqrt(1.0 - sine * sine);
     vec3 axis = d > 1.0e-6 ? to / d : normal;
     s.direction = soft_shadows() ? sample_cone(axis, cos_angle, u) : axis;
-    float omega = 2.0 * PI * (sine * sine) / (1.0 + cos_angle); // 2 pi (1 - cos) without its cancellation
+    float omega = 2.0 * PI * (sine * sine) / (1.0 + cos_angle); // 2 pi (1 - cos) without cancellation
     float cosine = max(dot(normal, s.direction), 0.0);
     s.light = light.radiance * (omega / PI * cosine * spot_factor(light, -axis));
     if (light.reach > 0.0) {
@@ -239,12 +240,12 @@ LightSample sample_light(uint light, vec3 position, vec3 normal, vec2 u) {
     if (kind == LIGHT_SUN) s = sample_sun(SunLights(VIEW.lights.suns).at[light_index(light)], normal, u);
     else if (kind >= LIGHT_SPHERE) s = sample_sphere(sphere_light(light), position, normal, u);
     else s = sample_triangle(triangle_light(light), position, normal, u);
-    // lights of this frame come scaled
+    // lights of this frame are scaled already
     if (kind == LIGHT_TRIANGLE || kind == LIGHT_SPHERE || kind == LIGHT_SUN) s.light *= VIEW.lights.scale;
     return s;
 }
 
-// What a triangle gives, about, where it is large as seen from the point.
+// Approximate light of a triangle that is large as seen from the point.
 float large_triangle_target(uint light, vec3 position, vec3 normal) {
     TriangleLight triangle = triangle_light(light);
     vec3 a = triangle.corners[0] - position, b = triangle.corners[1] - position, c = triangle.corners[2] - position;
@@ -253,9 +254,8 @@ float large_triangle_target(uint light, vec3 position, vec3 normal) {
     return luminance(triangle.radiance) * max(solid_angle(ua, ub, uc), 1.0e-6) * (cosine / 3.0) / PI;
 }
 
-// Target function of resampling, for all but suns: about the luminance that the light would give without shadows. Zero
-// only where the light gives exactly nothing, so that choosing by it leaves no light out: where all of it lies below
-// the horizon, or the point behind it or outside of its cone.
+// Target function of resampling, for all lights but suns: approximate luminance without shadows. Zero only where the
+// light contributes nothing (below the horizon, behind the light, outside of its cone), so that no light is lost.
 float light_target(uint light, vec3 position, vec3 normal) {
     uint kind = light_kind(light);
     LightBounds bounds = LightBoundsArray(VIEW.lights.bounds[kind]).at[light_index(light)];
@@ -271,54 +271,54 @@ float light_target(uint light, vec3 position, vec3 normal) {
         if (facing <= 0.0) return 0.0;
         if (bounds.radius * bounds.radius * 4.0 > squared) {
             float target = large_triangle_target(light, position, normal);
-            // the corners below the horizon: then all is
+            // zero only if every corner is below the horizon
             return target * scale;
         }
         towards = facing * inverse / PI;
     } else if (bounds.axis != vec3(0.0)) {
         float stretch = length(bounds.axis);
-        // a hair wider than the cone
+        // slightly wider than the cone
         if (-dot(bounds.axis, to) * inverse < (stretch - 2.0 - 1.0e-3) * stretch) return 0.0;
     }
-    // of a light that the horizon cuts a part is left
+    // keeps a part of a light that the horizon cuts
     float cosine = clamp(max(aloft, 0.25 * (aloft + bounds.radius)) * inverse, 0.0, 1.0);
     return towards * scale * cosine / max(squared, 0.25 * bounds.radius * bounds.radius);
 }
 
-// A light to send a ray to, and what its light is to be multiplied by; weight 0: none.
+// A selected light, and the factor of its light; weight 0: none.
 struct LightChoice {
     uint light;
     float weight;
-    float total; // what all that it was sampled from would give without shadows, about; of resampled ones alone
+    float total; // approximate unshadowed light of all candidates; of resampled choices only
 };
 
-// One light, each with about the same probability. `u` of this and what follows: uniform, before and after (see rng_decide),
-// so that with another number it is a point on the sampled light.
+// Selects one light, each with about the same probability. `u`, here and below: uniform before and after (see
+// `rng_decide`), so that with a second number it samples the point on the light.
 LightChoice sample_uniform(LightSet set, inout float u) {
     uint count = set_count(set), length = uint(findMSB(count));
     if (length > 13) {
         uint member = rng_pick(u, count);
         return LightChoice(light_of_member(set, member), float(count), 0.0);
     }
-    // Shares are multiples of one over a power of two, four to eight times as fine, so that of the frames, whose points are spread evenly
-    // over such parts, each light gets as many as are its due, and not one more or less.
+    // Probabilities are multiples of a power of 1/2 that is four to eight times finer than 1 / count. The points of a
+    // sequence over frames are spread evenly over such intervals, so each light gets exactly its share of the frames.
     uint parts = 8u << length, member = (uint(u * float(parts)) * count) >> (length + 3);
     uint first = (member * parts + count - 1) / count, next = ((member + 1) * parts + count - 1) / count;
     u = min((u * float(parts) - float(first)) / float(next - first), 1.0 - 1.0 / 16777216.0);
     return LightChoice(light_of_member(set, member), float(parts) / float(next - first), 0.0);
 }
 
-// One of the suns; a map has one as a rule.
+// Selects one of the suns; most maps have one.
 LightChoice sample_sun(uint count, inout float u) {
     uint index = count > 1 ? rng_pick(u, count) : 0;
     return LightChoice((LIGHT_SUN << LIGHT_KIND_SHIFT) | index, float(count), 0.0);
 }
 
-// Resampled importance sampling (Talbot et al. 2005): some candidates, one of them sampled by its target, weighed by
-// the inverse of the chance that it had. Candidates come from the row's list by alias tables (Walker 1977), with
-// chances by what each light gives in the cell to what faces about that way, shadows included; the whole list is taken if it is short enough.
-// Lights of this frame are candidates of their own. A hidden sun would outshine all that is left in its shadow: suns
-// get a ray of their own.
+// Resampled importance sampling (Talbot et al. 2005): draws candidates, selects one by its target, and weights it by
+// the inverse of its probability. Candidates come from the row's list by alias tables (Walker 1977), with probabilities
+// from the light's contribution in the cell to surfaces of this normal bin, shadows included; a short list is taken
+// whole. Lights of this frame are candidates by themselves. Suns have a ray of their own: an occluded sun would
+// outweigh all lights that reach its shadow.
 LightChoice sample_resampled(LightSet set, vec3 position, vec3 normal, inout float u) {
     uint candidates = max(VIEW.lights.candidates, 1);
     uint drawn = min(set.listed, candidates), drawn_dynamic = min(set.dynamic_count, candidates);
@@ -327,13 +327,13 @@ LightChoice sample_resampled(LightSet set, vec3 position, vec3 normal, inout flo
     float offset = set.listed > drawn ? rng_next() : 0.0, dynamic_offset = set.dynamic_count > drawn_dynamic ? rng_next() : 0.0;
     uint selected = 0;
     for (uint i = 0; i < drawn + drawn_dynamic; i++) {
-        // decisions use up digits: those of one number last for some
+        // decisions consume the digits of a number; renewed every 8 candidates
         if (i > 0 && i % 8 == 0) u = rng_next();
         uint light;
         float weight = 1.0, visibility = 1.0;
         if (i < drawn) {
             uint member = i;
-            // one number moves all of them, each in its part of the list
+            // one random number offsets all candidates, each in its part of the list
             float within = (float(i) + offset) / float(drawn);
             if (set.listed > drawn) member = rng_pick(within, set.listed);
             LightSlot slot = slots.at[set.first + member];
@@ -367,14 +367,14 @@ LightChoice sample_resampled(LightSet set, vec3 position, vec3 normal, inout flo
     return LightChoice(selected, selected_target > 0.0 ? sum / selected_target : 0.0, sum);
 }
 
-// A light of the list or a sun, for points that get one ray: about by what each would give without shadows, neither of
-// them rarely, as nobody knows here what is in the way.
+// Selects a listed light or a sun, for points with a single ray: by their approximate unshadowed light, each with a
+// probability of at least 1/4, because their visibility is unknown here.
 LightChoice sample_one(LightSet set, vec3 position, vec3 normal, inout float u) {
     LightChoice listed = sample_resampled(set, position, normal, u);
     if (set.suns == 0) return listed;
     LightChoice sun = sample_sun(set.suns, u);
     SunLight light = SunLights(VIEW.lights.suns).at[light_index(sun.light)];
-    // the disc's edge may be up where its middle is not
+    // the disc's edge may be above the horizon while its centre is below
     float aloft = dot(normal, light.direction) + sqrt(max(1.0 - light.cos_angle * light.cos_angle, 0.0));
     if (aloft <= 0.0) return listed;
     if (!(listed.weight > 0.0)) return sun;
@@ -384,7 +384,7 @@ LightChoice sample_one(LightSet set, vec3 position, vec3 normal, inout float u) 
     return LightChoice(listed.light, listed.weight / (1.0 - chance), listed.total);
 }
 
-// A point on the one light of a point whose surface faces `face_normal`.
+// Selects one light, and a point on it, for a surface point with the geometric normal `face_normal`.
 LightSample one_light(vec3 position, vec3 face_normal, vec3 normal) {
     LightSet set = lights_at(position, face_normal, normal);
     if (set_count(set) == 0) return no_light();

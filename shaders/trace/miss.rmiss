@@ -1,5 +1,5 @@
 #version 460
-// Nothing stopped the ray.
+// The ray hit nothing.
 #extension GL_EXT_ray_tracing : require
 #include "trace/payload.glsl"
 

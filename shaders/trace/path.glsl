@@ -1,4 +1,4 @@
-// The eye's path through a pixel: what it has gathered of what it passed, and the point whose light the pixel shows.
+// The path of a primary ray through a pixel: its accumulated radiance, and the lit point that the pixel shows.
 #ifndef RELIGHT_TRACE_PATH_GLSL
 #define RELIGHT_TRACE_PATH_GLSL
 #include "trace/layer.glsl"
@@ -8,69 +8,69 @@
 #include "trace/camera.glsl"
 #include "trace/motion.glsl"
 
-// A path ends after this many layers and surfaces; what is left of its transmittance stays black. Far above what any
-// scene stacks up, so this bounds only the time that a degenerate one takes.
+// Most layers and surfaces of a path; the remaining transmittance stays black. Far above the depth of any scene: bounds
+// the time of degenerate ones.
 const uint MAX_EVENTS = 512;
-// Less of the background's display than this cannot be told from none in eight bits.
+// Displayed part of the background below which it is invisible in eight bits.
 const float MIN_SHOWN = 1.0 / 1024.0;
-// Lit layers that are no further from the surface behind them, units, are painted on it.
+// Lit layers at most this far from the surface behind them, units, share its light.
 const float PAINT_DISTANCE = 0.5;
-// See Path.solid_mask.
+// First of the bits in `Path::solid_mask` that hold `PATHS_*`.
 const uint PATHS_BIT = 8;
-// Less of a reflection than this is not followed.
+// Weakest reflection that is followed.
 const float MIN_REFLECTION = 1.0 / 256.0;
 
-// How a path was bent: not at all, by what keeps its shape, by ripples, which move while time goes on.
+// How reflection or refraction has distorted a path: not at all; by a static shape; by ripples, which move with time.
 const uint BENT_NOT = 0, BENT_BY_SHAPE = 1, BENT_BY_RIPPLES = 2;
 
 struct Path {
     vec3 origin;
     vec3 direction;
-    vec3 transmittance; // of all that was passed but layers: mirrors, liquids
-    vec3 radiance;      // of all that was passed but layers, and of what has none in front
-    // Layers, fog among them, and what they lie in front of are summed as they are displayed (layer.glsl): of the
-    // background, the part of its displayed value that they leave; the displayed sum; and what glows in it, to be
+    vec3 transmittance; // of mirrors and liquids; layers are in `cover`
+    vec3 radiance;      // of surfaces without layers in front
+    // Layers (fog included) and the surfaces behind them are summed as displayed (`layer.glsl`). `cover`: displayed
+    // part of the background that the layers let through; `shown`: displayed sum; `glow`: emission in it, to be
     // multiplied by the sum's slope.
     vec3 cover;
     vec3 shown;
     vec3 glow;
-    float weight;       // one over the chance of the branches that were taken
-    float travelled;    // length of the segments before this one
-    LastSpace last;     // where points on the path were seen in the last frame
-    vec3 eye_direction; // in which the eye sees the path
-    uint bent;          // BENT_*: refracted, or mirrored by what is not flat: `last` is right for no more than its turn
-    vec3 absorption;    // of the liquid that the path is in, per unit
-    uint field;         // of a path that was split: 1 follows what is behind the surface, 2 what it reflects; 0: whole
-    uint solid_mask; // from bit PATHS_BIT on: which portals were passed (PATHS_*); rays read the bits below alone
+    float weight;       // reciprocal of the probability of the branches taken
+    float travelled;    // length of the previous segments
+    LastSpace last;     // map of the path's points to the last frame
+    vec3 eye_direction; // direction of the path at the camera
+    uint bent; // BENT_*: refracted, or mirrored by a curved surface: only the linear part of `last` is valid then
+    vec3 absorption;    // of the liquid that contains the segment, per unit
+    uint field;         // of the checkerboard: 1 refraction, 2 reflection; 0: the path was not split
+    uint solid_mask; // mask of solid geometry; from bit PATHS_BIT on: the portals passed (PATHS_*), which rays ignore
     uint layer_mask;
     uint events;
 };
 
-// The point whose light the pixel shows. Several lit layers can lie one behind the other; one of them is kept, with a
-// chance that grows with what it contributes, and weighed by the inverse of that chance (reservoir sampling), so that
-// the mean over frames is the sum of all.
+// The lit point that the pixel shows. Of several lit layers along a path one is selected with a probability
+// proportional to its contribution, and weighted by the reciprocal (reservoir sampling), so that the mean over frames
+// is their sum.
 GBufferPixel kept;
 float kept_weight;
 float weight_sum;
 LastPlace kept_last;
 uint kept_bent;
-// The plane of the last lit surface, and whether that is the one that is kept: what is painted on a surface shares its
-// light, so that both count as one and no chance comes between them.
+// Plane of the last lit surface, and whether that surface is selected. A decal shares the light of its surface, so both
+// count as one, without a random selection between them.
 vec4 lit_plane;
 bool lit_kept;
 
-// The solid surface that the path goes towards, or NO_HIT. Marks lie on it and have no light of their own to tell of.
+// The solid surface at the end of the segment, or NO_HIT. Marks lie on it and use its displayed light.
 Hit ahead;
 
-// The glow of the layers in front, displayed, and where in the picture the brightest of them was in the last frame, relative to
-// where it is; z negative: nobody knows.
+// Displayed emission of the layers in front, and the motion of the brightest: its position in the last frame relative
+// to this one, pixels; z negative: unknown.
 vec3 glow_sum;
 float brightest_glow;
 vec3 glow_motion;
-// Less glow than this, of display white, is not looked after.
+// Emission below this part of display white has no motion of its own.
 const float MIN_GLOW = 1.0 / 256.0;
 
-// Where a point of the path was seen in the last frame. What is seen bent is taken to stand where the eye sees it now.
+// Map of a point of the path to the last frame. A distorted point is taken to rest at its current virtual position.
 LastSpace last_space(Path path, vec3 position, float t) {
     if (path.bent == BENT_NOT) return path.last;
     return LastSpace(path.last.linear, VIEW.camera.origin + path.eye_direction * (path.travelled + t) - path.last.linear * position);
@@ -93,7 +93,7 @@ void keep_lit(SurfacePoint p, vec3 lit, Path path, float t) {
     kept.view_distance = path.travelled + t;
     bool turned = dot(p.face_normal, path.direction) > 0.0;
     kept.face_normal = turned ? -p.face_normal : p.face_normal;
-    // light is gathered on the side that is seen
+    // the side that the path sees is lit
     kept.normal = dot(p.normal, kept.face_normal) < 0.0 ? -p.normal : p.normal;
     kept.albedo = lit;
     kept.first_person = (instance_of(p.instance).flags & INSTANCE_FIRST_PERSON) != 0;
@@ -101,8 +101,8 @@ void keep_lit(SurfacePoint p, vec3 lit, Path path, float t) {
     kept_bent = path.bent;
 }
 
-// Notes what glows in front of the surface that the pixel's motion is of. Only temporal antialiasing asks for it.
-void note_glow(Path path, SurfacePoint p, vec3 emission, float t) {
+// Records emission in front of the surface that sets the pixel's motion. Only temporal antialiasing reads it.
+void record_glow(Path path, SurfacePoint p, vec3 emission, float t) {
     if (VIEW.antialias.history == 0 || emission == vec3(0.0)) return;
     vec3 glow = path.cover * encode_display(path.transmittance * emission);
     float brightest = max_component(glow);
@@ -114,31 +114,30 @@ void note_glow(Path path, SurfacePoint p, vec3 emission, float t) {
     glow_motion = motion_of(ray, last_place(last_space(path, p.position, t), p, path.travelled + t)).xyz;
 }
 
-// How much of the pixel's light is there by what was not in front of the surface in the last frame, layers that move
-// otherwise than it does, over what glows of it all (`front`): what they add to the display makes light behind them count
-// for more, too. The history of the pixel is that of the surface and knows nothing of them.
+// Part of the pixel's light, relative to its emission (`front`), that is due to layers which move differently from the
+// surface. Their display also increases the weight of light behind them. The pixel's history follows the surface and
+// does not include them.
 float moved_glow(vec4 motion, vec3 front, vec3 shown) {
     if (glow_sum == vec3(0.0)) return 0.0;
     vec3 without = max(shown - glow_sum, 0.0);
     vec3 added = shown == vec3(0.0) ? front : shown * display_slope(shown) - without * display_slope(without);
-    // of a pixel
+    // pixels
     const float AT_REST = 0.25, AWAY = 1.0;
     float away = glow_motion.z < 0.0 || motion.z < 0.0 ? 1.0 : smoothstep(AT_REST, AWAY, distance(glow_motion.xy, motion.xy));
     return away * clamp(max_component(added) / max(MOST_FRESH * max_component(front), 1.0e-6), 0.0, 0.99);
 }
 
-// What a pixel sees of a surface: its parts in linear light, the displayed part of the background that it leaves, and what
-// its texture shows of light that no ray finds: that which a lamp gives, and that which is added to models. It is part of
-// the texture's display as any light on it.
+// Contribution of a surface to a path: its parts in linear light; the displayed part of the background that it lets
+// through (`cover`); and the emission of lights and added light of models, shown by the texture (`own`).
 struct SeenLayer {
     Layer linear;
     vec3 cover;
     vec3 own;
-    float clear; // the part of its light that fog leaves
+    float clear; // part of its light that fog leaves
 };
 
-// `mirrors`: whether rays go on to what the surface reflects; else the picture of the environment stands for it. `clear`:
-// what fog leaves of the layer, as it is displayed.
+// `mirrors`: whether rays follow the reflection; otherwise environment images replace it. `clear`: displayed part of
+// the layer that fog leaves.
 SeenLayer seen_layer(SurfacePoint p, Material material, Footprint seen, bool mirrors, float clear) {
     Layer shown = run_stages(material, p, seen, mirrors ? SEEN_FOLLOWED : SEEN_LAST);
     if (clear < 1.0) {
@@ -154,25 +153,25 @@ SeenLayer seen_layer(SurfacePoint p, Material material, Footprint seen, bool mir
     return SeenLayer(part, max(shown.through, 0.0), part.lit * (shown_glow(material) + added_light(p)), linear_part(vec3(clear)).x);
 }
 
-// Where the engine shows hardly any light and traced light falls, that would count for more than a display shows: in a
-// sum it counts at most so many times of what it is alone.
+// Bound of the gain of traced light on layers where the engine shows hardly any light: their share of the displayed sum
+// would amplify it beyond what a display shows.
 const float MOST_GAIN = 4.0;
 
-// Adds a displayed value to what the layers in front of it leave of the display. The light of the value counts as the
-// result times the slope of the whole sum.
+// Adds a displayed value behind the layers in front. Returns the factor of its light, which the slope of the whole sum
+// multiplies at the end.
 vec3 share_display(inout Path path, vec3 own) {
     path.shown += path.cover * own;
     return path.cover / display_slope(own);
 }
 
-// Adds what does not pass on light of others: sky.
+// Adds emission that hides everything behind it: the sky.
 void add_glow(inout Path path, vec3 radiance) {
     vec3 glow = path.transmittance * radiance;
     if (path.cover == vec3(1.0) && path.shown == vec3(0.0)) path.radiance += path.weight * glow;
     else path.glow += path.weight * glow * share_display(path, encode_display(glow));
 }
 
-// The light that the engine shows at a layer, linear.
+// Light that the engine shows at a layer, linear.
 vec3 light_shown(SurfacePoint p) {
     bool mark = (p.triangle.flags & TRIANGLE_WORLD) == 0 && (material_of(p.triangle.material).flags & MATERIAL_POLYGON_OFFSET) != 0;
     if (mark && ahead.geometry != NO_HIT) {
@@ -203,11 +202,11 @@ void add_layer(inout Path path, SurfacePoint p, SeenLayer layer, float t) {
 }
 
 bool is_over(Path path) {
-    // the root of light is nearly its displayed value
-    return rays_wanted || max_component(path.cover * sqrt(path.transmittance)) < MIN_SHOWN || path.events >= MAX_EVENTS;
+    // the root of light is close to its displayed value
+    return rays_needed || max_component(path.cover * sqrt(path.transmittance)) < MIN_SHOWN || path.events >= MAX_EVENTS;
 }
 
-// What the pixel's cone meets of the surface.
+// The area of the surface that the pixel's cone covers.
 Footprint footprint(Path path, SurfacePoint p, float t) {
     float cosine = max(abs(dot(p.face_normal, path.direction)), 0.05);
     float width = (path.travelled + t) * VIEW.camera.pixel_spread * VIEW.antialias.texture_scale;

@@ -1,10 +1,10 @@
-// What travels with a ray of the pipeline tracer.
+// Ray payloads of the pipeline tracer.
 #ifndef RELIGHT_TRACE_PAYLOAD_GLSL
 #define RELIGHT_TRACE_PAYLOAD_GLSL
 
 #include "trace/candidate.glsl"
 
-// Of a ray for what stops it.
+// Payload of a ray for the nearest solid hit.
 struct Payload {
     float t;
     uint geometry;
@@ -12,7 +12,7 @@ struct Payload {
     vec2 barycentrics;
 };
 
-// Of a ray for translucent layers: the nearest so far, and the one that they must lie behind.
+// Payload of a ray for translucent layers: the nearest found so far; they must lie behind `last`.
 struct LayerPayload {
     LayerList found;
     LayerOrder last;

@@ -1,5 +1,5 @@
-// The finished linear picture, as everything after it reads it: bloom, exposure, tone curve. Its size is that of the view
-// in the window, whatever size was traced.
+// The finished linear picture, input of bloom, exposure and tone curve. It has the size of the view in the window,
+// whatever the traced size.
 #ifndef RELIGHT_TRACE_PICTURE_GLSL
 #define RELIGHT_TRACE_PICTURE_GLSL
 
@@ -7,7 +7,7 @@
 
 ivec2 picture_size() { return ivec2(VIEW.antialias.output_width, VIEW.antialias.output_height); }
 
-// Pixels that are counted for the exposure.
+// Size of the grid of pixels that the histogram counts.
 ivec2 histogram_size() { return (picture_size() + 1) / 2; }
 
 vec3 picture_load(ivec2 pixel) {
@@ -15,7 +15,7 @@ vec3 picture_load(ivec2 pixel) {
     return (VIEW.flags & VIEW_ACCUMULATE) != 0 ? imageLoad(images_rgba32f[image], pixel).rgb : imageLoad(images_rgba16f[image], pixel).rgb;
 }
 
-// Writes a display-encoded colour to the picture that is shown; where each eye has channels of its own, to those alone.
+// Writes a display-encoded colour to the target. In anaglyph stereo each eye writes its own channels.
 void target_store(ivec2 target, vec3 color) {
     if (VIEW.target.channels != 7u) {
         bvec3 written = notEqual(uvec3(VIEW.target.channels) & uvec3(1, 2, 4), uvec3(0));

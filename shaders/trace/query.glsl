@@ -1,4 +1,4 @@
-// The ray query tracer: the driver's structures, walked from a compute shader; candidates are decided in a loop here.
+// The ray query tracer: a compute shader traverses the driver's structures, and decides candidates in a loop.
 #ifndef RELIGHT_TRACE_QUERY_GLSL
 #define RELIGHT_TRACE_QUERY_GLSL
 
@@ -9,10 +9,10 @@
         uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, committed)), rayQueryGetIntersectionBarycentricsEXT(query, committed), \
         rayQueryGetIntersectionTEXT(query, committed))
 
-// The nearest thing of the mask between tmin and tmax, translucent ones left out; with `any_hit` only whether there is
-// one: `geometry` is NO_HIT if not, and nothing else of the answer counts.
+// The nearest hit of the mask between tmin and tmax, without translucent surfaces. With `any_hit` only `geometry` is
+// valid: NO_HIT if the ray hits nothing.
 Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
-    rays_asked++;
+    ray_count++;
     rayQueryEXT query;
     uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT : gl_RayFlagsNoneEXT;
     rayQueryInitializeEXT(query, scenes[VIEW.scene.top_level], flags, mask, origin, tmin, direction, tmax);
@@ -24,14 +24,14 @@ Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bo
     return QUERY_HIT(query, true);
 }
 
-// The next translucent layers behind `order` and before tmax. Layers in one plane come in the order of the engine, what
-// it draws last first.
+// The next translucent layers behind `order` and before tmax. Layers in one plane are ordered as the engine draws them,
+// the last drawn first.
 void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
-    rays_asked++;
+    ray_count++;
     layers_clear(found);
     rayQueryEXT query;
     rayQueryInitializeEXT(query, scenes[VIEW.scene.top_level], gl_RayFlagsNoneEXT, mask, origin, layer_start(order), direction, tmax);
-    // none is ever confirmed: the nearest so far are noted
+    // no candidate is confirmed; the list keeps the nearest
     while (rayQueryProceedEXT(query)) layers_add(found, QUERY_HIT(query, false), direction, order);
 }
 

@@ -1,12 +1,12 @@
-// Random numbers. Those of one pixel, pass and place in the pass are a sequence over the frames whose points are spread
-// evenly: of each 2^k frames in a row that begin at a multiple of 2^k, one lies in each interval of length 2^-k, and of
-// pairs one in each box of that area whose sides are powers of two. So what a pixel gathers over frames has less noise
-// than with independent numbers, and has the same mean. They depend on pixel, frame and pass alone, so that a frame can
-// be made again bit by bit.
+// Random numbers. The numbers of a pixel, pass and position in the pass form a low-discrepancy sequence over frames: of
+// 2^k consecutive frames that begin at a multiple of 2^k, one lies in each interval of length 2^-k, and for pairs one
+// in each box of that area with sides that are powers of two. Means over frames have less noise than with independent
+// numbers, and the same expectation. The numbers depend on pixel, frame and pass alone, so that a frame can be repeated
+// bit by bit.
 //
-// Sequences are Sobol's, two dimensions at a time: shuffled, so that one tells nothing of the next, and scrambled
-// (Burley, Practical Hash-based Owen Scrambling, JCGT 9(4), 2020). Hashes are PCG's (Jarzynski and Olano, Hash Functions
-// for GPU Rendering, JCGT 9(3), 2020).
+// The sequences are Sobol's, two dimensions at a time, shuffled so that they are independent of each other, and
+// scrambled (Burley, Practical Hash-based Owen Scrambling, JCGT 9(4), 2020). Hashes are PCG's (Jarzynski and Olano,
+// Hash Functions for GPU Rendering, JCGT 9(3), 2020).
 #ifndef RELIGHT_TRACE_RANDOM_GLSL
 #define RELIGHT_TRACE_RANDOM_GLSL
 
@@ -19,8 +19,8 @@ uint pcg_step(uint state) { return state * 747796405u + 2891336453u; }
 
 uint pcg_hash(uint x) { return pcg_permute(pcg_step(x)); }
 
-uint rng_state; // of pixel and pass; a step for each sequence
-uint rng_index; // the frame, its bits reversed
+uint rng_state; // of pixel and pass; one step for each sequence
+uint rng_index; // frame index with reversed bits
 
 // `stream`: STREAM_*.
 void rng_begin(uvec2 pixel, uint frame, uint stream) {
@@ -33,9 +33,8 @@ uint rng_seed() {
     return pcg_permute(rng_state);
 }
 
-// Owen's scrambling of a number whose bits are reversed: whether a bit is turned over depends on those below it alone
-// (Laine and Karras, Stratified Sampling for Stochastic Transparency, 2011; with Vegdahl's constants, which depend on
-// them more evenly).
+// Owen scrambling of a number with reversed bits: whether a bit is flipped depends on the bits below it (Laine and
+// Karras, Stratified Sampling for Stochastic Transparency, 2011; with Vegdahl's constants, which mix more evenly).
 uint scramble(uint reversed, uint seed) {
     reversed ^= reversed * 0x3D20ADEAu;
     reversed += seed;
@@ -45,7 +44,7 @@ uint scramble(uint reversed, uint seed) {
     return reversed;
 }
 
-// Sobol's second dimension with its bits reversed: the index as a polynomial over {0, 1}, taken at 1 + x in place of x.
+// Second Sobol dimension with reversed bits: the index as a polynomial over {0, 1}, evaluated at 1 + x in place of x.
 // (1 + x)^2^k is 1 + x^2^k there, so halves of halves are added.
 uint sobol_second(uint index) {
     index ^= index >> 16u;
@@ -55,34 +54,34 @@ uint sobol_second(uint index) {
     return index ^ (index & 0xAAAAAAAAu) >> 1u;
 }
 
-// Uniform in [0, 1): 24 bits, so that 1 is never returned.
+// Uniform in [0, 1): 24 bits, so that 1 never occurs.
 float unit_float(uint bits) { return float(bits >> 8u) * (1.0 / 16777216.0); }
 
-// The next sequence's number of this frame, of one dimension: Sobol's first is the index, its bits reversed.
+// The next number of one dimension: the first Sobol dimension is the index with reversed bits.
 float rng_next() {
     uint index = bitfieldReverse(scramble(rng_index, rng_seed()));
     return unit_float(bitfieldReverse(scramble(index, rng_seed())));
 }
 
-// Of two dimensions.
+// The next numbers of two dimensions.
 vec2 rng_next2() {
     uint index = bitfieldReverse(scramble(rng_index, rng_seed()));
     float x = unit_float(bitfieldReverse(scramble(index, rng_seed())));
     return vec2(x, unit_float(bitfieldReverse(scramble(sobol_second(index), rng_seed()))));
 }
 
-// A number that is independent from frame to frame, for what gains nothing from a sequence: it costs a third.
+// A number that is independent between frames, for uses that gain nothing from a sequence; a third of the cost.
 float rng_independent() { return unit_float(pcg_hash(rng_seed() ^ rng_index)); }
 
-// Whether something of the chance `chance` happens. `u` decides and is uniform afterwards, too, so that one number decides
-// several things, and evenly spread numbers spread evenly over all that can happen.
+// True with the probability `chance`. `u` decides and is uniform afterwards, so that one number makes several
+// decisions, and evenly spread numbers are spread evenly over all outcomes.
 bool rng_decide(inout float u, float chance) {
     bool happens = u < chance;
     u = min(happens ? u / chance : (u - chance) / (1.0 - chance), 1.0 - 1.0 / 16777216.0);
     return happens;
 }
 
-// One of `count`, each with the same chance; `u`: as above.
+// One of `count`, each with the same probability; `u`: as above.
 uint rng_pick(inout float u, uint count) {
     float at = u * float(count);
     uint picked = min(uint(at), count - 1);

@@ -1,6 +1,5 @@
-// Rays in the order of where they go: those of a tile of pixels are sorted by direction, because rays that are followed
-// side by side are followed the faster the longer they go the same way (Deligiannis and Schmid, It Just Works: Ray-Traced
-// Reflections in Battlefield V, GDC 2019).
+// Sorts the rays of a tile of pixels by direction, because the GPU traces neighbouring rays faster if they are coherent
+// (Deligiannis and Schmid, It Just Works: Ray-Traced Reflections in Battlefield V, GDC 2019).
 #ifndef RELIGHT_TRACE_RAY_ORDER_GLSL
 #define RELIGHT_TRACE_RAY_ORDER_GLSL
 
@@ -9,7 +8,7 @@
 
 const uint TILE_RAYS = RAY_TILE * RAY_TILE;
 
-// The pixel, which may lie beyond the picture, of the ray with number `slot` in this order, from its place in the tile.
+// The pixel (possibly outside of the picture) of the ray in sorted position `slot`; `place`: of the pixel in its tile.
 ivec2 pixel_of_slot(uint slot, uvec2 place) {
     uint tiles = (VIEW.width + RAY_TILE - 1) / RAY_TILE, tile = slot / TILE_RAYS;
     return ivec2(RAY_TILE * uvec2(tile % tiles, tile / tiles) + place);
@@ -19,17 +18,17 @@ const uvec2 NO_PLACE = uvec2(RAY_TILE);
 
 #ifdef SORTS_RAYS
 shared uint ray_counts[2][TILE_RAYS];
-shared uint wanted_count;
-shared uint wanted[TILE_RAYS];
+shared uint compacted_count;
+shared uint compacted[TILE_RAYS];
 
-// Bits of a number below 16 with room between them.
+// The bits of a number below 16, a zero bit between each two.
 uint spread_bits(uint v) {
     v = (v | v << 2) & 0x33u;
     return (v | v << 1) & 0x55u;
 }
 
-// The number of the calling thread's ray; all threads of a tile ask together. Cells of the sphere are counted along a curve
-// that keeps neighbours together (Morton's); `sent`: there is a ray at all.
+// Sorted position of this invocation's ray; all invocations of the work group must call it. Cells of the sphere are
+// ordered along a Morton curve, which keeps neighbours together. `sent`: there is a ray.
 uint ray_slot(vec3 direction, bool sent) {
     uint self = gl_LocalInvocationIndex;
     uvec2 cell = uvec2(clamp(octahedral(direction) * 8.0 + 8.0, 0.0, 15.0));
@@ -38,7 +37,7 @@ uint ray_slot(vec3 direction, bool sent) {
     barrier();
     uint rank = atomicAdd(ray_counts[0][key], 1);
     barrier();
-    // how many are before each cell (Hillis and Steele, Data Parallel Algorithms, 1986)
+    // prefix sum over the cells (Hillis and Steele, Data Parallel Algorithms, 1986)
     uint from = 0;
     for (uint step = 1; step < TILE_RAYS; step *= 2) {
         uint sum = ray_counts[from][self];
@@ -51,16 +50,17 @@ uint ray_slot(vec3 direction, bool sent) {
     return tile * TILE_RAYS + (key == 0 ? 0 : ray_counts[from][key - 1]) + rank;
 }
 
-// The place of that pixel of the tile which has number `slot` among those whose threads `want`, or NO_PLACE where they are
-// fewer: so that few of a tile have their rays followed side by side. All threads of a tile ask together.
-uvec2 wanted_place(uint slot, bool want) {
-    if (gl_LocalInvocationIndex == 0) wanted_count = 0;
+// Compacts the pixels of a tile whose invocations pass `want`, so that their rays run side by side. Returns the
+// position in the tile of compacted pixel number `slot`, or NO_PLACE if there are fewer. All invocations of the work
+// group must call it.
+uvec2 compacted_place(uint slot, bool want) {
+    if (gl_LocalInvocationIndex == 0) compacted_count = 0;
     barrier();
-    if (want) wanted[atomicAdd(wanted_count, 1)] = gl_LocalInvocationIndex;
+    if (want) compacted[atomicAdd(compacted_count, 1)] = gl_LocalInvocationIndex;
     barrier();
     uint number = slot % TILE_RAYS;
-    if (number >= wanted_count) return NO_PLACE;
-    return uvec2(wanted[number] % RAY_TILE, wanted[number] / RAY_TILE);
+    if (number >= compacted_count) return NO_PLACE;
+    return uvec2(compacted[number] % RAY_TILE, compacted[number] / RAY_TILE);
 }
 #endif
 

@@ -1,10 +1,10 @@
-// What sends the eye's path elsewhere: portals, mirrors, what reflects as its stages say, glass and liquids.
+// Redirection of primary paths by portals, mirrors, reflecting stages, glass and liquids.
 #ifndef RELIGHT_TRACE_REFLECT_REFRACT_GLSL
 #define RELIGHT_TRACE_REFLECT_REFRACT_GLSL
 #include "trace/path.glsl"
 #include "trace/dielectric.glsl"
 
-// The paths that have passed a portal after `paths` (scene/turned.rs counts alike).
+// `PATHS_*` number of paths that pass a portal after `paths`; `scene/turned.rs` numbers them the same way.
 uint paths_through(uint paths, uint portal) {
     uint count = VIEW.scene.portal_count;
     bool pairs = PATHS_PORTAL + count + count * count <= PATHS_MOST;
@@ -14,7 +14,7 @@ uint paths_through(uint paths, uint portal) {
     return PATHS_PORTAL + count + last * count + portal;
 }
 
-// The portal that the surface belongs to, or portal_count.
+// The portal that the surface belongs to, or `portal_count`.
 uint portal_at(SurfacePoint p) {
     for (uint i = 0; i < VIEW.scene.portal_count; i++) {
         vec4 plane = Portals(VIEW.scene.portals).at[i].plane;
@@ -23,7 +23,7 @@ uint portal_at(SurfacePoint p) {
     return VIEW.scene.portal_count;
 }
 
-// Goes on as seen through the portal: reflected, or from the far camera.
+// Continues the path through a portal: mirrored, or from the far camera.
 void pass_portal(inout Path path, SurfacePoint p, float t, uint index) {
     PortalRecord portal = Portals(VIEW.scene.portals).at[index];
     if (portal.mirror != 0) {
@@ -47,7 +47,7 @@ void pass_portal(inout Path path, SurfacePoint p, float t, uint index) {
     path.layer_mask = MASK_TRANSLUCENT | MASK_THIRD_TRANSLUCENT;
 }
 
-// Goes on from a surface point that lies `t` ahead, on the side of `normal`.
+// Continues the path from a surface point at the distance `t`, on the side of `normal`.
 void redirect_path(inout Path path, SurfacePoint p, float t, vec3 normal, vec3 direction) {
     path.origin = offset_ray(p.position, normal);
     path.direction = direction;
@@ -57,7 +57,8 @@ void redirect_path(inout Path path, SurfacePoint p, float t, vec3 normal, vec3 d
     lit_plane = vec4(0.0);
 }
 
-// Goes on mirrored at a surface that faces the path with `face`; `normal`: the same, bent as `bend` says.
+// Continues the path mirrored. `face`: geometric normal on the path's side; `normal`: shading normal, distorted as
+// `bend` (`BENT_*`) says.
 void reflect_path(inout Path path, SurfacePoint p, float t, vec3 face, vec3 normal, uint bend) {
     vec3 mirrored = reflect(path.direction, normal);
     if (dot(mirrored, face) <= 0.0) mirrored = reflect(path.direction, face);
@@ -68,21 +69,21 @@ void reflect_path(inout Path path, SurfacePoint p, float t, vec3 face, vec3 norm
     path.layer_mask = MASK_TRANSLUCENT | MASK_THIRD_TRANSLUCENT;
 }
 
-// 1: a pass of its own, which follows the paths that were split once more, to what the pixels of the other field show.
+// 1: the pass that follows each split path to the other field's surface.
 layout(constant_id = 2) const uint OTHER_FIELD = 0;
 
-// Whether the path follows what a surface reflects, and what either side's part is to be multiplied by. At the first
-// such surface the pixels take turns like the fields of a chessboard, so that each keeps showing one thing from frame to
-// frame; `composite` puts the fields together. In reference mode a pixel takes turns from frame to frame. Behind it
-// chance decides, by what each side may contribute. All three have the sum of both sides as their mean.
+// Whether the path follows the reflection; `weight`: factor of the followed side. At the first such surface pixels
+// alternate like a checkerboard, fixed over frames, and `composite` joins both fields; in reference mode a pixel
+// alternates over frames. At later surfaces a random number decides, by the contribution of each side. In all cases the
+// mean is the sum of both sides.
 bool follows_reflection(inout Path path, float reflected, float rest, out float weight) {
     weight = 1.0;
     if (!(reflected >= MIN_REFLECTION)) return false;
     if (!(rest >= MIN_REFLECTION)) return true;
     if (path.field == 0) {
         bool accumulates = (VIEW.flags & VIEW_ACCUMULATE) != 0;
-        uint turn = uint(LAUNCH_PIXEL.x) + uint(LAUNCH_PIXEL.y) + (accumulates ? VIEW.seed : 0u);
-        path.field = 1u + ((turn + OTHER_FIELD) & 1u);
+        uint parity = uint(LAUNCH_PIXEL.x) + uint(LAUNCH_PIXEL.y) + (accumulates ? VIEW.seed : 0u);
+        path.field = 1u + ((parity + OTHER_FIELD) & 1u);
         weight = 2.0;
         return path.field == 2;
     }
@@ -92,8 +93,8 @@ bool follows_reflection(inout Path path, float reflected, float rest, out float 
     return follows;
 }
 
-// Passes a surface that reflects as its stages say; true if the path was mirrored there.
-bool pass_shine(inout Path path, SurfacePoint p, Layer layer, float t) {
+// Handles a surface whose stages reflect; true if the path is mirrored.
+bool pass_reflection(inout Path path, SurfacePoint p, Layer layer, float t) {
     vec3 face = dot(p.face_normal, path.direction) > 0.0 ? -p.face_normal : p.face_normal;
     vec3 normal = dot(p.normal, face) < 0.0 ? -p.normal : p.normal;
     float weight;
@@ -109,8 +110,8 @@ bool pass_shine(inout Path path, SurfacePoint p, Layer layer, float t) {
     return false;
 }
 
-// Passes the surface of glass or of a liquid; true if the path was mirrored or refracted there. Glass in maps is panes:
-// the second face undoes what the first one bends (and is culled as a rule), so that a ray passes straight.
+// Handles the surface of glass or a liquid; true if the path is mirrored or refracted. Glass in maps is panes: the
+// second face, usually culled, reverses the refraction of the first, so rays pass straight.
 bool pass_dielectric(inout Path path, SurfacePoint p, Material material, SeenLayer seen, float width, float t) {
     Layer layer = seen.linear;
     Dielectric dielectric = material.dielectric;
@@ -143,7 +144,7 @@ bool pass_dielectric(inout Path path, SurfacePoint p, Material material, SeenLay
     path.transmittance *= dielectric.scale;
     if (!liquid || is_over(path)) return false;
     vec3 refracted = refract(path.direction, normal, 1.0 / eta);
-    // a ripple may turn the ray back: it goes on straight then
+    // a ripple may refract the ray backwards; it continues straight then
     if (dot(refracted, face) >= 0.0) refracted = path.direction;
     path.absorption = enters ? dielectric.absorption : vec3(0.0);
     path.bent = max(path.bent, bend);

@@ -1,6 +1,6 @@
 #version 460
-// Chooses for each pixel the light that it sends a ray to, and the point on it; direct.rgen sends the ray. A pass by itself,
-// because a ray is followed faster the less has to be kept over it.
+// Samples for each pixel a light and a point on it; `direct.rgen` traces the shadow ray. A pass of its own, because
+// rays are traced faster with less live state.
 #define SORTS_RAYS
 #include "trace/lights.glsl"
 #include "trace/gradient_reproject.glsl"
@@ -31,5 +31,5 @@ void main() {
         }
     }
     uint slot = ray_slot(sampled.direction, max_component(sampled.light) > 0.0);
-    sampled_light_write(slot, gl_LocalInvocationID.xy, wanted_place(slot, sun), sampled, random);
+    sampled_light_write(slot, gl_LocalInvocationID.xy, compacted_place(slot, sun), sampled, random);
 }

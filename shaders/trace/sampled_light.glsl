@@ -1,4 +1,4 @@
-// The light that a pixel sends a ray to: written by sample_lights.comp, read by direct.rgen.
+// The sampled light of a pixel: written by `sample_lights.comp`, read by `direct.rgen`.
 #ifndef RELIGHT_TRACE_SAMPLED_LIGHT_GLSL
 #define RELIGHT_TRACE_SAMPLED_LIGHT_GLSL
 
@@ -12,8 +12,8 @@ struct SampledLight {
     ivec2 pixel;
 };
 
-// `slot`: see ray_order.glsl; `place`: of the pixel in its tile; `sun_place`: that of the pixel with the same number among
-// those that send a ray to a sun, too, or NO_PLACE; `dither`: see pack_light.
+// `slot`: see `ray_order.glsl`; `place`: of the pixel in its tile; `sun_place`: of the pixel with the same number among
+// those that also trace a ray to a sun, or NO_PLACE; `dither`: see `pack_light`.
 void sampled_light_write(uint slot, uvec2 place, uvec2 sun_place, LightSample s, float dither) {
     bool sun = sun_place != NO_PLACE;
     SampledLightTexels(VIEW.scratch).at[slot] = pack_light_ray(s, place | (sun ? sun_place << 4 : uvec2(0)), sun, dither);
@@ -28,7 +28,7 @@ SampledLight sampled_light_read(uint slot) {
     return sampled;
 }
 
-// Whether there is a pixel with this number that sends a ray to a sun, and which.
+// Whether a pixel with this number traces a ray to a sun, and its position.
 bool samples_sun(uint slot, out ivec2 pixel) {
     uvec4 packed = SampledLightTexels(VIEW.scratch).at[slot];
     pixel = pixel_of_slot(slot, spare_of_direction(packed.xy) >> 4);

@@ -1,10 +1,10 @@
-// Sky by direction: the box of six images, the cloud stages on a sphere around the world, and the picture of the sun.
+// Sky radiance by direction: the box of six images, cloud stages on a sphere around the world, image of the sun.
 #ifndef RELIGHT_TRACE_SKY_GLSL
 #define RELIGHT_TRACE_SKY_GLSL
 
 #include "trace/layer.glsl"
 
-// The box face that a direction points at and where on it. Order of the faces: +X rt, +Y bk, -X lf, -Y ft, +Z up, -Z dn.
+// Box face and image coordinates of a direction. Faces: +X rt, +Y bk, -X lf, -Y ft, +Z up, -Z dn.
 void sky_face(vec3 d, out uint face, out vec2 uv) {
     vec3 m = abs(d);
     vec2 st;
@@ -35,7 +35,7 @@ vec3 sky_point(uint face, vec2 uv) {
 }
 
 // Texture coordinates of the clouds: the point where the direction meets a sphere of radius 4096 + height around a
-// centre 4096 below the eye, its unit vector's arc cosines.
+// centre 4096 below the camera; the arc cosines of its unit vector.
 vec2 cloud_uv(vec3 d, float height) {
     const float radius = 4096.0;
     float along = -d.z * radius + sqrt(max(d.z * d.z * radius * radius + 2.0 * radius * height + height * height, 0.0));
@@ -43,8 +43,8 @@ vec2 cloud_uv(vec3 d, float height) {
     return acos(clamp(v.xy, -1.0, 1.0));
 }
 
-// How much those coordinates change with the direction: the geometric mean of both ways, by differences. Overhead, where the
-// sphere is near, it is a few times less than at the horizon.
+// Change of these coordinates with the direction: the geometric mean of both axes, by differences. Overhead, where the
+// sphere is near, it is a few times smaller than at the horizon.
 float cloud_scale(vec3 d, vec2 uv, float height) {
     const float step_d = 1.0 / 128.0;
     vec3 aside = normalize(abs(d.z) < 0.9 ? vec3(-d.y, d.x, 0.0) : vec3(d.z, 0.0, -d.x));
@@ -53,7 +53,7 @@ float cloud_scale(vec3 d, vec2 uv, float height) {
     return sqrt(abs(along_x.x * along_y.y - along_x.y * along_y.x)) / step_d;
 }
 
-// What a blend factor multiplies by, of colours as they are displayed. The frame buffer's alpha reads as one.
+// A blend factor, as displayed. The frame buffer's alpha reads as one.
 vec3 displayed_factor(uint factor, vec4 source, vec3 destination) {
     switch (factor) {
     case BLEND_ONE: case BLEND_DST_ALPHA: return vec3(1.0);
@@ -67,7 +67,7 @@ vec3 displayed_factor(uint factor, vec4 source, vec3 destination) {
     }
 }
 
-// Whether the engine lets fog take from what a material adds to the display: by how its first stage blends.
+// Whether the engine's fog reduces what a material adds to the display, by the blending of its first stage.
 bool fades_in_fog(Material material) {
     if (material.stage_count == 0) return false;
     Stage stage = Stages(VIEW.materials.stages).at[material.stage_first];
@@ -76,7 +76,7 @@ bool fades_in_fog(Material material) {
     return (source == BLEND_ONE && target == BLEND_ONE) || (source == BLEND_ZERO && target == BLEND_ONE_MINUS_SRC_COLOR);
 }
 
-// What a blended stage draws behind fog that leaves `clear` of it, by how it blends.
+// A blended stage behind fog that leaves `clear` of it.
 vec4 faded(Stage stage, vec4 source, float clear) {
     if (stage.blend_dst == BLEND_ONE_MINUS_SRC_ALPHA && stage.blend_src == BLEND_SRC_ALPHA) return vec4(source.rgb, source.a * clear);
     if (stage.blend_dst == BLEND_ONE_MINUS_SRC_ALPHA && stage.blend_src == BLEND_ONE) return source * clear;
@@ -85,8 +85,8 @@ vec4 faded(Stage stage, vec4 source, float clear) {
     return fades ? vec4(source.rgb * clear, source.a) : source;
 }
 
-// The stages of clouds or of the sun over what lies behind them, behind fog that leaves `clear` of them. No light falls on
-// a sky: it is a picture, and put together as the engine does it, in displayed colours.
+// Stages of clouds or of the sun over `below`, behind fog that leaves `clear` of them. No light falls on a sky: its
+// stages are blended in displayed values, as in the engine.
 vec3 displayed_stages(SurfacePoint p, Footprint width, vec3 below, float clear) {
     Material material = material_of(p.triangle.material);
     Instance instance = instance_of(p.instance);
@@ -102,7 +102,7 @@ vec3 displayed_stages(SurfacePoint p, Footprint width, vec3 below, float clear) 
     return below;
 }
 
-// Whether the clouds cover the direction; `p` becomes their point in it.
+// Whether clouds cover the direction; `p` becomes their point in it.
 bool clouds_at(inout SurfacePoint p, vec3 d, uint face, float height) {
     if (face == 5u || material_of(p.triangle.material).stage_count == 0) return false;
     p.stage.st = cloud_uv(d, height);
@@ -112,7 +112,7 @@ bool clouds_at(inout SurfacePoint p, vec3 d, uint face, float height) {
     return true;
 }
 
-// Whether the picture of the sun covers the direction; `p` becomes its point in it.
+// Whether the image of the sun covers the direction; `p` becomes its point in it.
 bool sun_at(inout SurfacePoint p, vec3 d) {
     SunDisc sun = VIEW.scene.sun;
     float ahead = dot(d, sun.direction);
@@ -129,9 +129,9 @@ bool sun_at(inout SurfacePoint p, vec3 d) {
     return true;
 }
 
-// Displayed radiance of the sky in direction d. `p`: the sky surface that was hit; its lightmap index is the sky's.
-// `with_sun`: with the picture of the sun, which is seen but gives no light: that is a light's. `fog`: displayed colour of
-// the fog over the clouds, and its share.
+// Radiance of the sky in direction d. `p`: point on the sky surface; its lightmap index is the index of the sky.
+// `with_sun`: includes the image of the sun, which is visible but emits nothing: a `SunLight` does. `fog`: displayed
+// colour of the fog over the clouds, and its share.
 vec3 sky_radiance(SurfacePoint p, vec3 d, float spread, bool with_sun, vec4 fog) {
     if ((VIEW.flags & VIEW_FAST_SKY) != 0) return vec3(0.0);
     SkyRecord sky = Skies(VIEW.scene.skies).at[p.triangle.lightmap];

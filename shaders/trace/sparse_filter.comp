@@ -1,15 +1,15 @@
 #version 460
-// A pass of the cheap filter: a joint bilateral filter of eight taps that are scattered over a disc, turned from pixel
-// to pixel and frame to frame, so that neighbours see different ones and the next pass, with a smaller disc, evens out
-// what they found (Willberger, Musterle, Bergmann, Deferred Hybrid Path Tracing, Ray Tracing Gems, 2019, chapter 26: few
-// taps in several passes in place of a dense kernel). No variance is kept: that the light is noise and not a shadow
-// is judged by how many frames it comes from.
+// A pass of the sparse filter: a joint bilateral filter of eight taps scattered over a disc. The pattern is rotated
+// from pixel to pixel and frame to frame, so that neighbours use different taps and the next pass, with a smaller disc,
+// averages their results (Willberger, Musterle, Bergmann, Deferred Hybrid Path Tracing, Ray Tracing Gems, 2019, chapter
+// 26: few taps in several passes in place of a dense kernel). It keeps no variance: the number of accumulated frames
+// estimates the noise.
 #define OWN_PUSH
 #include "trace/sparse_filter.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// Whether this is the last pass, which leaves the light where direct light was.
+// 1: last pass; writes the image of direct light.
 layout(constant_id = 0) const uint LAST = 0;
 
 void main() {
@@ -24,16 +24,16 @@ void main() {
     vec3 normal = sparse_normal(middle.guide);
     vec2 depth_gradient = imageLoad(images_rg16f[DENOISE.depth_gradient], pixel).xy;
     float frames = max(sparse_frames(middle.guide), 1.0);
-    // the noise of one frame's light is about as large as the light
+    // the noise of one frame is about as large as the light
     float light_scale = 1.5 * sqrt(frames);
     float plane_scale = 1.0 / (0.01 + 2.0 * VIEW.camera.pixel_spread * float(push.spacing));
 
-    float turn = 2.0 * PI * dither(pixel, DITHER_TURN + push.spacing);
+    float rotation = 2.0 * PI * dither(pixel, DITHER_ROTATION + push.spacing);
     vec3 sum = middle.light;
     float total = 1.0;
     for (int i = 0; i < 8; i++) {
         // radii that cover a disc evenly, angles that are far apart (Vogel's spiral)
-        float angle = turn + float(i) * 2.39996323;
+        float angle = rotation + float(i) * 2.39996323;
         vec2 offset = round(vec2(cos(angle), sin(angle)) * sqrt((float(i) + 0.5) / 8.0) * float(push.spacing));
         ivec2 tap = pixel + ivec2(offset);
         if (!inside(tap)) continue;
@@ -42,7 +42,7 @@ void main() {
         float off_plane = abs((1.0 + dot(depth_gradient, offset)) * sparse_depth(other.guide) / depth - 1.0);
         float alike = max(dot(normal, sparse_normal(other.guide)), 0.0);
         alike *= alike; alike *= alike; alike *= alike;
-        // of the two values the larger one sets the scale, so that bright noise is not left alone by all around it
+        // the larger of both values sets the scale, so that bright outliers are filtered too
         float away = abs(luminance(other.light) - value) * light_scale / max(max(value, luminance(other.light)), 1.0e-6);
         float weight = alike * exp(-off_plane * plane_scale - away);
         sum += other.light * weight;

@@ -1,5 +1,5 @@
-// The cheap filter's texel: 8 bytes with the light, which is not told apart here, depth, the bit of reflections where the
-// depth has its sign, a normal of 2 x 6 bits and the number of frames, up to 15.
+// Texel of the sparse filter, 8 bytes: the sum of direct and indirect light; depth, with the reflection bit in place of
+// its sign; a normal of 2 x 6 bits; the number of frames, up to 15.
 #ifndef RELIGHT_TRACE_SPARSE_FILTER_GLSL
 #define RELIGHT_TRACE_SPARSE_FILTER_GLSL
 
@@ -7,7 +7,7 @@
 
 struct SparseTexel {
     vec3 light;
-    uint guide; // 0: nothing to light
+    uint guide; // 0: no surface
 };
 
 const uint SPARSE_FRAMES = 15;

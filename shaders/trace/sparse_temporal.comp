@@ -1,6 +1,6 @@
 #version 460
-// First pass of the cheap filter: the light of this frame joins the running mean of those before, where the surface was
-// in sight.
+// First pass of the sparse filter: adds the light of this frame to the running mean, where the surface was visible in
+// the last frame.
 #include "trace/sparse_filter.glsl"
 #include "trace/depth_gradient.glsl"
 
@@ -24,16 +24,16 @@ void main() {
 
     vec3 old = vec3(0.0);
     float frames = 0.0, sum = 0.0;
-    Before before = before_of(pixel);
-    if ((DENOISE.flags & DENOISE_HISTORY) != 0 && before.depth > 0.0) {
-        float tolerance = before.depth * (0.01 + 2.0 * (abs(depth_gradient.x) + abs(depth_gradient.y))) + 0.1;
-        vec2 low = floor(before.pixel), part = before.pixel - low;
+    LastPixel last = last_pixel_of(pixel);
+    if ((DENOISE.flags & DENOISE_HISTORY) != 0 && last.depth > 0.0) {
+        float tolerance = last.depth * (0.01 + 2.0 * (abs(depth_gradient.x) + abs(depth_gradient.y))) + 0.1;
+        vec2 low = floor(last.pixel), part = last.pixel - low;
         for (int i = 0; i < 4; i++) {
             ivec2 offset = ivec2(i & 1, i >> 1), tap = ivec2(low) + offset;
             float weight = (offset.x == 1 ? part.x : 1.0 - part.x) * (offset.y == 1 ? part.y : 1.0 - part.y);
             if (weight < 1.0e-3 || !inside(tap)) continue;
             SparseTexel other = sparse_read(DENOISE.history, tap);
-            if (other.guide == 0 || (other.guide & REFLECTION_BIT) != reflection || abs(sparse_depth(other.guide) - before.depth) > tolerance
+            if (other.guide == 0 || (other.guide & REFLECTION_BIT) != reflection || abs(sparse_depth(other.guide) - last.depth) > tolerance
                 || dot(sparse_normal(other.guide), normal) < 0.8) continue;
             old += other.light * weight;
             frames += sparse_frames(other.guide) * weight;

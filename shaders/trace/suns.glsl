@@ -1,16 +1,16 @@
-// The ray that a pixel sends to a sun, besides that to another light: a sun that something hides would outshine all that is
-// left in its shadow, were it one of them.
+// The shadow ray to a sun, in addition to the ray to another light: as one of the sampled lights, an occluded sun would
+// outweigh all lights that reach its shadow.
 #ifndef RELIGHT_TRACE_SUNS_GLSL
 #define RELIGHT_TRACE_SUNS_GLSL
 
 #include "trace/lights.glsl"
 #include "trace/gradient_reproject.glsl"
 
-// Where less than this part of a sun's light falls, fewer rays are sent, each for as much more: walls below a sun that
-// stands overhead see the edge of its disc, and so would send every other of their rays for next to nothing.
+// Where the cosine to a sun is below this, fewer rays are traced, with larger weights: walls below a sun overhead see
+// only the edge of its disc, and half of their rays would contribute next to nothing.
 const float WEAK_SUN = 1.0 / 64.0;
 
-// Its light without shadows; none where no ray is to be sent. The same for every pass that asks.
+// Unshadowed light of the sample; none if no ray is to be traced. Every pass gets the same sample.
 LightSample sun_sample(LightTask task) {
     rng_begin(uvec2(task.pixel), task.seed, STREAM_SUN);
     vec2 u = rng_next2();

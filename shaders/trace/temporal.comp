@@ -1,47 +1,46 @@
 #version 460
-// The light of this frame joins that of the frames before, where the surface that the pixel shows was in sight then
-// (Schied et al., Spatiotemporal Variance-Guided Filtering, 2017, section 4.1 and 4.2), the more of it the more the
-// light itself has changed (Schied et al., Gradient Estimation for Real-Time Adaptive Temporal Filtering, 2018,
-// section 4.4). Direct and indirect light each have their history. Works on light without albedo, so textures stay
-// sharp.
+// A-SVGF: joins the light of this frame with the history, where the surface was visible in the last frame (Schied et
+// al., Spatiotemporal Variance-Guided Filtering, 2017, sections 4.1 and 4.2). The larger the change of the light
+// itself, the less history is used (Schied et al., Gradient Estimation for Real-Time Adaptive Temporal Filtering, 2018,
+// section 4.4). Direct and indirect light have separate histories. Light is demodulated, so that textures stay sharp.
 #include "trace/subsample.glsl"
 #include "trace/depth_gradient.glsl"
 
-// Whether there is bounced light at all.
+// 1: there is bounced light.
 layout(constant_id = 0) const uint BOUNCES = 1;
 
 // Least weight of a new frame, of direct and indirect light.
 const vec2 MIN_WEIGHT = vec2(0.05, 0.035);
 const float MIN_VARIANCE_WEIGHT = 0.1;
-// A change of the light by this part counts as much as the noise of one frame, filtered.
+// Filtered noise of one frame, as a relative change of the light.
 const float NOISE = 0.15;
-// Frames before the variance over time can be trusted; until then it is taken over space.
+// Frames after which the variance over time is reliable; before, it is estimated over space.
 const float TRUSTED_FRAMES = 4.0;
-// Square of the difference of two normals' components beyond which they are of two surfaces: a cosine of 0.85.
-const float MOST_BEND = 67.5;
-// How far up and down it is taken from, of the pixels of the group.
-const int AROUND = 2;
+// Largest squared difference of the guides' normals on one surface: a cosine of 0.85.
+const float MAX_NORMAL_DIFFERENCE = 67.5;
+// Vertical radius of the spatial variance estimate, pixels of the work group.
+const int VARIANCE_RADIUS = 2;
 
-// Levels of this frame's light of the group's pixels.
+// Levels of this frame's light in the work group.
 shared vec2 levels[TILE * TILE];
 
-// What the last frame left; all zero: nothing.
+// History of a pixel; weight 0: none.
 struct History {
-    LightTexel light; // whose variance is that of one frame's
+    LightTexel light; // its variance is that of one frame
     vec2 frames;
     float weight;
 };
 
-// Colours are summed up as codes, times the level. `normal`: components of the guide; `range`: least and greatest inverse of
-// the depth that is the surface's.
+// Adds a tap of the history. Colours are summed as codes, weighted by the level. `normal`: components of the guide;
+// `range`: least and greatest inverse depth of the same surface.
 void add_tap(inout History h, ivec2 tap, vec3 normal, vec2 range, float weight) {
     if (!inside(tap) || !(weight > 0.0)) return;
     uint place = place_of(tap);
     uvec4 texel = LightTexels(DENOISE.history).at[place];
     float inverse = guide_inverse(texel.w);
     vec3 bend = guide_components(texel.w) - normal;
-    // where there is nothing to light the inverse is 0
-    if (inverse < range.x || inverse > range.y || dot(bend, bend) > MOST_BEND) return;
+    // the inverse depth of a pixel without a surface is 0
+    if (inverse < range.x || inverse > range.y || dot(bend, bend) > MAX_NORMAL_DIFFERENCE) return;
     uint past = Pasts(DENOISE.last_past).at[place];
     vec2 level = unpackHalf2x16(texel.x) * weight;
     h.light.level += level;
@@ -56,17 +55,17 @@ History history_at(ivec2 pixel, uint guide, vec2 depth_gradient) {
     const History NONE = History(LightTexel(vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), 0), vec2(0.0), 0.0);
     History h = NONE;
     if ((DENOISE.flags & DENOISE_HISTORY) == 0) return h;
-    Before before = before_of(pixel);
-    if (!(before.depth > 0.0)) return h;
-    // depths of taps differ by about as much as those of this frame's pixels, and by rounding
-    float tolerance = before.depth * (0.01 + 2.0 * (abs(depth_gradient.x) + abs(depth_gradient.y))) + 0.1;
-    vec2 range = INVERSE_SCALE / vec2(before.depth + tolerance, max(before.depth - tolerance, NEAREST_DEPTH));
+    LastPixel last = last_pixel_of(pixel);
+    if (!(last.depth > 0.0)) return h;
+    // tolerance for the depth gradient of the taps and for rounding
+    float tolerance = last.depth * (0.01 + 2.0 * (abs(depth_gradient.x) + abs(depth_gradient.y))) + 0.1;
+    vec2 range = INVERSE_SCALE / vec2(last.depth + tolerance, max(last.depth - tolerance, NEAREST_DEPTH));
     vec3 normal = guide_components(guide);
-    vec2 low = floor(before.pixel), part = before.pixel - low;
+    vec2 low = floor(last.pixel), part = last.pixel - low;
     for (int i = 0; i < 4; i++) {
         ivec2 offset = ivec2(i & 1, i >> 1);
         float weight = (offset.x == 1 ? part.x : 1.0 - part.x) * (offset.y == 1 ? part.y : 1.0 - part.y);
-        // a place that is a rounding error off a pixel's middle is there
+        // weights near 0 are rounding errors of a position at the centre of a pixel
         add_tap(h, ivec2(low) + offset, normal, range, weight < 1.0e-3 ? 0.0 : weight);
     }
     if (h.weight < 0.01) return NONE;
@@ -79,13 +78,14 @@ History history_at(ivec2 pixel, uint guide, vec2 depth_gradient) {
     return h;
 }
 
-// Variance of the level of this frame's light around the pixel, of what the group has of its surface: of every other row and
-// column, which show the same where pixels take turns. Where one pixel asks for it the others wait, so it reads no memory.
+// Variance of the level of this frame's light around the pixel, over pixels of the work group on the same surface:
+// every other row and column, which belong to the same field of the checkerboard. Reads shared memory only, because the
+// whole work group waits for a single pixel that needs it.
 vec2 variance_around(float depth, vec2 depth_gradient) {
     ivec2 own = ivec2(gl_LocalInvocationID.xy);
     vec4 moments = vec4(0.0);
     float count = 0.0;
-    for (int y = max(own.y - AROUND, own.y & 1); y <= min(own.y + AROUND, TILE - 1); y += 2) {
+    for (int y = max(own.y - VARIANCE_RADIUS, own.y & 1); y <= min(own.y + VARIANCE_RADIUS, TILE - 1); y += 2) {
         for (int x = own.x & 1; x < TILE; x += 2) {
             float other = depths[(y + 1) * (TILE + 2) + x + 1];
             if (other == 0.0 || abs(depth / other - 1.0 - dot(depth_gradient, vec2(ivec2(x, y) - own))) > 0.02) continue;
@@ -98,17 +98,17 @@ vec2 variance_around(float depth, vec2 depth_gradient) {
     return max(moments.zw - moments.xy * moments.xy, vec2(0.0));
 }
 
-// Of each stratum of the group the pixel that may be kept for the next frame's gradient, as `pack_place` does it.
+// For each stratum of the work group: the pixel that may become the next frame's gradient sample (`pack_place`).
 const int STRATA = TILE / STRATUM + 2;
 shared uint choices[STRATA * STRATA];
-// That pixel is a gradient sample itself, whose random numbers are older than this frame; bounced light was gathered for it.
+// That pixel is a gradient sample itself, with random numbers older than this frame; it has gathered bounced light.
 const uint AGAIN = 1u << 31, GATHERED = 1u << 30;
 
 uint choice_of(ivec2 stratum) {
     stratum = min(stratum, (ivec2(VIEW.width, VIEW.height) - 1) / STRATUM);
     GradientPixel c = GradientPixel(false, false, 0, ivec2(0));
     if ((DENOISE.flags & DENOISE_GRADIENTS) != 0) c = gradient_pixel_at(stratum);
-    // one whose turn it is where bounced light is not gathered everywhere: in each direction there are one or two
+    // with subsampled bounced light a pixel that gathers: one or two along each axis of the stratum
     bool sparse = (VIEW.flags & VIEW_SUBSAMPLED_BOUNCE) != 0;
     int random = int(4.0 * dither(stratum, DITHER_SAMPLE));
     ivec2 corner = stratum * STRATUM, first, choice;
@@ -118,12 +118,12 @@ uint choice_of(ivec2 stratum) {
     choice.x = first.x + (first.x == 0 && (random & 1) != 0 ? 2 : 0);
     int index = choice.y * STRATUM + choice.x;
     if (c.valid && c.index == index) {
-        // another of the same turn, or any other
+        // another pixel that gathers, or any other
         if (first.x == 0) index += choice.x == 0 ? 2 : -2;
         else if (first.y == 0) index = (2 - choice.y) * STRATUM;
         else index = 0;
     }
-    // at the right and the lower edge strata are cut off
+    // strata are cut off at the right and lower edge
     ivec2 pixel = min(pixel_of(stratum, index), ivec2(VIEW.width, VIEW.height) - 1);
     return pack_place(pixel) | (c.valid && pixel == pixel_of(stratum, c.index) ? AGAIN : 0) | (is_gathered(pixel) ? GATHERED : 0);
 }
@@ -178,11 +178,12 @@ void main() {
         frames = h.frames;
         vec2 weight = MIN_WEIGHT, change = vec2(0.0);
         if ((DENOISE.flags & DENOISE_GRADIENTS) != 0) {
-            // The part of the light that has changed is error in the history; against the noise of the light it is what
-            // decides. As only this frame sees the change, what is older than it loses its say for good.
-            // A light that comes or goes changes for many frames, so the history errs by more than the last change: the
-            // weight is the steady gain of Kalman's filter (A New Approach to Linear Filtering and Prediction Problems,
-            // 1960) for a value that wanders by `change` a frame, observed with the noise, which is relative to what is left.
+            // A change of the light makes the history wrong by that fraction; the weight follows from the ratio of
+            // change and noise. Only this frame detects the change, so the number of frames is reduced for good. A
+            // light that is switched changes for many frames, so the error of the history exceeds the last change. The
+            // weight is the steady-state gain of a Kalman filter (A New Approach to Linear Filtering and Prediction
+            // Problems, 1960) for a value that drifts by `change` a frame, observed with noise proportional to the
+            // unchanged part.
             change = imageLoad(images_rg16f[DENOISE.gradient], pixel / STRATUM).xy;
             vec2 left = NOISE * (1.0 - change);
             vec2 ratio = change * change / max(left * left, 1.0e-6);
@@ -191,7 +192,7 @@ void main() {
             weight = max(weight, change);
         }
         weight = max(weight, 1.0 / (frames + 1.0));
-        // what is known to be change is no noise
+        // a known change is not noise
         vec2 away = (1.0 - change) * (light.level - h.light.level);
         variance = mix(h.light.variance * (1.0 - change), away * away, max(weight, MIN_VARIANCE_WEIGHT));
         light.level = mix(h.light.level, light.level, weight);
@@ -203,7 +204,7 @@ void main() {
         vec2 around = variance_around(depth, depth_gradient);
         variance = mix(variance, max(variance, around), lessThan(frames, vec2(TRUSTED_FRAMES)));
     }
-    // of the mean over the frames: what has settled is left as it is
+    // variance of the mean over frames, so that converged pixels are filtered little
     light.variance = variance / min(frames, 2.0 / MIN_WEIGHT - 1.0);
 
     LightTexels(DENOISE.fresh).at[place_of(pixel)] = pack_texel(light, dither(pixel, DITHER_FRESH));

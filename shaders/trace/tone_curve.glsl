@@ -1,8 +1,8 @@
 // The tone curve: Uchimura's (HDR theory and practice, CEDEC 2017) with maximum brightness P = 1, contrast a = 1, linear
-// section from m = 0 on, of length l = KNEE, and no toe: the identity up to KNEE, so that textures look as their authors
-// saw them, and above it a film's shoulder, P - (P - KNEE) exp(-a (x - KNEE) / (P - KNEE)), with a continuous slope.
-// Radiance 1, the white of the classic look, shows as 0.85 of white, and what is brighter still gains.
-// `relight::exposure::tone_curve` is the same on the CPU.
+// section from m = 0 on, of length l = KNEE, and no toe. It is the identity up to KNEE, so that textures keep their
+// authors' colours, and above it a shoulder, P - (P - KNEE) exp(-a (x - KNEE) / (P - KNEE)), with a continuous slope.
+// Radiance 1, the white of the classic look, displays as 0.85 of white; brighter values approach white.
+// `relight::exposure::tone_curve` is the same on the CPU; a test compares them.
 #ifndef RELIGHT_TRACE_TONE_CURVE_GLSL
 #define RELIGHT_TRACE_TONE_CURVE_GLSL
 

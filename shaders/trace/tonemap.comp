@@ -1,5 +1,5 @@
 #version 460
-// From linear radiance to the picture: bloom, exposure, tone curve, display encoding.
+// From linear radiance to the displayed picture: bloom, exposure, tone curve, display encoding.
 #include "trace/bloom.glsl"
 #include "trace/exposure.glsl"
 #include "trace/picture.glsl"
@@ -7,8 +7,8 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// The bloom at a pixel, between its texels.
-vec3 spread_light(ivec2 pixel) {
+// The bloom at a pixel, interpolated between its texels.
+vec3 bloom_at(ivec2 pixel) {
     uint start = bloom_start(BLOOM_LEVELS);
     ivec2 size = bloom_size(0);
     vec2 at = (vec2(pixel) + 0.5) / float(BLOOM_FIRST) - 0.5;
@@ -26,7 +26,7 @@ void main() {
     if (target.x < 0 || target.y < 0 || target.x >= int(VIEW.target.width) || target.y >= int(VIEW.target.height)) return;
     float exposure = ExposureState(VIEW.exposure.state).exposure * exp2(VIEW.exposure.base + VIEW.exposure.bias);
     vec3 radiance = picture_load(pixel);
-    if (VIEW.post.bloom != 0) radiance = mix(radiance, spread_light(pixel), VIEW.post.bloom_strength);
+    if (VIEW.post.bloom != 0) radiance = mix(radiance, bloom_at(pixel), VIEW.post.bloom_strength);
     radiance = max(radiance * exposure, 0.0);
     target_store(target, encode_display(tone_curve(radiance)));
 }

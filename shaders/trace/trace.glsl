@@ -1,7 +1,7 @@
-// The tracer: how a pass asks for rays. Passes use these functions only, so the same pass is compiled for three
-// tracers: the ray tracing pipeline, whose hit shaders report what was hit and decide cut-outs; ray queries
-// (TRACER_QUERY); and our own hierarchies (TRACER_COMPUTE), which need no ray tracing hardware. The last two are walked
-// in a compute shader. A fourth one (TRACER_NONE) sends none, for what can be told without.
+// The common interface of the tracers. Passes trace rays through these functions only, so that each pass is compiled
+// for three tracers: the ray tracing pipeline, whose hit shaders report hits and decide cut-outs; ray queries
+// (TRACER_QUERY) and own hierarchies (TRACER_COMPUTE), both in compute shaders, the latter without ray tracing
+// hardware. A fourth tracer (TRACER_NONE) sends no rays, for pixels that need none.
 #ifndef RELIGHT_TRACE_TRACE_GLSL
 #define RELIGHT_TRACE_TRACE_GLSL
 
@@ -39,21 +39,21 @@ Hit payload_hit() {
     return Hit(payload.geometry, payload.primitive, payload.barycentrics, payload.t);
 }
 
-// The nearest thing of the mask between tmin and tmax, translucent ones left out; with `any_hit` only whether there is
-// one: `geometry` is NO_HIT if not, and nothing else of the answer counts.
+// The nearest hit of the mask between tmin and tmax, without translucent surfaces. With `any_hit` only `geometry` is
+// valid: NO_HIT if the ray hits nothing.
 Hit trace_ray(vec3 origin, float tmin, vec3 direction, float tmax, uint mask, bool any_hit) {
-    rays_asked++;
-    // where nothing reports, the ray was blocked
+    ray_count++;
+    // the miss shader reports NO_HIT; without a report the ray is blocked
     payload.geometry = any_hit ? 0 : NO_HIT;
     uint flags = any_hit ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT;
     traceRayEXT(scenes[VIEW.scene.top_level], flags, mask, 0, 0, 0, origin, tmin, direction, tmax, 0);
     return payload_hit();
 }
 
-// The next translucent layers behind `order` and before tmax. Layers in one plane come in the order of the engine, what
-// it draws last first.
+// The next translucent layers behind `order` and before tmax. Layers in one plane are ordered as the engine draws them,
+// the last drawn first.
 void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder order, out LayerList found) {
-    rays_asked++;
+    ray_count++;
     layers_clear(layer_payload.found);
     layer_payload.last = order;
     const uint missed = 1;
@@ -64,8 +64,8 @@ void trace_layers(vec3 origin, vec3 direction, float tmax, uint mask, LayerOrder
 #endif
 
 #ifndef TRACER_NONE
-// See no_rays.glsl.
-const bool rays_wanted = false;
+// See `no_rays.glsl`.
+const bool rays_needed = false;
 #define NEEDS_RAYS(answer)
 #endif
 

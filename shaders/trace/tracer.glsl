@@ -1,11 +1,11 @@
-// Which tracer a ray generation shader is compiled for; include it first, before anything but `#version`. Each such
-// file asks for its variants:
+// Selects the tracer of a ray generation shader. Must be the first include after `#version`. Each such file declares
+// its variants:
 //
-//     variants: COMPUTE=-DTRACER_COMPUTE -S comp     hierarchies of our own, in compute
+//     variants: COMPUTE=-DTRACER_COMPUTE -S comp     own hierarchies, in compute
 //     variants: QUERY=-DTRACER_QUERY -S comp         ray queries, in compute
-//     variants: NO_RAYS=-DTRACER_NONE -S comp        no rays at all: see no_rays.glsl
+//     variants: NO_RAYS=-DTRACER_NONE -S comp        no rays: see no_rays.glsl
 //
-// Without a definition it is for the ray tracing pipeline.
+// Without a definition the shader is compiled for the ray tracing pipeline.
 #ifndef RELIGHT_TRACE_TRACER_GLSL
 #define RELIGHT_TRACE_TRACER_GLSL
 

@@ -1,6 +1,6 @@
 #version 460
-// Upscaling without history: Catmull-Rom, kept within the range of the four nearest samples, so that edges are as sharp
-// as they can be and do not ring. Works on compressed colours, as antialias.comp does.
+// Upscaling without history: Catmull-Rom, clamped to the range of the four nearest samples, so that edges are sharp
+// without ringing. Works on compressed colours, as `antialias.comp` does.
 #include "trace/color.glsl"
 #include "trace/exposure.glsl"
 

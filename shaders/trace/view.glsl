@@ -1,4 +1,4 @@
-// What every stage of the traced look begins with: the one push constant and the arrays behind it.
+// Included by every shader of the traced look: the push constant and the arrays that it refers to.
 #ifndef RELIGHT_TRACE_VIEW_GLSL
 #define RELIGHT_TRACE_VIEW_GLSL
 
@@ -29,18 +29,18 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lig
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer DynamicRows { DynamicRow at[]; };
 
 #ifdef OWN_PUSH
-// the steps of filters: addresses of texels or bindless indices of images, and the distance between taps in pixels
+// push constants of filter steps: addresses of texels or bindless indices of images; spacing of the taps, pixels
 layout(push_constant, scalar) uniform Push { uint64_t view; uint64_t source; uint64_t target; uint spacing; } push;
 #else
 layout(push_constant, scalar) uniform Push { uint64_t view; } push;
 #endif
 #define VIEW (TraceViews(push.view).view)
 
-// Where a pixel's texel is in a buffer of texels.
+// Index of a pixel's texel in a buffer.
 uint place_of(ivec2 pixel) { return uint(pixel.y) * VIEW.width + uint(pixel.x); }
 
 const float PI = 3.14159265358979;
-// Farther than anything in a map (the engine's world ends at 131072 units).
+// Beyond everything in a map, units (the engine's world ends at 131072).
 const float FAR = 1.0e6;
 
 #endif

@@ -1,8 +1,8 @@
 //! Constants of the traced look that Rust and GLSL share. The build script writes them as
 //! `generated/trace_types.glsl`.
-#![allow(missing_docs)] // of a group the first one's comment describes all
+#![allow(missing_docs)] // the comment of a group's first constant describes the group
 
-/// What a geometry's triangles are to a ray.
+/// Kind of a geometry's triangles.
 pub const KIND_OPAQUE: u32 = 0;
 pub const KIND_TESTED: u32 = 1;
 pub const KIND_TRANSLUCENT: u32 = 2;
@@ -12,25 +12,25 @@ pub const KIND_PASSED: u32 = 4;
 /// Levels of bloom, each of half the size of the one before.
 pub const BLOOM_LEVELS: u32 = 5;
 
-/// Pixels to a texel of the first level of bloom.
+/// Pixels to a texel of the first level of bloom, along each axis.
 pub const BLOOM_FIRST: u32 = 4;
 
-/// Edge of the tiles of pixels whose rays are sorted.
+/// Edge of the tiles of pixels whose rays are sorted, pixels.
 pub const RAY_TILE: u32 = 16;
 
-/// `BvhNode::children`: nothing.
+/// `BvhNode::children`: no child.
 pub const BVH_NONE: u32 = 0xFFFF_FFFF;
 
-/// `BvhNode::children`: the bit of a leaf.
+/// `BvhNode::children`: bit that marks a leaf.
 pub const BVH_LEAF: u32 = 0x8000_0000;
 
-/// `BvhNode::children` of a leaf: the bit where the number of its entries less one begins.
+/// `BvhNode::children` of a leaf: lowest bit of the number of its entries minus one.
 pub const BVH_COUNT_SHIFT: u32 = 28;
 
-/// `BvhNode::children` of a leaf: the bits of its first entry.
+/// `BvhNode::children` of a leaf: mask of the index of its first entry.
 pub const BVH_FIRST: u32 = 0x0FFF_FFFF;
 
-/// Entries that a walk of one level keeps for later at most.
+/// Size of the traversal stack of one level, entries.
 pub const BVH_STACK: u32 = 48;
 
 /// Masks of top-level instances.
@@ -56,7 +56,7 @@ pub const VIEW_EXPOSURE_RESET: u32 = 32;
 pub const VIEW_FULLBRIGHT: u32 = 64;
 pub const VIEW_HISTORY: u32 = 128;
 pub const VIEW_DENOISE: u32 = 256;
-/// Bounced light is gathered for one of each 2 × 2 pixels, which take turns.
+/// One of each 2 × 2 pixels gathers bounced light, alternating over frames.
 pub const VIEW_SUBSAMPLED_BOUNCE: u32 = 512;
 
 /// The views of `rt_debug`: `PostView::debug`.
@@ -84,37 +84,37 @@ pub const COUNT_BOUNCE_RAYS: u32 = 4;
 pub const COUNT_BOUNCE_LIGHT: u32 = 5;
 pub const COUNT_SUNS: u32 = 6;
 
-/// Counters of each counted pass.
+/// Counters of each counted pass, to reduce contention.
 pub const COUNTER_ROWS: u32 = 64;
 
 /// No storage image.
 pub const NO_IMAGE: u32 = 0xFFFF_FFFF;
 
-/// Bits of `DenoiseView::flags`: the last frame's light is there; its samples are lit again; the cheap filter.
+/// Bits of `DenoiseView::flags`: the history is valid; gradient samples are shaded; the sparse filter is used.
 pub const DENOISE_HISTORY: u32 = 1;
 pub const DENOISE_GRADIENTS: u32 = 2;
 pub const DENOISE_SPARSE: u32 = 4;
 
-/// Bits of `FogView::flags`: fog is lit; its light is filtered; the last frame's is there.
+/// Bits of `FogView::flags`: fog is lit; its light is filtered; its light of the last frame is valid.
 pub const FOG_LIT: u32 = 1;
 pub const FOG_FILTERED: u32 = 2;
 pub const FOG_HISTORY: u32 = 4;
 
-/// How a light is sampled: `LightView::selection`.
+/// Estimators of light sampling: `LightView::selection`.
 pub const SELECT_UNIFORM: u32 = 0;
 pub const SELECT_RESAMPLED: u32 = 1;
 pub const SELECT_ALL: u32 = 2;
 
-/// Rays of an estimate by all lights for the weak ones of a list.
+/// `SELECT_ALL`: rays of an estimate that the weak lights of a list share.
 pub const WEAK_RAYS: u32 = 3;
 
 /// Bits of `LightView::flags`.
 pub const LIGHTS_SOFT: u32 = 1;
 
-/// Light lists of each cell: one for each side of a cube that normals point to.
+/// Light lists of each cell, one for each normal bin: the signed axis that a normal is nearest to.
 pub const NORMAL_BINS: u32 = 6;
 
-/// The upper bits of a light's number, from this one on, are its kind; the others are its index among its kind.
+/// Lowest bit of the kind in a light's number; the bits below are its index within the kind.
 pub const LIGHT_KIND_SHIFT: u32 = 29;
 
 /// Kinds of lights.
@@ -124,62 +124,62 @@ pub const LIGHT_SPHERE: u32 = 2;
 pub const LIGHT_CHANGING_SPHERE: u32 = 3;
 pub const LIGHT_SUN: u32 = 4;
 
-/// `Triangle::flags`: bits from here on hold the drawing rank, sort value times 8, at most 255.
+/// `Triangle::flags`: lowest bit of the drawing rank, sort value times 8, at most 255.
 pub const TRIANGLE_RANK_SHIFT: u32 = 8;
 
 /// Highest rank of an opaque material: sort 3 (`SS_OPAQUE`) times 8.
 pub const RANK_OPAQUE: u32 = 24;
 
-/// `Triangle::flags`: the eight bits from here on say which paths of the eye meet it, as `PATHS_*`.
+/// `Triangle::flags`: lowest of eight bits that hold the primary paths (`PATHS_*`) that hit the triangle.
 pub const TRIANGLE_PATHS_SHIFT: u32 = 16;
 
-/// All paths; those that have passed no portal; from `PATHS_PORTAL` on those through one portal each, then, where the
-/// numbers up to `PATHS_MOST` do, those through two.
+/// Paths by the portals that they have passed: all paths; those through no portal; from `PATHS_PORTAL` on, those
+/// through one portal each, then, if the numbers up to `PATHS_MOST` suffice, those through two.
 pub const PATHS_ALL: u32 = 0;
 pub const PATHS_DIRECT: u32 = 1;
 pub const PATHS_PORTAL: u32 = 2;
 pub const PATHS_MOST: u32 = 32;
 
-/// `LastInstance::known`: never seen before, placed elsewhere, placed as now.
+/// `LastInstance::known`: not in the last frame; moved since; at the same place.
 pub const LAST_UNKNOWN: u32 = 0;
 pub const LAST_MOVED: u32 = 1;
 pub const LAST_SAME: u32 = 2;
 
-/// Streams of a pixel's random numbers (`rng_begin` in `random.glsl`): the path from the eye.
+/// Streams of a pixel's random numbers (`rng_begin` in `random.glsl`): primary paths.
 pub const STREAM_PRIMARY: u32 = 0;
-/// The choice of a light for a visible surface.
+/// Light sampling of the visible surface.
 pub const STREAM_LIGHT: u32 = 1;
 /// Bounced light.
 pub const STREAM_BOUNCE: u32 = 2;
-/// Light in fog, of a cell in place of a pixel.
+/// Light in fog, per cell instead of per pixel.
 pub const STREAM_FOG: u32 = 3;
-/// The choice of a point on a sun, the same in each pass that makes it.
+/// The sampled point on a sun, equal in all passes that sample it.
 pub const STREAM_SUN: u32 = 4;
-/// The pass of suns, apart from that choice.
+/// Other random numbers of the pass of suns.
 pub const STREAM_SUN_PASS: u32 = 5;
 
-/// Streams of the denoiser's random numbers (`dither` in `denoise.glsl`): rounding of this frame's light in the history;
-/// of the number of frames with `rt_denoiser 2`.
+/// Streams of the denoiser's random numbers (`dither` in `denoise.glsl`): rounding of the fresh light; with
+/// `rt_denoiser 2` of the number of frames.
 pub const DITHER_FRESH: u32 = 0;
-/// Rounding of the number of frames and the variance; of the light with `rt_denoiser 2`.
+/// Rounding of the number of frames and the variance; with `rt_denoiser 2` of the light.
 pub const DITHER_PAST: u32 = 1;
 /// Rounding of filtered light.
 pub const DITHER_FILTERED: u32 = 2;
-/// Which pixel of a stratum is lit again in the next frame.
+/// Selection of a stratum's pixel as the next frame's gradient sample.
 pub const DITHER_SAMPLE: u32 = 3;
-/// Turn of the taps with `rt_denoiser 2`: this plus the distance of the step's taps in pixels.
-pub const DITHER_TURN: u32 = 4;
-/// Rounding of bounced light between the pixels that have it.
+/// Rotation of the taps with `rt_denoiser 2`: this plus the spacing of the taps in pixels.
+pub const DITHER_ROTATION: u32 = 4;
+/// Rounding of interpolated bounced light.
 pub const DITHER_UPSAMPLED: u32 = 5;
-/// Column and row of the first candidate for that pixel.
+/// Column and row of the first candidate for the gradient sample.
 pub const DITHER_SAMPLE_COLUMN: u32 = 6;
 pub const DITHER_SAMPLE_ROW: u32 = 7;
 
-/// Whose light the pass of direct light adds (`SAMPLING` in `direct.rgen`): of lights that it chooses itself; of those that
-/// `sample_lights.comp` has sampled; of suns.
+/// Lights of the pass of direct light (`SAMPLING` in `direct.rgen`): lights that it samples itself; lights that
+/// `sample_lights.comp` has sampled; suns.
 pub const SAMPLING_HERE: u32 = 0;
 pub const SAMPLING_LIGHT: u32 = 1;
 pub const SAMPLING_SUNS: u32 = 2;
 
-/// No instance of its own: the triangle names it.
+/// `GeometryRecord::instance`: each triangle names its own instance.
 pub const NO_INSTANCE: u32 = 0xFFFF_FFFF;

@@ -1,23 +1,23 @@
-//! Lights, and the lists that they are sampled from.
+//! Lights, and the lists from which they are sampled.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// A triangle that gives light from the side where its corners go round counter-clockwise.
+/// A triangle that emits on the side where its corners are counter-clockwise.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct TriangleLight {
     /// Corners.
     pub corners: [Vec3; 3],
-    /// Radiance, the same in all directions.
+    /// Radiance, equal in all directions.
     pub radiance: Vec3,
     /// `LIGHT_*` bits.
     pub flags: u32,
-    /// L without shadows below which it gives nothing; 0 for a light without an end.
+    /// Unshadowed L below which it contributes nothing; 0: no cutoff.
     pub end: f32,
 }
 
-/// A small sphere that gives light: a point light of the map or a dynamic light of the game.
+/// A small emitting sphere: a point light of the map or a dynamic light of the game.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SphereLight {
@@ -27,73 +27,73 @@ pub struct SphereLight {
     pub radius: f32,
     /// Radiance of its surface.
     pub radiance: Vec3,
-    /// What lies nearer to the centre than this casts no shadow (the model that carries the light).
+    /// Surfaces nearer to the centre cast no shadow (the model that carries the light).
     pub clearance: f32,
     /// Direction of a spot.
     pub axis: Vec3,
-    /// Cosine of the angle to `axis` up to which a spot shines in full; -1 for no spot.
+    /// Cosine of the angle to `axis` up to which a spot has its full radiance; -1: no spot.
     pub cos_inner: f32,
-    /// Cosine of the angle to `axis` from which on it is dark; -2 for no spot.
+    /// Cosine of the angle to `axis` from which on a spot is dark; -2: no spot.
     pub cos_outer: f32,
-    /// Radius of the ball of glowing gas that the sphere stands for: nearer to the centre than this it gives no more
-    /// light than here. 0: there is none.
+    /// Radius of the ball of glowing gas that the sphere represents: at smaller distances the light is as at this
+    /// radius. 0: none.
     pub core: f32,
-    /// Where light that falls off linearly ends; 0 for light that falls off with the square of the distance.
+    /// Distance at which linear falloff ends; 0: inverse-square falloff.
     pub reach: f32,
-    /// L without shadows below which it gives nothing; 0 for a light without an end.
+    /// Unshadowed L below which it contributes nothing; 0: no cutoff.
     pub end: f32,
 }
 
-/// A far disc of light.
+/// A distant disc of light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SunLight {
-    /// Unit vector towards its middle.
+    /// Unit vector towards its centre.
     pub direction: Vec3,
     /// Cosine of its angular radius.
     pub cos_angle: f32,
-    /// Irradiance of a surface that faces it, divided by pi: what a white diffuse surface shows.
+    /// Irradiance of a surface that faces it, divided by pi: L of a white diffuse surface.
     pub irradiance: Vec3,
 }
 
-/// What choosing a light needs to know about it, without reading all of it: a ball around it and what leaves it.
+/// Bounds of a light for light sampling: a bounding sphere, and the emitted light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct LightBounds {
     /// Centre: of a triangle its centroid, so that it lies in the triangle's plane.
     pub centre: Vec3,
-    /// Nothing of the light lies farther from the centre.
+    /// Radius of the bounding sphere.
     pub radius: f32,
-    /// Of a triangle: normal of the emitting side times area times luminance of the radiance. Of a sphere: direction of
-    /// a spot times the cosine from which on it is dark, shifted by 2 so that it is never zero; zero without a spot.
+    /// Triangle: normal of the emitting side times area times luminance of the radiance. Sphere: direction of a spot
+    /// times the cosine from which on it is dark, plus 2 so that the length is never zero; zero: no spot.
     pub axis: Vec3,
-    /// Of a sphere the luminance of its radiant intensity, above 0; of a triangle 0, or -1 if both sides shine.
+    /// Sphere: luminance of its radiant intensity, above 0. Triangle: 0, or -1 if both sides emit.
     pub omni_intensity: f32,
 }
 
-/// A slot of a row's alias table: two lights, of which a number in [0, 1) picks the first below `threshold`.
+/// A slot of a row's alias table: two lights; a number in [0, 1) selects the first if it is below `threshold`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct LightSlot {
-    /// The light that the slot is for: each of a row's lights has one slot.
+    /// The slot's own light: each light of a row has one slot.
     pub light: u32,
     /// The other light.
     pub alias: u32,
-    /// Chance of the first, given the slot.
+    /// Probability of the first light, given the slot.
     pub threshold: f32,
-    /// Chance of the first when a slot is drawn evenly from the row.
+    /// Probability of the first light when a slot is drawn uniformly from the row.
     pub chance: f32,
-    /// The same of the other light.
+    /// The same of the alias.
     pub alias_chance: f32,
-    /// About which part of the light reaches the row's cluster, above 0.
+    /// Approximate part of the light that reaches the row's cluster, above 0.
     pub visibility: f32,
-    /// The same of the other light.
+    /// The same of the alias.
     pub alias_visibility: f32,
     /// Makes the size a power of two, so that a slot lies in one sector of a cache line.
     pub padding: u32,
 }
 
-/// The list of a cell for normals about one way: slots from `first` on.
+/// Light list of a cell for one normal bin: slots from `first` on.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct LightRow {
@@ -101,15 +101,15 @@ pub struct LightRow {
     pub first: u32,
     /// Number of slots: strong lights first.
     pub count: u32,
-    /// Number of strong lights. The others have slots of their own after those of the row, to pick among them alone.
+    /// Number of strong lights. The weak lights have a second alias table behind the row's slots.
     pub strong: u32,
-    /// 1 if suns can reach the cell.
+    /// 1: suns can reach the cell.
     pub suns: u32,
-    /// The cluster that the cell is a piece of; more than there are: none.
+    /// The cluster that contains the cell; no cluster if not below the number of clusters.
     pub cluster: u32,
 }
 
-/// The list of a cluster among the lights of this frame: entries of `LightView::dynamic_lights`.
+/// Light list of a cluster for lights of this frame: entries of `LightView::dynamic_lights`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct DynamicRow {
@@ -119,7 +119,7 @@ pub struct DynamicRow {
     pub count: u32,
 }
 
-/// A node of the map's tree.
+/// A node of the map's BSP tree.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct BspNode {
@@ -129,24 +129,24 @@ pub struct BspNode {
     pub children: [i32; 2],
 }
 
-/// Light lists of a view. Arrays of two or four are by kind of light (`LIGHT_*`).
+/// Light lists of a view. Arrays of two or four are indexed by kind of light (`LIGHT_*`).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct LightView {
     /// [`LightBounds`] by kind: triangles, changing triangles, spheres, changing spheres.
     pub bounds: [u64; 4],
-    /// [`TriangleLight`]s that stay as they are, and those of this frame.
+    /// [`TriangleLight`]s with constant radiance, and those of this frame.
     pub triangles: [u64; 2],
     /// [`SphereLight`]s of the map, and those of this frame.
     pub spheres: [u64; 2],
     /// [`SunLight`]s.
     pub suns: u64,
-    /// `NORMAL_BINS` [`LightRow`]s of each cell (a piece of a cluster), one for each side of a cube that normals point to; the
-    /// last is for points in no cell, and holds all lights.
+    /// `NORMAL_BINS` [`LightRow`]s of each cell (a piece of a cluster), one for each normal bin; the last row is for
+    /// points in no cell, and holds all lights.
     pub rows: u64,
     /// [`LightSlot`]s.
     pub slots: u64,
-    /// [`DynamicRow`] of each cluster; the last is for points in none.
+    /// [`DynamicRow`] of each cluster; the last is for points in no cluster.
     pub dynamic_rows: u64,
     /// Numbers of the lights of this frame, row by row.
     pub dynamic_lights: u64,
@@ -154,13 +154,13 @@ pub struct LightView {
     pub nodes: u64,
     /// Cell of each leaf (`i32`).
     pub leaf_cells: u64,
-    /// Where the walk to a cell begins, for each box of a grid over the map (`i32`: a node, or `-1 - leaf`).
+    /// Start of the BSP walk for each box of a grid over the map (`i32`: a node, or `-1 - leaf`).
     pub grid: u64,
     /// Number of nodes; 0: every point lies in no cluster.
     pub node_count: u32,
     /// Number of rows.
     pub row_count: u32,
-    /// Number of dynamic rows; 0 without such lights.
+    /// Number of dynamic rows; 0: no lights of this frame.
     pub dynamic_row_count: u32,
     /// Number of suns.
     pub sun_count: u32,
@@ -168,13 +168,13 @@ pub struct LightView {
     pub flags: u32,
     /// `SELECT_*`.
     pub selection: u32,
-    /// Estimates a pixel.
+    /// Estimates per pixel.
     pub samples: u32,
-    /// Candidates of resampled selection.
+    /// Candidates of resampled importance sampling.
     pub candidates: u32,
-    /// Scale of the map's lights.
+    /// Factor of the map's lights (`rt_lightScale`).
     pub scale: f32,
-    /// Least corner of that grid.
+    /// Least corner of `grid`.
     pub grid_origin: Vec3,
     /// Boxes per unit of length.
     pub grid_scale: f32,

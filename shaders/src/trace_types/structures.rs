@@ -1,9 +1,9 @@
-//! What rays find: geometries, and the hierarchies of the compute tracer.
+//! Geometry that rays hit, and the hierarchies of the compute tracer.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// One geometry of the acceleration structures: found by a hit's instance custom index plus geometry index.
+/// One geometry of the acceleration structures; its index is a hit's instance custom index plus geometry index.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct GeometryRecord {
@@ -17,25 +17,25 @@ pub struct GeometryRecord {
     pub kind: u32,
 }
 
-/// A node of a bounding volume hierarchy: the boxes of up to four children, in steps of a grid of its own (after Ylitie,
+/// A node of a bounding volume hierarchy: boxes of up to four children, quantized to a grid of the node (after Ylitie,
 /// Karras and Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, HPG 2017).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct BvhNode {
-    /// Corner of the grid.
+    /// Least corner of the grid.
     pub origin: Vec3,
     /// Size of a step along each axis, above 0.
     pub step: Vec3,
-    /// Of each axis the low sides of the children's boxes, one byte for each child, the first in the lowest byte.
+    /// Low sides of the children's boxes along each axis, one byte for each child, the first in the lowest byte.
     pub low: [u32; 3],
-    /// The high sides.
+    /// High sides, likewise.
     pub high: [u32; 3],
-    /// Index of the child's node, or `BVH_LEAF` with the number of its entries less one and the first of them, or
+    /// Index of the child's node; or `BVH_LEAF` with the number of entries minus one and the first entry; or
     /// `BVH_NONE`.
     pub children: [u32; 4],
 }
 
-/// A triangle in the order of a hierarchy's leafs.
+/// A triangle in the order of a hierarchy's leaves.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct BvhTriangle {
@@ -45,15 +45,15 @@ pub struct BvhTriangle {
     pub b: Vec3,
     /// Third corner.
     pub c: Vec3,
-    /// Index of the geometry's triangle.
+    /// Index of the triangle in its geometry.
     pub primitive: u32,
-    /// Number of the geometry, counted from the instance's first.
+    /// Index of the geometry, counted from the instance's first.
     pub part: u32,
-    /// Makes the size a multiple of 16, so that it is read in three pieces.
+    /// Makes the size a multiple of 16, for three reads of 16 bytes.
     pub padding: u32,
 }
 
-/// A placed hierarchy, in the order of the top hierarchy's leafs.
+/// An instance of a hierarchy, in the order of the top hierarchy's leaves.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct BvhInstance {
@@ -65,6 +65,6 @@ pub struct BvhInstance {
     pub to_object: [[f32; 4]; 3],
     /// Index of its first geometry record.
     pub geometry: u32,
-    /// Rays see it when their mask shares a bit.
+    /// A ray tests the instance if their masks share a bit.
     pub mask: u32,
 }

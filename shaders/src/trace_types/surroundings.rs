@@ -1,4 +1,4 @@
-//! What a ray may see beside surfaces of the scene: skies, other places through portals, what lies in its way, flares, fog.
+//! Data for rays beside surfaces: skies, portals, filters, bounding boxes, flares, fog.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -19,41 +19,41 @@ pub struct SkyRecord {
 pub struct PortalRecord {
     /// Plane of the surface: `xyz . p = w`.
     pub plane: [f32; 4],
-    /// 1: reflects.
+    /// 1: a mirror.
     pub mirror: u32,
     /// A point of the plane.
     pub surface_origin: Vec3,
     /// Frame of the plane.
     pub surface_axis: [Vec3; 3],
-    /// Where `surface_origin` is seen from.
+    /// Camera position of the portal, to which `surface_origin` is mapped.
     pub camera_origin: Vec3,
-    /// What the frame of the plane turns to.
+    /// Axes to which `surface_axis` is mapped.
     pub camera_axis: [Vec3; 3],
 }
 
-/// What lies in the way of light.
+/// Bounds of surfaces that only some rays test, and limits of paths.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct TransportView {
-    /// Boxes around the surfaces of the world that colour the light that passes them: smallest and largest corners.
+    /// Boxes around the world's surfaces that tint light: smallest and largest corners.
     pub filters: u64,
-    /// Boxes around what is translucent in sight of the eye, likewise.
+    /// Boxes around the translucent surfaces visible from the camera, likewise.
     pub layers: u64,
-    /// Boxes around what may show through a sky, likewise.
+    /// Boxes around surfaces that may be visible through a sky, likewise.
     pub beyond: u64,
-    /// One bit for each surface of the world: it may show through a sky.
+    /// One bit for each surface of the world: it may be visible through a sky.
     pub beyond_surfaces: u64,
     /// Number of `filters`.
     pub filter_count: u32,
-    /// Number of `layers`; all ones: anything may be anywhere.
+    /// Number of `layers`; all ones: unknown, a ray tests layers always.
     pub layer_count: u32,
     /// Number of `beyond`.
     pub beyond_count: u32,
     /// Number of bits in `beyond_surfaces`.
     pub beyond_surface_count: u32,
-    /// Mirrors and portals on a path.
+    /// Most mirrors and portals on a path.
     pub max_depth: u32,
-    /// Diffuse bounces.
+    /// Most diffuse bounces.
     pub bounces: u32,
 }
 
@@ -75,21 +75,21 @@ pub struct FlareView {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct FogView {
-    /// What light in fog is multiplied by to be seen, of each pixel.
+    /// Factor of the fog's light, per pixel.
     pub weight: u32,
-    /// A point in the fog along the way of a pixel and its distance on the way, of each cell.
+    /// Selected point in fog and its distance along the path, per cell.
     pub point: u32,
-    /// Light at such points, with the number of frames that it is the mean of.
+    /// Light at these points, and the number of frames in its mean.
     pub fresh: u32,
-    /// The last frame's.
+    /// `fresh` of the last frame.
     pub last: u32,
-    /// The light that is shown.
+    /// Filtered light, as shown.
     pub filtered: u32,
-    /// Pixels to the edge of a cell.
+    /// Edge of a cell, pixels.
     pub cell: u32,
-    /// Cells.
+    /// Cells in a row.
     pub width: u32,
-    /// Cells.
+    /// Rows of cells.
     pub height: u32,
     /// `FOG_*` bits.
     pub flags: u32,

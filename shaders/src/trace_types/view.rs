@@ -13,20 +13,20 @@ pub struct CameraView {
     pub origin: Vec3,
     /// Unit vector of the view direction.
     pub forward: Vec3,
-    /// To the left, scaled by the tangent of half the horizontal angle.
+    /// Left, scaled by the tangent of half the horizontal field of view.
     pub left: Vec3,
-    /// Up, scaled by the tangent of half the vertical angle.
+    /// Up, scaled by the tangent of half the vertical field of view.
     pub up: Vec3,
-    /// Absorption of the liquid that the camera is in, per unit of length.
+    /// Absorption of the liquid that contains the camera, per unit of length.
     pub absorption: Vec3,
     /// Width of a pixel's cone at distance 1.
     pub pixel_spread: f32,
-    /// Of one eye of two: added to the horizontal coordinate of the picture (-1 to 1, left to right) for the direction of a
-    /// ray.
+    /// Stereo offset of this eye: added to the picture's horizontal coordinate (-1 to 1, left to right) for the
+    /// direction of a ray.
     pub stereo_shift: f32,
 }
 
-/// What rays meet: addresses and lengths of arrays.
+/// Scene data: addresses and lengths of arrays.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SceneView {
@@ -40,23 +40,23 @@ pub struct SceneView {
     pub portals: u64,
     /// A [`SkyRecord`](super::SkyRecord) for each sky material.
     pub skies: u64,
-    /// Top [`BvhNode`](super::BvhNode)s of the compute tracer; 0: nothing.
+    /// Top-level [`BvhNode`](super::BvhNode)s of the compute tracer; 0: no geometry.
     pub nodes: u64,
-    /// A [`BvhInstance`](super::BvhInstance) for each leaf of those.
+    /// A [`BvhInstance`](super::BvhInstance) for each leaf entry of those.
     pub placed: u64,
-    /// Index of the top-level structure.
+    /// Bindless index of the top-level structure.
     pub top_level: u32,
     /// Number of fog volumes.
     pub fog_count: u32,
     /// Number of portals.
     pub portal_count: u32,
-    /// Seconds.
+    /// Time of the view, seconds.
     pub time: f32,
-    /// Sampler for the images of sky boxes: clamped, with mip levels.
+    /// Sampler of sky box images: clamped, with mip levels.
     pub sky_sampler: u32,
-    /// Distance of the faces of the box that the engine draws a sky on, units.
+    /// Distance of the faces of the box on which the engine draws a sky, units.
     pub sky_distance: f32,
-    /// The sun's picture.
+    /// Image of the sun.
     pub sun: SunDisc,
 }
 
@@ -68,9 +68,9 @@ pub struct ImageView {
     pub position: u32,
     /// RG32UI: packed normals of triangle and shading.
     pub surface: u32,
-    /// RG32UI: what the light of the surface is multiplied by, and the radiance in front of it.
+    /// RG32UI: albedo, and radiance in front of the surface.
     pub shown: u32,
-    /// RG32UI: as `shown`, of what a pixel does not show where reflection and refraction alternate.
+    /// RG32UI: `shown` of the other field, where pixels alternate between reflection and refraction.
     pub other: u32,
     /// R32UI: direct light.
     pub direct: u32,
@@ -80,8 +80,8 @@ pub struct ImageView {
     pub composite: u32,
     /// RGBA32F: the mean of the accumulated frames.
     pub accumulation: u32,
-    /// RGBA16F: how far the pixel's surface was from here in the last frame (pixels, right and down), view distance then
-    /// (negative: it was not in the picture, or is unknown), and the pixel's mark (`motion.glsl`).
+    /// RGBA16F: offset to the surface's position in the last frame (pixels, right and down), view distance then
+    /// (negative: outside of the picture, or unknown), and the pixel's mark (`motion.glsl`).
     pub motion: u32,
 }
 
@@ -91,27 +91,27 @@ pub struct ImageView {
 pub struct ExposureView {
     /// State of automatic exposure: current exposure and histogram.
     pub state: u64,
-    /// Stops that the player adds.
+    /// Stops added by the player.
     pub bias: f32,
-    /// Stops at which the map looks as bright as the engine shows it.
+    /// Stops at which the map looks as bright as in the engine.
     pub base: f32,
     /// Mean logarithm of luminance of a usual picture of the map, stops.
     pub usual: f32,
-    /// How far automatic exposure moves to a brighter picture in this frame, 0..1.
+    /// Fraction of the way to a brighter exposure in this frame, 0..1.
     pub blend: f32,
-    /// The same for a darker picture.
+    /// Fraction of the way to a darker exposure in this frame, 0..1.
     pub blend_dark: f32,
     /// To a multiple of eight bytes.
     pub padding: u32,
 }
 
-/// The image that the finished picture is written to.
+/// Target image of the finished picture.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct TargetView {
     /// Bindless index.
     pub image: u32,
-    /// Place of the view, pixels from the left.
+    /// Position of the view, pixels from the left.
     pub x: i32,
     /// Pixels from the top.
     pub y: i32,
@@ -123,13 +123,13 @@ pub struct TargetView {
     pub channels: u32,
 }
 
-/// What the passes after the light read, and what passes count with.
+/// Inputs of the passes after lighting, and ray counters.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PostView {
-    /// Rays of each counted pass (`COUNT_*`), `COUNTER_ROWS` counters (`u32`) for each; 0: they are not counted.
+    /// Rays of each counted pass (`COUNT_*`), `COUNTER_ROWS` counters (`u32`) for each; 0: not counted.
     pub counters: u64,
-    /// Texels of the bloom; 0: there is none.
+    /// Texels of the bloom; 0: no bloom.
     pub bloom: u64,
     /// Part of the light that bloom spreads.
     pub bloom_strength: f32,

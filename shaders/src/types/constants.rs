@@ -1,6 +1,5 @@
-//! Constants that Rust and GLSL share: numbers of kinds, and bits of flags. The build script writes them as
-//! `generated/types.glsl`.
-#![allow(missing_docs)] // of a group the first one's comment describes all; some names say enough
+//! Constants that Rust and GLSL share: kinds and bits of flags. The build script writes them as `generated/types.glsl`.
+#![allow(missing_docs)] // the comment of a group's first constant describes the group; some names need none
 
 /// No texture.
 pub const NO_TEXTURE: u32 = 0xFFFF_FFFF;
@@ -69,28 +68,28 @@ pub const STAGE_WHITE: u32 = 1;
 pub const STAGE_DEPTH_WRITE: u32 = 2;
 /// The stage tests depth for equality.
 pub const STAGE_DEPTH_EQUAL: u32 = 4;
-/// The stage's picture stands for a reflection of the surroundings.
+/// The stage's image represents a reflection of the surroundings.
 pub const STAGE_REFLECTION: u32 = 8;
-/// Covers what lies behind by an alpha that the game fades: smoke, blood. It does not glow.
+/// Covers the background by an alpha that the game fades (smoke, blood); not emissive.
 pub const STAGE_MATTER: u32 = 16;
-/// The stage's picture, which stands for a reflection, shows the light at the surface, too.
+/// The reflection image also shows the light at the surface.
 pub const STAGE_GLOSS: u32 = 32;
-/// The stage shows the lightmap of a surface that has none: the engine takes a white picture.
+/// The stage shows the lightmap of a surface without one: the engine uses a white image.
 pub const STAGE_NO_LIGHTMAP: u32 = 64;
-/// The stage's picture, which stands for a reflection, is a lit haze over what lies behind, too.
+/// The reflection image is also a lit haze over the background.
 pub const STAGE_HAZE: u32 = 128;
-/// The stage's picture is baked light: an image with the coordinates of the lightmap.
+/// The stage's image is baked light: it uses lightmap coordinates.
 pub const STAGE_BAKED_LIGHT: u32 = 256;
-/// The stage adds baked light of a style, which the traced look has as light sources.
+/// The stage adds baked light of a style; the traced look has light sources for it.
 pub const STAGE_LIGHT_STYLE: u32 = 512;
 
-/// Seen from both sides.
+/// Drawn from both sides.
 pub const MATERIAL_TWO_SIDED: u32 = 1;
-/// Only the back side is seen.
+/// Only the back side is drawn.
 pub const MATERIAL_CULL_BACK: u32 = 2;
-/// Has an alpha-tested stage that decides what is solid.
+/// An alpha-tested stage decides which points are solid.
 pub const MATERIAL_CUT_OUT: u32 = 4;
-/// Its first stage blends: what lies behind shows through.
+/// Its first stage blends with the background.
 pub const MATERIAL_TRANSLUCENT: u32 = 8;
 pub const MATERIAL_SKY: u32 = 16;
 pub const MATERIAL_PORTAL: u32 = 32;
@@ -101,47 +100,47 @@ pub const MATERIAL_GLASS: u32 = 256;
 pub const MATERIAL_VERTEX_LIGHT: u32 = 512;
 /// Drawn with a depth offset (decals).
 pub const MATERIAL_POLYGON_OFFSET: u32 = 1024;
-/// Gives light (is in the light list).
+/// Emits light, and is in the light lists.
 pub const MATERIAL_EMITTER: u32 = 2048;
 /// Nothing is drawn.
 pub const MATERIAL_INVISIBLE: u32 = 4096;
-/// On the map's surfaces: casts no shadow, because the compiler gave it none.
+/// On the map's surfaces: casts no shadow, because the map compiler ignored it.
 pub const MATERIAL_PASSED: u32 = 8192;
 
 /// Drawn in front of everything near (first-person weapon).
 pub const INSTANCE_DEPTH_HACK: u32 = 1;
-/// Only in the eye's own view, never in mirrors and shadows.
+/// Visible to primary rays only, not in mirrors and shadows.
 pub const INSTANCE_FIRST_PERSON: u32 = 2;
-/// Only in mirrors and shadows.
+/// Visible in mirrors and shadows only.
 pub const INSTANCE_THIRD_PERSON: u32 = 4;
 pub const INSTANCE_NO_SHADOW: u32 = 8;
 /// The light grid does not light it: the world, sprites and beams, pictures.
 pub const INSTANCE_UNLIT: u32 = 16;
-/// A crosshair: in stereo it stays where the view has it.
+/// A crosshair: without stereo offset.
 pub const INSTANCE_CROSSHAIR: u32 = 32;
-/// A sprite: hangs in the air where the light is `ambient`. Of the traced look alone.
+/// A sprite, lit by `ambient`; traced look only.
 pub const INSTANCE_SUSPENDED: u32 = 64;
 
 /// A draw of a material's stage.
 pub const DRAW_STAGE: u32 = 0;
-/// A dynamic light's blob over a surface.
+/// The blob of a dynamic light over a surface.
 pub const DRAW_LIGHT: u32 = 1;
 /// The fog over an opaque surface.
 pub const DRAW_FOG: u32 = 2;
-/// Depth alone, before everything else.
+/// Depth only, before everything else.
 pub const DRAW_DEPTH: u32 = 3;
-/// As many stages go into one draw.
+/// Most stages of one draw.
 pub const DRAW_STAGES: u32 = 4;
 
-/// How a stage of a draw goes onto those before it: it is the first or there is none; it multiplies, is added or
-/// is shown instead, as a second texture of the same pass; it is blended, as a pass of its own.
+/// Combination of a stage with the previous stages of a draw: none (the first, or absent); as a second texture of the
+/// same pass, multiplied, added or replaced; blended, as a pass of its own.
 pub const COMBINE_NONE: u32 = 0;
 pub const COMBINE_MODULATE: u32 = 1;
 pub const COMBINE_ADD: u32 = 2;
 pub const COMBINE_REPLACE: u32 = 3;
 pub const COMBINE_BLEND: u32 = 4;
 
-/// Of a stage: its colour is white, the same for all vertices, or each vertex's own.
+/// Colour of a stage: white, equal for all vertices, or per vertex.
 pub const COLOR_WHITE: u32 = 0;
 pub const COLOR_FLAT: u32 = 1;
 pub const COLOR_VERTEX: u32 = 2;
@@ -151,16 +150,16 @@ pub const FOG_ADJUST_RGB: u32 = 1;
 pub const FOG_ADJUST_ALPHA: u32 = 2;
 pub const FOG_ADJUST_RGBA: u32 = 3;
 
-/// A fog volume has no visible face, has one, or has one that the engine also draws when the eye is inside.
+/// A fog volume has no visible face, has one, or has one that the engine also draws while the camera is inside.
 pub const FOG_SURFACE_NONE: u32 = 0;
 pub const FOG_SURFACE: u32 = 1;
 pub const FOG_SURFACE_DRAWN: u32 = 2;
 
 /// The triangle belongs to the world (its vertex colours and lightmap are baked light).
 pub const TRIANGLE_WORLD: u32 = 1;
-/// The triangle is turned to the eye: mirrors see it from behind, and see it all the same.
+/// The triangle faces the camera; mirrors show it although they see its back.
 pub const TRIANGLE_FACES_EYE: u32 = 2;
-/// The triangle has an opposite in its plane, and rays that come from its back are left to that.
+/// The triangle has an opposite in its plane, which handles rays from its back.
 pub const TRIANGLE_ONE_SIDED: u32 = 4;
-/// The triangle keeps its shape: its geometry names its instance, and `instance` is the number of its surface.
+/// The triangle is static: its geometry names its instance, and `instance` is the index of its surface.
 pub const TRIANGLE_STATIC: u32 = 8;
