@@ -293,7 +293,8 @@ impl Occluders {
         None
     }
 
-    /// The nearest hit before `limit` lengths of `ray`.
+    /// The nearest hit before `limit` lengths of `ray`. Of hits at the same distance a front comes before a back, then
+    /// the lowest tag: the result does not depend on the hierarchy.
     pub fn nearest(&self, from: Vec3, ray: Vec3, limit: f32) -> Option<Hit> {
         let ray = Ray::new(from, ray);
         let mut nearest: Option<Hit> = None;
@@ -301,11 +302,14 @@ impl Occluders {
             let Some(leaf) = self.leaves.get(index as usize) else {
                 return false;
             };
-            let hits = leaf.intersect(&ray, *limit);
-            for lane in lanes(hits.mask) {
-                if hits.t[lane] < *limit
-                    && let Some(hit) = self.hit(leaf, &hits, lane)
-                {
+            let hits = leaf.intersect(&ray, limit.next_up());
+            for hit in lanes(hits.mask).filter_map(|lane| self.hit(leaf, &hits, lane)) {
+                let rank = |hit: &Hit| (hit.t, !hit.front, hit.tag);
+                let is_nearer = match &nearest {
+                    Some(nearest) => rank(&hit) < rank(nearest),
+                    None => hit.t < *limit,
+                };
+                if is_nearer {
                     *limit = hit.t;
                     nearest = Some(hit);
                 }
@@ -320,7 +324,7 @@ impl Occluders {
     fn walk(&self, ray: &Ray, mut limit: f32, mut leaf: impl FnMut(u32, &mut f32) -> bool) -> bool {
         let mut stack = Stack::new();
         let mut next = (!self.nodes.is_empty()).then_some(0);
-        while let Some(at) = next.take().or_else(|| stack.pop(limit)) {
+        while let Some(at) = next.take().or_else(|| stack.pop(limit * BEYOND)) {
             if at & LEAF != 0 {
                 if leaf(at & !LEAF, &mut limit) {
                     return true;
@@ -330,7 +334,7 @@ impl Occluders {
             let Some(node) = self.nodes.get(at as usize) else {
                 continue;
             };
-            let (mask, near) = node.enters(ray, limit);
+            let (mask, near) = node.enters(ray, limit * BEYOND);
             let near = near.to_array();
             let from = stack.depth;
             for lane in lanes(mask) {
@@ -340,6 +344,9 @@ impl Occluders {
         false
     }
 }
+
+/// Factor of a limit up to which boxes are entered: distances of boxes and of triangles are rounded differently.
+const BEYOND: f32 = 1.00001;
 
 /// Part of a segment that is tested: at its end the target itself would be hit.
 const SHORT: f32 = 0.9999;

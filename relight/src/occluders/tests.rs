@@ -145,3 +145,28 @@ fn fronts_are_clockwise() {
     let hit = tree.nearest(Vec3::new(0.2, 0.2, -5.0), Vec3::Z, 10.0);
     assert!(hit.is_some_and(|h| !h.front));
 }
+
+#[test]
+fn at_the_same_distance_fronts_come_first_and_then_the_lowest_tag() {
+    let up = [Vec3::ZERO, Vec3::Y * 4.0, Vec3::X * 4.0];
+    let down = [up[0], up[2], up[1]];
+    let coplanar = [(down, 9), (up, 8), (up, 7), (down, 1)];
+    // Others below decide where the tree splits, and which of the coplanar ones a ray meets first.
+    for others in 0..40u32 {
+        for turned in 0..4 {
+            let mut input: Vec<([Vec3; 3], bool, u32)> = (0..others)
+                .map(|k| (up.map(|p| p - Vec3::Z * (5.0 + k as f32)), false, 100 + k))
+                .collect();
+            for (k, &(corners, tag)) in coplanar.iter().cycle().skip(turned).take(4).enumerate() {
+                input.insert(input.len() * k / 4, (corners, false, tag));
+            }
+            let tree = Occluders::new(input.into_iter());
+            let hit = |z: f32| {
+                let from = Vec3::new(1.0, 1.0, z);
+                let hit = tree.nearest(from, Vec3::Z * -z, f32::INFINITY);
+                hit.map(|hit| (hit.front, hit.tag))
+            };
+            assert_eq!([hit(2.0), hit(-2.0)], [Some((true, 7)), Some((true, 1))]);
+        }
+    }
+}
