@@ -4,16 +4,25 @@
 //! Source: Möller and Trumbore 1997 for triangles, the slab test for boxes, Dammertz et al. 2008 for four-wide
 //! hierarchies.
 
-mod build;
 mod of_world;
 #[cfg(test)]
 mod tests;
 
 use crate::world::Holes;
-use build::Binary;
 use glam::{Vec2, Vec3, Vec4};
 use std::sync::Arc;
+use support::Aabb;
+use support::bvh::{Hierarchy, LeafRule};
 use support::simd4::{Four, WIDE, at, cross, dot, four, lanes, splat, sub};
+
+/// A leaf tests up to four triangles at once: fewer cost the same.
+const LEAF_RULE: LeafRule = LeafRule {
+    most: WIDE,
+    split_cost: f32::MAX,
+};
+
+/// Padding of boxes: relative to their coordinates, and at least this, id units. Hits of rays along a face lie inside.
+const PAD: f32 = 1e-6;
 
 /// Entries of the traversal stack without a heap allocation: enough for most maps.
 const STACK: usize = 48;
@@ -44,6 +53,9 @@ struct Kind {
     /// Index of its [`CutOut`]; `u32::MAX` for triangles without holes.
     cut_out: u32,
 }
+
+/// A triangle and its properties.
+type Triangle = ([Vec3; 3], Kind);
 
 /// A triangle of a material with holes.
 pub(crate) struct CutOut {
@@ -115,65 +127,50 @@ struct LeafHits {
 impl Occluders {
     /// Builds the hierarchy from (corners, is sky, tag).
     pub fn new(input: impl Iterator<Item = ([Vec3; 3], bool, u32)>) -> Occluders {
-        let kept: Vec<([Vec3; 3], Kind)> = input
+        let triangles: Vec<Triangle> = input
             .filter(|(corners, ..)| corners.iter().all(|c| c.is_finite()))
             .map(|(corners, sky, tag)| {
                 let cut_out = u32::MAX;
                 (corners, Kind { sky, tag, cut_out })
             })
             .collect();
+        let boxes: Vec<Aabb> = triangles.iter().map(padded_box).collect();
+        let hierarchy = Hierarchy::new(&boxes, LEAF_RULE);
         let mut occluders = Occluders {
             nodes: Vec::new(),
             leaves: Vec::new(),
             cut_outs: Vec::new(),
         };
-        if let Some(root) = build::build(kept) {
-            // The root is a node even for a single leaf.
-            occluders.add(vec![root]);
+        if !hierarchy.is_empty() {
+            occluders.add(&hierarchy, 0, &triangles);
         }
         occluders
     }
 
-    /// Adds a node with these children and returns its index. Grandchildren replace children while there is room.
-    fn add(&mut self, mut children: Vec<Binary>) -> u32 {
-        while children.len() < WIDE {
-            let inner = |(_, c): &(usize, &Binary)| c.halves.is_ok();
-            let area = |(_, c): &(usize, &Binary)| c.bounds.area();
-            let largest = (children.iter().enumerate().filter(inner))
-                .max_by(|a, b| area(a).total_cmp(&area(b)))
-                .map(|(i, _)| i);
-            let Some(largest) = largest else {
-                break;
-            };
-            let taken = children.swap_remove(largest);
-            if let Ok(halves) = taken.halves {
-                children.extend(*halves);
-            }
-        }
+    /// Adds a node of the hierarchy in its wide form, and all below it; returns its index.
+    fn add(&mut self, hierarchy: &Hierarchy, node: u32, triangles: &[Triangle]) -> u32 {
+        let children = hierarchy.wide_children(node as usize, WIDE);
+        let mins = four(children.iter().map(|c| c.bounds.mins));
+        let maxs = four(children.iter().map(|c| c.bounds.maxs));
+        let mut references = [0; WIDE];
         let index = self.nodes.len();
-        let boxes = || children.iter().map(|c| c.bounds.padded());
-        let mins = four(boxes().map(|(mins, _)| mins));
-        let maxs = four(boxes().map(|(_, maxs)| maxs));
         self.nodes.push(Node {
             planes: [0, 1, 2].map(|k| [mins[k], maxs[k]]),
-            children: [0; WIDE],
+            children: references,
             there: (1 << children.len()) - 1,
         });
-        for (i, child) in children.into_iter().enumerate() {
-            let reference = match child.halves {
-                Ok(halves) => self.add((*halves).into()),
-                Err(triangles) => {
-                    self.leaves.push(Leaf::new(&triangles));
-                    (self.leaves.len() - 1) as u32 | LEAF
-                }
+        for (reference, child) in references.iter_mut().zip(children.iter()) {
+            *reference = if child.is_node() {
+                self.add(hierarchy, child.first, triangles)
+            } else {
+                let entries = hierarchy.entries(child).iter();
+                let entries = entries.filter_map(|&entry| triangles.get(entry as usize));
+                self.leaves.push(Leaf::new(&entries.collect::<Vec<_>>()));
+                (self.leaves.len() - 1) as u32 | LEAF
             };
-            if let Some(slot) = self
-                .nodes
-                .get_mut(index)
-                .and_then(|n| n.children.get_mut(i))
-            {
-                *slot = reference;
-            }
+        }
+        if let Some(node) = self.nodes.get_mut(index) {
+            node.children = references;
         }
         index as u32
     }
@@ -416,8 +413,15 @@ impl Node {
     }
 }
 
+/// Padded box of a triangle as the intersection test computes its corners: one corner plus edges.
+fn padded_box(([a, b, c], _): &Triangle) -> Aabb {
+    let bounds = Aabb::of([*a, *a + (*b - *a), *a + (*c - *a)]);
+    let pad = bounds.mins.abs().max(bounds.maxs.abs()) * PAD;
+    bounds.grown(pad.max(Vec3::splat(PAD)))
+}
+
 impl Leaf {
-    fn new(triangles: &[([Vec3; 3], Kind)]) -> Leaf {
+    fn new(triangles: &[&Triangle]) -> Leaf {
         let none = Kind {
             sky: false,
             tag: u32::MAX,
