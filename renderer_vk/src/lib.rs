@@ -5,6 +5,8 @@
 
 pub mod api;
 mod assets;
+#[cfg(test)]
+mod assets_tests;
 mod at_once;
 mod error;
 mod frame;

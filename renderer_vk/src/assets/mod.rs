@@ -173,6 +173,3 @@ const MAX_TEXTURE_SIZE: u32 = 4096;
 
 #[cfg(test)]
 mod tests;
-
-#[cfg(test)]
-mod gpu_tests;

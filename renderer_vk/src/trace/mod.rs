@@ -1,9 +1,8 @@
 //! The traced look: acceleration structures, and the passes from camera rays to the picture.
 //!
-//! A frame, in the order of [`view_tracer`]: [`accel`] builds what moves and the top level; [`passes::Primary`] finds what each
-//! pixel shows; [`passes::Direct`] and [`indirect`] light it; [`denoise`] takes the noise out; [`passes::Composite`], [`antialias::Antialias`],
-//! [`passes::Exposure`] and [`passes::ToneMap`] make the picture of it. Rays are launched only from the ray generation
-//! shaders; hit shaders report what was hit and decide cut-outs.
+//! [`view_tracer`] lists the passes of a frame in their order, [`passes`] declares each. Before them [`accel`] builds what
+//! moves and the top level, and [`motion`] finds where everything was in the last frame. Rays are launched only from ray
+//! generation shaders; hit shaders report what was hit and decide cut-outs.
 //!
 //! Radiometry: light is carried as `L`, the radiance that a white diffuse surface shows (irradiance divided by pi), in
 //! units where 1 is display white. Estimators divide by their probabilities, so all of them agree in the mean.
