@@ -367,7 +367,8 @@ impl DrawList {
         self.calls.append(&mut self.fog);
     }
 
-    fn call(
+    /// A call, whose record is added.
+    pub(super) fn call(
         &mut self,
         state: State,
         range: DepthRange,

@@ -7,10 +7,11 @@ use shaderscript::eval::{self, DeformContext, DeformVertex};
 use support::slice::part;
 
 use super::aids::Aids;
-use super::list::{Call, DepthRange, DrawList, faces, stage_depth};
+use super::list::{DepthRange, DrawList, faces, stage_depth};
 use super::pipelines::{CullFaces, Depth, State};
 use super::shading::{Shading, StageContext};
 use crate::assets::compile::sampler;
+use crate::assets::{Material, RasterPass};
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -190,38 +191,23 @@ impl Overlay {
         for run in &self.runs {
             let first_index = list.indices.len() as u32;
             self.geometry(run, &stages, instance.time, list);
-            let index_count = list.indices.len() as u32 - first_index;
-            let mut push = |state: State, draw: Draw| {
-                list.calls.push(Call {
-                    state,
-                    range: DepthRange::Normal,
-                    first_index,
-                    index_count,
-                    draw: list.draws.len() as u32,
-                });
-                list.draws.push(draw);
-            };
-            let plain = State {
-                blend: None,
-                depth: Depth::Always,
-                depth_write: false,
-                cull: CullFaces::None,
-                offset: false,
-                wireframe: false,
-                shading: Shading::WHITE,
-            };
+            let span = (first_index, list.indices.len() as u32 - first_index);
             let draw = Draw {
                 dynamic_vertices: 1,
                 ..Draw::default()
             };
+            let mut push = |state: State, draw: Draw| {
+                let call = list.call(state, DepthRange::Normal, span, draw);
+                list.calls.push(call);
+            };
             match run.content {
                 Content::Texture(texture) => {
                     let (shading, draw) = stages.image(texture, sampler::CLAMP, draw);
-                    push(State { shading, ..plain }, draw);
+                    push(State { shading, ..PLAIN }, draw);
                 }
                 Content::Film(texture) => {
                     let (shading, draw) = stages.plain_image(texture, sampler::CLAMP, draw);
-                    push(State { shading, ..plain }, draw);
+                    push(State { shading, ..PLAIN }, draw);
                 }
                 Content::Transparent(texture) => {
                     let (shading, draw) = stages.image(texture, sampler::CLAMP, draw);
@@ -229,7 +215,7 @@ impl Overlay {
                     let state = State {
                         blend,
                         shading,
-                        ..plain
+                        ..PLAIN
                     };
                     push(state, draw);
                 }
@@ -239,32 +225,55 @@ impl Overlay {
                         continue;
                     }
                     for pass in &material.passes {
-                        let (shading, draw) = stages.passes(
-                            material,
-                            std::slice::from_ref(pass),
-                            instance,
-                            c::NO_TEXTURE,
-                            c::FOG_ADJUST_NONE,
-                            draw,
-                        );
-                        let state = State {
-                            cull: faces(material.cull, false),
-                            offset: material.polygon_offset,
-                            blend: pass.blend,
-                            depth: stage_depth(pass),
-                            depth_write: pass.depth_write && pass.depth_test,
-                            shading,
-                            ..plain
-                        };
+                        let (state, draw) = material_pass(material, pass, &stages, instance, draw);
                         push(state, draw);
                     }
                 }
             }
             if aids.edges {
-                list.push_edges((first_index, index_count), draw, CullFaces::None);
+                list.push_edges(span, draw, CullFaces::None);
             }
         }
     }
+}
+
+/// State of a picture that nothing blends with.
+const PLAIN: State = State {
+    blend: None,
+    depth: Depth::Always,
+    depth_write: false,
+    cull: CullFaces::None,
+    offset: false,
+    wireframe: false,
+    shading: Shading::WHITE,
+};
+
+/// A pass of a material's picture.
+fn material_pass(
+    material: &Material,
+    pass: &RasterPass,
+    stages: &StageContext<'_>,
+    instance: &Instance,
+    draw: Draw,
+) -> (State, Draw) {
+    let (shading, draw) = stages.passes(
+        material,
+        std::slice::from_ref(pass),
+        instance,
+        c::NO_TEXTURE,
+        c::FOG_ADJUST_NONE,
+        draw,
+    );
+    let state = State {
+        cull: faces(material.cull, false),
+        offset: material.polygon_offset,
+        blend: pass.blend,
+        depth: stage_depth(pass),
+        depth_write: pass.depth_write && pass.depth_test,
+        shading,
+        ..PLAIN
+    };
+    (state, draw)
 }
 
 /// The one instance of the overlay: no transform, shader time in seconds. As the engine's entity for pictures it has

@@ -348,102 +348,93 @@ impl StageContext<'_> {
         (texture != c::NO_TEXTURE).then_some(texture)
     }
 
-    /// The colour of a stage. White is only what is always white, so that a pulse does not change the pipeline.
+    /// The colour of a stage.
     fn color(&self, stage: &shaderscript::Stage, instance: &Instance, time: f32) -> StageColor {
         let time = seconds(time);
-        let [er, eg, eb, ea] = instance.color;
-        let mut always_white = true;
-        let mut rgb_gen = None;
-        let rgb = match &stage.rgb_gen {
-            RgbGen::Identity => [1.0; 3],
-            RgbGen::IdentityLighting => {
-                always_white &= self.identity_light >= 1.0;
-                [self.identity_light; 3]
-            }
-            RgbGen::Const(rgb) => {
-                always_white &= rgb.min_element() >= 1.0;
-                rgb.to_array()
-            }
+        let rgb = self.rgb(&stage.rgb_gen, instance.color, time);
+        let mut alpha = alpha(&stage.alpha_gen, instance.color, time);
+        if matches!(stage.alpha_gen, AlphaGen::Identity) {
+            // light and vertex colours may bring their own
+            alpha.per_vertex = rgb.per_vertex.map(|_| c::ALPHAGEN_IDENTITY);
+        }
+        let ([r, g, b], [a]) = (rgb.flat, alpha.flat);
+        StageColor {
+            // the engine keeps bytes; see `point_color` in material.glsl
+            flat: [r, g, b, a].map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.001).floor() / 255.0),
+            always_white: rgb.always_white && alpha.always_white,
+            rgb_gen: rgb.per_vertex,
+            alpha_gen: alpha.per_vertex,
+        }
+    }
+
+    fn rgb(&self, rgb_gen: &RgbGen, [r, g, b, _]: [f32; 4], time: f64) -> Channels<3> {
+        match rgb_gen {
+            RgbGen::Identity => Channels::constant([1.0; 3]),
+            RgbGen::IdentityLighting => Channels::constant([self.identity_light; 3]),
+            RgbGen::Const(rgb) => Channels::constant(rgb.to_array()),
             RgbGen::Wave(wave) => {
-                always_white = false;
                 let scale = match wave.function {
                     WaveFunction::Noise => 1.0,
                     _ => self.identity_light,
                 };
-                [eval::wave(wave, time) * scale; 3]
+                Channels::changing([eval::wave(wave, time) * scale; 3])
             }
-            RgbGen::Entity => {
-                always_white = false;
-                [er, eg, eb]
-            }
-            RgbGen::OneMinusEntity => {
-                always_white = false;
-                [1.0 - er, 1.0 - eg, 1.0 - eb]
-            }
-            RgbGen::Vertex => {
-                rgb_gen = Some(c::RGBGEN_VERTEX);
-                [1.0; 3]
-            }
-            RgbGen::ExactVertex => {
-                rgb_gen = Some(c::RGBGEN_EXACT_VERTEX);
-                [1.0; 3]
-            }
-            RgbGen::OneMinusVertex => {
-                rgb_gen = Some(c::RGBGEN_ONE_MINUS_VERTEX);
-                [1.0; 3]
-            }
-            RgbGen::LightingDiffuse => {
-                rgb_gen = Some(c::RGBGEN_LIGHTING_DIFFUSE);
-                [1.0; 3]
-            }
-        };
-        let mut alpha_gen = None;
-        let alpha = match &stage.alpha_gen {
-            AlphaGen::Identity => {
-                // light and vertex colours may bring their own
-                alpha_gen = rgb_gen.map(|_| c::ALPHAGEN_IDENTITY);
-                1.0
-            }
-            AlphaGen::Const(alpha) => {
-                always_white &= *alpha >= 1.0;
-                *alpha
-            }
-            AlphaGen::Wave(wave) => {
-                always_white = false;
-                eval::wave(wave, time)
-            }
-            AlphaGen::Entity => {
-                always_white = false;
-                ea
-            }
-            AlphaGen::OneMinusEntity => {
-                always_white = false;
-                1.0 - ea
-            }
-            AlphaGen::Vertex => {
-                alpha_gen = Some(c::ALPHAGEN_VERTEX);
-                1.0
-            }
-            AlphaGen::OneMinusVertex => {
-                alpha_gen = Some(c::ALPHAGEN_ONE_MINUS_VERTEX);
-                1.0
-            }
-            AlphaGen::LightingSpecular => {
-                alpha_gen = Some(c::ALPHAGEN_LIGHTING_SPECULAR);
-                1.0
-            }
-            AlphaGen::Portal { .. } => {
-                alpha_gen = Some(c::ALPHAGEN_PORTAL);
-                1.0
-            }
-        };
-        let [r, g, b] = rgb;
-        StageColor {
-            // the engine keeps bytes; see `point_color` in material.glsl
-            flat: [r, g, b, alpha].map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.001).floor() / 255.0),
-            always_white,
-            rgb_gen,
-            alpha_gen,
+            RgbGen::Entity => Channels::changing([r, g, b]),
+            RgbGen::OneMinusEntity => Channels::changing([1.0 - r, 1.0 - g, 1.0 - b]),
+            RgbGen::Vertex => Channels::per_vertex(c::RGBGEN_VERTEX),
+            RgbGen::ExactVertex => Channels::per_vertex(c::RGBGEN_EXACT_VERTEX),
+            RgbGen::OneMinusVertex => Channels::per_vertex(c::RGBGEN_ONE_MINUS_VERTEX),
+            RgbGen::LightingDiffuse => Channels::per_vertex(c::RGBGEN_LIGHTING_DIFFUSE),
+        }
+    }
+}
+
+fn alpha(alpha_gen: &AlphaGen, [.., a]: [f32; 4], time: f64) -> Channels<1> {
+    match alpha_gen {
+        AlphaGen::Identity => Channels::constant([1.0]),
+        AlphaGen::Const(alpha) => Channels::constant([*alpha]),
+        AlphaGen::Wave(wave) => Channels::changing([eval::wave(wave, time)]),
+        AlphaGen::Entity => Channels::changing([a]),
+        AlphaGen::OneMinusEntity => Channels::changing([1.0 - a]),
+        AlphaGen::Vertex => Channels::per_vertex(c::ALPHAGEN_VERTEX),
+        AlphaGen::OneMinusVertex => Channels::per_vertex(c::ALPHAGEN_ONE_MINUS_VERTEX),
+        AlphaGen::LightingSpecular => Channels::per_vertex(c::ALPHAGEN_LIGHTING_SPECULAR),
+        AlphaGen::Portal { .. } => Channels::per_vertex(c::ALPHAGEN_PORTAL),
+    }
+}
+
+/// Channels of a stage's colour: RGB, or alpha.
+struct Channels<const N: usize> {
+    /// The value that all vertices of a draw share; 1 where vertices differ.
+    flat: [f32; N],
+    /// The value is 1 in every frame. White that changes is none, so that a pulse does not change the pipeline.
+    always_white: bool,
+    /// How the vertex shader evaluates them, where vertices differ.
+    per_vertex: Option<u32>,
+}
+
+impl<const N: usize> Channels<N> {
+    fn constant(flat: [f32; N]) -> Self {
+        Self {
+            flat,
+            always_white: flat.iter().all(|v| *v >= 1.0),
+            per_vertex: None,
+        }
+    }
+
+    fn changing(flat: [f32; N]) -> Self {
+        Self {
+            flat,
+            always_white: false,
+            per_vertex: None,
+        }
+    }
+
+    fn per_vertex(source: u32) -> Self {
+        Self {
+            flat: [1.0; N],
+            always_white: true,
+            per_vertex: Some(source),
         }
     }
 }
