@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::api::RefDef;
 use crate::assets::{Assets, ImageFlags, ImageSource, Samplers};
 use crate::gpu::{Device, DeviceOptions, SurfaceSource};
-use crate::scene::{Geometry, Look, Scene};
+use crate::scene::{GatherInput, Geometry, Scene};
 use crate::world::{World, WorldError};
 use crate::{Settings, TextureMode};
 use relight::{GameFiles, MemoryFiles};
@@ -146,19 +146,19 @@ fn the_sample_map_loads_and_gathers() {
         ..RefDef::default()
     };
     let views = scene
-        .gather(Some(&world), &assets, &settings, &def, Look::Classic)
+        .gather_classic(&GatherInput::new(Some(&world), &assets, &settings), &def)
         .unwrap();
     let view = views.last().unwrap();
-    assert!(view.has_world && !view.surfaces.is_empty());
-    let lightmapped = view.surfaces.iter().filter(|s| s.lightmap != u32::MAX);
+    assert!(view.has_world && !view.look.surfaces.is_empty());
+    let lightmapped = view.look.surfaces.iter().filter(|s| s.lightmap != u32::MAX);
     assert!(lightmapped.count() > 0);
-    let drawn = view.surfaces.iter().all(|s| match s.geometry {
+    let drawn = view.look.surfaces.iter().all(|s| match s.geometry {
         Geometry::Static { index_count, .. } | Geometry::Dynamic { index_count, .. } => {
             index_count > 0
         }
     });
     assert!(drawn);
-    scene.recycle(views);
+    scene.recycle_classic(views);
     drop((world, assets));
     finish(&device);
 }

@@ -9,7 +9,7 @@ use crate::raster::{
     Aids, DrawList, FlareTest, Flares, Overlay, Raster, StageContext, Statics, Target,
     ViewParameters, overlay_instance, window_to_clip,
 };
-use crate::scene::ViewScene;
+use crate::scene::{ClassicScene, TracedScene, ViewScene};
 use crate::settings::Settings;
 use crate::trace::{MapView, TraceLook};
 use crate::world::World;
@@ -21,9 +21,9 @@ pub enum Item {
     /// 2D pictures, with the shader time in seconds.
     Overlay(Overlay, f32),
     /// A 3D view in the classic look: at most one portal view, then the view itself.
-    Classic(Vec<ViewScene>),
+    Classic(Vec<ClassicScene>),
     /// A 3D view in the traced look.
-    Traced(Box<ViewScene>),
+    Traced(Box<TracedScene>),
 }
 
 /// What the items of a frame are drawn with and onto.
@@ -79,7 +79,7 @@ impl<'a> FrameContext<'a> {
             .record(recorder, "clear", target, self.list, &parameters)
     }
 
-    fn traced(&mut self, recorder: &mut Recorder, scene: &ViewScene) -> Result<(), gpu::Error> {
+    fn traced(&mut self, recorder: &mut Recorder, scene: &TracedScene) -> Result<(), gpu::Error> {
         let (Some(trace), Some(world)) = (self.trace.as_deref_mut(), self.world) else {
             return Ok(());
         };
@@ -180,7 +180,7 @@ impl<'a> FrameContext<'a> {
         }
     }
 
-    fn classic(&mut self, recorder: &mut Recorder, scene: &ViewScene) -> Result<(), gpu::Error> {
+    fn classic(&mut self, recorder: &mut Recorder, scene: &ClassicScene) -> Result<(), gpu::Error> {
         let settings = self.settings;
         let world = self.world.filter(|_| scene.has_world);
         self.list.clear();
@@ -219,7 +219,7 @@ impl<'a> FrameContext<'a> {
             viewport: view.viewport,
             clear_depth: true,
             clear_color: clear_color(scene, settings),
-            shadows: Some((&scene.shadows, view)),
+            shadows: Some((&scene.look.shadows, view)),
         };
         let target = self.target();
         self.raster
@@ -278,7 +278,7 @@ impl<'a> FrameContext<'a> {
 pub const CLEAR: [f32; 4] = [1.0, 0.0, 0.5, 1.0];
 
 /// The engine clears the colour of a view only where a setting or the game asks for it.
-pub fn clear_color(scene: &ViewScene, settings: &Settings) -> Option<[f32; 4]> {
+pub fn clear_color(scene: &ClassicScene, settings: &Settings) -> Option<[f32; 4]> {
     if scene.def.flags & crate::api::rdflags::HYPERSPACE != 0 {
         let grey = (scene.def.time_ms & 255) as f32 / 255.0;
         Some([grey, grey, grey, 1.0])

@@ -22,7 +22,7 @@ use crate::gpu::{
     SwapchainDesc, Window, give_back_freed_memory,
 };
 use crate::raster::{DrawList, Flares, Overlay, Present, Raster};
-use crate::scene::{Look, Scene};
+use crate::scene::{GatherInput, Scene};
 use crate::settings::{Anaglyph, Settings};
 use crate::stereo::Eye;
 use crate::targets::FrameTargets;
@@ -313,17 +313,12 @@ impl Renderer {
             return Err(Error::NoWorld);
         }
         self.queue_overlay();
-        let look = if self.settings.rt && wants_world && self.ready_to_trace()? {
-            Look::Traced
-        } else {
-            Look::Classic
-        };
+        let traced = self.settings.rt && wants_world && self.ready_to_trace()?;
         let mask = self.eye.mask(self.settings.anaglyph);
-        let pause = self.settings.rt_pause && look == Look::Traced;
+        let pause = self.settings.rt_pause && traced;
         if pause && let Some(mut view) = self.held.next(def) {
             // held for one eye, shown to both
-            view.view.stereo = self.eye.stereo(&self.settings);
-            view.view.update();
+            view.view = view.view.with_stereo(self.eye.stereo(&self.settings));
             self.scene.clear();
             self.keep_for_still(&view);
             self.queue.push((Item::Traced(Box::new(view)), mask));
@@ -333,24 +328,19 @@ impl Renderer {
             return Err(Error::NotRegistered);
         };
         let begin = Instant::now();
-        let mut scenes =
-            self.scene
-                .gather(self.world.as_ref(), assets, &self.settings, def, look)?;
-        self.gather_ms += milliseconds(begin, Instant::now());
-        let item = match look {
-            Look::Classic => Item::Classic(scenes),
-            Look::Traced => match scenes.pop() {
-                Some(scene) => {
-                    self.scene.recycle(scenes);
-                    if pause {
-                        self.held.hold(&scene);
-                    }
-                    self.keep_for_still(&scene);
-                    Item::Traced(Box::new(scene))
-                }
-                None => return Ok(()),
-            },
+        let input = GatherInput::new(self.world.as_ref(), assets, &self.settings);
+        let item = if traced {
+            Item::Traced(Box::new(self.scene.gather_traced(&input, def)?))
+        } else {
+            Item::Classic(self.scene.gather_classic(&input, def)?)
         };
+        self.gather_ms += milliseconds(begin, Instant::now());
+        if let Item::Traced(view) = &item {
+            if pause {
+                self.held.hold(view);
+            }
+            self.keep_for_still(view);
+        }
         self.queue.push((item, mask));
         Ok(())
     }
@@ -361,7 +351,7 @@ impl Renderer {
         if let Some((Item::Classic(scenes), _)) = self.queue.last_mut()
             && let Some(view) = scenes.last_mut()
         {
-            view.debug.add(color, corners, view.view.origin);
+            view.look.debug.add(color, corners, view.view.origin);
         }
     }
 

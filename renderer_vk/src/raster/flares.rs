@@ -15,7 +15,7 @@ use crate::gpu::{
     self, Access, Buffer, BufferDesc, BufferUsage, ColorMask, ComputePipeline, DepthTest, Device,
     GraphicsDesc, GraphicsPipeline, Memory, Recorder, Rendering, Topology,
 };
-use crate::scene::{DrawSurface, Geometry, ViewScene};
+use crate::scene::{ClassicScene, DrawSurface, Geometry, ViewScene};
 
 /// Invocations of a workgroup in `flare_fade.comp`.
 const GROUP: u32 = 64;
@@ -65,7 +65,7 @@ pub struct Flares {
     /// Views of this frame so far.
     views: u32,
     flares: Vec<Flare>,
-    quads: Option<ViewScene>,
+    quads: Option<ClassicScene>,
     /// The lack of what the depth test needs was told.
     warned: bool,
 }
@@ -190,7 +190,7 @@ impl Flares {
         scene: &ViewScene,
         material: u32,
         speed: f32,
-    ) -> Result<(u64, &ViewScene), gpu::Error> {
+    ) -> Result<(u64, &ClassicScene), gpu::Error> {
         let vertices = self.fit_vertices()?;
         let fade = match &mut self.fade {
             Some(fade) => fade,
@@ -217,7 +217,7 @@ impl Flares {
 
         let quads = self
             .quads
-            .get_or_insert_with(|| ViewScene::empty(&scene.def, scene.view));
+            .get_or_insert_with(|| ClassicScene::empty(&scene.def, scene.view));
         list_quads(quads, scene, material, test.count);
         Ok((vertices.address(), quads))
     }
@@ -311,7 +311,7 @@ fn test_pipeline(device: &Device, target: TargetKind) -> Result<GraphicsPipeline
 }
 
 /// Makes `quads` the view that shows the squares of `count` flares of `scene`.
-fn list_quads(quads: &mut ViewScene, scene: &ViewScene, material: u32, count: u32) {
+fn list_quads(quads: &mut ClassicScene, scene: &ViewScene, material: u32, count: u32) {
     quads.view = scene.view;
     quads.view.clip_plane = None;
     quads.time = scene.time;
@@ -322,8 +322,8 @@ fn list_quads(quads: &mut ViewScene, scene: &ViewScene, material: u32, count: u3
     for v in (0..count).map(|quad| quad * 4) {
         quads.indices.extend([v, v + 1, v + 2, v, v + 2, v + 3]);
     }
-    quads.surfaces.clear();
-    quads.surfaces.push(DrawSurface {
+    quads.look.surfaces.clear();
+    quads.look.surfaces.push(DrawSurface {
         sort_key: 0,
         material,
         instance: 0,

@@ -24,7 +24,7 @@ use super::passes;
 use super::pipelines::{Depth, State};
 use super::shading::{Shading, StageContext};
 use crate::assets::{Material, RasterPass};
-use crate::scene::{DrawSurface, Geometry, ViewScene};
+use crate::scene::{ClassicScene, DrawSurface, Geometry};
 use shaderscript::sort;
 
 /// `surfaceparm nodlight` and `surfaceparm sky`: no dynamic light falls on these.
@@ -83,7 +83,7 @@ pub(super) struct Group {
 #[derive(Clone, Copy)]
 pub(super) struct GroupContext<'a> {
     pub surfaces: &'a [DrawSurface],
-    pub scene: &'a ViewScene,
+    pub scene: &'a ClassicScene,
     pub stages: StageContext<'a>,
     pub statics: Statics<'a>,
     pub aids: Aids,

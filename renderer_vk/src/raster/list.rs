@@ -13,7 +13,7 @@ use super::sky;
 use crate::api::DynamicLight;
 use crate::assets::compile::sampler;
 use crate::assets::{Material, Materials, RasterPass};
-use crate::scene::{SKY_FACES, Sun, ViewScene, VisibleSky};
+use crate::scene::{ClassicScene, SKY_FACES, Sun, VisibleSky};
 use shaderscript::{Cull, sort};
 
 /// The part of the depth range that a draw uses.
@@ -117,15 +117,16 @@ impl DrawList {
     /// Adds everything that a view shows.
     pub fn add_view(
         &mut self,
-        scene: &ViewScene,
+        scene: &ClassicScene,
         stages: StageContext<'_>,
         statics: Statics<'_>,
         aids: Aids,
     ) {
         let materials = stages.materials;
         self.vertices.extend_from_slice(&scene.vertices);
-        let (before_sky, rest) = scene.surfaces.split_at(
+        let (before_sky, rest) = scene.look.surfaces.split_at(
             scene
+                .look
                 .surfaces
                 .partition_point(|s| materials.get(s.material).sort < sort::SKY),
         );
@@ -137,17 +138,17 @@ impl DrawList {
             aids,
         };
         self.add_surfaces(&context);
-        for sky in &scene.skies {
+        for sky in &scene.look.skies {
             self.add_sky(sky, scene, stages, aids);
         }
         self.add_surfaces(&GroupContext {
             surfaces: rest,
             ..context
         });
-        if let Some(sun) = scene.sun.filter(|_| !scene.skies.is_empty()) {
+        if let Some(sun) = scene.sun.filter(|_| !scene.look.skies.is_empty()) {
             self.add_sun(&sun, scene, stages, aids);
         }
-        self.push_debug_polygons(&scene.debug);
+        self.push_debug_polygons(&scene.look.debug);
         let clip = scene.view.clip_plane.is_some();
         if clip {
             self.occluders.clear();
@@ -162,7 +163,7 @@ impl DrawList {
     fn add_sky(
         &mut self,
         visible: &VisibleSky,
-        scene: &ViewScene,
+        scene: &ClassicScene,
         stages: StageContext<'_>,
         aids: Aids,
     ) {
@@ -235,7 +236,7 @@ impl DrawList {
     }
 
     /// The sun's disc, behind everything but the sky.
-    fn add_sun(&mut self, sun: &Sun, scene: &ViewScene, stages: StageContext<'_>, aids: Aids) {
+    fn add_sun(&mut self, sun: &Sun, scene: &ClassicScene, stages: StageContext<'_>, aids: Aids) {
         let material = stages.materials.get(sun.material);
         let Some(world) = scene.instances.first() else {
             return;

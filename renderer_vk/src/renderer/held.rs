@@ -2,12 +2,12 @@
 //! frame. The game goes on, and so do its 2D pictures.
 
 use crate::api::RefDef;
-use crate::scene::ViewScene;
+use crate::scene::TracedScene;
 
 /// The held views, by their order in a frame.
 #[derive(Default)]
 pub(super) struct HeldViews {
-    views: Vec<ViewScene>,
+    views: Vec<TracedScene>,
     next: usize,
 }
 
@@ -24,7 +24,7 @@ impl HeldViews {
     }
 
     /// The view to draw in place of one that the game asks for; `None` while there is none of its size.
-    pub fn next(&mut self, def: &RefDef) -> Option<ViewScene> {
+    pub fn next(&mut self, def: &RefDef) -> Option<TracedScene> {
         let rectangle = |d: &RefDef| [d.x, d.y, d.width, d.height];
         let held = self.views.get(self.next)?;
         if rectangle(&held.def) != rectangle(def) {
@@ -35,7 +35,7 @@ impl HeldViews {
     }
 
     /// Holds a view that [`next`](Self::next) had none for.
-    pub fn hold(&mut self, view: &ViewScene) {
+    pub fn hold(&mut self, view: &TracedScene) {
         self.views.truncate(self.next);
         self.views.push(view.clone());
         self.next += 1;
@@ -58,8 +58,8 @@ mod tests {
         }
     }
 
-    fn view(def: &RefDef) -> ViewScene {
-        ViewScene::empty(def, View::new(def, 4.0, 100.0))
+    fn view(def: &RefDef) -> TracedScene {
+        TracedScene::empty(def, View::new(def, 4.0, 100.0))
     }
 
     #[test]

@@ -108,10 +108,10 @@ impl Renderer {
                     self.spare_overlays.push(overlay);
                 }
                 Item::Clear(_) => {}
-                Item::Classic(scenes) => self.scene.recycle(scenes),
+                Item::Classic(scenes) => self.scene.recycle_classic(scenes),
                 // held views are copies: to keep their memory too would let it grow with each frame
                 Item::Traced(_) if self.settings.rt_pause => {}
-                Item::Traced(scene) => self.scene.recycle_view(*scene),
+                Item::Traced(scene) => self.scene.recycle_traced(*scene),
             }
         }
     }
@@ -177,7 +177,7 @@ impl Renderer {
                 context.record(&mut recorder, item)?;
                 if let Item::Classic(scenes) = item {
                     for scene in scenes {
-                        stats.scene.add(&scene.statistics);
+                        stats.scene.add(&scene.look.statistics);
                     }
                 }
                 stats.views += u32::from(!matches!(item, Item::Overlay(..) | Item::Clear(_)));

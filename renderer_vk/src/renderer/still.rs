@@ -6,7 +6,7 @@ use super::Renderer;
 use crate::api::Picture;
 use crate::error::Error;
 use crate::gpu::Recorder;
-use crate::scene::ViewScene;
+use crate::scene::TracedScene;
 use crate::trace::still::Still;
 
 /// A picture that was asked for.
@@ -96,7 +96,7 @@ impl Renderer {
 
     /// Keeps a view for the picture that was asked for. A picture that the device has no memory for is given up with a
     /// warning: the game goes on.
-    pub(super) fn keep_for_still(&mut self, view: &ViewScene) {
+    pub(super) fn keep_for_still(&mut self, view: &TracedScene) {
         if let (Some((size, samples)), Some(look)) = (self.still.wanted.take(), &self.trace) {
             match Still::new(&self.device, look, view, size, samples) {
                 Ok(still) => (self.still.still, self.still.pace) = (Some(still), 1),

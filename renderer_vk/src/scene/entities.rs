@@ -10,10 +10,9 @@ use super::entity;
 use super::gather::{Gatherer, count};
 use super::lighting;
 use super::mesh::RawMesh;
-use super::shapes::MeshBuilder;
 use super::surfaces::{self, LocalView};
 use super::turned::Way;
-use super::{Look, Submodel, ViewScene};
+use super::{LookPartMut, Submodel, ViewScene};
 use crate::api::{EntityKind, RefEntity, renderfx};
 use crate::assets::Model;
 use crate::world::GridLight;
@@ -26,7 +25,7 @@ impl Gatherer<'_> {
         }
         // in the main view they only cast shadows, which the classic look does not draw
         let third_person = entity.renderfx & renderfx::THIRD_PERSON != 0;
-        let hidden = third_person && !self.view.is_portal && self.look == Look::Classic;
+        let hidden = third_person && !self.view.is_portal && !self.traced;
         match entity.kind {
             EntityKind::PortalSurface | EntityKind::Poly => {}
             EntityKind::Model => self.add_model(number, entity, hidden, out),
@@ -53,7 +52,7 @@ impl Gatherer<'_> {
             .map_or(0, |w| w.fog_of_sphere(entity.origin, entity.radius));
         let instance = count(out.instances.len());
         let mut placed = entity::effect_instance(entity, &self.view, out.time);
-        if self.look == Look::Traced && entity.kind == EntityKind::Sprite {
+        if self.traced && entity.kind == EntityKind::Sprite {
             // in the air light comes from all sides: half of what has a direction reaches what is seen
             let light = self.light_at(entity.origin);
             placed.ambient = ((light.ambient + light.directed * 0.5) / 255.0).min(Vec3::ONE);
@@ -72,10 +71,7 @@ impl Gatherer<'_> {
             };
             let mut raw = RawMesh::begin(out, material, instance, fog);
             raw.paths = paths;
-            let mut builder = MeshBuilder {
-                vertices: &mut out.vertices,
-                indices: &mut out.indices,
-            };
+            let mut builder = out.builder();
             match entity.kind {
                 EntityKind::Sprite => builder.sprite(entity, &view),
                 EntityKind::Beam => builder.beam(entity),
@@ -112,11 +108,7 @@ impl Gatherer<'_> {
                     };
                     let mut raw = RawMesh::begin(out, axes, instance, 0);
                     raw.paths = paths;
-                    MeshBuilder {
-                        vertices: &mut out.vertices,
-                        indices: &mut out.indices,
-                    }
-                    .axes(entity, &view);
+                    out.builder().axes(entity, &view);
                     // the engine lists it under its default material
                     self.finish_and_list(raw, 0, number, Some(entity), out);
                 }
@@ -177,17 +169,17 @@ impl Gatherer<'_> {
             return;
         }
         let instance = self.push_instance(entity, out);
-        out.submodels.push(Submodel { model, instance });
         let first = brush.first_surface;
         let range = first..first.saturating_add(brush.num_surfaces);
         self.add_flares(world, range.clone(), instance, out);
         let mut pending = std::mem::take(&mut self.scratch.pending);
-        match self.look {
-            Look::Traced => {
+        match out.look.part() {
+            LookPartMut::Traced(traced) => {
+                traced.submodels.push(Submodel { model, instance });
                 let deformed = range.filter(|&s| world.is_deformed(s));
                 pending.extend(deformed.filter_map(|s| self.traced_deform(world, s)));
             }
-            Look::Classic => {
+            LookPartMut::Classic(classic) => {
                 let mut lights = std::mem::take(&mut self.scratch.lights);
                 surfaces::local_lights(self.lights, entity.origin, &entity.axis, &mut lights);
                 // a model that no light reaches has surfaces that none reaches; of the lights that reach one the
@@ -203,9 +195,9 @@ impl Gatherer<'_> {
                     forward: placed.map_or(Vec3::X, |i| entity::into_axes(i, self.view.axis[0])),
                     by_facing: self.input.settings.face_plane_cull,
                 };
-                let run = self.run(world, &local, instance, number);
+                let run = self.run(world, &local, (instance, &out.instances), number);
                 for surface in range {
-                    pending.extend(run.add(surface, out));
+                    pending.extend(run.add(surface, classic));
                 }
                 self.scratch.lights = lights;
             }

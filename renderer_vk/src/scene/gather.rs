@@ -2,8 +2,8 @@
 
 use glam::{Vec3, Vec4};
 use q3model::BoneMatrix;
-use shaders::types::Vertex;
 use shaders::types::constants::NO_TEXTURE;
+use shaders::types::{Instance, Vertex};
 use support::Aabb;
 use support::slice;
 
@@ -18,8 +18,8 @@ use super::surfaces::{
 };
 use super::turned::{self, Way};
 use super::{
-    DynamicMesh, GatherInput, Look, MeshId, Scene, Shape, Statistics, Sun, View, ViewEntity,
-    ViewScene,
+    ClassicScene, DynamicMesh, GatherInput, LookPartMut, MeshId, Scene, Shape, Sun, TracedScene,
+    View, ViewEntity, ViewScene,
 };
 use crate::api::{DynamicLight, PolyVert, RefDef, RefEntity, rdflags, renderfx};
 use crate::world::{VisibleQuery, VisibleSet, WorldData};
@@ -59,53 +59,66 @@ impl Scratch {
     }
 }
 
-/// The views of a scene: at most one through a portal or mirror (classic look), then the main one.
-pub(super) fn views(
+/// The views of a scene in the classic look: at most one through a portal or mirror, then the main one.
+pub(super) fn classic_views(
     scene: &mut Scene,
     input: &GatherInput<'_>,
     def: &RefDef,
-    look: Look,
-) -> Vec<ViewScene> {
+) -> Vec<ClassicScene> {
     // New lists if none can be used again.
     let mut out = scene.lists.pop().unwrap_or_default();
-    let mut view = View::new(def, input.settings.znear, FAR_WITHOUT_WORLD);
-    view.stereo = scene.eye.stereo(input.settings);
-    view.update();
-    let mut main = scene
-        .pool
-        .pop()
-        .unwrap_or_else(|| ViewScene::empty(def, view));
-    let portals = match look {
-        Look::Traced => portal::find_all(&scene.entities, input, def),
-        Look::Classic => Vec::new(),
-    };
-    let mut turned = std::mem::take(&mut scene.turned);
-    turned::views(&portals, &view, &mut turned);
-    Gatherer::new(scene, input, def, look, view, &turned).gather(def.view_origin, &mut main);
-    main.portals.extend(portals);
-    scene.turned = turned;
-    match look {
-        Look::Traced => {}
-        Look::Classic => {
-            if let Some(portal) = portal::find_first(&scene.entities, input, def, &main) {
-                let seen = portal::view_through(&portal, &main.view);
-                let mut behind = scene
-                    .pool
-                    .pop()
-                    .unwrap_or_else(|| ViewScene::empty(def, seen));
-                Gatherer::new(scene, input, def, look, seen, &[])
-                    .gather(portal.pvs_origin, &mut behind);
-                main.portals.push(portal);
-                out.push(behind);
-                if input.settings.portal_only {
-                    scene.pool.push(main);
-                    return out;
-                }
-            }
+    let main = classic_view(
+        scene,
+        input,
+        def,
+        main_view(scene, input, def),
+        def.view_origin,
+    );
+    if let Some(portal) = portal::find_first(&scene.entities, input, def, &main) {
+        let seen = portal::view_through(&portal, &main.view);
+        out.push(classic_view(scene, input, def, seen, portal.pvs_origin));
+        if input.settings.portal_only {
+            scene.classic_pool.push(main);
+            return out;
         }
     }
     out.push(main);
     out
+}
+
+fn classic_view(
+    scene: &mut Scene,
+    input: &GatherInput<'_>,
+    def: &RefDef,
+    view: View,
+    pvs_origin: Vec3,
+) -> ClassicScene {
+    let pooled = scene.classic_pool.pop();
+    let mut out = pooled.unwrap_or_else(|| ViewScene::empty(def, view));
+    let mut gatherer = Gatherer::new(scene, input, def, view, &[], &mut out);
+    gatherer.gather(pvs_origin, &mut out);
+    gatherer.sort_and_count(&mut out);
+    out
+}
+
+/// The view of a scene in the traced look, with all portals and mirrors that it may meet.
+pub(super) fn traced_view(scene: &mut Scene, input: &GatherInput<'_>, def: &RefDef) -> TracedScene {
+    let view = main_view(scene, input, def);
+    let portals = portal::find_all(&scene.entities, input, def);
+    let mut turned = std::mem::take(&mut scene.turned);
+    turned::views(&portals, &view, &mut turned);
+    let pooled = scene.traced_pool.pop();
+    let mut out = pooled.unwrap_or_else(|| ViewScene::empty(def, view));
+    Gatherer::new(scene, input, def, view, &turned, &mut out).gather(def.view_origin, &mut out);
+    scene.turned = turned;
+    out.look.portals = portals;
+    out
+}
+
+/// The view that the game asks for.
+fn main_view(scene: &Scene, input: &GatherInput<'_>, def: &RefDef) -> View {
+    let stereo = scene.eye.stereo(input.settings);
+    View::new(def, input.settings.znear, FAR_WITHOUT_WORLD).with_stereo(stereo)
 }
 
 /// A length as the GPU counts.
@@ -123,7 +136,8 @@ pub(super) struct Gatherer<'a> {
     pub(super) visible: &'a mut VisibleSet,
     pub(super) scratch: &'a mut Scratch,
     pub(super) def: &'a RefDef,
-    pub(super) look: Look,
+    /// The view is traced; otherwise it is rasterized.
+    pub(super) traced: bool,
     pub(super) view: View,
     /// The views through portals, by the numbers of their paths: what turns to the eye turns to these, too.
     turned: &'a [Option<View>],
@@ -139,10 +153,11 @@ impl<'a> Gatherer<'a> {
         scene: &'a mut Scene,
         input: &'a GatherInput<'a>,
         def: &'a RefDef,
-        look: Look,
         view: View,
         turned: &'a [Option<View>],
+        out: &mut ViewScene,
     ) -> Self {
+        let traced = matches!(out.look.part(), LookPartMut::Traced(_));
         let settings = input.settings;
         let dynamic = settings.dynamic_light && !settings.vertex_light;
         let shows_world = def.flags & rdflags::NO_WORLD_MODEL == 0;
@@ -163,16 +178,16 @@ impl<'a> Gatherer<'a> {
             },
             scratch: &mut scene.scratch,
             def,
-            look,
+            traced,
             view,
             turned,
             world: input.world.filter(|_| shows_world),
             frustum: view.frustum(),
-            culling: look == Look::Classic && !settings.no_cull,
+            culling: !traced && !settings.no_cull,
         }
     }
 
-    fn gather(mut self, pvs_origin: Vec3, out: &mut ViewScene) {
+    fn gather(&mut self, pvs_origin: Vec3, out: &mut ViewScene) {
         self.clear(out);
         self.scratch.rigid.begin_view();
         if let Some(world) = self.world {
@@ -186,8 +201,10 @@ impl<'a> Gatherer<'a> {
             let first_mesh = count(out.meshes.len());
             self.add_entity(count(number), entity, out);
             let instance_count = count(out.instances.len()) - first_instance;
-            if instance_count > 0 {
-                out.entities.push(ViewEntity {
+            if let LookPartMut::Traced(traced) = out.look.part()
+                && instance_count > 0
+            {
+                traced.entities.push(ViewEntity {
                     kind: entity.kind,
                     model: entity.model,
                     skin: entity.custom_skin,
@@ -203,17 +220,21 @@ impl<'a> Gatherer<'a> {
                 });
             }
         }
+    }
+
+    /// What the classic look does to a gathered view: greyscale, the order of drawing, counts.
+    fn sort_and_count(&mut self, out: &mut ClassicScene) {
         let greyscale = self.input.settings.greyscale.clamp(0.0, 1.0);
-        if greyscale > 0.0 && self.look == Look::Classic {
+        if greyscale > 0.0 {
             out.take_color(greyscale);
         }
         // equal keys keep the order of submission
-        self.scratch.sort(&mut out.surfaces);
+        self.scratch.sort(&mut out.look.surfaces);
         // of skies that lie behind each other the one that is drawn last shows: they write no depth
         let materials = self.input.materials;
-        (out.skies).sort_unstable_by_key(|sky| (materials.rank(sky.material), sky.fog));
-        if self.input.settings.speeds != 0 && self.look == Look::Classic {
-            out.statistics = self.count_view(out);
+        (out.look.skies).sort_unstable_by_key(|sky| (materials.rank(sky.material), sky.fog));
+        if self.input.settings.speeds != 0 {
+            out.look.statistics = self.count_view(out);
         }
     }
 
@@ -225,21 +246,12 @@ impl<'a> Gatherer<'a> {
         out.vertices.clear();
         out.indices.clear();
         out.meshes.clear();
-        out.rigid.clear();
-        out.submodels.clear();
-        out.entities.clear();
-        out.surfaces.clear();
-        out.potential.clear();
         out.dlights.clear();
         out.dlights.extend_from_slice(self.lights);
-        out.portals.clear();
         out.has_world = self.world.is_some();
-        out.skies.clear();
-        out.shadows.clear();
-        out.debug.clear();
-        out.statistics = Statistics::default();
         out.sun = self.sun();
         out.flares.clear();
+        out.look.clear();
         out.instances
             .push(entity::world_instance(&self.view, out.time));
     }
@@ -308,15 +320,15 @@ impl<'a> Gatherer<'a> {
             forward: self.view.axis[0],
             by_facing: settings.face_plane_cull,
         };
-        let run = self.run(world, &local, 0, WORLD_ENTITY);
-        match self.look {
-            Look::Classic => {
+        let run = self.run(world, &local, (0, &out.instances), WORLD_ENTITY);
+        match out.look.part() {
+            LookPartMut::Classic(classic) => {
                 for &surface in &self.visible.surfaces {
-                    pending.extend(run.add(surface, out));
+                    pending.extend(run.add(surface, classic));
                 }
             }
-            Look::Traced => {
-                out.potential.extend_from_slice(&self.visible.surfaces);
+            LookPartMut::Traced(traced) => {
+                traced.potential.extend_from_slice(&self.visible.surfaces);
                 let deformed = self
                     .visible
                     .surfaces
@@ -356,7 +368,7 @@ impl<'a> Gatherer<'a> {
         &self,
         world: &'b WorldData,
         local: &'b LocalView<'b>,
-        instance: u32,
+        (instance, instances): (u32, &'b [Instance]),
         entity: u32,
     ) -> SurfaceRun<'b>
     where
@@ -366,7 +378,9 @@ impl<'a> Gatherer<'a> {
             world,
             materials: self.input.materials,
             local,
+            eye: self.view.origin,
             instance,
+            placed: slice::get(instances, instance as usize),
             entity,
             curve_error: self.input.settings.lod_curve_error,
             no_curves: self.input.settings.no_curves,
@@ -415,9 +429,7 @@ impl<'a> Gatherer<'a> {
                 let range = first..first + surface.index_count as usize;
                 let base = count(out.vertices.len());
                 let own = world.surface_vertices(surface);
-                let classic = world
-                    .classic_vertices(surface)
-                    .filter(|_| self.look == Look::Classic);
+                let classic = world.classic_vertices(surface).filter(|_| !self.traced);
                 out.vertices.extend_from_slice(classic.unwrap_or(own));
                 out.indices.extend(
                     slice::part(&world.indices, range)
@@ -425,14 +437,9 @@ impl<'a> Gatherer<'a> {
                         .map(|i| i.wrapping_sub(surface.first_vertex).wrapping_add(base)),
                 );
                 let mesh = self.finish(raw, entity, out);
-                if let Some(mesh) = mesh.filter(|_| self.look == Look::Classic) {
-                    surfaces::push_mesh_surface(
-                        out,
-                        &mesh,
-                        deform.sort_key,
-                        surface.lightmap,
-                        deform.dlights,
-                    );
+                if let (Some(mesh), LookPartMut::Classic(classic)) = (mesh, out.look.part()) {
+                    let (key, lightmap) = (deform.sort_key, surface.lightmap);
+                    classic.push_mesh(&mesh, key, lightmap, deform.dlights);
                 }
             }
         }
@@ -496,10 +503,10 @@ impl<'a> Gatherer<'a> {
         out: &mut ViewScene,
     ) {
         let mesh = self.finish(raw, entity, out);
-        if let Some(mesh) = mesh.filter(|_| self.look == Look::Classic) {
+        if let (Some(mesh), LookPartMut::Classic(classic)) = (mesh, out.look.part()) {
             let rank = self.input.materials.rank(asked);
             let key = sort_key(rank, number, mesh.fog, false);
-            surfaces::push_mesh_surface(out, &mesh, key, NO_TEXTURE, 0);
+            classic.push_mesh(&mesh, key, NO_TEXTURE, 0);
         }
     }
 
@@ -511,7 +518,7 @@ impl<'a> Gatherer<'a> {
             let range = poly.first_vertex..poly.first_vertex + poly.vertex_count;
             let corners = slice::part(self.poly_vertices, range);
             let darkens = || only_darkens(&self.input.materials.get(poly.material).shader);
-            if self.look == Look::Traced && darkens() && is_painted_shadow(corners, self.entities) {
+            if self.traced && darkens() && is_painted_shadow(corners, self.entities) {
                 continue;
             }
             let bounds = Aabb::of(corners.iter().map(|v| v.position));

@@ -6,10 +6,10 @@
 use glam::Vec3;
 use support::slice::{part_mut, span};
 
-use super::ViewScene;
+use super::ClassicScene;
 use crate::assets::{desaturate, grey};
 
-impl ViewScene {
+impl ClassicScene {
     /// Takes this share (0 to 1) of the colour out of entities, their light, polygons and dynamic lights. The map's
     /// vertices lost it when they were loaded.
     pub(super) fn take_color(&mut self, amount: f32) {

@@ -7,7 +7,8 @@ use shaderscript::eval::{self, DeformContext, DeformVertex, ShadowProjection};
 use support::slice::{self, part};
 
 use super::entity::into_axes;
-use super::{DynamicMesh, Shape, View, ViewScene, turned};
+use super::shapes::MeshBuilder;
+use super::{DynamicMesh, LookPartMut, Shape, View, ViewScene, turned};
 use crate::api::{RefDef, RefEntity};
 use crate::assets::Materials;
 
@@ -57,17 +58,34 @@ impl RawMesh {
 }
 
 impl ViewScene {
-    /// Adds the shadow volumes of a mesh, before it is deformed.
+    /// What meshes are appended with.
+    pub(super) fn builder(&mut self) -> MeshBuilder<'_> {
+        MeshBuilder {
+            vertices: &mut self.vertices,
+            indices: &mut self.indices,
+        }
+    }
+
+    /// Adds the shadow volumes of a mesh, before it is deformed; the traced look has none.
     pub(super) fn add_shadow_volumes(&mut self, raw: &RawMesh) {
-        let (Some(instance), Some(vertices), Some(indices), Ok(base)) = (
+        let (
+            LookPartMut::Classic(classic),
+            Some(instance),
+            Some(vertices),
+            Some(indices),
+            Ok(base),
+        ) = (
+            self.look.part(),
             slice::get(&self.instances, raw.instance as usize),
             self.vertices.get(raw.first_vertex..),
             self.indices.get(raw.first_index..),
             u32::try_from(raw.first_vertex),
-        ) else {
+        )
+        else {
             return;
         };
-        self.shadows
+        classic
+            .shadows
             .add(raw.instance, instance, vertices, indices, base);
     }
 }

@@ -13,6 +13,7 @@ mod gather;
 mod greyscale;
 mod key_frames;
 mod lighting;
+mod look;
 mod mesh;
 mod models;
 mod painted_shadows;
@@ -26,8 +27,6 @@ mod surfaces;
 pub(crate) mod turned;
 pub mod view;
 
-use std::sync::Arc;
-
 use glam::{Vec3, Vec4};
 use shaders::types::{Instance, Vertex};
 use support::slice::{part, span};
@@ -40,6 +39,9 @@ use crate::stereo::Eye;
 use crate::world::{VisibleSet, World, WorldData};
 pub use debug_polygons::DebugPolygons;
 pub use flares::ViewFlare;
+#[cfg(test)]
+pub use look::TracedPart;
+pub use look::{ClassicPart, ClassicScene, LookPart, LookPartMut, TracedScene};
 pub use rigid::{MeshId, RigidMesh, Shape};
 pub use shadow_volumes::ShadowVolumes;
 pub(crate) use shapes::perpendicular;
@@ -211,9 +213,10 @@ pub struct Sun {
     pub direction: Vec3,
 }
 
-/// What is needed to draw one view.
+/// One view: what both looks read, and the part `L` that one look reads. `ViewScene` without `L` is a view of either
+/// look, for code that serves both.
 #[derive(Clone, Debug)]
-pub struct ViewScene {
+pub struct ViewScene<L: ?Sized = dyn LookPart> {
     /// The view as the game asked for it.
     pub def: RefDef,
     /// Camera, projection, viewport.
@@ -228,38 +231,19 @@ pub struct ViewScene {
     pub indices: Vec<u32>,
     /// What moves. For the traced look these are all meshes of the view; for the classic look those not culled.
     pub meshes: Vec<DynamicMesh>,
-    /// Meshes that keep their shape (traced look only), see [`Shape::Rigid`]; one may occur many times.
-    pub rigid: Vec<Arc<RigidMesh>>,
-    /// Inline models.
-    pub submodels: Vec<Submodel>,
-    /// The entities that added something, in the game's order.
-    pub entities: Vec<ViewEntity>,
-    /// Visible surfaces in drawing order (classic look only).
-    pub surfaces: Vec<DrawSurface>,
-    /// Numbers of the world's surfaces in the visible set (traced look only): those that show through a sky.
-    pub potential: Vec<u32>,
-    /// Static world surfaces that the tracer must not see in the static structure because `meshes` has their
-    /// deformed copy are fixed per map (see `world::World::is_deformed`), so they are not listed here.
+    /// Dynamic lights.
     pub dlights: Vec<DynamicLight>,
-    /// Portals and mirrors in sight.
-    pub portals: Vec<Portal>,
     /// The world is part of the view.
     pub has_world: bool,
-    /// Shadow volumes of models (classic look, `cg_shadows 2`).
-    pub shadows: ShadowVolumes,
-    /// What the engine's collision code wants to see.
-    pub debug: DebugPolygons,
-    /// Counts, when `r_speeds` asks for them.
-    pub statistics: Statistics,
-    /// The skies in sight, each material once with each fog (classic look only).
-    pub skies: Vec<VisibleSky>,
     /// The sun's disc, when it is to be drawn wherever a sky is in sight.
     pub sun: Option<Sun>,
     /// Flares in sight (`r_flares`).
     pub flares: Vec<ViewFlare>,
+    /// What one look alone reads.
+    pub look: L,
 }
 
-impl ViewScene {
+impl ClassicScene {
     /// The indices of a surface of the view. `static_indices` is the world's index array.
     pub fn indices_of<'a>(&'a self, surface: &DrawSurface, static_indices: &'a [u32]) -> &'a [u32] {
         let (source, first, count) = match surface.geometry {
@@ -274,11 +258,13 @@ impl ViewScene {
         };
         part(source, span(first, count))
     }
+}
 
+impl TracedScene {
     /// The vertices of a mesh, and its indices, which count from [`MeshGeometry::base`].
     pub fn mesh_geometry(&self, mesh: &DynamicMesh) -> MeshGeometry<'_> {
         if let Shape::Rigid(rigid) = mesh.shape {
-            let rigid = self.rigid.get(rigid as usize);
+            let rigid = self.look.rigid.get(rigid as usize);
             return MeshGeometry {
                 vertices: rigid.map_or(&[], |r| &r.vertices),
                 indices: rigid.map_or(&[], |r| &r.indices),
@@ -291,7 +277,9 @@ impl ViewScene {
             base: mesh.first_vertex,
         }
     }
+}
 
+impl<L: Default> ViewScene<L> {
     /// Nothing, seen by a camera.
     pub(crate) fn empty(def: &RefDef, view: View) -> Self {
         Self {
@@ -302,31 +290,13 @@ impl ViewScene {
             vertices: Vec::new(),
             indices: Vec::new(),
             meshes: Vec::new(),
-            rigid: Vec::new(),
-            submodels: Vec::new(),
-            entities: Vec::new(),
-            surfaces: Vec::new(),
-            potential: Vec::new(),
             dlights: Vec::new(),
-            portals: Vec::new(),
             has_world: false,
-            skies: Vec::new(),
-            shadows: ShadowVolumes::default(),
-            debug: DebugPolygons::default(),
-            statistics: Statistics::default(),
             sun: None,
             flares: Vec::new(),
+            look: L::default(),
         }
     }
-}
-
-/// Which of the two looks a view is gathered for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Look {
-    /// Rasterized: what the frustum shows, sorted, with a view for a portal or mirror.
-    Classic,
-    /// Traced: what moves, wherever it is.
-    Traced,
 }
 
 /// What a scene is gathered from.
@@ -346,9 +316,9 @@ pub struct GatherInput<'a> {
 
 impl<'a> GatherInput<'a> {
     /// From a registration.
-    pub fn new(world: Option<&'a WorldData>, assets: &'a Assets, settings: &'a Settings) -> Self {
+    pub fn new(world: Option<&'a World>, assets: &'a Assets, settings: &'a Settings) -> Self {
         Self {
-            world,
+            world: world.map(|world| &world.data),
             materials: &assets.materials,
             models: &assets.models,
             skins: &assets.skins,
@@ -375,9 +345,10 @@ pub struct Scene {
     lights: Vec<DynamicLight>,
     visible: VisibleSet,
     portal_visible: VisibleSet,
-    pool: Vec<ViewScene>,
+    classic_pool: Vec<ClassicScene>,
+    traced_pool: Vec<TracedScene>,
     /// Empty lists of views, for their memory.
-    lists: Vec<Vec<ViewScene>>,
+    lists: Vec<Vec<ClassicScene>>,
     scratch: gather::Scratch,
     /// Memory of the views through portals.
     turned: Vec<Option<View>>,
@@ -442,33 +413,37 @@ impl Scene {
         }
     }
 
-    /// Turns what was added into views and forgets it: at most one view through a portal or mirror (classic look),
-    /// then the view that was asked for. Hand the views back with [`recycle`](Self::recycle).
+    /// Turns what was added into views of the classic look and forgets it: at most one view through a portal or mirror,
+    /// then the view that was asked for. Hand the views back with [`recycle_classic`](Self::recycle_classic).
     ///
     /// # Errors
     /// [`Error::EntityKind`] for an entity of a kind that is never drawn.
-    pub fn gather(
-        &mut self,
-        world: Option<&World>,
-        assets: &Assets,
-        settings: &Settings,
-        def: &RefDef,
-        look: Look,
-    ) -> Result<Vec<ViewScene>, Error> {
-        let input = GatherInput::new(world.map(|world| &world.data), assets, settings);
-        self.gather_from(&input, def, look)
-    }
-
-    /// [`gather`](Self::gather) from parts, none of which is on a GPU.
-    ///
-    /// # Errors
-    /// As [`gather`](Self::gather).
-    pub fn gather_from(
+    pub fn gather_classic(
         &mut self,
         input: &GatherInput<'_>,
         def: &RefDef,
-        look: Look,
-    ) -> Result<Vec<ViewScene>, Error> {
+    ) -> Result<Vec<ClassicScene>, Error> {
+        self.gather(input, |scene| gather::classic_views(scene, input, def))
+    }
+
+    /// Turns what was added into a view of the traced look and forgets it. Hand the view back with
+    /// [`recycle_traced`](Self::recycle_traced).
+    ///
+    /// # Errors
+    /// As [`gather_classic`](Self::gather_classic).
+    pub fn gather_traced(
+        &mut self,
+        input: &GatherInput<'_>,
+        def: &RefDef,
+    ) -> Result<TracedScene, Error> {
+        self.gather(input, |scene| gather::traced_view(scene, input, def))
+    }
+
+    fn gather<T>(
+        &mut self,
+        input: &GatherInput<'_>,
+        views: impl FnOnce(&mut Self) -> T,
+    ) -> Result<T, Error> {
         let undrawable = |e: &RefEntity| e.kind == EntityKind::Poly;
         if input.settings.draw_entities && self.entities.iter().any(undrawable) {
             self.clear();
@@ -476,20 +451,20 @@ impl Scene {
                 kind: "polygon".into(),
             });
         }
-        let views = gather::views(self, input, def, look);
+        let views = views(self);
         self.clear();
         Ok(views)
     }
 
     /// Takes back views that are drawn, so that the next ones need no new memory.
-    pub fn recycle(&mut self, mut views: Vec<ViewScene>) {
-        self.pool.append(&mut views);
+    pub fn recycle_classic(&mut self, mut views: Vec<ClassicScene>) {
+        self.classic_pool.append(&mut views);
         self.lists.push(views);
     }
 
-    /// Takes back one view.
-    pub fn recycle_view(&mut self, view: ViewScene) {
-        self.pool.push(view);
+    /// Takes back a view that is drawn, so that the next one needs no new memory.
+    pub fn recycle_traced(&mut self, view: TracedScene) {
+        self.traced_pool.push(view);
     }
 
     /// The frame is over: what was added and never drawn is forgotten.

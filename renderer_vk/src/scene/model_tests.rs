@@ -6,7 +6,7 @@ use q3model::{
     MdrVertex, MdrWeight,
 };
 
-use super::{Look, Scene, ViewScene};
+use super::{ClassicScene, Scene, TracedScene, ViewScene};
 use crate::api::{RefDef, RefEntity, rdflags, renderfx};
 use crate::test_support::{PIXEL, Registration};
 
@@ -142,11 +142,17 @@ fn at(model: i32, frame: i32, old_frame: i32, backlerp: f32) -> RefEntity {
     }
 }
 
-fn gather(game: &Registration, entity: &RefEntity, look: Look) -> ViewScene {
+fn gather(game: &Registration, entity: &RefEntity) -> ClassicScene {
     let mut scene = Scene::default();
     scene.add_entity(entity);
-    let mut views = scene.gather_from(&game.input(None), &def(), look).unwrap();
+    let mut views = scene.gather_classic(&game.input(None), &def()).unwrap();
     views.pop().unwrap()
+}
+
+fn gather_traced(game: &Registration, entity: &RefEntity) -> TracedScene {
+    let mut scene = Scene::default();
+    scene.add_entity(entity);
+    scene.gather_traced(&game.input(None), &def()).unwrap()
 }
 
 fn places(view: &ViewScene) -> Vec<Vec3> {
@@ -156,31 +162,29 @@ fn places(view: &ViewScene) -> Vec<Vec3> {
 #[test]
 fn bones_move_vertices() {
     let mut game = game();
-    for (name, look) in [
-        ("m/large.mdr", Look::Classic),
-        ("m/small.mdr", Look::Classic),
-        ("m/large.mdr", Look::Traced),
-    ] {
+    for name in ["m/large.mdr", "m/small.mdr"] {
         let model = game.model(name);
-        let view = gather(&game, &at(model, 1, 0, 0.25), look);
-        assert_eq!(view.meshes.len(), 2, "{name}");
-        let found = places(&view);
-        let expected = [Vec3::X * 12.0, Vec3::new(12.0, 8.0, 0.0)];
-        for (found, expected) in found.iter().zip(expected) {
-            assert!(found.abs_diff_eq(expected, 1e-3), "{name}: {found}");
+        let between = at(model, 1, 0, 0.25);
+        let (view, traced) = (gather(&game, &between), gather_traced(&game, &between));
+        assert_eq!(view.look.surfaces.len(), 2, "{name}");
+        for (meshes, found) in [
+            (&view.meshes, places(&view)),
+            (&traced.meshes, places(&traced)),
+        ] {
+            assert_eq!(meshes.len(), 2, "{name}");
+            let expected = [Vec3::X * 12.0, Vec3::new(12.0, 8.0, 0.0)];
+            for (found, expected) in found.iter().zip(expected) {
+                assert!(found.abs_diff_eq(expected, 1e-3), "{name}: {found}");
+            }
         }
-        assert_eq!(
-            view.surfaces.len(),
-            if look == Look::Classic { 2 } else { 0 }
-        );
         // out of range: both frames are the first
-        let view = gather(&game, &at(model, 1, 2, 0.25), look);
+        let view = gather(&game, &at(model, 1, 2, 0.25));
         assert!(places(&view)[0].abs_diff_eq(Vec3::ZERO, 1e-3), "{name}");
         let wrapped = RefEntity {
             renderfx: renderfx::WRAP_FRAMES,
             ..at(model, 3, 3, 0.0)
         };
-        let view = gather(&game, &wrapped, look);
+        let view = gather(&game, &wrapped);
         assert!(places(&view)[0].abs_diff_eq(Vec3::X * 16.0, 1e-3), "{name}");
     }
 }
@@ -189,12 +193,12 @@ fn bones_move_vertices() {
 fn far_models_have_their_coarser_level() {
     let mut game = game();
     let model = game.model("m/large.mdr");
-    let near = gather(&game, &at(model, 0, 0, 0.0), Look::Classic);
+    let near = gather(&game, &at(model, 0, 0, 0.0));
     let away = RefEntity {
         origin: Vec3::X * 1000.0,
         ..at(model, 0, 0, 0.0)
     };
-    let far = gather(&game, &away, Look::Classic);
+    let far = gather(&game, &away);
     assert_eq!((near.meshes.len(), far.meshes.len()), (2, 1));
     assert_eq!(far.vertices[1].position, Vec3::Y * 7.0);
 }
@@ -204,13 +208,13 @@ fn joints_turn_vertices_and_normals() {
     let mut game = game();
     for name in ["m/a.iqm", "m/free.iqm"] {
         let model = game.model(name);
-        let view = gather(&game, &at(model, 1, 1, 0.0), Look::Classic);
+        let view = gather(&game, &at(model, 1, 1, 0.0));
         let vertex = view.vertices[0];
         assert!(vertex.position.abs_diff_eq(Vec3::Y * 8.0, 1e-3));
         assert!(vertex.normal.abs_diff_eq(Vec3::Y, 1e-3));
         assert_eq!(vertex.color.to_le_bytes(), [10, 20, 30, 40]);
         // half way there
-        let view = gather(&game, &at(model, 1, 0, 0.5), Look::Traced);
+        let view = gather_traced(&game, &at(model, 1, 0, 0.5));
         let eighth = std::f32::consts::FRAC_PI_4;
         let expected = Vec3::new(eighth.cos(), eighth.sin(), 0.0) * 8.0;
         assert!(view.vertices[0].position.abs_diff_eq(expected, 1e-3));
@@ -221,18 +225,14 @@ fn joints_turn_vertices_and_normals() {
         ..at(model, 0, 0, 0.0)
     };
     let (bounded, free) = (game.model("m/a.iqm"), game.model("m/free.iqm"));
-    assert!(
-        gather(&game, &behind(bounded), Look::Classic)
-            .meshes
-            .is_empty()
-    );
-    assert_eq!(gather(&game, &behind(free), Look::Classic).meshes.len(), 1);
+    assert!(gather(&game, &behind(bounded)).meshes.is_empty());
+    assert_eq!(gather(&game, &behind(free)).meshes.len(), 1);
 }
 
 #[test]
 fn skins_and_shaders_count_for_every_kind() {
     let mut game = game();
-    let wall = gather(&game, &at(0, 0, 0, 0.0), Look::Classic).meshes[0].material;
+    let wall = gather(&game, &at(0, 0, 0, 0.0)).meshes[0].material;
     let skin = game.skins.register(
         &*game.files,
         &mut game.materials,
@@ -249,7 +249,7 @@ fn skins_and_shaders_count_for_every_kind() {
         let model = game.model(name);
         let plain = at(model, 0, 0, 0.0);
         let material = |entity: &RefEntity, mesh: usize| {
-            let view = gather(&game, entity, Look::Classic);
+            let view = gather(&game, entity);
             view.meshes.get(mesh).map(|mesh| mesh.material)
         };
         let own = material(&plain, 0).unwrap();

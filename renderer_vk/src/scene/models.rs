@@ -13,8 +13,9 @@ use super::cull;
 use super::gather::{Gatherer, count};
 use super::key_frames::{self, Frames};
 use super::mesh::RawMesh;
+use super::shapes::MeshBuilder;
 use super::turned::Way;
-use super::{DynamicMesh, Look, MeshId, Shape, ViewScene};
+use super::{DynamicMesh, LookPartMut, MeshId, Shape, ViewScene};
 use crate::api::{RefEntity, renderfx};
 use crate::assets::{IqmModel, Md3Lod, MdrModel, Model};
 use crate::settings::ModelShadows;
@@ -135,8 +136,8 @@ impl Gatherer<'_> {
             let source = placed.source(&surface.name, own, level, index, still);
             self.add_surface(&placed, source, out, |out| {
                 let base = count(out.vertices.len());
-                key_frames::append_vertices(surface, frames, &mut out.vertices);
-                append_triangles(base, &surface.triangles, &mut out.indices);
+                key_frames::append_vertices(surface, frames, out.vertices);
+                append_triangles(base, &surface.triangles, out.indices);
             });
         }
     }
@@ -253,7 +254,7 @@ impl Gatherer<'_> {
         placed: &Placed<'_>,
         source: SurfaceSource<'_>,
         out: &mut ViewScene,
-        append: impl Fn(&mut ViewScene),
+        append: impl Fn(MeshBuilder<'_>),
     ) {
         let materials = self.input.materials;
         let asked = self.surface_material(placed.entity, source.name, source.materials);
@@ -268,7 +269,7 @@ impl Gatherer<'_> {
             if self.add_rigid(&source, &raw, out, &append) {
                 continue;
             }
-            append(out);
+            append(out.builder());
             if volumes && Some(asked) != shadow {
                 out.add_shadow_volumes(&raw);
             }
@@ -282,7 +283,7 @@ impl Gatherer<'_> {
                     let shape = raw.shape;
                     raw = RawMesh::begin(out, material, placed.instance, placed.fog);
                     raw.shape = shape;
-                    append(out);
+                    append(out.builder());
                 }
                 raw.paths = paths;
                 self.finish_and_list(raw, asked, placed.number, Some(placed.entity), out);
@@ -297,15 +298,19 @@ impl Gatherer<'_> {
         source: &SurfaceSource<'_>,
         raw: &RawMesh,
         out: &mut ViewScene,
-        append: &impl Fn(&mut ViewScene),
+        append: &impl Fn(MeshBuilder<'_>),
     ) -> bool {
-        let Some(still) = source.still.filter(|_| {
-            self.look == Look::Traced && !self.input.materials.get(raw.material).deforms()
-        }) else {
+        let deforms = self.input.materials.get(raw.material).deforms();
+        let (Some(still), LookPartMut::Traced(traced)) =
+            (source.still.filter(|_| !deforms), out.look.part())
+        else {
             return false;
         };
         let make = || {
-            append(out);
+            append(MeshBuilder {
+                vertices: &mut out.vertices,
+                indices: &mut out.indices,
+            });
             let vertices = out.vertices.split_off(raw.first_vertex);
             let mut indices = out.indices.split_off(raw.first_index);
             for index in &mut indices {
@@ -323,8 +328,8 @@ impl Gatherer<'_> {
             return false;
         };
         if !mesh.indices.is_empty() {
-            let shape = Shape::Rigid(count(out.rigid.len()));
-            out.rigid.push(mesh);
+            let shape = Shape::Rigid(count(traced.rigid.len()));
+            traced.rigid.push(mesh);
             out.meshes.push(DynamicMesh {
                 first_index: count(out.indices.len()),
                 index_count: 0,
@@ -344,7 +349,7 @@ impl Gatherer<'_> {
     /// The material that an entity casts a planar shadow with, if it casts one (`cg_shadows 3`). Traced views have
     /// real ones.
     fn shadow_material(&self, entity: &RefEntity) -> Option<u32> {
-        let casts = self.look == Look::Classic
+        let casts = !self.traced
             && self.input.settings.shadows == ModelShadows::Planar
             && entity.renderfx & renderfx::SHADOW_PLANE != 0
             && entity.shadow_plane.is_finite();
@@ -353,8 +358,7 @@ impl Gatherer<'_> {
 
     /// Whether an entity casts shadow volumes (`cg_shadows 2`).
     fn casts_volumes(&self, entity: &RefEntity) -> bool {
-        self.look == Look::Classic
-            && self.input.settings.shadows == ModelShadows::Volumes
+        self.input.settings.shadows == ModelShadows::Volumes
             && entity.renderfx & (renderfx::NO_SHADOW | renderfx::DEPTH_HACK) == 0
     }
 
@@ -378,7 +382,7 @@ fn append_triangles(base: u32, triangles: &[[u32; 3]], out: &mut Vec<u32>) {
     out.extend(triangles.iter().flatten().map(|i| base.wrapping_add(*i)));
 }
 
-fn append_mdr(surface: &MdrSurface, bones: &[BoneMatrix], out: &mut ViewScene) {
+fn append_mdr(surface: &MdrSurface, bones: &[BoneMatrix], out: MeshBuilder<'_>) {
     let base = count(out.vertices.len());
     out.vertices.extend(surface.vertices.iter().map(|vertex| {
         let (position, normal) = surface.skinned(vertex, bones);
@@ -390,10 +394,10 @@ fn append_mdr(surface: &MdrSurface, bones: &[BoneMatrix], out: &mut ViewScene) {
             ..Vertex::default()
         }
     }));
-    append_triangles(base, &surface.triangles, &mut out.indices);
+    append_triangles(base, &surface.triangles, out.indices);
 }
 
-fn append_iqm(iqm: &Iqm, surface: &IqmSurface, pose: &[BoneMatrix], out: &mut ViewScene) {
+fn append_iqm(iqm: &Iqm, surface: &IqmSurface, pose: &[BoneMatrix], out: MeshBuilder<'_>) {
     let base = count(out.vertices.len());
     let vertices = iqm.surface_vertices(surface).iter();
     out.vertices.extend(vertices.map(|vertex| {
@@ -406,5 +410,5 @@ fn append_iqm(iqm: &Iqm, surface: &IqmSurface, pose: &[BoneMatrix], out: &mut Vi
             ..Vertex::default()
         }
     }));
-    append_triangles(base, &surface.triangles, &mut out.indices);
+    append_triangles(base, &surface.triangles, out.indices);
 }

@@ -8,7 +8,7 @@ use shaders::types::Instance;
 use support::slice::{self, part, span};
 
 use super::shapes::perpendicular;
-use super::{DrawSurface, GatherInput, Geometry, Portal, View, ViewScene, entity};
+use super::{ClassicScene, DrawSurface, GatherInput, Geometry, Portal, View, entity};
 use crate::api::{EntityKind, RefDef, RefEntity, rdflags};
 use crate::assets::Model;
 use crate::world::WorldData;
@@ -21,7 +21,7 @@ pub(super) fn find_first(
     entities: &[RefEntity],
     input: &GatherInput<'_>,
     def: &RefDef,
-    scene: &ViewScene,
+    scene: &ClassicScene,
 ) -> Option<Portal> {
     let settings = input.settings;
     let world = input.world?;
@@ -30,6 +30,7 @@ pub(super) fn find_first(
     }
     // surfaces are in drawing order, portals first
     scene
+        .look
         .surfaces
         .iter()
         .take_while(|s| input.materials.get(s.material).sort <= shaderscript::sort::PORTAL)
@@ -117,7 +118,7 @@ fn placed_model(model: u32, entities: &[RefEntity], input: &GatherInput<'_>) -> 
 
 /// The plane that the map stores for a surface of the view. Which way is up in a portal depends on the least of its
 /// normal's components, so that of triangles does not do: they may be deformed, and their zeros are not exact.
-fn stored_plane(world: &WorldData, scene: &ViewScene, surface: &DrawSurface) -> Option<Plane> {
+fn stored_plane(world: &WorldData, scene: &ClassicScene, surface: &DrawSurface) -> Option<Plane> {
     let instance = slice::get(&scene.instances, surface.instance as usize)?;
     let mut portals = world
         .portal_surfaces
@@ -147,7 +148,7 @@ fn placed_plane(plane: Plane, instance: &Instance) -> Plane {
 }
 
 /// World-space triangles of a surface of the view.
-fn triangles(world: &WorldData, scene: &ViewScene, surface: &DrawSurface) -> Vec<[Vec3; 3]> {
+fn triangles(world: &WorldData, scene: &ClassicScene, surface: &DrawSurface) -> Vec<[Vec3; 3]> {
     let Some(instance): Option<&Instance> = slice::get(&scene.instances, surface.instance as usize)
     else {
         return Vec::new();

@@ -9,7 +9,7 @@ use support::slice;
 use super::cull::{self, Lies, ModelLies};
 use super::gather::Gatherer;
 use super::key_frames::Frames;
-use super::{DrawSurface, ViewScene};
+use super::{ClassicScene, DrawSurface};
 use crate::api::{RefEntity, renderfx};
 use crate::assets::Model;
 use crate::world::WorldData;
@@ -162,7 +162,7 @@ impl Statistics {
 
 impl Gatherer<'_> {
     /// Counts a gathered view. Only asked for when somebody looks.
-    pub(super) fn count_view(&self, out: &ViewScene) -> Statistics {
+    pub(super) fn count_view(&self, out: &ClassicScene) -> Statistics {
         let mut counts = Statistics {
             cluster: -1,
             far: out.view.far,
@@ -171,7 +171,7 @@ impl Gatherer<'_> {
         };
         let static_indices = self.world.map_or(&[][..], |world| world.indices.as_slice());
         let mut last = None;
-        for surface in &out.surfaces {
+        for surface in &out.look.surfaces {
             let material = self.input.materials.get(surface.material);
             let indices = out.indices_of(surface, static_indices);
             counts.add_surface(surface, material.passes.len(), indices);

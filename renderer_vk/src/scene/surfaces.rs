@@ -2,11 +2,12 @@
 
 use glam::{Vec3, Vec4};
 use q3bsp::SurfaceKind;
+use shaders::types::Instance;
 use shaderscript::Cull;
 use support::Aabb;
 use support::slice;
 
-use super::{DrawSurface, DynamicMesh, Geometry, SkyCoverage, ViewScene, VisibleSky, entity};
+use super::{ClassicPart, DrawSurface, DynamicMesh, Geometry, SkyCoverage, VisibleSky, entity};
 use crate::api::DynamicLight;
 use crate::assets::Materials;
 use crate::world::{WorldData, WorldSurface, outside};
@@ -116,8 +117,12 @@ pub(super) struct SurfaceRun<'a> {
     pub world: &'a WorldData,
     pub materials: &'a Materials,
     pub local: &'a LocalView<'a>,
+    /// Eye in the world.
+    pub eye: Vec3,
     /// Index of the instance.
     pub instance: u32,
+    /// The instance.
+    pub placed: Option<&'a Instance>,
     /// The engine's entity number.
     pub entity: u32,
     /// `r_lodCurveError`.
@@ -130,7 +135,7 @@ pub(super) struct SurfaceRun<'a> {
 
 impl SurfaceRun<'_> {
     /// Adds a surface if it is in sight. Returns it when its vertices have to be deformed first.
-    pub fn add(&self, index: u32, out: &mut ViewScene) -> Option<PendingDeform> {
+    pub fn add(&self, index: u32, out: &mut ClassicPart) -> Option<PendingDeform> {
         let surface = slice::get(&self.world.surfaces, index as usize)?;
         if surface.index_count == 0 || (self.no_curves && surface.kind == SurfaceKind::Patch) {
             return None;
@@ -194,12 +199,11 @@ impl SurfaceRun<'_> {
         (material, fog): (u32, u32),
         first_index: u32,
         index_count: u32,
-        out: &mut ViewScene,
+        out: &mut ClassicPart,
     ) {
-        let Some(instance) = slice::get(&out.instances, self.instance as usize) else {
+        let Some(placed) = self.placed else {
             return;
         };
-        let eye = out.view.origin;
         let same = |sky: &VisibleSky| (sky.material, sky.fog) == (material, fog);
         let at = match out.skies.iter().position(same) {
             Some(at) => at,
@@ -214,7 +218,7 @@ impl SurfaceRun<'_> {
         };
         if let Some(sky) = out.skies.get_mut(at) {
             for triangle in self.world.triangles(first_index, index_count) {
-                let seen = triangle.map(|p| entity::to_world(instance, p) - eye);
+                let seen = triangle.map(|p| entity::to_world(placed, p) - self.eye);
                 sky.coverage.add(seen);
             }
         }
@@ -230,28 +234,30 @@ pub(super) struct PendingDeform {
     pub dlights: u32,
 }
 
-/// Adds a mesh to the surfaces of the classic look.
-pub(super) fn push_mesh_surface(
-    out: &mut ViewScene,
-    mesh: &DynamicMesh,
-    sort_key: u64,
-    lightmap: u32,
-    dlights: u32,
-) {
-    out.surfaces.push(DrawSurface {
-        sort_key,
-        material: mesh.material,
-        instance: mesh.instance,
-        fog: mesh.fog,
-        lightmap,
-        dlights,
-        geometry: Geometry::Dynamic {
-            first_index: mesh.first_index,
-            index_count: mesh.index_count,
-        },
-        flat: false,
-        distance_squared: 0.0,
-    });
+impl ClassicPart {
+    /// Adds a mesh to the surfaces.
+    pub(super) fn push_mesh(
+        &mut self,
+        mesh: &DynamicMesh,
+        sort_key: u64,
+        lightmap: u32,
+        dlights: u32,
+    ) {
+        self.surfaces.push(DrawSurface {
+            sort_key,
+            material: mesh.material,
+            instance: mesh.instance,
+            fog: mesh.fog,
+            lightmap,
+            dlights,
+            geometry: Geometry::Dynamic {
+                first_index: mesh.first_index,
+                index_count: mesh.index_count,
+            },
+            flat: false,
+            distance_squared: 0.0,
+        });
+    }
 }
 
 /// Replaces `out` by the dynamic lights as seen from a space given by an origin and axes.

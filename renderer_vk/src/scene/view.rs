@@ -56,6 +56,14 @@ impl View {
         view
     }
 
+    /// The view with the eye at another place beside the middle.
+    #[must_use]
+    pub fn with_stereo(mut self, stereo: Stereo) -> Self {
+        self.stereo = stereo;
+        self.update();
+        self
+    }
+
     /// Distance of the faces of the box that the engine draws a sky on, and of the sun; its corners lie before the far
     /// plane.
     pub fn sky_distance(&self) -> f32 {
@@ -157,13 +165,12 @@ mod tests {
 
     #[test]
     fn the_eyes_pictures_meet_at_their_distance() {
-        let mut view = square();
+        let view = square();
         let middle = clip(&view, Vec3::new(64.0, 20.0, 0.0));
-        view.stereo = Stereo {
+        let view = view.with_stereo(Stereo {
             slope: 1.0 / 64.0,
             distance: 64.0,
-        };
-        view.update();
+        });
         let left = clip(&view, Vec3::new(64.0, 20.0, 0.0));
         assert!((left.x - middle.x).abs() < 1e-5);
         // to the left eye what is nearer lies farther to the right

@@ -21,7 +21,7 @@ use super::shapes::{Bottom, OwnBottom, Shapes};
 use crate::gpu::{
     self, Access, Blas, BlasBuild, BlasFlags, BlasGeometry, Device, Error, Recorder, Tlas,
 };
-use crate::scene::ViewScene;
+use crate::scene::TracedScene;
 
 /// Hit group: solids report the nearest hit, translucent layers search in their any-hit shader.
 fn hit_group(kind: Kind) -> u32 {
@@ -115,8 +115,8 @@ impl<'a> Placements<'a> {
     }
 
     /// Adds the world and the brush models of a view.
-    fn add_map(&mut self, view: &ViewScene, geometry: &'a StaticGeometry) {
-        let submodels = view.submodels.iter().map(|s| (s.model, s.instance));
+    fn add_map(&mut self, view: &TracedScene, geometry: &'a StaticGeometry) {
+        let submodels = view.look.submodels.iter().map(|s| (s.model, s.instance));
         for (model, index) in iter::once((0, 0)).chain(submodels) {
             let Some(instance) = view.instances.get(index as usize) else {
                 continue;
@@ -223,7 +223,7 @@ impl Accel {
     pub fn record(
         &mut self,
         rec: &mut Recorder,
-        view: &ViewScene,
+        view: &TracedScene,
         geometry: Option<&StaticGeometry>,
         materials: &dyn MaterialTable,
     ) -> Result<AccelOutput, Error> {

@@ -15,7 +15,7 @@ use super::input::{Kind, MaterialTable, StaticScene};
 use super::layer_boxes::{bounds_of, may_be_seen, placed};
 use super::parts::axes;
 use super::surroundings::merged;
-use crate::scene::{ViewScene, turned};
+use crate::scene::{TracedScene, turned};
 
 /// Boxes that a ray is held against; with more of them each is around several.
 const MAX_BOXES: usize = 48;
@@ -152,7 +152,7 @@ pub struct Beyond {
 impl Beyond {
     /// Of a view. `lens`: how far from the eye rays start at most. `geometry`: the map's, if the view shows it.
     pub fn of(
-        view: &ViewScene,
+        view: &TracedScene,
         eye: Vec3,
         lens: f32,
         geometry: Option<&StaticGeometry>,
@@ -174,7 +174,7 @@ impl Beyond {
         if skies.is_empty() {
             return beyond;
         }
-        for &number in &view.potential {
+        for &number in &view.look.potential {
             let Some(Some(bounds)) = map.surfaces.get(number as usize) else {
                 continue;
             };
@@ -192,7 +192,7 @@ impl Beyond {
             let bounds = bounds.zip(instance).and_then(|(b, i)| placed(b, i));
             beyond.boxes.extend(bounds.filter(&is_hidden));
         };
-        for submodel in &view.submodels {
+        for submodel in &view.look.submodels {
             add(map.models.get(&submodel.model), submodel.instance);
         }
         for mesh in &view.meshes {
@@ -210,14 +210,14 @@ impl Beyond {
 
 fn skies_in_sight(
     map: &MapSkies,
-    view: &ViewScene,
+    view: &TracedScene,
     world: &Instance,
     eye: Vec3,
     lens: f32,
 ) -> Vec<Seen> {
     let frustum = view.view.frustum();
     let mut potential = vec![false; map.sky_numbers];
-    for &number in &view.potential {
+    for &number in &view.look.potential {
         if let Some(seen) = potential.get_mut(number as usize) {
             *seen = true;
         }
@@ -233,7 +233,7 @@ fn skies_in_sight(
                 potential.get(number as usize) == Some(&true)
             });
         }
-        for submodel in view.submodels.iter().filter(|s| s.model == sky.model) {
+        for submodel in view.look.submodels.iter().filter(|s| s.model == sky.model) {
             if let Some(instance) = view.instances.get(submodel.instance as usize) {
                 add(instance, &|_| true);
             }

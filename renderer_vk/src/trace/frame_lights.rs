@@ -15,7 +15,7 @@ use super::lights::{
 };
 use crate::api::DynamicLight;
 use crate::gpu::{Error, Recorder};
-use crate::scene::{View, ViewScene};
+use crate::scene::{TracedScene, View};
 use crate::settings::{LightSelection, Settings};
 
 /// Lights of a view, and where they reach.
@@ -125,7 +125,7 @@ impl MapLights {
     pub fn of_view(
         &self,
         rec: &mut Recorder,
-        view: &ViewScene,
+        view: &TracedScene,
         settings: &Settings,
     ) -> Result<t::LightView, Error> {
         let scale = settings.rt_light_scale.max(0.0);
@@ -152,7 +152,7 @@ impl MapLights {
                 .collect(),
             ..FrameLights::default()
         };
-        for submodel in &view.submodels {
+        for submodel in &view.look.submodels {
             let lights = self.moving.iter().find(|(m, _)| *m == submodel.model);
             let instance = view.instances.get(submodel.instance as usize);
             if let (Some((_, lights)), Some(instance)) = (lights, instance) {

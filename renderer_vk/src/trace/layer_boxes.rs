@@ -11,7 +11,7 @@ use super::geometry::StaticGeometry;
 use super::input::{Kind, MaterialTable};
 use super::parts::axes;
 use super::surroundings::merged;
-use crate::scene::{ViewScene, turned};
+use crate::scene::{TracedScene, turned};
 use crate::world::outside;
 
 /// Boxes that a ray is held against; with more of them in sight each is around several.
@@ -68,7 +68,7 @@ pub(super) fn may_be_seen(bounds: &Aabb, eye: Vec3, frustum: &[Vec4]) -> bool {
 
 /// The boxes of what is translucent in a view: at most [`MAX_BOXES`]. `geometry`: the map's, if the view shows it.
 pub fn in_sight(
-    view: &ViewScene,
+    view: &TracedScene,
     geometry: Option<&StaticGeometry>,
     materials: &dyn MaterialTable,
 ) -> Vec<Aabb> {
@@ -90,7 +90,7 @@ pub fn in_sight(
         for layer in geometry.layers.iter().filter(|layer| layer.model == 0) {
             add(&layer.bounds, 0);
         }
-        for submodel in &view.submodels {
+        for submodel in &view.look.submodels {
             let of_model = |layer: &&StaticLayer| layer.model == submodel.model;
             for layer in geometry.layers.iter().filter(of_model) {
                 add(&layer.bounds, submodel.instance);

@@ -25,7 +25,7 @@ use crate::assets::compile::sampler;
 use crate::assets::{Assets, Materials};
 use crate::gpu::{ColorMask, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
-use crate::scene::ViewScene;
+use crate::scene::TracedScene;
 use crate::settings::Settings;
 use crate::world::World;
 
@@ -119,7 +119,7 @@ fn geometry(
 #[derive(Clone, Copy)]
 pub struct MapView<'a> {
     /// What the view shows.
-    pub scene: &'a ViewScene,
+    pub scene: &'a TracedScene,
     /// The loaded map.
     pub world: &'a World,
     /// Textures, materials and models.
@@ -252,7 +252,7 @@ impl TraceLook {
         &self,
         tracer: &mut ViewTracer,
         rec: &mut Recorder,
-        view: &ViewScene,
+        view: &TracedScene,
         assets: &Assets,
         settings: &Settings,
         target: &Image,

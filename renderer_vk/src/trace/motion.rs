@@ -21,7 +21,7 @@ use support::slice::item;
 use super::targets::Targets;
 use crate::api::{EntityKind, renderfx};
 use crate::gpu::{Error, Recorder};
-use crate::scene::{DynamicMesh, ViewEntity, ViewScene};
+use crate::scene::{DynamicMesh, TracedScene, ViewEntity};
 
 /// Fastest that an entity is taken to move, units a second, and what is allowed beside that.
 const FASTEST: f32 = 2500.0;
@@ -103,7 +103,7 @@ impl Motion {
     pub fn record(
         &mut self,
         rec: &mut Recorder,
-        view: &ViewScene,
+        view: &TracedScene,
         portals: &[PortalRecord],
         vertices: u64,
         targets: &Targets,
@@ -124,7 +124,7 @@ impl Motion {
     }
 
     /// Finds everything of a view in the one before, and keeps it for the next.
-    pub(super) fn follow(&mut self, view: &ViewScene, portals: &[PortalRecord]) -> Followed {
+    pub(super) fn follow(&mut self, view: &TracedScene, portals: &[PortalRecord]) -> Followed {
         // The first view has none before it.
         let past = self.past.take().unwrap_or_default();
         let mut found = Followed {
@@ -138,10 +138,10 @@ impl Motion {
         }
         past.follow_world(view, &mut found.positions);
         let passed = view.time - past.time;
-        let matches = past.match_entities(&view.entities, passed);
-        let mut velocities = vec![Vec3::ZERO; view.entities.len()];
+        let matches = past.match_entities(&view.look.entities, passed);
+        let mut velocities = vec![Vec3::ZERO; view.look.entities.len()];
         for ((entity, found_again), velocity) in
-            view.entities.iter().zip(matches).zip(&mut velocities)
+            view.look.entities.iter().zip(matches).zip(&mut velocities)
         {
             let Some(last) = found_again.and_then(|i| past.entities.get(i)) else {
                 continue;
@@ -152,7 +152,7 @@ impl Motion {
             past.follow_entity(view, entity, last, &mut found);
         }
         let mut past = past;
-        past.entities.clone_from(&view.entities);
+        past.entities.clone_from(&view.look.entities);
         past.velocities = velocities;
         past.meshes.clone_from(&view.meshes);
         past.places.clear();
@@ -219,7 +219,7 @@ impl Past {
 
     fn follow_entity(
         &self,
-        view: &ViewScene,
+        view: &TracedScene,
         entity: &ViewEntity,
         last: &ViewEntity,
         found: &mut Followed,
@@ -250,7 +250,7 @@ impl Past {
     }
 
     /// Surfaces of the world that are deformed.
-    fn follow_world(&self, view: &ViewScene, positions: &mut [Vec3]) {
+    fn follow_world(&self, view: &TracedScene, positions: &mut [Vec3]) {
         let ours = |mesh: &&DynamicMesh| mesh.instance == 0 && mesh.world_surface.is_some();
         let old: HashMap<(u32, u8), &DynamicMesh> = self
             .meshes

@@ -8,7 +8,7 @@ use super::cutout::Coverage;
 use super::input::Kind;
 use super::parts::{Part, Parts, Share};
 use crate::gpu::BlasGeometry;
-use crate::scene::{MeshGeometry, ViewScene};
+use crate::scene::{MeshGeometry, TracedScene};
 
 /// The geometry of one mesh of a part.
 pub struct MeshPart<'a> {
@@ -35,7 +35,7 @@ impl MeshPart<'_> {
 }
 
 /// The meshes of a part.
-pub fn members<'a>(view: &'a ViewScene, parts: &'a Parts, part: &Part) -> Vec<MeshPart<'a>> {
+pub fn members<'a>(view: &'a TracedScene, parts: &'a Parts, part: &Part) -> Vec<MeshPart<'a>> {
     let members = part.members.clone();
     let meshes = slice::part(&parts.meshes, members.clone());
     let skins = slice::part(&parts.skins, members);

@@ -15,7 +15,7 @@ use support::slice::{self, part, span};
 use super::cutout::Coverage;
 use super::geometry::{rank_bits, sides};
 use super::input::{Kind, MaterialInfo, MaterialTable};
-use crate::scene::{DynamicMesh, MeshId, Shape, ViewScene, turned};
+use crate::scene::{DynamicMesh, MeshId, Shape, TracedScene, turned};
 
 /// Smallest volume of an entity's axes that an instance can be turned back from; flatter ones are left out.
 const FLAT: f32 = 1.0e-12;
@@ -145,7 +145,7 @@ pub struct Part {
     pub kind: Kind,
     /// Its vertices are made anew each frame.
     pub animated: bool,
-    /// Of an animated part, its vertices in [`ViewScene::vertices`].
+    /// Of an animated part, its vertices in [`TracedScene::vertices`].
     pub vertices: Range<usize>,
     /// Its members in [`Parts::shapes`], [`Parts::skins`] and [`Parts::meshes`].
     pub members: Range<usize>,
@@ -159,7 +159,7 @@ pub struct Slot {
     pub seen: Seen,
     /// Kind of their triangles.
     pub kind: Kind,
-    /// For hits; they index [`ViewScene::vertices`].
+    /// For hits; they index [`TracedScene::vertices`].
     pub triangles: Vec<Triangle>,
     /// The same triangles for builds; they index [`Parts::positions`].
     pub indices: Vec<[u32; 3]>,
@@ -192,7 +192,7 @@ pub struct Parts {
     pub shapes: Vec<ShapeMesh>,
     /// Skins of the members.
     pub skins: Vec<SkinMesh>,
-    /// Indices of the members in [`ViewScene::meshes`].
+    /// Indices of the members in [`TracedScene::meshes`].
     pub meshes: Vec<usize>,
     /// Everything else.
     pub slots: Vec<Slot>,
@@ -268,10 +268,10 @@ fn triangle_flags(mesh: &DynamicMesh, instance: &Instance, kind: Kind, info: &Ma
 }
 
 /// Source, vertices and indices of a mesh that has a structure of its own.
-fn kept_source(view: &ViewScene, mesh: &DynamicMesh) -> Option<(Source, u32, u32)> {
+fn kept_source(view: &TracedScene, mesh: &DynamicMesh) -> Option<(Source, u32, u32)> {
     match mesh.shape {
         Shape::Rigid(rigid) => {
-            let rigid = view.rigid.get(rigid as usize)?;
+            let rigid = view.look.rigid.get(rigid as usize)?;
             let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
             let (vertices, indices) = (count(rigid.vertices.len()), count(rigid.indices.len()));
             Some((Source::Rigid(rigid.id), vertices, indices))
@@ -285,7 +285,7 @@ fn kept_source(view: &ViewScene, mesh: &DynamicMesh) -> Option<(Source, u32, u32
 
 impl Parts {
     /// Sorts a view's meshes.
-    pub fn collect(&mut self, view: &ViewScene, materials: &dyn MaterialTable) {
+    pub fn collect(&mut self, view: &TracedScene, materials: &dyn MaterialTable) {
         for slot in &mut self.slots {
             slot.triangles.clear();
             slot.indices.clear();
@@ -316,7 +316,7 @@ impl Parts {
 
     fn add(
         &mut self,
-        view: &ViewScene,
+        view: &TracedScene,
         mesh: &DynamicMesh,
         (order, index): (usize, usize),
         material: u32,
@@ -394,7 +394,7 @@ impl Parts {
     /// Kinds and shares of a cut-out's triangles: those without holes need no test.
     fn cut_out_shares(
         &mut self,
-        view: &ViewScene,
+        view: &TracedScene,
         mesh: &DynamicMesh,
         skin: SkinnedShape,
         materials: &dyn MaterialTable,
@@ -427,7 +427,7 @@ impl Parts {
     }
 
     /// Puts the members of each part side by side.
-    fn group(&mut self, view: &ViewScene) {
+    fn group(&mut self, view: &TracedScene) {
         self.parts.clear();
         self.shapes.clear();
         self.skins.clear();
@@ -475,7 +475,7 @@ impl Parts {
     /// Adds a mesh to those that are placed here. Triangles with a corner that is no number are left out.
     fn add_changing(
         &mut self,
-        view: &ViewScene,
+        view: &TracedScene,
         mesh: &DynamicMesh,
         instance: &Instance,
         (seen, kind): (Seen, Kind),
@@ -517,7 +517,7 @@ impl Parts {
 
 /// Coverage of each triangle of a model's surface in a material.
 fn triangle_coverages(
-    view: &ViewScene,
+    view: &TracedScene,
     mesh: &DynamicMesh,
     material: u32,
     materials: &dyn MaterialTable,
@@ -540,7 +540,7 @@ fn is_scrap(mesh: &DynamicMesh) -> bool {
 }
 
 /// Whether a mesh's vertices are there and numbers: a structure that is fitted to them must not meet others.
-fn is_whole(view: &ViewScene, mesh: &DynamicMesh) -> bool {
+fn is_whole(view: &TracedScene, mesh: &DynamicMesh) -> bool {
     let first = mesh.first_vertex as usize;
     let range = first..first.saturating_add(mesh.vertex_count as usize);
     let found = view.vertices.get(range);

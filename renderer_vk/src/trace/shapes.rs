@@ -18,7 +18,7 @@ use super::input::Tracer;
 use super::part_mesh::{MeshPart, members};
 use super::parts::{Part, Parts, ShapeMesh, SkinMesh};
 use crate::gpu::{BlasBuild, Buffer, BufferUsage, CompactedSizes, Device, Error, Pass, Recorder};
-use crate::scene::ViewScene;
+use crate::scene::TracedScene;
 
 use animated::{AnimatedShape, Scratch};
 use rigid::RigidShape;
@@ -149,7 +149,7 @@ impl Shapes {
     pub fn prepare(
         &mut self,
         rec: &mut Recorder,
-        view: &ViewScene,
+        view: &TracedScene,
         parts: &Parts,
         part: &Part,
         vertices: u64,
@@ -270,7 +270,7 @@ impl Shapes {
     fn prepare_animated(
         &mut self,
         rec: &mut Recorder,
-        view: &ViewScene,
+        view: &TracedScene,
         part: &Part,
         key: &[ShapeMesh],
         meshes: &[MeshPart<'_>],

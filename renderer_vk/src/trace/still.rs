@@ -2,7 +2,7 @@
 
 use super::view_tracer::ViewTracer;
 use crate::gpu::{Device, Error, Format, Image, ImageDesc, ImageUsage, Recorder};
-use crate::scene::{View, ViewScene};
+use crate::scene::{TracedScene, View};
 use crate::settings::{DebugOutput, Settings};
 
 use super::TraceLook;
@@ -11,7 +11,7 @@ use crate::assets::Assets;
 /// A picture in the making: the view as it was when it was asked for, and the passes that draw it.
 pub struct Still {
     tracer: ViewTracer,
-    view: Box<ViewScene>,
+    view: Box<TracedScene>,
     target: Image,
     wanted: u32,
 }
@@ -25,7 +25,7 @@ impl Still {
     pub fn new(
         device: &Device,
         look: &TraceLook,
-        view: &ViewScene,
+        view: &TracedScene,
         size: [u32; 2],
         samples: u32,
     ) -> Result<Self, Error> {
@@ -89,7 +89,7 @@ impl Still {
 }
 
 /// The view in a picture of another size.
-fn resized(view: &ViewScene, size: [u32; 2]) -> ViewScene {
+fn resized(view: &TracedScene, size: [u32; 2]) -> TracedScene {
     let mut view = view.clone();
     let [width, height] = size.map(|side| i32::try_from(side.max(1)).unwrap_or(i32::MAX));
     let camera = View {
@@ -119,7 +119,7 @@ mod tests {
             fov_y: 73.739_8,
             ..RefDef::default()
         };
-        let view = ViewScene::empty(&def, View::new(&def, 4.0, 100.0));
+        let view = TracedScene::empty(&def, View::new(&def, 4.0, 100.0));
         let wide = resized(&view, [1280, 480]);
         assert_eq!(wide.view.viewport, [0, 0, 1280, 480]);
         assert!((wide.view.tan_y - view.view.tan_y).abs() < 1e-6);

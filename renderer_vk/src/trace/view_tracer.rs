@@ -25,7 +25,7 @@ use super::passes::{COUNTERS, Pass, Resource};
 use super::targets::Targets;
 use crate::gpu::{Access, Buffer, BufferUsage, Device, Error, Image, Recorder};
 use crate::raster::FlareTest;
-use crate::scene::ViewScene;
+use crate::scene::TracedScene;
 use crate::settings::{DebugOutput, DenoiserChoice, Settings};
 use crate::world::outside;
 use content::content_hash;
@@ -46,7 +46,7 @@ pub struct TracedMap<'a> {
 #[derive(Clone, Copy)]
 pub struct TracedView<'a> {
     /// What the view shows.
-    pub scene: &'a ViewScene,
+    pub scene: &'a TracedScene,
     /// The map, if one is loaded; views without world leave it out.
     pub map: Option<TracedMap<'a>>,
     /// Materials of everything that rays meet.
@@ -251,7 +251,7 @@ impl ViewTracer {
         let portals: Vec<PortalRecord> = if settings.hides_portals() {
             Vec::new()
         } else {
-            scene.portals.iter().map(portal_record).collect()
+            scene.look.portals.iter().map(portal_record).collect()
         };
         let camera_rests = self.history == Some(camera_frame(scene));
         let vertices = accel.vertices;
@@ -353,7 +353,7 @@ impl ViewTracer {
     }
 
     /// How far automatic exposure moves to its aim in this frame, when the eye adapts within `seconds`.
-    fn exposure_blend(&self, view: &ViewScene, settings: &Settings, seconds: f32) -> f32 {
+    fn exposure_blend(&self, view: &TracedScene, settings: &Settings, seconds: f32) -> f32 {
         // the picture settles at once where frames must not depend on those before them
         if settings.rt_accumulate || !self.exposure_started {
             return 1.0;
@@ -370,7 +370,7 @@ impl ViewTracer {
     /// Number of frames that the accumulated sum holds before this one; 0 if anything that shows has changed.
     fn accumulated_before(
         &mut self,
-        view: &ViewScene,
+        view: &TracedScene,
         materials: &dyn MaterialTable,
         settings: &Settings,
     ) -> u32 {
@@ -420,11 +420,11 @@ fn size_in(target: &Image, viewport: [i32; 4]) -> Option<[u32; 2]> {
 
 /// Whether a view may see into fog: straight on, or by a portal wherever that leads. In what glass and shiny surfaces
 /// reflect while no fog lies in the view itself, fog has its constant colour alone.
-fn fog_in_sight(map: &TracedMap<'_>, view: &ViewScene) -> bool {
+fn fog_in_sight(map: &TracedMap<'_>, view: &TracedScene) -> bool {
     let frustum = view.view.frustum();
     let may_see = map.lights.fogs_seen_from(view.view.origin);
     let mut boxes = map.geometry.fog_boxes.iter().enumerate();
-    boxes.any(|(i, fog)| !view.portals.is_empty() || (may_see(i) && !outside(fog, &frustum)))
+    boxes.any(|(i, fog)| !view.look.portals.is_empty() || (may_see(i) && !outside(fog, &frustum)))
 }
 
 /// Whether surfaces show light; otherwise they show their own colour.

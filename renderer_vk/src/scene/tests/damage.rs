@@ -1,9 +1,9 @@
 //! Scenes that make no sense.
 
-use super::{check_ranges, def, entity, game, gather, room};
+use super::{check_ranges, check_surfaces, def, entity, game, gather, room};
 use crate::Error;
 use crate::api::{DynamicLight, EntityKind, PolyVert, RefDef, RefEntity};
-use crate::scene::{Look, Scene};
+use crate::scene::Scene;
 use glam::Vec3;
 use testkit::Random;
 
@@ -43,16 +43,16 @@ fn bad_entities_do_no_harm() {
         ..DynamicLight::default()
     });
     let views = scene
-        .gather_from(&game.input(Some(&world)), &def(), Look::Classic)
+        .gather_classic(&game.input(Some(&world)), &def())
         .unwrap();
     assert!(views[0].dlights.is_empty());
     // handle 0 shows its axes
     scene.add_entity(&entity(EntityKind::Model));
-    let views = gather(&mut scene, &game, Some(&world), &def(), Look::Classic);
+    let views = gather(&mut scene, &game, Some(&world), &def());
     let axes = game.materials.internal().axes;
     assert!(views[0].meshes.iter().any(|m| m.material == axes));
     scene.add_entity(&entity(EntityKind::Poly));
-    let failed = scene.gather_from(&game.input(None), &def(), Look::Classic);
+    let failed = scene.gather_classic(&game.input(None), &def());
     assert!(matches!(failed, Err(Error::EntityKind { .. })));
 }
 
@@ -148,17 +148,18 @@ fn random_scenes_stay_within_their_arrays() {
             flags: u32::from(round % 5 == 0),
             ..RefDef::default()
         };
-        let look = if round % 2 == 0 {
-            Look::Classic
+        let input = game.input(Some(&world));
+        if round % 2 == 0 {
+            let views = scene.gather_classic(&input, &def).unwrap();
+            for view in &views {
+                check_ranges(view);
+                check_surfaces(view, Some(&world));
+            }
+            scene.recycle_classic(views);
         } else {
-            Look::Traced
-        };
-        let views = scene
-            .gather_from(&game.input(Some(&world)), &def, look)
-            .unwrap();
-        for view in &views {
-            check_ranges(view, Some(&world));
+            let view = scene.gather_traced(&input, &def).unwrap();
+            check_ranges(&view);
+            scene.recycle_traced(view);
         }
-        scene.recycle(views);
     }
 }

@@ -1,8 +1,8 @@
 //! What the game adds: models, persons, shadows, brush models, polygons.
 
-use super::{def, entity, game, gather, room};
+use super::{def, entity, game, gather, gather_traced, room};
 use crate::api::{DynamicLight, EntityKind, PolyVert, RefDef, RefEntity, rdflags, renderfx};
-use crate::scene::{Look, Scene, ViewScene};
+use crate::scene::{DrawSurface, Scene, ViewScene};
 use crate::test_support::Registration;
 use glam::{Vec2, Vec3};
 use shaders::types::constants as c;
@@ -31,7 +31,7 @@ fn models_are_lerped_and_placed() {
         ..entity(EntityKind::Model)
     };
     scene.add_entity(&moving);
-    let views = gather(&mut scene, &game, None, &none, Look::Classic);
+    let views = gather(&mut scene, &game, None, &none);
     let view = &views[0];
     let vertex = view.vertices[view.meshes[0].first_vertex as usize];
     assert!(
@@ -54,7 +54,7 @@ fn models_are_lerped_and_placed() {
         skin_num: 0,
         ..moving
     });
-    let views = gather(&mut scene, &game, None, &none, Look::Classic);
+    let views = gather(&mut scene, &game, None, &none);
     assert_eq!(views[0].meshes[0].material, glass);
     // a skin without that surface shows the default
     scene.add_entity(&RefEntity {
@@ -62,7 +62,7 @@ fn models_are_lerped_and_placed() {
         skin_num: -3,
         ..moving
     });
-    let views = gather(&mut scene, &game, None, &none, Look::Classic);
+    let views = gather(&mut scene, &game, None, &none);
     assert_eq!(
         game.materials.get(views[0].meshes[0].material).name,
         "t/wall"
@@ -72,7 +72,7 @@ fn models_are_lerped_and_placed() {
         origin: Vec3::new(-500.0, 0.0, 0.0),
         ..moving
     });
-    let views = gather(&mut scene, &game, None, &none, Look::Classic);
+    let views = gather(&mut scene, &game, None, &none);
     assert!(views[0].meshes.is_empty());
 }
 
@@ -99,7 +99,7 @@ fn persons_show_where_they_should() {
     ] {
         scene.add_entity(&e);
     }
-    let views = gather(&mut scene, &game, Some(&world), &def(), Look::Classic);
+    let views = gather(&mut scene, &game, Some(&world), &def());
     let [behind, main] = views.as_slice() else {
         panic!("the mirror shows no view");
     };
@@ -119,7 +119,6 @@ fn persons_show_where_they_should() {
             .origin
             .abs_diff_eq(Vec3::new(600.0, 0.0, 0.0), 1e-3)
     );
-    assert!(behind.portals.is_empty() && main.portals.len() == 1);
     // traced: both are there, with their flags, and the mirror is listed
     for e in [
         at(renderfx::FIRST_PERSON),
@@ -128,15 +127,13 @@ fn persons_show_where_they_should() {
     ] {
         scene.add_entity(&e);
     }
-    let views = gather(&mut scene, &game, Some(&world), &def(), Look::Traced);
-    let [view] = views.as_slice() else { panic!() };
+    let view = gather_traced(&mut scene, &game, Some(&world), &def());
     assert_eq!(
-        flags(view),
+        flags(&view),
         [c::INSTANCE_FIRST_PERSON, c::INSTANCE_THIRD_PERSON]
     );
-    assert!(view.surfaces.is_empty());
-    assert_eq!(view.portals.len(), 1);
-    assert!(view.portals[0].mirror);
+    assert_eq!(view.look.portals.len(), 1);
+    assert!(view.look.portals[0].mirror);
     assert_eq!(
         view.meshes
             .iter()
@@ -168,25 +165,30 @@ fn what_turns_to_the_eye_turns_to_mirrors_too() {
         ..def()
     };
     let mut scene = Scene::default();
-    let mut shown = |look, renderfx, mirrored: bool| {
+    let mut shown = |traced: bool, renderfx, mirrored: bool| {
         scene.add_entity(&sprite(renderfx));
         if mirrored {
             scene.add_entity(&mirror);
         }
-        let views = gather(&mut scene, &game, Some(&world), &def, look);
         let of_view = |view: &ViewScene| -> Vec<(u8, Vec<Vec3>)> {
             let ours = view.meshes.iter().filter(|m| m.world_surface.is_none());
             let corners = |m: &crate::scene::DynamicMesh| {
-                let vertices = view.mesh_geometry(m).vertices;
+                let first = m.first_vertex as usize;
+                let vertices = &view.vertices[first..first + m.vertex_count as usize];
                 vertices.iter().map(|v| v.position).collect()
             };
             ours.map(|m| (m.paths, corners(m))).collect()
         };
-        views.iter().flat_map(of_view).collect::<Vec<_>>()
+        if traced {
+            of_view(&gather_traced(&mut scene, &game, Some(&world), &def))
+        } else {
+            let views = gather(&mut scene, &game, Some(&world), &def);
+            views.iter().flat_map(|view| of_view(view)).collect()
+        }
     };
     // the two views of the classic look, the mirror's first
-    let classic = shown(Look::Classic, 0, true);
-    let traced = shown(Look::Traced, 0, true);
+    let classic = shown(false, 0, true);
+    let traced = shown(true, 0, true);
     let [(_, in_mirror), (_, straight_on)] = classic.as_slice() else {
         panic!("{classic:?}");
     };
@@ -198,8 +200,8 @@ fn what_turns_to_the_eye_turns_to_mirrors_too() {
     assert!(same(&direct.1, straight_on) && same(&through.1, in_mirror));
     assert!(!same(&direct.1, &through.1));
     // without a mirror in sight, and for what mirrors do not show, there is one for all
-    assert_eq!(shown(Look::Traced, 0, false)[0].0, 0);
-    let first_person = shown(Look::Traced, renderfx::FIRST_PERSON, true);
+    assert_eq!(shown(true, 0, false)[0].0, 0);
+    let first_person = shown(true, renderfx::FIRST_PERSON, true);
     assert_eq!((first_person.len(), first_person[0].0), (1, 0));
 }
 
@@ -220,11 +222,11 @@ fn models_cast_planar_shadows_when_asked() {
     };
     let mut scene = Scene::default();
     scene.add_entity(&standing);
-    let views = gather(&mut scene, &game, None, &none, Look::Classic);
+    let views = gather(&mut scene, &game, None, &none);
     assert!(views[0].meshes.is_empty());
     game.settings.shadows = crate::settings::ModelShadows::Planar;
     scene.add_entity(&standing);
-    let views = gather(&mut scene, &game, None, &none, Look::Classic);
+    let views = gather(&mut scene, &game, None, &none);
     let [mesh] = views[0].meshes.as_slice() else {
         panic!("no shadow");
     };
@@ -248,17 +250,16 @@ fn opaque_models_cast_shadow_volumes_when_asked() {
         origin: Vec3::new(0.0, 100.0, 0.0),
         ..entity(EntityKind::Model)
     };
-    let volumes = |game: &Registration, entity: RefEntity, look| {
+    let volumes = |game: &Registration, entity: RefEntity| {
         let mut scene = Scene::default();
         scene.add_entity(&entity);
-        let views = gather(&mut scene, game, Some(&world), &def(), look);
-        views.last().unwrap().shadows.ranges.clone()
+        let views = gather(&mut scene, game, Some(&world), &def());
+        views.last().unwrap().look.shadows.ranges.clone()
     };
-    assert!(volumes(&game, standing, Look::Classic).is_empty());
+    assert!(volumes(&game, standing).is_empty());
     game.settings.shadows = crate::settings::ModelShadows::Volumes;
     // one triangle that the sun meets from behind: three sides, two triangles each
-    assert_eq!(volumes(&game, standing, Look::Classic), [(0, 18)]);
-    assert!(volumes(&game, standing, Look::Traced).is_empty());
+    assert_eq!(volumes(&game, standing), [(0, 18)]);
     let flags = [
         renderfx::NO_SHADOW,
         renderfx::DEPTH_HACK,
@@ -269,101 +270,95 @@ fn opaque_models_cast_shadow_volumes_when_asked() {
             renderfx,
             ..standing
         };
-        assert!(volumes(&game, entity, Look::Classic).is_empty());
+        assert!(volumes(&game, entity).is_empty());
     }
     // its second material blends
     let glass = RefEntity {
         skin_num: 1,
         ..standing
     };
-    assert!(volumes(&game, glass, Look::Classic).is_empty());
+    assert!(volumes(&game, glass).is_empty());
+}
+
+/// The instance of a scene's only entity; 0 is the world's.
+const DOOR: u32 = 1;
+
+/// A brush model, which an entity moves.
+fn door(game: &mut Registration) -> RefEntity {
+    RefEntity {
+        model: game.model("*1"),
+        origin: Vec3::new(0.0, 50.0, 0.0),
+        ..entity(EntityKind::Model)
+    }
 }
 
 #[test]
 fn brush_models_move_with_their_entity() {
     let mut game = game();
     let world = room(&mut game);
-    let door = game.model("*1");
-    assert!(door > 0);
-    let (mins, maxs) = game.models.bounds(door);
+    let placed = door(&mut game);
+    assert!(placed.model > 0);
+    let (mins, maxs) = game.models.bounds(placed.model);
     assert!(mins.max_element() <= -16.0 && maxs.min_element() >= 16.0);
     let mut scene = Scene::default();
-    let placed = RefEntity {
-        model: door,
-        origin: Vec3::new(0.0, 50.0, 0.0),
-        ..entity(EntityKind::Model)
+    scene.add_entity(&placed);
+    let views = gather(&mut scene, &game, Some(&world), &def());
+    let instance = views[0].instances[DOOR as usize];
+    assert_eq!(instance.origin, placed.origin);
+    // unlike the world itself it has an entity's light
+    assert!(instance.flags & c::INSTANCE_UNLIT == 0 && instance.ambient.x > 0.0);
+    let of_door = |s: &&DrawSurface| s.instance == DOOR;
+    // its front and, seen from the side, one more
+    let count = views[0].look.surfaces.iter().filter(of_door).count();
+    assert!((1..=3).contains(&count), "{count}");
+    // it asks in vain to be seen in mirrors alone
+    scene.add_entity(&RefEntity {
+        renderfx: renderfx::THIRD_PERSON,
+        ..placed
+    });
+    let views = gather(&mut scene, &game, Some(&world), &def());
+    assert_eq!(views[0].look.surfaces.iter().filter(of_door).count(), count);
+    scene.add_entity(&placed);
+    let view = gather_traced(&mut scene, &game, Some(&world), &def());
+    let [submodel] = view.look.submodels.as_slice() else {
+        panic!("{:?}", view.look.submodels);
     };
+    assert_eq!((submodel.model, submodel.instance), (1, DOOR));
+}
+
+#[test]
+fn brush_models_keep_one_bit_for_all_lights() {
+    let mut game = game();
+    let world = room(&mut game);
+    let placed = door(&mut game);
     let light = DynamicLight {
         origin: Vec3::new(-40.0, 50.0, 0.0),
         radius: 30.0,
         color: Vec3::ONE,
         additive: false,
     };
-    scene.add_entity(&placed);
-    scene.add_light(light);
-    let views = gather(&mut scene, &game, Some(&world), &def(), Look::Classic);
-    let view = &views[0];
-    let submodel = view.submodels[0];
-    assert_eq!(submodel.model, 1);
-    let instance = view.instances[submodel.instance as usize];
-    // unlike the world itself it has an entity's light
-    assert!(instance.flags & c::INSTANCE_UNLIT == 0 && instance.ambient.x > 0.0);
-    let of_door: Vec<_> = view
-        .surfaces
-        .iter()
-        .filter(|s| s.instance == submodel.instance)
-        .collect();
-    // its front and, seen from the side, one more
-    assert!((1..=3).contains(&of_door.len()), "{}", of_door.len());
+    let short = DynamicLight {
+        radius: 5.0,
+        ..light
+    };
+    let mut scene = Scene::default();
+    let mut bits = |lights: &[DynamicLight]| -> Vec<u32> {
+        scene.add_entity(&placed);
+        for light in lights {
+            scene.add_light(*light);
+        }
+        let views = gather(&mut scene, &game, Some(&world), &def());
+        let surfaces = views[0].look.surfaces.iter();
+        let bits = surfaces.filter(|s| s.instance == DOOR).map(|s| s.dlights);
+        bits.collect()
+    };
     // its sides are compared with the light as if they had not moved, and miss it
-    let lit = of_door.iter().filter(|s| s.dlights == 1).count();
-    assert_eq!(lit, 1, "{}", of_door.len());
+    let one = bits(&[light]);
+    assert_eq!(one.iter().filter(|bits| **bits == 1).count(), 1, "{one:?}");
     // of several lights the first one counts, whichever reaches the model
-    scene.add_entity(&placed);
-    scene.add_light(light);
-    scene.add_light(light);
-    let views = gather(&mut scene, &game, Some(&world), &def(), Look::Classic);
-    let of_door = |s: &&crate::scene::DrawSurface| s.instance == submodel.instance;
-    let mut lit = views[0].surfaces.iter().filter(of_door);
-    assert!(lit.any(|s| s.dlights == 1));
-    assert!(
-        views[0]
-            .surfaces
-            .iter()
-            .filter(of_door)
-            .all(|s| s.dlights < 2)
-    );
-    scene.add_entity(&placed);
-    scene.add_light(DynamicLight {
-        radius: 5.0,
-        ..light
-    });
-    scene.add_light(light);
-    let views = gather(&mut scene, &game, Some(&world), &def(), Look::Classic);
-    assert!(
-        views[0]
-            .surfaces
-            .iter()
-            .all(|s| s.dlights & !1 == 0 || s.instance == 0)
-    );
-    // it asks in vain to be seen in mirrors alone
-    scene.add_entity(&RefEntity {
-        renderfx: renderfx::THIRD_PERSON,
-        ..placed
-    });
-    let views = gather(&mut scene, &game, Some(&world), &def(), Look::Classic);
-    assert_eq!(views[0].submodels.len(), 1);
-    // out of the light's reach
-    scene.add_entity(&placed);
-    scene.add_light(DynamicLight {
-        radius: 5.0,
-        ..light
-    });
-    let views = gather(&mut scene, &game, Some(&world), &def(), Look::Classic);
-    assert!(views[0].surfaces.iter().all(|s| s.dlights == 0));
-    scene.add_entity(&placed);
-    let views = gather(&mut scene, &game, Some(&world), &def(), Look::Traced);
-    assert_eq!(views[0].submodels.len(), 1);
+    assert_eq!(bits(&[light, light]), one);
+    assert!(bits(&[short, light]).iter().all(|bits| bits & !1 == 0));
+    assert!(bits(&[short]).iter().all(|bits| *bits == 0));
 }
 
 #[test]
@@ -403,7 +398,7 @@ fn polygons_of_one_material_are_one_mesh() {
     );
     scene.add_poly(-1, &quad, 4);
     scene.add_poly(9999, &quad, 3);
-    let views = gather(&mut scene, &game, Some(&world), &def(), Look::Classic);
+    let views = gather(&mut scene, &game, Some(&world), &def());
     let polys: Vec<_> = views[0]
         .meshes
         .iter()

@@ -4,7 +4,7 @@ mod damage;
 mod entities;
 mod views;
 
-use super::{Geometry, Look, Scene, ViewScene};
+use super::{ClassicScene, Geometry, Scene, TracedScene, ViewScene};
 use crate::api::{EntityKind, RefDef, RefEntity};
 use crate::test_support::{PIXEL, Registration};
 use crate::world::WorldData;
@@ -143,18 +143,30 @@ fn gather(
     game: &Registration,
     world: Option<&WorldData>,
     def: &RefDef,
-    look: Look,
-) -> Vec<ViewScene> {
-    let views = scene.gather_from(&game.input(world), def, look).unwrap();
+) -> Vec<ClassicScene> {
+    let views = scene.gather_classic(&game.input(world), def).unwrap();
     for view in &views {
-        check(view, world);
+        check_finite(view);
+        check_ranges(view);
+        check_surfaces(view, world);
     }
     views
 }
 
+fn gather_traced(
+    scene: &mut Scene,
+    game: &Registration,
+    world: Option<&WorldData>,
+    def: &RefDef,
+) -> TracedScene {
+    let view = scene.gather_traced(&game.input(world), def).unwrap();
+    check_finite(&view);
+    check_ranges(&view);
+    view
+}
+
 /// What must hold for every gathered view of sane entities.
-fn check(view: &ViewScene, world: Option<&WorldData>) {
-    check_ranges(view, world);
+fn check_finite(view: &ViewScene) {
     assert!(
         view.vertices
             .iter()
@@ -163,8 +175,7 @@ fn check(view: &ViewScene, world: Option<&WorldData>) {
 }
 
 /// What must hold for every gathered view.
-fn check_ranges(view: &ViewScene, world: Option<&WorldData>) {
-    assert!(view.surfaces.is_sorted_by_key(|s| s.sort_key));
+fn check_ranges(view: &ViewScene) {
     assert!(view.vertices.iter().all(|v| v.position.is_finite()));
     for mesh in &view.meshes {
         let first = mesh.first_index as usize;
@@ -173,7 +184,12 @@ fn check_ranges(view: &ViewScene, world: Option<&WorldData>) {
         assert!(indices.iter().all(|i| vertices.contains(i)));
         assert!((mesh.instance as usize) < view.instances.len());
     }
-    for surface in &view.surfaces {
+}
+
+/// What must hold for every gathered view of the classic look.
+fn check_surfaces(view: &ClassicScene, world: Option<&WorldData>) {
+    assert!(view.look.surfaces.is_sorted_by_key(|s| s.sort_key));
+    for surface in &view.look.surfaces {
         assert!((surface.instance as usize) < view.instances.len());
         let (count, range) = match surface.geometry {
             Geometry::Static {

@@ -1,8 +1,8 @@
 //! What of the map a view gathers.
 
-use super::{def, entity, game, gather, room};
+use super::{def, entity, game, gather, gather_traced, room};
 use crate::api::{EntityKind, RefDef, RefEntity, rdflags};
-use crate::scene::{Geometry, Look, Scene, ViewScene};
+use crate::scene::{ClassicScene, Geometry, Scene};
 use crate::test_support::{Registration, openarena};
 use crate::world::WorldData;
 use glam::Vec3;
@@ -14,9 +14,10 @@ fn the_world_in_sight_is_sorted_and_culled() {
     let mut game = game();
     let world = room(&mut game);
     let mut scene = Scene::default();
-    let views = gather(&mut scene, &game, Some(&world), &def(), Look::Classic);
+    let views = gather(&mut scene, &game, Some(&world), &def());
     let [view] = views.as_slice() else { panic!() };
     let sorts: Vec<f32> = view
+        .look
         .surfaces
         .iter()
         .map(|s| game.materials.get(s.material).sort)
@@ -25,8 +26,8 @@ fn the_world_in_sight_is_sorted_and_culled() {
     assert_eq!(sorts[0], shaderscript::sort::PORTAL);
     // six walls (the box of the one behind is not wholly outside any one plane), the mirror, the sprite; the sky is
     // listed apart
-    assert_eq!(view.surfaces.len(), 8);
-    assert_eq!(view.skies.len(), 1);
+    assert_eq!(view.look.surfaces.len(), 8);
+    assert_eq!(view.look.skies.len(), 1);
     assert_eq!(view.meshes.len(), 1);
     assert_eq!(view.meshes[0].world_surface, Some(7));
     // the far plane is at the farthest corner
@@ -39,16 +40,17 @@ fn the_world_in_sight_is_sorted_and_culled() {
             .iter()
             .all(|v| (v.position.x - 100.0).abs() < 1e-3)
     );
-    scene.recycle(views);
+    scene.recycle_classic(views);
     // looking the other way
     let back = RefDef {
         view_axis: [-Vec3::X, -Vec3::Y, Vec3::Z],
         ..def()
     };
-    let views = gather(&mut scene, &game, Some(&world), &back, Look::Classic);
-    assert!(views[0].skies.is_empty());
+    let views = gather(&mut scene, &game, Some(&world), &back);
+    assert!(views[0].look.skies.is_empty());
     assert!(
         views[0]
+            .look
             .surfaces
             .iter()
             .all(|s| game.materials.get(s.material).sort > 1.0)
@@ -69,9 +71,9 @@ fn without_the_world_only_entities_show() {
         model: thing,
         ..entity(EntityKind::Model)
     });
-    let views = gather(&mut scene, &game, Some(&world), &none, Look::Classic);
+    let views = gather(&mut scene, &game, Some(&world), &none);
     assert!(!views[0].has_world);
-    assert_eq!(views[0].surfaces.len(), 1);
+    assert_eq!(views[0].look.surfaces.len(), 1);
     assert_eq!(views[0].view.far, 2048.0);
     let instance = views[0].instances[1];
     assert!(
@@ -80,10 +82,10 @@ fn without_the_world_only_entities_show() {
             .abs_diff_eq(Vec3::splat(182.0 / 255.0), 1e-5)
     );
     // what was added is gone
-    let views = gather(&mut scene, &game, Some(&world), &none, Look::Classic);
-    assert!(views[0].surfaces.is_empty());
-    let views = gather(&mut scene, &game, None, &none, Look::Classic);
-    assert!(views[0].surfaces.is_empty());
+    let views = gather(&mut scene, &game, Some(&world), &none);
+    assert!(views[0].look.surfaces.is_empty());
+    let views = gather(&mut scene, &game, None, &none);
+    assert!(views[0].look.surfaces.is_empty());
 }
 
 #[test]
@@ -110,7 +112,7 @@ fn real_maps_gather_from_every_spawn() {
                 time_ms: 12_345,
                 ..RefDef::default()
             };
-            for look in [Look::Classic, Look::Traced] {
+            for traced in [false, true] {
                 for model in 1..world.models.len() {
                     let handle = game.model(&format!("*{model}"));
                     scene.add_entity(&RefEntity {
@@ -118,14 +120,20 @@ fn real_maps_gather_from_every_spawn() {
                         ..entity(EntityKind::Model)
                     });
                 }
-                let views = gather(&mut scene, &game, Some(&world), &def, look);
-                if look == Look::Classic {
-                    check_against_leafs(&world, &game, &views[0]);
-                    drawn += views[0].surfaces.len();
-                    let sky = !views[0].skies.is_empty();
-                    assert!(sky || !views[0].surfaces.is_empty(), "{map} at {origin}");
+                if traced {
+                    let view = gather_traced(&mut scene, &game, Some(&world), &def);
+                    scene.recycle_traced(view);
+                    continue;
                 }
-                scene.recycle(views);
+                let views = gather(&mut scene, &game, Some(&world), &def);
+                check_against_leafs(&world, &game, &views[0]);
+                drawn += views[0].look.surfaces.len();
+                let sky = !views[0].look.skies.is_empty();
+                assert!(
+                    sky || !views[0].look.surfaces.is_empty(),
+                    "{map} at {origin}"
+                );
+                scene.recycle_classic(views);
             }
         }
         assert!(drawn > 0, "{map}");
@@ -133,7 +141,7 @@ fn real_maps_gather_from_every_spawn() {
 }
 
 /// The surfaces in sight are those of the leafs in sight, found here without marks.
-fn check_against_leafs(world: &WorldData, game: &Registration, view: &ViewScene) {
+fn check_against_leafs(world: &WorldData, game: &Registration, view: &ClassicScene) {
     let bsp = &world.relit.bsp;
     let frustum = view.view.frustum();
     let cluster = bsp.cluster_at(view.def.view_origin);
@@ -183,7 +191,7 @@ fn check_against_leafs(world: &WorldData, game: &Registration, view: &ViewScene)
         Geometry::Dynamic { .. } => None,
     };
     let drawn: std::collections::BTreeSet<u32> =
-        view.surfaces.iter().filter_map(first_of).collect();
+        view.look.surfaces.iter().filter_map(first_of).collect();
     let meshes = view.meshes.iter().filter_map(|m| m.world_surface);
     let meshes: std::collections::BTreeSet<u32> = meshes
         .map(|s| world.surfaces[s as usize].first_index)

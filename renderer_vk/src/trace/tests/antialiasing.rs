@@ -8,7 +8,7 @@ use shaders::types::constants as c;
 use super::dielectrics::{LIQUID, square};
 use super::harness::{Gpu, Scene, identity, mirror_at, rectangle, reference, stage};
 use crate::api::RefDef;
-use crate::scene::ViewScene;
+use crate::scene::TracedScene;
 use crate::settings::{DenoiserChoice, Settings};
 use crate::trace::input::Tracer;
 
@@ -199,7 +199,7 @@ fn ripples_leave_nothing_behind(gpu: &mut Gpu) {
     let shape = rectangle(corner, Vec3::X * 1200.0, Vec3::Y * 1200.0);
     scene.quad(shape, water);
     let (frames, last) = (24, 23.0);
-    let run = |view: &mut ViewScene, left: f32| {
+    let run = |view: &mut TracedScene, left: f32| {
         view.time = 7.0 - 0.016 * left;
         view.instances[0].time = view.time;
     };
@@ -225,10 +225,10 @@ fn what_moves_leaves_nothing_behind(gpu: &mut Gpu) {
     let shape = rectangle(Vec3::ZERO, Vec3::Z * 30.0, Vec3::Y * 30.0);
     scene.mesh(shape, red, identity());
     let at = |frame: f32| from - Vec3::Y * (5.0 * frame);
-    let place = |frame: f32, view: &mut ViewScene| {
+    let place = |frame: f32, view: &mut TracedScene| {
         view.time = frame * 0.02;
         view.instances.last_mut().expect("placed").origin = at(frame);
-        view.entities[0].origin = at(frame);
+        view.look.entities[0].origin = at(frame);
     };
     let last = 14;
     let (_, truth) = gpu.render_views(&scene, &reference(), TRUTH, |_, view| {
@@ -272,11 +272,11 @@ fn what_glows_and_moves_is_as_bright_as_it_is(gpu: &mut Gpu) {
     let line = |pixels: &[Vec3]| -> f32 { pixels.iter().map(|p| p.x - p.z).sum() };
     let (frames, first) = (24, 8);
     for speed in [0.0, 2.3, -7.1] {
-        let place = |frame: u32, view: &mut ViewScene| {
+        let place = |frame: u32, view: &mut TracedScene| {
             let at = Vec3::Y * (speed * (frame as f32 - 16.0));
             view.time = frame as f32 * 0.02;
             view.instances.last_mut().expect("placed").origin = at;
-            view.entities[0].origin = at;
+            view.look.entities[0].origin = at;
         };
         let mut sum = 0.0;
         let mut watch = |frame: u32, pixels: &[Vec3]| {
@@ -414,7 +414,7 @@ fn what_is_thin_keeps_its_history_in_motion(gpu: &mut Gpu) {
             frames.push(pixels.to_vec());
         }
     };
-    let walk = |frame: u32, view: &mut ViewScene| {
+    let walk = |frame: u32, view: &mut TracedScene| {
         view.def.view_origin = scene.def.view_origin + Vec3::Y * (pixel * frame as f32);
     };
     gpu.render_watched(&scene, &live(), last, walk, Some(&mut watch));

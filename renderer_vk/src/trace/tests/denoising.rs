@@ -7,7 +7,7 @@ use support::Aabb;
 
 use super::harness::{Gpu, Scene, gpu_tests, identity, rectangle, reference, stage};
 use crate::api::DynamicLight;
-use crate::scene::ViewScene;
+use crate::scene::TracedScene;
 use crate::settings::{DenoiserChoice, Settings};
 
 gpu_tests! {
@@ -201,7 +201,7 @@ fn frames_until_true(
     scene: &Scene,
     frames: u32,
     change: u32,
-    place: impl Fn(u32, &mut ViewScene),
+    place: impl Fn(u32, &mut TracedScene),
     truth: &[Vec3],
 ) -> u32 {
     let mut late = 0;
@@ -220,17 +220,17 @@ fn frames_until_true(
 
 fn light_that_is_switched_is_seen_soon(gpu: &mut Gpu) {
     let scene = room();
-    let lit = |view: &mut ViewScene| view.dlights = vec![lamp(Vec3::new(0.0, -60.0, 20.0))];
+    let lit = |view: &mut TracedScene| view.dlights = vec![lamp(Vec3::new(0.0, -60.0, 20.0))];
     let (dark_truth, _) = gpu.render(&scene, &truth_settings(), 128);
     let (lit_truth, _) = gpu.render_views(&scene, &truth_settings(), 128, |_, view| lit(view));
-    let off = |frame: u32, view: &mut ViewScene| {
+    let off = |frame: u32, view: &mut TracedScene| {
         if frame < 24 {
             lit(view);
         } else {
             view.dlights.clear();
         }
     };
-    let on = |frame: u32, view: &mut ViewScene| {
+    let on = |frame: u32, view: &mut TracedScene| {
         if frame >= 24 {
             lit(view);
         }
@@ -252,7 +252,7 @@ fn light_that_is_switched_is_seen_soon(gpu: &mut Gpu) {
 fn a_moving_light_leaves_no_trail(gpu: &mut Gpu) {
     let scene = room();
     // from one end of the room to the other, as a rocket flies
-    let fly = |frame: u32, view: &mut ViewScene| {
+    let fly = |frame: u32, view: &mut TracedScene| {
         let at = Vec3::new(-60.0 + 8.0 * frame as f32, -90.0, -40.0);
         view.dlights = vec![DynamicLight {
             radius: 120.0,
@@ -274,7 +274,7 @@ fn a_moving_light_leaves_no_trail(gpu: &mut Gpu) {
 fn a_light_that_fades_is_followed(gpu: &mut Gpu) {
     // by a twelfth each frame: little enough to be taken for noise, and after some frames far from what it was
     let scene = room();
-    let fade = |frame: u32, view: &mut ViewScene| {
+    let fade = |frame: u32, view: &mut TracedScene| {
         let light = lamp(Vec3::new(0.0, -60.0, 20.0));
         let left = (11.0f32 / 12.0).powf(frame as f32);
         view.dlights = vec![DynamicLight {
@@ -309,10 +309,10 @@ fn a_broken_number_does_not_spread(gpu: &mut Gpu) {
         scene.instances.push(identity());
         let lamp = crate::scene::Submodel { model: 1, instance };
         let with_lamp = |at: u32| {
-            move |frame: u32, view: &mut ViewScene| {
-                view.submodels.clear();
+            move |frame: u32, view: &mut TracedScene| {
+                view.look.submodels.clear();
                 if frame == at {
-                    view.submodels.push(lamp);
+                    view.look.submodels.push(lamp);
                 }
             }
         };

@@ -5,7 +5,7 @@ use relight::light::{Falloff, PointLight};
 
 use super::harness::{Gpu, Scene, gpu_tests, rectangle, reference};
 use crate::api::DynamicLight;
-use crate::scene::ViewScene;
+use crate::scene::TracedScene;
 use crate::settings::{DebugOutput, DenoiserChoice, Settings};
 
 gpu_tests! {
@@ -61,7 +61,7 @@ fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther(gpu: &
     };
     let last = 15;
     let mut history = |lit_until: u32| {
-        let lamp = |frame: u32, view: &mut ViewScene| {
+        let lamp = |frame: u32, view: &mut TracedScene| {
             view.dlights.clear();
             if frame < lit_until {
                 view.dlights.push(DynamicLight {
@@ -145,7 +145,7 @@ fn antialiasing_keeps_nothing_of_light_that_fades(gpu: &mut Gpu) {
             rt_num_random_dl: 0,
             ..reference()
         };
-        let lamp = |frame: u32, view: &mut ViewScene| {
+        let lamp = |frame: u32, view: &mut TracedScene| {
             let left = if dims {
                 0.94f32.powi(frame as i32)
             } else {

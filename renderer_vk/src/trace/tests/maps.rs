@@ -14,7 +14,7 @@ use crate::assets::Assets;
 use crate::gpu::ColorMask;
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::raster::FlareTest;
-use crate::scene::{Look, Scene};
+use crate::scene::{GatherInput, Scene};
 use crate::settings::{Settings, TracerChoice};
 use crate::test_support::openarena;
 use crate::trace::input::Tracer;
@@ -93,9 +93,7 @@ fn maps_are_lit() {
         let mut scene = Scene::default();
         let def = camera(&world);
         let view = scene
-            .gather(Some(&world), &assets, &settings, &def, Look::Traced)
-            .expect("view")
-            .pop()
+            .gather_traced(&GatherInput::new(Some(&world), &assets, &settings), &def)
             .expect("view");
         let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
         let target = Image::new(
@@ -198,9 +196,7 @@ fn tracers_agree_on_maps() {
                 ..camera(&world)
             };
             let view = Scene::default()
-                .gather(Some(&world), &assets, &settings, &def, Look::Traced)
-                .expect("view")
-                .pop()
+                .gather_traced(&GatherInput::new(Some(&world), &assets, &settings), &def)
                 .expect("view");
             let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
             let target = Image::new(

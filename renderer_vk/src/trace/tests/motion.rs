@@ -8,7 +8,7 @@ use shaders::types::constants as c;
 
 use super::harness::{Gpu, Scene, gpu_tests, identity, mirror_at, rectangle, reference, stage};
 use crate::api::{EntityKind, RefDef};
-use crate::scene::{Portal, View, ViewEntity, ViewScene};
+use crate::scene::{Portal, TracedScene, View, ViewEntity};
 use crate::settings::Settings;
 use crate::trace::motion::Motion;
 
@@ -136,7 +136,7 @@ fn meshes_move_with_their_entities_and_by_their_vertices(gpu: &mut Gpu) {
         view.time = frame as f32 * 0.02;
         let instance = view.instances.last_mut().expect("placed");
         instance.origin = if frame == 0 { from } else { to };
-        view.entities[0].origin = instance.origin;
+        view.look.entities[0].origin = instance.origin;
         if frame == 1 {
             instance.axis = instance.axis.map(|v| turn * v);
             step(&mut view.def);
@@ -158,7 +158,7 @@ fn meshes_move_with_their_entities_and_by_their_vertices(gpu: &mut Gpu) {
         view.time = frame as f32 * 0.02;
         let instance = view.instances.last_mut().expect("placed");
         instance.origin = from + Vec3::Z * if frame == 0 { 200.0 } else { 0.0 };
-        view.entities[0].origin = instance.origin;
+        view.look.entities[0].origin = instance.origin;
     });
     let unknown = gpu.motion().iter().filter(|(_, m)| m[2] < 0.0).count() as i32;
     assert!(unknown > SIZE * SIZE / 2 && unknown < SIZE * SIZE);
@@ -189,9 +189,9 @@ fn what_a_mirror_shows_moves_like_its_mirror_image(gpu: &mut Gpu) {
         if frame == 1 {
             step(&mut view.def);
             view.instances.last_mut().expect("placed").origin = moved;
-            view.entities[0].origin = moved;
+            view.look.entities[0].origin = moved;
         }
-        view.portals[0] = mirror_at(if frame == 0 { 49.5 } else { 50.0 }, Vec3::NEG_X);
+        view.look.portals[0] = mirror_at(if frame == 0 { 49.5 } else { 50.0 }, Vec3::NEG_X);
     });
     let last = |p: Vec3| {
         let then = p - moved;
@@ -289,13 +289,15 @@ fn entity(model: i32, origin: Vec3, instance: u32) -> ViewEntity {
 }
 
 /// A view of entities without meshes.
-fn entities(time: f32, list: &[(i32, Vec3)]) -> ViewScene {
+fn entities(time: f32, list: &[(i32, Vec3)]) -> TracedScene {
     let def = RefDef::default();
-    let mut view = ViewScene::empty(&def, View::new(&def, 4.0, 1000.0));
+    let mut view = TracedScene::empty(&def, View::new(&def, 4.0, 1000.0));
     view.time = time;
     view.instances.push(identity());
     for (i, (model, origin)) in list.iter().enumerate() {
-        view.entities.push(entity(*model, *origin, i as u32 + 1));
+        view.look
+            .entities
+            .push(entity(*model, *origin, i as u32 + 1));
         view.instances.push(Instance {
             origin: *origin,
             ..identity()

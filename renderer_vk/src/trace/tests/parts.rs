@@ -7,7 +7,7 @@ use shaders::types::constants as c;
 use shaders::types::{Instance, MaterialBuffers, Vertex};
 
 use crate::api::RefDef;
-use crate::scene::{DynamicMesh, RigidMesh, Shape, View, ViewScene};
+use crate::scene::{DynamicMesh, RigidMesh, Shape, TracedScene, View};
 use crate::trace::cutout::Coverage;
 use crate::trace::input::{Kind, MaterialInfo, MaterialTable};
 use crate::trace::part_mesh;
@@ -77,8 +77,8 @@ fn parts_of_skins(mesh: RigidMesh, skins: &[u32], up: Vec3) -> Vec<(u32, Kind, V
         fov_y: 90.0,
         ..RefDef::default()
     };
-    let mut view = ViewScene::empty(&def, View::new(&def, 4.0, 100.0));
-    view.rigid.push(Arc::new(mesh));
+    let mut view = TracedScene::empty(&def, View::new(&def, 4.0, 100.0));
+    view.look.rigid.push(Arc::new(mesh));
     for (instance, &material) in skins.iter().enumerate() {
         view.instances.push(Instance {
             axis: [Vec3::X, Vec3::Y, up],

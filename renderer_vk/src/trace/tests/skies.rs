@@ -184,7 +184,7 @@ fn what_the_visible_set_holds_shows_through_a_sky(gpu: &mut Gpu) {
         (&[2, 3], [0, 0, 0]),
     ] {
         let (pixels, _) = gpu.render_views(&scene, &settings, 1, |_, view| {
-            view.potential = potential.to_vec();
+            view.look.potential = potential.to_vec();
         });
         for (x, color) in [8, 11, 15].into_iter().zip(shown) {
             let found = pixels[SIZE / 2 * SIZE + x].to_array().map(encode);
@@ -197,7 +197,7 @@ fn what_the_visible_set_holds_shows_through_a_sky(gpu: &mut Gpu) {
     }
     // what moves shows behind a sky alone as well, where it has a face to the eye
     let (pixels, _) = gpu.render_views(&scene, &settings, 1, |_, view| {
-        view.potential = vec![0, 1, 2];
+        view.look.potential = vec![0, 1, 2];
         view.meshes.clear();
     });
     let found = pixels[SIZE / 2 * SIZE + 11].to_array().map(encode);

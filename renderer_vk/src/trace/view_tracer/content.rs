@@ -4,13 +4,13 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use glam::Vec3;
 
-use crate::scene::ViewScene;
+use crate::scene::TracedScene;
 use crate::settings::Settings;
 use crate::trace::input::MaterialTable;
 
 /// A number that changes whenever the mean picture does: camera, everything in the scene, time, settings.
 pub(super) fn content_hash(
-    view: &ViewScene,
+    view: &TracedScene,
     materials: &dyn MaterialTable,
     settings: &Settings,
 ) -> u64 {
@@ -33,7 +33,7 @@ pub(super) fn content_hash(
         floats(&vector(light.color));
         floats(&[light.radius]);
     }
-    for portal in &view.portals {
+    for portal in &view.look.portals {
         floats(&portal.plane.to_array());
         floats(&vector(portal.camera_origin));
         for axis in portal.camera_axis {
@@ -51,11 +51,11 @@ pub(super) fn content_hash(
         }
         (mesh.material, mesh.instance, mesh.fog).hash(&mut hasher);
     }
-    for submodel in &view.submodels {
+    for submodel in &view.look.submodels {
         (submodel.model, submodel.instance).hash(&mut hasher);
     }
     view.has_world.hash(&mut hasher);
-    view.potential.hash(&mut hasher);
+    view.look.potential.hash(&mut hasher);
     materials.generation().hash(&mut hasher);
     settings.accumulation_key(&mut hasher);
     hasher.finish()

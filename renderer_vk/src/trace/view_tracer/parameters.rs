@@ -12,7 +12,7 @@ use super::super::indirect::is_subsampled;
 use super::{DARK_ADAPTATION, LIGHT_ADAPTATION, TracedView, ViewTracer, is_lit};
 use crate::gpu::{Error, Image, Recorder};
 use crate::raster::FlareTest;
-use crate::scene::{SUN_SIZE, ViewScene, perpendicular};
+use crate::scene::{SUN_SIZE, TracedScene, perpendicular};
 use crate::settings::Settings;
 use crate::trace::accel::AccelOutput;
 use crate::trace::beyond_sky::Beyond;
@@ -233,7 +233,7 @@ fn transport(rec: &mut Recorder, traced: &TracedView<'_>) -> Result<TransportVie
 }
 
 /// Where a view is seen from: what two frames must have in common to show the same directions.
-pub(super) fn camera_frame(view: &ViewScene) -> CameraView {
+pub(super) fn camera_frame(view: &TracedScene) -> CameraView {
     let camera = &view.view;
     let [forward, left, up] = camera.axis;
     CameraView {
@@ -246,7 +246,7 @@ pub(super) fn camera_frame(view: &ViewScene) -> CameraView {
 }
 
 /// The sun's picture where it is to be seen.
-fn sun_disc(view: &ViewScene) -> SunDisc {
+fn sun_disc(view: &TracedScene) -> SunDisc {
     view.sun.map_or(
         SunDisc {
             material: NO_TEXTURE,

@@ -13,7 +13,7 @@ use crate::gpu::{
     SamplerDesc, SurfaceSource, Wrap,
 };
 use crate::raster::FlareTest;
-use crate::scene::{View, ViewScene};
+use crate::scene::{TracedScene, View};
 use crate::settings::Settings;
 use crate::trace::input::Tracer;
 use crate::trace::pass_set::PassSet;
@@ -169,7 +169,7 @@ impl Gpu {
         scene: &Scene,
         settings: &Settings,
         frames: u32,
-        change: impl Fn(u32, &mut ViewScene),
+        change: impl Fn(u32, &mut TracedScene),
     ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
         self.render_watched(scene, settings, frames, change, None)
     }
@@ -181,7 +181,7 @@ impl Gpu {
         scene: &Scene,
         settings: &Settings,
         frames: u32,
-        change: impl Fn(u32, &mut ViewScene),
+        change: impl Fn(u32, &mut TracedScene),
         mut watch: Option<&mut dyn FnMut(u32, &[Vec3])>,
     ) -> (Vec<Vec3>, Vec<[u8; 4]>) {
         let uploaded = scene.upload(&self.device, self.tracer);

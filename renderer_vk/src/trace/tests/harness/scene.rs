@@ -13,7 +13,7 @@ use super::{encode, identity, rectangle, stage};
 use crate::api::{DynamicLight, EntityKind, RefDef};
 use crate::gpu::{Buffer, BufferUsage, Device};
 use crate::scene::{
-    DynamicMesh, Portal, RigidMesh, ShadowVolumes, Shape, Submodel, View, ViewEntity, ViewScene,
+    DynamicMesh, Portal, RigidMesh, Shape, Submodel, TracedPart, TracedScene, View, ViewEntity,
 };
 use crate::trace::geometry::StaticGeometry;
 use crate::trace::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurface, Tracer};
@@ -237,8 +237,8 @@ impl Scene {
         });
     }
 
-    pub fn view(&self) -> ViewScene {
-        ViewScene {
+    pub fn view(&self) -> TracedScene {
+        TracedScene {
             def: self.def,
             view: View::new(&self.def, 4.0, 10000.0),
             time: self.def.time_ms as f32 * 0.001,
@@ -246,20 +246,17 @@ impl Scene {
             vertices: self.dynamic_vertices.clone(),
             indices: self.dynamic_indices.clone(),
             meshes: self.meshes.clone(),
-            rigid: self.rigid.clone(),
-            submodels: self.submodels.clone(),
-            entities: self.entities.clone(),
-            surfaces: Vec::new(),
-            potential: (0..self.surfaces.len() as u32).collect(),
             dlights: self.dlights.clone(),
-            portals: self.portals.clone(),
             has_world: true,
-            skies: Vec::new(),
-            shadows: ShadowVolumes::default(),
-            debug: Default::default(),
-            statistics: Default::default(),
             sun: None,
             flares: Vec::new(),
+            look: TracedPart {
+                rigid: self.rigid.clone(),
+                submodels: self.submodels.clone(),
+                entities: self.entities.clone(),
+                potential: (0..self.surfaces.len() as u32).collect(),
+                portals: self.portals.clone(),
+            },
         }
     }
 
