@@ -1,8 +1,8 @@
 //! The acceleration structures of a frame: the top level over the map and everything that moves.
 //!
-//! Models are instances of structures that are kept (`shapes`). Polygons, sprites and beams, of which nothing outlives
-//! the frame, are placed in world space on the CPU; those that a ray treats alike share one structure, built each frame.
-//! All builds of a frame are one batch.
+//! Models are instances of structures that are kept between frames (`shapes`). Polygons, sprites and beams live for one
+//! frame: the CPU transforms them to world space, and those of equal visibility and kind share one structure, built
+//! each frame. All builds of a frame are one batch.
 
 use std::iter;
 
@@ -28,14 +28,14 @@ fn hit_group(kind: Kind) -> u32 {
     u32::from(kind == Kind::Translucent)
 }
 
-/// What a frame's rays are traced against.
+/// Acceleration structures and geometry of one frame, as shaders address them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AccelOutput {
     /// Bindless index of the driver's top-level structure.
     pub scene: u32,
-    /// Device address of our own top level's nodes; 0: nothing is there.
+    /// Device address of the nodes of our own top level; 0: the scene is empty.
     pub nodes: u64,
-    /// Device address of the `BvhInstance`s in the order of its leafs.
+    /// Device address of the `BvhInstance`s, in leaf order of the top level.
     pub placed: u64,
     /// Device address of the `GeometryRecord`s.
     pub geometries: u64,
@@ -43,32 +43,31 @@ pub struct AccelOutput {
     pub instances: u64,
     /// Device address of the view's `Vertex`es.
     pub vertices: u64,
-    /// There is something that only the eye sees.
+    /// Some geometry is visible to camera rays alone.
     pub first_person: bool,
 }
 
-/// Bytes of the structures that rays are traced against, by what they hold. What is made for one frame alone is counted
-/// as it was in the last one.
+/// Bytes of the acceleration structures, by content. Memory that lives for one frame is that of the last frame.
 #[cfg(test)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AccelMemory {
     /// The map, with its triangle records.
     pub map: u64,
-    /// Models that keep their shape, however often they are placed.
+    /// Models of constant shape, each counted once.
     pub models: u64,
-    /// What is fitted to its vertices each frame.
+    /// Structures that are refitted each frame.
     pub animated: u64,
     /// Triangle records of models.
     pub skins: u64,
-    /// What is built anew each frame.
+    /// Structures that are built each frame.
     pub changing: u64,
     /// The top level.
     pub top: u64,
 }
 
-/// What is placed, before it is built.
+/// Source of a placement, before the structures are built.
 enum Part<'a> {
-    /// Of the map.
+    /// A structure of the map.
     Static(&'a Structure),
     /// Index of the slot.
     Slot(usize),
@@ -76,7 +75,7 @@ enum Part<'a> {
     Kept(usize, super::shapes::Prepared),
 }
 
-/// A structure in its place.
+/// A structure with its transform.
 struct Placement<'a> {
     part: Part<'a>,
     axis: Mat3,
@@ -86,11 +85,12 @@ struct Placement<'a> {
     kind: Kind,
 }
 
-/// The structures of a view.
+/// The placements of a view.
 #[derive(Default)]
 struct Placements<'a> {
     placed: Vec<Placement<'a>>,
-    /// One for each geometry of a structure; a hit finds its record by the number of the structure's first.
+    /// One record per geometry of a structure; a hit's record index is the structure's first plus the geometry's
+    /// number.
     records: Vec<GeometryRecord>,
 }
 
@@ -122,7 +122,7 @@ impl<'a> Placements<'a> {
                 continue;
             };
             let axis = axes(instance);
-            // flattened to nothing it is not to be seen
+            // axes without volume have no inverse: the model is left out
             if !is_solid(axis) {
                 continue;
             }
@@ -152,27 +152,27 @@ impl<'a> Placements<'a> {
     }
 }
 
-/// The driver's structures that are built in each frame.
+/// The driver's structures.
 struct DriverStructures {
-    /// One for each slot.
+    /// Rebuilt each frame, one per slot.
     slots: Vec<Blas>,
     tlas: Tlas,
-    /// What `tlas` was built from, once it is: the serial of the map's geometry, and all instances.
+    /// Input of the last build of `tlas`: serial of the map's geometry, and all instances.
     placed: Option<(u64, Vec<gpu::Instance>)>,
 }
 
-/// Builds the structures of each frame in storage that stays.
+/// Builds the structures of each frame in persistent storage.
 pub struct Accel {
     parts: Parts,
     shapes: Shapes,
-    /// With the tracers that walk them.
+    /// Only with the tracers that use them.
     driver: Option<DriverStructures>,
-    /// Bytes of our own structures that were made for the last frame: bottom and top.
+    /// Bytes of our own structures of the last frame: bottom levels, top level.
     own_bytes: [u64; 2],
 }
 
 impl Accel {
-    /// Empty structures.
+    /// Makes empty storage.
     pub fn new(device: &Device, tracer: Tracer) -> Self {
         let parts = Parts::default();
         let flags = BlasFlags {
@@ -192,7 +192,7 @@ impl Accel {
         }
     }
 
-    /// Bytes of everything but the map.
+    /// Bytes of all structures but the map's.
     #[cfg(test)]
     pub fn memory(&self) -> AccelMemory {
         let shapes = self.shapes.memory();
@@ -210,7 +210,7 @@ impl Accel {
         }
     }
 
-    /// How many structures are kept: of models that keep their shape, and such as are fitted each frame.
+    /// Number of kept structures: of constant shape, and refitted ones.
     #[cfg(test)]
     pub fn counts(&self) -> [usize; 2] {
         self.shapes.counts()
@@ -282,7 +282,7 @@ impl Accel {
         Ok(output)
     }
 
-    /// Whether anything that stops a ray is seen by the eye alone.
+    /// Whether geometry that stops rays is visible to camera rays alone.
     fn shows_first_person(&self) -> bool {
         let solid = |seen, kind| seen == Seen::FirstPerson && kind != Kind::Translucent;
         let parts = self.parts.parts.iter();
@@ -291,8 +291,8 @@ impl Accel {
             || parts.into_iter().any(|p| solid(p.seen, p.kind))
     }
 
-    /// Builds what the driver's tracers walk: the bottom level in one batch, then the top level, whose index it returns.
-    /// `serial`: of the map's geometry.
+    /// Builds the driver's bottom levels in one batch, then the top level; returns its bindless index. `serial`: that
+    /// of the map's geometry.
     fn build_driver(
         &mut self,
         rec: &mut Recorder,
@@ -354,7 +354,7 @@ impl Accel {
                 blas: address(&p.part),
             })
             .collect();
-        // while nothing moves, what was built shows it
+        // equal instances over the same map: the last top level is still valid
         let same = |(of, built): &(u64, Vec<gpu::Instance>)| *of == serial && *built == instances;
         if rests && driver.placed.as_ref().is_some_and(same) {
             return Ok(driver.tlas.index());
@@ -366,7 +366,8 @@ impl Accel {
         Ok(driver.tlas.index())
     }
 
-    /// Builds our own hierarchies of what changes and the one over everything; their addresses in the frame's memory.
+    /// Builds our own hierarchies of changing geometry and the top level; returns their addresses in the frame's
+    /// memory.
     fn build_own(
         &mut self,
         rec: &mut Recorder,
@@ -438,7 +439,7 @@ impl Accel {
     }
 }
 
-/// Rows of the matrix that places an entity.
+/// Rows of an instance's transform.
 fn rows(axis: Mat3, o: Vec3) -> [[f32; 4]; 3] {
     let (x, y, z) = (axis.x_axis, axis.y_axis, axis.z_axis);
     [

@@ -1,8 +1,8 @@
-//! From the traced picture to the one of the window's size: temporal antialiasing, and upscaling with and without it.
+//! Resolves the traced picture to the window's size: temporal antialiasing, and upscaling with and without it.
 //!
-//! With temporal antialiasing the rays of each frame go through another place of their pixels (the R2 sequence of
-//! Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018: evenly spread however many frames are taken
-//! of it), and a picture of the output's size is kept from frame to frame.
+//! With temporal antialiasing, each frame's rays are jittered within their pixels by the R2 sequence (Roberts, The
+//! Unreasonable Effectiveness of Quasirandom Sequences, 2018: every run of its samples is evenly distributed), and a
+//! picture of the output's size is accumulated over frames.
 
 use glam::Vec2;
 use shaders::trace_types::AntialiasView;
@@ -15,17 +15,17 @@ use crate::gpu::{
 };
 use crate::settings::Settings;
 
-/// The smallest part of the picture's size that is traced, along each axis.
+/// Least traced size along each axis, as a part of the output's.
 const LEAST_SCALE: f32 = 0.25;
 
-/// What makes the picture of a view.
+/// Method that makes a view's picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Method {
-    /// The traced picture is the picture.
+    /// The traced picture is shown unchanged.
     Plain,
-    /// Samples of many frames.
+    /// Temporal antialiasing, with upscaling.
     Temporal,
-    /// A larger picture of one frame.
+    /// Upscaling of a single frame.
     Upscale,
 }
 
@@ -34,7 +34,7 @@ impl Method {
         if settings.rt_accumulate {
             Self::Plain
         } else if settings.rt_taa || settings.multisample > 1 {
-            // several samples a pixel, the rasterizer's way to smooth edges, come one a frame here
+            // multisampling is replaced by one jittered sample per frame
             Self::Temporal
         } else if traced_size(settings, output) != output {
             Self::Upscale
@@ -44,7 +44,7 @@ impl Method {
     }
 }
 
-/// The size that is traced for a picture of the size `output`, pixels. Reference pictures are traced in full.
+/// Traced size for a picture of the size `output`, pixels. Reference pictures are traced in full size.
 pub fn traced_size(settings: &Settings, output: [u32; 2]) -> [u32; 2] {
     if settings.rt_accumulate || settings.rt_scale.is_nan() || settings.rt_scale >= 1.0 {
         return output;
@@ -58,19 +58,19 @@ pub fn traced_size(settings: &Settings, output: [u32; 2]) -> [u32; 2] {
     output.map(|side| ((side as f32 * scale).round() as u32).clamp(1, side.max(1)))
 }
 
-/// Resolves traced pictures to those of the window.
+/// Resolves traced pictures to the window's size.
 pub struct Antialias {
     sampler: u32,
-    /// This frame's and the last one's, while they are asked for.
+    /// Resolved pictures of this frame and the last, while temporal antialiasing is on.
     resolved: Option<[Image; 2]>,
-    /// The last frame left a picture to go on from.
+    /// The last frame left a valid resolved picture.
     history: bool,
     frame: u32,
     method: Method,
 }
 
 impl Antialias {
-    /// No picture is kept yet.
+    /// Without a history.
     ///
     /// # Errors
     /// The device has no room for the sampler.
@@ -90,16 +90,15 @@ impl Antialias {
         })
     }
 
-    /// The next picture has nothing to do with the last one. Its samples begin anew, too, so that the same frames make the
-    /// same picture.
+    /// Discards the history. The jitter sequence restarts, too, so that equal frames give equal pictures.
     #[cfg(test)]
     pub fn reset(&mut self) {
         self.history = false;
         self.frame = 0;
     }
 
-    /// Makes ready for a view of the size `output`. `targets`: the images that it is traced to; `history`: the last frame
-    /// saw the same scene.
+    /// Prepares a view of the size `output`. `targets`: the images that it is traced to; `history`: the last frame
+    /// showed the same scene.
     ///
     /// # Errors
     /// Out of memory.
@@ -162,7 +161,7 @@ impl Antialias {
         })
     }
 
-    /// Records the pass, if there is anything to do.
+    /// Records the pass, if the method has one.
     ///
     /// # Errors
     /// Out of memory, or the driver refuses the pipeline.
@@ -174,7 +173,7 @@ impl Antialias {
         }
     }
 
-    /// The picture of this frame becomes that of the last one.
+    /// Ends the frame: its resolved picture becomes that of the last frame.
     pub fn advance(&mut self) {
         if let Some(resolved) = &mut self.resolved {
             resolved.swap(0, 1);
@@ -183,14 +182,14 @@ impl Antialias {
         self.frame = self.frame.wrapping_add(1);
     }
 
-    /// The picture that the last frame resolved to, if it did.
+    /// The resolved picture of the last frame, if it has one.
     pub fn picture(&self) -> Option<&Image> {
         self.resolved.as_ref().map(|r| &r[1])
     }
 }
 
-/// Textures are read finer than a traced pixel is wide where the samples of many frames make a pixel: as fine as the
-/// output's pixels, and half a level more, which their mean smooths again.
+/// Scale of texture gradients. With temporal antialiasing, textures are sampled at the resolution of the output's
+/// pixels and half a mip level finer, which the mean over frames smooths.
 fn texture_scale(settings: &Settings, output: [u32; 2], jittered: bool) -> f32 {
     if !jittered {
         return 1.0;
@@ -200,10 +199,9 @@ fn texture_scale(settings: &Settings, output: [u32; 2], jittered: bool) -> f32 {
     ratio * std::f32::consts::FRAC_1_SQRT_2
 }
 
-/// Where the rays of a frame go through their pixels, from the middle: the R2 sequence in fixed point, so that it stays
-/// exact for as long as a game runs.
+/// Offset of a frame's rays from the pixel centre: the R2 sequence in fixed point, exact for any number of frames.
 fn jitter(frame: u32) -> Vec2 {
-    // 2^32 over the plastic number, and over its square
+    // 2^32 divided by the plastic number, and by its square
     let step = [3_242_174_889u32, 2_447_445_414];
     #[allow(clippy::cast_precision_loss)] // 24 bits are kept
     let part =
@@ -221,7 +219,7 @@ mod tests {
             let mean: Vec2 = (0..frames).map(jitter).sum::<Vec2>() / frames as f32;
             assert!(mean.length() < 2.0 / frames as f32, "{frames}: {mean}");
         }
-        // a sample in each sixteenth of the pixel within 40 frames, wherever one begins
+        // any 40 consecutive frames have a sample in each sixteenth of the pixel
         for begin in [0u32, 1000, u32::MAX - 10] {
             let mut hit = [false; 16];
             for i in 0..40 {

@@ -1,8 +1,8 @@
-//! What shows through a sky.
+//! Geometry that is visible through skies.
 //!
-//! The engine draws a sky behind everything else, wherever its surfaces are: what lies behind them shows, too, if the
-//! visible set holds it. Most views have nothing there. So it is found here what may lie behind a sky in sight, and rays
-//! go on behind one only where they meet a box of that.
+//! The engine draws a sky behind everything else, wherever its surfaces are: surfaces of the visible set that lie
+//! behind a sky surface are visible through it. Few views have any. This module computes boxes around them; a primary
+//! ray continues behind a sky only if it meets one of the boxes.
 
 use std::collections::BTreeMap;
 
@@ -17,35 +17,35 @@ use super::parts::axes;
 use super::surroundings::merged;
 use crate::scene::{TracedScene, turned};
 
-/// Boxes that a ray is held against; with more of them each is around several.
+/// Maximum number of boxes that a ray is tested against; above it, boxes are merged.
 const MAX_BOXES: usize = 48;
-/// Less far behind a plane, units, is in it.
+/// Points less than this far behind a plane, units, count as in the plane.
 const IN_PLANE: f32 = 0.1;
 
-/// Surfaces of a sky in one plane, in the space of their model.
+/// Sky surfaces in one plane, in the space of their model.
 #[derive(Debug)]
 struct Sky {
     model: u32,
     point: Vec3,
     normal: Vec3,
-    /// Numbers and bounds.
+    /// Surface numbers and bounds.
     surfaces: Vec<(u32, Aabb)>,
 }
 
-/// The skies of a map, and what may show through them.
+/// The skies of a map, and the bounds of surfaces that may be visible through them.
 #[derive(Debug, Default)]
 pub struct MapSkies {
     skies: Vec<Sky>,
-    /// One more than the greatest number of a surface in `skies`.
+    /// Greatest surface number in `skies`, plus one.
     sky_numbers: usize,
-    /// Of the world's other surfaces, by number.
+    /// Bounds of the world's other surfaces, by surface number.
     surfaces: Vec<Option<Aabb>>,
-    /// Of the other models.
+    /// Bounds of the brush models, by number.
     models: BTreeMap<u32, Aabb>,
 }
 
 impl MapSkies {
-    /// Of a map.
+    /// Collects the skies of a map.
     pub fn new(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Self {
         let mut made = Self::default();
         let mut planes: BTreeMap<(u32, [i32; 4]), Sky> = BTreeMap::new();
@@ -62,7 +62,7 @@ impl MapSkies {
                     let Some(normal) = (c - a).cross(b - a).try_normalize() else {
                         continue;
                     };
-                    // those of one brush differ by rounding
+                    // planes of one brush differ by rounding
                     #[allow(clippy::cast_possible_truncation)]
                     let key = (normal * 100.0).extend(normal.dot(a)).round().as_ivec4();
                     let key = (surface.model, key.to_array());
@@ -99,15 +99,15 @@ impl MapSkies {
     }
 }
 
-/// A sky in sight.
+/// A sky in view, in world space.
 struct Seen {
-    /// Towards the eye: `xyz . p > w` on its side.
+    /// Plane, oriented towards the camera: `xyz . p > w` on the camera's side.
     plane: Vec4,
     bounds: Aabb,
 }
 
 impl Seen {
-    /// Where an instance places it; `None`: the view shows nothing of it.
+    /// The sky transformed by an instance; `None`: it is not in view.
     fn of(
         sky: &Sky,
         instance: &Instance,
@@ -121,7 +121,7 @@ impl Seen {
         let axis = axes(instance);
         let normal = (axis * sky.normal).try_normalize()?;
         let plane = normal.extend(normal.dot(axis * sky.point + instance.origin));
-        // rays end at its back, too
+        // rays end at the back of a sky, too
         let in_front = normal.dot(eye) >= plane.w;
         Some(Self {
             plane: if in_front { plane } else { -plane },
@@ -129,28 +129,29 @@ impl Seen {
         })
     }
 
-    /// Whether a ray from the eye may meet a box behind it.
+    /// Whether a ray from the camera may reach a box behind the sky.
     fn hides(&self, bounds: &Aabb, eye: Vec3) -> bool {
         let normal = self.plane.truncate();
         if normal.dot(bounds.nearest(normal)) > self.plane.w - IN_PLANE {
             return false;
         }
-        // all ways from the eye to the box lie between these corners
+        // these bounds hold all segments from the camera to the box
         bounds.with(eye).touches(self.bounds)
     }
 }
 
-/// What may show through the skies of a view.
+/// Geometry of a view that may be visible through its skies.
 #[derive(Debug, Default)]
 pub struct Beyond {
-    /// Boxes around it.
+    /// Boxes around the geometry.
     pub boxes: Vec<Aabb>,
-    /// One bit for each surface of the world.
+    /// Bit mask of the world's surfaces.
     pub surfaces: Vec<u32>,
 }
 
 impl Beyond {
-    /// Of a view. `lens`: how far from the eye rays start at most. `geometry`: the map's, if the view shows it.
+    /// Computes it for a view. `lens`: greatest distance of a ray's origin from the camera, units. `geometry`: the
+    /// map's, if the view shows it.
     pub fn of(
         view: &TracedScene,
         eye: Vec3,
@@ -196,7 +197,7 @@ impl Beyond {
             add(map.models.get(&submodel.model), submodel.instance);
         }
         for mesh in &view.meshes {
-            // rays go on for what is seen straight on
+            // only directly visible geometry is behind a sky
             let (_, info) = materials.info(mesh.material);
             if mesh.paths < turned::PORTAL && Kind::of(info.flags).is_some() {
                 let bounds = bounds_of(view.mesh_geometry(mesh).vertices.iter());

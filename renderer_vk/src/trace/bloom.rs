@@ -1,19 +1,19 @@
-//! Bloom: a part of the light spread around where it comes from; `shaders/trace/bloom.glsl` says how.
+//! Bloom: adds a blurred copy of the picture's light; `shaders/trace/bloom.glsl` describes the filter.
 
 use super::frame_passes::FramePasses;
 use super::passes::Pass;
 use crate::gpu::{Buffer, BufferDesc, BufferUsage, Device, Error, Memory};
 use shaders::trace_types::constants::{BLOOM_FIRST, BLOOM_LEVELS};
 
-/// Reads `hdr`; writes the spread light, a texel for each 4 x 4 pixels. Nothing is made before it is first asked for.
+/// Reads `hdr`; writes the blurred light, one texel for each 4 x 4 pixels. Buffers are made at first use.
 #[derive(Default)]
 pub struct Bloom {
-    /// With the size of the picture that it is for.
+    /// Picture size and texels.
     texels: Option<([u32; 2], Buffer)>,
 }
 
 impl Bloom {
-    /// Address of the texels for a picture of a size; 0 with a strength of 0, which frees them.
+    /// Address of the texels for a picture of this size; 0 if the strength is 0, which frees them.
     ///
     /// # Errors
     /// Out of memory.
@@ -42,7 +42,7 @@ impl Bloom {
         Ok(texels.address())
     }
 
-    /// Records the passes, once [`prepare`](Self::prepare) gave an address.
+    /// Records the passes. [`prepare`](Self::prepare) must have returned an address.
     ///
     /// # Errors
     /// Out of memory, or the driver refuses a pipeline.
@@ -55,7 +55,7 @@ impl Bloom {
     }
 }
 
-/// Texels of all levels and of their sum.
+/// Number of texels of all levels and of their sum.
 fn texel_count(size: [u32; 2]) -> u64 {
     let level = |level: u32| {
         let [w, h] = size.map(|s| u64::from(s.div_ceil(BLOOM_FIRST << level)));

@@ -1,7 +1,7 @@
-//! Our hierarchies on the GPU: up to four children to a node, their boxes rounded outwards to a grid of the node's own,
-//! so that a node is 64 bytes and a walk takes half as many steps as in a binary hierarchy (after Ylitie, Karras and
-//! Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, HPG 2017; there with eight children,
-//! here with fewer, because a walk without hardware for it tests them all).
+//! Our hierarchies on the GPU: up to four children per node, whose boxes are rounded outwards to a grid of the node, so
+//! that a node has 64 bytes and a traversal takes half the steps of a binary hierarchy (after Ylitie, Karras and Laine,
+//! Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, HPG 2017, who use eight children; software
+//! traversal tests all children of a node, and four cost less).
 
 use glam::Vec3;
 use shaders::trace_types::constants::{BVH_COUNT_SHIFT, BVH_FIRST, BVH_LEAF, BVH_NONE, BVH_STACK};
@@ -10,38 +10,38 @@ use support::Aabb;
 use support::bvh::{Child, Hierarchy, LeafRule, MAX_DEPTH};
 use support::simd4::WIDE;
 
-/// Leafs of triangles; testing the boxes of a split costs as much as 0.7 triangles.
+/// Leaf rule for triangles: the box tests of a split cost as much as 0.7 triangle tests.
 pub const TRIANGLES: LeafRule = LeafRule {
     most: 4,
     split_cost: 0.7,
 };
-/// Leafs of instances: testing one costs more than a node.
+/// Leaf rule for instances: testing an instance costs more than testing a node.
 pub const INSTANCES: LeafRule = LeafRule {
     most: 1,
     split_cost: 0.7,
 };
 
-/// A walk of a binary hierarchy keeps one child a level.
+/// A traversal of a binary hierarchy pushes at most one child per level.
 const _: () = assert!(MAX_DEPTH <= BVH_STACK);
 
-/// Steps of a node's grid that its children span; the others are margins.
+/// Grid steps that the children of a node span; the other steps of 8 bits are margins.
 const STEPS: f32 = 252.0;
-/// Part of a coordinate that a step is at least: a few times what a 32-bit float can tell apart.
+/// Least step relative to the coordinate: a few times the relative precision of a 32-bit float.
 const FINEST: f32 = 1.0e-6;
-/// Part of a step that boxes are widened by before they are rounded outwards, for the shader's own rounding.
+/// Part of a step by which boxes grow before they are rounded outwards; covers rounding in the shader.
 const MARGIN: f32 = 0.01;
 
-/// A node to be made.
+/// A wide node to be made.
 struct Task {
-    /// Binary node whose children it begins with.
+    /// Binary node, root of the wide node.
     node: usize,
     /// Index of the wide node.
     index: usize,
-    /// Entries that a walk from here on may keep for later.
+    /// Free stack entries of a traversal at this node.
     room: u32,
 }
 
-/// The wide form of a hierarchy: entries keep their places, nodes do not. Empty for an empty one.
+/// Converts a hierarchy to its wide form: entries keep their order, nodes are renumbered. Empty for an empty hierarchy.
 pub fn widen(hierarchy: &Hierarchy) -> Vec<BvhNode> {
     if hierarchy.is_empty() {
         return Vec::new();
@@ -55,7 +55,7 @@ pub fn widen(hierarchy: &Hierarchy) -> Vec<BvhNode> {
         room: BVH_STACK,
     }];
     while let Some(task) = tasks.pop() {
-        // a walk keeps all children but one, and must have room for one more on each level below
+        // a traversal pushes all children but one, and needs one more stack entry for each level below
         let spare = task.room.saturating_sub(height(task.node)) as usize;
         let children = hierarchy.wide_children(task.node, spare + 2);
         let mut node = quantize(&children);
@@ -81,7 +81,7 @@ pub fn widen(hierarchy: &Hierarchy) -> Vec<BvhNode> {
     wide
 }
 
-/// The grid of a node and its children's boxes on it.
+/// Computes the grid of a node and quantizes its children's boxes.
 fn quantize(children: &[Child]) -> BvhNode {
     let bounds = (children.iter()).fold(Aabb::EMPTY, |b, c| b.union(c.bounds));
     let mut node = BvhNode {
@@ -99,10 +99,10 @@ fn quantize(children: &[Child]) -> BvhNode {
         for (i, child) in children.iter().take(WIDE).enumerate() {
             let place = |x: f32| (x - origin) * steps;
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            // 0 to 255, and none where it is no number
+            // the cast clamps to 0..=255 and maps NaN to 0
             let floor = |x: f32| u32::from(x as u8);
             let low = floor(place(child.bounds.mins[axis]) - MARGIN);
-            // what lies on a step gets one more than it needs
+            // a bound exactly on a step is rounded up one step further
             let high = (floor(place(child.bounds.maxs[axis]) + MARGIN) + 1).min(255);
             node.low[axis] |= low << (8 * i);
             node.high[axis] |= high << (8 * i);
@@ -127,7 +127,7 @@ pub fn ordered(hierarchy: &Hierarchy, corners: &[[Vec3; 3]]) -> Vec<BvhTriangle>
     hierarchy.order().iter().filter_map(triangle).collect()
 }
 
-/// A hierarchy over triangles, with the triangles in the order of its leafs.
+/// A hierarchy over triangles, with the triangles in leaf order.
 #[derive(Clone, Debug)]
 pub struct TriangleHierarchy {
     /// Nodes.
@@ -138,7 +138,7 @@ pub struct TriangleHierarchy {
     pub bounds: Aabb,
 }
 
-/// Builds a hierarchy over triangles given by their corners; `None` if there is none that a ray can hit.
+/// Builds a hierarchy over triangles, given by their corners; `None` if no triangle can be hit.
 pub fn build_triangles(corners: &[[Vec3; 3]]) -> Option<TriangleHierarchy> {
     let boxes: Vec<Aabb> = corners.iter().map(|&c| Aabb::of(c)).collect();
     let hierarchy = Hierarchy::new(&boxes, TRIANGLES);
@@ -176,7 +176,7 @@ mod tests {
         Aabb::new(side(node.low), side(node.high))
     }
 
-    /// Walks everything below a node; what a walk that keeps all children but one has kept at most.
+    /// Checks the subtree of a node; returns the greatest number of stack entries that a traversal needs.
     fn check(
         wide: &[BvhNode],
         order: &[u32],
@@ -196,7 +196,7 @@ mod tests {
                 let below = &wide[word as usize];
                 for c in 0..WIDE {
                     if below.children[c] != BVH_NONE {
-                        // each is rounded on its own grid
+                        // each node has its own grid, so boxes are rounded anew at each level
                         let part = child_box(below, c);
                         let slack = below.step * 2.0 + 0.01;
                         assert!((part.mins + slack).cmpge(around.mins).all());
@@ -242,7 +242,7 @@ mod tests {
 
     #[test]
     fn a_chain_of_nodes_needs_no_more_than_the_stack() {
-        // each box twice as far as the last: what makes the deepest hierarchies
+        // each box at twice the distance of the last: the deepest hierarchies
         let spread: Vec<Aabb> = (0..4000)
             .map(|i| {
                 let p = Vec3::X * 1.02f32.powi(i);

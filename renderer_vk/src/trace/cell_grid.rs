@@ -1,40 +1,40 @@
-//! A grid over the map that spares shaders most of the walk through the tree to a point's cell of lights: each box knows
-//! the last node that all of its points pass.
+//! A uniform grid over the map that shortens the tree walk from a point to its cell of lights: each grid box stores the
+//! deepest node that the walks of all its points pass.
 
 use glam::{UVec3, Vec3};
 use shaders::trace_types::BspNode;
 use support::slice::part_mut;
 
-/// Boxes, about, at most: 1 MB.
+/// Approximate maximum number of grid boxes: 1 MB.
 const MOST_BOXES: f32 = 262_144.0;
-/// Boxes are at least this long, units: rooms are larger.
+/// Least edge of a grid box, units: rooms are larger.
 const LEAST_SIDE: f32 = 32.0;
-/// Points this near to a plane, units, are taken to be on both of its sides, as shaders round otherwise.
+/// Points closer to a plane than this, units, count as on both sides, because shaders round differently.
 const MARGIN: f32 = 0.25;
 
-/// The grid.
+/// The grid over a map's tree.
 #[derive(Default)]
 pub struct CellGrid {
-    /// Least corner.
+    /// Smallest corner.
     pub origin: Vec3,
     /// Boxes per unit of length.
     pub scale: f32,
-    /// Boxes along each axis; zero: no grid.
+    /// Boxes along each axis; zero: the grid is empty.
     pub size: UVec3,
-    /// For each box, x fastest, where the walk begins: a node, or `-1 - leaf`.
+    /// First node of the walk for each box, x fastest: a node, or `-1 - leaf`.
     pub starts: Vec<i32>,
 }
 
 impl CellGrid {
-    /// The grid between two corners of a tree's space; none where that has no volume, or there is no tree.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a bounded number of boxes
+    /// The grid between two corners; empty if they span no volume or the tree has no node.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // bounded by MOST_BOXES
     pub fn new(nodes: &[BspNode], low: Vec3, high: Vec3) -> Self {
         let extent = high - low;
         if nodes.is_empty() || !extent.is_finite() || extent.min_element() <= 0.0 {
             return Self::default();
         }
         let side = (extent.element_product() / MOST_BOXES).cbrt();
-        // however flat or long the map is, rounding up adds a layer of boxes, not many times their number
+        // for flat or long maps too, rounding up adds at most one layer of boxes
         let side = side.max(extent.max_element() / MOST_BOXES.sqrt());
         let side = side.max(LEAST_SIDE);
         let size = (extent / side).ceil().max(Vec3::ONE).as_uvec3();
@@ -55,7 +55,7 @@ impl CellGrid {
     }
 }
 
-/// A grid that is being filled.
+/// A grid during its construction.
 struct Fill<'a> {
     nodes: &'a [BspNode],
     origin: Vec3,
@@ -65,7 +65,7 @@ struct Fill<'a> {
 }
 
 impl Fill<'_> {
-    /// Fills the boxes from `low` to before `high`, all of whose points come by `start`.
+    /// Fills the boxes from `low` to `high` (excluded); the walks of all their points pass `start`.
     fn boxes(&mut self, low: UVec3, high: UVec3, start: i32) {
         let start = self.descend(low, high, start);
         let count = high - low;
@@ -80,7 +80,7 @@ impl Fill<'_> {
             }
             return;
         }
-        // the longest side in half
+        // halve the longest side
         let axis = count.max_position();
         let (mut low_end, mut high_start) = (high, low);
         low_end[axis] = low[axis] + count[axis] / 2;
@@ -89,12 +89,12 @@ impl Fill<'_> {
         self.boxes(high_start, high, start);
     }
 
-    /// The last node, from `start` on, that all points of a block of boxes pass.
+    /// The deepest node, from `start` on, that the walks of all points of a block of boxes pass.
     fn descend(&self, low: UVec3, high: UVec3, start: i32) -> i32 {
         let half = (high - low).as_vec3() * (self.side * 0.5);
         let centre = self.origin + low.as_vec3() * self.side + half;
         let mut index = start;
-        // a tree is never deeper than it has nodes; this also ends on a cyclic one
+        // no path is longer than the number of nodes; the bound also ends cyclic trees
         for _ in 0..=self.nodes.len() {
             let Some(node) = usize::try_from(index).ok().and_then(|i| self.nodes.get(i)) else {
                 break;
@@ -118,7 +118,7 @@ mod tests {
 
     use super::*;
 
-    /// A walk from a start, as the shader walks.
+    /// Walks from a start node, as the shader does.
     fn leaf_from(nodes: &[BspNode], point: Vec3, start: i32) -> i32 {
         let mut index = start;
         while index >= 0 {
@@ -142,7 +142,7 @@ mod tests {
         let extent = Vec3::new(1000.0, 700.0, 333.0);
         let grid = CellGrid::new(&nodes, low, low + extent);
         assert_eq!(grid.starts.len() as u32, grid.size.element_product());
-        // most of the way is spared, and where two leafs meet a walk is left
+        // most boxes store a leaf; boxes across a plane store a node
         assert!(grid.starts.iter().filter(|s| **s < 0).count() * 2 > grid.starts.len());
         assert!(grid.starts.iter().any(|s| *s > 0));
         let mut random = Random::new(1);

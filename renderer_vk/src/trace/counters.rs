@@ -1,4 +1,4 @@
-//! How many rays the passes ask for: counted on the GPU, exactly, while somebody wants to know.
+//! Ray counters of the passes: exact counts made on the GPU, while a caller requests them.
 
 use shaders::trace_types::constants as t;
 
@@ -11,33 +11,33 @@ use crate::gpu::{
 /// Bytes of the counters.
 const SIZE: u64 = COUNTERS as u64 * t::COUNTER_ROWS as u64 * 4;
 
-/// The counters, and the answers of the newest frame that is over.
+/// The counters on the GPU, and the counts of the newest finished frame.
 #[derive(Default)]
 pub struct RayCounters {
     counters: Option<Buffer>,
-    /// Copies that the CPU reads, each with the frame that wrote it; a frame uses the oldest.
+    /// Copies for the CPU, each with the serial of the frame that wrote it; a frame reuses the oldest.
     copies: Vec<(u64, Buffer)>,
     newest: Option<(u64, [u64; COUNTERS])>,
-    /// Rays of each pixel, while they are shown.
+    /// Ray count of each pixel, while it is displayed.
     pixels: Option<Image>,
 }
 
-/// Where a view's passes count.
+/// Where the passes of a view count rays.
 #[derive(Clone, Copy)]
 pub struct Counting {
-    /// Address of the counters; 0: nowhere.
+    /// Address of the counters; 0: rays are not counted.
     pub address: u64,
-    /// Storage image of the rays of each pixel, or `NO_IMAGE`.
+    /// Storage image of each pixel's ray count, or `NO_IMAGE`.
     pub image: u32,
 }
 
 impl RayCounters {
-    /// Rays of each counted pass in the newest frame that is over; `None` while there is none.
+    /// Rays of each counted pass in the newest finished frame; `None` before one has finished.
     pub fn rays(&self) -> Option<[u64; COUNTERS]> {
         self.newest.map(|(_, rays)| rays)
     }
 
-    /// Begins a view: `count` its rays by pass, `show` those of each pixel. Frees what is not asked for.
+    /// Begins a view. `count`: count its rays by pass; `show`: count the rays of each pixel. Frees what neither needs.
     ///
     /// # Errors
     /// Out of memory.
@@ -77,7 +77,7 @@ impl RayCounters {
                 self.counters.insert(Buffer::new(device, &desc)?)
             }
         };
-        // the views of a frame add up
+        // counts of the views of a frame add up
         let begun = self.copies.iter().any(|(frame, _)| *frame == rec.serial());
         if !begun {
             rec.pass("count rays", Access::TRANSFER, Access::TRANSFER)?
@@ -86,7 +86,7 @@ impl RayCounters {
         Ok(counters.address())
     }
 
-    /// Takes the newest copy whose frame is over.
+    /// Reads the newest copy whose frame has finished.
     fn read(&mut self, rec: &Recorder) -> Result<(), Error> {
         let over = |(frame, _): &&(u64, Buffer)| *frame <= rec.finished();
         let Some((frame, buffer)) = self.copies.iter().filter(over).max_by_key(|c| c.0) else {
@@ -124,7 +124,7 @@ impl RayCounters {
             .map_or(t::NO_IMAGE, Image::storage_index))
     }
 
-    /// Ends a view: keeps what it counted for the CPU.
+    /// Ends a view: copies its counts for the CPU.
     ///
     /// # Errors
     /// Out of memory.

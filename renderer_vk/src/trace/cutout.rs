@@ -1,5 +1,6 @@
-//! Which triangles of cut-outs have holes: those alone are tested where a ray meets them. Large parts of a grate, a
-//! plant or a banner are solid or empty all over, and a ray's cost is the triangles that it has to ask about.
+//! Classifies the triangles of alpha-tested materials: only triangles with holes need the alpha test at a hit. Large
+//! parts of a grate, a plant or a banner are solid or empty throughout, and any-hit tests dominate the cost of such
+//! rays.
 
 use glam::Vec2;
 use relight::materials::light;
@@ -7,20 +8,20 @@ use shaders::types::constants as c;
 
 use crate::assets::Assets;
 
-/// How much of a triangle of a cut-out is there.
+/// Alpha coverage of a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Coverage {
-    /// All of it.
+    /// Every point passes the alpha test.
     Solid,
-    /// Nothing.
+    /// No point passes.
     Hole,
-    /// Part of it, or nobody knows.
+    /// Some points pass, or the coverage is unknown.
     #[default]
     Mixed,
 }
 
 impl Coverage {
-    /// From the least and the greatest alpha under the triangle and the test (`ALPHAFUNC_*`).
+    /// Coverage by the smallest and greatest alpha in the triangle and the test (`ALPHAFUNC_*`).
     fn of(alpha_func: u32, (low, high): (u8, u8)) -> Self {
         let passes = |alpha: u8| match alpha_func {
             c::ALPHAFUNC_GT0 => alpha > 0,
@@ -28,7 +29,7 @@ impl Coverage {
             c::ALPHAFUNC_GE128 => alpha >= 128,
             _ => true,
         };
-        // every test has one threshold: where both ends pass, all between them do
+        // every test is one threshold: if both ends pass, all values between them pass
         match (passes(low), passes(high)) {
             (true, true) => Self::Solid,
             (false, false) => Self::Hole,
@@ -37,18 +38,18 @@ impl Coverage {
     }
 }
 
-/// Coverage of a triangle of a material by its texture coordinates. Mixed unless one still image with an alpha of its
-/// own decides: animated, moved or generated coordinates and alphas change from frame to frame.
+/// Coverage of a triangle of a material by its texture coordinates. Mixed unless one constant image with an alpha
+/// channel decides: animated, transformed or generated coordinates and alphas change from frame to frame.
 pub fn coverage(assets: &Assets, material: u32, corners: [Vec2; 3]) -> Coverage {
     let material = assets.materials.get(material);
     let Some(index) = light::cut_out_stage(&material.shader) else {
         return Coverage::Mixed;
     };
-    // what is deformed may change its coordinates with its shape
+    // a deformation may change texture coordinates
     if !material.shader.deforms.is_empty() {
         return Coverage::Mixed;
     }
-    // of several stages that write depth each cuts its own holes
+    // each stage that writes depth has its own holes
     let writes = material.shader.stages.iter().filter(|s| s.depth_write);
     if writes.count() != 1 {
         return Coverage::Mixed;
@@ -59,7 +60,7 @@ pub fn coverage(assets: &Assets, material: u32, corners: [Vec2; 3]) -> Coverage 
             && s.tc_gen == c::TCGEN_BASE
             && s.tc_mod_count == 0
             && s.alpha_gen == c::ALPHAGEN_IDENTITY
-            // these set an alpha of their own
+            // these replace the image's alpha
             && ![
                 c::RGBGEN_VERTEX,
                 c::RGBGEN_EXACT_VERTEX,

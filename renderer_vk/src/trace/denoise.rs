@@ -3,12 +3,12 @@
 //! `rt_denoiser 1` is A-SVGF (Schied, Peters, Dachsbacher, Gradient Estimation for Real-Time Adaptive Temporal
 //! Filtering, 2018) over direct and indirect light:
 //!
-//! 1. [`Denoiser::reproject_gradients`], before anything is lit: in each stratum of 3 × 3 pixels one is to light a
-//!    surface of the last frame again, with the random numbers of then.
-//! 2. [`Denoiser::filter`], after: the change of light that those samples show is spread over their neighbourhood; the
-//!    light joins that of earlier frames, which keep less weight where it has changed; three wavelet steps, guided by
-//!    the variance, even out what noise is left. The first of them is what the next frame starts from; the last leaves
-//!    the light of the picture where the rays' direct light was.
+//! 1. [`Denoiser::reproject_gradients`], before lighting: selects in each stratum of 3 × 3 pixels one pixel that shades
+//!    a surface of the last frame again, with that frame's random numbers.
+//! 2. [`Denoiser::filter`], after lighting: spreads the change of light at those pixels over their neighbourhood;
+//!    blends the light with the history, with less weight for history where light has changed; three wavelet steps,
+//!    guided by the variance, remove the remaining noise. The result of the first step is the history of the next
+//!    frame; the last step writes the filtered light into the image of direct light.
 //!
 //! `rt_denoiser 2` costs about a third: a running mean over frames, and three passes of few scattered taps.
 
@@ -21,42 +21,42 @@ use super::targets::texels;
 use crate::gpu::{Buffer, Device, Error, Format, Image, ImageDesc, ImageUsage};
 use crate::settings::DenoiserChoice;
 
-/// Pixels to the edge of a stratum, see `denoise.glsl`.
+/// Edge of a stratum, pixels; see `denoise.glsl`.
 const STRATUM: u32 = 3;
-/// Distances between the taps of the wavelet steps, pixels: a fourth step between them changes no measure of quality.
+/// Distances between the taps of the wavelet steps, pixels. A fourth step changed no measure of quality.
 const WAVELET: [u32; 3] = [1, 3, 8];
-/// Radii of the passes of the cheap filter, pixels.
+/// Radii of the passes of the sparse filter, pixels.
 const SPARSE: [u32; 3] = [3, 9, 5];
 
-/// Which filter.
+/// The filter in use.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Tier {
     Adaptive,
     Sparse,
 }
 
-/// What is kept for one size of view: 36 bytes a pixel, of the cheap filter 12. Light has its guide beside it, of the
-/// adaptive filter its variance, too.
+/// Images for one size of view: 36 bytes a pixel for the adaptive filter, 12 for the sparse one. Light is stored with
+/// its guide, for the adaptive filter also with its variance.
 struct Images {
     tier: Tier,
     size: [u32; 2],
-    /// What the last frame left; once it has joined the fresh light, that after the first step, for the next frame.
+    /// History of the last frame. After the temporal pass: the result of the first step, for the next frame.
     history: Buffer,
     depth_gradient: Image,
     adaptive: Option<AdaptiveImages>,
 }
 
-/// What the adaptive filter keeps beside.
+/// Further images of the adaptive filter.
 struct AdaptiveImages {
-    /// Number of frames and variance; of this frame and the last.
+    /// Number of frames and variance, of this frame and the last.
     past: [Buffer; 2],
-    /// A pixel of each stratum as it was lit in the last frame.
+    /// For each stratum, light of one pixel of the last frame.
     samples: Image,
     sample_surfaces: Image,
     /// The gradient samples of this frame.
     gradient_pixels: Image,
     stratum_guide: Image,
-    /// Their gradients, spread over some and over many strata.
+    /// Their gradients: of single strata, then filtered over some and over many strata.
     gradient_samples: Image,
     gradient_sums: Image,
     gradient: Image,
@@ -113,16 +113,16 @@ impl AdaptiveImages {
 pub struct Denoiser {
     device: Device,
     images: Option<Images>,
-    /// Stands for every image that is not there: software drivers look at the images of branches that are not taken.
+    /// Placeholder for absent images: software drivers access the images of branches that are not taken.
     nothing: Image,
-    /// The images hold the light of the last frame.
+    /// The images hold valid light of the last frame.
     history: bool,
-    /// Off: history keeps its weight whatever the light does, as in the filter that this one came from. For comparison.
+    /// Off: history keeps its weight even if the light changes, as in SVGF. For comparisons.
     pub gradients: bool,
 }
 
 impl Denoiser {
-    /// Without images until they are asked for.
+    /// A denoiser without images; [`prepare`](Self::prepare) makes them.
     ///
     /// # Errors
     /// Out of memory.
@@ -136,8 +136,8 @@ impl Denoiser {
         })
     }
 
-    /// To be called before a frame's parameters are gathered. `size`: of the view, pixels;
-    /// `goes_on`: the frame follows the last one that was drawn, whose motion and camera are known.
+    /// Call before the parameters of a frame are collected. `size`: of the view, pixels; `goes_on`: the frame continues
+    /// the last drawn one, whose motion and camera are known.
     ///
     /// # Errors
     /// Out of memory.
@@ -154,7 +154,7 @@ impl Denoiser {
         };
         let had = self.images.as_ref().map(|i| (i.tier, i.size));
         if had != tier.map(|tier| (tier, size)) {
-            // the old ones go first: there may not be room for both
+            // free the old images first: memory may not suffice for both
             self.images = None;
             self.history = false;
             if let Some(tier) = tier {
@@ -170,7 +170,7 @@ impl Denoiser {
         self.images.is_some()
     }
 
-    /// The images for gradients, if this frame has gradient samples.
+    /// The images, if this frame has gradient samples.
     fn gradient_images(&self) -> Option<&Images> {
         let wanted = self.history && self.gradients;
         self.images
@@ -178,7 +178,7 @@ impl Denoiser {
             .filter(|i| wanted && i.tier == Tier::Adaptive)
     }
 
-    /// What the passes read. `last_seed`: of the last frame's random numbers; `fresh`: texels for light that is being
+    /// Parameters of the passes. `last_seed`: random seed of the last frame; `fresh`: texels for light that is being
     /// filtered, 16 bytes a pixel.
     pub fn view(&self, last_seed: u32, fresh: &Buffer) -> DenoiseView {
         let nothing = self.nothing.storage_index();
@@ -225,7 +225,7 @@ impl Denoiser {
         }
     }
 
-    /// Finds the gradient samples of a frame, before anything is lit.
+    /// Selects the gradient samples of a frame, before lighting.
     ///
     /// # Errors
     /// Out of memory, or the driver refuses a pipeline.
@@ -236,8 +236,8 @@ impl Denoiser {
         }
     }
 
-    /// Filters the light of the rays with what the last frame left; direct and indirect light go together to where direct
-    /// light was. `fresh`: as for [`view`](Self::view).
+    /// Filters the traced light together with the history; writes the sum of direct and indirect light into the image
+    /// of direct light. `fresh`: as for [`view`](Self::view).
     ///
     /// # Errors
     /// Out of memory, or the driver refuses a pipeline.
@@ -263,14 +263,14 @@ impl Denoiser {
             }
         };
         let [history, fresh] = [&images.history, fresh].map(Buffer::address);
-        // The result of the first step replaces the history, which the fresh light holds by now; the last step writes to an
-        // image.
+        // The first step overwrites the history, which the temporal pass has merged into the fresh light; the last step
+        // writes an image.
         passes.run_step(steps[0], fresh, history, spacings[0])?;
         passes.run_step(steps[1], history, fresh, spacings[1])?;
         passes.run_step(steps[2], fresh, fresh, spacings[2])
     }
 
-    /// The frame is recorded: what it wrote becomes what the last one wrote.
+    /// Ends the frame: its images become those of the last frame.
     pub fn advance(&mut self) {
         self.history = self.images.is_some();
         let images = self.images.as_mut();

@@ -1,9 +1,9 @@
-//! Triangles of the map that lie in one plane with others that face the other way.
+//! Coplanar triangles of the map that face opposite ways.
 //!
-//! Maps have them where a liquid's surface is drawn from above and from below, by two surfaces that show one face each.
-//! A ray meets both at the same distance, and which of them it is told of is left to the last bits: told of the one that
-//! does not show its face, it would go on and miss the other. So the sides of such triangles are decided where the ray
-//! meets them, which costs a test each; all others need none.
+//! Maps have them where one surface draws a liquid from above and another from below, each one-sided. A ray meets both
+//! at the same distance, and rounding decides which of the two it reports: if the ray reports the one that it sees from
+//! behind, it continues and misses the other. Therefore the sides of such triangles are tested during traversal, which
+//! costs one test per hit; other triangles need no such test.
 
 use std::collections::{HashMap, HashSet};
 
@@ -12,28 +12,28 @@ use shaders::types::constants as c;
 
 use super::input::{Kind, MaterialTable, StaticScene};
 
-/// Planes are alike when their normals and distances differ by less than about these, units.
+/// Planes are equal if their normals and distances differ by less than about this, units.
 const NORMAL_STEP: f32 = 1.0e-3;
 const DISTANCE_STEP: f32 = 0.125;
-/// Boxes that share no more than this are side by side, units.
+/// Boxes that overlap by no more than this, units, are separate.
 const TOUCHING: f32 = 0.01;
 
-/// A plane whichever way it faces, of a model of the map.
+/// Key of a plane regardless of its orientation: BSP model, normal, distance.
 type PlaneKey = (u32, [i32; 3], i32);
 
-/// A triangle in its plane.
+/// A triangle with its bounds in its plane.
 struct Flat {
-    /// Place of its first corner among the scene's indices.
+    /// Index of its first corner in the scene's index list.
     first: usize,
-    /// It shows its face where the key's normal points.
+    /// Its front faces along the key's normal.
     along: bool,
-    /// Around it, on the two axes that the plane leans to least.
+    /// Bounds on the plane's two main axes.
     mins: [f32; 2],
     maxs: [f32; 2],
 }
 
-/// Opaque triangles that show one side and have an opposite in their plane, by the places of their first corners among the
-/// scene's indices.
+/// Opaque one-sided triangles with an opposite triangle in their plane, by the index of their first corner in the
+/// scene's index list.
 pub fn doubled(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> HashSet<usize> {
     let mut planes: HashMap<PlaneKey, Vec<Flat>> = HashMap::new();
     for surface in &scene.surfaces {
@@ -76,11 +76,11 @@ pub fn doubled(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> HashSe
     found
 }
 
-/// A triangle and its plane; `None` for one without area, or without numbers.
-#[allow(clippy::cast_possible_truncation)] // steps of unit vectors, and of a map's size
+/// A triangle and its plane; `None` for a triangle without area or with non-finite corners.
+#[allow(clippy::cast_possible_truncation)] // steps of unit vectors and of map coordinates
 fn flat(first: usize, corners: [Vec3; 3], back: bool) -> Option<(([i32; 3], i32), Flat)> {
     let [p, q, r] = corners;
-    // the front is where the corners go round clockwise
+    // fronts are clockwise
     let normal = (r - p).cross(q - p).try_normalize()?;
     if !p.is_finite() {
         return None;

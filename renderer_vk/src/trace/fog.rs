@@ -1,9 +1,9 @@
 //! Light in fog: single scattering at one point of each cell of pixels, found by rays to lights.
 //!
-//! The primary rays leave for each pixel what light in its fog is multiplied by, and for each cell a point in that fog,
-//! chosen by how much each place scatters. A pass lights the points. In a denoised picture a cell is 2 × 2 pixels, its
-//! light joins that of earlier frames, and neighbours are evened out; otherwise each pixel is a cell, and the mean over
-//! frames is exact.
+//! The primary pass writes for each pixel the weight of light in its fog, and for each cell a point in that fog,
+//! sampled in proportion to scattering. A pass lights the points. In a denoised picture a cell is 2 × 2 pixels, its
+//! light is blended with that of earlier frames and filtered over neighbours; otherwise each pixel is a cell, and the
+//! mean over frames is exact.
 
 use shaders::trace_types::FogView;
 use shaders::trace_types::constants as t;
@@ -12,22 +12,22 @@ use super::frame_passes::FramePasses;
 use super::passes::Pass;
 use crate::gpu::{Device, Error, Format, Image, ImageDesc, ImageUsage};
 
-/// Pixels to the edge of a cell of filtered light.
+/// Edge of a cell of filtered light, pixels.
 const CELL: u32 = 2;
-/// Distances between the taps of the filter's steps, cells.
+/// Distances between the taps of the filter steps, cells.
 const SPACINGS: [u32; 3] = [1, 2, 4];
-/// Frames that the images are kept for after fog was last in sight: turning to and fro costs no memory to be taken anew.
+/// Frames for which the images are kept after fog was last in view, so that turning around does not reallocate them.
 const KEPT_FRAMES: u32 = 300;
 
 struct Images {
-    /// Of the view, pixels.
+    /// Size of the view, pixels.
     size: [u32; 2],
     cell: u32,
     cells: [u32; 2],
     weight: Image,
-    /// Light at the points: of this frame and the last.
+    /// Light at the points, of this frame and the last.
     light: [Image; 2],
-    /// What the filter makes of it.
+    /// Filtered light.
     filtered: Option<Image>,
 }
 
@@ -54,18 +54,18 @@ impl Images {
     }
 }
 
-/// Lights fog; nothing is held while there is none.
+/// Lighting of fog; holds no images while no fog is in view.
 pub struct LitFog {
     device: Device,
     images: Option<Images>,
-    /// The images hold the light of the last frame.
+    /// The images hold valid light of the last frame.
     history: bool,
-    /// Frames since fog was in sight.
+    /// Frames since fog was last in view.
     unseen: u32,
 }
 
 impl LitFog {
-    /// Without images until fog comes into sight.
+    /// Without images; [`prepare`](Self::prepare) makes them once fog is in view.
     pub fn new(device: &Device) -> Self {
         Self {
             device: device.clone(),
@@ -75,9 +75,8 @@ impl LitFog {
         }
     }
 
-    /// To be called before a frame's parameters are gathered. `wanted`: the view has fog that is lit; `filtered`: its
-    /// light is to be free of noise; `size`: of the view, pixels; `goes_on`: the frame follows the last one that was
-    /// drawn, whose camera is known.
+    /// Call before the parameters of a frame are collected. `wanted`: the view has lit fog; `filtered`: its light is
+    /// denoised; `size`: of the view, pixels; `goes_on`: the frame continues the last drawn one, whose camera is known.
     ///
     /// # Errors
     /// Out of memory.
@@ -96,7 +95,7 @@ impl LitFog {
         };
         let fits = had == Some((size, filtered)) && self.unseen < KEPT_FRAMES;
         if !fits {
-            // the old ones go first: there may not be room for both
+            // free the old images first: memory may not suffice for both
             self.images = None;
             if wanted {
                 self.images = Some(Images::new(&self.device, size, filtered)?);
@@ -111,14 +110,14 @@ impl LitFog {
         self.seen().is_some()
     }
 
-    /// The images, if there is fog in sight.
+    /// The images, if fog is in view.
     fn seen(&self) -> Option<&Images> {
         self.images.as_ref().filter(|_| self.unseen == 0)
     }
 
-    /// What the passes read. `half`: the image of half floats that the picture is put together in; until then it holds
-    /// the points in fog. It and `packed`, an image of packed light, stand for images that are not there, since software
-    /// drivers look at the images of branches that are not taken.
+    /// Parameters of the passes. `half`: the half-float image of the picture, which holds the points in fog before the
+    /// picture is composed. `half` and `packed`, an image of packed light, also stand for absent images, because
+    /// software drivers access the images of branches that are not taken.
     pub fn view(&self, packed: &Image, half: &Image) -> FogView {
         let half = half.storage_index();
         let Some(images) = self.seen() else {
@@ -154,7 +153,7 @@ impl LitFog {
         self.seen().map_or([0; 2], |images| images.cells)
     }
 
-    /// Lights the fog in sight, and filters that light where the picture is denoised.
+    /// Lights the fog in view, and filters that light if the picture is denoised.
     ///
     /// # Errors
     /// Out of memory, or the driver refuses a pipeline.
@@ -168,14 +167,14 @@ impl LitFog {
         };
         let [fresh, last, filtered] = [&images.light[0], &images.light[1], filtered]
             .map(|image| u64::from(image.storage_index()));
-        // the next frame goes on from the fresh light; the last frame's is free
+        // the fresh light is the next frame's history; the last frame's image is free
         let [first, second, third] = SPACINGS;
         passes.run_step(Pass::FogFilter, fresh, filtered, first)?;
         passes.run_step(Pass::FogFilter, filtered, last, second)?;
         passes.run_step(Pass::FogFilter, last, filtered, third)
     }
 
-    /// The frame is recorded: what it wrote becomes what the last one wrote.
+    /// Ends the frame: its images become those of the last frame.
     pub fn advance(&mut self) {
         self.history = self.is_on();
         if let Some(images) = &mut self.images {
@@ -183,7 +182,7 @@ impl LitFog {
         }
     }
 
-    /// Forgets the last frame.
+    /// Discards the history.
     #[cfg(test)]
     pub fn reset(&mut self) {
         self.history = false;

@@ -1,8 +1,8 @@
-//! The light that a map's lights give to its fog in the mean.
+//! Mean light that a map's lights give to its fog.
 //!
-//! An author chose a fog's colour for how it looks in the map, whose lights shine there. So the light of these is a part of
-//! the colour and not something beside it: the shaders take as much of the colour as they give in the mean for light that
-//! comes straight from them.
+//! A map's author chose the colour of a fog by its look in the map, where the lights already shine. The fog's colour
+//! therefore includes their light: shaders replace the part of the colour that equals the mean direct light by the
+//! direct light that rays find.
 
 use std::f32::consts::PI;
 
@@ -15,13 +15,13 @@ use super::light_tables::luminance;
 use super::light_weights::spread_point;
 use super::lights::MapLightSource;
 
-/// Places that a volume's light is the mean of.
+/// Number of points that a volume's light is averaged over.
 const PLACES: usize = 256;
 
-/// Lights nearer than this to such a place are taken to be as far away, units: what they give grows without end there.
+/// Least distance between a light and such a point, units; it bounds the inverse-square law.
 const NEAREST: f32 = 16.0;
 
-/// A volume's places below its surface.
+/// Sample points of a volume below its surface.
 fn places(fog: &Fog) -> impl Iterator<Item = Vec3> {
     let (mins, size) = (fog.mins, fog.maxs - fog.mins);
     let [x, y, z, distance] = fog.plane;
@@ -31,7 +31,7 @@ fn places(fog: &Fog) -> impl Iterator<Item = Vec3> {
         .filter(move |place| surface.is_none_or(|(normal, d)| normal.dot(*place) >= d))
 }
 
-/// Mean radiance over all directions that lights of the list of a place's cluster give there.
+/// Mean radiance over all directions at a point from the lights in the list of its cluster.
 fn light_at(place: Vec3, cluster: i32, source: &MapLightSource<'_>) -> Vec3 {
     let shares = source.lists.shares(cluster);
     let given = |(turn, &entry): (usize, &u32)| {
@@ -49,14 +49,14 @@ fn light_at(place: Vec3, cluster: i32, source: &MapLightSource<'_>) -> Vec3 {
             None => visibility,
         };
         let light = listed.straight_on(place, NEAREST)? * arrives;
-        // what faces all ways has a quarter of what faces the light
+        // the mean over the sphere is a quarter of the light on a facing surface
         Some(color / luminance(color).max(f32::MIN_POSITIVE) * (0.25 * light))
     };
     let lights = source.lists.row(cluster).iter().enumerate();
     lights.filter_map(given).sum::<Vec3>() + suns_at(place, cluster, source)
 }
 
-/// The same of suns.
+/// The same for suns.
 fn suns_at(place: Vec3, cluster: i32, source: &MapLightSource<'_>) -> Vec3 {
     let arrives = |direction: Vec3| match source.occlusion {
         Some(occlusion) => occlusion.sees_sky(place, direction),
@@ -68,7 +68,7 @@ fn suns_at(place: Vec3, cluster: i32, source: &MapLightSource<'_>) -> Vec3 {
         .sum()
 }
 
-/// Mean radiance at places in a volume that lie in the open.
+/// Mean radiance at the points of a volume outside of solids.
 fn own_light(fog: &Fog, source: &MapLightSource<'_>) -> Vec3 {
     let (mut sum, mut count) = (Vec3::ZERO, 0.0f32);
     for place in places(fog) {
@@ -85,7 +85,7 @@ fn own_light(fog: &Fog, source: &MapLightSource<'_>) -> Vec3 {
     sum / count.max(1.0)
 }
 
-/// Volumes with the light that these lights give there.
+/// The volumes, with the mean light of these lights.
 pub fn lit(fogs: &[Fog], source: &MapLightSource<'_>) -> Vec<Fog> {
     let lit = |fog: &Fog| Fog {
         own_light: own_light(fog, source),
@@ -126,7 +126,7 @@ mod tests {
         }
     }
 
-    /// From -50 to 50, below a height.
+    /// A fog volume from -50 to 50, below a height.
     fn fog_below(height: f32) -> Fog {
         Fog {
             mins: Vec3::splat(-50.0),

@@ -1,5 +1,6 @@
-//! The lights of one view: emitters that flicker and points that pulse, as bright as they are now; emitting surfaces of brush models where
-//! these are now; the game's dynamic lights; the flashlight; and which clusters they can reach.
+//! The lights of one view: flickering emitters and pulsing points at their present brightness; emitting surfaces of
+//! brush models at their present position; the game's dynamic lights; the flashlight; and the clusters that each can
+//! reach.
 
 use std::f32::consts::PI;
 
@@ -18,16 +19,16 @@ use crate::gpu::{Error, Recorder};
 use crate::scene::{TracedScene, View};
 use crate::settings::{LightSelection, Settings};
 
-/// Lights of a view, and where they reach.
+/// Lights of a view, with the clusters that they reach.
 #[derive(Debug, Default)]
 struct FrameLights {
     triangles: Vec<t::TriangleLight>,
     spheres: Vec<t::SphereLight>,
-    /// Numbers of lights, with the clusters that each can reach.
+    /// Light numbers, with the clusters that each light can reach.
     reach: Vec<(u32, ClusterSet)>,
 }
 
-/// How far around a light its clusters are looked for, units: leafs end where lamps begin.
+/// Distance around a light within which its clusters are searched, units: leafs end at the surface of lamps.
 const SEARCH_MARGIN: f32 = 2.0;
 
 impl FrameLights {
@@ -39,7 +40,7 @@ impl FrameLights {
         self.reach.push((light_number, sight.lit_from(&at)));
     }
 
-    /// The emitting triangles of a model. `scale_of`: what the radiance of a light is multiplied by.
+    /// Adds the emitting triangles of a model. `scale_of`: factor of a light's radiance.
     fn add_model(
         &mut self,
         lights: &[ChangingLight],
@@ -77,7 +78,7 @@ impl FrameLights {
         }
     }
 
-    /// The list of each of so many clusters, and at the end that of all lights.
+    /// The list of each of `clusters` clusters, then a list of all lights.
     fn rows(&self, clusters: usize) -> (Vec<t::DynamicRow>, Vec<u32>) {
         let mut counts = vec![0u32; clusters];
         for (_, reach) in &self.reach {
@@ -118,7 +119,7 @@ impl FrameLights {
 }
 
 impl MapLights {
-    /// The lights of a view, with those that only this frame has uploaded for it.
+    /// The lights of a view; uploads those that only this frame has.
     ///
     /// # Errors
     /// Out of memory.
@@ -129,7 +130,7 @@ impl MapLights {
         settings: &Settings,
     ) -> Result<t::LightView, Error> {
         let scale = settings.rt_light_scale.max(0.0);
-        // the engine's own time, in which its stages change
+        // the engine's time, by which stages are animated
         let time = f64::from(view.time);
         let flickers: Vec<f32> = self.flickers.iter().map(|f| f.scale(time)).collect();
         let scale_of = |light: &ChangingLight| {
@@ -137,7 +138,7 @@ impl MapLights {
             scale * flicker.copied().unwrap_or(1.0)
         };
         let mut frame = FrameLights {
-            // the lists name these by their place: they come first, and all of them
+            // the lists index them by position: all of them, and first
             triangles: self
                 .changing
                 .iter()
@@ -187,7 +188,7 @@ impl MapLights {
             lights.dynamic_row_count = count(rows.len());
         }
         if !settings.rt_cull_lights {
-            // without a tree every point lies in the last row, which holds all lights
+            // without a tree every point uses the last row, which holds all lights
             lights.node_count = 0;
         }
         lights.flags = if settings.rt_soft_shadows {
@@ -208,7 +209,7 @@ impl MapLights {
     }
 }
 
-/// A point light at a part of its mean strength.
+/// A point light scaled to its present strength.
 fn pulsed(light: &t::SphereLight, scale: f32) -> t::SphereLight {
     t::SphereLight {
         radiance: light.radiance * scale,
@@ -217,13 +218,13 @@ fn pulsed(light: &t::SphereLight, scale: f32) -> t::SphereLight {
     }
 }
 
-/// Radius of the ball of a dynamic light, as a part of its reach, and its bounds in units: about a muzzle flash.
+/// Radius of a dynamic light: part of its reach, and bounds in units, about the size of a muzzle flash.
 const DYNAMIC_LIGHT_SIZE: (f32, f32, f32) = (0.02, 2.0, 8.0);
 
-/// What lies this near to a dynamic light casts no shadow: the projectile or weapon that carries it.
+/// Geometry closer than this to a dynamic light, units, casts no shadow: the projectile or weapon that carries it.
 const DYNAMIC_LIGHT_CLEARANCE: f32 = 20.0;
 
-/// Radius of the gas that glows, as a part of a light's reach.
+/// Radius of the glowing gas, as a part of the light's reach.
 const DYNAMIC_LIGHT_CORE: f32 = 0.35;
 
 /// The game's dynamic lights as small spheres.
@@ -233,12 +234,12 @@ const DYNAMIC_LIGHT_CORE: f32 = 0.35;
 /// surface that faces it at half the reach shows the light's colour: intensity = colour * pi * (r / 2)². Colours are as
 /// displayed, so they are decoded. `scale`: the radiance that shows as white.
 ///
-/// What gives this light in the game is gas: muzzle flashes, explosions, the tails of missiles. Of a ball of radius `a`
-/// that glows evenly and lets light through, what faces it receives intensity / d² from outside, as from a point
-/// (Gauss's theorem; all of the ball is above the horizon), and inside at most about intensity / a², for the gas behind a
-/// surface gives it nothing. So inside of 0.35 of the reach it is as bright as there: twice the light's colour. The classic
-/// look multiplies what is displayed by up to one more than the colour: dark walls at a muzzle flash get less light by
-/// that than here, lit floors more.
+/// In the game this light comes from gas: muzzle flashes, explosions, missile trails. Outside of a uniformly glowing
+/// transparent ball of radius `a`, a facing surface receives intensity / d², as from a point (Gauss's theorem, with the
+/// whole ball above the horizon); inside, at most about intensity / a², because gas behind the surface does not light
+/// it. Therefore light is constant within 0.35 of the reach: twice the light's colour. The classic look multiplies the
+/// displayed colour by up to one more than the light's colour: dark walls at a muzzle flash get less light there than
+/// here, lit floors more.
 pub fn dynamic_lights(lights: &[DynamicLight], scale: f32) -> Vec<t::SphereLight> {
     lights
         .iter()
@@ -267,26 +268,27 @@ pub fn dynamic_lights(lights: &[DynamicLight], scale: f32) -> Vec<t::SphereLight
         .collect()
 }
 
-/// Where the flashlight is held: to the right and below the eye, units. Light from the eye itself would hide every
-/// shadow behind what casts it.
+/// Position of the flashlight: right of and below the camera, units. From the camera's own position its shadows would
+/// be hidden behind their casters.
 const FLASHLIGHT_PLACE: (f32, f32) = (6.0, 6.0);
 
-/// Radius of its lens, units.
+/// Radius of the flashlight, units.
 const FLASHLIGHT_RADIUS: f32 = 1.5;
 
-/// Distance at which it shows a white surface that faces it as its own colour.
+/// Distance, units, at which a facing white surface shows the flashlight's own colour.
 const FLASHLIGHT_REACH: f32 = 384.0;
 
-/// Its colour, linear: a warm white.
+/// Colour of the flashlight, linear: a warm white.
 const FLASHLIGHT_COLOR: Vec3 = Vec3::new(1.0, 0.93, 0.8);
 
-/// Half angles of its cone, degrees: full light up to the first, none from the second on.
+/// Half angles of its cone, degrees: full light inside the first, none outside the second.
 const FLASHLIGHT_ANGLES: (f32, f32) = (9.0, 24.0);
 
-/// What lies this near to it casts no shadow: the player who holds it, whose own model is there for mirrors.
+/// Geometry closer than this, units, casts no shadow: the model of the player who holds the flashlight, which only
+/// mirrors show.
 const FLASHLIGHT_CLEARANCE: f32 = 40.0;
 
-/// The lamp that goes with the eye. `white`: the radiance that shows as white.
+/// The flashlight of a view. `white`: radiance that is shown as white.
 fn flashlight(view: &View, white: f32) -> t::SphereLight {
     let [forward, left, up] = view.axis;
     let (right, down) = FLASHLIGHT_PLACE;
@@ -301,7 +303,7 @@ fn flashlight(view: &View, white: f32) -> t::SphereLight {
     }
 }
 
-/// Linear colour of an encoded one, as `shaders/trace/color.glsl` decodes it.
+/// Decodes a display-encoded colour to linear, as `shaders/trace/color.glsl` does.
 pub fn decode(c: Vec3) -> Vec3 {
     c.map(relight::overbright::to_linear)
 }

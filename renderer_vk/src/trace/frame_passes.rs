@@ -6,10 +6,10 @@ use super::pass_set::{PassSet, Pipeline};
 use super::passes::{Pass, Resource, Size, Switch, TABLE};
 use crate::gpu::{Access, Error, Recorder};
 
-/// What decides sizes and variants of a view's passes.
+/// Facts about a view that select sizes and variants of its passes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrameFacts {
-    /// Size that is traced, pixels.
+    /// Traced size, pixels.
     pub traced: [u32; 2],
     /// Size of the finished picture, pixels.
     pub output: [u32; 2],
@@ -34,7 +34,7 @@ impl FrameFacts {
         }
     }
 
-    /// Invocations along both axes; those of [`Size::RayTiles`] as `pipeline` numbers them.
+    /// Invocations along both axes; [`Size::RayTiles`] is laid out as `pipeline` requires.
     fn invocations(&self, size: Size, pipeline: &Pipeline) -> [u32; 2] {
         let (traced, output) = (self.traced, self.output);
         match size {
@@ -53,7 +53,7 @@ impl FrameFacts {
     }
 }
 
-/// One invocation for each slot of all tiles: in a row, or with the work groups of a tile side by side.
+/// One invocation for each slot of all tiles: in one row, or with the work groups of a tile adjacent.
 fn ray_tiles(traced: [u32; 2], pipeline: &Pipeline) -> [u32; 2] {
     let [across, down] = traced.map(|n| n.div_ceil(RAY_TILE));
     match pipeline {
@@ -66,7 +66,7 @@ fn ray_tiles(traced: [u32; 2], pipeline: &Pipeline) -> [u32; 2] {
     }
 }
 
-/// What a step of a filter reads and writes: addresses of texels or bindless indices of images.
+/// Input and output of a filter step: addresses of texels or bindless indices of images.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 struct Step {
@@ -80,7 +80,7 @@ struct Step {
 /// Records the passes of a view.
 pub struct FramePasses<'a> {
     set: &'a PassSet,
-    /// What they are recorded to.
+    /// Recorder of the commands.
     pub rec: &'a mut Recorder,
     view: u64,
     /// Sizes and variants.
@@ -89,7 +89,7 @@ pub struct FramePasses<'a> {
 }
 
 impl<'a> FramePasses<'a> {
-    /// Records to `rec`; `view` is the device address of the `TraceView`.
+    /// A list of passes that records to `rec`; `view`: device address of the `TraceView`.
     pub fn new(set: &'a PassSet, rec: &'a mut Recorder, view: u64, facts: FrameFacts) -> Self {
         let mut written = Written::default();
         written.add(&[Resource::Scene, Resource::Lights]);
@@ -111,8 +111,8 @@ impl<'a> FramePasses<'a> {
         self.record(pass, &view)
     }
 
-    /// Records a step of a filter from `source` to `target`, addresses of texels or indices of images; `spacing`: pixels
-    /// between its taps.
+    /// Records a filter step from `source` to `target`, addresses of texels or indices of images; `spacing`: distance
+    /// of its taps, pixels.
     ///
     /// # Errors
     /// Out of memory, or the driver refuses the pipeline.
@@ -133,7 +133,7 @@ impl<'a> FramePasses<'a> {
         self.record(pass, &step)
     }
 
-    /// Notes that something else than a pass of the table has written a resource.
+    /// Marks a resource as written by commands outside of the table of passes.
     pub fn wrote(&mut self, resource: Resource) {
         self.written.add(&[resource]);
     }
@@ -169,7 +169,7 @@ impl<'a> FramePasses<'a> {
     }
 }
 
-/// Which resources hold what this frame has written.
+/// Bit mask of the resources that this frame has written.
 #[derive(Clone, Copy, Debug, Default)]
 struct Written(u64);
 
@@ -187,7 +187,7 @@ impl Written {
     }
 }
 
-/// Bits of the resources that share memory with one.
+/// Bit mask of the resources that share memory with one.
 fn sharing(resource: Resource) -> u64 {
     let all = TABLE.iter().flat_map(|row| row.writes);
     all.filter(|other| other.memory() == resource.memory())

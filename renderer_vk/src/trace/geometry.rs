@@ -1,4 +1,4 @@
-//! The acceleration structures of what keeps its shape: one for each brush model and kind of material, built once per
+//! Acceleration structures of the map's constant geometry: one for each brush model and group of kinds, built once per
 //! map.
 
 use std::collections::BTreeMap;
@@ -33,18 +33,18 @@ pub struct StaticPart {
 pub struct StaticBlas {
     /// BSP model.
     pub model: u32,
-    /// The geometries in it. All that stops rays of a model is in one structure, because each that a ray meets is a walk
-    /// of its own; what is translucent and what light passes are in others, which fewer rays meet.
+    /// The geometries in it. All geometry of a model that stops rays shares one structure, because a ray traverses each
+    /// structure that it meets; translucent and passed geometry is separate, because fewer ray types test it.
     pub parts: Vec<StaticPart>,
     /// The structure.
     pub structure: Structure,
 }
 
-/// What rays walk.
+/// An acceleration structure of either tracer.
 pub enum Structure {
-    /// The driver's own, for the ray tracing pipeline and ray queries.
+    /// The driver's structure, for the ray tracing pipeline and ray queries.
     Driver(Blas),
-    /// Ours, for the compute tracer.
+    /// Our own hierarchy, for the compute tracer.
     Own(OwnStructure),
 }
 
@@ -54,13 +54,13 @@ pub struct OwnStructure {
     pub nodes: Buffer,
     /// `BvhTriangle`s.
     pub triangles: Buffer,
-    /// Of all triangles, in the model's space.
+    /// Bounds of all triangles, in the model's space.
     pub bounds: Aabb,
 }
 
-/// A map's geometry as rays see it.
+/// Acceleration structures and shading data of a map.
 pub struct StaticGeometry {
-    /// Tells it from every other one, whose memory it may have taken over.
+    /// Unique number of this geometry; addresses may be reused by a later one.
     pub serial: u64,
     /// Its bottom-level structures.
     pub structures: Vec<StaticBlas>,
@@ -74,18 +74,18 @@ pub struct StaticGeometry {
     pub fog_count: u32,
     /// Their boxes.
     pub fog_boxes: Vec<Aabb>,
-    /// What of it is translucent.
+    /// Its translucent surfaces.
     pub layers: Vec<StaticLayer>,
-    /// Its skies, and what may show through them.
+    /// Its skies, and the geometry that may be visible through them.
     pub map_skies: MapSkies,
-    /// What lies in the way of light; nothing unless it is put here.
+    /// Surfaces that filter light, and liquids; empty unless the caller sets them.
     pub surroundings: Surroundings,
     /// Records of the structures' triangles, which shaders read by address.
     #[cfg_attr(not(test), expect(dead_code, reason = "only kept alive"))]
     triangle_records: Buffer,
 }
 
-/// Kinds that share a structure, whose instances have one mask.
+/// Groups of kinds that share a structure, whose instances have one mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Together {
     Solid,
@@ -109,16 +109,16 @@ struct Group {
     count: usize,
 }
 
-/// Rank of a material among those drawn, as a triangle's flags hold it: of translucent layers in one plane the one with
-/// the greater rank is in front.
+/// Drawing rank of a material as bits of a triangle's flags: of coplanar translucent layers, the one of greater rank is
+/// in front.
 pub fn rank_bits(info: &MaterialInfo) -> u32 {
-    // sort values lie between 0 and 16 and have fractions now and then
+    // sort values lie between 0 and 16, some with fractions
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let rank = (info.sort * 8.0).clamp(0.0, 255.0) as u32;
     rank << shaders::trace_types::constants::TRIANGLE_RANK_SHIFT
 }
 
-/// Flags of the triangles of a kind. `Kind::Passed` is one-sided: a camera ray goes on through its hidden face.
+/// Triangle flags of a kind. `Kind::Passed` is one-sided: camera rays pass its back face.
 pub fn sides(kind: Kind) -> u32 {
     match kind {
         Kind::Passed => TRIANGLE_ONE_SIDED,
@@ -126,25 +126,25 @@ pub fn sides(kind: Kind) -> u32 {
     }
 }
 
-/// The CPU half: triangles grouped by model and kind, translucent ones in drawing order, indices beside them.
+/// CPU data: triangles grouped by model and kind, translucent ones in drawing order, with their indices.
 struct Grouped {
     triangles: Vec<Triangle>,
     groups: BTreeMap<(u32, Kind), Group>,
     skies: Vec<SkyRecord>,
 }
 
-/// Which triangles of a surface.
+/// A subset of a surface's triangles.
 #[derive(Clone, Copy)]
 enum Portion {
     /// All.
     Whole,
-    /// Of a cut-out those that are covered so.
+    /// Those of an alpha-tested surface with this coverage.
     Covered(Coverage),
-    /// Those that have opposites in their plane, or those that have none.
+    /// Those with an opposite triangle in their plane, or those without.
     Doubled(bool),
 }
 
-/// Surfaces of one structure with the material that is drawn for each.
+/// Surfaces of one structure, each with its drawn material.
 type Members<'a> = Vec<(&'a StaticSurface, u32, MaterialInfo, Portion)>;
 
 fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
@@ -163,7 +163,7 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
                 list.push((surface, material, info, part));
             };
             if kind == Kind::Tested {
-                // what has no hole need not be tested, and what is all hole is not there
+                // solid triangles need no alpha test, empty ones are left out
                 add(Kind::Opaque, Portion::Covered(Coverage::Solid));
                 add(Kind::Tested, Portion::Covered(Coverage::Mixed));
             } else if kind == Kind::Opaque && has_doubled(surface) {
@@ -181,7 +181,7 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
     };
     let mut sky_of_material: BTreeMap<u32, u32> = BTreeMap::new();
     for (key, mut list) in sorted {
-        // in the engine's order, so that a later primitive is one that is drawn later; stable, as its order is
+        // a stable sort in drawing order, so that later primitives are drawn later
         list.sort_by(|a, b| {
             a.2.sort
                 .total_cmp(&b.2.sort)
@@ -236,7 +236,7 @@ fn group(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Grouped {
     grouped
 }
 
-/// The boxes of translucent surfaces.
+/// Bounds of translucent surfaces.
 fn layers(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Vec<StaticLayer> {
     let is_layer = |s: &&StaticSurface| {
         let (_, info) = materials.info(s.material);
@@ -260,7 +260,7 @@ impl StaticGeometry {
         self.structures.iter().map(structure).sum::<u64>() + self.triangle_records.size()
     }
 
-    /// Builds the structures of a map, blocking until they are done.
+    /// Builds the structures of a map; returns when the GPU has built them.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
@@ -304,7 +304,7 @@ impl StaticGeometry {
     }
 }
 
-/// Structures of the driver: built in one batch, compacted.
+/// The driver's structures: built in one batch, compacted.
 fn driver_structures(
     device: &Device,
     positions: &[Vec3],
@@ -314,7 +314,7 @@ fn driver_structures(
     let input = BufferUsage::ACCEL_INPUT;
     let indices: Vec<[u32; 3]> = grouped.triangles.iter().map(|t| t.indices).collect();
     let index_buffer = Buffer::with_data(device, "trace static indices", input, &indices)?;
-    // of their own, because only these need to be readable by builds
+    // a separate buffer, because only positions need the usage flag of build inputs
     let position_buffer = Buffer::with_data(device, "trace static positions", input, positions)?;
     let flags = BlasFlags {
         compact: true,
@@ -375,7 +375,7 @@ fn own_structures(
         members.or_default().push((*kind, group));
     }
     for ((model, _), groups) in together {
-        // of each triangle its geometry, counted from the first, and its number there
+        // geometry of each triangle, counted from the first, and its number in the geometry
         let mut places: Vec<[u32; 2]> = Vec::new();
         let mut corners: Vec<[Vec3; 3]> = Vec::new();
         for (part, (_, group)) in (0..).zip(&groups) {

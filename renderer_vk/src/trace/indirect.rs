@@ -5,8 +5,8 @@ use super::passes::Pass;
 use crate::gpu::Error;
 use crate::settings::{DenoiserChoice, Settings};
 
-/// Whether one of 2 × 2 pixels gathers bounced light: in a denoised picture the difference is invisible, and gathering is the
-/// most expensive pass. Reference mode and undenoised pictures gather for every pixel.
+/// Whether one of 2 × 2 pixels gathers bounced light: in a denoised picture the difference is invisible, and gathering
+/// is the most expensive pass. In reference mode and in undenoised pictures every pixel gathers.
 pub fn is_subsampled(settings: &Settings) -> bool {
     !settings.rt_accumulate
         && settings.rt_denoiser != DenoiserChoice::None

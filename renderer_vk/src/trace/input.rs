@@ -1,5 +1,5 @@
-//! What the traced look is given: plain descriptions of a map and of a view's surroundings, so that the passes depend
-//! on no loader and tests can make scenes by hand.
+//! Input of the traced look: plain descriptions of a map and of a view, so that the passes depend on no loader and
+//! tests build scenes directly.
 
 use glam::Vec2;
 use shaders::trace_types::SkyRecord;
@@ -11,19 +11,19 @@ use super::cutout::Coverage;
 use crate::gpu::DeviceInfo;
 use crate::settings::TracerChoice;
 
-/// What follows the rays.
+/// Method of tracing rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tracer {
     /// The device's ray tracing pipeline.
     Pipeline,
     /// The device's ray queries, in compute shaders.
     Query,
-    /// Hierarchies of our own, walked by compute shaders: on any device, and faster where the driver traces in software.
+    /// Our own hierarchies in compute shaders: on any device, and faster on devices that trace in software.
     Compute,
 }
 
 impl Tracer {
-    /// Whether a device can do it.
+    /// Whether a device supports this tracer.
     pub fn is_possible(self, info: &DeviceInfo) -> bool {
         match self {
             Self::Pipeline => info.ray_tracing.is_some(),
@@ -32,7 +32,7 @@ impl Tracer {
         }
     }
 
-    /// The one that is wished for; where the device cannot do that, the fastest one that it can, with a warning.
+    /// The tracer of the setting; if the device does not support it, the fastest supported one, with a warning.
     pub fn of(info: &DeviceInfo, wish: TracerChoice) -> Self {
         let possible = |tracer: Self| tracer.is_possible(info);
         let found = Self::choose(wish, info.software, possible);
@@ -56,9 +56,9 @@ impl Tracer {
         }
     }
 
-    /// The wish where it is possible, otherwise the fastest, as measured: where the driver follows rays by programs,
-    /// hierarchies of our own. A device that has units for rays has queries, too; drivers that do without such units
-    /// (NVIDIA's for Pascal, Volta and devices made for computing) offer pipelines alone.
+    /// The wished tracer if possible, otherwise the fastest by measurement: on devices that trace in software, our own
+    /// hierarchies. Devices with ray tracing hardware offer ray queries; drivers without such hardware (NVIDIA's for
+    /// Pascal, Volta and compute devices) offer ray tracing pipelines only.
     fn choose(wish: TracerChoice, software: bool, possible: impl Fn(Self) -> bool) -> Self {
         let by_programs = software || (possible(Self::Pipeline) && !possible(Self::Query));
         let fastest = [Self::Pipeline, Self::Query].map(|tracer| (!by_programs).then_some(tracer));
@@ -71,14 +71,14 @@ impl Tracer {
     }
 }
 
-/// What a material is to a ray.
+/// How rays treat a material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Kind {
     /// Stops every ray.
     Opaque,
     /// Stops a ray where its alpha test passes.
     Tested,
-    /// Is passed, and composed over what lies behind.
+    /// Rays pass it; its colour is composed over the surface behind.
     Translucent,
     /// Shows the sky.
     Sky,
@@ -87,9 +87,9 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// From a material's `MATERIAL_*` bits; `None` if no ray sees it. Fog brushes are volumes, not surfaces. A portal's
-    /// surface stops the ray, because what lies behind is replaced by what it shows. What is painted on a wall with
-    /// holes and blends with it is passed: the wall lies in the same plane, and a ray that was stopped would miss it.
+    /// The kind by a material's `MATERIAL_*` bits; `None` if rays ignore it. Fog brushes are volumes, not surfaces. A
+    /// portal's surface stops the ray, because the portal's view replaces the geometry behind it. A blended layer on an
+    /// alpha-tested wall is passed: the wall lies in the same plane, and a ray that stopped at the layer would miss it.
     pub fn of(flags: u32) -> Option<Self> {
         const PAINTED: u32 = c::MATERIAL_TRANSLUCENT | c::MATERIAL_POLYGON_OFFSET;
         if flags & (c::MATERIAL_INVISIBLE | c::MATERIAL_FOG) != 0 {
@@ -109,9 +109,9 @@ impl Kind {
         }
     }
 
-    /// As [`of`](Self::of), with one-sided opaque surfaces that cast no shadow as [`Passed`](Self::Passed): those of the map
-    /// (`world`) to which the compiler gave no shadow, and those of models that show their back faces alone, because the
-    /// outline shell of a cel-shaded model would shade the model inside.
+    /// As [`of`](Self::of), but one-sided opaque surfaces without shadow are [`Passed`](Self::Passed): those of the map
+    /// (`world`) that the map compiler gave no shadow, and those of models that show back faces only, because the
+    /// outline shell of a cel-shaded model would shadow the model inside.
     pub fn in_light(flags: u32, world: bool) -> Option<Self> {
         let passed = if world {
             c::MATERIAL_PASSED
@@ -125,7 +125,7 @@ impl Kind {
         }
     }
 
-    /// Whether all its triangles stop the rays that meet them, untested.
+    /// Whether its triangles stop all rays without an any-hit test.
     pub fn is_untested(self) -> bool {
         matches!(self, Self::Opaque | Self::Sky)
     }
@@ -143,36 +143,36 @@ impl Kind {
     }
 }
 
-/// What the tracer's CPU side asks about a material.
+/// Facts about a material for the CPU side of the tracer.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MaterialInfo {
     /// `MATERIAL_*` bits.
     pub flags: u32,
-    /// Sort value: surfaces are drawn in rising order.
+    /// Sort value: surfaces are drawn in ascending order.
     pub sort: f32,
     /// Order among materials of one sort value.
     pub order: u32,
-    /// For skies.
+    /// Sky parameters of a sky.
     pub sky: Option<SkyRecord>,
 }
 
-/// Looks materials up by index.
+/// Materials by index.
 pub trait MaterialTable {
-    /// The material that is drawn for `index` (remapping applied), and what it is.
+    /// The material drawn for `index` (after remapping), and its facts.
     fn info(&self, index: u32) -> (u32, MaterialInfo);
-    /// How much is there of a triangle of a cut-out, by its texture coordinates.
+    /// Alpha coverage of a triangle by its texture coordinates.
     fn coverage(&self, _material: u32, _corners: [Vec2; 3]) -> Coverage {
         Coverage::Mixed
     }
-    /// Addresses of the arrays on the GPU.
+    /// Device addresses of the material arrays.
     fn buffers(&self) -> MaterialBuffers;
     /// Bindless index of the clamped sampler with mip levels, for sky boxes.
     fn sky_sampler(&self) -> u32;
-    /// Changes whenever an answer of [`info`](Self::info) may have changed.
+    /// A number that changes whenever a result of [`info`](Self::info) may have changed.
     fn generation(&self) -> u64;
 }
 
-/// A surface of the map that keeps its shape.
+/// A surface of constant shape of the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StaticSurface {
     /// First index in [`StaticScene::indices`].
@@ -181,17 +181,17 @@ pub struct StaticSurface {
     pub index_count: u32,
     /// Index of the material.
     pub material: u32,
-    /// Fog volume plus one; 0 none.
+    /// Fog volume plus one; 0: no fog.
     pub fog: u32,
     /// Bindless texture of the lightmap page, or `NO_TEXTURE`.
     pub lightmap: u32,
     /// BSP model: 0 is the world, others are placed by entities.
     pub model: u32,
-    /// Among all surfaces of the map.
+    /// Number of the surface in the map.
     pub number: u32,
 }
 
-/// A map's geometry that keeps its shape.
+/// The map's geometry of constant shape.
 #[derive(Clone, Debug)]
 pub struct StaticScene<'a> {
     /// Vertices.
@@ -213,7 +213,7 @@ impl StaticScene<'_> {
         indices.as_chunks::<3>().0
     }
 
-    /// The corners of a surface's triangles, three each.
+    /// The vertices of a surface's triangles, three each.
     pub fn corners(&self, surface: &StaticSurface) -> impl Iterator<Item = &Vertex> {
         let indices = self.triangles(surface).as_flattened();
         indices

@@ -1,7 +1,7 @@
-//! Boxes around everything translucent that the eye may see.
+//! Bounding boxes of the translucent geometry in view.
 //!
-//! Most rays of the eye meet no translucent layer, and to find that out by a ray costs about a quarter of what the ray for
-//! solids costs. A ray that meets none of these boxes asks for no layers.
+//! Most primary rays meet no translucent layer. A ray that searches for layers costs about a quarter of the ray for
+//! opaque surfaces; a primary ray that meets none of these boxes skips it.
 
 use glam::{Vec3, Vec4};
 use shaders::types::{Instance, Vertex};
@@ -14,7 +14,7 @@ use super::surroundings::merged;
 use crate::scene::{TracedScene, turned};
 use crate::world::outside;
 
-/// Boxes that a ray is held against; with more of them in sight each is around several.
+/// Maximum number of boxes that a ray is tested against; above it, boxes are merged.
 const MAX_BOXES: usize = 48;
 
 /// A translucent surface of the map in the space of its model.
@@ -22,11 +22,11 @@ const MAX_BOXES: usize = 48;
 pub struct StaticLayer {
     /// Index of the map's model; 0 is the world.
     pub model: u32,
-    /// Around all of it.
+    /// Its bounds.
     pub bounds: Aabb,
 }
 
-/// Around some vertices; infinite if one is not finite, as rays may meet what hangs on it.
+/// Bounds of vertices; infinite if one is not finite, because rays may meet its triangles.
 pub fn bounds_of<'a>(vertices: impl Iterator<Item = &'a Vertex>) -> Aabb {
     let mut bounds = Aabb::EMPTY;
     for vertex in vertices {
@@ -38,10 +38,10 @@ pub fn bounds_of<'a>(vertices: impl Iterator<Item = &'a Vertex>) -> Aabb {
     bounds
 }
 
-/// Around all that a map can hold.
+/// Bounds of every possible map.
 const EVERYWHERE: Aabb = Aabb::new(Vec3::splat(-1.0e6), Vec3::splat(1.0e6));
 
-/// A box where an instance places it, with room for rounding; `None`: nothing is in it.
+/// A box transformed by an instance, with a margin for rounding; `None`: the box is empty.
 pub(super) fn placed(bounds: &Aabb, instance: &Instance) -> Option<Aabb> {
     if bounds.is_empty() {
         return None;
@@ -58,15 +58,15 @@ pub(super) fn placed(bounds: &Aabb, instance: &Instance) -> Option<Aabb> {
     Some(Aabb::new(middle - reach, middle + reach))
 }
 
-/// Whether rays of a view's pixels may meet a box.
+/// Whether primary rays of a view may meet a box.
 pub(super) fn may_be_seen(bounds: &Aabb, eye: Vec3, frustum: &[Vec4]) -> bool {
-    // rays go through all of a pixel, also of those on the picture's edge
+    // rays pass through all of a pixel, also at the picture's edge
     let farthest = (bounds.mins - eye).abs().max((bounds.maxs - eye).abs());
     let margin = Vec3::splat(0.01 * farthest.max_element());
     !outside(&bounds.grown(margin), frustum)
 }
 
-/// The boxes of what is translucent in a view: at most [`MAX_BOXES`]. `geometry`: the map's, if the view shows it.
+/// Boxes of the translucent geometry of a view: at most [`MAX_BOXES`]. `geometry`: the map's, if the view shows it.
 pub fn in_sight(
     view: &TracedScene,
     geometry: Option<&StaticGeometry>,
@@ -99,7 +99,7 @@ pub fn in_sight(
     }
     for mesh in &view.meshes {
         let (_, info) = materials.info(mesh.material);
-        // the rays that meet what is turned otherwise ask anyway
+        // rays that meet copies for portals search for layers unconditionally
         let straight_on = mesh.paths < turned::PORTAL;
         if straight_on && Kind::of(info.flags) == Some(Kind::Translucent) {
             let vertices = view.mesh_geometry(mesh).vertices;

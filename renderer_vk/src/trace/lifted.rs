@@ -1,8 +1,8 @@
-//! Where rays meet what lies in one plane with something else: posters, decals and paint on walls.
+//! Offsets for coplanar surfaces: posters, decals and paint on walls.
 //!
-//! A ray meets both at the same distance, and which of them it is told of is left to the last bits. So for rays the upper
-//! one, by the engine's order, lies a little before the lower one. What is shaded stays where it is: a hit's point is that
-//! of the map's own vertices.
+//! A ray meets coplanar surfaces at the same distance, and rounding decides which one it reports. In acceleration
+//! structures the upper surface, by the engine's order, is therefore moved slightly forward. Shading is unaffected: hit
+//! points are computed from the map's own vertices.
 
 use glam::Vec3;
 use relight::world::coplanar::{DrawOrder, Sheet, stack};
@@ -11,13 +11,12 @@ use shaderscript::Cull;
 
 use super::input::{Kind, MaterialTable, StaticScene, StaticSurface};
 
-/// How far the uppermost of several surfaces in one plane lies before the lowest, units. Far above what rounding costs
-/// (0.001 where coordinates are 4096), and below the 0.02 that rays start away from their surface (`offset_ray`) and
-/// that shadow rays end before their light: no ray meets what it leaves.
+/// Distance of the uppermost of several coplanar surfaces from the lowest, units. Far above rounding errors (0.001 at
+/// coordinates of 4096), and below the 0.02 by which rays start away from their surface (`offset_ray`) and shadow rays
+/// end before their light, so that no ray hits the surface that it leaves.
 pub const LIFT: f32 = 1.0 / 128.0;
 
-/// The positions of a map's vertices as rays meet them. Translucent layers are left where they are: rays order them by
-/// themselves.
+/// Positions of a map's vertices for acceleration structures. Translucent layers keep theirs: shaders sort them.
 pub fn lifted(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Vec<Vec3> {
     let mut positions: Vec<Vec3> = scene.vertices.iter().map(|v| v.position).collect();
     let sheets: Vec<Sheet> = (scene.surfaces.iter())
@@ -37,7 +36,7 @@ pub fn lifted(scene: &StaticScene<'_>, materials: &dyn MaterialTable) -> Vec<Vec
     positions
 }
 
-/// The triangles of a surface: their vertices' numbers and places.
+/// The triangles of a surface: vertex numbers and positions.
 fn triangles<'a>(
     scene: &'a StaticScene<'_>,
     surface: &StaticSurface,

@@ -1,8 +1,8 @@
-//! Clusters cut into cells, each with a list of lights of its own.
+//! Cells: subdivisions of clusters, each with its own light list.
 //!
-//! What a light gives changes within a large cluster: chances of picking it that are right at one end are wrong at the
-//! other. So the leafs of the map's tree are cut along a grid, as fine as the memory for the lists allows, and the tree
-//! that shaders walk goes on to the pieces: a few more steps of a walk find a list that fits better.
+//! The contribution of a light varies within a large cluster: selection probabilities that fit one end do not fit the
+//! other. Leafs of the map's tree are therefore split along a grid, as fine as the memory for the lists allows, and the
+//! tree that shaders walk is extended to the pieces: a few more steps of a walk reach a better list.
 
 use std::collections::HashMap;
 
@@ -14,33 +14,33 @@ use support::Aabb;
 
 use super::light_normal_bins::{NormalBins, normal_bins};
 
-/// Sides of the grid that are tried, units, from the finest; after these clusters stay whole.
+/// Grid edges that are tried, units, from the finest; if none fits, clusters stay whole.
 const SIDES: [f32; 7] = [128.0, 192.0, 256.0, 384.0, 512.0, 1024.0, 2048.0];
 
-/// Entries of all lists, at the most, for which clusters are cut: 80 MiB of slots.
+/// Maximum number of entries of all lists with cells: 80 MiB of slots.
 const MOST_ENTRIES: f64 = 2_621_440.0;
 
-/// How far behind a light's plane a cell must lie for its list to do without the light, units: the list of a point is
-/// that of the cell one unit before it.
+/// Distance behind a light's plane, units, from which a cell's list omits the light: a shaded point uses the cell one
+/// unit in front of it.
 const BEHIND: f32 = 1.5;
 
-/// A piece of a cluster.
+/// A part of a cluster.
 #[derive(Clone, Copy, Debug)]
 pub struct Cell {
-    /// The cluster.
+    /// Number of the cluster.
     pub cluster: usize,
     /// Bounds.
     pub bounds: Aabb,
 }
 
 impl Cell {
-    /// Middle and half diagonal.
+    /// Centre and half diagonal.
     pub fn ball(&self) -> (Vec3, f32) {
         let size = self.bounds.size();
         (self.bounds.mins + size * 0.5, size.length() * 0.5)
     }
 
-    /// Whether all of it lies behind a light that shines to its front alone.
+    /// Whether the cell lies wholly behind a one-sided light.
     pub fn behind(&self, light: &TriangleLight) -> bool {
         let normal = light.normal();
         let in_front = (self.bounds.farthest(normal) - light.vertices[0]).dot(normal);
@@ -48,32 +48,32 @@ impl Cell {
     }
 }
 
-/// Cells of a map, and the tree that finds them.
+/// The cells of a map, and the tree that finds them.
 #[derive(Debug, Default)]
 pub struct Cells {
-    /// The map's nodes, and after them those that cut leafs.
+    /// The map's nodes, then the nodes that split leafs.
     pub nodes: Vec<BspNode>,
     /// Index of the cell of each leaf of the tree; -1: none.
     pub leaf_cells: Vec<i32>,
     /// The cells.
     pub cells: Vec<Cell>,
-    /// Of each cell where surfaces face which way.
+    /// For each cell, sample points on its surfaces by normal.
     pub normal_bins: Vec<NormalBins>,
 }
 
-/// A leaf of the map that is to be cut.
+/// A leaf, or part of a leaf, to be split.
 #[derive(Clone, Copy)]
 struct Piece {
     cluster: usize,
     bounds: Aabb,
-    /// Cells of the grid that it lies in: from, to (excluded).
+    /// Grid range that it covers: from, to (excluded).
     from: [i32; 3],
     to: [i32; 3],
 }
 
 impl Piece {
     fn new(cluster: usize, bounds: Aabb, side: f32) -> Self {
-        #[allow(clippy::cast_possible_truncation)] // saturates, for damaged maps
+        #[allow(clippy::cast_possible_truncation)] // saturates for damaged maps
         let index = |v: f32| v as i32;
         let from = (bounds.mins / side).floor().to_array().map(index);
         let mut to = (bounds.maxs / side).ceil().to_array().map(index);
@@ -95,16 +95,16 @@ impl Piece {
     }
 }
 
-/// What cutting has made.
+/// State and result of splitting.
 struct Cutter {
     side: f32,
     made: Cells,
-    /// Cells by cluster and place in the grid.
+    /// Index of the cell by cluster and grid position.
     known: HashMap<(usize, [i32; 3]), usize>,
 }
 
 impl Cutter {
-    /// Index of the cell of a piece that lies in one cell of the grid; grown by the piece's bounds.
+    /// Index of the cell of a piece that lies in one grid box; the cell's bounds grow by the piece's.
     fn cell(&mut self, piece: &Piece) -> i32 {
         let cells = &mut self.made.cells;
         let index = *self
@@ -123,7 +123,7 @@ impl Cutter {
         i32::try_from(index).unwrap_or(-1)
     }
 
-    /// Cuts a piece; returns what a node has for its child.
+    /// Splits a piece; returns the child index for its parent node.
     fn cut(&mut self, piece: Piece) -> i32 {
         let sizes = piece.sizes();
         let axis = (0..3).fold(0, |a, b| if sizes.get(b) > sizes.get(a) { b } else { a });
@@ -136,7 +136,7 @@ impl Cutter {
             return i32::try_from(self.made.leaf_cells.len()).map_or(-1, |n| -n);
         }
         let middle = from + (to - from) / 2;
-        #[allow(clippy::cast_precision_loss)] // lies between the piece's bounds
+        #[allow(clippy::cast_precision_loss)] // between the piece's bounds
         let dist = middle as f32 * self.side;
         let index = self.made.nodes.len();
         self.made.nodes.push(BspNode::default());
@@ -167,7 +167,7 @@ impl Cutter {
 }
 
 impl Cells {
-    /// Of a map of so many clusters; `length`: entries of a cluster's list.
+    /// Cells of a map with `clusters` clusters; `length`: number of entries of a cluster's list.
     pub fn new(bsp: &Bsp, clusters: usize, length: impl Fn(usize) -> usize) -> Self {
         let leafs: Vec<(LeafId, usize, Aabb)> = bsp
             .tree_leafs()
@@ -202,7 +202,7 @@ impl Cells {
         })
     }
 
-    /// Entries of the lists: of each cell one for all normals, and one for each way that surfaces face.
+    /// Number of entries of all lists: per cell one list for all normals, and one for each normal bin with surfaces.
     fn entries(&self, length: impl Fn(usize) -> usize) -> f64 {
         let cells = self.cells.iter().zip(&self.normal_bins);
         let lists = cells.map(|(cell, normal_bins)| {
@@ -217,7 +217,7 @@ impl Cells {
         lists.sum()
     }
 
-    /// Cuts leafs, which have an id, a cluster and bounds, along a grid; without one they stay whole.
+    /// Splits leafs, given by id, cluster and bounds, along a grid; without a grid they stay whole.
     fn cut(
         bsp: &Bsp,
         leafs: &[(LeafId, usize, Aabb)],
@@ -240,10 +240,10 @@ impl Cells {
             },
             known: HashMap::new(),
         };
-        // what takes the place of each leaf as a child
+        // child index that replaces each leaf
         let mut instead: Vec<Option<i32>> = vec![None; bsp.leafs.len()];
         for &(id, cluster, bounds) in leafs {
-            // Where there is no light, there is nothing to tell apart: such a leaf may be as large as the map.
+            // Clusters without lights stay whole: such a leaf may be as large as the map.
             let piece = match side.filter(|_| length(cluster) > 0) {
                 Some(side) => Piece::new(cluster, bounds, side),
                 None => Piece {
@@ -283,7 +283,7 @@ mod tests {
     use q3bsp::builder::MapBuilder;
     use testkit::Random;
 
-    /// Walks as the shaders do.
+    /// Walks the tree as shaders do.
     fn cell_at(cells: &Cells, p: Vec3) -> i32 {
         let mut index = 0i32;
         while index >= 0 {
@@ -342,7 +342,7 @@ mod tests {
         let cells = Cells::new(&bsp, 2, |_| 1 << 22);
         assert_eq!(cells.cells.len(), 2);
         assert_eq!(cells.nodes.len(), bsp.nodes.len());
-        // clusters that the lists do not know have no cell
+        // clusters outside of the light lists have no cell
         assert_eq!(
             Cells::new(&bsp, 1, |_| 1)
                 .cells

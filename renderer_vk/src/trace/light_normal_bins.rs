@@ -10,13 +10,13 @@ use super::light_cells::Cell;
 /// Normal bins: one for each signed axis.
 pub const NORMAL_BINS: usize = c::NORMAL_BINS as usize;
 
-/// How far beside its cell a point may lie, units: that of a point is the cell one unit before it.
+/// Margin of a cell for sample points, units: a shaded point uses the cell one unit in front of it.
 pub const BESIDE: f32 = 1.5;
 
-/// Points on surfaces of a cell, with unit normals, for each normal bin; none for a bin without surfaces.
+/// Points on surfaces of a cell, with unit normals, for each normal bin; empty for a bin without surfaces.
 pub type NormalBins = [Vec<(Vec3, Vec3)>; NORMAL_BINS];
 
-/// Most points for each normal bin of a cell.
+/// Maximum number of points for each normal bin of a cell.
 pub const POINTS: usize = 8;
 
 /// The axis of a normal bin.
@@ -25,11 +25,11 @@ pub fn direction(bin: usize) -> Vec3 {
     if bin.is_multiple_of(2) { axis } else { -axis }
 }
 
-/// How much shorter a part of a normal may be than its longest and still be taken for that: what shaders know of normals is
-/// rounded, and a slope of 45 degrees faces two ways.
+/// A normal's component of at least this part of its largest counts as largest: shaders read rounded normals, and a
+/// slope of 45 degrees belongs to two bins.
 const TIE: f32 = 0.99;
 
-/// Whether shaders may take a normal to face a direction.
+/// Whether shaders may assign a normal to a bin.
 fn faces(normal: Vec3, bin: usize) -> bool {
     normal.dot(direction(bin)) >= TIE * normal.abs().max_element()
 }
@@ -41,7 +41,7 @@ struct Piece {
 }
 
 impl Piece {
-    /// From positions and normals; `None` without an area.
+    /// A triangle from positions and normals; `None` without area.
     fn new(corners: [(Vec3, Vec3); 3]) -> Option<Self> {
         let [a, b, c] = corners.map(|(p, _)| p);
         // fronts are clockwise
@@ -53,7 +53,7 @@ impl Piece {
         })
     }
 
-    /// What of it lies in a box, as corners of a polygon (Sutherland and Hodgman, Reentrant Polygon Clipping, 1974).
+    /// The part of it inside a box, as corners of a polygon (Sutherland and Hodgman, Reentrant Polygon Clipping, 1974).
     fn within(&self, bounds: Aabb) -> Vec<Vec3> {
         let mut polygon = self.corners.to_vec();
         let planes = Vec3::AXES.map(|axis| {
@@ -81,7 +81,7 @@ impl Piece {
     }
 }
 
-/// What of a surface is drawn; of a curved one its control points' triangles, which lie near it.
+/// The triangles of a surface; for a patch those of its control points, which lie near it.
 fn pieces(bsp: &Bsp, surface: &Surface) -> Vec<Piece> {
     let vertices = bsp.surface_vertices(surface);
     let corner = |i: usize| Some((vertices.get(i)?.position, vertices.get(i)?.normal));
@@ -105,7 +105,7 @@ fn pieces(bsp: &Bsp, surface: &Surface) -> Vec<Piece> {
     }
 }
 
-/// Parts of surfaces that face one way: triangles with the sum of the areas up to them.
+/// Triangles of one normal bin, with the running sum of their areas.
 #[derive(Default)]
 struct Parts {
     triangles: Vec<(f32, [Vec3; 3], Vec3)>,
@@ -126,7 +126,7 @@ impl Parts {
         }
     }
 
-    /// Points spread evenly over the area, each a unit before its surface.
+    /// Points distributed evenly over the area, each one unit in front of its surface.
     fn points(&self) -> Vec<(Vec3, Vec3)> {
         let point = |i: usize| {
             #[allow(clippy::cast_precision_loss)] // a handful
@@ -146,7 +146,7 @@ impl Parts {
     }
 }
 
-/// For each cell points on the surfaces of the world in it, but for skies.
+/// Sample points for each cell on the world's surfaces in it, without skies.
 pub fn normal_bins(bsp: &Bsp, cells: &[Cell]) -> Vec<NormalBins> {
     let world = bsp.models.first().map(|model| bsp.model_surfaces(model));
     let drawn: Vec<(Aabb, Vec<Piece>)> = (bsp.surfaces.iter().enumerate())
@@ -207,7 +207,7 @@ mod tests {
         let mut parts = Parts::default();
         let polygon = piece.within(Aabb::new(Vec3::splat(-1.0), Vec3::new(60.0, 60.0, 1.0)));
         parts.add(&polygon, Vec3::Z);
-        // the square but for the corner beyond the long side
+        // the square without the corner beyond the hypotenuse
         assert!(
             (parts.area - (3600.0 - 200.0)).abs() < 0.1,
             "{}",

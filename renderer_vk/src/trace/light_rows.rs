@@ -1,9 +1,9 @@
-//! The lists that lights are drawn from: for each cell one for each direction that surfaces in it face.
+//! Light lists for sampling: for each cell one list per normal bin.
 //!
-//! What faces away from a lamp gets nothing from it, however strong it is in the cell: with one list for all normals most
-//! candidates on a wall may be lamps behind it. So a list's chances are by what its lights give to surfaces that face
-//! about one way, where those lie; and by what of that arrives, which rays tell. What moves has the list of the cell for all normals where nothing of the map faces
-//! its way.
+//! A lamp gives no light to surfaces that face away from it, however strong it is in the cell: with one list for all
+//! normals, most candidates on a wall may be lamps behind it. The probabilities of a list are therefore proportional to
+//! the light that arrives at surfaces of its normal bin; rays estimate the visibility. Moving geometry uses the cell's
+//! list for all normals if the map has no surface in its bin.
 
 use glam::Vec3;
 use relight::light::{LightRef, LightShare};
@@ -20,25 +20,25 @@ use super::lights::{
 };
 use crate::at_once::{Late, Make, make_all};
 
-/// Lights nearer to such a point than this part of the cell's half diagonal are taken to be as far away: what they give
-/// grows without end there, but next to few points.
+/// Least distance at which a light is weighted, as a part of the cell's half diagonal; it bounds the inverse-square
+/// law, which would overweight a light that few points are close to.
 const NEAREST: f32 = 1.0 / 6.0;
 
-/// Part of the chances of a list for one direction that is as in the list of the cell for all: for what moves, and for
-/// places that are like none of the points.
+/// Part of a normal bin's probabilities that comes from the cell's list for all normals: for moving geometry, and for
+/// points unlike all sample points.
 const ANYWHERE_PART: f32 = 0.125;
 
-/// Part of a list's light that its weak lights may give together, by what is known of them. Where all lights are used,
-/// some of these are picked at random.
+/// Maximum part of a list's estimated light that its weak lights give together. Where a shader uses all lights of a
+/// list, it samples only some of the weak ones.
 const WEAK_PART: f32 = 0.2;
 
-/// Fewest strong lights of a list that has weak ones: shorter lists are used whole.
+/// Minimum number of strong lights in a list with weak ones; shorter lists have no weak lights.
 const LEAST_STRONG: usize = 2;
 
-/// Rays for the weak lights of a list, as the shaders send them.
+/// Number of rays that shaders send to the weak lights of a list.
 const WEAK_RAYS: usize = c::WEAK_RAYS as usize;
 
-/// How many of the entries, which fall by what they give, are strong.
+/// Number of strong lights among entries in descending order of their light.
 fn strong(entries: &[Entry]) -> usize {
     let all: f32 = entries.iter().map(Entry::given).sum();
     let mut weak = 0.0;
@@ -54,14 +54,14 @@ fn strong(entries: &[Entry]) -> usize {
     }
 }
 
-/// The lights of a row, with the strong ones first.
+/// The lights of a row, strong ones first.
 struct Row {
     entries: Vec<Entry>,
     strong: usize,
 }
 
 impl Row {
-    /// `swept`: the lights' visibility is known, so that weak ones can be told.
+    /// `swept`: the visibility of the lights is known, so that weak ones can be identified.
     fn new(mut entries: Vec<Entry>, swept: bool) -> Self {
         entries.sort_by(|a, b| b.given().total_cmp(&a.given()).then(a.light.cmp(&b.light)));
         let strong = if swept {
@@ -76,7 +76,7 @@ impl Row {
 /// The rows of a cell.
 struct RowsOfCell {
     of_all: Row,
-    /// For each direction, where something faces that way.
+    /// For each normal bin with surfaces, its row.
     bins: [Option<Row>; NORMAL_BINS],
 }
 
@@ -136,11 +136,10 @@ impl RowsOfCell {
     }
 }
 
-/// Cells whose rows one thread makes at a time.
+/// Number of cells for which one thread builds rows at a time.
 const CELLS_AT_ONCE: usize = 16;
 
-/// Rows and slots of the lists: for each cell a row for each direction. The last row, which is always there, holds all
-/// lights.
+/// Rows and slots of the lists: for each cell its rows. The last row always exists and holds all lights.
 pub fn rows(
     source: &MapLightSource<'_>,
     numbers: &[Option<u32>],
@@ -201,7 +200,7 @@ pub fn rows(
     (rows, slots)
 }
 
-/// A light of a list. `triangle_number`: the number of a triangle light, by its index; `None` leaves it out.
+/// A light of a list. `triangle_number`: maps the index of a triangle light to its number; `None` omits the light.
 pub fn listed_light<'a>(
     source: &MapLightSource<'a>,
     entry: u32,
@@ -227,7 +226,7 @@ pub fn listed_light<'a>(
     })
 }
 
-/// The lights of a cluster's list, or of all for -1.
+/// The lights of a cluster's list; all lights for -1.
 fn listed<'a>(
     source: &MapLightSource<'a>,
     numbers: &[Option<u32>],

@@ -1,10 +1,10 @@
-//! Alias tables for drawing lights from a cluster's list.
+//! Alias tables that shaders sample lights from.
 
 use glam::Vec3;
 use shaders::trace_types::LightSlot;
 use support::slice::part_mut;
 
-/// Part of a row's chance that is shared out evenly, so that no light is left out by a bad guess.
+/// Part of a row's probability that is distributed uniformly, so that a wrong estimate excludes no light.
 const EVEN_PART: f64 = 0.1;
 
 /// An entry of a row before its table is built.
@@ -12,14 +12,14 @@ const EVEN_PART: f64 = 0.1;
 pub struct Entry {
     /// Number of the light.
     pub light: u32,
-    /// About how much light it brings to the row's cell; any unit.
+    /// Estimated light at the row's cell without occlusion; any unit.
     pub weight: f32,
-    /// About which part of that arrives, above 0.
+    /// Estimated visible part of the light, above 0.
     pub visibility: f32,
 }
 
 impl Entry {
-    /// About how much light of it arrives.
+    /// Estimated light that arrives.
     pub fn given(&self) -> f32 {
         let given = self.weight * self.visibility;
         if given.is_finite() {
@@ -30,7 +30,7 @@ impl Entry {
     }
 }
 
-/// Appends the slots of a row. Each light's chance is above 0.
+/// Appends the slots of a row. The probability of each light is above 0.
 ///
 /// Source: Walker's alias method (ACM TOMS 3(3), 1977), built as by Vose (IEEE TSE 17(9), 1991).
 pub fn append_slots(slots: &mut Vec<LightSlot>, entries: &[Entry]) {
@@ -47,7 +47,7 @@ pub fn append_slots(slots: &mut Vec<LightSlot>, entries: &[Entry]) {
     };
     let first = slots.len();
     let visibility = |e: &Entry| e.visibility.clamp(1.0e-4, 1.0);
-    #[allow(clippy::cast_possible_truncation)] // to single precision
+    #[allow(clippy::cast_possible_truncation)] // rounds to single precision
     slots.extend(entries.iter().map(|e| LightSlot {
         light: e.light,
         alias: e.light,
@@ -59,7 +59,7 @@ pub fn append_slots(slots: &mut Vec<LightSlot>, entries: &[Entry]) {
         padding: 0,
     }));
     let row = part_mut(slots, first..);
-    // what each slot has of its own light, in parts of a slot
+    // part of each slot that its own light occupies
     let mut parts: Vec<f64> = entries.iter().map(|e| chance(e) / even).collect();
     let (mut poor, mut rich): (Vec<usize>, Vec<usize>) =
         (0..parts.len()).partition(|&i| parts.get(i).is_some_and(|&p| p < 1.0));
@@ -76,7 +76,7 @@ pub fn append_slots(slots: &mut Vec<LightSlot>, entries: &[Entry]) {
             break;
         };
         if let Some(slot) = row.get_mut(low) {
-            #[allow(clippy::cast_possible_truncation)] // to single precision
+            #[allow(clippy::cast_possible_truncation)] // rounds to single precision
             {
                 slot.threshold = own as f32;
             }
@@ -94,7 +94,7 @@ pub fn append_slots(slots: &mut Vec<LightSlot>, entries: &[Entry]) {
     }
 }
 
-/// Luminance of linear colours, of negative ones none.
+/// Luminance of a linear colour; 0 for negative colours.
 pub fn luminance(c: Vec3) -> f32 {
     relight::overbright::luminance(c).max(0.0)
 }
@@ -103,7 +103,7 @@ pub fn luminance(c: Vec3) -> f32 {
 mod tests {
     use super::*;
 
-    /// Chance of each light as the slots really give it.
+    /// Probability of each light, computed from the slots.
     fn drawn(slots: &[LightSlot]) -> Vec<f64> {
         let mut chances = vec![0.0; slots.len()];
         for slot in slots {

@@ -1,4 +1,4 @@
-//! What the lights of a list give at places of a cell, as far as it arrives there.
+//! Weights of a list's lights: estimated irradiance at points of a cell, with visibility.
 
 use std::f32::consts::PI;
 
@@ -10,40 +10,40 @@ use support::Aabb;
 use super::light_cells::Cell;
 use super::light_normal_bins::{BESIDE, NORMAL_BINS, POINTS, direction};
 
-/// Cosine and sine of the angle by which normals are tilted besides the one that faces straight on.
+/// Cosine and sine of the angle by which the tilted sample normals deviate from the surface normal.
 const TILT: (f32, f32) = (0.8, 0.6);
 
-/// As many rays as what is known of a light in the whole cluster counts for, beside those from a cell's few places. With
-/// fewer, a light that none of these sees is drawn too seldom where it does arrive.
+/// Weight, in rays, of a light's visibility in the whole cluster against the rays from a cell's few points. With a
+/// smaller weight, a light that none of these points sees is sampled too rarely where it is visible.
 const KNOWN_RAYS: f32 = 4.0;
 
-/// The same at a place itself, whose only ray goes to one point of the light.
+/// The same at a single point, which sends one ray to one point of the light.
 const KNOWN_RAYS_AT_PLACE: f32 = 1.0;
 
-/// A light of a cluster's list.
+/// A light of a cluster's list, with the data that weights need.
 pub struct Listed<'a> {
     /// Its number.
     pub number: u32,
     /// Bounds.
     pub bounds: t::LightBounds,
-    /// Where it is one.
+    /// The triangle, if it is a triangle light.
     pub triangle: Option<&'a TriangleLight>,
-    /// Which part of it arrives in the cluster, about.
+    /// Estimated visible part of the light in the cluster.
     pub visibility: f32,
 }
 
-/// What a point sees of a light: its light but for the cosine at the point, and where it lies.
+/// A light as seen from a point: its light without the cosine at the point, and its direction.
 struct Seen {
     light: f32,
-    /// Unit vectors to its corners, or one to its middle.
+    /// Unit vectors to its corners, or to its centre.
     directions: [Vec3; 3],
     parts: usize,
-    /// Sine of its angular radius, where that matters.
+    /// Sine of its angular radius; 0 if `directions` are its corners.
     size: f32,
 }
 
 impl Seen {
-    /// About the mean cosine between a normal and the light.
+    /// Approximate mean cosine between a normal and the directions to the light.
     fn cosine(&self, normal: Vec3) -> f32 {
         let of = |direction: &Vec3| {
             let aloft = normal.dot(*direction);
@@ -57,7 +57,7 @@ impl Seen {
 }
 
 impl Listed<'_> {
-    /// As `light_target` of `shaders/trace/lights.glsl`; `nearest`: the least distance that is believed.
+    /// As `light_target` of `shaders/trace/lights.glsl`; `nearest`: lower bound of the distance.
     fn seen_from(&self, point: Vec3, nearest: f32) -> Option<Seen> {
         let bounds = &self.bounds;
         let to = bounds.centre - point;
@@ -93,13 +93,13 @@ impl Listed<'_> {
         })
     }
 
-    /// Irradiance over pi that it gives to what faces it, about; `nearest`: the least distance that is believed. `None`
-    /// where it shines the other way.
+    /// Approximate irradiance over pi on a surface that faces the light; `nearest`: lower bound of the distance. `None`
+    /// behind a one-sided light.
     pub fn straight_on(&self, point: Vec3, nearest: f32) -> Option<f32> {
         self.seen_from(point, nearest).map(|seen| seen.light)
     }
 
-    /// What it gives to all sides, about.
+    /// Approximate light that it emits in all directions.
     pub fn power(&self) -> f32 {
         if self.bounds.omni_intensity > 0.0 {
             self.bounds.omni_intensity
@@ -108,8 +108,8 @@ impl Listed<'_> {
         }
     }
 
-    /// One of some points of it, `turn` says which, short of what the light itself may stand in; `None` where it shines the
-    /// other way.
+    /// Target of a visibility ray: point number `turn` on a triangle light, or the nearest point of a sphere light, whose
+    /// centre may lie inside of geometry; `None` behind a one-sided light.
     pub fn point_for(&self, place: Vec3, turn: usize) -> Option<Vec3> {
         let Some(triangle) = self.triangle else {
             let away = (place - self.bounds.centre).clamp_length_max(self.bounds.radius);
@@ -129,12 +129,12 @@ impl Listed<'_> {
         faces.then_some(point)
     }
 
-    /// Whether it gives nothing to any point of a cell whose normal has its largest part along the axis of `facing`.
+    /// Whether every point of a cell with a normal of this normal bin is below the light's horizon.
     pub fn is_below(&self, cell: &Cell, bin: usize) -> bool {
         let Aabb { mins, maxs } = cell.bounds.grown(Vec3::splat(BESIDE));
         let axis = direction(bin);
-        // The height of a place over a point's horizon, were the largest part of the normal 1 and the others, which may
-        // be anything up to that, the worst; such a normal is no longer than the root of 3.
+        // Height of a position over a point's horizon, for a normal whose largest component is 1 and whose others, of
+        // any value up to 1, are the most favourable; its length is at most the root of 3.
         let highest = |place: Vec3, radius: f32| {
             let (low, high) = (place - maxs, place - mins);
             let along = (axis * low).max(axis * high).dot(axis.abs());
@@ -148,7 +148,7 @@ impl Listed<'_> {
     }
 }
 
-/// A triangle that is large as seen from a point.
+/// A triangle light that subtends a large solid angle at a point.
 fn large_triangle(triangle: &TriangleLight, bounds: &t::LightBounds, point: Vec3) -> Seen {
     let directions = triangle.vertices.map(|p| (p - point).normalize_or(Vec3::Z));
     let [a, b, c] = directions;
@@ -164,7 +164,7 @@ fn large_triangle(triangle: &TriangleLight, bounds: &t::LightBounds, point: Vec3
     }
 }
 
-/// One of points that are spread evenly over a cube of edge 1, however many are taken.
+/// Point `i` of a low-discrepancy sequence in the unit cube.
 ///
 /// Source: the additive recurrence by the root of x^4 = x + 1 (Roberts, The Unreasonable Effectiveness of Quasirandom
 /// Sequences, 2018).
@@ -174,14 +174,14 @@ pub fn spread_point(i: usize) -> Vec3 {
     (step * i as f32 + 0.5).fract()
 }
 
-/// A point where lights are weighed, with normals and how much each counts.
+/// A point at which lights are weighted, with normals and their weights.
 pub struct Place {
     point: Vec3,
     normals: Vec<(Vec3, f32)>,
 }
 
 impl Place {
-    /// Throughout a cell, for what faces any way.
+    /// Points throughout a cell, for surfaces of any orientation.
     pub fn throughout(cell: &Cell) -> Vec<Self> {
         let place = |i: usize| Self {
             point: cell.bounds.mins + cell.bounds.size() * spread_point(i),
@@ -192,7 +192,7 @@ impl Place {
         (0..POINTS).map(place).collect()
     }
 
-    /// On a surface, for normals about its own.
+    /// A point on a surface, with normals around the surface's own.
     pub fn on_surface(point: Vec3, normal: Vec3) -> Self {
         let (x, y) = normal.any_orthonormal_pair();
         let tilted = [x, y, -x, -y].map(|side| (normal * TILT.0 + side * TILT.1, 0.1));
@@ -203,16 +203,16 @@ impl Place {
     }
 }
 
-/// Which part of each light arrives, about.
+/// Estimated visible part of each light.
 pub struct Arriving {
-    /// At all places together.
+    /// Mean over all points.
     pub together: Vec<f32>,
-    /// At each place.
+    /// At each point.
     at_places: Vec<Vec<f32>>,
 }
 
 impl Arriving {
-    /// As the lights' list has it.
+    /// Visibility as the light list stores it.
     pub fn as_listed(lights: &[&Listed<'_>], places: &[Place]) -> Self {
         let together: Vec<f32> = lights.iter().map(|light| light.visibility).collect();
         Self {
@@ -221,7 +221,7 @@ impl Arriving {
         }
     }
 
-    /// With a ray from each place to each light that it faces.
+    /// Visibility by one ray from each point to each light that it faces.
     pub fn looked_for(lights: &[&Listed<'_>], places: &[Place], occlusion: &Occlusion) -> Self {
         let mut arriving = Self::as_listed(lights, places);
         for (number, (light, together)) in lights.iter().zip(&mut arriving.together).enumerate() {
@@ -258,9 +258,9 @@ impl Arriving {
     }
 }
 
-/// Chances for the lights of a list: one half by the share of each in what all give at all places
-/// together, which keeps the noise of bright ones low, and one half by the mean of its shares at each place. By that one
-/// that is dark beside others keeps a part of the chances for itself, and there is no light that it finds too rarely.
+/// Probabilities for the lights of a list: one half by each light's share in the sum of all light at all points, which
+/// keeps the noise of bright points low; one half by the mean of its shares at each point, by which a dark point keeps
+/// a part of the probabilities, so that no light is sampled too rarely there.
 pub fn shares(
     lights: &[&Listed<'_>],
     arriving: &Arriving,
@@ -343,7 +343,7 @@ mod tests {
 
     #[test]
     fn chances_are_by_what_surfaces_that_face_one_way_get() {
-        // two like lamps, one before a wall and one behind it, and a weak one that alone lights a place far off
+        // two equal lamps, one in front of a wall and one behind it, and a weak lamp that alone lights a distant point
         let wall = [Vec3::ZERO, Vec3::new(10.0, 0.0, 0.0)];
         let far = Vec3::X * 4000.0;
         let before = lamp(Vec3::Y * 100.0, -Vec3::Y, 1.0);
@@ -356,11 +356,11 @@ mod tests {
         let found = chances(&lights, &places);
         assert!((found.iter().sum::<f32>() - 1.0).abs() < 1.0e-4);
         assert!(found[0] > 0.99, "{found:?}");
-        // a dark place has its part, however dark it is
+        // a dark point keeps its half, however dark it is
         let places: Vec<Place> = wall.iter().chain([&far]).map(on).collect();
         let found = chances(&lights, &places);
         assert!(found[2] > 0.1, "{found:?}");
-        // facing any way, both lamps are alike
+        // without orientation, both lamps have equal weights
         let cell = Cell {
             cluster: 0,
             bounds: Aabb::new(Vec3::splat(-1.0), Vec3::splat(1.0)),
@@ -371,7 +371,7 @@ mod tests {
 
     #[test]
     fn what_stands_before_a_lamp_takes_its_chances() {
-        // a board that hides the left lamp from a floor
+        // a board hides the left lamp from a floor
         let mut map = MapBuilder::new();
         let wall = map.add_shader("t/wall", 0, 1);
         map.add_cell(Vec3::splat(-500.0), Vec3::splat(500.0));
@@ -390,7 +390,7 @@ mod tests {
             .map(|i| Place::on_surface(Vec3::new(i as f32 * 4.0 - 100.0, 0.0, 1.0), Vec3::Z))
             .collect();
         let arriving = Arriving::looked_for(&lights, &places, &occlusion);
-        // none of eight, all of them, and none looked at: what the list says counts as four more
+        // no ray of eight arrives, all arrive, no ray sent; the list's visibility has the weight of four rays
         let expected = [4.0 / 12.0, 1.0, 1.0];
         for (found, expected) in arriving.together.iter().zip(expected) {
             assert!((found - expected).abs() < 1.0e-6, "{:?}", arriving.together);
@@ -402,7 +402,7 @@ mod tests {
             1.0,
         );
         let seen = shares(&lights, &arriving, &places, 1.0);
-        // at each place the hidden lamp has a sixth of what it had
+        // at each point the hidden lamp has a sixth of its former weight
         let ratio = |shares: &[f32]| shares[0] / shares[1];
         assert!(ratio(&seen) < 0.25 * ratio(&open), "{seen:?} {open:?}");
         assert!(ratio(&seen) > 0.1 * ratio(&open), "{seen:?} {open:?}");
@@ -434,7 +434,7 @@ mod tests {
                     assert!(heights.iter().all(|h| *h <= 0.0), "{normal} {point}");
                 }
             }
-            // what lies before the cell is kept
+            // geometry in front of the cell is kept
             let axis = light.vertices[0].abs().max_element();
             let before = (0..NORMAL_BINS).find(|&f| light.vertices[0].dot(direction(f)) == axis);
             assert!(before.is_some_and(|f| !listed.is_below(&cell, f)));

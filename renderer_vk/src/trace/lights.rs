@@ -1,4 +1,4 @@
-//! The lights of a map on the GPU. Those of one view are in [`frame_lights`](super::frame_lights).
+//! The lights of a map on the GPU. [`frame_lights`](super::frame_lights) has those of one view.
 
 use std::collections::HashMap;
 use std::f32::consts::PI;
@@ -18,36 +18,36 @@ use super::light_rows;
 use super::light_tables::luminance;
 use crate::gpu::{Buffer, BufferUsage, Device, Error};
 
-/// Lights of a map, its lists, and the tree that finds the list of a point.
+/// Lights of a map, their lists, and the tree that finds the list of a point.
 pub struct MapLights {
-    /// What `fixed` has the addresses of.
+    /// Buffers whose addresses `fixed` holds.
     _buffers: Vec<Buffer>,
-    /// What does not change from view to view: counts and addresses.
+    /// Counts and addresses that are equal in all views.
     fixed: t::LightView,
-    /// Which cluster sees which.
+    /// Mutual visibility of clusters.
     pub(super) sight: Sight,
-    /// For each fog volume the clusters that may see it.
+    /// For each fog volume, the clusters that it may be visible from.
     fog_reach: Vec<ClusterSet>,
-    /// Lights of the world that change in time.
+    /// Animated triangle lights of the world.
     pub(super) changing: Vec<ChangingLight>,
-    /// Points of the world that change in time, as they are in the mean.
+    /// Animated point lights of the world, at their mean strength.
     pub(super) pulsing: Vec<(t::SphereLight, Pulse)>,
     /// Lights of brush models, in the models' space, by model.
     pub(super) moving: Vec<(u32, Vec<ChangingLight>)>,
-    /// How lights change, each way once.
+    /// Distinct animations of lights.
     pub(super) flickers: Vec<Flicker>,
-    /// Radiance of a white diffuse surface in the light that is everywhere.
+    /// Radiance of a white diffuse surface in the map's ambient light.
     pub ambient: Vec3,
-    /// Radiance that the map's exposure shows as white: what is given as displayed is that much brighter.
+    /// Radiance that the map's exposure shows as white; display-encoded colours are scaled by it.
     pub white: f32,
 }
 
-/// A light that each view has in its own form.
+/// A light that each view uploads in its current state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ChangingLight {
-    /// As it is in the mean, in the space of its model.
+    /// At mean strength, in the space of its model.
     pub light: t::TriangleLight,
-    /// Index of how it changes in time.
+    /// Index of its animation.
     pub flicker: Option<usize>,
 }
 
@@ -62,22 +62,22 @@ pub struct MapLightSource<'a> {
     pub suns: &'a [SunLight],
     /// Lists; entries below the number of triangle lights are triangle lights, the others point lights.
     pub lists: &'a LightLists,
-    /// For each triangle light how it changes in time; lights without an entry do not.
+    /// Animation of each triangle light; missing entries are constant lights.
     pub flickers: &'a [Option<&'a Flicker>],
-    /// Where the map's entities put each brush model at start; triangle lights are there.
+    /// Initial position of each brush model by the map's entities; triangle lights are at these positions.
     pub model_origins: &'a [Vec3],
-    /// Radiance of the even light from everywhere.
+    /// Radiance of the ambient light.
     pub ambient: Vec3,
-    /// Light, irradiance / π, that a surface must get from one light to get any; 0: lights have no end.
+    /// Irradiance / π below which the map compiler drops a light's contribution; 0: no cutoff.
     pub light_cutoff: f32,
-    /// The map's tree; `None`: every point gets the list of all lights.
+    /// The map's tree; `None`: every point uses the list of all lights.
     pub bsp: Option<&'a Bsp>,
-    /// What is in the way of light; `None`: only what the lists know of that is known.
+    /// Occluders for visibility rays; `None`: visibility comes from the lists alone.
     pub occlusion: Option<&'a Occlusion>,
 }
 
 impl<'a> MapLightSource<'a> {
-    /// No lights and nothing that is known of them but lists.
+    /// A source without lights.
     pub fn empty(lists: &'a LightLists) -> Self {
         Self {
             triangles: &[],
@@ -93,7 +93,7 @@ impl<'a> MapLightSource<'a> {
         }
     }
 
-    /// The number of a point light: those that change in time are in each view's own.
+    /// Number of a point light; animated ones belong to each view.
     pub(super) fn point_number(&self, index: usize) -> u32 {
         let pulses = |light: &&PointLight| light.pulse.is_some();
         if self.points.get(index).as_ref().is_some_and(pulses) {
@@ -108,21 +108,21 @@ pub(super) fn count(n: usize) -> u32 {
     u32::try_from(n).unwrap_or(u32::MAX)
 }
 
-/// The number of a light: its kind (`LIGHT_*`) and its index among those.
+/// Light number from kind (`LIGHT_*`) and index within the kind.
 pub(super) fn number(kind: u32, index: usize) -> u32 {
     kind << c::LIGHT_KIND_SHIFT | count(index)
 }
 
-/// Cosines of the cone of a spot: full light inside of the first, none outside of the second. The map compiler fades
-/// over the last 32 units of the cone's radius at each distance; here the fade covers the outer eighth of the cone's
-/// tangent, which is the same at a distance of 256 units over the tangent.
+/// Cosines of a spot's cone: full light inside the first, none outside the second. The map compiler fades over the last
+/// 32 units of the cone's radius at each distance; here the fade covers the outer eighth of the cone's tangent, which
+/// is equal at a distance of 256 units over the tangent.
 fn spot_cosines(tan_half_angle: f32) -> (f32, f32) {
     let cosine = |tangent: f32| 1.0 / (1.0 + tangent * tangent).sqrt();
     let tangent = tan_half_angle.clamp(0.001, 1000.0);
     (cosine(tangent * 0.875), cosine(tangent))
 }
 
-/// The sphere that gives a radiant intensity (in a unit where irradiance is `intensity / distance²`).
+/// The sphere light with this radiant intensity (irradiance is `intensity / distance²`).
 pub(super) fn sphere(origin: Vec3, radius: f32, intensity: Vec3, clearance: f32) -> t::SphereLight {
     let radius = radius.max(0.1);
     t::SphereLight {
@@ -150,7 +150,7 @@ pub(super) fn sphere_bounds(light: &t::SphereLight) -> t::LightBounds {
         } else {
             Vec3::ZERO
         },
-        // as L: irradiance over pi. What gives nothing needs no candidates, but 0 would say that it is a triangle.
+        // irradiance over pi. Lights of zero radiance need no candidates, but 0 would mark a triangle light.
         omni_intensity: (luminance(light.radiance) * light.radius * light.radius)
             .max(f32::MIN_POSITIVE),
     }
@@ -173,8 +173,8 @@ pub(super) fn triangle_bounds(light: &t::TriangleLight) -> t::LightBounds {
     }
 }
 
-/// For each light the L below which it gives nothing. The compiler made a light of each triangle; of a sprite it made one,
-/// of which each quad ends at its part. Skies have no end.
+/// For each light, the irradiance over pi below which its contribution is 0. The map compiler made one light per
+/// triangle; of a sprite it made one light in all, so that each quad's cutoff is its share. Skies have no cutoff.
 fn ends(source: &MapLightSource<'_>) -> Vec<f32> {
     if source.light_cutoff <= 0.0 {
         return vec![0.0; source.triangles.len()];
@@ -220,17 +220,17 @@ pub(super) fn point_light(light: &PointLight, end: f32) -> t::SphereLight {
     s
 }
 
-/// Triangle lights by where and how they shine.
+/// Triangle lights by motion and animation.
 #[derive(Default)]
 struct SortedTriangles {
-    /// Of the world, as they are.
+    /// Constant lights of the world.
     triangles: Vec<t::TriangleLight>,
-    /// Of the world, changing in time.
+    /// Animated lights of the world.
     changing: Vec<ChangingLight>,
-    /// Of brush models.
+    /// Lights of brush models, by model.
     moving: Vec<(u32, Vec<ChangingLight>)>,
     flickers: Vec<Flicker>,
-    /// For each light of the source its number in the lists; lights of brush models are in no list.
+    /// For each light of the source, its number in the lists; lights of brush models are in no list.
     numbers: Vec<Option<u32>>,
 }
 
@@ -246,7 +246,7 @@ impl SortedTriangles {
         sorted
     }
 
-    /// Index of a way to change in time.
+    /// Index of an animation; adds it if it is new.
     fn flicker(&mut self, flicker: &Flicker) -> usize {
         let at = self.flickers.iter().position(|f| f == flicker);
         at.unwrap_or_else(|| {
@@ -294,7 +294,7 @@ struct Buffers<'a> {
 }
 
 impl Buffers<'_> {
-    /// Uploads data; returns their address.
+    /// Uploads data; returns its address.
     fn add<T: bytemuck::Pod>(&mut self, name: &str, data: &[T]) -> Result<u64, Error> {
         let buffer = Buffer::with_data(self.device, name, BufferUsage::STORAGE, data)?;
         let address = buffer.address();
@@ -388,13 +388,13 @@ impl MapLights {
         Self::new(device, &MapLightSource::empty(&LightLists::default()))
     }
 
-    /// Finds from where each of the map's fog volumes may be seen.
+    /// Computes from which clusters each fog volume may be visible.
     pub fn find_fogs(&mut self, boxes: &[Aabb]) {
         let reach = |fog: &Aabb| self.sight.lit_from(&self.sight.touching(*fog));
         self.fog_reach = boxes.iter().map(reach).collect();
     }
 
-    /// Which fog volumes may be seen from a point; all where nobody knows.
+    /// Fog volumes that may be visible from a point; all if their visibility is unknown.
     pub(super) fn fogs_seen_from(&self, eye: Vec3) -> impl Fn(usize) -> bool {
         let cluster = self.sight.cluster_at(eye);
         move |fog| {
@@ -403,7 +403,7 @@ impl MapLights {
         }
     }
 
-    /// Counts and addresses that are the same in every view.
+    /// Counts and addresses that are equal in all views.
     pub(super) fn fixed(&self) -> t::LightView {
         self.fixed
     }

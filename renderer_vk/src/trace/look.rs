@@ -1,4 +1,4 @@
-//! The traced look of a loaded map: what the loaders made, as the tracer takes it.
+//! Adapter of the traced look: converts the loaded map and its assets to the tracer's input.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -63,7 +63,7 @@ impl MaterialTable for Assets {
     }
 }
 
-/// Changes when another material is drawn in place of one, or the skies' clouds move to another height.
+/// A number that changes when a material is remapped or the height of a sky's clouds changes.
 fn remapping(materials: &Materials) -> u64 {
     let mut hasher = DefaultHasher::new();
     materials.cloud_height().to_bits().hash(&mut hasher);
@@ -75,7 +75,7 @@ fn remapping(materials: &Materials) -> u64 {
     hasher.finish()
 }
 
-/// What of the map keeps its shape.
+/// The map's geometry of constant shape.
 fn static_scene<'a>(world: &'a World, fogs: &'a [Fog]) -> StaticScene<'a> {
     let data = &world.data;
     let surfaces = data
@@ -102,7 +102,7 @@ fn static_scene<'a>(world: &'a World, fogs: &'a [Fog]) -> StaticScene<'a> {
     }
 }
 
-/// What keeps its shape, as rays meet it.
+/// Acceleration structures of the map's constant geometry.
 fn geometry(
     device: &Device,
     tracer: Tracer,
@@ -115,7 +115,7 @@ fn geometry(
     Ok(geometry)
 }
 
-/// A view of the loaded map, with what it is drawn from and to.
+/// A view of the loaded map, with its inputs and target.
 #[derive(Clone, Copy)]
 pub struct MapView<'a> {
     /// What the view shows.
@@ -128,28 +128,28 @@ pub struct MapView<'a> {
     pub settings: &'a Settings,
     /// The image that the view's rectangle is in: RGBA8, usable as storage image.
     pub target: &'a Image,
-    /// Flares of the view that rays test.
+    /// Flares of the view whose visibility rays test.
     pub flares: FlareTest,
-    /// Channels of the target that are written.
+    /// Colour channels of the target that are written.
     pub mask: ColorMask,
 }
 
 /// The traced look of one map.
 pub struct TraceLook {
     pub(super) tracer: ViewTracer,
-    /// Draws for the right eye, while there are two: what is kept from frame to frame is each eye's own.
+    /// Tracer of the right eye in stereo; each eye has its own history.
     right: Option<Box<ViewTracer>>,
     passes: Arc<PassSet>,
     geometry: StaticGeometry,
-    /// The map's, with the light in them.
+    /// The map's fog volumes, with their mean light.
     fogs: Vec<Fog>,
     lights: MapLights,
-    /// Of the materials, when `geometry` was built.
+    /// Remapping of the materials at the time when `geometry` was built.
     remapping: u64,
 }
 
 impl TraceLook {
-    /// Compiles what the passes lack and builds the map's acceleration structures and light lists.
+    /// Compiles missing passes, and builds the map's acceleration structures and light lists.
     ///
     /// # Errors
     /// The device is out of memory or lost.
@@ -191,7 +191,7 @@ impl TraceLook {
         })
     }
 
-    /// Records all passes of a view into its rectangle of the target, and finds which of its flares are seen.
+    /// Records all passes of a view into its rectangle of the target, and tests the visibility of its flares.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
@@ -207,7 +207,7 @@ impl TraceLook {
         } = view;
         let remapping = remapping(&assets.materials);
         if remapping != self.remapping {
-            // triangles name their materials; this happens when a game changes a flag's or button's look
+            // triangles store their materials; a game remaps when a flag or a button changes its look
             self.geometry = geometry(rec.device(), self.tracer(), world, &self.fogs, assets)?;
             self.remapping = remapping;
         }
@@ -244,7 +244,7 @@ impl TraceLook {
         tracer.record_view(rec, view)
     }
 
-    /// Records all passes of a view by another tracer than the one whose picture is shown.
+    /// Records all passes of a view with a given `ViewTracer`, such as that of a screenshot.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
@@ -272,28 +272,27 @@ impl TraceLook {
         tracer.record_view(rec, view)
     }
 
-    /// What follows rays.
+    /// The tracer.
     pub fn tracer(&self) -> Tracer {
         self.passes.tracer()
     }
 
-    /// The passes.
+    /// The pipelines of the passes.
     pub(super) fn passes(&self) -> &Arc<PassSet> {
         &self.passes
     }
 
-    /// Counts rays from the next view on, or no longer.
+    /// Switches ray counters, from the next view on.
     pub fn count_rays(&mut self, count: bool) {
         self.tracer.count_rays = count;
     }
 
-    /// Rays that a pass asked for in the newest finished frame; `None` for a pass that asks for none, or while rays
-    /// are not counted.
+    /// Rays of a pass in the newest finished frame; `None` for a pass without a counter, or while rays are not counted.
     pub fn rays(&self, pass: &str) -> Option<u64> {
         self.tracer.rays()?.get(counter_of(pass)?).copied()
     }
 
-    /// Bytes of the acceleration structures, by what they hold.
+    /// Bytes of the acceleration structures, by content.
     #[cfg(test)]
     pub fn accel_memory(&self) -> AccelMemory {
         AccelMemory {

@@ -1,11 +1,11 @@
 //! The traced look: acceleration structures, and the passes from camera rays to the picture.
 //!
-//! [`view_tracer`] lists the passes of a frame in their order, [`passes`] declares each. Before them [`accel`] builds what
-//! moves and the top level, and [`motion`] finds where everything was in the last frame. Rays are launched only from ray
-//! generation shaders; hit shaders report what was hit and decide cut-outs.
+//! [`view_tracer`] lists the passes of a frame in their order, [`passes`] declares each. Before them, [`accel`] builds
+//! structures of moving geometry and the top level, and [`motion`] finds positions of the last frame. Only ray
+//! generation shaders launch rays; hit shaders report hits and evaluate alpha tests.
 //!
-//! Radiometry: light is carried as `L`, the radiance that a white diffuse surface shows (irradiance divided by pi), in
-//! units where 1 is display white. Estimators divide by their probabilities, so all of them agree in the mean.
+//! Radiometry: light is stored as `L`, the radiance that a white diffuse surface reflects (irradiance divided by pi),
+//! in units where 1 is display white. Estimators divide by their probabilities, so that all have the same mean.
 #![forbid(unsafe_code)]
 
 pub mod accel;

@@ -1,14 +1,14 @@
-//! Where everything of a view was in the last frame: what the motion of a pixel's surface is found with.
+//! Motion vectors: positions of a view's geometry in the last frame.
 //!
-//! The engine's entities have no names, so an entity is found again by what it is (kind, model, skin, material, who
-//! sees it) and where: among those that are alike, the nearest to where the one of the last frame would be by now, a
-//! little farther counted if its key frames do not follow on. An entity is not found again when none that is alike is
-//! within reach of the fastest thing in a game; then its surfaces say that nobody knows where they were, and they begin
-//! without history. If two that are alike are mistaken for each other, the motion points at where the other one was,
-//! and the length of the way there tells whether the same was seen.
+//! The engine's entities have no identifiers. An entity is therefore matched by its properties (kind, model, skin,
+//! material, visibility) and position: among entities of equal properties, the one of the last frame whose extrapolated
+//! position is nearest; key frames that do not continue add a penalty distance. Without such an entity within the
+//! distance that the fastest projectile covers, the entity is unmatched: its surfaces have unknown motion and no
+//! history. If two equal entities are confused, the motion vector points to the other entity, and filters reject the
+//! history where the stored view distance differs.
 //!
-//! The vertices of a mesh that is found again, and has as many, are those of the last frame; otherwise it moved as a
-//! whole. Polygons that belong to no entity (marks on walls, most of them) are taken to be at rest.
+//! The vertices of a matched mesh of equal vertex count have their positions of the last frame; otherwise the mesh
+//! moves rigidly. Polygons without an entity (most are marks on walls) count as static.
 
 use std::collections::HashMap;
 
@@ -23,15 +23,15 @@ use crate::api::{EntityKind, renderfx};
 use crate::gpu::{Error, Recorder};
 use crate::scene::{DynamicMesh, TracedScene, ViewEntity};
 
-/// Fastest that an entity is taken to move, units a second, and what is allowed beside that.
+/// Greatest speed of an entity, units a second, and an additional distance, units.
 const FASTEST: f32 = 2500.0;
 const SLACK: f32 = 32.0;
-/// Longest time between two frames that a velocity is trusted for, seconds.
+/// Longest frame time for which velocities are extrapolated, seconds.
 const TRUSTED_TIME: f32 = 0.25;
-/// What key frames that do not follow on count for, as a part of the reach.
+/// Penalty for key frames that do not continue, as a part of the search distance.
 const STRANGE_FRAME: f32 = 0.1;
 
-/// What tells one sort of entity from another.
+/// Properties by which entities are matched.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 struct Sort {
     kind: u8,
@@ -63,11 +63,11 @@ impl Sort {
     }
 }
 
-/// The last frame's view, as much of it as is asked for.
+/// Data of the last frame's view.
 #[derive(Default)]
 struct Past {
     entities: Vec<ViewEntity>,
-    /// Units a second, of each entity.
+    /// Velocity of each entity, units a second.
     velocities: Vec<Vec3>,
     meshes: Vec<DynamicMesh>,
     places: Vec<([Vec3; 3], Vec3)>,
@@ -76,27 +76,27 @@ struct Past {
     time: f32,
 }
 
-/// Finds what moves in the last frame.
+/// Matches a view's geometry with that of the last frame.
 #[derive(Default)]
 pub struct Motion {
     past: Option<Past>,
 }
 
-/// What [`Motion::follow`] found.
+/// Result of [`Motion::follow`].
 pub(super) struct Followed {
-    /// Of each instance.
+    /// For each instance.
     pub instances: Vec<LastInstance>,
-    /// Of each vertex, in the space of its instance then.
+    /// For each vertex, in the space of its instance in the last frame.
     pub positions: Vec<Vec3>,
-    /// Of each portal.
+    /// For each portal.
     pub portals: Vec<PortalRecord>,
-    /// No time has passed.
+    /// The game's time is that of the last frame.
     pub time_stands: bool,
 }
 
 impl Motion {
-    /// Compares a view with the one before and keeps it for the next. `vertices`: device address of the view's
-    /// vertices; `camera_rests`: the camera is where it was.
+    /// Matches a view with the last one and stores it for the next. `vertices`: device address of the view's vertices;
+    /// `camera_rests`: the camera has not moved.
     ///
     /// # Errors
     /// Out of memory.
@@ -123,9 +123,9 @@ impl Motion {
         })
     }
 
-    /// Finds everything of a view in the one before, and keeps it for the next.
+    /// Matches all geometry of a view with the last view, and stores the view for the next frame.
     pub(super) fn follow(&mut self, view: &TracedScene, portals: &[PortalRecord]) -> Followed {
-        // The first view has none before it.
+        // The first view has no predecessor.
         let past = self.past.take().unwrap_or_default();
         let mut found = Followed {
             instances: vec![LastInstance::default(); view.instances.len()],
@@ -182,13 +182,13 @@ fn last_instance(now: &Instance, (axis, origin): ([Vec3; 3], Vec3)) -> LastInsta
 }
 
 impl Past {
-    /// For each entity the index of the one that it was.
+    /// For each entity, the index of its match in the last frame.
     fn match_entities(&self, entities: &[ViewEntity], passed: f32) -> Vec<Option<usize>> {
         let mut alike: HashMap<Sort, Vec<usize>> = HashMap::new();
         for (index, entity) in self.entities.iter().enumerate() {
             alike.entry(Sort::of(entity)).or_default().push(index);
         }
-        // a game that starts anew sets its clock back
+        // a restarted game resets its clock
         let passed = if passed >= 0.0 { passed } else { 0.0 };
         let reach = SLACK + FASTEST * passed;
         let ahead = if passed <= TRUSTED_TIME { passed } else { 0.0 };
@@ -211,7 +211,7 @@ impl Past {
                 .enumerate()
                 .filter_map(|(place, index)| Some((place, cost(index)?)))
                 .min_by(|a, b| a.1.total_cmp(&b.1))?;
-            // the order stays: of two at one place each finds its own
+            // keeps the order, so that of two entities at one position each is matched with itself
             Some(candidates.remove(best.0))
         };
         entities.iter().map(match_one).collect()
@@ -249,7 +249,7 @@ impl Past {
         }
     }
 
-    /// Surfaces of the world that are deformed.
+    /// Motion of the world's deformed surfaces.
     fn follow_world(&self, view: &TracedScene, positions: &mut [Vec3]) {
         let ours = |mesh: &&DynamicMesh| mesh.instance == 0 && mesh.world_surface.is_some();
         let old: HashMap<(u32, u8), &DynamicMesh> = self
@@ -265,7 +265,7 @@ impl Past {
         }
     }
 
-    /// Of a mesh with as many vertices and triangles as before, the positions that it had.
+    /// Copies the last positions of a mesh whose counts of vertices and triangles are unchanged.
     fn follow_mesh(&self, mesh: &DynamicMesh, old: &DynamicMesh, positions: &mut [Vec3]) {
         if (mesh.vertex_count, mesh.index_count) != (old.vertex_count, old.index_count) {
             return;
@@ -282,7 +282,8 @@ impl Past {
         }
     }
 
-    /// A portal as it was: the nearest of its sort that faces alike; itself if there was none.
+    /// The matching portal of the last frame: the nearest one of equal kind and direction; without one, the portal
+    /// itself.
     fn portal(&self, now: &PortalRecord) -> PortalRecord {
         let normal = |p: &PortalRecord| Vec3::new(p.plane[0], p.plane[1], p.plane[2]);
         self.portals

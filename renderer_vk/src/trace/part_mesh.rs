@@ -1,4 +1,4 @@
-//! The triangles of a part, gathered from its meshes.
+//! Triangles of a part, collected from its meshes.
 
 use glam::Vec3;
 use shaders::types::Vertex;
@@ -14,14 +14,14 @@ use crate::scene::{MeshGeometry, TracedScene};
 pub struct MeshPart<'a> {
     /// Its vertices and indices.
     pub mesh: MeshGeometry<'a>,
-    /// First vertex, counted from the part's first.
+    /// Index of its first vertex in the part.
     pub offset: u32,
-    /// The triangles that it takes, with the coverage of all; `None`: all of them.
+    /// The triangles of the mesh that the part takes, with the coverage of each; `None`: all.
     pub taken: Option<(Coverage, &'a [Coverage])>,
 }
 
 impl MeshPart<'_> {
-    /// Triangles that count from the part's first vertex.
+    /// Triangles, as vertex indices in the part.
     pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         let offset = self.offset;
         let takes = |place: usize| match self.taken {
@@ -39,7 +39,7 @@ pub fn members<'a>(view: &'a TracedScene, parts: &'a Parts, part: &Part) -> Vec<
     let members = part.members.clone();
     let meshes = slice::part(&parts.meshes, members.clone());
     let skins = slice::part(&parts.skins, members);
-    // one that is not there is an empty one, so that members and skins stay side by side
+    // an absent mesh is replaced by an empty one, so that meshes and skins keep equal indices
     const NOTHING: MeshGeometry<'_> = MeshGeometry {
         vertices: &[],
         indices: &[],
@@ -67,19 +67,19 @@ pub fn part_indices(meshes: &[MeshPart<'_>]) -> Vec<[u32; 3]> {
     meshes.iter().flat_map(MeshPart::triangles).collect()
 }
 
-/// Whether a part has these triangles.
+/// Whether `indices` equal the triangles of these meshes.
 pub fn is_same(indices: &[[u32; 3]], meshes: &[MeshPart<'_>]) -> bool {
     let now = meshes.iter().flat_map(MeshPart::triangles);
     now.eq(indices.iter().copied())
 }
 
-/// Positions of triangles' corners.
+/// Corner positions of triangles.
 pub fn part_corners(vertices: &[Vertex], indices: &[[u32; 3]]) -> Vec<[Vec3; 3]> {
     let position = |i: u32| vertices.get(i as usize).map_or(Vec3::NAN, |v| v.position);
     indices.iter().map(|t| t.map(position)).collect()
 }
 
-/// A part's triangles as the driver builds from them; `vertices` and `triangles` are counts.
+/// A part's triangles as build input of the driver; `vertices` and `triangles` are counts.
 pub fn geometry(
     kind: Kind,
     vertex_address: u64,

@@ -1,4 +1,4 @@
-//! The meshes of a view, sorted by what rays do with them and by how much of them outlives the frame.
+//! Sorts the meshes of a view by ray visibility and by lifetime.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -17,27 +17,27 @@ use super::geometry::{rank_bits, sides};
 use super::input::{Kind, MaterialInfo, MaterialTable};
 use crate::scene::{DynamicMesh, MeshId, Shape, TracedScene, turned};
 
-/// Smallest volume of an entity's axes that an instance can be turned back from; flatter ones are left out.
+/// Least volume of an entity's axes that counts as invertible; flatter entities are omitted.
 const FLAT: f32 = 1.0e-12;
 
-/// Triangles of a deformed surface of the map from which on it has a structure of its own.
+/// Minimum number of triangles for which a deformed surface of the map has its own structure.
 const SCRAP: u32 = 128;
 
-/// Who sees a mesh that moves.
+/// Ray types that see a moving mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
     /// Every ray.
     Always,
-    /// The eye alone.
+    /// Camera rays alone.
     FirstPerson,
-    /// Mirrors, shadows and bounced light.
+    /// Mirror rays, shadow rays and bounce rays.
     ThirdPerson,
-    /// Everything but shadows.
+    /// All but shadow rays.
     NoShadow,
 }
 
 impl Seen {
-    /// All there are.
+    /// All values.
     pub const ALL: [Self; 4] = [
         Self::Always,
         Self::FirstPerson,
@@ -45,7 +45,7 @@ impl Seen {
         Self::NoShadow,
     ];
 
-    /// By an instance's `INSTANCE_*` bits.
+    /// By the `INSTANCE_*` bits of an instance.
     pub fn of(flags: u32) -> Self {
         if flags & c::INSTANCE_FIRST_PERSON != 0 {
             Self::FirstPerson
@@ -58,7 +58,7 @@ impl Seen {
         }
     }
 
-    /// Mask of a top-level instance.
+    /// Instance mask in the top level.
     pub fn mask(self, kind: Kind) -> u8 {
         match (self, kind) {
             (_, Kind::Sky) => MASK_SKY,
@@ -66,7 +66,7 @@ impl Seen {
             (Self::FirstPerson, Kind::Translucent) => MASK_FIRST_TRANSLUCENT,
             (Self::ThirdPerson, Kind::Translucent) => MASK_THIRD_TRANSLUCENT,
             (Self::Always, Kind::Passed) => MASK_NO_SHADOW,
-            // no mask is of mirror rays alone: every one that they have is shared with shadow rays
+            // no mask bit is for mirror rays alone: they share each bit with shadow rays
             (Self::ThirdPerson, Kind::Passed) => 0,
             (Self::Always, _) => MASK_SOLID,
             (Self::FirstPerson, _) => MASK_FIRST_SOLID,
@@ -76,104 +76,103 @@ impl Seen {
     }
 }
 
-/// What a part's triangles are made from.
+/// Source of a part's triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Source {
-    /// A mesh that keeps its shape, by its number.
+    /// A mesh of constant shape, by its number.
     Rigid(u64),
-    /// A mesh whose vertices are made anew each frame.
+    /// A mesh whose vertices change each frame.
     Animated(MeshId),
 }
 
-/// What a bottom-level structure is known by: one for each of its meshes.
+/// Key of a bottom-level structure: one for each of its meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ShapeMesh {
     /// Kind of its triangles.
     pub kind: Kind,
-    /// Where they come from.
+    /// Source of the triangles.
     pub source: Source,
-    /// First vertex, counted from the part's first.
+    /// Index of its first vertex in the part.
     pub first_vertex: u32,
     /// Number of vertices.
     pub vertices: u32,
     /// Number of indices.
     pub indices: u32,
-    /// Which of its triangles.
+    /// The subset of its triangles.
     pub share: Share,
 }
 
-/// The triangles of a mesh that a part takes; which these are depends on the material, by whose index shares are told
-/// apart.
+/// Subset of a mesh's triangles in a part. The subset depends on the material, whose index distinguishes subsets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Share {
     /// All.
     #[default]
     Whole,
-    /// Of a cut-out those without holes.
+    /// Triangles of an alpha-tested material without holes.
     Solid(u32),
-    /// Of a cut-out those that have to be tested.
+    /// Triangles that need the alpha test.
     Mixed(u32),
 }
 
-/// A skin of a shape: what the coverage of triangles is known by.
+/// Key of the coverage of triangles: source, subset of vertices, material.
 type SkinnedShape = (Source, u32, u32);
 
-/// Coverages that are kept at most; beyond that they are found anew, which takes a while and changes nothing.
+/// Maximum number of stored coverages; above it all are dropped and computed again.
 const KEPT_COVERAGES: usize = 4096;
 
-/// What a part's triangles are known by, beside their shape: the skin.
+/// Key of a part's triangle records: shape and skin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SkinMesh {
     /// The shape.
     pub shape: ShapeMesh,
-    /// Material that is drawn.
+    /// Drawn material.
     pub material: u32,
-    /// Fog volume plus one.
+    /// Fog volume plus one; 0: none.
     pub fog: u32,
     /// `Triangle.flags`.
     pub flags: u32,
 }
 
-/// Meshes of one instance that rays treat alike.
+/// Meshes of one instance with equal ray visibility and kind.
 #[derive(Clone, Debug)]
 pub struct Part {
     /// Index of the instance.
     pub instance: u32,
-    /// Who sees it.
+    /// Ray types that see it.
     pub seen: Seen,
     /// Kind of its triangles.
     pub kind: Kind,
-    /// Its vertices are made anew each frame.
+    /// Its vertices change each frame.
     pub animated: bool,
-    /// Of an animated part, its vertices in [`TracedScene::vertices`].
+    /// Range of an animated part's vertices in [`TracedScene::vertices`].
     pub vertices: Range<usize>,
     /// Its members in [`Parts::shapes`], [`Parts::skins`] and [`Parts::meshes`].
     pub members: Range<usize>,
-    /// Place of its first mesh in drawing order.
+    /// Drawing order of its first mesh.
     order: usize,
 }
 
-/// Meshes without a shape of their own, in world space.
+/// Meshes that live for one frame, in world space.
 pub struct Slot {
-    /// Who sees them.
+    /// Ray types that see them.
     pub seen: Seen,
     /// Kind of their triangles.
     pub kind: Kind,
-    /// For hits; they index [`TracedScene::vertices`].
+    /// Triangle records; they index [`TracedScene::vertices`].
     pub triangles: Vec<Triangle>,
-    /// The same triangles for builds; they index [`Parts::positions`].
+    /// The same triangles as build input; they index [`Parts::positions`].
     pub indices: Vec<[u32; 3]>,
 }
 
-/// What distinguishes one part from another.
+/// Properties that distinguish parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct PartKey {
     instance: u32,
     kind: Kind,
     animated: bool,
-    /// Translucent layers in one plane keep the order in which they are drawn: one material to a part.
+    /// Coplanar translucent layers keep their drawing order: one material per part.
     material: u32,
-    /// Which surfaces of the map are in sight changes; each is a part.
+    /// The set of visible map surfaces changes; each surface is a part.
     world_surface: u32,
 }
 
@@ -184,7 +183,7 @@ struct Member {
     skin: SkinMesh,
 }
 
-/// A view's meshes in order. The memory is reused.
+/// Sorted meshes of a view. Its memory is reused.
 pub struct Parts {
     /// Parts in drawing order.
     pub parts: Vec<Part>,
@@ -194,15 +193,15 @@ pub struct Parts {
     pub skins: Vec<SkinMesh>,
     /// Indices of the members in [`TracedScene::meshes`].
     pub meshes: Vec<usize>,
-    /// Everything else.
+    /// Meshes that live for one frame.
     pub slots: Vec<Slot>,
     /// Positions of the slots' triangles, in world space.
     pub positions: Vec<Vec3>,
     members: Vec<Member>,
     order: Vec<(f32, u32, usize)>,
-    /// Of cut-outs with triangles that need no test.
+    /// Coverage of the triangles of alpha-tested meshes, where some triangles need no test.
     coverages: HashMap<SkinnedShape, Option<Box<[Coverage]>>>,
-    /// Of the materials, when `coverages` was last emptied.
+    /// Generation of the materials when `coverages` was last cleared.
     generation: u64,
 }
 
@@ -238,7 +237,7 @@ impl Default for Parts {
     }
 }
 
-/// Whether an instance can be turned back: its axes span a volume.
+/// Whether an instance's axes span a volume, so that its transform is invertible.
 pub fn is_solid(axis: Mat3) -> bool {
     let volume = axis.determinant().abs();
     volume.is_finite() && volume > FLAT
@@ -252,7 +251,7 @@ pub fn axes(instance: &Instance) -> Mat3 {
 
 /// `Triangle.flags` of a mesh.
 fn triangle_flags(mesh: &DynamicMesh, instance: &Instance, kind: Kind, info: &MaterialInfo) -> u32 {
-    // what is baked into the world's own vertices is not part of the material
+    // lightmap coordinates in the world's vertices are not part of the material
     let world = if mesh.world_surface.is_some() {
         c::TRIANGLE_WORLD
     } else {
@@ -267,7 +266,7 @@ fn triangle_flags(mesh: &DynamicMesh, instance: &Instance, kind: Kind, info: &Ma
     world | faces_eye | sides(kind) | rank_bits(info) | paths
 }
 
-/// Source, vertices and indices of a mesh that has a structure of its own.
+/// Source, vertices and indices of a mesh with its own structure; `None` if it lives for one frame.
 fn kept_source(view: &TracedScene, mesh: &DynamicMesh) -> Option<(Source, u32, u32)> {
     match mesh.shape {
         Shape::Rigid(rigid) => {
@@ -296,7 +295,7 @@ impl Parts {
             self.coverages.clear();
             self.generation = materials.generation();
         }
-        // in drawing order, so that of two translucent layers in one plane the later primitive is drawn later
+        // in drawing order, so that of two coplanar translucent layers the later primitive is drawn later
         let mut order = std::mem::take(&mut self.order);
         order.clear();
         for (index, mesh) in view.meshes.iter().enumerate() {
@@ -330,13 +329,13 @@ impl Parts {
             return;
         };
         let flags = triangle_flags(mesh, instance, kind, info);
-        // Seen from anywhere, the faces of something pressed flat lie in one plane, and which of them a ray meets first
-        // is left to the last bits of its distance: it would flicker.
+        // The faces of an instance without volume are coplanar, and rounding decides which of them a ray hits first:
+        // the instance would flicker.
         if !is_solid(axes(instance)) {
             return;
         }
-        // Only paths of the eye that were turned by a portal meet what is turned to the eye as they see it: to all
-        // tracers it is a translucent layer, whatever its stages are, because nothing else asks for those.
+        // Copies that face a portal's camera are visible only to primary rays that passed that portal: for all tracers
+        // they are translucent layers, whatever their stages are, because no other ray searches for layers.
         if mesh.paths >= turned::PORTAL {
             let seen = Seen::ThirdPerson;
             self.add_changing(
@@ -391,7 +390,7 @@ impl Parts {
         }
     }
 
-    /// Kinds and shares of a cut-out's triangles: those without holes need no test.
+    /// Kinds and subsets of an alpha-tested mesh: triangles without holes need no test.
     fn cut_out_shares(
         &mut self,
         view: &TracedScene,
@@ -417,7 +416,7 @@ impl Parts {
         ]
     }
 
-    /// The coverages of a skin's triangles, where it takes a share of them.
+    /// Coverage of a skin's triangles, if it takes a subset of them.
     pub fn coverages(&self, skin: &SkinMesh) -> Option<&[Coverage]> {
         if skin.shape.share == Share::Whole {
             return None;
@@ -426,7 +425,7 @@ impl Parts {
         self.coverages.get(&key)?.as_deref()
     }
 
-    /// Puts the members of each part side by side.
+    /// Sorts members so that those of a part are contiguous.
     fn group(&mut self, view: &TracedScene) {
         self.parts.clear();
         self.shapes.clear();
@@ -442,7 +441,7 @@ impl Parts {
                 continue;
             };
             let first = self.meshes.len();
-            // vertices of an animated part lie side by side in the view, those of a rigid one in its own memory
+            // vertices of an animated part are contiguous in the view, those of a rigid mesh in its own buffer
             let base = members.iter().map(|m| m.skin.shape.first_vertex).min();
             let base = base.unwrap_or(0);
             let mut end = 0;
@@ -472,7 +471,7 @@ impl Parts {
         self.parts.sort_by_key(|part| part.order);
     }
 
-    /// Adds a mesh to those that are placed here. Triangles with a corner that is no number are left out.
+    /// Adds a mesh that lives for one frame, in world space. Omits triangles with a non-finite corner.
     fn add_changing(
         &mut self,
         view: &TracedScene,
@@ -515,7 +514,7 @@ impl Parts {
     }
 }
 
-/// Coverage of each triangle of a model's surface in a material.
+/// Coverage of each triangle of a model's surface with a material.
 fn triangle_coverages(
     view: &TracedScene,
     mesh: &DynamicMesh,
@@ -533,13 +532,13 @@ fn triangle_coverages(
         .collect()
 }
 
-/// Whether a deformed surface of the map is so small that it is better built together with all others of its sort:
-/// flames and lamps that turn to the eye come by hundreds, and each structure costs a build and an instance.
+/// Whether a deformed surface of the map is so small that it shares a structure with others of its kind: a map may have
+/// hundreds of flames and lamps that face the camera, and each structure costs a build and an instance.
 fn is_scrap(mesh: &DynamicMesh) -> bool {
     mesh.world_surface.is_some() && mesh.index_count < 3 * SCRAP
 }
 
-/// Whether a mesh's vertices are there and numbers: a structure that is fitted to them must not meet others.
+/// Whether a mesh's vertices exist and are finite, as refits require.
 fn is_whole(view: &TracedScene, mesh: &DynamicMesh) -> bool {
     let first = mesh.first_vertex as usize;
     let range = first..first.saturating_add(mesh.vertex_count as usize);

@@ -1,4 +1,4 @@
-//! The pipelines of the traced look's passes, compiled once for a device and tracer, whatever maps and views come and go.
+//! The compiled pipelines of the traced look's passes, one set per device and tracer, shared by all maps and views.
 
 use std::sync::OnceLock;
 
@@ -9,20 +9,20 @@ use crate::gpu::{ComputePipeline, Device, Error, HitGroup, RayTracingDesc, RayTr
 
 /// A compiled variant of a pass.
 pub enum Pipeline {
-    /// Launched as rays.
+    /// A ray tracing pipeline.
     Rays(RayTracingPipeline),
-    /// Work groups, which may follow rays themselves.
+    /// A compute shader, which may trace rays itself.
     Compute(ComputePipeline),
 }
 
-/// The pipelines: those of each pass with its switch off and on.
+/// Pipelines of each pass, with its switch off and on.
 pub struct PassSet {
     device: Device,
     tracer: Tracer,
     pipelines: Vec<[OnceLock<Pipeline>; 2]>,
 }
 
-/// Passes of denoised pictures with one bounce, those that compile longest first.
+/// Passes of denoised pictures with one bounce, in descending order of compile time.
 const AHEAD: [Pass; 27] = [
     Pass::Primary,
     Pass::OtherSide,
@@ -52,11 +52,11 @@ const AHEAD: [Pass; 27] = [
     Pass::SparseFirst,
     Pass::SparseLast,
 ];
-/// Passes that only maps with fog need.
+/// Passes that only maps with fog run.
 const FOG_AHEAD: [Pass; 2] = [Pass::FogLight, Pass::FogFilter];
 
 impl PassSet {
-    /// Nothing is compiled yet.
+    /// An empty set.
     pub fn new(device: &Device, tracer: Tracer) -> Self {
         Self {
             device: device.clone(),
@@ -70,12 +70,12 @@ impl PassSet {
         &self.device
     }
 
-    /// What follows rays in them.
+    /// The tracer of the passes.
     pub fn tracer(&self) -> Tracer {
         self.tracer
     }
 
-    /// The pipeline of a pass with its switch `on` or off, compiled now if it was not.
+    /// The pipeline of a pass with its switch `on` or off; compiles it at first use.
     ///
     /// # Errors
     /// The driver refuses the pipeline.
@@ -122,8 +122,8 @@ impl PassSet {
         }
     }
 
-    /// Compiles, on all cores at once, what denoised pictures with one bounce need and is not there yet. `has_fog`: the
-    /// map has some; where this is not known, its passes are compiled when it comes into sight.
+    /// Compiles missing pipelines of denoised pictures with one bounce, on all cores at once. `has_fog`: the map has
+    /// fog; if this is unknown, fog passes are compiled when fog comes into view.
     ///
     /// # Errors
     /// The driver refuses a pipeline.

@@ -1,8 +1,8 @@
-//! The passes of the traced look, one row each: shader, specialization constants, size, and what a pass reads and writes.
+//! The passes of the traced look, one row each: shader, specialization constants, size, inputs and outputs.
 //!
-//! [`PassSet`](super::pass_set::PassSet) compiles the rows, [`FramePasses`](super::frame_passes::FramePasses) records them
-//! and checks in debug builds that a frame has written what a pass reads. Timers, statistics and the table in
-//! ARCHITECTURE.md take their names from here. The order of a frame is that of `ViewTracer::record_passes`.
+//! [`PassSet`](super::pass_set::PassSet) compiles the rows, [`FramePasses`](super::frame_passes::FramePasses) records
+//! them, and checks in debug builds that the frame has written each input of a pass. Timers, statistics and the table
+//! in ARCHITECTURE.md use the names of the rows. The order of a frame is that of `ViewTracer::record_passes`.
 
 use shaders::constant_ids::trace as ids;
 use shaders::trace_types::constants as t;
@@ -11,18 +11,18 @@ use shaders::{RayShader, Spirv};
 /// A shader of a pass.
 #[derive(Clone, Copy, Debug)]
 pub enum Shader {
-    /// Traces rays, by whichever tracer.
+    /// Traces rays, with any tracer.
     Rays(&'static RayShader),
-    /// Traces none.
+    /// Traces no rays.
     Compute(&'static Spirv),
 }
 
-/// How many invocations a pass has.
+/// Number of invocations of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Size {
     /// One for each traced pixel.
     Traced,
-    /// One for each slot of the tiles of rays (`ray_order.glsl`).
+    /// One for each slot of the ray tiles (`ray_order.glsl`).
     RayTiles,
     /// One for each cell of 2 × 2 traced pixels.
     Cells,
@@ -44,7 +44,7 @@ pub enum Size {
     Group,
 }
 
-/// A fact about a frame that decides which variant of a pass runs.
+/// A fact about a frame that selects the variant of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Switch {
     /// The view has fog that rays light.
@@ -55,34 +55,34 @@ pub enum Switch {
     Bounces,
 }
 
-/// What passes hand on to each other within a frame.
+/// Data that passes exchange within a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resource {
-    /// Acceleration structures, geometry, materials and where things were in the last frame; ready before the passes.
+    /// Acceleration structures, geometry, materials and positions of the last frame; ready before the passes.
     Scene,
     /// Light lists, lights and suns; ready before the passes.
     Lights,
-    /// What the camera's rays meet first.
+    /// First hits of the camera's rays.
     PrimaryHits,
     /// Position, normals, motion and view distance of the surface that a pixel shows.
     GBuffer,
     /// Albedo of that surface, and the radiance in front of it.
     Shown,
-    /// The same for the other side of a reflecting surface.
+    /// The same for the alternate side of a reflecting or transparent surface.
     Other,
-    /// Points in fog that are to be lit, and the weight of their light.
+    /// Points in fog to be lit, and the weight of their light.
     FogPoints,
     /// Visibility of flares.
     FlareStates,
     /// Pixels that shade a surface of the last frame again.
     GradientPixels,
-    /// The light that each pixel sends a shadow ray to.
+    /// For each pixel, the light that its shadow ray tests.
     SampledLights,
     /// Direct light without albedo; the denoiser leaves the sum of all filtered light here.
     DirectLight,
     /// What the first rays of bounces hit.
     BounceHits,
-    /// The light that each of those hits sends a shadow ray to.
+    /// For each of those hits, the light that its shadow ray tests.
     BounceLights,
     /// Bounced light without albedo.
     IndirectLight,
@@ -119,7 +119,7 @@ pub enum Resource {
 }
 
 impl Resource {
-    /// The first of the resources that share memory with this one: writing one of them destroys the others.
+    /// Representative of the resources that share memory with this one: writing one of them destroys the others.
     pub fn memory(self) -> Self {
         match self {
             Self::SampledLights | Self::BounceHits | Self::BounceLights | Self::FreshLight => {
@@ -134,25 +134,25 @@ impl Resource {
 /// Declaration of a pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
-    /// What it does, for the table in ARCHITECTURE.md.
+    /// Purpose, for the table in ARCHITECTURE.md.
     #[cfg_attr(not(test), expect(dead_code, reason = "documentation"))]
     pub about: &'static str,
     /// Name in timers, statistics and captures. Steps of one filter share a name.
     pub name: &'static str,
-    /// Its code.
+    /// Shader.
     pub shader: Shader,
-    /// Invocations.
+    /// Number of invocations.
     pub size: Size,
     /// Specialization constants, id and value.
     pub constants: &'static [(u32, u32)],
     /// Id of the constant that a switch sets to 0 or 1.
     pub switch: Option<(u32, Switch)>,
-    /// What this frame has written before.
+    /// Resources that an earlier pass of the frame must have written.
     pub reads: &'static [Resource],
-    /// What it reads if this frame has written it, for the same table.
+    /// Resources that it reads if this frame has written them, for the same table.
     #[cfg_attr(not(test), expect(dead_code, reason = "documentation"))]
     pub may_read: &'static [Resource],
-    /// What it writes.
+    /// Resources that it writes.
     pub writes: &'static [Resource],
     /// Number of its ray counter (`COUNT_*`).
     pub counter: Option<u32>,
@@ -420,7 +420,7 @@ passes! {
 }
 
 impl Pass {
-    /// Its declaration.
+    /// Declaration of the pass.
     pub fn row(self) -> &'static Row {
         &TABLE[self as usize]
     }
@@ -429,7 +429,7 @@ impl Pass {
 /// Number of ray counters.
 pub const COUNTERS: usize = t::COUNT_SUNS as usize + 1;
 
-/// Number of the ray counter of the pass with a name.
+/// Number of the ray counter of the pass with this name.
 pub fn counter_of(name: &str) -> Option<usize> {
     let mut rows = TABLE.iter().filter(|row| row.name == name);
     rows.find_map(|row| row.counter).map(|count| count as usize)

@@ -1,8 +1,8 @@
-//! Bottom-level structures of what moves, kept from frame to frame.
+//! Bottom-level structures of moving geometry, kept between frames.
 //!
-//! A part that keeps its shape (a weapon, an item) has one structure ([`rigid`]), however many entities show it. A part
-//! whose vertices move (between key frames, by bones, by deformation) keeps its triangles, and its structure follows the
-//! vertices ([`animated`]). What is not seen for a while is dropped.
+//! A part of constant shape (a weapon, an item) has one structure ([`rigid`]), shared by all entities that show it. A
+//! part whose vertices move (between key frames, by bones, by deformation) keeps its triangles, and its structure is
+//! refitted to the vertices ([`animated`]). Parts that are out of view for long are dropped.
 
 mod animated;
 mod rigid;
@@ -23,14 +23,14 @@ use crate::scene::TracedScene;
 use animated::{AnimatedShape, Scratch};
 use rigid::RigidShape;
 
-/// Frames after which what was not seen is dropped.
+/// Number of frames out of view after which a structure is dropped.
 const KEPT: u64 = 1000;
-/// What stands for a part in the top level.
+/// A part's bottom-level structure, as the top level refers to it.
 #[derive(Clone, Copy, Debug)]
 pub enum Bottom {
-    /// The driver's structure, by its address.
+    /// Address of the driver's structure.
     Driver(u64),
-    /// Ours.
+    /// Our hierarchy.
     Own(OwnBottom),
 }
 
@@ -41,42 +41,42 @@ pub struct OwnBottom {
     pub nodes: u64,
     /// Address of the triangles.
     pub triangles: u64,
-    /// Of all triangles, in the space of the instance.
+    /// Bounds of all triangles, in the space of the instance.
     pub bounds: Aabb,
 }
 
 /// Triangle records of a skin.
 struct Skin {
     seen: u64,
-    /// Of the triangles that it was made for.
+    /// Version of the triangles that it was made for.
     version: u64,
     triangles: Buffer,
 }
 
-/// A part ready to be placed.
+/// A part that is ready for the top level.
 #[derive(Clone, Copy, Debug)]
 pub struct Prepared {
     /// Address of its `Vertex`es.
     pub vertices: u64,
     /// Address of its `Triangle`s.
     pub triangles: u64,
-    /// Of an animated part, which of its shape's poses.
+    /// Index of an animated part's pose.
     pose: usize,
 }
 
-/// Bytes of the structures by what they are for.
+/// Bytes of the structures, by use.
 #[cfg(test)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ShapeMemory {
-    /// Of shapes that stay: structures, vertices and indices.
+    /// Parts of constant shape: structures, vertices and indices.
     pub rigid: u64,
-    /// Of what is fitted each frame.
+    /// Refitted structures.
     pub animated: u64,
-    /// Of triangle records.
+    /// Triangle records.
     pub skins: u64,
 }
 
-/// The structures that are kept.
+/// The kept structures.
 pub struct Shapes {
     device: Device,
     tracer: Tracer,
@@ -85,13 +85,13 @@ pub struct Shapes {
     rigid: HashMap<Box<[ShapeMesh]>, RigidShape>,
     animated: HashMap<Box<[ShapeMesh]>, AnimatedShape>,
     skins: HashMap<Box<[SkinMesh]>, Skin>,
-    /// Structures whose compacted size the GPU was asked for.
+    /// Structures whose compacted sizes the GPU was asked to write.
     asked: Vec<(CompactedSizes, Vec<Box<[ShapeMesh]>>)>,
     scratch: Scratch,
 }
 
 impl Shapes {
-    /// None yet.
+    /// An empty store.
     pub fn new(device: &Device, tracer: Tracer) -> Self {
         Self {
             device: device.clone(),
@@ -106,7 +106,7 @@ impl Shapes {
         }
     }
 
-    /// Another view begins; what was not seen for long is dropped.
+    /// Begins a view; drops what has been out of view for long.
     pub fn begin_view(&mut self) {
         self.frame += 1;
         for shape in self.animated.values_mut() {
@@ -125,7 +125,7 @@ impl Shapes {
         }
     }
 
-    /// How many shapes are kept: those that stay, and structures that are fitted.
+    /// Number of kept shapes: of constant shape, and refitted structures.
     #[cfg(test)]
     pub fn counts(&self) -> [usize; 2] {
         let poses = self.animated.values().map(AnimatedShape::pose_count).sum();
@@ -142,7 +142,8 @@ impl Shapes {
         }
     }
 
-    /// Sees to it that a part has its structure and its triangle records. `vertices`: device address of the view's.
+    /// Makes a part's structure and triangle records if they are missing. `vertices`: device address of the view's
+    /// vertices.
     ///
     /// # Errors
     /// Out of memory.
@@ -171,7 +172,7 @@ impl Shapes {
         })
     }
 
-    /// What to place for a part, after [`build`](Self::build).
+    /// A part's structure for the top level, after [`build`](Self::build).
     pub fn bottom(&self, parts: &Parts, part: &Part, prepared: &Prepared) -> Option<Bottom> {
         let key = parts.shapes.get(part.members.clone())?;
         if part.animated {
@@ -188,7 +189,7 @@ impl Shapes {
             || self.animated.values().any(AnimatedShape::has_work)
     }
 
-    /// Builds what is new and fits what has moved, together with `changing`, in one batch.
+    /// Builds new structures and refits moved ones, together with `changing`, in one batch.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
@@ -230,7 +231,7 @@ impl Shapes {
         Ok(())
     }
 
-    /// Compacts those whose sizes have arrived.
+    /// Compacts structures whose compacted sizes have been read back.
     fn compact(&mut self, pass: &mut Pass<'_>) -> Result<(), Error> {
         let mut waiting = Vec::new();
         for (asked, keys) in std::mem::take(&mut self.asked) {
@@ -239,7 +240,7 @@ impl Shapes {
                 continue;
             };
             for (key, size) in keys.iter().zip(sizes) {
-                // dropped in the meantime, and perhaps made again: then it is another one that is not built yet
+                // the shape may have been dropped, and made again: the new one is not built yet
                 if let Some(shape) = self.rigid.get_mut(key) {
                     shape.compact(pass, size)?;
                 }
@@ -266,7 +267,7 @@ impl Shapes {
         Ok(vertices)
     }
 
-    /// Which pose of the shape it is, and the version of its triangles.
+    /// Index of the shape's pose, and the version of its triangles.
     fn prepare_animated(
         &mut self,
         rec: &mut Recorder,
@@ -318,7 +319,7 @@ impl Shapes {
             triangles.extend(mesh.triangles().map(|indices| Triangle {
                 indices,
                 material: skin.material,
-                // the geometry's record names it
+                // the geometry record holds the instance
                 instance: 0,
                 fog: skin.fog,
                 lightmap: c::NO_TEXTURE,

@@ -1,4 +1,4 @@
-//! An accumulated picture of any size, made over several frames beside what is shown.
+//! Accumulates a picture of any size over several frames, independent of the displayed one.
 
 use super::view_tracer::ViewTracer;
 use crate::gpu::{Device, Error, Format, Image, ImageDesc, ImageUsage, Recorder};
@@ -8,7 +8,7 @@ use crate::settings::{DebugOutput, Settings};
 use super::TraceLook;
 use crate::assets::Assets;
 
-/// A picture in the making: the view as it was when it was asked for, and the passes that draw it.
+/// A picture in progress: the view at the time of the request, and the passes that trace it.
 pub struct Still {
     tracer: ViewTracer,
     view: Box<TracedScene>,
@@ -17,8 +17,8 @@ pub struct Still {
 }
 
 impl Still {
-    /// Keeps a view, to be drawn with a size in pixels until `samples` frames are averaged. Its vertical angle stays;
-    /// a wider picture shows more at the sides.
+    /// Stores a view, to be traced at a size in pixels until `samples` frames are averaged. Its vertical field of view
+    /// stays; a wider picture shows more at the sides.
     ///
     /// # Errors
     /// Out of memory.
@@ -42,7 +42,7 @@ impl Still {
         })
     }
 
-    /// Frames averaged so far, and how many are wanted.
+    /// Number of averaged frames, and of requested ones.
     pub fn progress(&self) -> (u32, u32) {
         (self.tracer.accumulated_frames(), self.wanted)
     }
@@ -52,7 +52,7 @@ impl Still {
         &self.target
     }
 
-    /// Records up to `count` more frames of the picture. Changes of settings start it anew.
+    /// Records up to `count` more frames of the picture. A change of settings restarts it.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
@@ -88,7 +88,7 @@ impl Still {
     }
 }
 
-/// The view in a picture of another size.
+/// The view at another picture size.
 fn resized(view: &TracedScene, size: [u32; 2]) -> TracedScene {
     let mut view = view.clone();
     let [width, height] = size.map(|side| i32::try_from(side.max(1)).unwrap_or(i32::MAX));

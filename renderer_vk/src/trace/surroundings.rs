@@ -1,4 +1,4 @@
-//! What lies in the way of light in a map: surfaces that colour it, and the liquids that a camera can be in.
+//! Transmission of light in a map: surfaces that filter light, and the liquids that a camera can be in.
 
 use glam::{Vec3, Vec4};
 use q3bsp::{Brush, Bsp};
@@ -8,19 +8,19 @@ use crate::assets::Assets;
 use crate::gpu::{Buffer, BufferUsage, Device, Error};
 use crate::world::World;
 
-/// Boxes that shadow rays are held against; with more surfaces each box is around several.
+/// Maximum number of boxes that a shadow ray is tested against; above it, boxes are merged.
 const MAX_BOXES: usize = 16;
-/// How far a deformed surface leaves its place, units, at most as a rule.
+/// Margin for deformed surfaces, units: the usual maximum of a deformation.
 const DEFORMATION: f32 = 16.0;
 
 /// A brush of liquid.
 struct Liquid {
-    /// Outward planes: outside where `xyz . p > w`.
+    /// Outward planes: a point is outside where `xyz . p > w`.
     planes: Vec<Vec4>,
     absorption: Vec3,
 }
 
-/// What lies in the way of light.
+/// Filtering surfaces and liquids of a map.
 #[derive(Default)]
 pub struct Surroundings {
     boxes: Option<Buffer>,
@@ -29,7 +29,7 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// Of a map.
+    /// Collects them from a map.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
@@ -64,7 +64,7 @@ impl Surroundings {
         })
     }
 
-    /// With surfaces that colour light in these boxes alone.
+    /// Only filtering surfaces, in these boxes.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
@@ -81,7 +81,7 @@ impl Surroundings {
         })
     }
 
-    /// Device address of the boxes around surfaces that colour light; 0: there are none.
+    /// Device address of the boxes around filtering surfaces; 0: there are none.
     pub fn filters(&self) -> u64 {
         self.boxes.as_ref().map_or(0, Buffer::address)
     }
@@ -91,7 +91,7 @@ impl Surroundings {
         self.count
     }
 
-    /// Absorption of the liquid around a point, per unit of length; zero outside of liquids.
+    /// Absorption per unit of length of the liquid at a point; zero outside of liquids.
     pub fn absorption(&self, point: Vec3) -> Vec3 {
         let outside = |plane: &Vec4| plane.truncate().dot(point) > plane.w;
         let around = |liquid: &&Liquid| !liquid.planes.iter().any(outside);
@@ -99,7 +99,7 @@ impl Surroundings {
     }
 }
 
-/// The brushes of the world that a material fills.
+/// The world's brushes of a material.
 fn brushes(bsp: &Bsp, name: &str, absorption: Vec3) -> Vec<Liquid> {
     let world = bsp.models.first();
     let brushes = world.map_or(&[][..], |world| bsp.brushes_of(world));
@@ -118,7 +118,7 @@ fn brushes(bsp: &Bsp, name: &str, absorption: Vec3) -> Vec<Liquid> {
         .collect()
 }
 
-/// At most `limit` boxes that hold all of these: neighbours along the longest axis are put together.
+/// At most `limit` boxes that cover all of these: merges neighbours along the longest axis.
 pub fn merged(mut boxes: Vec<Aabb>, limit: usize) -> Vec<Aabb> {
     boxes.retain(|b| b.is_finite());
     if boxes.len() <= limit {
@@ -149,7 +149,7 @@ mod tests {
         for b in &boxes {
             assert!(few.iter().any(|f| f.union(*b) == *f), "{b:?}");
         }
-        // and are not around everything
+        // and none covers everything
         assert!(few.iter().all(|f| f.size().x < 300.0));
         assert_eq!(merged(boxes[..3].to_vec(), 16), boxes[..3]);
     }

@@ -6,7 +6,7 @@ use crate::gpu::{
     Buffer, BufferDesc, BufferUsage, Device, Error, Format, Image, ImageDesc, ImageUsage, Memory,
 };
 
-/// Texels of a size in pixels, `bytes` each.
+/// A buffer with `bytes` bytes for each pixel of a size.
 pub(super) fn texels(
     device: &Device,
     name: &str,
@@ -25,46 +25,47 @@ pub(super) fn texels(
     )
 }
 
-/// Images of one size: the G-buffer, the light, the picture before tone mapping, and the accumulated sum.
+/// Images of one size: the G-buffer, light, the picture before tone mapping, and the accumulated mean.
 ///
-/// Formats are given as texels are read; colours are linear, lengths units of the map. *Light* is four bytes: three
+/// Formats are given with each image; colours are linear, lengths in units of the map. *Light* has four bytes: three
 /// mantissas of nine bits with one exponent (`light_image.glsl`).
 pub struct Targets {
     /// Pixels.
     pub width: u32,
     /// Pixels.
     pub height: u32,
-    /// 16 bytes a pixel that passes use in turns: primary hits, then sampled lights, then light that the denoiser filters.
+    /// 16 bytes a pixel that passes use in turns: primary hits, then sampled lights, then light that the denoiser
+    /// filters.
     pub scratch: Buffer,
-    /// `Rgba32F`: world position of the surface that is shown, and length of the way to it from the eye (negative: nothing
-    /// to light; its lowest bit is set of what the eye alone sees). Written by `plain` and `primary`, read by all that light
-    /// or filter.
+    /// `Rgba32F`: world position of the shown surface, and its view distance (negative: no surface to light; its lowest
+    /// bit is set if only camera rays see the surface). Written by `primary_simple` and `primary`, read by all passes
+    /// that light or filter.
     pub position: Image,
-    /// `Rg32Uint`: normal of its triangle and normal that it is lit by, packed (`direction.glsl`). Written and read as
-    /// `position` is.
+    /// `Rg32Uint`: geometric normal and shading normal, packed (`direction.glsl`). Written and read as `position` is.
     pub surface: Image,
-    /// `Rg32Uint`, two of light: albedo, with all that lies between the eye and the surface, and the radiance of what is in
-    /// front of the surface and of its own glow. Written by `plain` and `primary`, read by `composite`.
+    /// `Rg32Uint`, two of light: albedo times the transmission between camera and surface, and the radiance in front of
+    /// the surface plus its own emission. Written by `primary_simple` and `primary`, read by `composite`.
     pub shown: Image,
-    /// Where pixels show what a surface reflects and what lies behind it in turns: as `shown`, of that which the pixel
-    /// does not show. Written by the pass of the other side.
+    /// As `shown`, for pixels that show reflection and refraction alternately: the side that the pixel does not show.
+    /// Written by `trace_other_side`.
     pub other: Image,
-    /// `Rgba16F`: how far from the pixel its surface was in the last frame (pixels, right and down), the length of the way
-    /// to it then (negative: unknown), and the mark of the pixel (`motion.glsl`). Read by the denoiser and by TAA.
+    /// `Rgba16F`: offset of the surface's pixel in the last frame (pixels, right and down), its view distance in that
+    /// frame (negative: unknown), and the pixel's mark (`motion.glsl`). Read by the denoiser and by temporal
+    /// antialiasing.
     pub motion: Image,
     /// `R16F`: view distance in this frame and in the last; negative where the surface moves in the picture.
     pub view_distance: [Image; 2],
-    /// `R32Uint`, light: what comes straight from lamps and suns, without albedo. Written by `direct` and `suns`, where the
-    /// denoiser leaves the filtered light for `composite`; of this frame and the last.
+    /// `R32Uint`, light: direct light of lamps and suns, without albedo; of this frame and the last. Written by
+    /// `direct` and `suns`; the denoiser replaces it with the filtered light for `composite`.
     pub direct: [Image; 2],
-    /// Bounced light, likewise.
+    /// Bounced light, in the same format.
     pub indirect: Image,
-    /// `indirect` holds zeros: nothing has to be written while nothing bounces.
+    /// `indirect` holds zeros: it need not be cleared again while there is no bounced light.
     pub indirect_is_black: bool,
-    /// `Rgba16F`: radiance of the traced size before exposure; 1 is display white of the classic look. Written by
-    /// `composite`, read by TAA or the tone curve.
+    /// `Rgba16F`: radiance at the traced size before exposure; 1 is display white of the classic look. Written by
+    /// `composite`, read by temporal antialiasing or the tone curve.
     pub composite: Image,
-    /// `Rgba32F`: the mean of the frames in reference mode, while that is on.
+    /// `Rgba32F`: mean of the frames in reference mode; absent outside of it.
     pub accumulation: Option<Image>,
 }
 
@@ -107,7 +108,7 @@ impl Targets {
         })
     }
 
-    /// Makes or drops the image that only reference mode needs.
+    /// Makes or drops the image that only reference mode uses.
     ///
     /// # Errors
     /// Out of memory.
@@ -122,12 +123,12 @@ impl Targets {
         Ok(())
     }
 
-    /// The linear picture, as far as nothing is resolved over time.
+    /// The linear picture before temporal antialiasing.
     pub fn picture(&self) -> &Image {
         self.accumulation.as_ref().unwrap_or(&self.composite)
     }
 
-    /// What this frame has written becomes what the last one wrote.
+    /// Ends the frame: its images become those of the last frame.
     pub fn advance(&mut self) {
         self.view_distance.swap(0, 1);
         self.direct.swap(0, 1);

@@ -1,4 +1,4 @@
-//! The traced look: its state from frame to frame and the order of its passes.
+//! The traced look: its state between frames and the order of its passes.
 
 mod content;
 mod parameters;
@@ -38,18 +38,18 @@ pub struct TracedMap<'a> {
     pub geometry: &'a StaticGeometry,
     /// Its lights.
     pub lights: &'a MapLights,
-    /// Flares of the view that rays are to test.
+    /// Flares of the view whose visibility rays test.
     pub flares: FlareTest,
 }
 
-/// A view, with what it is drawn from and to.
+/// A view, with its inputs and target.
 #[derive(Clone, Copy)]
 pub struct TracedView<'a> {
     /// What the view shows.
     pub scene: &'a TracedScene,
-    /// The map, if one is loaded; views without world leave it out.
+    /// The map, if one is loaded; `None` for views without the world.
     pub map: Option<TracedMap<'a>>,
-    /// Materials of everything that rays meet.
+    /// Materials of all geometry.
     pub materials: &'a dyn MaterialTable,
     /// Settings of the frame.
     pub settings: &'a Settings,
@@ -57,7 +57,7 @@ pub struct TracedView<'a> {
     pub target: &'a Image,
 }
 
-/// Values of 32 bits that automatic exposure keeps from frame to frame: the exposure and the histogram.
+/// Number of 32-bit values that automatic exposure keeps between frames: the exposure and the histogram.
 const EXPOSURE_STATE: usize = 1 + t::EXPOSURE_BINS as usize;
 
 /// Draws views by tracing rays.
@@ -71,31 +71,32 @@ pub struct ViewTracer {
     motion: Motion,
     bloom: Bloom,
     counters: RayCounters,
-    /// Channels of the target that are written: 1 red, 2 green, 4 blue.
+    /// Colour channels of the target that are written: 1 red, 2 green, 4 blue.
     pub(super) channels: u32,
     /// Rays are counted.
     pub(super) count_rays: bool,
     pub(super) targets: Option<Targets>,
     exposure_state: Buffer,
     exposure_started: bool,
-    /// At which the map looks as bright as the engine shows it.
+    /// Exposure at which the map is as bright as the engine shows it.
     pub(super) map_exposure: relight::exposure::Exposure,
     no_lights: MapLights,
     frame: u32,
     last_time: f32,
-    /// Camera of the last frame whose light the denoiser can go on from.
+    /// Camera of the last frame, if its light is valid history.
     history: Option<CameraView>,
-    /// Hash of everything that the accumulated frames show, and how many there are.
+    /// Hash of the content of the accumulated frames, and their number.
     accumulated: (u64, u32),
 }
 
-/// Seconds after which the eye has adapted to a brighter and to a darker view but for 1/e of the difference: those of
-/// cones and rods (Krawczyk, Myszkowski and Seidel, Perceptual Effects in Real-time Tone Mapping, SCCG 2005, section 3.2).
+/// Time constants of adaptation to a brighter and to a darker view, seconds: after this time 1/e of the difference is
+/// left. Values of cones and rods (Krawczyk, Myszkowski and Seidel, Perceptual Effects in Real-time Tone Mapping, SCCG
+/// 2005, section 3.2).
 const LIGHT_ADAPTATION: f32 = 0.1;
 const DARK_ADAPTATION: f32 = 0.4;
 
 impl ViewTracer {
-    /// Makes what stays from frame to frame.
+    /// Makes the state that persists between frames.
     ///
     /// # Errors
     /// The device is out of memory.
@@ -114,7 +115,7 @@ impl ViewTracer {
             channels: 7,
             count_rays: false,
             targets: None,
-            // zeros: the first frame counts into the histogram before any pass has emptied it
+            // zeros: the first frame adds to the histogram before a pass has cleared it
             exposure_state: Buffer::with_data(
                 device,
                 "trace exposure",
@@ -131,25 +132,24 @@ impl ViewTracer {
         })
     }
 
-    /// How many frames the picture is the mean of; 1 outside of reference mode.
+    /// Number of frames in the mean picture; 1 outside of reference mode.
     pub fn accumulated_frames(&self) -> u32 {
         self.accumulated.1.max(1)
     }
 
-    /// The linear picture of the last view, before exposure: RGBA, floats of 32 bits while frames are accumulated and of
-    /// 16 bits otherwise.
+    /// The linear picture of the last view, before exposure: RGBA, 32-bit floats in reference mode, 16-bit floats
+    /// otherwise.
     pub fn hdr(&self) -> Option<&Image> {
         let targets = self.targets.as_ref()?;
         Some(self.antialias.picture().unwrap_or(targets.picture()))
     }
 
-    /// Rays of each counter (`COUNT_*`) in the newest finished frame; `None` while they
-    /// are not counted.
+    /// Rays of each counter (`COUNT_*`) in the newest finished frame; `None` while rays are not counted.
     pub fn rays(&self) -> Option<[u64; COUNTERS]> {
         self.counters.rays()
     }
 
-    /// Forgets what was accumulated and lets exposure start anew: the map has changed.
+    /// Discards accumulated frames and restarts exposure, after a change of map.
     #[cfg(test)]
     pub fn reset(&mut self) {
         self.accumulated = (0, 0);
@@ -160,7 +160,7 @@ impl ViewTracer {
         self.exposure_started = false;
     }
 
-    /// Records all passes of a view into its rectangle of the target. A view without area is left out.
+    /// Records all passes of a view into its rectangle of the target. Omits a view without area.
     ///
     /// # Errors
     /// Out of memory, or a lost device.
@@ -178,7 +178,7 @@ impl ViewTracer {
         recorded
     }
 
-    /// Takes the images of a size in pixels out; those of another size go, with the history in them.
+    /// Takes the images of a size in pixels; drops images of another size, with their history.
     fn take_targets(&mut self, size: [u32; 2]) -> Result<Targets, Error> {
         let fits = |t: &mut Targets| [t.width, t.height] == size;
         if let Some(targets) = self.targets.take_if(fits) {
@@ -214,7 +214,7 @@ impl ViewTracer {
         Ok(())
     }
 
-    /// Makes everything ready that the passes of a view read, for a picture of the size `output`.
+    /// Prepares all inputs of a view's passes, for a picture of the size `output`.
     fn prepare(
         &mut self,
         targets: &Targets,
@@ -333,7 +333,7 @@ impl ViewTracer {
         Ok(())
     }
 
-    /// What decides sizes and variants of the passes.
+    /// Facts that select sizes and variants of the passes.
     fn facts(
         &self,
         targets: &Targets,
@@ -352,9 +352,9 @@ impl ViewTracer {
         }
     }
 
-    /// How far automatic exposure moves to its aim in this frame, when the eye adapts within `seconds`.
+    /// Weight of the new value in automatic exposure in this frame, for an adaptation time of `seconds`.
     fn exposure_blend(&self, view: &TracedScene, settings: &Settings, seconds: f32) -> f32 {
-        // the picture settles at once where frames must not depend on those before them
+        // in reference mode frames must not depend on earlier ones: exposure adapts at once
         if settings.rt_accumulate || !self.exposure_started {
             return 1.0;
         }
@@ -367,7 +367,7 @@ impl ViewTracer {
         1.0 - (-passed / seconds).exp()
     }
 
-    /// Number of frames that the accumulated sum holds before this one; 0 if anything that shows has changed.
+    /// Number of frames in the accumulated mean before this one; 0 if any visible content has changed.
     fn accumulated_before(
         &mut self,
         view: &TracedScene,
@@ -394,7 +394,7 @@ fn samples_one_light(params: &TraceView) -> bool {
     params.lights.selection == t::SELECT_RESAMPLED && params.lights.samples == 1
 }
 
-/// Makes bounced light black, where it is not.
+/// Clears bounced light, unless it is black.
 fn clear_indirect(targets: &mut Targets, passes: &mut FramePasses<'_>) -> Result<(), Error> {
     if !targets.indirect_is_black {
         let (rec, access) = (&mut *passes.rec, Access::TRANSFER);
@@ -406,11 +406,11 @@ fn clear_indirect(targets: &mut Targets, passes: &mut FramePasses<'_>) -> Result
     Ok(())
 }
 
-/// Width and height of a viewport; `None` where nothing of it is in the target.
+/// Width and height of a viewport; `None` if it lies outside of the target.
 fn size_in(target: &Image, viewport: [i32; 4]) -> Option<[u32; 2]> {
     let [x, y, width, height] = viewport;
     let (width, height) = (u32::try_from(width).ok()?, u32::try_from(height).ok()?);
-    // what lies outside of the target is not traced, unless the view begins to its left or above
+    // a view that begins right of or below the target is not traced
     let room =
         |size: u32, start: i32| i64::from(size) - i64::from(start.min(0)) - i64::from(start.max(0));
     let seen =
@@ -418,8 +418,8 @@ fn size_in(target: &Image, viewport: [i32; 4]) -> Option<[u32; 2]> {
     seen.then_some([width, height])
 }
 
-/// Whether a view may see into fog: straight on, or by a portal wherever that leads. In what glass and shiny surfaces
-/// reflect while no fog lies in the view itself, fog has its constant colour alone.
+/// Whether a view may see fog, directly or through any portal. Fog that is visible only in reflections and refractions
+/// has its constant colour.
 fn fog_in_sight(map: &TracedMap<'_>, view: &TracedScene) -> bool {
     let frustum = view.view.frustum();
     let may_see = map.lights.fogs_seen_from(view.view.origin);
@@ -427,7 +427,7 @@ fn fog_in_sight(map: &TracedMap<'_>, view: &TracedScene) -> bool {
     boxes.any(|(i, fog)| !view.look.portals.is_empty() || (may_see(i) && !outside(fog, &frustum)))
 }
 
-/// Whether surfaces show light; otherwise they show their own colour.
+/// Whether surfaces are lit; otherwise they show their albedo.
 fn is_lit(settings: &Settings) -> bool {
     settings.rt_illumination && !settings.fullbright
 }

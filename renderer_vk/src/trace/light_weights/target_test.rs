@@ -1,4 +1,4 @@
-//! The target function of the CPU against that of the shaders.
+//! Compares the target function of the CPU with that of the shaders.
 
 use super::super::lights::{point_light, sphere_bounds, triangle_bounds, triangle_light};
 use super::tests::{lamp, listed};
@@ -12,7 +12,7 @@ use relight::light::{Falloff, PointLight, Spot};
 use shaders::trace_types::constants as c;
 use testkit::Random;
 
-/// A place and what faces it, as `shaders/test/light_target.comp` reads it.
+/// A point and its normal, as `shaders/test/light_target.comp` reads them.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Query {
@@ -110,7 +110,7 @@ type Targets = (
     Vec<t::TriangleLight>,
 );
 
-/// Places about a triangle with one side, one with two, a point light and a spot; what they get; the lights.
+/// Points around a one-sided triangle, a two-sided one, a point light and a spot; the expected values; the lights.
 fn targets() -> Targets {
     let one_sided = lamp(Vec3::ZERO, Vec3::Z, 3.0);
     let two_sided = TriangleLight {
@@ -150,7 +150,7 @@ fn targets() -> Targets {
     let mut vector = |size: f32| Vec3::from_array([(); 3].map(|()| random.signed() * size));
     let (mut queries, mut expected) = (Vec::new(), Vec::new());
     for i in 0..4000 {
-        // Near ones, where triangles are large, and far ones.
+        // Near points, where triangles subtend large angles, and distant ones.
         let position = vector(if i % 2 == 0 { 12.0 } else { 200.0 });
         let normal = vector(1.0).normalize_or(Vec3::Z);
         let light = &listed[i % 4];

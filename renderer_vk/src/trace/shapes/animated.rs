@@ -1,9 +1,9 @@
-//! Shapes whose vertices move: their triangles stay, and a structure is fitted to the new positions each frame, and built
-//! anew when that has made it bad. Of several entities of one model each has its own, by turns.
+//! Shapes with moving vertices: triangles stay, and the structure is refitted to the new positions each frame, and
+//! rebuilt when refits have degraded it. Several entities of one model have one structure each, assigned in order.
 //!
-//! When a fitted structure is bad: our own hierarchies know what a ray costs in them, and are built anew once that is
-//! [`WORSE`] times what it was. The driver does not tell; its structures are built anew after [`REFITS`] frames, and at
-//! once when the box of all triangles has [`GROWN`] times the surface it had, or as much less.
+//! Rebuilds: our own hierarchies compute their expected ray cost, and are rebuilt once it exceeds [`WORSE`] times its
+//! initial value. The driver reports no cost; its structures are rebuilt after [`REFITS`] frames, and at once when the
+//! surface area of the bounds has changed by the factor [`GROWN`] in either direction.
 
 use glam::Vec3;
 #[cfg(test)]
@@ -20,29 +20,29 @@ use crate::gpu::{
     Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error, Recorder,
 };
 
-/// How much more a ray may cost in a fitted hierarchy of ours.
+/// Cost ratio at which our refitted hierarchy is rebuilt.
 const WORSE: f32 = 1.5;
-/// How often a structure of the driver is fitted before it is built anew.
+/// Number of refits after which a structure of the driver is rebuilt.
 const REFITS: u32 = 60;
-/// How much the surface of the box around a structure of the driver may change.
+/// Ratio of the surface areas of the bounds at which a structure of the driver is rebuilt.
 const GROWN: f32 = 2.0;
 
-/// Triangles that stay, of parts whose vertices move.
+/// Constant triangles of parts with moving vertices.
 pub struct AnimatedShape {
-    /// Number of the frame that showed it last.
+    /// Number of the last frame that showed it.
     pub seen: u64,
-    /// Another number whenever the triangles have become others.
+    /// Changes whenever the triangles change.
     version: u64,
     indices: Vec<[u32; 3]>,
-    /// The same for the driver; without it the hierarchies are ours.
+    /// The triangles as build input of the driver; `None` for our own hierarchies.
     index_buffer: Option<Buffer>,
-    /// One for each part of the shape in a view.
+    /// One for each part of this shape in a view.
     poses: Vec<Pose>,
-    /// Poses taken in this view.
+    /// Number of poses used in this view.
     taken: usize,
 }
 
-/// A structure that is fitted.
+/// A structure that is refitted.
 struct Pose {
     seen: u64,
     bottom: PoseBottom,
@@ -51,21 +51,21 @@ struct Pose {
 enum PoseBottom {
     Driver {
         blas: Blas,
-        /// Surface of the box when it was built.
+        /// Surface area of the bounds at the last build.
         area: f32,
         refits: u32,
-        /// To be built (or fitted) in this frame.
+        /// Geometry to be built in this frame; `true`: by a refit.
         pending: Option<([BlasGeometry; 1], bool)>,
     },
     Own {
         hierarchy: Hierarchy,
-        /// When it was built.
+        /// Expected ray cost at the last build.
         cost: f32,
         bottom: Option<OwnBottom>,
     },
 }
 
-/// Memory that fitting hierarchies uses again.
+/// Reused memory for refits of our hierarchies.
 #[derive(Default)]
 pub struct Scratch {
     boxes: Vec<Aabb>,
@@ -73,8 +73,8 @@ pub struct Scratch {
 }
 
 impl AnimatedShape {
-    /// With the triangles of some meshes. `old`: the shape whose triangles these replace, as those of a deformation that
-    /// makes other ones each time; its structures go on.
+    /// A shape with the triangles of some meshes. `old`: the shape whose triangles these replace, for deformations that
+    /// change triangles each frame; its structures are reused.
     ///
     /// # Errors
     /// Out of memory.
@@ -107,20 +107,20 @@ impl AnimatedShape {
         })
     }
 
-    /// Another view begins.
+    /// Begins a view.
     pub fn begin_view(&mut self) {
         self.taken = 0;
     }
 
     /// Drops poses whose last frame is not `fresh`.
     pub fn drop_poses(&mut self, fresh: impl Fn(u64) -> bool) {
-        // they are taken in order, so the last ones are those that rest
+        // poses are assigned in order, so unused ones are last
         while self.poses.last().is_some_and(|pose| !fresh(pose.seen)) {
             self.poses.pop();
         }
     }
 
-    /// Whether its triangles are those of some meshes.
+    /// Whether its triangles equal those of some meshes.
     pub fn has_triangles_of(&self, meshes: &[MeshPart<'_>]) -> bool {
         is_same(&self.indices, meshes)
     }
@@ -130,7 +130,7 @@ impl AnimatedShape {
         self.version
     }
 
-    /// Structures that are kept.
+    /// Number of kept structures.
     #[cfg(test)]
     pub fn pose_count(&self) -> usize {
         self.poses.len()
@@ -143,7 +143,7 @@ impl AnimatedShape {
         indices + self.poses.iter().map(Pose::size).sum::<u64>()
     }
 
-    /// What to place of a pose.
+    /// A pose's structure for the top level.
     pub fn bottom(&self, pose: usize) -> Option<Bottom> {
         match &self.poses.get(pose)?.bottom {
             PoseBottom::Driver { blas, .. } => Some(Bottom::Driver(blas.address())),
@@ -151,7 +151,7 @@ impl AnimatedShape {
         }
     }
 
-    /// Whether a pose waits to be built or fitted.
+    /// Whether a pose is still to be built or refitted.
     pub fn has_work(&self) -> bool {
         let waits = |pose: &Pose| {
             let PoseBottom::Driver { pending, .. } = &pose.bottom else {
@@ -162,7 +162,7 @@ impl AnimatedShape {
         self.poses.iter().any(waits)
     }
 
-    /// How to build or fit the poses of this frame.
+    /// Build inputs of this frame's poses.
     pub fn pending(&mut self) -> impl Iterator<Item = BlasBuild<'_>> {
         self.poses.iter_mut().filter_map(|pose| {
             if let PoseBottom::Driver {
@@ -182,7 +182,7 @@ impl AnimatedShape {
         })
     }
 
-    /// All poses were built or fitted.
+    /// Marks all poses as built.
     pub fn settle(&mut self) {
         for pose in &mut self.poses {
             if let PoseBottom::Driver { pending, .. } = &mut pose.bottom {
@@ -191,8 +191,8 @@ impl AnimatedShape {
         }
     }
 
-    /// The next pose of the view, with its vertices and where they are on the device: our own hierarchy is fitted at
-    /// once, the driver's is left to [`pending`](Self::pending). Which one it is.
+    /// Assigns the next pose to vertices and their device address, and returns its index: refits our own hierarchy at
+    /// once, leaves the driver's structure to [`pending`](Self::pending).
     ///
     /// # Errors
     /// Out of memory.
@@ -228,7 +228,7 @@ impl AnimatedShape {
                 if refit {
                     *refits += 1;
                 } else {
-                    // entities that come into sight together are not all built anew together
+                    // spreads the rebuilds of entities that come into view together over frames
                     *refits = u32::try_from(index).unwrap_or(0) % (REFITS / 2);
                     *area = bounds;
                 }
@@ -264,7 +264,7 @@ impl AnimatedShape {
 }
 
 impl Pose {
-    /// Not built yet. `own`: a hierarchy of ours.
+    /// A pose that is not built. `own`: it has a hierarchy of ours.
     fn new(device: &Device, own: bool) -> Self {
         let bottom = if own {
             PoseBottom::Own {
@@ -299,7 +299,7 @@ impl Pose {
         }
     }
 
-    /// Builds anew when it is used next: its triangles have become others.
+    /// Forces a rebuild at its next use: its triangles have changed.
     fn forget(&mut self) {
         match &mut self.bottom {
             PoseBottom::Driver { area, .. } => *area = 0.0,
@@ -308,7 +308,7 @@ impl Pose {
     }
 }
 
-/// Fits a hierarchy to its entries, or builds it anew; the box of everything, if there is anything.
+/// Refits a hierarchy to its entries, or rebuilds it; returns its bounds, if it has entries.
 fn fit(hierarchy: &mut Hierarchy, cost: &mut f32, boxes: &[Aabb]) -> Option<Aabb> {
     if hierarchy.order().len() == boxes.len() && !boxes.is_empty() {
         let bounds = hierarchy.refit(boxes);

@@ -1,4 +1,4 @@
-//! Shapes that stay: built and compacted once, with vertices of their own.
+//! Shapes of constant vertices: built and compacted once, with their own vertex buffer.
 
 use shaders::types::Vertex;
 
@@ -10,9 +10,9 @@ use crate::gpu::{
     Blas, BlasBuild, BlasFlags, BlasGeometry, Buffer, BufferUsage, Device, Error, Pass,
 };
 
-/// A shape that stays.
+/// A shape of constant vertices.
 pub struct RigidShape {
-    /// Number of the frame that showed it last.
+    /// Number of the last frame that showed it.
     pub seen: u64,
     /// Vertices, then the driver's indices, or our nodes and triangles.
     data: Buffer,
@@ -22,15 +22,16 @@ pub struct RigidShape {
 enum RigidBottom {
     Driver {
         blas: Blas,
-        /// Until it is built.
+        /// Build input until the structure is built.
         pending: Option<[BlasGeometry; 1]>,
     },
-    /// `None`: no triangle that a ray could hit.
+    /// `None`: no triangle can be hit.
     Own(Option<OwnBottom>),
 }
 
 impl RigidShape {
-    /// Of some meshes, first seen in a frame. Of the driver's structure building is left to [`pending`](Self::pending).
+    /// A shape of some meshes, first shown in a frame. The driver's structure is built later, by
+    /// [`pending`](Self::pending).
     ///
     /// # Errors
     /// Out of memory.
@@ -108,7 +109,7 @@ impl RigidShape {
         self.data.size() + self.blas().map_or(0, Blas::size)
     }
 
-    /// What to place.
+    /// Its structure for the top level.
     pub fn bottom(&self) -> Option<Bottom> {
         match &self.bottom {
             RigidBottom::Driver { blas, .. } => Some(Bottom::Driver(blas.address())),
@@ -124,7 +125,7 @@ impl RigidShape {
         }
     }
 
-    /// Whether it waits to be built.
+    /// Whether it is still to be built.
     pub fn has_work(&self) -> bool {
         matches!(
             self.bottom,
@@ -135,7 +136,7 @@ impl RigidShape {
         )
     }
 
-    /// How to build it, unless that is done.
+    /// Its build input, unless it is built.
     pub fn pending(&mut self) -> Option<BlasBuild<'_>> {
         match &mut self.bottom {
             RigidBottom::Driver {
@@ -150,14 +151,14 @@ impl RigidShape {
         }
     }
 
-    /// It was built.
+    /// Marks it as built.
     pub fn settle(&mut self) {
         if let RigidBottom::Driver { pending, .. } = &mut self.bottom {
             *pending = None;
         }
     }
 
-    /// Makes the structure as small as it can be, if it is built and that is smaller. `size`: compacted, bytes.
+    /// Compacts the structure if it is built and becomes smaller. `size`: compacted, bytes.
     ///
     /// # Errors
     /// Out of memory.

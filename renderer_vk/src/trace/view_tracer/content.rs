@@ -1,4 +1,4 @@
-//! What the accumulated frames of a view have in common.
+//! Hash of a view's content, which all accumulated frames share.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -8,7 +8,7 @@ use crate::scene::TracedScene;
 use crate::settings::Settings;
 use crate::trace::input::MaterialTable;
 
-/// A number that changes whenever the mean picture does: camera, everything in the scene, time, settings.
+/// A number that changes whenever the mean picture changes: camera, scene, time, settings.
 pub(super) fn content_hash(
     view: &TracedScene,
     materials: &dyn MaterialTable,
@@ -45,7 +45,7 @@ pub(super) fn content_hash(
     for mesh in &view.meshes {
         let geometry = view.mesh_geometry(mesh);
         bytemuck::cast_slice::<_, u8>(geometry.vertices).hash(&mut hasher);
-        // whether a mesh is kept from frame to frame is nothing that shows
+        // keeping a mesh between frames does not change the picture
         for triangle in geometry.triangles() {
             triangle.hash(&mut hasher);
         }

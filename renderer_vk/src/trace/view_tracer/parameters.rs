@@ -1,4 +1,4 @@
-//! The parameters that the passes of a view read.
+//! Parameters of a view's passes.
 
 use glam::Vec3;
 use shaders::trace_types::constants as t;
@@ -19,21 +19,21 @@ use crate::trace::beyond_sky::Beyond;
 use crate::trace::layer_boxes::in_sight;
 use crate::trace::targets::Targets;
 
-/// What the parts of the traced look have prepared for a view.
+/// Data that the parts of the traced look have prepared for a view.
 pub(super) struct Prepared<'a> {
     /// The images that the view is traced to.
     pub targets: &'a Targets,
-    /// What rays are traced against.
+    /// Acceleration structures.
     pub accel: AccelOutput,
-    /// Number of frames that the accumulated sum holds before this one.
+    /// Number of frames in the accumulated mean before this one.
     pub accumulated: u32,
-    /// Portals and mirrors that rays go through.
+    /// Portals and mirrors that primary rays pass.
     pub portals: &'a [PortalRecord],
-    /// Where everything was in the last frame.
+    /// Positions of the last frame.
     pub motion: MotionView,
-    /// How samples of several frames become a picture.
+    /// Parameters of temporal antialiasing and upscaling.
     pub antialias: AntialiasView,
-    /// What comes after tracing, and the ray counters.
+    /// Parameters of the passes after tracing, and the ray counters.
     pub post: PostView,
 }
 
@@ -117,7 +117,7 @@ impl ViewTracer {
         }
     }
 
-    /// The bits `VIEW_*` of a view. `first_person`: there is something that only the eye sees.
+    /// The bits `VIEW_*` of a view. `first_person`: some geometry is visible to camera rays alone.
     fn flags(&self, settings: &Settings, first_person: bool) -> u32 {
         let mut flags = 0;
         let mut set = |bit: u32, on: bool| flags |= if on { bit } else { 0 };
@@ -139,7 +139,7 @@ impl ViewTracer {
     }
 }
 
-/// What rays meet.
+/// Geometry and materials.
 fn scene_view(
     rec: &mut Recorder,
     traced: &TracedView<'_>,
@@ -193,7 +193,8 @@ fn camera_view(traced: &TracedView<'_>, height: u32) -> CameraView {
     }
 }
 
-/// The boxes that rays are tested against: translucent layers, what lies behind skies, and surfaces that colour light.
+/// Boxes that rays are tested against: around translucent layers, geometry behind skies, and surfaces that filter
+/// light.
 fn transport(rec: &mut Recorder, traced: &TracedView<'_>) -> Result<TransportView, Error> {
     let TracedView {
         scene: view,
@@ -205,7 +206,7 @@ fn transport(rec: &mut Recorder, traced: &TracedView<'_>) -> Result<TransportVie
     let geometry = map.map(|m| m.geometry);
     let boxes = in_sight(view, geometry, materials);
     let (layers, layer_count) = if settings.rt_dof {
-        // rays start beside the eye
+        // rays start away from the camera
         (0, u32::MAX)
     } else {
         let count = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
@@ -232,7 +233,7 @@ fn transport(rec: &mut Recorder, traced: &TracedView<'_>) -> Result<TransportVie
     })
 }
 
-/// Where a view is seen from: what two frames must have in common to show the same directions.
+/// The camera of a view, as two frames must share it to show equal directions.
 pub(super) fn camera_frame(view: &TracedScene) -> CameraView {
     let camera = &view.view;
     let [forward, left, up] = camera.axis;
@@ -245,7 +246,7 @@ pub(super) fn camera_frame(view: &TracedScene) -> CameraView {
     }
 }
 
-/// The sun's picture where it is to be seen.
+/// The sun's disc, if it is visible.
 fn sun_disc(view: &TracedScene) -> SunDisc {
     view.sun.map_or(
         SunDisc {
