@@ -11,20 +11,20 @@ use relight::overbright;
 use super::WorldData;
 use crate::settings::Settings;
 
-/// Light that falls on an entity, on a scale of 0..255.
+/// Light on an entity, in 0..255.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridLight {
-    /// From everywhere.
+    /// Ambient light.
     pub ambient: Vec3,
-    /// From `direction`.
+    /// Directed light from `direction`.
     pub directed: Vec3,
-    /// Unit vector towards the light; zero for none.
+    /// Unit vector towards the light; zero if there is none.
     pub direction: Vec3,
 }
 
 impl WorldData {
     /// Light at a point after the engine's scales, before its constant ambient part and dynamic lights; `None` without
-    /// a grid.
+    /// a light grid.
     pub fn grid_light(&self, point: Vec3, settings: &Settings) -> Option<GridLight> {
         let sample = self.grid?.sample(&self.grid_points, point)?;
         Some(GridLight {
@@ -35,7 +35,8 @@ impl WorldData {
     }
 }
 
-/// The points of a map's grid with the overbright shift applied: it keeps the hue, so it comes before interpolation.
+/// The points of a map's light grid with the overbright shift applied. The shift keeps the hue and precedes
+/// interpolation.
 pub(super) fn shifted_points(bsp: &Bsp, shift: u32) -> Vec<GridPoint> {
     bsp.light_grid
         .iter()

@@ -1,4 +1,4 @@
-//! From a relit map to what is drawn: materials found, lightmaps made, curves given their levels of detail.
+//! Converts a relit map to drawable data: finds materials, makes lightmaps, and adds the levels of detail of curves.
 
 use glam::Vec3;
 use q3bsp::{SurfaceKind, lightmap_index};
@@ -17,10 +17,10 @@ use crate::assets::{ImageSource, LightmapClass, Materials, Textures, prepare};
 use crate::gpu;
 use crate::settings::Settings;
 
-/// The direction that the engine gives the sun before any material says otherwise.
+/// Direction towards the sun until a material defines one, as in the engine.
 const DEFAULT_SUN: Vec3 = Vec3::new(0.45, 0.3, 0.9);
 
-/// The settings that loading a map depends on.
+/// Settings that loading a map depends on.
 #[derive(Clone, Debug)]
 pub struct WorldOptions {
     /// Largest distance of a curve from its mesh, units.
@@ -29,18 +29,18 @@ pub struct WorldOptions {
     pub overbright_shift: u32,
     /// Desaturation of lightmaps and vertex colours, 0..1.
     pub greyscale: f32,
-    /// Lightmaps count as white.
+    /// Lightmaps are treated as white.
     pub fullbright: bool,
     /// Light comes from vertices instead of lightmaps.
     pub vertex_light: bool,
-    /// Everything but skies shows the default material.
+    /// All surfaces but skies have the default material.
     pub single_shader: bool,
-    /// Lightmaps show brightness as colour.
+    /// Lightmaps show their brightness as colour.
     pub lightmap_heat: bool,
 }
 
 impl WorldOptions {
-    /// The part of the settings that matters here.
+    /// The options that these settings select.
     pub fn new(settings: &Settings) -> Self {
         let display = settings.effective_overbright_bits();
         Self {
@@ -54,7 +54,7 @@ impl WorldOptions {
         }
     }
 
-    /// The same for the converter. Lights are not calibrated here: only the traced look needs that, see
+    /// Options for `relight`. Lights are not calibrated at load: only the traced look needs calibration, see
     /// [`World::light_by`](super::World::light_by).
     pub fn relight(&self) -> relight::Options<'static> {
         relight::Options {
@@ -67,7 +67,7 @@ impl WorldOptions {
     }
 }
 
-/// Takes lightmap pages. [`Textures`] puts them on the GPU.
+/// Receiver of lightmap pages. [`Textures`] uploads them to the GPU.
 pub trait LightmapSink: ImageSource {
     /// Bindless index of a page.
     fn lightmap(&mut self, name: &str, page: &Image) -> Result<u32, gpu::Error>;
@@ -81,7 +81,7 @@ impl LightmapSink for Textures {
 
 fn class_of(lightmap: i32, options: &WorldOptions) -> LightmapClass {
     match lightmap {
-        // in this order: the engine lets full brightness win over vertex light
+        // in this order: in the engine full brightness has precedence over vertex light
         _ if options.fullbright => LightmapClass::White,
         _ if options.vertex_light => LightmapClass::Vertex,
         0.. => LightmapClass::Page,
@@ -93,8 +93,8 @@ fn class_of(lightmap: i32, options: &WorldOptions) -> LightmapClass {
 }
 
 impl WorldData {
-    /// Finds materials and makes lightmaps for a relit map. A failure of the device is left in `failure` and the
-    /// surfaces go without lightmap.
+    /// Finds materials and makes lightmaps for a relit map. A device failure is stored in `failure`, and the surfaces
+    /// have no lightmap.
     pub fn new<S: LightmapSink>(
         relit: RelitWorld,
         materials: &mut Materials,
@@ -104,7 +104,7 @@ impl WorldData {
     ) -> Self {
         materials.forget_sun();
         let lightmaps = make_lightmaps(&relit, source, options, failure);
-        // before the surfaces', as the engine: of equal sort, what was found first is drawn first
+        // before those of surfaces, as the engine: of equal sort values, the material found first is drawn first
         let fog_materials = relit
             .fogs
             .iter()
@@ -154,7 +154,7 @@ impl WorldData {
     }
 }
 
-/// The surfaces with their materials, lightmaps and levels of detail. The indices of coarser levels are appended.
+/// The surfaces with materials, lightmaps and levels of detail. Appends the indices of coarser levels.
 fn find_surfaces<S: LightmapSink>(
     relit: &RelitWorld,
     lightmaps: &[u32],
@@ -210,7 +210,7 @@ fn find_surfaces<S: LightmapSink>(
     surfaces
 }
 
-/// Tells a surface's material which light it is.
+/// Passes a surface's light to its material.
 pub(super) fn mark_emitter(
     relit: &RelitWorld,
     surface: &relight::world::WorldSurface,
@@ -221,17 +221,17 @@ pub(super) fn mark_emitter(
     if surface.num_indices == 0 || stored.is_none_or(|m| m.emission.is_none()) {
         return;
     }
-    // none of its own where calibration found that it gives no light
+    // surfaces that emit no light by the calibration have none
     let light = relit
         .lights
         .get(surface.first_light as usize)
         .filter(|_| surface.num_lights > 0);
-    // what glows or is sky shows its light by its stages
+    // the stages of glowing surfaces and skies show the light themselves
     let hidden = light.filter(|l| l.source == relight::light::EmissionSource::SurfaceLight);
     materials.set_emitter(material, hidden.map_or(Vec3::ZERO, |l| l.radiance));
 }
 
-/// Whether every triangle of a surface lies in its plane, within a unit, and faces as it does.
+/// Whether every triangle of a surface lies in its plane, within a unit, and faces along the plane's normal.
 fn is_flat(relit: &RelitWorld, surface: &relight::world::WorldSurface) -> bool {
     let Some(plane) = surface.plane else {
         return false;
@@ -241,14 +241,14 @@ fn is_flat(relit: &RelitWorld, surface: &relight::world::WorldSurface) -> bool {
         .filter_map(|triangle| relit.triangle(triangle))
         .all(|[a, b, c]| {
             let front = (c - a).cross(b - a);
-            // slivers face nowhere
+            // degenerate triangles have no direction
             let faces = front.dot(plane.normal) >= 0.99 * front.length();
             let sliver = front.length_squared() < 1e-3;
             (faces || sliver) && [a, b, c].iter().all(|p| plane.distance(*p).abs() <= 1.0)
         })
 }
 
-/// Appends a planar surface with the normal that the map stores for it, if its vertices have others.
+/// Appends a copy of a planar surface with the normal that the map stores for it, if its vertices have other normals.
 fn copy_for_classic(
     relit: &RelitWorld,
     index: usize,
@@ -326,7 +326,7 @@ fn make_lightmaps<S: LightmapSink>(
     pages
 }
 
-/// A page in colours by the brightness of what is stored; raises `brightest`.
+/// A lightmap page that shows its stored brightness as colour; raises `brightest`.
 fn heat_page(relit: &RelitWorld, page: usize, side: u32, brightest: &mut f32) -> Option<Image> {
     let stored = relit.bsp.lightmaps.get(page)?;
     let (picture, most) = prepare::heat_page(&stored.0, side)?;
@@ -348,15 +348,14 @@ fn vertex(v: &relight::world::WorldVertex, options: &WorldOptions) -> Vertex {
     }
 }
 
-/// The fog volumes. A surface of a volume that the engine draws, and that shows from both sides, veils what is seen from
-/// within.
+/// The fog volumes. A drawn, two-sided surface of a volume also covers the view from inside.
 fn fogs(relit: &RelitWorld, surfaces: &[WorldSurface], materials: &Materials) -> Vec<types::Fog> {
     let mut fogs: Vec<_> = relit.fogs.iter().map(fog).collect();
     let veil = c::MATERIAL_FOG | c::MATERIAL_TWO_SIDED;
     for surface in surfaces {
         let volume = (surface.fog as usize).checked_sub(1);
         let Some(fog) = volume.and_then(|volume| fogs.get_mut(volume)) else {
-            // The surface lies in no fog.
+            // A surface outside of fog.
             continue;
         };
         if fog.has_surface != 0 && materials.get(surface.material).flags & veil == veil {
@@ -401,7 +400,7 @@ fn remap_by_map<S: LightmapSink>(
 ) {
     let entities = relit.bsp.entities();
     let Some(world) = entities.first() else {
-        // The map has no entities.
+        // A map without entities.
         return;
     };
     let starts = |key: &str, prefix: &str| {

@@ -1,4 +1,4 @@
-//! Decals: the parts of the world's surfaces that a polygon swept along a direction covers.
+//! Decals: the parts of the world's surfaces inside a polygon that is swept along a direction.
 //!
 //! Source: engine behaviour of `MarkFragments`, its tolerances included.
 
@@ -13,27 +13,27 @@ use super::{WorldData, WorldSurface};
 use crate::api::MarkFragment;
 use crate::assets::Materials;
 
-/// Most corners of the polygon and of a clipped piece.
+/// Maximum number of corners of the polygon and of a clipped piece.
 const MAX_POINTS: usize = 64;
-/// Most surfaces that one call looks at.
+/// Maximum number of surfaces in one call.
 const MAX_SURFACES: usize = 64;
-/// Distance within which a point counts as on a plane.
+/// Distance, units, within which a point counts as on a plane.
 const EPSILON: f32 = 0.5;
-/// How far behind the polygon surfaces are still marked, units.
+/// Distance behind the polygon within which surfaces are marked, units.
 const BEHIND: f32 = 20.0;
-/// How far along the projection surfaces are marked, units, whatever its length.
+/// Distance along the projection within which surfaces are marked, units, regardless of the projection's length.
 const AHEAD: f32 = 32.0;
-/// Surface and content flags that take no marks.
+/// Surface and content flags that prevent marks.
 const NO_IMPACT: u32 = q3bsp::surface_flags::NOIMPACT | q3bsp::surface_flags::NOMARKS;
 
-/// Keeps what is in front of it.
+/// A clipping plane; it keeps the part in front of it.
 #[derive(Clone, Copy, Debug)]
 struct ClipPlane {
     normal: Vec3,
     dist: f32,
 }
 
-/// Finds the parts of surfaces under marks. Kept, so that nothing is allocated anew.
+/// Clips surfaces to marks. Its memory is reused between calls.
 #[derive(Debug, Default)]
 pub struct Marker {
     out: Output,
@@ -41,16 +41,16 @@ pub struct Marker {
     found: Vec<SurfaceId>,
 }
 
-/// The answer while it grows.
+/// The result during its construction.
 #[derive(Debug, Default)]
 struct Output {
     points: Vec<Vec3>,
     fragments: Vec<MarkFragment>,
     max_points: usize,
     max_fragments: usize,
-    /// What is left of the triangle at hand.
+    /// The clipped part of the current triangle.
     piece: Vec<Vec3>,
-    /// What the next plane leaves of it.
+    /// Output of the next clip.
     clipped: Vec<Vec3>,
 }
 
@@ -59,7 +59,7 @@ impl Output {
         self.fragments.len() >= self.max_fragments
     }
 
-    /// Adds what the planes leave of a triangle; a piece for which there is no room is dropped.
+    /// Adds the part of a triangle inside of the planes; omits a piece that exceeds the limits.
     fn add(&mut self, triangle: [Vec3; 3], planes: &[ClipPlane]) {
         self.piece.clear();
         self.piece.extend(triangle);
@@ -81,14 +81,14 @@ impl Output {
     }
 }
 
-/// What takes marks.
+/// Surfaces that marks are projected on.
 #[derive(Clone, Copy)]
 pub struct Marked<'a> {
     /// The map.
     pub world: &'a WorldData,
     /// Its materials.
     pub materials: &'a Materials,
-    /// Triangle meshes take marks too.
+    /// Triangle meshes are marked, too.
     pub on_meshes: bool,
 }
 
@@ -135,7 +135,7 @@ impl Marker {
     }
 }
 
-/// One plane for each side of the polygon, and the two ends of the sweep.
+/// One plane for each side of the polygon, and one for each end of the sweep.
 fn clip_planes(
     points: &[Vec3],
     projection: Vec3,
@@ -163,7 +163,7 @@ fn clip_planes(
     });
 }
 
-/// Surfaces of the leafs that the box touches and that can take the mark, each once.
+/// Surfaces of the leafs that touch the box and that can be marked, each once.
 fn candidates(marked: &Marked<'_>, bounds: &Aabb, direction: Vec3, found: &mut Vec<SurfaceId>) {
     let (world, materials) = (marked.world, marked.materials);
     let bsp = &world.relit.bsp;
@@ -200,8 +200,8 @@ fn candidates(marked: &Marked<'_>, bounds: &Aabb, direction: Vec3, found: &mut V
     });
 }
 
-/// The plane as the map stores it. Compilers leave it zero on surfaces that they merge, and the engine then marks
-/// nothing.
+/// The plane as the map stores it. Map compilers store a zero plane for merged surfaces; the engine does not mark
+/// those.
 fn stored_plane(bsp: &Bsp, id: SurfaceId) -> Option<Plane> {
     let stored = bsp.surface(id);
     let normal = stored.lightmap_vecs[2];
@@ -243,7 +243,7 @@ fn mark_surface(
     }
 }
 
-/// Both triangles of every cell of the full grid that face the mark.
+/// Both triangles of every cell of the full grid, if they face the mark.
 fn mark_curve(
     world: &WorldData,
     surface: &WorldSurface,
@@ -291,7 +291,8 @@ fn mark_curve(
     }
 }
 
-/// Makes `out` the part of a convex polygon in front of a plane. Points within [`EPSILON`] of it stay as they are.
+/// Clips a convex polygon to the front of a plane, into `out`. Points within [`EPSILON`] of the plane are kept
+/// unchanged.
 fn clip(polygon: &[Vec3], plane: &ClipPlane, out: &mut Vec<Vec3>) {
     out.clear();
     if polygon.len() >= MAX_POINTS - 2 {

@@ -1,4 +1,4 @@
-//! The relit world on the GPU, and what the scene asks about it: visible surfaces, fog, light, decals.
+//! The relit world on the GPU, with visible surfaces, fog, light and decals for the scene.
 
 mod grid;
 mod load;
@@ -26,25 +26,25 @@ pub use tokens::EntityTokens;
 pub(crate) use visible::outside;
 pub use visible::{Tree, VisibleQuery, VisibleSet};
 
-/// Why a map could not be loaded.
+/// Reason why a map could not be loaded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WorldError {
     /// The map is absent, unreadable or damaged.
     #[error(transparent)]
     Map(#[from] relight::LoadError),
-    /// The device has no memory left, or worse.
+    /// The device is out of memory or lost.
     #[error(transparent)]
     Gpu(#[from] gpu::Error),
 }
 
-/// A surface of the map as it is drawn. Index = index of the map's surface.
+/// A drawable surface of the map; its index is that of the map's surface.
 #[derive(Clone, Debug)]
 pub struct WorldSurface {
     /// First index in the static index buffer; indices count from the start of the static vertex buffer. Triangles
     /// are clockwise seen from the front.
     pub first_index: u32,
-    /// Number of indices; 0 for what is not drawn (flares, `nodraw` curves).
+    /// Number of indices; 0 for surfaces that are not drawn (flares, `nodraw` curves).
     pub index_count: u32,
     /// First vertex.
     pub first_vertex: u32,
@@ -52,39 +52,39 @@ pub struct WorldSurface {
     pub vertex_count: u32,
     /// Index of the material, before remapping.
     pub material: u32,
-    /// Fog volume plus one; 0 none.
+    /// Fog volume plus one; 0: no fog.
     pub fog: u32,
     /// Bindless texture index of the lightmap page, or `NO_TEXTURE`.
     pub lightmap: u32,
     /// Bounds in the model's space.
     pub bounds: Aabb,
-    /// Plane of planar surfaces, normal to the front.
+    /// Plane of a planar surface; its normal points to the front.
     pub plane: Option<Plane>,
-    /// Every triangle lies in `plane` and faces as it does. Compilers also write "planar" surfaces that bend, or whose
-    /// stored normal is not their triangles'; those cannot be culled as a whole.
+    /// Every triangle lies in `plane` and faces along its normal. Map compilers also write bent "planar" surfaces, and
+    /// surfaces whose stored normal is not their triangles'; back-face culling cannot treat those as one plane.
     pub flat: bool,
-    /// What the map stores it as.
+    /// Type in the map.
     pub kind: SurfaceKind,
-    /// Brush model that it belongs to; 0 is the world.
+    /// Brush model of the surface; 0 is the world.
     pub model: u32,
-    /// The material deforms its vertices, so that it is drawn as a dynamic mesh and is not in the static acceleration
+    /// The material deforms the vertices: the surface is drawn as a dynamic mesh and is not in the static acceleration
     /// structure.
     pub deformed: bool,
-    /// It shows the sky.
+    /// Its material is a sky.
     pub sky: bool,
-    /// Index lists of a curve for larger distances.
+    /// Index lists of a curve for greater distances.
     pub lod: Option<PatchLod>,
-    /// What the classic look draws instead, where the normals matter and the engine's are not the surface's.
+    /// Replacement in the classic look, if the normals affect the picture and the engine's differ from the surface's.
     pub classic: Option<ClassicCopy>,
 }
 
-/// A copy of a planar surface that has the one normal that the map stores for it, as in the engine: compilers store none
-/// for faces that they joined, so reflections and highlights on these do not follow the face.
+/// A copy of a planar surface that has the single normal that the map stores, as in the engine: compilers store no
+/// normal for merged faces, so that reflections and highlights on these ignore the face's direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ClassicCopy {
-    /// First vertex; there are as many as the surface has.
+    /// First vertex; the number of vertices is the surface's.
     pub first_vertex: u32,
-    /// First index; there are as many as the surface has.
+    /// First index; the number of indices is the surface's.
     pub first_index: u32,
 }
 
@@ -103,9 +103,9 @@ pub struct BrushModel {
 pub struct WorldData {
     /// The relit map.
     pub relit: RelitWorld,
-    /// Vertices as the GPU has them: those of the relit map, then the copies for the classic look.
+    /// Vertices in the GPU's buffer: those of the relit map, then the copies for the classic look.
     pub vertices: Vec<Vertex>,
-    /// Indices as the GPU has them: those of the relit map, then the coarser lists of curves, then the copies for the
+    /// Indices in the GPU's buffer: those of the relit map, then the coarser levels of curves, then the copies for the
     /// classic look.
     pub indices: Vec<u32>,
     /// The map's surfaces.
@@ -118,9 +118,9 @@ pub struct WorldData {
     pub fog_materials: Vec<u32>,
     /// Layout of the light grid.
     pub grid: Option<LightGridLayout>,
-    /// Its points, overbright shift applied.
+    /// Points of the light grid, overbright shift applied.
     pub grid_points: Vec<q3bsp::GridPoint>,
-    /// The tree in a form that cannot lead astray.
+    /// The validated tree.
     pub tree: Tree,
     /// Unit vector towards the engine's sun.
     pub sun_direction: Vec3,
@@ -201,15 +201,15 @@ pub struct World {
     pub index_buffer: Buffer,
     /// `types::Fog`; a surface's `fog` less one is the index.
     pub fog_buffer: Buffer,
-    /// The light that the map is in; `None` before it was traced.
+    /// Light of the map for the traced look; `None` before the first traced view.
     lit: Option<Lit>,
 }
 
-/// The light that a map is in, and the one that it could be in.
+/// The current light of a map, and the alternative one.
 struct Lit {
     choice: MapLightChoice,
     other: relight::world::Lighting,
-    /// Whether the other one is ready; else it is as the map was loaded.
+    /// The alternative light is computed; otherwise it is the map's initial light.
     found: bool,
 }
 
@@ -222,8 +222,7 @@ impl std::ops::Deref for World {
 }
 
 impl World {
-    /// Loads a map (game path `maps/....bsp`) and everything that its surfaces show. Brush models are registered as
-    /// `*0`, `*1`, ...
+    /// Loads a map (game path `maps/....bsp`) and its materials. Registers brush models as `*0`, `*1`, ...
     ///
     /// # Errors
     /// [`WorldError`] when the map is absent or damaged, or the device fails. Missing materials are warnings.
@@ -281,9 +280,8 @@ impl World {
         })
     }
 
-    /// Puts the map into the light that is wished for: `false` when it was in it before. What the traced look needs, to
-    /// be done before light lists are copied to the GPU. Each light is found once: the first time takes a few seconds
-    /// unless `cache` has it.
+    /// Selects the light of the map for the traced look: `false` if it is already selected. Call before light lists are
+    /// copied to the GPU. Each light is computed once, which takes a few seconds unless `cache` has it.
     pub fn light_by(
         &mut self,
         choice: MapLightChoice,
@@ -317,7 +315,7 @@ impl World {
         true
     }
 
-    /// Fits the lights as they were loaded, if they are to be, and sweeps their lists.
+    /// Calibrates the initial lights if the settings request it, and sweeps their lists.
     fn find_light(
         &mut self,
         choice: MapLightChoice,
@@ -333,7 +331,7 @@ impl World {
                 cache: cache.cloned(),
                 ..relight::CalibrationOptions::default()
             };
-            // A line for every quarter: a map may take long on a slow machine.
+            // One line per quarter: a map may take minutes on a slow machine.
             let (name, mut told) = (relit.name.clone(), 0);
             let report = relight::calibrate_with(relit, &options, &mut |done| {
                 let quarter = (done * 4.0) as u32;
@@ -368,7 +366,7 @@ impl World {
         self.mark_emitters(assets);
     }
 
-    /// Tells materials which of them are in the light lists.
+    /// Marks the materials that are in the light lists.
     fn mark_emitters(&self, assets: &mut Assets) {
         assets.materials.forget_emitters();
         for (surface, stored) in self.data.surfaces.iter().zip(&self.data.relit.surfaces) {

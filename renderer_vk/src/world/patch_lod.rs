@@ -1,22 +1,22 @@
 //! Levels of detail of curves.
 //!
-//! The engine leaves out an inner row or column of a grid when its stored error is larger than a limit that falls
-//! with distance. Every set of rows and columns that can come of it is an index list made at load.
+//! The engine omits an inner row or column of a grid if its stored error exceeds a limit that falls with distance.
+//! Loading makes an index list for every set of rows and columns that can result.
 
 use glam::Vec3;
 use q3bsp::PatchMesh;
 use relight::world::WorldSurface;
 
-/// Most indices that the lists of one curve may have together. A curve with so many vertices and so many distinct
-/// errors that this is too few skips some levels towards the finer side.
+/// Maximum number of indices of one curve's lists together. A curve that exceeds it omits some levels, towards the
+/// finer side.
 const MAX_INDICES: usize = 1 << 18;
-/// Least number of levels of a curve that needs more than one.
+/// Minimum number of levels of a curve that needs more than one.
 const MIN_LEVELS: usize = 8;
 
 /// One index list.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Level {
-    /// The smallest limit that calls for it.
+    /// Smallest limit that selects this list.
     from: f32,
     first_index: u32,
     index_count: u32,
@@ -45,7 +45,7 @@ impl PatchLod {
         errors.sort_unstable_by(f32::total_cmp);
         errors.dedup();
         let finest = errors.len() - 1;
-        // keep the finest; with too many, every n-th counted from there
+        // keep the finest; if there are too many, keep every n-th from there
         let full = surface.num_indices.max(1) as usize;
         let most = (MAX_INDICES / full).max(MIN_LEVELS);
         let step = errors.len().div_ceil(most).max(1);
@@ -55,8 +55,7 @@ impl PatchLod {
             if !(finest - i).is_multiple_of(step) {
                 continue;
             }
-            // a limit between the last kept error and this one needs this list as soon as it reaches the first
-            // error that was skipped
+            // a limit between the last kept error and this one selects this list from the first omitted error on
             let from = errors.iter().copied().find(|&e| e > below).unwrap_or(error);
             let level = if i == finest {
                 Level {
@@ -85,8 +84,8 @@ impl PatchLod {
         }
     }
 
-    /// The index range to draw. `depth`: distance of the level-of-detail origin along the view; `curve_error`:
-    /// `r_lodCurveError`.
+    /// The index range to draw. `depth`: distance of the level-of-detail origin along the view direction;
+    /// `curve_error`: `r_lodCurveError`.
     pub fn choose(&self, depth: f32, curve_error: f32) -> (u32, u32) {
         let limit = curve_error / (depth.abs() - self.radius).max(1.0);
         let level = self

@@ -1,4 +1,4 @@
-//! Worlds without a GPU: what is visible, decals, fog, light.
+//! Tests of worlds without a GPU: visibility, decals, fog, light.
 
 use glam::{Vec2, Vec3};
 use q3bsp::builder::MapBuilder;
@@ -22,7 +22,7 @@ fn game() -> Registration {
     ])
 }
 
-/// Two rooms side by side along x that do not see each other.
+/// Two rooms side by side along x, mutually invisible.
 fn two_rooms(game: &mut Registration) -> WorldData {
     let mut map = MapBuilder::new();
     let wall = map.add_shader("t/wall", 0, 0);
@@ -69,7 +69,7 @@ fn a_room_sees_its_own_walls() {
     );
     let outside = visible(&world, Vec3::splat(-500.0), &[]);
     assert_eq!(outside, (0..12).collect::<Vec<_>>());
-    // a plane that cuts the first room off
+    // a plane that excludes the first room
     let plane = Vec3::X.extend(300.0);
     assert!(visible(&world, Vec3::splat(128.0), &[plane]).is_empty());
 }
@@ -93,7 +93,7 @@ fn hidden_areas_and_no_vis() {
     query.no_vis = true;
     set.gather(&world, &query);
     assert_eq!(set.surfaces.len(), 12);
-    // locked: the answer stays as the eye moves
+    // locked: the visible set stays when the camera moves
     query.no_vis = false;
     query.area_mask = &[0; 32];
     set.gather(&world, &query);
@@ -163,7 +163,7 @@ fn a_decal_covers_its_own_area() {
     let (area, fragments) = mark(&game, &world, &points, (384, 128));
     assert!((area - 400.0).abs() < 1.0, "{area}");
     assert_eq!(fragments, 2);
-    // the other way round the planes look outwards and nothing is left
+    // with reversed winding the planes face outwards and nothing remains
     points.reverse();
     assert_eq!(mark(&game, &world, &points, (384, 128)).1, 0);
 }
@@ -179,7 +179,7 @@ fn decals_respect_limits_flags_and_distance() {
     assert_eq!(mark(&game, &world, &points, (384, 0)).1, 0);
     assert_eq!(mark(&game, &world, &[], (384, 128)).1, 0);
     assert_eq!(mark(&game, &world, &[Vec3::NAN; 4], (384, 128)).1, 0);
-    // more than 20 units behind the floor, and more than the sweep above it
+    // more than 20 units behind the floor, and more than the sweep's length above it
     assert_eq!(
         mark(&game, &world, &quad_corners(10.0, -25.0), (384, 128)).1,
         0
@@ -400,7 +400,7 @@ fn what_rays_meet_of_a_curve_is_as_fine_as_asked() {
                 .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])])
                 .map(|(a, b)| {
                     let [a, b] = [a, b].map(|i| world.vertices[i as usize].position);
-                    // edges of the mesh seen along y
+                    // edges of the mesh, projected along y
                     let [a, b, p] = [a, b, on].map(|p| Vec2::new(p.x, p.z));
                     let along =
                         ((p - a).dot(b - a) / (b - a).length_squared().max(1e-9)).clamp(0.0, 1.0);

@@ -2,15 +2,15 @@
 
 use support::slice::part;
 
-/// Where reading stands.
+/// Read position.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EntityTokens {
     at: usize,
 }
 
 impl EntityTokens {
-    /// The next token of the text (braces are tokens, quotes are taken off); `None` at the end, after which reading
-    /// begins anew. The text ends at its first NUL.
+    /// The next token of the text (braces are tokens, quotes are removed); `None` at the end, after which reading
+    /// restarts. The text ends at its first NUL.
     ///
     /// Source: engine tokenizer: white space is everything up to a blank, `//` and `/* */` are comments where a token
     /// could begin.
@@ -45,7 +45,7 @@ impl EntityTokens {
 /// Position of the next byte that is neither white space nor comment.
 fn skip_blank(text: &[u8], mut at: usize) -> usize {
     loop {
-        // A string or comment without an end puts the place beyond the text.
+        // An unterminated string or comment moves the position beyond the text.
         let rest = text.get(at..).unwrap_or_default();
         match rest {
             [b, ..] if *b <= b' ' => at += 1,

@@ -1,7 +1,7 @@
-//! Which surfaces of the world a view can see.
+//! Visible surfaces of the world for a view.
 //!
-//! Source: engine behaviour: the leafs of the clusters in the eye's row of the visibility lump whose area is not
-//! hidden, their ancestors, the frustum against the nodes' boxes, and each surface of what is left once.
+//! Source: engine behaviour: the leafs of the clusters in the camera cluster's row of the visibility lump whose area is
+//! not hidden, their ancestors, the frustum against the nodes' boxes, and each surface of the remaining leafs once.
 
 use glam::{Vec3, Vec4};
 use q3bsp::{Bsp, Child, LeafId, NodeId};
@@ -9,7 +9,7 @@ use support::Aabb;
 
 use super::WorldData;
 
-/// Children still to be visited, newest first. Memory is taken only for deep trees.
+/// Stack of children to visit, newest first; it allocates memory only for deep trees.
 struct Pending {
     near: [Child; 64],
     count: usize,
@@ -58,7 +58,7 @@ struct TreeLeaf {
     cluster: i32,
     area: i32,
     bounds: Aabb,
-    /// `None` for leafs that the tree does not reach.
+    /// `None` for leafs that no node refers to.
     parent: Option<NodeId>,
 }
 
@@ -75,7 +75,7 @@ fn bounds_of(mins: [i32; 3], maxs: [i32; 3]) -> Aabb {
 }
 
 impl Tree {
-    /// The tree of a map. Of several nodes with the same leaf one is its parent.
+    /// The tree of a map. Of several nodes that refer to the same leaf, one is its parent.
     pub fn new(bsp: &Bsp) -> Self {
         let mut tree = Self {
             nodes: bsp
@@ -140,13 +140,13 @@ impl Tree {
         }
     }
 
-    /// The root; `None` without a map.
+    /// The root; `None` for an empty tree.
     fn root(&self) -> Option<Child> {
         (!self.nodes.is_empty()).then_some(Child::Node(NodeId::ROOT))
     }
 }
 
-/// On which sides of a plane a box has points.
+/// The sides of a plane that a box reaches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Side {
     pub front: bool,
@@ -154,7 +154,7 @@ pub(super) struct Side {
 }
 
 impl Side {
-    /// A box that only touches the plane counts as in front.
+    /// A box that only touches the plane is in front.
     pub fn of(bounds: &Aabb, normal: Vec3, dist: f32) -> Self {
         Self {
             front: normal.dot(bounds.farthest(normal)) >= dist,
@@ -163,7 +163,7 @@ impl Side {
     }
 }
 
-/// Whether a box lies wholly outside one of the planes (`xyz.p >= w` is inside).
+/// Whether a box lies wholly outside of one of the planes (`xyz.p >= w` is inside).
 pub(crate) fn outside(bounds: &Aabb, planes: &[Vec4]) -> bool {
     planes.iter().any(|plane| {
         let normal = plane.truncate();
@@ -171,33 +171,33 @@ pub(crate) fn outside(bounds: &Aabb, planes: &[Vec4]) -> bool {
     })
 }
 
-/// What is asked of [`VisibleSet::gather`].
+/// Input of [`VisibleSet::gather`].
 #[derive(Clone, Copy, Debug)]
 pub struct VisibleQuery<'a> {
-    /// Point whose cluster decides.
+    /// Point whose cluster selects the potentially visible set.
     pub pvs_origin: Vec3,
     /// A set bit hides that area.
     pub area_mask: &'a [u8; 32],
-    /// Planes pointing inwards; empty for everything around.
+    /// Planes that face inwards; empty for views in all directions.
     pub frustum: &'a [Vec4],
-    /// Surfaces outside of the frustum are left out.
+    /// Surfaces outside of the frustum are omitted.
     pub culls: bool,
     /// Everything is potentially visible (`r_novis`).
     pub no_vis: bool,
-    /// The clusters of the last call stay (`r_lockpvs`); everything, if there was none.
+    /// The clusters of the last call are kept (`r_lockpvs`); without a last call all are visible.
     pub locked: bool,
-    /// A change finds the visible part anew; other than 0 its cluster is logged (`r_showcluster`).
+    /// A change recomputes the visible set; unless 0, the cluster is logged (`r_showcluster`).
     pub show_cluster: i32,
 }
 
-/// The potentially visible part of the world, kept from frame to frame.
+/// The potentially visible part of the world; its memory is reused between frames.
 #[derive(Clone, Debug, Default)]
 pub struct VisibleSet {
     /// Visible surfaces of the world (model 0), in the engine's order, each once.
     pub surfaces: Vec<u32>,
-    /// Bounds of the visible leafs in the frustum; `Aabb::EMPTY` when there are none.
+    /// Bounds of the visible leafs in the frustum; `Aabb::EMPTY` if there are none.
     pub bounds: Aabb,
-    /// Leafs in sight of the last call.
+    /// Number of visible leafs in the last call.
     pub leafs: u32,
     marked_for: Option<(i32, [u8; 32], bool, i32)>,
     node_marks: Vec<bool>,
@@ -208,7 +208,7 @@ pub struct VisibleSet {
 }
 
 impl VisibleSet {
-    /// Cluster that the last call was for; `None` before the first.
+    /// Cluster of the last call; `None` before the first.
     pub fn cluster(&self) -> Option<i32> {
         self.marked_for.map(|(cluster, ..)| cluster)
     }
@@ -234,7 +234,7 @@ impl VisibleSet {
                 Child::Node(id) => {
                     let marked = self.node_marks.get(id.index()) == Some(&true);
                     let Some(node) = tree.nodes.get(id.index()).filter(|_| marked) else {
-                        // Out of sight.
+                        // Not in the potentially visible set.
                         continue;
                     };
                     if culled(&node.bounds) {
@@ -246,7 +246,7 @@ impl VisibleSet {
                 Child::Leaf(id) => {
                     let marked = self.leaf_marks.get(id.index()) == Some(&true);
                     let Some(leaf) = tree.leafs.get(id.index()).filter(|_| marked) else {
-                        // Out of sight.
+                        // Not in the potentially visible set.
                         continue;
                     };
                     if !outside(&leaf.bounds, query.frustum) {
@@ -273,12 +273,12 @@ impl VisibleSet {
         }
     }
 
-    /// Marks the leafs of the eye's potentially visible set and their ancestors.
+    /// Marks the leafs of the camera's potentially visible set and their ancestors.
     fn mark(&mut self, world: &WorldData, query: &VisibleQuery<'_>) {
         let tree = &world.tree;
         let bsp = &world.relit.bsp;
         if query.locked {
-            // before anything was found, nothing is known to be out of sight
+            // before the first call everything counts as visible
             if self.marked_for.is_none() {
                 self.node_marks.clear();
                 self.node_marks.resize(tree.nodes.len(), true);
@@ -303,7 +303,7 @@ impl VisibleSet {
         self.leaf_marks.resize(tree.leafs.len(), false);
         let everything = query.no_vis || cluster < 0;
         for (leaf, mark) in tree.leafs.iter().zip(&mut self.leaf_marks) {
-            // leafs without cluster are solid; they list no surfaces
+            // leafs without a cluster are solid and list no surfaces
             if leaf.cluster < 0 && !everything {
                 continue;
             }
