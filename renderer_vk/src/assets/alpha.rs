@@ -1,14 +1,14 @@
-//! Where the images of textures are transparent, for the classification of cut-outs.
+//! Alpha ranges of texture regions, for the classification of alpha-tested triangles.
 
 use glam::{IVec2, Vec2};
 use relight::image::Image;
 
-/// Cells along a side, at most.
+/// Maximum number of cells along a side.
 const CELLS: u32 = 64;
-/// A triangle that reaches over this many cells is taken to show the whole image.
+/// A triangle that covers more cells than this counts as covering the whole image.
 const REACH: i64 = 1 << 14;
 
-/// The least and the greatest alpha of an image in the cells of a grid.
+/// The smallest and the greatest alpha of an image in each cell of a grid.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AlphaGrid {
     width: u32,
@@ -47,8 +47,8 @@ impl AlphaGrid {
         })
     }
 
-    /// The least and the greatest alpha that a bilinear filter finds at texture coordinates within a triangle. Never a
-    /// narrower range than the true one, except where a smaller mip level mixes in what lies outside of the triangle.
+    /// The smallest and the greatest alpha of a bilinear lookup at texture coordinates within a triangle. Conservative,
+    /// except where a smaller mip level includes texels outside of the triangle.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)] // cells of a grid
     pub fn range(&self, corners: [Vec2; 3], clamped: bool) -> (u8, u8) {
         let size = Vec2::new(self.width as f32, self.height as f32);
@@ -59,7 +59,7 @@ impl AlphaGrid {
         if !(low.is_finite() && high.is_finite() && low.abs().max(high.abs()).max_element() < far) {
             return self.whole;
         }
-        // a cell is a texel or more, so the filter reaches into the next one at most
+        // a cell is at least one texel wide, so that the filter reaches at most one cell further
         let first = low.floor().as_ivec2() - 1;
         let last = high.floor().as_ivec2() + 1;
         let span = last - first + 1;
@@ -96,7 +96,7 @@ fn join(a: (u8, u8), b: &(u8, u8)) -> (u8, u8) {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
-/// Whether a triangle comes within a cell's width of a cell: by the separating axes of both.
+/// Whether a triangle comes within one cell's width of a cell, by the separating axis test.
 fn meets(corners: [Vec2; 3], cell: IVec2) -> bool {
     const HALF: f32 = 1.5;
     let middle = cell.as_vec2() + 0.5;
@@ -122,7 +122,7 @@ fn meets(corners: [Vec2; 3], cell: IVec2) -> bool {
 mod tests {
     use super::*;
 
-    /// Left half solid, right half a hole.
+    /// Left half solid, right half transparent.
     fn halves(size: u32) -> AlphaGrid {
         let rgba = (0..size * size)
             .flat_map(|i| [0, 0, 0, if i % size < size / 2 { 255 } else { 0 }])
@@ -146,10 +146,10 @@ mod tests {
             assert_eq!(at(0.15, 0.3), (255, 255), "{size}");
             assert_eq!(at(0.65, 0.3), (0, 0), "{size}");
             assert_eq!(at(0.4, 0.3), (0, 255), "{size}");
-            // the image repeats, and its edges touch
+            // the image repeats, and its edges are adjacent
             assert_eq!(at(-3.85, 9.3), (255, 255), "{size}");
             assert_eq!(at(0.9, 0.3), (0, 255), "{size}");
-            // the slanted side keeps away from the solid half
+            // the slanted side does not reach the solid half
             let slanted = [(0.95, 0.0), (0.7, 1.0), (0.95, 1.0)].map(Vec2::from);
             assert_eq!(grid.range(slanted, true), (0, 0), "{size}");
         }

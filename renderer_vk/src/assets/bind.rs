@@ -1,4 +1,4 @@
-//! Parts of a material: its own stages, sky sides and drawing passes.
+//! Parts of a material: the renderer's own stages, sky sides and drawing passes.
 
 use shaderscript::{Shader, Sky};
 
@@ -6,7 +6,7 @@ use super::compile;
 use super::material::{Combine, RasterPass};
 use super::source::{ImageFlags, ImageSource};
 
-/// A material of one white stage, changed by `edit`.
+/// A material of one white stage, modified by `edit`.
 pub(super) fn internal_shader(name: &str, edit: impl FnOnce(&mut shaderscript::Stage)) -> Shader {
     let mut stage = shaderscript::Stage::default();
     edit(&mut stage);
@@ -16,7 +16,7 @@ pub(super) fn internal_shader(name: &str, edit: impl FnOnce(&mut shaderscript::S
     shader
 }
 
-/// The sides of a far box; a missing side is the default image, a missing first side is no box.
+/// The sides of a sky's far box. A missing side has the default image; without the first side there is no box.
 pub(super) fn sky_faces(outer: &str, source: &mut dyn ImageSource) -> Option<[u32; 6]> {
     let flags = ImageFlags {
         mipmap: true,

@@ -1,4 +1,4 @@
-//! A script's stages as the structures that shaders read. No GPU is needed here.
+//! Compiles a script's stages to the structures that shaders read, without a GPU.
 
 use bytemuck::Zeroable;
 use shaders::types::{self, constants as c};
@@ -24,7 +24,7 @@ pub mod sampler {
 /// The arrays that all materials share.
 #[derive(Clone, Debug, Default)]
 pub struct StageArrays {
-    /// Stages; `sampler_index` is one of [`sampler`]'s here and is translated when uploaded.
+    /// Stages; their `sampler_index` is a value of [`sampler`], which the upload translates to a bindless index.
     pub stages: Vec<types::Stage>,
     /// `tcMod`s.
     pub tc_mods: Vec<types::TcMod>,
@@ -32,17 +32,17 @@ pub struct StageArrays {
     pub images: Vec<u32>,
 }
 
-/// Name of the picture that fog is drawn with, see [`fog_picture`](super::prepare::fog_picture).
+/// Name of the fog image, see [`fog_picture`](super::prepare::fog_picture).
 pub const FOG_IMAGE: &str = "*fog";
 
-/// Client numbers from here on belong to `videoMap` stages; lower ones are the engine's own.
+/// First client number of `videoMap` stages; the engine uses lower ones itself.
 pub const FIRST_VIDEO_CLIENT: usize = 32;
 
 fn count(len: usize) -> u32 {
     u32::try_from(len).unwrap_or(u32::MAX)
 }
 
-/// `BLEND_*` of a factor. The engine's frame has no alpha, which therefore reads as 1: factors that ask for it are
+/// `BLEND_*` of a factor. The engine's framebuffer has no alpha, which reads as 1: factors of destination alpha become
 /// constants.
 pub fn blend_factor(factor: BlendFactor) -> u32 {
     match factor {
@@ -130,21 +130,21 @@ fn tc_mod(tc_mod: &TcMod) -> types::TcMod {
     out
 }
 
-/// Whether a stage covers what lies behind by an alpha that the game fades. What glows is added instead, and what is to
-/// be seen as it is (names, icons) is not faded.
+/// Whether a stage covers the background by an alpha that the game fades. Glowing stages are added instead, and names
+/// and icons are not faded.
 fn is_matter(stage: &Stage) -> bool {
     let covers = Some((BlendFactor::SrcAlpha, BlendFactor::OneMinusSrcAlpha));
     let alpha_of_game = matches!(
         stage.alpha_gen,
         AlphaGen::Entity | AlphaGen::OneMinusEntity | AlphaGen::Vertex | AlphaGen::OneMinusVertex
     );
-    // these colours bring their alpha along
+    // these colour sources also set alpha
     let color_of_game = matches!(stage.rgb_gen, RgbGen::Vertex | RgbGen::Entity)
         && matches!(stage.alpha_gen, AlphaGen::Identity);
     stage.blend == covers && stage.image != StageImage::Lightmap && (alpha_of_game || color_of_game)
 }
 
-/// The image of a stage, found.
+/// The image of a stage with its flags.
 struct FoundImage {
     first: u32,
     count: u32,
@@ -153,11 +153,11 @@ struct FoundImage {
     flags: u32,
 }
 
-/// A video stage's file and the client number that its pictures arrive under.
+/// File name of a video stage and the client number of its pictures.
 pub type Video = (String, usize);
 
 impl StageArrays {
-    /// Looks for the images of a stage that is not drawn; `Err` with the name of one that is missing.
+    /// Loads the images of a stage that is not drawn; `Err` with the name of a missing image.
     pub fn need_stage(
         &mut self,
         stage: &Stage,
@@ -169,7 +169,7 @@ impl StageArrays {
         self.need_images(image, stage, None, videos, source)
     }
 
-    /// Looks for images as [`push_image`](Self::push_image) does, and appends nothing.
+    /// Loads images as [`push_image`](Self::push_image) does, without appending a stage.
     fn need_images(
         &mut self,
         images: &[StageImage],
@@ -187,9 +187,9 @@ impl StageArrays {
         Ok(())
     }
 
-    /// Appends a stage and returns its index; `Err` with the name of an image that is missing, and nothing appended.
+    /// Appends a stage and returns its index; on a missing image, appends nothing and returns its name in `Err`.
     ///
-    /// `implicit` are the flags of a material that no script wrote; a script's stages say themselves.
+    /// `implicit`: flags of a material without a script; a script's stages define their own.
     pub fn push_stage(
         &mut self,
         stage: &Stage,
@@ -309,7 +309,7 @@ impl StageArrays {
         };
         match image {
             StageImage::Map(name) | StageImage::ClampMap(name) => {
-                // the engine finds its own image by this name, too; `$whiteimage` is a word of `map` alone
+                // the engine's own image has this name, too; `$whiteimage` is special only in `map`
                 if name == "*white" {
                     self.images.push(source.white());
                     found.flags = c::STAGE_WHITE;
@@ -326,7 +326,7 @@ impl StageArrays {
                 for name in images {
                     let (texture, first) = source.image(name, flags).ok_or_else(|| name.clone())?;
                     textures.push(texture);
-                    // One sampler serves all: that of the first image.
+                    // all images share one sampler: that of the first
                     if textures.len() == 1 {
                         flags = first;
                     }
@@ -358,7 +358,7 @@ impl StageArrays {
     }
 }
 
-/// The client numbers of `videoMap` files, given out in order of first use.
+/// Client numbers of `videoMap` files, assigned in order of first use.
 #[derive(Clone, Debug, Default)]
 pub struct VideoClients {
     names: Vec<String>,

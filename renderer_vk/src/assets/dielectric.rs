@@ -1,4 +1,4 @@
-//! What a material that is seen through does to rays, decided from its directives and the means of its images.
+//! Transmission of a transparent material for rays, derived from its directives and the mean colours of its images.
 
 use glam::{Vec3, Vec4};
 use relight::materials::light::{self, LightLinear};
@@ -12,8 +12,8 @@ use super::flags::has_vertex_light;
 use super::material::LightmapClass;
 use super::source::ImageSource;
 
-/// A material's stages with every image replaced by its mean and every wave at its brightest, without the stages that
-/// stand for reflections.
+/// A material's stages with every image replaced by its mean and every wave at its maximum, without the stages that
+/// imitate reflections.
 fn mean_layer(
     shader: &Shader,
     class: LightmapClass,
@@ -39,17 +39,17 @@ fn mean_layer(
     light::compose(&shader.stages, &samples, has_vertex_light(class))
 }
 
-/// Distance in a liquid after which white light has the colour that its surface shows, units.
+/// Distance in a liquid after which white light has the colour of the liquid's surface, units.
 const LIQUID_DEPTH: f32 = 1024.0;
-/// Slime that in the mean passes less than this is not seen through, whatever its class: it stays what its stages show.
-/// Water is smooth all the same.
+/// Slime of a lower mean transmission than this is opaque to rays, whatever its class: it shows its stages. Water
+/// remains a dielectric.
 const LEAST_TRANSMISSION: f32 = 0.15;
-/// Darkest that a liquid colours one channel over its depth.
+/// Minimum of a liquid's colour channels at [`LIQUID_DEPTH`].
 const LEAST_COLOR: f32 = 0.05;
 
-/// What a material does to rays that pass it. The absorption of a liquid has no directive: it is derived from the colour
-/// that the stages have in the mean over white, in white light, with its brightest channel at 1. Where a map has a volume
-/// of fog of it that absorbs instead ([`Materials::leave_to_fog`](super::Materials::leave_to_fog)).
+/// Transmission of a material for rays. No directive defines a liquid's absorption: it is derived from the mean colour
+/// of the stages over white, in white light, normalised to a brightest channel of 1. If the map has a fog volume of
+/// this material, the fog absorbs instead ([`Materials::leave_to_fog`](super::Materials::leave_to_fog)).
 pub fn dielectric(
     shader: &Shader,
     class: LightmapClass,
@@ -85,7 +85,7 @@ pub fn dielectric(
         } else {
             0.0
         },
-        // the light that darkens what is behind bounds it already
+        // the light in a darkening stage already bounds its result
         scale: if light::darkens_behind(&shader.stages, has_vertex_light(class)) {
             1.0
         } else {

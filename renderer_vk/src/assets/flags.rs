@@ -1,4 +1,4 @@
-//! What a material is to light, as `MATERIAL_*` bits.
+//! Properties of materials for lighting, as `MATERIAL_*` bits.
 
 use relight::materials::light::{self, BakedLight, SurfaceClass};
 use shaders::types::constants as c;
@@ -11,7 +11,7 @@ pub(super) fn has_vertex_light(class: LightmapClass) -> bool {
     matches!(class, LightmapClass::Page | LightmapClass::Vertex)
 }
 
-/// Whether a stage is white in full light on surfaces without a lightmap: it shows the lightmap, and no other light.
+/// Whether a stage is white in full light on surfaces without a lightmap: it shows the lightmap and no other light.
 pub(super) fn shows_full_light(stage: &Stage) -> bool {
     let lit = matches!(
         stage.rgb_gen,
@@ -20,7 +20,7 @@ pub(super) fn shows_full_light(stage: &Stage) -> bool {
     stage.image == StageImage::Lightmap && !lit
 }
 
-/// The `STAGE_*` bits of a stage that depend on its material and its place in it. `baked`: the baked light that it shows.
+/// The `STAGE_*` bits of a stage that depend on its material and its index. `baked`: the baked light that it shows.
 pub(super) fn stage_flags(
     shader: &Shader,
     class: LightmapClass,
@@ -46,7 +46,7 @@ pub(super) fn stage_flags(
     flags
 }
 
-/// The `STAGE_*` bit of a stage that shows baked light. The lightmap of a draw needs none.
+/// The `STAGE_*` bit of a stage that shows baked light. The lightmap of a draw needs no bit.
 pub(super) fn baked_light_flag(found: Option<BakedLight>, stage: &Stage) -> u32 {
     match found {
         Some(BakedLight::Style) => c::STAGE_LIGHT_STYLE,
@@ -72,7 +72,7 @@ pub fn material_flags(shader: &Shader, class: LightmapClass) -> u32 {
     if found.liquid {
         flags |= c::MATERIAL_LIQUID;
     }
-    // an alpha-tested first stage may blend as well: then what passes the test still shows what is behind
+    // an alpha-tested first stage may also blend: points that pass the test still show the background
     let first_blends = shader.stages.first().is_some_and(|s| s.blend.is_some());
     if first_blends && found.class == SurfaceClass::CutOut {
         flags |= c::MATERIAL_TRANSLUCENT;
@@ -82,7 +82,7 @@ pub fn material_flags(shader: &Shader, class: LightmapClass) -> u32 {
         shaderscript::Cull::Back => flags |= c::MATERIAL_CULL_BACK,
         shaderscript::Cull::None => flags |= c::MATERIAL_TWO_SIDED,
     }
-    // what turns to the eye shows mirrors its back
+    // geometry that turns to the camera shows its back in mirrors
     let turns = |deform: &Deform| matches!(deform, Deform::AutoSprite | Deform::AutoSprite2);
     if shader.deforms.iter().any(turns) {
         flags |= c::MATERIAL_TWO_SIDED;

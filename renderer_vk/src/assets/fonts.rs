@@ -1,11 +1,11 @@
-//! Fonts that were drawn into images beforehand.
+//! Fonts that are stored as images.
 
 use q3model::FontInfo;
 
 use super::Assets;
 use super::material::LightmapClass;
 
-/// Size that a font gets when the game asks for none.
+/// Default font size, points.
 const DEFAULT_POINT_SIZE: i32 = 12;
 
 /// A font with the handles of its glyphs' materials.
@@ -15,13 +15,13 @@ pub struct LoadedFont {
     pub name: String,
     /// The table.
     pub info: FontInfo,
-    /// For each glyph the handle of its material, 0 for none.
+    /// For each glyph the handle of its material; 0: no material.
     pub handles: Vec<i32>,
 }
 
 impl Assets {
-    /// The font of a size, read from `fonts/fontImage_<size>.dat` at its first use; `None` (and a warning) without such
-    /// a file.
+    /// The font of a size, read from `fonts/fontImage_<size>.dat` at its first use; `None`, with a warning, if there is
+    /// no such file.
     pub fn register_font(&mut self, point_size: i32) -> Option<LoadedFont> {
         let size = if point_size <= 0 {
             DEFAULT_POINT_SIZE

@@ -1,9 +1,9 @@
-//! What a material is once it is registered: a script's definition bound to images, in the form that the passes read.
+//! A registered material: a script's definition bound to images, in the form that the passes read.
 
 use shaders::types::Dielectric;
 use shaderscript::{AlphaGen, Cull, Deform, Fog, Shader, TcGen};
 
-/// What a surface's light comes from: part of a material's identity, as the engine's lightmap index is.
+/// Light source of a surface: part of a material's identity, as the engine's lightmap index is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LightmapClass {
     /// A lightmap page (index 0 and above).
@@ -38,22 +38,22 @@ pub enum Combine {
     Add,
 }
 
-/// One drawing pass: a stage, or two that the engine draws as one with two texture units.
+/// One drawing pass: one stage, or two that the engine draws with two texture units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RasterPass {
-    /// Indices of the GPU stages; the second counts only when `stage_count` is 2.
+    /// Indices of the GPU stages; the second is valid only if `stage_count` is 2.
     pub stages: [u32; 2],
     /// 1 or 2.
     pub stage_count: u32,
-    /// How two stages combine.
+    /// Combination of two stages.
     pub combine: Combine,
-    /// `BLEND_*` factors of source and destination; `None` overwrites.
+    /// `BLEND_*` factors of source and destination; `None`: no blending.
     pub blend: Option<(u32, u32)>,
     /// Writes depth.
     pub depth_write: bool,
-    /// Passes only where the depth is already this surface's.
+    /// Depth test for equality.
     pub depth_equal: bool,
-    /// `false`: drawn whatever the depth says (implicit 2D materials).
+    /// `false`: no depth test (implicit 2D materials).
     pub depth_test: bool,
     /// One of the `ALPHAFUNC_*` constants.
     pub alpha_func: u32,
@@ -62,8 +62,8 @@ pub struct RasterPass {
 /// `skyParms`, with its images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkyBox {
-    /// Bindless indices of the far box's sides `rt bk lf ft up dn`; `None` without a box (or when its first side is
-    /// missing: the engine then draws none).
+    /// Bindless indices of the far box's sides `rt bk lf ft up dn`; `None` without a box, or without its first side:
+    /// the engine then draws no box.
     pub faces: Option<[u32; 6]>,
 }
 
@@ -72,38 +72,38 @@ pub struct SkyBox {
 pub struct VideoStage {
     /// Index of the GPU stage.
     pub stage: u32,
-    /// File name as written.
+    /// File name as written in the script.
     pub name: String,
-    /// The client number whose pictures it shows, see [`Textures::scratch`](super::Textures::scratch).
+    /// Client number of the pictures that it shows, see [`Textures::scratch`](super::Textures::scratch).
     pub client: usize,
 }
 
 /// A registered material.
 #[derive(Clone, Debug)]
 pub struct Material {
-    /// Name without extension, as first asked for.
+    /// Name without extension, in the spelling of the first request.
     pub name: String,
-    /// Which of the engine's variants it is. A material of class `Page` whose script has no lightmap stage keeps its
+    /// The engine's variant of the material. A material of class `Page` whose script has no lightmap stage keeps its
     /// class.
     pub lightmap_class: LightmapClass,
-    /// The definition, detail stages dropped and stages after a missing image cut off.
+    /// The definition without detail stages, and without stages from a missing image on.
     pub shader: Shader,
-    /// It comes from a script.
+    /// It is defined by a script.
     pub explicit: bool,
-    /// The definition is unusable (rejected, or an image is missing). Skins draw what is left of it; everything else
-    /// uses the default material in its place.
+    /// The definition is unusable (rejected, or an image is missing). Skins draw its remaining stages; all other
+    /// geometry uses the default material instead.
     pub defaulted: bool,
-    /// Sort value that applies.
+    /// Effective sort value.
     pub sort: f32,
     /// Creation order.
     pub order: u32,
     /// `MATERIAL_*` bits.
     pub flags: u32,
-    /// What it does to rays that pass it.
+    /// Transmission for rays.
     pub dielectric: Dielectric,
     /// Which faces are drawn.
     pub cull: Cull,
-    /// Drawn slightly nearer than it is.
+    /// Drawn with a depth offset towards the camera.
     pub polygon_offset: bool,
     /// Drawing passes of the classic look, in order.
     pub passes: Vec<RasterPass>,
@@ -119,9 +119,9 @@ pub struct Material {
     pub surface_flags: u32,
     /// `CONTENTS_*` bits of the script.
     pub content_flags: u32,
-    /// Distance at which an `alphaGen portal` stage hides what is behind, units; the engine's default is 256.
+    /// Distance at which an `alphaGen portal` stage is opaque, units; the engine's default is 256.
     pub portal_range: f32,
-    /// Drawn instead of this one (`RemapShader`).
+    /// Material that replaces this one (`RemapShader`).
     pub remapped: Option<u32>,
     /// Seconds subtracted from shader time.
     pub time_offset: f32,
@@ -130,18 +130,18 @@ pub struct Material {
 }
 
 impl Material {
-    /// Whether vertices move with time or view, so that its surfaces are dynamic meshes.
+    /// Whether vertices depend on time or view, so that its surfaces are dynamic meshes.
     pub fn deforms(&self) -> bool {
         !self.shader.deforms.is_empty()
     }
 
-    /// Whether its surfaces turn to the eye.
+    /// Whether its surfaces turn to the camera.
     pub fn turns_to_eye(&self) -> bool {
         let turns = |d: &Deform| matches!(d, Deform::AutoSprite | Deform::AutoSprite2);
         self.shader.deforms.iter().any(turns)
     }
 
-    /// Its name in lists: the default material has one of its own.
+    /// Its name in lists; the default material has a special one.
     pub fn shown_name(&self) -> &str {
         if self.order == 0 {
             "<default>"
@@ -150,7 +150,7 @@ impl Material {
         }
     }
 
-    /// Whether the look of a surface depends on its normals.
+    /// Whether the appearance of a surface depends on its normals.
     pub fn uses_normals(&self) -> bool {
         let by_normal = |stage: &shaderscript::Stage| {
             stage.tc_gen == TcGen::Environment || stage.alpha_gen == AlphaGen::LightingSpecular

@@ -7,7 +7,7 @@ use shaders::types::{self, MaterialBuffers};
 use super::{LightmapClass, Material, Materials, Samplers};
 use crate::gpu::{self, Buffer, BufferUsage, Device};
 
-/// `clamp_time` of a material that never stops.
+/// `clamp_time` of a material without a time limit.
 const ENDLESS: f32 = 1.0e30;
 
 /// The arrays on the GPU.
@@ -19,8 +19,8 @@ pub(super) struct Uploaded {
     noise: Buffer,
 }
 
-/// What the map's compiler multiplied the light on a material by before it stored it: traced, it is the surface that
-/// throws back so much less, or more.
+/// Factor by which the map compiler scaled the light on a material before storing it. The traced look scales the
+/// reflectance by it.
 fn lit_scale(material: &Material) -> f32 {
     let says = material.shader.light.lightmap_brightness;
     let lightmapped = material.lightmap_class == LightmapClass::Page;
@@ -28,7 +28,7 @@ fn lit_scale(material: &Material) -> f32 {
 }
 
 impl Materials {
-    /// Copies the arrays to the GPU if anything changed. `samplers` translates sampler kinds to bindless indices.
+    /// Uploads the arrays to the GPU if they have changed. `samplers` translates sampler kinds to bindless indices.
     ///
     /// # Errors
     /// The device has no memory for the buffers.
@@ -52,7 +52,7 @@ impl Materials {
             .map(|(material, &light)| self.gpu_material(material, light, samplers))
             .collect();
         let usage = BufferUsage::STORAGE;
-        // values as bits, then the permutation: one array of words
+        // noise values as bits, then the permutation: one array of words
         let noise: Vec<u32> = shaderscript::eval::noise_values()
             .iter()
             .map(|value| value.to_bits())
@@ -73,7 +73,7 @@ impl Materials {
         Ok(())
     }
 
-    /// Device addresses as of the last upload; zero before the first.
+    /// Device addresses of the last upload; zero before the first.
     pub fn addresses(&self) -> MaterialBuffers {
         self.uploaded
             .as_ref()
@@ -111,8 +111,8 @@ impl Materials {
         }
     }
 
-    /// Texture and kind of sampler of a material whose stages come to one still image under light: the image alone
-    /// where light is computed or baked into vertices, or the image and baked light multiplied in either order.
+    /// Texture and sampler kind of a material whose stages reduce to one constant image under light: the image alone
+    /// where light is computed or stored in vertices, or the product of image and baked light in either order.
     pub(super) fn plain_image(&self, material: &Material) -> Option<(u32, u32)> {
         let is_drawn = |s: &&types::Stage| s.flags & c::STAGE_LIGHT_STYLE == 0;
         let stages: Vec<_> = self.stages(material).iter().filter(is_drawn).collect();

@@ -1,4 +1,4 @@
-//! All materials of a registration: found by name as the engine finds them, compiled to the arrays that shaders read.
+//! All materials of a registration: looked up by name as in the engine, compiled to the arrays that shaders read.
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
@@ -24,23 +24,23 @@ use crate::settings::Settings;
 /// Distance at which a portal without `alphaGen portal` is opaque, units: the engine's default.
 pub const DEFAULT_PORTAL_RANGE: f32 = 256.0;
 
-/// What the settings say about materials that are found from now on.
+/// Settings that apply to materials when they are loaded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaterialSettings {
     /// Stages marked `detail` are drawn.
     pub detail_textures: bool,
     /// One stage with vertex light instead of lightmaps.
     pub vertex_light: bool,
-    /// Stages stay as they are even so: a menu covers the game.
+    /// Overrides `vertex_light`: stages are unchanged, because a menu covers the game.
     pub menu: bool,
-    /// Scripts that are used are named in the log.
+    /// The log lists the scripts in use.
     pub print: bool,
-    /// 0..1: how much colour is taken out of the colours that scripts name.
+    /// 0..1: desaturation of the colours in scripts.
     pub greyscale: f32,
 }
 
 impl MaterialSettings {
-    /// The part of the settings that matters here.
+    /// The part of the renderer's settings that materials depend on.
     pub fn new(settings: &Settings) -> Self {
         Self {
             detail_textures: settings.detail_textures,
@@ -52,14 +52,14 @@ impl MaterialSettings {
     }
 }
 
-/// Stages of a material that were appended to the arrays.
+/// Stages of a material that have been appended to the arrays.
 #[derive(Default)]
 struct PushedStages {
-    /// How many, from the first.
+    /// Number of stages, from the first.
     count: usize,
-    /// Those of them that show videos.
+    /// The video stages among them.
     videos: Vec<VideoStage>,
-    /// Name of the image that the next stage lacks.
+    /// Name of the missing image of the next stage.
     missing: Option<String>,
 }
 
@@ -68,11 +68,11 @@ pub struct Materials {
     pub(super) list: Vec<Material>,
     by_key: HashMap<(String, LightmapClass), u32>,
     pub(super) arrays: StageArrays,
-    /// Of each material: its radiance as a light, which only the traced look knows.
+    /// Radiance of each material as a light; only the traced look uses it.
     pub(super) light_radiance: Vec<Vec3>,
     /// Indices in drawing order.
     sorted: Vec<u32>,
-    /// Place of each material in `sorted`.
+    /// Position of each material in `sorted`.
     ranks: Vec<u32>,
     videos: VideoClients,
     scripts: Arc<relight::Materials>,
@@ -83,22 +83,22 @@ pub struct Materials {
     pub(super) uploaded: Option<Uploaded>,
     pub(super) dirty: bool,
     generation: u64,
-    /// Lightmap pages that each material is shown under.
+    /// Lightmap pages of each material's surfaces.
     pages: BTreeSet<(u32, i32)>,
 }
 
-/// Materials that the renderer draws with itself.
+/// Materials of the renderer's own geometry.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Internal {
-    /// Red, added to what is there: beams.
+    /// Red, additive: beams.
     pub beam: u32,
-    /// Vertex colour: the axes that stand for a missing model.
+    /// Vertex colour: the axes that replace a missing model.
     pub axes: u32,
     /// The white image with vertex colour, for the 2D overlay.
     pub white: u32,
     /// The game's material for planar shadows (`cg_shadows 3`), if it has one.
     pub shadow: Option<u32>,
-    /// Bindless texture of the picture that fog is drawn with.
+    /// Bindless texture of the fog image.
     pub fog_image: u32,
     /// The game's material for the sun's disc (`r_drawSun`), if it has one.
     pub sun: Option<u32>,
@@ -106,15 +106,15 @@ pub struct Internal {
     pub flare: Option<u32>,
 }
 
-/// Name of the script that the engine draws planar shadows with.
+/// Name of the script for planar shadows, as in the engine.
 const SHADOW_MATERIAL: &str = "projectionShadow";
-/// Name of the script that the engine draws the sun with.
+/// Name of the script for the sun.
 const SUN_MATERIAL: &str = "sun";
-/// Name of the script that the engine draws all flares with, whatever their surfaces' own are.
+/// Name of the script for all flares, as in the engine, whatever material the flare surfaces have.
 const FLARE_MATERIAL: &str = "flareShader";
 
 impl Materials {
-    /// The default material and the renderer's own ones. `scripts` are the game's.
+    /// The default material and the renderer's own materials. `scripts`: those of the game.
     pub fn new(
         scripts: Arc<relight::Materials>,
         settings: MaterialSettings,
@@ -159,7 +159,7 @@ impl Materials {
             ));
             stage.depth_write = false;
         });
-        // the engine leaves culling as the surface before had it, which mostly has one side
+        // the engine keeps the culling state of the previously drawn surface, which mostly is one-sided
         beam.cull = shaderscript::Cull::Front;
         materials.internal.beam =
             materials.add("*beam", beam, LightmapClass::None, false, None, source);
@@ -180,7 +180,7 @@ impl Materials {
             materials.scripts.library().find(name)?;
             Some(materials.find(source, name, LightmapClass::None, true))
         };
-        // in the order in which the engine makes them
+        // in the engine's order of creation
         let shadow = scripted(SHADOW_MATERIAL);
         let flare = scripted(FLARE_MATERIAL);
         let sun = scripted(SUN_MATERIAL);
@@ -190,10 +190,10 @@ impl Materials {
         materials
     }
 
-    /// The index of the material that a name stands for on surfaces of a class, compiled at its first use.
+    /// The index of the material with a name and a class, compiled at its first use.
     ///
-    /// Identity as in the engine: the name without extension, compared without case, and the class; a name that has no
-    /// usable definition is one material for all classes. `mip` matters only for names that no script defines.
+    /// Identity as in the engine: the name without extension, compared without case, and the class; a name without a
+    /// usable definition is one material for all classes. `mip` applies only to names without a script.
     pub fn find(
         &mut self,
         source: &mut dyn ImageSource,
@@ -246,7 +246,7 @@ impl Materials {
         index
     }
 
-    /// Tells what the engine would warn about in a script, when the first material is made of it.
+    /// Logs the engine's warnings about a script when its first material is made.
     fn tell_warnings(&self, shader: &Shader) {
         let class = |class| (shader.name.to_ascii_lowercase(), class);
         let told = |c: &LightmapClass| self.by_key.contains_key(&class(*c));
@@ -268,8 +268,7 @@ impl Materials {
         })
     }
 
-    /// [`find`](Self::find), with the default material in place of an unusable one: what world and model surfaces
-    /// draw.
+    /// [`find`](Self::find), with the default material instead of an unusable one, as world and model surfaces use it.
     pub fn find_or_default(
         &mut self,
         source: &mut dyn ImageSource,
@@ -295,13 +294,13 @@ impl Materials {
         if let Some(reason) = &shader.rejected {
             self.scripts.tell_fault(name, &format!("{place}: {reason}"));
         }
-        // the engine loads the images of all stages before it drops any
+        // the engine loads the images of all stages before it drops any stage
         let written = shader.stages.clone();
         self.apply_settings(&mut shader);
         if let Some(sun) = &shader.sun {
             self.last_sun = Some(sun.direction.normalize_or_zero());
         }
-        // the order value is decided before anything is taken away
+        // the sort value depends on all stages
         let sort = shader.sort_value();
         if self.settings.vertex_light && !self.settings.menu && shader.stages.len() > 1 {
             shader = shaderscript::collapse_vertex_light(&shader, class == LightmapClass::None);
@@ -318,7 +317,7 @@ impl Materials {
         let kept = pushed.count;
         let missing = missing.or(pushed.missing);
         if let Some(image) = missing {
-            // menus and mods ask for pictures that do not exist all the time: only scripts are worth a warning
+            // menus and mods often request absent images: only scripts cause a warning
             if explicit {
                 let fault = format!("{place}: image {image} is missing");
                 self.scripts.tell_fault(name, &fault);
@@ -373,7 +372,7 @@ impl Materials {
         order
     }
 
-    /// Leaves out stages, and colour, that the settings ask to be left out.
+    /// Removes stages and colour according to the settings.
     fn apply_settings(&self, shader: &mut Shader) {
         if !self.settings.detail_textures {
             shader.stages.retain(|stage| !stage.detail);
@@ -385,7 +384,7 @@ impl Materials {
         }
     }
 
-    /// Loads the images of stages; the name of the first that is missing.
+    /// Loads the images of stages; returns the name of the first missing one.
     fn missing_image(
         &mut self,
         stages: &[shaderscript::Stage],
@@ -398,7 +397,7 @@ impl Materials {
         })
     }
 
-    /// Appends the stages of a material to the arrays, up to the first whose image is missing.
+    /// Appends the stages of a material to the arrays, up to the first with a missing image.
     fn push_stages(
         &mut self,
         shader: &Shader,
@@ -431,7 +430,7 @@ impl Materials {
         pushed
     }
 
-    /// Keeps the drawing order: by sort value, then by creation.
+    /// Inserts a material into the drawing order: by sort value, then by creation.
     fn insert_sorted(&mut self, index: u32, sort: f32) {
         let at = self
             .sorted
@@ -445,7 +444,7 @@ impl Materials {
         }
     }
 
-    /// A material; the default one for an index that does not exist.
+    /// A material; the default material for an invalid index.
     pub fn get(&self, index: u32) -> &Material {
         self.list.get(index as usize).unwrap_or(&self.list[0])
     }
@@ -455,7 +454,7 @@ impl Materials {
         self.list.len()
     }
 
-    /// Never: the default material is always there.
+    /// Always `false`: the default material exists.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
@@ -465,7 +464,7 @@ impl Materials {
         self.list.iter()
     }
 
-    /// What is drawn in place of a material (`RemapShader`).
+    /// The material that replaces `index` (`RemapShader`).
     pub fn resolve(&self, index: u32) -> u32 {
         let index = if (index as usize) < self.list.len() {
             index
@@ -475,7 +474,7 @@ impl Materials {
         self.get(index).remapped.unwrap_or(index)
     }
 
-    /// Place of a material in the drawing order.
+    /// Position of a material in the drawing order.
     pub fn rank(&self, index: u32) -> u32 {
         self.ranks.get(index as usize).copied().unwrap_or(0)
     }
@@ -485,7 +484,7 @@ impl Materials {
         &self.sorted
     }
 
-    /// The index of a handle that the game passes in; the default material for a bad one.
+    /// The index of a handle from the game; the default material for an invalid handle.
     pub fn of_handle(&self, handle: i32) -> u32 {
         u32::try_from(handle)
             .ok()
@@ -493,7 +492,7 @@ impl Materials {
             .unwrap_or(0)
     }
 
-    /// Settings of materials that are found from now on.
+    /// Settings for materials that are loaded from now on.
     pub fn set_settings(&mut self, settings: MaterialSettings) {
         self.settings = settings;
     }
@@ -503,17 +502,18 @@ impl Materials {
         self.internal
     }
 
-    /// Height of the cloud layer of all skies, units: that of the sky parsed last, as the engine has one dome for all.
+    /// Height of the cloud layer of all skies, units: that of the last parsed sky, because the engine has one dome for
+    /// all.
     pub fn cloud_height(&self) -> f32 {
         self.cloud_height
     }
 
-    /// Direction towards the sun of the material parsed last that has one.
+    /// Direction towards the sun by the last parsed material that defines a sun.
     pub fn last_sun(&self) -> Option<Vec3> {
         self.last_sun
     }
 
-    /// Forgets the sun of materials parsed so far: a map begins.
+    /// Forgets the sun of parsed materials, before a map is loaded.
     pub fn forget_sun(&mut self) {
         self.last_sun = None;
     }
@@ -523,13 +523,13 @@ impl Materials {
         self.videos.iter()
     }
 
-    /// The stages, on the CPU; samplers are kinds, not bindless indices.
+    /// A material's stages on the CPU; samplers are kinds, not bindless indices.
     pub fn stages(&self, material: &Material) -> &[types::Stage] {
         let range = span(material.stage_first, material.stage_count);
         part(&self.arrays.stages, range)
     }
 
-    /// Bindless texture of a stage of one still image, and whether it ends at its edges instead of repeating.
+    /// Bindless texture of a stage with one constant image, and whether it is clamped at its edges.
     pub fn image(&self, stage: &types::Stage) -> Option<(u32, bool)> {
         let texture = self.arrays.images.get(stage.image_first as usize)?;
         let repeats = [sampler::REPEAT_MIP, sampler::REPEAT].contains(&stage.sampler_index);
@@ -541,7 +541,7 @@ impl Materials {
         &self.arrays
     }
 
-    /// Marks everything for a new upload (a change of samplers).
+    /// Marks all arrays for upload, after a change of samplers.
     pub fn invalidate(&mut self) {
         self.touch();
     }
@@ -551,13 +551,13 @@ impl Materials {
         self.generation += 1;
     }
 
-    /// Grows whenever a material is added or changed.
+    /// A number that grows whenever a material is added or changed.
     pub fn generation(&self) -> u64 {
         self.generation
     }
 
-    /// Notes that a surface of the map shows a material under a lightmap page. The engine counts each page as a
-    /// material of its own; here one serves for all.
+    /// Records that a surface of the map shows a material with a lightmap page. The engine counts each page as a
+    /// material of its own; here one material serves all pages.
     pub fn note_lightmap_page(&mut self, material: u32, page: i32) {
         if self.get(material).lightmap_class == LightmapClass::Page {
             self.pages.insert((material, page));

@@ -1,4 +1,4 @@
-//! What the game registers: images, materials, models, skins and fonts, as handles to data on the GPU.
+//! Assets that the game registers: images, materials, models, skins and fonts, as handles to data on the GPU.
 
 mod alpha;
 mod bind;
@@ -35,9 +35,9 @@ pub use textures::{Samplers, Textures};
 use crate::gpu::{self, Device};
 use crate::settings::{Settings, TextureMode};
 
-/// Everything registered since the last `BeginRegistration`.
+/// All assets registered since the last `BeginRegistration`.
 pub struct Assets {
-    /// The GPU that it lives on.
+    /// The device that holds them.
     pub device: Device,
     /// Images.
     pub textures: Textures,
@@ -47,7 +47,7 @@ pub struct Assets {
     pub models: Models,
     /// Skins.
     pub skins: Skins,
-    /// Samplers of the texture mode in force.
+    /// Samplers of the current texture mode.
     pub samplers: Samplers,
     /// The game's scripts.
     pub scripts: Arc<relight::Materials>,
@@ -57,10 +57,10 @@ pub struct Assets {
 }
 
 impl Assets {
-    /// Nothing but the built-in images and materials. `scripts` are the game's.
+    /// The built-in images and materials only. `scripts`: those of the game.
     ///
     /// # Errors
-    /// The device has no memory, or no room in its tables, for the built-in images and the samplers.
+    /// The device has no memory or no free descriptors for the built-in images and the samplers.
     pub fn new(
         device: &Device,
         files: Arc<dyn GameFiles>,
@@ -89,15 +89,15 @@ impl Assets {
         })
     }
 
-    /// Settings of what is loaded from now on. The game may change a setting that the player cannot change without a
-    /// restart, between `BeginRegistration` and the map.
+    /// Settings for assets that are loaded from now on. Between `BeginRegistration` and the map, a game may change a
+    /// setting that players can change only with a restart.
     pub fn set_settings(&mut self, settings: &Settings) {
         self.textures
             .set_settings(TextureSettings::new(settings, MAX_TEXTURE_SIZE));
         self.materials.set_settings(MaterialSettings::new(settings));
     }
 
-    /// Registers a picture or material for the game; 0 when it is unusable. `mip`: with smaller levels, repeated.
+    /// Registers an image or material for the game; 0 if it is unusable. `mip`: with mip levels, repeated.
     pub fn register_shader(&mut self, name: &str, mip: bool) -> i32 {
         let index = self
             .materials
@@ -108,21 +108,21 @@ impl Assets {
         i32::try_from(index).unwrap_or(0)
     }
 
-    /// Registers a model; 0 when it is unusable.
+    /// Registers a model; 0 if it is unusable.
     pub fn register_model(&mut self, name: &str) -> i32 {
         let files = Arc::clone(self.textures.files());
         self.models
             .register(&*files, &mut self.materials, &mut self.textures, name)
     }
 
-    /// Registers a skin; 0 when it is unusable.
+    /// Registers a skin; 0 if it is unusable.
     pub fn register_skin(&mut self, name: &str) -> i32 {
         let files = Arc::clone(self.textures.files());
         self.skins
             .register(&*files, &mut self.materials, &mut self.textures, name)
     }
 
-    /// The material index of a handle that the game passes in; the default material for a bad one.
+    /// The material index of a handle from the game; the default material for an invalid handle.
     pub fn material_of_handle(&self, handle: i32) -> u32 {
         self.materials.of_handle(handle)
     }
@@ -133,7 +133,7 @@ impl Assets {
             .remap(&mut self.textures, old, new, time_offset);
     }
 
-    /// Shows new pixels of a cinematic, see [`Textures::update_scratch`].
+    /// Uploads new pixels of a cinematic, see [`Textures::update_scratch`].
     ///
     /// # Errors
     /// The device has no memory for a texture of another size, or for the upload.
@@ -154,10 +154,10 @@ impl Assets {
         Ok(())
     }
 
-    /// Once a frame, before anything is recorded: takes over a changed texture mode and copies changed materials.
+    /// Call once a frame, before recording: applies a changed texture mode and uploads changed materials.
     ///
     /// # Errors
-    /// The device has no memory for the copies, or no room for more samplers.
+    /// The device has no memory for the uploads, or no free descriptors for samplers.
     pub fn prepare_frame(&mut self, settings: &Settings) -> Result<(), gpu::Error> {
         if settings.texture_mode != self.texture_mode {
             self.texture_mode = settings.texture_mode;
@@ -168,7 +168,7 @@ impl Assets {
     }
 }
 
-/// Largest side of a texture: what every Vulkan device has to offer.
+/// Maximum side of a texture: every Vulkan device supports it.
 const MAX_TEXTURE_SIZE: u32 = 4096;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Reading of models: which reader, which file, which levels of detail.
+//! Loads models: selects reader, file and levels of detail.
 //!
 //! Source: engine behaviour of `renderer_opengl1` (model registration).
 
@@ -12,16 +12,16 @@ use super::materials::Materials;
 use super::models::{IqmModel, MAX_LODS, Md3Lod, MdrModel, Model};
 use super::source::ImageSource;
 
-/// What models are read with.
+/// Inputs of model loading.
 pub(super) struct Loader<'a> {
     pub files: &'a dyn GameFiles,
     pub materials: &'a mut Materials,
     pub source: &'a mut dyn ImageSource,
-    /// Bytes of the files that were used.
+    /// Total bytes of the files read.
     pub bytes: usize,
 }
 
-/// A kind of model file.
+/// A model file format.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Format {
     Iqm,
@@ -37,8 +37,8 @@ const FORMATS: [(Format, &str); 3] = [
 ];
 
 impl Loader<'_> {
-    /// Reads a model by the reader of its extension. Where that fails, or there is no such reader, the other kinds are
-    /// tried under the same name.
+    /// Reads a model by the reader of its extension. If that fails, or no reader has this extension, tries the other
+    /// formats under the same name.
     pub fn model(&mut self, name: &str) -> Option<Model> {
         let known = extension(name).and_then(|extension| {
             let known = |(_, own): &&(Format, &str)| extension.eq_ignore_ascii_case(own);
@@ -124,12 +124,11 @@ impl Loader<'_> {
         Some(Model::Mdr(MdrModel { mdr, materials }))
     }
 
-    /// Reads what levels there are, the coarsest first: materials of equal sort are drawn in the order in which they
-    /// were registered.
+    /// Reads the existing levels, coarsest first: materials of equal sort values are drawn in order of registration.
     fn md3_lods(&mut self, name: &str) -> Option<Model> {
         let mut found: [Option<Arc<Md3Lod>>; MAX_LODS] = Default::default();
         for (lod, slot) in found.iter_mut().enumerate().rev() {
-            // a level that fails is taken over from a coarser one
+            // a coarser level replaces one that fails
             *slot = self.md3(&lod_name(name, lod)).map(Arc::new);
         }
         let last = found.iter().rposition(Option::is_some)?;
@@ -154,13 +153,13 @@ impl Loader<'_> {
     }
 }
 
-/// What follows the last dot of the last part of a path.
+/// The text after the last dot of a path's last component.
 fn extension(name: &str) -> Option<&str> {
     let file = name.rsplit('/').next().unwrap_or(name);
     file.rsplit_once('.').map(|(_, extension)| extension)
 }
 
-/// The name of a level of detail: `name_1.md3`; the name is split at its first dot, as in the engine.
+/// The file name of a level of detail: `name_1.md3`; the name is split at its first dot, as in the engine.
 fn lod_name(name: &str, lod: usize) -> String {
     let stem = name.split('.').next().unwrap_or(name);
     let extension = name

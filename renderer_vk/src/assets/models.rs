@@ -12,7 +12,7 @@ use super::model_load::Loader;
 use super::source::ImageSource;
 use crate::api::Orientation;
 
-/// Most levels of detail of a model.
+/// Maximum number of levels of detail of a model.
 pub const MAX_LODS: usize = 3;
 
 /// One level of detail.
@@ -20,11 +20,11 @@ pub const MAX_LODS: usize = 3;
 pub struct Md3Lod {
     /// The mesh.
     pub md3: Md3,
-    /// For each surface the materials that its shader names stand for; the default material for unusable ones.
+    /// For each surface the materials of its shaders; the default material for unusable ones.
     pub materials: Vec<Vec<u32>>,
 }
 
-/// A model whose vertices hang on bones stored per frame.
+/// A model with bones that are stored per frame.
 #[derive(Debug)]
 pub struct MdrModel {
     /// The model.
@@ -33,12 +33,12 @@ pub struct MdrModel {
     pub materials: Vec<Vec<u32>>,
 }
 
-/// A model whose vertices hang on a skeleton of joints.
+/// A model with a skeleton of joints.
 #[derive(Debug)]
 pub struct IqmModel {
     /// The model.
     pub iqm: Iqm,
-    /// Its joints when it was bound.
+    /// Its joints in the bind pose.
     pub skeleton: IqmSkeleton,
     /// For each surface the material; the default material for an unusable one.
     pub materials: Vec<u32>,
@@ -47,13 +47,13 @@ pub struct IqmModel {
 /// A model.
 #[derive(Debug)]
 pub enum Model {
-    /// Key-framed triangles, the finest level first; missing levels are left out and coarser ones repeated in their
-    /// place, so that every entry up to `lods.len()` can be drawn.
+    /// Key-framed triangles, finest level first; a coarser level replaces a missing one, so that every entry up to
+    /// `lods.len()` can be drawn.
     Mesh {
         /// At least one level.
         lods: Vec<Arc<Md3Lod>>,
     },
-    /// Bones stored per frame, with levels of detail of its own.
+    /// Bones stored per frame, with levels of detail in the file.
     Mdr(MdrModel),
     /// A skeleton of joints.
     Iqm(IqmModel),
@@ -66,12 +66,12 @@ pub enum Model {
     },
 }
 
-/// Models by handle; handle 0 is no model.
+/// Models by handle; handle 0 is invalid.
 #[derive(Debug, Default)]
 pub struct Models {
     list: Vec<(String, Option<Model>)>,
     by_name: HashMap<String, i32>,
-    /// Bytes of the files of each handle's model.
+    /// File size of each handle's model, bytes.
     file_bytes: HashMap<i32, usize>,
 }
 
@@ -137,13 +137,13 @@ impl Models {
         }
     }
 
-    /// A model; `None` for 0, for a failed one and for a handle that was never given out.
+    /// A model; `None` for 0, for a model that failed to load and for unknown handles.
     pub fn get(&self, handle: i32) -> Option<&Model> {
         let slot = usize::try_from(handle.checked_sub(1)?).ok()?;
         self.list.get(slot)?.1.as_ref()
     }
 
-    /// Where a tag is between two frames; `None` when the model has no such tag.
+    /// Interpolated orientation of a tag between two frames; `None` if the model has no such tag.
     pub fn lerp_tag(
         &self,
         handle: i32,
@@ -164,8 +164,8 @@ impl Models {
         })
     }
 
-    /// Bounds: those of the brush model, or of the first frame of the finest level; zeros for no model and for one that
-    /// tells none.
+    /// Bounds of the brush model, or of the first frame of the finest level; zeros without a model or without stored
+    /// bounds.
     pub fn bounds(&self, handle: i32) -> (Vec3, Vec3) {
         let of_frame = |frame: &q3model::Frame| (frame.mins, frame.maxs);
         let bounds = match self.get(handle) {
@@ -181,7 +181,7 @@ impl Models {
         bounds.unwrap_or((Vec3::ZERO, Vec3::ZERO))
     }
 
-    /// Lines for `modellist`: bytes of the files, levels of detail that are files of their own, name; then the sum.
+    /// Lines for `modellist`: bytes of the files, number of levels with files of their own, name; then the sum.
     pub fn list(&self) -> Vec<String> {
         let mut total = 0;
         let mut lines = Vec::with_capacity(self.list.len() + 1);

@@ -1,4 +1,4 @@
-//! An image file's pixels as the levels of a texture, by the engine's rules and the player's settings.
+//! Prepares the mip levels of a texture from an image file, by the engine's rules and the player's settings.
 //!
 //! Source: engine behaviour of `renderer_opengl1`: sides become powers of two, `r_picmip` halves, then the mip chain.
 
@@ -10,29 +10,29 @@ use support::slice::item;
 use super::source::ImageFlags;
 use crate::settings::Settings;
 
-/// The settings that textures depend on; they change only at registration.
+/// Settings that textures depend on; they change only at registration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureSettings {
-    /// Halvings of images that allow it.
+    /// Number of halvings of images with `picmip`.
     pub picmip: u32,
-    /// Odd sizes shrink to a power of two instead of growing.
+    /// Sizes are rounded down to a power of two instead of up.
     pub round_down: bool,
-    /// Box filter for smaller levels; otherwise a weighted 4 x 4 one.
+    /// Box filter for mip levels; otherwise a weighted 4 x 4 filter.
     pub simple_mip_maps: bool,
     /// Factor on the colours of mipmapped images, at least 1.
     pub intensity: f32,
-    /// Brightening of images where the display does none: `r_gamma` with `r_ignorehwgamma`, otherwise 1.
+    /// Gamma applied to images if the display applies none: `r_gamma` with `r_ignorehwgamma`, otherwise 1.
     pub gamma: f32,
-    /// 0..1: how much colour is taken out.
+    /// 0..1: desaturation.
     pub greyscale: f32,
-    /// Smaller levels are tinted.
+    /// Mip levels are tinted.
     pub color_mips: bool,
-    /// Largest side the device can have.
+    /// Maximum side that the device supports.
     pub max_size: u32,
 }
 
 impl TextureSettings {
-    /// The part of the settings that matters here.
+    /// The part of the renderer's settings that textures depend on.
     pub fn new(settings: &Settings, max_size: u32) -> Self {
         Self {
             picmip: settings.picmip,
@@ -55,7 +55,7 @@ impl TextureSettings {
     }
 }
 
-/// The levels of a texture, the largest first; at least one.
+/// The levels of a texture, largest first; at least one.
 pub fn prepare(image: &Image, flags: ImageFlags, settings: &TextureSettings) -> Vec<Image> {
     let mut base = image.to_power_of_two(settings.round_down);
     let whole = (base.width, base.height);
@@ -75,7 +75,7 @@ pub fn prepare(image: &Image, flags: ImageFlags, settings: &TextureSettings) -> 
     if flags.mipmap && settings.intensity > 1.0 {
         brighten(&mut base.rgba, settings.intensity);
     }
-    // the engine hands pictures without smaller levels on as they are, unless it had to halve them
+    // the engine does not modify images without mip levels, unless it halves them
     let halved = (base.width, base.height) != whole;
     if settings.gamma != 1.0 && (flags.mipmap || halved) {
         apply_gamma(&mut base.rgba, settings.gamma);
@@ -92,7 +92,7 @@ pub fn prepare(image: &Image, flags: ImageFlags, settings: &TextureSettings) -> 
         if settings.color_mips
             && let Some(tint) = tints.next()
         {
-            // the level after it is made of what is tinted here
+            // the next level is computed from the tinted one
             blend_over(&mut next.rgba, *tint);
         }
         levels.push(next);
@@ -100,10 +100,10 @@ pub fn prepare(image: &Image, flags: ImageFlags, settings: &TextureSettings) -> 
     levels
 }
 
-/// Colours of `r_colorMipLevels` from the first smaller level on.
+/// Colours of `r_colorMipLevels` from the first mip level below the largest.
 const MIP_TINTS: [[u8; 3]; 3] = [[255, 0, 0], [0, 255, 0], [0, 0, 255]];
 
-/// Mixes a colour in with the engine's weights: 127 and 128 of 512, so that the levels come out half as bright.
+/// Blends a tint with the engine's weights, 127 and 128 of 512, which halve the brightness.
 fn blend_over(rgba: &mut [u8], tint: [u8; 3]) {
     for texel in rgba.as_chunks_mut::<4>().0 {
         for (channel, tint) in texel.iter_mut().zip(tint) {
@@ -119,7 +119,7 @@ pub fn mean(image: &Image) -> Vec4 {
 }
 
 fn smaller(image: &Image, simple: bool) -> Image {
-    // the weighted filter needs two texels each way; the engine falls back as well
+    // the weighted filter needs two texels in each direction; the engine uses the box filter here, too
     if simple || image.width < 2 || image.height < 2 {
         image.halve()
     } else {
@@ -127,7 +127,7 @@ fn smaller(image: &Image, simple: bool) -> Image {
     }
 }
 
-/// Half the size by the weights 1 2 2 1 / 2 4 4 2 / 2 4 4 2 / 1 2 2 1 (of 36), wrapping round the edges.
+/// Half the size by the weights 1 2 2 1 / 2 4 4 2 / 2 4 4 2 / 1 2 2 1 (of 36), with repeated edges.
 fn weighted(image: &Image) -> Image {
     let (width, height) = (image.width / 2, image.height / 2);
     let texels = image.rgba.as_chunks::<4>().0;
@@ -142,7 +142,7 @@ fn weighted(image: &Image) -> Image {
             let mut sum = [0u32; 4];
             for (dy, wy) in (0u32..).zip(WEIGHTS) {
                 for (dx, wx) in (0u32..).zip(WEIGHTS) {
-                    // one texel up and left of the 2 x 2 block; adding the size first keeps it unsigned
+                    // one texel up and left of the 2 x 2 block; adding the size first avoids unsigned underflow
                     let texel = at(x * 2 + dx + image.width - 1, y * 2 + dy + image.height - 1);
                     for (sum, byte) in sum.iter_mut().zip(texel) {
                         *sum += u32::from(byte) * wx * wy;
@@ -155,7 +155,7 @@ fn weighted(image: &Image) -> Image {
     Image::from_rgba(width, height, rgba).unwrap_or_else(|| image.halve())
 }
 
-/// Luma's weights (Rec. 709, as the engine).
+/// Luma weights (Rec. 709, as the engine).
 const LUMA: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
 /// A colour moved towards its luma by `amount`, 0 to 1 (`r_greyscale`).
@@ -163,7 +163,7 @@ pub fn grey(color: Vec3, amount: f32) -> Vec3 {
     color.lerp(Vec3::splat(color.dot(LUMA)), amount)
 }
 
-/// Moves colours towards their luma.
+/// Blends colours towards their luma.
 pub fn desaturate(rgba: &mut [u8], amount: f32) {
     for texel in rgba.as_chunks_mut::<4>().0 {
         let [r, g, b, _] = *texel;
@@ -183,7 +183,7 @@ fn brighten(rgba: &mut [u8], intensity: f32) {
     }
 }
 
-/// Brightens colours as a display's gamma ramp would.
+/// Applies gamma to colours, as a display's gamma ramp would.
 fn apply_gamma(rgba: &mut [u8], gamma: f32) {
     let table = overbright::gamma_table(gamma, 0);
     for texel in rgba.as_chunks_mut::<4>().0 {
@@ -193,8 +193,7 @@ fn apply_gamma(rgba: &mut [u8], gamma: f32) {
     }
 }
 
-/// A lightmap page or other RGB bytes as an opaque picture, overbright shift applied; `None` when the length does
-/// not fit.
+/// An opaque image of a lightmap page or other RGB bytes, overbright shift applied; `None` if the length is wrong.
 pub fn light_page(rgb: &[u8], side: u32, shift_bits: u32, greyscale: f32) -> Option<Image> {
     let mut rgba = Vec::with_capacity(rgb.len() / 3 * 4);
     for texel in rgb.as_chunks::<3>().0 {
@@ -207,14 +206,14 @@ pub fn light_page(rgb: &[u8], side: u32, shift_bits: u32, greyscale: f32) -> Opt
     Image::from_rgba(side, side, rgba)
 }
 
-/// A lightmap page as colours by brightness, red the darkest (`r_lightmap 2`), with the brightness of its brightest
-/// texel, 0 to 1; `None` when the length does not fit.
+/// A lightmap page with brightness as hue, red the darkest (`r_lightmap 2`), and the brightness of its brightest texel,
+/// 0 to 1; `None` if the length is wrong.
 pub fn heat_page(rgb: &[u8], side: u32) -> Option<(Image, f32)> {
     let mut rgba = Vec::with_capacity(rgb.len() / 3 * 4);
     let mut brightest = 0.0f32;
     for texel in rgb.as_chunks::<3>().0 {
         let [r, g, b] = texel.map(f32::from);
-        // the engine's own weights
+        // the engine's weights
         let brightness = ((0.33 * r + 0.685 * g + 0.063 * b) / 255.0).min(1.0);
         brightest = brightest.max(brightness);
         let [r, g, b] = hue(brightness);
@@ -223,10 +222,10 @@ pub fn heat_page(rgb: &[u8], side: u32) -> Option<(Image, f32)> {
     Some((Image::from_rgba(side, side, rgba)?, brightest))
 }
 
-/// The colour of a brightness (0 to 1) at half the value: once from red to magenta.
+/// The colour of a brightness (0 to 1) at half the value: hues from red to magenta.
 fn hue(brightness: f32) -> [u8; 3] {
     let sixths = brightness * 5.0;
-    // 1 around the channel's own hue, down to 0 a third of a turn away
+    // 1 at the channel's own hue, 0 from a third of a turn away
     let channel = |centre: f32| {
         let away = (sixths - centre).abs();
         let away = away.min(6.0 - away);
@@ -235,7 +234,7 @@ fn hue(brightness: f32) -> [u8; 3] {
     [0.0, 2.0, 4.0].map(|centre| (channel(centre) * 0.5 * 255.0) as u8)
 }
 
-/// The 16 x 16 grid for what is missing: dark grey with a white border.
+/// The 16 x 16 image of missing textures: dark grey with a white border.
 pub fn default_picture() -> Image {
     picture((16, 16), |x, y| {
         if x == 0 || y == 0 || x == 15 || y == 15 {
@@ -246,7 +245,7 @@ pub fn default_picture() -> Image {
     })
 }
 
-/// The 16 x 16 blob of a dynamic light: falls off with the square of the distance from its middle.
+/// The 16 x 16 image of a dynamic light: falls off with the square of the distance from its centre.
 pub fn dynamic_light_picture() -> Image {
     picture((16, 16), |x, y| {
         let (dx, dy) = (7.5 - x as f32, 7.5 - y as f32);
@@ -260,8 +259,8 @@ pub fn dynamic_light_picture() -> Image {
     })
 }
 
-/// How much of what is seen is fog, as alpha: from left to right by the distance in it, from top to bottom by how much
-/// of that lies below the fog's surface. Its filtering is part of how fog looks: a little even at the surface.
+/// Fog density as alpha: horizontally by the distance in fog, vertically by the part of that distance below the fog's
+/// surface. Filtering of this image is part of the appearance: slight fog even at the surface.
 pub fn fog_picture() -> Image {
     const WIDTH: u32 = 256;
     const HEIGHT: u32 = 32;
@@ -273,7 +272,7 @@ pub fn fog_picture() -> Image {
         } else if below < 31.0 / 32.0 {
             distance *= (below - 1.0 / 32.0) / (30.0 / 32.0);
         }
-        // eight times the distance at which the fog is full fits in the picture; the root comes from a table
+        // the image covers eight times the distance of full fog; the square root comes from a table
         let step = ((distance * 8.0).min(1.0) * 255.0).floor();
         [255, 255, 255, ((step / 255.0).sqrt() * 255.0) as u8]
     })
@@ -330,7 +329,7 @@ mod tests {
             round_down: false,
             ..settings()
         };
-        // both sides are halved together until the larger one fits
+        // both sides are halved together until the larger fits
         assert_eq!(sizes(ImageFlags::NO_MIP, &limited), [(8, 4)]);
     }
 
@@ -345,10 +344,10 @@ mod tests {
         // 255 * (64 / 255) ^ 0.5
         assert_eq!(first(2, ImageFlags::WORLD), 128);
         assert_eq!(first(128, ImageFlags::NO_MIP), 128);
-        // a power of two or made one
+        // the size is a power of two, or becomes one
         assert_eq!(first(2, ImageFlags::NO_MIP), 64);
         assert_eq!(first(3, ImageFlags::NO_MIP), 64);
-        // only where the display does none
+        // only if the display applies no gamma
         let player = Settings {
             gamma: 2.0,
             ..Settings::default()
@@ -406,7 +405,7 @@ mod tests {
         let at = |x: usize, y: usize| fog.rgba[(y * 256 + x) * 4 + 3];
         assert_eq!((at(0, 31), at(255, 0)), (0, 0));
         assert_eq!((at(32, 31), at(255, 31)), (255, 255));
-        // an eighth of the way to full: the root of the table's step below, 31 of 255
+        // an eighth of full density: the square root of the table's next lower step, 31 of 255
         assert_eq!(at(4, 31), 88);
         assert!(at(16, 10) < at(16, 20) && at(16, 20) < at(16, 31));
     }

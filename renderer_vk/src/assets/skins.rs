@@ -1,4 +1,4 @@
-//! Skins by handle: which material each surface of a model shows.
+//! Skins by handle: the material of each surface of a model.
 
 use q3model::Skin;
 use relight::GameFiles;
@@ -10,10 +10,9 @@ use super::source::ImageSource;
 /// A skin.
 #[derive(Clone, Debug, Default)]
 pub struct LoadedSkin {
-    /// Name as registered.
+    /// Registered name.
     pub name: String,
-    /// Surface names (lower case) and materials. An unusable material stays as it is here: what is left of it is
-    /// drawn.
+    /// Surface names (lower case) and materials. An unusable material is kept: its remaining stages are drawn.
     pub surfaces: Vec<(String, u32)>,
 }
 
@@ -27,14 +26,14 @@ impl LoadedSkin {
     }
 }
 
-/// Skins by handle; 0 is the default skin, which every surface shows the default material in.
+/// Skins by handle; 0 is the default skin, which has the default material on every surface.
 #[derive(Debug, Default)]
 pub struct Skins {
     list: Vec<LoadedSkin>,
 }
 
 impl Skins {
-    /// The handle of a skin; 0 when there is none. A name that does not end in `.skin` is a material for a model of one
+    /// The handle of a skin; 0 if there is none. A name without the ending `.skin` is a material for a model of one
     /// surface.
     pub fn register(
         &mut self,
@@ -64,13 +63,13 @@ impl Skins {
         }
     }
 
-    /// A skin; `None` for 0 and for handles never given out.
+    /// A skin; `None` for 0 and for unknown handles.
     pub fn get(&self, handle: i32) -> Option<&LoadedSkin> {
         let slot = usize::try_from(handle.checked_sub(1)?).ok()?;
         self.list.get(slot)
     }
 
-    /// Lines for `skinlist`: each skin by handle with its surfaces and what they show.
+    /// Lines for `skinlist`: each skin by handle, with its surfaces and their materials.
     pub fn list(&self, materials: &Materials) -> Vec<String> {
         let default = LoadedSkin {
             name: "<default skin>".into(),

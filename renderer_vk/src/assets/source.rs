@@ -1,11 +1,11 @@
-//! What compiling a material needs from the outside, so that it can be tested without a GPU.
+//! Interface of material compilation to its images, so that tests need no GPU.
 
 use glam::Vec4;
 
-/// How an image is loaded. The flags of its first user win, as in the engine.
+/// Loading options of an image. The first request determines them, as in the engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ImageFlags {
-    /// Has smaller levels.
+    /// With mip levels.
     pub mipmap: bool,
     /// `r_picmip` applies.
     pub picmip: bool,
@@ -14,13 +14,13 @@ pub struct ImageFlags {
 }
 
 impl ImageFlags {
-    /// What world and model textures use.
+    /// Flags of world and model textures.
     pub const WORLD: Self = Self {
         mipmap: true,
         picmip: true,
         clamp: false,
     };
-    /// What pictures registered without mip levels use.
+    /// Flags of images registered without mip levels.
     pub const NO_MIP: Self = Self {
         mipmap: false,
         picmip: false,
@@ -28,19 +28,19 @@ impl ImageFlags {
     };
 }
 
-/// Finds images by name. [`Textures`](super::Textures) does it with files and a GPU.
+/// Finds images by name. [`Textures`](super::Textures) implements it with files and a GPU.
 pub trait ImageSource {
-    /// Bindless index of the image that a script or map names, and the flags that it was loaded with: those of its
-    /// first user. `None` when there is no usable file.
+    /// Bindless index of the image that a script or map names, and its flags, which the first request determined.
+    /// `None` if there is no usable file.
     fn image(&mut self, name: &str, flags: ImageFlags) -> Option<(u32, ImageFlags)>;
-    /// White.
+    /// The white image.
     fn white(&self) -> u32;
-    /// The grid that stands for what is missing.
+    /// The image of missing textures.
     fn default_image(&self) -> u32;
-    /// The picture that a cinematic of this client number is uploaded to; black before the first.
+    /// The texture of a cinematic's client number; black before the first upload.
     fn scratch(&mut self, client: usize) -> u32;
     /// A lightmap page of the map.
     fn lightmap(&self, page: usize) -> Option<u32>;
-    /// Mean of an image: linear colour 0..1 and alpha 0..1; white for an unknown one.
+    /// Mean of an image: linear colour 0..1 and alpha 0..1; white for an unknown image.
     fn mean(&self, texture: u32) -> Vec4;
 }

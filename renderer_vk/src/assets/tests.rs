@@ -1,4 +1,4 @@
-//! Materials, models and skins without a GPU.
+//! Tests of materials, models and skins without a GPU.
 
 use shaders::types::constants as c;
 
@@ -201,7 +201,7 @@ fn lightmap_and_image_are_one_pass() {
     assert_eq!(stages[1].image_count, 1);
     assert!(material.flags & c::MATERIAL_VERTEX_LIGHT != 0);
     assert_eq!(game.find("t/wall", LightmapClass::Page, true), wall);
-    // where there is no lightmap the engine takes white for it
+    // without a lightmap the engine uses white
     for class in [LightmapClass::Vertex, LightmapClass::None] {
         let other = game.find("t/wall", class, true);
         assert_ne!(other, wall);
@@ -253,7 +253,7 @@ fn stages_keep_what_the_script_says() {
     assert_eq!(first.sampler_index, super::compile::sampler::REPEAT);
     let second = stages[1];
     assert_eq!(second.sampler_index, super::compile::sampler::CLAMP);
-    // its first user repeats it
+    // the first request sets the sampler to repeat
     assert_eq!(stages[2].sampler_index, super::compile::sampler::REPEAT);
     assert_eq!(second.alpha_func, c::ALPHAFUNC_GE128);
     assert!(second.flags & c::STAGE_DEPTH_EQUAL != 0);
@@ -273,12 +273,12 @@ fn liquids_and_reflections_come_from_directives() {
     };
     let water = material("t/water").dielectric;
     assert!((water.index - 1.33).abs() < 1.0e-6 && water.ripple > 0.0);
-    // its stage doubles the brightest channel of what is behind: that much is taken back
+    // its stage doubles the brightest channel of the background: the scale compensates
     assert!((water.scale - 0.5).abs() < 0.01, "{}", water.scale);
-    // the light that its lightmap multiplies bounds it as well
+    // the light in its lightmap bounds it, too
     assert_eq!(material("t/lit_water").dielectric.scale, 1.0);
     assert_eq!(water.filters, 0);
-    // red goes through, blue least of all
+    // red is absorbed least, blue most
     let [red, green, blue] = water.absorption.to_array();
     assert!(red.abs() < 1.0e-6 && green > 0.0 && blue > green);
     assert_eq!(material("t/lava").dielectric.index, 0.0);
@@ -337,7 +337,7 @@ fn missing_things_are_the_default_for_every_class() {
             .find_or_default(&mut game.textures, name, LightmapClass::None);
         assert_eq!(drawn, 0);
     }
-    // what was read before the fault is kept, for skins
+    // stages before the fault are kept, for skins
     let gone = game.find("t/gone", LightmapClass::None, true);
     assert_eq!(game.materials.get(gone).stage_count, 1);
     assert_eq!(game.find("", LightmapClass::None, true), 0);
@@ -424,7 +424,7 @@ fn settings_change_stages() {
     let mut game = Registration::with(files, plain);
     let one = game.find("t/detail", LightmapClass::None, true);
     assert_eq!(game.materials.get(one).stage_count, 1);
-    // a stage that is not drawn needs its image all the same
+    // a stage that is not drawn still requires its image
     let lost = game.find("t/lost_detail", LightmapClass::None, true);
     assert!(game.materials.get(lost).defaulted);
     let wall = game.find("t/wall", LightmapClass::Page, true);
@@ -481,7 +481,7 @@ fn skies_have_faces_and_clouds() {
     assert_eq!(faces[1], game.textures.default_image());
     assert_eq!(faces[4], game.textures.index("t/box_up.tga").unwrap());
     assert_eq!(game.materials.cloud_height(), 300.0);
-    // all skies have the height of the last one, in the engine
+    // in the engine, all skies have the height of the last one
     game.find("t/highsky", LightmapClass::None, true);
     game.find("t/sky", LightmapClass::None, true);
     assert_eq!(game.materials.cloud_height(), 700.0);
@@ -511,7 +511,7 @@ fn skins_name_materials_by_surface() {
     let loaded = game.skins.get(skin).unwrap();
     let low = loaded.material("head").unwrap();
     assert_eq!(game.materials.get(low).name, "t/low");
-    // unusable, but what is left of it is drawn
+    // unusable, but its remaining stages are drawn
     let gone = loaded.material("body").unwrap();
     assert!(game.materials.get(gone).defaulted && gone != 0);
     assert!(loaded.material("legs").is_none());

@@ -17,16 +17,16 @@ use crate::settings::TextureMode;
 
 /// The samplers of textures: bindless indices in the order of [`compile::sampler`](super::compile::sampler).
 ///
-/// On a fresh device they are 0 to 4. Those without mip levels never change; a change of `r_textureMode` or
-/// anisotropy replaces the first two.
+/// On a new device they are 0 to 4. Samplers without mip levels never change; a change of `r_textureMode` or anisotropy
+/// replaces the first two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Samplers(pub [u32; 5]);
 
 impl Samplers {
-    /// Makes or finds them for an `r_textureMode` and an anisotropy (1 and below: none).
+    /// Finds or makes the samplers for an `r_textureMode` and an anisotropy (1 and below: none).
     ///
     /// # Errors
-    /// The device has no room for more samplers.
+    /// The device has no free descriptors for samplers.
     pub fn new(
         device: &Device,
         texture_mode: TextureMode,
@@ -56,7 +56,7 @@ impl Samplers {
         ]))
     }
 
-    /// Bindless index of one of [`compile::sampler`](super::compile::sampler)'s.
+    /// Bindless index of a value of [`compile::sampler`](super::compile::sampler).
     pub fn index(&self, kind: u32) -> u32 {
         self.0.get(kind as usize).copied().unwrap_or(self.0[0])
     }
@@ -74,18 +74,18 @@ fn texture_filter(mode: TextureMode) -> (Filter, MipFilter) {
     }
 }
 
-/// A texture that a name stands for.
+/// A texture by name.
 struct Texture {
     name: String,
-    /// `None` when no usable file was found.
+    /// `None` if there is no usable file.
     image: Option<gpu::Image>,
     flags: ImageFlags,
 }
 
-/// A picture that changes: cinematics and raw pictures.
+/// A dynamic texture: cinematics and raw pictures.
 struct Scratch {
     image: gpu::Image,
-    /// It is to be drawn in this frame.
+    /// A queued command of this frame draws it.
     queued: bool,
 }
 
@@ -99,7 +99,7 @@ pub struct Textures {
     means: HashMap<u32, Vec4>,
     /// Lightmap pages with their names.
     lightmaps: Vec<(String, gpu::Image)>,
-    /// By bindless index where the images are transparent that have a texel that is not opaque.
+    /// Alpha grids of images with a transparent texel, by bindless index.
     transparent: HashMap<u32, AlphaGrid>,
     scratch: HashMap<usize, Scratch>,
     white: u32,
@@ -110,7 +110,7 @@ pub struct Textures {
 }
 
 impl Textures {
-    /// No textures but the built-in ones.
+    /// The built-in textures only.
     ///
     /// # Errors
     /// The device has no memory for them.
@@ -145,33 +145,33 @@ impl Textures {
         Ok(textures)
     }
 
-    /// The files that names are looked up in.
+    /// The game's files.
     pub fn files(&self) -> &Arc<dyn GameFiles> {
         &self.files
     }
 
-    /// The settings of textures that are loaded from now on.
+    /// Settings for textures that are loaded from now on.
     pub fn set_settings(&mut self, settings: TextureSettings) {
         self.settings = settings;
     }
 
-    /// The settings in force.
+    /// The current settings.
     pub fn settings(&self) -> &TextureSettings {
         &self.settings
     }
 
-    /// The 16 x 16 blob that dynamic lights put on walls.
+    /// The 16 x 16 image of dynamic lights on walls.
     pub fn dynamic_light(&self) -> u32 {
         self.dynamic_light
     }
 
-    /// Black.
+    /// The black image.
     pub fn black(&self) -> u32 {
         self.black
     }
 
-    /// The bindless index of the image that `name` stands for, loaded at its first use; `None` when no usable file
-    /// exists. Names are compared exactly and the first user's flags win, as in the engine.
+    /// The bindless index of the image `name`, loaded at its first use; `None` if there is no usable file. Names are
+    /// compared exactly, and the first request determines the flags, as in the engine.
     pub fn find(&mut self, name: &str, flags: ImageFlags) -> Option<u32> {
         if let Some(texture) = self.by_name.get(name).and_then(|&i| self.textures.get(i)) {
             if texture.flags != flags && texture.image.is_some() {
@@ -202,10 +202,10 @@ impl Textures {
         index
     }
 
-    /// Uploads a lightmap page (`side` x `side` RGB) whose bytes are final and returns its bindless index.
+    /// Uploads a lightmap page (`side` x `side` RGB), whose bytes are stored unchanged, and returns its bindless index.
     ///
     /// # Errors
-    /// The device has no memory for it, or no room in its tables.
+    /// The device has no memory for it, or no free descriptor.
     pub fn create_lightmap(&mut self, name: &str, page: &Image) -> Result<u32, gpu::Error> {
         let image = self.create(name, std::slice::from_ref(page))?;
         let index = image.texture_index();
@@ -214,8 +214,8 @@ impl Textures {
         Ok(index)
     }
 
-    /// Shows new pixels (RGBA rows from the top) under a client number. Returns `(old, new)` when the texture had to be
-    /// made anew, so that stages that show it can be pointed at the new one.
+    /// Uploads new pixels (RGBA rows from the top) of a client number. Returns `(old, new)` if it had to make a new
+    /// texture, so that stages can be changed to the new index.
     ///
     /// # Errors
     /// The device has no memory for a texture of another size, or for the upload.
@@ -238,7 +238,7 @@ impl Textures {
         if let Some(scratch) = known
             && scratch.image.width() == width
             && scratch.image.height() == height
-            // what is queued shows the picture that it was queued with
+            // a queued command shows the pixels of the time when it was queued
             && !(dirty && scratch.queued)
         {
             if dirty {
@@ -267,8 +267,7 @@ impl Textures {
             .map(|image| (image.texture_index(), image.width(), image.height()))
     }
 
-    /// The picture of a client that is to be drawn in this frame: until [`Self::end_frame`] another one gets a texture
-    /// of its own.
+    /// The texture of a client for a command of this frame: until [`Self::end_frame`] new pixels go to a new texture.
     pub fn queue_scratch(&mut self, client: usize) -> u32 {
         if let Some(scratch) = self.scratch.get_mut(&client) {
             scratch.queued = true;
@@ -276,12 +275,13 @@ impl Textures {
         self.scratch(client)
     }
 
-    /// What was queued has been drawn.
+    /// Ends the frame: its queued commands have been recorded.
     pub fn end_frame(&mut self) {
         self.scratch.values_mut().for_each(|s| s.queued = false);
     }
 
-    /// Lines for `imagelist`: number, size, channels in use, bytes on the GPU, name; then how many bytes and images.
+    /// Lines for `imagelist`: number, size, channels in use, bytes on the GPU, name; then total bytes and number of
+    /// images.
     pub fn list(&self) -> Vec<String> {
         let mut bytes = 0;
         let mut lines = vec![
@@ -314,7 +314,7 @@ impl Textures {
         lines
     }
 
-    /// The first failure of the device since the last call: callers that look up by name cannot return it.
+    /// The first device failure since the last call: lookups by name cannot return it.
     pub fn take_failure(&mut self) -> Option<gpu::Error> {
         self.failure.take()
     }
@@ -324,7 +324,7 @@ impl Textures {
         match self.create(name, &levels) {
             Ok(created) => {
                 if let Some(smallest) = levels.last() {
-                    // the smallest level of a mip chain averages encoded values; the mean is taken of light
+                    // the smallest mip level averages encoded values; the mean is computed in linear light
                     let of = levels.first().unwrap_or(smallest);
                     self.means
                         .insert(created.texture_index(), prepare::mean(of));
@@ -346,8 +346,8 @@ impl Textures {
         }
     }
 
-    /// The least and the greatest alpha of an image within a triangle of texture coordinates; `None` for an image that
-    /// changes or does not exist.
+    /// The smallest and the greatest alpha of an image within a triangle of texture coordinates; `None` for a dynamic
+    /// or unknown image.
     pub fn alpha_range(&self, texture: u32, corners: [Vec2; 3], clamped: bool) -> Option<(u8, u8)> {
         match self.transparent.get(&texture) {
             Some(grid) => Some(grid.range(corners, clamped)),
@@ -410,7 +410,7 @@ fn image_bytes(image: &gpu::Image) -> u64 {
         .sum()
 }
 
-/// A size in as many characters as the list's column has.
+/// A size, formatted for the width of the list's column.
 fn readable_size(bytes: u64) -> String {
     const KIB: u64 = 1024;
     match bytes {

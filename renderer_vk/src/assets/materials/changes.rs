@@ -1,4 +1,4 @@
-//! What changes materials after they were found: remaps, light that a map gives them, pictures of films.
+//! Changes of materials after loading: remaps, light from maps, video pictures.
 
 use glam::Vec3;
 use shaders::types;
@@ -11,7 +11,7 @@ use super::super::source::ImageSource;
 use super::Materials;
 
 impl Materials {
-    /// A material that only `RemapShader` names. The engine gives it the map's first lightmap page, wherever it shows.
+    /// Finds a material that only `RemapShader` names. The engine assigns it the map's first lightmap page.
     fn find_with_first_page(&mut self, source: &mut dyn ImageSource, name: &str) -> u32 {
         let Some(page) = source.lightmap(0) else {
             return self.find(source, name, LightmapClass::None, true);
@@ -29,8 +29,8 @@ impl Materials {
         index
     }
 
-    /// Draws `new` wherever `old` is asked for, in every class (`RemapShader`); equal names cancel. `time_offset` is
-    /// subtracted from the new material's time.
+    /// Replaces `old` by `new` in every class (`RemapShader`); equal names cancel. `time_offset` is subtracted from the
+    /// new material's time.
     pub fn remap(
         &mut self,
         source: &mut dyn ImageSource,
@@ -77,9 +77,9 @@ impl Materials {
         self.touch();
     }
 
-    /// Says that surfaces of a material are in the light list, and which radiance (display-white units) they have. Where
-    /// a stage glows by itself it shows that, on the parts of the image that its author drew as a lamp; else the whole
-    /// texture is shown as bright as its light.
+    /// Marks a material as an emitter of the light list, with its radiance (in units of display white). If a stage
+    /// glows by itself, the traced look shows the radiance on the glowing parts of the image; otherwise the whole
+    /// texture has the light's brightness.
     pub fn set_emitter(&mut self, index: u32, radiance: Vec3) {
         let slots = (
             self.list.get_mut(index as usize),
@@ -96,7 +96,7 @@ impl Materials {
         }
     }
 
-    /// Takes back every [`set_emitter`](Self::set_emitter).
+    /// Reverts every [`set_emitter`](Self::set_emitter).
     pub fn forget_emitters(&mut self) {
         for material in &mut self.list {
             material.flags &= !types::constants::MATERIAL_EMITTER;
@@ -105,7 +105,7 @@ impl Materials {
         self.touch();
     }
 
-    /// Leaves what becomes of light in a liquid to the volume of fog that the map has of it.
+    /// Leaves the absorption of a liquid to the map's fog volume of this material.
     pub fn leave_to_fog(&mut self, name: &str) {
         let name = strip_extension(name);
         for material in &mut self.list {
@@ -116,7 +116,7 @@ impl Materials {
         self.touch();
     }
 
-    /// Points every stage that shows texture `old` for a client at `new`.
+    /// Replaces texture `old` by `new` in every stage of a client.
     pub fn replace_scratch(&mut self, client: usize, new: u32) {
         let mut changed = false;
         for material in &self.list {
@@ -137,7 +137,7 @@ impl Materials {
         }
     }
 
-    /// Takes away the stages of a video that cannot be played, and with each all stages after it, as the engine does.
+    /// Removes the stages of a video that cannot be played, and all stages after each of them, as the engine does.
     pub fn drop_video(&mut self, client: usize) {
         for material in &mut self.list {
             let Some(at) = material.videos.iter().position(|v| v.client == client) else {

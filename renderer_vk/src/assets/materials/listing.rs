@@ -1,11 +1,11 @@
-//! What the console command `shaderlist` prints.
+//! Output of the console command `shaderlist`.
 
 use super::super::material::{Combine, LightmapClass, Material};
 use super::Materials;
 
 impl Materials {
-    /// Lines for `shaderlist`, one for each material and lightmap page: passes, `L` under a lightmap, `E` from a
-    /// script, how two textures of the first pass combine, kind, name.
+    /// Lines for `shaderlist`, one for each material and lightmap page: number of passes, `L` with a lightmap, `E` with
+    /// a script, combination of two textures in the first pass, kind, name.
     pub fn list(&self, in_drawing_order: bool) -> Vec<String> {
         let order: Vec<u32> = if in_drawing_order {
             self.sorted.clone()
