@@ -1,10 +1,10 @@
-//! What `rt_pause` keeps on show: the traced views of the frame in which it was switched on, drawn again in every
-//! frame. The game goes on, and so do its 2D pictures.
+//! Held views of `rt_pause`: the traced views of the frame in which it was switched on are traced again in every frame.
+//! The game and its 2D pictures continue.
 
 use crate::api::RefDef;
 use crate::scene::TracedScene;
 
-/// The held views, by their order in a frame.
+/// The held views, in the order of the frame.
 #[derive(Default)]
 pub(super) struct HeldViews {
     views: Vec<TracedScene>,
@@ -12,18 +12,18 @@ pub(super) struct HeldViews {
 }
 
 impl HeldViews {
-    /// Holds nothing any more.
+    /// Releases all views.
     pub fn release(&mut self) {
         self.views.clear();
         self.next = 0;
     }
 
-    /// A frame begins: its first view is the first one held.
+    /// Begins a frame: its first view is the first held one.
     pub fn begin_frame(&mut self) {
         self.next = 0;
     }
 
-    /// The view to draw in place of one that the game asks for; `None` while there is none of its size.
+    /// The held view for the next traced view; `None` if there is none of its size.
     pub fn next(&mut self, def: &RefDef) -> Option<TracedScene> {
         let rectangle = |d: &RefDef| [d.x, d.y, d.width, d.height];
         let held = self.views.get(self.next)?;
@@ -34,7 +34,7 @@ impl HeldViews {
         Some(held.clone())
     }
 
-    /// Holds a view that [`next`](Self::next) had none for.
+    /// Holds a view for which [`next`](Self::next) returned none.
     pub fn hold(&mut self, view: &TracedScene) {
         self.views.truncate(self.next);
         self.views.push(view.clone());

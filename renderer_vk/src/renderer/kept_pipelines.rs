@@ -1,24 +1,24 @@
-//! The driver's compiled pipelines, kept in a file, so that the next start and every `vid_restart` find them ready.
+//! The driver's pipeline cache in a file, so that the next start and every `vid_restart` need not compile.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::gpu::{self, Device};
 
-/// The file that a device's compiled pipelines are kept in. Whatever goes wrong with it costs time, not a picture: it is
-/// told once, and pipelines are compiled.
+/// The file of a device's pipeline cache. If it cannot be read or written, the log has one warning, and pipelines are
+/// compiled.
 #[derive(Debug, Default)]
 pub(super) struct KeptPipelines {
-    /// `None`: nothing is kept.
+    /// `None`: the cache is not stored.
     path: Option<PathBuf>,
-    /// What the file holds, as a length and a hash.
+    /// Length and hash of the file's content.
     held: Option<(usize, u64)>,
-    /// Writing has failed.
+    /// Writing failed.
     failed: bool,
 }
 
 impl KeptPipelines {
-    /// Reads the file; the second is what the device begins with.
+    /// Reads the file; the second value is the initial content of the device's cache.
     pub fn read(path: Option<PathBuf>) -> (Self, Option<Vec<u8>>) {
         let mut kept = Self {
             path,
@@ -46,7 +46,7 @@ impl KeptPipelines {
         (kept, Some(bytes))
     }
 
-    /// Writes the file if the device has compiled anything since.
+    /// Writes the file if the device has compiled pipelines since.
     pub fn write(&mut self, device: &Device) {
         let Some(path) = self.path.as_ref().filter(|_| !self.failed) else {
             return;
@@ -73,7 +73,7 @@ fn mark(bytes: &[u8]) -> (usize, u64) {
     (bytes.len(), gpu::hash(bytes))
 }
 
-/// Writes a file that appears whole or not at all.
+/// Writes a file atomically.
 fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
@@ -82,7 +82,7 @@ fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let written =
         std::fs::write(&unfinished, bytes).and_then(|()| std::fs::rename(&unfinished, path));
     if written.is_err() {
-        // what is left of a failed attempt; that it may not be there is fine
+        // removes the rest of a failed attempt, if there is one
         let _ = std::fs::remove_file(&unfinished);
     }
     written
@@ -108,7 +108,7 @@ mod tests {
         let (mut again, bytes) = KeptPipelines::read(Some(path.clone()));
         assert_eq!(bytes.as_deref(), Some(&good[..]));
 
-        // what has not changed is not written
+        // unchanged content is not written
         std::fs::remove_file(&path).unwrap();
         again.write(&device);
         assert!(!path.exists());

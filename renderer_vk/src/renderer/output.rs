@@ -1,4 +1,4 @@
-//! From what was queued to a picture: recording, showing, reading back, and what that cost.
+//! Output of queued frames: recording, presenting, reading back, and the costs.
 
 use std::time::Instant;
 
@@ -23,24 +23,24 @@ pub struct FrameStats {
     pub views: u32,
     /// Draw calls of the classic look and the overlay.
     pub draws: u32,
-    /// How often a pixel of the newest finished frame was drawn; 0 without `r_measureOverdraw`.
+    /// Mean number of times that the newest finished frame drew a pixel; 0 without `r_measureOverdraw`.
     pub overdraw: f32,
-    /// What the views of the classic look show; counted only with `r_speeds`.
+    /// Contents of the classic look's views; counted only with `r_speeds`.
     pub scene: Statistics,
-    /// Milliseconds of the CPU on the frame.
+    /// CPU times of the frame.
     pub cpu: CpuTimes,
 }
 
-/// Where the calling thread's time went in a frame, milliseconds.
+/// CPU times of the calling thread in a frame, milliseconds.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CpuTimes {
-    /// Finding out what the views show.
+    /// Gathering the scenes of the views.
     pub gather: f32,
-    /// Waiting for an earlier frame; with two in flight the one before the last.
+    /// Waiting for an earlier frame; with two frames in flight, for the one before the last.
     pub wait: f32,
-    /// Recording commands, with the upload of what moves.
+    /// Recording commands and uploading moving geometry.
     pub record: f32,
-    /// Handing them to the driver, and the picture to the window.
+    /// Submitting commands and presenting.
     pub submit: f32,
 }
 
@@ -49,19 +49,19 @@ pub(super) fn milliseconds(from: Instant, to: Instant) -> f32 {
 }
 
 impl Renderer {
-    /// Starts a frame; `time_ms` is the time that 2D materials see.
+    /// Begins a frame; `time_ms`: shader time of 2D materials.
     pub fn begin_frame(&mut self, time_ms: i32) {
         self.set_eye(Eye::Both);
         self.held.begin_frame();
         self.overlay_time = time_ms as f32 * 0.001;
-        // the second eye's picture goes over the first's
+        // the second eye draws over the first eye's picture
         if self.settings.clear && self.queue.is_empty() {
             self.queue.push((Item::Clear(CLEAR), ColorMask::ALL));
         }
     }
 
-    /// Says whose picture the calls that follow are for, after [`begin_frame`](Self::begin_frame). A frame begins with
-    /// both eyes'.
+    /// Sets the eye that subsequent calls draw for, after [`begin_frame`](Self::begin_frame). A frame begins with both
+    /// eyes.
     pub fn set_eye(&mut self, eye: Eye) {
         self.queue_overlay();
         self.eye = eye;
@@ -70,7 +70,7 @@ impl Renderer {
 
     pub(super) fn queue_overlay(&mut self) {
         if !self.overlay.is_empty() {
-            // A new one if none can be used again.
+            // A new overlay if no spare one is left.
             let empty = self.spare_overlays.pop().unwrap_or_default();
             let overlay = std::mem::replace(&mut self.overlay, empty);
             let mask = self.eye.mask(self.settings.anaglyph);
@@ -79,7 +79,7 @@ impl Renderer {
         }
     }
 
-    /// Draws what is queued, and shows it.
+    /// Records and presents the queue.
     ///
     /// # Errors
     /// The device is lost or out of memory.
@@ -99,7 +99,7 @@ impl Renderer {
         Ok(stats)
     }
 
-    /// Forgets what is queued; its memory is used again.
+    /// Empties the queue and keeps its memory for reuse.
     fn recycle_queue(&mut self) {
         for (item, _) in self.queue.drain(..) {
             match item {
@@ -109,14 +109,14 @@ impl Renderer {
                 }
                 Item::Clear(_) => {}
                 Item::Classic(scenes) => self.scene.recycle_classic(scenes),
-                // held views are copies: to keep their memory too would let it grow with each frame
+                // held views are copies: keeping their memory would leak a copy per frame
                 Item::Traced(_) if self.settings.rt_pause => {}
                 Item::Traced(scene) => self.scene.recycle_traced(*scene),
             }
         }
     }
 
-    /// `r_showImages`: covers the picture with all images.
+    /// `r_showImages`: draws all images over the picture.
     fn queue_image_sheet(&mut self) {
         if let (1.., Some(assets)) = (self.settings.show_images, &self.assets) {
             let proportional = self.settings.show_images == 2;
@@ -132,7 +132,7 @@ impl Renderer {
         }
     }
 
-    /// Draws what is queued; `end`: of a whole frame, which is shown.
+    /// Records and submits the queue; `end`: it ends a frame, which is presented.
     fn flush(&mut self, end: bool) -> Result<FrameStats, Error> {
         self.queue_image_sheet();
         self.queue_overlay();
@@ -145,7 +145,7 @@ impl Renderer {
         let begin = Instant::now();
         let mut recorder = self.ring.begin()?;
         let ready = Instant::now();
-        // channels that no eye draws keep what was there
+        // colour channels that no eye draws keep old content
         if self.shown_anaglyph != self.settings.anaglyph {
             self.shown_anaglyph = self.settings.anaglyph;
             self.targets.clear(&mut recorder)?;
@@ -206,7 +206,7 @@ impl Renderer {
         Ok(stats)
     }
 
-    /// Shows the last frame's picture, before work that takes long.
+    /// Presents the last frame's picture, before a long operation.
     pub(super) fn show_finished(&mut self) -> Result<(), Error> {
         match &mut self.swapchain {
             Some(swapchain) => Ok(swapchain.show()?),
@@ -214,12 +214,12 @@ impl Renderer {
         }
     }
 
-    /// Ends a frame with the picture on its way to the window.
+    /// Ends a frame: presents its picture.
     fn show(&mut self, mut recorder: Recorder) -> Result<(), Error> {
         match &mut self.swapchain {
             Some(swapchain) => {
                 if let Some(target) = swapchain.acquire(&mut recorder)? {
-                    // a new format comes with a new swapchain
+                    // a change of the window's format needs a new swapchain
                     if self
                         .present
                         .as_ref()
@@ -245,9 +245,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// The format that the picture is drawn in. The window's own where the picture is shown just as it is: showing it
-    /// then is a copy of bytes, which software drivers make faster than a change of format. Otherwise one that every
-    /// shader can read and write.
+    /// Format of the picture. If the picture is presented unchanged, the window's own format: presenting then copies
+    /// bytes, which software drivers do faster than a conversion. Otherwise a format that every shader can read and
+    /// write.
     pub(super) fn picture_format(&self) -> Format {
         let traced = |(item, _): &(Item, _)| matches!(item, Item::Traced(_));
         let plain = self.settings.display_gamma() == 1.0
@@ -264,7 +264,7 @@ impl Renderer {
         }
     }
 
-    /// The picture as it stands after everything queued so far, as the display shows it.
+    /// The picture after all queued commands, as the display shows it.
     ///
     /// # Errors
     /// The device is lost or out of memory.
@@ -277,7 +277,7 @@ impl Renderer {
         Ok(Picture { width, height, rgb })
     }
 
-    /// The bytes that the display shows for texels of four bytes, alpha left out.
+    /// Display values of texels of four bytes, without alpha.
     pub(super) fn displayed(&self, texels: &[u8], blue_first: bool) -> Vec<u8> {
         let table = overbright::gamma_table(
             self.settings.display_gamma(),
@@ -296,7 +296,7 @@ impl Renderer {
             .collect()
     }
 
-    /// The linear picture of the last traced view before exposure, RGB in rows from the top; empty where nothing was
+    /// The linear picture of the last traced view before exposure, RGB in rows from the top; empty if no view was
     /// traced. Display white has radiance 1.
     ///
     /// # Errors

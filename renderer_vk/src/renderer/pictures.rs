@@ -1,4 +1,4 @@
-//! 2D pictures: what lies over the views, and films.
+//! 2D pictures: drawings over the views, and cinematics.
 
 use glam::{IVec2, Vec2};
 
@@ -9,10 +9,10 @@ use crate::error::Error;
 use crate::raster::Picture2d;
 
 impl Renderer {
-    /// Colour of the pictures that follow; `None` is white. Values become bytes as the engine makes them.
+    /// Sets the colour of subsequent pictures; `None` is white. Values are converted to bytes as in the engine.
     pub fn set_color(&mut self, rgba: Option<[f32; 4]>) {
         self.color_2d = rgba.map_or(u32::MAX, |rgba| {
-            // truncated and wrapped, not clamped
+            // truncates and wraps, without clamping
             let mut bytes = rgba.map(|c| (c * 255.0) as i32 as u8);
             desaturate(&mut bytes, self.settings.greyscale);
             u32::from_le_bytes(bytes)
@@ -35,7 +35,7 @@ impl Renderer {
         );
     }
 
-    /// Draws a cinematic's pixels, stretched to a rectangle of the window: its left top corner and its size, pixels.
+    /// Draws a cinematic's pixels, stretched to a rectangle of the window.
     ///
     /// # Errors
     /// The picture's size is not a power of two, or the data is too short.
@@ -69,10 +69,10 @@ impl Renderer {
         Ok(())
     }
 
-    /// Replaces the picture of a cinematic.
+    /// Uploads the pixels of a cinematic.
     ///
     /// # Errors
-    /// The data is shorter than the size says, or the device is out of memory.
+    /// The data is too short for the size, or the device is out of memory.
     pub fn upload_cinematic(&mut self, frame: &CinematicFrame<'_>) -> Result<(), Error> {
         let CinematicFrame {
             cols,

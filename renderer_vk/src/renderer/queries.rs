@@ -1,4 +1,4 @@
-//! What the game and its console ask: light, marks, tags, visibility, lists.
+//! Queries of the game and its console: light, marks, tags, visibility, lists.
 
 use glam::Vec3;
 
@@ -8,7 +8,7 @@ use crate::statistics::Costs;
 use crate::world::{Marked, World};
 
 impl Renderer {
-    /// Light of the map's grid at a point; `None` without a map or grid.
+    /// Light of the map's light grid at a point; `None` without a map or a light grid.
     pub fn light_for_point(&self, point: Vec3) -> Option<PointLighting> {
         let light = self.world.as_ref()?.grid_light(point, &self.settings)?;
         Some(PointLighting {
@@ -18,7 +18,7 @@ impl Renderer {
         })
     }
 
-    /// The pieces of the map that a decal's polygon covers, projected along `projection`.
+    /// The pieces of the map under a decal's polygon, projected along `projection`.
     pub fn mark_fragments(
         &mut self,
         points: &[Vec3],
@@ -39,7 +39,8 @@ impl Renderer {
         }
     }
 
-    /// Where a model's tag is between two frames (`frac` weighs the end frame); `None`: no such model or tag.
+    /// Interpolated orientation of a model's tag between two frames (`frac` is the weight of the end frame); `None`
+    /// without such a model or tag.
     pub fn lerp_tag(
         &self,
         model: i32,
@@ -69,27 +70,27 @@ impl Renderer {
             .map_or(-1, |world| world.relit.bsp.cluster_at(point))
     }
 
-    /// Whether the map's visibility lets cluster `a` see cluster `b`.
+    /// Whether cluster `b` is in the potentially visible set of cluster `a`.
     pub fn cluster_sees(&self, a: i32, b: i32) -> bool {
         self.world
             .as_ref()
             .is_none_or(|world| world.relit.bsp.cluster_sees(a, b))
     }
 
-    /// The next token of the map's entity text; `None` at the end, after which it starts over.
+    /// The next token of the map's entity text; `None` at the end, after which reading restarts.
     pub fn entity_token(&mut self) -> Option<String> {
         self.entity_tokens
             .next(&self.world.as_ref()?.relit.bsp.entities)
     }
 
-    /// Counts the rays of traced views from the next frame on, or no longer; see [`costs`](Self::costs). Counting is
-    /// not free. Without the traced look there is nothing to count.
+    /// Switches the ray counters of traced views, from the next frame on; see [`costs`](Self::costs). Counting has a
+    /// cost. No effect without the traced look.
     pub fn count_rays(&mut self, count: bool) {
         self.counts_rays = count;
     }
 
-    /// What the newest finished frame cost, and what memory is held for. On a software device passes are timed once
-    /// this was called.
+    /// Costs of the newest finished frame, and memory in use. On a software device, passes are timed from the first
+    /// call on.
     pub fn costs(&self) -> Costs {
         let timings = self.timings();
         let rays = |pass: &str| self.trace.as_ref().and_then(|trace| trace.rays(pass));
@@ -103,7 +104,7 @@ impl Renderer {
         }
     }
 
-    /// Name of the loaded map, as it was asked for.
+    /// Name of the loaded map, as given to [`load_world`](Self::load_world).
     pub fn world_name(&self) -> Option<&str> {
         self.world.as_ref().map(|world| world.relit.name.as_str())
     }
@@ -113,15 +114,15 @@ impl Renderer {
         self.world.as_ref()
     }
 
-    /// The `videoMap` files of registered materials with the client number that
-    /// [`upload_cinematic`](Self::upload_cinematic) takes their pictures under.
+    /// The `videoMap` files of registered materials, with the client numbers for
+    /// [`upload_cinematic`](Self::upload_cinematic).
     pub fn videos(&self) -> impl Iterator<Item = (&str, usize)> {
         let assets = self.assets.iter();
         assets.flat_map(|assets| assets.materials.videos())
     }
 
-    /// Says that a video of [`videos`](Self::videos) cannot be played: the stages that show it, and those above them,
-    /// are not drawn.
+    /// Reports that a video of [`videos`](Self::videos) cannot be played: its stages and the stages above them are no
+    /// longer drawn.
     pub fn drop_video(&mut self, client: usize) {
         if let Some(assets) = &mut self.assets {
             assets.materials.drop_video(client);

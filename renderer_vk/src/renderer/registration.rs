@@ -1,4 +1,4 @@
-//! What the game registers: models, materials, fonts, the map.
+//! Registration: models, materials, fonts, the map.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::settings::Settings;
 use crate::world::{EntityTokens, World};
 
 impl Renderer {
-    /// Starts afresh: forgets every model, texture, material and the map, and reads the scripts through `files`.
+    /// Begins a registration: drops all models, textures, materials and the map, and reads the scripts through `files`.
     ///
     /// # Errors
     /// The device is out of memory.
@@ -45,9 +45,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// The game has registered everything: makes the pipelines that it will draw with.
+    /// Ends a registration: compiles the pipelines of the registered materials.
     pub fn end_registration(&mut self) {
-        // what is not made now is made when it is drawn
+        // pipelines that are missing after a failure are compiled at first use
         if let Err(e) = self.warm_up() {
             log::warn!("pipelines are not made ahead: {e}");
         }
@@ -55,7 +55,7 @@ impl Renderer {
         give_back_freed_memory();
     }
 
-    /// Draws once, out of sight, with everything that is registered.
+    /// Draws all registered materials once, invisibly.
     fn warm_up(&mut self) -> Result<(), Error> {
         let format = self.picture_format();
         self.targets.fit(&self.device, &self.settings, format)?;
@@ -108,7 +108,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Forgets every model, texture, material and the map. May be called again and again.
+    /// Drops all models, textures, materials and the map. Repeated calls have no effect.
     pub fn shutdown_registration(&mut self) {
         self.queue.clear();
         self.overlay.clear();
@@ -121,16 +121,17 @@ impl Renderer {
         self.entity_tokens = EntityTokens::default();
     }
 
-    /// Handle of a material by name; `mip` is false for 2D art. 0: there is none, the default is drawn.
+    /// Handle of a material by name; `mip` is false for 2D pictures. 0: it is unusable, and the default material is
+    /// drawn.
     pub fn register_shader(&mut self, name: &str, mip: bool) -> i32 {
         self.assets
             .as_mut()
             .map_or(0, |assets| assets.register_shader(name, mip))
     }
 
-    /// Handle of a model by file name, or `*n` for the map's inline models. 0: there is none.
+    /// Handle of a model by file name, or `*n` for the map's brush models. 0: it is unusable.
     pub fn register_model(&mut self, name: &str) -> i32 {
-        // loading takes a while after the picture that tells of it
+        // loading takes long, and the finished picture shows its progress
         if let Err(e) = self.show_finished() {
             log::warn!("{e}");
         }
@@ -139,14 +140,14 @@ impl Renderer {
             .map_or(0, |assets| assets.register_model(name))
     }
 
-    /// Handle of a `.skin` file or of a skin of one material. 0: the default.
+    /// Handle of a `.skin` file or of a skin of one material. 0: the default skin.
     pub fn register_skin(&mut self, name: &str) -> i32 {
         self.assets
             .as_mut()
             .map_or(0, |assets| assets.register_skin(name))
     }
 
-    /// A pre-rendered font of a size in points (0: 12), with its glyphs' materials registered.
+    /// The stored font of a size in points (0: 12), with its glyphs' materials registered.
     pub fn register_font(&mut self, point_size: i32) -> Option<LoadedFont> {
         self.assets.as_mut()?.register_font(point_size)
     }
@@ -154,7 +155,7 @@ impl Renderer {
     /// Loads a map (`maps/NAME.bsp`).
     ///
     /// # Errors
-    /// The file is missing or broken, or a map is loaded already; the message names file and place.
+    /// The file is missing or damaged, or a map is loaded already; the message names file and position.
     pub fn load_world(&mut self, name: &str) -> Result<(), Error> {
         self.show_finished()?;
         let Some(assets) = &mut self.assets else {
@@ -169,7 +170,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws `new` wherever `old` would be; `old` = `new` takes that back.
+    /// Replaces material `old` by `new`; equal names cancel.
     pub fn remap_shader(&mut self, old: &str, new: &str, time_offset: Option<f32>) {
         if let Some(assets) = &mut self.assets {
             assets.remap_shader(old, new, time_offset);

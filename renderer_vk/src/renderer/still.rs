@@ -1,4 +1,4 @@
-//! `rt_screenshot`: an accumulated picture of the view, of any size, drawn a few frames of it in each frame of the game.
+//! `rt_screenshot`: an accumulated picture of the view at any size; each frame of the game traces a few of its frames.
 
 use std::time::Instant;
 
@@ -9,39 +9,39 @@ use crate::gpu::Recorder;
 use crate::scene::TracedScene;
 use crate::trace::still::Still;
 
-/// A picture that was asked for.
+/// A requested picture.
 #[derive(Default)]
 pub(super) struct StillRequest {
-    /// Size and samples, until the next traced view of the world comes.
+    /// Size and number of samples, until the next traced view of the world.
     wanted: Option<([u32; 2], u32)>,
     still: Option<Still>,
-    /// Frames of the picture in a frame of the game.
+    /// Frames of the picture per frame of the game.
     pace: u32,
     last: Option<Instant>,
 }
 
-/// The game's frames take about this long while a picture is made, in milliseconds: more is done at once while they
-/// are shorter.
+/// Duration of the game's frames while a picture is made, milliseconds: the pace rises below the first value and falls
+/// above the second.
 const FRAME_MS: (f32, f32) = (40.0, 120.0);
 
-/// Frames of the picture in a frame of the game at most: each uploads what moves anew.
+/// Maximum frames of the picture per frame of the game: each uploads the moving geometry again.
 const FASTEST: u32 = 16;
 
 impl StillRequest {
-    /// Forgets it.
+    /// Drops the picture and its request.
     pub fn cancel(&mut self) {
         *self = Self::default();
     }
 }
 
 impl Renderer {
-    /// Asks for a picture of the next traced view of the world, `samples` frames averaged; `size` in pixels, `None` for
-    /// the window's. It is made over several frames; ask [`still_progress`](Self::still_progress) and take it with
+    /// Requests a picture of the next traced view of the world, the mean of `samples` frames; `size` in pixels, `None`:
+    /// the window's. It takes several frames: poll [`still_progress`](Self::still_progress), then call
     /// [`take_still`](Self::take_still).
     ///
     /// # Errors
-    /// A message for the console: the traced look is off, a picture is being made, or the device has no images of the
-    /// size.
+    /// A message for the console: the traced look is off, another picture is in progress, or the device does not
+    /// support images of this size.
     pub fn request_still(&mut self, samples: u32, size: Option<(u32, u32)>) -> Result<(), String> {
         if !self.settings.rt {
             return Err("the traced look is off (r_rt 0)".into());
@@ -60,18 +60,18 @@ impl Renderer {
         Ok(())
     }
 
-    /// Frames averaged and wanted of the picture in the making; `None`: there is none.
+    /// Number of averaged and of requested frames of the picture in progress; `None` without one.
     pub fn still_progress(&self) -> Option<(u32, u32)> {
         let waiting = self.still.wanted.map(|(_, samples)| (0, samples));
         (self.still.still.as_ref()).map_or(waiting, |still| Some(still.progress()))
     }
 
-    /// Gives up the picture in the making.
+    /// Cancels the picture in progress.
     pub fn cancel_still(&mut self) {
         self.still.cancel();
     }
 
-    /// The finished picture, as the display would show it. `None` while it is not finished.
+    /// The finished picture, as the display would show it; `None` before it is finished.
     ///
     /// # Errors
     /// The device is lost or out of memory.
@@ -94,8 +94,8 @@ impl Renderer {
         }))
     }
 
-    /// Keeps a view for the picture that was asked for. A picture that the device has no memory for is given up with a
-    /// warning: the game goes on.
+    /// Stores a view for a requested picture. If the device has no memory for the picture, drops it with a warning, and
+    /// the game continues.
     pub(super) fn keep_for_still(&mut self, view: &TracedScene) {
         if let (Some((size, samples)), Some(look)) = (self.still.wanted.take(), &self.trace) {
             match Still::new(&self.device, look, view, size, samples) {
@@ -105,7 +105,7 @@ impl Renderer {
         }
     }
 
-    /// Records some more of the picture; gives it up as [`keep_for_still`](Self::keep_for_still) does.
+    /// Records more frames of the picture; drops it as [`keep_for_still`](Self::keep_for_still) does.
     pub(super) fn record_still(&mut self, rec: &mut Recorder) {
         let request = &mut self.still;
         let (Some(still), Some(look), Some(assets)) =
