@@ -1,16 +1,16 @@
-//! What a front end hands to the renderer: entities, polygons, views, in the engine's own terms but as safe types.
+//! Types of a front end's calls: entities, polygons and views, in the engine's terms as safe types.
 //!
-//! Space: id Tech units, x forward, y left, z up. Angles: degrees. Time: milliseconds. Colours: as displayed.
+//! Space: id Tech units, x forward, y left, z up. Angles: degrees. Time: milliseconds. Colours: display-encoded.
 
 use glam::{Vec2, Vec3};
 
-/// What a scene entity is (`refEntityType_t`).
+/// Kind of a scene entity (`refEntityType_t`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum EntityKind {
     /// A model, inline BSP models included.
     #[default]
     Model,
-    /// Accepted by the engine's interface, but an error once it is drawn.
+    /// Part of the engine's interface, but an error when drawn.
     Poly,
     /// A quad that faces the camera.
     Sprite,
@@ -22,7 +22,7 @@ pub enum EntityKind {
     RailRings,
     /// A lightning bolt.
     Lightning,
-    /// Nothing to see: marks the plane of a portal or mirror.
+    /// Invisible: marks the plane of a portal or mirror.
     PortalSurface,
 }
 
@@ -47,9 +47,9 @@ pub mod rdflags {
     pub const HYPERSPACE: u32 = 0x4;
 }
 
-/// One thing to draw (`refEntity_t`).
+/// An entity to draw (`refEntity_t`).
 #[derive(Clone, Copy, Debug, Default)]
-#[allow(missing_docs)] // the engine's fields, under its names
+#[allow(missing_docs)] // the engine's fields under its names
 pub struct RefEntity {
     pub kind: EntityKind,
     pub renderfx: u32,
@@ -130,13 +130,13 @@ impl Default for RefDef {
 /// A dynamic light as the game sends it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DynamicLight {
-    /// Where it is.
+    /// Position.
     pub origin: Vec3,
-    /// Reach in units (the engine calls it intensity).
+    /// Reach, units (the engine calls it intensity).
     pub radius: f32,
     /// Nominally 0..1.
     pub color: Vec3,
-    /// Added instead of modulated.
+    /// Added to surfaces instead of modulating them.
     pub additive: bool,
 }
 
@@ -149,7 +149,7 @@ pub struct MarkFragment {
     pub num_points: usize,
 }
 
-/// A tag's place (`orientation_t`).
+/// Position and axes of a tag (`orientation_t`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orientation {
     /// Origin.
@@ -158,7 +158,7 @@ pub struct Orientation {
     pub axis: [Vec3; 3],
 }
 
-/// Answer of `light_for_point`: 0..255 scale.
+/// Result of `light_for_point`, on a scale of 0..255.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLighting {
     /// Ambient light.
@@ -185,7 +185,7 @@ pub struct Picture {
 pub struct StretchedPicture {
     /// Left top corner, window pixels.
     pub position: Vec2,
-    /// Width and height, window pixels; with one of them negative the picture's back is seen.
+    /// Width and height, window pixels; if one is negative, the back of the picture is shown.
     pub size: Vec2,
     /// Texture coordinates of the left top corner.
     pub st1: Vec2,
@@ -202,8 +202,8 @@ pub struct CinematicFrame<'a> {
     pub rows: u32,
     /// RGBA8, rows from the top.
     pub rgba: &'a [u8],
-    /// The engine's number of the cinematic. Each has a texture of its own.
+    /// The engine's number of the cinematic. Each number has its own texture.
     pub client: usize,
-    /// The pixels are new. Otherwise a texture of the same size keeps its own.
+    /// The pixels have changed. Otherwise a texture of the same size keeps its content.
     pub dirty: bool,
 }

@@ -1,4 +1,4 @@
-//! Assets and worlds on whatever Vulkan device there is, with the validation layer where it is installed.
+//! Tests of assets and worlds on any Vulkan device, with the validation layer if it is installed.
 //!
 //! Without a device each test is skipped; with `RELIGHT_REQUIRE_GPU=1` it fails.
 
@@ -28,7 +28,7 @@ fn assets(device: &Device, files: MemoryFiles, settings: &Settings) -> Assets {
     Assets::new(device, files, scripts, settings).unwrap()
 }
 
-/// Nothing was said by the validation layer, and everything that was dropped is gone.
+/// Checks that the validation layer is silent and that all dropped objects are freed.
 fn finish(device: &Device) {
     device.wait_idle().unwrap();
     let messages = device.validation_messages();

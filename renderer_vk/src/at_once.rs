@@ -1,21 +1,21 @@
-//! Things that take long to make, made by all cores at once.
+//! Parallel construction of objects that take long to make, such as pipelines.
 
 use std::num::NonZeroUsize;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// Room for a driver's compiler, which is written for the stack of a program's first thread.
+/// Stack of a thread, bytes: drivers' compilers assume the stack of a main thread.
 const STACK_SIZE: usize = 16 << 20;
 
-/// Something that can be made by any thread, once.
+/// A value that any thread can make, once.
 pub struct Late<T, F> {
     made: OnceLock<T>,
     make: F,
 }
 
 impl<T, F: Fn() -> T> Late<T, F> {
-    /// Not made yet.
+    /// A value that is not made yet.
     pub fn new(make: F) -> Self {
         Self {
             made: OnceLock::new(),
@@ -23,7 +23,7 @@ impl<T, F: Fn() -> T> Late<T, F> {
         }
     }
 
-    /// What was made; made now if it was not.
+    /// The value; makes it if no thread has.
     pub fn take(self) -> T {
         self.made.into_inner().unwrap_or_else(self.make)
     }
@@ -31,7 +31,7 @@ impl<T, F: Fn() -> T> Late<T, F> {
 
 /// A [`Late`] of any type.
 pub trait Make: Sync {
-    /// Makes it, unless another thread does.
+    /// Makes the value, unless another thread does.
     fn make(&self);
 }
 
@@ -41,8 +41,8 @@ impl<T: Send + Sync, F: Fn() -> T + Sync> Make for Late<T, F> {
     }
 }
 
-/// Makes all of them, begun in their order: on as many threads as the machine has cores, the caller's among them, and none
-/// of the others outlives the call.
+/// Makes all values, started in their order, on as many threads as the machine has cores, including the caller's. All
+/// other threads end before the call returns.
 pub fn make_all(things: &[&dyn Make]) {
     let next = AtomicUsize::new(0);
     let work = || {
@@ -53,7 +53,7 @@ pub fn make_all(things: &[&dyn Make]) {
     let cores = thread::available_parallelism().map_or(1, NonZeroUsize::get);
     thread::scope(|scope| {
         for _ in 1..cores.min(things.len()) {
-            // where a thread is refused, the others do its work
+            // if a thread cannot be started, the other threads do its work
             let builder = thread::Builder::new().stack_size(STACK_SIZE);
             if builder.spawn_scoped(scope, work).is_err() {
                 break;

@@ -1,4 +1,4 @@
-//! What can go wrong.
+//! Errors of the renderer.
 
 use crate::gpu;
 
@@ -6,7 +6,7 @@ use crate::gpu;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Vulkan, its loader, or the device.
+    /// An error of Vulkan, its loader, or the device.
     #[error(transparent)]
     Gpu(#[from] gpu::Error),
     /// A map that cannot be loaded.
@@ -15,16 +15,16 @@ pub enum Error {
     /// A second map without a new registration.
     #[error("{name}: a map is loaded already")]
     WorldTwice {
-        /// The map asked for.
+        /// The requested map.
         name: String,
     },
-    /// A view of the world without one.
+    /// A view of the world without a map.
     #[error("a view of the world is drawn, but no map is loaded")]
     NoWorld,
-    /// Something is asked for before the game registered anything.
+    /// A call that needs a registration, before the first one.
     #[error("nothing is registered yet")]
     NotRegistered,
-    /// A raw picture of a bad size.
+    /// A raw picture whose sides are no powers of two.
     #[error("a raw picture has {cols}x{rows} pixels; both must be powers of two")]
     NotPowerOfTwo {
         /// Width.
@@ -39,7 +39,7 @@ pub enum Error {
         cols: u32,
         /// Height.
         rows: u32,
-        /// Bytes that came.
+        /// Bytes in the data.
         length: usize,
     },
     /// An entity of a kind that is never drawn.

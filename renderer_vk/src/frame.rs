@@ -1,4 +1,5 @@
-//! One frame: what was queued, in order. The passes of a traced view are listed in `trace`; a classic view is one pass.
+//! Recording of a frame: its queued items in order. `trace` lists the passes of a traced view; a classic view is one
+//! pass.
 
 use glam::{Mat4, Vec3, Vec4};
 use shaders::types::Instance;
@@ -14,11 +15,11 @@ use crate::settings::Settings;
 use crate::trace::{MapView, TraceLook};
 use crate::world::World;
 
-/// What the game asked for, in its order.
+/// A queued command of the game.
 pub enum Item {
-    /// The whole picture becomes one colour.
+    /// Clears the whole picture to a colour.
     Clear([f32; 4]),
-    /// 2D pictures, with the shader time in seconds.
+    /// 2D pictures; shader time, seconds.
     Overlay(Overlay, f32),
     /// A 3D view in the classic look: at most one portal view, then the view itself.
     Classic(Vec<ClassicScene>),
@@ -26,15 +27,15 @@ pub enum Item {
     Traced(Box<TracedScene>),
 }
 
-/// What the items of a frame are drawn with and onto.
+/// Inputs and targets of a frame's items.
 pub struct FrameContext<'a> {
-    /// The picture: what the traced look writes.
+    /// The picture; the traced look writes it directly.
     pub color: &'a Image,
-    /// What the classic look draws to.
+    /// Colour target of the classic look.
     pub drawn: &'a Image,
-    /// Depth of what the classic look draws to.
+    /// Depth target of the classic look.
     pub depth: &'a Image,
-    /// Channels that the item is drawn in.
+    /// Colour channels of the item.
     pub mask: ColorMask,
     /// Materials and textures.
     pub assets: &'a Assets,
@@ -46,7 +47,7 @@ pub struct FrameContext<'a> {
     pub raster: &'a mut Raster,
     /// Flares of both looks.
     pub flares: &'a mut Flares,
-    /// The traced look, where the device traces rays.
+    /// The traced look, if the device traces rays.
     pub trace: Option<&'a mut TraceLook>,
     /// Draw list, reused.
     pub list: &'a mut DrawList,
@@ -106,7 +107,7 @@ impl<'a> FrameContext<'a> {
         self.flares(recorder, target, scene, test, true)
     }
 
-    /// What stages are evaluated with in this frame.
+    /// Inputs of stage evaluation in this frame.
     fn stages(&self) -> StageContext<'a> {
         let assets = self.assets;
         StageContext {
@@ -141,11 +142,11 @@ impl<'a> FrameContext<'a> {
             .record(recorder, "overlay", target, self.list, &parameters)
     }
 
-    /// What is drawn in window pixels is drawn with.
+    /// View parameters of drawings in window pixels.
     fn window_parameters<'b>(&self, instances: &'b [Instance]) -> ViewParameters<'b> {
         let (width, height) = (self.color.width() as f32, self.color.height() as f32);
         ViewParameters {
-            // window pixels to clip space; pictures lie at the near plane, a depth of 1 before the far one
+            // window pixels to clip space; pictures lie at the near plane, at a depth of 1 before the far plane
             world_to_clip: Mat4::from_cols(
                 Vec4::new(2.0 / width, 0.0, 0.0, 0.0),
                 Vec4::new(0.0, 2.0 / height, 0.0, 0.0),
@@ -171,7 +172,7 @@ impl<'a> FrameContext<'a> {
         }
     }
 
-    /// What the classic look draws to.
+    /// Targets of the classic look.
     fn target(&self) -> Target<'a> {
         Target {
             color: self.drawn,
@@ -231,7 +232,7 @@ impl<'a> FrameContext<'a> {
         self.flares(recorder, target, scene, test, false)
     }
 
-    /// Draws the tested flares of a view that was just drawn.
+    /// Draws the tested flares of the view just drawn.
     fn flares(
         &mut self,
         recorder: &mut Recorder,
@@ -274,10 +275,10 @@ impl<'a> FrameContext<'a> {
     }
 }
 
-/// With `r_clear` each frame begins with this colour.
+/// Colour of each new frame with `r_clear`.
 pub const CLEAR: [f32; 4] = [1.0, 0.0, 0.5, 1.0];
 
-/// The engine clears the colour of a view only where a setting or the game asks for it.
+/// Clear colour of a view; the engine clears only if a setting or the game requests it.
 pub fn clear_color(scene: &ClassicScene, settings: &Settings) -> Option<[f32; 4]> {
     if scene.def.flags & crate::api::rdflags::HYPERSPACE != 0 {
         let grey = (scene.def.time_ms & 255) as f32 / 255.0;

@@ -1,4 +1,4 @@
-//! Half floats, as images of 16 bits a channel hold them.
+//! Half floats, as stored in images of 16 bits per channel.
 
 /// The value of a half float (IEEE 754 binary16).
 pub fn half(bits: u16) -> f32 {

@@ -1,5 +1,5 @@
-//! The renderer: a safe Rust API over Vulkan. It knows no engine and no C; `ffi` translates for engines and `cli`
-//! uses it directly.
+//! The renderer: a safe Rust API over Vulkan, independent of engines and C. `ffi` adapts it to engines, and `cli` uses
+//! it directly.
 
 #![deny(unsafe_code)]
 

@@ -1,7 +1,7 @@
-//! Camera paths: the views of a game, frame by frame, as text, so that the same ones can be measured again without it.
+//! Camera paths: the views of a game, frame by frame, as text, for repeated measurements without the game.
 //!
-//! A line a frame: time in milliseconds, origin, pitch, yaw and roll in degrees, both angles of the field of view in
-//! degrees; all separated by spaces. Empty lines and what follows a `#` do not count.
+//! One line per frame: time in milliseconds, origin, pitch, yaw and roll in degrees, both angles of the field of view
+//! in degrees, separated by spaces. Empty lines and text after a `#` are ignored.
 
 use glam::{Mat3, Vec3};
 use thiserror::Error;
@@ -21,13 +21,13 @@ pub struct PathPoint {
     pub fov: [f32; 2],
 }
 
-/// A line that is no camera.
+/// A line that is not a camera.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("line {line}: {text:?} is not TIME X Y Z PITCH YAW ROLL FOV_X FOV_Y")]
 pub struct PathError {
-    /// From 1.
+    /// Line number, from 1.
     pub line: usize,
-    /// As read.
+    /// Text of the line.
     pub text: String,
 }
 
@@ -56,8 +56,8 @@ impl PathPoint {
         [turn.x_axis, turn.y_axis, turn.z_axis]
     }
 
-    /// The view of a picture of this size. The angle across is kept; the other one follows from the size's shape, as
-    /// the picture may have another than the recorded one.
+    /// The view for a picture of this size. The horizontal angle is kept; the vertical angle follows from the size's
+    /// aspect ratio, which may differ from the recorded one.
     pub fn ref_def(&self, width: u32, height: u32) -> RefDef {
         let half = (self.fov[0].clamp(1.0, 170.0).to_radians() * 0.5).tan();
         #[allow(clippy::cast_precision_loss)] // pixels
@@ -74,7 +74,7 @@ impl PathPoint {
         }
     }
 
-    /// The line of a path's file.
+    /// The line of a path file.
     pub fn line(&self) -> String {
         let Self {
             time_ms,
@@ -89,10 +89,10 @@ impl PathPoint {
     }
 }
 
-/// Reads a path's file.
+/// Reads a path file.
 ///
 /// # Errors
-/// The first line that is no camera.
+/// The first line that is not a camera.
 pub fn parse(text: &str) -> Result<Vec<PathPoint>, PathError> {
     let mut points = Vec::new();
     for (index, full) in text.lines().enumerate() {

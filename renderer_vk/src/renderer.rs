@@ -1,4 +1,4 @@
-//! The renderer as a front end sees it: made, filled with what is registered, told what a frame shows.
+//! The public renderer: construction, registration, and the scenes of a frame.
 
 mod held;
 mod kept_pipelines;
@@ -37,7 +37,7 @@ use output::milliseconds;
 pub use output::{CpuTimes, FrameStats};
 use still::StillRequest;
 
-/// How to make a renderer.
+/// Options for making a renderer.
 pub struct RendererOptions {
     /// Width of the picture, pixels.
     pub width: u32,
@@ -45,18 +45,18 @@ pub struct RendererOptions {
     pub height: u32,
     /// The window to present to; `None` renders without one.
     pub window: Option<Window>,
-    /// Vulkan's validation layer.
+    /// Enables Vulkan's validation layer.
     pub validation: bool,
-    /// Part of the name of the device to prefer.
+    /// Part of the name of the preferred device.
     pub device: Option<String>,
-    /// Wait for the display's refresh.
+    /// Wait for vertical blank.
     pub vsync: bool,
-    /// File that the driver's compiled pipelines are kept in from one start to the next; `None` keeps nothing.
+    /// File of the driver's pipeline cache between starts; `None` stores nothing.
     pub pipeline_cache: Option<std::path::PathBuf>,
 }
 
 impl RendererOptions {
-    /// Without a window, on whatever device there is, and keeping nothing. Sizes in pixels.
+    /// Options without a window, for any device, without a pipeline cache. Sizes in pixels.
     pub fn headless(width: u32, height: u32) -> Self {
         Self {
             width,
@@ -70,16 +70,16 @@ impl RendererOptions {
     }
 }
 
-/// The renderer: one device, one window or none, and what the game has registered.
+/// The renderer: one device, at most one window, and the game's registration.
 pub struct Renderer {
-    // dropped in this order: what the device owns comes before it
+    // fields are dropped in this order: objects of the device before the device
     still: StillRequest,
     trace: Option<TraceLook>,
-    /// Those of the traced look, once it was asked for.
+    /// Pipelines of the traced look, made at its first use.
     trace_passes: Option<Arc<PassSet>>,
     world: Option<World>,
     scene: Scene,
-    /// What `rt_pause` keeps on show.
+    /// Held views of `rt_pause`.
     held: HeldViews,
     assets: Option<Assets>,
     list: DrawList,
@@ -96,12 +96,12 @@ pub struct Renderer {
     /// Rays of traced views are counted.
     counts_rays: bool,
     marker: Marker,
-    /// With the channels that each is drawn in.
+    /// Queued items, with the colour channels of each.
     queue: Vec<(Item, ColorMask)>,
     eye: Eye,
     /// `r_anaglyphMode` of the newest frame.
     shown_anaglyph: Anaglyph,
-    /// Milliseconds spent on gathering views since the last frame.
+    /// Time spent on gathering views since the last frame, milliseconds.
     gather_ms: f32,
     overlay: Overlay,
     spare_overlays: Vec<Overlay>,
@@ -109,14 +109,14 @@ pub struct Renderer {
     color_2d: u32,
     entity_tokens: EntityTokens,
     calibrations: Option<relight::CalibrationCache>,
-    /// The window is not on the screen.
+    /// The window is minimised.
     hidden: bool,
 }
 
-/// Looks for a device without making a window: what it is called and what it can do.
+/// Finds a device without making a window; returns its name and features.
 ///
 /// # Errors
-/// There is no Vulkan, or no device that fits; the message says which.
+/// There is no Vulkan, or no suitable device; the message says which.
 pub fn probe(device: Option<&str>) -> Result<DeviceInfo, Error> {
     let options = device_options(device, false);
     Ok(Device::new(&options, SurfaceSource::Headless)?
@@ -128,13 +128,12 @@ impl Renderer {
     /// Makes the device, the swapchain if there is a window, and the frame's images. No game data is read.
     ///
     /// # Errors
-    /// There is no Vulkan, no device that fits, or it is out of memory.
+    /// There is no Vulkan or no suitable device, or the device is out of memory.
     pub fn new(options: RendererOptions) -> Result<Self, Error> {
         Self::on(options, false)
     }
 
-    /// The same on a device that shows nothing of what it could do beyond what this renderer requires: how poor devices
-    /// draw can be seen on a rich one.
+    /// The same with all optional device features disabled, to test the code for devices without them.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
@@ -209,29 +208,29 @@ impl Renderer {
         self.device.info()
     }
 
-    /// How many descriptors were written so far; drawing a frame like the one before writes none.
+    /// Number of descriptors written so far; a frame that equals the last one writes none.
     pub fn descriptor_writes(&self) -> u64 {
         self.device.descriptor_writes()
     }
 
-    /// How many pipelines of any kind were compiled so far; what is registered and drawn as expected adds none.
+    /// Number of pipelines compiled so far; frames that draw only registered materials in the expected ways add none.
     pub fn compiled_pipelines(&self) -> u64 {
         self.device.compiled_pipelines()
     }
 
-    /// How many of them the driver holds: those of earlier maps alone are gone once the next is registered.
+    /// Number of pipelines that exist; those that only earlier maps used are dropped at the next registration.
     pub fn live_pipelines(&self) -> u64 {
         self.device.live_pipelines()
     }
 
-    /// What the validation layer has said so far.
+    /// Messages of the validation layer so far.
     pub fn validation_messages(&self) -> Vec<String> {
         self.device.validation_messages()
     }
 
     /// GPU milliseconds of each pass of the newest finished frame.
     ///
-    /// On a software device passes are timed once this was called.
+    /// On a software device, passes are timed from the first call on.
     pub fn timings(&self) -> Vec<(String, f32)> {
         self.device.measure(true);
         self.device.timings()
@@ -252,8 +251,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// Tells whether the window is off the screen (minimised): frames are drawn but not shown, because the window
-    /// system may keep a hidden window's frames waiting.
+    /// Sets whether the window is minimised: frames are then drawn but not presented, because the window system may
+    /// delay a hidden window's frames.
     pub fn set_hidden(&mut self, hidden: bool) {
         self.hidden = hidden;
     }
@@ -264,7 +263,8 @@ impl Renderer {
         (color.width(), color.height())
     }
 
-    /// Settings for what follows. What is latched counts at the next [`begin_registration`](Self::begin_registration).
+    /// Settings for subsequent calls. Latched ones take effect at the next
+    /// [`begin_registration`](Self::begin_registration).
     pub fn set_settings(&mut self, settings: &Settings) {
         if self.settings != *settings {
             self.settings.clone_from(settings);
@@ -279,7 +279,7 @@ impl Renderer {
         }
     }
 
-    /// Forgets what was added since the last view.
+    /// Drops all entities, polygons and lights added since the last view.
     pub fn clear_scene(&mut self) {
         self.scene.clear();
     }
@@ -299,10 +299,11 @@ impl Renderer {
         self.scene.add_light(light);
     }
 
-    /// Queues a view of what was added.
+    /// Queues a view of everything added since the last one.
     ///
     /// # Errors
-    /// [`Error::NoWorld`]: there is no map, and the view wants one. An entity has a kind that cannot be drawn.
+    /// [`Error::NoWorld`]: the view shows the world, but no map is loaded. Also an entity of a kind that cannot be
+    /// drawn.
     pub fn render_scene(&mut self, def: &RefDef) -> Result<(), Error> {
         let wants_world = def.flags & rdflags::NO_WORLD_MODEL == 0;
         if self.settings.no_refresh {
@@ -317,7 +318,7 @@ impl Renderer {
         let mask = self.eye.mask(self.settings.anaglyph);
         let pause = self.settings.rt_pause && traced;
         if pause && let Some(mut view) = self.held.next(def) {
-            // held for one eye, shown to both
+            // both eyes share a held view
             view.view = view.view.with_stereo(self.eye.stereo(&self.settings));
             self.scene.clear();
             self.keep_for_still(&view);
@@ -345,8 +346,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// Adds a polygon that the engine's collision code wants to see to the view that was queued last, unless that is a
-    /// traced one. Of `color` the lowest three bits are red, green and blue.
+    /// Adds a polygon of the engine's collision debugging to the last queued view, unless that is traced. The lowest
+    /// three bits of `color` are red, green and blue.
     pub fn add_debug_polygon(&mut self, color: u32, corners: &[Vec3]) {
         if let Some((Item::Classic(scenes), _)) = self.queue.last_mut()
             && let Some(view) = scenes.last_mut()
@@ -355,12 +356,13 @@ impl Renderer {
         }
     }
 
-    /// Keeps what is found about maps' lights in a folder, so that the traced look is ready at once the next time.
+    /// Sets the folder that caches light calibrations of maps, so that the traced look starts without calibrating
+    /// again.
     pub fn keep_calibrations(&mut self, folder: Option<std::path::PathBuf>) {
         self.calibrations = folder.map(relight::CalibrationCache::new);
     }
 
-    /// Makes the traced look when it is first asked for; `false` while there is no map.
+    /// Makes the traced look at its first use; `false` without a map.
     fn ready_to_trace(&mut self) -> Result<bool, Error> {
         if let (Some(world), Some(assets)) = (&mut self.world, &mut self.assets)
             && (world.light_by(self.settings.rt_lights, assets, self.calibrations.as_ref())

@@ -1,6 +1,6 @@
-//! The renderer's settings. A setting is a row of the table below: from it come the field of [`Settings`] and its
-//! default, the console variable that a front end registers, the key of accumulation, `docs/settings.md`, and the values
-//! that the command line takes.
+//! The renderer's settings. A setting is a row of the table below, from which macros generate the field of [`Settings`]
+//! and its default, the console variable of a front end, the key of accumulation, `docs/settings.md`, and the values of
+//! the command line.
 
 mod choices;
 mod row;
@@ -49,7 +49,7 @@ macro_rules! settings {
             put: |settings, given| settings.$field.put(given),
         } ),*];
 
-        /// What a player has who changed nothing.
+        /// Defaults.
         impl Default for Settings {
             fn default() -> Self {
                 Self {
@@ -70,11 +70,11 @@ macro_rules! settings {
     };
 }
 
-// Columns: field, type, console variable, default, flags, limits, when it is read, what a change does to accumulation,
+// Columns: field, type, console variable, default, flags, limits, when it is read, effect of a change on accumulation,
 // help with the unit.
 #[rustfmt::skip] // one row, one line
 settings! { variables {
-    // of the engine's own renderer, with its names, defaults and flags
+    // the engine's settings, with their names, defaults and flags
     swap_interval: i32 = "r_swapInterval", "0", ARCHIVE | LATCH, None, Frame, GoesOn, "1 waits for the display's vertical retrace.";
     multisample: u32 = "r_ext_multisample", "0", ARCHIVE | LATCH, kept(0.0, 4.0), Frame, GoesOn, "Samples of a pixel, for smooth edges; the next number that the device has. The traced look has none.";
     anaglyph: Anaglyph = "r_anaglyphMode", "0", ARCHIVE, None, Frame, GoesOn, "Stereo through coloured glasses: 1 red-cyan, 2 red-blue, 3 red-green, 4 green-magenta; 5 to 8 the same, eyes swapped.";
@@ -143,7 +143,7 @@ settings! { variables {
     no_vis: bool = "r_novis", "0", CHEAT, None, Frame, GoesOn, "1 ignores the map's visibility.";
     no_cull: bool = "r_nocull", "0", CHEAT, None, Frame, GoesOn, "1 draws what is out of view as well.";
     show_cluster: i32 = "r_showcluster", "0", CHEAT, None, Frame, GoesOn, "1 prints the cluster and area of the eye when they change.";
-    // ours
+    // settings of this renderer
     rt: bool = "r_rt", "0", ARCHIVE, kept(0.0, 1.0), Frame, GoesOn, "1 traces light with rays, 0 draws the classic look. Switches at once.";
     rt_tracer: TracerChoice = "rt_tracer", "auto", ARCHIVE | LATCH, None, Start, GoesOn, "What follows the rays: auto, pipeline, query or compute. A device without it gets what auto picks.";
     rt_lights: MapLightChoice = "rt_lights", "calibrated", ARCHIVE, None, With("rt_lights"), Restarts, "Lights of the map: calibrated, fitted to the light that its compiler stored, or prior, as its directives say. Switches at once.";
@@ -174,7 +174,7 @@ settings! { variables {
     rt_debug: DebugOutput = "rt_debug", "0", NONE, kept(0.0, 11.0), Frame, GoesOn, "Shows a step of the traced look in place of the picture: 1 albedo, 2 normals, 3 depth, 4 motion, 5 clusters, 6 lights per pixel, 7 samples, 8 variance, 9 gradients, 10 rays per pixel, 11 reflections.";
 
 } others {
-    /// Temporal gradients of A-SVGF. Off is the baseline that measurements compare with.
+    /// Temporal gradients of A-SVGF. Measurements compare with them off.
     rt_gradients: bool = true;
     /// Whether the window filled the screen when it was opened (`r_fullscreen`).
     fullscreen: bool = false;
@@ -182,7 +182,7 @@ settings! { variables {
     ignore_hw_gamma: bool = false;
 } }
 
-/// The row of a console variable, whatever the case of the name.
+/// The row of a console variable; case is ignored.
 pub fn row(name: &str) -> Option<&'static Row> {
     ROWS.iter()
         .find(|row| row.spec.name.eq_ignore_ascii_case(name))
@@ -190,7 +190,7 @@ pub fn row(name: &str) -> Option<&'static Row> {
 
 impl Settings {
     /// Defaults with textures of full size, for pictures without a player: the engine's default of `r_picmip` halves
-    /// them.
+    /// textures.
     pub fn full_size() -> Self {
         Self {
             picmip: 0,
@@ -206,17 +206,17 @@ impl Settings {
         }
     }
 
-    /// Whether the sky is left out.
+    /// Whether the sky is not drawn.
     pub fn hides_sky(&self) -> bool {
         self.fast_sky != 0
     }
 
-    /// Whether portals and mirrors are left out.
+    /// Whether portals and mirrors are not drawn.
     pub fn hides_portals(&self) -> bool {
         self.no_portals || self.fast_sky == 1
     }
 
-    /// Overbright bits in force: only a full-screen window with a gamma ramp shows colours doubled.
+    /// Effective overbright bits: only a full-screen window with a gamma ramp doubles displayed colours.
     pub fn effective_overbright_bits(&self) -> u32 {
         if self.ignore_hw_gamma || !self.fullscreen {
             0
@@ -225,7 +225,7 @@ impl Settings {
         }
     }
 
-    /// The gamma that the finished picture is shown with.
+    /// Gamma of presentation.
     pub fn display_gamma(&self) -> f32 {
         if self.ignore_hw_gamma {
             1.0
@@ -234,7 +234,7 @@ impl Settings {
         }
     }
 
-    /// The gamma that images get when they are loaded.
+    /// Gamma of images at load.
     pub fn software_gamma(&self) -> f32 {
         if self.ignore_hw_gamma {
             self.gamma
@@ -243,7 +243,7 @@ impl Settings {
         }
     }
 
-    /// What the engine calls identity light: the brightness that shows as white.
+    /// Brightness that shows as white; the engine calls it identity light.
     pub fn identity_light(&self) -> f32 {
         1.0 / (1 << self.effective_overbright_bits()) as f32
     }

@@ -1,18 +1,18 @@
-//! What a frame costs: time and rays of each pass, memory by kind; as lines and as JSON.
+//! Costs of a frame: time and rays of each pass, memory by purpose; as lines and as JSON.
 
 use std::fmt::Write as _;
 
 use crate::gpu::{MemoryKind, MemoryUse};
 use serde::{Serialize, Serializer};
 
-/// A pass of the newest finished frame; those of the same name are one.
+/// Cost of a pass in the newest finished frame; passes of the same name are summed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PassCost {
     /// Name.
     pub name: String,
     /// Milliseconds on the GPU.
     pub ms: f32,
-    /// Rays that it asked for; `None` for a pass that asks for none, or while rays are not counted.
+    /// Number of its rays; `None` for a pass without a counter, or while rays are not counted.
     pub rays: Option<u64>,
 }
 
@@ -20,7 +20,7 @@ impl PassCost {
     /// Millions of rays a second, where both are known.
     pub fn mrays_per_second(&self) -> Option<f64> {
         let rays = self.rays.filter(|_| self.ms > 0.0)?;
-        #[allow(clippy::cast_precision_loss)] // a count for people
+        #[allow(clippy::cast_precision_loss)] // a rounded count for reports
         Some(rays as f64 / (f64::from(self.ms) * 1000.0))
     }
 }
@@ -34,7 +34,7 @@ const STRUCTURES: [&str; 5] = [
     "trace animated",
 ];
 
-/// What GPU memory is held for.
+/// Purpose of GPU memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MemoryPurpose {
     /// Images as large as the picture.
@@ -47,7 +47,7 @@ pub enum MemoryPurpose {
     Textures,
     /// Other buffers of the device.
     Buffers,
-    /// Memory that the CPU writes and reads: uploads, what a frame sends, read-backs.
+    /// Memory that the CPU writes and reads: uploads, per-frame data, read-backs.
     Shared,
 }
 
@@ -62,7 +62,7 @@ impl MemoryPurpose {
         Self::Shared,
     ];
 
-    /// As reports call it.
+    /// Name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::ScreenImages => "screen images",
@@ -74,7 +74,7 @@ impl MemoryPurpose {
         }
     }
 
-    /// Of an allocation, by its kind, and for plain buffers by the label that this renderer gave it.
+    /// Purpose of an allocation, by its kind, and for plain buffers by their label.
     pub fn of(allocation: &MemoryUse) -> Self {
         let any = |parts: &[&str]| parts.iter().any(|part| allocation.label.contains(part));
         match allocation.kind {
@@ -89,20 +89,20 @@ impl MemoryPurpose {
     }
 }
 
-/// What the newest finished frame cost, and what is held.
+/// Costs of the newest finished frame, and memory in use.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Costs {
     /// Name of the device.
     pub device: String,
-    /// What follows rays, while the traced look is there.
+    /// Name of the tracer, if the traced look is in use.
     pub tracer: Option<String>,
     /// Pixels of the picture.
     pub size: (u32, u32),
-    /// In the order of recording.
+    /// Costs of passes, in the order of recording.
     pub passes: Vec<PassCost>,
     /// Bytes in use by purpose.
     pub memory: Vec<(MemoryPurpose, u64)>,
-    /// Bytes taken from the driver.
+    /// Bytes allocated from the driver.
     pub reserved: u64,
 }
 
@@ -147,7 +147,7 @@ impl Costs {
         }
     }
 
-    /// For people: a line for each pass, one for all, one for each purpose of memory.
+    /// Lines for people: one for each pass, one for all, one for each purpose of memory.
     pub fn lines(&self) -> Vec<String> {
         let (width, height) = self.size;
         let tracer = self.tracer.as_deref().unwrap_or("no tracer");
@@ -183,7 +183,7 @@ impl Costs {
             }
         }
         if let Some(rays) = total.rays {
-            #[allow(clippy::cast_precision_loss)] // a count for people
+            #[allow(clippy::cast_precision_loss)] // a rounded count for reports
             let _ = write!(line, "; {:.2} Mrays", rays as f64 / 1.0e6);
         }
         let held = self.memory.iter().map(|(_, bytes)| bytes).sum();
@@ -191,7 +191,7 @@ impl Costs {
         line
     }
 
-    /// The same as JSON, one value a line.
+    /// The same as JSON, one value per line.
     pub fn json(&self) -> String {
         let report = Report {
             device: &self.device,
@@ -202,7 +202,7 @@ impl Costs {
             total: PassReport::of(&self.total()),
             memory: self,
         };
-        // Nothing in a report fails to serialize.
+        // No value in a report fails to serialize.
         serde_json::to_string_pretty(&report).unwrap_or_default() + "\n"
     }
 }
@@ -246,7 +246,7 @@ fn memory_by_name<S: Serializer>(costs: &&Costs, to: S) -> Result<S::Ok, S::Erro
 }
 
 fn megabytes(bytes: u64) -> f64 {
-    #[allow(clippy::cast_precision_loss)] // for people
+    #[allow(clippy::cast_precision_loss)] // a rounded value for reports
     let bytes = bytes as f64;
     bytes / f64::from(1 << 20)
 }
@@ -342,7 +342,7 @@ mod tests {
         let json: serde_json::Value = serde_json::from_str(&json.json()).unwrap();
         assert_eq!(json["passes"][0]["ms"], 0.1235);
         assert_eq!(json["passes"][0]["mrays_per_second"], 0.01);
-        // neither a pass nor a tracer
+        // neither passes nor a tracer
         let empty = Costs::default().json();
         let empty: serde_json::Value = serde_json::from_str(&empty).unwrap();
         assert_eq!(empty["passes"], serde_json::json!([]));

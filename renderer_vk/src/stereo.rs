@@ -1,24 +1,24 @@
-//! Stereo: which channels of the picture each eye draws, and where its pictures meet.
+//! Stereo: colour channels and camera offset of each eye.
 //!
 //! Source: engine behaviour of `renderer_opengl1` (anaglyph modes, stereo projection).
 
 use crate::gpu::ColorMask;
 use crate::settings::{Anaglyph, Settings};
 
-/// Whose picture is drawn.
+/// Eye that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Eye {
-    /// One picture for both.
+    /// One picture for both eyes.
     #[default]
     Both,
-    /// The left one's, the first of a frame.
+    /// The left eye, the first of a frame.
     Left,
-    /// The right one's.
+    /// The right eye.
     Right,
 }
 
 impl Eye {
-    /// The channels that it draws.
+    /// Colour channels of the eye.
     pub fn mask(self, anaglyph: Anaglyph) -> ColorMask {
         const RED: [bool; 3] = [true, false, false];
         const GREEN: [bool; 3] = [false, true, false];
@@ -49,7 +49,7 @@ impl Eye {
         }
     }
 
-    /// How it sees.
+    /// Camera offset of the eye.
     pub fn stereo(self, settings: &Settings) -> Stereo {
         let (distance, ratio) = (settings.convergence, settings.stereo_separation);
         let side = match self {
@@ -67,17 +67,17 @@ impl Eye {
     }
 }
 
-/// The place of an eye beside the middle: both eyes' pictures meet at a distance.
+/// Camera offset of an eye; both eyes' pictures coincide at a distance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stereo {
-    /// Distance of the eye from the middle to the left, over that at which the pictures meet; 0 for a single picture.
+    /// Offset to the left divided by that distance; 0 for a single picture.
     pub slope: f32,
-    /// Distance at which the pictures meet, units.
+    /// Distance at which the pictures coincide, units.
     pub distance: f32,
 }
 
 impl Stereo {
-    /// Distance of the eye from the middle to the left, units.
+    /// Offset to the left, units.
     pub fn offset(&self) -> f32 {
         self.slope * self.distance
     }

@@ -1,4 +1,4 @@
-//! The images that a frame is drawn to, as the settings want them.
+//! Target images of a frame, according to the settings.
 
 use crate::Error;
 use crate::gpu::{self, Access, Device, Format, Image, ImageDesc, ImageUsage, Recorder};
@@ -9,9 +9,9 @@ use crate::settings::{ModelShadows, Settings};
 pub struct FrameTargets {
     /// The picture, one sample a pixel.
     color: Image,
-    /// What the classic look draws to, where pixels have several samples.
+    /// Multisampled colour target of the classic look, if enabled.
     several: Option<Image>,
-    /// Depth of what the classic look draws to.
+    /// Depth target of the classic look.
     depth: Image,
 }
 
@@ -30,9 +30,9 @@ impl FrameTargets {
         })
     }
 
-    /// Makes the images anew that the settings want otherwise: several samples where `r_ext_multisample` asks for them
-    /// and nothing is traced, a stencil while shadow volumes are drawn. `format` is the colour's; only
-    /// [`raster::COLOR_FORMAT`] can be written by shaders other than those of draws.
+    /// Makes images anew whose settings have changed: multisampled with `r_ext_multisample` if nothing is traced, with
+    /// a stencil while shadow volumes are drawn. `format` is the colour format; only [`raster::COLOR_FORMAT`] supports
+    /// writes of compute and ray tracing shaders.
     ///
     /// # Errors
     /// The device is out of memory.
@@ -70,22 +70,22 @@ impl FrameTargets {
         Ok(())
     }
 
-    /// The picture, once resolved.
+    /// The resolved picture.
     pub fn color(&self) -> &Image {
         &self.color
     }
 
-    /// The colour that the classic look draws to.
+    /// The colour target of the classic look.
     pub fn drawn(&self) -> &Image {
         self.several.as_ref().unwrap_or(&self.color)
     }
 
-    /// The depth that the classic look draws to.
+    /// The depth target of the classic look.
     pub fn depth(&self) -> &Image {
         &self.depth
     }
 
-    /// Records that the picture becomes black.
+    /// Records clearing the picture to black.
     ///
     /// # Errors
     /// The device is out of memory.
@@ -95,7 +95,7 @@ impl FrameTargets {
         Ok(())
     }
 
-    /// Records the averaging of samples into the picture.
+    /// Records resolving the samples into the picture.
     ///
     /// # Errors
     /// The device is out of memory.
@@ -110,15 +110,15 @@ impl FrameTargets {
 
 const BLACK: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
-/// A black image for the picture: neither the game nor the engine clears it before it is first seen.
+/// A black image for the picture: neither the game nor the engine clears it before the first frame.
 fn color_image(
     device: &Device,
     width: u32,
     height: u32,
     format: Format,
 ) -> Result<Image, gpu::Error> {
-    // Not among the sampled textures: the validation layer takes every draw for a reader of all of them, so a target
-    // among them would be a hazard to itself.
+    // Without the usage of sampled textures: the validation layer assumes that every draw reads all sampled textures,
+    // and would report a target among them as a hazard.
     let usage = if format == raster::COLOR_FORMAT {
         ImageUsage::COLOR | ImageUsage::STORAGE
     } else {
@@ -138,7 +138,7 @@ fn clear(device: &Device, image: &Image) -> Result<(), gpu::Error> {
     })
 }
 
-/// Samples of a pixel for a wish: at least as many where the device has them, otherwise as many as it has.
+/// Number of samples for a requested number: the next supported one, otherwise the largest supported one.
 fn samples(device: &Device, wish: u32, stencil: bool) -> u32 {
     if wish < 2 {
         return 1;
@@ -154,7 +154,7 @@ fn samples(device: &Device, wish: u32, stencil: bool) -> u32 {
     more.or_else(|| sizes.next_back()).unwrap_or(1)
 }
 
-/// A depth image as large as `color`.
+/// A depth image of the size of `color`.
 fn depth_image(
     device: &Device,
     color: &Image,

@@ -1,4 +1,4 @@
-//! Textures without a GPU, and maps loaded through them, for tests.
+//! Textures without a GPU, and maps loaded with them, for tests.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -13,14 +13,14 @@ use crate::scene::GatherInput;
 use crate::settings::Settings;
 use crate::world::{LightmapSink, WorldData, WorldOptions};
 
-/// Gives every image that exists an index.
+/// Assigns an index to every existing image.
 pub struct FakeTextures {
     files: Arc<dyn GameFiles>,
     by_name: HashMap<String, Option<u32>>,
     next: u32,
-    /// Flags that each image was first asked for with.
+    /// Flags of each image's first request.
     pub flags: HashMap<String, ImageFlags>,
-    /// Lightmap pages made.
+    /// Number of lightmap pages made.
     pub lightmaps: usize,
 }
 
@@ -38,7 +38,7 @@ impl FakeTextures {
         }
     }
 
-    /// Index of an image that was found before.
+    /// Index of an image that was requested before.
     pub fn index(&self, name: &str) -> Option<u32> {
         self.by_name.get(name).copied().flatten()
     }
@@ -135,14 +135,14 @@ impl Registration {
         Self::new(files)
     }
 
-    /// A map in these files.
+    /// Loads a map from these files.
     pub fn load(&mut self, map: &str) -> WorldData {
         let options = WorldOptions::new(&self.settings);
         let relit = RelitWorld::load(&*self.files, &self.scripts, map, options.relight()).unwrap();
         self.finish(relit, &options)
     }
 
-    /// A map made in memory.
+    /// Loads a map built in memory.
     pub fn build(&mut self, bsp: q3bsp::Bsp) -> WorldData {
         let options = WorldOptions::new(&self.settings);
         let relit = RelitWorld::from_bsp(
@@ -195,7 +195,7 @@ pub const PIXEL: &[u8] = &[
     0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 24, 0, 10, 20, 30,
 ];
 
-/// The files of OpenArena's own packs; `None`, with a report of a skipped test, without them.
+/// The files of OpenArena's packs; without them `None`, with a report of a skipped test.
 pub fn openarena() -> Option<SearchPath> {
     Some(SearchPath::open(&[testkit::folder()?]).unwrap())
 }
