@@ -1,4 +1,4 @@
-//! Bottom-level acceleration structures, from triangles.
+//! Bottom-level acceleration structures of triangles.
 
 use ash::vk;
 
@@ -9,17 +9,17 @@ use super::error::{Context, Error};
 use super::graveyard::Garbage;
 use super::pass::Pass;
 
-/// Scratch memory that the builds of one call share; larger calls build in several steps.
+/// Scratch memory shared by the builds of one call, bytes; larger calls build in several steps.
 const SCRATCH: u64 = 64 << 20;
 
-/// How a bottom-level structure is built.
+/// Flags of a bottom-level structure's builds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct BlasFlags {
-    /// Build fast (what moves) instead of tracing fast (what stays).
+    /// Prefer fast builds (moving geometry) to fast traversal (static geometry).
     pub fast_build: bool,
-    /// May be compacted, which [`Device::build_static_blas`] does, and [`Pass::compact_blas`].
+    /// Allows compaction, by [`Device::build_static_blas`] and [`Pass::compact_blas`].
     pub compact: bool,
-    /// May be refitted ([`BlasBuild::refit`]).
+    /// Allows refits ([`BlasBuild::refit`]).
     pub refit: bool,
 }
 
@@ -36,20 +36,20 @@ pub struct BlasGeometry {
     pub index_address: u64,
     /// Triangles.
     pub triangle_count: u32,
-    /// No any-hit shader is called.
+    /// The any-hit shader is never called.
     pub opaque: bool,
-    /// The any-hit shader is called once for a triangle at most.
+    /// The any-hit shader is called at most once per triangle.
     pub no_duplicate_any_hit: bool,
 }
 
 /// One build of a batch.
 pub struct BlasBuild<'a> {
-    /// The structure; it takes new storage when its old one is too small, and has a new address then.
+    /// The structure; if its storage is too small, it gets new storage and a new address.
     pub blas: &'a mut Blas,
     /// Its triangles.
     pub geometries: &'a [BlasGeometry],
-    /// The triangles are those of the last build, with other positions: the structure is kept and its boxes are fitted
-    /// to them. Asked of a structure that was never built, or whose triangles differ in number, it is built.
+    /// The triangles are those of the last build at other positions: the structure is updated instead of built. Ignored
+    /// for a structure that was never built, or whose number of triangles has changed.
     pub refit: bool,
 }
 
@@ -78,7 +78,7 @@ impl Storage {
             device,
             &BufferDesc {
                 name,
-                // The structure must start at a multiple of 256 of the buffer: it starts at 0.
+                // The structure begins at offset 0, a multiple of the required 256.
                 size,
                 usage: BufferUsage::ACCEL_STORAGE,
                 memory: Memory::Device,
@@ -108,7 +108,7 @@ impl Storage {
 
 impl Drop for Storage {
     fn drop(&mut self) {
-        // Before its buffer, which is dropped after this.
+        // The structure is buried before its buffer, which is dropped afterwards.
         self.device.0.bury(Garbage::Acceleration(self.raw));
     }
 }
@@ -134,12 +134,12 @@ pub struct Blas {
     name: String,
     flags: BlasFlags,
     storage: Option<Storage>,
-    /// Triangles of each geometry of the last build.
+    /// Number of triangles of each geometry in the last build.
     built: Vec<u32>,
 }
 
 impl Blas {
-    /// An empty structure; it gets its memory when it is built.
+    /// An empty structure; the first build allocates its memory.
     pub fn new(device: &Device, name: &str, flags: BlasFlags) -> Self {
         Self {
             device: device.clone(),
@@ -150,7 +150,8 @@ impl Blas {
         }
     }
 
-    /// The device address for [`Instance::blas`](super::tlas::Instance::blas); 0 before the first build. Building anew may change it.
+    /// The device address for [`Instance::blas`](super::tlas::Instance::blas); 0 before the first build. A new build
+    /// may change it.
     pub fn address(&self) -> u64 {
         self.storage.as_ref().map_or(0, |s| s.address)
     }
@@ -165,13 +166,13 @@ impl Blas {
         &self.name
     }
 
-    /// What can be copied to less memory, if it is built and was made for that.
+    /// The structure to compact, if it is built and allows compaction.
     pub(super) fn compactable(&self) -> Option<vk::AccelerationStructureKHR> {
         let storage = self.storage.as_ref().filter(|_| self.flags.compact)?;
         Some(storage.raw)
     }
 
-    /// Goes on in other memory, which holds a copy.
+    /// Replaces the storage by one that holds a copy.
     pub(super) fn replace_storage(&mut self, storage: Storage) {
         self.storage = Some(storage);
     }
@@ -220,19 +221,19 @@ fn triangles(g: &BlasGeometry) -> vk::AccelerationStructureGeometryKHR<'static> 
         })
 }
 
-/// A build that is ready to be recorded.
+/// A build that is ready for recording.
 struct Planned {
     geometries: Vec<vk::AccelerationStructureGeometryKHR<'static>>,
     ranges: Vec<vk::AccelerationStructureBuildRangeInfoKHR>,
     flags: vk::BuildAccelerationStructureFlagsKHR,
     target: vk::AccelerationStructureKHR,
-    /// Refitted in place.
+    /// Updated in place.
     refit: bool,
     scratch: u64,
 }
 
 impl Planned {
-    /// Vulkan's form, but for the scratch memory.
+    /// Vulkan's structure, without the scratch address.
     fn info(&self) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
         use vk::BuildAccelerationStructureModeKHR as Mode;
         let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
@@ -249,7 +250,7 @@ impl Planned {
     }
 }
 
-/// Sizes the storage of every build and plans it.
+/// Allocates storage for every build and plans it.
 fn plan(builds: &mut [BlasBuild<'_>]) -> Result<Vec<Planned>, Error> {
     let mut planned = Vec::with_capacity(builds.len());
     for build in builds {
@@ -280,7 +281,8 @@ fn plan(builds: &mut [BlasBuild<'_>]) -> Result<Vec<Planned>, Error> {
         let sizes = unsafe { build_sizes(functions, &info, &counts) };
         let refit = build.refit && build.blas.flags.refit && build.blas.built == counts;
         if !refit && build.blas.size() < sizes.acceleration_structure_size {
-            // A structure that is built anew each frame with varying triangles should not be made anew each time.
+            // A structure of varying triangles that is built each frame gets spare storage, so that not every build
+            // reallocates.
             let size = if build.blas.flags.fast_build && !build.blas.flags.refit {
                 sizes.acceleration_structure_size.saturating_mul(5) / 4
             } else {
@@ -350,8 +352,8 @@ pub(super) fn scratch_alignment(device: &Device) -> u64 {
 }
 
 impl Pass<'_> {
-    /// Builds bottom-level structures, all in one command unless their scratch memory would grow large. The pass
-    /// declares [`Access::ACCEL_BUILD`].
+    /// Builds bottom-level structures, in one command unless their scratch memory exceeds a limit. The pass declares
+    /// [`Access::ACCEL_BUILD`].
     ///
     /// # Errors
     /// A device without acceleration structures; out of memory.
@@ -364,7 +366,7 @@ impl Pass<'_> {
         self.end_rendering();
         let functions = functions(&device, "build_blas")?;
         let align = scratch_alignment(&device);
-        // Steps of builds whose scratch memory lies side by side.
+        // Steps of builds with adjacent scratch memory.
         let mut steps: Vec<(Vec<(usize, u64)>, u64)> = Vec::new();
         for (index, build) in planned.iter().enumerate() {
             let size = build.scratch.next_multiple_of(align);
@@ -380,7 +382,7 @@ impl Pass<'_> {
         let scratch = self.recorder().scratch(most + align)?;
         let base = scratch.address().next_multiple_of(align);
         for (members, _) in &steps {
-            // The scratch memory is shared with the step, or the build, before.
+            // The scratch memory is also that of the previous step or build.
             self.barrier();
             let parts = || {
                 members
@@ -395,8 +397,8 @@ impl Pass<'_> {
                 })
                 .collect();
             let ranges: Vec<&[_]> = parts().map(|(build, _)| &build.ranges[..]).collect();
-            // SAFETY: storage and scratch have the sizes that the driver asked for; the addresses of the geometry are
-            // the caller's, within buffers of this device.
+            // SAFETY: storage and scratch have the sizes that the driver requires; the caller provides geometry
+            // addresses within buffers of this device.
             unsafe {
                 functions.cmd_build_acceleration_structures(self.cmd(), &infos, &ranges);
             }
@@ -406,8 +408,7 @@ impl Pass<'_> {
 }
 
 impl Device {
-    /// Builds bottom-level structures at once and compacts those that allow it. Blocks; for loading.
-    ///
+    /// Builds bottom-level structures and compacts those that allow it. Blocks; for loading.
     /// # Errors
     /// As [`Pass::build_blas`].
     pub fn build_static_blas(&self, builds: &mut [BlasBuild<'_>]) -> Result<(), Error> {

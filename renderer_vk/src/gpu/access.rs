@@ -1,4 +1,4 @@
-//! Which parts of the GPU a pass uses, for its barrier.
+//! The GPU stages that a pass uses, for its barrier.
 
 use std::ops::BitOr;
 
@@ -11,27 +11,27 @@ use super::select::Abilities;
 pub struct Access(u32);
 
 impl Access {
-    /// Nothing.
+    /// No work.
     pub const NONE: Self = Self(0);
     /// Compute shaders, and the parameters of indirect dispatches.
     pub const COMPUTE: Self = Self(1);
     /// Shaders of ray tracing pipelines.
     pub const RAY_TRACING: Self = Self(2);
-    /// Everything of drawing: vertex and fragment shaders, attachments, indices, indirect parameters.
+    /// All drawing: vertex and fragment shaders, attachments, indices, indirect parameters.
     pub const GRAPHICS: Self = Self(4);
-    /// Building acceleration structures, with what it reads.
+    /// Building acceleration structures and reading build inputs.
     pub const ACCEL_BUILD: Self = Self(8);
     /// Copies, fills, clears, blits.
     pub const TRANSFER: Self = Self(16);
-    /// Reading by the CPU after the frame.
+    /// Reads by the CPU after the frame.
     pub const HOST: Self = Self(32);
 
-    /// Whether the CPU may read what such work wrote: copies go to its memory, too.
+    /// Whether the CPU may read the results: copies may write to mapped memory.
     pub(crate) fn reaches_host(self) -> bool {
         self.0 & (Self::HOST.0 | Self::TRANSFER.0) != 0
     }
 
-    /// The pipeline stages; those of absent extensions are left out.
+    /// The pipeline stages, without those of disabled extensions.
     pub(crate) fn stages(self, abilities: Abilities) -> vk::PipelineStageFlags {
         use vk::PipelineStageFlags as S;
         let has = |kind: Self| self.0 & kind.0 != 0;
@@ -67,10 +67,10 @@ impl BitOr for Access {
 
 /// The barrier rule: one global memory barrier at the beginning of each pass.
 ///
-/// The validation layer does not see hazards between dispatches, so the rule is simple enough to be checked by eye:
-/// a pass waits for everything recorded or submitted before it, and every write so far is visible to the stages that
-/// the pass declares. Layouts do not take part, because images keep one layout. What differs between `reads` and
-/// `writes` is only that a pass that declares neither gets no barrier.
+/// The validation layer does not detect hazards between dispatches, so that the rule is simple enough to verify by
+/// reading: a pass waits for all work recorded or submitted before it, and all earlier writes are visible to the stages
+/// that it declares. Layouts need no transitions, because each image keeps one layout. `reads` and `writes` have the
+/// same effect; a pass that declares neither has no barrier.
 pub(crate) fn pass_barrier(
     abilities: Abilities,
     reads: Access,
@@ -106,7 +106,7 @@ mod tests {
             ),
             Some(S::ACCELERATION_STRUCTURE_BUILD_KHR | S::TRANSFER | S::RAY_TRACING_SHADER_KHR)
         );
-        // Stages of an extension that is off must not appear.
+        // Stages of a disabled extension must not appear.
         assert_eq!(
             stages(Abilities::default(), Access::RAY_TRACING, Access::GRAPHICS),
             Some(S::ALL_GRAPHICS)

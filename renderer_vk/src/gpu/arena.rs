@@ -1,4 +1,4 @@
-//! Memory for the data that the CPU makes anew in every frame.
+//! Memory for data that the CPU writes in every frame.
 
 use bytemuck::Pod;
 
@@ -6,22 +6,22 @@ use super::buffer::{Buffer, BufferDesc, BufferUsage, Memory};
 use super::device::Device;
 use super::error::Error;
 
-/// Size of a chunk; larger requests get one of their own size.
+/// Size of a chunk, bytes; larger allocations get a chunk of their own.
 const CHUNK: u64 = 1 << 20;
-/// Alignment of everything at least.
+/// Minimum alignment of allocations, bytes.
 const ALIGN: u64 = 16;
 
-/// Mapped memory of one frame, handed out from front to back and taken back whole when the frame is over. It grows by
-/// chunks, which are kept for the next frame.
+/// Mapped memory of one frame: a linear allocator that is reset when the frame is over. It grows by chunks, which are
+/// kept for later frames.
 pub struct UploadArena {
     device: Device,
     chunks: Vec<Buffer>,
-    /// The chunk in use and its taken bytes.
+    /// The current chunk and the bytes used in it.
     current: usize,
     used: u64,
 }
 
-/// A piece of an [`UploadArena`]; write it through [`bytes`](Self::bytes) before the frame ends.
+/// An allocation in an [`UploadArena`]; write to it through [`bytes`](Self::bytes) before the frame ends.
 pub struct ArenaSlice<'a> {
     bytes: &'a mut [u8],
     /// Device address of the first byte.
@@ -32,12 +32,12 @@ pub struct ArenaSlice<'a> {
 }
 
 impl ArenaSlice<'_> {
-    /// The bytes; what is not written is undefined.
+    /// The bytes; unwritten ones are undefined.
     pub fn bytes(&mut self) -> &mut [u8] {
         self.bytes
     }
 
-    /// The buffer that holds the piece (usable for indices, indirect parameters and acceleration structure input).
+    /// The buffer of the allocation (usable for indices, indirect parameters and acceleration structure input).
     pub fn buffer(&self) -> &Buffer {
         &self.buffer
     }
@@ -53,13 +53,13 @@ impl UploadArena {
         }
     }
 
-    /// Takes everything back; the frame that used it is over.
+    /// Frees all allocations; the frame that used them is over.
     pub(crate) fn reset(&mut self) {
         self.current = 0;
         self.used = 0;
     }
 
-    /// Takes `size` bytes at a multiple of `align` (a power of two; at least 16 is used).
+    /// Allocates `size` bytes at a multiple of `align` (a power of two; at least 16).
     ///
     /// # Errors
     /// Out of memory.
@@ -72,7 +72,7 @@ impl UploadArena {
         })?;
         loop {
             let Some(chunk) = self.chunks.get(self.current) else {
-                // `align` more, because a chunk itself is only aligned as the driver likes.
+                // `align` more, because the driver determines the alignment of the chunk itself.
                 let chunk = Buffer::new(
                     &self.device,
                     &BufferDesc {
@@ -111,7 +111,7 @@ impl UploadArena {
         }
     }
 
-    /// Copies `data` and returns their device address, 16-aligned.
+    /// Copies `data` and returns the device address, a multiple of 16.
     ///
     /// # Errors
     /// Out of memory.
@@ -122,13 +122,13 @@ impl UploadArena {
         Ok(slice.address)
     }
 
-    /// Copies indices and returns where they are, for [`Pass::bind_index_buffer`](super::Pass::bind_index_buffer).
+    /// Copies indices; returns buffer and offset for [`Pass::bind_index_buffer`](super::Pass::bind_index_buffer).
     ///
     /// # Errors
     /// Out of memory.
     pub fn push_indices(&mut self, indices: &[u32]) -> Result<(Buffer, u64), Error> {
         let source: &[u8] = bytemuck::cast_slice(indices);
-        // an empty piece would have no buffer to bind
+        // an empty allocation would have no buffer to bind
         let mut slice = self.alloc(source.len().max(4) as u64, ALIGN)?;
         if let Some(out) = slice.bytes().get_mut(..source.len()) {
             out.copy_from_slice(source);

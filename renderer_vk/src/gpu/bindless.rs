@@ -1,8 +1,8 @@
-//! The one descriptor set that every pipeline uses, and the one pipeline layout.
+//! The descriptor set and the pipeline layout that all pipelines share.
 //!
 //! Binding 0: samplers; 1: sampled images; 2: storage images; 3: top-level acceleration structures (with ray tracing).
-//! `shaders/common/bindless.glsl` declares the same. Entries are written while frames are in flight
-//! (update-after-bind); an index is used again only after its frames are over (`graveyard`).
+//! `shaders/common/bindless.glsl` declares the same bindings. Descriptors are written while frames are in flight
+//! (update-after-bind); an index is reused only after the frames that may use it are over (`graveyard`).
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -13,14 +13,14 @@ use super::device::{Device, lock};
 use super::error::{Context, Error};
 use super::select::{Abilities, DeviceInfo};
 
-/// Most samplers.
+/// Maximum number of samplers.
 const SAMPLERS: u32 = 64;
-/// Most top-level structures at a time.
+/// Maximum number of top-level structures at a time.
 const SCENES: u32 = 16;
-/// Bytes of push constants: what every device has.
+/// Size of push constants, bytes: the minimum that Vulkan guarantees.
 pub(crate) const PUSH_BYTES: u32 = 128;
 
-/// How texels between samples are made.
+/// Filter between texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Filter {
     /// The nearest texel.
@@ -30,31 +30,31 @@ pub enum Filter {
     Linear,
 }
 
-/// Use of the mip chain.
+/// Filter between mip levels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum MipFilter {
     /// Only level 0.
     None,
     /// The nearest level.
     Nearest,
-    /// Between two levels.
+    /// Linear between two levels.
     #[default]
     Linear,
 }
 
-/// What lies outside [0, 1].
+/// Addressing outside of [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Wrap {
-    /// The image again.
+    /// Repeats the image.
     #[default]
     Repeat,
-    /// The border texels.
+    /// Clamps to the border texels.
     Clamp,
     /// Transparent black.
     Border,
 }
 
-/// A sampler.
+/// Parameters of a sampler.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct SamplerDesc {
     /// Minification and magnification.
@@ -63,13 +63,13 @@ pub struct SamplerDesc {
     pub mip: MipFilter,
     /// Both axes.
     pub wrap: Wrap,
-    /// Wanted anisotropy; cut to what the device has, off below 1.
+    /// Requested anisotropy; limited to the device's maximum, off below 1.
     pub anisotropy: f32,
     /// Added to the level of detail.
     pub lod_bias: f32,
 }
 
-/// Indices of one binding.
+/// Allocated and free indices of one binding.
 #[derive(Default)]
 struct Slots {
     free: Vec<u32>,
@@ -125,8 +125,8 @@ impl Bindless {
         if abilities.acceleration {
             counts.push((T::ACCELERATION_STRUCTURE_KHR, SCENES));
         }
-        // Index 0 stays empty: the synchronization validation of an array of textures that is indexed at run time
-        // takes every draw for a reader of its first element, which must then not be an image being drawn to.
+        // Index 0 stays empty: for arrays of textures with dynamic indices, synchronization validation treats every
+        // draw as a read of the first element, which would be a hazard if that is a render target.
         *lock(&self.textures) = Slots {
             next: 1,
             capacity: info.max_textures,
@@ -197,7 +197,7 @@ impl Bindless {
         Ok(())
     }
 
-    /// Destroys everything; the device is idle.
+    /// Destroys all objects; the device is idle.
     pub fn destroy(&self, raw: &ash::Device) {
         for (_, sampler) in lock(&self.samplers).drain(..) {
             // SAFETY: made from this idle device.
@@ -211,7 +211,7 @@ impl Bindless {
         unsafe { raw.destroy_descriptor_set_layout(self.set_layout, None) };
     }
 
-    /// Enters a sampled image into the table.
+    /// Writes a descriptor of a sampled image; returns its index.
     pub fn add_texture(
         &self,
         raw: &ash::Device,
@@ -230,7 +230,7 @@ impl Bindless {
         Ok(index)
     }
 
-    /// Enters a storage image into the table.
+    /// Writes a descriptor of a storage image; returns its index.
     pub fn add_storage(&self, raw: &ash::Device, view: vk::ImageView) -> Result<u32, Error> {
         let index = lock(&self.storages).take("storage images")?;
         let layout = vk::ImageLayout::GENERAL;
@@ -245,7 +245,7 @@ impl Bindless {
         Ok(index)
     }
 
-    /// Enters a top-level acceleration structure into the table.
+    /// Writes a descriptor of a top-level acceleration structure; returns its index.
     pub fn add_scene(
         &self,
         raw: &ash::Device,
@@ -307,7 +307,8 @@ impl Bindless {
 }
 
 impl Device {
-    /// The index (binding 0) of a sampler like `desc`, made at its first use and kept until the device ends.
+    /// The index (binding 0) of a sampler with these parameters, made at its first use and kept until the device is
+    /// dropped.
     ///
     /// # Errors
     /// [`Error::Full`] after 64 different samplers.

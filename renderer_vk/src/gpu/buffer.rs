@@ -1,4 +1,4 @@
-//! Buffers: every one has a device address and can be copied from and to.
+//! Buffers: each has a device address, and can be source and target of copies.
 
 use std::ops::BitOr;
 use std::ptr::NonNull;
@@ -13,12 +13,12 @@ use super::error::{Context, Error};
 use super::graveyard::Garbage;
 use super::memory::MemoryKind;
 
-/// What a buffer is for, beyond storage and copies, which every buffer allows.
+/// Usage of a buffer in addition to storage and copies, which every buffer allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct BufferUsage(u32);
 
 impl BufferUsage {
-    /// Read and written by shaders through its address.
+    /// Access by shaders through the address.
     pub const STORAGE: Self = Self(0);
     /// Copies only; the same as [`STORAGE`](Self::STORAGE).
     pub const TRANSFER: Self = Self(0);
@@ -30,7 +30,7 @@ impl BufferUsage {
     pub const ACCEL_INPUT: Self = Self(4);
     /// A shader binding table.
     pub const SBT: Self = Self(8);
-    /// As large as the screen: counted among the images of that size.
+    /// Size proportional to the screen: statistics count it with images of that size.
     pub const SCREEN: Self = Self(32);
     /// Holds acceleration structures.
     pub(crate) const ACCEL_STORAGE: Self = Self(16);
@@ -47,28 +47,28 @@ impl BitOr for BufferUsage {
     }
 }
 
-/// Where a buffer lies.
+/// Memory type of a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Memory {
-    /// On the device; written by uploads and by the GPU.
+    /// Device memory; uploads and the GPU write it.
     #[default]
     Device,
-    /// Mapped, written by the CPU in order and read by the GPU.
+    /// Mapped memory that the CPU writes sequentially and the GPU reads.
     Upload,
-    /// Mapped, written by the GPU and read by the CPU.
+    /// Mapped memory that the GPU writes and the CPU reads.
     Readback,
 }
 
-/// How to make a [`Buffer`].
+/// Parameters of a [`Buffer`].
 #[derive(Clone, Copy, Debug)]
 pub struct BufferDesc<'a> {
     /// Label in captures, validation messages and leak reports.
     pub name: &'a str,
-    /// Bytes; 0 is made 16, so that empty scenes need no special case.
+    /// Size, bytes; 0 becomes 16, so that empty scenes need no special case.
     pub size: u64,
-    /// What for.
+    /// Usage.
     pub usage: BufferUsage,
-    /// Where.
+    /// Memory type.
     pub memory: Memory,
 }
 
@@ -173,7 +173,7 @@ impl Buffer {
         Ok(Self(Arc::new(inner)))
     }
 
-    /// A device buffer that holds `data` from the next submission on.
+    /// A device buffer with the content `data`, which later submissions read.
     ///
     /// # Errors
     /// Out of memory.
@@ -197,10 +197,10 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// Writes to a mapped buffer. The caller sees to it that no running frame reads that part.
+    /// Writes to a mapped buffer. The caller ensures that no frame in flight reads this range.
     ///
     /// # Errors
-    /// [`Error::Usage`] when the buffer is not mapped or the range is outside.
+    /// [`Error::Usage`] if the buffer is not mapped or the range is outside.
     pub fn write(&self, offset: u64, bytes: &[u8]) -> Result<(), Error> {
         let target = self.mapped_range(offset, bytes.len())?;
         let _lock = lock(&self.0.memory);
@@ -210,10 +210,10 @@ impl Buffer {
         Ok(())
     }
 
-    /// Reads from a mapped buffer what the GPU wrote in a frame that is over.
+    /// Reads the GPU's results of a finished frame from a mapped buffer.
     ///
     /// # Errors
-    /// [`Error::Usage`] when the buffer is not mapped or the range is outside.
+    /// [`Error::Usage`] if the buffer is not mapped or the range is outside.
     pub fn read(&self, offset: u64, bytes: &mut [u8]) -> Result<(), Error> {
         let source = self.mapped_range(offset, bytes.len())?;
         let _lock = lock(&self.0.memory);
@@ -222,12 +222,12 @@ impl Buffer {
         Ok(())
     }
 
-    /// The device address, 16-aligned at least.
+    /// The device address, a multiple of 16.
     pub fn address(&self) -> u64 {
         self.0.address
     }
 
-    /// Bytes.
+    /// Size, bytes.
     pub fn size(&self) -> u64 {
         self.0.size
     }
@@ -237,13 +237,13 @@ impl Buffer {
         &self.0.name
     }
 
-    /// Takes the raw buffer and its memory out of a buffer that nobody else holds; the caller buries them.
+    /// Takes the raw buffer and its memory from a buffer with a single owner; the caller buries them.
     pub(crate) fn dissolve(self) -> Option<(vk::Buffer, Allocation)> {
         let memory = lock(&self.0.memory).take()?;
         Some((self.0.raw, memory))
     }
 
-    /// Checks that `[offset, offset + size)` lies inside.
+    /// Checks that `[offset, offset + size)` is inside of the buffer.
     pub(crate) fn check(&self, offset: u64, size: u64) -> Result<(), Error> {
         match offset.checked_add(size) {
             Some(end) if end <= self.0.size => Ok(()),

@@ -1,7 +1,7 @@
-//! Compaction: bottom-level structures that stay are copied to as little memory as they need.
+//! Compaction: copies long-lived bottom-level structures to the least memory that they need.
 //!
-//! The driver knows how little that is once it has built a structure, so the size is asked for behind the build and
-//! read in a later frame, without waiting.
+//! The driver determines this size during the build. A query after the build requests it, and a later frame reads it
+//! without waiting.
 
 use ash::vk;
 
@@ -11,18 +11,17 @@ use super::error::{Context, Error};
 use super::graveyard::Garbage;
 use super::pass::Pass;
 
-/// Sizes that the GPU was asked for.
+/// Compacted sizes requested from the GPU.
 pub struct CompactedSizes {
     device: Device,
     pool: vk::QueryPool,
     count: usize,
-    /// Timeline value of the frame that asks; 0: not a frame, and over when the caller has them.
+    /// Timeline value of the requesting frame; 0: outside of frames, and finished before the caller gets the value.
     frame: u64,
 }
 
 impl CompactedSizes {
-    /// Bytes that each structure needs, in the order in which they were asked for; `None` while the GPU has not come
-    /// to it.
+    /// Bytes that each structure needs, in the order of the request; `None` while the GPU has not finished the query.
     ///
     /// # Errors
     /// A lost device.
@@ -35,8 +34,8 @@ impl CompactedSizes {
             return Ok(None);
         }
         let mut sizes = vec![0u64; self.count];
-        // SAFETY: the pool has as many queries, which the frame has reset; without the flag to wait the call returns at
-        // once.
+        // SAFETY: the pool has as many queries, which the frame has reset; without the WAIT flag the call does not
+        // block.
         let read = unsafe {
             self.device.vk().get_query_pool_results(
                 self.pool,
@@ -60,8 +59,8 @@ impl Drop for CompactedSizes {
 }
 
 impl Pass<'_> {
-    /// Asks how small structures could be; those built in this pass are waited for. They were made to be compacted. The
-    /// pass declares [`Access::ACCEL_BUILD`](super::Access::ACCEL_BUILD).
+    /// Queries the compacted sizes of structures, after waiting for their builds in this pass. They must allow
+    /// compaction. The pass declares [`Access::ACCEL_BUILD`](super::Access::ACCEL_BUILD).
     ///
     /// # Errors
     /// A device without acceleration structures; a structure that is not built; out of memory.
@@ -102,8 +101,8 @@ impl Pass<'_> {
         })
     }
 
-    /// Copies a structure to memory of `size` bytes, which [`ask_compacted_sizes`](Self::ask_compacted_sizes) has told
-    /// since its last build; it has a new address then. The pass declares
+    /// Copies a structure to memory of `size` bytes, the value of [`ask_compacted_sizes`](Self::ask_compacted_sizes)
+    /// since its last build; its address changes. The pass declares
     /// [`Access::ACCEL_BUILD`](super::Access::ACCEL_BUILD).
     ///
     /// # Errors
@@ -126,7 +125,7 @@ impl Pass<'_> {
         self.end_rendering();
         // SAFETY: the target has the compacted size of the source, which was built with the flag for it.
         unsafe { functions.cmd_copy_acceleration_structure(self.cmd(), &info) };
-        // the old memory lives until no frame uses it
+        // the graveyard keeps the old memory until no frame uses it
         blas.replace_storage(target);
         Ok(())
     }

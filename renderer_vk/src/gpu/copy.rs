@@ -1,4 +1,4 @@
-//! Copying commands of a pass: buffers, images, read-backs.
+//! Copy commands of a pass: buffers, images, read-backs.
 
 use ash::vk;
 
@@ -17,7 +17,7 @@ fn first_level(image: &Image) -> vk::ImageSubresourceLayers {
 }
 
 impl Pass<'_> {
-    /// Copies bytes between buffers, or between parts of one that do not overlap.
+    /// Copies bytes between buffers, or between disjoint ranges of one buffer.
     pub fn copy_buffer(
         &mut self,
         source: &Buffer,
@@ -59,14 +59,14 @@ impl Pass<'_> {
             self.refuse("a fill outside of the buffer or of odd bytes");
             return;
         }
-        // SAFETY: the range is inside and aligned; outside of a render pass.
+        // SAFETY: the range is inside of the buffer and aligned; outside of a render pass.
         unsafe {
             self.vk()
                 .cmd_fill_buffer(self.cmd(), buffer.0.raw, offset, size, value);
         }
     }
 
-    /// Changes the layout of an image that is not `GENERAL`, for a copy.
+    /// Changes the layout of an image whose layout is not `GENERAL`, for a copy.
     fn change_layout(&self, image: &Image, from: vk::ImageLayout, to: vk::ImageLayout) {
         if from == to {
             return;
@@ -74,7 +74,7 @@ impl Pass<'_> {
         self.record_barrier(&[], &[layout_change(image.0.raw, image.0.aspect, from, to)]);
     }
 
-    /// Runs a copy with an image in a layout that allows it.
+    /// Runs a copy with an image in a layout that allows copies.
     fn with_layout(
         &self,
         image: &Image,
@@ -92,7 +92,7 @@ impl Pass<'_> {
         self.change_layout(image, during, own);
     }
 
-    /// Runs a copy between two images with both in layouts that allow it.
+    /// Runs a copy between two images, both in layouts that allow copies.
     fn between(
         &self,
         source: &Image,
@@ -108,7 +108,7 @@ impl Pass<'_> {
         });
     }
 
-    /// Copies level 0, as much as both images have.
+    /// Copies the common rectangle of level 0.
     pub fn copy_image(&mut self, source: &Image, target: &Image) {
         self.end_rendering();
         if source.format().block() != target.format().block()
@@ -144,7 +144,7 @@ impl Pass<'_> {
         });
     }
 
-    /// Averages the samples of each texel of a colour image into one of another image of the same size and format.
+    /// Resolves a multisampled colour image to an image of the same size and format.
     pub fn resolve_image(&mut self, source: &Image, target: &Image) {
         self.end_rendering();
         let fits = source.samples() > 1
@@ -168,7 +168,7 @@ impl Pass<'_> {
             ..Default::default()
         };
         let general = vk::ImageLayout::GENERAL;
-        // SAFETY: samples, formats and sizes were checked; what is drawn to stays in GENERAL; outside of a render pass.
+        // SAFETY: samples, formats and sizes were checked; render targets stay in GENERAL; outside of a render pass.
         unsafe {
             self.vk().cmd_resolve_image(
                 self.cmd(),
@@ -182,7 +182,7 @@ impl Pass<'_> {
     }
 
     /// Copies a rectangle (x, y, width, height) of level 0 with scaling and conversion; a negative width or height
-    /// mirrors. Rectangles must lie inside their images.
+    /// mirrors. Rectangles must lie inside of their images.
     pub fn blit_image(
         &mut self,
         source: &Image,
@@ -316,14 +316,14 @@ impl Pass<'_> {
         );
     }
 
-    /// Makes levels 1 and up from level 0, each from the one before by linear filtering.
+    /// Generates levels 1 and up, each from the previous one with a linear filter.
     pub fn generate_mips(&mut self, image: &Image) {
         self.end_rendering();
         if image.format().block().0 != 1 {
             self.refuse("mip levels of a compressed image");
             return;
         }
-        // In GENERAL all levels can be source and target; barriers separate them.
+        // In GENERAL, levels can be both source and target; barriers separate the copies.
         let own = image.0.layout;
         self.change_layout(image, own, vk::ImageLayout::GENERAL);
         for mip in 1..image.mips() {

@@ -1,4 +1,4 @@
-//! The device: everything else is made from it and holds it alive.
+//! The device: all GPU objects are made from it and keep it alive.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -19,20 +19,20 @@ use super::render_pass::{FramebufferKey, RenderPassKey};
 use super::select::{self, Abilities, DeviceInfo};
 use super::upload::Pending;
 
-/// How to make a [`Device`].
+/// Parameters of a [`Device`].
 #[derive(Clone, Debug)]
 pub struct DeviceOptions {
-    /// Told to the driver.
+    /// Application name for the driver.
     pub app_name: String,
-    /// Whether to switch on the validation layer with synchronization validation.
+    /// Enables the validation layer with synchronization validation.
     pub validation: bool,
-    /// Part of the wanted device's name, or its index; `None`: the best one.
+    /// Part of the preferred device's name, or its index; `None`: the best device.
     pub prefer: Option<String>,
-    /// `false`: behave as on a device without ray tracing.
+    /// `false`: disables ray tracing, for tests.
     pub allow_ray_tracing: bool,
-    /// `true`: behave as on a device that has what is required and nothing of what is optional.
+    /// `true`: disables all optional features, for tests.
     pub required_only: bool,
-    /// What [`Device::pipeline_cache_data`] gave in an earlier run; ignored when it does not fit.
+    /// Result of [`Device::pipeline_cache_data`] in an earlier run; ignored if it is invalid or of another driver.
     pub pipeline_cache: Option<Vec<u8>>,
 }
 
@@ -49,7 +49,7 @@ impl Default for DeviceOptions {
     }
 }
 
-/// Owner of the raw device; its only task is to outlive everything that is made from it.
+/// Owner of the raw device, which it destroys after all other objects.
 pub(crate) struct RawDevice {
     pub raw: ash::Device,
     pub instance: Instance,
@@ -67,15 +67,15 @@ pub(crate) struct DeviceInner {
     pub allocator: Mutex<Option<Allocator>>,
     pub state: Mutex<SyncState>,
     pub pending: Mutex<Pending>,
-    /// A handful: one for each set of images that is drawn to.
+    /// Few: one for each combination of attachments.
     pub framebuffers: Mutex<Vec<(FramebufferKey, vk::Framebuffer)>>,
     pub bindless: Bindless,
     pub render_passes: Mutex<HashMap<RenderPassKey, vk::RenderPass>>,
     pub pipeline_cache: vk::PipelineCache,
     pub shared_pipelines: Shared,
-    /// Pipelines of any kind compiled so far.
+    /// Number of pipelines compiled so far.
     pub compiled: AtomicU64,
-    /// Those of them that are not yet destroyed.
+    /// Number of pipelines that exist.
     pub live_pipelines: AtomicU64,
     pub timeline: vk::Semaphore,
     pub timings: Mutex<Vec<(String, f32)>>,
@@ -101,20 +101,19 @@ pub(crate) struct DeviceInner {
 #[derive(Clone)]
 pub struct Device(pub(crate) Arc<DeviceInner>);
 
-/// Locks, and takes a lock that a panicking thread left behind: the data are plain lists.
+/// Locks a mutex, even after a panic of another holder: the data are plain lists.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Device {
-    /// Chooses a device and makes it ready.
+    /// Selects a device and initializes it.
     ///
-    /// Needed: Vulkan 1.2 with buffer device addresses, descriptor indexing, scalar block layout, timeline
-    /// semaphores and 64-bit integers. Used when there: ray tracing pipelines, ray queries, anisotropy, wireframe,
-    /// BC textures.
+    /// Required: Vulkan 1.2 with buffer device addresses, descriptor indexing, scalar block layout, timeline semaphores
+    /// and 64-bit integers. Optional: ray tracing pipelines, ray queries, anisotropy, wireframe, BC textures.
     ///
     /// # Errors
-    /// One message that says what is missing: the loader, the surface, or on each device which feature.
+    /// One message that names the missing item: the loader, the surface, or the features that each device lacks.
     pub fn new(options: &DeviceOptions, source: SurfaceSource<'_>) -> Result<Self, Error> {
         let instance = Instance::new(&options.app_name, options.validation, source)?;
         let choice = select::choose(&instance, options)?;
@@ -176,30 +175,29 @@ impl Device {
         Ok(Self(Arc::new(inner)))
     }
 
-    /// What the device is and can do.
+    /// Name, limits and features of the device.
     pub fn info(&self) -> &DeviceInfo {
         &self.0.info
     }
 
-    /// Whether passes of the frames that follow are timed, which they are at first. Software drivers finish all drawing
-    /// at each time stamp.
+    /// Switches timing of passes in subsequent frames; initially on. Software drivers finish all drawing at each
+    /// timestamp.
     pub fn measure(&self, on: bool) {
         self.0.measuring.store(on, Ordering::Relaxed);
     }
 
-    /// GPU milliseconds of each pass of the newest frame whose results have arrived, in order of recording. Empty
-    /// when the device has no timestamps.
+    /// GPU milliseconds of each pass of the newest finished frame, in order of recording. Empty if the device has no
+    /// timestamps.
     pub fn timings(&self) -> Vec<(String, f32)> {
         lock(&self.0.timings).clone()
     }
 
-    /// Everything that the validation layer said since the device was made.
+    /// All messages of the validation layer since the device was made.
     pub fn validation_messages(&self) -> Vec<String> {
         lock(&self.0.core.instance.messages).clone()
     }
 
-    /// Runs waiting uploads, waits until the device has nothing to do and frees what was waiting for that. Not for use
-    /// within a frame.
+    /// Runs pending uploads, waits until the device is idle and frees all buried objects. Not for use within a frame.
     ///
     /// # Errors
     /// Device loss.
@@ -220,7 +218,7 @@ impl Device {
         Ok(())
     }
 
-    /// The driver's compiled pipelines, to be given to a later run in [`DeviceOptions::pipeline_cache`].
+    /// The driver's pipeline cache, for [`DeviceOptions::pipeline_cache`] of a later run.
     ///
     /// # Errors
     /// Those of `vkGetPipelineCacheData`.
@@ -236,22 +234,22 @@ impl Device {
         Ok(cache_to_bytes(&data))
     }
 
-    /// How many dropped objects still wait for the frames that may use them.
+    /// Number of dropped objects that wait for frames which may use them.
     pub fn graveyard_len(&self) -> usize {
         lock(&self.0.state).graveyard.len()
     }
 
-    /// How many descriptors were written so far: as many as images, samplers and scenes were made, none by drawing.
+    /// Number of descriptors written so far: one per image view, sampler and scene; drawing writes none.
     pub fn descriptor_writes(&self) -> u64 {
         self.0.bindless.writes.load(Ordering::Relaxed)
     }
 
-    /// How many pipelines of any kind were compiled so far.
+    /// Number of pipelines compiled so far.
     pub fn compiled_pipelines(&self) -> u64 {
         self.0.compiled.load(Ordering::Relaxed)
     }
 
-    /// How many of them the driver holds.
+    /// Number of pipelines that exist.
     pub fn live_pipelines(&self) -> u64 {
         self.0.live_pipelines.load(Ordering::Relaxed)
     }
@@ -261,8 +259,8 @@ impl Device {
         self.0.abilities.fragment_stores
     }
 
-    /// The format of depth to use: 24 bits, as the engine asks OpenGL for, where the device draws to them. Some GPUs
-    /// clear and test them faster than floats. Every device has one of each kind.
+    /// The depth format: 24 bits, as the engine requests of OpenGL, if the device can render to it. Some GPUs clear and
+    /// test it faster than floats. Every device supports one format of each kind.
     pub fn depth_format(&self, stencil: bool) -> Format {
         let (format, other) = match stencil {
             false => (Format::D24, Format::D32F),
@@ -276,7 +274,7 @@ impl Device {
         }
     }
 
-    /// Whether the device draws to images of a colour or depth format with so many samples.
+    /// Whether the device can render to images of a colour or depth format with this number of samples.
     pub fn supports_samples(&self, format: Format, samples: u32) -> bool {
         let usage = if format.aspect() == vk::ImageAspectFlags::COLOR {
             vk::ImageUsageFlags::COLOR_ATTACHMENT
@@ -285,7 +283,8 @@ impl Device {
         } else {
             vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT
         };
-        // SAFETY: the physical device belongs to the live instance. An error says that the format cannot be used so.
+        // SAFETY: the physical device belongs to the live instance. An error means that the format does not support
+        // this usage.
         let properties = unsafe {
             self.0
                 .core
@@ -320,7 +319,7 @@ impl std::fmt::Debug for Device {
 }
 
 impl DeviceInner {
-    /// Makes what needs the device to be there; on an error, dropping `self` destroys what was made.
+    /// Makes objects that need the device; on an error, dropping `self` destroys those already made.
     fn init(&mut self, options: &DeviceOptions) -> Result<(), Error> {
         let raw = &self.core.raw;
         *lock(&self.allocator) = Some(
@@ -345,7 +344,7 @@ impl DeviceInner {
         // SAFETY: the timelineSemaphore feature is on.
         self.timeline =
             unsafe { raw.create_semaphore(&info, None) }.context("vkCreateSemaphore")?;
-        // A cache that is missing or damaged starts empty.
+        // A missing or damaged cache starts empty.
         let old = options
             .pipeline_cache
             .as_deref()
@@ -361,7 +360,7 @@ impl DeviceInner {
         Ok(())
     }
 
-    /// What optimally tiled images of a format can be used for.
+    /// Features of a format with optimal tiling.
     pub fn features(&self, format: Format) -> vk::FormatFeatureFlags {
         // SAFETY: the physical device belongs to the live instance.
         unsafe {
@@ -373,7 +372,7 @@ impl DeviceInner {
         .optimal_tiling_features
     }
 
-    /// Gives an object its name in validation messages and captures.
+    /// Sets an object's name for validation messages and captures.
     pub fn name<T: vk::Handle>(&self, handle: T, name: &str) {
         let Some(debug) = &self.debug else { return };
         let Ok(name) = std::ffi::CString::new(name) else {
@@ -386,7 +385,7 @@ impl DeviceInner {
         let _ = unsafe { debug.set_debug_utils_object_name(&info) };
     }
 
-    /// Puts an object to rest until no frame uses it.
+    /// Keeps an object until no frame uses it, then destroys it.
     pub fn bury(&self, garbage: Garbage) {
         let pending = !lock(&self.pending).is_empty();
         let mut state = lock(&self.state);
@@ -394,7 +393,7 @@ impl DeviceInner {
         state.graveyard.push((tag, garbage));
     }
 
-    /// Frees every buried object that no frame can use any more.
+    /// Destroys buried objects that no frame uses.
     pub fn collect(&self) -> Result<(), Error> {
         // SAFETY: the timeline belongs to this device.
         let done = unsafe { self.core.raw.get_semaphore_counter_value(self.timeline) }
@@ -429,7 +428,7 @@ impl DeviceInner {
                 self.free(memory);
             }
             Garbage::View(view) => {
-                // frames that could use them could use the view
+                // frames that could use the framebuffer could also use the view
                 let mut framebuffers = lock(&self.framebuffers);
                 for (_, made) in framebuffers.extract_if(.., |(key, _)| key.views.contains(&view)) {
                     // SAFETY: see above.

@@ -1,4 +1,4 @@
-//! Drawing commands of a pass.
+//! Draw commands of a pass.
 
 use ash::vk;
 
@@ -8,16 +8,16 @@ use super::image::{Image, ImageUsage};
 use super::pass::Pass;
 use super::render_pass::{FramebufferKey, RenderPassKey};
 
-/// What [`Pass::begin_rendering`] draws to. The attachments keep their contents unless a clear value is given.
+/// Attachments of [`Pass::begin_rendering`]. Their contents are kept unless a clear value is given.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Rendering<'a> {
     /// Colour attachment.
     pub color: Option<&'a Image>,
     /// Depth attachment, of the same size.
     pub depth: Option<&'a Image>,
-    /// Colour that the attachment is cleared to first.
+    /// Clear value of the colour attachment.
     pub clear_color: Option<[f32; 4]>,
-    /// Depth that the attachment is cleared to first.
+    /// Clear value of the depth attachment.
     pub clear_depth: Option<f32>,
 }
 
@@ -47,7 +47,7 @@ impl Attachments {
     }
 }
 
-/// Where clip space lands. A negative height turns the picture upside down, as Vulkan 1.1 allows.
+/// Viewport transform. A negative height flips the picture vertically, as Vulkan 1.1 allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewport {
     /// Left edge, pixels.
@@ -64,7 +64,7 @@ pub struct Viewport {
     pub max_depth: f32,
 }
 impl Pass<'_> {
-    /// Starts drawing to images. Viewport and scissor are set to their whole size.
+    /// Begins rendering to attachments. Viewport and scissor cover their whole size.
     ///
     /// # Errors
     /// No attachment, attachments of different sizes or without the usage; out of memory.
@@ -141,7 +141,7 @@ impl Pass<'_> {
         Ok(())
     }
 
-    /// Goes on with the drawing that the pass before left open.
+    /// Continues rendering that the previous pass left open.
     pub(crate) fn go_on(&mut self, attachments: Attachments) {
         self.rendering = Some(attachments.extent);
         self.stays_open = Some(attachments);
@@ -162,7 +162,7 @@ impl Pass<'_> {
         self.set_scissor(0, 0, width, height);
     }
 
-    /// Stops drawing; without effect when nothing is drawn to.
+    /// Ends rendering; no effect outside of rendering.
     pub fn end_rendering(&mut self) {
         self.stays_open = None;
         if self.rendering.take().is_some() {
@@ -190,9 +190,9 @@ impl Pass<'_> {
         unsafe { self.vk().cmd_set_viewport(self.cmd(), 0, &[viewport]) };
     }
 
-    /// Sets the rectangle outside of which nothing is drawn; it is cut to the attachments.
+    /// Sets the scissor rectangle, clipped to the attachments.
     pub fn set_scissor(&mut self, x: i32, y: i32, width: u32, height: u32) {
-        // Nothing is drawn outside of a rendering.
+        // Outside of rendering the extent is empty.
         let rect = cut([x, y], [width, height], self.rendering.unwrap_or_default());
         // SAFETY: recording; offsets are not negative and offset + extent does not overflow.
         unsafe { self.vk().cmd_set_scissor(self.cmd(), 0, &[rect]) };
@@ -239,7 +239,7 @@ impl Pass<'_> {
         }
     }
 
-    /// Draws by the bound indices.
+    /// Draws with the bound indices.
     pub fn draw_indexed(
         &mut self,
         indices: u32,
@@ -263,7 +263,7 @@ impl Pass<'_> {
         }
     }
 
-    /// Draws `count` times by parameters in a buffer (`VkDrawIndexedIndirectCommand`, `stride` bytes apart).
+    /// Draws `count` times with parameters from a buffer (`VkDrawIndexedIndirectCommand`, `stride` bytes apart).
     pub fn draw_indexed_indirect(&mut self, buffer: &Buffer, offset: u64, count: u32, stride: u32) {
         let size = u64::from(stride) * u64::from(count);
         if buffer.check(offset, size).is_err() || stride < 20 || !self.can_draw() {
@@ -323,7 +323,7 @@ impl Pass<'_> {
         );
     }
 
-    /// Clears a rectangle (x, y, width, height) of the stencil to 0. The depth attachment must have one.
+    /// Clears a rectangle (x, y, width, height) of the stencil to 0. The depth attachment must have a stencil.
     pub fn clear_stencil_rect(&mut self, rect: [i32; 4]) {
         self.clear_rect(
             rect,
@@ -355,7 +355,7 @@ impl Pass<'_> {
     }
 }
 
-/// A rectangle cut to the attachments.
+/// Clips a rectangle to the attachments.
 fn cut([x, y]: [i32; 2], [width, height]: [u32; 2], extent: vk::Extent2D) -> vk::Rect2D {
     let axis = |start: i32, size: u32, whole: u32| {
         let whole = i64::from(whole);

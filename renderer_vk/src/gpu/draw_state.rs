@@ -1,10 +1,10 @@
-//! The fixed steps of drawing as plain types: blending, depth, stencil, channels, culling, topology.
+//! Fixed-function state of draws as plain types: blending, depth, stencil, channels, culling, topology.
 
 use ash::vk;
 
-/// Factor of a blend, of the colour and of the alpha channel alike.
+/// Blend factor, for colour and alpha alike.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[allow(missing_docs)] // the names say it
+#[allow(missing_docs)] // names are Vulkan's
 pub enum BlendFactor {
     Zero,
     One,
@@ -38,15 +38,15 @@ impl BlendFactor {
     }
 }
 
-/// When a fragment passes.
+/// Depth comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum DepthTest {
     /// Always.
     Always,
-    /// At the stored depth or nearer.
+    /// At most the stored depth.
     #[default]
     LessEqual,
-    /// At exactly the stored depth.
+    /// Exactly the stored depth.
     Equal,
 }
 
@@ -60,14 +60,14 @@ impl DepthTest {
     }
 }
 
-/// What a draw does with the stencil, where it passes all tests.
+/// Stencil operation for fragments that pass all tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stencil {
-    /// Passes everywhere; where depth passes too, adds one, up to 255.
+    /// Always passes; increments if depth passes, up to 255.
     Increment,
-    /// Passes everywhere; where depth passes too, takes one, down to 0.
+    /// Always passes; decrements if depth passes, down to 0.
     Decrement,
-    /// Passes where the stencil is not 0, and leaves it.
+    /// Passes if the stencil is not 0; keeps it.
     NotZero,
 }
 
@@ -90,7 +90,7 @@ impl Stencil {
     }
 }
 
-/// Which channels of the colour attachment a draw writes.
+/// Written channels of the colour attachment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ColorMask {
     /// Red.
@@ -133,7 +133,7 @@ impl ColorMask {
     }
 }
 
-/// Which triangles are left out. The front is where the corners go counter-clockwise as they lie on the screen.
+/// Culled faces. Front faces are counter-clockwise on the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Cull {
     /// None.
@@ -155,17 +155,17 @@ impl Cull {
     }
 }
 
-/// What the vertices make.
+/// Primitive topology.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Topology {
-    /// Three for a triangle.
+    /// A triangle for each three vertices.
     #[default]
     Triangles,
-    /// Each with the two before it.
+    /// A triangle for each vertex with the two before it.
     TriangleStrip,
-    /// Two for a line.
+    /// A line for each two vertices.
     Lines,
-    /// One for a point.
+    /// A point for each vertex.
     Points,
 }
 

@@ -1,5 +1,5 @@
-//! What newer drivers are told while drawing, so that pipelines which differ in nothing else are one: a software driver
-//! takes milliseconds to make one, and the materials of a map ask for twice as many without it.
+//! Dynamic state: on devices that support it, pipelines that differ only in this state are shared. A software driver
+//! takes milliseconds to compile one, and the materials of a map need half as many.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, Weak};
@@ -11,7 +11,7 @@ use super::draw_state::{BlendFactor, ColorMask, Cull, DepthTest, Stencil, Topolo
 use super::image::Format;
 use super::pipeline::{GraphicsDesc, Pipeline};
 
-/// State of a draw that is no part of a pipeline where the device allows that.
+/// State of a draw that is not part of a pipeline if the device supports it as dynamic state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct DynamicState {
     pub cull: Cull,
@@ -21,7 +21,7 @@ pub(crate) struct DynamicState {
 }
 
 impl DynamicState {
-    /// What stands for it when a pipeline is made.
+    /// The dynamic states of a pipeline.
     pub const STATES: [vk::DynamicState; 5] = [
         vk::DynamicState::CULL_MODE_EXT,
         vk::DynamicState::DEPTH_COMPARE_OP_EXT,
@@ -40,14 +40,14 @@ impl DynamicState {
     }
 }
 
-/// The commands that tell it.
+/// Commands that set the state.
 pub(crate) struct DynamicStateCommands {
     base: ext::extended_dynamic_state::Device,
     blending: ext::extended_dynamic_state3::Device,
 }
 
 impl DynamicStateCommands {
-    /// For a device that was made with both extensions and their features.
+    /// Loads the commands of a device with both extensions and their features.
     pub fn new(instance: &ash::Instance, device: &ash::Device) -> Self {
         Self {
             base: ext::extended_dynamic_state::Device::new(instance, device),
@@ -55,7 +55,7 @@ impl DynamicStateCommands {
         }
     }
 
-    /// Records what of `wanted` is not as it was told last in this pass.
+    /// Records the parts of `wanted` that differ from the last recorded state of this pass.
     pub fn record(&self, cmd: vk::CommandBuffer, wanted: DynamicState, told: Option<DynamicState>) {
         let (source, target) = wanted
             .blend
@@ -92,10 +92,10 @@ impl DynamicStateCommands {
     }
 }
 
-/// All that a pipeline is made of besides its [`DynamicState`].
+/// Everything that determines a pipeline besides its [`DynamicState`].
 #[derive(PartialEq, Eq, Hash)]
 struct Key {
-    /// Names, which modules have for themselves.
+    /// Names identify modules.
     shaders: [Option<&'static str>; 2],
     formats: [Option<Format>; 2],
     stencil: Option<Stencil>,
@@ -123,12 +123,12 @@ impl Key {
     }
 }
 
-/// The pipelines that are alive.
+/// The pipelines that exist, by key.
 #[derive(Default)]
 pub(crate) struct Shared(Mutex<HashMap<Key, Weak<Pipeline>>>);
 
 impl Shared {
-    /// The pipeline that was made of the same, dynamic state aside, or what `make` makes.
+    /// The existing pipeline with this key, or the result of `make`.
     pub fn get<E>(
         &self,
         desc: &GraphicsDesc<'_>,

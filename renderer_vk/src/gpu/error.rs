@@ -1,4 +1,4 @@
-//! What can go wrong between the renderer and the driver.
+//! Errors of the GPU layer.
 
 use ash::vk;
 
@@ -9,44 +9,44 @@ pub enum Error {
     /// The Vulkan loader library could not be opened or is older than 1.2.
     #[error("no usable Vulkan loader: {0}")]
     Loader(String),
-    /// No device meets the requirements; the text names each device and what it lacks.
+    /// No device meets the requirements; the text names each device and its missing features.
     #[error("no usable Vulkan device: {0}")]
     NoDevice(String),
-    /// The window system did not give a surface, or an instance extension that it needs is absent.
+    /// The window system provided no surface, or a required instance extension is absent.
     #[error("no Vulkan surface: {0}")]
     Surface(String),
     /// Memory for `what` is exhausted.
     #[error("out of GPU memory for `{what}` ({bytes} bytes): {reason}")]
     OutOfMemory {
-        /// Name of the object that was to be made.
+        /// Name of the object to be made.
         what: String,
         /// Its size.
         bytes: u64,
-        /// The allocator's words.
+        /// Message of the allocator.
         reason: String,
     },
-    /// The device stopped answering; every object of it is dead.
+    /// The device was lost; none of its objects is usable.
     #[error("the Vulkan device was lost in {0}")]
     DeviceLost(&'static str),
-    /// A table that the device limits is full.
+    /// A table of limited size is full.
     #[error("the device allows {limit} {what}, all are in use")]
     Full {
-        /// What is full.
+        /// Name of the table.
         what: &'static str,
-        /// How many the device allows.
+        /// Limit of the device.
         limit: u32,
     },
-    /// The device or the format cannot do what was asked.
+    /// The device or the format does not support the request.
     #[error("{name}: {what} is not supported by {device}")]
     Unsupported {
-        /// The object that was to be made.
+        /// Name of the object to be made.
         name: String,
-        /// The missing ability.
+        /// The missing feature.
         what: String,
         /// The device's name.
         device: String,
     },
-    /// The caller asked for something that contradicts itself, such as a range outside a buffer.
+    /// The caller passed inconsistent arguments, such as a range outside of a buffer.
     #[error("{name}: {what}")]
     Usage {
         /// The object concerned.
@@ -64,7 +64,7 @@ pub enum Error {
     },
 }
 
-/// Turns a Vulkan result into an [`Error`] that names the call.
+/// Converts a Vulkan result to an [`Error`] that names the call.
 pub(crate) trait Context<T> {
     /// Names the call.
     fn context(self, call: &'static str) -> Result<T, Error>;

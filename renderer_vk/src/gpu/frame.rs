@@ -1,4 +1,4 @@
-//! The ring of frames: while the GPU works on one, the CPU records the next.
+//! The ring of frames in flight: the CPU records one while the GPU executes another.
 
 use ash::vk;
 
@@ -8,21 +8,21 @@ use super::graveyard::Garbage;
 use super::recorder::{Recorder, Recording, SlotResources};
 use super::swapchain::{Submitted, Swapchain};
 
-/// A place in the ring.
+/// A slot of the ring.
 struct Slot {
     /// Timeline value of the frame that used it last.
     value: u64,
     resources: Option<SlotResources>,
-    /// Signalled when the swapchain's image of this frame may be drawn to.
+    /// Signalled when the swapchain image of this frame is available.
     available: vk::Semaphore,
 }
 
-/// Frames in flight of a device; there is one ring at a time.
+/// Frames in flight of a device; a device has at most one ring.
 pub struct FrameRing {
     device: Device,
     slots: Vec<Slot>,
     next: usize,
-    /// Frames begun so far.
+    /// Number of frames begun.
     begun: u64,
 }
 
@@ -66,8 +66,8 @@ impl FrameRing {
         Ok(ring)
     }
 
-    /// Begins the next frame: waits until its place in the ring is free (and for no other frame), publishes the times
-    /// of the frame that held it and frees what no frame uses any more.
+    /// Begins the next frame: waits until its slot is free, publishes the timings of the frame that used it before and
+    /// frees buried objects.
     ///
     /// # Errors
     /// [`Error::Usage`] when a frame is being recorded; out of memory; device loss.
@@ -121,7 +121,7 @@ impl FrameRing {
         })
     }
 
-    /// Submits a frame that shows nothing.
+    /// Submits a frame without presenting.
     ///
     /// # Errors
     /// Out of memory, device loss.
@@ -129,11 +129,10 @@ impl FrameRing {
         self.submit(recorder).map(|_| ())
     }
 
-    /// Submits a frame and shows the image that [`Swapchain::acquire`] gave it, if it did.
+    /// Submits a frame and presents the image that [`Swapchain::acquire`] returned, if any.
     ///
     /// # Errors
-    /// Out of memory, device loss. A swapchain that became out of date is no error: it is made anew at the next
-    /// acquisition.
+    /// Out of memory, device loss. An out-of-date swapchain is not an error: the next acquisition recreates it.
     pub fn end_present(
         &mut self,
         mut recorder: Recorder,
@@ -185,7 +184,7 @@ impl FrameRing {
                 .wait_semaphore_values(&[0][..shown])
                 .signal_semaphore_values(values);
             let submits = [
-                // Apart, so that uploads do not wait for the swapchain.
+                // Separate, so that uploads do not wait for the swapchain.
                 vk::SubmitInfo::default().command_buffers(&first),
                 vk::SubmitInfo::default()
                     .command_buffers(&main)

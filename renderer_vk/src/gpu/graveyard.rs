@@ -1,16 +1,16 @@
-//! Objects whose owner is gone but which a frame may still use.
+//! Deferred destruction of objects that a frame may still use.
 //!
-//! Frames are counted by the device's timeline semaphore: frame `n` signals the value `n` when the GPU has finished
-//! it. An object dropped now may be used by every frame submitted so far and by the one that is being recorded, so it
-//! is tagged with the last of these and destroyed once the timeline has reached the tag.
+//! The device's timeline semaphore counts frames: frame `n` signals the value `n` when the GPU has finished it. An
+//! object dropped now may be used by every submitted frame and by the one being recorded. It is tagged with the last of
+//! these, and destroyed once the timeline has reached the tag.
 
 use ash::vk;
 use gpu_allocator::vulkan::Allocation;
 
-/// A raw object that waits for its end.
+/// A raw object that waits for destruction.
 pub(crate) enum Garbage {
     Buffer(vk::Buffer, Allocation),
-    /// A staging buffer, which uploads may use again.
+    /// A staging buffer, which uploads may reuse.
     Staging(vk::Buffer, Allocation),
     Image(vk::Image, Allocation),
     View(vk::ImageView),
@@ -27,7 +27,7 @@ pub(crate) enum Garbage {
     Scene(u32),
 }
 
-/// What is known about the progress of frames.
+/// Progress of frames.
 #[derive(Default)]
 pub(crate) struct SyncState {
     /// Timeline value of the newest submitted frame.
@@ -40,7 +40,7 @@ pub(crate) struct SyncState {
     pub ring: bool,
     /// Tag and object.
     pub graveyard: Vec<(u64, Garbage)>,
-    /// Memory for [`Self::take_dead`].
+    /// Reused memory of [`Self::take_dead`].
     pub dead: Vec<Garbage>,
 }
 
@@ -54,8 +54,8 @@ impl SyncState {
         }
     }
 
-    /// Takes out the objects that no frame can use, given the value that the timeline has reached. To be handed back
-    /// in [`Self::dead`], emptied.
+    /// Removes the objects that no frame can use, given the timeline's value. Return the emptied list to
+    /// [`Self::dead`].
     pub fn take_dead(&mut self, done: u64) -> Vec<Garbage> {
         let mut dead = std::mem::take(&mut self.dead);
         let over = self.graveyard.extract_if(.., |(tag, _)| *tag <= done);
@@ -63,8 +63,8 @@ impl SyncState {
         dead
     }
 
-    /// Lets objects that were only tagged for the next frame because of an immediate, or of a frame that was thrown
-    /// away, go with the newest submitted one. `pending`: whether uploads wait, which may concern them.
+    /// Retags objects of the next frame with the newest submitted one, when an immediate submission has ended or a
+    /// frame was dropped. `pending`: uploads wait, which may use the objects.
     pub fn retag(&mut self, pending: bool) {
         if !self.recording && self.immediates == 0 && !pending {
             for entry in &mut self.graveyard {

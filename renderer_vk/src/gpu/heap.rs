@@ -1,11 +1,11 @@
-//! Gives the memory that a driver's compiler has freed back to the system.
+//! Returns memory that a driver's compiler has freed to the system.
 //!
-//! The C library keeps what was freed for the next request of the same thread's arena. A software driver's compiler
-//! takes hundreds of megabytes for one large shader, in the arena of each thread that compiles, and frees them
-//! when it is done: without this they stay with the process.
+//! The C library keeps freed memory for later allocations in the same thread's arena. A software driver's compiler
+//! allocates hundreds of megabytes for one large shader, in the arena of each compiling thread, and frees them
+//! afterwards: without this call they remain with the process.
 
-/// Gives free memory of the C library's heap back to the system. Takes milliseconds: not for use within a steady frame.
-/// Without effect where the library has no such function (`malloc_trim` is the GNU one's).
+/// Returns free memory of the C library's heap to the system. Takes milliseconds: not for steady frames. No effect
+/// without `malloc_trim`, a function of GNU's C library.
 #[cfg(unix)]
 pub fn give_back_freed_memory() {
     use libloading::os::unix::Library;
@@ -15,12 +15,12 @@ pub fn give_back_freed_memory() {
     let process = Library::this();
     // SAFETY: where the symbol exists, it is the C library's, of this type.
     if let Ok(trim) = unsafe { process.get::<Trim>(b"malloc_trim\0") } {
-        // SAFETY: callable at any time from any thread; it touches free memory alone.
+        // SAFETY: callable at any time from any thread; it accesses only free memory.
         unsafe { trim(0) };
     }
 }
 
-/// Elsewhere freed memory is left to the C library.
+/// On other systems, the C library manages freed memory.
 #[cfg(not(unix))]
 pub fn give_back_freed_memory() {}
 
@@ -40,7 +40,7 @@ mod tests {
     fn what_a_thread_has_freed_goes_back_to_the_system() {
         let make = || {
             let mut blocks: Vec<Vec<u8>> = (0..64 << 10).map(|_| vec![1; 4 << 10]).collect();
-            // what lies at the end keeps the C library from giving back what lies before it
+            // a live block at the end prevents the C library from returning memory before it
             blocks.pop()
         };
         let last = std::thread::scope(|scope| scope.spawn(make).join());

@@ -1,8 +1,8 @@
 //! Images and their formats.
 //!
-//! Layout rule: an image that shaders write or that is drawn to stays in `GENERAL`; one that is only sampled stays in
-//! `SHADER_READ_ONLY_OPTIMAL`. Copies change it for their own duration. Swapchain images are `GENERAL` between
-//! acquisition and presentation.
+//! Layout rule: an image with the usage of storage or attachments stays in `GENERAL`; one that is only sampled stays in
+//! `SHADER_READ_ONLY_OPTIMAL`. Copies change it temporarily. Swapchain images are `GENERAL` between acquisition and
+//! presentation.
 
 use std::ops::BitOr;
 use std::sync::{Arc, Mutex};
@@ -16,19 +16,20 @@ use super::error::{Context, Error};
 use super::graveyard::Garbage;
 use super::memory::MemoryKind;
 
-/// What [`Image::texture_index`] and [`Image::storage_index`] return for an image without that usage.
+/// Result of [`Image::texture_index`] and [`Image::storage_index`] for an image without that usage.
 pub const NO_INDEX: u32 = u32::MAX;
 
 macro_rules! formats {
     ($($(#[$doc:meta])* $name:ident = $vk:ident, $block:expr, $bytes:expr;)*) => {
-        /// Texel format; the name says the channels, their bits, and `F` float, `Uint` integer, else normalized.
+        /// Texel format; the name lists channels and bits, with `F` for float and `Uint` for integer, otherwise
+        /// normalized.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Format { $($(#[$doc])* $name,)* }
         impl Format {
             pub(crate) fn vk(self) -> vk::Format {
                 match self { $(Self::$name => vk::Format::$vk,)* }
             }
-            /// Width and height of a block (1 for formats that are not compressed) and its bytes.
+            /// Width and height of a block (1 for uncompressed formats), and its size in bytes.
             pub fn block(self) -> (u32, u32) {
                 match self { $(Self::$name => ($block, $bytes),)* }
             }
@@ -41,7 +42,7 @@ formats! {
     R8 = R8_UNORM, 1, 1;
     /// Two channels, 8 bits.
     Rg8 = R8G8_UNORM, 1, 2;
-    /// Four channels, 8 bits, as stored.
+    /// Four channels, 8 bits, without conversion.
     Rgba8 = R8G8B8A8_UNORM, 1, 4;
     /// Four channels, 8 bits, sampled as linear values of sRGB-encoded texels.
     Rgba8Srgb = R8G8B8A8_SRGB, 1, 4;
@@ -49,7 +50,7 @@ formats! {
     Bgra8 = B8G8R8A8_UNORM, 1, 4;
     /// Ten bits for each colour, two for alpha.
     Rgb10A2 = A2B10G10R10_UNORM_PACK32, 1, 4;
-    /// Small floats without sign.
+    /// Small unsigned floats.
     R11G11B10F = B10G11R11_UFLOAT_PACK32, 1, 4;
     /// Half float.
     R16F = R16_SFLOAT, 1, 2;
@@ -87,16 +88,16 @@ formats! {
     Bc7 = BC7_UNORM_BLOCK, 4, 16;
     /// Depth, float.
     D32F = D32_SFLOAT, 1, 4;
-    /// Depth, float, and 8 bits of stencil. Copies carry the depth alone.
+    /// Depth, float, and 8 bits of stencil. Copies include the depth alone.
     D32FS8 = D32_SFLOAT_S8_UINT, 1, 4;
     /// Depth, 24 bits normalized.
     D24 = X8_D24_UNORM_PACK32, 1, 4;
-    /// Depth, 24 bits normalized, and 8 bits of stencil. Copies carry the depth alone.
+    /// Depth, 24 bits normalized, and 8 bits of stencil. Copies include the depth alone.
     D24S8 = D24_UNORM_S8_UINT, 1, 4;
 }
 
 impl Format {
-    /// Bytes of `width` × `height` texels, blocks counted whole.
+    /// Bytes of `width` × `height` texels, in whole blocks.
     pub fn bytes(self, width: u32, height: u32) -> u64 {
         let (size, bytes) = self.block();
         u64::from(width.div_ceil(size)) * u64::from(height.div_ceil(size)) * u64::from(bytes)
@@ -118,25 +119,25 @@ impl Format {
     }
 }
 
-/// What an image is for, beyond copies, which every image allows.
+/// Usage of an image in addition to copies, which every image allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct ImageUsage(u32);
 
 impl ImageUsage {
-    /// Sampled as a texture.
+    /// Sampled texture.
     pub const SAMPLED: Self = Self(1);
-    /// Read and written by shaders as a storage image.
+    /// Storage image of shaders.
     pub const STORAGE: Self = Self(2);
-    /// Drawn to.
+    /// Colour attachment.
     pub const COLOR: Self = Self(4);
-    /// Depth buffer.
+    /// Depth attachment.
     pub const DEPTH: Self = Self(8);
 
     pub(crate) fn has(self, other: Self) -> bool {
         self.0 & other.0 != 0
     }
 
-    /// Vulkan's usage, and the features that it takes of a format.
+    /// Vulkan's usage flags, and the format features that they require.
     fn vk(self) -> (vk::ImageUsageFlags, vk::FormatFeatureFlags) {
         use vk::FormatFeatureFlags as F;
         use vk::ImageUsageFlags as U;
@@ -176,7 +177,7 @@ impl BitOr for ImageUsage {
     }
 }
 
-/// How to make an [`Image`].
+/// Parameters of an [`Image`].
 #[derive(Clone, Copy, Debug)]
 pub struct ImageDesc<'a> {
     /// Label in captures, validation messages and leak reports.
@@ -191,9 +192,9 @@ pub struct ImageDesc<'a> {
     pub layers: u32,
     /// Texel format.
     pub format: Format,
-    /// What for.
+    /// Usage.
     pub usage: ImageUsage,
-    /// Samples of a texel: 1, or 2, 4, 8 for an image that is only drawn to and resolved.
+    /// Samples per texel: 1, or 2, 4, 8 for an image that is only an attachment and source of a resolve.
     pub samples: u32,
 }
 
@@ -212,7 +213,7 @@ impl<'a> ImageDesc<'a> {
         }
     }
 
-    /// Whether the device can make it.
+    /// Checks that the device supports the image.
     fn check(&self, device: &Device) -> Result<(), Error> {
         let limit = device.0.info.max_image_size;
         if self.width == 0 || self.height == 0 || self.width > limit || self.height > limit {
@@ -269,7 +270,7 @@ pub(crate) struct ImageInner {
 #[derive(Clone)]
 pub struct Image(pub(crate) Arc<ImageInner>);
 
-/// One image, all its levels and layers, for barriers.
+/// The whole image, all levels and layers, for barriers.
 pub(crate) fn whole(aspect: vk::ImageAspectFlags) -> vk::ImageSubresourceRange {
     vk::ImageSubresourceRange {
         aspect_mask: aspect,
@@ -291,7 +292,7 @@ pub(crate) fn rectangle([x, y, width, height]: [u32; 4]) -> (vk::Offset3D, vk::E
     (vk::Offset3D { x, y, z: 0 }, size)
 }
 
-/// A change of layout of a whole image, between all writes before and all accesses after.
+/// A layout transition of a whole image, after all earlier writes and before all later accesses.
 pub(crate) fn layout_change(
     image: vk::Image,
     aspect: vk::ImageAspectFlags,
@@ -313,8 +314,8 @@ impl Image {
     /// Makes an image; its contents are undefined until written.
     ///
     /// # Errors
-    /// Out of memory, a full descriptor table, a size of zero or beyond the device's limit, a format that the device
-    /// cannot use so.
+    /// Out of memory, a full descriptor table, a size of zero or beyond the device's limit, a format that does not
+    /// support the usage.
     pub fn new(device: &Device, desc: &ImageDesc<'_>) -> Result<Self, Error> {
         desc.check(device)?;
         let most_mips = 32 - desc.width.max(desc.height).leading_zeros();
@@ -384,7 +385,7 @@ impl Image {
         Ok(image)
     }
 
-    /// Wraps an image of a swapchain, which keeps its ownership.
+    /// Wraps an image that a swapchain owns.
     pub(crate) fn of_swapchain(
         device: &Device,
         raw: vk::Image,
@@ -495,7 +496,7 @@ impl std::fmt::Debug for Image {
 }
 
 impl ImageInner {
-    /// What copies carry: of depth and stencil, the depth.
+    /// Aspects of copies: for depth and stencil, the depth.
     pub fn copied(&self) -> vk::ImageAspectFlags {
         if self.aspect.contains(vk::ImageAspectFlags::DEPTH) {
             vk::ImageAspectFlags::DEPTH
@@ -504,7 +505,7 @@ impl ImageInner {
         }
     }
 
-    /// Makes the views and enters them into the tables.
+    /// Makes the views and their descriptors.
     fn make_views(&mut self) -> Result<(), Error> {
         if self.usage.0 == 0 {
             return Ok(());

@@ -7,18 +7,18 @@ use ash::{ext, khr, vk};
 
 use super::error::{Context, Error};
 
-/// Makes the surface of a window for an instance, or says why it cannot.
+/// Makes the surface of a window for an instance, or returns an error message.
 pub type CreateSurface<'a> = &'a mut dyn FnMut(vk::Instance) -> Result<vk::SurfaceKHR, String>;
 
-/// Where the picture goes.
+/// Target of presentation.
 pub enum SurfaceSource<'a> {
-    /// Nowhere: no window, the loader is the system's `libvulkan`.
+    /// None: no window; the loader is the system's `libvulkan`.
     Headless,
-    /// A window of somebody else, who also knows the loader. Made by [`SurfaceSource::window`].
+    /// A window of the caller, with its Vulkan loader. Made by [`SurfaceSource::window`].
     Window(WindowSource<'a>),
 }
 
-/// The Vulkan side of a window; see [`SurfaceSource::window`].
+/// The Vulkan data of a window; see [`SurfaceSource::window`].
 pub struct WindowSource<'a> {
     get_instance_proc_addr: vk::PFN_vkGetInstanceProcAddr,
     extensions: Vec<CString>,
@@ -26,9 +26,8 @@ pub struct WindowSource<'a> {
 }
 
 impl<'a> SurfaceSource<'a> {
-    /// A window whose owner gives the loader's entry point, the instance extensions that its surfaces need, and a
-    /// function that makes the surface. The device owns the surface from then on and must be dropped before the
-    /// window is destroyed.
+    /// A window by the loader's entry point, the instance extensions that its surfaces need, and a function that makes
+    /// the surface. The device owns the surface and must be dropped before the window is destroyed.
     ///
     /// # Safety
     /// `get_instance_proc_addr` must be the entry point of a Vulkan loader that stays in memory for as long as the
@@ -49,14 +48,14 @@ impl<'a> SurfaceSource<'a> {
 /// Messages of the validation layer, in the order of their arrival.
 pub(crate) type Messages = Mutex<Vec<String>>;
 
-/// Owner of the instance and of what is made from it alone.
+/// Owner of the instance and of its debug messenger and surface.
 pub(crate) struct Instance {
     pub raw: ash::Instance,
     pub debug_utils: bool,
     pub messages: Arc<Messages>,
     pub surface: Option<(khr::surface::Instance, vk::SurfaceKHR)>,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
-    // Last: the loader must outlive everything above.
+    // Last: the loader must outlive all other fields.
     _entry: ash::Entry,
 }
 
@@ -108,7 +107,7 @@ impl Instance {
         }
         let listens = debug_utils && validates;
         if listens {
-            // Catches what the layer says while the instance itself is made and destroyed.
+            // Receives messages of the layer during the instance's creation and destruction.
             info = info.push_next(&mut debug_info);
         }
         // SAFETY: every pointer in `info` lives in this function, names are NUL-terminated.
@@ -146,7 +145,7 @@ impl Instance {
     }
 }
 
-/// The loader, the extensions that the window needs, and what makes its surface.
+/// The loader, the instance extensions of the window, and the function that makes its surface.
 fn load(
     source: SurfaceSource<'_>,
 ) -> Result<(ash::Entry, Vec<CString>, Option<CreateSurface<'_>>), Error> {
@@ -191,7 +190,7 @@ fn has(list: &[vk::ExtensionProperties], name: &CStr) -> bool {
         .any(|e| e.extension_name_as_c_str().is_ok_and(|n| n == name))
 }
 
-/// Whether the validation layer is installed; warns if not.
+/// Whether the validation layer is installed; logs a warning if it is not.
 fn has_validation_layer(entry: &ash::Entry) -> Result<bool, Error> {
     // SAFETY: no instance is needed for this call.
     let found = unsafe { entry.enumerate_instance_layer_properties() }
@@ -207,7 +206,7 @@ fn has_validation_layer(entry: &ash::Entry) -> Result<bool, Error> {
     Ok(found)
 }
 
-/// Whether the validation layer, which is installed, can check synchronization.
+/// Whether the installed validation layer supports synchronization validation.
 fn validates_synchronization(entry: &ash::Entry) -> bool {
     // SAFETY: no instance is needed; the layer was found.
     let of_layer = unsafe { entry.enumerate_instance_extension_properties(Some(VALIDATION_LAYER)) };
@@ -238,13 +237,13 @@ fn messenger_info(messages: &Arc<Messages>) -> vk::DebugUtilsMessengerCreateInfo
             vk::DebugUtilsMessageSeverityFlagsEXT::ERROR
                 | vk::DebugUtilsMessageSeverityFlagsEXT::WARNING,
         )
-        // Not PERFORMANCE: it objects to copies in the layout GENERAL, which is the rule here.
+        // Without PERFORMANCE: it warns about copies in the layout GENERAL, which is the rule here.
         .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
         .pfn_user_callback(Some(on_message))
         .user_data(Arc::as_ptr(messages).cast_mut().cast())
 }
 
-/// Keeps and logs one message of the validation layer.
+/// Stores and logs one message of the validation layer.
 ///
 /// # Safety
 /// Called by the loader with valid data; `user_data` is the [`Messages`] of a live [`Instance`].

@@ -1,4 +1,4 @@
-//! Memory of the device: taken for an object, given back, and counted by what it is for.
+//! Device memory: allocation, release, and statistics by kind.
 
 use ash::vk;
 use gpu_allocator::MemoryLocation;
@@ -7,10 +7,10 @@ use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use super::device::{Device, DeviceInner, lock};
 use super::error::Error;
 
-/// What a piece of memory is for.
+/// Kind of a memory allocation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MemoryKind {
-    /// An image that shaders write or that is drawn to.
+    /// A storage image or an attachment.
     Target,
     /// An image that is only sampled.
     Texture,
@@ -18,7 +18,7 @@ pub enum MemoryKind {
     AccelerationStructure,
     /// Any other buffer of the device.
     Buffer,
-    /// A buffer that the CPU sees.
+    /// A mapped buffer.
     Shared,
 }
 
@@ -31,7 +31,7 @@ impl MemoryKind {
         Self::Shared,
     ];
 
-    /// What the allocator's name of the memory begins with: it knows names alone.
+    /// Prefix of the allocation's name: the allocator stores only names.
     fn mark(self) -> &'static str {
         match self {
             Self::Target => "target: ",
@@ -42,7 +42,7 @@ impl MemoryKind {
         }
     }
 
-    /// Back from the allocator's name: kind and label.
+    /// Kind and label from the allocation's name.
     fn of(name: &str) -> (Self, &str) {
         let found = Self::ALL
             .iter()
@@ -51,23 +51,23 @@ impl MemoryKind {
     }
 }
 
-/// A piece of memory in use.
+/// An allocation in use.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryUse {
-    /// What for.
+    /// Kind.
     pub kind: MemoryKind,
     /// Label of the object.
     pub label: String,
-    /// Bytes.
+    /// Size, bytes.
     pub bytes: u64,
 }
 
 /// GPU memory in use, for a console command.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MemoryReport {
-    /// Bytes taken by live objects.
+    /// Bytes of live objects.
     pub allocated: u64,
-    /// Bytes taken from the driver.
+    /// Bytes allocated from the driver.
     pub reserved: u64,
     /// Number of live allocations.
     pub allocations: usize,
@@ -89,7 +89,7 @@ impl Device {
             .unwrap_or_default()
     }
 
-    /// Every piece of memory in use.
+    /// All allocations in use.
     pub fn memory_uses(&self) -> Vec<MemoryUse> {
         let allocator = lock(&self.0.allocator);
         let allocations = allocator.as_ref().map(|a| a.generate_report().allocations);
@@ -106,7 +106,7 @@ impl Device {
 }
 
 impl DeviceInner {
-    /// Takes memory for an object.
+    /// Allocates memory for an object.
     pub fn allocate(
         &self,
         name: &str,
@@ -134,7 +134,7 @@ impl DeviceInner {
             .map_err(|e| fail(e.to_string()))
     }
 
-    /// Gives memory back.
+    /// Frees memory.
     pub fn free(&self, allocation: Allocation) {
         if let Some(allocator) = lock(&self.allocator).as_mut()
             && let Err(e) = allocator.free(allocation)

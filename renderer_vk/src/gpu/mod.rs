@@ -1,16 +1,16 @@
 //! The GPU layer: a thin, owning layer over `ash`. This is the only place of the renderer with `unsafe`.
 //!
-//! - **Ownership.** A [`Buffer`], [`Image`], pipeline or acceleration structure owns what it is made of and holds its
-//!   [`Device`]. Dropping one at any time is fine: it is destroyed when the frames that may use it are over.
-//! - **Frames.** [`FrameRing::begin`] gives a [`Recorder`], [`Recorder::pass`] gives a [`Pass`], and only a pass records
-//!   work. Each pass begins with one barrier (`access.rs` has the rule) and is timed.
+//! - **Ownership.** A [`Buffer`], [`Image`], pipeline or acceleration structure owns its parts and holds its
+//!   [`Device`]. It can be dropped at any time: it is destroyed when the frames that may use it are over.
+//! - **Frames.** [`FrameRing::begin`] returns a [`Recorder`], [`Recorder::pass`] returns a [`Pass`], and only a pass
+//!   records work. Each pass begins with one barrier (`access.rs` has the rule) and is timed.
 //! - **Resources.** One descriptor set serves every pipeline: textures and storage images are 32-bit indices, buffers
-//!   are device addresses in 128 bytes of push constants. `shaders/common/bindless.glsl` is the other side.
-//! - **Uploads** asked for at any time run before the commands of the frame that is being recorded.
+//!   are device addresses in 128 bytes of push constants. `shaders/common/bindless.glsl` has the shaders' declarations.
+//! - **Uploads** requested at any time run before the commands of the frame that is being recorded.
 //!
-//! Needed is Vulkan 1.2; dynamic rendering and the newer synchronization calls are not used. What a caller can still get
-//! wrong in safe code is what no API of addresses and indices can check: a shader that follows a wrong address reads
-//! other GPU memory of this process or loses the device, which is reported as [`Error::DeviceLost`].
+//! Requires Vulkan 1.2; does not use dynamic rendering and synchronization2. No API with addresses and indices can
+//! check that shaders use valid ones: a shader with a wrong address reads other GPU memory of this process or loses the
+//! device, which is reported as [`Error::DeviceLost`].
 
 #![allow(unsafe_code)]
 #![warn(clippy::multiple_unsafe_ops_per_block)]

@@ -1,4 +1,4 @@
-//! A pass: the guard that records, what it binds, and its dispatches. Drawing is in `draw`, copying in `copy`.
+//! A pass: records bindings and dispatches. Draw commands are in `draw`, copies in `copy`.
 
 use ash::vk;
 use bytemuck::Pod;
@@ -13,27 +13,27 @@ use super::pipeline::{ComputePipeline, GraphicsPipeline};
 use super::ray_tracing::{RayTracingPipeline, SbtRegions};
 use super::recorder::Recorder;
 
-/// A pass that is being recorded; see [`Recorder::pass`]. Commands that contradict themselves (a range outside of a
-/// buffer, a draw outside of rendering) are left out with a warning, because a frame must go on.
+/// A pass that is being recorded; see [`Recorder::pass`]. Invalid commands (a range outside of a buffer, a draw outside
+/// of rendering) are omitted with a warning, so that the frame can continue.
 pub struct Pass<'a> {
     pub(crate) rec: &'a mut Recorder,
     query: Option<(vk::QueryPool, u32)>,
-    /// Size of the attachments while drawing.
+    /// Size of the attachments during rendering.
     pub(crate) rendering: Option<vk::Extent2D>,
-    /// Drawing need not end with the pass.
+    /// Rendering may continue in the next pass.
     pub(crate) stays_open: Option<Attachments>,
     rays: Option<SbtRegions>,
     pub(crate) bound: Bound,
 }
 
-/// Which pipelines are bound.
+/// Bound pipelines.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Bound {
-    /// The pipeline for draws, and the dynamic state that was told.
+    /// The graphics pipeline, and the last recorded dynamic state.
     pub graphics: Option<(vk::Pipeline, DynamicState)>,
-    /// Size of the work groups of the pipeline for dispatches.
+    /// Work group size of the compute pipeline.
     compute: Option<[u32; 3]>,
-    /// The bind point that the descriptor set was bound for last.
+    /// The bind point of the last binding of the descriptor set.
     set: Option<vk::PipelineBindPoint>,
 }
 
@@ -54,7 +54,7 @@ impl<'a> Pass<'a> {
         &self.rec.device
     }
 
-    /// Memory for data that this frame alone uses.
+    /// Memory for data of this frame.
     pub fn arena(&mut self) -> &mut UploadArena {
         self.rec.arena()
     }
@@ -74,7 +74,7 @@ impl<'a> Pass<'a> {
     fn bind(&mut self, point: vk::PipelineBindPoint, pipeline: vk::Pipeline) {
         // SAFETY: recording; the pipeline is alive (the graveyard keeps it for this frame).
         unsafe { self.vk().cmd_bind_pipeline(self.cmd(), point, pipeline) };
-        // All pipelines have the same layout, so the set stays bound from one to the next.
+        // All pipelines have the same layout, so the descriptor set stays bound.
         if self.bound.set.replace(point) == Some(point) {
             return;
         }
@@ -92,7 +92,7 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Binds a pipeline for the draws that follow.
+    /// Binds a pipeline for subsequent draws.
     pub fn bind_graphics(&mut self, pipeline: &GraphicsPipeline) {
         let (raw, state) = (pipeline.raw(), pipeline.state());
         let before = self.bound.graphics.replace((raw, state));
@@ -104,19 +104,19 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Binds a pipeline for the dispatches that follow.
+    /// Binds a pipeline for subsequent dispatches.
     pub fn bind_compute(&mut self, pipeline: &ComputePipeline) {
         self.bind(vk::PipelineBindPoint::COMPUTE, pipeline.raw());
         self.bound.compute = Some(pipeline.local_size());
     }
 
-    /// Binds a pipeline for the ray launches that follow.
+    /// Binds a pipeline for subsequent ray launches.
     pub fn bind_rays(&mut self, pipeline: &RayTracingPipeline) {
         self.bind(vk::PipelineBindPoint::RAY_TRACING_KHR, pipeline.raw());
         self.rays = Some(pipeline.regions());
     }
 
-    /// Sets the push constants from offset 0, for all stages; 128 bytes at most, a multiple of 4.
+    /// Sets the push constants from offset 0, for all stages; at most 128 bytes, a multiple of 4.
     pub fn push<T: Pod>(&mut self, constants: &T) {
         let bytes = bytemuck::bytes_of(constants);
         if bytes.len() > PUSH_BYTES as usize || !bytes.len().is_multiple_of(4) || bytes.is_empty() {
@@ -134,7 +134,7 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Waits within the pass: everything recorded so far happens before everything after, with memory visible.
+    /// A full barrier within the pass: all earlier commands complete, and their writes are visible to all later ones.
     pub fn barrier(&mut self) {
         self.end_rendering();
         let memory = [vk::MemoryBarrier::default()
@@ -143,7 +143,7 @@ impl<'a> Pass<'a> {
         self.record_barrier(&memory, &[]);
     }
 
-    /// Waits outside of a render pass; images have the layouts that their barriers begin with.
+    /// Records a barrier outside of a render pass; images must have the old layouts of their barriers.
     pub(crate) fn record_barrier(
         &self,
         memory: &[vk::MemoryBarrier<'_>],
@@ -151,14 +151,14 @@ impl<'a> Pass<'a> {
     ) {
         let all = vk::PipelineStageFlags::ALL_COMMANDS;
         let none = vk::DependencyFlags::empty();
-        // SAFETY: recording, outside of a render pass; the callers see to layouts.
+        // SAFETY: recording, outside of a render pass; the callers ensure the layouts.
         unsafe {
             self.vk()
                 .cmd_pipeline_barrier(self.cmd(), all, all, none, memory, &[], images);
         }
     }
 
-    /// Launches workgroups.
+    /// Dispatches work groups.
     pub fn dispatch(&mut self, x: u32, y: u32, z: u32) {
         self.end_rendering();
         if self.bound.compute.is_none() {
@@ -169,13 +169,13 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Launches the workgroups that at least so many invocations need.
+    /// Dispatches the work groups for at least this many invocations.
     pub fn dispatch_invocations(&mut self, x: u32, y: u32) {
         let [width, height, _] = self.bound.compute.unwrap_or([1; 3]);
         self.dispatch(x.div_ceil(width), y.div_ceil(height), 1);
     }
 
-    /// Launches as many workgroups as three 32-bit numbers in a buffer say.
+    /// Dispatches work groups by three 32-bit counts in a buffer.
     pub fn dispatch_indirect(&mut self, buffer: &Buffer, offset: u64) {
         self.end_rendering();
         if self.bound.compute.is_none() || buffer.check(offset, 12).is_err() {
@@ -189,7 +189,7 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Launches ray generation.
+    /// Launches ray generation shaders.
     pub fn trace_rays(&mut self, width: u32, height: u32, depth: u32) {
         self.end_rendering();
         let (Some(functions), Some(regions)) = (&self.rec.device.0.ray_tracing, &self.rays) else {
@@ -212,7 +212,7 @@ impl<'a> Pass<'a> {
             }
         }
     }
-    /// Says that a command was left out; the same words once, because frames repeat themselves.
+    /// Logs that a command was omitted; each message once, because frames repeat.
     pub(crate) fn refuse(&self, what: &str) {
         if lock(&self.rec.device.0.refused).insert(what.to_owned()) {
             log::warn!("GPU command left out: {what}");

@@ -1,22 +1,21 @@
-//! Keeps the driver in memory for as long as the process lives.
+//! Keeps the driver loaded until the process ends.
 //!
-//! The Vulkan loader unloads a driver with its last instance. Some drivers (seen: NVIDIA 580) take a piece of the
-//! process's static thread-local storage each time they are loaded and do not give it back, so that after about thirty
-//! times the loader finds no driver any more; and they consist of several libraries of which one, left loaded alone,
-//! is torn down twice. An engine unloads the renderer at every `vid_restart`, so a long session gets there.
+//! The Vulkan loader unloads a driver with its last instance. Some drivers (seen: NVIDIA 580) allocate static
+//! thread-local storage of the process at each load and do not free it, so that the loader fails to load any driver
+//! after about thirty times. Such a driver consists of several libraries; pinning only one of them would run its
+//! destructors twice. Engines unload the renderer at every `vid_restart`, so that long sessions reach the limit.
 
 use ash::vk;
 
-/// Pins the library that `function` lives in and every Vulkan driver in memory: what exports the entry point that the
-/// loader's interface demands of drivers. Without effect where the system does not tell what is in memory (it is asked
-/// through `/proc`): then nothing is lost but the driver's place there.
+/// Pins the library of `function` and every loaded Vulkan driver: libraries that export the entry point of the loader's
+/// driver interface. No effect on systems without `/proc`, where drivers may be unloaded.
 #[cfg(unix)]
 pub(crate) fn pin_drivers(function: vk::PFN_vkQueueSubmit) {
     use libloading::os::unix::{Library, RTLD_NOW};
     use std::collections::BTreeSet;
     use std::os::unix::ffi::OsStrExt;
 
-    /// Finds what is loaded; loads nothing.
+    /// Opens only libraries that are already loaded.
     const RTLD_NOLOAD: i32 = 4;
     const ENTRY_POINT: &[u8] = b"vk_icdGetInstanceProcAddr\0";
 
@@ -29,9 +28,9 @@ pub(crate) fn pin_drivers(function: vk::PFN_vkQueueSubmit) {
         let path = std::ffi::OsStr::from_bytes(file);
         // SAFETY: the library is in memory already, so no initializer runs.
         let Ok(library) = (unsafe { Library::open(Some(path), RTLD_NOW | RTLD_NOLOAD) }) else {
-            continue; // no library
+            continue; // not a library
         };
-        // SAFETY: the symbol is looked for, never called.
+        // SAFETY: the symbol is looked up, never called.
         let driver = unsafe { library.get::<*const ()>(ENTRY_POINT) }.is_ok();
         if driver || own == Some(file) {
             std::mem::forget(library); // never closed
@@ -39,12 +38,12 @@ pub(crate) fn pin_drivers(function: vk::PFN_vkQueueSubmit) {
     }
 }
 
-/// Elsewhere drivers are left to the loader.
+/// On other systems the loader manages drivers.
 #[cfg(not(unix))]
 pub(crate) fn pin_drivers(_function: vk::PFN_vkQueueSubmit) {}
 
-/// The files of a process's memory map with where they are mapped, from and to. The map has lines of `from-to permissions
-/// offset device inode path`, the addresses in hexadecimal.
+/// The mapped files of a process's memory map, with first and last address. Lines of the map are `from-to permissions
+/// offset device inode path`, with hexadecimal addresses.
 #[cfg(unix)]
 fn mappings(maps: &[u8]) -> impl Iterator<Item = (u64, u64, &[u8])> {
     let hexadecimal =

@@ -14,12 +14,12 @@ use super::graveyard::Garbage;
 use super::image::Format;
 use super::render_pass::RenderPassKey;
 
-/// How to make a [`GraphicsPipeline`].
+/// Parameters of a [`GraphicsPipeline`].
 #[derive(Clone, Copy, Debug)]
 pub struct GraphicsDesc<'a> {
     /// Label.
     pub name: &'a str,
-    /// Vertex shader; there is no vertex input, it fetches by `gl_VertexIndex`.
+    /// Vertex shader; it fetches vertices by `gl_VertexIndex`, without vertex input.
     pub vertex: &'a Spirv,
     /// Fragment shader; `None` for depth alone.
     pub fragment: Option<&'a Spirv>,
@@ -27,32 +27,32 @@ pub struct GraphicsDesc<'a> {
     pub color: Option<Format>,
     /// Format of the depth attachment.
     pub depth: Option<Format>,
-    /// Source and destination factor, added; `None`: the colour replaces.
+    /// Source and destination factor of additive blending; `None`: no blending.
     pub blend: Option<(BlendFactor, BlendFactor)>,
-    /// Depth test, without effect when there is no depth attachment.
+    /// Depth test; no effect without a depth attachment.
     pub depth_test: DepthTest,
-    /// Whether passing fragments set the depth.
+    /// Depth writes.
     pub depth_write: bool,
-    /// What happens with the stencil; needs a depth attachment that has one. `None`: it does not take part.
+    /// Stencil operation; requires a depth attachment with stencil. `None`: no stencil.
     pub stencil: Option<Stencil>,
-    /// Samples of a pixel of the attachments.
+    /// Samples per pixel of the attachments.
     pub samples: u32,
-    /// Which faces are left out.
+    /// Culled faces.
     pub cull: Cull,
-    /// Slope factor and constant units of the depth offset, as OpenGL's `glPolygonOffset` takes them.
+    /// Slope factor and constant units of the depth offset, as in OpenGL's `glPolygonOffset`.
     pub polygon_offset: Option<(f32, f32)>,
-    /// What the vertices make.
+    /// Primitive topology.
     pub topology: Topology,
     /// Draw the edges of triangles only (needs the device's `wireframe`).
     pub wireframe: bool,
-    /// Channels that are written.
+    /// Written channels.
     pub color_write: ColorMask,
     /// Specialization constants: id and 32-bit value.
     pub constants: &'a [(u32, u32)],
 }
 
 impl<'a> GraphicsDesc<'a> {
-    /// No attachments, no blend, no culling; depth is tested with `LessEqual` and written when there is an attachment.
+    /// No attachments, blending or culling; depth is tested with `LessEqual` and written if there is an attachment.
     pub fn new(name: &'a str, vertex: &'a Spirv, fragment: &'a Spirv) -> Self {
         Self {
             name,
@@ -111,7 +111,7 @@ impl<'a> GraphicsDesc<'a> {
         let Some((source, target)) = self.blend else {
             return attachment;
         };
-        // SRC_ALPHA_SATURATE means 1 for the alpha channel, so one pair serves both.
+        // SRC_ALPHA_SATURATE is 1 for the alpha channel, so that one pair of factors serves both.
         attachment
             .blend_enable(true)
             .src_color_blend_factor(source.vk())
@@ -123,7 +123,7 @@ impl<'a> GraphicsDesc<'a> {
     }
 }
 
-/// A raw pipeline with its end.
+/// A raw pipeline; dropping it buries it.
 pub(crate) struct Pipeline {
     device: Device,
     raw: vk::Pipeline,
@@ -151,7 +151,7 @@ impl Drop for Pipeline {
     }
 }
 
-/// A shader module for the time of making a pipeline.
+/// A shader module during the compilation of a pipeline.
 pub(crate) struct Module {
     device: Device,
     pub raw: vk::ShaderModule,
@@ -173,7 +173,7 @@ impl Module {
 
 impl Drop for Module {
     fn drop(&mut self) {
-        // SAFETY: modules may go once their pipelines are made.
+        // SAFETY: modules may be destroyed once their pipelines are made.
         unsafe { self.device.vk().destroy_shader_module(self.raw, None) };
     }
 }
@@ -209,18 +209,17 @@ impl Constants {
     }
 }
 
-/// A pipeline for draws, with the state that may not be part of it.
+/// A graphics pipeline, with the state that may be dynamic.
 pub struct GraphicsPipeline {
     pipeline: Arc<Pipeline>,
     state: DynamicState,
 }
 
 impl GraphicsPipeline {
-    /// Compiles a pipeline, or takes one that differs in blending, culling and depth tests alone, where the device is
-    /// told these while drawing.
+    /// Compiles a pipeline; with dynamic state, reuses one that differs only in blending, culling and depth tests.
     ///
     /// # Errors
-    /// Wireframe on a device without it; the driver's refusal.
+    /// Wireframe on a device without it; an error of the driver.
     pub fn new(device: &Device, desc: &GraphicsDesc<'_>) -> Result<Self, Error> {
         let pipeline = if device.0.dynamic_state.is_some() {
             device
@@ -303,7 +302,7 @@ impl GraphicsPipeline {
             .dynamic_state(&dynamic)
             .layout(device.0.bindless.pipeline_layout)
             .render_pass(render_pass)];
-        // SAFETY: everything that the description points to lives here; the modules declare the common layout.
+        // SAFETY: all pointers of the description are to live data; the modules declare the common layout.
         let made = unsafe {
             device
                 .vk()
@@ -321,7 +320,7 @@ impl GraphicsPipeline {
     }
 }
 
-/// A pipeline for dispatches.
+/// A compute pipeline.
 pub struct ComputePipeline {
     pipeline: Pipeline,
     local_size: [u32; 3],
@@ -331,7 +330,7 @@ impl ComputePipeline {
     /// Compiles a pipeline; `constants` are specialization constants, id and 32-bit value.
     ///
     /// # Errors
-    /// The driver's refusal.
+    /// An error of the driver.
     pub fn new(
         device: &Device,
         name: &str,
@@ -349,7 +348,7 @@ impl ComputePipeline {
         let infos = [vk::ComputePipelineCreateInfo::default()
             .stage(stage)
             .layout(device.0.bindless.pipeline_layout)];
-        // SAFETY: as for graphics.
+        // SAFETY: as for graphics pipelines.
         let made = unsafe {
             device
                 .vk()

@@ -1,6 +1,6 @@
-//! The driver's compiled pipelines as bytes that can be kept in a file.
+//! The driver's pipeline cache as bytes for a file.
 
-/// Marks a saved pipeline cache; the number is the form's version.
+/// Magic number of a saved pipeline cache, with the format version.
 const CACHE_MAGIC: &[u8; 8] = b"RLPCACH1";
 
 /// FNV-1a.
@@ -10,7 +10,7 @@ pub fn hash(bytes: &[u8]) -> u64 {
     })
 }
 
-/// A driver's cache with a mark and a hash before it: drivers check whose cache it is, not whether it is whole.
+/// A driver's cache after magic number and hash: drivers check the origin of a cache, not its integrity.
 pub(crate) fn cache_to_bytes(data: &[u8]) -> Vec<u8> {
     let mut bytes = CACHE_MAGIC.to_vec();
     bytes.extend(hash(data).to_le_bytes());
@@ -18,14 +18,15 @@ pub(crate) fn cache_to_bytes(data: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// The driver's part of a saved cache, if it is whole.
+/// The driver's part of a saved cache, if it is intact.
 pub(crate) fn cache_from_bytes(bytes: &[u8]) -> Option<&[u8]> {
     let rest = bytes.strip_prefix(CACHE_MAGIC)?;
     let (sum, data) = rest.split_at_checked(8)?;
     (sum == hash(data).to_le_bytes()).then_some(data)
 }
 
-/// Whether bytes are a whole cache as [`Device::pipeline_cache_data`](super::Device::pipeline_cache_data) gives it. Whose it is, the driver knows.
+/// Whether bytes are an intact cache of [`Device::pipeline_cache_data`](super::Device::pipeline_cache_data). The driver
+/// checks its origin.
 pub fn is_pipeline_cache(bytes: &[u8]) -> bool {
     cache_from_bytes(bytes).is_some()
 }

@@ -8,31 +8,31 @@ use super::device::Device;
 use super::error::{Context, Error};
 use super::pipeline::{Constants, Module, Pipeline, one};
 
-/// A triangle hit group; a hit group of `None`s is legal and reports nothing.
+/// A triangle hit group; a hit group without shaders is valid.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HitGroup<'a> {
-    /// Runs for the nearest hit.
+    /// Runs at the nearest hit.
     pub closest_hit: Option<&'a Spirv>,
-    /// Runs for each candidate on geometry that is not opaque.
+    /// Runs for each candidate on non-opaque geometry.
     pub any_hit: Option<&'a Spirv>,
 }
 
-/// How to make a [`RayTracingPipeline`].
+/// Parameters of a [`RayTracingPipeline`].
 #[derive(Clone, Copy, Debug)]
 pub struct RayTracingDesc<'a> {
     /// Label.
     pub name: &'a str,
-    /// Ray generation.
+    /// Ray generation shader.
     pub raygen: &'a Spirv,
-    /// Miss shaders; the ray's miss index counts them.
+    /// Miss shaders, by the ray's miss index.
     pub miss: &'a [&'a Spirv],
-    /// Hit groups; instance offset plus ray offset counts them.
+    /// Hit groups, by the sum of instance offset and ray offset.
     pub hit: &'a [HitGroup<'a>],
     /// Specialization constants of all stages: id and 32-bit value.
     pub constants: &'a [(u32, u32)],
 }
 
-/// Where the records of a pipeline lie.
+/// Regions of a pipeline's shader binding table.
 #[derive(Clone, Copy)]
 pub(crate) struct SbtRegions {
     pub raygen: vk::StridedDeviceAddressRegionKHR,
@@ -40,7 +40,7 @@ pub(crate) struct SbtRegions {
     pub hit: vk::StridedDeviceAddressRegionKHR,
 }
 
-/// A ray tracing pipeline whose rays are launched from ray generation alone (recursion 1), with its shader binding
+/// A ray tracing pipeline without recursion (depth 1): only ray generation shaders launch rays. With its shader binding
 /// table.
 pub struct RayTracingPipeline {
     pipeline: Pipeline,
@@ -52,7 +52,7 @@ impl RayTracingPipeline {
     /// Compiles a pipeline and fills its table.
     ///
     /// # Errors
-    /// A device without ray tracing pipelines; the driver's refusal; out of memory.
+    /// A device without ray tracing pipelines; an error of the driver; out of memory.
     pub fn new(device: &Device, desc: &RayTracingDesc<'_>) -> Result<Self, Error> {
         let (Some(functions), Some(limits)) = (&device.0.ray_tracing, device.0.info.ray_tracing)
         else {
@@ -84,7 +84,7 @@ impl RayTracingPipeline {
             device,
             &BufferDesc {
                 name: desc.name,
-                // The buffer itself may be aligned less than a region must be.
+                // The buffer's alignment may be less than that of a region.
                 size: layout.size + u64::from(limits.base_alignment),
                 usage: BufferUsage::SBT,
                 memory: Memory::Device,
@@ -122,7 +122,7 @@ impl RayTracingPipeline {
     }
 }
 
-/// Compiles a pipeline; its groups are ray generation, misses, hit groups.
+/// Compiles a pipeline; its groups are ray generation, miss shaders, hit groups.
 fn compile(
     device: &Device,
     functions: &ash::khr::ray_tracing_pipeline::Device,
@@ -170,7 +170,7 @@ fn compile(
         .groups(&groups)
         .max_pipeline_ray_recursion_depth(1)
         .layout(device.0.bindless.pipeline_layout)];
-    // SAFETY: everything that the description points to lives here; the modules declare the common layout.
+    // SAFETY: all pointers of the description are to live data; the modules declare the common layout.
     let made = unsafe {
         functions.create_ray_tracing_pipelines(
             vk::DeferredOperationKHR::null(),

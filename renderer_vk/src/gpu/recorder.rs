@@ -1,4 +1,4 @@
-//! Recording: command buffers, and passes as the only way to put work into them.
+//! Recording of command buffers; passes are the only way to record work.
 
 use std::ffi::CStr;
 
@@ -16,10 +16,10 @@ use super::pass::Pass;
 use super::timers::Timers;
 use super::upload;
 
-/// Bytes of a pass's name in a capture, with the one that ends it.
+/// Maximum length of a pass's name in captures, bytes, with the terminating NUL.
 const LABEL: usize = 64;
 
-/// A name as C has it, cut to the place that it is written to; `None` with a NUL inside.
+/// A name as a C string, truncated to `place`; `None` with a NUL inside.
 fn label<'a>(name: &str, place: &'a mut [u8; LABEL]) -> Option<&'a CStr> {
     let length = name.floor_char_boundary(LABEL - 1);
     let (text, end) = place.split_at_mut_checked(length)?;
@@ -28,7 +28,7 @@ fn label<'a>(name: &str, place: &'a mut [u8; LABEL]) -> Option<&'a CStr> {
     CStr::from_bytes_with_nul(place.get(..=length)?).ok()
 }
 
-/// What one command buffer at a time needs and keeps for its next use.
+/// Command pool and buffers of one slot, reused.
 pub(crate) struct SlotResources {
     device: Device,
     pool: vk::CommandPool,
@@ -70,7 +70,7 @@ impl SlotResources {
         Ok(slot)
     }
 
-    /// Starts the main command buffer; the last use of the slot is over.
+    /// Begins the main command buffer; the GPU has finished the last use of the slot.
     pub fn restart(&mut self) -> Result<(), Error> {
         let vk = self.device.vk();
         // SAFETY: no command buffer of the pool is pending.
@@ -81,7 +81,7 @@ impl SlotResources {
         begin(&self.device, self.main)
     }
 
-    /// Records uploads and query resets into the command buffer that runs before the main one.
+    /// Records uploads and query resets into the command buffer that is submitted before the main one.
     pub fn record_before(&self, pending: &mut upload::Pending) -> Result<(), Error> {
         begin(&self.device, self.before)?;
         self.timers.reset(self.before);
@@ -92,7 +92,7 @@ impl SlotResources {
         unsafe { self.device.vk().end_command_buffer(self.before) }.context("vkEndCommandBuffer")
     }
 
-    /// Ends the main command buffer; with `host_reads`, everything is visible to the CPU once the submission is over.
+    /// Ends the main command buffer; with `host_reads`, the CPU sees all writes after the submission.
     pub fn finish(&self, host_reads: bool) -> Result<(), Error> {
         let vk = self.device.vk();
         if !host_reads {
@@ -132,7 +132,7 @@ fn begin(device: &Device, cmd: vk::CommandBuffer) -> Result<(), Error> {
     unsafe { device.vk().begin_command_buffer(cmd, &info) }.context("vkBeginCommandBuffer")
 }
 
-/// A swapchain image that the frame draws to.
+/// The swapchain image of a frame.
 pub(crate) struct Acquired {
     pub image: Image,
     pub index: u32,
@@ -140,12 +140,12 @@ pub(crate) struct Acquired {
     pub finished: vk::Semaphore,
 }
 
-/// Says for as long as it lives that a frame is being recorded.
+/// While it lives, a frame is being recorded.
 pub(crate) struct Recording(pub Device);
 
 impl Drop for Recording {
     fn drop(&mut self) {
-        // After a submission this changes nothing; a frame that was thrown away gives its objects to earlier frames.
+        // No effect after a submission; the objects of a dropped frame are retagged with earlier frames.
         let pending = !lock(&self.0.0.pending).is_empty();
         let mut state = lock(&self.0.0.state);
         state.recording = false;
@@ -153,8 +153,7 @@ impl Drop for Recording {
     }
 }
 
-/// A frame, or an immediate piece of work, while it is recorded. Dropping a frame's recorder instead of ending it
-/// throws the frame away.
+/// Recorder of a frame or of immediate work. Dropping a frame's recorder without ending it discards the frame.
 pub struct Recorder {
     pub(crate) device: Device,
     pub(crate) cmd: vk::CommandBuffer,
@@ -164,13 +163,13 @@ pub struct Recorder {
     pub(crate) ring_slot: Option<usize>,
     pub(crate) serial: u64,
     pub(crate) finished: u64,
-    /// What is drawn to, while drawing may go on in the next pass; see [`Recorder::drawing`].
+    /// Open attachments, if rendering may continue in the next pass; see [`Recorder::drawing`].
     pub(crate) open: Option<Attachments>,
-    /// A pass wrote what the CPU may read once the frame is over.
+    /// A pass wrote data that the CPU reads after the frame.
     pub(crate) host_reads: bool,
-    /// What an acquisition of a swapchain image for this frame signals.
+    /// Semaphore for the acquisition of this frame's swapchain image.
     pub(crate) available: Option<vk::Semaphore>,
-    // Last, so that the slot of a frame that is thrown away is buried as one of that frame.
+    // Last, so that the slot of a discarded frame is buried as part of that frame.
     pub(crate) recording: Option<Recording>,
 }
 
@@ -185,19 +184,18 @@ impl Recorder {
         self.serial
     }
 
-    /// The newest frame that the GPU is known to be done with when this one was begun; 0: none.
+    /// The newest frame that the GPU had finished when this one began; 0: none.
     pub fn finished(&self) -> u64 {
         self.finished
     }
 
-    /// Memory for data that this frame alone uses.
+    /// Memory for data of this frame.
     pub fn arena(&mut self) -> &mut UploadArena {
         &mut self.slot.arena
     }
 
-    /// Begins a pass: waits for everything before it, makes every write so far visible to the stages that `reads` and
-    /// `writes` name, opens a debug label and takes a timestamp. The pass ends when the returned guard is dropped.
-    ///
+    /// Begins a pass: waits for all earlier work, makes its writes visible to the stages in `reads` and `writes`, opens
+    /// a debug label and writes a timestamp. Dropping the returned guard ends the pass.
     /// # Errors
     /// Out of memory for timestamps.
     pub fn pass(&mut self, name: &str, reads: Access, writes: Access) -> Result<Pass<'_>, Error> {
@@ -206,9 +204,9 @@ impl Recorder {
         self.begin_pass(name, Some((reads, writes)))
     }
 
-    /// Begins a pass that draws to images. When the pass before drew to the same ones, it goes on where that stopped,
-    /// without a barrier: what both draw comes out in order, and the pass must read nothing else that the other wrote.
-    /// Software drivers finish all drawing at each barrier, and other ones at least drain their pipeline.
+    /// Begins a pass that draws to attachments. If the previous pass drew to the same ones, it continues without a
+    /// barrier: both draw in order, and the pass must not read other results of the previous one. Software drivers
+    /// finish all drawing at each barrier, and GPUs drain their pipeline.
     ///
     /// # Errors
     /// Those of [`pass`](Self::pass) and [`Pass::begin_rendering`].
@@ -226,12 +224,12 @@ impl Recorder {
         Ok(pass)
     }
 
-    /// Whether a [`drawing`](Self::drawing) to `target` that clears nothing goes on where the pass before stopped.
+    /// Whether a [`drawing`](Self::drawing) to `target` without clears continues the previous pass.
     pub fn goes_on(&self, target: &Rendering<'_>) -> bool {
         self.open == Some(Attachments::of(target))
     }
 
-    /// Ends the drawing that a [`drawing`](Self::drawing) left open.
+    /// Ends rendering that a [`drawing`](Self::drawing) left open.
     pub(crate) fn close_drawing(&mut self) {
         if self.open.take().is_some() {
             // SAFETY: a render pass is open.
@@ -286,7 +284,7 @@ impl Recorder {
         Ok(Pass::new(self, query))
     }
 
-    /// Scratch memory of acceleration structure builds, shared by the builds of this frame.
+    /// Scratch memory for acceleration structure builds of this frame.
     pub(crate) fn scratch(&mut self, size: u64) -> Result<Buffer, Error> {
         if let Some(buffer) = &self.slot.scratch
             && buffer.size() >= size
@@ -308,8 +306,8 @@ impl Recorder {
 }
 
 impl Device {
-    /// Records work, submits it before the frame that may be under way, and waits for it. Waiting uploads run first.
-    /// For loading and tests.
+    /// Records work, submits it before the frame being recorded, and waits for it. Pending uploads run first. For
+    /// loading and tests.
     ///
     /// # Errors
     /// Those of `record`, out of memory, device loss.
@@ -381,7 +379,7 @@ impl Device {
         done
     }
 
-    /// Reads a part of a buffer back, after all work that was submitted so far. Blocks.
+    /// Reads a range of a buffer after all submitted work. Blocks.
     ///
     /// # Errors
     /// A range outside of the buffer, out of memory, device loss.
@@ -396,8 +394,7 @@ impl Device {
         read_all(&target, size)
     }
 
-    /// Reads level 0 of an image back, rows from the top without padding, after all work that was submitted so far.
-    /// Blocks.
+    /// Reads level 0 of an image, rows from the top without padding, after all submitted work. Blocks.
     ///
     /// # Errors
     /// Out of memory, device loss.

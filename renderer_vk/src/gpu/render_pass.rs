@@ -1,4 +1,4 @@
-//! Render passes and framebuffers, made when they are first asked for and kept.
+//! Render passes and framebuffers, made at first use and cached.
 
 use ash::vk;
 
@@ -15,7 +15,7 @@ pub(crate) struct RenderPassKey {
     pub clear_depth: bool,
 }
 
-/// What a framebuffer is made of.
+/// Key of a framebuffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FramebufferKey {
     pub render_pass: vk::RenderPass,
@@ -41,7 +41,7 @@ impl DeviceInner {
                     vk::AttachmentLoadOp::LOAD
                 })
                 .store_op(vk::AttachmentStoreOp::STORE)
-                // without effect where there is no stencil
+                // no effect without a stencil
                 .stencil_load_op(vk::AttachmentLoadOp::LOAD)
                 .stencil_store_op(vk::AttachmentStoreOp::STORE)
                 .initial_layout(vk::ImageLayout::GENERAL)

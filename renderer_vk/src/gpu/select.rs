@@ -1,4 +1,4 @@
-//! Which physical device, and which of its abilities.
+//! Selection of the physical device and its features.
 
 mod examine;
 
@@ -9,12 +9,12 @@ use super::error::{Context, Error};
 use super::instance::Instance;
 use examine::examine;
 
-/// What kind of device it is; the order of preference.
+/// Type of the device, in ascending order of preference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DeviceKind {
-    /// The driver does not say.
+    /// Unknown.
     Other,
-    /// Vulkan in software.
+    /// A software implementation.
     Cpu,
     /// A virtual machine's device.
     Virtual,
@@ -33,19 +33,19 @@ pub struct RayTracingLimits {
     pub handle_alignment: u32,
     /// Alignment of a region of a shader binding table.
     pub base_alignment: u32,
-    /// How deep `traceRayEXT` may nest; this renderer needs 1.
+    /// Maximum nesting of `traceRayEXT`; this renderer needs 1.
     pub max_recursion: u32,
     /// Alignment of scratch addresses.
     pub scratch_alignment: u32,
-    /// Most triangles in a bottom-level structure.
+    /// Maximum number of triangles in a bottom-level structure.
     pub max_primitives: u64,
-    /// Most instances in a top-level structure.
+    /// Maximum number of instances in a top-level structure.
     pub max_instances: u64,
-    /// Most rays in one launch.
+    /// Maximum number of rays in one launch.
     pub max_invocations: u32,
 }
 
-/// What the renderer may know about its device.
+/// Properties of the device for the renderer.
 #[derive(Clone, Debug)]
 pub struct DeviceInfo {
     /// The driver's name of the device.
@@ -58,15 +58,15 @@ pub struct DeviceInfo {
     pub api_version: (u32, u32, u32),
     /// PCI vendor number.
     pub vendor_id: u32,
-    /// Present when the ray tracing pipeline can be used.
+    /// Limits of the ray tracing pipeline, if it is supported.
     pub ray_tracing: Option<RayTracingLimits>,
-    /// Whether `rayQueryEXT` can be used (acceleration structures are there too then).
+    /// Whether `rayQueryEXT` is supported (then acceleration structures are, too).
     pub ray_query: bool,
     /// Whether passes are timed.
     pub timestamps: bool,
-    /// Highest anisotropy, `None` without the feature.
+    /// Maximum anisotropy; `None` without the feature.
     pub anisotropy: Option<f32>,
-    /// Whether lines instead of filled triangles can be drawn.
+    /// Whether triangles can be drawn as lines.
     pub wireframe: bool,
     /// Whether BC1 to BC7 textures can be sampled.
     pub bc: bool,
@@ -76,17 +76,17 @@ pub struct DeviceInfo {
     pub small_storage: bool,
     /// Invocations of a subgroup.
     pub subgroup_size: u32,
-    /// Most textures at a time (binding 1).
+    /// Maximum number of textures at a time (binding 1).
     pub max_textures: u32,
-    /// Most storage images at a time (binding 2).
+    /// Maximum number of storage images at a time (binding 2).
     pub max_storage_images: u32,
-    /// Largest width and height of a 2D image.
+    /// Maximum width and height of a 2D image.
     pub max_image_size: u32,
-    /// Whether it is Vulkan in software, where the choice of tracer differs.
+    /// Whether it is a software implementation, which has another default tracer.
     pub software: bool,
 }
 
-/// What is switched on at device creation.
+/// Features enabled at device creation.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Abilities {
     pub acceleration: bool,
@@ -108,7 +108,7 @@ pub(crate) struct Abilities {
     pub dynamic_state: bool,
 }
 
-/// The device that was chosen.
+/// The selected device.
 pub(crate) struct Choice {
     pub physical: vk::PhysicalDevice,
     pub queue_family: u32,
@@ -118,8 +118,8 @@ pub(crate) struct Choice {
     pub info: DeviceInfo,
 }
 
-/// Chooses among the devices that meet the requirements: the one `prefer` names (part of its name, or its index),
-/// else discrete before integrated before virtual before software.
+/// Selects among the devices that meet the requirements: the one that `prefer` names (part of its name, or its index),
+/// otherwise discrete before integrated before virtual before software.
 pub(crate) fn choose(instance: &Instance, options: &DeviceOptions) -> Result<Choice, Error> {
     let prefer = options.prefer.as_deref();
     // SAFETY: the instance is alive.
@@ -160,7 +160,7 @@ pub(crate) fn choose(instance: &Instance, options: &DeviceOptions) -> Result<Cho
     }
 }
 
-/// Makes the logical device with everything in `choice.abilities` switched on.
+/// Makes the logical device with all features in `choice.abilities`.
 pub(crate) fn create_device(instance: &Instance, choice: &Choice) -> Result<ash::Device, Error> {
     let a = choice.abilities;
     let mut extensions = Vec::new();

@@ -1,4 +1,4 @@
-//! The images of the window.
+//! The swapchain of the window.
 
 use ash::vk;
 
@@ -8,18 +8,18 @@ use super::graveyard::Garbage;
 use super::image::{Format, Image, layout_change};
 use super::recorder::{Acquired, Recorder};
 
-/// Nanoseconds that an image is waited for. Window systems hold images back while a window is not on the screen; the
-/// game goes on meanwhile.
+/// Timeout of image acquisition, nanoseconds. Window systems withhold images of invisible windows; the game continues
+/// without presenting.
 const PATIENCE: u64 = 500_000_000;
 
-/// How to make a [`Swapchain`].
+/// Parameters of a [`Swapchain`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SwapchainDesc {
-    /// Pixels; what the window system dictates goes before it.
+    /// Width, pixels, unless the window system dictates the size.
     pub width: u32,
-    /// Pixels.
+    /// Height, pixels.
     pub height: u32,
-    /// Whether to wait for the display.
+    /// Waits for vertical blank.
     pub vsync: bool,
 }
 
@@ -35,7 +35,7 @@ impl SwapchainDesc {
     /// Size of the images.
     fn extent(&self, caps: &vk::SurfaceCapabilitiesKHR) -> vk::Extent2D {
         let (least, most) = (caps.min_image_extent, caps.max_image_extent);
-        // This value says that the swapchain decides the size.
+        // This value means that the swapchain determines the size.
         if caps.current_extent.width != u32::MAX {
             return caps.current_extent;
         }
@@ -46,17 +46,17 @@ impl SwapchainDesc {
     }
 }
 
-/// Three images, or one more than the window system needs.
+/// Three images, or one more than the window system's minimum.
 fn image_count(caps: &vk::SurfaceCapabilitiesKHR) -> u32 {
     let count = caps.min_image_count.saturating_add(1).max(3);
     match caps.max_image_count {
-        // no limit
+        // no maximum
         0 => count,
         most => count.min(most),
     }
 }
 
-/// Opaque if the window system offers it.
+/// Opaque if the window system supports it.
 fn composite_alpha(caps: &vk::SurfaceCapabilitiesKHR) -> vk::CompositeAlphaFlagsKHR {
     [
         vk::CompositeAlphaFlagsKHR::OPAQUE,
@@ -69,7 +69,7 @@ fn composite_alpha(caps: &vk::SurfaceCapabilitiesKHR) -> vk::CompositeAlphaFlags
     .unwrap_or(vk::CompositeAlphaFlagsKHR::OPAQUE)
 }
 
-/// The images that the window shows, made anew when the window changes.
+/// The images of the window, recreated when the window changes.
 pub struct Swapchain {
     device: Device,
     desc: SwapchainDesc,
@@ -77,13 +77,13 @@ pub struct Swapchain {
     format: Format,
     images: Vec<(Image, vk::Semaphore)>,
     stale: bool,
-    /// Images can be copied to.
+    /// Images can be targets of copies.
     copies: bool,
-    /// What the acquisition for a frame signals while that frame is not submitted yet.
+    /// Semaphore of an acquired image whose frame is not submitted yet.
     acquired: Option<vk::Semaphore>,
-    /// An image of a submitted frame that is to be shown before the next one is submitted.
+    /// Image of a submitted frame, to be presented before the next submission.
     put_off: Option<Submitted>,
-    /// Images are shown late; see [`Swapchain::new`].
+    /// Presentation is deferred; see [`Swapchain::new`].
     late: bool,
 }
 
@@ -91,15 +91,15 @@ pub struct Swapchain {
 #[derive(Clone, Copy)]
 pub(crate) struct Submitted {
     pub index: u32,
-    /// Signalled when it is drawn.
+    /// Signalled when drawing is finished.
     pub finished: vk::Semaphore,
 }
 
 impl Swapchain {
-    /// Makes the swapchain of the device's window. The window may be minimised; images come when it is shown.
+    /// Makes the swapchain of the device's window. While the window is minimised, there are no images.
     ///
-    /// Presenting waits until a software device has finished drawing. So its pictures are shown just before the next
-    /// frame is submitted: the game goes on meanwhile, and that frame is recorded.
+    /// On a software device, presenting waits until drawing has finished. Its images are therefore presented just
+    /// before the next submission: meanwhile the game continues and the next frame is recorded.
     ///
     /// # Errors
     /// A headless device, a surface without a usable format, out of memory, a lost surface.
@@ -121,12 +121,12 @@ impl Swapchain {
         Ok(swapchain)
     }
 
-    /// Format of the images: 8 bits, as stored, red or blue first.
+    /// Format of the images: 8 bits per channel without conversion, red or blue first.
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// Whether the images can be copied to, besides being drawn to.
+    /// Whether images can be targets of copies in addition to attachments.
     pub fn copies(&self) -> bool {
         self.copies
     }
@@ -139,7 +139,7 @@ impl Swapchain {
             .map_or((0, 0), |(i, _)| (i.width(), i.height()))
     }
 
-    /// Tells of a new size or a new wish; takes effect at the next acquisition.
+    /// Requests a new size or presentation mode, from the next acquisition on.
     pub fn resize(&mut self, width: u32, height: u32, vsync: bool) {
         let desc = SwapchainDesc {
             width,
@@ -152,9 +152,9 @@ impl Swapchain {
         }
     }
 
-    /// Takes the next image for the frame. Call it late, just before the first pass that draws to the window: passes
-    /// after it wait for the window system. `None`: nothing can be shown now (minimised), and the frame goes on
-    /// without.
+    /// Acquires the next image for the frame. Call it just before the first pass that draws to the window: later passes
+    /// wait for the window system. `None`: nothing can be presented now (minimised), and the frame continues without an
+    /// image.
     ///
     /// # Errors
     /// Out of memory, a lost surface, device loss.
@@ -168,14 +168,14 @@ impl Swapchain {
         if let Some(acquired) = &recorder.acquired {
             return Ok(Some(acquired.image.clone()));
         }
-        // A frame that was thrown away after acquiring leaves its image behind.
+        // A frame that was discarded after acquisition leaves its image acquired.
         if self.stale || self.acquired.is_some() {
             self.recreate()?;
         }
         let Some(functions) = self.device.0.swapchain.clone() else {
             return Ok(None);
         };
-        // A swapchain may be out of date again at once while a window is dragged; then skip the frame.
+        // While a window is resized, a new swapchain may be out of date at once; then skip the frame.
         for _ in 0..2 {
             if self.images.is_empty() {
                 return Ok(None);
@@ -208,7 +208,7 @@ impl Swapchain {
                     return Ok(Some(image));
                 }
                 Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.recreate()?,
-                // nothing was promised, so the semaphore stays free
+                // no image was acquired, so the semaphore is unused
                 Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(None),
                 Err(result) => return Err(result).context("vkAcquireNextImageKHR"),
             }
@@ -216,7 +216,7 @@ impl Swapchain {
         Ok(None)
     }
 
-    /// Records the change to the layout for showing.
+    /// Records the layout transition for presentation.
     pub(crate) fn prepare_present(&self, recorder: &mut Recorder) {
         recorder.close_drawing();
         if let Some(acquired) = &recorder.acquired {
@@ -230,14 +230,14 @@ impl Swapchain {
         }
     }
 
-    /// Shows the image of a frame that was just submitted, soon or at once.
+    /// Presents the image of a submitted frame, deferred or at once.
     pub(crate) fn submitted(&mut self, image: Submitted) -> Result<(), Error> {
         self.acquired = None;
         self.put_off = Some(image);
         if self.late { Ok(()) } else { self.show() }
     }
 
-    /// Shows at once what was put off, for the next frame may take long.
+    /// Presents a deferred image now, before a long operation.
     ///
     /// # Errors
     /// Out of memory, a lost surface, device loss.
@@ -272,7 +272,7 @@ impl Swapchain {
         to: vk::ImageLayout,
     ) {
         let barrier = layout_change(image.0.raw, vk::ImageAspectFlags::COLOR, from, to);
-        // The stages that the wait for the acquisition has too, so that this comes after it.
+        // The same stages as the wait for the acquisition, so that this barrier is ordered after it.
         let stages =
             vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT | vk::PipelineStageFlags::TRANSFER;
         // SAFETY: recording outside of a render pass; the image is in the layout `from`.
@@ -300,7 +300,7 @@ impl Swapchain {
             .ok_or_else(|| Error::Surface("the device was made without a window".to_owned()))
     }
 
-    /// Eight bits as stored are wanted, because the picture is already encoded.
+    /// Selects a format of 8 bits per channel without conversion, because the picture is already display-encoded.
     fn choose_format(&self) -> Result<(Format, vk::ColorSpaceKHR), Error> {
         let (functions, surface) = self.surface()?;
         // SAFETY: surface and physical device belong to the same live instance.
@@ -323,8 +323,8 @@ impl Swapchain {
         )))
     }
 
-    /// Makes the swapchain anew for the window as it is now; without images when the window is minimised. Waits for
-    /// the device, because nothing says when the window system has done with the old images.
+    /// Recreates the swapchain for the present window; without images while it is minimised. Waits for the device,
+    /// because Vulkan 1.2 does not report when the window system has released the old images.
     fn recreate(&mut self) -> Result<(), Error> {
         self.show()?;
         if let Some(available) = self.acquired.take() {
@@ -352,7 +352,7 @@ impl Swapchain {
         .context("vkGetPhysicalDeviceSurfacePresentModesKHR")?;
         let extent = self.desc.extent(&caps);
         if extent.width == 0 || extent.height == 0 {
-            // Minimised. Stay stale, so that the next acquisition tries again.
+            // Minimised. The swapchain stays stale, so that the next acquisition tries again.
             self.stale = true;
             return Ok(());
         }
@@ -380,11 +380,11 @@ impl Swapchain {
         // SAFETY: values are within the surface's capabilities; the old swapchain is retired by this.
         let made = unsafe { swapchains.create_swapchain(&info, None) };
         self.raw = vk::SwapchainKHR::null();
-        // SAFETY: its images are forgotten and the device is idle. Null is allowed.
+        // SAFETY: no reference to its images remains and the device is idle. Null is allowed.
         unsafe { swapchains.destroy_swapchain(old, None) };
         self.raw = made.context("vkCreateSwapchainKHR")?;
         self.format = format;
-        // one image waits while the next frame takes another
+        // one image is deferred while the next frame acquires another
         self.late = device.info().software && count > caps.min_image_count;
         device.0.name(self.raw, "swapchain");
         self.add_images(swapchains, extent)?;
@@ -418,7 +418,7 @@ impl Swapchain {
         Ok(())
     }
 
-    /// Takes the signal of an acquisition whose frame was thrown away, so that its semaphore can be used again.
+    /// Consumes the signal of an acquisition whose frame was discarded, so that its semaphore can be reused.
     fn swallow(&self, available: vk::Semaphore) -> Result<(), Error> {
         let waits = [available];
         let stages = [vk::PipelineStageFlags::ALL_COMMANDS];
@@ -459,7 +459,7 @@ impl Drop for Swapchain {
             log::warn!("{e}");
         }
         self.forget_images();
-        // The views of the images must go before the swapchain.
+        // The views of the images must be destroyed before the swapchain.
         if let Err(e) = self.device.0.collect() {
             log::warn!("{e}");
         }
@@ -477,7 +477,7 @@ mod tests {
     use super::super::{Access, DeviceOptions, FrameRing, Rendering, SurfaceSource};
     use super::*;
 
-    /// A device with a surface that no window system stands behind, or `None` with a report of a skipped test.
+    /// A device with a headless surface, or `None` with a report of a skipped test.
     fn device() -> Option<Device> {
         // SAFETY: the library is a Vulkan loader by its name.
         let entry = testkit::device(unsafe { ash::Entry::load() })?;
@@ -504,9 +504,9 @@ mod tests {
             validation: true,
             ..DeviceOptions::default()
         };
-        // Not every driver has such surfaces, so that a test without one is skipped even where a device is required.
+        // Not every driver supports headless surfaces: without one, the test is skipped even if a device is required.
         let device = Device::new(&options, source).map_err(testkit::skip).ok();
-        // The device needs the loader for as long as it lives.
+        // The device needs the loader until it is dropped.
         std::mem::forget(entry);
         device
     }
@@ -542,7 +542,7 @@ mod tests {
                 shown += 1;
             }
             if frame == 7 {
-                // An image that was acquired and never shown.
+                // An image that was acquired and never presented.
                 drop(rec);
                 continue;
             }

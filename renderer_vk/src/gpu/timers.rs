@@ -15,10 +15,10 @@ const PASSES: u32 = 64;
 pub(crate) struct Timers {
     device: Device,
     pools: Vec<vk::QueryPool>,
-    /// Names of passes; those behind `used` are left from earlier frames, for their memory.
+    /// Names of passes; those after `used` are from earlier frames, kept for their memory.
     names: Vec<String>,
     used: usize,
-    /// What queries answered.
+    /// Query results.
     ticks: Vec<u64>,
 }
 
@@ -33,12 +33,12 @@ impl Timers {
         }
     }
 
-    /// Forgets the passes of the last use.
+    /// Removes the passes of the last use.
     pub fn clear(&mut self) {
         self.used = 0;
     }
 
-    /// Enters a pass: the pool and the first of its two queries. `None` without timestamps.
+    /// Adds a pass; returns the pool and the first of its two queries. `None` without timestamps.
     pub fn begin(&mut self, name: &str) -> Result<Option<(vk::QueryPool, u32)>, Error> {
         if !self.device.0.info.timestamps || !self.device.0.measuring.load(Ordering::Relaxed) {
             return Ok(None);
@@ -66,7 +66,7 @@ impl Timers {
         Ok(self.pools.get(index / per_pool).map(|pool| (*pool, query)))
     }
 
-    /// Records the reset of every pool; runs before the passes.
+    /// Records the reset of every pool, before the passes.
     pub fn reset(&self, cmd: vk::CommandBuffer) {
         for pool in &self.pools {
             // SAFETY: outside of a render pass, the whole pool, and its last frame is over.
@@ -78,7 +78,7 @@ impl Timers {
         }
     }
 
-    /// Publishes the times of a frame that is over.
+    /// Publishes the timings of a finished frame.
     pub fn publish(&mut self) {
         if self.used == 0 {
             return;

@@ -13,24 +13,24 @@ use super::pass::Pass;
 pub struct Instance {
     /// Object to world, three rows.
     pub transform: [[f32; 4]; 3],
-    /// Read by shaders; 24 bits.
+    /// Custom index for shaders; 24 bits.
     pub custom_index: u32,
-    /// Rays see it when their mask shares a bit.
+    /// Rays test it if their mask shares a bit.
     pub mask: u8,
-    /// Added to the ray's offset to choose the hit group; 24 bits.
+    /// Added to the ray's offset to select the hit group; 24 bits.
     pub sbt_offset: u32,
-    /// Both faces are hit, whatever the ray culls.
+    /// Disables face culling.
     pub cull_disable: bool,
     /// Front faces are clockwise seen from the ray's origin, instead of counter-clockwise.
     pub flip_facing: bool,
     /// Overrides the geometry: `Some(true)` as opaque, `Some(false)` as not opaque.
     pub force_opaque: Option<bool>,
-    /// Address of the bottom-level structure; 0 is an instance of nothing.
+    /// Address of the bottom-level structure; 0: an inactive instance.
     pub blas: u64,
 }
 
 impl Instance {
-    /// An instance in place, seen by every ray.
+    /// An instance with the identity transform, visible to all rays.
     pub fn new(blas: u64) -> Self {
         Self {
             transform: [
@@ -92,7 +92,7 @@ pub struct Tlas {
 }
 
 impl Tlas {
-    /// An empty structure; build it before a shader walks it.
+    /// An empty structure; build it before shaders use it.
     pub fn new(device: &Device, name: &str) -> Self {
         Self {
             name: name.to_owned(),
@@ -117,7 +117,7 @@ impl Tlas {
         self.storage.as_ref().map_or(0, |s| s.size)
     }
 
-    /// Sees to it that the storage holds `size` bytes.
+    /// Ensures that the storage holds `size` bytes.
     fn reserve(&mut self, device: &Device, size: u64) -> Result<(), Error> {
         if self.storage.as_ref().is_some_and(|s| s.size >= size) {
             return Ok(());
@@ -150,8 +150,8 @@ impl Drop for Tlas {
 }
 
 impl Pass<'_> {
-    /// Builds the top-level structure from `instances`. The pass declares [`Access::ACCEL_BUILD`](super::Access::ACCEL_BUILD); structures built in
-    /// the same pass are waited for.
+    /// Builds the top-level structure from `instances`, after waiting for bottom-level builds of this pass. The pass
+    /// declares [`Access::ACCEL_BUILD`](super::Access::ACCEL_BUILD).
     ///
     /// # Errors
     /// A device without acceleration structures; out of memory; more instances than the device allows.
@@ -199,7 +199,7 @@ impl Pass<'_> {
                 device_address: scratch.address().next_multiple_of(align),
             });
         let ranges = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count)];
-        // SAFETY: storage and scratch have the sizes that the driver asked for; the instances lie in the frame's arena.
+        // SAFETY: storage and scratch have the sizes that the driver requires; the instances lie in the frame's arena.
         unsafe {
             functions.cmd_build_acceleration_structures(self.cmd(), &[info], &[&ranges]);
         }
@@ -207,7 +207,7 @@ impl Pass<'_> {
     }
 }
 
-/// The 64 bytes that Vulkan reads.
+/// The 64 bytes of Vulkan's instance structure.
 fn instance_bytes(instance: &vk::AccelerationStructureInstanceKHR) -> [u8; 64] {
     const {
         assert!(size_of::<vk::AccelerationStructureInstanceKHR>() == 64);

@@ -1,8 +1,8 @@
-//! Uploads: data on their way to device memory.
+//! Uploads to device memory.
 //!
-//! Data are copied into mapped staging buffers at once. The copies to their targets are recorded into the command
-//! buffer that runs just before the next submission's own: a resource made while a frame is recorded is ready for that
-//! same frame. New images get their layout there too.
+//! Data are copied into mapped staging buffers immediately. The copies to their targets are recorded into the command
+//! buffer that runs before the next submission's own: a resource made while a frame is recorded is ready for that
+//! frame. New images get their layout there, too.
 
 use std::collections::{HashMap, HashSet};
 
@@ -15,14 +15,14 @@ use super::error::Error;
 use super::graveyard::Garbage;
 use super::image::{Image, layout_change, rectangle};
 
-/// Size of a staging buffer; larger data get one of their own size.
+/// Size of a staging buffer, bytes; larger data get a buffer of their own.
 const CHUNK: u64 = 4 << 20;
-/// Staging buffers that are kept between frames, for pictures that move.
+/// Number of staging buffers kept between frames, for video pictures.
 const SPARE: usize = 3;
-/// Staged bytes after which uploads are submitted without waiting for a frame.
+/// Staged bytes above which uploads are submitted without waiting for a frame.
 const FLUSH: u64 = 96 << 20;
 
-/// A target image and what barriers need to know of it.
+/// A target image, with the data for its barriers.
 #[derive(Clone, Copy)]
 struct Target {
     image: vk::Image,
@@ -61,31 +61,31 @@ enum Copy {
     },
 }
 
-/// Work that waits for the next submission. Raw handles: their owners may be dropped meanwhile, and the graveyard
-/// keeps the objects until that submission is over.
+/// Uploads that wait for the next submission. Raw handles: if their owners are dropped meanwhile, the graveyard keeps
+/// the objects until that submission has finished.
 #[derive(Default)]
 pub(crate) struct Pending {
     inits: Vec<Target>,
     targets: HashMap<vk::Image, Target>,
     copies: Vec<Copy>,
     staging: Vec<(vk::Buffer, Allocation)>,
-    /// Staging buffers that no frame uses any more.
+    /// Unused staging buffers.
     spare: Vec<(vk::Buffer, Allocation)>,
-    /// What is known of the work while it is recorded.
+    /// Targets written so far during recording.
     seen: Seen,
-    /// Taken bytes of the last staging buffer.
+    /// Used bytes of the last staging buffer.
     used: u64,
     staged: u64,
 }
 
-/// What has been recorded of a [`Pending`]; its memory is used again.
+/// Targets that a [`Pending`] has written; its memory is reused.
 #[derive(Default)]
 struct Seen {
-    /// Images that are new.
+    /// New images.
     fresh: HashSet<vk::Image>,
-    /// Range of a buffer that was written.
+    /// Written range of each buffer.
     buffers: HashMap<vk::Buffer, (u64, u64)>,
-    /// Image, level and layer that were written.
+    /// Written image, level and layer.
     levels: HashSet<(vk::Image, u32, u32)>,
 }
 
@@ -94,23 +94,23 @@ impl Pending {
         self.inits.is_empty() && self.copies.is_empty()
     }
 
-    /// Takes the staging buffers out, those in use and the spare ones.
+    /// Removes all staging buffers, used and spare.
     pub fn take_staging(&mut self) -> impl Iterator<Item = (vk::Buffer, Allocation)> {
         self.staging.drain(..).chain(self.spare.drain(..))
     }
 
-    /// Takes the spare staging buffers out, to be destroyed.
+    /// Removes the spare staging buffers, to be destroyed.
     pub fn take_spare(&mut self) -> Vec<(vk::Buffer, Allocation)> {
         std::mem::take(&mut self.spare)
     }
 
-    /// Keeps a staging buffer that no frame uses any more for the next uploads, or hands it back.
+    /// Keeps an unused staging buffer for later uploads, or returns it.
     pub fn keep_spare(
         &mut self,
         buffer: vk::Buffer,
         memory: Allocation,
     ) -> Option<(vk::Buffer, Allocation)> {
-        // larger ones are for single large uploads
+        // larger ones serve single large uploads
         if self.spare.len() >= SPARE || memory.size() != CHUNK {
             return Some((buffer, memory));
         }
@@ -185,7 +185,7 @@ fn full_barrier(
     let memory = [vk::MemoryBarrier::default()
         .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
         .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)];
-    // A piece at a time, which needs no memory; without images the memory barrier alone.
+    // In batches of fixed size, which need no allocation; without images, the memory barrier alone.
     let mut piece = [vk::ImageMemoryBarrier::default(); 16];
     loop {
         let mut count = 0;
@@ -207,7 +207,7 @@ fn full_barrier(
 }
 
 impl Seen {
-    /// Whether a copy writes where an earlier one did, as far as it is known; two such copies must keep their order.
+    /// Whether a copy may write to the range of an earlier one; then both must keep their order.
     fn overlaps(&mut self, copy: &Copy) -> bool {
         match copy {
             Copy::Buffer { target, region, .. } => {
@@ -230,7 +230,7 @@ impl Seen {
     }
 }
 
-/// Records everything that waits, between two full barriers.
+/// Records all pending uploads between two full barriers.
 pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &mut Pending) {
     let vk = device.vk();
     let Pending {
@@ -241,7 +241,7 @@ pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &mut Pend
         ..
     } = pending;
     let dst = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-    // A new image that is written now goes straight to the layout for that.
+    // A new image that is written now changes directly to the transfer layout.
     seen.fresh.clear();
     seen.fresh.extend(inits.iter().map(|target| target.image));
     let new = inits.iter().map(|target| {
@@ -274,7 +274,7 @@ pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &mut Pend
                 target,
                 region,
             } => {
-                // SAFETY: the ranges were checked when the upload was asked for; both buffers are alive.
+                // SAFETY: the ranges were checked at the request; both buffers are alive.
                 unsafe { vk.cmd_copy_buffer(cmd, *source, *target, &[*region]) };
             }
             Copy::Image {
@@ -292,7 +292,7 @@ pub(crate) fn record(device: &Device, cmd: vk::CommandBuffer, pending: &mut Pend
 }
 
 impl DeviceInner {
-    /// Takes back what was recorded, for its memory: its staging buffers are buried.
+    /// Takes back a recorded list, for its memory: its staging buffers are buried.
     pub fn put_back(&self, mut recorded: Pending) {
         for (buffer, memory) in recorded.staging.drain(..) {
             self.bury(Garbage::Staging(buffer, memory));
@@ -302,7 +302,7 @@ impl DeviceInner {
         recorded.copies.clear();
         (recorded.used, recorded.staged) = (0, 0);
         let mut pending = lock(&self.pending);
-        // what was asked for meanwhile stays
+        // keeps uploads requested meanwhile
         if pending.is_empty() && pending.staging.is_empty() {
             recorded.spare.append(&mut pending.spare);
             *pending = recorded;
@@ -312,7 +312,7 @@ impl DeviceInner {
     }
 }
 
-/// A rectangle of one level and layer of an image, texels. For compressed formats it starts at a block.
+/// A rectangle of one level and layer of an image, texels. In compressed formats it starts at a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageRegion {
     /// Mip level; 0 is the largest.
@@ -330,8 +330,8 @@ pub struct ImageRegion {
 }
 
 impl Device {
-    /// Brings `bytes` into a device buffer at `offset`. The copy runs before the commands of the frame that is being
-    /// recorded, or of the next one.
+    /// Uploads `bytes` to a device buffer at `offset`. The copy runs before the commands of the frame being recorded,
+    /// or of the next one.
     ///
     /// # Errors
     /// A range outside of the buffer; out of staging memory.
@@ -354,11 +354,11 @@ impl Device {
         self.flush_when_full(pending)
     }
 
-    /// Brings the texels of one level and layer into an image: rows from the top without padding, blocks for
-    /// compressed formats. When it runs: as [`upload_buffer`](Self::upload_buffer).
+    /// Uploads the texels of one level and layer of an image: rows from the top without padding, blocks in compressed
+    /// formats. Timing as for [`upload_buffer`](Self::upload_buffer).
     ///
     /// # Errors
-    /// A level or layer that is not there, a wrong number of bytes; out of staging memory.
+    /// An invalid level or layer, a wrong number of bytes; out of staging memory.
     pub fn upload_image(
         &self,
         target: &Image,
@@ -378,10 +378,10 @@ impl Device {
         self.upload_image_region(target, whole, bytes)
     }
 
-    /// Brings texels into a rectangle of one level and layer.
+    /// Uploads texels to a rectangle of one level and layer.
     ///
     /// # Errors
-    /// As [`upload_image`](Self::upload_image), and a rectangle that is not inside.
+    /// As [`upload_image`](Self::upload_image), and a rectangle that is not inside of the image.
     pub fn upload_image_region(
         &self,
         target: &Image,
@@ -441,12 +441,12 @@ impl Device {
         self.flush_when_full(pending)
     }
 
-    /// Gives a new image its layout before anything uses it.
+    /// Records the initial layout transition of a new image.
     pub(crate) fn queue_init(&self, image: &Image) {
         lock(&self.0.pending).inits.push(Target::of(image));
     }
 
-    /// Runs waiting uploads at once when they hold much staging memory.
+    /// Submits pending uploads if they hold much staging memory.
     fn flush_when_full(&self, pending: std::sync::MutexGuard<'_, Pending>) -> Result<(), Error> {
         let full = pending.staged >= FLUSH;
         drop(pending);

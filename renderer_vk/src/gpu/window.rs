@@ -1,4 +1,4 @@
-//! A window as a front end hands it over: the Vulkan side of it, without Vulkan types.
+//! A window of a front end: its Vulkan functions, without Vulkan types.
 
 use std::ffi::{CString, c_void};
 
@@ -44,11 +44,11 @@ impl Window {
         })
     }
 
-    /// Hands the window to `with` as the source of a device's surface.
+    /// Passes the window to `with` as the source of a device's surface.
     pub(crate) fn source<T>(mut self, with: impl FnOnce(SurfaceSource<'_>) -> T) -> T {
         let mut create =
             |instance: vk::Instance| (self.create)(instance.as_raw()).map(vk::SurfaceKHR::from_raw);
-        // SAFETY: what `window` asks for is what the maker of this value promised.
+        // SAFETY: the contract of `SurfaceSource::window` is that of `Window::new`, whose caller fulfilled it.
         with(unsafe {
             SurfaceSource::window(self.get_instance_proc_addr, self.extensions, &mut create)
         })

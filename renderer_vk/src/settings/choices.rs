@@ -28,11 +28,11 @@ numbered! {
 }
 
 numbered! {
-    /// What the traced look shows.
+    /// Output of the traced look.
     DebugOutput {
         /// The picture.
         None = 0,
-        /// Albedo of the surface and of all before it.
+        /// Albedo of the surface times the transmission in front of it.
         Albedo = t::DEBUG_ALBEDO,
         /// Normals.
         Normals = t::DEBUG_NORMALS,
@@ -44,15 +44,15 @@ numbered! {
         Clusters = t::DEBUG_CLUSTERS,
         /// Lights that may reach the point.
         Lights = t::DEBUG_LIGHTS,
-        /// Light samples in the mean.
+        /// Mean number of light samples.
         Samples = t::DEBUG_SAMPLES,
-        /// Deviation of a frame's light over its mean.
+        /// Relative deviation of a frame's light.
         Variance = t::DEBUG_VARIANCE,
         /// Changed part of the light.
         Gradients = t::DEBUG_GRADIENTS,
         /// Rays of all passes.
         Rays = t::DEBUG_RAYS,
-        /// What is seen in mirrors, portals, glass, liquids and glossy surfaces.
+        /// Reflections and refractions: mirrors, portals, glass, liquids and glossy surfaces.
         Specular = t::DEBUG_SPECULAR,
     }
 }
@@ -86,7 +86,7 @@ numbered! {
     ModelShadows {
         /// No shadows.
         None = 0,
-        /// A dark spot, which the game draws.
+        /// A dark spot, drawn by the game.
         Spot = 1,
         /// Stencil shadow volumes.
         Volumes = 2,
@@ -96,7 +96,7 @@ numbered! {
 }
 
 named! {
-    /// Which way of tracing rays is wanted. A device that cannot do it gets the one that `Auto` selects.
+    /// Preferred tracer. On a device that does not support it, `Auto` selects another one.
     TracerChoice, other: None, {
         /// The fastest one on the device.
         #[default]
@@ -113,10 +113,10 @@ named! {
 named! {
     /// Which lights of a map are traced.
     MapLightChoice, other: Some(Self::Calibrated), {
-        /// Those of the map's directives, fitted to the light that its compiler stored, and those found there.
+        /// Lights of the map's directives and lights found by calibration, fitted to the map's stored light.
         #[default]
         Calibrated = "calibrated",
-        /// Those of the map's directives, with the strength that these state.
+        /// Lights of the map's directives, at their stated strength.
         Prior = "prior",
     }
 }

@@ -7,17 +7,17 @@ use super::value::Given;
 pub mod flags {
     /// None.
     pub const NONE: u8 = 0;
-    /// The engine keeps the value in its configuration.
+    /// The engine stores the value in its configuration.
     pub const ARCHIVE: u8 = 1;
-    /// A player's change counts after a restart of the renderer.
+    /// A player's change takes effect at a restart of the renderer.
     pub const LATCH: u8 = 2;
     /// Only the renderer sets it.
     pub const ROM: u8 = 4;
-    /// The engine never keeps the value.
+    /// The engine never stores the value.
     pub const TEMP: u8 = 8;
-    /// A player can change it only where cheats are allowed.
+    /// A player can change it only if cheats are allowed.
     pub const CHEAT: u8 = 16;
-    /// Each flag with its letter in documents.
+    /// Each flag with its letter in documentation.
     pub const LETTERS: [(u8, char); 5] = [
         (ARCHIVE, 'A'),
         (LATCH, 'L'),
@@ -32,7 +32,7 @@ pub mod flags {
 pub enum Kind {
     /// A whole number.
     Whole,
-    /// A number.
+    /// A number, which may have a fraction.
     Number,
     /// One of these names, in any case.
     Name(&'static [&'static str]),
@@ -47,12 +47,12 @@ pub struct Range {
     pub min: f32,
     /// Largest value.
     pub max: f32,
-    /// Whether the engine is given the limits and keeps the variable within them. Otherwise the front end writes the
-    /// limit to a variable beyond it, as the engine's own renderer does.
+    /// The engine enforces the limits. Otherwise the front end writes the limit to a variable beyond it, as the
+    /// engine's own renderer does.
     pub by_engine: bool,
 }
 
-/// Limits that the engine keeps.
+/// Limits enforced by the engine.
 pub const fn kept(min: f32, max: f32) -> Option<Range> {
     let by_engine = true;
     Some(Range {
@@ -62,7 +62,7 @@ pub const fn kept(min: f32, max: f32) -> Option<Range> {
     })
 }
 
-/// Limits that the front end keeps.
+/// Limits enforced by the front end.
 pub(super) const fn written_back(min: f32, max: f32) -> Option<Range> {
     let by_engine = false;
     Some(Range {
@@ -79,13 +79,13 @@ pub struct Spec {
     pub name: &'static str,
     /// Type of the value.
     pub kind: Kind,
-    /// Value of a player who never changed it.
+    /// Default.
     pub default: &'static str,
     /// Bits of [`flags`].
     pub flags: u8,
     /// Limits, if it has any.
     pub range: Option<Range>,
-    /// What the console shows.
+    /// Help text of the console.
     pub help: &'static str,
 }
 
@@ -98,7 +98,7 @@ impl Spec {
         set.map(|(_, letter)| letter).collect()
     }
 
-    /// The error for a text that is no value.
+    /// The error for an invalid text.
     fn refused(&self, text: &str) -> SettingError {
         SettingError {
             name: self.name,
@@ -107,7 +107,7 @@ impl Spec {
         }
     }
 
-    /// What a value is: "a whole number from 0 to 2".
+    /// Description of the valid values: "a whole number from 0 to 2".
     fn expected(&self) -> String {
         let kind = match self.kind {
             Kind::Whole => "a whole number".to_owned(),
@@ -122,7 +122,7 @@ impl Spec {
         }
     }
 
-    /// Whether a text is a value within the limits.
+    /// Whether a text is a valid value within the limits.
     fn allows(&self, text: &str) -> bool {
         let given = Given::parse(text);
         let is_value = match self.kind {

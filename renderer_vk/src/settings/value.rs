@@ -1,4 +1,4 @@
-//! From the value of a console variable to the value of a field.
+//! Converts values of console variables to values of fields.
 
 use super::row::{Kind, Range};
 
@@ -42,7 +42,7 @@ pub(super) trait Value: Copy + Default {
     const KIND: Kind;
     /// `None` for an unknown name.
     fn of(given: &Given<'_>) -> Option<Self>;
-    /// Different for different values.
+    /// Distinct for distinct values.
     fn bits(self) -> u32;
 
     /// The value of a row's default.
@@ -50,7 +50,7 @@ pub(super) trait Value: Copy + Default {
         Self::of(&Given::parse(text)).unwrap_or_default()
     }
 
-    /// Takes a value over, if it is one.
+    /// Sets the value, if `given` is valid.
     fn put(&mut self, given: &Given<'_>) -> bool {
         let value = Self::of(given);
         if let Some(value) = value {
@@ -101,7 +101,7 @@ impl Value for f32 {
     }
 }
 
-/// An enumeration by the numbers of its variable. The first value stands for all other numbers.
+/// An enumeration by the numbers of its variable. All other numbers select the first value.
 macro_rules! numbered {
     ($(#[$meta:meta])* $name:ident { $(#[$first_meta:meta])* $first:ident = $zero:expr,
         $( $(#[$value_meta:meta])* $value:ident = $number:expr, )* }) => {
@@ -127,7 +127,7 @@ macro_rules! numbered {
     };
 }
 
-/// An enumeration by the names of its variable. `$other` is what any other text gives.
+/// An enumeration by the names of its variable. Any other text selects `$other`.
 macro_rules! named {
     ($(#[$meta:meta])* $name:ident, other: $other:expr, { $( $(#[$value_meta:meta])* $value:ident = $text:literal, )* }) => {
         $(#[$meta])*

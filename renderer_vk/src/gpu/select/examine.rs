@@ -1,4 +1,4 @@
-//! Checks one physical device: whether it meets the requirements, and what of it the renderer uses.
+//! Examines one physical device: requirements and optional features.
 
 use std::ffi::CStr;
 
@@ -9,14 +9,14 @@ use crate::gpu::device::DeviceOptions;
 use crate::gpu::error::{Context, Error};
 use crate::gpu::instance::Instance;
 
-/// Most entries of the texture table, whatever the device would allow.
+/// Maximum size of the texture table, even if the device allows more.
 const TEXTURES: u32 = 65536;
-/// Most entries of the storage image table.
+/// Maximum size of the storage image table.
 const STORAGE_IMAGES: u32 = 4096;
-/// Invocations of the largest groups of compute shaders: 16 x 16. Vulkan promises half as many, drivers have more.
+/// Invocations of the largest compute work groups: 16 x 16. Vulkan guarantees half as many, drivers support more.
 const GROUP: u32 = 256;
 
-/// Checks one device: what it can do, or the one line that says why it cannot be used.
+/// Examines one device: its features, or one line that says why it is unusable.
 pub(super) fn examine(
     instance: &Instance,
     physical: vk::PhysicalDevice,
@@ -25,7 +25,7 @@ pub(super) fn examine(
     // SAFETY: the physical device belongs to the live instance.
     let properties = unsafe { instance.raw.get_physical_device_properties(physical) };
     let name = device_name(&properties);
-    // Features and properties of Vulkan 1.1 and 1.2 can be asked of such a device alone.
+    // Only devices of version 1.2 accept queries of its features and properties.
     if properties.api_version < vk::API_VERSION_1_2 {
         return Ok(Err(format!(
             "{name} offers Vulkan {}.{}, 1.2 is needed",
@@ -56,7 +56,7 @@ pub(super) fn examine(
     } else {
         features.abilities(extensions)
     };
-    // A pipeline that may not call `traceRayEXT` once is of no use.
+    // A pipeline that does not allow `traceRayEXT` is useless.
     abilities.pipeline &= limits.pipeline.max_ray_recursion_depth > 0;
     Ok(Ok(Choice {
         physical,
@@ -75,10 +75,10 @@ fn device_name(properties: &vk::PhysicalDeviceProperties) -> String {
     )
 }
 
-/// Extensions that the device has and the options allow.
+/// Extensions that the device supports and the options allow.
 #[derive(Clone, Copy)]
 struct Extensions {
-    /// Pictures can be shown in a window.
+    /// Presentation to a window.
     swapchain: bool,
     /// Acceleration structures.
     acceleration: bool,
@@ -86,7 +86,7 @@ struct Extensions {
     pipeline: bool,
     /// `rayQueryEXT`, with `acceleration`.
     query: bool,
-    /// Both extensions by which blending, culling and depth tests are set while drawing.
+    /// Both extensions of dynamic blending, culling and depth tests.
     dynamic_state: bool,
 }
 
@@ -123,8 +123,8 @@ fn is_on(feature: vk::Bool32) -> bool {
     feature == vk::TRUE
 }
 
-/// Features of a device; those of extensions that it lacks are off. Only the flags count: the structures were chained
-/// for one call, and their `p_next` pointers are stale since.
+/// Features of a device; those of absent extensions are off. Only the flags are valid: the structures were chained for
+/// one call, and their `p_next` pointers are stale.
 #[derive(Default)]
 struct Features {
     base: vk::PhysicalDeviceFeatures,
@@ -138,7 +138,7 @@ struct Features {
 }
 
 impl Features {
-    /// Asks a device of Vulkan 1.2.
+    /// Queries a device of Vulkan 1.2.
     fn of(instance: &Instance, physical: vk::PhysicalDevice, extensions: Extensions) -> Self {
         let mut found = Self::default();
         let mut chain = vk::PhysicalDeviceFeatures2::default()
@@ -164,7 +164,7 @@ impl Features {
         found
     }
 
-    /// Names of the features that the renderer cannot do without and the device lacks.
+    /// Names of required features that the device lacks.
     fn missing(&self) -> Vec<&'static str> {
         let (base, v12) = (&self.base, &self.v12);
         let required = [
@@ -210,7 +210,7 @@ impl Features {
         absent.map(|(name, _)| *name).collect()
     }
 
-    /// What is switched on, as far as features decide.
+    /// The features to enable, without regard to limits.
     fn abilities(&self, extensions: Extensions) -> Abilities {
         let Self { base, v11, v12, .. } = self;
         // Scene descriptors change while frames are in flight, hence update-after-bind.
@@ -246,15 +246,15 @@ impl Features {
     }
 }
 
-/// The queue family that all work is submitted to.
+/// The queue family of all submissions.
 struct QueueFamily {
     index: u32,
-    /// Valid bits of its timestamps; 0: it has none.
+    /// Valid bits of its timestamps; 0: no timestamps.
     timestamp_bits: u32,
 }
 
 impl QueueFamily {
-    /// The first family for graphics and compute that can show pictures in the window, if there is a window.
+    /// The first family with graphics and compute that can present to the window, if there is one.
     fn of(instance: &Instance, physical: vk::PhysicalDevice) -> Result<Option<Self>, Error> {
         // SAFETY: the physical device belongs to the live instance.
         let families =
@@ -274,7 +274,7 @@ impl QueueFamily {
     }
 }
 
-/// Whether a queue family can show pictures in the window; without a window, every family can.
+/// Whether a queue family can present to the window; without a window, every family can.
 fn can_present(
     instance: &Instance,
     physical: vk::PhysicalDevice,
@@ -288,8 +288,8 @@ fn can_present(
         .context("vkGetPhysicalDeviceSurfaceSupportKHR")
 }
 
-/// Limits of a device; those of extensions that it lacks are zero. Only the numbers count: the structures were chained
-/// for one call, and their `p_next` pointers are stale since.
+/// Limits of a device; those of absent extensions are zero. Only the numbers are valid: the structures were chained for
+/// one call, and their `p_next` pointers are stale.
 #[derive(Default)]
 struct Limits {
     v11: vk::PhysicalDeviceVulkan11Properties<'static>,
@@ -299,7 +299,7 @@ struct Limits {
 }
 
 impl Limits {
-    /// Asks a device of Vulkan 1.2.
+    /// Queries a device of Vulkan 1.2.
     fn of(instance: &Instance, physical: vk::PhysicalDevice, extensions: Extensions) -> Self {
         let mut found = Self::default();
         let mut chain = vk::PhysicalDeviceProperties2::default()
@@ -316,8 +316,8 @@ impl Limits {
         found
     }
 
-    /// Entries of the texture table. A stage's limit of resources covers all tables: it leaves room for the storage
-    /// images and for 256 descriptors beside them.
+    /// Size of the texture table. The per-stage limit of resources covers all tables: the size leaves room for storage
+    /// images and for 256 other descriptors.
     fn max_textures(&self) -> u32 {
         let limits = &self.v12;
         let resources = limits
@@ -329,7 +329,7 @@ impl Limits {
             .min(resources)
     }
 
-    /// Entries of the storage image table.
+    /// Size of the storage image table.
     fn max_storage_images(&self) -> u32 {
         let limits = &self.v12;
         STORAGE_IMAGES
@@ -379,7 +379,7 @@ fn kind(of: vk::PhysicalDeviceType) -> DeviceKind {
     }
 }
 
-/// What the renderer may know about the device. What is not switched on is not reported either.
+/// Properties of the device for the renderer. Disabled features are reported as absent.
 fn info(
     name: String,
     properties: &vk::PhysicalDeviceProperties,
