@@ -1,44 +1,44 @@
-//! The boundary between the engine's C and our Rust: no panic crosses it, and the engine's error function, which never
-//! comes back, is called only when nothing of ours is alive on the stack.
+//! The boundary between the engine's C code and Rust: no panic crosses it, and the engine's error function, which does
+//! not return, is called only from frames without live destructors.
 //!
 //! The engine's `Error` does a `longjmp` to its main loop, and before that calls `Shutdown`, `BeginRegistration` and
-//! more of our functions. So a failing call first ends completely: the closure's frame is gone with its destructors
-//! run, the state is back in its cell, the message lies in a static buffer.
+//! other exports. A failing call therefore ends completely first: the closure's frame is gone and its destructors have
+//! run, the state is back in its cell, the message is in a static buffer.
 //!
 //! # Call contract
-//! Each function that the engine calls (an *export*: the table of exports, console commands, callbacks) is an
-//! `unsafe extern "C" fn`. Its `# Safety` section says what it needs of its own arguments. These hold for all exports:
+//! Each function that the engine calls (an *export*: the table of exports, console commands, callbacks) is an `unsafe
+//! extern "C" fn`. Its `# Safety` section has the requirements on its arguments. These hold for all exports:
 //! - **Thread.** The engine calls on the thread that called `GetRefAPI`. On any other thread [`entry`] does nothing and
-//!   answers 0; no argument is read.
-//! - **Memory.** An export uses a pointer during the call alone, unless its section says otherwise; nobody else writes
-//!   to that memory meanwhile. The memory of game modules has no alignment, so exports read and write unaligned.
+//!   returns 0; no argument is read.
+//! - **Memory.** An export uses a pointer only during the call, unless its section says otherwise; no other code writes
+//!   to that memory meanwhile. The memory of game modules is not aligned, so that exports use unaligned accesses.
 //! - **Null.** A pointer may be null unless its section says otherwise. A null input has a value that the section
 //!   states; a null output is not written.
 //! - **No return.** The call may end in the engine's `Error`, a `longjmp`. Every frame between the engine's `setjmp`
 //!   and the export must then be a *plain old frame* (RFC 2945): one without a pending destructor or `catch_unwind`. C
 //!   frames are. Rust code that calls an export must be.
-//! - **Time.** Before `BeginRegistration` and after `Shutdown` nothing is registered: exports answer what they answer
-//!   for a thing that does not exist.
+//! - **Time.** Before `BeginRegistration` and after `Shutdown` nothing is registered: exports return the values for
+//!   absent objects.
 //!
 //! # Plain frames
-//! Why exports are `extern "C"` and not `extern "C-unwind"`:
+//! Reasons for `extern "C"` instead of `extern "C-unwind"`:
 //! - The ABI string decides about unwinding. Nothing unwinds across this boundary: [`guarded`] catches every panic, and
 //!   the engine is C, without exceptions. With `"C"` a panic that escaped all the same would abort the process; with
 //!   `"C-unwind"` it would unwind the engine's C frames.
-//! - `longjmp` is no matter of the ABI string. RFC 2945 treats both alike: to cross a frame with a pending destructor
-//!   or `catch_unwind` is undefined; to cross a plain old frame is not specified yet. The Rust Reference (*Behavior
-//!   considered undefined*, Rust runtime) forbids to deallocate a frame before the destructors of its variables ran,
-//!   so a frame that has none to run may go.
+//! - The ABI string does not affect `longjmp`. RFC 2945 treats both strings alike: to cross a frame with a pending
+//!   destructor or `catch_unwind` is undefined; to cross a plain old frame is not specified yet. The Rust Reference
+//!   (*Behavior considered undefined*, Rust runtime) forbids deallocating a frame before the destructors of its
+//!   variables have run, so that a frame without destructors may be deallocated.
 //!
-//! So [`entry`] calls `Error` from plain frames alone: its own, where `R: Copy` and the closure was moved away, and
-//! that of the export, which owns nothing but the closure that it hands to [`entry`].
+//! So [`entry`] calls `Error` only from plain frames: its own, where `R: Copy` and the closure was moved away, and that
+//! of the export, which owns only the closure that it passes to [`entry`].
 //!
 //! # Services that do not return
-//! The engine also leaves by `longjmp` from inside a service that a call of ours asked for: a broken pack in
-//! `FS_ReadFile`, a full hunk. That crosses [`guarded`] and frames with destructors, which RFC 2945 leaves undefined,
-//! and no renderer can prevent it. It works because `longjmp` of the C libraries on Linux restores registers and looks
-//! at no frame between: what the frames owned leaks, and [`session`] starts over where one had taken the state. On a
-//! system whose `longjmp` unwinds (Windows) this would have to be decided anew.
+//! The engine also leaves by `longjmp` from inside a service that an export calls: for a damaged pack in `FS_ReadFile`,
+//! or a full hunk. That crosses [`guarded`] and frames with destructors, which RFC 2945 leaves undefined, and no
+//! renderer can prevent it. It works because `longjmp` of the C libraries on Linux restores registers without
+//! inspecting the frames between: memory that the frames owned leaks, and [`session`] restarts if one of them had taken
+//! the state. A system whose `longjmp` unwinds (Windows) needs another solution.
 
 use crate::engine::error_level;
 use crate::failure::Failure;
@@ -48,7 +48,7 @@ use std::cell::UnsafeCell;
 use std::ffi::{c_char, c_int};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// The engine copies at most this much of a message.
+/// Maximum length of a message that the engine copies, bytes.
 const MESSAGE_BYTES: usize = 4096;
 
 struct Message(UnsafeCell<[u8; MESSAGE_BYTES]>);
@@ -58,7 +58,7 @@ unsafe impl Sync for Message {}
 
 static MESSAGE: Message = Message(UnsafeCell::new([0; MESSAGE_BYTES]));
 
-/// Puts `text` into the static buffer, cut between characters, and answers where it is.
+/// Copies `text` into the static buffer, truncated between characters, and returns its address.
 fn keep_message(text: &str) -> *const c_char {
     let mut end = text.len().min(MESSAGE_BYTES - 1);
     while !text.is_char_boundary(end) {
@@ -73,7 +73,7 @@ fn keep_message(text: &str) -> *const c_char {
     buffer.as_ptr().cast()
 }
 
-/// The text of a panic.
+/// Message of a panic.
 fn panic_text(payload: &(dyn Any + Send)) -> &str {
     payload
         .downcast_ref::<&str>()
@@ -82,13 +82,14 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
         .unwrap_or("unknown reason")
 }
 
-/// Runs one call of the engine. `R` has no destructor, so that nothing is alive when the engine's error is called.
+/// Runs one call of the engine. `R` has no destructor, so that no destructor is pending when the engine's error is
+/// called.
 ///
-/// For exports alone, as their last expression, from a frame that owns nothing: it may not return
-/// ([plain frames](self#plain-frames)).
+/// For exports only, as their last expression, from a frame that owns nothing: it may not return ([plain
+/// frames](self#plain-frames)).
 ///
-/// An error or a panic of `f` becomes the engine's error, from which this does not return. A panic costs the renderer
-/// its state: the next `BeginRegistration` starts a new one. Calls from another thread than the one that called
+/// An error or a panic of `f` becomes the engine's error, from which this does not return. A panic discards the
+/// renderer: the next `BeginRegistration` makes a new one. Calls from threads other than the one that called
 /// `GetRefAPI` are refused.
 pub fn entry<R: Copy + Default>(f: impl FnOnce() -> Result<R, Failure>) -> R {
     if !session::on_main_thread() {
@@ -102,7 +103,7 @@ pub fn entry<R: Copy + Default>(f: impl FnOnce() -> Result<R, Failure>) -> R {
                 // longjmp crosses this frame and the export's, which are plain ("Plain frames" above).
                 unsafe { error(level, c"%s".as_ptr(), message) };
             }
-            // Only an engine without an error function comes here.
+            // Reached only with an engine that has no error function.
             R::default()
         }
     }
@@ -130,8 +131,8 @@ fn guarded<R>(f: impl FnOnce() -> Result<R, Failure>) -> Result<R, (c_int, *cons
                 panic_text(payload.as_ref())
             );
             let kept = keep_message(&text);
-            // What the panic left behind cannot be trusted; giving it back may fail as well. A second panic's payload
-            // is dropped like the first one's.
+            // After a panic the state may be inconsistent, and dropping it may panic, too. The payload of a second
+            // panic is dropped like the first one's.
             let _ = catch_unwind(session::discard_renderer);
             (error_level::DROP, kept)
         }

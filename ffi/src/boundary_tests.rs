@@ -1,4 +1,4 @@
-//! The boundary against an error function that really leaves by `longjmp`.
+//! Tests of the boundary with an error function that leaves by `longjmp`.
 
 use crate::boundary::entry;
 use crate::c_tests::{compile, scratch, source};
@@ -14,7 +14,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 type Call = extern "C" fn();
 
-/// The library's state is one for the process: tests that install an engine take turns.
+/// The library's state is global: tests that install an engine run one at a time.
 static TURN: Mutex<()> = Mutex::new(());
 
 /// The C half of an engine, installed with an otherwise empty table.
@@ -24,7 +24,7 @@ pub struct TestEngine {
 }
 
 impl TestEngine {
-    /// Takes the turn; `None` without a C compiler.
+    /// Locks [`TURN`]; `None` without a C compiler.
     pub fn start(name: &str) -> Option<Self> {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = scratch(name);
@@ -37,7 +37,7 @@ impl TestEngine {
         // SAFETY: our own C code without initialisers.
         let library = unsafe { Library::new(&file) }.unwrap();
         std::fs::remove_dir_all(&folder).unwrap();
-        // SAFETY: every entry of the table is an optional function pointer; zero is "not there".
+        // SAFETY: every entry of the table is an optional function pointer; zero is `None`.
         let mut table: refimport_t = unsafe { std::mem::zeroed() };
         // SAFETY: the signatures are those of test_engine.c.
         unsafe {
@@ -74,7 +74,7 @@ impl TestEngine {
 
     fn text(&self, name: &[u8]) -> String {
         let text: unsafe extern "C" fn() -> *const c_char = self.function(name);
-        // SAFETY: answers a static NUL-terminated buffer.
+        // SAFETY: returns a static NUL-terminated buffer.
         unsafe { CStr::from_ptr(text()) }
             .to_str()
             .unwrap()
@@ -98,15 +98,15 @@ impl TestEngine {
 
 impl Drop for TestEngine {
     fn drop(&mut self) {
-        // Nobody may print through a library that is closed.
-        // SAFETY: zero is "not there" for each entry.
+        // No code may print through a closed library.
+        // SAFETY: zero is `None` for each entry.
         unsafe { Ioq3::install(std::mem::zeroed()) };
     }
 }
 
 static DROPPED: AtomicUsize = AtomicUsize::new(0);
 
-/// Counts its destructor's runs.
+/// Counts the runs of its destructor.
 struct Witness;
 
 impl Drop for Witness {
@@ -189,7 +189,7 @@ fn a_long_message_is_cut_to_what_the_engine_copies() {
 }
 
 extern "C" fn shuts_down_inside() {
-    // What the engine does before it jumps.
+    // The engine's calls before its jump.
     for _ in 0..2 {
         // SAFETY: on the thread that installed the engine, from a frame that owns nothing.
         unsafe { crate::ioq3::shutdown_for_tests(0) };
@@ -212,7 +212,7 @@ fn the_engine_may_shut_us_down_from_inside_its_error() {
     );
 }
 
-/// A service that the engine leaves from, while a call of ours has the state.
+/// A service that leaves by `longjmp` while one of our calls has the state.
 extern "C" fn taken_and_left() {
     session::with(|session| {
         session.front.size = (1, 1);

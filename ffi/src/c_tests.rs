@@ -1,4 +1,4 @@
-//! For tests: C compiled by the machine's own compiler, because only C knows C's layouts and `longjmp`.
+//! For tests: C code compiled by the system's compiler, which defines C layouts and `longjmp`.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -12,8 +12,8 @@ pub fn source(relative: &str) -> PathBuf {
         .join(relative)
 }
 
-/// Compiles `input` with extra arguments. `None`, with a report of a skipped test, when there is no C compiler;
-/// with `RELIGHT_REQUIRE_DATA=1` that is a failure.
+/// Compiles `input` with extra arguments. `None`, with a report of a skipped test, without a C compiler; with
+/// `RELIGHT_REQUIRE_DATA=1` that is a failure.
 pub fn compile(input: &Path, output: &Path, arguments: &[&str]) -> Option<()> {
     let result = Command::new("cc")
         .args(arguments)

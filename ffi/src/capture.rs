@@ -1,7 +1,7 @@
 //! Pictures of the screen as files: screenshots, level shots, and frames of a recorded video.
 //!
-//! The pixels handed in are what the screen shows, gamma and all, rows from the top. File names and shapes follow the
-//! engine's own renderer.
+//! The input pixels are those that the screen shows, after gamma, with rows from the top. File names and formats follow
+//! the engine's own renderer.
 
 use crate::failure::Failure;
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
@@ -20,7 +20,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// File name ending, without the dot.
+    /// File name extension, without the dot.
     pub fn extension(self) -> &'static str {
         match self {
             Format::Tga => "tga",
@@ -29,54 +29,54 @@ impl Format {
     }
 }
 
-/// A picture to write.
+/// A requested picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Shot {
     /// The whole screen.
     Screen {
-        /// How.
+        /// File format.
         format: Format,
-        /// Below the user's game folder.
+        /// Path in the user's game folder.
         path: String,
-        /// Say nothing.
+        /// Prints no message.
         silent: bool,
     },
     /// 128x128 pixels for the map menu.
     Level {
-        /// Below the user's game folder.
+        /// Path in the user's game folder.
         path: String,
     },
 }
 
-/// A video frame to hand to the engine. The buffers are the engine's.
+/// A requested video frame. The buffers are the engine's.
 #[derive(Clone, Copy, Debug)]
 pub struct VideoFrame {
     /// Pixels of the video.
     pub width: u32,
     /// Pixels of the video.
     pub height: u32,
-    /// Where the encoded frame goes; holds at least `width * height * 4` bytes.
+    /// Destination of the encoded frame, at least `width * height * 4` bytes.
     pub encode_buffer: *mut u8,
     /// JPEG instead of raw rows.
     pub motion_jpeg: bool,
 }
 
-/// The picture of `rt_screenshot` in the making.
+/// The picture of `rt_screenshot` in progress.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StillShot {
-    /// Below the user's game folder.
+    /// Path in the user's game folder.
     pub path: String,
-    /// Tenths of the work that were told.
+    /// Tenths of the work that have been reported.
     told: u32,
 }
 
 impl StillShot {
-    /// Begun.
+    /// A picture without progress.
     pub fn new(path: String) -> Self {
         Self { path, told: 0 }
     }
 
-    /// A line for each tenth of the work.
+    /// A progress message for each tenth of the work.
     pub fn tell(&mut self, done: u32, wanted: u32) -> Option<String> {
         let tenths = u64::from(done) * 10 / u64::from(wanted.max(1));
         let tenths = u32::try_from(tenths).unwrap_or(10);
@@ -88,7 +88,7 @@ impl StillShot {
     }
 }
 
-/// The arguments of `rt_screenshot`: samples a pixel, and the size if one is named. `None`: they are none.
+/// Arguments of `rt_screenshot`: samples per pixel, and optionally the size. `None`: invalid arguments.
 pub fn still_arguments(arguments: &[String]) -> Option<(u32, Option<(u32, u32)>)> {
     let size = |text: &String| {
         let (width, height) = text.split_once(['x', 'X'])?;
@@ -102,30 +102,30 @@ pub fn still_arguments(arguments: &[String]) -> Option<(u32, Option<(u32, u32)>)
     }
 }
 
-/// What is to be captured, and which file numbers were tried.
+/// Requested captures, and the file numbers in use.
 #[derive(Debug, Default)]
 pub struct Captures {
-    /// In the order asked for.
+    /// In the order of the requests.
     pub shots: Vec<Shot>,
-    /// At most one a frame.
+    /// At most one per frame.
     pub video: Option<VideoFrame>,
     /// `rt_screenshot`.
     pub still: Option<StillShot>,
     next_number: [u32; 2],
 }
 
-/// Numbers in file names have four digits.
+/// Number of file numbers: file names have four digits.
 const NUMBERS: u32 = 10_000;
 
 impl Captures {
-    /// Forgets what was asked for; the numbers stay.
+    /// Drops the requests; keeps the numbers.
     pub fn clear(&mut self) {
         self.shots.clear();
         self.video = None;
         self.still = None;
     }
 
-    /// The next free `screenshots/shotNNNN` name. `None` when there is none left.
+    /// The next unused `screenshots/shotNNNN` name; `None` if all are in use.
     pub fn next_path(&mut self, format: Format, exists: impl Fn(&str) -> bool) -> Option<String> {
         let next = &mut self.next_number[format as usize];
         while *next < NUMBERS {
@@ -139,7 +139,7 @@ impl Captures {
     }
 }
 
-/// Pixels of a picture's row, whatever its data really holds.
+/// Pixels of a picture's row; shorter if the data is.
 fn row(picture: &Picture, y: u32) -> &[u8] {
     let length = picture.width as usize * 3;
     let start = y as usize * length;
@@ -149,7 +149,7 @@ fn row(picture: &Picture, y: u32) -> &[u8] {
 /// A 24-bit uncompressed TGA file, rows from the bottom.
 ///
 /// # Errors
-/// When the picture is larger than the format's 65535 pixels a side.
+/// The picture exceeds the format's limit of 65535 pixels a side.
 pub fn tga(picture: &Picture) -> Result<Vec<u8>, Failure> {
     let side = |n: u32| {
         u16::try_from(n).map_err(|_| {
@@ -174,13 +174,14 @@ pub fn tga(picture: &Picture) -> Result<Vec<u8>, Failure> {
     Ok(file)
 }
 
-/// From this quality on chroma has a sample for each pixel; below it one for four, as in the engine's own renderer.
+/// Minimum quality with full chroma resolution; below it, chroma has one sample for four pixels, as in the engine's own
+/// renderer.
 const FULL_CHROMA_QUALITY: u8 = 85;
 
-/// A JPEG file; a quality out of 1 to 100 counts as the nearest one.
+/// A JPEG file; the quality is clamped to 1..=100.
 ///
 /// # Errors
-/// When the picture is larger than the format's 65535 pixels a side.
+/// The picture exceeds the format's limit of 65535 pixels a side.
 pub fn jpeg(picture: &Picture, quality: i32) -> Result<Vec<u8>, Failure> {
     let failed = |reason: String| {
         Failure::drop(format!(
@@ -204,11 +205,11 @@ pub fn jpeg(picture: &Picture, quality: i32) -> Result<Vec<u8>, Failure> {
     Ok(file)
 }
 
-/// The picture of a map menu: 128x128 pixels, each the mean of 4x3 samples, whatever the screen's size.
+/// The picture of a map menu: 128x128 pixels, each the mean of 4x3 samples, for any screen size.
 pub fn level_shot(picture: &Picture) -> Picture {
     const SIDE: u32 = 128;
     let mut rgb = Vec::with_capacity((SIDE * SIDE * 3) as usize);
-    // Samples lie on a grid of 512x384 over the whole screen, counted from its lower left corner.
+    // Samples are on a grid of 512x384 over the whole screen, from its lower left corner.
     let source = |length: u32, index: u32, samples: u32| {
         (u64::from(length) * u64::from(index) / u64::from(samples)) as u32
     };
@@ -236,14 +237,14 @@ pub fn level_shot(picture: &Picture) -> Picture {
     }
 }
 
-/// The picture at the size of the video: its lower left corner, black where it has nothing.
+/// The picture at the size of the video: its lower left part, black outside.
 fn fit(picture: &Picture, width: u32, height: u32) -> Picture {
     if (picture.width, picture.height) == (width, height) {
         return picture.clone();
     }
     let mut rgb = Vec::with_capacity(width as usize * height as usize * 3);
     for y in 0..height {
-        // Counted from the bottom, where both pictures begin.
+        // Counted from the bottom, where both pictures start.
         let from_bottom = height - 1 - y;
         let line = if from_bottom < picture.height {
             row(picture, picture.height - 1 - from_bottom)
@@ -261,7 +262,7 @@ fn fit(picture: &Picture, width: u32, height: u32) -> Picture {
 /// The bytes of a video frame: JPEG, or rows from the bottom in blue, green, red, padded to four bytes.
 ///
 /// # Errors
-/// When the frame does not fit into the engine's buffer of `width * height * 4` bytes even at the lowest quality.
+/// The frame exceeds the engine's buffer of `width * height * 4` bytes even at the lowest quality.
 pub fn video_frame(
     picture: &Picture,
     frame: &VideoFrame,
@@ -281,7 +282,7 @@ pub fn video_frame(
         return Ok(bytes);
     }
     let room = frame.width as usize * frame.height as usize * 4;
-    // Only pictures of a few pixels need a second try.
+    // Only pictures of a few pixels need a second attempt.
     for quality in [quality, 50, 1] {
         let bytes = jpeg(&picture, quality)?;
         if bytes.len() <= room {

@@ -1,47 +1,48 @@
-//! Videos that materials show. The engine decodes them; each frame it is asked to go on, and uploads from inside.
+//! Videos of materials. The engine decodes them: each frame advances them by a service of the engine, which calls
+//! `UploadCinematic`.
 //!
-//! The engine knows a video by the handle that it answered, the renderer by a client number of its own.
+//! The engine identifies a video by its handle, the renderer by a client number.
 
 use std::collections::HashMap;
 
-/// Which videos the engine plays for us.
+/// Videos that the engine plays for materials.
 #[derive(Debug, Default)]
 pub struct Cinematics {
-    /// By the renderer's client number: the engine's handle, or `None` for a video that cannot be played, so that it
-    /// is asked for once and not every frame.
+    /// By the renderer's client number: the engine's handle, or `None` for a video that cannot be played, so that it is
+    /// not requested again every frame.
     playing: HashMap<usize, Option<i32>>,
-    /// An empty list of clients, for its memory.
+    /// An empty list of clients, kept for its memory.
     list: Vec<usize>,
 }
 
 impl Cinematics {
-    /// Forgets all; the engine closes them itself when the map ends.
+    /// Drops all entries; the engine closes its videos when the map ends.
     pub fn clear(&mut self) {
         self.playing.clear();
     }
 
-    /// An empty list to be given back.
+    /// Takes the empty list; return it by [`keep_list`](Self::keep_list).
     pub fn take_list(&mut self) -> Vec<usize> {
         std::mem::take(&mut self.list)
     }
 
-    /// Takes an empty list back.
+    /// Stores an empty list for reuse.
     pub fn keep_list(&mut self, list: Vec<usize>) {
         self.list = list;
     }
 
-    /// What is known of a client's video: not asked yet, unplayable, or its handle.
+    /// State of a client's video: `None` before the request, `Some(None)` if it cannot be played, otherwise its handle.
     pub fn state(&self, client: usize) -> Option<Option<i32>> {
         self.playing.get(&client).copied()
     }
 
-    /// Remembers the engine's answer.
+    /// Stores the engine's handle.
     pub fn remember(&mut self, client: usize, handle: Option<i32>) {
         self.playing.insert(client, handle);
     }
 
-    /// The client that a picture of the engine's video `handle` is for: a material's, or else the number itself, which
-    /// is what the engine draws full-screen videos under.
+    /// The client of the engine's video `handle`: that of a material, otherwise the number itself, by which the engine
+    /// draws full-screen videos.
     pub fn client_of(&self, handle: i32) -> Option<usize> {
         let ours = self
             .playing

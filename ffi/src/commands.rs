@@ -13,19 +13,20 @@ use crate::window::modes::MODES;
 use renderer_vk::Renderer;
 use std::ffi::{CStr, CString};
 
-/// A command as the engine calls it.
+/// A command, as the engine calls it.
 ///
 /// # Safety
-/// The [call contract](crate::boundary#call-contract): the engine runs commands out of its command buffer, on its main
-/// thread, from C frames. There are no arguments; the words of the command are asked for
-/// ([`engine::Services::arguments`]). Words that a command cannot use are answered with a line on the console.
+/// The [call contract](crate::boundary#call-contract): the engine runs commands from its command buffer, on its main
+/// thread, from C frames. There are no parameters; a command reads its words by [`engine::Services::arguments`] and
+/// prints a message for invalid ones.
 type Function = unsafe extern "C" fn();
 
-/// What is wrong with a name that the engine would not write to.
+/// Message for file names that the engine does not write to.
 const NOT_A_NAME: &str =
     "not a name for a file: it has to stay in the game's folder, in 63 characters at most";
 
-/// All commands. They exist between `BeginRegistration` and `Shutdown`: the engine keeps our function pointers.
+/// All commands. They exist only between `BeginRegistration` and `Shutdown`, because the engine stores our function
+/// pointers.
 static COMMANDS: &[(&CStr, Function)] = &[
     (c"imagelist", image_list),
     (c"shaderlist", shader_list),
@@ -57,7 +58,7 @@ pub fn remove(engine: Engine) {
     }
 }
 
-/// Runs a command that prints lines. The lines are printed with the state back in its place.
+/// Runs a command that prints lines. The state is back in its cell when they are printed.
 fn print_lines(make: impl FnOnce(&mut Renderer, &mut Front, &[String]) -> Vec<String>) {
     entry(|| {
         let Some(engine) = engine::current() else {
@@ -77,7 +78,7 @@ unsafe extern "C" fn image_list() {
 }
 
 unsafe extern "C" fn shader_list() {
-    // Any argument asks for the order in which they are drawn.
+    // Any argument selects drawing order.
     print_lines(|renderer, _, arguments| renderer.shader_list(arguments.len() > 1));
 }
 
@@ -90,7 +91,7 @@ unsafe extern "C" fn model_list() {
 }
 
 unsafe extern "C" fn mode_list() {
-    // Not a list of what is registered: it works before anything is.
+    // Does not use the registration: it works before `BeginRegistration`.
     entry(|| {
         let Some(engine) = engine::current() else {
             return Ok(());
@@ -132,13 +133,14 @@ unsafe extern "C" fn stats() {
             return vec![format!("rt_stats: {path}: {NOT_A_NAME}")];
         }
         front.questions.ask(report);
-        // counted from the next frame on; the answer comes when the GPU is done with it
+        // rays are counted from the next frame on; the report follows when the GPU has finished that frame
         renderer.count_rays(true);
         Vec::new()
     });
 }
 
-/// With a word: sets the variable of the same name, which a command hides from the console. Without: what lights there are.
+/// With an argument: sets the variable of the same name, which the console cannot set because the command hides it.
+/// Without: lists the map's lights.
 unsafe extern "C" fn lights() {
     let was_set = entry(|| {
         let Some(engine) = engine::current() else {
@@ -309,7 +311,7 @@ unsafe extern "C" fn still() {
     });
 }
 
-/// Asks for an accumulated picture. Returns what is wrong with that, if anything.
+/// Requests an accumulated picture. Returns an error message, if there is one.
 fn begin_still(
     engine: Engine,
     samples: u32,
@@ -330,7 +332,7 @@ fn begin_still(
     })
 }
 
-/// Takes the picture of the frame that the player sees, or of the one that is being drawn.
+/// Captures the frame on the screen, or the one being drawn.
 fn screenshot(format: Format) -> Result<(), Failure> {
     let Some(engine) = engine::current() else {
         return Ok(());
@@ -350,7 +352,7 @@ fn screenshot(format: Format) -> Result<(), Failure> {
         return Ok(());
     }
     let silent = argument == "silent";
-    // A name counts only alone; anything after it makes it one of the numbered pictures.
+    // A name is used only without further arguments; otherwise the picture gets a number.
     let path = if arguments.len() == 2 && !argument.is_empty() && !silent {
         Some(format!("screenshots/{argument}.{}", format.extension()))
     } else {

@@ -1,16 +1,16 @@
-//! The device in the words that the engine, its menus and the game show.
+//! Names of the device for the engine, its menus and the game.
 
 use renderer_vk::DeviceInfo;
 
-/// The device in the words that menus show.
+/// Names of the device, as menus show them.
 pub struct DeviceStrings {
-    /// Who made it.
+    /// Vendor name.
     pub vendor: String,
-    /// Its name.
+    /// Device name.
     pub renderer: String,
-    /// Vulkan's version and the driver's.
+    /// Vulkan version and driver version.
     pub version: String,
-    /// Words separated by single spaces, never empty: menus split them.
+    /// Words separated by single spaces, never empty, because menus split it.
     pub extensions: String,
 }
 
@@ -31,7 +31,7 @@ fn vendor_name(id: u32) -> String {
 }
 
 impl DeviceStrings {
-    /// Describes a device.
+    /// The names of a device.
     pub fn new(info: &DeviceInfo) -> Self {
         let (major, minor, patch) = info.api_version;
         Self {

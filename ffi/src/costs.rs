@@ -1,19 +1,19 @@
-//! `rt_stats` and `rt_printPerfStats`: what frames cost.
+//! `rt_stats` and `rt_printPerfStats`: costs of frames.
 //!
-//! Rays are counted only while somebody asks, and the GPU's answers come a few frames later; so `rt_stats` prints a
-//! little after it was typed.
+//! Rays are counted only on request, and the GPU finishes a few frames later; `rt_stats` therefore prints a few frames
+//! after the command.
 
 use renderer_vk::{Renderer, Settings};
 use std::time::{Duration, Instant};
 
-/// How `rt_stats` answers.
+/// Output format of `rt_stats`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Report {
     /// Lines for people.
     Lines,
     /// JSON in the console.
     Json,
-    /// JSON in a file below the user's game folder.
+    /// JSON in a file in the user's game folder.
     File(String),
 }
 
@@ -32,13 +32,13 @@ impl Report {
     }
 }
 
-/// Frames from the question to the answer: one is begun with counters, and is over when another two have begun.
+/// Frames from request to report: one begins with counters, and is finished when two more have begun.
 const FRAMES: u32 = 4;
 
 /// Time between the lines of `rt_printPerfStats`.
 const INTERVAL: Duration = Duration::from_secs(1);
 
-/// What was asked for.
+/// Requests for reports.
 #[derive(Debug, Default)]
 pub struct Questions {
     asked: Vec<(Report, u32)>,
@@ -47,22 +47,22 @@ pub struct Questions {
     frames: u32,
 }
 
-/// What a frame has to tell.
+/// Reports of a frame.
 #[derive(Debug, Default)]
 pub struct Answers {
-    /// For the console.
+    /// Lines for the console.
     pub lines: Vec<String>,
     /// Files to write.
     pub files: Vec<(String, Vec<u8>)>,
 }
 
 impl Questions {
-    /// Asks.
+    /// Adds a request.
     pub fn ask(&mut self, report: Report) {
         self.asked.push((report, FRAMES));
     }
 
-    /// A frame has ended: what is due. `now` is the time of that.
+    /// Ends a frame at the time `now`; returns the reports that are due.
     pub fn answer(
         &mut self,
         renderer: &mut Renderer,
@@ -101,13 +101,13 @@ impl Questions {
             let summary = renderer.costs().summary();
             answers.lines.push(format!("{fps:.0} frames/s; {summary}"));
         }
-        // passes are timed once they were asked for
+        // the first call enables timing of passes
         renderer.timings();
         renderer.count_rays(prints || !self.asked.is_empty());
         answers
     }
 
-    /// Frames a second, once in each interval.
+    /// Frames per second, once per interval.
     fn frame_rate(&mut self, now: Instant) -> Option<f32> {
         self.frames += 1;
         let Some(printed) = self.printed else {
@@ -118,7 +118,7 @@ impl Questions {
         if passed < INTERVAL {
             return None;
         }
-        #[allow(clippy::cast_precision_loss)] // a second's frames
+        #[allow(clippy::cast_precision_loss)] // frames of one second
         let rate = std::mem::take(&mut self.frames) as f32 / passed.as_secs_f32();
         self.printed = Some(now);
         Some(rate)

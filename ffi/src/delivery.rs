@@ -1,5 +1,5 @@
-//! Delivers captures to the engine: reads them back from the renderer, encodes them, and hands them over after the
-//! renderer's state was returned to its cell.
+//! Delivers captures to the engine: reads pictures back from the renderer, encodes them, and passes them to the engine
+//! after the renderer's state is back in its cell.
 
 use crate::capture::{self, Format, Shot, VideoFrame};
 use crate::cvars::Cvar;
@@ -10,23 +10,23 @@ use renderer_vk::Renderer;
 use renderer_vk::api::Picture;
 use std::ffi::c_int;
 
-/// What is to be handed to the engine once the frame is done and the state is back in its cell.
+/// Output for the engine, delivered once the frame has ended and the state is back in its cell.
 #[derive(Default)]
 pub struct Outbox {
-    /// Path below the user's game folder, contents, and whether to say nothing about it.
+    /// Path in the user's game folder, contents, and whether to print no message.
     pub files: Vec<(String, Vec<u8>, bool)>,
-    /// The engine's buffer and how many bytes of it the frame fills.
+    /// The engine's buffer and the number of bytes of the frame.
     pub video: Option<(*mut u8, c_int)>,
-    /// For the console, without the line's end.
+    /// Lines for the console, without line ends.
     pub lines: Vec<String>,
-    /// What the game took for the frame.
+    /// Time of the game for the frame, milliseconds.
     pub front_end_ms: c_int,
-    /// What the renderer took to end it.
+    /// Time of the renderer for ending the frame, milliseconds.
     pub back_end_ms: c_int,
 }
 
-/// Takes captures requested between two frames. They show the previous frame, which the player sees, whatever the next
-/// command does. Within a frame, or before the first one, captures wait for its end.
+/// Takes captures requested between two frames. They show the previous frame, which is on the screen. During a frame,
+/// or before the first one, captures wait for the frame's end.
 pub fn take_captures_of_last_frame(engine: Engine) -> Result<(), Failure> {
     let outbox = with_renderer(|renderer, front| {
         let mut outbox = Outbox::default();
@@ -39,7 +39,7 @@ pub fn take_captures_of_last_frame(engine: Engine) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Takes the requested captures from the picture as drawn so far.
+/// Takes the requested captures of the picture drawn so far.
 pub fn take_captures(
     renderer: &mut Renderer,
     front: &mut Front,
@@ -47,7 +47,7 @@ pub fn take_captures(
 ) -> Result<(), Failure> {
     let shots = std::mem::take(&mut front.captures.shots);
     let video = front.captures.video.take();
-    // Like everything else that is drawn, pictures are left out.
+    // With drawing disabled, captures are omitted, too.
     if front.settings.skip_back_end {
         return Ok(());
     }
@@ -88,20 +88,20 @@ fn take_shot(
     Ok(())
 }
 
-/// Copies an encoded frame into the engine's buffer, so that nothing of ours is alive when the engine writes it.
+/// Copies an encoded frame into the engine's buffer, so that no destructor is pending when the engine writes it.
 fn keep_video(frame: &VideoFrame, bytes: &[u8]) -> Option<(*mut u8, c_int)> {
     let room = frame.width as usize * frame.height as usize * 4;
     let length = c_int::try_from(bytes.len()).ok()?;
     if frame.encode_buffer.is_null() || bytes.len() > room {
         return None;
     }
-    // SAFETY: by the contract of `take_video_frame` the buffer has `width * height * 4` bytes, at least as many
-    // as `bytes`, and stays until the frame ends. The two do not overlap.
+    // SAFETY: by the contract of `take_video_frame` the buffer has `width * height * 4` bytes, at least the length of
+    // `bytes`, and is valid until the frame ends. The two do not overlap.
     unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), frame.encode_buffer, bytes.len()) };
     Some((frame.encode_buffer, length))
 }
 
-/// Writes files and prints lines. The renderer is in its cell meanwhile: the engine may call back.
+/// Writes files and prints lines. The state is in its cell meanwhile, because the engine may call exports.
 pub fn deliver(engine: Engine, outbox: Outbox) {
     for (path, bytes, silent) in outbox.files {
         if !engine.write_file(&path, &bytes) {

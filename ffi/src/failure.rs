@@ -1,22 +1,22 @@
-//! Why a call of the engine fails, as the engine has to hear it.
+//! Failures of the engine's calls, in the engine's terms.
 
 use crate::engine::error_level;
 use renderer_vk::{Error, GpuError};
 use std::ffi::c_int;
 
-/// Why a call cannot do what the engine asked, in a way that the engine has to hear about.
+/// A failure that must be reported to the engine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
     /// One of [`error_level`].
     pub level: c_int,
-    /// For the player: what failed, where, and if possible what to do.
+    /// Message for the player: what failed, where, and if possible what to do.
     pub message: String,
-    /// The renderer did not survive it: the next registration makes a new one.
+    /// The renderer is unusable: the next registration makes a new one.
     pub discard: bool,
 }
 
 impl Failure {
-    /// Back to the menu.
+    /// Returns to the menu.
     pub fn drop(message: impl ToString) -> Self {
         Self {
             level: error_level::DROP,
@@ -25,7 +25,7 @@ impl Failure {
         }
     }
 
-    /// The process has to end.
+    /// Ends the process.
     pub fn fatal(message: impl ToString) -> Self {
         Self {
             level: error_level::FATAL,
@@ -35,7 +35,7 @@ impl Failure {
     }
 }
 
-/// An error of the renderer as the engine has to hear it. What the device did not survive takes the renderer with it.
+/// An error of the renderer in the engine's terms. After a device error, the renderer is discarded.
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let discard = match &error {

@@ -1,13 +1,13 @@
-//! The engine's file system behind the renderer's own trait.
+//! The engine's file system as the renderer's trait.
 
 use crate::engine::{Engine, valid_game_path};
 use crate::session;
 use relight::{FileError, GameFiles};
 use std::ffi::CString;
 
-/// Game files as the engine finds them: its packs, folders and download rules.
+/// Game files as the engine finds them: in its packs and folders, by its download rules.
 ///
-/// Usable on the engine's main thread alone; the trait asks for nothing more.
+/// For use on the engine's main thread only, as the trait allows.
 #[derive(Debug)]
 pub struct EngineFiles {
     engine: Engine,
@@ -19,7 +19,7 @@ impl EngineFiles {
         Self { engine }
     }
 
-    /// `path` as something that the engine can be asked for.
+    /// `path` as a valid argument of the engine's services.
     fn checked(path: &str) -> Result<CString, FileError> {
         let usable = if session::on_main_thread() {
             valid_game_path(path)
@@ -38,13 +38,13 @@ impl GameFiles for EngineFiles {
     }
 
     fn list(&self, dir: &str, extension: &str) -> Vec<String> {
-        // An empty folder name is the game folder itself; the engine takes it here, unlike for reading.
+        // An empty folder name is the game folder itself, which the engine accepts here but not for reading.
         let dir = if dir.is_empty() {
             Some(CString::default())
         } else {
             Self::checked(dir).ok()
         };
-        // The engine compares name endings: without the dot `menushader` would count as a `shader`.
+        // The engine compares name endings: without the dot, `menushader` would match `shader`.
         let suffix = if extension.is_empty() || extension.starts_with('.') {
             extension.to_string()
         } else {

@@ -1,25 +1,28 @@
 //! The renderer library that an id Tech 3 engine loads in place of its OpenGL one.
 //!
-//! This is the only room with raw pointers from outside. It translates between an engine's C interface and the safe
-//! renderer in `renderer_vk`, and owns what these engines leave to their renderers: the window, console variables,
+//! All raw pointers from outside stay in this crate. It adapts an engine's C interface to the safe renderer in
+//! `renderer_vk`, and implements the parts that these engines leave to their renderers: the window, console variables,
 //! console commands, screenshots.
 //!
 //! # The contract with the engine
-//! - One exported symbol, [`GetRefAPI`]. Everything runs on the thread that called it; other threads are refused.
-//! - The library stays mapped after the engine unloads it (`-z nodelete`), because code that ever ran a thread cannot be
-//!   unmapped safely. So statics outlive an unload, and each `GetRefAPI` rebuilds all state. No thread outlives a call.
-//! - Before any service but `Printf` is called the engine is recognized (`ioq3::recognize`): others speak the same
-//!   version number with other tables.
-//! - No panic and no Rust value that needs dropping is on the stack when the engine's `Error` is called, which leaves by
-//!   `longjmp` ([`boundary`]). Services that the engine itself may leave by `longjmp` can cost memory, never
-//!   consistency ([`session`]).
-//! - Without a usable Vulkan device, found out in `GetRefAPI`, the engine's own OpenGL renderer is loaded from beside
-//!   this library and works in our place (`ioq3::fallback`). If the device fails only later, with the real window, the
-//!   game ends with a message that says how to start without us: at that point the engine offers no way back.
+//! - One exported symbol, [`GetRefAPI`]. Everything runs on the thread that called it; calls on other threads are
+//!   refused.
+//! - The library stays mapped after the engine unloads it (`-z nodelete`), because code that has run a thread cannot be
+//!   unmapped safely. Statics therefore outlive an unload, and each `GetRefAPI` resets all state. No thread outlives a
+//!   call.
+//! - The engine is identified before any service but `Printf` is called (`ioq3::recognize`): other engines have the
+//!   same version number with other tables.
+//! - When the engine's `Error` is called, which leaves by `longjmp`, no panic is in progress and no destructor is
+//!   pending on the stack ([`boundary`]). A service from which the engine leaves by `longjmp` can leak memory, but the
+//!   state stays consistent ([`session`]).
+//! - If there is no usable Vulkan device, which `GetRefAPI` tests, the engine's own OpenGL renderer is loaded from the
+//!   folder of this library and replaces this one (`ioq3::fallback`). If the device fails later, with the real window,
+//!   the game ends with a message that explains how to start with another renderer: the engine supports no other way
+//!   then.
 //!
 //! # Modules
-//! [`engine`] is at the bottom: the services that the engine offers, as a trait. All other modules but [`ioq3`] use the
-//! engine through it and know no structure of the engine's ABI. [`ioq3`] is at the top: it implements the services over
+//! [`engine`] is the lowest module: the engine's services, as a trait. All other modules but [`ioq3`] call the engine
+//! through it and use no structure of the engine's ABI. [`ioq3`] is the highest: it implements the services with
 //! ioquake3's table and holds the exports.
 
 mod boundary;
@@ -46,17 +49,17 @@ mod window;
 use ioq3::abi::{refexport_t, refimport_t};
 use std::ffi::c_int;
 
-/// The engine's way in: takes the engine's functions, answers ours; null when the engine speaks another version
-/// or has other tables.
+/// Entry point: takes the engine's functions, returns ours; null if the engine has another version of the interface or
+/// other tables.
 ///
 /// # Safety
-/// - `imports` must be null (then the answer is null) or point at the import table of an ioquake3 engine. The table is
-///   copied: it need not outlive the call. Its functions must stay callable for as long as the process lives.
+/// - `imports` must be null (the result is then null) or point at the import table of an ioquake3 engine. The table is
+///   copied: it need not outlive the call. Its functions must be callable until the process ends.
 /// - The call must come from the engine's main thread while none of our functions runs.
 ///
-/// The answer is static and valid until the next `GetRefAPI`. The functions in it keep to the *call contract* in the
-/// head of `boundary`.
-#[allow(non_snake_case)] // the engine looks for this name
+/// The result is static and valid until the next `GetRefAPI`. Its functions have the *call contract* in the module
+/// documentation of `boundary`.
+#[allow(non_snake_case)] // the engine requires this name
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn GetRefAPI(
     api_version: c_int,

@@ -1,7 +1,7 @@
-//! Log records of the renderer go to the engine's console.
+//! Passes log records of the renderer to the engine's console.
 //!
-//! The engine's print function belongs to the main thread. A record from another thread waits in a list until the call
-//! that started the thread ends.
+//! Only the main thread may call the engine's print function. A record from another thread waits in a list until the
+//! call that started the thread ends.
 
 use crate::engine::print;
 use crate::{engine, session};
@@ -12,7 +12,7 @@ use std::sync::{Mutex, Once, PoisonError};
 
 struct EngineLog;
 
-/// Records of other threads, and where the newest panic happened.
+/// Records of other threads, and the position of the last panic.
 static WAITING: Mutex<Vec<(c_int, String)>> = Mutex::new(Vec::new());
 static PANIC_PLACE: Mutex<Option<String>> = Mutex::new(None);
 static INSTALL: Once = Once::new();
@@ -26,7 +26,7 @@ fn level_of(level: Level) -> c_int {
     }
 }
 
-/// A record as a line of the console; the engine colours it.
+/// A record as a line of the console, with the engine's colour codes.
 fn line_of(level: Level, text: &str) -> String {
     match level {
         Level::Error => format!("ERROR: {text}\n"),
@@ -37,7 +37,7 @@ fn line_of(level: Level, text: &str) -> String {
 
 impl Log for EngineLog {
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
-        // Traces of the GPU allocator and the like would drown the developer console.
+        // Debug records, for example of the GPU allocator, would flood the developer console.
         metadata.level() <= Level::Debug
     }
 
@@ -62,10 +62,10 @@ impl Log for EngineLog {
     fn flush(&self) {}
 }
 
-/// Sends records to the engine from now on. Safe to call at every `GetRefAPI`.
+/// Starts passing records to the engine. May be called at every `GetRefAPI`.
 pub fn install() {
     INSTALL.call_once(|| {
-        // Fails only if someone in this library set another logger before: then that one stays.
+        // Fails only if this library already has another logger, which then stays.
         let _ = log::set_logger(&EngineLog);
         log::set_max_level(LevelFilter::Debug);
         panic::set_hook(Box::new(|info| {
@@ -77,7 +77,7 @@ pub fn install() {
     });
 }
 
-/// Where the newest panic happened, as ` (file:line)`, or nothing.
+/// Position of the last panic, as ` (file:line)`, or empty.
 pub fn take_panic_place() -> String {
     PANIC_PLACE
         .lock()
@@ -86,7 +86,7 @@ pub fn take_panic_place() -> String {
         .unwrap_or_default()
 }
 
-/// Prints what other threads logged.
+/// Prints the waiting records of other threads.
 pub fn flush() {
     let waiting = std::mem::take(&mut *WAITING.lock().unwrap_or_else(PoisonError::into_inner));
     if let Some(engine) = engine::current() {

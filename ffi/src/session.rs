@@ -1,9 +1,9 @@
-//! The library's state between the engine's calls, and the rule by which a call gets at it.
+//! The library's state between the engine's calls, and the rule of access.
 //!
-//! A call *takes* the state out of its cell and puts it back when it ends, also when it panics. While it is out, a
-//! second call finds nothing and does nothing, except that `Shutdown` and `BeginRegistration` start over: they can only
-//! come from an error that the engine met inside a service that the first call had asked for, so that the first call
-//! will never return. What it had taken is then lost (leaked, in truth) and the window it presented to is replaced.
+//! A call *takes* the state out of its cell and puts it back when it ends, also on a panic. While it is out, a nested
+//! call does nothing, except that `Shutdown` and `BeginRegistration` reset the state: nested, they can only come from
+//! an error of the engine inside a service that the outer call used, so that the outer call will never return. The
+//! taken state is then leaked, and its window is replaced.
 
 use crate::capture::Captures;
 use crate::cinematics::Cinematics;
@@ -18,51 +18,51 @@ use std::sync::PoisonError;
 use std::thread::{self, ThreadId};
 use std::time::Instant;
 
-/// The renderer and what the front end knows. Fields are destroyed in order.
+/// The renderer and the front end's state. Fields are dropped in order.
 #[derive(Default)]
 pub struct Session {
-    /// `None` before the first registration and after a fault.
+    /// `None` before the first registration and after a failure.
     pub renderer: Option<Renderer>,
-    /// The rest.
+    /// The front end's state.
     pub front: Front,
 }
 
-/// What the front end knows.
+/// State of the front end.
 #[derive(Default)]
 pub struct Front {
     /// Between `BeginRegistration` and `Shutdown`. Calls outside are ignored.
     pub registered: bool,
     /// The engine's variables, once registered.
     pub cvars: Option<Cvars>,
-    /// As of the newest frame.
+    /// Settings of the last frame.
     pub settings: Settings,
-    /// Screenshots and video frames to take: those of a frame that is being drawn wait for its end.
+    /// Requested screenshots and video frames; those of the frame being drawn wait for its end.
     pub captures: Captures,
-    /// What `rt_stats` and `rt_printPerfStats` want to know.
+    /// Requests of `rt_stats` and `rt_printPerfStats`.
     pub questions: Questions,
-    /// The camera path that `rt_path` records: its file and the lines so far.
+    /// The camera path being recorded by `rt_path`: its file and its lines.
     pub path: Option<(String, String)>,
-    /// Videos on materials.
+    /// Videos of materials.
     pub cinematics: Cinematics,
-    /// Pixels of the window as the game was told.
+    /// Size of the window as the game received it, pixels.
     pub size: (u32, u32),
-    /// When the frame's first `BeginFrame` came; `None` between frames.
+    /// Time of the frame's first `BeginFrame`; `None` between frames.
     pub frame_start: Option<Instant>,
     /// The renderer has finished a frame.
     pub has_picture: bool,
-    /// An entity without a place was reported already.
+    /// The warning about a NaN origin has been printed.
     pub warned_bad_origin: bool,
 }
 
 struct State {
     session: UnsafeCell<Option<Box<Session>>>,
-    /// A call has it.
+    /// A call has taken the state.
     taken: Cell<bool>,
-    /// Counts fresh starts, so that a call that was given up cannot put its old state back.
+    /// Number of resets, so that an abandoned call cannot put its old state back.
     generation: Cell<u64>,
 }
 
-// SAFETY: `on_main_thread` is asked by every entry point before it comes here.
+// SAFETY: every entry point tests `on_main_thread` first.
 unsafe impl Sync for State {}
 
 static STATE: State = State {
@@ -71,7 +71,7 @@ static STATE: State = State {
     generation: Cell::new(0),
 };
 
-/// The thread of the newest `GetRefAPI`.
+/// The thread of the last `GetRefAPI`.
 static MAIN: Mutex<Option<ThreadId>> = Mutex::new(None);
 
 /// Whether this is the engine's main thread.
@@ -79,7 +79,7 @@ pub fn on_main_thread() -> bool {
     *MAIN.lock().unwrap_or_else(PoisonError::into_inner) == Some(thread::current().id())
 }
 
-/// Starts over: this thread is the engine's, nothing is registered. What was there before is destroyed.
+/// Resets the state: this thread is the engine's main thread, and nothing is registered. Drops the old state.
 pub fn reset() {
     *MAIN.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread::current().id());
     start_over();
@@ -88,7 +88,7 @@ pub fn reset() {
 fn start_over() {
     STATE.generation.set(STATE.generation.get().wrapping_add(1));
     STATE.taken.set(false);
-    // SAFETY: main thread; no reference into the cell is ever kept (`take` and `put` move).
+    // SAFETY: main thread; no reference into the cell is kept (`take` and `put` move).
     let old = unsafe { (*STATE.session.get()).replace(Box::default()) };
     drop(old);
 }
@@ -102,7 +102,8 @@ struct Taken {
 impl Drop for Taken {
     fn drop(&mut self) {
         if self.generation != STATE.generation.get() {
-            // A fresh start happened meanwhile. The old renderer may share a window with the new one: better leaked.
+            // The state was reset meanwhile. The old renderer may share a window with the new one, so that it is
+            // leaked.
             std::mem::forget(self.session.take());
             return;
         }
@@ -112,7 +113,7 @@ impl Drop for Taken {
     }
 }
 
-/// Runs `f` with the state. `None`: it is taken by a call further up, or there was no `GetRefAPI` yet.
+/// Runs `f` with the state. `None`: an outer call has taken it, or there was no `GetRefAPI` yet.
 pub fn with<R>(f: impl FnOnce(&mut Session) -> R) -> Option<R> {
     // SAFETY: main thread; the value moves out of the cell.
     let session = unsafe { (*STATE.session.get()).take() }?;
@@ -124,7 +125,7 @@ pub fn with<R>(f: impl FnOnce(&mut Session) -> R) -> Option<R> {
     taken.session.as_deref_mut().map(f)
 }
 
-/// Runs `f` with the renderer while it is registered; otherwise answers the default, as the engine's own renderer does
+/// Runs `f` with the renderer during a registration; otherwise returns the default, as the engine's own renderer does
 /// for calls at the wrong time.
 pub fn with_renderer<R: Default>(
     f: impl FnOnce(&mut Renderer, &mut Front) -> Result<R, Failure>,
@@ -136,14 +137,14 @@ pub fn with_renderer<R: Default>(
     .unwrap_or_else(|| Ok(R::default()))
 }
 
-/// Like [`with_renderer`], for what draws.
+/// Like [`with_renderer`], for drawing.
 pub fn draw(
     f: impl FnOnce(&mut Renderer, &mut Front) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     with_renderer(f)
 }
 
-/// Gives up a state that a call further up has taken and will never put back.
+/// Resets a state that an outer call has taken and will never put back.
 pub fn abandon_if_taken() {
     if STATE.taken.get() {
         window::mark_stale();
@@ -151,7 +152,7 @@ pub fn abandon_if_taken() {
     }
 }
 
-/// Throws the renderer away after a fault; the next `BeginRegistration` makes a new one.
+/// Drops the renderer after a failure; the next `BeginRegistration` makes a new one.
 pub fn discard_renderer() {
     let renderer = with(|session| {
         session.front.registered = false;

@@ -1,9 +1,9 @@
-//! What `r_speeds` prints of a frame.
+//! Output of `r_speeds`.
 
 use renderer_vk::{FrameStats, Renderer, Settings};
 
-/// The lines of one frame: with 1 to 6 what the engine's own renderer prints, in its order and with our counts; for
-/// the traced look, which has no such counts, how long the frame took.
+/// The lines of one frame: for 1 to 6 those of the engine's own renderer, in its order, with our counts; for the traced
+/// look, which has no such counts, the frame's time.
 pub fn lines(settings: &Settings, stats: &FrameStats, renderer: &Renderer) -> Vec<String> {
     if settings.speeds == 0 || settings.skip_back_end {
         return Vec::new();
@@ -52,7 +52,7 @@ fn classic(speeds: i32, stats: &FrameStats) -> Vec<String> {
             scene.lit_surfaces, scene.unlit_surfaces, scene.lit_vertices, scene.lit_triangles
         )],
         5 => vec![format!("zFar: {:.0}", scene.far)],
-        // whether they are covered is known on the GPU alone
+        // only the GPU tests whether flares are covered
         6 => vec![format!("flare adds:{0} tests:{0}", scene.flares)],
         _ => Vec::new(),
     }

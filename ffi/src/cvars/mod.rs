@@ -1,4 +1,4 @@
-//! Console variables: registration, reading, and their way into the renderer's settings.
+//! Console variables: registration, reading, and transfer to the renderer's settings.
 
 #[cfg(test)]
 mod document;
@@ -19,7 +19,7 @@ use table::{TABLE, UNUSED};
 struct Registered {
     row: &'static Row,
     variable: Option<Variable>,
-    /// The variable with whose change it is read, if it is not read each frame.
+    /// The variable whose change triggers reading; `None`: it is read each frame.
     with: Option<Variable>,
 }
 
@@ -27,12 +27,12 @@ struct Registered {
 #[derive(Debug)]
 pub struct Cvars {
     engine: Engine,
-    /// Of [`TABLE`], by position.
+    /// Those of [`TABLE`], by position.
     own: Vec<Option<Variable>>,
     settings: Vec<Registered>,
 }
 
-/// A text for the engine. Texts of tables have no NUL; one from elsewhere with a NUL is empty.
+/// A text for the engine. A text with a NUL becomes empty; texts of tables have none.
 pub fn c_text(text: &str) -> CString {
     CString::new(text).unwrap_or_default()
 }
@@ -72,7 +72,7 @@ fn register(engine: Engine, spec: &Spec) -> Option<Variable> {
 }
 
 impl Cvars {
-    /// Registers every variable. Doing it again applies the latched values.
+    /// Registers every variable. A repeated call applies latched values.
     pub fn register(engine: Engine) -> Cvars {
         let own = TABLE.iter().map(|spec| register(engine, spec)).collect();
         for spec in UNUSED {
@@ -106,13 +106,13 @@ impl Cvars {
         self.own.get(cvar as usize).copied().flatten()
     }
 
-    /// The value as an integer, as the engine parsed it; 0 if the engine has no such cvar.
+    /// The value as an integer, as parsed by the engine; 0 if the engine has no such variable.
     pub fn integer(&self, cvar: Cvar) -> i32 {
         self.handle(cvar)
             .map_or(0, |handle| self.engine.cvar_as_integer(handle))
     }
 
-    /// The value as a finite number; 0 if the engine has no such cvar.
+    /// The value as a finite number; 0 if the engine has no such variable.
     pub fn value(&self, cvar: Cvar) -> f32 {
         self.handle(cvar)
             .map_or(0.0, |handle| number(self.engine, handle))
@@ -129,13 +129,13 @@ impl Cvars {
             .map_or_else(String::new, |handle| self.engine.cvar_string(handle))
     }
 
-    /// Whether the value changed since [`Cvars::seen`] was last called.
+    /// Whether the value has changed since the last call of [`Cvars::seen`].
     pub fn modified(&self, cvar: Cvar) -> bool {
         self.handle(cvar)
             .is_some_and(|handle| self.engine.cvar_modified(handle))
     }
 
-    /// Marks the change as consumed.
+    /// Marks a change as processed.
     pub fn seen(&self, cvar: Cvar) {
         if let Some(handle) = self.handle(cvar) {
             self.engine.cvar_seen(handle);

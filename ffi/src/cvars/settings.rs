@@ -1,11 +1,11 @@
-//! From console variables to the renderer's settings.
+//! Transfers console variables to the renderer's settings.
 
 use super::{Cvars, Registered, number};
 use crate::engine::Engine;
 use renderer_vk::Settings;
 use renderer_vk::settings::{Given, Kind, Reading, SettingError};
 
-/// Takes a variable's value over.
+/// Transfers the value of a variable.
 fn read(
     engine: Engine,
     registered: &Registered,
@@ -26,7 +26,7 @@ fn read(
     registered.row.put(settings, &given)
 }
 
-/// Reads the settings that are read when the renderer starts. A latched one with an unknown name gets its default.
+/// Transfers the settings that are read at the renderer's start. A latched one with an unknown name gets its default.
 pub fn apply_at_registration(cvars: &Cvars, settings: &mut Settings) {
     for registered in &cvars.settings {
         let row = registered.row;
@@ -41,15 +41,15 @@ pub fn apply_at_registration(cvars: &Cvars, settings: &mut Settings) {
     }
 }
 
-/// Reads the settings that are read each frame, and those whose variable has changed. Cheap: the variables are the
-/// engine's memory; text is copied when it changed.
+/// Transfers the settings that are read each frame, and those whose variable has changed. Cheap: the values are in the
+/// engine's memory, and text is copied only after a change.
 pub fn apply(cvars: &Cvars, settings: &mut Settings) {
     let engine = cvars.engine;
     let modified = |r: &&Registered| r.with.is_some_and(|v| engine.cvar_modified(v));
     for registered in &cvars.settings {
         let due = registered.row.reading == Reading::Frame || modified(&registered);
         if due && read(engine, registered, settings).is_err() {
-            // r_textureMode alone: what the engine's own renderer prints
+            // only r_textureMode; the message is that of the engine's own renderer
             log::info!("bad filter name");
         }
     }
@@ -63,7 +63,8 @@ pub fn apply(cvars: &Cvars, settings: &mut Settings) {
     }
 }
 
-/// Writes limits back to variables that menus show and the engine does not limit: `r_gamma` and `r_intensity`.
+/// Writes limited values back to variables that menus show and that the engine does not limit: `r_gamma` and
+/// `r_intensity`.
 pub fn write_back_limits(cvars: &Cvars) {
     for Registered { row, variable, .. } in &cvars.settings {
         let (Some(variable), Some(range)) = (variable, row.spec.range) else {

@@ -1,6 +1,6 @@
-//! Console variables that are no settings of the renderer ([`ROWS`](renderer_vk::settings::ROWS) are those): of the window,
-//! of captures, and those of the engine's own renderer that have no effect here. Names, defaults and flags are those of
-//! the engine's own renderer, so that menus, configurations and mods find what they expect; the last three rows are ours.
+//! Console variables that are not settings of the renderer (those are [`ROWS`](renderer_vk::settings::ROWS)): for the
+//! window, for captures, and those of the engine's own renderer that have no effect here. Names, defaults and flags are
+//! those of the engine's own renderer, for menus, configurations and mods; only the last three rows are ours.
 
 use renderer_vk::settings::flags::{ARCHIVE, CHEAT, LATCH, NONE, ROM};
 use renderer_vk::settings::{Kind, Spec, kept};
@@ -9,8 +9,8 @@ macro_rules! cvars {
     ($( $id:ident: $kind:ident = $name:literal, $default:literal, $flags:expr, $range:expr, $help:literal; )*) => {
         /// A row of [`TABLE`].
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[allow(missing_docs)] // each row says what it is
-        #[allow(dead_code)] // some exist for menus and configurations alone
+        #[allow(missing_docs)] // each row has a help text
+        #[allow(dead_code)] // some exist only for menus and configurations
         pub enum Cvar { $( $id ),* }
 
         /// Variables that the front end reads or sets, in the order of [`Cvar`].
@@ -27,7 +27,7 @@ macro_rules! cvars {
 
 macro_rules! unused {
     ($( $name:literal, $default:literal, $flags:expr, $help:literal; )*) => {
-        /// Variables without effect: they choose among ways to use OpenGL.
+        /// Variables without effect: they select features of OpenGL.
         pub static UNUSED: &[Spec] = &[$( Spec {
             name: $name,
             kind: Kind::Text,

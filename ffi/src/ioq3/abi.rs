@@ -1,18 +1,18 @@
-//! The structures that cross the ABI of Debian's ioquake3 (1.36+u20221123, upstream 70d07d91) and of ioquake3's HEAD,
-//! which has the same layouts. The scene structures are the same in all Quake III engines.
+//! The structures of the ABI of Debian's ioquake3 (1.36+u20221123, upstream 70d07d91) and of ioquake3's HEAD, which has
+//! the same layouts. The scene structures are equal in all Quake III engines.
 
 use super::layout::abi_struct;
 use std::ffi::{c_char, c_float, c_int, c_long, c_uchar, c_void};
 
-/// `REF_API_VERSION` of the engines that this front end serves. Other engines use the same number for other tables.
+/// `REF_API_VERSION` of the engines that this front end supports. Other engines use the same number with other tables.
 pub const API_VERSION: c_int = 8;
 
-/// `qboolean`: a C enum, 0 or 1. Never declared as a Rust enum, because the engine may hand over any int.
+/// `qboolean`: a C enum, 0 or 1. Not a Rust enum, because the engine may pass any int.
 pub type QBool = c_int;
 /// `vec3_t` inside a structure.
 pub type Vec3C = [c_float; 3];
 
-/// `cbufExec_t`: run when the engine next empties its command buffer.
+/// `cbufExec_t`: runs when the engine next executes its command buffer.
 pub const EXEC_APPEND: c_int = 2;
 /// `stereoFrame_t` of the first eye.
 pub const STEREO_LEFT: c_int = 1;
@@ -21,7 +21,7 @@ pub const STEREO_RIGHT: c_int = 2;
 /// Number of `refEntityType_t` values.
 #[cfg(test)]
 pub const RT_MAX_REF_ENTITY_TYPE: c_int = 8;
-/// `CIN_*` bits for a video that a material shows: again and again, without sound.
+/// `CIN_*` bits for a video of a material: looped, without sound.
 pub const CIN_MATERIAL: c_int = 2 | 8 | 16;
 
 abi_struct! {
@@ -72,7 +72,7 @@ abi_struct! {
         20 4 modulate: [c_uchar; 4],
     }
 
-    /// What the renderer tells the engine, the user interface and the game about itself.
+    /// Properties of the renderer for the engine, the user interface and the game.
     pub struct glconfig_t = 11332 {
         0 1024 renderer_string: [c_char; 1024],
         1024 1024 vendor_string: [c_char; 1024],
@@ -97,7 +97,7 @@ abi_struct! {
         11328 4 smpActive: QBool,
     }
 
-    /// The place of a model's tag.
+    /// Position and axes of a model's tag.
     pub struct orientation_t = 48 {
         0 12 origin: Vec3C,
         12 36 axis: [Vec3C; 3],
@@ -133,7 +133,7 @@ abi_struct! {
         20484 64 name: [c_char; 64],
     }
 
-    /// A console variable. The engine owns it; the renderer reads, and clears `modified` of its own.
+    /// A console variable. The engine owns it; the renderer reads it, and clears `modified` of its own variables.
     pub struct cvar_t = 120 {
         0 8 name: *mut c_char,
         8 8 string: *mut c_char,
@@ -156,7 +156,7 @@ abi_struct! {
         112 4 hashIndex: c_int,
     }
 
-    /// The functions that the engine offers. An entry that is null counts as "not there".
+    /// The engine's functions. Entries may be null.
     pub struct refimport_t = 320 {
         0 8 Printf: Option<unsafe extern "C" fn(c_int, *const c_char, ...)>,
         8 8 Error: Option<unsafe extern "C" fn(c_int, *const c_char, ...)>,
@@ -200,7 +200,7 @@ abi_struct! {
         312 8 Sys_LowPhysicalMemory: Option<unsafe extern "C" fn() -> QBool>,
     }
 
-    /// The functions that the renderer offers.
+    /// The renderer's functions.
     pub struct refexport_t = 240 {
         0 8 Shutdown: unsafe extern "C" fn(QBool),
         8 8 BeginRegistration: unsafe extern "C" fn(*mut glconfig_t),

@@ -1,4 +1,4 @@
-//! Between the engine's structures and the renderer's types.
+//! Conversions between the engine's structures and the renderer's types.
 
 use super::abi::{
     Vec3C, fontInfo_t, glyphInfo_t, markFragment_t, orientation_t, polyVert_t, refEntity_t,
@@ -9,7 +9,7 @@ use renderer_vk::LoadedFont;
 use renderer_vk::api::{EntityKind, MarkFragment, Orientation, PolyVert, RefDef, RefEntity};
 use std::ffi::c_char;
 
-/// The kind of an entity; `None` for a number that is none.
+/// The kind of an entity; `None` for an invalid number.
 fn entity_kind(number: i32) -> Option<EntityKind> {
     Some(match number {
         0 => EntityKind::Model,
@@ -24,7 +24,7 @@ fn entity_kind(number: i32) -> Option<EntityKind> {
     })
 }
 
-/// An entity; `None` when its type is no entity type.
+/// An entity; `None` if its type is invalid.
 pub fn entity(from: &refEntity_t) -> Option<RefEntity> {
     Some(RefEntity {
         kind: entity_kind(from.reType)?,
@@ -77,7 +77,7 @@ pub fn poly_vert(from: &polyVert_t) -> PolyVert {
     }
 }
 
-/// A tag's place; without one the identity at the origin.
+/// A tag's position and axes; without a tag, the identity at the origin.
 pub fn orientation(from: Option<Orientation>) -> orientation_t {
     let place = from.unwrap_or(Orientation {
         origin: Vec3::ZERO,
@@ -100,14 +100,14 @@ pub fn mark_fragment(from: &MarkFragment) -> markFragment_t {
 
 fn text<const N: usize>(from: &str) -> [c_char; N] {
     let mut to = [0; N];
-    // The last byte stays zero.
+    // The last byte remains zero.
     for (to, byte) in to.iter_mut().take(N - 1).zip(from.bytes()) {
         *to = byte as c_char;
     }
     to
 }
 
-/// A font with its glyphs' shaders registered.
+/// A font, with the shaders of its glyphs registered.
 pub fn font(from: &LoadedFont) -> Box<fontInfo_t> {
     let blank = glyphInfo_t {
         height: 0,
@@ -127,7 +127,7 @@ pub fn font(from: &LoadedFont) -> Box<fontInfo_t> {
     let mut to = Box::new(fontInfo_t {
         glyphs: [blank; 256],
         glyphScale: from.info.glyph_scale,
-        // The engine's own renderer answers the file's name here.
+        // The engine's own renderer returns the file's name here.
         name: text(&from.name),
     });
     for (index, (to, from_glyph)) in to.glyphs.iter_mut().zip(&from.info.glyphs).enumerate() {
@@ -153,16 +153,16 @@ pub fn font(from: &LoadedFont) -> Box<fontInfo_t> {
 /// A vector of the engine.
 ///
 /// # Safety
-/// `from` must be null (then the answer is the origin) or point at three floats.
+/// `from` must be null (the result is then the origin) or point at three floats.
 pub unsafe fn vector(from: *const Vec3C) -> Vec3 {
     if from.is_null() {
         return Vec3::ZERO;
     }
-    // SAFETY: not null, so it points at three floats by this function's contract; game code may not even align floats.
+    // SAFETY: not null, so it points at three floats by this function's contract; floats of game code may be unaligned.
     unsafe { from.read_unaligned() }.into()
 }
 
-/// Writes a vector where the engine wants it; null is left alone.
+/// Writes a vector to the engine's memory; null is ignored.
 ///
 /// # Safety
 /// `to` must be null or have room for three floats.

@@ -1,9 +1,9 @@
-//! The table of functions that the engine gets.
+//! The table of functions for the engine.
 
 use super::abi::refexport_t;
 use super::{lifecycle, scene};
 
-/// Answered by every `GetRefAPI`; the engine copies it.
+/// Result of every `GetRefAPI`; the engine copies it.
 pub static EXPORTS: refexport_t = refexport_t {
     Shutdown: lifecycle::shutdown,
     BeginRegistration: lifecycle::begin_registration,
@@ -37,7 +37,7 @@ pub static EXPORTS: refexport_t = refexport_t {
     TakeVideoFrame: lifecycle::take_video_frame,
 };
 
-/// Calls every function of the table with arguments as odd as an engine's mistakes.
+/// Calls every function of the table with invalid arguments.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract).
@@ -48,7 +48,7 @@ pub unsafe fn call_everything() {
     let pixels = [0u8; 4];
     let mut buffer = [1; 4];
     // SAFETY: pointers are null, C strings, or our own memory of the stated size, which outlives the call. The frame
-    // owns nothing that needs dropping, should a call end in the engine's error.
+    // owns nothing with a destructor, in case a call ends in the engine's error.
     unsafe {
         (re.RegisterModel)(c"a".as_ptr());
         (re.RegisterSkin)(null());

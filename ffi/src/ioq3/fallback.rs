@@ -1,7 +1,7 @@
-//! What happens on a machine without usable Vulkan: the engine's own OpenGL renderer works in our place.
+//! Fallback for machines without usable Vulkan: loads the engine's own OpenGL renderer.
 //!
-//! The engine asks for `GetRefAPI` before any window exists, and does not try another library once ours is loaded. So
-//! that is where the other renderer is loaded and its functions are answered instead of ours.
+//! The engine calls `GetRefAPI` before any window exists, and tries no other library once ours is loaded. Therefore the
+//! other renderer is loaded there, and its functions are returned instead of ours.
 
 use super::abi::{QBool, refexport_t, refimport_t};
 use crate::engine::Engine;
@@ -12,9 +12,9 @@ use std::sync::{Mutex, PoisonError};
 
 type GetRefApi = unsafe extern "C" fn(c_int, *const refimport_t) -> *const refexport_t;
 
-/// The renderer that works in our place.
+/// The substitute renderer.
 struct Substitute {
-    /// Closed when the engine has shut it down for good, as the engine would do.
+    /// Closed after the engine's last `Shutdown`, as the engine would do.
     _library: Library,
     shutdown: unsafe extern "C" fn(QBool),
 }
@@ -25,7 +25,7 @@ fn substitute() -> std::sync::MutexGuard<'static, Option<Substitute>> {
     SUBSTITUTE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The architecture as these engines spell it in file names.
+/// The architecture, as these engines spell it in file names.
 fn engine_architecture() -> &'static str {
     match std::env::consts::ARCH {
         "aarch64" => "arm64",
@@ -33,7 +33,7 @@ fn engine_architecture() -> &'static str {
     }
 }
 
-/// File names to look for, best first: opengl1 looks and runs the same everywhere.
+/// File names to try, best first: opengl1 looks and runs the same everywhere.
 fn file_names() -> Vec<String> {
     let (arch, suffix) = (engine_architecture(), std::env::consts::DLL_SUFFIX);
     ["opengl1", "opengl2"]
@@ -47,7 +47,7 @@ fn file_names() -> Vec<String> {
         .collect()
 }
 
-/// The folder of the file that this code was loaded from.
+/// The folder of this library's file.
 #[cfg(unix)]
 fn own_folder() -> Option<PathBuf> {
     use std::ffi::{CStr, OsStr, c_char, c_void};
@@ -72,7 +72,7 @@ fn own_folder() -> Option<PathBuf> {
     // SAFETY: the address is one of ours; the system fills the structure.
     let known = unsafe { dladdr(crate::GetRefAPI as *const c_void, &mut info) } != 0
         && !info.file_name.is_null();
-    // SAFETY: the loader's own string.
+    // SAFETY: a string of the dynamic loader.
     let file = known.then(|| unsafe { CStr::from_ptr(info.file_name) })?;
     PathBuf::from(OsStr::from_bytes(file.to_bytes()))
         .parent()
@@ -84,7 +84,7 @@ fn own_folder() -> Option<PathBuf> {
     None
 }
 
-/// Folders to look in, in order, none twice.
+/// Folders to search, in order, each once.
 fn folders() -> Vec<PathBuf> {
     let program = std::env::args_os()
         .next()
@@ -105,10 +105,10 @@ fn folders() -> Vec<PathBuf> {
     list
 }
 
-/// Loads another renderer and answers its functions, with `Shutdown` going through us.
+/// Loads another renderer and returns its functions, with `Shutdown` replaced by ours.
 ///
 /// # Safety
-/// `table` must be the engine's import table, as `GetRefAPI` got it.
+/// `table` must be the engine's import table, the argument of `GetRefAPI`.
 pub unsafe fn load(
     engine: Engine,
     api_version: c_int,
@@ -118,17 +118,17 @@ pub unsafe fn load(
     unsafe { load_from(&folders(), engine, api_version, table) }
 }
 
-/// [`load`] out of given folders.
+/// [`load`] from given folders.
 ///
 /// # Safety
-/// `table` must be the engine's import table, as `GetRefAPI` got it, or what the renderers in `folders` take for one.
+/// `table` must be the engine's import table, the argument of `GetRefAPI`, or valid for the renderers in `folders`.
 unsafe fn load_from(
     folders: &[PathBuf],
     engine: Engine,
     api_version: c_int,
     table: *const refimport_t,
 ) -> Option<refexport_t> {
-    // One that the engine never shut down must not be loaded twice.
+    // A substitute that was never shut down must not be loaded twice.
     drop(substitute().take());
     for folder in folders {
         for name in file_names() {
@@ -136,7 +136,7 @@ unsafe fn load_from(
             if !path.is_file() {
                 continue;
             }
-            // SAFETY: a renderer of the engine; its initialisers are made to run at load time.
+            // SAFETY: a renderer of the engine; its initialisers are safe at load time.
             let library = match unsafe { Library::new(&path) } {
                 Ok(library) => library,
                 Err(error) => {
@@ -151,10 +151,10 @@ unsafe fn load_from(
                 continue;
             };
             if std::ptr::fn_addr_eq(get_ref_api, crate::GetRefAPI as GetRefApi) {
-                // Someone installed us under that name.
+                // This library, installed under that name.
                 continue;
             }
-            // SAFETY: `table` is what this renderer takes by this function's contract; it copies the table.
+            // SAFETY: `table` is valid for this renderer by this function's contract; it copies the table.
             let exports = unsafe { get_ref_api(api_version, table) };
             if exports.is_null() {
                 continue;
@@ -173,13 +173,13 @@ unsafe fn load_from(
     None
 }
 
-/// `Shutdown` of the substitute, and the end of its library when the engine is done with it: the engine unloads only
-/// us, and the substitute must start afresh next time.
+/// `Shutdown` of the substitute. Closes its library after the last `Shutdown`: the engine unloads only ours, and the
+/// substitute must be loaded anew next time.
 ///
 /// # Safety
-/// The [call contract](crate::boundary#call-contract), except that nothing of ours runs: the substitute may end in the
-/// engine's `Error`, which crosses this frame while it owns nothing. Any number but 0 ends the substitute; none of its
-/// functions may be called afterwards.
+/// The [call contract](crate::boundary#call-contract), except that no Rust code with destructors runs: the substitute
+/// may end in the engine's `Error`, which crosses this frame while it owns nothing. Any number but 0 ends the
+/// substitute; none of its functions may be called afterwards.
 unsafe extern "C" fn shutdown(destroy_window: QBool) {
     let function = substitute().as_ref().map(|substitute| substitute.shutdown);
     if let Some(function) = function {
@@ -226,24 +226,24 @@ mod tests {
             return;
         };
         let path = std::ffi::CString::new(report.as_os_str().as_bytes()).unwrap();
-        // The made-up renderer reads a path where a real one would find the engine's print function.
+        // The test renderer reads a path where a real one would read the engine's print function.
         let mut table = [std::ptr::null::<std::ffi::c_char>(); 40];
         table[0] = path.as_ptr();
         let load = |version| {
             let folders = [folder.join("nowhere"), folder.clone()];
-            // SAFETY: the made-up renderer reads its first entry alone, as what it is here.
+            // SAFETY: the test renderer reads only its first entry, as a path.
             unsafe { load_from(&folders, engine, version, table.as_ptr().cast()) }
         };
         let loaded = || {
             const NOLOAD: c_int = 4;
-            // SAFETY: with NOLOAD nothing runs.
+            // SAFETY: with NOLOAD no code runs.
             unsafe { UnixLibrary::open(Some(&library), RTLD_NOW | NOLOAD) }.is_ok()
         };
         assert!(load(7).is_none(), "it refuses other versions");
         assert!(!loaded());
         for _ in 0..2 {
             let exports = load(8).map(|exports| exports.Shutdown).unwrap();
-            // SAFETY: `shutdown` with a substitute that calls no service of the engine: it returns.
+            // SAFETY: `shutdown` of a substitute that calls no service of the engine: it returns.
             unsafe { exports(0) };
             assert!(loaded());
             // SAFETY: `shutdown`, which returns here; no function of the substitute is called afterwards.

@@ -1,26 +1,26 @@
-//! What the engine, its menus and the game are told about the renderer (`glconfig_t`).
+//! Properties of the renderer for the engine, its menus and the game (`glconfig_t`).
 
 use super::abi::{QBool, glconfig_t};
 use crate::config::DeviceStrings;
 use renderer_vk::DeviceInfo;
 use std::ffi::c_char;
 
-/// Facts besides the device.
+/// Properties besides those of the device.
 #[derive(Clone, Copy, Debug)]
 pub struct Screen {
     /// Pixels.
     pub size: (u32, u32),
-    /// Width over height as seen.
+    /// Width over height of the display.
     pub aspect: f32,
-    /// Hz, 0 = unknown.
+    /// Hz; 0: unknown.
     pub refresh_rate: i32,
     /// Fills the screen.
     pub fullscreen: bool,
-    /// `r_gamma` works on the finished picture, not on textures.
+    /// `r_gamma` applies to the finished picture, not to textures.
     pub gamma: bool,
 }
 
-/// Copies text into a C array, cut to fit, always ended by a zero.
+/// Copies text into a C array, truncated, with a terminating zero.
 fn put<const N: usize>(to: &mut [c_char; N], text: &str) {
     let bytes = text
         .bytes()
@@ -45,10 +45,10 @@ pub fn glconfig(info: &DeviceInfo, screen: Screen) -> glconfig_t {
         numTextureUnits: 32,
         colorBits: 32,
         depthBits: 24,
-        // Enough for the game to offer shadow volumes.
+        // With 8 bits the game offers shadow volumes.
         stencilBits: 8,
         driverType: 0,
-        // Anything else makes game code leave effects out.
+        // With any other value game code omits effects.
         hardwareType: 0,
         deviceSupportsGamma: screen.gamma.into(),
         textureCompression: 0,
@@ -58,7 +58,7 @@ pub fn glconfig(info: &DeviceInfo, screen: Screen) -> glconfig_t {
         windowAspect: screen.aspect,
         displayFrequency: screen.refresh_rate,
         isFullscreen: screen.fullscreen.into(),
-        // The engine would send every frame twice.
+        // Otherwise the engine would send every frame twice.
         stereoEnabled: QBool::from(false),
         smpActive: QBool::from(false),
     };

@@ -1,28 +1,28 @@
-//! A structure of the engine's ABI declared together with the offsets that its fields must have.
+//! Declares a structure of the engine's ABI together with the offsets of its fields.
 
-/// One field as the engine lays it out, in bytes.
+/// A field in the engine's layout, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// The engine's name of it.
+    /// The engine's name.
     pub name: &'static str,
-    /// From the start of the structure.
+    /// Offset from the start of the structure.
     pub offset: usize,
-    /// Of the field.
+    /// Size of the field.
     pub size: usize,
 }
 
-/// Declares `#[repr(C)]` structures from rows of `offset size name: type`. The numbers are the engine's, written down
-/// independently of the Rust types; a row that disagrees with what the compiler does is a build error. Each
-/// structure gets `LAYOUT`, the same rows as data, for the test that asks a C compiler.
+/// Declares `#[repr(C)]` structures from rows of `offset size name: type`. The numbers are the engine's, independent of
+/// the Rust types; a row that differs from the compiler's layout is a build error. Each structure has `LAYOUT`, the
+/// same rows as data, for the test with a C compiler.
 macro_rules! abi_struct {
     ($( $(#[$meta:meta])* pub struct $name:ident = $size:literal { $( $offset:literal $fsize:literal $field:ident : $type:ty ),* $(,)? } )*) => { $(
         $(#[$meta])*
         #[repr(C)]
         #[derive(Clone, Copy)]
-        #[allow(non_camel_case_types, non_snake_case, missing_docs)] // the engine's names, so that they can be looked up
+        #[allow(non_camel_case_types, non_snake_case, missing_docs)] // the engine's names
         pub struct $name { $( pub $field: $type ),* }
 
-        // Only `GetRefAPI` on a machine with 8-byte pointers is described by the tables.
+        // The tables describe only machines with 8-byte pointers.
         #[cfg(target_pointer_width = "64")]
         const _: () = {
             assert!(size_of::<$name>() == $size, concat!("size of ", stringify!($name)));

@@ -1,4 +1,4 @@
-//! Registration, frames and shutdown: when the window, the device and the assets come and go.
+//! Registration, frames and shutdown: lifetime of the window, the device and the assets.
 
 use super::abi::{QBool, glconfig_t};
 use super::glconfig;
@@ -18,10 +18,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Looks whether a usable Vulkan device is there, without a window.
+/// Tests whether there is a usable Vulkan device, without a window.
 ///
 /// # Errors
-/// One sentence: what is missing.
+/// One sentence that names the missing item.
 pub fn probe(engine: Engine) -> Result<(), String> {
     let device = wanted_device(&Cvars::register(engine));
     renderer_vk::probe(device.as_deref())
@@ -33,15 +33,14 @@ fn wanted_device(cvars: &Cvars) -> Option<String> {
     Some(cvars.string(Cvar::Device)).filter(|name| !name.is_empty())
 }
 
-/// Where the game writes its own files: what was found out about a map, and compiled pipelines, are kept in a folder of
-/// ours below it.
+/// Our folder in the game's writable folder, for light calibrations and pipeline caches.
 fn cache_folder(engine: Engine) -> Option<PathBuf> {
     let home = engine.cvar_text(c"fs_homepath");
     let game = [c"fs_game", c"com_basegame"]
         .map(|name| engine.cvar_text(name))
         .into_iter()
         .find(|game| !game.is_empty())?;
-    // a game folder is one name; anything else is not a place to write to
+    // a game folder is a single name; other values are not used as a path
     let plain = !game.contains(['/', '\\', ':']) && !game.contains("..");
     (plain && !home.is_empty()).then(|| PathBuf::from(home).join(game).join("relight"))
 }
@@ -97,7 +96,7 @@ pub unsafe extern "C" fn begin_registration(out: *mut glconfig_t) {
     });
 }
 
-/// Opens the window, unless there is one or none is wanted, and makes a renderer for it.
+/// Opens the window, unless it is open or not wanted, and makes a renderer for it.
 fn start_renderer(
     engine: Engine,
     cvars: &Cvars,
@@ -136,7 +135,7 @@ fn start_renderer(
             session::with(|session| {
                 session.renderer = Some(renderer);
                 session.front.has_picture = false;
-                // whatever the variables become: the engine's own renderer reads them here only
+                // fixed until the next start: the engine's own renderer reads them only here
                 let settings = &mut session.front.settings;
                 settings.fullscreen =
                     window::current().is_some_and(|window| window.is_fullscreen());
@@ -176,7 +175,7 @@ fn make_renderer(
     Renderer::new(options).map_err(|e| e.to_string())
 }
 
-/// Fills in what depends on the window, and answers what the game is told.
+/// Sets the fields that depend on the window, and returns the structure for the game.
 fn describe(renderer: &Renderer, front: &mut Front) -> glconfig_t {
     let size = renderer.size();
     let window = window::current();
@@ -191,20 +190,20 @@ fn describe(renderer: &Renderer, front: &mut Front) -> glconfig_t {
     glconfig::glconfig(renderer.device_info(), screen)
 }
 
-/// `re.Shutdown`. Twice in a row, before any registration and from inside an error of the engine are all fine.
+/// `re.Shutdown`. May be called repeatedly, before any registration, and from inside an error of the engine.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). Any number but 0 closes the window; the engine's input code,
-/// which is told first, must not use it from then on. Buffers that [`take_video_frame`] was given are forgotten.
+/// which is notified first, must not use it afterwards. Buffers of [`take_video_frame`] are forgotten.
 pub unsafe extern "C" fn shutdown(destroy_window: QBool) {
     entry(|| {
         session::abandon_if_taken();
         let Some(engine) = engine::current() else {
             return Ok(());
         };
-        // What was asked for within a frame that will not end shows what is drawn of it.
+        // Captures of a frame that will not end show the part drawn so far.
         if let Ok(outbox) = with_renderer(|renderer, front| {
-            // The buffer of a video frame may be gone by now.
+            // The buffer of a video frame may be invalid by now.
             front.captures.video = None;
             let mut outbox = Outbox::default();
             outbox.lines.extend(give_up_still(renderer, front));
@@ -212,7 +211,7 @@ pub unsafe extern "C" fn shutdown(destroy_window: QBool) {
         }) {
             deliver(engine, outbox);
         }
-        // The engine would keep our pointers after it has unloaded us.
+        // The engine would keep our function pointers after unloading the library.
         commands::remove(engine);
         let destroyed = session::with(|session| {
             session.front.registered = false;
@@ -228,7 +227,7 @@ pub unsafe extern "C" fn shutdown(destroy_window: QBool) {
                 None
             }
         });
-        // The surface goes before its window.
+        // The surface must be destroyed before its window.
         drop(destroyed);
         if destroy_window != 0 {
             window::close(engine, true);
@@ -253,7 +252,7 @@ pub unsafe extern "C" fn end_registration() {
 /// `re.BeginFrame`.
 ///
 /// # Safety
-/// The [call contract](crate::boundary#call-contract). A number that is no `stereoFrame_t` counts as both eyes.
+/// The [call contract](crate::boundary#call-contract). An invalid `stereoFrame_t` counts as both eyes.
 pub unsafe extern "C" fn begin_frame(stereo: c_int) {
     entry(|| {
         let Some(engine) = engine::current() else {
@@ -288,14 +287,14 @@ pub unsafe extern "C" fn begin_frame(stereo: c_int) {
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `front_end_ms` and `back_end_ms` must each be null or have room
-/// for an integer. The buffer of a video frame that [`take_video_frame`] was given must still be there: the frame's
-/// picture is encoded into it here.
+/// for an integer. The buffer of a video frame of [`take_video_frame`] must still be valid: the frame's picture is
+/// encoded into it here.
 pub unsafe extern "C" fn end_frame(front_end_ms: *mut c_int, back_end_ms: *mut c_int) {
     entry(|| {
         let Some(engine) = engine::current() else {
             return Ok(());
         };
-        // what rt_pause holds includes the pictures on its walls
+        // views held by rt_pause include the video pictures on their walls
         let held = with_renderer(|_, front| Ok(front.settings.rt && front.settings.rt_pause))?;
         if !held {
             run_videos(engine)?;
@@ -324,7 +323,7 @@ fn milliseconds(duration: std::time::Duration) -> c_int {
     c_int::try_from(duration.as_millis()).unwrap_or(c_int::MAX)
 }
 
-/// Ends the frame on the GPU, and takes the pictures that were asked for before it is shown.
+/// Ends the frame on the GPU, and takes the requested captures before it is presented.
 fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Failure> {
     let mut outbox = Outbox::default();
     let start = Instant::now();
@@ -350,7 +349,7 @@ fn finish_frame(renderer: &mut Renderer, front: &mut Front) -> Result<Outbox, Fa
     Ok(outbox)
 }
 
-/// What the player is told about an accumulated picture that the end of the game comes before.
+/// Drops an accumulated picture at the end of the game; returns a message for the player.
 fn give_up_still(renderer: &Renderer, front: &mut Front) -> Option<String> {
     let shot = front.captures.still.take()?;
     let (done, wanted) = renderer.still_progress()?;
@@ -360,7 +359,7 @@ fn give_up_still(renderer: &Renderer, front: &mut Front) -> Option<String> {
     ))
 }
 
-/// Tells how far an accumulated picture is, and takes it when it is finished.
+/// Reports the progress of an accumulated picture, and takes it when it is finished.
 fn finish_still(
     renderer: &mut Renderer,
     front: &mut Front,
@@ -371,7 +370,7 @@ fn finish_still(
     };
     match renderer.still_progress() {
         Some((done, wanted)) => outbox.lines.extend(shot.tell(done, wanted)),
-        // the map it was of is gone
+        // its map was unloaded
         None => front.captures.still = None,
     }
     if let Some(picture) = renderer.take_still().map_err(Failure::from)?
@@ -382,7 +381,7 @@ fn finish_still(
     Ok(())
 }
 
-/// Lets the engine decode the videos that are in view. It calls `UploadCinematic` from inside, so the state is in its
+/// Decodes the videos of materials. The engine calls `UploadCinematic` during the call, so that the state is in its
 /// cell meanwhile.
 fn run_videos(engine: Engine) -> Result<(), Failure> {
     let mut wanted = with_renderer(|renderer, front| {
@@ -400,7 +399,7 @@ fn run_videos(engine: Engine) -> Result<(), Failure> {
         let handle = match state {
             Some(handle) => handle,
             None => {
-                // Another call may have dropped the video; the empty name is refused.
+                // Another call may have dropped the video; the engine's services refuse the empty name.
                 let name = name.unwrap_or_default();
                 let handle = valid_game_path(&name).and_then(|name| engine.play_cinematic(&name));
                 with_renderer(|renderer, front| {
@@ -422,13 +421,13 @@ fn run_videos(engine: Engine) -> Result<(), Failure> {
     Ok(())
 }
 
-/// `re.TakeVideoFrame`. The header of the engine calls the first two height and width, but the engine passes the width
-/// first.
+/// `re.TakeVideoFrame`. The engine's header names the first two parameters height and width, but the engine passes the
+/// width first.
 ///
 /// # Safety
-/// The [call contract](crate::boundary#call-contract). `encode_buffer` must be null or have room for
-/// `width * height * 4` bytes and **outlive the call**: within a frame it is filled by [`end_frame`], or forgotten by
-/// [`shutdown`]. A null buffer or a side below 1 asks for nothing. The capture buffer is not used.
+/// The [call contract](crate::boundary#call-contract). `encode_buffer` must be null or have room for `width * height *
+/// 4` bytes and **outlive the call**: during a frame, [`end_frame`] fills it or [`shutdown`] forgets it. A null buffer
+/// or a side below 1 requests nothing. The capture buffer is not used.
 pub unsafe extern "C" fn take_video_frame(
     width: c_int,
     height: c_int,

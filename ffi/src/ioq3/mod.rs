@@ -1,9 +1,8 @@
 //! The front end for ioquake3 (Debian's 1.36 and HEAD: one ABI).
 //!
-//! Another engine gets a module like this one beside it, with its own tables and its own rules about windows; the
-//! scene structures in [`abi`] and everything outside this folder, which calls the engine through [`Services`], serve
-//! all of them. Ten engines pass version 8 to `GetRefAPI`, with seven different tables; [`recognize`] finds out which
-//! one calls.
+//! A front end for another engine is a module beside this one, with its own tables and window rules; it shares the
+//! scene structures in [`abi`] and everything outside of this folder, which calls the engine through [`Services`]. Ten
+//! engines pass version 8 to `GetRefAPI`, with seven different tables; [`recognize`] identifies the caller.
 
 pub mod abi;
 mod convert;
@@ -32,7 +31,7 @@ use std::ffi::c_int;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr;
 
-/// The table of a renderer that works in our place, where the engine can read it.
+/// The table of a substitute renderer, in memory that the engine can read.
 struct Borrowed(UnsafeCell<Option<refexport_t>>);
 
 // SAFETY: written and read by `get_ref_api` on the engine's main thread.
@@ -40,13 +39,13 @@ unsafe impl Sync for Borrowed {}
 
 static BORROWED: Borrowed = Borrowed(UnsafeCell::new(None));
 
-/// `GetRefAPI`: starts over with the engine behind `imports` and answers the table of our functions, or null when the
-/// engine speaks another version of the interface or has other tables. Without usable Vulkan it answers the table of
-/// the engine's own OpenGL renderer.
+/// `GetRefAPI`: resets all state for the engine of `imports` and returns our functions, or null if the engine has
+/// another version of the interface or other tables. Without usable Vulkan it returns the functions of the engine's own
+/// OpenGL renderer.
 ///
 /// # Safety
-/// `imports` must be null or point at the import table of an ioquake3 engine, whose functions stay callable for as long
-/// as the process lives. The call must come from the engine's main thread while none of our functions runs.
+/// `imports` must be null or point at the import table of an ioquake3 engine, whose functions must be callable until
+/// the process ends. The call must come from the engine's main thread while none of our functions runs.
 pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *const refexport_t {
     if imports.is_null() {
         return ptr::null();
@@ -60,7 +59,7 @@ pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *c
         engine.say(&format!("Relight speaks version {API_VERSION} of the renderer interface, this engine wants {api_version}\n"));
         return ptr::null();
     }
-    // SAFETY: the table of the engine that was installed above, and that engine speaks our version.
+    // SAFETY: the table of the engine installed above, which has our version number.
     if let Some(line) = unsafe { recognize::refusal(engine, imports) } {
         engine.say(&format!("{line}\n"));
         return ptr::null();
@@ -68,7 +67,7 @@ pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *c
     logging::install();
     let prepared = catch_unwind(AssertUnwindSafe(|| {
         session::reset();
-        // Normally there is none any more; a renderer that was lost may have left one.
+        // A window that an abandoned renderer left open.
         window::mark_stale();
         lifecycle::probe(engine)
     }));
@@ -88,7 +87,7 @@ pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *c
                 (*slot).as_ref().map_or(ptr::null(), ptr::from_ref)
             }
         }
-        // No renderer at all: ours, whose `BeginRegistration` will say what is missing and end the game.
+        // Without any renderer, our functions: `BeginRegistration` reports the missing item and ends the game.
         None => &EXPORTS,
     }
 }

@@ -1,14 +1,14 @@
-//! Which engine loads us, found out before any of its services but `Printf` is called.
+//! Identifies the loading engine before any of its services but `Printf` is called.
 //!
-//! Ten engines speak the same version number with seven different tables, and a service of another table is another
-//! function: in Quake3e `Cvar_Get` of ioquake3 is `Free`. So, in this order:
-//! 1. [`VARIABLE`] in the environment overrules the rest;
-//! 2. the executable's file holds text that one family of engines alone has ([`OTHERS`]);
-//! 3. what stands where ioquake3 has functions is no function, or functions go on far beyond ioquake3's table;
-//! 4. engines without these differences keep `Cvar_Get` and the first members of a variable in their places, and of
-//!    these only those with ioquake3's table keep a variable's description.
+//! Ten engines have the same version number with seven different tables, and the same entry of another table is another
+//! function: in Quake3e, `Cvar_Get` of ioquake3 is `Free`. The tests, in this order:
+//! 1. [`VARIABLE`] in the environment overrides the rest;
+//! 2. the executable's file contains text that is specific to one family of engines ([`OTHERS`]);
+//! 3. an entry where ioquake3 has a function is no function, or functions continue far beyond ioquake3's table;
+//! 4. engines without these differences have `Cvar_Get` and the first members of a variable in ioquake3's places, and
+//!    only those with ioquake3's table store a variable's description.
 //!
-//! What cannot be looked at (no `/proc`, an unreadable file) decides nothing.
+//! A test whose data cannot be read (no `/proc`, an unreadable file) is skipped.
 
 use super::abi::refimport_t;
 use super::services::Ioq3;
@@ -17,13 +17,14 @@ use crate::engine::Services;
 use std::ops::Range;
 use std::sync::OnceLock;
 
-/// Environment variable: `ioquake3` takes any engine for one with ioquake3's tables.
+/// Environment variable: with `ioquake3`, any engine is treated as having ioquake3's tables.
 const VARIABLE: &str = "RELIGHT_ENGINE";
 
-/// Engines that speak our version number with other tables.
+/// Engines with our version number and other tables.
 struct Other {
     name: &'static str,
-    /// Text in the executable's file, spelled backwards: a program that this library is linked into does not hold it.
+    /// Text in the executable's file, spelled backwards, so that a program linked with this library does not contain
+    /// it.
     backwards: &'static str,
     /// `cl_renderer` of its own OpenGL renderer.
     opengl: &'static str,
@@ -54,19 +55,19 @@ const OTHERS: &[Other] = &[
 
 /// Services in ioquake3's table.
 const SERVICES: usize = size_of::<refimport_t>() / size_of::<usize>();
-/// The first of these that this library calls; what follows may be anything.
+/// Number of entries, from the first, that this library calls; later entries may be anything.
 const CALLED: usize = 35;
-/// From so many functions in a row on, a table is not ioquake3's. World of Padman, whose table begins with ioquake3's,
-/// has 44; Quake3e 56. What happens to lie behind a table on the stack is rarely a function, and never eight times.
+/// Number of consecutive functions from which a table is not ioquake3's. World of Padman, whose table begins with
+/// ioquake3's, has 44; Quake3e 56. A word after a table on the stack is rarely a function's address, and never eight in
+/// a row.
 const TOO_MANY: usize = 52;
 
-/// One line that says why this engine must not be served, and what to do; `None` for an engine with ioquake3's tables.
+/// Message that this engine is not supported, and what to do; `None` for an engine with ioquake3's tables.
 ///
 /// # Safety
-/// `imports` must point at the import table of an engine that speaks our version number, which must be the one that
-/// `engine` calls.
+/// `imports` must point at the import table of an engine with our version number, the same one that `engine` calls.
 pub unsafe fn refusal(engine: &Ioq3, imports: *const refimport_t) -> Option<String> {
-    // A variable that is not set is as one that is empty.
+    // An unset variable counts as empty.
     let wanted = std::env::var(VARIABLE).unwrap_or_default();
     let (found, opengl) = match is_ours(&wanted) {
         Some(true) => return None,
@@ -81,22 +82,21 @@ pub unsafe fn refusal(engine: &Ioq3, imports: *const refimport_t) -> Option<Stri
     ))
 }
 
-/// What the environment says about the engine, if anything.
+/// Value of the environment variable, if it is set.
 fn is_ours(variable: &str) -> Option<bool> {
     (!variable.is_empty()).then(|| variable.eq_ignore_ascii_case("ioquake3"))
 }
 
-/// What is not as in ioquake3, and the `cl_renderer` of the engine's OpenGL renderer.
+/// First difference from ioquake3, and the `cl_renderer` of the engine's OpenGL renderer.
 ///
 /// # Safety
-/// `imports` must point at the import table of an engine that speaks our version number, which must be the one that
-/// `engine` calls.
+/// `imports` must point at the import table of an engine with our version number, the same one that `engine` calls.
 unsafe fn difference(engine: &Ioq3, imports: *const refimport_t) -> Option<(String, &'static str)> {
     if let Some(other) = executable() {
         return Some((format!("it is {}", other.name), other.opengl));
     }
-    // SAFETY: a table of ioquake3 has as many words; of the shorter ones of other engines (39, 38 words), which lie on
-    // the stack, we read one or two words of the caller's frame.
+    // SAFETY: ioquake3's table has this number of words; for the shorter tables of other engines (39, 38 words), which
+    // are on the stack, this reads one or two words of the caller's frame.
     let services = unsafe { imports.cast::<[usize; SERVICES]>().read_unaligned() };
     let code = code_ranges();
     if !code.is_empty() {
@@ -117,7 +117,7 @@ unsafe fn difference(engine: &Ioq3, imports: *const refimport_t) -> Option<(Stri
     ))
 }
 
-/// The engine that the file of the running program names, if it is one of [`OTHERS`]. Looked up once.
+/// The engine in [`OTHERS`] that the running program's file contains. Searched once.
 fn executable() -> Option<&'static Other> {
     static FOUND: OnceLock<Option<&'static Other>> = OnceLock::new();
     *FOUND.get_or_init(|| {
@@ -126,7 +126,7 @@ fn executable() -> Option<&'static Other> {
     })
 }
 
-/// Which of [`OTHERS`] these bytes of a program name.
+/// The engine in [`OTHERS`] whose text a program's bytes contain.
 fn marked(bytes: &[u8]) -> Option<&'static Other> {
     OTHERS.iter().find(|other| {
         let marker: Vec<u8> = other.backwards.bytes().rev().collect();
@@ -137,12 +137,12 @@ fn marked(bytes: &[u8]) -> Option<&'static Other> {
     })
 }
 
-/// What in a table, and in the words after it, cannot be ioquake3's.
+/// Description of the first entry of a table, or word after it, that differs from ioquake3.
 fn odd_table(services: &[usize], beyond: &[usize], code: &[Range<usize>]) -> Option<String> {
     let is_function = |word: usize| code.iter().any(|range| range.contains(&word));
     let called = services.iter().take(CALLED);
     for (number, &word) in called.enumerate() {
-        // null is "not there", which callers mind
+        // null entries are allowed; callers test for them
         if word != 0 && !is_function(word) {
             return Some(format!("service {number} of its table is no function"));
         }
@@ -154,13 +154,13 @@ fn odd_table(services: &[usize], beyond: &[usize], code: &[Range<usize>]) -> Opt
         .then(|| format!("its table has {functions} services or more, ioquake3's {SERVICES}"))
 }
 
-/// Addresses of the process that hold code; empty where that cannot be known.
+/// Address ranges of the process that hold code; empty if they cannot be read.
 fn code_ranges() -> Vec<Range<usize>> {
     let maps = std::fs::read("/proc/self/maps").unwrap_or_default();
     code_in(&String::from_utf8_lossy(&maps))
 }
 
-/// The ranges of `/proc/self/maps` that may be executed.
+/// The executable ranges of `/proc/self/maps`.
 fn code_in(maps: &str) -> Vec<Range<usize>> {
     let range = |line: &str| {
         let (addresses, rest) = line.split_once(' ')?;
@@ -172,7 +172,8 @@ fn code_in(maps: &str) -> Vec<Range<usize>> {
     maps.lines().filter_map(range).collect()
 }
 
-/// The words that follow a table on the stack, as far as they can be read; through the kernel, since they are not ours.
+/// The words after a table on the stack, as far as they are readable; read through the kernel, because they may be
+/// unmapped.
 #[cfg(unix)]
 fn words_after(address: usize) -> Vec<usize> {
     use std::os::unix::fs::FileExt;

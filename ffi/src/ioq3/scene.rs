@@ -1,4 +1,4 @@
-//! Registration of assets, the scene, 2D drawing and questions about the world.
+//! Registration of assets, the scene, 2D drawing and queries of the world.
 
 use super::abi::{
     QBool, Vec3C, fontInfo_t, markFragment_t, orientation_t, polyVert_t, refEntity_t, refdef_t,
@@ -15,9 +15,9 @@ use renderer_vk::api::{CinematicFrame, DynamicLight, PolyVert, StretchedPicture,
 use renderer_vk::path::PathPoint;
 use std::ffi::{c_char, c_float, c_int, c_uchar};
 
-/// Corners of a decal's polygon that are looked at.
+/// Maximum number of corners of a decal's polygon that are read.
 const MAX_MARK_POINTS: usize = 64;
-/// Longest side of a picture that is handed over for drawing; keeps sizes far from overflow.
+/// Maximum side of a raw picture; prevents overflow of sizes.
 const MAX_RAW_SIDE: c_int = 1 << 14;
 
 /// Runs a registration of something by name.
@@ -32,43 +32,43 @@ unsafe fn register(name: *const c_char, f: impl FnOnce(&mut Renderer, &str) -> i
     })
 }
 
-/// `re.RegisterModel`. A name without a model answers 0.
+/// `re.RegisterModel`. A name without a model returns 0.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `name` must be null, which counts as an empty name, or a
 /// NUL-terminated string.
 pub unsafe extern "C" fn register_model(name: *const c_char) -> c_int {
-    // SAFETY: the name that the engine asks for, null or NUL-terminated by this function's contract.
+    // SAFETY: the requested name, null or NUL-terminated by this function's contract.
     unsafe { register(name, |renderer, name| renderer.register_model(name)) }
 }
 
-/// `re.RegisterSkin`. A name without a skin answers 0.
+/// `re.RegisterSkin`. A name without a skin returns 0.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `name` must be null, which counts as an empty name, or a
 /// NUL-terminated string.
 pub unsafe extern "C" fn register_skin(name: *const c_char) -> c_int {
-    // SAFETY: the name that the engine asks for, null or NUL-terminated by this function's contract.
+    // SAFETY: the requested name, null or NUL-terminated by this function's contract.
     unsafe { register(name, |renderer, name| renderer.register_skin(name)) }
 }
 
-/// `re.RegisterShader`. A name without a material or an image answers 0.
+/// `re.RegisterShader`. A name without a material or an image returns 0.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `name` must be null, which counts as an empty name, or a
 /// NUL-terminated string.
 pub unsafe extern "C" fn register_shader(name: *const c_char) -> c_int {
-    // SAFETY: the name that the engine asks for, null or NUL-terminated by this function's contract.
+    // SAFETY: the requested name, null or NUL-terminated by this function's contract.
     unsafe { register(name, |renderer, name| renderer.register_shader(name, true)) }
 }
 
-/// `re.RegisterShaderNoMip`. A name without a material or an image answers 0.
+/// `re.RegisterShaderNoMip`. A name without a material or an image returns 0.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `name` must be null, which counts as an empty name, or a
 /// NUL-terminated string.
 pub unsafe extern "C" fn register_shader_no_mip(name: *const c_char) -> c_int {
-    // SAFETY: the name that the engine asks for, null or NUL-terminated by this function's contract.
+    // SAFETY: the requested name, null or NUL-terminated by this function's contract.
     unsafe { register(name, |renderer, name| renderer.register_shader(name, false)) }
 }
 
@@ -84,7 +84,7 @@ pub unsafe extern "C" fn register_font(
 ) {
     entry(|| {
         with_renderer(|renderer, _| {
-            // The file is found by the size alone, whatever the font is called.
+            // Only the size determines the file, whatever the font's name.
             match renderer.register_font(point_size) {
                 // SAFETY: not null, so it has room for a `fontInfo_t` by this function's contract.
                 Some(font) if !out.is_null() => unsafe {
@@ -111,7 +111,8 @@ pub unsafe extern "C" fn load_world(name: *const c_char) {
             if renderer.world_name().is_some() {
                 return Err(Failure::drop(format!("{name}: a map is loaded already")));
             }
-            // The game may have changed a latched setting since the frame began, such as one that its server forbids.
+            // The game may have changed a latched setting since the frame began, for example because its server forbids
+            // a value.
             if let Some(cvars) = &front.cvars {
                 cvars::apply(cvars, &mut front.settings);
                 renderer.set_settings(&front.settings);
@@ -125,7 +126,7 @@ pub unsafe extern "C" fn load_world(name: *const c_char) {
 /// itself.
 ///
 /// # Safety
-/// Nothing is asked of the caller: the pointer is not used, and the call always returns.
+/// None: the pointer is not used, and the call always returns.
 pub unsafe extern "C" fn set_world_vis_data(_vis: *const c_uchar) {}
 
 /// `re.ClearScene`.
@@ -141,8 +142,8 @@ pub unsafe extern "C" fn clear_scene() {
     });
 }
 
-/// `re.AddRefEntityToScene`. An entity with a NaN in its origin is left out; one of an unknown type ends in the
-/// engine's `Error`.
+/// `re.AddRefEntityToScene`. An entity with a NaN in its origin is omitted; one of an unknown type ends in the engine's
+/// `Error`.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `from` must be null, which adds nothing, or point at a
@@ -152,8 +153,8 @@ pub unsafe extern "C" fn add_ref_entity(from: *const refEntity_t) {
         if from.is_null() {
             return Ok(());
         }
-        // SAFETY: not null, so it points at an entity by this function's contract, perhaps in a game module's memory,
-        // which aligns nothing. All of its members are numbers: any bytes are a value.
+        // SAFETY: not null, so it points at an entity by this function's contract, possibly in a game module's
+        // unaligned memory. All of its members are numbers: any bytes are valid.
         let from = unsafe { from.read_unaligned() };
         draw(|renderer, front| {
             if from.origin.iter().any(|v| v.is_nan()) {
@@ -177,11 +178,12 @@ pub unsafe extern "C" fn add_ref_entity(from: *const refEntity_t) {
     });
 }
 
-/// `re.AddPolyToScene`: `num` polygons of `num_verts` corners each. Material 0 is reported and left out.
+/// `re.AddPolyToScene`: `num` polygons of `num_verts` corners each. Polygons with material 0 are omitted with a
+/// warning.
 ///
 /// # Safety
-/// The [call contract](crate::boundary#call-contract). `verts` must be null, or point at `num * num_verts`
-/// corners one behind the other, which are copied. Null, or a count below 1, adds nothing.
+/// The [call contract](crate::boundary#call-contract). `verts` must be null, or point at `num * num_verts` contiguous
+/// corners, which are copied. Null, or a count below 1, adds nothing.
 pub unsafe extern "C" fn add_poly(
     shader: c_int,
     num_verts: c_int,
@@ -208,7 +210,7 @@ pub unsafe extern "C" fn add_poly(
             convert::poly_vert(&unsafe { verts.add(i).read_unaligned() })
         };
         draw(|renderer, _| {
-            // marks and puffs come by the hundred in a frame and have few corners: those need no memory
+            // frames may have hundreds of marks and puffs with few corners: these need no allocation
             let mut few = [PolyVert::default(); 16];
             if let Some(corners) = few.get_mut(..per_poly) {
                 for first in (0..count).step_by(per_poly) {
@@ -235,7 +237,7 @@ unsafe fn add_light_of(origin: *const Vec3C, radius: f32, color: Vec3, additive:
         // SAFETY: null or three floats by this function's contract.
         let origin = unsafe { convert::vector(origin) };
         draw(|renderer, _| {
-            // Also false for a radius that is no number.
+            // Also false for a NaN radius.
             if radius > 0.0 && origin.is_finite() && color.is_finite() {
                 renderer.add_light(DynamicLight {
                     origin,
@@ -253,7 +255,7 @@ unsafe fn add_light_of(origin: *const Vec3C, radius: f32, color: Vec3, additive:
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `origin` must be null, which counts as the world's origin, or
-/// point at three floats. A radius that is not above 0 and a place or colour that is not finite add nothing.
+/// point at three floats. A radius that is not above 0, and an origin or colour that is not finite, add nothing.
 pub unsafe extern "C" fn add_light(
     origin: *const Vec3C,
     radius: c_float,
@@ -261,7 +263,7 @@ pub unsafe extern "C" fn add_light(
     g: c_float,
     b: c_float,
 ) {
-    // SAFETY: the light's place, null or three floats by this function's contract.
+    // SAFETY: the light's origin, null or three floats by this function's contract.
     unsafe { add_light_of(origin, radius, Vec3::new(r, g, b), false) };
 }
 
@@ -269,7 +271,7 @@ pub unsafe extern "C" fn add_light(
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `origin` must be null, which counts as the world's origin, or
-/// point at three floats. A radius that is not above 0 and a place or colour that is not finite add nothing.
+/// point at three floats. A radius that is not above 0, and an origin or colour that is not finite, add nothing.
 pub unsafe extern "C" fn add_additive_light(
     origin: *const Vec3C,
     radius: c_float,
@@ -277,7 +279,7 @@ pub unsafe extern "C" fn add_additive_light(
     g: c_float,
     b: c_float,
 ) {
-    // SAFETY: the light's place, null or three floats by this function's contract.
+    // SAFETY: the light's origin, null or three floats by this function's contract.
     unsafe { add_light_of(origin, radius, Vec3::new(r, g, b), true) };
 }
 
@@ -291,8 +293,8 @@ pub unsafe extern "C" fn render_scene(from: *const refdef_t) {
         if from.is_null() {
             return Ok(());
         }
-        // SAFETY: not null, so it points at a view by this function's contract, perhaps in a game module's memory. All
-        // of its members are numbers: any bytes are a value.
+        // SAFETY: not null, so it points at a view by this function's contract, possibly in a game module's memory. All
+        // of its members are numbers: any bytes are valid.
         let view = convert::view(&unsafe { from.read_unaligned() });
         draw(|renderer, front| {
             if front.settings.no_refresh {
@@ -305,7 +307,7 @@ pub unsafe extern "C" fn render_scene(from: *const refdef_t) {
             }
             renderer.render_scene(&view).map_err(Failure::from)
         })?;
-        // it calls back for each polygon, so the state is in its cell meanwhile
+        // the engine calls back for each polygon, so that the state is in its cell meanwhile
         let debugs = |cvars: &Cvars| cvars.flag(Cvar::DebugSurface);
         let wanted = with_renderer(|_, front| Ok(front.cvars.as_ref().is_some_and(debugs)))?;
         if let Some(engine) = engine::current().filter(|_| wanted) {
@@ -315,7 +317,7 @@ pub unsafe extern "C" fn render_scene(from: *const refdef_t) {
     });
 }
 
-/// A polygon of the engine's collision code: the callback of `ri.CM_DrawDebugSurface`.
+/// Receives a polygon of the engine's collision debugging: the callback of `ri.CM_DrawDebugSurface`.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `points` must be null, which draws nothing, or point at `count`
@@ -373,10 +375,10 @@ pub unsafe extern "C" fn stretch_pic(x: c_float, y: c_float, w: c_float, h: c_fl
     });
 }
 
-/// The pixels behind a raw picture: `cols * rows` of four bytes.
+/// The pixels of a raw picture: `cols * rows` of four bytes.
 ///
 /// # Safety
-/// `data` must be null or hold that many bytes for as long as the answer is used.
+/// `data` must be null or hold that many bytes while the result is used.
 unsafe fn raw_pixels<'a>(
     cols: c_int,
     rows: c_int,
@@ -401,7 +403,7 @@ unsafe fn raw_pixels<'a>(
 #[allow(clippy::too_many_arguments)] // the engine's signature
 pub unsafe extern "C" fn stretch_raw(x: c_int, y: c_int, w: c_int, h: c_int, cols: c_int, rows: c_int, data: *const c_uchar, client: c_int, dirty: QBool) {
     entry(|| {
-        // Decided before a byte is read: the engine's own renderer stops on such sizes too.
+        // Checked before data is read: the engine's own renderer also refuses such sizes.
         if [cols, rows].iter().any(|&n| n <= 0 || !n.cast_unsigned().is_power_of_two()) {
             return Err(Failure::drop(format!("a raw picture of {cols}x{rows} pixels: both must be powers of two")));
         }
@@ -452,7 +454,7 @@ pub unsafe extern "C" fn upload_cinematic(
     });
 }
 
-/// `re.LightForPoint`. Without a map, or in one without a light grid, this answers 0 and writes nothing.
+/// `re.LightForPoint`. Without a map, or in one without a light grid, this returns 0 and writes nothing.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `point` must be null, which counts as the world's origin, or
@@ -492,7 +494,7 @@ pub unsafe extern "C" fn light_for_point(
 /// - `point_buffer` must be null or have room for `max_points` vectors, `fragment_buffer` for `max_fragments`
 ///   fragments.
 ///
-/// Null where points or a buffer should be, or a count below 1, answers 0 and writes nothing.
+/// Null where points or a buffer should be, or a count below 1, returns 0 and writes nothing.
 #[rustfmt::skip]
 #[allow(clippy::too_many_arguments)] // the engine's signature
 pub unsafe extern "C" fn mark_fragments(num_points: c_int, points: *const Vec3C, projection: *const Vec3C, max_points: c_int, point_buffer: *mut Vec3C, max_fragments: c_int, fragment_buffer: *mut markFragment_t) -> c_int {
@@ -518,7 +520,7 @@ pub unsafe extern "C" fn mark_fragments(num_points: c_int, points: *const Vec3C,
             }
             let mut written = 0;
             for fragment in fragments.iter().take(max_fragments) {
-                // Nothing may point outside what was written.
+                // No fragment may refer to points that were not written.
                 if fragment.first_point.checked_add(fragment.num_points).is_none_or(|end| end > points.len().min(max_points)) {
                     break;
                 }
@@ -532,7 +534,7 @@ pub unsafe extern "C" fn mark_fragments(num_points: c_int, points: *const Vec3C,
     })
 }
 
-/// `re.LerpTag`. A model or tag that does not exist answers 0 and writes the identity at the origin.
+/// `re.LerpTag`. A model or tag that does not exist returns 0 and writes the identity at the origin.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `name` must be null, which counts as an empty name, or a
@@ -574,7 +576,7 @@ pub unsafe extern "C" fn model_bounds(model: c_int, mins: *mut Vec3C, maxs: *mut
     });
 }
 
-/// The leading number of a text, as C's `atof` reads it; 0 without one.
+/// The leading number of a text, as C's `atof` parses it; 0 without one.
 fn number(text: &str) -> f32 {
     let text = text.trim_start();
     let mut best = 0.0;
@@ -618,11 +620,11 @@ pub unsafe extern "C" fn remap_shader(
     });
 }
 
-/// `re.GetEntityToken`: the next word of the map's entities, cut to fit. At their end this answers 0 and an empty text.
+/// `re.GetEntityToken`: the next word of the map's entities, truncated. At their end this returns 0 and an empty text.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `buffer` must be null or have room for `size` bytes. Null or a
-/// size below 1 answers 0 and writes nothing.
+/// size below 1 returns 0 and writes nothing.
 pub unsafe extern "C" fn get_entity_token(buffer: *mut c_char, size: c_int) -> QBool {
     entry(|| {
         let (Ok(room @ 1..), false) = (usize::try_from(size), buffer.is_null()) else {
@@ -640,7 +642,7 @@ pub unsafe extern "C" fn get_entity_token(buffer: *mut c_char, size: c_int) -> Q
     })
 }
 
-/// `re.inPVS`. Without a map this answers 0.
+/// `re.inPVS`. Without a map this returns 0.
 ///
 /// # Safety
 /// The [call contract](crate::boundary#call-contract). `from` and `to` must each be null, which counts as the world's
@@ -658,7 +660,7 @@ pub unsafe extern "C" fn in_pvs(from: *const Vec3C, to: *const Vec3C) -> QBool {
                 .is_some()
                 .then(|| (renderer.leaf_cluster(from), renderer.leaf_cluster(to))))
         })?;
-        // The engine's collision model holds the same map; its rows have a bit for each cluster of it.
+        // The engine's collision model is of the same map; its rows have a bit for each cluster.
         Ok(QBool::from(
             clusters.is_some_and(|(from, to)| engine.cluster_sees(from, to)),
         ))

@@ -1,7 +1,7 @@
-//! The services of ioquake3's table, with the raw pointers and the C strings kept inside.
+//! The services of ioquake3's table; raw pointers and C strings stay inside of this module.
 //!
-//! Every service may leave by `longjmp` when the engine meets an error of its own. The calls here keep nothing on the
-//! stack that needs a destructor for correctness; what can leak in such a case is memory alone.
+//! Every service may leave by `longjmp` on an error of the engine. The calls here have no destructor on the stack that
+//! correctness depends on; only memory can leak in this case.
 
 use super::abi::{self, QBool, cvar_t, refimport_t};
 use crate::engine::{self, Services, Variable, string_from, valid_path_to_write};
@@ -9,11 +9,11 @@ use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_float, c_int, c_uchar, c_void};
 use std::ptr;
 
-/// Where `GetRefAPI` puts its copy of the engine's table.
+/// Storage for `GetRefAPI`'s copy of the engine's table.
 struct Imports(UnsafeCell<Option<refimport_t>>);
 
-// SAFETY: written by `GetRefAPI` alone and read by calls of the engine, all of them on the engine's main thread
-// (`session::on_main_thread` is asked before any other thread gets here).
+// SAFETY: only `GetRefAPI` writes it and calls of the engine read it, all on the engine's main thread
+// (`session::on_main_thread` refuses all other threads earlier).
 unsafe impl Sync for Imports {}
 
 static IMPORTS: Imports = Imports(UnsafeCell::new(None));
@@ -24,14 +24,14 @@ pub struct Ioq3(());
 
 static IOQ3: Ioq3 = Ioq3(());
 
-/// A cvar as ioquake3 lays it out.
+/// A variable in ioquake3's layout.
 fn raw(cvar: Variable) -> *mut cvar_t {
     cvar.as_ptr().cast()
 }
 
-/// Hands the pieces of `text` to `f`, each short enough for the engine's print buffer and NUL-terminated.
+/// Passes the pieces of `text` to `f`, each short enough for the engine's print buffer and NUL-terminated.
 ///
-/// The buffer is on the stack, so that nothing needs to be freed when `f` does not come back.
+/// The buffer is on the stack, so that nothing leaks if `f` does not return.
 fn in_c_pieces(text: &str, mut f: impl FnMut(*const c_char)) {
     // The engine formats into 4096 bytes.
     const PIECE: usize = 3500;
@@ -52,14 +52,14 @@ fn in_c_pieces(text: &str, mut f: impl FnMut(*const c_char)) {
 }
 
 impl Ioq3 {
-    /// Takes over the engine's table and installs its services.
+    /// Stores the engine's table and installs its services.
     ///
     /// # Safety
-    /// Every function of the table must be callable with the signature that the engine's ABI gives it for as long as
-    /// the process lives, and this must run on the engine's main thread while no other call of ours runs.
+    /// Every function of the table must be callable with the signature of the engine's ABI until the process ends, and
+    /// this must run on the engine's main thread while no other call of ours runs.
     pub unsafe fn install(table: refimport_t) -> &'static Ioq3 {
-        // SAFETY: no other call of ours runs, and this is the main thread, by this function's contract: nobody else
-        // reads or writes the table.
+        // SAFETY: no other call of ours runs, and this is the main thread, by this function's contract: no other code
+        // accesses the table.
         unsafe { *IMPORTS.0.get() = Some(table) };
         engine::install(&IOQ3);
         &IOQ3
@@ -71,16 +71,16 @@ impl Ioq3 {
         unsafe { (*IMPORTS.0.get()).as_ref().and_then(pick) }
     }
 
-    /// Describes a cvar and looks whether the engine keeps that, as those with ioquake3's tables do. In the others of
-    /// its family the same entry of the table only looks for a variable of that name, and the member is another pointer
-    /// into the engine's memory.
+    /// Sets a variable's description and tests whether the engine stores it, as engines with ioquake3's tables do. In
+    /// the other engines of its family, the same entry of the table only searches a variable of that name, and the
+    /// member is another pointer into the engine's memory.
     pub fn cvar_keeps_description(self, cvar: Variable, text: &CStr) -> bool {
         self.cvar_describe(cvar, text);
-        // SAFETY: the engine's own variable; in the others of the family, too, it has a member in this place.
+        // SAFETY: the engine's own variable; in the other engines of the family, too, it has a member at this offset.
         let kept = unsafe { (*raw(cvar)).description }.cast::<u8>();
         let mut bytes = text.to_bytes_with_nul().iter().enumerate();
-        // SAFETY: bytes are read up to the first that differs: in a copy of the text its zero is the last one read, and
-        // what other engines keep here is a variable, which holds more bytes than agree with a text.
+        // SAFETY: bytes are read up to the first difference: in a copy of the text, its zero is the last byte read; in
+        // other engines the pointer is to a variable, which is larger than the matching part.
         !kept.is_null() && bytes.all(|(i, &byte)| unsafe { *kept.add(i) } == byte)
     }
 }
@@ -123,30 +123,30 @@ impl Services for Ioq3 {
     }
 
     fn cvar_as_integer(&self, cvar: Variable) -> c_int {
-        // SAFETY: a `cvar_t` of the engine, which changes it on this thread alone: nothing writes while this reads.
+        // SAFETY: a `cvar_t` of the engine, which only this thread changes: there are no concurrent writes.
         unsafe { (*raw(cvar)).integer }
     }
 
     fn cvar_as_number(&self, cvar: Variable) -> f32 {
-        // SAFETY: a `cvar_t` of the engine, which changes it on this thread alone: nothing writes while this reads.
+        // SAFETY: a `cvar_t` of the engine, which only this thread changes: there are no concurrent writes.
         unsafe { (*raw(cvar)).value }
     }
 
     fn cvar_string(&self, cvar: Variable) -> String {
-        // SAFETY: a `cvar_t` of the engine, which changes it on this thread alone; its text is NUL-terminated
-        // and is copied before anything can change it.
+        // SAFETY: a `cvar_t` of the engine, which only this thread changes; its text is NUL-terminated and is copied
+        // before any change.
         unsafe { string_from((*raw(cvar)).string) }
     }
 
     fn cvar_modified(&self, cvar: Variable) -> bool {
-        // SAFETY: a `cvar_t` of the engine, which changes it on this thread alone: nothing writes while this reads.
+        // SAFETY: a `cvar_t` of the engine, which only this thread changes: there are no concurrent writes.
         unsafe { (*raw(cvar)).modified != 0 }
     }
 
     fn cvar_seen(&self, cvar: Variable) {
         const NO: QBool = 0;
-        // SAFETY: a `cvar_t` of the engine, which changes it on this thread alone. To clear this member is what
-        // the engine expects of a cvar's owner.
+        // SAFETY: a `cvar_t` of the engine, which only this thread changes. The engine expects a variable's owner to
+        // clear this member.
         unsafe { (*raw(cvar)).modified = NO }
     }
 
@@ -192,7 +192,8 @@ impl Services for Ioq3 {
         };
         (0..count)
             .map(|i| {
-                // SAFETY: the engine answers any index with a string that stays until the next command; copied at once.
+                // SAFETY: for any index the engine returns a string that is valid until the next command; copied at
+                // once.
                 unsafe { string_from(argv(i)) }
             })
             .collect()
@@ -209,8 +210,8 @@ impl Services for Ioq3 {
         let (Some(f), Ok(bit)) = (self.get(|t| t.CM_ClusterPVS), usize::try_from(to)) else {
             return false;
         };
-        // SAFETY: the engine takes any cluster. The row it answers has a bit for each cluster of the map, and `to` is
-        // a cluster of the map, by the caller's contract.
+        // SAFETY: the engine accepts any cluster. The row that it returns has a bit for each cluster of the map, and
+        // `to` is a cluster of the map, by the caller's contract.
         unsafe {
             let row = f(from);
             !row.is_null() && *row.add(bit / 8) & (1 << (bit % 8)) != 0
@@ -221,13 +222,13 @@ impl Services for Ioq3 {
         let read = self.get(|t| t.FS_ReadFile)?;
         let free = self.get(|t| t.FS_FreeFile)?;
         let mut buffer: *mut c_void = ptr::null_mut();
-        // SAFETY: the name is not empty (that would be a fatal error); the engine stores its buffer in ours.
+        // SAFETY: the name is not empty (an empty one is a fatal error); the engine writes the address of its buffer.
         let length = unsafe { read(name.as_ptr(), &mut buffer) };
         if buffer.is_null() {
             return None;
         }
         let contents = usize::try_from(length).ok().map(|length| {
-            // SAFETY: the engine's buffer holds `length` bytes and stays until it is freed.
+            // SAFETY: the engine's buffer holds `length` bytes and is valid until it is freed.
             unsafe { std::slice::from_raw_parts(buffer.cast::<u8>(), length) }.to_vec()
         });
         // SAFETY: freed once, before anything else is read: the engine's temporary memory is a stack.
@@ -236,7 +237,7 @@ impl Services for Ioq3 {
     }
 
     fn has_file(&self, name: &CStr) -> bool {
-        // SAFETY: with no buffer to fill the engine only looks.
+        // SAFETY: without a buffer, the engine only tests for the file.
         self.get(|t| t.FS_ReadFile)
             .is_some_and(|f| unsafe { f(name.as_ptr(), ptr::null_mut()) } >= 0)
     }
@@ -256,7 +257,7 @@ impl Services for Ioq3 {
         }
         let copied = (0..usize::try_from(count).unwrap_or(0))
             .map(|i| {
-                // SAFETY: `count` strings stand in the list.
+                // SAFETY: the list holds `count` strings.
                 unsafe { string_from(*names.add(i)) }
             })
             .collect();
@@ -285,7 +286,7 @@ impl Services for Ioq3 {
     }
 
     fn play_cinematic(&self, name: &CStr) -> Option<c_int> {
-        // SAFETY: the name lives through the call. The size only matters to videos that the engine draws itself.
+        // SAFETY: the name lives through the call. The size matters only for videos that the engine draws itself.
         let handle = self
             .get(|t| t.CIN_PlayCinematic)
             .map(|f| unsafe { f(name.as_ptr(), 0, 0, 256, 256, abi::CIN_MATERIAL) })?;
@@ -297,7 +298,7 @@ impl Services for Ioq3 {
             self.get(|t| t.CIN_RunCinematic),
             self.get(|t| t.CIN_UploadCinematic),
         ) {
-            // SAFETY: the engine takes any handle that `play_cinematic` answered, also of a video that ended.
+            // SAFETY: the engine accepts any handle from `play_cinematic`, also of a video that has ended.
             unsafe {
                 run(handle);
                 upload(handle);
@@ -307,7 +308,7 @@ impl Services for Ioq3 {
 
     fn draw_debug_surface(&self, polygon: unsafe extern "C" fn(c_int, c_int, *mut c_float)) {
         if let Some(f) = self.get(|t| t.CM_DrawDebugSurface) {
-            // SAFETY: the function has the type that the engine calls.
+            // SAFETY: the function has the type of the engine's callback.
             unsafe { f(Some(polygon)) }
         }
     }
@@ -365,7 +366,7 @@ mod tests {
         let mut joined = Vec::new();
         let mut pieces = 0;
         in_c_pieces(&text, |piece| {
-            // SAFETY: `in_c_pieces` hands over NUL-terminated text.
+            // SAFETY: `in_c_pieces` passes NUL-terminated text.
             let piece = unsafe { CStr::from_ptr(piece) };
             assert!(piece.to_bytes().len() < 4000);
             assert!(std::str::from_utf8(piece.to_bytes()).is_ok());

@@ -1,7 +1,7 @@
-//! The window: made by the renderer in this family of engines, used by the engine's input code.
+//! The window: the renderer makes it in this family of engines, and the engine's input code uses it.
 //!
-//! It lives in a cell of its own, apart from the renderer, because it must stay reachable when a call into the
-//! renderer was abandoned by an error of the engine (see `session`).
+//! It is stored in its own cell, separate from the renderer, because it must be accessible after an error of the engine
+//! has abandoned a call of the renderer (see `session`).
 
 pub mod modes;
 pub mod sdl;
@@ -18,19 +18,19 @@ use std::ffi::c_int;
 pub struct Window {
     sdl: Sdl,
     raw: WindowPtr,
-    /// Drawable size in pixels when the renderer was last registered.
+    /// Drawable size at the last registration, pixels.
     pub size: (u32, u32),
-    /// Width over height as seen.
+    /// Width over height of the display.
     pub aspect: f32,
-    /// A renderer that was never torn down may still present to it: the next registration must replace it.
+    /// A leaked renderer may still present to it: the next registration must replace the window.
     pub stale: bool,
-    /// The engine's input code has it.
+    /// The engine's input code uses it.
     given: bool,
 }
 
 struct OpenWindow(Cell<Option<Window>>);
 
-// SAFETY: exports alone come here, through `boundary::entry`, which refuses all threads but the engine's main one.
+// SAFETY: only exports access it, through `boundary::entry`, which refuses all threads but the engine's main one.
 unsafe impl Sync for OpenWindow {}
 
 static OPEN: OpenWindow = OpenWindow(Cell::new(None));
@@ -47,7 +47,7 @@ fn update(change: impl FnOnce(&mut Window)) {
     }
 }
 
-/// Takes note of the open window's present size: a new renderer starts with that.
+/// Updates the stored size of the open window, for a new renderer.
 pub fn refresh_size() {
     if let Some(size) = current().and_then(|window| window.drawable_size()) {
         update(|window| {
@@ -59,15 +59,15 @@ pub fn refresh_size() {
     }
 }
 
-/// Marks the open window as used by a renderer that can no longer be reached.
+/// Marks the open window as used by a leaked renderer.
 pub fn mark_stale() {
     update(|window| window.stale = true);
 }
 
-/// Why there is no window.
+/// Reason why no window was opened.
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
-    /// Not even the safe mode worked.
+    /// The safe mode failed, too.
     #[error(
         "no window could be opened for Vulkan ({0}); is there a display, and does its driver do Vulkan?"
     )]
@@ -82,7 +82,7 @@ struct Wish {
     borderless: bool,
 }
 
-/// What is tried, in order: what was asked for, the same with a frame, then the safe mode in a window.
+/// Attempts in order: the requested mode, the same in a window, the safe mode in a window.
 fn attempts(wish: Wish) -> Vec<Wish> {
     let mut list = vec![wish];
     for next in [
@@ -103,8 +103,7 @@ fn attempts(wish: Wish) -> Vec<Wish> {
     list
 }
 
-/// Settings that a crash may have been the fault of go back to safe ones when the engine says that the last run
-/// crashed and the player agreed.
+/// Resets settings that may have caused a crash, if the engine reports that the last run crashed and the player agreed.
 pub fn apply_safe_settings(engine: Engine) {
     if engine.cvar_integer(c"com_abnormalExit") == 0 {
         return;
@@ -127,16 +126,16 @@ fn custom(cvars: &Cvars) -> Custom {
     }
 }
 
-/// The size to render at without a window.
+/// The size for rendering without a window.
 pub fn headless_mode(cvars: &Cvars) -> Option<Mode> {
     modes::resolve(cvars.integer(Cvar::Mode), custom(cvars), None)
         .or_else(|| modes::resolve(modes::SAFE_MODE, custom(cvars), None))
 }
 
-/// Opens the window as the cvars say and remembers it. Does not tell the engine's input code yet.
+/// Opens the window by the variables and stores it. Does not pass it to the engine's input code.
 ///
 /// # Errors
-/// When neither the wanted mode nor the safe one works.
+/// Neither the requested mode nor the safe one works.
 pub fn open(engine: Engine, cvars: &Cvars) -> Result<Window, WindowError> {
     engine.video_init_hook(false);
     let sdl = Sdl::load()?;
@@ -228,7 +227,7 @@ fn open_once(engine: Engine, cvars: &Cvars, sdl: Sdl, wish: Wish) -> Result<Wind
             engine.say(&format!("{error}; the display keeps its mode\n"));
         }
     }
-    // SAFETY: this SDL made `raw` a few lines above, for Vulkan, and nobody closed it.
+    // SAFETY: this SDL made `raw` above, for Vulkan, and it is still open.
     let size = unsafe { sdl.drawable_size(raw) }.unwrap_or((mode.width, mode.height));
     let aspect = if size == (mode.width, mode.height) {
         mode.aspect
@@ -246,7 +245,7 @@ fn open_once(engine: Engine, cvars: &Cvars, sdl: Sdl, wish: Wish) -> Result<Wind
 }
 
 fn publish_sizes(engine: Engine, sdl: Sdl, window: &Window) {
-    // SAFETY: the caller, `open`, made the window just now.
+    // SAFETY: the caller, `open`, has just made the window.
     let display = unsafe { sdl.display_of(window.raw) };
     let desktop = sdl
         .desktop(display)
@@ -258,26 +257,26 @@ fn publish_sizes(engine: Engine, sdl: Sdl, window: &Window) {
     }
 }
 
-/// Closes the window, if one is open, and with `end_video` SDL's video too. The engine's input code lets go of it
-/// first. No Vulkan surface of it may be in use by a renderer that still runs.
+/// Closes the window, if one is open, and with `end_video` also SDL's video. The engine's input code releases it first.
+/// No Vulkan surface of it may be in use.
 pub fn close(engine: Engine, end_video: bool) {
     let Some(window) = OPEN.0.take() else { return };
     if window.given {
         engine.input_shutdown();
     }
-    // A renderer was given up in the middle of a call, by a signal or a fatal error: its driver's threads may still be
-    // showing a picture through SDL's connection, which has to stay for the moments that the process has left.
+    // A renderer was abandoned during a call, by a signal or a fatal error: its driver's threads may still present
+    // through SDL's connection, which must remain until the process ends.
     if end_video && window.stale {
         return;
     }
-    // SAFETY: the window is open and forgotten by everybody now.
+    // SAFETY: the window is open, and no other code uses it any more.
     unsafe { window.sdl.destroy(window.raw) };
     if end_video {
         window.sdl.stop_video();
     }
 }
 
-/// Hands a new window to the engine's input code.
+/// Passes a new window to the engine's input code.
 pub fn give_to_input_once(engine: Engine) {
     if let Some(window) = current().filter(|window| !window.given) {
         update(|window| window.given = true);
@@ -287,10 +286,10 @@ pub fn give_to_input_once(engine: Engine) {
 }
 
 impl Window {
-    /// What the renderer needs for a swapchain.
+    /// Window data for a swapchain.
     ///
     /// # Errors
-    /// When SDL has no Vulkan for this window.
+    /// SDL has no Vulkan support for this window.
     pub fn source(&self) -> Result<renderer_vk::Window, SdlError> {
         let (sdl, raw) = (self.sdl, self.raw);
         // SAFETY: the window is open: whoever has a `Window` got it from `current` or `open` in this call.
@@ -311,13 +310,13 @@ impl Window {
         })
     }
 
-    /// Whether it fills the screen.
+    /// Whether it is in full screen.
     pub fn is_fullscreen(&self) -> bool {
         // SAFETY: the window is open: a `Window` is only got from `current`, within one call of the engine.
         unsafe { self.sdl.is_fullscreen(self.raw) }
     }
 
-    /// Whether it is off the screen: minimised or not shown yet.
+    /// Whether it is invisible: minimised or not shown yet.
     pub fn is_hidden(&self) -> bool {
         // SAFETY: SDL reads the flags of a window that is open: whoever has a `Window` got it from `current` in this
         // call.
@@ -331,24 +330,24 @@ impl Window {
         unsafe { self.sdl.refresh_rate(self.raw) }
     }
 
-    /// Takes it off the screen until the player brings it back.
+    /// Minimises it.
     pub fn minimize(&self) {
         // SAFETY: the window is open: whoever has a `Window` got it from `current` in this call, and nothing closed it
         // since.
         unsafe { self.sdl.minimize(self.raw) }
     }
 
-    /// Drawable size in pixels as it is now.
+    /// Present drawable size, pixels.
     pub fn drawable_size(&self) -> Option<(u32, u32)> {
         // SAFETY: SDL reads the size of a window that is open: whoever has a `Window` got it from `current` or `open`
         // in this call.
         unsafe { self.sdl.drawable_size(self.raw) }
     }
 
-    /// Fills the screen or stops doing so.
+    /// Switches full screen on or off.
     ///
     /// # Errors
-    /// What SDL says.
+    /// An error of SDL.
     pub fn switch_fullscreen(&self, on: bool) -> Result<(), SdlError> {
         // SAFETY: the window is open: whoever has a `Window` got it from `current` in this call, and nothing closed it
         // since.
@@ -356,8 +355,8 @@ impl Window {
     }
 }
 
-/// Follows `r_fullscreen`, which the engine changes on Alt+Enter. Where the window cannot be switched, or comes out
-/// in another size than the game knows, the video system is restarted by a command.
+/// Applies `r_fullscreen`, which the engine changes on Alt+Enter. If the window cannot be switched, or its new size
+/// differs from the game's, a command restarts the video system.
 pub fn follow_fullscreen(engine: Engine, cvars: &Cvars) {
     if !cvars.modified(Cvar::Fullscreen) {
         return;

@@ -1,17 +1,17 @@
-//! Video modes: what `r_mode` means, and the list of sizes that menus offer.
+//! Video modes: sizes by `r_mode`, and the list of sizes for menus.
 
-/// A size to ask for, in pixels.
+/// A requested size, pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
     /// Pixels.
     pub width: u32,
     /// Pixels.
     pub height: u32,
-    /// Width over height as seen, with pixels that need not be square.
+    /// Width over height of the display; pixels need not be square.
     pub aspect: f32,
 }
 
-/// The sizes behind `r_mode` 0 to 11 and what `modelist` calls them.
+/// The sizes of `r_mode` 0 to 11 and their names in `modelist`.
 pub const MODES: [(&str, u32, u32); 12] = [
     ("320x240", 320, 240),
     ("400x300", 400, 300),
@@ -27,13 +27,13 @@ pub const MODES: [(&str, u32, u32); 12] = [
     ("856x480 (wide)", 856, 480),
 ];
 
-/// The mode that always works, tried last.
+/// The mode of the last attempt.
 pub const SAFE_MODE: i32 = 3;
 
-/// `r_mode` of the desktop's size.
+/// `r_mode` for the desktop's size.
 pub const DESKTOP_MODE: i32 = -2;
 
-/// The largest side that a window is asked for with; the device's own limit is checked by the renderer.
+/// Maximum side of a requested window, pixels; the renderer checks the device's own limit.
 const MAX_SIDE: u32 = 16384;
 
 fn mode(width: u32, height: u32, pixel_aspect: f32) -> Option<Mode> {
@@ -45,7 +45,7 @@ fn mode(width: u32, height: u32, pixel_aspect: f32) -> Option<Mode> {
     })
 }
 
-/// What the player asked for with `r_custom*`.
+/// The size in `r_custom*`.
 #[derive(Clone, Copy, Debug)]
 pub struct Custom {
     /// `r_customwidth`.
@@ -56,7 +56,7 @@ pub struct Custom {
     pub pixel_aspect: f32,
 }
 
-/// The size of a mode; `None` for a number that names none, a size that cannot be, or the desktop's when unknown.
+/// The size of a mode; `None` for an unknown number, an invalid size, or an unknown desktop size.
 pub fn resolve(number: i32, custom: Custom, desktop: Option<(u32, u32)>) -> Option<Mode> {
     match number {
         DESKTOP_MODE => desktop.and_then(|(width, height)| mode(width, height, 1.0)),
@@ -79,10 +79,10 @@ pub fn resolve(number: i32, custom: Custom, desktop: Option<(u32, u32)>) -> Opti
     }
 }
 
-/// Value of `r_availableModes`: sizes without repetition, those shaped most like the desktop first, then small to
-/// large, as far as a cvar can hold them.
+/// Value of `r_availableModes`: distinct sizes, those with the desktop's aspect ratio first, then in ascending order,
+/// up to the maximum length of a variable.
 pub fn available_list(mut sizes: Vec<(u32, u32)>, desktop: Option<(u32, u32)>) -> String {
-    // Longest value that the engine's consumers copy.
+    // Maximum length that the engine's menus copy.
     const LIMIT: usize = 1023;
     let shape = |(width, height): (u32, u32)| width as f32 / height as f32;
     let wanted = desktop

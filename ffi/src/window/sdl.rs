@@ -1,6 +1,6 @@
-//! SDL 2, found at run time: the one instance that the engine itself uses.
+//! SDL 2, loaded at run time: the same library that the engine uses.
 //!
-//! Declarations from SDL's stable 2.0 ABI (`SDL_video.h`, `SDL_vulkan.h`), written out by hand.
+//! Hand-written declarations of SDL's stable 2.0 ABI (`SDL_video.h`, `SDL_vulkan.h`).
 
 use libloading::Library;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
@@ -57,7 +57,7 @@ impl Default for DisplayMode {
     }
 }
 
-/// Why SDL cannot give a window.
+/// Reason why SDL cannot make a window.
 #[derive(Debug, thiserror::Error)]
 pub enum SdlError {
     /// Neither the engine nor the system has SDL.
@@ -71,7 +71,7 @@ pub enum SdlError {
     Call {
         /// SDL's name of the function.
         call: &'static str,
-        /// What SDL says.
+        /// An error of SDL.
         message: String,
     },
 }
@@ -131,12 +131,12 @@ const SDL_NAME: &str = "libSDL2-2.0.0.dylib";
 #[cfg(all(unix, not(target_os = "macos")))]
 const SDL_NAME: &str = "libSDL2-2.0.so.0";
 
-/// The SDL that is in the process already, as a shared library of its own or inside the executable; else the system's.
+/// The SDL that is already loaded, as a shared library or inside of the executable; otherwise the system's.
 fn open() -> Result<Library, SdlError> {
     #[cfg(unix)]
     {
         use libloading::os::unix::{Library as UnixLibrary, RTLD_LAZY, RTLD_NOW};
-        // glibc's value; the others of this family of systems agree or ignore it.
+        // glibc's value; other systems of this family have the same or ignore it.
         #[cfg(target_os = "linux")]
         const RTLD_NOLOAD: c_int = 4;
         #[cfg(not(target_os = "linux"))]
@@ -146,28 +146,28 @@ fn open() -> Result<Library, SdlError> {
             return Ok(library.into());
         }
         let own: Library = UnixLibrary::this().into();
-        // SAFETY: only asked whether it is there.
+        // SAFETY: only tests whether the symbol exists.
         if unsafe { own.get::<*const c_void>(b"SDL_CreateWindow\0") }.is_ok() {
             return Ok(own);
         }
-        // SAFETY: SDL's initialisers are made to run at load time.
+        // SAFETY: SDL's initialisers are safe at load time.
         unsafe { UnixLibrary::open(Some(SDL_NAME), RTLD_NOW) }
             .map(Into::into)
             .map_err(|e| SdlError::NoLibrary(e.to_string()))
     }
     #[cfg(windows)]
     {
-        // LoadLibrary answers the copy that the engine already loaded.
-        // SAFETY: SDL's initialisers are made to run at load time.
+        // LoadLibrary returns the copy that the engine has loaded.
+        // SAFETY: SDL's initialisers are safe at load time.
         unsafe { Library::new(SDL_NAME) }.map_err(|e| SdlError::NoLibrary(e.to_string()))
     }
 }
 
 impl Sdl {
-    /// Finds SDL. The library stays loaded: the engine holds it anyway.
+    /// Finds SDL. The library stays loaded, because the engine uses it.
     ///
     /// # Errors
-    /// When there is none, or it is too old for Vulkan.
+    /// SDL is absent, or too old for Vulkan.
     pub fn load() -> Result<Sdl, SdlError> {
         let library = open()?;
         let sdl = Sdl::from_library(&library);
@@ -176,46 +176,46 @@ impl Sdl {
     }
 
     fn error(&self, call: &'static str) -> SdlError {
-        // SAFETY: SDL takes this call at any time.
+        // SAFETY: SDL allows this call at any time.
         let text = unsafe { (self.get_error)() };
         // SAFETY: SDL's own NUL-terminated buffer, which its next error changes; copied at once.
         let message = unsafe { crate::engine::string_from(text) };
         SdlError::Call { call, message }
     }
 
-    /// Starts SDL's video unless it runs. Answers the driver's name.
+    /// Starts SDL's video unless it runs. Returns the driver's name.
     ///
     /// # Errors
-    /// When no display can be reached.
+    /// No display can be reached.
     pub fn start_video(&self) -> Result<String, SdlError> {
-        // SAFETY: SDL takes any set of subsystems, at any time.
+        // SAFETY: SDL allows any set of subsystems, at any time.
         let runs = unsafe { (self.was_init)(INIT_VIDEO) } != 0;
-        // SAFETY: on the engine's main thread, where the engine's own calls of SDL come from too.
+        // SAFETY: on the engine's main thread, which also makes the engine's own calls of SDL.
         if !runs && unsafe { (self.init_subsystem)(INIT_VIDEO) } != 0 {
             return Err(self.error("SDL_Init"));
         }
-        // SAFETY: SDL takes this call at any time.
+        // SAFETY: SDL allows this call at any time.
         let driver = unsafe { (self.video_driver)() };
         // SAFETY: null, or SDL's own static NUL-terminated name; copied at once.
         Ok(unsafe { crate::engine::string_from(driver) })
     }
 
-    /// Ends SDL's video. No window may be left.
+    /// Ends SDL's video. All windows must be closed.
     pub fn stop_video(&self) {
-        // SAFETY: on the engine's main thread; SDL counts who started its video, and ends it for the last one.
+        // SAFETY: on the engine's main thread; SDL counts the users of its video, and ends it after the last one.
         unsafe { (self.quit_subsystem)(INIT_VIDEO) }
     }
 
-    /// Size of the desktop of a display, if SDL knows it.
+    /// Size of a display's desktop, if SDL can determine it.
     pub fn desktop(&self, display: c_int) -> Option<DisplayMode> {
         let mut mode = DisplayMode::default();
-        // SAFETY: SDL takes any index and fills the structure for a good one.
+        // SAFETY: SDL accepts any index and fills the structure for a valid one.
         (unsafe { (self.desktop_mode)(display, &mut mode) } == 0).then_some(mode)
     }
 
-    /// Sizes that a display offers in full screen.
+    /// Full-screen sizes of a display.
     pub fn display_sizes(&self, display: c_int) -> Vec<(u32, u32)> {
-        // SAFETY: SDL takes any index; a bad one gives a negative count.
+        // SAFETY: SDL accepts any index; an invalid one gives a negative count.
         let count = unsafe { (self.num_display_modes)(display) };
         (0..count)
             .filter_map(|index| {
@@ -230,7 +230,7 @@ impl Sdl {
     /// Makes a window for Vulkan.
     ///
     /// # Errors
-    /// What SDL says, in particular when the video driver cannot do Vulkan.
+    /// An error of SDL, for example if the video driver does not support Vulkan.
     pub fn create(
         &self,
         title: &CStr,
@@ -268,7 +268,7 @@ impl Sdl {
     /// # Safety
     /// `window` must be a window of this SDL that is not used again.
     pub unsafe fn destroy(&self, window: WindowPtr) {
-        // SAFETY: `window` is an open window of this SDL by this function's contract, and nobody uses it from now on.
+        // SAFETY: `window` is an open window of this SDL by this function's contract, and is not used afterwards.
         unsafe { (self.destroy_window)(window) }
     }
 
@@ -281,7 +281,7 @@ impl Sdl {
         unsafe { (self.minimize_window)(window) }
     }
 
-    /// Whether a window fills its screen.
+    /// Whether a window is in full screen.
     ///
     /// # Safety
     /// `window` must be a window of this SDL.
@@ -290,7 +290,7 @@ impl Sdl {
         unsafe { (self.window_flags)(window) & flags::FULLSCREEN != 0 }
     }
 
-    /// Whether a window is off the screen.
+    /// Whether a window is invisible.
     ///
     /// # Safety
     /// `window` must be a window of this SDL.
@@ -299,10 +299,10 @@ impl Sdl {
         unsafe { (self.window_flags)(window) & (flags::HIDDEN | flags::MINIMIZED) != 0 }
     }
 
-    /// Fills the screen or goes back to a window.
+    /// Switches a window to full screen or back.
     ///
     /// # Errors
-    /// What SDL says.
+    /// An error of SDL.
     ///
     /// # Safety
     /// `window` must be a window of this SDL.
@@ -312,16 +312,16 @@ impl Sdl {
         if unsafe { (self.set_fullscreen)(window, flags) } != 0 {
             return Err(self.error("SDL_SetWindowFullscreen"));
         }
-        // SAFETY: no arguments; video runs, since there is a window. The new size is known once the window system's
-        // answer is in.
+        // SAFETY: no arguments; video runs, because there is a window. The new size is known after the window system's
+        // reply.
         unsafe { (self.pump_events)() };
         Ok(())
     }
 
-    /// Says which size and rate a window wants in full screen.
+    /// Sets the size and refresh rate of a window in full screen.
     ///
     /// # Errors
-    /// What SDL says.
+    /// An error of SDL.
     ///
     /// # Safety
     /// `window` must be a window of this SDL.
@@ -346,7 +346,7 @@ impl Sdl {
         }
     }
 
-    /// The display's rate in Hz for a window; 0 if unknown.
+    /// Refresh rate of a window's display, Hz; 0 if unknown.
     ///
     /// # Safety
     /// `window` must be a window of this SDL.
@@ -360,7 +360,7 @@ impl Sdl {
         }
     }
 
-    /// The display that a window is on; the first if unknown.
+    /// The display of a window; the first one if unknown.
     ///
     /// # Safety
     /// `window` must be a window of this SDL.
@@ -369,7 +369,7 @@ impl Sdl {
         unsafe { (self.display_index)(window) }.max(0)
     }
 
-    /// Size in pixels of what Vulkan draws to; `None` if it has none.
+    /// Size of a window's Vulkan surface, pixels; `None` if it has none.
     ///
     /// # Safety
     /// `window` must be a window of this SDL.
@@ -384,7 +384,7 @@ impl Sdl {
     /// Instance extensions that a surface for this window needs.
     ///
     /// # Errors
-    /// What SDL says.
+    /// An error of SDL.
     ///
     /// # Safety
     /// `window` must be a window of this SDL, made for Vulkan.
@@ -409,12 +409,12 @@ impl Sdl {
             .collect())
     }
 
-    /// `vkGetInstanceProcAddr` of the Vulkan loader that SDL took.
+    /// `vkGetInstanceProcAddr` of SDL's Vulkan loader.
     ///
     /// # Errors
-    /// When SDL has no Vulkan.
+    /// SDL has no Vulkan support.
     pub fn vulkan_entry(&self) -> Result<*const c_void, SdlError> {
-        // SAFETY: no arguments; SDL answers null where it has loaded no Vulkan.
+        // SAFETY: no arguments; SDL returns null if it has loaded no Vulkan.
         let entry = unsafe { (self.vulkan_loader)() };
         if entry.is_null() {
             Err(self.error("SDL_Vulkan_GetVkGetInstanceProcAddr"))
@@ -426,7 +426,7 @@ impl Sdl {
     /// Makes a `VkSurfaceKHR` for a window.
     ///
     /// # Errors
-    /// What SDL says.
+    /// An error of SDL.
     ///
     /// # Safety
     /// `window` must be a window of this SDL made for Vulkan, `instance` a live `VkInstance` with the extensions of
