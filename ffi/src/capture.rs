@@ -420,7 +420,7 @@ mod tests {
     }
 
     #[test]
-    fn a_still_picture_takes_samples_and_a_size_and_tells_tenths() {
+    fn still_arguments_are_parsed_and_progress_is_in_tenths() {
         let of = |arguments: &[&str]| {
             let arguments: Vec<String> = arguments.iter().map(|a| (*a).to_owned()).collect();
             still_arguments(&arguments)

@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rate_is_told_once_a_second() {
+    fn the_rate_is_reported_once_a_second() {
         let mut questions = Questions::default();
         let start = Instant::now();
         let at =

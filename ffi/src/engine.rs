@@ -241,7 +241,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_that_the_engine_would_die_of_are_refused() {
+    fn names_that_would_end_the_process_are_refused() {
         assert!(valid_game_path("").is_none());
         assert!(valid_game_path("a\0b").is_none());
         assert!(valid_game_path(&"x".repeat(64)).is_none());

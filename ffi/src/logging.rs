@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_become_the_engines() {
+    fn log_levels_map_to_engine_levels() {
         assert_eq!(level_of(Level::Error), 3);
         assert_eq!(level_of(Level::Warn), 2);
         assert_eq!(level_of(Level::Info), 0);

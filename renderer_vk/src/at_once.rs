@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn everything_is_made_once_whoever_makes_it() {
+    fn each_value_is_made_once_by_any_thread() {
         let count = AtomicUsize::new(0);
         let make = |n: usize| {
             let count = &count;

@@ -17,7 +17,7 @@ mod tests {
     use super::half;
 
     #[test]
-    fn halves_are_what_the_standard_says() {
+    fn half_floats_follow_ieee_754() {
         for (bits, value) in [
             (0x0000, 0.0),
             (0x3c00, 1.0),

@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_view_comes_back() {
+    fn path_lines_round_trip() {
         let point = PathPoint {
             time_ms: 1234,
             origin: Vec3::new(1.5, -2.25, 300.0),

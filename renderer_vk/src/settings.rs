@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_that_are_no_value_are_refused_with_what_a_value_is() {
+    fn invalid_texts_are_refused_with_the_valid_values() {
         let refused = |name, text| row(name).unwrap().check(text).unwrap_err().to_string();
         assert_eq!(
             refused("rt_bounces", "9"),

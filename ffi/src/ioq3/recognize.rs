@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn executables_are_known_by_their_text() {
+    fn executables_are_recognized_by_their_text() {
         let quake3e = marker(&OTHERS[0]);
         assert_eq!(
             (quake3e.len(), &quake3e[..6], &quake3e[20..]),
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn debians_engine_is_no_other() {
+    fn debians_engine_matches_no_other_engine() {
         let path = "/usr/lib/ioquake3/ioquake3";
         match std::fs::read(path) {
             Ok(bytes) => assert!(marked(&bytes).is_none()),
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_called_must_be_a_function_or_null() {
+    fn called_entries_must_be_functions_or_null() {
         let code = std::slice::from_ref(&(0x1000..0x2000));
         for (at, word, fine) in [
             (8, 0, true),
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn code_is_what_may_be_executed() {
+    fn executable_mappings_are_code() {
         let maps = "\
 55d0a0000000-55d0a0001000 r--p 00000000 fe:01 1234   /usr/lib/ioquake3/ioquake3
 55d0a0001000-55d0a0003000 r-xp 00001000 fe:01 1234   /usr/lib/ioquake3/ioquake3
@@ -296,7 +296,7 @@ ffffffffff600000-ffffffffff601000 --xp 00000000 00:00 0 [vsyscall]";
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn the_own_code_and_stack_can_be_looked_at() {
+    fn own_code_and_stack_are_readable() {
         let function = code_in as *const ();
         let code = code_ranges();
         assert!(code.iter().any(|range| range.contains(&function.addr())));

@@ -296,7 +296,7 @@ fn liquids_and_reflections_come_from_directives() {
 }
 
 #[test]
-fn what_the_game_fades_by_alpha_is_matter() {
+fn stages_that_the_game_fades_by_alpha_are_matter() {
     let mut game = game();
     let index = game.find("t/smoke", LightmapClass::Page, true);
     let smoke = game.materials.get(index).clone();
@@ -437,7 +437,7 @@ fn settings_change_stages() {
 }
 
 #[test]
-fn films_that_cannot_be_played_take_later_stages_along() {
+fn unplayable_videos_drop_their_stage_and_later_ones() {
     let mut game = game();
     let index = game.find("t/broken", LightmapClass::None, true);
     assert_eq!(game.materials.get(index).stage_count, 3);

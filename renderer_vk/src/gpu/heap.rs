@@ -37,7 +37,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_thread_has_freed_goes_back_to_the_system() {
+    fn memory_freed_by_a_thread_returns_to_the_system() {
         let make = || {
             let mut blocks: Vec<Vec<u8>> = (0..64 << 10).map(|_| vec![1; 4 << 10]).collect();
             // a live block at the end prevents the C library from returning memory before it

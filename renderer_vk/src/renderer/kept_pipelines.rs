@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_place_nothing_is_kept() {
+    fn without_a_path_no_cache_is_stored() {
         let (kept, bytes) = KeptPipelines::read(None);
         assert!(bytes.is_none() && kept.path.is_none());
         let folder = tempfile::tempdir().unwrap();

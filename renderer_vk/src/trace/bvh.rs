@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_is_left_out() {
+    fn non_finite_triangles_are_omitted() {
         let good = [Vec3::ZERO, Vec3::X, Vec3::Y];
         for corner in 0..3 {
             for value in [f32::INFINITY, f32::NEG_INFINITY] {

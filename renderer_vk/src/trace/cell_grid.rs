@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_volume_has_no_grid() {
+    fn a_space_without_volume_has_no_grid() {
         let nodes = [BspNode::default()];
         for high in [Vec3::ZERO, Vec3::new(1.0, 1.0, f32::NAN), -Vec3::ONE] {
             assert_eq!(CellGrid::new(&nodes, Vec3::ZERO, high).size, UVec3::ZERO);

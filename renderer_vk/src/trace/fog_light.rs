@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lamp_gives_fog_what_arrives_in_the_mean() {
+    fn a_lamp_gives_fog_its_mean_radiance() {
         let color = Vec3::new(4000.0, 2000.0, 1000.0);
         let lamp = [point(Vec3::Z * 100.0, color)];
         let lists = lists(1);

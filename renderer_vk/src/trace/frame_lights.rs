@@ -313,7 +313,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whatever_the_game_asks_for_a_dynamic_light_can_be_computed_with() {
+    fn dynamic_lights_are_finite_for_any_input() {
         let light = |radius, color| DynamicLight {
             radius,
             color,

@@ -227,7 +227,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wish_is_met_where_the_device_can() {
+    fn an_unsupported_tracer_falls_back_to_the_fastest() {
         use Tracer::{Compute, Pipeline, Query};
         use TracerChoice as W;
         let (none, both) = (&[Compute][..], &[Pipeline, Query, Compute]);

@@ -191,7 +191,7 @@ mod tests {
     use q3bsp::builder::MapBuilder;
 
     #[test]
-    fn a_slope_of_45_degrees_faces_two_ways() {
+    fn a_slope_of_45_degrees_is_in_two_normal_bins() {
         let count = |normal: Vec3| (0..NORMAL_BINS).filter(|&f| faces(normal, f)).count();
         assert!(faces(Vec3::NEG_Y, 3) && count(Vec3::NEG_Y) == 1);
         let slope = Vec3::new(-0.707_2, 0.0, -0.707_0);
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_lies_in_a_box_is_left_of_a_triangle() {
+    fn triangles_are_clipped_to_a_box() {
         let up = |p| (p, Vec3::Z);
         let corners = [Vec3::ZERO, Vec3::Y * 100.0, Vec3::X * 100.0];
         let piece = Piece::new(corners.map(up)).unwrap();
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_know_which_ways_their_surfaces_face() {
+    fn cells_list_the_normal_bins_of_their_surfaces() {
         let mut map = MapBuilder::new();
         map.add_cell(Vec3::ZERO, Vec3::splat(100.0));
         let stone = map.add_shader("stone", 0, 0);

@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn lights_are_drawn_with_the_chance_that_they_tell() {
+    fn lights_are_sampled_with_their_stated_probability() {
         for weights in [
             vec![1.0],
             vec![0.0, 0.0, 0.0],

@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn chances_are_by_what_surfaces_that_face_one_way_get() {
+    fn probabilities_follow_the_light_on_surfaces_of_one_normal_bin() {
         // two equal lamps, one in front of a wall and one behind it, and a weak lamp that alone lights a distant point
         let wall = [Vec3::ZERO, Vec3::new(10.0, 0.0, 0.0)];
         let far = Vec3::X * 4000.0;
@@ -370,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_before_a_lamp_takes_its_chances() {
+    fn occluded_lamps_lose_probability() {
         // a board hides the left lamp from a floor
         let mut map = MapBuilder::new();
         let wall = map.add_shader("t/wall", 0, 1);
@@ -410,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_gives_nothing() {
+    fn lights_omitted_by_normal_bin_contribute_nothing() {
         let mut random = Random::new(1);
         let mut vector = || random.signed_point();
         let cell = Cell {

@@ -355,7 +355,7 @@ fn levels_of_real_curves_are_exact() {
 }
 
 #[test]
-fn what_rays_meet_of_a_curve_is_as_fine_as_asked() {
+fn curves_for_rays_meet_the_subdivision_limit() {
     // a quarter of a cylinder of radius 128 along y: control points on its tangents
     let radius = 128.0;
     let profile = [

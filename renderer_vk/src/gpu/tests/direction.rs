@@ -43,7 +43,7 @@ fn directions() -> Vec<Vec3> {
 }
 
 #[test]
-fn directions_of_rays_come_back_as_they_were() {
+fn packed_directions_round_trip() {
     let Some(device) = device(true) else {
         return;
     };

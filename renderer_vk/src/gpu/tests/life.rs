@@ -161,7 +161,7 @@ impl log::Log for Capture {
 }
 
 #[test]
-fn a_device_that_ends_in_the_middle_of_everything_leaves_nothing_behind() {
+fn a_device_dropped_with_pending_work_frees_everything() {
     log::set_logger(&Capture).unwrap();
     log::set_max_level(log::LevelFilter::Warn);
     let Some(device) = device(true) else { return };

@@ -147,7 +147,7 @@ fn assert_independent(pairs: impl Iterator<Item = (f32, f32)>, what: &str) {
 }
 
 #[test]
-fn numbers_of_one_frame_tell_nothing_of_each_other() {
+fn random_numbers_of_one_frame_are_independent() {
     let Some(mut source) = Source::new() else {
         return;
     };
@@ -190,7 +190,7 @@ fn numbers_of_one_frame_tell_nothing_of_each_other() {
 }
 
 #[test]
-fn sequences_of_a_pixel_tell_nothing_of_each_other() {
+fn random_sequences_of_a_pixel_are_independent() {
     let Some(mut source) = Source::new() else {
         return;
     };

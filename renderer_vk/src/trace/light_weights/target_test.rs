@@ -33,7 +33,7 @@ struct Push {
 }
 
 #[test]
-fn targets_are_those_of_the_shaders() {
+fn light_targets_match_the_shaders() {
     let options = DeviceOptions {
         validation: true,
         ..DeviceOptions::default()

@@ -84,15 +84,15 @@ fn temporal_antialiasing() {
     };
     at_rest_it_comes_to_the_mean_of_many_samples(&mut gpu);
     in_motion_it_stays_sharp(&mut gpu);
-    what_moves_leaves_nothing_behind(&mut gpu);
-    what_glows_and_moves_is_as_bright_as_it_is(&mut gpu);
+    moving_objects_leave_no_trail(&mut gpu);
+    moving_emissive_surfaces_keep_their_brightness(&mut gpu);
     a_smaller_traced_picture_comes_to_the_full_one(&mut gpu);
     the_lens_blurs_by_its_circle_of_confusion(&mut gpu);
     both_sides_of_a_reflection_come_to_rest(&mut gpu);
-    what_is_thin_comes_to_rest(&mut gpu);
-    what_is_thin_keeps_its_history_in_motion(&mut gpu);
+    thin_geometry_does_not_flicker(&mut gpu);
+    thin_geometry_keeps_its_history_in_motion(&mut gpu);
     a_mirror_shows_what_is_seen_from_behind_it(&mut gpu);
-    ripples_leave_nothing_behind(&mut gpu);
+    ripples_leave_no_trail(&mut gpu);
 }
 
 fn at_rest_it_comes_to_the_mean_of_many_samples(gpu: &mut Gpu) {
@@ -186,7 +186,7 @@ fn a_mirror_shows_what_is_seen_from_behind_it(gpu: &mut Gpu) {
 }
 
 /// Water before a floor of squares, its ripples running: with a camera that moves and with one that rests.
-fn ripples_leave_nothing_behind(gpu: &mut Gpu) {
+fn ripples_leave_no_trail(gpu: &mut Gpu) {
     let mut scene = checkerboard();
     let water = scene.material(&[stage::filter([1.0; 3])], LIQUID);
     scene.materials[water as usize].0.dielectric = Dielectric {
@@ -218,7 +218,7 @@ fn ripples_leave_nothing_behind(gpu: &mut Gpu) {
     }
 }
 
-fn what_moves_leaves_nothing_behind(gpu: &mut Gpu) {
+fn moving_objects_leave_no_trail(gpu: &mut Gpu) {
     let mut scene = checkerboard();
     let red = scene.material(&[stage::constant([0.9, 0.1, 0.1])], 0);
     let from = Vec3::new(-40.0, 40.0, 20.0);
@@ -254,7 +254,7 @@ fn what_moves_leaves_nothing_behind(gpu: &mut Gpu) {
     assert!(counts[1] <= counts[0], "{counts:?}");
 }
 
-fn what_glows_and_moves_is_as_bright_as_it_is(gpu: &mut Gpu) {
+fn moving_emissive_surfaces_keep_their_brightness(gpu: &mut Gpu) {
     // a thin bright line in the air, before a wall that rests: the wall's history must not swallow it
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, SIZE);
     let wall = scene.material(&[stage::constant([0.2; 3])], 0);
@@ -395,7 +395,7 @@ fn the_lens_blurs_by_its_circle_of_confusion(gpu: &mut Gpu) {
 }
 
 /// Poles as wide as a pixel, far before a wall: all around them lies the wall, and yet they were there in the last frame.
-fn what_is_thin_keeps_its_history_in_motion(gpu: &mut Gpu) {
+fn thin_geometry_keeps_its_history_in_motion(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, SIZE);
     let wall = scene.material(&[stage::constant([0.1; 3])], 0);
     let pole = scene.material(&[stage::constant([0.9; 3])], c::MATERIAL_TWO_SIDED);
@@ -434,7 +434,7 @@ fn what_is_thin_keeps_its_history_in_motion(gpu: &mut Gpu) {
 }
 
 /// Wires thinner than a pixel, far before a wall: most frames' samples miss them.
-fn what_is_thin_comes_to_rest(gpu: &mut Gpu) {
+fn thin_geometry_does_not_flicker(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, SIZE);
     let wall = scene.material(&[stage::constant([0.1; 3])], 0);
     let wire = scene.material(&[stage::constant([0.9; 3])], c::MATERIAL_TWO_SIDED);

@@ -17,7 +17,7 @@ use crate::trace::frame_lights::decode;
 gpu_tests! {
     any: [
         a_furnace_sums_its_bounces,
-        what_stores_a_part_of_its_light_throws_back_that_part,
+        lightmap_brightness_scales_reflectance,
         gloss_throws_back_what_its_picture_shows,
         a_red_wall_colours_the_floor,
         a_bounce_has_one_ray_for_lamps_and_sun,
@@ -105,7 +105,7 @@ fn a_furnace_sums_its_bounces(gpu: &mut Gpu) {
     }
 }
 
-fn what_stores_a_part_of_its_light_throws_back_that_part(gpu: &mut Gpu) {
+fn lightmap_brightness_scales_reflectance(gpu: &mut Gpu) {
     // the furnace with an albedo of a half: of light come back that part of it, but never more than all; what glows stays
     for (scale, part) in [(1.0, 0.5), (0.25, 0.125), (64.0, 1.0)] {
         let mut scene = Scene::new(

@@ -13,7 +13,7 @@ use crate::settings::{DenoiserChoice, Settings};
 gpu_tests! {
     any: [
         filtered_frames_come_near_the_reference,
-        what_comes_into_sight_has_no_history,
+        disoccluded_surfaces_have_no_history,
     ],
     compute: [
         light_that_is_switched_is_seen_soon,
@@ -124,7 +124,7 @@ fn filtered_frames_come_near_the_reference(gpu: &mut Gpu) {
     assert!(error < 0.3 * raw_error, "{error} {raw_error}");
 }
 
-fn what_comes_into_sight_has_no_history(gpu: &mut Gpu) {
+fn disoccluded_surfaces_have_no_history(gpu: &mut Gpu) {
     // a wall slides over everything: what it shows must not come from what was there before
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, 32);
     let white = scene.diffuse(1.0);

@@ -11,7 +11,7 @@ use crate::settings::{DebugOutput, DenoiserChoice, Settings};
 gpu_tests! {
     compute: [
         a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther,
-        what_rests_has_not_changed_whatever_place_in_the_pixel_is_seen,
+        static_surfaces_have_no_gradient_under_jitter,
         antialiasing_keeps_nothing_of_light_that_fades,
     ],
 }
@@ -102,7 +102,7 @@ fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther(gpu: &
     assert!(beyond.clone().all(|&n| n == 0), "beyond reach: {changed:?}");
 }
 
-fn what_rests_has_not_changed_whatever_place_in_the_pixel_is_seen(gpu: &mut Gpu) {
+fn static_surfaces_have_no_gradient_under_jitter(gpu: &mut Gpu) {
     // boards that lean on the wall: beside their edges are surfaces as far away that are lit otherwise
     let mut scene = halved_wall();
     let white = scene.diffuse(0.8);

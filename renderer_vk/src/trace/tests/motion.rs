@@ -76,10 +76,10 @@ fn check(gpu: &Gpu, first: &RefDef, expected: impl Fn(Vec3) -> Option<Vec3>) -> 
 
 fn motion_is_that_of_the_projection(gpu: &mut Gpu) {
     // one test, because compiling the pipelines takes longer than all of these
-    what_rests_moves_as_the_camera_does(gpu);
+    static_geometry_moves_with_the_camera(gpu);
     meshes_move_with_their_entities_and_by_their_vertices(gpu);
-    what_a_mirror_shows_moves_like_its_mirror_image(gpu);
-    what_a_portal_shows_moves_as_if_it_stood_there(gpu);
+    reflections_have_the_motion_of_the_mirror_image(gpu);
+    portal_views_have_the_motion_of_the_far_camera(gpu);
     the_sky_turns_but_does_not_come_nearer(gpu);
 }
 
@@ -100,7 +100,7 @@ fn room() -> Scene {
     scene
 }
 
-fn what_rests_moves_as_the_camera_does(gpu: &mut Gpu) {
+fn static_geometry_moves_with_the_camera(gpu: &mut Gpu) {
     let scene = room();
     gpu.render_views(&scene, &live(), 2, |frame, view| {
         if frame == 1 {
@@ -164,7 +164,7 @@ fn meshes_move_with_their_entities_and_by_their_vertices(gpu: &mut Gpu) {
     assert!(unknown > SIZE * SIZE / 2 && unknown < SIZE * SIZE);
 }
 
-fn what_a_mirror_shows_moves_like_its_mirror_image(gpu: &mut Gpu) {
+fn reflections_have_the_motion_of_the_mirror_image(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 50.0, SIZE);
     let white = scene.diffuse(0.9);
     scene.ambient = Vec3::ONE;
@@ -200,7 +200,7 @@ fn what_a_mirror_shows_moves_like_its_mirror_image(gpu: &mut Gpu) {
     assert_eq!(check(gpu, &scene.def, last) as i32, SIZE * SIZE);
 }
 
-fn what_a_portal_shows_moves_as_if_it_stood_there(gpu: &mut Gpu) {
+fn portal_views_have_the_motion_of_the_far_camera(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 50.0, SIZE);
     let white = scene.diffuse(0.9);
     scene.ambient = Vec3::ONE;
@@ -307,7 +307,7 @@ fn entities(time: f32, list: &[(i32, Vec3)]) -> TracedScene {
 }
 
 #[test]
-fn entities_are_found_again() {
+fn entities_are_matched_between_frames() {
     let mut motion = Motion::default();
     let at = |x: f32| Vec3::X * x;
     let follow = |motion: &mut Motion, time: f32, list: &[(i32, Vec3)]| -> Vec<(u32, f32)> {

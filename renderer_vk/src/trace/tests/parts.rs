@@ -129,7 +129,7 @@ fn skins_of_one_model_have_holes_of_their_own() {
 }
 
 #[test]
-fn what_is_pressed_flat_is_left_out() {
+fn instances_without_volume_are_omitted() {
     let mesh = || strip(&[0.2, 0.7]);
     assert_eq!(parts_of_skins(mesh(), &[0], Vec3::Z * 0.01).len(), 2);
     assert_eq!(parts_of_skins(mesh(), &[0], Vec3::ZERO), []);

@@ -13,7 +13,7 @@ gpu_tests! {
     any: [
         clouds_are_as_sharp_as_a_pixel_is_small,
         the_sun_is_a_square_in_its_direction,
-        what_the_visible_set_holds_shows_through_a_sky,
+        visible_surfaces_behind_a_sky_are_shown,
     ],
 }
 
@@ -145,7 +145,7 @@ fn the_sun_is_a_square_in_its_direction(gpu: &mut Gpu) {
     assert!(inside > 100 && inside < SIZE * SIZE / 2, "{inside}");
 }
 
-fn what_the_visible_set_holds_shows_through_a_sky(gpu: &mut Gpu) {
+fn visible_surfaces_behind_a_sky_are_shown(gpu: &mut Gpu) {
     const SIZE: usize = 16;
     let colors = [
         [0.0, 0.0, 0.4],

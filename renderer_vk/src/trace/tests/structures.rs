@@ -16,7 +16,7 @@ use crate::trace::input::Tracer;
 gpu_tests! {
     each: [
         kept_structures_show_what_built_ones_show,
-        what_is_not_a_number_hits_nothing_and_breaks_nothing,
+        non_finite_geometry_is_never_hit,
     ],
 }
 
@@ -230,7 +230,7 @@ fn a_thousand_entities_of_one_model_share_one_structure() {
     });
 }
 
-fn what_is_not_a_number_hits_nothing_and_breaks_nothing(gpu: &mut Gpu) {
+fn non_finite_geometry_is_never_hit(gpu: &mut Gpu) {
     let empty = gpu.render(&stage_scene(), &settings(), 1).0;
     for how in [How::Changing, How::Animated] {
         for bad in [f32::NAN, f32::INFINITY, 3.0e38] {

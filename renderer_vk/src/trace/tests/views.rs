@@ -17,7 +17,7 @@ use crate::trace::input::Tracer;
 gpu_tests! {
     any: [
         a_mirror_shows_what_is_behind_the_eye_and_who_looks,
-        what_turns_to_the_eye_is_met_on_its_own_way,
+        camera_facing_copies_are_hit_only_by_their_own_paths,
         back_faces_do_not_show,
         of_two_faces_in_one_plane_the_one_that_shows_is_met,
         the_sky_is_where_its_stages_say_and_lets_the_sun_in,
@@ -127,7 +127,7 @@ fn only_the_fronts_of_a_weapon_are_seen(gpu: &mut Gpu) {
     assert!(close(mean, linear(BLUE)), "{mean}");
 }
 
-fn what_turns_to_the_eye_is_met_on_its_own_way(gpu: &mut Gpu) {
+fn camera_facing_copies_are_hit_only_by_their_own_paths(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
     let red = scene.material(&[stage::constant(RED)], 0);
     let green = scene.material(&[stage::constant(GREEN)], 0);
