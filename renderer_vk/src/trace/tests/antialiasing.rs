@@ -1,4 +1,4 @@
-//! Temporal antialiasing, upscaling and the lens against pictures of many samples a pixel.
+//! Temporal antialiasing, upscaling and depth of field, compared with pictures of many samples per pixel.
 
 use glam::{Mat3, Vec3};
 use relight::compare::{Rgb8, compare};
@@ -13,7 +13,7 @@ use crate::settings::{DenoiserChoice, Settings};
 use crate::trace::input::Tracer;
 
 const SIZE: i32 = 64;
-/// Frames accumulated for a reference picture: its standard error is a sixteenth of that of one sample.
+/// Frames accumulated for a reference picture: its standard error is one sixteenth of a single sample's.
 const TRUTH: u32 = 256;
 
 fn live() -> Settings {
@@ -40,14 +40,14 @@ fn ssim(a: &[[u8; 4]], b: &[[u8; 4]]) -> f64 {
     compare(&picture(a), &picture(b)).expect("compared").ssim
 }
 
-/// Root of the mean square difference of what is shown, 0..255.
+/// Root mean square difference of display values, 0..255.
 fn error(a: &[[u8; 4]], b: &[[u8; 4]]) -> f64 {
     let difference = compare(&picture(a), &picture(b)).expect("compared");
     difference.root_mean_square
 }
 
-/// A floor of black and white squares seen aslant, with a few poles on it. What glows needs no light, so nothing in the
-/// picture is noisy but its edges.
+/// A floor of black and white squares at a grazing angle, with a few poles. All surfaces are emissive, so that only
+/// edges are noisy.
 fn checkerboard() -> Scene {
     let mut scene = Scene::new(
         Vec3::new(-150.0, 20.0, 70.0),
@@ -78,7 +78,7 @@ fn checkerboard() -> Scene {
 
 #[test]
 fn temporal_antialiasing() {
-    // one test, because compiling the pipelines takes longer than all of these; none of it depends on what traces
+    // one test, because compiling the pipelines takes longer than all of these; the results do not depend on the tracer
     let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
         return;
     };
@@ -105,14 +105,15 @@ fn at_rest_it_comes_to_the_mean_of_many_samples(gpu: &mut Gpu) {
     println!("at rest: error {raw} without, {now} with; SSIM {alike:?}");
     assert!(now < 0.3 * raw, "{now} {raw}");
     assert!(alike[1] > 0.975, "{alike:?}");
-    // it does not flicker
+    // no flicker
     let (_, next) = gpu.render(&scene, &live(), 65);
     let flicker = error(&settled, &next);
     println!("from frame to frame: {flicker}");
     assert!(flicker < 0.15 * raw, "{flicker} {raw}");
 }
 
-/// What a shiny floor reflects is far behind it, so its pixels are by turns of a short and of a long way.
+/// The reflection in a shiny floor is far behind it, so that its pixels alternate between a short and a long view
+/// distance.
 fn both_sides_of_a_reflection_come_to_rest(gpu: &mut Gpu) {
     let mut scene = checkerboard();
     let around = square(gpu, 1, &[128, 128, 128, 255]);
@@ -151,14 +152,15 @@ fn in_motion_it_stays_sharp(gpu: &mut Gpu) {
     assert!(alike[1] > alike[0] && alike[1] > 0.945, "{alike:?}");
 }
 
-/// Where a camera is that many frames before it arrives.
+/// Camera position `left` frames before it arrives.
 fn walk(def: &mut RefDef, arrived: &RefDef, left: f32) {
     def.view_origin = arrived.view_origin + Vec3::new(-0.9, 0.6, 0.2) * left;
     let turn = Mat3::from_rotation_z(0.004 * left);
     def.view_axis = arrived.view_axis.map(|v| turn * v);
 }
 
-/// A camera before a mirror whose left and right are exchanged has the very picture that one behind it has without it.
+/// A camera in front of a mirror has, with left and right exchanged, the picture of the mirrored camera without the
+/// mirror.
 fn a_mirror_shows_what_is_seen_from_behind_it(gpu: &mut Gpu) {
     const MIRROR: f32 = -130.0;
     let scene = checkerboard();
@@ -185,7 +187,7 @@ fn a_mirror_shows_what_is_seen_from_behind_it(gpu: &mut Gpu) {
     assert!(off < 0.2 * blur, "{off} {blur}");
 }
 
-/// Water before a floor of squares, its ripples running: with a camera that moves and with one that rests.
+/// Moving ripples on water over a floor of squares, with a moving camera and with a static one.
 fn ripples_leave_no_trail(gpu: &mut Gpu) {
     let mut scene = checkerboard();
     let water = scene.material(&[stage::filter([1.0; 3])], LIQUID);
@@ -241,7 +243,7 @@ fn moving_objects_leave_no_trail(gpu: &mut Gpu) {
     let (raw, now) = (error(&jagged, &truth), error(&moved, &truth));
     println!("a thing that moves: error {raw} without, {now} with");
     assert!(now < 0.6 * raw, "{now} {raw}");
-    // nowhere is there red where it was but is not: nor does the thing itself wear the floor
+    // no red remains where the object was, and the object does not show the floor
     let redness = |p: &[u8; 4]| i32::from(p[0]) - i32::from(p[1]);
     let wrong = |p: &[[u8; 4]]| {
         let pairs = p.iter().zip(&truth);
@@ -255,7 +257,7 @@ fn moving_objects_leave_no_trail(gpu: &mut Gpu) {
 }
 
 fn moving_emissive_surfaces_keep_their_brightness(gpu: &mut Gpu) {
-    // a thin bright line in the air, before a wall that rests: the wall's history must not swallow it
+    // a thin bright line in the air before a static wall, whose history must not suppress it
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, SIZE);
     let wall = scene.material(&[stage::constant([0.2; 3])], 0);
     scene.room(Vec3::splat(-300.0), Vec3::splat(300.0), wall);
@@ -263,7 +265,7 @@ fn moving_emissive_surfaces_keep_their_brightness(gpu: &mut Gpu) {
         &[stage::add([0.9, 0.2, 0.1])],
         c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED,
     );
-    // two pixels wide, so that in each frame as many samples meet it, wherever it is
+    // two pixels wide, so that each frame has equally many samples on it, at any position
     let width = 2.0 * 2.0 * 100.0 * 30f32.to_radians().tan() / SIZE as f32;
     let corner = Vec3::new(100.0, -0.5 * width, -45.0);
     let shape = rectangle(corner, Vec3::Z * 90.0, Vec3::Y * width);
@@ -300,7 +302,7 @@ fn a_smaller_traced_picture_comes_to_the_full_one(gpu: &mut Gpu) {
     };
     let (_, upscaled) = gpu.render(&scene, &half(plain()), 1);
     let (_, settled) = gpu.render(&scene, &half(live()), 96);
-    // the mean of the four nearest, as a texture unit would have it
+    // bilinear interpolation, as a texture unit computes it
     let (_, small) = gpu.render(&half_size(&scene), &plain(), 1);
     let bilinear = bilinear(&small);
     let alike = [&bilinear, &upscaled, &settled].map(|p| ssim(p, &truth));
@@ -308,7 +310,7 @@ fn a_smaller_traced_picture_comes_to_the_full_one(gpu: &mut Gpu) {
     assert!(alike[1] > alike[0], "{alike:?}");
     assert!(alike[2] > alike[0] + 0.35 * (1.0 - alike[0]), "{alike:?}");
     assert!(alike[2] > 0.85, "{alike:?}");
-    // a size that divides nothing
+    // a size that is no multiple of the traced one
     let odd = |settings: Settings| Settings {
         rt_scale: 0.27,
         ..settings
@@ -349,7 +351,7 @@ fn bilinear(small: &[[u8; 4]]) -> Vec<[u8; 4]> {
 }
 
 fn the_lens_blurs_by_its_circle_of_confusion(gpu: &mut Gpu) {
-    // an upright edge between white and black 400 away, the lens set to some distance
+    // a vertical edge between white and black at distance 400, for several focus distances
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 10.0, SIZE);
     let white = scene.material(&[stage::constant([1.0; 3])], 0);
     let black = scene.material(&[stage::constant([0.0; 3])], 0);
@@ -370,7 +372,7 @@ fn the_lens_blurs_by_its_circle_of_confusion(gpu: &mut Gpu) {
             ..reference()
         };
         let (pixels, _) = gpu.render(&scene, &settings, 192);
-        // radius of the circle that a point is spread over, in the plane of the edge
+        // radius of the circle of confusion, in the plane of the edge
         let radius = 0.5 * aperture * (distance - focus).abs() / focus;
         for x in 0..SIZE {
             let column = (0..SIZE).map(|y| pixels[(y * SIZE + x) as usize].x);
@@ -378,12 +380,12 @@ fn the_lens_blurs_by_its_circle_of_confusion(gpu: &mut Gpu) {
             let tan = 5.0f32.to_radians().tan();
             let y = -((x as f32 + 0.5) / SIZE as f32 * 2.0 - 1.0) * tan * distance;
             if radius == 0.0 {
-                // sharp but for the column that the edge runs along
+                // sharp except for the column of the edge
                 let wanted = if y > 0.0 { 1.0 } else { 0.0 };
                 assert!((found - wanted).abs() < 1.0e-3, "{x}: {found} {wanted}");
                 continue;
             }
-            // part of the disc that lies beyond the edge
+            // part of the disc beyond the edge
             let h = (y / radius).clamp(-1.0, 1.0);
             let wanted = 0.5 + (h.asin() + h * (1.0 - h * h).sqrt()) / std::f32::consts::PI;
             assert!(
@@ -394,7 +396,7 @@ fn the_lens_blurs_by_its_circle_of_confusion(gpu: &mut Gpu) {
     }
 }
 
-/// Poles as wide as a pixel, far before a wall: all around them lies the wall, and yet they were there in the last frame.
+/// Poles of one pixel's width, far before a wall: the wall around them was hidden by them in the last frame.
 fn thin_geometry_keeps_its_history_in_motion(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, SIZE);
     let wall = scene.material(&[stage::constant([0.1; 3])], 0);
@@ -406,7 +408,7 @@ fn thin_geometry_keeps_its_history_in_motion(gpu: &mut Gpu) {
         let shape = rectangle(corner, Vec3::Z * 180.0, Vec3::Y * pixel);
         scene.quad(shape, pole);
     }
-    // to the side by a pixel a frame: each frame is the one before, a column farther
+    // to the side by one pixel per frame: each frame is the previous one, shifted by a column
     let (first, last) = (12, 24);
     let mut frames: Vec<Vec<Vec3>> = Vec::new();
     let mut watch = |frame: u32, pixels: &[Vec3]| {
@@ -429,11 +431,11 @@ fn thin_geometry_keeps_its_history_in_motion(gpu: &mut Gpu) {
     }
     let shimmer = (sum / count).sqrt();
     println!("thin poles in motion change by {shimmer} from frame to frame");
-    // without that history 0.083
+    // 0.083 without that history
     assert!(shimmer < 0.06, "{shimmer}");
 }
 
-/// Wires thinner than a pixel, far before a wall: most frames' samples miss them.
+/// Wires thinner than a pixel, far before a wall: the samples of most frames miss them.
 fn thin_geometry_does_not_flicker(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, SIZE);
     let wall = scene.material(&[stage::constant([0.1; 3])], 0);
@@ -454,7 +456,7 @@ fn thin_geometry_does_not_flicker(gpu: &mut Gpu) {
         }
     };
     let (_, settled) = gpu.render_watched(&scene, &live(), last, |_, _| {}, Some(&mut watch));
-    // how much brighter than in the mean a pixel gets for a frame
+    // largest excess of a pixel in one frame over the mean
     let count = frames.len() as f32;
     let mut flash = 0.0f32;
     for i in 0..truth.len() {

@@ -1,4 +1,4 @@
-//! Bloom spreads light and keeps its sum.
+//! Bloom spreads light and preserves its sum.
 
 use glam::Vec3;
 
@@ -13,7 +13,7 @@ gpu_tests! {
 
 const SIZE: i32 = 150;
 
-/// What the picture shows, linear: display codes decoded, below the tone curve's shoulder.
+/// Linear values of the picture: display values decoded, below the shoulder of the tone curve.
 fn linear(picture: &[[u8; 4]]) -> Vec<f32> {
     let decode =
         |p: &[u8; 4]| crate::trace::frame_lights::decode(Vec3::splat(f32::from(p[1]) / 255.0)).x;
@@ -26,7 +26,7 @@ fn bloom_keeps_even_light_and_the_sum_of_uneven_light(gpu: &mut Gpu) {
         rt_illumination: false,
         ..reference()
     };
-    // looking down on a floor with a brighter square in its middle
+    // the camera looks down on a floor with a brighter square in its middle
     let scene = |middle: f32| {
         let mut scene = Scene::new(Vec3::new(0.0, 0.0, 100.0), Vec3::ZERO, 90.0, SIZE);
         let ground = scene.diffuse(0.05);
@@ -48,7 +48,7 @@ fn bloom_keeps_even_light_and_the_sum_of_uneven_light(gpu: &mut Gpu) {
     let sum = |picture: &[f32]| picture.iter().sum::<f32>();
     let ratio = sum(&bloomed) / sum(&plain);
     assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
-    // light has left the square and falls off around it
+    // light is spread from the square and falls off around it
     let at = |picture: &[f32], right: i32| picture[(SIZE / 2 * SIZE + SIZE / 2 + right) as usize];
     assert!(at(&bloomed, 0) < at(&plain, 0) * 0.95);
     let glow = [16, 30, 60].map(|right| at(&bloomed, right) - at(&plain, right));

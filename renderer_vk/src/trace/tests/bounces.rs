@@ -1,4 +1,4 @@
-//! Bounced light: partial sums of a furnace, colour that bleeds, walls that keep light out.
+//! Bounced light: partial sums of a furnace, colour bleeding, walls that stop light from outside.
 
 use std::f32::consts::PI;
 
@@ -36,7 +36,7 @@ fn bounced(bounces: u32) -> Settings {
     }
 }
 
-/// The mean of a picture with one bounce: in reference mode, and in that of a game, which has passes of its own for it.
+/// Mean of a picture with one bounce: in reference mode, and in that of a game, which has separate passes for it.
 fn by_each_way(gpu: &mut Gpu, scene: &Scene, settings: &Settings, frames: u32) -> [Vec3; 2] {
     let live = Settings {
         rt_accumulate: false,
@@ -52,8 +52,8 @@ fn by_each_way(gpu: &mut Gpu, scene: &Scene, settings: &Settings, frames: u32) -
     [gpu.mean(scene, settings, frames), sum / frames as f32]
 }
 
-/// What an eye sees of a wall that glows and is lit: both are summed as displayed under the light that the engine shows,
-/// here that of white corners, and share the light of the sum.
+/// Displayed radiance of an emissive, lit wall: both parts are summed in display values under the light that the engine
+/// shows, here that of white vertices, and share the light of the sum.
 pub(super) fn seen(glow: f32, albedo: f32, light: f32) -> f32 {
     let slope = |displayed: f32| {
         let bounded = displayed.clamp(1.0e-4, 1.0);
@@ -65,8 +65,8 @@ pub(super) fn seen(glow: f32, albedo: f32, light: f32) -> f32 {
 }
 
 fn a_furnace_sums_its_bounces(gpu: &mut Gpu) {
-    // every wall glows with e and reflects a: after n bounces it shows e (1 + a + ... + a^n). Of the three albedos one
-    // is below the least chance of going on, one above, and one loses no path at all
+    // every wall emits e and reflects a: after n bounces it shows e (1 + a + ... + a^n). Of the three albedos, one is
+    // below the minimum survival probability, one above, and one terminates no path
     for albedo in [0.1, 0.5, 1.0] {
         let mut scene = Scene::new(
             Vec3::new(-20.0, 10.0, 5.0),
@@ -84,7 +84,7 @@ fn a_furnace_sums_its_bounces(gpu: &mut Gpu) {
         );
         scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), wall);
         let [e, a] = [0.25, albedo].map(|v| through_byte(encode(v)));
-        // light that has come to a wall, by number of bounces
+        // light that arrives at a wall, by number of bounces
         let mut light = 0.0;
         let mut power = e;
         for bounces in 0..=2 {
@@ -106,7 +106,7 @@ fn a_furnace_sums_its_bounces(gpu: &mut Gpu) {
 }
 
 fn lightmap_brightness_scales_reflectance(gpu: &mut Gpu) {
-    // the furnace with an albedo of a half: of light come back that part of it, but never more than all; what glows stays
+    // the furnace with an albedo of one half: the reflected light is scaled, to at most all of it; emission is not
     for (scale, part) in [(1.0, 0.5), (0.25, 0.125), (64.0, 1.0)] {
         let mut scene = Scene::new(
             Vec3::new(-20.0, 10.0, 5.0),
@@ -131,8 +131,8 @@ fn lightmap_brightness_scales_reflectance(gpu: &mut Gpu) {
 }
 
 fn gloss_throws_back_what_its_picture_shows(gpu: &mut Gpu) {
-    // a small white patch in a furnace whose walls are nothing but gloss: of their glow g it finds g and, with a second
-    // bounce, g a, where a is the mean of their picture
+    // a small white patch in a furnace with glossy walls: it receives their emission g and, with a second bounce, g a,
+    // where a is the mean of their image
     let texels: Vec<u8> = [40u8, 216].iter().flat_map(|&v| [v, v, v, 255]).collect();
     let texels = [texels.clone(), texels].concat();
     let picture = square(gpu, 2, &texels);
@@ -182,7 +182,7 @@ fn a_red_wall_colours_the_floor(gpu: &mut Gpu) {
     scene.quad(rectangle(floor, Vec3::X * 1000.0, Vec3::Y * 1000.0), white);
     let wall = rectangle(Vec3::new(0.0, -40.0, 0.0), Vec3::Z * 50.0, Vec3::Y * 80.0);
     scene.quad(wall, red);
-    // shines along the floor on the wall alone
+    // shines parallel to the floor, on the wall only
     scene.suns.push(SunLight {
         direction: -Vec3::X,
         irradiance: Vec3::splat(3.0),
@@ -205,7 +205,7 @@ fn a_red_wall_colours_the_floor(gpu: &mut Gpu) {
 }
 
 fn a_bounce_has_one_ray_for_lamps_and_sun(gpu: &mut Gpu) {
-    // what sees the sun, what only sees lamps, what sees both: a sunlit floor, part of it under a roof with lamps below
+    // points lit by the sun only, by lamps only, and by both: a sunlit floor, part of it under a roof with lamps
     let mut scene = Scene::new(
         Vec3::new(-150.0, 0.0, 40.0),
         Vec3::new(0.0, 0.0, 10.0),
@@ -259,7 +259,7 @@ fn a_bounce_has_one_ray_for_lamps_and_sun(gpu: &mut Gpu) {
 }
 
 fn no_light_leaks_through_walls(gpu: &mut Gpu) {
-    // a bright room beside a dark one, a wall of one unit between them, the sun outside of both
+    // a bright room and a dark one, separated by a wall of one unit, with the sun outside of both
     for culling in [0, c::MATERIAL_TWO_SIDED] {
         let mut scene = Scene::new(
             Vec3::new(-90.0, 0.0, 5.0),
@@ -299,15 +299,15 @@ fn no_light_leaks_through_walls(gpu: &mut Gpu) {
                 );
             }
         }
-        // and the lamp does shine: on its own side
+        // the lamp lights its own side
         scene.def.view_origin = Vec3::new(90.0, 0.0, 5.0);
         assert!(gpu.mean(&scene, &bounced(0), 4).min_element() > 0.1);
     }
 }
 
 fn bounced_light_passes_fog(gpu: &mut Gpu) {
-    // below a slab of fog under a glowing ceiling, all without end: from the direction at the angle t to the normal the
-    // floor gets fog * f + glow * (1 - f), f = sqrt(thickness / cos t / depth), weighed by 2 cos t sin t
+    // below a slab of fog under a glowing ceiling, all infinite: from the direction at the angle t to the normal the
+    // floor receives fog * f + glow * (1 - f), f = sqrt(thickness / cos t / depth), weighted by 2 cos t sin t
     let (glow, tint) = (0.8, Vec3::new(0.1, 0.5, 0.2));
     let mut scene = Scene::new(Vec3::Z * 20.0, Vec3::new(0.1, 0.0, 0.0), 20.0, 32);
     let ceiling = scene.material(&[stage::constant([encode(glow); 3])], 0);
@@ -332,7 +332,7 @@ fn bounced_light_passes_fog(gpu: &mut Gpu) {
     let steps = 10_000;
     let factor: f32 = (0..steps)
         .map(|i| {
-            // even steps of the squared sine are even in 2 cos t sin t dt
+            // uniform steps of the squared sine are uniform in 2 cos t sin t dt
             let cosine = (1.0 - (i as f32 + 0.5) / steps as f32).sqrt();
             (thickness / cosine / depth).sqrt().min(1.0) / steps as f32
         })
@@ -348,7 +348,7 @@ fn bounced_light_passes_fog(gpu: &mut Gpu) {
 }
 
 fn bounced_light_passes_tinted_glass(gpu: &mut Gpu) {
-    // a white floor under a glowing ceiling, all without end, and tinted glass between them
+    // a white floor under a glowing ceiling, both infinite, with tinted glass between them
     let (glow, tint) = (0.8, Vec3::new(0.9, 0.2, 0.1));
     let mut scene = Scene::new(Vec3::Z * 20.0, Vec3::new(0.1, 0.0, 0.0), 20.0, 32);
     let ceiling = scene.material(&[stage::constant([encode(glow); 3])], 0);

@@ -1,4 +1,4 @@
-//! What lies in one plane with something else.
+//! Coplanar surfaces.
 
 use glam::Vec3;
 use shaders::types::constants as c;
@@ -18,7 +18,7 @@ const BACK: [f32; 3] = [0.2, 0.4, 0.8];
 const RED: [f32; 3] = [0.9, 0.1, 0.1];
 const GREEN: [f32; 3] = [0.1, 0.8, 0.2];
 
-/// A square of the wall around a point of it; the wall is at x and faces the middle of the world.
+/// A square on the wall around a point; the wall is at x and faces the origin.
 fn patch(x: f32, [y, z]: [f32; 2], half: f32) -> [Vec3; 4] {
     let corner = Vec3::new(x, y - half, z - half);
     let (up, aside) = (Vec3::Z * half * 2.0, Vec3::Y * half * 2.0);
@@ -32,7 +32,7 @@ fn patch(x: f32, [y, z]: [f32; 2], half: f32) -> [Vec3; 4] {
 fn posters_lie_before_their_wall_in_the_order_of_the_engine(gpu: &mut Gpu) {
     let image = stripes(gpu, [[255; 4], [255, 255, 255, 0]]);
     for (mirrored, wall_first) in [(false, false), (false, true), (true, false), (true, true)] {
-        // 200 units from the eye either way
+        // 200 units from the camera in both cases
         let x = if mirrored { -100.0 } else { 200.0 };
         let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 40.0, 32);
         scene.images.push(image.texture_index());
@@ -69,7 +69,7 @@ fn posters_lie_before_their_wall_in_the_order_of_the_engine(gpu: &mut Gpu) {
         let linear = |color: [f32; 3]| Vec3::from(color.map(through_byte));
         let (green, back) = (linear(GREEN), linear(BACK));
         let mixed = over(&[(RED, 0.5)], BACK);
-        // y points left, z up; s of the cut-out runs along z
+        // y points left, z up; s of the alpha-tested image runs along z
         for (row, column, exact) in [
             ([5, 10], [5, 10], green),
             ([5, 10], [21, 26], green),

@@ -1,4 +1,4 @@
-//! Cut-outs: what has holes where its image says so.
+//! Alpha-tested surfaces.
 
 use glam::Vec3;
 use shaders::types::Stage;
@@ -31,7 +31,7 @@ pub(super) fn stripes(gpu: &Gpu, texels: [[u8; 4]; 2]) -> Image {
 
 fn cut_outs_have_holes_for_eyes_and_shadows(gpu: &mut Gpu) {
     let image = stripes(gpu, [[255; 4], [255, 255, 255, 0]]);
-    // left half white and solid, right half a hole
+    // left half white and solid, right half transparent
     let mut scene = scene();
     scene.images.push(image.texture_index());
     let back = [0.2, 0.4, 0.8];
@@ -50,7 +50,7 @@ fn cut_outs_have_holes_for_eyes_and_shadows(gpu: &mut Gpu) {
             assert!(close(pixel, color), "row {row}: {pixel}");
         }
     }
-    // the same for a shadow: light from beyond the grate falls through the hole only
+    // the same for a shadow: light from behind the grate passes only the hole
     let mut scene = Scene::new(Vec3::new(0.0, 0.0, 50.0), Vec3::ZERO, 60.0, 32);
     scene.images.push(image.texture_index());
     let white = scene.diffuse(1.0);
@@ -65,7 +65,7 @@ fn cut_outs_have_holes_for_eyes_and_shadows(gpu: &mut Gpu) {
     let mut stripes = stage::image(0);
     stripes.alpha_func = c::ALPHAFUNC_GE128;
     let grate = scene.material(&[stripes], c::MATERIAL_CUT_OUT | c::MATERIAL_TWO_SIDED);
-    // above the eye; s runs along x: the hole is at x > 0
+    // above the camera; s runs along x: the hole is at x > 0
     scene.quad(
         rectangle(
             Vec3::new(-100.0, -100.0, 60.0),
@@ -90,8 +90,8 @@ fn cut_outs_have_holes_for_eyes_and_shadows(gpu: &mut Gpu) {
     }
 }
 
-/// Nearly in the plane of its wall, as the depth offset of such a material asks for: behind a ray that stopped at the
-/// paint there would be no wall left.
+/// Nearly coplanar with its wall, as the depth offset of such a material requires: behind a ray that stopped at the
+/// paint there would be no wall.
 fn paint_with_holes_lets_its_wall_through(gpu: &mut Gpu) {
     let image = stripes(gpu, [[255, 128, 64, 255], [255, 128, 64, 0]]);
     let back = [0.2, 0.4, 0.3];
@@ -101,7 +101,7 @@ fn paint_with_holes_lets_its_wall_through(gpu: &mut Gpu) {
         ..stage::image(0)
     };
     painted.alpha_func = c::ALPHAFUNC_GE128;
-    // twice as bright, where the stage before it is
+    // doubles the brightness where the stage before it is drawn
     let doubled = Stage {
         blend_dst: c::BLEND_ONE,
         ..stage::filter([1.0; 3])
@@ -114,7 +114,7 @@ fn paint_with_holes_lets_its_wall_through(gpu: &mut Gpu) {
             c::MATERIAL_CUT_OUT | c::MATERIAL_TRANSLUCENT | c::MATERIAL_POLYGON_OFFSET,
         );
         let wall = scene.material(&[stage::constant(back)], 0);
-        // s runs along z, from below to above
+        // s runs along z, upwards
         scene.quad(screen(300.0 - before), paint);
         scene.quad(screen(300.0 - behind), wall);
         let (pixels, _) = gpu.render(&scene, &reference(), 1);

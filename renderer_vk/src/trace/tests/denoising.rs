@@ -1,4 +1,4 @@
-//! The denoiser against the reference.
+//! The denoiser compared with the reference.
 
 use glam::Vec3;
 use relight::light::PointLight;
@@ -73,7 +73,7 @@ fn live() -> Settings {
     }
 }
 
-/// Mean, and error against the truth: root of the mean square over the mean.
+/// Mean, and relative error: root mean square difference from the reference, divided by its mean.
 fn compare(pixels: &[Vec3], truth: &[Vec3]) -> (f32, f32) {
     let n = truth.len() as f32;
     let mean = truth.iter().map(|p| p.x).sum::<f32>() / n;
@@ -96,7 +96,7 @@ fn filtered_frames_come_near_the_reference(gpu: &mut Gpu) {
         ..reference()
     };
     let (truth, _) = gpu.render(&scene, &settings, 400);
-    // one frame as it comes from the rays
+    // one frame without denoising
     let (raw, _) = gpu.render(&scene, &settings, 1);
     let (_, raw_error) = compare(&raw, &truth);
     let (first, _) = gpu.render(&scene, &live(), 1);
@@ -108,10 +108,10 @@ fn filtered_frames_come_near_the_reference(gpu: &mut Gpu) {
     );
     assert!((mean - 1.0).abs() < 0.03, "{mean}");
     assert!(first_error < 0.6 * raw_error, "{first_error} {raw_error}");
-    // what is left is mostly the smooth edges of the reference, which a frame without jitter has not
+    // the remaining error is mostly at the antialiased edges of the reference, which a frame without jitter lacks
     assert!(error < 0.25 * raw_error, "{error} {raw_error}");
 
-    // a camera that moves and turns ends where the truth was taken
+    // a moving and turning camera arrives at the reference's position
     let (moved, _) = gpu.render_path(&scene, &live(), 32, |frame, def| {
         let back = 31.0 - frame as f32;
         def.view_origin = scene.def.view_origin + Vec3::new(0.7, 0.4, 0.1) * back;
@@ -125,7 +125,7 @@ fn filtered_frames_come_near_the_reference(gpu: &mut Gpu) {
 }
 
 fn disoccluded_surfaces_have_no_history(gpu: &mut Gpu) {
-    // a wall slides over everything: what it shows must not come from what was there before
+    // a moving wall covers everything: it must not show the history of surfaces behind it
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, 32);
     let white = scene.diffuse(1.0);
     let black = scene.material(&[stage::light(), stage::filter([0.0; 3])], 0);
@@ -159,7 +159,7 @@ fn disoccluded_surfaces_have_no_history(gpu: &mut Gpu) {
     );
 }
 
-/// What the denoiser is asked for.
+/// Settings of the reference.
 fn truth_settings() -> Settings {
     Settings {
         rt_bounces: 1,
@@ -180,7 +180,7 @@ fn tiles(pixels: &[Vec3]) -> Vec<f32> {
     sums
 }
 
-/// Mean over the tiles of the difference, as a part of the truth.
+/// Mean difference over the tiles, relative to the reference.
 fn tile_error(pixels: &[Vec3], truth: &[Vec3]) -> f32 {
     let pairs = tiles(pixels).into_iter().zip(tiles(truth));
     pairs.map(|(a, b)| (a - b).abs() / b).sum::<f32>() / 64.0
@@ -195,7 +195,7 @@ fn lamp(origin: Vec3) -> DynamicLight {
     }
 }
 
-/// Frames after frame `change` until the picture is within a tenth of the truth, for good.
+/// Frames after frame `change` until the picture stays within a tenth of the reference.
 fn frames_until_true(
     gpu: &mut Gpu,
     scene: &Scene,
@@ -251,7 +251,7 @@ fn light_that_is_switched_is_seen_soon(gpu: &mut Gpu) {
 
 fn a_moving_light_leaves_no_trail(gpu: &mut Gpu) {
     let scene = room();
-    // from one end of the room to the other, as a rocket flies
+    // from one end of the room to the other, at a rocket's speed
     let fly = |frame: u32, view: &mut TracedScene| {
         let at = Vec3::new(-60.0 + 8.0 * frame as f32, -90.0, -40.0);
         view.dlights = vec![DynamicLight {
@@ -272,7 +272,7 @@ fn a_moving_light_leaves_no_trail(gpu: &mut Gpu) {
 }
 
 fn a_light_that_fades_is_followed(gpu: &mut Gpu) {
-    // by a twelfth each frame: little enough to be taken for noise, and after some frames far from what it was
+    // by a twelfth each frame: little enough to be mistaken for noise, and after some frames far from the initial value
     let scene = room();
     let fade = |frame: u32, view: &mut TracedScene| {
         let light = lamp(Vec3::new(0.0, -60.0, 20.0));
@@ -297,7 +297,7 @@ fn a_light_that_fades_is_followed(gpu: &mut Gpu) {
 
 fn a_broken_number_does_not_spread(gpu: &mut Gpu) {
     for bad in [f32::INFINITY, f32::NAN] {
-        // a lamp that is there in one frame alone, and gives what is no number
+        // a lamp that exists in a single frame, with a NaN radiance
         let mut scene = room();
         let at = Vec3::new(0.0, -60.0, 60.0);
         scene.light(
@@ -403,8 +403,8 @@ fn the_cheap_filter_comes_near_the_truth(gpu: &mut Gpu) {
     assert!(settled.1 < 0.5 * raw.1, "{settled:?} {raw:?}");
 }
 
-/// A wall that stands in water, lit above it and dark below it: what the water mirrors and what lies in it are side by side
-/// in the picture, as far away and turned alike, and differ in their light alone.
+/// A wall that stands in water, lit above the surface and dark below: reflection and refraction are adjacent in the
+/// picture, at equal view distances and normals, and differ only in their light.
 fn both_sides_of_water_keep_their_light(gpu: &mut Gpu) {
     let mut scene = Scene::new(
         Vec3::new(-60.0, 0.0, 40.0),
@@ -417,7 +417,7 @@ fn both_sides_of_water_keep_their_light(gpu: &mut Gpu) {
         &[stage::filter([1.0; 3])],
         c::MATERIAL_LIQUID | c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED,
     );
-    // seen through, but lets no light of the lamps pass
+    // transparent, but lamps do not shine through it
     scene.materials[water as usize].0.dielectric = Dielectric {
         index: 1.33,
         scale: 1.0,
@@ -440,7 +440,7 @@ fn both_sides_of_water_keep_their_light(gpu: &mut Gpu) {
         [lamp, lamp + Vec3::Y * 60.0, lamp + Vec3::X * 60.0],
         Vec3::splat(12.0),
     );
-    // direct and bounced light each go their own way through the denoiser
+    // direct and bounced light have separate passes in the denoiser
     for (bounces, denoiser) in [
         (0, DenoiserChoice::ASvgf),
         (1, DenoiserChoice::ASvgf),
@@ -464,7 +464,7 @@ fn both_sides_of_water_keep_their_light(gpu: &mut Gpu) {
     }
 }
 
-/// Light that is the same everywhere comes out of the filter, over many frames, as it went in: of any color, dim and bright.
+/// Uniform light is unchanged by the filter over many frames, for any colour, dim or bright.
 fn even_light_keeps_its_level_and_color(gpu: &mut Gpu) {
     let colors = [[1.0, 0.3, 0.05], [0.0, 1.0, 0.0], [0.02, 0.1, 1.0]].map(Vec3::from);
     for light in [1.0e-3, 1.0, 1.0e3].map(|level| colors.map(|color| color * level)) {

@@ -1,4 +1,4 @@
-//! Glass, liquids and shiny stages against closed forms.
+//! Glass, liquids and shiny stages compared with closed forms.
 
 use glam::Vec3;
 use shaders::types::constants as c;
@@ -30,7 +30,7 @@ const SIDE: usize = 24;
 const ABOVE: f32 = 0.8;
 const BELOW: f32 = 0.3;
 
-/// Unpolarized reflectance by the angles, in the sine and tangent form; `None` when all is reflected.
+/// Unpolarized reflectance by the angles, in the sine and tangent form; `None` for total reflection.
 fn fresnel(incident: f32, index: f32) -> Option<f32> {
     let sine = incident.sin() / index;
     if sine >= 1.0 {
@@ -56,7 +56,7 @@ fn level(z: f32, up: bool) -> [Vec3; 4] {
     }
 }
 
-/// Passes the background unchanged.
+/// Transmits the background unchanged.
 fn clear() -> Stage {
     stage::filter([1.0; 3])
 }
@@ -74,7 +74,7 @@ fn scene(eye: Vec3, target: Vec3, stages: &[Stage], flags: u32, dielectric: Diel
     scene
 }
 
-/// Direction of a pixel's middle ray.
+/// Direction of the ray through a pixel's centre.
 fn direction(scene: &Scene, i: usize) -> Vec3 {
     let def = &scene.def;
     let tan = (def.fov_x.to_radians() * 0.5).tan();
@@ -83,7 +83,7 @@ fn direction(scene: &Scene, i: usize) -> Vec3 {
     (def.view_axis[0] - def.view_axis[1] * (u * tan) - def.view_axis[2] * (v * tan)).normalize()
 }
 
-/// A picture of the middles of the pixels, in which both sides of a surface are seen one after the other.
+/// Settings of a picture through pixel centres that shows both sides of a surface in successive frames.
 fn middles() -> Settings {
     Settings {
         rt_antialiasing: false,
@@ -91,14 +91,14 @@ fn middles() -> Settings {
     }
 }
 
-/// Compares every pixel with a closed form over the angle of incidence.
+/// Compares every pixel with a closed form of the angle of incidence.
 fn compare(gpu: &mut Gpu, scene: &Scene, settings: &Settings, exact: impl Fn(f32) -> f32) {
     let (pixels, _) = gpu.render(scene, settings, if settings.rt_accumulate { 2 } else { 1 });
     let mut worst = 0.0f32;
     for (i, pixel) in pixels.iter().enumerate() {
         let (x, y) = (i % SIDE, i / SIDE);
         if !settings.rt_accumulate && (x == 0 || y == 0 || x == SIDE - 1 || y == SIDE - 1) {
-            continue; // neighbours on one side only
+            continue; // all neighbours show one side
         }
         let incident = direction(scene, i).z.abs().acos();
         worst = worst.max((pixel.x / exact(incident) - 1.0).abs());
@@ -124,7 +124,7 @@ fn water_reflects_by_fresnel_and_absorbs_by_beer(gpu: &mut Gpu) {
         reflected * above + (1.0 - reflected) * below * (-0.004 * way).exp()
     };
     compare(gpu, &scene, &middles(), exact);
-    // a single frame shows the two sides in turns over the pixels
+    // a single frame alternates both sides over the pixels
     let live = Settings {
         rt_accumulate: false,
         rt_taa: false,
@@ -145,7 +145,7 @@ fn from_below_water_reflects_everything_beyond_its_angle(gpu: &mut Gpu) {
         let reflected = fresnel(incident, 1.0 / 1.33).unwrap_or(1.0);
         reflected * below + (1.0 - reflected) * above
     };
-    // within the window of 48.75 degrees, across its edge, and beyond it
+    // inside of Snell's window of 48.75 degrees, across its edge, and outside
     for target in [
         Vec3::new(2.0, 0.0, 0.0),
         Vec3::new(70.0, 0.0, 0.0),
@@ -167,7 +167,7 @@ fn a_pane_reflects_from_both_faces(gpu: &mut Gpu) {
     };
     let eye = Vec3::new(0.0, 0.0, 60.0);
     let target = Vec3::new(60.0, 10.0, 0.0);
-    // tinted: what is seen through it is multiplied, what it reflects is not
+    // tinted: the tint multiplies the refraction, not the reflection
     let flags = c::MATERIAL_GLASS | c::MATERIAL_TRANSLUCENT;
     let tint = (encode(0.6) * 255.0 + 0.001).floor() / 255.0;
     let decode = |v: f32| crate::trace::frame_lights::decode(Vec3::splat(v)).x;
@@ -181,7 +181,7 @@ fn a_pane_reflects_from_both_faces(gpu: &mut Gpu) {
 }
 
 fn ripples_keep_the_light_that_a_surface_sends_on(gpu: &mut Gpu) {
-    // the same radiance on both sides: whatever way a ray takes, it finds it
+    // equal radiance on both sides: every path has the same result
     let water = Dielectric {
         index: 1.33,
         scale: 1.0,
@@ -198,7 +198,7 @@ fn ripples_keep_the_light_that_a_surface_sends_on(gpu: &mut Gpu) {
     assert!((mean / exact - 1.0).abs() < 0.005, "{mean} {exact}");
 }
 
-/// A square picture of RGBA8 texels.
+/// A square image of RGBA8 texels.
 pub(super) fn square(gpu: &Gpu, side: u32, texels: &[u8]) -> Image {
     let desc = ImageDesc::new("square", side, side, Format::Rgba8, ImageUsage::SAMPLED);
     let image = Image::new(&gpu.device, &desc).expect("image");
@@ -211,7 +211,7 @@ pub(super) fn square(gpu: &Gpu, side: u32, texels: &[u8]) -> Image {
 fn an_environment_stage_shows_what_is_around(gpu: &mut Gpu) {
     let above = through_byte(encode(ABOVE));
     let image = square(gpu, 1, &[128, 128, 128, 255]);
-    // a body of one colour, shiny by a quarter of what is around
+    // a body of one colour that reflects a quarter of its surroundings
     let body = stage::constant([0.5; 3]);
     let shine = stage::shine(0);
     let eye = Vec3::new(0.0, 0.0, 60.0);
@@ -221,12 +221,12 @@ fn an_environment_stage_shows_what_is_around(gpu: &mut Gpu) {
     let weight = crate::trace::frame_lights::decode(Vec3::splat(128.0 / 255.0)).x;
     let exact = through_byte(0.5) + weight * above;
     compare(gpu, &scene, &middles(), |_| exact);
-    // at the depth where rays end the picture itself stands for the reflection, and is added as it is displayed
+    // at the depth limit the stage's image replaces the reflection, added in display values
     let ended = Settings {
         rt_max_depth: 0,
         ..reference()
     };
-    // half of 255 and 128 are white together
+    // half of 255 and 128 add up to white
     compare(gpu, &scene, &ended, |_| 1.0);
 }
 
@@ -245,10 +245,10 @@ fn gloss_shows_the_light_by_its_picture_and_mirrors(gpu: &mut Gpu) {
     let linear = |displayed: f32| crate::trace::frame_lights::decode(Vec3::splat(displayed)).x;
     for light in [0.7, 0.0] {
         scene.ambient = Vec3::splat(light);
-        // body and picture are summed as they are displayed, and lit; what is mirrored brings its own light
+        // body and image are summed in display values, and lit; the reflection has its own light
         let lit = linear(body + picture) * light;
         compare(gpu, &scene, &middles(), |_| lit + linear(picture) * above);
-        // where rays end nothing is mirrored
+        // at the depth limit there is no reflection
         let ended = Settings {
             rt_max_depth: 0,
             ..reference()
@@ -260,7 +260,7 @@ fn gloss_shows_the_light_by_its_picture_and_mirrors(gpu: &mut Gpu) {
 }
 
 fn the_texture_of_what_shines_is_seen_in_every_pixel(gpu: &mut Gpu) {
-    // about a texel a pixel, each of another grey
+    // about one texel per pixel, each of another grey
     let mut random = Random::new(1);
     let texels: Vec<u8> = (0..32 * 32)
         .flat_map(|_| {
@@ -276,7 +276,7 @@ fn the_texture_of_what_shines_is_seen_in_every_pixel(gpu: &mut Gpu) {
         blend_dst: c::BLEND_ZERO,
         ..stage::image(1)
     };
-    // what is lit, and what glows by itself
+    // a lit body, and an emissive one
     for body in [&[stage::light(), lit][..], &[stage::image(1)]] {
         let mut stages = body.to_vec();
         stages.push(stage::shine(0));
@@ -316,7 +316,7 @@ fn a_shiny_pixel_alone_is_as_bright_as_its_surface(gpu: &mut Gpu) {
         &ImageDesc::new("environment", 1, 1, Format::Rgba8, ImageUsage::SAMPLED),
     )
     .expect("image");
-    // hardly more than what is worth following
+    // slightly above the limit for following reflections
     gpu.device
         .upload_image(&image, 0, 0, &[20, 20, 20, 255])
         .expect("upload");
@@ -327,7 +327,7 @@ fn a_shiny_pixel_alone_is_as_bright_as_its_surface(gpu: &mut Gpu) {
     scene.images.push(image.texture_index());
     let patch = scene.material(&[body, shine], c::MATERIAL_TWO_SIDED);
     let [_, left, up] = scene.def.view_axis;
-    // pixels that follow the reflection, and such that follow what is behind it
+    // pixels that follow the reflection, and pixels that follow the refraction
     let alone = [(5, 5), (9, 8), (15, 15), (18, 5)].map(|(x, y)| y * SIDE + x);
     for i in alone {
         let size = 0.5;
@@ -368,7 +368,7 @@ fn light_takes_on_the_colour_of_what_it_passes(gpu: &mut Gpu) {
         filter_color,
         ..Dielectric::default()
     };
-    // a red sheet over x < 0, above the eye, and a second one of half the light over y < 0
+    // a red sheet over x < 0, above the camera, and a second one of half transmission over y < 0
     let (x, y) = (Vec3::X * 200.0, Vec3::Y * 400.0);
     let red = Vec3::new(0.9, 0.2, 0.1);
     let corner = Vec3::new(-200.0, -200.0, 70.0);
@@ -376,7 +376,7 @@ fn light_takes_on_the_colour_of_what_it_passes(gpu: &mut Gpu) {
     let grey = Vec3::splat(0.5);
     let above = corner + Vec3::Z * 10.0;
     sheet(&mut scene, above, x * 2.0, y * 0.5, filter(grey));
-    // light in a liquid was measured there: it has lost nothing on its way
+    // the light inside of a liquid was measured there, and is not absorbed again
     let water = Dielectric {
         index: 1.33,
         absorption: Vec3::splat(0.01),

@@ -1,4 +1,4 @@
-//! Fog against closed forms.
+//! Fog compared with closed forms.
 
 use glam::Vec3;
 use shaders::trace_types::SkyRecord;
@@ -35,7 +35,7 @@ fn fog_is_lit_by_what_lights_each_place_of_it(gpu: &mut Gpu) {
         depth,
         own_light: Vec3::ZERO,
     });
-    // mixed as it is displayed: what is behind is black; without a surface all the way counts, as in the engine
+    // blended in display values over black; without a surface the whole distance counts, as in the engine
     let ambient = decode(Vec3::new(0.2, 0.4, 0.6) * (300.0f32 / depth).sqrt());
     let (origin, radius, intensity) = (Vec3::new(130.0, 0.0, 30.0), 4.0f32, 9000.0f32);
     scene.points.push(relight::light::PointLight {
@@ -46,8 +46,8 @@ fn fog_is_lit_by_what_lights_each_place_of_it(gpu: &mut Gpu) {
         falloff: relight::light::Falloff::InverseSquare,
         pulse: None,
     });
-    // the mean radiance over the sphere of directions, over what scatters at each place, shares the display as the fog's
-    // own colour does
+    // the mean radiance over the sphere of directions, weighted by the scattering at each point, is blended in display
+    // values as the fog's own colour is
     let steps = 4000;
     let mut lit = 0.0;
     for i in 0..steps {
@@ -56,7 +56,7 @@ fn fog_is_lit_by_what_lights_each_place_of_it(gpu: &mut Gpu) {
         let squared = (origin - place).length_squared();
         let sine_squared = radius * radius / squared;
         let cosine = (1.0 - sine_squared).sqrt();
-        // 1 - cos without its cancellation
+        // 1 - cos without cancellation
         let share = 0.5 * sine_squared / (1.0 + cosine);
         let radiance = intensity / (std::f32::consts::PI * radius * radius);
         lit += radiance * share / steps as f32;
@@ -73,7 +73,7 @@ fn fog_is_lit_by_what_lights_each_place_of_it(gpu: &mut Gpu) {
         let mean = gpu.mean(&scene, &settings, frames) - ambient;
         let error = ((mean - exact) / exact).abs().max_element();
         assert!(error < tolerance, "{mean} {exact}");
-        // what the map's lights give in the mean is a part of the fog's colour, at most one half
+        // the mean light of the map is a part of the fog's colour, at most one half
         let own = Vec3::new(0.8, 0.2, 0.4);
         scene.fogs[0].own_light = own;
         let part = own.min(Vec3::splat(0.5));
@@ -83,7 +83,7 @@ fn fog_is_lit_by_what_lights_each_place_of_it(gpu: &mut Gpu) {
         assert!(error < tolerance, "{mean} {exact}");
         scene.fogs[0].own_light = Vec3::ZERO;
     }
-    // a screen between the light and the fog's nearer half; what glows is not lit
+    // a screen between the light and the fog's nearer half; emissive surfaces are unlit
     let wall = scene.material(&[stage::constant([0.0; 3])], 0);
     scene.quad(
         rectangle(
@@ -113,13 +113,13 @@ fn slab(has_surface: u32, top: f32) -> Fog {
 const TINT: [f32; 3] = [0.2, 0.4, 0.6];
 const BACK: [f32; 3] = [0.9, 0.5, 0.3];
 
-/// What is displayed behind fog by the engine's factor for a way of so many units in it.
+/// Display value behind fog of this length, by the engine's factor.
 fn fogged(length: f32, shown: Vec3) -> Vec3 {
     let factor = (length / 400.0).min(1.0).sqrt();
     Vec3::from(TINT) * factor + shown * (1.0 - factor)
 }
 
-/// A wall at x = 300, seen straight on; it and the eye lie below the fog's surface.
+/// A wall at x = 300, perpendicular to the view; it and the camera are below the fog's surface.
 fn wall_behind_fog() -> Scene {
     let eye = Vec3::new(0.0, 0.0, 50.0);
     let mut scene = Scene::new(eye, eye + Vec3::X * 100.0, 1.0, 4);
@@ -138,18 +138,18 @@ fn shows(gpu: &mut Gpu, scene: &Scene, displayed: Vec3) {
 fn fog_covers_surfaces_that_are_stored_with_it_alone(gpu: &mut Gpu) {
     let back = displayed(BACK);
     let mut scene = wall_behind_fog();
-    // what lies behind the volume but is stored without its fog
+    // the map stores no fog for the surface behind the volume
     shows(gpu, &scene, back);
-    // stored with it, by the distance from an eye that is below the fog's surface, wherever the box is
+    // with stored fog, by the distance from a camera below the fog's surface, wherever the box is
     scene.surfaces[0].fog = 1;
     shows(gpu, &scene, fogged(300.0, back));
-    // an index without its fog
+    // an invalid fog index
     scene.surfaces[0].fog = 2;
     shows(gpu, &scene, back);
 }
 
 fn fog_seen_from_above_counts_the_way_below_its_surface(gpu: &mut Gpu) {
-    // a floor at z = -100, straight below the eye: 180 of 300 units lie below the fog's surface at 80
+    // a floor at z = -100, straight below the camera: 180 of 300 units are below the fog's surface at 80
     let mut scene = Scene::new(Vec3::Z * 200.0, Vec3::X * 0.01, 1.0, 4);
     let floor = scene.material(&[stage::constant(BACK)], 0);
     let (x, y) = (Vec3::X * 400.0, Vec3::Y * 400.0);
@@ -157,7 +157,7 @@ fn fog_seen_from_above_counts_the_way_below_its_surface(gpu: &mut Gpu) {
     scene.surfaces[0].fog = 1;
     scene.fogs.push(slab(c::FOG_SURFACE, 80.0));
     shows(gpu, &scene, fogged(180.0, displayed(BACK)));
-    // a surface above the fog's
+    // a surface above that of the fog
     scene.fogs[0].plane[3] = 150.0;
     shows(gpu, &scene, displayed(BACK));
 }
@@ -172,7 +172,7 @@ fn fog_fades_layers_that_are_stored_with_it(gpu: &mut Gpu) {
             displayed(veil) * (alpha * left) + back * (1.0 - alpha * left),
         ),
         (stage::add([0.1; 3]), displayed([0.1; 3]) * left + back),
-        // what multiplies the display is not faded
+        // stages that multiply the background are not faded
         (stage::filter(veil), displayed(veil) * back),
     ] {
         let mut scene = wall_behind_fog();
@@ -184,7 +184,7 @@ fn fog_fades_layers_that_are_stored_with_it(gpu: &mut Gpu) {
 }
 
 fn skies_show_behind_fog_but_through_a_surface_that_is_drawn(gpu: &mut Gpu) {
-    // from within the fog, straight up: its surface is 60 units away, the sky above it
+    // from inside the fog, straight up: its surface is 60 units away, the sky above it
     let mut scene = Scene::new(
         Vec3::new(150.0, 0.0, 20.0),
         Vec3::new(150.0, 0.01, 500.0),
@@ -205,7 +205,7 @@ fn skies_show_behind_fog_but_through_a_surface_that_is_drawn(gpu: &mut Gpu) {
     shows(gpu, &scene, back);
     scene.fogs[0].has_surface = c::FOG_SURFACE_DRAWN;
     shows(gpu, &scene, fogged(60.0, back));
-    // from above the surface there is no veil, nor where the ray leaves the volume at its side
+    // no fog from above the surface, nor for rays that leave the volume at its side
     scene.def.view_origin.z = 200.0;
     shows(gpu, &scene, back);
     let forward = Vec3::new(2.0, 0.0, 1.0).normalize();
@@ -219,7 +219,7 @@ fn clouds_are_behind_the_fog_that_their_sky_is_stored_with(gpu: &mut Gpu) {
         faces: [c::NO_TEXTURE; 6],
         cloud_height: 512.0,
     };
-    // below the fog's surface, down to the cells of a side of the sky's box that lie below it, too
+    // below the fog's surface, including cells on a side of the sky box below it
     let (eye, at) = (
         Vec3::new(150.0, 0.0, 20.0),
         Vec3::new(250.0, 0.0, 20.0 - 37.5),
@@ -232,7 +232,7 @@ fn clouds_are_behind_the_fog_that_their_sky_is_stored_with(gpu: &mut Gpu) {
     let left = 1.0 - cover;
     for (clouds, exact) in [
         (stage::constant(BACK), displayed(BACK) * left),
-        // what blends fades before the fog is laid over it; nothing is behind it
+        // blended stages fade before the fog is applied; nothing is behind them
         (
             stage::blend(veil, 0.5),
             displayed(veil) * (alpha * left) * left,
@@ -250,7 +250,7 @@ fn clouds_are_behind_the_fog_that_their_sky_is_stored_with(gpu: &mut Gpu) {
         };
         scene.fogs.push(fog);
         shows(gpu, &scene, exact + fog.color * cover);
-        // stored without a fog, they have none
+        // surfaces without a stored fog have none
         for surface in &mut scene.surfaces {
             surface.fog = 0;
         }

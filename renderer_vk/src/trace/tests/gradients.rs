@@ -1,4 +1,4 @@
-//! How far the denoiser tells of a light that has changed.
+//! Range over which the denoiser detects a change of light.
 
 use glam::Vec3;
 use relight::light::{Falloff, PointLight};
@@ -18,12 +18,13 @@ gpu_tests! {
 
 const WIDTH: usize = 192;
 const HEIGHT: usize = 24;
-/// Pixels to the edge of a stratum (`denoise.glsl`).
+/// Edge of a stratum, pixels (`denoise.glsl`).
 const STRATUM: usize = 3;
-/// Strata that a change is told over: 12 by the last step, over sums of 6 by those before.
+/// Range of a gradient, strata: 12 by the last step, over sums of 6 by those before.
 const REACH: usize = 18;
 
-/// A wall in even light. A board before its middle, seen from its edge, keeps what shines on the left from the right.
+/// A uniformly lit wall. A board before its middle, edge-on to the camera, separates the light of its left from its
+/// right.
 fn halved_wall() -> Scene {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 60.0, WIDTH as i32);
     scene.def.height = HEIGHT as i32;
@@ -54,7 +55,7 @@ fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther(gpu: &
         rt_accumulate: false,
         rt_taa: false,
         rt_denoiser: DenoiserChoice::ASvgf,
-        // all of them, so that one that is gone changes nothing where it did not shine
+        // all lights, so that a removed one changes nothing where it did not shine
         rt_num_random_dl: 0,
         rt_debug: DebugOutput::Samples,
         ..reference()
@@ -76,7 +77,7 @@ fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther(gpu: &
         picture
     };
     let (never, until_now) = (history(0), history(last));
-    // of each column, the pixels whose history is not what it would be without the lamp
+    // for each column, the pixels whose history differs from that without the lamp
     let changed: Vec<usize> = (0..WIDTH)
         .map(|x| {
             let at = |y: usize| y * WIDTH + x;
@@ -91,7 +92,7 @@ fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther(gpu: &
         changed.iter().take(edge).all(|&n| n == HEIGHT),
         "where the lamp shone: {changed:?}"
     );
-    // beside it two thirds of the way: farther than the first steps alone reach
+    // beside it, two thirds of the range: farther than the first steps alone reach
     let beside = changed.iter().skip(edge).take(REACH * 2 / 3 * STRATUM);
     assert!(
         beside.clone().all(|&n| n == HEIGHT),
@@ -103,7 +104,7 @@ fn a_change_of_light_shortens_history_as_far_as_it_reaches_and_no_farther(gpu: &
 }
 
 fn static_surfaces_have_no_gradient_under_jitter(gpu: &mut Gpu) {
-    // boards that lean on the wall: beside their edges are surfaces as far away that are lit otherwise
+    // boards leaning on the wall: beside their edges are surfaces at equal distance with other light
     let mut scene = halved_wall();
     let white = scene.diffuse(0.8);
     for i in 0..8u8 {
@@ -129,7 +130,7 @@ fn static_surfaces_have_no_gradient_under_jitter(gpu: &mut Gpu) {
 }
 
 fn antialiasing_keeps_nothing_of_light_that_fades(gpu: &mut Gpu) {
-    // stripes hardly wider than pixels, which differ by more than the light of a few frames
+    // stripes slightly wider than pixels, whose contrast exceeds the light of a few frames
     let mut scene = halved_wall();
     let colors = [0.2, 0.9].map(|albedo| scene.diffuse(albedo));
     for (i, color) in (0..70u8).zip(colors.into_iter().cycle()) {
@@ -141,7 +142,7 @@ fn antialiasing_keeps_nothing_of_light_that_fades(gpu: &mut Gpu) {
             rt_accumulate: false,
             rt_taa,
             rt_denoiser: DenoiserChoice::ASvgf,
-            // all of them, so that no noise is in the way
+            // all lights, so that there is no noise
             rt_num_random_dl: 0,
             ..reference()
         };

@@ -1,4 +1,4 @@
-//! What the traced look tells about itself: counted rays, views of its steps.
+//! Diagnostics of the traced look: ray counters and debug views.
 
 use glam::Vec3;
 use relight::light::SunLight;
@@ -51,13 +51,13 @@ fn rays_are_counted_exactly_and_only_when_asked(gpu: &mut Gpu) {
     gpu.render(&scene, &settings(0), 4);
     let rays = gpu.rays().expect("counted");
     let pixels = u64::from(SIZE * SIZE);
-    // for each pixel one for the floor and one to the light; nothing translucent is there to ask for
+    // for each pixel one ray to the floor and one to the light; no rays for layers, because there are none
     assert_eq!(rays, [pixels, 0, pixels, 0, 0, 0, 0]);
     gpu.render(&scene, &settings(1), 4);
-    // the floor sees nothing but emptiness
+    // the floor faces empty space
     let rays = gpu.rays().expect("counted");
     assert_eq!(rays, [pixels, 0, pixels, pixels, 0, 0, 0]);
-    // one of 2 x 2 pixels in a picture that is denoised, by other passes
+    // one of 2 x 2 pixels in a denoised picture, by other passes
     let denoised = Settings {
         rt_accumulate: false,
         rt_denoiser: DenoiserChoice::ASvgf,
@@ -66,7 +66,7 @@ fn rays_are_counted_exactly_and_only_when_asked(gpu: &mut Gpu) {
     gpu.render(&scene, &denoised, 4);
     let rays = gpu.rays().expect("counted");
     assert_eq!(rays, [pixels, 0, pixels, 0, pixels / 4, 0, 0]);
-    // of what is chosen for each pixel, and of a sun beside it
+    // rays to the sampled light of each pixel, and to a sun
     let mut sunny = lit_floor();
     sunny.suns.push(SunLight {
         direction: Vec3::Z,
@@ -133,7 +133,7 @@ fn a_ray_finds_several_layers(gpu: &mut Gpu) {
         gpu.render(&scene, &reference(), 4);
         gpu.rays().expect("counted")[1] / pixels
     };
-    // a ray for layers finds two, and one that finds fewer is the last
+    // a ray for layers finds two; one that finds fewer is the last
     assert_eq!([1, 3, 4, 8].map(&mut asked), [1, 2, 3, 5]);
 }
 
@@ -151,7 +151,7 @@ fn debug_views_show_what_they_say(gpu: &mut Gpu) {
     };
     let near = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).all(|(a, b)| a.abs_diff(b) <= 2);
     let albedo = view(DebugOutput::Albedo);
-    // 0.25 linear is 0.537 as displayed
+    // 0.25 linear is 0.537 display-encoded
     assert!(near(albedo, [137; 3]), "{albedo:?}");
     let normal = view(DebugOutput::Normals);
     assert!(near(normal, [128, 128, 255]), "{normal:?}");
@@ -165,9 +165,9 @@ fn debug_views_show_what_they_say(gpu: &mut Gpu) {
         "{motion:?}"
     );
     let lights = view(DebugOutput::Lights);
-    // one light: a tenth of the way, three fifths of the way to blue
+    // one light: a tenth of the scale, three fifths of the way to blue
     assert!(near(lights, [15, 23, 138]), "{lights:?}");
     let rays = view(DebugOutput::Rays);
-    // two rays: an eighth of the binary logarithm of three of the way, a fifth from blue to cyan
+    // two rays: an eighth of log2(3) of the scale, a fifth of the way from blue to cyan
     assert!(near(rays, [21, 67, 230]), "{rays:?}");
 }

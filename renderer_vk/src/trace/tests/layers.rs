@@ -44,17 +44,17 @@ pub(super) fn scene() -> Scene {
     Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 32)
 }
 
-/// What shaders keep of a constant that passes through a byte.
+/// A constant after the shaders' rounding to 8 bits.
 fn byte(value: f32) -> f32 {
     (value * 255.0 + 0.001).floor() / 255.0
 }
 
-/// A constant colour as it is displayed.
+/// A constant colour in display values.
 pub(super) fn displayed(color: [f32; 3]) -> Vec3 {
     Vec3::from(color.map(byte))
 }
 
-/// What constant layers (encoded colour, alpha), nearest first, show over a background (encoded): mixed as displayed.
+/// Constant layers (encoded colour, alpha), nearest first, over a background (encoded): blended in display values.
 pub(super) fn over(layers: &[([f32; 3], f32)], background: [f32; 3]) -> Vec3 {
     let mixed = layers
         .iter()
@@ -66,7 +66,7 @@ pub(super) fn over(layers: &[([f32; 3], f32)], background: [f32; 3]) -> Vec3 {
 }
 
 pub(super) fn close(a: Vec3, b: Vec3) -> bool {
-    // what a pixel shows is kept to a part of its largest channel, rounded up or down in reference mode
+    // stored colours are quantized to a part of their largest channel, with stochastic rounding in reference mode
     (a - b).abs().max_element() < 5.0e-4 + b.max_element() / 256.0
 }
 
@@ -75,7 +75,7 @@ fn layers_are_composed_in_order_however_many_there_are(gpu: &mut Gpu) {
     let green = [0.1, 0.8, 0.2];
     let blue = [0.2, 0.1, 1.0];
     let back = [0.5, 0.6, 0.4];
-    // given in no order of distance; half of them move
+    // in arbitrary order; half of them move
     let mut scene = scene();
     let wall = scene.material(&[stage::constant(back)], 0);
     scene.quad(screen(300.0), wall);
@@ -87,12 +87,12 @@ fn layers_are_composed_in_order_however_many_there_are(gpu: &mut Gpu) {
     let exact = over(&[(red, 0.5), (green, 0.25), (blue, 0.75)], back);
     let mean = gpu.mean(&scene, &reference(), 2);
     assert!(close(mean, exact), "{mean} {exact}");
-    // behind a wall they do not show
+    // layers behind a wall are invisible
     scene.quad(screen(120.0), wall);
     let mean = gpu.mean(&scene, &reference(), 2);
     assert!(close(mean, over(&[(red, 0.5)], back)), "{mean}");
 
-    // many, and additive ones among them
+    // many layers, some of them additive
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 8);
     let thin = scene.material(&[stage::blend(red, 0.05)], TRANSLUCENT);
     for i in 0..40 {
@@ -110,7 +110,7 @@ fn paints_of_one_body_are_mixed_as_displayed(gpu: &mut Gpu) {
     let mixed = |i: usize| byte(below[i]) * (1.0 - alpha) + byte(above[i]) * alpha;
     let exact = decode(Vec3::from_array([0, 1, 2].map(mixed)));
     let stages = [stage::constant(below), stage::blend(above, 0.25)];
-    // as a glow, and lit by half
+    // emissive, and lit by half
     let mut glowing = scene();
     let wall = glowing.material(&stages, 0);
     glowing.quad(screen(100.0), wall);
@@ -128,15 +128,15 @@ fn paints_of_one_body_are_mixed_as_displayed(gpu: &mut Gpu) {
     }
 }
 
-/// What lies on a path, from the eye on: the displayed sum of the layers so far.
+/// Layers along a path, from the camera on: the display-encoded sum so far.
 #[derive(Clone, Copy)]
 struct Displayed {
-    /// Sum of all, and each weighed by one over the chance that its branch is seen.
+    /// Sum of all layers, and of each divided by the probability of its branch.
     sum: Vec3,
     weighed: Vec3,
-    /// Part of the display that is left to what lies behind.
+    /// Part of the display value that the background keeps.
     cover: Vec3,
-    /// Part of the light that a branch of a pane passes on, and the weight of the branch.
+    /// Part of the light that a branch of a pane transmits, and the weight of the branch.
     passed: f32,
     weight: f32,
 }
@@ -160,7 +160,7 @@ impl Displayed {
         }
     }
 
-    /// Light of the whole: the sum's, shared as the sum is.
+    /// Light of the whole, shared in proportion to the sum.
     fn light(self) -> Vec3 {
         let bounded = self.sum.min(Vec3::ONE);
         decode(bounded) / bounded * self.weighed
@@ -178,8 +178,8 @@ fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass(gpu: &mut Gpu) {
             _ => path.behind(Vec3::ZERO, own),
         }
     };
-    // every other count with a pane of glass in the middle, which mirrors the layers before it and the black behind the
-    // eye
+    // every other count has a pane of glass in the middle, which reflects the layers before it and the black behind the
+    // camera
     for count in 1..=8 {
         let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 2.0, 8);
         let wall = scene.material(&[stage::constant(back)], 0);
@@ -210,8 +210,8 @@ fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass(gpu: &mut Gpu) {
                     ..Default::default()
                 };
                 scene.quad(screen(x + 10.0), pane);
-                // at right angles a face reflects ((n - 1) / (n + 1))²; a sheet of two sides counts as one face. A
-                // picture shows either branch in every other frame
+                // at normal incidence a face reflects ((n - 1) / (n + 1))²; a sheet of two sides counts as one face. A
+                // picture shows each branch in every other frame
                 path.weight = 2.0;
                 let back = Displayed {
                     passed: 0.04,
@@ -232,8 +232,8 @@ fn one_to_eight_mixed_layers_are_exact_before_and_behind_glass(gpu: &mut Gpu) {
 }
 
 fn light_behind_a_veil_counts_in_proportion(gpu: &mut Gpu) {
-    // a lit wall behind a veil that glows: as bright as the display mixes both where the light is the engine's, and linear
-    // in light whatever that is, so that means of noisy frames are means of the picture
+    // a lit wall behind a glowing veil: equal to the blend in display values if the light is the engine's, and linear
+    // in the light in general, so that means of noisy frames are means of the picture
     let (veil, alpha) = ([0.3, 0.2, 0.5], 0.25);
     let picture = |gpu: &mut Gpu, light: f32| {
         let mut scene = scene();
@@ -245,7 +245,7 @@ fn light_behind_a_veil_counts_in_proportion(gpu: &mut Gpu) {
         gpu.mean(&scene, &reference(), 1)
     };
     let [dark, half, full] = [0.0, 0.5, 1.0].map(|light| picture(gpu, light));
-    // the harness' surfaces have white corners: there the engine shows full light
+    // the harness' surfaces have white vertices: there the engine shows full light
     let exact = over(&[(veil, alpha)], [encode(0.5); 3]);
     assert!(close(full, exact), "{full} {exact}");
     assert!(close(half, (dark + full) * 0.5), "{dark} {half} {full}");
@@ -256,7 +256,8 @@ fn light_behind_a_veil_counts_in_proportion(gpu: &mut Gpu) {
 }
 
 fn light_over_a_layer_darkens_what_lies_behind_it(gpu: &mut Gpu) {
-    // water whose stages multiply what is behind, and their lightmap that, too: the light that the engine shows at the water
+    // water whose stages multiply the background, followed by their lightmap: the light that the engine shows at the
+    // water
     let (back, tint, stored) = ([0.9, 0.8, 0.5], [0.9, 0.7, 0.8], [153, 102, 204]);
     let mut scene = scene();
     let wall = scene.material(&[stage::constant(back)], 0);
@@ -289,7 +290,8 @@ fn a_lit_picture_on_a_pane_is_a_haze(gpu: &mut Gpu) {
         corner.color = u32::from_le_bytes([red, green, blue, 255]);
     }
     let unit = |bytes: [u8; 3]| Vec3::from(bytes.map(|c| f32::from(c) / 255.0));
-    // added as displayed to what lies behind, and both by the light that the map stores; nothing lies before the pane
+    // added in display values to the background, then both times the light that the map stores; nothing is in front of
+    // the pane
     let exact = decode((displayed(back) + unit(texel)) * unit(stored));
     for depth in [0, 2] {
         let settings = Settings {
@@ -310,7 +312,7 @@ fn the_lightmap_of_what_has_none_is_white_and_lights_nothing(gpu: &mut Gpu) {
     bright.quad(screen(300.0), shown);
     let mean = gpu.mean(&bright, &reference(), 1);
     assert!(close(mean, decode(displayed(color))), "{mean}");
-    // a wall that sees nothing else
+    // a wall that faces nothing else
     let mut dark = scene();
     let wall = dark.diffuse(0.8);
     dark.quad(screen(300.0), wall);
@@ -331,7 +333,7 @@ fn layers_in_one_plane_come_in_drawing_order(gpu: &mut Gpu) {
     let wall = scene.material(&[stage::constant(back)], 0);
     let a = scene.material(&[stage::blend(first, 0.5)], TRANSLUCENT);
     let b = scene.material(&[stage::blend(second, 0.5)], TRANSLUCENT);
-    // b has the greater sort value, so it is drawn later and lies on top, wherever it stands in the lists
+    // b has the greater sort value, so that it is drawn later and is on top, in any order of the lists
     scene.materials[a as usize].1.sort = 4.0;
     scene.materials[b as usize].1.sort = 9.0;
     scene.quad(screen(100.0), b);
@@ -343,7 +345,7 @@ fn layers_in_one_plane_come_in_drawing_order(gpu: &mut Gpu) {
 }
 
 fn lit_layers_and_what_is_behind_them_are_all_lit(gpu: &mut Gpu) {
-    // two lit layers of one half over a lit wall: all of them share the light of what the display shows, in the mean
+    // two lit layers of one half over a lit wall: in the mean, all share the light of the displayed sum
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 40.0, 16);
     scene.ambient = Vec3::splat(0.8);
     let wall = scene.diffuse(0.5);
@@ -364,7 +366,7 @@ fn lit_layers_and_what_is_behind_them_are_all_lit(gpu: &mut Gpu) {
     assert!((mean / exact - 1.0).abs() < 0.005, "{mean} {exact}");
 }
 
-/// What the game fades by its alpha.
+/// A stage that the game fades by its alpha.
 fn matter(color: [f32; 3], alpha: f32) -> Stage {
     Stage {
         flags: c::STAGE_MATTER | c::STAGE_WHITE,
@@ -386,7 +388,7 @@ fn a_mark_shares_the_light_of_its_wall_without_noise(gpu: &mut Gpu) {
     let alpha = 127.0 / 255.0;
     let albedo = byte(encode(0.5));
     let exact = 0.8 * decode(displayed(blood) * alpha + (1.0 - alpha) * albedo);
-    // what is behind counts by itself where it is no longer the same wall
+    // the background is lit by itself where it is not at the same wall
     for (place, noisy) in [(299.9, false), (200.0, true)] {
         scene
             .dynamic_vertices

@@ -25,7 +25,7 @@ gpu_tests! {
     ],
 }
 
-/// The ways to choose lights.
+/// Methods of light sampling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LightSampling {
     Uniform,
@@ -39,7 +39,7 @@ const ALL: [LightSampling; 3] = [
     LightSampling::All,
 ];
 
-/// A white floor in sight of a slanted camera.
+/// A white floor and a slanted camera.
 fn floor() -> Scene {
     let mut scene = Scene::new(Vec3::new(-100.0, 0.0, 80.0), Vec3::ZERO, 20.0, 32);
     let white = scene.diffuse(1.0);
@@ -66,7 +66,7 @@ fn sampled(sampling: LightSampling) -> Settings {
     }
 }
 
-/// Mean of |a - b| / b over the picture.
+/// Mean relative difference over the picture.
 fn mean_difference(a: &[Vec3], b: impl Fn(usize) -> f32) -> f32 {
     let sum: f32 = a
         .iter()
@@ -109,7 +109,7 @@ fn one_triangle_gives_the_irradiance_of_the_closed_form(gpu: &mut Gpu) {
         println!("mean relative difference {difference}, ratio {ratio}");
         assert!(difference < 0.002, "{difference}");
         assert!((ratio - 1.0).abs() < 0.0005, "{ratio}");
-        // turned away it gives nothing
+        // no light behind a one-sided light
         let mut scene = floor();
         scene.light([triangle[0], triangle[2], triangle[1]], Vec3::splat(5.0));
         assert_eq!(
@@ -186,7 +186,7 @@ fn all_estimators_have_the_same_mean(gpu: &mut Gpu) {
         // noise of the sampled ones, not bias
         assert!(difference < 0.08, "{sampling:?} {difference}");
     }
-    // what resampling is for: fewer errors than uniform choice at the same number of rays, while these are few
+    // resampling has smaller errors than uniform selection at an equal, small number of rays
     let mut error = |sampling| {
         let (few, _) = gpu.render(&scene, &sampled(sampling), 2);
         let errors = few.iter().zip(&means[2]).map(|(a, b)| (a.x - b.x).powi(2));
@@ -216,7 +216,7 @@ fn an_umbra_is_black_and_a_penumbra_is_between(gpu: &mut Gpu) {
         ),
         white,
     );
-    // between light and floor, above the eye
+    // between light and floor, above the camera
     scene.quad(
         rectangle(
             Vec3::new(-20.0, -20.0, 100.0),
@@ -232,7 +232,7 @@ fn an_umbra_is_black_and_a_penumbra_is_between(gpu: &mut Gpu) {
     for (i, pixel) in pixels.iter().enumerate() {
         let p = floor_point(&scene, i % 32, i / 32);
         let extent = p.x.abs().max(p.y.abs());
-        // the plate's shadow reaches 40 on the floor; the light's size blurs it by 5, a pixel covers 5
+        // the plate's shadow extends to 40 on the floor; the light's size blurs it by 5, a pixel covers 5
         if extent < 30.0 {
             umbra += 1;
             assert_eq!(*pixel, Vec3::ZERO, "{p}");
@@ -262,7 +262,7 @@ fn triangles_end_alone_and_quads_together(gpu: &mut Gpu) {
     };
     let whole = brightest(gpu, &scene);
     assert!(whole > 0.1, "a test of nothing: {whole}");
-    // more than each of the two gives, and less than both
+    // above the contribution of each light alone, below their sum
     scene.light_cutoff = 0.75 * whole;
     let together = brightest(gpu, &scene);
     assert!((together / whole - 1.0).abs() < 0.02, "{together} {whole}");
@@ -283,7 +283,7 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
         assert!(difference < 0.01, "{difference}");
     };
     let at = Vec3::new(20.0, 10.0, 90.0);
-    // a small sphere is a point: E = I cos / d²
+    // a small sphere is a point light: E = I cos / d²
     let falloff = |p: Vec3| (at.z / (at - p).length()) / (at - p).length_squared();
     let mut scene = floor();
     scene.points.push(PointLight {
@@ -295,7 +295,7 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
         pulse: None,
     });
     check(gpu, &scene, &|p| 7000.0 * falloff(p) / std::f32::consts::PI);
-    // where it gives too little it gives nothing; at the edge its size and the pixels' blur that
+    // below the cutoff it contributes nothing; at the boundary, its size and the pixels blur this
     let full = |p: Vec3| 7000.0 * falloff(p) / std::f32::consts::PI;
     let end = full(Vec3::new(at.x + 20.0, at.y, 0.0));
     scene.light_cutoff = end;
@@ -317,14 +317,14 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
     }
     assert!(dark > 20 && lit > 5, "{dark} {lit}");
     scene.light_cutoff = 0.0;
-    // a linear one: E = 8 I / R² (cos - d / R)
+    // a linear light: E = 8 I / R² (cos - d / R)
     let linear = relight::light::Falloff::Linear { reach: 160.0 };
     scene.points[0].falloff = linear;
     check(gpu, &scene, &|p| {
         let distance = (at - p).length();
         7000.0 * linear.irradiance(distance, at.z / distance) / std::f32::consts::PI
     });
-    // facing it at half its reach a white surface shows the colour of a dynamic light
+    // a facing white surface at half the reach has the colour of the dynamic light
     let mut scene = floor();
     scene.dlights.push(DynamicLight {
         origin: at,
@@ -333,7 +333,7 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
         additive: false,
     });
     check(gpu, &scene, &|p| 100.0 * 100.0 * falloff(p));
-    // nearer than 0.35 of its reach it is no stronger than there
+    // closer than 0.35 of its reach it is no stronger
     let near = Vec3::new(20.0, 10.0, 24.0);
     let mut scene = floor();
     scene.dlights.push(DynamicLight {
@@ -356,7 +356,7 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
         material: None,
     });
     check(gpu, &scene, &|_| 2.0 * direction.z / std::f32::consts::PI);
-    // a low one: few rays, each of which counts for more
+    // a low sun: few rays, each of greater weight
     let low = Vec3::new(0.8, 0.6, 0.008).normalize();
     scene.suns[0] = SunLight {
         direction: low,
@@ -368,14 +368,14 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
     let mean = pixels.iter().map(|p| p.x).sum::<f32>() / pixels.len() as f32;
     let exact = 200.0 * low.z / std::f32::consts::PI;
     assert!((mean / exact - 1.0).abs() < 0.01, "{mean} {exact}");
-    // and the even light is simply there
+    // the ambient light has no shadows
     let mut scene = floor();
     scene.ambient = Vec3::splat(0.25);
     check(gpu, &scene, &|_| 0.25);
 }
 
 fn a_white_room_bounces_what_its_walls_give(gpu: &mut Gpu) {
-    // every wall glows with radiance e and reflects rho: one bounce adds rho * e, two add rho² * e more
+    // every wall emits e and reflects rho: one bounce adds rho * e, two add rho² * e more
     let mut scene = Scene::new(
         Vec3::new(-20.0, 10.0, 5.0),
         Vec3::new(50.0, 20.0, -30.0),
@@ -416,7 +416,7 @@ fn a_white_room_bounces_what_its_walls_give(gpu: &mut Gpu) {
 }
 
 fn bounced_light_of_listed_lights_is_counted_once(gpu: &mut Gpu) {
-    // a floor lit by a wall that the sun lights: by form factor of the wall, seen from the floor's point
+    // a floor lit by a sunlit wall: by the wall's form factor at the floor's point
     let mut scene = Scene::new(
         Vec3::new(-60.0, 0.0, 40.0),
         Vec3::new(-40.0, 0.0, 0.0),
@@ -433,7 +433,7 @@ fn bounced_light_of_listed_lights_is_counted_once(gpu: &mut Gpu) {
         ),
         white,
     );
-    // a wall at x = 0 that faces -x, and a lamp of the light lists on it that bounced rays must not count
+    // a wall at x = 0 that faces -x, with a lamp of the light lists on it that bounced rays must not count
     let wall = [
         Vec3::new(0.0, -40.0, 0.0),
         Vec3::new(0.0, -40.0, 50.0),
@@ -441,7 +441,7 @@ fn bounced_light_of_listed_lights_is_counted_once(gpu: &mut Gpu) {
         Vec3::new(0.0, 40.0, 0.0),
     ];
     scene.quad(wall, half);
-    // the sun stands low behind the camera: it lights the wall in full and the floor too
+    // the sun is low behind the camera: it lights the wall fully, and the floor
     let direction = Vec3::new(-1.0, 0.0, 0.2).normalize();
     scene.suns.push(SunLight {
         direction,
@@ -472,7 +472,7 @@ fn bounced_light_of_listed_lights_is_counted_once(gpu: &mut Gpu) {
 }
 
 fn a_point_is_lit_by_the_list_of_its_cluster(gpu: &mut Gpu) {
-    // two cells side by side without a wall between them: what differs is the lists alone
+    // two adjacent cells without a wall between them: only the lists differ
     let mut map = q3bsp::builder::MapBuilder::new();
     let far = map.add_cell(
         Vec3::new(-400.0, -400.0, -64.0),
@@ -502,7 +502,7 @@ fn a_point_is_lit_by_the_list_of_its_cluster(gpu: &mut Gpu) {
     let green = red.map(|p| p + Vec3::X * 30.0);
     scene.light(red, Vec3::new(90.0, 0.0, 0.0));
     scene.light(green, Vec3::new(0.0, 90.0, 0.0));
-    // the left cell knows the first light, the right one the second, points outside know both
+    // the left cell lists the first light, the right one the second, outside both
     let mut rows = [vec![], vec![]];
     rows[left].push(0);
     rows[right].push(1);

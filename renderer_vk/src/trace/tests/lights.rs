@@ -1,4 +1,4 @@
-//! Direct light against closed forms: edges, discs, furnaces, lights that move or are carried, and estimators.
+//! Direct light compared with closed forms: edges, discs, furnaces, moving lights, the flashlight, and estimators.
 
 use std::f32::consts::PI;
 
@@ -29,7 +29,7 @@ gpu_tests! {
 
 const SIDE: usize = 32;
 
-/// A white floor seen from above, `half` units to each side.
+/// A white floor from above, `half` units to each side.
 fn floor_from_above(half: f32) -> Scene {
     let height = 90.0;
     let fov = 2.0 * (half / height).atan().to_degrees();
@@ -88,7 +88,7 @@ fn an_edge_hides_the_part_of_a_light_that_lies_behind_it(gpu: &mut Gpu) {
     ];
     let mut scene = floor_from_above(40.0);
     let white = scene.diffuse(1.0);
-    // covers x < 0 at half the height, above the eye
+    // covers x < 0 at half the height, above the camera
     scene.quad(
         rectangle(
             Vec3::new(-900.0, -900.0, 150.0),
@@ -103,7 +103,7 @@ fn an_edge_hides_the_part_of_a_light_that_lies_behind_it(gpu: &mut Gpu) {
     let (mut worst, mut partial) = (0.0f32, 0);
     for (i, pixel) in pixels.iter().enumerate() {
         let p = floor_point(&scene, i % SIDE, i / SIDE);
-        // the plane through the point and the edge x = 0, z = 150; the side that is open
+        // the plane through the point and the edge x = 0, z = 150; the open side
         let normal = Vec3::new(150.0, 0.0, p.x).normalize();
         let seen = clipped(&triangle, normal, p);
         let exact: f32 = (1..seen.len().max(2) - 1)
@@ -116,7 +116,7 @@ fn an_edge_hides_the_part_of_a_light_that_lies_behind_it(gpu: &mut Gpu) {
     println!("worst {worst} of the whole light, {partial} pixels in the penumbra");
     // 256 rays: four standard errors of a fraction are 0.125
     assert!(worst < 0.125 && partial > 300, "{worst} {partial}");
-    // from the middle of the light alone there is no penumbra
+    // a light sampled only at its centre has no penumbra
     let hard = Settings {
         rt_soft_shadows: false,
         ..all_lights()
@@ -128,7 +128,7 @@ fn an_edge_hides_the_part_of_a_light_that_lies_behind_it(gpu: &mut Gpu) {
         let whole = lambert(p, Vec3::Z, triangle, 20.0);
         let part = pixel.x / whole;
         assert!(part == 0.0 || (part - 1.0).abs() < 0.05, "{p} {part}");
-        // the middle is above x = 0: its shadow ends where the edge's does
+        // the centre is above x = 0: its shadow ends at the edge's
         assert_eq!(part == 0.0, p.x < 0.0, "{p}");
         dark += usize::from(part == 0.0);
     }
@@ -158,7 +158,7 @@ fn the_suns_disc_makes_a_penumbra_of_its_own_width(gpu: &mut Gpu) {
     let mut worst = 0.0f32;
     for (i, pixel) in pixels.iter().enumerate() {
         let p = floor_point(&scene, i % SIDE, i / SIDE);
-        // where the edge cuts the disc, in radii from its middle: a chord
+        // position of the edge in the disc, in radii from its centre: a chord
         let t = (-p.x / 150.0).atan() / radius;
         let hidden = if t <= -1.0 {
             0.0
@@ -226,7 +226,7 @@ fn the_flashlight_lights_a_spot_before_the_eye(gpu: &mut Gpu) {
         ..all_lights()
     };
     let (pixels, _) = gpu.render(&scene, &settings, 8);
-    // held beside the eye, as high above the floor
+    // held beside the camera, at the same height
     let middle = pixels[SIDE / 2 * SIDE + SIDE / 2];
     let expected = (384.0f32 / 90.0).powi(2);
     assert!(
@@ -255,7 +255,7 @@ fn lights_of_a_brush_model_go_where_it_goes(gpu: &mut Gpu) {
         let mut scene = floor_from_above(40.0);
         scene.light(triangle, Vec3::splat(50.0));
         scene.lights[0].model = 1;
-        // without its entity the model is not there, nor is its light
+        // without its entity, neither the model nor its light exists
         assert_eq!(gpu.mean(&scene, &all_lights(), 1), Vec3::ZERO);
         let instance = scene.instances.len() as u32;
         scene.instances.push(Instance {
@@ -334,14 +334,14 @@ fn crowd() -> Scene {
 }
 
 fn estimators_differ_by_noise_alone(gpu: &mut Gpu) {
-    // pixels are independent and without bias their differences have the mean zero: then the sum of differences over
-    // the root of the sum of their squares is normally distributed with a deviation of one, in the picture and in each
-    // square of it. Four and a half deviations happen to one picture of some hundred thousand.
+    // if pixels are independent and unbiased, their differences have mean zero: then the sum of differences over the
+    // root of the sum of their squares is normally distributed with a deviation of one, in the picture and in each
+    // square of it. Four and a half deviations happen in one picture of some hundred thousand.
     const BOUND: f32 = 4.5;
     let scene = crowd();
     let (truth, _) = gpu.render(&scene, &all_lights(), 16);
     for selection in [LightSelection::Uniform, LightSelection::Resampled] {
-        // one sample a pixel goes through a pass of its own
+        // one sample per pixel has a pass of its own
         for (candidates, samples, frames) in [(3, 16, 12), (8, 16, 12), (8, 1, 192)] {
             let settings = Settings {
                 rt_light_selection: selection,
@@ -373,7 +373,7 @@ fn estimators_differ_by_noise_alone(gpu: &mut Gpu) {
 }
 
 fn a_chosen_ray_goes_where_it_was_sent(gpu: &mut Gpu) {
-    // a small lamp, far away, in a hole that is hardly wider: what turns a ray by a hundred-thousandth lets it miss the hole
+    // a small, distant lamp in a slightly wider hole: a direction error of 1e-5 makes a ray miss the hole
     const HEIGHT: f32 = 4000.0;
     const LAMP: f32 = 0.125;
     const HOLE: f32 = 0.131;
@@ -421,7 +421,7 @@ fn errors_fall_faster_than_those_of_independent_frames(gpu: &mut Gpu) {
             rt_num_random_dl: 1,
             ..all_lights()
         };
-        // mean squared error times the frames: one number for independent ones, however many they are
+        // mean square error times the number of frames: constant if frames are independent
         let mut noise = |frames: u32| {
             let (pixels, _) = gpu.render(&scene, &settings, frames);
             let errors = pixels.iter().zip(&truth).map(|(a, b)| (a.x - b.x).powi(2));

@@ -1,6 +1,6 @@
-//! Real maps: whether they look lit, and the same for every estimator. With `RELIGHT_TRACE_PICTURES=folder` the
-//! pictures are kept there; `RELIGHT_TRACE_MAPS=a,b` chooses maps, `RELIGHT_TRACE_FRAMES=n` how long they settle,
-//! `RELIGHT_TRACE_LIVE` takes the denoiser in place of accumulation.
+//! Real maps: they are lit, and equal for every estimator. `RELIGHT_TRACE_PICTURES=folder` stores the pictures;
+//! `RELIGHT_TRACE_MAPS=a,b` selects maps, `RELIGHT_TRACE_FRAMES=n` the number of frames, `RELIGHT_TRACE_LIVE` the
+//! denoiser in place of accumulation.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -142,7 +142,7 @@ fn maps_are_lit() {
             image::save_buffer(path, &pixels, SIZE[0], SIZE[1], image::ColorType::Rgba8)
                 .expect("saved");
         }
-        // a single view may be a dark one
+        // a single view may be dark
         assert!(mean > 0.5 && mean < 230.0, "{map}: {mean}");
         let mut colors: Vec<&[u8]> = pixels.chunks_exact(4).collect();
         colors.sort_unstable();
@@ -223,7 +223,7 @@ fn tracers_agree_on_maps() {
             }
             device.wait_idle().expect("done");
             pictures.push(device.read_image(&target).expect("read"));
-            // what the second frame cost is told when its place in the ring is taken again
+            // timings of the second frame are published when its ring slot is reused
             gpu.ring
                 .begin()
                 .and_then(|rec| gpu.ring.end(rec))
@@ -252,7 +252,7 @@ fn tracers_agree_on_maps() {
         for (other, name) in pictures[1..].iter().zip(["query", "compute"]) {
             let count = differing(other);
             println!("{map}: {count} of {} differ with {name}", 64 * 48);
-            // rays that graze an edge may fall to either side of it, and so does all that follows from them
+            // rays that graze an edge may hit or miss it, with all consequences
             assert!(count < 64 * 48 / 40, "{map} {name}: {count}");
         }
     }

@@ -1,5 +1,5 @@
-//! The traced look against closed forms, on whatever Vulkan device there is (Mesa's lavapipe in continuous
-//! integration). Without one the tests are skipped; with `RELIGHT_REQUIRE_GPU=1` they fail.
+//! The traced look compared with closed forms, on any Vulkan device (Mesa's lavapipe in continuous integration).
+//! Without one the tests are skipped; with `RELIGHT_REQUIRE_GPU=1` they fail.
 
 mod antialiasing;
 mod blooming;

@@ -1,4 +1,4 @@
-//! Models: the light that the engine adds to them, and what stands in the way of light to a weapon before the eye.
+//! Models: the light that the engine adds to them, and occlusion of the first-person weapon.
 
 use glam::Vec3;
 use relight::light::{Falloff, PointLight};
@@ -47,18 +47,18 @@ fn models_have_the_light_that_the_engine_adds(gpu: &mut Gpu) {
     let model = Instance {
         ambient: Vec3::new(0.1, 0.2, 0.9) + added,
         directed: Vec3::new(0.5, 0.2, 0.0),
-        // the screen faces the eye at half of that light
+        // the screen faces the camera, at half of that light
         light_direction: Vec3::new(-0.5, 0.75f32.sqrt(), 0.0),
         added,
         ..identity()
     };
     let albedo = decode(displayed(PAINT));
-    // what is displayed ends at white
+    // display values are clamped at white
     let grid = Vec3::new(0.35, 0.3, 0.9);
     let more = decode((grid + added).min(Vec3::ONE)) - decode(grid);
     let mean = gpu.mean(&scene_of(&lit(), model), &reference(), 2);
     assert!(close(mean, albedo * (more + traced)), "{mean}");
-    // not what is seen without light, nor what the engine gives no light
+    // neither unlit stages nor stages to which the engine adds no light
     let glow = [stage::constant(PAINT)];
     let mean = gpu.mean(&scene_of(&glow, model), &reference(), 2);
     assert!(close(mean, albedo), "{mean}");
@@ -70,7 +70,7 @@ fn models_have_the_light_that_the_engine_adds(gpu: &mut Gpu) {
     assert!(close(mean, albedo * traced), "{mean}");
 }
 
-/// A weapon before the eye, which fills the picture.
+/// A first-person weapon that fills the picture.
 fn armed() -> Scene {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 20.0, 16);
     let skin = scene.material(&lit(), 0);
@@ -82,7 +82,7 @@ fn armed() -> Scene {
     scene
 }
 
-/// The weapon in the light of a lamp above, with a roof between that instances of `flags` have.
+/// The weapon in the light of a lamp above, with a roof of instance flags `flags` between them.
 fn under_a_roof(flags: u32) -> Scene {
     let mut scene = armed();
     let black = scene.material(&[stage::constant([0.0; 3])], c::MATERIAL_TWO_SIDED);
@@ -105,7 +105,7 @@ fn under_a_roof(flags: u32) -> Scene {
 }
 
 fn who_carries_a_weapon_casts_no_shadow_on_it(gpu: &mut Gpu) {
-    // one light in two passes, and all of them in one
+    // one light in two passes, and all lights in one
     for rt_num_random_dl in [1, 0] {
         let settings = Settings {
             rt_num_random_dl,
@@ -113,7 +113,7 @@ fn who_carries_a_weapon_casts_no_shadow_on_it(gpu: &mut Gpu) {
         };
         let free = gpu.mean(&under_a_roof(c::INSTANCE_NO_SHADOW), &settings, 64);
         assert!(free.min_element() > 1.0e-3, "{free}");
-        // the body is not there for the weapon, whatever else is, is
+        // the player's body does not occlude the weapon, all other geometry does
         let body = gpu.mean(&under_a_roof(c::INSTANCE_THIRD_PERSON), &settings, 64);
         assert!(
             (body / free - 1.0).abs().max_element() < 0.02,
@@ -125,7 +125,7 @@ fn who_carries_a_weapon_casts_no_shadow_on_it(gpu: &mut Gpu) {
 }
 
 fn who_carries_a_weapon_is_not_in_the_way_of_bounced_light(gpu: &mut Gpu) {
-    // a glowing wall behind the eye, and a body between
+    // a glowing wall behind the camera, and a body between them
     let scene_of = |flags: u32| {
         let mut scene = armed();
         let glow = scene.material(&[stage::constant([1.0; 3])], c::MATERIAL_TWO_SIDED);

@@ -1,4 +1,4 @@
-//! Motion of what pixels show, against a projection on the CPU.
+//! Motion vectors compared with a projection on the CPU.
 
 use glam::{Mat3, Vec2, Vec3};
 use shaders::trace_types::SkyRecord;
@@ -23,13 +23,13 @@ const SIZE: i32 = 24;
 fn live() -> Settings {
     Settings {
         rt_accumulate: false,
-        // through the middles of pixels
+        // through pixel centres
         rt_taa: false,
         ..reference()
     }
 }
 
-/// Where a camera sees a point, pixels from the left and the top.
+/// Projection of a point, pixels from the left and the top.
 fn seen(def: &RefDef, point: Vec3) -> Vec2 {
     let clip = View::new(def, 4.0, 10000.0).world_to_clip * point.extend(1.0);
     let size = Vec2::new(def.width as f32, def.height as f32);
@@ -43,8 +43,8 @@ fn step(def: &mut RefDef) {
     def.view_axis = def.view_axis.map(|v| turn * v);
 }
 
-/// Compares the motion of every pixel that `expected` knows the last place of (as seen by the eye, in the last frame)
-/// with where the first camera saw that place. Returns how many it knew.
+/// Compares the motion of every pixel for which `expected` returns the last position (as seen by the camera, in the
+/// last frame) with the first camera's projection of that position. Returns the number of these pixels.
 fn check(gpu: &Gpu, first: &RefDef, expected: impl Fn(Vec3) -> Option<Vec3>) -> usize {
     let mut known = 0;
     for (i, (place, motion)) in gpu.motion().into_iter().enumerate() {
@@ -109,13 +109,13 @@ fn static_geometry_moves_with_the_camera(gpu: &mut Gpu) {
     });
     let known = check(gpu, &scene.def, Some);
     assert_eq!(known as i32, SIZE * SIZE);
-    // a camera that rests: no motion at all, to the last bit
+    // a static camera: exactly no motion
     gpu.render_views(&scene, &live(), 2, |_, _| {});
     for (_, [u, v, last, now]) in gpu.motion() {
         assert_eq!([u, v], [0.0, 0.0]);
         assert_eq!(last, now);
     }
-    // the first frame knows nothing
+    // the first frame has no history
     gpu.render_views(&scene, &live(), 1, |_, _| {});
     assert!(gpu.motion().iter().all(|(_, m)| m[2] < 0.0));
 }
@@ -148,12 +148,12 @@ fn meshes_move_with_their_entities_and_by_their_vertices(gpu: &mut Gpu) {
     let last = |p: Vec3| {
         let local = turn.transpose() * (p - to);
         let flat = Vec3::new(local.x - 0.05 * local.y, local.y, local.z);
-        // beside it the room shows
+        // beside it the room is visible
         Some(if flat.x.abs() < 0.01 { flat + from } else { p })
     };
     assert_eq!(check(gpu, &scene.def, last) as i32, SIZE * SIZE);
 
-    // one that was nowhere near has no past
+    // an entity that was not nearby has no history
     gpu.render_views(&scene, &live(), 2, |frame, view| {
         view.time = frame as f32 * 0.02;
         let instance = view.instances.last_mut().expect("placed");
@@ -181,7 +181,7 @@ fn reflections_have_the_motion_of_the_mirror_image(gpu: &mut Gpu) {
             ..identity()
         },
     );
-    // the mirror comes nearer too, as one on a moving brush does
+    // the mirror comes nearer too, as on a moving brush
     scene.portals.push(mirror_at(50.0, Vec3::NEG_X));
     let moved = Vec3::new(4.0, -3.0, 2.0);
     gpu.render_views(&scene, &live(), 2, |frame, view| {
@@ -230,7 +230,7 @@ fn portal_views_have_the_motion_of_the_far_camera(gpu: &mut Gpu) {
             step(&mut view.def);
         }
     });
-    // 300 in front of the far camera is as if 300 behind the portal
+    // 300 in front of the far camera corresponds to 300 behind the portal
     let last = |p: Vec3| Some(Vec3::new(50.0 + p.y, p.x - 5000.0, p.z));
     assert_eq!(check(gpu, &scene.def, last) as i32, SIZE * SIZE);
 }
@@ -315,14 +315,14 @@ fn entities_are_matched_between_frames() {
         let entity = |i: &shaders::trace_types::LastInstance| (i.known, i.origin.x);
         found.instances[1..].iter().map(entity).collect()
     };
-    // what is new has no past
+    // new entities have no history
     let first = follow(
         &mut motion,
         0.0,
         &[(1, at(0.0)), (2, at(5.0)), (1, at(20.0))],
     );
     assert!(first.iter().all(|f| f.0 == LAST_UNKNOWN));
-    // the nearest of the same sort, whatever the order; one stays, one is another model
+    // the nearest one of equal properties, in any order; one is static, one is another model
     let second = follow(
         &mut motion,
         0.02,
@@ -332,7 +332,7 @@ fn entities_are_matched_between_frames() {
         second,
         [(LAST_UNKNOWN, 0.0), (LAST_MOVED, 20.0), (LAST_SAME, 0.0)]
     );
-    // two that fly in a row: the first comes to where the second was, and is not taken for it
+    // two in a row, one behind the other: the first arrives at the second's old position, and is not mistaken for it
     let mut motion = Motion::default();
     for frame in 0..4 {
         let x = 20.0 * frame as f32;

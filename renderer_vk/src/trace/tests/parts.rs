@@ -1,4 +1,4 @@
-//! How the meshes of a view are sorted for rays.
+//! Sorting of a view's meshes for rays.
 
 use std::sync::Arc;
 
@@ -13,8 +13,7 @@ use crate::trace::input::{Kind, MaterialInfo, MaterialTable};
 use crate::trace::part_mesh;
 use crate::trace::parts::Parts;
 
-/// Cut-outs, by their number: left of 0.5 they are there, right of 1 there is nothing; all that further right, the
-/// higher the number.
+/// Alpha coverage, by material number: solid left of 0.5, empty right of 1; both limits move right with the number.
 struct CutOut;
 
 impl MaterialTable for CutOut {
@@ -47,7 +46,7 @@ impl MaterialTable for CutOut {
     }
 }
 
-/// A strip of triangles, each three corners of its own at the given texture coordinates.
+/// A strip of separate triangles at the given texture coordinates.
 fn strip(st: &[f32]) -> RigidMesh {
     let vertices = st.iter().enumerate().flat_map(|(i, &s)| {
         [Vec3::ZERO, Vec3::X, Vec3::Y].map(|corner| Vertex {
@@ -68,7 +67,7 @@ fn parts_of(mesh: RigidMesh) -> Vec<(Kind, Vec<[u32; 3]>)> {
     parts.into_iter().map(|(_, kind, of)| (kind, of)).collect()
 }
 
-/// The instances' numbers, kinds and triangles of entities of one model, one in each skin; `up`: their third axis.
+/// Instance numbers, kinds and triangles of entities of one model, one for each skin; `up`: their third axis.
 fn parts_of_skins(mesh: RigidMesh, skins: &[u32], up: Vec3) -> Vec<(u32, Kind, Vec<[u32; 3]>)> {
     let def = RefDef {
         width: 8,
@@ -98,7 +97,7 @@ fn parts_of_skins(mesh: RigidMesh, skins: &[u32], up: Vec3) -> Vec<(u32, Kind, V
         });
     }
     let mut parts = Parts::default();
-    // known from the second time on
+    // the second time from the stored coverage
     for _ in 0..2 {
         parts.collect(&view, &CutOut);
     }

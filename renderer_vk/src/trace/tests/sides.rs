@@ -1,4 +1,4 @@
-//! Sides: what the eye's rays and what light's rays meet of surfaces that show one side.
+//! One-sided surfaces for primary rays and light rays.
 
 use glam::Vec3;
 use relight::light::{Falloff, PointLight, SunLight};
@@ -15,13 +15,13 @@ gpu_tests! {
     ],
 }
 
-/// A rectangle that fills the view, at distance x; it faces away from the eye.
+/// A rectangle that fills the view, at distance x; it faces away from the camera.
 fn turned_away(x: f32) -> [Vec3; 4] {
     let [a, b, c, d] = screen(x);
     [a, d, c, b]
 }
 
-/// Where the light of a scene comes from.
+/// Source of a scene's light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Source {
     Lamp,
@@ -29,7 +29,7 @@ enum Source {
     Bounce,
 }
 
-/// A wall before the eye, and light that comes from behind the eye.
+/// A wall in front of the camera, lit from behind the camera.
 fn lit_wall(from: Source) -> Scene {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X * 100.0, 20.0, 16);
     let wall = scene.diffuse(0.8);
@@ -57,7 +57,8 @@ fn lit_wall(from: Source) -> Scene {
     scene
 }
 
-/// What the eye sees, with a black shell close before the wall: corners, flags, and whether the map or a model has it.
+/// Mean picture with a black shell close before the wall: corners, flags, and whether it is part of the map or of a
+/// model.
 fn mean(gpu: &mut Gpu, from: Source, shell: Option<([Vec3; 4], u32, bool)>, bounces: u32) -> Vec3 {
     let mut scene = lit_wall(from);
     if let Some((corners, flags, world)) = shell {
@@ -75,7 +76,7 @@ fn mean(gpu: &mut Gpu, from: Source, shell: Option<([Vec3; 4], u32, bool)>, boun
     gpu.mean(&scene, &settings, 32)
 }
 
-/// A shell whose shown side is turned to the wall, by its winding or by its `cull`.
+/// A shell whose visible side faces the wall, by its winding or by its `cull`.
 const BACK: u32 = c::MATERIAL_CULL_BACK;
 
 fn light_passes_what_the_compiler_let_it_pass(gpu: &mut Gpu) {
@@ -91,7 +92,7 @@ fn light_passes_what_the_compiler_let_it_pass(gpu: &mut Gpu) {
         for (corners, flags, world) in [
             (screen(90.0), BACK | passed, true),
             (turned_away(90.0), passed, true),
-            // no compiler saw a model: the shell of its outline shows its back
+            // models have no compiler: the outline shell shows its back
             (screen(90.0), BACK, false),
         ] {
             let lit = mean(gpu, from, Some((corners, flags, world)), bounces);
@@ -102,7 +103,7 @@ fn light_passes_what_the_compiler_let_it_pass(gpu: &mut Gpu) {
             );
         }
         for (corners, flags, world) in [
-            // walls of the map stop light from both sides, and so do models that show their front
+            // walls of the map stop light from both sides, and so do models with visible fronts
             (screen(90.0), BACK, true),
             (turned_away(90.0), 0, true),
             (turned_away(90.0), passed, false),

@@ -1,4 +1,4 @@
-//! Clouds against the geometry of their sphere, and the picture of the sun against that of its square.
+//! Clouds compared with the geometry of their sphere, and the sun's image with that of its square.
 
 use glam::{Vec2, Vec3};
 use shaders::trace_types::SkyRecord;
@@ -17,13 +17,13 @@ gpu_tests! {
     ],
 }
 
-/// Texels on each side of the picture.
+/// Texels on each side of the image.
 const SIDE: u32 = 1024;
-/// What one level of the picture is brighter than the one before it.
+/// Brightness step between levels of the image.
 const STEP: u8 = 20;
 const HEIGHT: f32 = 512.0;
 
-/// A picture whose levels tell which they are.
+/// An image whose levels encode their number.
 fn levels(gpu: &Gpu) -> Image {
     let mut desc = ImageDesc::new("levels", SIDE, SIDE, Format::Rgba8, ImageUsage::SAMPLED);
     desc.mips = SIDE.ilog2() + 1;
@@ -39,7 +39,7 @@ fn levels(gpu: &Gpu) -> Image {
     image
 }
 
-/// The clouds' coordinates: arc cosines of the direction from the centre of the sphere, 4096 below the eye.
+/// The clouds' coordinates: arc cosines of the direction from the centre of the sphere, 4096 below the camera.
 fn coordinates(d: Vec3) -> Vec2 {
     let center = Vec3::new(0.0, 0.0, -4096.0);
     let (b, c) = (
@@ -55,7 +55,7 @@ fn clouds_are_as_sharp_as_a_pixel_is_small(gpu: &mut Gpu) {
     const SIZE: usize = 16;
     const FOV: f32 = 40.0;
     let image = levels(gpu);
-    // overhead, half way, and near the horizon
+    // at the zenith, half way, and near the horizon
     for elevation in [89.0f32, 45.0, 22.0] {
         let (sine, cosine) = elevation.to_radians().sin_cos();
         let forward = Vec3::new(cosine, 0.0, sine);
@@ -160,7 +160,7 @@ fn visible_surfaces_behind_a_sky_are_shown(gpu: &mut Gpu) {
     };
     let blue = scene.sky(&[stage::constant(colors[0])], record);
     let [red, green, violet] = [1, 2, 3].map(|i| scene.material(&[stage::constant(colors[i])], 0));
-    // faces the eye, `half` to each side
+    // faces the camera, `half` to each side
     let wall = |x: f32, half: f32| {
         let edge = 2.0 * half;
         rectangle(Vec3::new(x, -half, -half), Vec3::Z * edge, Vec3::Y * edge)
@@ -180,7 +180,7 @@ fn visible_surfaces_behind_a_sky_are_shown(gpu: &mut Gpu) {
         (&[0u32, 1, 2, 3][..], [3, 3, 0]),
         (&[0, 1, 2], [1, 2, 0]),
         (&[0, 1], [2, 2, 0]),
-        // nothing of the sky is known to be in sight
+        // no sky is in the visible set
         (&[2, 3], [0, 0, 0]),
     ] {
         let (pixels, _) = gpu.render_views(&scene, &settings, 1, |_, view| {
@@ -195,7 +195,7 @@ fn visible_surfaces_behind_a_sky_are_shown(gpu: &mut Gpu) {
             assert!(!differs, "{potential:?} at {x}: {found:?}, not {color}");
         }
     }
-    // what moves shows behind a sky alone as well, where it has a face to the eye
+    // moving geometry is visible only behind a sky, too, with its face to the camera
     let (pixels, _) = gpu.render_views(&scene, &settings, 1, |_, view| {
         view.look.potential = vec![0, 1, 2];
         view.meshes.clear();

@@ -1,4 +1,4 @@
-//! Structures that are kept from frame to frame show what structures built on the spot show.
+//! Kept structures render the same as structures built in the frame.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ gpu_tests! {
     ],
 }
 
-/// Triangles here and there within a cube of 40 units, some of them degenerate.
+/// Random triangles within a cube of 40 units, some of them degenerate.
 fn shards(seed: u64, triangles: usize) -> (Vec<Vertex>, Vec<u32>) {
     let mut random = Random::new(seed);
     let mut vertices = Vec::new();
@@ -116,7 +116,7 @@ fn stage_scene() -> Scene {
     scene
 }
 
-/// Pixels that are not alike: rays that graze an edge may fall to either side of it.
+/// Number of differing pixels: rays that graze an edge may hit or miss it.
 fn differing(a: &[Vec3], b: &[Vec3]) -> usize {
     let pairs = a.iter().zip(b);
     pairs
@@ -133,7 +133,7 @@ fn settings() -> Settings {
 
 fn kept_structures_show_what_built_ones_show(gpu: &mut Gpu) {
     let mut last: Option<Vec<Vec3>> = None;
-    // poses from near to far from the first: fitted, and after the leaps built anew
+    // poses from near to far from the first: refitted, and rebuilt after large changes
     for (pose, stretch) in [1.0, 1.05, 1.2, 6.0, 0.3].into_iter().enumerate() {
         let mut pictures = Vec::new();
         for how in [How::Changing, How::Rigid, How::Animated] {
@@ -194,7 +194,7 @@ fn a_thousand_entities_of_one_model_share_one_structure() {
             let instance = turned(&mut random);
             add(&mut scene, How::Rigid, &rigid, 1, solid, instance);
         }
-        // small deformed surfaces of the map are built together, a large one is fitted
+        // small deformed surfaces of the map are built together, a large one is refitted
         for triangles in [20, 30, 500] {
             let (vertices, indices) = shards(4, triangles);
             let surface = Arc::new(RigidMesh::new(vertices, indices));
@@ -221,7 +221,7 @@ fn a_thousand_entities_of_one_model_share_one_structure() {
             let models = accel.memory().models;
             match frame {
                 0 => before = Some(models),
-                // compacted once the GPU has told how far
+                // compacted once the GPU has reported the sizes
                 _ => assert!(Some(models) <= before, "{models}"),
             }
         }
@@ -238,12 +238,12 @@ fn non_finite_geometry_is_never_hit(gpu: &mut Gpu) {
             let solid = scene.diffuse(0.8);
             let (mut vertices, mut indices) = shards(5, 8);
             for (i, vertex) in vertices.iter_mut().enumerate() {
-                // a corner of each triangle
+                // one corner of each triangle
                 if i % 3 == 0 {
                     vertex.position = Vec3::new(bad, 0.0, bad);
                 }
             }
-            // a corner that does not exist
+            // an invalid vertex index
             indices.extend([0, 1, 4_000_000]);
             let mesh = Arc::new(RigidMesh::new(vertices, indices));
             let far = bad.is_finite();
@@ -252,7 +252,7 @@ fn non_finite_geometry_is_never_hit(gpu: &mut Gpu) {
                 ..identity()
             };
             add(&mut scene, how, &mesh, 9, solid, instance);
-            // flat, and placed nowhere
+            // an instance without volume
             let (vertices, indices) = shards(6, 8);
             let mesh = Arc::new(RigidMesh::new(vertices, indices));
             let nowhere = Instance {

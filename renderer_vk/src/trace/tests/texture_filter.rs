@@ -1,4 +1,4 @@
-//! Textures on slanted surfaces against the mean of many samples.
+//! Textures on slanted surfaces compared with the mean of many samples.
 
 use glam::Vec3;
 use testkit::Random;
@@ -8,15 +8,15 @@ use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::settings::Settings;
 use crate::trace::input::Tracer;
 
-/// Texels on each side of the picture.
+/// Texels on each side of the image.
 const SIDE: u32 = 256;
 
-/// Stripes of four texels along s, light or dark without a pattern, and if asked all smaller levels.
+/// Random light and dark stripes of four texels along s, optionally with mip levels.
 fn image(gpu: &Gpu, levels: bool) -> Image {
     let mut random = Random::new(1);
     let stripes: Vec<u8> = (0..SIDE / 4)
         .map(|_| {
-            // little contrast: means of what is displayed are then nearly those of light
+            // low contrast: means of display values are then close to those of linear light
             if random.below(2) == 0 { 110 } else { 145 }
         })
         .collect();
@@ -47,7 +47,7 @@ fn image(gpu: &Gpu, levels: bool) -> Image {
     image
 }
 
-/// A floor that glows with the picture, seen along the stripes.
+/// A floor that shows the image, seen along the stripes.
 fn floor(image: &Image) -> Scene {
     let mut scene = Scene::new(
         Vec3::new(-60.0, 0.0, 12.0),
@@ -70,7 +70,7 @@ fn floor(image: &Image) -> Scene {
 
 #[test]
 fn anisotropy_comes_nearer_to_the_mean_of_many_samples() {
-    // what is seen of a texture does not depend on what follows the rays
+    // texture filtering does not depend on the tracer
     let Some(mut gpu) = Gpu::new(Tracer::Compute) else {
         return;
     };
@@ -91,7 +91,7 @@ fn anisotropy_comes_nearer_to_the_mean_of_many_samples() {
             .zip(&truth)
             .map(|(p, t)| (p.x - t.x).powi(2))
             .collect();
-        // of all, and of the lower quarter, where the ellipse is less than four times as long as wide
+        // of the whole picture, and of its lower quarter, where the ellipse is less than four times as long as wide
         let near = squares.len() * 3 / 4;
         [&squares[..], &squares[near..]].map(|s| s.iter().sum::<f32>() / truth.len() as f32)
     };

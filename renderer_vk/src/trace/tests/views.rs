@@ -1,4 +1,4 @@
-//! Mirrors, portals, sky, who sees what, and the way to the picture.
+//! Mirrors, portals, sky, ray visibility, and output of the picture.
 
 use glam::Vec3;
 use shaders::trace_types::SkyRecord;
@@ -40,7 +40,7 @@ fn linear(color: [f32; 3]) -> Vec3 {
 }
 
 fn close(a: Vec3, b: Vec3) -> bool {
-    // what a pixel shows is kept to a part of its largest channel, rounded up or down in reference mode
+    // stored colours are quantized to a part of their largest channel, with stochastic rounding in reference mode
     (a - b).abs().max_element() < 5.0e-4 + b.max_element() / 256.0
 }
 
@@ -64,17 +64,17 @@ fn screen(x: f32) -> [Vec3; 4] {
 fn a_mirror_shows_what_is_behind_the_eye_and_who_looks(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
     let red = scene.material(&[stage::constant(RED)], 0);
-    // a clean mirror: its one stage leaves half of what it shows
+    // a clean mirror: its single stage passes half of the reflection
     let mirror = scene.material(&[stage::filter([encode(0.5); 3])], c::MATERIAL_PORTAL);
     scene.quad(screen(-100.0), red);
     scene.quad(screen(50.0), mirror);
     scene.portals.push(mirror_at(50.0, Vec3::NEG_X));
-    // a product of what is displayed
+    // a product of display values
     let byte = |v: f32| (v * 255.0 + 0.001).floor() / 255.0;
     let half = |color: [f32; 3]| decode(Vec3::from(color.map(byte)) * byte(encode(0.5)));
     let mean = gpu.mean(&scene, &reference(), 1);
     assert!(close(mean, half(RED)), "{mean}");
-    // the body of the one who looks shows in the mirror, the weapon before the eye does not
+    // the player's body is visible in the mirror, the first-person weapon is not
     let green = scene.material(&[stage::constant(GREEN)], 0);
     let blue = scene.material(&[stage::constant(BLUE)], 0);
     let body = Instance {
@@ -91,16 +91,16 @@ fn a_mirror_shows_what_is_behind_the_eye_and_who_looks(gpu: &mut Gpu) {
     scene.mesh(screen(-5.0), blue, weapon);
     let mean = gpu.mean(&scene, &reference(), 1);
     assert!(close(mean, half(GREEN)), "{mean}");
-    // no mirror deeper than the setting says
+    // no deeper mirror recursion than the setting
     let shallow = Settings {
         rt_max_depth: 0,
         ..reference()
     };
     assert_eq!(gpu.mean(&scene, &shallow, 1), Vec3::ZERO);
-    // without an entity that marks it, it is a surface like any other
+    // without its portal entity it is an ordinary surface
     scene.portals.clear();
     assert_eq!(gpu.mean(&scene, &reference(), 1), Vec3::ZERO);
-    // the weapon is in front of walls that it sticks into, and the body is not seen by its own eye
+    // the weapon is drawn in front of walls that it penetrates, and the body is invisible to its own camera
     scene.mesh(screen(60.0), blue, weapon);
     let mean = gpu.mean(&scene, &reference(), 1);
     assert!(close(mean, linear(BLUE)), "{mean}");
@@ -115,7 +115,7 @@ fn only_the_fronts_of_a_weapon_are_seen(gpu: &mut Gpu) {
         flags: c::INSTANCE_FIRST_PERSON,
         ..identity()
     };
-    // the wall is nearer than the back of a weapon that sticks into it
+    // the wall is nearer than the back of a weapon that penetrates it
     scene.quad(screen(40.0), red);
     let [a, b, c, d] = screen(60.0);
     scene.mesh([d, c, b, a], green, weapon);
@@ -145,24 +145,24 @@ fn camera_facing_copies_are_hit_only_by_their_own_paths(gpu: &mut Gpu) {
         scene.meshes.last_mut().unwrap().paths = paths;
         gpu.mean(scene, &reference(), 1)
     };
-    // what only the eye sees straight on is not in the mirror, solid or not
+    // geometry for direct views is not visible in the mirror, solid or not
     let mean = on_way(&mut scene, -10.0, red, 1);
     assert!(close(mean, Vec3::ONE), "{mean}");
     let mean = on_way(&mut scene, -15.0, veil, 1);
     assert!(close(mean, Vec3::ONE), "{mean}");
-    // what is turned to another mirror is not, either; what is turned to this one is
+    // neither are copies that face another mirror; copies that face this one are
     let mean = on_way(&mut scene, -20.0, red, 3);
     assert!(close(mean, Vec3::ONE), "{mean}");
     let mean = on_way(&mut scene, -40.0, veil, 2);
     assert!(close(mean, linear(BLUE)), "{mean}");
     let mean = on_way(&mut scene, -30.0, green, 2);
     assert!(close(mean, linear(GREEN)), "{mean}");
-    // and is not in the eye's own way
+    // and these are invisible to direct rays
     let mean = on_way(&mut scene, 30.0, red, 2);
     assert!(close(mean, linear(GREEN)), "{mean}");
     let mean = on_way(&mut scene, 20.0, veil, 1);
     assert!(close(mean, linear(BLUE)), "{mean}");
-    // a mirror in the mirror: its paths have numbers after those of one mirror
+    // a mirror in the mirror: its paths are numbered after those of one mirror
     scene.meshes.clear();
     scene.entities.clear();
     scene.quad(screen(-90.0), mirror);
@@ -193,7 +193,7 @@ fn a_portal_shows_what_its_camera_sees(gpu: &mut Gpu) {
     let red = scene.material(&[stage::constant(RED)], 0);
     scene.quad(screen(50.0), portal);
     scene.quad(screen(-100.0), red);
-    // the far camera stands at (5000, 0, 0) and looks along +y, at a green wall there
+    // the far camera is at (5000, 0, 0) and looks along +y, at a green wall
     scene.quad(
         rectangle(
             Vec3::new(4000.0, 300.0, -900.0),
@@ -205,7 +205,7 @@ fn a_portal_shows_what_its_camera_sees(gpu: &mut Gpu) {
     scene.portals.push(Portal {
         mirror: false,
         camera_origin: Vec3::new(5000.0, 0.0, 0.0),
-        // surface axis 0 looks to the eye; looking into the surface (-axis 0) becomes +y
+        // surface axis 0 points to the camera; the direction into the surface (-axis 0) becomes +y
         camera_axis: [Vec3::NEG_Y, Vec3::X, Vec3::Z],
         ..mirror_at(50.0, Vec3::NEG_X)
     });
@@ -235,7 +235,7 @@ fn back_faces_do_not_show(gpu: &mut Gpu) {
 }
 
 fn of_two_faces_in_one_plane_the_one_that_shows_is_met(gpu: &mut Gpu) {
-    // no plane along an axis, so that distances to it are rounded in all sorts of ways
+    // no plane perpendicular to an axis, so that distances are rounded variously
     let normal = Vec3::new(-0.8, 0.47, -0.371).normalize();
     let across = normal.cross(Vec3::Z).normalize() * 400.0;
     let along = normal.cross(across);
@@ -246,7 +246,7 @@ fn of_two_faces_in_one_plane_the_one_that_shows_is_met(gpu: &mut Gpu) {
     let green = scene.material(&[stage::constant(GREEN)], 0);
     let blue = scene.material(&[stage::constant(BLUE)], 0);
     scene.quad(screen(500.0), green);
-    // that which shows its back first and last, each cut otherwise
+    // two quads whose backs are first and last, each with another diagonal
     let back = rectangle(corner, along, across);
     scene.quad(back, blue);
     scene.quad(rectangle(corner, across, along), red);
@@ -264,7 +264,7 @@ fn the_sky_is_where_its_stages_say_and_lets_the_sun_in(gpu: &mut Gpu) {
         90.0,
         32,
     );
-    // what is added to the sky is added as displayed
+    // additive layers over the sky are added in display values
     let haze = [0.2, 0.4, 0.6];
     let shown: [f32; 3] = std::array::from_fn(|i| (BLUE[i] + haze[i]).min(1.0));
     let sky = scene.sky(
@@ -306,7 +306,7 @@ fn the_sky_is_where_its_stages_say_and_lets_the_sun_in(gpu: &mut Gpu) {
         "{}",
         pixels[30 * 32 + 16]
     );
-    // the sky is above the roof: shadow
+    // the sky is above the roof: the floor is in shadow
     scene.quad(
         rectangle(
             Vec3::new(-500.0, -500.0, 300.0),
@@ -361,7 +361,7 @@ fn exposure_adapts_to_surfaces_alone(gpu: &mut Gpu) {
         rt_auto_exposure: true,
         ..reference()
     };
-    // a lit wall, and a glow that covers the left half of it or nothing: the wall at the right, as displayed
+    // a lit wall, and an emissive square over its left half or none: display value of the wall on the right
     let mut shown = |value: f32, glow: Option<f32>| {
         let mut scene = Scene::new(Vec3::ZERO, Vec3::X, 30.0, 16);
         scene.ambient = Vec3::ONE;
@@ -375,11 +375,11 @@ fn exposure_adapts_to_surfaces_alone(gpu: &mut Gpu) {
         let (_, picture) = gpu.render(&scene, &automatic, 1);
         f32::from(picture[8 * 16 + 12][0])
     };
-    // what is dark is lifted, but not to the brightness of what is not
+    // dark views are brightened, but remain darker than bright ones
     let (dark, bright) = (shown(0.01, None), shown(0.1, None));
     let (fixed, lifted) = (encode(0.01) * 255.0, encode(0.0105) * 255.0);
     assert!(dark > lifted && dark < bright, "{dark} {bright}");
-    // half as much where half of the picture glows, however brightly
+    // half as much if half of the picture glows, however brightly
     let halves = [0.001, 0.5].map(|glow| shown(0.01, Some(glow)));
     for half in halves {
         assert!(half > fixed + 0.2 && half < dark, "{half} {fixed} {dark}");
@@ -433,7 +433,7 @@ fn all_tracers_make_the_same_picture() {
         Vec3::new(200.0, 150.0, 120.0),
         grey,
     );
-    // a crowd of small things, turned and scaled, that throw shadows
+    // many small objects, rotated and scaled, that cast shadows
     let veil = scene.material(
         &[stage::blend(BLUE, 0.4)],
         c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED,
@@ -455,7 +455,7 @@ fn all_tracers_make_the_same_picture() {
         let square = rectangle(Vec3::splat(-10.0), Vec3::X * 20.0, Vec3::Y * 20.0);
         scene.mesh(square, if i % 3 == 0 { veil } else { grey }, instance);
     }
-    // a brush model somewhere else than where it was made
+    // a brush model away from its original position
     let first = scene.surfaces.len();
     scene.quad(
         rectangle(Vec3::new(0.0, -20.0, -20.0), Vec3::Z * 40.0, Vec3::Y * 40.0),
@@ -488,13 +488,13 @@ fn all_tracers_make_the_same_picture() {
             .count()
     };
     println!("{} of {} pixels differ", differing(&b), a.len());
-    // rays that graze an edge may fall to either side of it
+    // rays that graze an edge may hit or miss it
     assert!(differing(&b) < a.len() / 50, "{}", differing(&b));
     assert!(a.iter().filter(|p| p.x > 0.02).count() > a.len() / 2);
     if let Some(mut query) = Gpu::new(Tracer::Query) {
         let (c, _) = query.render(&scene, &settings, 2);
         println!("{} of {} pixels differ", differing(&c), a.len());
-        // the driver's own walk over the same structures
+        // the driver's traversal of the same structures
         assert!(differing(&c) < a.len() / 200, "{}", differing(&c));
     }
 }

@@ -1,4 +1,4 @@
-//! A device with the look under test, and the views that it draws.
+//! A device with the traced look, and the views that it renders.
 
 use std::sync::Arc;
 
@@ -47,7 +47,7 @@ pub struct Gpu {
 
 impl Gpu {
     /// Runs a test of shading, which all tracers share: with the compute tracer, which runs on every device; with every
-    /// tracer where `RELIGHT_FULL=1`. A software driver compiles the passes of one tracer for minutes.
+    /// tracer if `RELIGHT_FULL=1`. A software driver takes minutes to compile the passes of one tracer.
     pub fn any(test: fn(&mut Gpu)) {
         if testkit::is_set("RELIGHT_FULL") {
             return Self::each(test);
@@ -62,7 +62,7 @@ impl Gpu {
         }
     }
 
-    /// Runs a test of ray traversal with every tracer that the device has.
+    /// Runs a test of ray traversal with every tracer that the device supports.
     pub fn each(test: fn(&mut Gpu)) {
         Self::with(
             &[Tracer::Pipeline, Tracer::Query, Tracer::Compute],
@@ -70,7 +70,7 @@ impl Gpu {
         );
     }
 
-    /// Runs a test with those of `tracers` that the device has. Without any of them the test is skipped.
+    /// Runs a test with each of `tracers` that the device supports. Without any of them, the test is skipped.
     pub fn with(tracers: &[Tracer], test: impl Fn(Gpu)) {
         let mut absent = Vec::new();
         for &tracer in tracers {
@@ -91,16 +91,16 @@ impl Gpu {
         }
     }
 
-    /// `None`, with a report of a skipped test, where there is no device for the tracer.
+    /// `None`, with a report of a skipped test, without a device for the tracer.
     pub fn new(tracer: Tracer) -> Option<Self> {
         testkit::device(Self::open(tracer))
     }
 
-    /// The reason, where there is no device for the tracer.
+    /// An error message without a device for the tracer.
     fn open(tracer: Tracer) -> Result<Self, String> {
         let options = DeviceOptions {
             validation: true,
-            // without the tracer's extensions, so that it is shown to need none
+            // with the tracer's extensions disabled, to prove that it needs none
             allow_ray_tracing: tracer != Tracer::Compute,
             ..DeviceOptions::default()
         };
@@ -130,7 +130,7 @@ impl Gpu {
         })
     }
 
-    /// Counts rays in what is rendered from now on, or no longer.
+    /// Switches ray counters for subsequent frames.
     pub fn count_rays(&mut self, count: bool) {
         self.look.count_rays = count;
     }
@@ -174,8 +174,8 @@ impl Gpu {
         self.render_watched(scene, settings, frames, change, None)
     }
 
-    /// As [`render_views`](Self::render_views), and hands the picture before exposure to `watch` after each frame.
-    #[allow(clippy::type_complexity)] // of an optional closure
+    /// As [`render_views`](Self::render_views); passes the picture before exposure to `watch` after each frame.
+    #[allow(clippy::type_complexity)] // for an optional closure
     pub fn render_watched(
         &mut self,
         scene: &Scene,
@@ -254,12 +254,13 @@ impl Gpu {
             .collect()
     }
 
-    /// Whether the denoiser looks at gradients; it does unless told otherwise.
+    /// Switches the denoiser's gradients, which are on by default.
     pub fn use_gradients(&mut self, on: bool) {
         self.look.denoiser.gradients = on;
     }
 
-    /// Position and path of each pixel of the last frame, and its motion: offset, length of the way then and now.
+    /// Position and view distance of each pixel of the last frame, and its motion: offset, view distance in both
+    /// frames.
     pub fn motion(&self) -> Vec<([f32; 4], [f32; 4])> {
         let targets = self.look.targets.as_ref().expect("traced");
         let read = |image| self.device.read_image(image).expect("read");
@@ -268,13 +269,13 @@ impl Gpu {
         let paths: Vec<u16> = bytemuck::pod_collect_to_vec(&read(&targets.view_distance[1]));
         let motions = halves.iter().zip(paths).map(|(motion, path)| {
             let [x, y, last, _mark] = motion.map(half);
-            // its sign tells whether it rests
+            // the sign marks static surfaces
             [x, y, last, half(path).abs()]
         });
         places.into_iter().zip(motions).collect()
     }
 
-    /// The validation layer has nothing to say.
+    /// Asserts that the validation layer is silent.
     pub fn check_messages(&self) {
         let messages = self.device.validation_messages();
         let short: Vec<String> = messages

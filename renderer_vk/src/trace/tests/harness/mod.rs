@@ -1,4 +1,4 @@
-//! Scenes made by hand, and what renders them.
+//! Scenes built in code, and their renderer.
 
 mod gpu;
 mod scene;
@@ -28,7 +28,7 @@ pub fn reference() -> Settings {
     }
 }
 
-/// What the shaders make of a constant colour: it passes through a byte.
+/// A constant colour after the shaders' rounding to 8 bits.
 pub fn through_byte(encoded: f32) -> f32 {
     let byte = (encoded * 255.0 + 0.001).floor() / 255.0;
     crate::trace::frame_lights::decode(Vec3::splat(byte)).x
@@ -44,7 +44,7 @@ pub fn rectangle(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> [Vec3; 4] {
     ]
 }
 
-/// An entity in place.
+/// An instance with the identity transform.
 pub fn identity() -> Instance {
     Instance {
         axis: [Vec3::X, Vec3::Y, Vec3::Z],
@@ -68,7 +68,7 @@ pub fn lambert(point: Vec3, normal: Vec3, triangle: [Vec3; 3], radiance: f32) ->
     (f64::from(radiance) * sum.abs() / (2.0 * std::f64::consts::PI)) as f32
 }
 
-/// Where a pixel's middle ray meets the plane z = 0.
+/// Intersection of a pixel's centre ray with the plane z = 0.
 pub fn floor_point(scene: &Scene, x: usize, y: usize) -> Vec3 {
     let def = &scene.def;
     let tan = (def.fov_x.to_radians() * 0.5).tan();
@@ -83,7 +83,7 @@ pub fn plane(normal: Vec3, point: Vec3) -> Vec4 {
     normal.extend(normal.dot(point))
 }
 
-/// A mirror across x; `normal`: along x, to the side that it shows.
+/// A mirror perpendicular to x; `normal`: along x, on its front.
 pub fn mirror_at(x: f32, normal: Vec3) -> Portal {
     let origin = Vec3::new(x, 0.0, 0.0);
     Portal {

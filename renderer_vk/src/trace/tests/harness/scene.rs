@@ -1,4 +1,4 @@
-//! Scenes made by hand: triangles, materials, lights, what moves, and their way to the GPU.
+//! Scenes built in code: triangles, materials, lights and moving geometry, and their upload.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ use crate::trace::input::{MaterialInfo, MaterialTable, StaticScene, StaticSurfac
 use crate::trace::lights::{MapLightSource, MapLights};
 use crate::trace::surroundings::Surroundings;
 
-/// A scene made by hand.
+/// A scene built in code.
 pub struct Scene {
     pub materials: Vec<(Material, MaterialInfo)>,
     pub stages: Vec<Stage>,
@@ -34,7 +34,7 @@ pub struct Scene {
     pub ambient: Vec3,
     pub light_cutoff: f32,
     pub fogs: Vec<Fog>,
-    /// Boxes around what colours light.
+    /// Boxes around surfaces that filter light.
     pub filters: Vec<Aabb>,
     pub instances: Vec<Instance>,
     pub dynamic_vertices: Vec<Vertex>,
@@ -45,13 +45,13 @@ pub struct Scene {
     pub entities: Vec<ViewEntity>,
     pub portals: Vec<Portal>,
     pub dlights: Vec<DynamicLight>,
-    /// The map's tree with lists of its own; otherwise all lights are everywhere.
+    /// The map's tree with its light lists; without it, all lights reach all points.
     pub tree: Option<(q3bsp::Bsp, LightLists)>,
     pub def: RefDef,
 }
 
 impl Scene {
-    /// Nothing but a camera: at `eye`, looking at `target`, `fov` degrees wide, square.
+    /// An empty scene with a camera: at `eye`, looking at `target`, `fov` degrees wide, square.
     pub fn new(eye: Vec3, target: Vec3, fov: f32, size: i32) -> Self {
         let forward = (target - eye).normalize();
         let aside = if forward.z.abs() > 0.99 {
@@ -186,7 +186,7 @@ impl Scene {
         self.quad(rectangle(maxs, -x, -z), material);
     }
 
-    /// A rectangle that moves.
+    /// A rectangle of moving geometry.
     pub fn mesh(&mut self, points: [Vec3; 4], material: u32, instance: Instance) {
         let instance_index = self.instances.len() as u32;
         self.instances.push(instance);
@@ -223,7 +223,7 @@ impl Scene {
         });
     }
 
-    /// A triangle that shines to the side from which a, b, c go round counter-clockwise.
+    /// A triangle light that shines to the side from which a, b, c are counter-clockwise.
     pub fn light(&mut self, vertices: [Vec3; 3], radiance: Vec3) {
         self.lights.push(TriangleLight {
             vertices,

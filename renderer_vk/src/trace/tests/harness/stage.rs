@@ -15,7 +15,7 @@ fn plain() -> Stage {
     }
 }
 
-/// The lightmap: light itself.
+/// The lightmap alone.
 pub fn light() -> Stage {
     Stage {
         flags: 0,
@@ -32,7 +32,7 @@ pub fn constant(color: [f32; 3]) -> Stage {
     }
 }
 
-/// Multiplies what is below by a constant colour (encoded).
+/// Multiplies the background by a constant colour (encoded).
 pub fn filter(color: [f32; 3]) -> Stage {
     Stage {
         blend_src: c::BLEND_DST_COLOR,
@@ -41,7 +41,7 @@ pub fn filter(color: [f32; 3]) -> Stage {
     }
 }
 
-/// A constant colour (encoded) laid over what is below with some alpha.
+/// Blends a constant colour (encoded) over the background.
 pub fn blend(color: [f32; 3], alpha: f32) -> Stage {
     Stage {
         alpha_gen: c::ALPHAGEN_CONST,
@@ -52,7 +52,7 @@ pub fn blend(color: [f32; 3], alpha: f32) -> Stage {
     }
 }
 
-/// A constant colour (encoded) added to what is below.
+/// Adds a constant colour (encoded) to the background.
 pub fn add(color: [f32; 3]) -> Stage {
     Stage {
         blend_src: c::BLEND_ONE,
@@ -71,7 +71,7 @@ pub fn image(first: u32) -> Stage {
     }
 }
 
-/// Multiplies what is below by the light.
+/// Multiplies the background by the light.
 pub fn light_over() -> Stage {
     Stage {
         blend_src: c::BLEND_DST_COLOR,
@@ -80,7 +80,7 @@ pub fn light_over() -> Stage {
     }
 }
 
-/// A reflection as [`shine`], whose picture shows the light at the surface, too, where [`light_over`] follows.
+/// A reflection as [`shine`], with an image that is also lit if [`light_over`] follows.
 pub fn gloss(first: u32) -> Stage {
     let shine = shine(first);
     Stage {
@@ -89,7 +89,7 @@ pub fn gloss(first: u32) -> Stage {
     }
 }
 
-/// A reflection as [`shine`], whose picture is a haze, too, where [`light_over`] follows.
+/// A reflection as [`shine`], with an image that is also a haze if [`light_over`] follows.
 pub fn haze(first: u32) -> Stage {
     let shine = shine(first);
     Stage {
@@ -98,7 +98,7 @@ pub fn haze(first: u32) -> Stage {
     }
 }
 
-/// A reflection added to what is below, as strong as an image of the scene, by its bindless index, is bright.
+/// A reflection added to the background, scaled by the brightness of an image of the scene, by its bindless index.
 pub fn shine(first: u32) -> Stage {
     Stage {
         flags: c::STAGE_REFLECTION,
