@@ -23,7 +23,7 @@ type Function = unsafe extern "C" fn();
 
 /// Message for file names that the engine does not write to.
 const NOT_A_NAME: &str =
-    "not a name for a file: it has to stay in the game's folder, in 63 characters at most";
+    "not a name for a file: use at most 63 characters and a path inside of the game's folder";
 
 /// All commands. They exist only between `BeginRegistration` and `Shutdown`, because the engine stores our function
 /// pointers.

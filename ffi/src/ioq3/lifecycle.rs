@@ -354,7 +354,7 @@ fn give_up_still(renderer: &Renderer, front: &mut Front) -> Option<String> {
     let shot = front.captures.still.take()?;
     let (done, wanted) = renderer.still_progress()?;
     Some(format!(
-        "rt_screenshot: {} was not made: only {done} of {wanted} samples were there when its map ended",
+        "rt_screenshot: {} was not made: the map ended after {done} of {wanted} samples",
         shot.path
     ))
 }

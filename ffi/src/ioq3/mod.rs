@@ -56,7 +56,7 @@ pub unsafe fn get_ref_api(api_version: c_int, imports: *const refimport_t) -> *c
     // SAFETY: an engine calls this on its main thread, with none of our functions running.
     let engine = unsafe { Ioq3::install(table) };
     if api_version != API_VERSION {
-        engine.say(&format!("Relight speaks version {API_VERSION} of the renderer interface, this engine wants {api_version}\n"));
+        engine.say(&format!("Relight supports version {API_VERSION} of the renderer interface, this engine has version {api_version}\n"));
         return ptr::null();
     }
     // SAFETY: the table of the engine installed above, which has our version number.

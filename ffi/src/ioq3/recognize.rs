@@ -76,8 +76,8 @@ pub unsafe fn refusal(engine: &Ioq3, imports: *const refimport_t) -> Option<Stri
         None => unsafe { difference(engine, imports) }?,
     };
     Some(format!(
-        "Relight speaks to ioquake3 and engines with its tables; this engine has others ({found}). Start it with \
-         \"+set cl_renderer {opengl}\" to play without Relight; if it has ioquake3's tables all the same, set the \
+        "Relight supports ioquake3 and engines with its tables; this engine has others ({found}). Start it with \
+         \"+set cl_renderer {opengl}\" to play without Relight; if it does have ioquake3's tables, set the \
          environment variable {VARIABLE}=ioquake3"
     ))
 }

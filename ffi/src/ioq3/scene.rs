@@ -91,7 +91,7 @@ pub unsafe extern "C" fn register_font(
                     out.write_unaligned(*convert::font(&font))
                 },
                 Some(_) => {}
-                None => log::warn!("there is no font of {point_size} points"),
+                None => log::warn!("no font of {point_size} points is installed"),
             }
             Ok(())
         })
@@ -161,7 +161,7 @@ pub unsafe extern "C" fn add_ref_entity(from: *const refEntity_t) {
                 if !front.warned_bad_origin {
                     front.warned_bad_origin = true;
                     log::warn!(
-                        "the game sent an entity without a place; such entities are left out"
+                        "the game sent an entity with NaN coordinates; such entities are not drawn"
                     );
                 }
                 return Ok(());

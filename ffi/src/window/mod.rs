@@ -69,7 +69,7 @@ pub fn mark_stale() {
 pub enum WindowError {
     /// The safe mode failed, too.
     #[error(
-        "no window could be opened for Vulkan ({0}); is there a display, and does its driver do Vulkan?"
+        "no window could be opened for Vulkan ({0}); check that a display is connected and that its driver supports Vulkan"
     )]
     Sdl(#[from] SdlError),
 }
@@ -224,7 +224,7 @@ fn open_once(engine: Engine, cvars: &Cvars, sdl: Sdl, wish: Wish) -> Result<Wind
                 cvars.integer(Cvar::DisplayRefresh),
             )
         } {
-            engine.say(&format!("{error}; the display keeps its mode\n"));
+            engine.say(&format!("{error}; the display mode is unchanged\n"));
         }
     }
     // SAFETY: this SDL made `raw` above, for Vulkan, and it is still open.

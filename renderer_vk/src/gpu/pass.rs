@@ -215,7 +215,7 @@ impl<'a> Pass<'a> {
     /// Logs that a command was omitted; each message once, because frames repeat.
     pub(crate) fn refuse(&self, what: &str) {
         if lock(&self.rec.device.0.refused).insert(what.to_owned()) {
-            log::warn!("GPU command left out: {what}");
+            log::warn!("GPU command omitted: {what}");
         }
     }
 }

@@ -386,7 +386,7 @@ pub(crate) fn one(
             }),
         },
         Err((_, result)) => {
-            log::error!("pipeline `{name}` was refused");
+            log::error!("the driver did not compile pipeline `{name}`");
             Err(result).context(call)
         }
     }

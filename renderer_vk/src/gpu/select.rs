@@ -149,7 +149,7 @@ pub(crate) fn choose(instance: &Instance, options: &DeviceOptions) -> Result<Cho
                     || (number.is_none() && c.info.name.to_lowercase().contains(&lower))
             });
             if found.is_none() {
-                log::warn!("no usable Vulkan device matches `{prefer}`, taking the best one");
+                log::warn!("no usable Vulkan device matches `{prefer}`; the best one is used");
             }
             found
         });

@@ -49,7 +49,7 @@ impl Renderer {
     pub fn end_registration(&mut self) {
         // pipelines that are missing after a failure are compiled at first use
         if let Err(e) = self.warm_up() {
-            log::warn!("pipelines are not made ahead: {e}");
+            log::warn!("pipelines could not be compiled in advance: {e}");
         }
         self.kept_pipelines.write(&self.device);
         give_back_freed_memory();

@@ -44,16 +44,16 @@ impl Renderer {
     /// support images of this size.
     pub fn request_still(&mut self, samples: u32, size: Option<(u32, u32)>) -> Result<(), String> {
         if !self.settings.rt {
-            return Err("the traced look is off (r_rt 0)".into());
+            return Err("the traced look is off; set r_rt 1".into());
         }
         if self.still.wanted.is_some() || self.still.still.is_some() {
-            return Err("a picture is being made".into());
+            return Err("another picture is in progress; wait until it is written".into());
         }
         let (width, height) = size.unwrap_or(self.size());
         let most = self.device_info().max_image_size;
         if width == 0 || height == 0 || width > most || height > most {
             return Err(format!(
-                "{width}x{height}: sides of 1 to {most} pixels are possible"
+                "{width}x{height}: choose a width and height from 1 to {most} pixels"
             ));
         }
         self.still.wanted = Some(([width, height], samples));

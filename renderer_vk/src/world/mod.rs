@@ -337,11 +337,11 @@ impl World {
                 let quarter = (done * 4.0) as u32;
                 if quarter > told && quarter < 4 {
                     told = quarter;
-                    log::info!("{name}: fitting lights, {} % done", quarter * 25);
+                    log::info!("{name}: calibrating lights, {} % done", quarter * 25);
                 }
             });
             log::info!(
-                "{}: lights fitted to the light that the map stores, in {:.1} s",
+                "{}: lights calibrated to the lightmaps in {:.1} s",
                 relit.name,
                 report.seconds
             );
@@ -352,12 +352,12 @@ impl World {
             log::warn!("{}: {warning}", relit.name);
         }
         log::info!(
-            "{}: lists of lights swept by rays {} {:.2} s, {} entries of {} left",
+            "{}: visibility sweep of light lists {} {:.2} s, {} of {} entries left",
             relit.name,
             if swept.cached {
-                "before, read in"
+                "read from the cache in"
             } else {
-                "in"
+                "took"
             },
             swept.seconds,
             swept.entries[1],
