@@ -67,6 +67,8 @@ pub struct Antialias {
     history: bool,
     frame: u32,
     method: Method,
+    /// The resolved picture is sharpened, into the image of the last frame's, which nothing reads any more.
+    sharpens: bool,
 }
 
 impl Antialias {
@@ -87,6 +89,7 @@ impl Antialias {
             history: false,
             frame: 0,
             method: Method::Plain,
+            sharpens: false,
         })
     }
 
@@ -131,9 +134,15 @@ impl Antialias {
         self.method = method;
         let jittered = method == Method::Temporal && settings.rt_antialiasing;
         let dof = settings.rt_dof && settings.rt_aperture > 0.0;
+        self.sharpens = self.resolved.is_some() && settings.rt_sharpness > 0.0;
         let (image, last) = match &self.resolved {
             Some([now, last]) => (now.storage_index(), last.texture_index()),
             None => (0, 0),
+        };
+        let picture = match &self.resolved {
+            Some([_, last]) if self.sharpens => last,
+            Some([now, _]) => now,
+            None => targets.picture(),
         };
         Ok(AntialiasView {
             jitter: if jittered {
@@ -143,11 +152,7 @@ impl Antialias {
             },
             output_width: output[0],
             output_height: output[1],
-            image_picture: if self.resolved.is_some() {
-                image
-            } else {
-                targets.picture().storage_index()
-            },
+            image_picture: picture.storage_index(),
             image_resolved: image,
             last_resolved: last,
             last_light: targets.direct[1].storage_index(),
@@ -157,20 +162,24 @@ impl Antialias {
             focal_distance: settings.rt_focal_length.max(1.0),
             texture_scale: texture_scale(settings, output, jittered),
             anisotropy: settings.anisotropy(),
-            padding: 0,
+            sharpness: settings.rt_sharpness,
         })
     }
 
-    /// Records the pass, if the method has one.
+    /// Records the passes of the method.
     ///
     /// # Errors
     /// Out of memory, or the driver refuses the pipeline.
     pub fn record(&self, passes: &mut FramePasses<'_>) -> Result<(), Error> {
         match self.method {
-            Method::Plain => Ok(()),
-            Method::Temporal => passes.run(Pass::Antialias),
-            Method::Upscale => passes.run(Pass::Upscale),
+            Method::Plain => return Ok(()),
+            Method::Temporal => passes.run(Pass::Antialias)?,
+            Method::Upscale => passes.run(Pass::Upscale)?,
         }
+        if self.sharpens {
+            passes.run(Pass::Sharpen)?;
+        }
+        Ok(())
     }
 
     /// Ends the frame: its resolved picture becomes that of the last frame.
@@ -182,9 +191,10 @@ impl Antialias {
         self.frame = self.frame.wrapping_add(1);
     }
 
-    /// The resolved picture of the last frame, if it has one.
+    /// The picture of the last frame, if it was resolved: after [`advance`](Self::advance), which swaps the images.
     pub fn picture(&self) -> Option<&Image> {
-        self.resolved.as_ref().map(|r| &r[1])
+        let [sharpened, resolved] = self.resolved.as_ref()?;
+        Some(if self.sharpens { sharpened } else { resolved })
     }
 }
 

@@ -383,6 +383,11 @@ passes! {
         reads: &[Picture],
         writes: &[ResolvedPicture],
     }
+    /// Sharpening of that picture (`rt_sharpness`).
+    Sharpen = "trace_sharpen", Compute(&shaders::TRACE_SHARPEN_COMP), Output {
+        reads: &[ResolvedPicture],
+        writes: &[ResolvedPicture],
+    }
     /// Histogram of luminance.
     Histogram = "trace_exposure", Compute(&shaders::TRACE_HISTOGRAM_COMP), OutputHalf {
         reads: &[GBuffer, Picture],

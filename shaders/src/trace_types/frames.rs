@@ -103,6 +103,6 @@ pub struct AntialiasView {
     pub texture_scale: f32,
     /// Largest ratio of length to width of a texture footprint; 1 and below: isotropic.
     pub anisotropy: f32,
-    /// To a multiple of eight bytes.
-    pub padding: u32,
+    /// Strength of sharpening, 0 to 1; 0: none.
+    pub sharpness: f32,
 }

@@ -90,6 +90,7 @@ fn temporal_antialiasing() {
     the_lens_blurs_by_its_circle_of_confusion(&mut gpu);
     both_sides_of_a_reflection_come_to_rest(&mut gpu);
     thin_geometry_does_not_flicker(&mut gpu);
+    sharpening_raises_contrast_alone(&mut gpu);
     thin_geometry_keeps_its_history_in_motion(&mut gpu);
     a_mirror_shows_what_is_seen_from_behind_it(&mut gpu);
     ripples_leave_no_trail(&mut gpu);
@@ -467,4 +468,32 @@ fn thin_geometry_does_not_flicker(gpu: &mut Gpu) {
     let off = error(&settled, &truth);
     println!("thin wires: error {off}, brightest flash {flash}");
     assert!(flash < 0.15, "{flash}");
+}
+
+/// Sharpening raises the contrast of neighbouring pixels, keeps the mean, and makes no negative colour.
+fn sharpening_raises_contrast_alone(gpu: &mut Gpu) {
+    let scene = checkerboard();
+    let traced = |gpu: &mut Gpu, rt_sharpness: f32| {
+        let settings = Settings {
+            rt_scale: 0.5,
+            rt_sharpness,
+            ..plain()
+        };
+        gpu.render(&scene, &settings, 2).0
+    };
+    let (soft, sharp) = (traced(gpu, 0.0), traced(gpu, 1.0));
+    let mean = |pixels: &[Vec3]| pixels.iter().map(|p| p.y).sum::<f32>() / pixels.len() as f32;
+    let contrast = |pixels: &[Vec3]| {
+        let rows = pixels.chunks_exact(SIZE as usize);
+        rows.flat_map(|row| row.windows(2).map(|w| (w[1].y - w[0].y).abs()))
+            .sum::<f32>()
+    };
+    let (ratio, shift) = (
+        contrast(&sharp) / contrast(&soft),
+        mean(&sharp) / mean(&soft),
+    );
+    println!("sharpened: contrast {ratio}, mean {shift}");
+    assert!(ratio > 1.15, "{ratio}");
+    assert!((shift - 1.0).abs() < 0.02, "{shift}");
+    assert!(sharp.iter().all(|p| p.cmpge(Vec3::ZERO).all()), "negative");
 }
