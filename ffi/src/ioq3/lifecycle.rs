@@ -96,7 +96,7 @@ pub unsafe extern "C" fn begin_registration(out: *mut glconfig_t) {
     });
 }
 
-/// Opens the window, unless it is open or not wanted, and makes a renderer for it.
+/// Opens the window, unless it is open or disabled, and makes a renderer for it.
 fn start_renderer(
     engine: Engine,
     cvars: &Cvars,

@@ -85,7 +85,7 @@ pub struct Shapes {
     rigid: HashMap<Box<[ShapeMesh]>, RigidShape>,
     animated: HashMap<Box<[ShapeMesh]>, AnimatedShape>,
     skins: HashMap<Box<[SkinMesh]>, Skin>,
-    /// Structures whose compacted sizes the GPU was asked to write.
+    /// Structures with pending queries of their compacted sizes.
     asked: Vec<(CompactedSizes, Vec<Box<[ShapeMesh]>>)>,
     scratch: Scratch,
 }

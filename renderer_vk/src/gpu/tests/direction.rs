@@ -1,4 +1,4 @@
-//! Directions in few bits: nothing is lost but what rounding takes, along the axes either.
+//! Packed directions: the error is that of rounding, also along the axes.
 
 use super::support::{collect, device, finish};
 use crate::gpu::*;
@@ -21,7 +21,7 @@ struct Push {
     padding: u32,
 }
 
-/// Directions along the axes and planes between them, and by chance all around.
+/// Directions along the axes, in the planes between them, and random ones.
 fn directions() -> Vec<Vec3> {
     let mut all = Vec::new();
     for i in 0..27 {

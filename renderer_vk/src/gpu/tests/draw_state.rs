@@ -1,5 +1,5 @@
-//! Blending, culling and depth of draws that follow each other, on devices that are told these while drawing and on
-//! such that are not.
+//! Blending, culling and depth tests of successive draws, on devices with these as dynamic state and on devices
+//! without.
 
 use super::support::{device, finish, poor_device};
 use crate::gpu::*;
@@ -14,7 +14,7 @@ struct Draw {
     color: [f32; 4],
 }
 
-/// What a draw does to a pixel of its own.
+/// Effect of a draw on its own pixel.
 #[derive(Clone, Copy)]
 struct State {
     cull: Cull,
@@ -23,7 +23,7 @@ struct State {
     blend: Option<(BlendFactor, BlendFactor)>,
 }
 
-/// All combinations, in an order in which each part changes by itself and with others.
+/// All combinations, in an order in which each part changes alone and with others.
 fn states() -> Vec<State> {
     let mut all = Vec::new();
     for blend in [
@@ -50,8 +50,8 @@ fn states() -> Vec<State> {
         .collect()
 }
 
-/// What is left of a pixel of 0.4 at depth 0.5 after a clockwise draw of 0.6 at depth `z` and a test whether depth 0.6
-/// passes, which shows in blue.
+/// Value of a pixel of 0.4 at depth 0.5 after a clockwise draw of 0.6 at depth `z`; blue shows whether a later draw at
+/// depth 0.6 passes.
 fn expected(state: State, z: f32) -> [u8; 3] {
     let near_enough = match state.test {
         DepthTest::Always => true,

@@ -1,4 +1,4 @@
-//! Graphics pipelines: depth, blending, culling, stencils, channel masks, several samples a pixel.
+//! Graphics pipelines: depth, blending, culling, stencils, channel masks, multisampling.
 
 use super::support::{collect, device, finish};
 use crate::gpu::*;
@@ -107,7 +107,7 @@ fn triangles_are_drawn_with_depth_blend_and_culling() {
     draw(&mut pass, &solid, full, [1.0, 1.0, 0.0, 1.0]);
     pass.clear_color_rect([0, 30, 2, 99], [0.2, 0.4, 0.6, 0.8]);
     pass.end_rendering();
-    // Outside of rendering: left out, not undefined behaviour.
+    // Outside of rendering: omitted with a warning.
     pass.draw(3, 1, 0, 0);
     drop(pass);
     ring.end(rec).unwrap();
@@ -220,7 +220,7 @@ fn stencils_count_and_masks_hold_channels_back() {
     draw_corners(&mut pass, &up, all, [0.0; 4]);
     draw_corners(&mut pass, &up, lower, [0.0; 4]);
     draw_corners(&mut pass, &down, all, [0.0; 4]);
-    // behind the depth nothing counts
+    // fragments behind the depth do not count
     draw_corners(&mut pass, &up, hidden, [0.0; 4]);
     // the right half is cleared again
     pass.clear_stencil_rect([16, 0, 16, 32]);
@@ -300,7 +300,7 @@ fn several_samples_are_averaged_along_edges() {
         .pass("resolve", Access::TRANSFER, Access::TRANSFER)
         .unwrap();
     pass.resolve_image(&several, &one);
-    // left out, because the samples do not fit
+    // omitted, because the numbers of samples do not match
     pass.resolve_image(&one, &several);
     drop(pass);
     ring.end(rec).unwrap();

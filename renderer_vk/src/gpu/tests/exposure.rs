@@ -1,4 +1,4 @@
-//! What `relight::exposure` and `relight::overbright` repeat of the shaders.
+//! Functions of `relight::exposure` and `relight::overbright` that repeat those of the shaders.
 
 use super::support::{collect, device, finish};
 use crate::gpu::*;

@@ -1,4 +1,4 @@
-//! The life of objects and of the device: the graveyard, the pipeline cache, refused requests, an end amid everything.
+//! Lifetime of objects and of the device: the graveyard, the pipeline cache, failed requests, drops with pending work.
 
 use super::support::{device, finish};
 use crate::gpu::*;
@@ -36,7 +36,7 @@ fn dropped_objects_wait_for_their_frame_and_no_longer() {
         ring.end(rec).unwrap();
         assert!(device.graveyard_len() < 60, "the dead pile up");
     }
-    // An image that nothing ever used, and an upload whose target is gone before it runs.
+    // An image that is never used, and an upload whose target is dropped before it runs.
     let image = Image::new(
         &device,
         &ImageDesc::new("unused", 4, 4, Format::R8, ImageUsage::SAMPLED),
@@ -129,7 +129,7 @@ fn impossible_requests_are_errors() {
         })
         .unwrap();
     drop((color, other));
-    // The size of the failed buffer is the one thing that the layer may have an opinion on.
+    // The validation layer may only report the size of the failed buffer.
     device.wait_idle().unwrap();
     let messages = device.validation_messages();
     assert!(
@@ -140,8 +140,8 @@ fn impossible_requests_are_errors() {
     );
 }
 
-/// Keeps the warnings and errors that were logged on this thread: the allocator's leak reports and what the validation
-/// layer says while a device is destroyed come after anybody could ask the device.
+/// Collects the warnings and errors logged on this thread: the allocator's leak reports, and messages of the validation
+/// layer during the destruction of the device, when the device can no longer return them.
 struct Capture;
 
 thread_local! {

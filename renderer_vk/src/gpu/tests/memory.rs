@@ -11,7 +11,7 @@ fn buffers_keep_what_was_uploaded() {
     println!("{:#?}", device.info());
     let data: Vec<u32> = (0..100_000).collect();
     let buffer = Buffer::with_data(&device, "numbers", BufferUsage::STORAGE, &data).unwrap();
-    // A later upload to the same place wins, also within one batch.
+    // A later upload to the same range overwrites an earlier one, also within one batch.
     device
         .upload_buffer(&buffer, 40, bytemuck::bytes_of(&77u32))
         .unwrap();
@@ -49,7 +49,7 @@ fn compute_writes_a_storage_image_and_reads_by_address() {
     assert!(FrameRing::new(&device, 2).is_err(), "one ring per device");
     let added = [(shaders::constant_ids::test::fill::ADDED, 5)];
     let pipeline = ComputePipeline::new(&device, "fill", &shaders::TEST_FILL_COMP, &added).unwrap();
-    // Another compilation of the same file, asked for by a comment in it.
+    // Another compilation of the same file, requested by a comment in it.
     let twice =
         ComputePipeline::new(&device, "twice", &shaders::TEST_FILL_COMP_TWICE, &added).unwrap();
     let image = Image::new(
@@ -93,7 +93,7 @@ fn compute_writes_a_storage_image_and_reads_by_address() {
         drop(pass);
         ring.end(rec).unwrap();
         if frame == 3 {
-            // A frame that is thrown away leaves no trace.
+            // A discarded frame has no effect.
             let mut rec = ring.begin().unwrap();
             let gone = Buffer::with_data(&device, "gone", BufferUsage::STORAGE, &[1u32]).unwrap();
             rec.pass("nothing", Access::TRANSFER, Access::TRANSFER)

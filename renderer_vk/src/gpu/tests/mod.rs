@@ -1,4 +1,4 @@
-//! The GPU layer on whatever Vulkan device there is, with the validation layer where it is installed.
+//! The GPU layer on any Vulkan device, with the validation layer if it is installed.
 //!
 //! Without a device each test is skipped; with `RELIGHT_REQUIRE_GPU=1` it fails.
 

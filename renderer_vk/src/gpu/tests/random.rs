@@ -1,4 +1,4 @@
-//! The random numbers of the shaders: spread over the frames, independent of each other in all else.
+//! The shaders' random numbers: stratified over frames, otherwise independent.
 
 use super::support::{collect, device, finish};
 use crate::gpu::*;
@@ -44,7 +44,7 @@ impl Source {
         })
     }
 
-    /// What each of `pixels` pixels draws in `count` frames from `first` on, frame by frame.
+    /// The numbers of each of `pixels` pixels in `count` frames from `first` on, frame by frame.
     fn draw(&mut self, first: u32, count: u32, pixels: u32, stream: u32) -> Vec<Drawn> {
         let size = (count * pixels) as usize * size_of::<Drawn>();
         let draws = Buffer::new(
@@ -84,7 +84,7 @@ impl Source {
     }
 }
 
-/// Asserts that each of the intervals that [0, 1) is cut into holds one of the numbers.
+/// Asserts that each of the equal intervals of [0, 1) holds one of the numbers.
 fn assert_one_each(numbers: impl ExactSizeIterator<Item = f32>, what: &str) {
     let count = numbers.len();
     let mut met = vec![false; count];
@@ -102,7 +102,7 @@ fn each_elementary_interval_has_one_point_of_a_row_of_frames() {
     let Some(mut source) = Source::new() else {
         return;
     };
-    // the first frames, and rows of 2^k frames that begin at a multiple of 2^k, so late that all digits are in use
+    // the first frames, and runs of 2^k frames that begin at a multiple of 2^k, late enough to use all digits
     for first in [0, 1 << 10, 0xABCD_E400] {
         for drawn in source.draw(first, 1 << 10, 3, 5).chunks(1 << 10) {
             for k in 0..=10 {
@@ -110,7 +110,7 @@ fn each_elementary_interval_has_one_point_of_a_row_of_frames() {
                     assert_one_each(row.iter().map(|d| d.single), "single");
                     for pair in [|d: &Drawn| d.pair, |d: &Drawn| d.second_pair] {
                         for across in 0..=k {
-                            // the box that a point lies in, as a number
+                            // number of the box that a point lies in
                             let (wide, high) = ((1 << across) as f32, (1 << (k - across)) as f32);
                             let boxes = row.iter().map(|d| {
                                 let [x, y] = pair(d);
@@ -127,7 +127,7 @@ fn each_elementary_interval_has_one_point_of_a_row_of_frames() {
     source.finish();
 }
 
-/// Asserts that pairs of numbers are spread over the unit square as independent ones are.
+/// Asserts that pairs of numbers are distributed over the unit square as independent ones are.
 fn assert_independent(pairs: impl Iterator<Item = (f32, f32)>, what: &str) {
     const SIDE: usize = 8;
     let mut boxes = [0.0f64; SIDE * SIDE];
@@ -142,7 +142,7 @@ fn assert_independent(pairs: impl Iterator<Item = (f32, f32)>, what: &str) {
         .iter()
         .map(|n| (n - expected).powi(2) / expected)
         .sum();
-    // of 64 boxes the mean is 63, the deviation 11.2; six deviations do not happen
+    // for 64 boxes the mean is 63, the deviation 11.2; six deviations do not occur
     assert!(squares < 63.0 + 6.0 * 11.2, "{what}: chi squared {squares}");
 }
 
@@ -202,11 +202,11 @@ fn random_sequences_of_a_pixel_are_independent() {
         independent("pairs across", &|d| (d.pair[1], d.second_pair[0]));
         independent("second numbers", &|d| (d.pair[1], d.second_pair[1]));
         independent("single", &|d| (d.pair[0], d.single));
-        // a choice by one number from frame to frame is no choice by another
+        // a selection by one number from frame to frame does not select by another
         independent("choice", &|d| {
             ((d.picked as f32 + d.independent) / 7.0, d.single)
         });
-        // every fourth frame is as good as any: what passes do in turns is not bound to a part of the numbers
+        // every fourth frame is like all frames: passes that alternate over frames get all parts of the numbers
         for turn in 0..4 {
             let frames = pixel.iter().skip(turn).step_by(4);
             assert_independent(frames.clone().map(|d| d.pair.into()), "turns, pairs");
@@ -225,7 +225,7 @@ fn choices_by_one_number_take_their_share_and_leave_it_uniform() {
     for pixel in source.draw(0, FRAMES, 4, 1).chunks(FRAMES as usize) {
         for choice in 0..7 {
             let chosen: Vec<_> = pixel.iter().filter(|d| d.picked == choice).collect();
-            // an interval misses or has too much a few points of those that lie around its ends
+            // an interval deviates by a few of the points near its ends
             let share = chosen.len() as f32 / FRAMES as f32 * 7.0;
             assert!((share - 1.0).abs() < 0.02, "{choice}: {share}");
             let mean = chosen.iter().map(|d| d.left).sum::<f32>() / chosen.len() as f32;

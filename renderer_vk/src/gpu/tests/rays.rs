@@ -1,4 +1,4 @@
-//! Acceleration structures, traced by pipeline and by query, and devices that have none.
+//! Acceleration structures, traced by pipeline and by query, and devices without them.
 
 use super::support::{collect, device, finish};
 use crate::gpu::*;
@@ -12,14 +12,14 @@ struct Rays {
     size: u32,
 }
 
-/// What the ray through pixel (x, y) of 64 must report: two instances of a triangle that covers x + y < 1 of the unit
+/// Expected result of the ray through pixel (x, y) of 64: two instances of a triangle that covers x + y < 1 of the unit
 /// square, scaled to a half and moved; candidates whose first barycentric is below 0.25 are holes.
 fn expected(x: usize, y: usize) -> [u32; 4] {
     let (px, py) = ((x as f32 + 0.5) / 64.0, (y as f32 + 0.5) / 64.0);
     for (custom, ox, oy) in [(7, 0.0, 0.0), (9, 0.5, 0.5)] {
         let (u, v) = ((px - ox) * 2.0, (py - oy) * 2.0);
         if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
-            // Counter-clockwise seen from above, where the rays come from: the front.
+            // Counter-clockwise from above, the rays' origin: the front.
             return if u < 0.25 {
                 [0; 4]
             } else {
@@ -122,21 +122,21 @@ fn rays_find_triangles_through_pipeline_and_query() {
     let query = info
         .ray_query
         .then(|| ComputePipeline::new(&device, "query", &shaders::TEST_QUERY_COMP, &[]).unwrap());
-    // Frame 0 has an empty scene; later ones grow, so that storage is made anew while frames are in flight.
+    // Frame 0 has an empty scene; later ones grow, so that storage is reallocated while frames are in flight.
     for frame in 0..4usize {
         for by_query in [false, true] {
             let mut rec = ring.begin().unwrap();
             let mut pass = rec
                 .pass("build", Access::ACCEL_BUILD, Access::ACCEL_BUILD)
                 .unwrap();
-            // a refit that was never built is built
+            // a refit of a structure that was never built is a build
             pass.build_blas(&mut [BlasBuild {
                 blas: &mut moving,
                 geometries: &geometry,
                 refit: true,
             }])
             .unwrap();
-            // one that stays: built in the first frame, copied to the memory that it needs two frames later
+            // a static structure: built in the first frame, compacted two frames later
             match (frame, by_query) {
                 (0, false) => {
                     pass.build_blas(&mut [BlasBuild {
@@ -163,7 +163,7 @@ fn rays_find_triangles_through_pipeline_and_query() {
             if frame > 0 {
                 instances.push(place(kept.address(), 7, 0.0, 0.0));
                 instances.push(place(moving.address(), 9, 0.5, 0.5));
-                // Out of sight; many of them in the end.
+                // Outside of the view; many of them in the end.
                 instances.extend(
                     (0..frame * 40).map(|i| place(blases[1].address(), 1, 5.0 + i as f32, 0.0)),
                 );
@@ -242,7 +242,7 @@ fn a_device_without_ray_tracing_says_so_instead_of_failing_later() {
         panic!("a pipeline without the extension");
     };
     assert!(e.to_string().contains("rays"), "{e}");
-    // Rays declared, nothing traced: the pass must not name stages of the absent extension.
+    // Rays are declared, but none is traced: the pass must not name stages of the absent extension.
     device
         .immediate(|rec| {
             rec.pass(

@@ -1,4 +1,4 @@
-//! What these tests share: a device with the validation layer, and what must hold at the end.
+//! Shared code of these tests: a device with the validation layer, and the checks at the end.
 
 use crate::gpu::*;
 use bytemuck::Pod;
@@ -11,7 +11,7 @@ pub(super) fn device(allow_ray_tracing: bool) -> Option<Device> {
     })
 }
 
-/// The same, with what is required alone.
+/// The same, with required features only.
 pub(super) fn poor_device() -> Option<Device> {
     made(DeviceOptions {
         required_only: true,
@@ -28,7 +28,7 @@ fn made(options: DeviceOptions) -> Option<Device> {
     testkit::device(Device::new(&options, SurfaceSource::Headless))
 }
 
-/// Whatever a test did, the validation layer must have been silent and nothing may be left behind.
+/// Asserts that the validation layer is silent and that no object is left.
 pub(super) fn finish(device: Device) {
     device.wait_idle().unwrap();
     assert_eq!(device.graveyard_len(), 0, "objects that never died");
