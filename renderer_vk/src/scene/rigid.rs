@@ -51,8 +51,8 @@ pub enum Shape {
     Changing,
     /// Its triangles; the vertices are somewhere else: key frames between which it is drawn, bones.
     Animated(MeshId),
-    /// Everything: this index of [`TracedPart::rigid`](super::TracedPart::rigid), which has its vertices and indices;
-    /// the mesh's own ranges are empty.
+    /// Everything: this index of [`TracedPart::rigid`](super::look::TracedPart::rigid), which has its vertices and
+    /// indices; the mesh's own ranges are empty.
     Rigid(u32),
 }
 
