@@ -3,13 +3,13 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
-use relight::light::{PointLight, SunLight};
 use shaders::types::{Dielectric, constants as c};
 use support::Aabb;
 
 use super::dielectrics::square;
 use super::harness::{
-    Gpu, Scene, encode, floor_point, gpu_tests, lambert, rectangle, stage, through_byte,
+    Gpu, Scene, bounced, encode, floor_at, floor_points, gpu_tests, lambert, rectangle, stage,
+    through_byte,
 };
 use crate::settings::{DenoiserChoice, LightSelection, Settings};
 use crate::trace::frame_lights::decode;
@@ -29,14 +29,7 @@ gpu_tests! {
     ],
 }
 
-fn bounced(bounces: u32) -> Settings {
-    Settings {
-        rt_bounces: bounces,
-        ..super::harness::reference()
-    }
-}
-
-/// Mean of a picture with one bounce: in reference mode, and in that of a game, which has separate passes for it.
+/// The mean of a picture with one bounce: in reference mode, and in that of a game, which has passes of its own for it.
 fn by_each_way(gpu: &mut Gpu, scene: &Scene, settings: &Settings, frames: u32) -> [Vec3; 2] {
     let live = Settings {
         rt_accumulate: false,
@@ -64,25 +57,43 @@ pub(super) fn seen(glow: f32, albedo: f32, light: f32) -> f32 {
     whole * (glow / slope(own_glow) + albedo * light / slope(own_lit))
 }
 
+/// A room whose walls glow with 0.25 and reflect `albedo`; their stored light is scaled by `scale`.
+pub(super) fn furnace(albedo: f32, scale: f32) -> Scene {
+    let eye = Vec3::new(-20.0, 10.0, 5.0);
+    let mut scene = Scene::new(eye, Vec3::new(50.0, 20.0, -30.0), 90.0, 32);
+    let glow = stage::add([encode(0.25); 3]);
+    let stages = [stage::light(), stage::filter([encode(albedo); 3]), glow];
+    let wall = scene.material(&stages, 0);
+    scene.materials[wall as usize].0.lit_scale = scale;
+    scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), wall);
+    scene
+}
+
+/// A white floor before a wall of some color (encoded) at x = 0 that faces -x, and the wall's corners.
+pub(super) fn floor_before_a_wall(color: [f32; 3]) -> (Scene, [Vec3; 4]) {
+    let eye = Vec3::new(-60.0, 0.0, 40.0);
+    let mut scene = Scene::new(eye, Vec3::new(-40.0, 0.0, 0.0), 4.0, 32);
+    let white = scene.diffuse(1.0);
+    let painted = scene.material(&[stage::light(), stage::filter(color)], 0);
+    scene.quad(floor_at(0.0, 500.0), white);
+    let wall = rectangle(Vec3::new(0.0, -40.0, 0.0), Vec3::Z * 50.0, Vec3::Y * 80.0);
+    scene.quad(wall, painted);
+    (scene, wall)
+}
+
+/// [`lambert`] of a quad, for a point that faces up.
+pub(super) fn lambert_of_quad(point: Vec3, [a, b, c, d]: [Vec3; 4], radiance: f32) -> f32 {
+    [[a, b, c], [a, c, d]]
+        .map(|triangle| lambert(point, Vec3::Z, triangle, radiance))
+        .iter()
+        .sum()
+}
+
 fn a_furnace_sums_its_bounces(gpu: &mut Gpu) {
     // every wall emits e and reflects a: after n bounces it shows e (1 + a + ... + a^n). Of the three albedos, one is
     // below the minimum survival probability, one above, and one terminates no path
     for albedo in [0.1, 0.5, 1.0] {
-        let mut scene = Scene::new(
-            Vec3::new(-20.0, 10.0, 5.0),
-            Vec3::new(50.0, 20.0, -30.0),
-            90.0,
-            32,
-        );
-        let wall = scene.material(
-            &[
-                stage::light(),
-                stage::filter([encode(albedo); 3]),
-                stage::add([encode(0.25); 3]),
-            ],
-            0,
-        );
-        scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), wall);
+        let scene = furnace(albedo, 1.0);
         let [e, a] = [0.25, albedo].map(|v| through_byte(encode(v)));
         // light that arrives at a wall, by number of bounces
         let mut light = 0.0;
@@ -108,20 +119,7 @@ fn a_furnace_sums_its_bounces(gpu: &mut Gpu) {
 fn lightmap_brightness_scales_reflectance(gpu: &mut Gpu) {
     // the furnace with an albedo of one half: the reflected light is scaled, to at most all of it; emission is not
     for (scale, part) in [(1.0, 0.5), (0.25, 0.125), (64.0, 1.0)] {
-        let mut scene = Scene::new(
-            Vec3::new(-20.0, 10.0, 5.0),
-            Vec3::new(50.0, 20.0, -30.0),
-            90.0,
-            32,
-        );
-        let stages = [
-            stage::light(),
-            stage::filter([encode(0.5); 3]),
-            stage::add([encode(0.25); 3]),
-        ];
-        let wall = scene.material(&stages, 0);
-        scene.materials[wall as usize].0.lit_scale = scale;
-        scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), wall);
+        let scene = furnace(0.5, scale);
         let glow = through_byte(encode(0.25));
         let exact = seen(glow, part, glow);
         let mean = gpu.mean(&scene, &bounced(1), 16).x;
@@ -170,32 +168,13 @@ fn gloss_throws_back_what_its_picture_shows(gpu: &mut Gpu) {
 
 fn a_red_wall_colours_the_floor(gpu: &mut Gpu) {
     let color = [encode(0.6), encode(0.2), encode(0.05)];
-    let mut scene = Scene::new(
-        Vec3::new(-60.0, 0.0, 40.0),
-        Vec3::new(-40.0, 0.0, 0.0),
-        4.0,
-        32,
-    );
-    let white = scene.diffuse(1.0);
-    let red = scene.material(&[stage::light(), stage::filter(color)], 0);
-    let floor = Vec3::new(-500.0, -500.0, 0.0);
-    scene.quad(rectangle(floor, Vec3::X * 1000.0, Vec3::Y * 1000.0), white);
-    let wall = rectangle(Vec3::new(0.0, -40.0, 0.0), Vec3::Z * 50.0, Vec3::Y * 80.0);
-    scene.quad(wall, red);
-    // shines parallel to the floor, on the wall only
-    scene.suns.push(SunLight {
-        direction: -Vec3::X,
-        irradiance: Vec3::splat(3.0),
-        angular_radius: 1.0e-5,
-        material: None,
-    });
+    let (mut scene, wall) = floor_before_a_wall(color);
+    // shines along the floor on the wall alone
+    scene.sun(-Vec3::X, 3.0, 1.0e-5);
     let (pixels, _) = gpu.render(&scene, &bounced(1), 256);
-    let mut truth = 0.0;
-    for i in 0..pixels.len() {
-        let p = floor_point(&scene, i % 32, i / 32);
-        truth += lambert(p, Vec3::Z, [wall[0], wall[1], wall[2]], 3.0 / PI)
-            + lambert(p, Vec3::Z, [wall[0], wall[2], wall[3]], 3.0 / PI);
-    }
+    let truth: f32 = floor_points(&scene)
+        .map(|p| lambert_of_quad(p, wall, 3.0 / PI))
+        .sum();
     let sum = pixels.iter().sum::<Vec3>();
     for (channel, code) in color.into_iter().enumerate() {
         let ratio = sum[channel] / (truth * through_byte(code));
@@ -220,21 +199,9 @@ fn a_bounce_has_one_ray_for_lamps_and_sun(gpu: &mut Gpu) {
     let wall = Vec3::new(150.0, -100.0, 0.0);
     scene.quad(rectangle(wall, Vec3::Z * 80.0, Vec3::Y * 200.0), grey);
     for y in [-60.0, 0.0, 60.0] {
-        scene.points.push(PointLight {
-            origin: Vec3::new(60.0, y, 60.0),
-            intensity: Vec3::splat(3000.0 + 10.0 * y),
-            radius: 4.0,
-            spot: None,
-            falloff: relight::light::Falloff::InverseSquare,
-            pulse: None,
-        });
+        scene.point(Vec3::new(60.0, y, 60.0), 3000.0 + 10.0 * y, 4.0);
     }
-    scene.suns.push(SunLight {
-        direction: Vec3::new(-0.5, 0.2, 0.8).normalize(),
-        irradiance: Vec3::splat(4.0),
-        angular_radius: 0.02,
-        material: None,
-    });
+    scene.sun(Vec3::new(-0.5, 0.2, 0.8).normalize(), 4.0, 0.02);
     let [uniform, resampled] =
         [LightSelection::Uniform, LightSelection::Resampled].map(|selection| {
             let settings = Settings {
@@ -271,20 +238,8 @@ fn no_light_leaks_through_walls(gpu: &mut Gpu) {
         scene.room(Vec3::splat(-100.0), Vec3::new(0.0, 100.0, 100.0), grey);
         let sheet = scene.material(&[stage::light(), stage::filter([0.8; 3])], culling);
         scene.room(Vec3::new(1.0, -100.0, -100.0), Vec3::splat(100.0), sheet);
-        scene.points.push(PointLight {
-            origin: Vec3::new(30.0, 0.0, 0.0),
-            intensity: Vec3::splat(50_000.0),
-            radius: 4.0,
-            spot: None,
-            falloff: relight::light::Falloff::InverseSquare,
-            pulse: None,
-        });
-        scene.suns.push(SunLight {
-            direction: Vec3::new(-0.4, 0.3, 0.6).normalize(),
-            irradiance: Vec3::splat(5.0),
-            angular_radius: 0.01,
-            material: None,
-        });
+        scene.point(Vec3::new(30.0, 0.0, 0.0), 50_000.0, 4.0);
+        scene.sun(Vec3::new(-0.4, 0.3, 0.6).normalize(), 5.0, 0.01);
         for selection in [LightSelection::Uniform, LightSelection::Resampled] {
             let settings = Settings {
                 rt_light_selection: selection,

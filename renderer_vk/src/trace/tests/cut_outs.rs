@@ -4,7 +4,9 @@ use glam::Vec3;
 use shaders::types::Stage;
 use shaders::types::constants as c;
 
-use super::harness::{Gpu, Scene, gpu_tests, rectangle, reference, stage, through_byte};
+use super::harness::{
+    Gpu, Scene, floor_at, floor_points, gpu_tests, reference, stage, through_byte,
+};
 use super::layers::{close, displayed, scene, screen};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::trace::frame_lights::decode;
@@ -54,35 +56,15 @@ fn cut_outs_have_holes_for_eyes_and_shadows(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::new(0.0, 0.0, 50.0), Vec3::ZERO, 60.0, 32);
     scene.images.push(image.texture_index());
     let white = scene.diffuse(1.0);
-    scene.quad(
-        rectangle(
-            Vec3::new(-100.0, -100.0, 0.0),
-            Vec3::X * 200.0,
-            Vec3::Y * 200.0,
-        ),
-        white,
-    );
+    scene.quad(floor_at(0.0, 100.0), white);
     let mut stripes = stage::image(0);
     stripes.alpha_func = c::ALPHAFUNC_GE128;
     let grate = scene.material(&[stripes], c::MATERIAL_CUT_OUT | c::MATERIAL_TWO_SIDED);
-    // above the camera; s runs along x: the hole is at x > 0
-    scene.quad(
-        rectangle(
-            Vec3::new(-100.0, -100.0, 60.0),
-            Vec3::X * 200.0,
-            Vec3::Y * 200.0,
-        ),
-        grate,
-    );
-    scene.suns.push(relight::light::SunLight {
-        direction: Vec3::Z,
-        irradiance: Vec3::splat(std::f32::consts::PI),
-        angular_radius: 0.001,
-        material: None,
-    });
+    // above the eye; s runs along x: the hole is at x > 0
+    scene.quad(floor_at(60.0, 100.0), grate);
+    scene.sun(Vec3::Z, std::f32::consts::PI, 0.001);
     let (pixels, _) = gpu.render(&scene, &reference(), 2);
-    for (i, pixel) in pixels.iter().enumerate() {
-        let p = super::harness::floor_point(&scene, i % 32, i / 32);
+    for (pixel, p) in pixels.iter().zip(floor_points(&scene)) {
         if p.x.abs() > 3.0 {
             let exact = if p.x > 0.0 { 1.0 } else { 0.0 };
             assert!((pixel.x - exact).abs() < 0.002, "{p} {pixel}");

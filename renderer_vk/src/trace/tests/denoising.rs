@@ -1,11 +1,12 @@
 //! The denoiser compared with the reference.
 
 use glam::Vec3;
-use relight::light::PointLight;
 use shaders::types::{Dielectric, constants as c};
 use support::Aabb;
 
-use super::harness::{Gpu, Scene, gpu_tests, identity, rectangle, reference, stage};
+use super::harness::{
+    Gpu, Scene, bounced, floor_at, gpu_tests, identity, rectangle, reference, stage, wall_at,
+};
 use crate::api::DynamicLight;
 use crate::scene::TracedScene;
 use crate::settings::{DenoiserChoice, Settings};
@@ -29,37 +30,10 @@ gpu_tests! {
 
 /// A room with a pillar, a lamp and a small light that throws soft and hard shadows.
 fn room() -> Scene {
-    let mut scene = Scene::new(
-        Vec3::new(-180.0, 0.0, 40.0),
-        Vec3::new(100.0, 0.0, -20.0),
-        70.0,
-        64,
-    );
-    let grey = scene.diffuse(0.6);
-    scene.room(
-        Vec3::new(-200.0, -150.0, -80.0),
-        Vec3::new(200.0, 150.0, 120.0),
-        grey,
-    );
-    for side in [Vec3::X, Vec3::Y] {
-        scene.quad(
-            rectangle(Vec3::new(40.0, -20.0, -80.0), Vec3::Z * 120.0, side * 40.0),
-            grey,
-        );
-    }
+    let mut scene = Scene::hall(40.0, 0.6, 64);
     let lamp = Vec3::new(0.0, 60.0, 110.0);
-    scene.light(
-        [lamp, lamp + Vec3::Y * 60.0, lamp + Vec3::X * 60.0],
-        Vec3::splat(12.0),
-    );
-    scene.points.push(PointLight {
-        origin: Vec3::new(-100.0, -100.0, 0.0),
-        intensity: Vec3::splat(6000.0),
-        radius: 4.0,
-        spot: None,
-        falloff: relight::light::Falloff::InverseSquare,
-        pulse: None,
-    });
+    scene.lamp(lamp, 60.0, Vec3::splat(12.0));
+    scene.point(Vec3::new(-100.0, -100.0, 0.0), 6000.0, 4.0);
     scene
 }
 
@@ -91,10 +65,7 @@ fn compare(pixels: &[Vec3], truth: &[Vec3]) -> (f32, f32) {
 
 fn filtered_frames_come_near_the_reference(gpu: &mut Gpu) {
     let scene = room();
-    let settings = Settings {
-        rt_bounces: 1,
-        ..reference()
-    };
+    let settings = bounced(1);
     let (truth, _) = gpu.render(&scene, &settings, 400);
     // one frame without denoising
     let (raw, _) = gpu.render(&scene, &settings, 1);
@@ -130,14 +101,7 @@ fn disoccluded_surfaces_have_no_history(gpu: &mut Gpu) {
     let white = scene.diffuse(1.0);
     let black = scene.material(&[stage::light(), stage::filter([0.0; 3])], 0);
     scene.ambient = Vec3::ONE;
-    scene.quad(
-        rectangle(
-            Vec3::new(300.0, -900.0, -900.0),
-            Vec3::Z * 1800.0,
-            Vec3::Y * 1800.0,
-        ),
-        white,
-    );
+    scene.quad(wall_at(300.0, 900.0), white);
     scene.quad(
         rectangle(
             Vec3::new(600.0, -900.0, 1000.0),
@@ -300,10 +264,7 @@ fn a_broken_number_does_not_spread(gpu: &mut Gpu) {
         // a lamp that exists in a single frame, with a NaN radiance
         let mut scene = room();
         let at = Vec3::new(0.0, -60.0, 60.0);
-        scene.light(
-            [at, at + Vec3::Y * 40.0, at + Vec3::X * 40.0],
-            Vec3::new(bad, 1.0, 1.0),
-        );
+        scene.lamp(at, 40.0, Vec3::new(bad, 1.0, 1.0));
         scene.lights.last_mut().expect("added").model = 1;
         let instance = scene.instances.len() as u32;
         scene.instances.push(identity());
@@ -425,22 +386,15 @@ fn both_sides_of_water_keep_their_light(gpu: &mut Gpu) {
         ..Dielectric::default()
     };
     scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), grey);
-    let surface = rectangle(
-        Vec3::new(-100.0, -100.0, 0.0),
-        Vec3::X * 200.0,
-        Vec3::Y * 200.0,
-    );
+    let surface = floor_at(0.0, 100.0);
     scene.quad(surface, water);
     scene.filters.push(Aabb::new(
         Vec3::new(-100.0, -100.0, -1.0),
         Vec3::new(100.0, 100.0, 1.0),
     ));
     let lamp = Vec3::new(0.0, -30.0, 95.0);
-    scene.light(
-        [lamp, lamp + Vec3::Y * 60.0, lamp + Vec3::X * 60.0],
-        Vec3::splat(12.0),
-    );
-    // direct and bounced light have separate passes in the denoiser
+    scene.lamp(lamp, 60.0, Vec3::splat(12.0));
+    // direct and bounced light each go their own way through the denoiser
     for (bounces, denoiser) in [
         (0, DenoiserChoice::ASvgf),
         (1, DenoiserChoice::ASvgf),

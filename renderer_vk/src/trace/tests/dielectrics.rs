@@ -6,7 +6,9 @@ use shaders::types::{Dielectric, Stage};
 use support::Aabb;
 use testkit::Random;
 
-use super::harness::{Gpu, Scene, encode, gpu_tests, rectangle, reference, stage, through_byte};
+use super::harness::{
+    Gpu, Scene, encode, floor_points, gpu_tests, rectangle, reference, stage, through_byte,
+};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::settings::{DenoiserChoice, Settings};
 
@@ -350,12 +352,7 @@ fn light_takes_on_the_colour_of_what_it_passes(gpu: &mut Gpu) {
     let mut scene = Scene::new(Vec3::new(0.0, 0.0, 50.0), Vec3::ZERO, 60.0, SIDE as i32);
     let white = scene.diffuse(1.0);
     scene.quad(level(0.0, true), white);
-    scene.suns.push(relight::light::SunLight {
-        direction: Vec3::Z,
-        irradiance: Vec3::splat(std::f32::consts::PI),
-        angular_radius: 0.001,
-        material: None,
-    });
+    scene.sun(Vec3::Z, std::f32::consts::PI, 0.001);
     let sheet = |scene: &mut Scene, corner: Vec3, u: Vec3, v: Vec3, dielectric: Dielectric| {
         let material = scene.material(&[clear()], c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SIDED);
         scene.materials[material as usize].0.dielectric = dielectric;
@@ -384,8 +381,7 @@ fn light_takes_on_the_colour_of_what_it_passes(gpu: &mut Gpu) {
     };
     sheet(&mut scene, corner - Vec3::Z * 10.0, x * 2.0, y, water);
     let (pixels, _) = gpu.render(&scene, &middles(), 2);
-    for (i, pixel) in pixels.iter().enumerate() {
-        let p = super::harness::floor_point(&scene, i % SIDE, i / SIDE);
+    for (pixel, p) in pixels.iter().zip(floor_points(&scene)) {
         let mut exact = Vec3::ONE;
         if p.x < 0.0 {
             exact *= red;

@@ -38,16 +38,9 @@ fn fog_is_lit_by_what_lights_each_place_of_it(gpu: &mut Gpu) {
     // blended in display values over black; without a surface the whole distance counts, as in the engine
     let ambient = decode(Vec3::new(0.2, 0.4, 0.6) * (300.0f32 / depth).sqrt());
     let (origin, radius, intensity) = (Vec3::new(130.0, 0.0, 30.0), 4.0f32, 9000.0f32);
-    scene.points.push(relight::light::PointLight {
-        origin,
-        intensity: Vec3::splat(intensity),
-        radius,
-        spot: None,
-        falloff: relight::light::Falloff::InverseSquare,
-        pulse: None,
-    });
-    // the mean radiance over the sphere of directions, weighted by the scattering at each point, is blended in display
-    // values as the fog's own colour is
+    scene.point(origin, intensity, radius);
+    // the mean radiance over the sphere of directions, over what scatters at each place, shares the display as the fog's
+    // own colour does
     let steps = 4000;
     let mut lit = 0.0;
     for i in 0..steps {

@@ -1,7 +1,6 @@
 //! Range over which the denoiser detects a change of light.
 
 use glam::Vec3;
-use relight::light::{Falloff, PointLight};
 
 use super::harness::{Gpu, Scene, gpu_tests, rectangle, reference};
 use crate::api::DynamicLight;
@@ -38,14 +37,7 @@ fn halved_wall() -> Scene {
     let [a, b, c, d] = rectangle(corner, Vec3::Z * 800.0, Vec3::X * 100.0);
     scene.quad([a, b, c, d], board);
     scene.quad([d, c, b, a], board);
-    scene.points.push(PointLight {
-        origin: Vec3::new(-2000.0, 0.0, 0.0),
-        intensity: Vec3::splat(2.0e6),
-        radius: 1.0,
-        spot: None,
-        falloff: Falloff::InverseSquare,
-        pulse: None,
-    });
+    scene.point(Vec3::new(-2000.0, 0.0, 0.0), 2.0e6, 1.0);
     scene
 }
 

@@ -1,7 +1,6 @@
 //! Diagnostics of the traced look: ray counters and debug views.
 
 use glam::Vec3;
-use relight::light::SunLight;
 use shaders::types::constants as c;
 
 use super::harness::{Gpu, Scene, gpu_tests, identity, rectangle, reference, stage};
@@ -68,12 +67,7 @@ fn rays_are_counted_exactly_and_only_when_asked(gpu: &mut Gpu) {
     assert_eq!(rays, [pixels, 0, pixels, 0, pixels / 4, 0, 0]);
     // rays to the sampled light of each pixel, and to a sun
     let mut sunny = lit_floor();
-    sunny.suns.push(SunLight {
-        direction: Vec3::Z,
-        irradiance: Vec3::ONE,
-        angular_radius: 0.01,
-        material: None,
-    });
+    sunny.sun(Vec3::Z, 1.0, 0.01);
     let chosen = Settings {
         rt_num_random_dl: 1,
         rt_light_selection: LightSelection::Resampled,

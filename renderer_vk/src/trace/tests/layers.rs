@@ -5,7 +5,9 @@ use shaders::types::Stage;
 use shaders::types::constants as c;
 
 use super::dielectrics::square;
-use super::harness::{Gpu, Scene, encode, gpu_tests, identity, rectangle, reference, stage};
+use super::harness::{
+    Gpu, Scene, bounced, encode, gpu_tests, identity, rectangle, reference, stage, wall_at,
+};
 use crate::settings::Settings;
 use crate::trace::frame_lights::decode;
 
@@ -33,11 +35,7 @@ pub(super) const TRANSLUCENT: u32 = c::MATERIAL_TRANSLUCENT | c::MATERIAL_TWO_SI
 /// A rectangle at distance x that fills the view of `scene()`.
 pub(super) fn screen(x: f32) -> [Vec3; 4] {
     // faces -x
-    rectangle(
-        Vec3::new(x, -200.0, -200.0),
-        Vec3::Z * 400.0,
-        Vec3::Y * 400.0,
-    )
+    wall_at(x, 200.0)
 }
 
 pub(super) fn scene() -> Scene {
@@ -320,10 +318,7 @@ fn the_lightmap_of_what_has_none_is_white_and_lights_nothing(gpu: &mut Gpu) {
     let mut facing = screen(-100.0);
     facing.reverse();
     dark.quad(facing, shown);
-    let settings = Settings {
-        rt_bounces: 1,
-        ..reference()
-    };
+    let settings = bounced(1);
     assert_eq!(gpu.mean(&dark, &settings, 4), Vec3::ZERO);
 }
 

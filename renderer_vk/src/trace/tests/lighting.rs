@@ -1,12 +1,14 @@
 //! Direct and bounced light.
 
 use glam::Vec3;
-use relight::light::{PointLight, Pulse, SunLight};
+use relight::light::Pulse;
 use relight::world::StyleStrength;
 
-use super::bounces::seen;
-use super::harness::{Gpu, Scene, floor_point, gpu_tests, lambert, rectangle, reference};
-use crate::api::DynamicLight;
+use super::bounces::{floor_before_a_wall, furnace, lambert_of_quad, seen};
+use super::harness::{
+    Gpu, Scene, bounced, ceiling_at, encode, floor_at, floor_points, gpu_tests, lambert, reference,
+    through_byte,
+};
 use crate::settings::{LightSelection, Settings};
 
 gpu_tests! {
@@ -43,14 +45,7 @@ const ALL: [LightSampling; 3] = [
 fn floor() -> Scene {
     let mut scene = Scene::new(Vec3::new(-100.0, 0.0, 80.0), Vec3::ZERO, 20.0, 32);
     let white = scene.diffuse(1.0);
-    scene.quad(
-        rectangle(
-            Vec3::new(-500.0, -500.0, 0.0),
-            Vec3::X * 1000.0,
-            Vec3::Y * 1000.0,
-        ),
-        white,
-    );
+    scene.quad(floor_at(0.0, 500.0), white);
     scene
 }
 
@@ -66,13 +61,10 @@ fn sampled(sampling: LightSampling) -> Settings {
     }
 }
 
-/// Mean relative difference over the picture.
-fn mean_difference(a: &[Vec3], b: impl Fn(usize) -> f32) -> f32 {
-    let sum: f32 = a
-        .iter()
-        .enumerate()
-        .map(|(i, p)| (p.x - b(i)).abs() / b(i).max(1.0e-6))
-        .sum();
+/// Mean of |a - b| / b over the picture.
+fn mean_difference(a: &[Vec3], b: impl Iterator<Item = f32>) -> f32 {
+    let pairs = a.iter().zip(b);
+    let sum: f32 = pairs.map(|(a, b)| (a.x - b).abs() / b.max(1.0e-6)).sum();
     sum / a.len() as f32
 }
 
@@ -93,18 +85,10 @@ fn one_triangle_gives_the_irradiance_of_the_closed_form(gpu: &mut Gpu) {
         let mut scene = floor();
         scene.light(triangle, Vec3::splat(5.0));
         let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::Resampled), 64);
-        let side = scene.def.width as usize;
-        let exact: Vec<f32> = (0..pixels.len())
-            .map(|i| {
-                lambert(
-                    floor_point(&scene, i % side, i / side),
-                    Vec3::Z,
-                    triangle,
-                    5.0,
-                )
-            })
+        let exact: Vec<f32> = floor_points(&scene)
+            .map(|p| lambert(p, Vec3::Z, triangle, 5.0))
             .collect();
-        let difference = mean_difference(&pixels, |i| exact[i]);
+        let difference = mean_difference(&pixels, exact.iter().copied());
         let ratio = pixels.iter().map(|p| p.x).sum::<f32>() / exact.iter().sum::<f32>();
         println!("mean relative difference {difference}, ratio {ratio}");
         assert!(difference < 0.002, "{difference}");
@@ -120,24 +104,7 @@ fn one_triangle_gives_the_irradiance_of_the_closed_form(gpu: &mut Gpu) {
 }
 
 fn all_estimators_have_the_same_mean(gpu: &mut Gpu) {
-    let mut scene = Scene::new(
-        Vec3::new(-180.0, 0.0, 60.0),
-        Vec3::new(100.0, 0.0, -20.0),
-        70.0,
-        32,
-    );
-    let grey = scene.diffuse(0.7);
-    scene.room(
-        Vec3::new(-200.0, -150.0, -80.0),
-        Vec3::new(200.0, 150.0, 120.0),
-        grey,
-    );
-    // a pillar for shadows
-    for i in 0..2 {
-        let side = if i == 0 { Vec3::X } else { Vec3::Y } * 40.0;
-        let corner = Vec3::new(40.0, -20.0, -80.0);
-        scene.quad(rectangle(corner, Vec3::Z * 120.0, side), grey);
-    }
+    let mut scene = Scene::hall(60.0, 0.7, 32);
     for i in 0..12 {
         let angle = i as f32 * 0.53;
         let at = Vec3::new(
@@ -146,25 +113,10 @@ fn all_estimators_have_the_same_mean(gpu: &mut Gpu) {
             80.0 + (i % 3) as f32 * 10.0,
         );
         // downwards
-        scene.light(
-            [at, at + Vec3::Y * 20.0, at + Vec3::X * 20.0],
-            Vec3::splat(4.0 + i as f32),
-        );
+        scene.lamp(at, 20.0, Vec3::splat(4.0 + i as f32));
     }
-    scene.points.push(PointLight {
-        origin: Vec3::new(0.0, 90.0, 20.0),
-        intensity: Vec3::splat(2000.0),
-        radius: 4.0,
-        spot: None,
-        falloff: relight::light::Falloff::InverseSquare,
-        pulse: None,
-    });
-    scene.dlights.push(DynamicLight {
-        origin: Vec3::new(-60.0, -80.0, 0.0),
-        radius: 200.0,
-        color: Vec3::ONE,
-        additive: false,
-    });
+    scene.point(Vec3::new(0.0, 90.0, 20.0), 2000.0, 4.0);
+    scene.dlight(Vec3::new(-60.0, -80.0, 0.0), 200.0, 1.0);
     let frames = |sampling| {
         if sampling == LightSampling::All {
             32
@@ -180,7 +132,7 @@ fn all_estimators_have_the_same_mean(gpu: &mut Gpu) {
     let truth = total(&means[2]);
     for (mean, sampling) in means.iter().zip(ALL) {
         let ratio = total(mean) / truth;
-        let difference = mean_difference(mean, |i| means[2][i].x.max(0.05 * truth));
+        let difference = mean_difference(mean, means[2].iter().map(|p| p.x.max(0.05 * truth)));
         println!("{sampling:?}: mean {ratio} of All, pixels differ by {difference}");
         assert!((ratio - 1.0).abs() < 0.005, "{sampling:?} {ratio}");
         // noise of the sampled ones, not bias
@@ -208,29 +160,14 @@ fn an_umbra_is_black_and_a_penumbra_is_between(gpu: &mut Gpu) {
     ];
     let mut scene = Scene::new(Vec3::new(0.0, 0.0, 90.0), Vec3::ZERO, 80.0, 32);
     let white = scene.diffuse(1.0);
-    scene.quad(
-        rectangle(
-            Vec3::new(-500.0, -500.0, 0.0),
-            Vec3::X * 1000.0,
-            Vec3::Y * 1000.0,
-        ),
-        white,
-    );
-    // between light and floor, above the camera
-    scene.quad(
-        rectangle(
-            Vec3::new(-20.0, -20.0, 100.0),
-            Vec3::Y * 40.0,
-            Vec3::X * 40.0,
-        ),
-        white,
-    );
+    scene.quad(floor_at(0.0, 500.0), white);
+    // between light and floor, above the eye
+    scene.quad(ceiling_at(100.0, 20.0), white);
     scene.light(triangle, Vec3::splat(1000.0));
     let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::All), 16);
     let mut umbra = 0;
     let mut partial = 0;
-    for (i, pixel) in pixels.iter().enumerate() {
-        let p = floor_point(&scene, i % 32, i / 32);
+    for (pixel, p) in pixels.iter().zip(floor_points(&scene)) {
         let extent = p.x.abs().max(p.y.abs());
         // the plate's shadow extends to 40 on the floor; the light's size blurs it by 5, a pixel covers 5
         if extent < 30.0 {
@@ -278,7 +215,7 @@ fn triangles_end_alone_and_quads_together(gpu: &mut Gpu) {
 fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
     let check = |gpu: &mut Gpu, scene: &Scene, exact: &dyn Fn(Vec3) -> f32| {
         let (pixels, _) = gpu.render(scene, &sampled(LightSampling::Resampled), 32);
-        let difference = mean_difference(&pixels, |i| exact(floor_point(scene, i % 32, i / 32)));
+        let difference = mean_difference(&pixels, floor_points(scene).map(exact));
         println!("{difference}");
         assert!(difference < 0.01, "{difference}");
     };
@@ -286,23 +223,19 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
     // a small sphere is a point light: E = I cos / d²
     let falloff = |p: Vec3| (at.z / (at - p).length()) / (at - p).length_squared();
     let mut scene = floor();
-    scene.points.push(PointLight {
-        origin: at,
-        intensity: Vec3::splat(7000.0),
-        radius: 4.0,
-        spot: None,
-        falloff: relight::light::Falloff::InverseSquare,
-        pulse: None,
-    });
-    check(gpu, &scene, &|p| 7000.0 * falloff(p) / std::f32::consts::PI);
-    // below the cutoff it contributes nothing; at the boundary, its size and the pixels blur this
+    scene.point(at, 7000.0, 4.0);
     let full = |p: Vec3| 7000.0 * falloff(p) / std::f32::consts::PI;
+    check(gpu, &scene, &full);
+    // where it gives too little it gives nothing; at the edge its size and the pixels' blur that
     let end = full(Vec3::new(at.x + 20.0, at.y, 0.0));
     scene.light_cutoff = end;
     let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::Resampled), 32);
     let (mut dark, mut lit) = (0, 0);
-    for (i, pixel) in pixels.iter().enumerate() {
-        let exact = full(floor_point(&scene, i % 32, i / 32));
+    for (i, (pixel, exact)) in pixels
+        .iter()
+        .zip(floor_points(&scene).map(full))
+        .enumerate()
+    {
         if exact < end * 0.95 {
             dark += 1;
             assert_eq!(pixel.x, 0.0, "{i}");
@@ -326,22 +259,12 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
     });
     // a facing white surface at half the reach has the colour of the dynamic light
     let mut scene = floor();
-    scene.dlights.push(DynamicLight {
-        origin: at,
-        radius: 200.0,
-        color: Vec3::ONE,
-        additive: false,
-    });
+    scene.dlight(at, 200.0, 1.0);
     check(gpu, &scene, &|p| 100.0 * 100.0 * falloff(p));
     // closer than 0.35 of its reach it is no stronger
     let near = Vec3::new(20.0, 10.0, 24.0);
     let mut scene = floor();
-    scene.dlights.push(DynamicLight {
-        origin: near,
-        radius: 240.0,
-        color: Vec3::splat(0.5),
-        additive: false,
-    });
+    scene.dlight(near, 240.0, 0.5);
     check(gpu, &scene, &|p| {
         let distance = (near - p).length();
         let colour = crate::trace::frame_lights::decode(Vec3::splat(0.5)).x;
@@ -349,21 +272,12 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
     });
     let mut scene = floor();
     let direction = Vec3::new(0.3, 0.2, 0.8).normalize();
-    scene.suns.push(SunLight {
-        direction,
-        irradiance: Vec3::splat(2.0),
-        angular_radius: 0.005,
-        material: None,
-    });
+    scene.sun(direction, 2.0, 0.005);
     check(gpu, &scene, &|_| 2.0 * direction.z / std::f32::consts::PI);
     // a low sun: few rays, each of greater weight
     let low = Vec3::new(0.8, 0.6, 0.008).normalize();
-    scene.suns[0] = SunLight {
-        direction: low,
-        irradiance: Vec3::splat(200.0),
-        angular_radius: 0.001,
-        material: None,
-    };
+    scene.suns.clear();
+    scene.sun(low, 200.0, 0.001);
     let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::Resampled), 32);
     let mean = pixels.iter().map(|p| p.x).sum::<f32>() / pixels.len() as f32;
     let exact = 200.0 * low.z / std::f32::consts::PI;
@@ -375,38 +289,16 @@ fn spheres_and_suns_give_their_irradiance(gpu: &mut Gpu) {
 }
 
 fn a_white_room_bounces_what_its_walls_give(gpu: &mut Gpu) {
-    // every wall emits e and reflects rho: one bounce adds rho * e, two add rho² * e more
-    let mut scene = Scene::new(
-        Vec3::new(-20.0, 10.0, 5.0),
-        Vec3::new(50.0, 20.0, -30.0),
-        90.0,
-        32,
-    );
-    let [glow, albedo] =
-        [0.25, 0.5].map(|v| super::harness::through_byte(super::harness::encode(v)));
-    let code = super::harness::encode(0.5);
-    let glow_code = super::harness::encode(0.25);
-    let wall = scene.material(
-        &[
-            super::harness::stage::light(),
-            super::harness::stage::filter([code; 3]),
-            super::harness::stage::add([glow_code; 3]),
-        ],
-        0,
-    );
-    scene.room(Vec3::splat(-100.0), Vec3::splat(100.0), wall);
+    // every wall glows with radiance e and reflects rho: one bounce adds rho * e, two add rho² * e more
+    let scene = furnace(0.5, 1.0);
+    let [glow, albedo] = [0.25, 0.5].map(|v| through_byte(encode(v)));
     for (bounces, exact) in [
         (0, seen(glow, albedo, 0.0)),
         (1, seen(glow, albedo, glow)),
         (2, seen(glow, albedo, glow * (1.0 + albedo))),
     ] {
-        let settings = Settings {
-            rt_bounces: bounces,
-            ..reference()
-        };
-        let mean = gpu
-            .mean(&scene, &settings, if bounces > 1 { 32 } else { 4 })
-            .x;
+        let frames = if bounces > 1 { 32 } else { 4 };
+        let mean = gpu.mean(&scene, &bounced(bounces), frames).x;
         println!("{bounces}: {mean} {exact}");
         assert!(
             (mean / exact - 1.0).abs() < 0.002,
@@ -416,55 +308,17 @@ fn a_white_room_bounces_what_its_walls_give(gpu: &mut Gpu) {
 }
 
 fn bounced_light_of_listed_lights_is_counted_once(gpu: &mut Gpu) {
-    // a floor lit by a sunlit wall: by the wall's form factor at the floor's point
-    let mut scene = Scene::new(
-        Vec3::new(-60.0, 0.0, 40.0),
-        Vec3::new(-40.0, 0.0, 0.0),
-        4.0,
-        32,
-    );
-    let white = scene.diffuse(1.0);
-    let half = scene.diffuse(0.5);
-    scene.quad(
-        rectangle(
-            Vec3::new(-500.0, -500.0, 0.0),
-            Vec3::X * 1000.0,
-            Vec3::Y * 1000.0,
-        ),
-        white,
-    );
-    // a wall at x = 0 that faces -x, with a lamp of the light lists on it that bounced rays must not count
-    let wall = [
-        Vec3::new(0.0, -40.0, 0.0),
-        Vec3::new(0.0, -40.0, 50.0),
-        Vec3::new(0.0, 40.0, 50.0),
-        Vec3::new(0.0, 40.0, 0.0),
-    ];
-    scene.quad(wall, half);
-    // the sun is low behind the camera: it lights the wall fully, and the floor
+    // a floor lit by a wall that the sun lights: by form factor of the wall, seen from the floor's point
+    let (mut scene, wall) = floor_before_a_wall([encode(0.5); 3]);
+    // the sun stands low behind the camera: it lights the wall in full and the floor too
     let direction = Vec3::new(-1.0, 0.0, 0.2).normalize();
-    scene.suns.push(SunLight {
-        direction,
-        irradiance: Vec3::splat(3.0),
-        angular_radius: 0.002,
-        material: None,
-    });
-    let settings = Settings {
-        rt_bounces: 1,
-        ..reference()
-    };
-    let (pixels, _) = gpu.render(&scene, &settings, 256);
+    scene.sun(direction, 3.0, 0.002);
+    let (pixels, _) = gpu.render(&scene, &bounced(1), 256);
     let direct = 3.0 * direction.z / std::f32::consts::PI;
-    let albedo = super::harness::through_byte(super::harness::encode(0.5));
+    let albedo = through_byte(encode(0.5));
     let wall_radiance = albedo * 3.0 * -direction.x / std::f32::consts::PI;
-    let exact = |p: Vec3| {
-        direct
-            + lambert(p, Vec3::Z, [wall[0], wall[1], wall[2]], wall_radiance)
-            + lambert(p, Vec3::Z, [wall[0], wall[2], wall[3]], wall_radiance)
-    };
-    let side = 32;
-    let truth: f32 = (0..pixels.len())
-        .map(|i| exact(floor_point(&scene, i % side, i / side)))
+    let truth: f32 = floor_points(&scene)
+        .map(|p| direct + lambert_of_quad(p, wall, wall_radiance))
         .sum();
     let ratio = pixels.iter().map(|p| p.x).sum::<f32>() / truth;
     println!("{ratio}");
@@ -486,14 +340,7 @@ fn a_point_is_lit_by_the_list_of_its_cluster(gpu: &mut Gpu) {
     let [left, right] = [far, near].map(|c| usize::try_from(c).expect("a cluster"));
     let mut scene = Scene::new(Vec3::new(0.0, 0.0, 90.0), Vec3::ZERO, 60.0, 32);
     let white = scene.diffuse(1.0);
-    scene.quad(
-        rectangle(
-            Vec3::new(-300.0, -300.0, 0.0),
-            Vec3::X * 600.0,
-            Vec3::Y * 600.0,
-        ),
-        white,
-    );
+    scene.quad(floor_at(0.0, 300.0), white);
     let red = [
         Vec3::new(-20.0, 0.0, 200.0),
         Vec3::new(-20.0, 9.0, 200.0),
@@ -517,8 +364,7 @@ fn a_point_is_lit_by_the_list_of_its_cluster(gpu: &mut Gpu) {
     scene.tree = Some((bsp, lists));
     for sampling in ALL {
         let (pixels, _) = gpu.render(&scene, &sampled(sampling), 4);
-        for (i, pixel) in pixels.iter().enumerate() {
-            let p = floor_point(&scene, i % 32, i / 32);
+        for (pixel, p) in pixels.iter().zip(floor_points(&scene)) {
             // a pixel is four units wide
             if p.x < -4.0 {
                 assert!(pixel.x > 0.0 && pixel.y == 0.0, "{sampling:?} {p} {pixel}");
@@ -539,17 +385,10 @@ fn points_pulse_with_their_style(gpu: &mut Gpu) {
     };
     let (mean, pulse) = Pulse::of(StyleStrength::Wave(wave));
     let at = [Vec3::new(20.0, 10.0, 90.0), Vec3::new(-30.0, 0.0, 80.0)];
-    let lamp = |origin, intensity, pulse| PointLight {
-        origin,
-        intensity: Vec3::splat(intensity),
-        radius: 4.0,
-        spot: None,
-        falloff: relight::light::Falloff::InverseSquare,
-        pulse,
-    };
     let mut scene = floor();
-    scene.points.push(lamp(at[0], 7000.0 * mean, pulse));
-    scene.points.push(lamp(at[1], 3000.0, None));
+    scene.point(at[0], 7000.0 * mean, 4.0);
+    scene.points[0].pulse = pulse;
+    scene.point(at[1], 3000.0, 4.0);
     for (time, strength) in [(250, 1.0), (750, 0.0)] {
         scene.def.time_ms = time;
         let (pixels, _) = gpu.render(&scene, &sampled(LightSampling::All), 32);
@@ -557,10 +396,8 @@ fn points_pulse_with_their_style(gpu: &mut Gpu) {
             let offset = at - p;
             at.z / offset.length().powi(3) / std::f32::consts::PI
         };
-        let difference = mean_difference(&pixels, |i| {
-            let p = floor_point(&scene, i % 32, i / 32);
-            strength * 7000.0 * given(p, at[0]) + 3000.0 * given(p, at[1])
-        });
+        let exact = |p| strength * 7000.0 * given(p, at[0]) + 3000.0 * given(p, at[1]);
+        let difference = mean_difference(&pixels, floor_points(&scene).map(exact));
         assert!(difference < 0.01, "{time}: {difference}");
     }
 }

@@ -3,13 +3,11 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
-use relight::light::SunLight;
 use shaders::types::{Instance, constants as c};
 
 use super::harness::{
-    Gpu, Scene, floor_point, gpu_tests, identity, lambert, rectangle, reference, stage,
+    Gpu, Scene, floor_at, floor_points, gpu_tests, identity, lambert, rectangle, reference, stage,
 };
-use crate::api::DynamicLight;
 use crate::settings::{LightSelection, Settings};
 
 gpu_tests! {
@@ -35,14 +33,16 @@ fn floor_from_above(half: f32) -> Scene {
     let fov = 2.0 * (half / height).atan().to_degrees();
     let mut scene = Scene::new(Vec3::new(0.0, 0.0, height), Vec3::ZERO, fov, SIDE as i32);
     let white = scene.diffuse(1.0);
-    scene.quad(
-        rectangle(
-            Vec3::new(-900.0, -900.0, 0.0),
-            Vec3::X * 1800.0,
-            Vec3::Y * 1800.0,
-        ),
-        white,
-    );
+    scene.quad(floor_at(0.0, 900.0), white);
+    scene
+}
+
+/// The same below a ceiling at a height of 150 units, above the eye, that covers x < 0.
+fn floor_below_an_edge() -> Scene {
+    let mut scene = floor_from_above(40.0);
+    let white = scene.diffuse(1.0);
+    let corner = Vec3::new(-900.0, -900.0, 150.0);
+    scene.quad(rectangle(corner, Vec3::Y * 1800.0, Vec3::X * 900.0), white);
     scene
 }
 
@@ -86,24 +86,13 @@ fn an_edge_hides_the_part_of_a_light_that_lies_behind_it(gpu: &mut Gpu) {
         Vec3::new(0.0, 45.0, 300.0),
         Vec3::new(40.0, -30.0, 300.0),
     ];
-    let mut scene = floor_from_above(40.0);
-    let white = scene.diffuse(1.0);
-    // covers x < 0 at half the height, above the camera
-    scene.quad(
-        rectangle(
-            Vec3::new(-900.0, -900.0, 150.0),
-            Vec3::Y * 1800.0,
-            Vec3::X * 900.0,
-        ),
-        white,
-    );
+    let mut scene = floor_below_an_edge();
     scene.light(triangle, Vec3::splat(20.0));
     let (settings, frames) = many_samples();
     let (pixels, _) = gpu.render(&scene, &settings, frames);
     let (mut worst, mut partial) = (0.0f32, 0);
-    for (i, pixel) in pixels.iter().enumerate() {
-        let p = floor_point(&scene, i % SIDE, i / SIDE);
-        // the plane through the point and the edge x = 0, z = 150; the open side
+    for (pixel, p) in pixels.iter().zip(floor_points(&scene)) {
+        // the plane through the point and the edge x = 0, z = 150; the side that is open
         let normal = Vec3::new(150.0, 0.0, p.x).normalize();
         let seen = clipped(&triangle, normal, p);
         let exact: f32 = (1..seen.len().max(2) - 1)
@@ -123,8 +112,7 @@ fn an_edge_hides_the_part_of_a_light_that_lies_behind_it(gpu: &mut Gpu) {
     };
     let (pixels, _) = gpu.render(&scene, &hard, 2);
     let mut dark = 0;
-    for (i, pixel) in pixels.iter().enumerate() {
-        let p = floor_point(&scene, i % SIDE, i / SIDE);
+    for (pixel, p) in pixels.iter().zip(floor_points(&scene)) {
         let whole = lambert(p, Vec3::Z, triangle, 20.0);
         let part = pixel.x / whole;
         assert!(part == 0.0 || (part - 1.0).abs() < 0.05, "{p} {part}");
@@ -137,28 +125,13 @@ fn an_edge_hides_the_part_of_a_light_that_lies_behind_it(gpu: &mut Gpu) {
 
 fn the_suns_disc_makes_a_penumbra_of_its_own_width(gpu: &mut Gpu) {
     let radius = 0.1f32;
-    let mut scene = floor_from_above(40.0);
-    let white = scene.diffuse(1.0);
-    scene.quad(
-        rectangle(
-            Vec3::new(-900.0, -900.0, 150.0),
-            Vec3::Y * 1800.0,
-            Vec3::X * 900.0,
-        ),
-        white,
-    );
-    scene.suns.push(SunLight {
-        direction: Vec3::Z,
-        irradiance: Vec3::splat(PI),
-        angular_radius: radius,
-        material: None,
-    });
+    let mut scene = floor_below_an_edge();
+    scene.sun(Vec3::Z, PI, radius);
     let (settings, frames) = many_samples();
     let (pixels, _) = gpu.render(&scene, &settings, frames);
     let mut worst = 0.0f32;
-    for (i, pixel) in pixels.iter().enumerate() {
-        let p = floor_point(&scene, i % SIDE, i / SIDE);
-        // position of the edge in the disc, in radii from its centre: a chord
+    for (pixel, p) in pixels.iter().zip(floor_points(&scene)) {
+        // where the edge cuts the disc, in radii from its middle: a chord
         let t = (-p.x / 150.0).atan() / radius;
         let hidden = if t <= -1.0 {
             0.0
@@ -235,8 +208,7 @@ fn the_flashlight_lights_a_spot_before_the_eye(gpu: &mut Gpu) {
     );
     assert!(middle.x > middle.y && middle.y > middle.z, "warm: {middle}");
     // the cone ends at 24 degrees: 40 units from its middle
-    for (i, pixel) in pixels.iter().enumerate() {
-        let p = floor_point(&scene, i % SIDE, i / SIDE);
+    for (pixel, p) in pixels.iter().zip(floor_points(&scene)) {
         if p.truncate().length() > 60.0 {
             assert_eq!(*pixel, Vec3::ZERO, "{p}");
         } else if p.truncate().length() < 25.0 {
@@ -266,11 +238,8 @@ fn lights_of_a_brush_model_go_where_it_goes(gpu: &mut Gpu) {
             .submodels
             .push(crate::scene::Submodel { model: 1, instance });
         let (pixels, _) = gpu.render(&scene, &all_lights(), 32);
-        let exact: f32 = (0..pixels.len())
-            .map(|i| {
-                let p = floor_point(&scene, i % SIDE, i / SIDE);
-                lambert(p, Vec3::Z, triangle.map(|c| c + moved), 50.0)
-            })
+        let exact: f32 = floor_points(&scene)
+            .map(|p| lambert(p, Vec3::Z, triangle.map(|c| c + moved), 50.0))
             .sum();
         let ratio = pixels.iter().map(|p| p.x).sum::<f32>() / exact;
         println!("{ratio}");
@@ -280,55 +249,28 @@ fn lights_of_a_brush_model_go_where_it_goes(gpu: &mut Gpu) {
 
 /// Many lights of all kinds between pillars.
 fn crowd() -> Scene {
-    let mut scene = Scene::new(
-        Vec3::new(-180.0, 0.0, 60.0),
-        Vec3::new(100.0, 0.0, -20.0),
-        70.0,
-        SIDE as i32,
-    );
-    let grey = scene.diffuse(0.7);
-    scene.room(
-        Vec3::new(-200.0, -150.0, -80.0),
-        Vec3::new(200.0, 150.0, 120.0),
-        grey,
-    );
-    for i in 0..2 {
-        let side = if i == 0 { Vec3::X } else { Vec3::Y } * 40.0;
-        scene.quad(
-            rectangle(Vec3::new(40.0, -20.0, -80.0), Vec3::Z * 120.0, side),
-            grey,
-        );
-    }
+    let mut scene = Scene::hall(60.0, 0.7, SIDE as i32);
     for i in 0..40 {
         let angle = i as f32 * 2.4;
         let reach = 20.0 + 3.0 * i as f32;
         let at = Vec3::new(angle.cos() * reach, angle.sin() * reach, 100.0);
         let size = 2.0 + (i % 7) as f32 * 6.0;
-        scene.light(
-            [at, at + Vec3::Y * size, at + Vec3::X * size],
-            Vec3::splat(0.5 + (i % 5) as f32),
-        );
+        scene.lamp(at, size, Vec3::splat(0.5 + (i % 5) as f32));
     }
     for i in 0..70 {
         let angle = i as f32 * 2.4;
-        scene.dlights.push(DynamicLight {
-            origin: Vec3::new(
+        scene.dlight(
+            Vec3::new(
                 angle.cos() * 130.0,
                 angle.sin() * 120.0,
                 (i % 9) as f32 * 10.0 - 40.0,
             ),
-            radius: 20.0 + (i % 4) as f32 * 20.0,
-            color: Vec3::ONE,
-            additive: false,
-        });
+            20.0 + (i % 4) as f32 * 20.0,
+            1.0,
+        );
     }
     for i in 0..3 {
-        scene.suns.push(SunLight {
-            direction: Vec3::new(i as f32 - 1.0, 0.3, 1.5).normalize(),
-            irradiance: Vec3::splat(0.2),
-            angular_radius: 0.01,
-            material: None,
-        });
+        scene.sun(Vec3::new(i as f32 - 1.0, 0.3, 1.5).normalize(), 0.2, 0.01);
     }
     scene
 }

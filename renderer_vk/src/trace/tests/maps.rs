@@ -55,13 +55,90 @@ fn camera(world: &World) -> RefDef {
     }
 }
 
+/// The game's files and materials, with a device.
+struct Game {
+    files: Arc<dyn GameFiles>,
+    scripts: Arc<relight::Materials>,
+    gpu: Gpu,
+}
+
+impl Game {
+    fn new(tracer: Tracer) -> Option<Self> {
+        let files: Arc<dyn GameFiles> = Arc::new(openarena()?);
+        let gpu = Gpu::new(tracer)?;
+        let scripts = Arc::new(relight::Materials::load(&*files).0);
+        Some(Self {
+            files,
+            scripts,
+            gpu,
+        })
+    }
+
+    fn load(&self, map: &str, settings: &Settings) -> (Assets, World) {
+        let (files, scripts) = (Arc::clone(&self.files), Arc::clone(&self.scripts));
+        let device = &self.gpu.device;
+        let mut assets = Assets::new(device, files, scripts, settings).expect("assets");
+        let name = format!("maps/{map}");
+        let world = World::load(device, &mut assets, &name, settings).expect("map");
+        (assets, world)
+    }
+
+    /// Draws frames of the view of the first spawn point: the last picture, and the look.
+    fn draw(
+        &mut self,
+        (assets, world): (&mut Assets, &World),
+        passes: &Arc<PassSet>,
+        settings: &Settings,
+        [width, height]: [u32; 2],
+        frames: u32,
+    ) -> (Vec<u8>, TraceLook) {
+        let device = &self.gpu.device;
+        let mut look = TraceLook::new(passes, world, assets).expect("structures");
+        assets
+            .materials
+            .upload(device, &assets.samplers)
+            .expect("materials");
+        let def = RefDef {
+            width: width as i32,
+            height: height as i32,
+            ..camera(world)
+        };
+        let view = Scene::default()
+            .gather(Some(world), assets, settings, &def, TRACED)
+            .expect("view")
+            .pop()
+            .expect("view");
+        let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
+        let desc = ImageDesc::new("picture", width, height, Format::Rgba8, usage);
+        let target = Image::new(device, &desc).expect("image");
+        for _ in 0..frames {
+            let mut rec = self.gpu.ring.begin().expect("frame");
+            look.record(
+                &mut rec,
+                MapView {
+                    scene: &view,
+                    world,
+                    assets,
+                    settings,
+                    target: &target,
+                    flares: FlareTest::default(),
+                    mask: ColorMask::ALL,
+                },
+            )
+            .expect("recorded");
+            self.gpu.ring.end(rec).expect("submitted");
+        }
+        device.wait_idle().expect("done");
+        (device.read_image(&target).expect("read"), look)
+    }
+}
+
 #[test]
 fn maps_are_lit() {
-    let (Some(files), Some(mut gpu)) = (openarena(), Gpu::new(Tracer::Compute)) else {
+    let Some(mut game) = Game::new(Tracer::Compute) else {
         return;
     };
-    let files: Arc<dyn GameFiles> = Arc::new(files);
-    let device = &gpu.device.clone();
+    let device = &game.gpu.device.clone();
     let frames: u32 = std::env::var("RELIGHT_TRACE_FRAMES")
         .ok()
         .and_then(|v| v.parse().ok())
@@ -69,57 +146,24 @@ fn maps_are_lit() {
     let chosen = std::env::var("RELIGHT_TRACE_MAPS").ok();
     let maps: Vec<String> = match &chosen {
         Some(list) => list.split(',').map(|m| format!("{m}.bsp")).collect(),
-        None => files.list("maps", ".bsp").into_iter().step_by(30).collect(),
+        None => game
+            .files
+            .list("maps", ".bsp")
+            .into_iter()
+            .step_by(30)
+            .collect(),
     };
-    let (scripts, _) = relight::Materials::load(&*files);
-    let scripts = Arc::new(scripts);
     let settings = Settings {
         rt: true,
         rt_accumulate: std::env::var_os("RELIGHT_TRACE_LIVE").is_none(),
         ..Settings::full_size()
     };
-    let passes = Arc::new(PassSet::new(device, gpu.tracer));
+    let passes = Arc::new(PassSet::new(device, game.gpu.tracer));
     for map in maps {
-        let mut assets = Assets::new(device, Arc::clone(&files), Arc::clone(&scripts), &settings)
-            .expect("assets");
-        let mut world =
-            World::load(device, &mut assets, &format!("maps/{map}"), &settings).expect("map");
+        let (mut assets, mut world) = game.load(&map, &settings);
         world.light_by(settings.rt_lights, &mut assets, None);
-        let mut look = TraceLook::new(&passes, &world, &assets).expect("structures");
-        assets
-            .materials
-            .upload(device, &assets.samplers)
-            .expect("materials");
-        let mut scene = Scene::default();
-        let def = camera(&world);
-        let view = scene
-            .gather_traced(&GatherInput::new(Some(&world), &assets, &settings), &def)
-            .expect("view");
-        let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
-        let target = Image::new(
-            device,
-            &ImageDesc::new("picture", SIZE[0], SIZE[1], Format::Rgba8, usage),
-        )
-        .expect("image");
-        for _ in 0..frames {
-            let mut rec = gpu.ring.begin().expect("frame");
-            look.record(
-                &mut rec,
-                MapView {
-                    scene: &view,
-                    world: &world,
-                    assets: &assets,
-                    settings: &settings,
-                    target: &target,
-                    flares: FlareTest::default(),
-                    mask: ColorMask::ALL,
-                },
-            )
-            .expect("recorded");
-            gpu.ring.end(rec).expect("submitted");
-        }
-        device.wait_idle().expect("done");
-        let pixels = device.read_image(&target).expect("read");
+        let drawn = (&mut assets, &world);
+        let (pixels, look) = game.draw(drawn, &passes, &settings, SIZE, frames);
         let hdr: Vec<f32> = bytemuck::pod_collect_to_vec(
             &device
                 .read_image(look.hdr().expect("traced"))
@@ -149,20 +193,16 @@ fn maps_are_lit() {
         colors.dedup();
         assert!(colors.len() > 100, "{map}: {} colours", colors.len());
     }
-    gpu.check_messages();
+    game.gpu.check_messages();
 }
 
 #[test]
 fn tracers_agree_on_maps() {
-    let (Some(files), Some(mut gpu)) = (openarena(), Gpu::new(Tracer::Pipeline)) else {
+    let Some(mut game) = Game::new(Tracer::Pipeline) else {
         return;
     };
-    let files: Arc<dyn GameFiles> = Arc::new(files);
-    let device = &gpu.device.clone();
-    let (scripts, _) = relight::Materials::load(&*files);
-    let scripts = Arc::new(scripts);
-    let maps: Vec<String> = files.list("maps", ".bsp");
-    let size = [64, 48];
+    let device = &game.gpu.device.clone();
+    let maps: Vec<String> = game.files.list("maps", ".bsp");
     for map in maps.iter().skip(32).take(1) {
         let mut pictures: Vec<Vec<u8>> = Vec::new();
         for rt_tracer in [
@@ -180,54 +220,13 @@ fn tracers_agree_on_maps() {
             };
             let tracer = Tracer::of(device.info(), rt_tracer);
             let passes = Arc::new(PassSet::new(device, tracer));
-            let mut assets =
-                Assets::new(device, Arc::clone(&files), Arc::clone(&scripts), &settings)
-                    .expect("assets");
-            let world =
-                World::load(device, &mut assets, &format!("maps/{map}"), &settings).expect("map");
-            let mut look = TraceLook::new(&passes, &world, &assets).expect("structures");
-            assets
-                .materials
-                .upload(device, &assets.samplers)
-                .expect("materials");
-            let def = RefDef {
-                width: size[0] as i32,
-                height: size[1] as i32,
-                ..camera(&world)
-            };
-            let view = Scene::default()
-                .gather_traced(&GatherInput::new(Some(&world), &assets, &settings), &def)
-                .expect("view");
-            let usage = ImageUsage::STORAGE | ImageUsage::COLOR;
-            let target = Image::new(
-                device,
-                &ImageDesc::new("picture", size[0], size[1], Format::Rgba8, usage),
-            )
-            .expect("image");
-            for _ in 0..2 {
-                let mut rec = gpu.ring.begin().expect("frame");
-                look.record(
-                    &mut rec,
-                    MapView {
-                        scene: &view,
-                        world: &world,
-                        assets: &assets,
-                        settings: &settings,
-                        target: &target,
-                        flares: FlareTest::default(),
-                        mask: ColorMask::ALL,
-                    },
-                )
-                .expect("recorded");
-                gpu.ring.end(rec).expect("submitted");
-            }
-            device.wait_idle().expect("done");
-            pictures.push(device.read_image(&target).expect("read"));
-            // timings of the second frame are published when its ring slot is reused
-            gpu.ring
-                .begin()
-                .and_then(|rec| gpu.ring.end(rec))
-                .expect("frame");
+            let (mut assets, world) = game.load(map, &settings);
+            let drawn = (&mut assets, &world);
+            let (pixels, look) = game.draw(drawn, &passes, &settings, [64, 48], 2);
+            pictures.push(pixels);
+            // what the second frame cost is told when its place in the ring is taken again
+            let ring = &mut game.gpu.ring;
+            ring.begin().and_then(|rec| ring.end(rec)).expect("frame");
             let passes = [
                 "trace_primary_rays",
                 "trace_primary",
@@ -256,5 +255,5 @@ fn tracers_agree_on_maps() {
             assert!(count < 64 * 48 / 40, "{map} {name}: {count}");
         }
     }
-    gpu.check_messages();
+    game.gpu.check_messages();
 }

@@ -1,10 +1,9 @@
 //! Models: the light that the engine adds to them, and occlusion of the first-person weapon.
 
 use glam::Vec3;
-use relight::light::{Falloff, PointLight};
 use shaders::types::{Instance, Stage, constants as c};
 
-use super::harness::{Gpu, Scene, gpu_tests, identity, rectangle, reference, stage};
+use super::harness::{Gpu, Scene, bounced, gpu_tests, identity, rectangle, reference, stage};
 use super::layers::{displayed, screen};
 use crate::settings::Settings;
 use crate::trace::frame_lights::decode;
@@ -93,14 +92,7 @@ fn under_a_roof(flags: u32) -> Scene {
         ..identity()
     };
     scene.mesh(roof, black, instance);
-    scene.points.push(PointLight {
-        origin: Vec3::new(0.0, 0.0, 500.0),
-        intensity: Vec3::splat(200_000.0),
-        radius: 8.0,
-        spot: None,
-        falloff: Falloff::InverseSquare,
-        pulse: None,
-    });
+    scene.point(Vec3::new(0.0, 0.0, 500.0), 200_000.0, 8.0);
     scene
 }
 
@@ -139,10 +131,7 @@ fn who_carries_a_weapon_is_not_in_the_way_of_bounced_light(gpu: &mut Gpu) {
         scene
     };
     for bounces in [1, 2] {
-        let settings = Settings {
-            rt_bounces: bounces,
-            ..reference()
-        };
+        let settings = bounced(bounces);
         let seen = gpu.mean(&scene_of(c::INSTANCE_THIRD_PERSON), &settings, 64);
         let hidden = gpu.mean(&scene_of(0), &settings, 64);
         assert!(

@@ -6,7 +6,9 @@ use shaders::trace_types::constants::{LAST_MOVED, LAST_SAME, LAST_UNKNOWN};
 use shaders::types::Instance;
 use shaders::types::constants as c;
 
-use super::harness::{Gpu, Scene, gpu_tests, identity, mirror_at, rectangle, reference, stage};
+use super::harness::{
+    Gpu, Scene, gpu_tests, identity, mirror_at, rectangle, reference, stage, wall_at,
+};
 use crate::api::{EntityKind, RefDef};
 use crate::scene::{Portal, TracedScene, View, ViewEntity};
 use crate::settings::Settings;
@@ -123,11 +125,7 @@ fn static_geometry_moves_with_the_camera(gpu: &mut Gpu) {
 fn meshes_move_with_their_entities_and_by_their_vertices(gpu: &mut Gpu) {
     let mut scene = room();
     let white = scene.diffuse(0.9);
-    let screen = rectangle(
-        Vec3::new(0.0, -300.0, -300.0),
-        Vec3::Z * 600.0,
-        Vec3::Y * 600.0,
-    );
+    let screen = wall_at(0.0, 300.0);
     let turn = Mat3::from_rotation_z(0.1);
     scene.mesh(screen, white, identity());
     let bend = |p: Vec3| p + Vec3::X * (0.05 * p.y);
@@ -205,11 +203,7 @@ fn portal_views_have_the_motion_of_the_far_camera(gpu: &mut Gpu) {
     let white = scene.diffuse(0.9);
     scene.ambient = Vec3::ONE;
     let portal = scene.material(&[stage::add([0.0; 3])], c::MATERIAL_PORTAL);
-    let wall = rectangle(
-        Vec3::new(50.0, -900.0, -900.0),
-        Vec3::Z * 1800.0,
-        Vec3::Y * 1800.0,
-    );
+    let wall = wall_at(50.0, 900.0);
     scene.quad(wall, portal);
     scene.quad(
         rectangle(

@@ -1,7 +1,6 @@
 //! One-sided surfaces for primary rays and light rays.
 
 use glam::Vec3;
-use relight::light::{Falloff, PointLight, SunLight};
 use shaders::types::constants as c;
 
 use super::harness::{Gpu, Scene, gpu_tests, identity, reference, stage};
@@ -35,20 +34,8 @@ fn lit_wall(from: Source) -> Scene {
     let wall = scene.diffuse(0.8);
     scene.quad(screen(100.0), wall);
     match from {
-        Source::Lamp => scene.points.push(PointLight {
-            origin: Vec3::new(-100.0, 0.0, 0.0),
-            intensity: Vec3::splat(20_000.0),
-            radius: 8.0,
-            spot: None,
-            falloff: Falloff::InverseSquare,
-            pulse: None,
-        }),
-        Source::Sun => scene.suns.push(SunLight {
-            direction: -Vec3::X,
-            irradiance: Vec3::ONE,
-            angular_radius: 0.001,
-            material: None,
-        }),
+        Source::Lamp => scene.point(Vec3::new(-100.0, 0.0, 0.0), 20_000.0, 8.0),
+        Source::Sun => scene.sun(-Vec3::X, 1.0, 0.001),
         Source::Bounce => {
             let glow = scene.material(&[stage::constant([1.0; 3])], c::MATERIAL_TWO_SIDED);
             scene.quad(screen(-60.0), glow);

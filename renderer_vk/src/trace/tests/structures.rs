@@ -125,10 +125,7 @@ fn differing(a: &[Vec3], b: &[Vec3]) -> usize {
 }
 
 fn settings() -> Settings {
-    Settings {
-        rt_bounces: 0,
-        ..reference()
-    }
+    reference()
 }
 
 fn kept_structures_show_what_built_ones_show(gpu: &mut Gpu) {

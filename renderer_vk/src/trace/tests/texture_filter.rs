@@ -3,7 +3,7 @@
 use glam::Vec3;
 use testkit::Random;
 
-use super::harness::{Gpu, Scene, rectangle, reference, stage};
+use super::harness::{Gpu, Scene, floor_at, reference, stage};
 use crate::gpu::{Format, Image, ImageDesc, ImageUsage};
 use crate::settings::Settings;
 use crate::trace::input::Tracer;
@@ -57,14 +57,7 @@ fn floor(image: &Image) -> Scene {
     );
     scene.images.push(image.texture_index());
     let material = scene.material(&[stage::image(0)], 0);
-    scene.quad(
-        rectangle(
-            Vec3::new(-64.0, -64.0, 0.0),
-            Vec3::X * 128.0,
-            Vec3::Y * 128.0,
-        ),
-        material,
-    );
+    scene.quad(floor_at(0.0, 64.0), material);
     scene
 }
 

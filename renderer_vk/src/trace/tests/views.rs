@@ -6,8 +6,8 @@ use shaders::types::Instance;
 use shaders::types::constants as c;
 
 use super::harness::{
-    Gpu, Scene, encode, gpu_tests, identity, mirror_at, plane, rectangle, reference, stage,
-    through_byte,
+    Gpu, Scene, bounced, ceiling_at, encode, floor_at, gpu_tests, identity, mirror_at, plane,
+    rectangle, reference, stage, through_byte, wall_at,
 };
 use crate::scene::Portal;
 use crate::settings::Settings;
@@ -44,14 +44,17 @@ fn close(a: Vec3, b: Vec3) -> bool {
     (a - b).abs().max_element() < 5.0e-4 + b.max_element() / 256.0
 }
 
+/// The scene has one color in the mean.
+#[track_caller]
+fn shows(gpu: &mut Gpu, scene: &Scene, color: Vec3) {
+    let mean = gpu.mean(scene, &reference(), 1);
+    assert!(close(mean, color), "{mean}");
+}
+
 /// A rectangle at distance x that faces -x; with a negative distance it faces +x.
 fn screen(x: f32) -> [Vec3; 4] {
     if x > 0.0 {
-        rectangle(
-            Vec3::new(x, -900.0, -900.0),
-            Vec3::Z * 1800.0,
-            Vec3::Y * 1800.0,
-        )
+        wall_at(x, 900.0)
     } else {
         rectangle(
             Vec3::new(x, -900.0, -900.0),
@@ -72,9 +75,8 @@ fn a_mirror_shows_what_is_behind_the_eye_and_who_looks(gpu: &mut Gpu) {
     // a product of display values
     let byte = |v: f32| (v * 255.0 + 0.001).floor() / 255.0;
     let half = |color: [f32; 3]| decode(Vec3::from(color.map(byte)) * byte(encode(0.5)));
-    let mean = gpu.mean(&scene, &reference(), 1);
-    assert!(close(mean, half(RED)), "{mean}");
-    // the player's body is visible in the mirror, the first-person weapon is not
+    shows(gpu, &scene, half(RED));
+    // the body of the one who looks shows in the mirror, the weapon before the eye does not
     let green = scene.material(&[stage::constant(GREEN)], 0);
     let blue = scene.material(&[stage::constant(BLUE)], 0);
     let body = Instance {
@@ -82,16 +84,14 @@ fn a_mirror_shows_what_is_behind_the_eye_and_who_looks(gpu: &mut Gpu) {
         ..identity()
     };
     scene.mesh(screen(-10.0), green, body);
-    let mean = gpu.mean(&scene, &reference(), 1);
-    assert!(close(mean, half(GREEN)), "{mean}");
+    shows(gpu, &scene, half(GREEN));
     let weapon = Instance {
         flags: c::INSTANCE_FIRST_PERSON,
         ..identity()
     };
     scene.mesh(screen(-5.0), blue, weapon);
-    let mean = gpu.mean(&scene, &reference(), 1);
-    assert!(close(mean, half(GREEN)), "{mean}");
-    // no deeper mirror recursion than the setting
+    shows(gpu, &scene, half(GREEN));
+    // no mirror deeper than the setting says
     let shallow = Settings {
         rt_max_depth: 0,
         ..reference()
@@ -102,8 +102,7 @@ fn a_mirror_shows_what_is_behind_the_eye_and_who_looks(gpu: &mut Gpu) {
     assert_eq!(gpu.mean(&scene, &reference(), 1), Vec3::ZERO);
     // the weapon is drawn in front of walls that it penetrates, and the body is invisible to its own camera
     scene.mesh(screen(60.0), blue, weapon);
-    let mean = gpu.mean(&scene, &reference(), 1);
-    assert!(close(mean, linear(BLUE)), "{mean}");
+    shows(gpu, &scene, linear(BLUE));
 }
 
 fn only_the_fronts_of_a_weapon_are_seen(gpu: &mut Gpu) {
@@ -119,12 +118,10 @@ fn only_the_fronts_of_a_weapon_are_seen(gpu: &mut Gpu) {
     scene.quad(screen(40.0), red);
     let [a, b, c, d] = screen(60.0);
     scene.mesh([d, c, b, a], green, weapon);
-    let mean = gpu.mean(&scene, &reference(), 1);
-    assert!(close(mean, linear(RED)), "{mean}");
+    shows(gpu, &scene, linear(RED));
     // and behind that back is a front
     scene.mesh(screen(80.0), blue, weapon);
-    let mean = gpu.mean(&scene, &reference(), 1);
-    assert!(close(mean, linear(BLUE)), "{mean}");
+    shows(gpu, &scene, linear(BLUE));
 }
 
 fn camera_facing_copies_are_hit_only_by_their_own_paths(gpu: &mut Gpu) {
@@ -209,8 +206,7 @@ fn a_portal_shows_what_its_camera_sees(gpu: &mut Gpu) {
         camera_axis: [Vec3::NEG_Y, Vec3::X, Vec3::Z],
         ..mirror_at(50.0, Vec3::NEG_X)
     });
-    let mean = gpu.mean(&scene, &reference(), 1);
-    assert!(close(mean, linear(GREEN)), "{mean}");
+    shows(gpu, &scene, linear(GREEN));
 }
 
 fn back_faces_do_not_show(gpu: &mut Gpu) {
@@ -224,14 +220,14 @@ fn back_faces_do_not_show(gpu: &mut Gpu) {
     };
     scene.quad(screen(200.0), green);
     scene.quad(away(100.0), red);
-    assert!(close(gpu.mean(&scene, &reference(), 1), linear(GREEN)));
+    shows(gpu, &scene, linear(GREEN));
     scene.quad(away(150.0), two_sided);
-    assert!(close(gpu.mean(&scene, &reference(), 1), linear(BLUE)));
+    shows(gpu, &scene, linear(BLUE));
     let only_back = scene.material(&[stage::constant(RED)], c::MATERIAL_CULL_BACK);
     scene.quad(screen(60.0), only_back);
-    assert!(close(gpu.mean(&scene, &reference(), 1), linear(BLUE)));
+    shows(gpu, &scene, linear(BLUE));
     scene.quad(away(50.0), only_back);
-    assert!(close(gpu.mean(&scene, &reference(), 1), linear(RED)));
+    shows(gpu, &scene, linear(RED));
 }
 
 fn of_two_faces_in_one_plane_the_one_that_shows_is_met(gpu: &mut Gpu) {
@@ -281,20 +277,8 @@ fn the_sky_is_where_its_stages_say_and_lets_the_sun_in(gpu: &mut Gpu) {
         sky,
     );
     scene.surfaces.remove(0);
-    scene.quad(
-        rectangle(
-            Vec3::new(-500.0, -500.0, 0.0),
-            Vec3::X * 1000.0,
-            Vec3::Y * 1000.0,
-        ),
-        white,
-    );
-    scene.suns.push(relight::light::SunLight {
-        direction: Vec3::Z,
-        irradiance: Vec3::splat(std::f32::consts::PI),
-        angular_radius: 0.001,
-        material: None,
-    });
+    scene.quad(floor_at(0.0, 500.0), white);
+    scene.sun(Vec3::Z, std::f32::consts::PI, 0.001);
     let (pixels, _) = gpu.render(&scene, &reference(), 2);
     assert!(
         close(pixels[4 * 32 + 16], linear(shown)),
@@ -306,15 +290,8 @@ fn the_sky_is_where_its_stages_say_and_lets_the_sun_in(gpu: &mut Gpu) {
         "{}",
         pixels[30 * 32 + 16]
     );
-    // the sky is above the roof: the floor is in shadow
-    scene.quad(
-        rectangle(
-            Vec3::new(-500.0, -500.0, 300.0),
-            Vec3::Y * 1000.0,
-            Vec3::X * 1000.0,
-        ),
-        white,
-    );
+    // the sky is above the roof: shadow
+    scene.quad(ceiling_at(300.0, 500.0), white);
     let (pixels, _) = gpu.render(&scene, &reference(), 2);
     assert_eq!(pixels[30 * 32 + 16], Vec3::ZERO);
     // quick sky
@@ -404,10 +381,7 @@ fn frames_can_be_made_again_bit_by_bit(gpu: &mut Gpu) {
         ],
         Vec3::splat(9.0),
     );
-    let settings = Settings {
-        rt_bounces: 1,
-        ..reference()
-    };
+    let settings = bounced(1);
     let (first, _) = gpu.render(&scene, &settings, 3);
     let (second, _) = gpu.render(&scene, &settings, 3);
     assert_eq!(first, second);
@@ -457,10 +431,7 @@ fn all_tracers_make_the_same_picture() {
     }
     // a brush model away from its original position
     let first = scene.surfaces.len();
-    scene.quad(
-        rectangle(Vec3::new(0.0, -20.0, -20.0), Vec3::Z * 40.0, Vec3::Y * 40.0),
-        grey,
-    );
+    scene.quad(wall_at(0.0, 20.0), grey);
     scene.surfaces[first].model = 1;
     scene.instances.push(Instance {
         origin: Vec3::new(-60.0, 40.0, 20.0),
@@ -471,14 +442,8 @@ fn all_tracers_make_the_same_picture() {
         instance: scene.instances.len() as u32 - 1,
     });
     let lamp = Vec3::new(0.0, 60.0, 110.0);
-    scene.light(
-        [lamp, lamp + Vec3::Y * 60.0, lamp + Vec3::X * 60.0],
-        Vec3::splat(12.0),
-    );
-    let settings = Settings {
-        rt_bounces: 2,
-        ..reference()
-    };
+    scene.lamp(lamp, 60.0, Vec3::splat(12.0));
+    let settings = bounced(2);
     let (a, _) = pipeline.render(&scene, &settings, 2);
     let (b, _) = compute.render(&scene, &settings, 2);
     let differing = |other: &[Vec3]| {

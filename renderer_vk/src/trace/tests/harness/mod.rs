@@ -28,7 +28,15 @@ pub fn reference() -> Settings {
     }
 }
 
-/// A constant colour after the shaders' rounding to 8 bits.
+/// The same with light of this many bounces.
+pub fn bounced(bounces: u32) -> Settings {
+    Settings {
+        rt_bounces: bounces,
+        ..reference()
+    }
+}
+
+/// What the shaders make of a constant colour: it passes through a byte.
 pub fn through_byte(encoded: f32) -> f32 {
     let byte = (encoded * 255.0 + 0.001).floor() / 255.0;
     crate::trace::frame_lights::decode(Vec3::splat(byte)).x
@@ -44,7 +52,25 @@ pub fn rectangle(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> [Vec3; 4] {
     ]
 }
 
-/// An instance with the identity transform.
+/// A horizontal square around the z axis that faces up: its height, and half its side.
+pub fn floor_at(z: f32, half: f32) -> [Vec3; 4] {
+    let corner = Vec3::new(-half, -half, z);
+    rectangle(corner, Vec3::X * (2.0 * half), Vec3::Y * (2.0 * half))
+}
+
+/// The same, facing down.
+pub fn ceiling_at(z: f32, half: f32) -> [Vec3; 4] {
+    let corner = Vec3::new(-half, -half, z);
+    rectangle(corner, Vec3::Y * (2.0 * half), Vec3::X * (2.0 * half))
+}
+
+/// A square around the x axis that faces -x: its distance, and half its side.
+pub fn wall_at(x: f32, half: f32) -> [Vec3; 4] {
+    let corner = Vec3::new(x, -half, -half);
+    rectangle(corner, Vec3::Z * (2.0 * half), Vec3::Y * (2.0 * half))
+}
+
+/// An entity in place.
 pub fn identity() -> Instance {
     Instance {
         axis: [Vec3::X, Vec3::Y, Vec3::Z],
@@ -68,14 +94,20 @@ pub fn lambert(point: Vec3, normal: Vec3, triangle: [Vec3; 3], radiance: f32) ->
     (f64::from(radiance) * sum.abs() / (2.0 * std::f64::consts::PI)) as f32
 }
 
-/// Intersection of a pixel's centre ray with the plane z = 0.
-pub fn floor_point(scene: &Scene, x: usize, y: usize) -> Vec3 {
+/// Where a pixel's middle ray meets the plane z = 0.
+fn floor_point(scene: &Scene, x: usize, y: usize) -> Vec3 {
     let def = &scene.def;
     let tan = (def.fov_x.to_radians() * 0.5).tan();
     let u = (x as f32 + 0.5) / def.width as f32 * 2.0 - 1.0;
     let v = (y as f32 + 0.5) / def.height as f32 * 2.0 - 1.0;
     let d = def.view_axis[0] - def.view_axis[1] * (u * tan) - def.view_axis[2] * (v * tan);
     def.view_origin + d * (-def.view_origin.z / d.z)
+}
+
+/// The same of each pixel, row by row.
+pub fn floor_points(scene: &Scene) -> impl Iterator<Item = Vec3> {
+    let [width, height] = [scene.def.width, scene.def.height].map(|side| side as usize);
+    (0..width * height).map(move |i| floor_point(scene, i % width, i / width))
 }
 
 /// The plane through a point, as `xyz.p = w`.

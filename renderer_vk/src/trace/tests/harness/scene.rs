@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
-use relight::light::{EmissionSource, LightLists, PointLight, SunLight, TriangleLight};
+use relight::light::{EmissionSource, Falloff, LightLists, PointLight, SunLight, TriangleLight};
 use shaders::trace_types::SkyRecord;
 use shaders::types::constants as c;
 use shaders::types::{Fog, Instance, Material, MaterialBuffers, Stage, TcMod, Vertex};
@@ -96,6 +96,20 @@ impl Scene {
                 ..RefDef::default()
             },
         }
+    }
+
+    /// A hall with two walls for shadows in it, seen from `height` units above its middle.
+    pub fn hall(height: f32, albedo: f32, size: i32) -> Self {
+        let eye = Vec3::new(-180.0, 0.0, height);
+        let mut scene = Self::new(eye, Vec3::new(100.0, 0.0, -20.0), 70.0, size);
+        let grey = scene.diffuse(albedo);
+        let far = Vec3::new(200.0, 150.0, 120.0);
+        scene.room(Vec3::new(-200.0, -150.0, -80.0), far, grey);
+        let corner = Vec3::new(40.0, -20.0, -80.0);
+        for side in [Vec3::X, Vec3::Y] {
+            scene.quad(rectangle(corner, Vec3::Z * 120.0, side * 40.0), grey);
+        }
+        scene
     }
 
     pub fn material(&mut self, stages: &[Stage], flags: u32) -> u32 {
@@ -234,6 +248,44 @@ impl Scene {
             model: 0,
             is_sky: false,
             source: EmissionSource::SurfaceLight,
+        });
+    }
+
+    /// A light that faces down: a right triangle with legs of `size` units along x and y.
+    pub fn lamp(&mut self, corner: Vec3, size: f32, radiance: Vec3) {
+        let corners = [corner, corner + Vec3::Y * size, corner + Vec3::X * size];
+        self.light(corners, radiance);
+    }
+
+    /// A white point light with inverse-square falloff.
+    pub fn point(&mut self, origin: Vec3, intensity: f32, radius: f32) {
+        self.points.push(PointLight {
+            origin,
+            intensity: Vec3::splat(intensity),
+            radius,
+            spot: None,
+            falloff: Falloff::InverseSquare,
+            pulse: None,
+        });
+    }
+
+    /// A white sun.
+    pub fn sun(&mut self, direction: Vec3, irradiance: f32, angular_radius: f32) {
+        self.suns.push(SunLight {
+            direction,
+            irradiance: Vec3::splat(irradiance),
+            angular_radius,
+            material: None,
+        });
+    }
+
+    /// A grey dynamic light.
+    pub fn dlight(&mut self, origin: Vec3, radius: f32, color: f32) {
+        self.dlights.push(DynamicLight {
+            origin,
+            radius,
+            color: Vec3::splat(color),
+            additive: false,
         });
     }
 
